@@ -1,0 +1,22 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace cumulet {
+
+/// Why an operation failed. The C ABI maps each to one cumulet_status.
+enum class ErrorCode { invalid_argument, unsupported, file, out_of_memory, gl, internal };
+
+/// The library's one exception. It never crosses the C ABI. The message is one
+/// line that names the file (where there is one) and the cause.
+class Error : public std::runtime_error {
+ public:
+  Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  [[nodiscard]] ErrorCode code() const noexcept { return code_; }
+
+ private:
+  ErrorCode code_;
+};
+
+}  // namespace cumulet

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "base/log.hpp"
+
+namespace cumulet::volume {
+
+inline constexpr int brick_size = 8;
+inline constexpr int brick_voxels = brick_size * brick_size * brick_size;
+
+/// A box of voxels [min, max], both inclusive, of one value.
+struct Tile {
+  glm::ivec3 min;
+  glm::ivec3 max;
+  float value;
+};
+
+/// A scalar field on a sparse voxel lattice, free of any file format.
+///
+/// Voxel (i,j,k) is the unit cube centred on (i,j,k) in index space, of constant value (design.md
+/// section 3). The field is zero outside bounds; inside, a voxel is in a brick, else in a tile,
+/// else it has the background value. Values are finite and not negative.
+struct ScalarVolume {
+  std::string name;                     ///< grid name, for messages
+  glm::dmat4 index_to_world{1.0};       ///< affine: world = index_to_world * (i,j,k,1)
+  glm::ivec3 bounds_min{0};             ///< first active voxel, inclusive
+  glm::ivec3 bounds_max{-1};            ///< last active voxel, inclusive
+  float background = 0.0F;
+  float max_value = 0.0F;               ///< over all voxels within bounds
+  std::uint64_t active_voxels = 0;      ///< active tiles count with all their voxels
+  /// Brick origins: multiples of 8, unique, sorted by (x, y, z) lexicographically.
+  std::vector<glm::ivec3> brick_origins;
+  /// 512 floats a brick, z fastest: index ((x & 7) * 8 + (y & 7)) * 8 + (z & 7), OpenVDB's leaf
+  /// order. Voxels outside bounds hold zero.
+  std::vector<float> brick_values;
+  /// Disjoint, not overlapping any brick, clipped to bounds; only tiles whose value differs from
+  /// the background.
+  std::vector<Tile> tiles;
+};
+
+/// One grid of a file, for listings and messages.
+struct GridInfo {
+  std::string name;
+  std::string type;  ///< as the file says: "float", "half", "vec3s", ...
+  std::string grid_class;  ///< "fog volume", "level set", "unknown", ...
+};
+
+/// The grids of a .vdb or .nvdb file, without their voxels. Throws Error(file).
+std::vector<GridInfo> list_grids(const std::filesystem::path& file);
+
+/// Reads one scalar grid of a .vdb or .nvdb file.
+///
+/// grid_name empty: "density" if there is one, else the only scalar fog grid; several: an error that
+/// lists them. Level sets, vector grids, points, empty grids, non-finite voxels and unreadable files
+/// throw Error(file) with one line that names file and cause. Negative voxels are clamped to zero
+/// with one warning that counts them. Any affine transform is accepted; a frustum transform is not.
+/// O(active nodes) time and memory.
+ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name,
+                           const Log& log);
+
+}  // namespace cumulet::volume
