@@ -1,0 +1,105 @@
+// PNG by stb: two headers that build in, so the portable package carries no libpng beside OpenEXR's own zlib, and the
+// glTF importer brings stb along anyway. Its functions are made private to this file, out of the way of that copy.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "checks.hpp"
+#include "file.hpp"
+#include "image.hpp"
+
+#define STB_IMAGE_STATIC
+#define STB_IMAGE_IMPLEMENTATION
+#define STBI_ONLY_PNG
+#define STBI_NO_STDIO
+#define STB_IMAGE_WRITE_STATIC
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STBI_WRITE_NO_STDIO
+#include <stb_image.h>
+#include <stb_image_write.h>
+
+namespace cumulet::image {
+namespace {
+
+std::uint8_t to_byte(float unit) { return static_cast<std::uint8_t>(std::clamp(unit, 0.0f, 1.0f) * 255.0f + 0.5f); }
+
+/// A number that can be shown: not negative, and finite.
+float displayable(float value) {
+  if (!(value > 0.0f)) return 0.0f;
+  return std::min(value, 1e30f);
+}
+
+}  // namespace
+
+std::array<float, 3> tone_map_neutral(std::array<float, 3> rgb) {
+  constexpr float start = 0.8f - 0.04f;
+  constexpr float desaturation = 0.15f;
+  for (float& c : rgb) c = displayable(c);
+  const float least = std::min({rgb[0], rgb[1], rgb[2]});
+  const float offset = least < 0.08f ? least - 6.25f * least * least : 0.04f;
+  for (float& c : rgb) c -= offset;
+  const float peak = std::max({rgb[0], rgb[1], rgb[2]});
+  if (peak < start) return rgb;
+  constexpr float room = 1.0f - start;
+  const float new_peak = 1.0f - room * room / (peak + room - start);
+  const float keep = 1.0f / (desaturation * (peak - new_peak) + 1.0f);
+  for (float& c : rgb) c = new_peak + (c * (new_peak / peak) - new_peak) * keep;
+  return rgb;
+}
+
+float srgb_encode(float linear) {
+  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
+}
+
+float srgb_decode(float encoded) {
+  return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
+}
+
+void write_png(const std::string& path, const Image& image, const PngOptions& options) {
+  check_image(path, image);
+  const auto exposure = static_cast<float>(std::exp2(options.exposure_stops));
+  const std::size_t channels = options.keep_alpha ? 4 : 3;
+  const std::size_t pixels = std::size_t{image.width} * image.height;
+  std::vector<std::uint8_t> bytes(pixels * channels);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const float* in = &image.rgba[4 * i];
+    std::uint8_t* out = &bytes[channels * i];
+    std::array<float, 3> rgb = {in[0] * exposure, in[1] * exposure, in[2] * exposure};
+    if (options.tone_mapping == ToneMapping::neutral) rgb = tone_map_neutral(rgb);
+    for (std::size_t c = 0; c < 3; ++c) out[c] = to_byte(srgb_encode(std::min(displayable(rgb[c]), 1.0f)));
+    if (options.keep_alpha) out[3] = to_byte(displayable(in[3]));
+  }
+  std::string file;
+  const auto append = [](void* context, void* data, int size) {
+    static_cast<std::string*>(context)->append(static_cast<const char*>(data), static_cast<std::size_t>(size));
+  };
+  const auto width = static_cast<int>(image.width);
+  if (stbi_write_png_to_func(append, &file, width, static_cast<int>(image.height), static_cast<int>(channels),
+                             bytes.data(), width * static_cast<int>(channels)) == 0)
+    fail(path, "the PNG encoder failed: the picture may be too large for it");
+  replace_file(path, file);
+}
+
+Image read_png(const std::string& path) {
+  const std::string bytes = read_file(path);
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  if (bytes.size() > 0x7fffffff) fail(path, "too large for a PNG");
+  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+      stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(bytes.data()), static_cast<int>(bytes.size()), &width,
+                            &height, &channels, 4),
+      stbi_image_free);
+  if (pixels == nullptr) fail(path, std::string("not a readable PNG: ") + stbi_failure_reason());
+  check_size(path, width, height);
+  Image image{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
+  image.rgba.resize(std::size_t{4} * image.width * image.height);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
+    const float value = static_cast<float>(pixels.get()[i]) / 255.0f;
+    image.rgba[i] = i % 4 == 3 ? value : srgb_decode(value);
+  }
+  return image;
+}
+
+}  // namespace cumulet::image

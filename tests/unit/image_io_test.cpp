@@ -1,0 +1,238 @@
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "file.hpp"
+#include "image.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace cumulet::image;
+
+/// A folder of its own for each test, gone afterwards.
+class ImageIo : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::temp_directory_path() / ("cumulet-image-" + std::to_string(::getpid()) + "-" + info->name());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
+  /// Every name in the folder: temporary files that were left behind show up here.
+  [[nodiscard]] std::size_t count() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+  fs::path folder_;
+};
+
+Image gradient(std::uint32_t width, std::uint32_t height) {
+  Image image{width, height, {}};
+  for (std::uint32_t y = 0; y < height; ++y)
+    for (std::uint32_t x = 0; x < width; ++x) {
+      const auto fx = static_cast<float>(x);
+      const auto fy = static_cast<float>(y);
+      image.rgba.insert(image.rgba.end(), {fx * 0.25f, fy * 100.0f, -1.5f + fx * fy, 0.5f});
+    }
+  return image;
+}
+
+std::string failure(const auto& action) {
+  try {
+    action();
+    return "";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+void put(const std::string& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+
+Image pixel(float r, float g, float b, float a) { return {1, 1, {r, g, b, a}}; }
+
+TEST_F(ImageIo, ExrRoundTripIsExact) {
+  const Image image = gradient(37, 19);
+  write_exr(path("a.exr"), image);
+  const Image back = read_exr(path("a.exr"));
+  EXPECT_EQ(back.width, 37u);
+  EXPECT_EQ(back.height, 19u);
+  EXPECT_EQ(back.rgba, image.rgba);
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(ImageIo, PfmRoundTripIsExactButForAlpha) {
+  Image image = gradient(5, 4);
+  write_pfm(path("a.pfm"), image);
+  const Image back = read_pfm(path("a.pfm"));
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 1.0f;
+  EXPECT_EQ(back.width, 5u);
+  EXPECT_EQ(back.height, 4u);
+  EXPECT_EQ(back.rgba, image.rgba);
+}
+
+TEST_F(ImageIo, PfmBytesAreThoseOfTheFormat) {
+  // One column, two rows: the top pixel is (1, 2, -0.5), the bottom one black.
+  write_pfm(path("a.pfm"), Image{1, 2, {1.0f, 2.0f, -0.5f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f}});
+  std::string expected = "PF\n1 2\n-1.0\n";
+  expected += std::string(12, '\0');  // the bottom row comes first
+  expected += std::string("\x00\x00\x80\x3f\x00\x00\x00\x40\x00\x00\x00\xbf", 12);
+  EXPECT_EQ(read_file(path("a.pfm")), expected);
+}
+
+TEST_F(ImageIo, PfmReadsBigEndianAndGrey) {
+  put(path("a.pfm"), std::string("Pf\n1 1\n1.0\n\x3f\x80\x00\x00", 15));
+  EXPECT_EQ(read_pfm(path("a.pfm")).rgba, (std::vector<float>{1.0f, 1.0f, 1.0f, 1.0f}));
+}
+
+TEST_F(ImageIo, DamagedFilesGiveOneLineThatNamesThem) {
+  write_exr(path("good.exr"), gradient(64, 64));
+  write_pfm(path("good.pfm"), gradient(64, 64));
+  write_png(path("good.png"), gradient(64, 64));
+  for (const char* name : {"good.exr", "good.pfm", "good.png"}) {
+    const std::string bytes = read_file(path(name));
+    for (const std::string& damaged : {std::string(), bytes.substr(0, bytes.size() / 2), std::string("nonsense")}) {
+      put(path("bad"), damaged);
+      const std::string error = failure([&] {
+        const std::string kind = name + 5;
+        if (kind == "exr") static_cast<void>(read_exr(path("bad")));
+        if (kind == "pfm") static_cast<void>(read_pfm(path("bad")));
+        if (kind == "png") static_cast<void>(read_png(path("bad")));
+      });
+      EXPECT_NE(error.find(path("bad")), std::string::npos) << name << ": " << error;
+      EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    }
+  }
+  put(path("bad.pfm"), "PF\n100000 100000\n-1.0\n");
+  EXPECT_NE(failure([&] { static_cast<void>(read_pfm(path("bad.pfm"))); }), "");
+  EXPECT_NE(failure([&] { static_cast<void>(read_exr(path("absent.exr"))); }), "");
+}
+
+TEST(ToneMapping, NeutralIsKhronosPbrNeutral) {
+  // Below the shoulder: the toe's offset and nothing else.
+  const auto grey = tone_map_neutral({0.5f, 0.5f, 0.5f});
+  for (const float c : grey) EXPECT_NEAR(c, 0.46f, 1e-6f);
+  // Dark: x - (x - 6.25 x^2) for the smallest channel.
+  EXPECT_NEAR(tone_map_neutral({0.04f, 0.04f, 0.04f})[0], 6.25f * 0.04f * 0.04f, 1e-6f);
+  // White of 1: peak 0.96, 1 - 0.24^2 / (0.96 + 0.24 - 0.76).
+  EXPECT_NEAR(tone_map_neutral({1.0f, 1.0f, 1.0f})[1], 1.0f - 0.0576f / 0.44f, 1e-6f);
+  // Bright colours lose saturation, never their order, and never pass 1.
+  const auto bright = tone_map_neutral({20.0f, 10.0f, 5.0f});
+  EXPECT_LT(bright[0], 1.0f);
+  EXPECT_GT(bright[0], bright[1]);
+  EXPECT_GT(bright[1], bright[2]);
+  EXPECT_GT(bright[2] / bright[0], 5.0f / 20.0f);
+}
+
+TEST(ToneMapping, NeutralRisesAndIsContinuous) {
+  float last = -1.0f;
+  for (int i = 0; i <= 4000; ++i) {
+    const float x = static_cast<float>(i) * 0.001f;
+    const float y = tone_map_neutral({x, x, x})[0];
+    EXPECT_GE(y, last);
+    if (i > 0) {
+      EXPECT_LT(y - last, 0.0011f) << x;
+    }
+    last = y;
+  }
+  EXPECT_EQ(tone_map_neutral({0.0f, 0.0f, 0.0f})[0], 0.0f);
+}
+
+TEST(ToneMapping, SrgbCurveInverts) {
+  for (int i = 0; i <= 255; ++i) {
+    const float v = static_cast<float>(i) / 255.0f;
+    EXPECT_NEAR(srgb_encode(srgb_decode(v)), v, 1e-5f);
+  }
+  EXPECT_NEAR(srgb_encode(0.18f), 0.46136f, 1e-4f);
+}
+
+TEST_F(ImageIo, PngHoldsTheToneCurve) {
+  const auto byte = [&](const PngOptions& options, float value) {
+    write_png(path("a.png"), pixel(value, value, value, 0.25f), options);
+    const Image back = read_png(path("a.png"));
+    EXPECT_EQ(back.rgba[3], 1.0f);  // opaque by default
+    return std::lround(srgb_encode(back.rgba[0]) * 255.0f);
+  };
+  const auto expected = [](float display) { return std::lround(srgb_encode(display) * 255.0f); };
+  EXPECT_EQ(byte({}, 0.0f), 0);
+  EXPECT_EQ(byte({}, 0.5f), expected(0.46f));
+  EXPECT_EQ(byte({1.0}, 0.25f), expected(0.46f));  // a stop is a doubling
+  EXPECT_EQ(byte({-1.0}, 1.0f), expected(0.46f));
+  EXPECT_EQ(byte({}, 1.0f), expected(1.0f - 0.0576f / 0.44f));
+  EXPECT_EQ(byte({}, 1e9f), 255);
+  EXPECT_EQ(byte({0.0, ToneMapping::none}, 0.5f), expected(0.5f));
+  EXPECT_EQ(byte({0.0, ToneMapping::none}, 3.0f), 255);
+}
+
+TEST_F(ImageIo, PngKeepsAlphaWhenAsked) {
+  write_png(path("a.png"), pixel(0.5f, 0.5f, 0.5f, 0.2f), {0.0, ToneMapping::neutral, true});
+  EXPECT_NEAR(read_png(path("a.png")).rgba[3], 0.2f, 0.5f / 255.0f);
+}
+
+TEST_F(ImageIo, PngSurvivesNumbersThatAreNone) {
+  const float infinite = std::numeric_limits<float>::infinity();
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  write_png(path("a.png"), pixel(infinite, none, -1.0f, none), {0.0, ToneMapping::none, true});
+  EXPECT_EQ(read_png(path("a.png")).rgba, (std::vector<float>{1.0f, 0.0f, 0.0f, 0.0f}));
+  write_png(path("a.png"), pixel(infinite, none, -1.0f, none));
+  EXPECT_NEAR(read_png(path("a.png")).rgba[0], 1.0f, 0.01f);
+}
+
+TEST_F(ImageIo, PngIsTopDown) {
+  write_png(path("a.png"), Image{1, 2, {1.0f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f}});
+  const Image back = read_png(path("a.png"));
+  EXPECT_GT(back.rgba[0], 0.5f);
+  EXPECT_EQ(back.rgba[4], 0.0f);
+}
+
+TEST_F(ImageIo, FailedWriteLeavesTheOldFile) {
+  put(path("a.png"), "old");
+  // A full disk, played by the limit on a file's size: writing stops in the middle.
+  EXPECT_EXIT(
+      {
+        std::signal(SIGXFSZ, SIG_IGN);
+        rlimit limit{};
+        limit.rlim_cur = limit.rlim_max = 4;
+        setrlimit(RLIMIT_FSIZE, &limit);
+        const std::string error = failure([&] { write_png(path("a.png"), gradient(64, 64)); });
+        std::exit(error.rfind(path("a.png") + ": ", 0) == 0 && error.find('\n') == std::string::npos ? 0 : 1);
+      },
+      ::testing::ExitedWithCode(0), "");
+  EXPECT_EQ(read_file(path("a.png")), "old");
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(ImageIo, CheckWritableTellsAndTouchesNothing) {
+  EXPECT_NE(failure([&] { check_writable(path("absent/a.png")); }).find(path("absent/a.png")), std::string::npos);
+  EXPECT_NE(failure([&] { check_writable(folder_.string()); }), "");
+  EXPECT_NE(failure([&] { check_writable(""); }), "");
+  put(path("a.png"), "old");
+  check_writable(path("a.png"));
+  check_writable(path("new.png"));
+  EXPECT_EQ(read_file(path("a.png")), "old");
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(ImageIo, LinksAndPermissionsStay) {
+  put(path("target"), "old");
+  fs::permissions(path("target"), fs::perms{0640});
+  fs::create_symlink("target", path("link"));
+  replace_file(path("link"), "new");
+  EXPECT_TRUE(fs::is_symlink(path("link")));
+  EXPECT_EQ(read_file(path("target")), "new");
+  EXPECT_EQ(fs::status(path("target")).permissions(), fs::perms{0640});
+  replace_file("/dev/null", "new");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
+}  // namespace
