@@ -10,6 +10,10 @@
 #include <thread>
 #include <utility>
 
+// Mesa 22's OSMesa never frees the framebuffers it makes for itself. Asked for by LeakSanitizer, where it is built in.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
 namespace {
 
 using cumulet::headless::Backend;
@@ -143,6 +147,7 @@ TEST(Headless, GetProcSurvivesNonsense) {
   EXPECT_EQ(Context::get_proc(&context, nullptr), nullptr);
 }
 
+// They end by _Exit: at exit a leak checker would count the driver's own leaks against them.
 // Mesa reads its variables when a driver starts, so a driver that is not there is played in a process of its own.
 TEST(HeadlessDeathTest, MissingEglIsOneLine) {
   ::testing::FLAGS_gtest_death_test_style = "threadsafe";
@@ -152,7 +157,7 @@ TEST(HeadlessDeathTest, MissingEglIsOneLine) {
         const std::string error = creation_error(Backend::egl);
         const bool good = error.find("EGL (") != std::string::npos && error.find('\n') == std::string::npos;
         if (!good) std::fprintf(stderr, "error: %s\n", error.c_str());
-        std::exit(good ? 0 : 1);
+        std::_Exit(good ? 0 : 1);
       },
       ::testing::ExitedWithCode(0), "");
 }
@@ -164,7 +169,7 @@ TEST(HeadlessDeathTest, AutomaticFallsBackToOsMesa) {
         setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json", 1);
         Context context = Context::create(Backend::automatic);
         expect_works(context);
-        std::exit(std::string(context.name()) == "osmesa" && !::testing::Test::HasFailure() ? 0 : 1);
+        std::_Exit(std::string(context.name()) == "osmesa" && !::testing::Test::HasFailure() ? 0 : 1);
       },
       ::testing::ExitedWithCode(0), "");
 }
@@ -179,7 +184,7 @@ TEST(HeadlessDeathTest, BothFailingNamesBoth) {
         std::fprintf(stderr, "error: %s\n", error.c_str());
         const bool good = error.find("EGL (") != std::string::npos && error.find("OSMesa (") != std::string::npos &&
                           error.find('\n') == std::string::npos;
-        std::exit(good ? 0 : 1);
+        std::_Exit(good ? 0 : 1);
       },
       ::testing::ExitedWithCode(0), "");
 }

@@ -1,0 +1,389 @@
+#include "options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <ostream>
+#include <utility>
+
+namespace cumulet::demo {
+namespace {
+
+constexpr std::uint64_t max_u32 = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t max_u64 = std::numeric_limits<std::uint64_t>::max();
+
+std::string in_quotes(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+std::string one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const auto end = text.find(separator);
+    parts.push_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+/// The words of a value such as "0,0,1 0,0,0 40".
+std::vector<std::string_view> words(std::string_view text) {
+  std::vector<std::string_view> parts = split(text, ' ');
+  std::erase(parts, std::string_view{});
+  return parts;
+}
+
+double parse_positive(std::string_view text) {
+  const double value = parse_number(text);
+  if (!(value > 0.0)) throw UsageError(in_quotes(text) + " is not above 0");
+  return value;
+}
+
+/// Three numbers that are not negative and that a float can hold.
+std::array<double, 3> parse_rgb(std::string_view text, double most) {
+  const std::vector<double> values = parse_numbers(text, 3);
+  for (const double value : values) {
+    if (value < 0.0) throw UsageError(in_quotes(text) + " has a negative number");
+    if (value > most) throw UsageError(in_quotes(text) + " has a number that is too large");
+  }
+  return {values[0], values[1], values[2]};
+}
+
+void parse_light(std::string_view text, float (&rgb)[3]) {
+  const std::array<double, 3> values = parse_rgb(text, 1e30);
+  for (std::size_t i = 0; i < 3; ++i) rgb[i] = static_cast<float>(values[i]);
+}
+
+template <class Value>
+using Choices = std::vector<std::pair<const char*, Value>>;
+
+template <class Value>
+std::string list(const Choices<Value>& choices, const char* separator) {
+  std::string text;
+  for (const auto& [name, value] : choices) text += (text.empty() ? "" : separator) + std::string(name);
+  return text;
+}
+
+/// A flag with a value. Repeating it is an error, as is a bad value, which names the flag.
+CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, const std::string& type,
+                 std::function<void(const std::string&)> parse, const std::string& help) {
+  const auto checked = [flag, parse = std::move(parse)](const std::string& text) {
+    try {
+      parse(text);
+    } catch (const UsageError& error) {
+      // The long spelling is the one to be recognised in a script's log.
+      throw CLI::ValidationError(flag.substr(flag.rfind("--")), error.what());
+    }
+  };
+  return app.add_option_function<std::string>(flag, checked, help)->type_name(type)->group(group);
+}
+
+template <class Value, class Target>
+CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& flag, const Choices<Value>& choices,
+                        Target& target, const std::string& help) {
+  return add(
+      app, group, flag, list(choices, "|"),
+      [choices, &target](const std::string& text) {
+        for (const auto& [name, value] : choices) {
+          if (text == name) {
+            target = value;
+            return;
+          }
+        }
+        throw UsageError(in_quotes(text) + " is none of " + list(choices, ", "));
+      },
+      help);
+}
+
+void parse_size(std::string_view text, cumulet_image_desc& image) {
+  const std::vector<std::string_view> sides = split(text, 'x');
+  if (sides.size() != 2) throw UsageError(in_quotes(text) + " is not WIDTHxHEIGHT, such as 1280x720");
+  image.width = static_cast<std::uint32_t>(parse_integer(sides[0], 1, 16384));
+  image.height = static_cast<std::uint32_t>(parse_integer(sides[1], 1, 16384));
+}
+
+void parse_camera(std::string_view text, cumulet_camera_desc& camera) {
+  const std::vector<std::string_view> parts = words(text);
+  if (parts.size() != 3) throw UsageError(in_quotes(text) + " is not \"ex,ey,ez tx,ty,tz fovy\"");
+  const std::vector<double> eye = parse_numbers(parts[0], 3);
+  const std::vector<double> target = parse_numbers(parts[1], 3);
+  if (eye == target) throw UsageError("the eye and the target are the same point");
+  const double fovy = parse_number(parts[2]);
+  if (!(fovy > 0.0 && fovy < 180.0))
+    throw UsageError(in_quotes(parts[2]) + " is not an angle between 0 and 180 degrees");
+  std::copy(eye.begin(), eye.end(), camera.eye);
+  std::copy(target.begin(), target.end(), camera.target);
+  camera.fovy_degrees = fovy;
+}
+
+void parse_sun(std::string_view text, cumulet_light_desc& light) {
+  const std::vector<std::string_view> parts = words(text);
+  if (parts.size() != 2) throw UsageError(in_quotes(text) + " is not \"azimuth,elevation r,g,b\"");
+  const std::vector<double> angles = parse_numbers(parts[0], 2);
+  if (std::abs(angles[0]) > 360.0) throw UsageError("the azimuth is not from -360 to 360 degrees");
+  if (std::abs(angles[1]) > 90.0) throw UsageError("the elevation is not from -90 to 90 degrees");
+  parse_light(parts[1], light.sun_irradiance);
+  light.sun_azimuth_degrees = static_cast<float>(angles[0]);
+  light.sun_elevation_degrees = static_cast<float>(angles[1]);
+}
+
+/// CLI11 takes "-.5" for a flag. Glued to the flag before it, it is a value.
+std::vector<std::string> glue_negative_fractions(std::vector<std::string> arguments) {
+  std::vector<std::string> glued;
+  for (std::string& argument : arguments) {
+    const bool fraction =
+        argument.size() > 2 && argument[0] == '-' && argument[1] == '.' && argument[2] >= '0' && argument[2] <= '9';
+    const bool after_flag = !glued.empty() && glued.back().rfind("--", 0) == 0 && glued.back().size() > 2 &&
+                            glued.back().find('=') == std::string::npos;
+    if (fraction && after_flag)
+      glued.back() += "=" + argument;
+    else
+      glued.push_back(std::move(argument));
+  }
+  return glued;
+}
+
+OutputFormat format_of(const std::string& path) {
+  const auto dot = path.find_last_of("./");
+  std::string ending = dot == std::string::npos || path[dot] != '.' ? "" : path.substr(dot + 1);
+  for (char& c : ending)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  if (ending == "png") return OutputFormat::png;
+  if (ending == "exr") return OutputFormat::exr;
+  if (ending == "pfm") return OutputFormat::pfm;
+  throw UsageError(in_quotes(path) + " ends in none of .png, .exr, .pfm");
+}
+
+std::string version_text() {
+  return "cumulet-render " + std::to_string(CUMULET_VERSION_MAJOR) + "." + std::to_string(CUMULET_VERSION_MINOR) + "." +
+         std::to_string(CUMULET_VERSION_PATCH);
+}
+
+}  // namespace
+
+double parse_number(std::string_view text) {
+  double value = 0.0;
+  const std::string_view digits = text.substr(text.size() > 1 && text[0] == '+' && text[1] != '-' ? 1 : 0);
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc{} || end != digits.data() + digits.size() || !std::isfinite(value))
+    throw UsageError(in_quotes(text) + " is not a finite number");
+  return value;
+}
+
+std::vector<double> parse_numbers(std::string_view text, std::size_t count) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  if (parts.size() != count)
+    throw UsageError(in_quotes(text) + " is not " + std::to_string(count) + " numbers between commas");
+  std::vector<double> values;
+  for (const std::string_view part : parts) values.push_back(parse_number(part));
+  return values;
+}
+
+std::uint64_t parse_integer(std::string_view text, std::uint64_t least, std::uint64_t most) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool number = end == text.data() + text.size() && !text.empty();
+  if (!number || error == std::errc::invalid_argument) throw UsageError(in_quotes(text) + " is not a whole number");
+  if (error != std::errc{} || value < least || value > most)
+    throw UsageError(in_quotes(text) + " is not from " + std::to_string(least) + " to " + std::to_string(most));
+  return value;
+}
+
+SceneOptions::SceneOptions() {
+  grid.struct_size = sizeof grid;
+  medium.struct_size = sizeof medium;
+  light.struct_size = sizeof light;
+  camera.struct_size = sizeof camera;
+  image.struct_size = sizeof image;
+  image.width = 1280;
+  image.height = 720;
+  image.samples = 64;
+}
+
+void SceneOptions::set_daylight() {
+  light.sun_azimuth_degrees = 60.0f;
+  light.sun_elevation_degrees = 40.0f;
+  constexpr std::array<float, 3> sun = {2.6f, 2.5f, 2.3f};
+  constexpr std::array<float, 3> sky = {0.18f, 0.28f, 0.45f};
+  std::copy(sun.begin(), sun.end(), light.sun_irradiance);
+  std::copy(sky.begin(), sky.end(), light.sky_radiance);
+}
+
+void add_scene_options(CLI::App& app, SceneOptions& scene) {
+  const char* group = "Scene";
+  add(
+      app, group, "--volume", "FILE",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        scene.volume = text;
+      },
+      "OpenVDB or NanoVDB file (.vdb, .nvdb)")
+      ->required();
+  add(
+      app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
+      "Grid to show (default: density, else the only scalar one)");
+  add(
+      app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
+      [&](const std::string& text) { parse_camera(text, scene.camera); },
+      "Eye, target and vertical field of view in degrees (default: fit the volume)");
+
+  group = "Medium";
+  add(
+      app, group, "--density-scale", "K",
+      [&](const std::string& text) { scene.medium.density_scale = parse_positive(text); },
+      "Extinction is K x grid value, 1 / world unit (default: 1)");
+  add(
+      app, group, "--albedo", "R,G,B",
+      [&](const std::string& text) {
+        const std::array<double, 3> albedo = parse_rgb(text, 1.0);
+        for (std::size_t i = 0; i < 3; ++i) scene.medium.coalbedo[i] = static_cast<float>(1.0 - albedo[i]);
+      },
+      "Single-scattering albedo, each from 0 to 1 (default: 1,1,1)");
+  add(
+      app, group, "--anisotropy", "G",
+      [&](const std::string& text) {
+        const auto g = static_cast<float>(parse_number(text));
+        if (!(g > -1.0f && g < 1.0f)) throw UsageError(in_quotes(text) + " is not between -1 and 1");
+        scene.medium.anisotropy = g;
+      },
+      "Henyey-Greenstein g, between -1 and 1 (default: 0, isotropic)");
+  add(
+      app, group, "--max-bounces", "N",
+      [&](const std::string& text) {
+        scene.medium.max_bounces = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32));
+      },
+      "Scattering events a path may have; 0: no limit (default)");
+
+  group = "Light (default: daylight; given one of the two, the other is dark)";
+  add(
+      app, group, "--sun", "\"azimuth,elevation r,g,b\"",
+      [&](const std::string& text) { parse_sun(text, scene.light); },
+      "Degrees from +Z towards +X and above the horizon; irradiance");
+  add(
+      app, group, "--sky", "R,G,B", [&](const std::string& text) { parse_light(text, scene.light.sky_radiance); },
+      "Radiance, the same from everywhere");
+
+  group = "Grid";
+  add_choice<cumulet_march>(
+      app, group, "--march",
+      {{"tet", CUMULET_MARCH_TET}, {"dense", CUMULET_MARCH_DENSE}, {"brick", CUMULET_MARCH_BRICK}}, scene.grid.march,
+      "Adaptive tetrahedra (default), every voxel, or voxels that skip empty 8^3 bricks");
+  add_choice<cumulet_cells>(app, group, "--cells",
+                            {{"constant", CUMULET_CELLS_CONSTANT}, {"linear", CUMULET_CELLS_LINEAR}}, scene.grid.cells,
+                            "Density inside a tetrahedron (default: linear)");
+  add_choice<cumulet_criterion>(
+      app, group, "--criterion",
+      {{"range-mean", CUMULET_CRITERION_RANGE_MEAN}, {"deviation", CUMULET_CRITERION_DEVIATION}}, scene.grid.criterion,
+      "What is compared with the threshold (default: deviation)");
+  add(
+      app, group, "--threshold", "T",
+      [&](const std::string& text) {
+        const double threshold = parse_number(text);
+        if (threshold < 0.0) throw UsageError(in_quotes(text) + " is negative");
+        // Zero means the default in the API and "always split" to whoever types it.
+        scene.grid.threshold = threshold == 0.0 ? -1.0 : threshold;
+      },
+      "Split cells above it; 0: down to the voxel (default: 0.05, for range-mean 1)");
+  add(
+      app, group, "--max-cells", "N",
+      [&](const std::string& text) { scene.grid.max_cells = parse_integer(text, 1, max_u64); },
+      "Stop splitting there (default: 5400000)");
+  add_choice<int>(app, group, "--camera-adaptive", {{"on", 1}, {"off", 0}}, scene.grid.camera_adaptive,
+                  "Keep cells coarse that are out of sight or under a pixel (default: off)");
+  add(
+      app, group, "--pixel-size", "P", [&](const std::string& text) { scene.grid.pixel_size = parse_positive(text); },
+      "Pixels that a split cell's longest edge must cover (default: 1)");
+
+  group = "Picture";
+  add(
+      app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene.image); },
+      "Pixels (default: 1280x720)");
+  add(
+      app, group, "--spp", "N",
+      [&](const std::string& text) {
+        scene.image.samples = static_cast<std::uint32_t>(parse_integer(text, 1, max_u32));
+      },
+      "Samples a pixel (default: 64)");
+  add(
+      app, group, "--seed", "S",
+      [&](const std::string& text) { scene.image.seed = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32)); },
+      "Same seed, same driver: same picture (default: 0)");
+  add_choice<cumulet_view>(app, group, "--view",
+                           {{"shaded", CUMULET_VIEW_SHADED},
+                            {"cells", CUMULET_VIEW_CELLS},
+                            {"steps", CUMULET_VIEW_STEPS},
+                            {"density", CUMULET_VIEW_DENSITY}},
+                           scene.image.view, "The picture (default), or a look at the grid that made it");
+}
+
+void finish_scene_options(const CLI::App& app, SceneOptions& scene) {
+  if (app.count("--sun") == 0 && app.count("--sky") == 0) scene.set_daylight();
+}
+
+std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
+  RenderOptions options;
+  CLI::App app("Path-traces a volume into a picture, without a display.", "cumulet-render");
+  app.set_help_flag("-h,--help", "Show this and exit");
+  app.set_version_flag("--version", version_text(), "Show the version and exit");
+  app.get_formatter()->column_width(44);
+  app.footer(
+      "Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.\n"
+      "Ctrl-C writes the samples so far and exits 1; a second one stops at once.");
+  add_scene_options(app, options.scene);
+
+  const char* group = "Output";
+  add(
+      app, group, "-o,--output", "FILE",
+      [&](const std::string& text) {
+        options.format = format_of(text);
+        options.output = text;
+      },
+      ".png is tone-mapped (Khronos PBR Neutral); .exr and .pfm hold linear radiance")
+      ->required();
+  add(
+      app, group, "--exposure", "STOPS",
+      [&](const std::string& text) {
+        options.exposure_stops = parse_number(text);
+        if (std::abs(options.exposure_stops) > 64.0) throw UsageError(in_quotes(text) + " is not from -64 to 64");
+      },
+      "Brightens a .png by 2^STOPS (default: 0)");
+  add(
+      app, group, "--stats", "FILE.json",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        options.stats = text;
+      },
+      "What was built and how long it took, in SI units");
+  add_choice<BackendChoice>(
+      app, group, "--backend",
+      {{"auto", BackendChoice::automatic}, {"egl", BackendChoice::egl}, {"osmesa", BackendChoice::osmesa}},
+      options.backend, "OpenGL without a display (default: auto: EGL, then OSMesa)");
+
+  try {
+    std::vector<std::string> reversed = glue_negative_fractions(std::move(arguments));
+    std::reverse(reversed.begin(), reversed.end());  // as CLI11 wants them
+    app.parse(std::move(reversed));
+  } catch (const CLI::CallForHelp&) {
+    out << app.help();
+    return std::nullopt;
+  } catch (const CLI::CallForVersion&) {
+    out << version_text() << '\n';
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(one_line(error.what()));
+  }
+  finish_scene_options(app, options.scene);
+  if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
+  return options;
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,78 @@
+#include "progress.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace cumulet::demo {
+namespace {
+
+constexpr int bar_width = 24;
+
+/// "12.3 M": three digits, for reading only.
+std::string format_count(double count) {
+  const char* unit = "";
+  for (const char* next : {"k", "M", "G"}) {
+    if (count < 1000.0) break;
+    count /= 1000.0;
+    unit = next;
+  }
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g %s", std::min(count, 999.0), unit);
+  return text.data();
+}
+
+}  // namespace
+
+std::string format_duration(double seconds) {
+  if (!(seconds < 1e6)) return "-:--";
+  const auto all = static_cast<long>(std::lround(std::max(seconds, 0.0)));
+  std::array<char, 64> text{};
+  if (all >= 3600)
+    std::snprintf(text.data(), text.size(), "%ld:%02ld:%02ld", all / 3600, all / 60 % 60, all % 60);
+  else
+    std::snprintf(text.data(), text.size(), "%ld:%02ld", all / 60, all % 60);
+  return text.data();
+}
+
+Progress::Progress() : terminal_(isatty(STDERR_FILENO) == 1) {}
+
+Progress::~Progress() { clear(); }
+
+void Progress::stage(const std::string& what) {
+  rendering_ = false;
+  show(what + " ...");
+}
+
+void Progress::render(double part, double total) {
+  if (!rendering_) start_ = Clock::now();
+  rendering_ = true;
+  part = std::clamp(part, 0.0, 1.0);
+  const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  const auto filled = static_cast<std::size_t>(part * bar_width);
+  std::string line = "rendering [" + std::string(filled, '#') + std::string(bar_width - filled, '.') + "] ";
+  line += std::to_string(static_cast<int>(part * 100.0)) + " %";
+  // The rates mean nothing yet at the very start.
+  if (part > 0.0 && seconds > 0.0) {
+    line += "  " + format_count(part * total / seconds) + "samples/s";
+    line += "  ETA " + format_duration(seconds * (1.0 - part) / part);
+  }
+  show(line);
+}
+
+void Progress::clear() {
+  if (shown_) std::fputs("\r\033[K", stderr);
+  shown_ = false;
+}
+
+void Progress::show(const std::string& line) {
+  if (!terminal_) return;
+  std::fprintf(stderr, "\r%s\033[K", line.c_str());
+  std::fflush(stderr);
+  shown_ = true;
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+namespace cumulet::demo {
+
+/// One line on standard error that says how far we are; silent unless that is a terminal.
+class Progress {
+ public:
+  Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  /// Wipes the line.
+  ~Progress();
+
+  /// A stage whose length is not known.
+  void stage(const std::string& what);
+  /// Rendering, with part of all samples done since the first call; total is their number.
+  void render(double part, double total);
+  /// Wipes the line, so that something else can be printed.
+  void clear();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void show(const std::string& line);
+
+  bool terminal_;
+  bool shown_ = false;
+  Clock::time_point start_;
+  bool rendering_ = false;
+};
+
+/// "1:05", "2:01:40", "0:00".
+[[nodiscard]] std::string format_duration(double seconds);
+
+}  // namespace cumulet::demo

@@ -1,0 +1,271 @@
+#include "options.hpp"
+
+#include <gtest/gtest.h>
+
+#include <clocale>
+#include <cstdint>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace cumulet::demo;
+using Arguments = std::vector<std::string>;
+
+/// With what is required, so that a test names only what it is about.
+Arguments with(const Arguments& more) {
+  Arguments all = {"--volume", "cloud.vdb", "-o", "out.png"};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+RenderOptions parse(const Arguments& more) {
+  std::ostringstream out;
+  auto options = parse_render_options(with(more), out);
+  if (!options) throw std::logic_error("help instead of options");
+  EXPECT_EQ(out.str(), "");
+  return *options;
+}
+
+std::string usage_error(const Arguments& all) {
+  std::ostringstream out;
+  try {
+    static_cast<void>(parse_render_options(all, out));
+    return "";
+  } catch (const UsageError& error) {
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    return error.what();
+  }
+}
+
+void expect_rgb(const float (&rgb)[3], float r, float g, float b) {
+  EXPECT_FLOAT_EQ(rgb[0], r);
+  EXPECT_FLOAT_EQ(rgb[1], g);
+  EXPECT_FLOAT_EQ(rgb[2], b);
+}
+
+TEST(Options, DefaultsAreTheLibrarysOwn) {
+  const RenderOptions options = parse({});
+  const SceneOptions& scene = options.scene;
+  EXPECT_EQ(scene.volume, "cloud.vdb");
+  EXPECT_EQ(scene.grid_name, "");
+  EXPECT_EQ(scene.grid.struct_size, sizeof(cumulet_grid_desc));
+  EXPECT_EQ(scene.medium.struct_size, sizeof(cumulet_medium_desc));
+  EXPECT_EQ(scene.light.struct_size, sizeof(cumulet_light_desc));
+  EXPECT_EQ(scene.camera.struct_size, sizeof(cumulet_camera_desc));
+  EXPECT_EQ(scene.image.struct_size, sizeof(cumulet_image_desc));
+  EXPECT_EQ(scene.grid.march, CUMULET_MARCH_TET);
+  EXPECT_EQ(scene.grid.cells, CUMULET_CELLS_LINEAR);
+  EXPECT_EQ(scene.grid.threshold, 0.0);
+  EXPECT_EQ(scene.grid.max_cells, 0u);
+  EXPECT_EQ(scene.medium.density_scale, 0.0);
+  EXPECT_EQ(scene.camera.fovy_degrees, 0.0);
+  EXPECT_EQ(scene.image.width, 1280u);
+  EXPECT_EQ(scene.image.height, 720u);
+  EXPECT_EQ(scene.image.samples, 64u);
+  EXPECT_EQ(options.output, "out.png");
+  EXPECT_EQ(options.format, OutputFormat::png);
+  EXPECT_EQ(options.backend, BackendChoice::automatic);
+  EXPECT_EQ(options.exposure_stops, 0.0);
+  EXPECT_EQ(options.stats, "");
+}
+
+TEST(Options, EveryFlag) {
+  const RenderOptions options = parse({"--grid-name",
+                                       "smoke",
+                                       "--size",
+                                       "320x200",
+                                       "--spp",
+                                       "7",
+                                       "--seed",
+                                       "4294967295",
+                                       "--camera",
+                                       "1,2,3 -4,5e-1,-6 35.5",
+                                       "--march",
+                                       "brick",
+                                       "--cells",
+                                       "constant",
+                                       "--criterion",
+                                       "range-mean",
+                                       "--threshold",
+                                       "0.25",
+                                       "--max-cells",
+                                       "50000000",
+                                       "--camera-adaptive",
+                                       "on",
+                                       "--pixel-size",
+                                       "1.5",
+                                       "--density-scale",
+                                       "2.5",
+                                       "--albedo",
+                                       "1,0.75,0",
+                                       "--anisotropy",
+                                       "-0.6",
+                                       "--max-bounces",
+                                       "3",
+                                       "--sun",
+                                       "-30,12.5 1,2,3",
+                                       "--sky",
+                                       ".1,.2,.3",
+                                       "--view",
+                                       "steps",
+                                       "--backend",
+                                       "osmesa",
+                                       "--exposure",
+                                       "-1.5",
+                                       "--stats",
+                                       "s.json"});
+  const SceneOptions& scene = options.scene;
+  EXPECT_EQ(scene.grid_name, "smoke");
+  EXPECT_EQ(scene.image.width, 320u);
+  EXPECT_EQ(scene.image.height, 200u);
+  EXPECT_EQ(scene.image.samples, 7u);
+  EXPECT_EQ(scene.image.seed, 4294967295u);
+  EXPECT_EQ(scene.image.view, CUMULET_VIEW_STEPS);
+  EXPECT_EQ(scene.camera.eye[2], 3.0);
+  EXPECT_EQ(scene.camera.target[0], -4.0);
+  EXPECT_EQ(scene.camera.target[1], 0.5);
+  EXPECT_EQ(scene.camera.fovy_degrees, 35.5);
+  EXPECT_EQ(scene.grid.march, CUMULET_MARCH_BRICK);
+  EXPECT_EQ(scene.grid.cells, CUMULET_CELLS_CONSTANT);
+  EXPECT_EQ(scene.grid.criterion, CUMULET_CRITERION_RANGE_MEAN);
+  EXPECT_EQ(scene.grid.threshold, 0.25);
+  EXPECT_EQ(scene.grid.max_cells, 50000000u);
+  EXPECT_EQ(scene.grid.camera_adaptive, 1);
+  EXPECT_EQ(scene.grid.pixel_size, 1.5);
+  EXPECT_EQ(scene.medium.density_scale, 2.5);
+  expect_rgb(scene.medium.coalbedo, 0.0f, 0.25f, 1.0f);
+  EXPECT_FLOAT_EQ(scene.medium.anisotropy, -0.6f);
+  EXPECT_EQ(scene.medium.max_bounces, 3u);
+  EXPECT_FLOAT_EQ(scene.light.sun_azimuth_degrees, -30.0f);
+  EXPECT_FLOAT_EQ(scene.light.sun_elevation_degrees, 12.5f);
+  expect_rgb(scene.light.sun_irradiance, 1.0f, 2.0f, 3.0f);
+  expect_rgb(scene.light.sky_radiance, 0.1f, 0.2f, 0.3f);
+  EXPECT_EQ(options.backend, BackendChoice::osmesa);
+  EXPECT_EQ(options.exposure_stops, -1.5);
+  EXPECT_EQ(options.stats, "s.json");
+}
+
+TEST(Options, LightGivenIsTheOnlyLight) {
+  const RenderOptions day = parse({});
+  EXPECT_GT(day.scene.light.sun_irradiance[0], 0.0f);
+  EXPECT_GT(day.scene.light.sky_radiance[2], 0.0f);
+  const RenderOptions sky = parse({"--sky", "1,1,1"});
+  expect_rgb(sky.scene.light.sun_irradiance, 0.0f, 0.0f, 0.0f);
+  const RenderOptions sun = parse({"--sun", "0,90 1,1,1"});
+  expect_rgb(sun.scene.light.sky_radiance, 0.0f, 0.0f, 0.0f);
+  const RenderOptions night = parse({"--sky", "0,0,0"});
+  expect_rgb(night.scene.light.sky_radiance, 0.0f, 0.0f, 0.0f);
+}
+
+TEST(Options, ThresholdZeroIsTheVoxel) { EXPECT_LT(parse({"--threshold", "0"}).scene.grid.threshold, 0.0); }
+
+TEST(Options, NegativeValuesAreNotFlags) {
+  EXPECT_FLOAT_EQ(parse({"--anisotropy", "-.5"}).scene.medium.anisotropy, -0.5f);
+  EXPECT_FLOAT_EQ(parse({"--anisotropy=-.5"}).scene.medium.anisotropy, -0.5f);
+  EXPECT_EQ(parse({"--camera", "-.5,0,0 1,1,1 40"}).scene.camera.eye[0], -0.5);
+  EXPECT_EQ(parse({"--camera", "-5,0,0 1,1,1 40"}).scene.camera.eye[0], -5.0);
+}
+
+TEST(Options, OutputFormatByItsEnding) {
+  const auto format = [](const std::string& name) {
+    std::ostringstream out;
+    return parse_render_options({"--volume", "v", "--output", name}, out)->format;
+  };
+  EXPECT_EQ(format("a.b/c.EXR"), OutputFormat::exr);
+  EXPECT_EQ(format("c.pfm"), OutputFormat::pfm);
+  EXPECT_NE(usage_error({"--volume", "v", "-o", "a.png/c"}), "");
+}
+
+TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
+  const std::vector<Arguments> wrong = {{"--size", "640"},
+                                        {"--size", "0x10"},
+                                        {"--size", "10x10x10"},
+                                        {"--size", "99999x1"},
+                                        {"--size", "-1x1"},
+                                        {"--size", "1x"},
+                                        {"--spp", "0"},
+                                        {"--spp", "-3"},
+                                        {"--spp", "1.5"},
+                                        {"--spp", "4294967296"},
+                                        {"--spp", "1 "},
+                                        {"--seed", "x"},
+                                        {"--seed", "4294967296"},
+                                        {"--camera", "0,0,0"},
+                                        {"--camera", "0,0,0 0,0,0 40"},
+                                        {"--camera", "0,0,1 0,0,0 0"},
+                                        {"--camera", "0,0,1 0,0,0 180"},
+                                        {"--camera", "0,0,nan 0,0,0 40"},
+                                        {"--camera", "0,0 0,0,0 40"},
+                                        {"--march", "fast"},
+                                        {"--march", ""},
+                                        {"--cells", "Linear"},
+                                        {"--criterion", "best"},
+                                        {"--threshold", "-1"},
+                                        {"--threshold", "inf"},
+                                        {"--max-cells", "0"},
+                                        {"--max-cells", "-1"},
+                                        {"--camera-adaptive", "1"},
+                                        {"--pixel-size", "0"},
+                                        {"--density-scale", "0"},
+                                        {"--density-scale", "-2"},
+                                        {"--density-scale", "1e999"},
+                                        {"--albedo", "1,1"},
+                                        {"--albedo", "1,1,1.1"},
+                                        {"--albedo", "1,1,-.1"},
+                                        {"--albedo", "1,,1"},
+                                        {"--anisotropy", "1"},
+                                        {"--anisotropy", "-1"},
+                                        {"--anisotropy", "0.99999999999"},
+                                        {"--max-bounces", "-1"},
+                                        {"--sun", "60 1,1,1"},
+                                        {"--sun", "60,91 1,1,1"},
+                                        {"--sun", "60,40"},
+                                        {"--sun", "60,40 1,1,-1"},
+                                        {"--sky", "1"},
+                                        {"--sky", "1,1,1e39"},
+                                        {"--view", "nice"},
+                                        {"--backend", "glx"},
+                                        {"--exposure", "1,5"},
+                                        {"--exposure", "65"},
+                                        {"--stats", ""},
+                                        {"--spp"},
+                                        {"--volume", ""}};
+  for (const Arguments& arguments : wrong) {
+    Arguments all = {"-o", "out.png"};
+    if (arguments[0] != "--volume") all.insert(all.end(), {"--volume", "cloud.vdb"});
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    EXPECT_NE(usage_error(all).find(arguments[0]), std::string::npos) << arguments[0] << ' ' << arguments.back();
+  }
+  EXPECT_NE(usage_error({"-o", "a.png"}).find("--volume"), std::string::npos);
+  EXPECT_NE(usage_error({"--volume", "a.vdb"}).find("--output"), std::string::npos);
+  EXPECT_NE(usage_error(with({"--bogus"})).find("--bogus"), std::string::npos);
+  EXPECT_NE(usage_error(with({"stray"})).find("stray"), std::string::npos);
+  EXPECT_NE(usage_error(with({"--spp", "1", "--spp", "2"})).find("--spp"), std::string::npos);
+  EXPECT_NE(usage_error(with({"--stats", "out.png"})), "");
+}
+
+TEST(Options, HelpAndVersionNeedNothingElse) {
+  std::ostringstream help;
+  EXPECT_FALSE(parse_render_options({"--help"}, help).has_value());
+  for (const char* flag : {"--volume", "--march", "--sun", "--stats", "--exposure", "--view"})
+    EXPECT_NE(help.str().find(flag), std::string::npos) << flag;
+  std::ostringstream version;
+  EXPECT_FALSE(parse_render_options({"--version"}, version).has_value());
+  EXPECT_EQ(version.str(), "cumulet-render 0.1.0\n");
+}
+
+TEST(Options, NumbersAreTheSameInEveryLocale) {
+  for (const char* name : {"de_DE.UTF-8", "fr_FR.UTF-8", "C"}) {
+    if (std::setlocale(LC_ALL, name) == nullptr) continue;
+    EXPECT_EQ(parse_number("1.5"), 1.5) << name;
+    EXPECT_THROW(static_cast<void>(parse_number("1,5")), UsageError) << name;
+  }
+  EXPECT_EQ(parse_number("+2"), 2.0);
+  for (const char* text : {"", "+", "+-2", " 1", "1 ", "0x10", "nan", "1e400", "--1", "1.5.2"})
+    EXPECT_THROW(static_cast<void>(parse_number(text)), UsageError) << text;
+}
+
+}  // namespace
