@@ -1,0 +1,66 @@
+# Sourced by demo/run.sh and tests/run.sh.
+# shellcheck shell=bash
+set -euo pipefail
+exec </dev/null
+export DEBIAN_FRONTEND=noninteractive
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$root"
+script_started=$SECONDS
+jobs=${CUMULET_JOBS:-$(nproc)}
+# OpenVDB's headers take up to 1.5 GiB a compiler.
+memory_jobs=$(awk '/^MemAvailable/ {print int($2 / 1572864) + 1}' /proc/meminfo)
+[ "$jobs" -le "$memory_jobs" ] || jobs=$memory_jobs
+
+die() {
+  echo "$(basename "$(dirname "$0")")/$(basename "$0"): $*" >&2
+  exit 1
+}
+
+elapsed() { # [SINCE]: m:ss since then, or since the script began
+  local seconds=$((SECONDS - ${1:-$script_started}))
+  printf '%d:%02d' $((seconds / 60)) $((seconds % 60))
+}
+
+say() { printf '[%s] %s\n' "$(elapsed)" "$*"; }
+
+# install_packages build|test: those of packages.txt that are missing; no network and no root when none is.
+install_packages() {
+  command -v dpkg-query >/dev/null || { say "not a Debian system: assuming what scripts/packages.txt lists is there"; return; }
+  local package missing=() wanted
+  mapfile -t wanted < <(sed -E -e 's/#.*//' -e "s/^$1: *//" -e '/:/d' -e '/^[[:space:]]*$/d' scripts/packages.txt)
+  for package in "${wanted[@]}"; do
+    [[ $(dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null || true) == *installed* ]] || missing+=("$package")
+  done
+  [ "${#missing[@]}" -gt 0 ] || { say "packages: all ${#wanted[@]} are here"; return; }
+
+  local as_root=()
+  if [ "$(id -u)" != 0 ]; then
+    command -v sudo >/dev/null || die "missing packages, and neither root nor sudo to install them: ${missing[*]}"
+    as_root=(sudo)
+  fi
+  say "packages: installing ${missing[*]}"
+  local log=build/packages.log
+  mkdir -p build
+  local install=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "${missing[@]}")
+  # The package lists may be absent or older than the archive: then fetch them and try once more.
+  "${install[@]}" >"$log" 2>&1 ||
+    { "${as_root[@]}" apt-get update >>"$log" 2>&1 && "${install[@]}" >>"$log" 2>&1; } ||
+    { tail -n 20 "$log" >&2; die "apt-get could not install ${missing[*]} (all of it: $log)"; }
+}
+
+# build PRESET [TARGET...]: configured if it is not yet; ninja shows its own progress.
+build() {
+  local preset=$1
+  shift
+  local folder=build/$preset since=$SECONDS
+  if [ ! -f "$folder/build.ninja" ]; then
+    say "configuring $folder"
+    mkdir -p "$folder"
+    cmake --preset "$preset" >"$folder/configure.log" 2>&1 ||
+      { tail -n 30 "$folder/configure.log" >&2; echo "configuring failed (all of it: $folder/configure.log)" >&2; return 1; }
+  fi
+  say "building $folder with $jobs jobs"
+  cmake --build "$folder" --parallel "$jobs" ${1:+--target "$@"} || return 1
+  say "built $folder in $(elapsed "$since")"
+}

@@ -1,0 +1,111 @@
+#!/bin/bash
+# The portable tarball runs where none of our libraries is: in a root folder with the C library alone, then in one
+# with Mesa added. Usage: portable_test.sh BUILD_DIR
+set -euo pipefail
+build=$1
+
+PATH=$PATH:/usr/sbin:/sbin
+if [ "$(id -u)" = 0 ]; then
+  enter=("$(command -v chroot)")
+elif unshare --map-root-user true 2>/dev/null; then
+  enter=("$(command -v unshare)" --map-root-user "$(command -v chroot)")
+else
+  echo "portable_test: skipped: chroot needs root, or user namespaces"
+  exit 77
+fi
+
+fail() { echo "portable_test: $*" >&2; exit 1; }
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+(cd "$build" && cpack -G TGZ -B "$work/pack") >"$work/cpack.log" 2>&1 || { cat "$work/cpack.log"; fail "cpack failed"; }
+tarball=$(find "$work/pack" -maxdepth 1 -name 'cumulet-*.tar.gz')
+[ -n "$tarball" ] || fail "cpack wrote no tarball"
+echo "$(basename "$tarball"): $(($(stat -c %s "$tarball") / 1048576)) MiB"
+
+# Neither too much nor too little is in it.
+tar -tzf "$tarball" >"$work/list"
+if grep -E '/lib(c|m|pthread|dl|rt|GL|GLX|EGL|OSMesa|X11|xcb|gbm|drm)(-[0-9.]+)?\.so|/ld-linux' "$work/list"; then
+  fail "the tarball holds libraries that must be the system's"
+fi
+for wanted in lib/libcumulet.so.0 lib/fallback/libstdc++.so.6 share/doc/cumulet/LICENSE include/cumulet/cumulet.h; do
+  grep -q "/$wanted\$" "$work/list" || fail "the tarball lacks $wanted"
+done
+
+# copy_file FILE ROOT: the file under the name asked for, as a link where possible.
+copy_file() {
+  mkdir -p "$2$(dirname "$1")"
+  [ -e "$2$1" ] || cp -lL "$1" "$2$1" 2>/dev/null || cp -L "$1" "$2$1"
+}
+
+new_root() { # ROOT: the C library, the loader, /tmp, /dev/null and the unpacked tarball in /opt
+  mkdir -p "$1/opt" "$1/tmp" "$1/dev" "$1/proc/self" "$1/usr/lib" "$1/usr/lib64"
+  ln -s usr/lib usr/lib64 "$1"
+  : >"$1/dev/null"
+  local library
+  for library in ld-linux-x86-64.so.2 libc.so.6 libm.so.6 libpthread.so.0 libdl.so.2 librt.so.1; do
+    library=$(ldconfig_path "$library")
+    copy_file "$library" "$1"
+  done
+  copy_file /lib64/ld-linux-x86-64.so.2 "$1"
+  tar -xzf "$tarball" -C "$1/opt" --strip-components=1
+}
+
+ldconfig_path() { # SONAME: where this system has it
+  ldconfig -p | awk -v name="$1" '$1 == name && /x86-64/ && !n++ {print $NF}'
+}
+
+copy_closure() { # ROOT FILE...: files and the libraries that they need
+  local root=$1 file library
+  shift
+  for file in "$@"; do
+    copy_file "$file" "$root"
+    ldd "$file" | awk '$2 == "=>" && $3 ~ /^\// {print $3}' | while read -r library; do
+      copy_file "$library" "$root"
+    done
+  done
+}
+
+in_root() { # ROOT PROGRAM ARGS...: with a bare environment; the loader asks /proc/self/exe what $ORIGIN is
+  ln -sfn "$2" "$1/proc/self/exe"
+  env -i "${enter[@]}" "$@"
+}
+
+# 1. Only the C library: what needs no OpenGL runs, on the bundled C++ runtime.
+bare=$work/bare
+new_root "$bare"
+in_root "$bare" /opt/bin/cumulet-scene /tmp/scene || fail "cumulet-scene did not run in a root with the C library alone"
+volume=$(find "$bare/tmp/scene" -name '*.vdb' | sort | head -n1)
+[ -s "$volume" ] || fail "cumulet-scene wrote no .vdb"
+in_root "$bare" /opt/bin/cumulet-render --help >"$work/help" || fail "cumulet-render --help did not run there"
+grep -q -- --volume "$work/help" || fail "cumulet-render --help does not name --volume"
+
+# 2. With Mesa, whose libraries share the process with the bundled ones.
+mesa=$work/mesa
+new_root "$mesa"
+read -ra drivers <<<"$(find /usr/lib -path '*/dri/*' -name 'swrast_dri.so' -printf '%p ')"
+vendor=/usr/share/glvnd/egl_vendor.d/50_mesa.json
+egl=$(ldconfig_path libEGL.so.1) egl_mesa=$(ldconfig_path libEGL_mesa.so.0) osmesa=$(ldconfig_path libOSMesa.so.8)
+backends=()
+if [ -n "$egl" ] && [ -n "$egl_mesa" ] && [ -f "$vendor" ] && [ "${#drivers[@]}" -gt 0 ]; then
+  copy_closure "$mesa" "$egl" "$egl_mesa" "${drivers[@]}"
+  copy_file "$vendor" "$mesa"
+  backends+=(egl)
+fi
+if [ -n "$osmesa" ]; then
+  copy_closure "$mesa" "$osmesa"
+  backends+=(osmesa)
+fi
+find "$mesa" -path "$mesa/opt" -prune -o \( -name 'libopenvdb*' -o -name 'libtbb*' -o -name 'libOpenEXR*' \) -print |
+  grep . && fail "the test's own root holds a library that the tarball should bring"
+cp -r "$bare/tmp/scene" "$mesa/tmp/scene"
+for backend in "${backends[@]}"; do
+  in_root "$mesa" /opt/bin/cumulet-render --volume "${volume#"$bare"}" --size 32x32 --spp 1 --threshold 1 \
+    --backend "$backend" -o "/tmp/$backend.png" || fail "cumulet-render --backend $backend failed in a root with Mesa"
+  [ -s "$mesa/tmp/$backend.png" ] || fail "cumulet-render --backend $backend wrote no picture"
+done
+if [ "${#backends[@]}" -gt 0 ]; then
+  runtime=$(in_root "$mesa" /lib64/ld-linux-x86-64.so.2 --list /opt/bin/cumulet-render)
+  grep -q 'libstdc++.so.6 => /opt/bin/../lib/host/' <<<"$runtime" || fail "the driver's C++ runtime was not preferred"
+fi
+echo "ran with the C library alone, and with Mesa by: ${backends[*]:-none: no Mesa here}"

@@ -1,0 +1,18 @@
+#!/bin/bash
+# libcumulet exports the C ABI, all of it and nothing else. Usage: symbols_test.sh LIBCUMULET.so
+set -euo pipefail
+library=$1
+here=$(cd "$(dirname "$0")" && pwd)
+
+exported=$(nm --dynamic --defined-only --format=posix "$library" | cut -d' ' -f1 | LC_ALL=C sort)
+if ! diff -u --label committed --label exported "$here/exported_symbols.txt" - <<<"$exported"; then
+  echo "symbols_test: $library and tests/package/exported_symbols.txt differ; if that is meant, update the list" >&2
+  exit 1
+fi
+dynamic=$(readelf --dynamic "$library")
+grep -q 'SONAME.*\[libcumulet\.so\.[0-9]*\]' <<<"$dynamic" ||
+  { echo "symbols_test: $library has no SONAME libcumulet.so.N" >&2; exit 1; }
+if needed=$(grep -E 'NEEDED.*\[lib(GL|EGL|OpenGL|OSMesa|X11|wayland)' <<<"$dynamic"); then
+  echo "symbols_test: the core must not link OpenGL or a window system: $needed" >&2
+  exit 1
+fi

@@ -1,0 +1,166 @@
+#!/bin/bash
+# Every test: installs the Debian packages that are missing, builds, and runs the tests, the unit tests again under
+# AddressSanitizer and UndefinedBehaviorSanitizer, and the checks of format, scripts and (clang-tidy) code.
+# The last line is "N passed, N failed" (", N skipped"); the exit status is 0 if none failed. --quick: the release
+# build's tests only.
+# shellcheck source=scripts/common.sh
+. "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
+
+quick=
+for argument in "$@"; do
+  case $argument in
+    --quick) quick=yes ;;
+    -h | --help)
+      echo "usage: tests/run.sh [--quick]    (--quick: the release build's tests only)"
+      exit 0
+      ;;
+    *)
+      echo "tests/run.sh: unknown argument '$argument'; there is only --quick" >&2
+      exit 2
+      ;;
+  esac
+done
+
+passed=0 failed=0 skipped=0
+count() { # PASSED FAILED SKIPPED
+  passed=$((passed + $1)) failed=$((failed + $2)) skipped=$((skipped + $3))
+}
+
+finish() {
+  trap - EXIT
+  say "all done"
+  if [ "$skipped" -gt 0 ]; then
+    echo "$passed passed, $failed failed, $skipped skipped"
+  else
+    echo "$passed passed, $failed failed"
+  fi
+  [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
+  exit
+}
+# Whatever ends the script, the closing line tells of it.
+trap 'count 0 1 0; finish' EXIT
+trap 'exit 130' INT TERM
+
+check() { # NAME COMMAND...: one check that counts as one test
+  local name=$1 since=$SECONDS
+  shift
+  say "$name"
+  if "$@"; then
+    count 1 0 0
+    say "$name: passed in $(elapsed "$since")"
+  else
+    count 0 1 0
+    say "$name: FAILED after $(elapsed "$since")"
+  fi
+}
+
+run_ctest() { # NAME FOLDER: its tests, each counted
+  local name=$1 folder=$2 since=$SECONDS report total bad skips
+  report=$root/build/$name.junit.xml
+  rm -f "$report"
+  say "$name: running"
+  ctest --test-dir "$folder" --output-on-failure --progress --no-tests=error --parallel "$jobs" \
+    --output-junit "$report" || true
+  total=$(junit tests "$report") bad=$(junit failures "$report")
+  skips=$(($(junit skipped "$report") + $(junit disabled "$report")))
+  if [ "${total:-0}" -eq 0 ]; then
+    say "$name: no test ran"
+    count 0 1 0
+    return
+  fi
+  count $((total - bad - skips)) "$bad" "$skips"
+  say "$name: $bad of $total failed, in $(elapsed "$since")"
+}
+
+junit() { # ATTRIBUTE FILE: of the test suite; 0 if there is none
+  local value
+  value=$(sed -n "/<testsuite/,/>/s/.*[[:space:]]$1=\"\([0-9]*\)\".*/\1/p" "$2" 2>/dev/null | sed -n 1p || true)
+  echo "${value:-0}"
+}
+
+# shellcheck disable=SC2317 # called by check
+format_check() {
+  find src demo tests \( -name '*.[ch]' -o -name '*.[ch]pp' \) -print0 | xargs -0 clang-format --dry-run --Werror
+}
+
+# shellcheck disable=SC2317 # called by check
+script_check() {
+  shellcheck -x .ci/run demo/run.sh scripts/common.sh tests/run.sh tests/package/*.sh
+}
+
+# shellcheck disable=SC2317 # called by xargs
+tidy_one() { # STAMP SOURCE
+  local log
+  if log=$(clang-tidy --quiet -p build/release --extra-arg=-Wno-unknown-warning-option "$2" 2>&1); then
+    : >"$1"
+    echo "  ok      $2"
+  else
+    printf '%s\n  FAILED  %s\n' "$log" "$2"
+  fi
+}
+export -f tidy_one
+
+# clang-tidy of src/ and demo/, but for the files that include OpenVDB (a minute each and more). Each file is a check;
+# one that passed is not looked at again until it, a header or the rules change.
+tidy() {
+  local stamps=build/tidy since=$SECONDS sources=() source common key todo=() files
+  mkdir -p "$stamps"
+  say "clang-tidy"
+  # What ninja knows of the includes of every object file: those without OpenVDB.
+  mapfile -t sources < <(ninja -C build/release -t deps | awk -v root="$root/" '
+    /^[^ ].*: #deps/ { flush(); next }
+    /^    / { file = $1; if (!first) first = file; if (file ~ /\/openvdb\/openvdb\.h$|\/openvdb\/.*\.h$/) vdb = 1 }
+    END { flush() }
+    function flush() {
+      sub("^../../", root, first)
+      if (first && !vdb && index(first, root) == 1) print substr(first, length(root) + 1)
+      first = ""; vdb = 0
+    }' | grep -E '^(src|demo)/.*\.cpp$' | LC_ALL=C sort -u || true)
+  files=${#sources[@]}
+  [ "$files" -gt 0 ] || { say "clang-tidy: found no files"; count 0 1 0; return; }
+
+  common=$({ cat .clang-tidy; clang-tidy --version; find src demo glsl -name '*.h' -o -name '*.hpp' -o -name '*.glsl' |
+    LC_ALL=C sort | xargs cat; } | sha256sum)
+  for source in "${sources[@]}"; do
+    key=$stamps/$({ echo "$common $source"; cat "$source"; } | sha256sum | cut -c1-32)
+    [ -e "$key" ] || todo+=("$key" "$source")
+  done
+  say "clang-tidy: $((${#todo[@]} / 2)) of $files files have changed"
+  if [ "${#todo[@]}" -gt 0 ]; then
+    printf '%s\0' "${todo[@]}" | xargs -0 -n 2 -P "$jobs" bash -c 'tidy_one "$@"' tidy || true
+  fi
+  local good=0
+  for source in "${sources[@]}"; do
+    key=$stamps/$({ echo "$common $source"; cat "$source"; } | sha256sum | cut -c1-32)
+    [ ! -e "$key" ] || good=$((good + 1))
+  done
+  count "$good" $((files - good)) 0
+  say "clang-tidy: $((files - good)) of $files failed, in $(elapsed "$since")"
+}
+
+# No display and no session: what a test finds must not depend on them.
+unset DISPLAY WAYLAND_DISPLAY XDG_RUNTIME_DIR
+export CTEST_OUTPUT_ON_FAILURE=1
+install_packages test
+
+if build release; then
+  run_ctest release build/release
+else
+  count 0 1 0
+fi
+
+if [ -z "$quick" ]; then
+  check "clang-format" format_check
+  check "shellcheck" script_check
+  tidy
+  # Leaks inside the software GL driver and TBB are theirs.
+  export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1
+  export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
+  export UBSAN_OPTIONS=print_stacktrace=1
+  if build sanitize tests/unit/all; then
+    run_ctest sanitize build/sanitize/tests/unit
+  else
+    count 0 1 0
+  fi
+fi
+finish
