@@ -64,7 +64,7 @@ def main():
         literal = "\n".join(f'R"glsl({chunk})glsl"' for chunk in chunks)
         parts.append(f"static constexpr char {symbol}[] =\n{literal};\n")
         cases.append(f'  if (name == "{path.name}") return {symbol};\n')
-    parts.append("std::string_view shader_source(std::string_view name) {\n" + "".join(cases) + "  return {};\n}\n")
+    parts.append("std::string_view shader_source([[maybe_unused]] std::string_view name) {\n" + "".join(cases) + "  return {};\n}\n")
     parts.append("}  // namespace cumulet::gl\n")
     options.out.write_text("\n".join(parts))
 

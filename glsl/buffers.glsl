@@ -1,0 +1,55 @@
+// Bindings of the marches' data.
+#if CM_MARCH == 0
+// Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
+layout(binding = 0) uniform usamplerBuffer cm_cells[CM_PAGES];
+layout(binding = 12) uniform usamplerBuffer cm_tree_words;
+layout(std140, binding = 1) uniform CmRoots { uvec4 cm_roots[13]; };  // 25 pairs: first leaf, first tree node
+
+uvec4 cm_record(uint cell, uint part) {
+#if CM_PAGES == 1
+  return texelFetch(cm_cells[0], int(cell * 2u + part));
+#else
+  uint page = cell >> cm.march.z;
+  int texel = int((cell & ((1u << cm.march.z) - 1u)) * 2u + part);
+  // Samplers may only be indexed by constants here: lanes differ in their page.
+  if (page == 0u) return texelFetch(cm_cells[0], texel);
+#if CM_PAGES > 2
+  if (page == 1u) return texelFetch(cm_cells[1], texel);
+#endif
+#if CM_PAGES > 3
+  if (page == 2u) return texelFetch(cm_cells[2], texel);
+#endif
+#if CM_PAGES > 4
+  if (page == 3u) return texelFetch(cm_cells[3], texel);
+#endif
+#if CM_PAGES > 5
+  if (page == 4u) return texelFetch(cm_cells[4], texel);
+#endif
+#if CM_PAGES > 6
+  if (page == 5u) return texelFetch(cm_cells[5], texel);
+#endif
+#if CM_PAGES > 7
+  if (page == 6u) return texelFetch(cm_cells[6], texel);
+#endif
+  return texelFetch(cm_cells[CM_PAGES - 1], texel);
+#endif
+}
+
+uint cm_tree(uint node) {
+  uvec4 words = texelFetch(cm_tree_words, int(node >> 2));
+  return cm_link(words, node & 3u);
+}
+
+uint cm_root_leaf(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].x : cm_roots[root >> 1].z; }
+uint cm_root_node(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].y : cm_roots[root >> 1].w; }
+#elif CM_MARCH == 1
+layout(binding = 13) uniform sampler3D cm_voxels;
+float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(cm.box_min.xyz), 0).x; }
+#else
+layout(binding = 13) uniform samplerBuffer cm_brick_values;
+layout(binding = 14) uniform usampler3D cm_brick_slots;
+uint cm_brick_slot(ivec3 brick) {
+  return texelFetch(cm_brick_slots, brick - (ivec3(cm.box_min.xyz) >> 3), 0).x;
+}
+float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * 512u + index)).x; }
+#endif

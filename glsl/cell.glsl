@@ -1,0 +1,186 @@
+// A cell of the bisected cube: its shape, its record, its children, its faces.
+// Shared by GLSL and C++.
+//
+// Every cell is, in a frame of its own (origin at its vertex v0, axes a signed permutation of the cube's, unit
+// 2^exponent voxels), one of three tetrahedra:
+//
+//   class 0 (A)  v0 (0,0,0)  v1 (2,0,0)  v2 (1,1,0)  v3 (1,1,1)   refinement edge: cube edge
+//   class 1 (B)  v0 (0,0,0)  v1 (1,1,1)  v2 (1,1,0)  v3 (1,0,0)   refinement edge: body diagonal
+//   class 2 (C)  v0 (0,0,0)  v1 (2,2,0)  v2 (2,0,0)  v3 (1,1,1)   refinement edge: face diagonal
+//
+// v0 v1 is always the longest edge, which bisection cuts in half. All three lie in 0 <= z <= y <= x and differ
+// only in the fourth face, the cap: x + y <= 2 (A), x <= 1 (B), x + z <= 2 (C). 3 classes x 48 frames are the 144
+// shapes of design.md section 2. Faces are numbered 0: z >= 0, 1: x >= y, 2: y >= z, 3: the cap.
+//
+// Shape word, 16 bits: 0-2 sign of frame axes x, y, z; 3-4, 5-6, 7-8 cube axis behind frame axis x, y, z;
+// 9-10 class; 11-15 exponent.
+#ifndef CM_CELL_GLSL
+#define CM_CELL_GLSL
+
+#define CM_NONE 0xffffffffu
+
+CM_FN uint cm_shape_class(uint shape) { return (shape >> 9) & 3u; }
+CM_FN uint cm_shape_exponent(uint shape) { return (shape >> 11) & 31u; }
+// 2^exponent and 2^-exponent, exactly.
+CM_FN float cm_shape_unit(uint shape) { return uintBitsToFloat((127u + cm_shape_exponent(shape)) << 23); }
+CM_FN float cm_shape_inverse_unit(uint shape) { return uintBitsToFloat((127u - cm_shape_exponent(shape)) << 23); }
+
+CM_FN float cm_pick(vec3 v, uint axis) { return axis == 0u ? v.x : (axis == 1u ? v.y : v.z); }
+CM_FN float cm_signed(float value, uint sign_bit) {
+  return uintBitsToFloat(floatBitsToUint(value) ^ ((sign_bit & 1u) << 31));
+}
+
+// A cube-space vector in the cell's frame (not scaled): exact.
+CM_FN vec3 cm_to_frame(vec3 v, uint shape) {
+  return vec3(cm_signed(cm_pick(v, (shape >> 3) & 3u), shape), cm_signed(cm_pick(v, (shape >> 5) & 3u), shape >> 1),
+              cm_signed(cm_pick(v, (shape >> 7) & 3u), shape >> 2));
+}
+
+// The inverse of cm_to_frame.
+CM_FN vec3 cm_from_frame(vec3 v, uint shape) {
+  float x = cm_signed(v.x, shape);
+  float y = cm_signed(v.y, shape >> 1);
+  float z = cm_signed(v.z, shape >> 2);
+  uint px = (shape >> 3) & 3u;
+  uint py = (shape >> 5) & 3u;
+  return vec3(px == 0u ? x : (py == 0u ? y : z), px == 1u ? x : (py == 1u ? y : z), px == 2u ? x : (py == 2u ? y : z));
+}
+
+// Vertex i in the frame, in units.
+CM_FN vec3 cm_frame_vertex(uint cell_class, uint i) {
+  if (i == 0u) return vec3(0.0f, 0.0f, 0.0f);
+  if (cell_class == 0u) return vec3(i == 1u ? 2.0f : 1.0f, i == 1u ? 0.0f : 1.0f, i == 3u ? 1.0f : 0.0f);
+  if (cell_class == 1u) return vec3(1.0f, i == 3u ? 0.0f : 1.0f, i == 1u ? 1.0f : 0.0f);
+  return vec3(i == 3u ? 1.0f : 2.0f, i == 1u ? 2.0f : (i == 2u ? 0.0f : 1.0f), i == 3u ? 1.0f : 0.0f);
+}
+
+// Middle of the refinement edge in the frame, in units.
+CM_FN vec3 cm_frame_midpoint(uint cell_class) {
+  if (cell_class == 0u) return vec3(1.0f, 0.0f, 0.0f);
+  if (cell_class == 1u) return vec3(0.5f, 0.5f, 0.5f);
+  return vec3(1.0f, 1.0f, 0.0f);
+}
+
+// Centre of gravity in the frame, in units.
+CM_FN vec3 cm_frame_centroid(uint cell_class) {
+  return vec3(cell_class == 0u ? 1.0f : (cell_class == 1u ? 0.75f : 1.25f), cell_class == 2u ? 0.75f : 0.5f, 0.25f);
+}
+
+CM_FN vec3 cm_cell_vertex(vec3 v0, uint shape, uint i) {
+  return v0 + cm_from_frame(cm_frame_vertex(cm_shape_class(shape), i) * cm_shape_unit(shape), shape);
+}
+
+// The shape of child 0 (which keeps v0 and the frame) or child 1 (whose v0 is the parent's v1).
+//   A -> B: child 1 flips x.   B -> C, half the unit: child 1 has axes (-z, -y, -x).   C -> A: child 1 has (-y, -x, z).
+CM_FN uint cm_child_shape(uint shape, uint child) {
+  uint cell_class = cm_shape_class(shape);
+  uint frame = shape & 0x1ffu;
+  if (child == 1u) {
+    uint sx = frame & 1u;
+    uint sy = (frame >> 1) & 1u;
+    uint sz = (frame >> 2) & 1u;
+    uint px = (frame >> 3) & 3u;
+    uint py = (frame >> 5) & 3u;
+    uint pz = (frame >> 7) & 3u;
+    if (cell_class == 0u) {
+      frame = frame ^ 1u;
+    } else if (cell_class == 1u) {
+      frame = (1u - sz) | ((1u - sy) << 1) | ((1u - sx) << 2) | (pz << 3) | (py << 5) | (px << 7);
+    } else {
+      frame = (1u - sy) | ((1u - sx) << 1) | (sz << 2) | (py << 3) | (px << 5) | (pz << 7);
+    }
+  }
+  uint exponent = cm_shape_exponent(shape) - (cell_class == 1u ? 1u : 0u);
+  uint child_class = cell_class == 2u ? 0u : cell_class + 1u;
+  return frame | (child_class << 9) | (exponent << 11);
+}
+
+// Whether a point (relative to v0, in the frame, in units) lies on child 1's side of the bisecting plane:
+// x = 1 (A), x + z = 1 (B), x + y = 2 (C).
+CM_FN bool cm_on_child_1(uint cell_class, vec3 p) {
+  if (cell_class == 0u) return p.x > 1.0f;
+  if (cell_class == 1u) return p.x + p.z > 1.0f;
+  return p.x + p.y > 2.0f;
+}
+
+// Which of the control cube's 24 cells holds p, for a cube [0, 2 half]^3: 4 * cube face + edge of that face.
+CM_FN uint cm_root_of(vec3 p, float half_size) {
+  vec3 r = p - vec3(half_size, half_size, half_size);
+  vec3 a = abs(r);
+  uint axis = a.x >= a.y && a.x >= a.z ? 0u : (a.y >= a.z ? 1u : 2u);
+  uint axis_1 = axis == 0u ? 1u : 0u;
+  uint axis_2 = axis == 2u ? 1u : 2u;
+  float r_1 = cm_pick(r, axis_1);
+  float r_2 = cm_pick(r, axis_2);
+  bool first = abs(r_1) >= abs(r_2);
+  uint edge = first ? (r_1 >= 0.0f ? 1u : 0u) : (r_2 >= 0.0f ? 3u : 2u);
+  return axis * 8u + (cm_pick(r, axis) >= 0.0f ? 4u : 0u) + edge;
+}
+
+// Root cell number r: v0 and shape. Its face centre is on cube face (r / 4), its edge on side (r % 4) of that face.
+CM_FN void cm_root_cell(uint root, uint exponent, CM_OUT(vec3) v0, CM_OUT(uint) shape) {
+  uint axis = root / 8u;
+  uint axis_1 = axis == 0u ? 1u : 0u;
+  uint axis_2 = axis == 2u ? 1u : 2u;
+  bool high = (root & 4u) != 0u;
+  bool first = (root & 2u) == 0u;
+  bool edge_high = (root & 1u) != 0u;
+  uint across = first ? axis_1 : axis_2;
+  uint along = first ? axis_2 : axis_1;
+  float size = 2.0f * uintBitsToFloat((127u + exponent) << 23);
+  v0 = vec3(0.0f, 0.0f, 0.0f);
+  v0 += (high ? size : 0.0f) * vec3(axis == 0u ? 1.0f : 0.0f, axis == 1u ? 1.0f : 0.0f, axis == 2u ? 1.0f : 0.0f);
+  v0 += (edge_high ? size : 0.0f) *
+        vec3(across == 0u ? 1.0f : 0.0f, across == 1u ? 1.0f : 0.0f, across == 2u ? 1.0f : 0.0f);
+  // Frame: x along the edge, y from the edge to the face's centre, z from there to the cube's.
+  shape = (edge_high ? 2u : 0u) | (high ? 4u : 0u) | (along << 3) | (across << 5) | (axis << 7) | (exponent << 11);
+}
+
+// The record, 32 bytes: links (4 neighbours across faces 0 to 3, CM_NONE outside) and
+// data: x = v0.x | v0.y << 16, y = v0.z | shape << 16, z = half2(density at the centroid, gradient x),
+// w = half2(gradient y, z); gradient along the frame's axes per unit, density relative to the volume's maximum.
+CM_FN vec3 cm_record_v0(uvec4 data) {
+  return vec3(float(data.x & 0xffffu), float(data.x >> 16), float(data.y & 0xffffu));
+}
+CM_FN uint cm_record_shape(uvec4 data) { return data.y >> 16; }
+
+// Where a ray leaves a cell: o, d and t in cube space. t_exit is the smallest (c - n.o) / (n.d) over the faces with
+// n.d > 0, each rounded the same way from both sides, so neighbours agree bit for bit; face is CM_NONE for a ray
+// that leaves through no face (d = 0).
+CM_FN void cm_cell_exit(vec3 v0, uint shape, vec3 o, vec3 d, CM_OUT(float) t_exit, CM_OUT(uint) face) {
+  vec3 fa = cm_to_frame(v0, shape);
+  vec3 fo = cm_to_frame(o, shape);
+  vec3 fd = cm_to_frame(d, shape);
+  uint cell_class = cm_shape_class(shape);
+  float unit = cm_shape_unit(shape);
+  float cap_a = cell_class == 0u ? fa.y : (cell_class == 2u ? fa.z : 0.0f);
+  float cap_o = cell_class == 0u ? fo.y : (cell_class == 2u ? fo.z : 0.0f);
+  float cap_d = cell_class == 0u ? fd.y : (cell_class == 2u ? fd.z : 0.0f);
+  float far_away = 3.0e38f;
+  float n_d_0 = -fd.z;
+  float n_d_1 = fd.y - fd.x;
+  float n_d_2 = fd.z - fd.y;
+  float n_d_3 = fd.x + cap_d;
+  float t_0 = n_d_0 > 0.0f ? (fo.z - fa.z) / n_d_0 : far_away;
+  float t_1 = n_d_1 > 0.0f ? ((fa.y - fa.x) - (fo.y - fo.x)) / n_d_1 : far_away;
+  float t_2 = n_d_2 > 0.0f ? ((fa.z - fa.y) - (fo.z - fo.y)) / n_d_2 : far_away;
+  float cap_c = (fa.x + cap_a) + (cell_class == 1u ? unit : 2.0f * unit);
+  float t_3 = n_d_3 > 0.0f ? (cap_c - (fo.x + cap_o)) / n_d_3 : far_away;
+  t_exit = min(min(t_0, t_1), min(t_2, t_3));
+  face = t_exit >= far_away ? CM_NONE : (t_exit == t_0 ? 0u : (t_exit == t_1 ? 1u : (t_exit == t_2 ? 2u : 3u)));
+}
+
+CM_FN uint cm_link(uvec4 links, uint face) {
+  return face == 0u ? links.x : (face == 1u ? links.y : (face == 2u ? links.z : (face == 3u ? links.w : CM_NONE)));
+}
+
+// Density (relative) at o + t d, as a linear function of t: value at t = 0 in x, slope in y.
+CM_FN vec2 cm_cell_density(uvec4 data, vec3 v0, uint shape, vec3 o, vec3 d) {
+  vec2 low = unpackHalf2x16(data.z);
+  vec2 high = unpackHalf2x16(data.w);
+  vec3 gradient = vec3(low.y, high.x, high.y) * cm_shape_inverse_unit(shape);
+  vec3 from_centroid = cm_to_frame(o - v0, shape) - cm_frame_centroid(cm_shape_class(shape)) * cm_shape_unit(shape);
+  return vec2(low.x + dot(gradient, from_centroid), dot(gradient, cm_to_frame(d, shape)));
+}
+
+#endif

@@ -1,0 +1,57 @@
+// March through the tetrahedral grid. Shared by GLSL and C++; the includer provides
+//   uvec4 cm_record(uint cell, uint part)   part 0: links, part 1: data (glsl/cell.glsl)
+//   uint cm_tree(uint node)                 the point-location tree
+//   uint cm_root_leaf(uint root), uint cm_root_node(uint root)
+#ifndef CM_MARCH_TET_GLSL
+#define CM_MARCH_TET_GLSL
+
+// Point location: descends the bisection, O(level).
+CM_FN uvec3 cm_march_enter(vec3 p) {
+  float half_size = uintBitsToFloat((127u + cm.cube.x) << 23);
+  uint root = cm_root_of(p, half_size);
+  vec3 v0;
+  uint shape;
+  cm_root_cell(root, cm.cube.x, v0, shape);
+  uint leaf = cm_root_leaf(root);
+  uint node = cm_root_node(root);
+  uint inside = cm_root_node(root + 1u) - node;
+  for (int level = 0; level < 64 && inside > 0u; ++level) {
+    uint left = cm_tree(node);
+    bool second =
+        cm_on_child_1(cm_shape_class(shape), cm_to_frame(p - v0, shape) * cm_shape_inverse_unit(shape));
+    if (second) {
+      v0 = cm_cell_vertex(v0, shape, 1u);
+      leaf += left + 1u;
+      node += left + 1u;
+      inside -= left + 1u;
+    } else {
+      node += 1u;
+      inside = left;
+    }
+    shape = cm_child_shape(shape, second ? 1u : 0u);
+  }
+  return uvec3(leaf, 0u, CM_NONE);
+}
+
+CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT(float) t_1, CM_OUT(float) r_0,
+                         CM_OUT(float) r_1, CM_OUT(uvec3) next) {
+  uvec4 links = cm_record(cell.x, 0u);
+  uvec4 data = cm_record(cell.x, 1u);
+  vec3 v0 = cm_record_v0(data);
+  uint shape = cm_record_shape(data);
+  float t_exit;
+  uint face;
+  cm_cell_exit(v0, shape, o, d, t_exit, face);
+  t_1 = max(t, t_exit);
+#if CM_LINEAR
+  vec2 density = cm_cell_density(data, v0, shape, o, d);
+  r_0 = max(0.0f, density.x + density.y * t);
+  r_1 = max(0.0f, density.x + density.y * t_1);
+#else
+  r_0 = unpackHalf2x16(data.z).x;
+  r_1 = r_0;
+#endif
+  next = uvec3(cm_link(links, face), 0u, CM_NONE);
+}
+
+#endif

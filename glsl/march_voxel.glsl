@@ -1,0 +1,76 @@
+// The two opponents: a 3D DDA over every voxel (Amanatides and Woo 1987), and the same with empty 8^3 bricks skipped.
+// A cell is a voxel of cube space: x | y << 16, z, and (bricks) the slot of its brick, CM_NONE if not looked up yet.
+// Shared by GLSL and C++; the includer provides
+//   float cm_voxel(ivec3 voxel)                   dense: density of a voxel of the box
+//   uint cm_brick_slot(ivec3 brick)               bricks: slot of a brick of the box, CM_EMPTY_BRICK if it is empty
+//   float cm_brick_voxel(uint slot, uint index)   bricks: density; index = (x * 8 + y) * 8 + z
+#ifndef CM_MARCH_VOXEL_GLSL
+#define CM_MARCH_VOXEL_GLSL
+
+#define CM_EMPTY_BRICK 0xfffffffeu
+
+CM_FN ivec3 cm_voxel_of(uvec3 cell) { return ivec3(int(cell.x & 0xffffu), int(cell.x >> 16), int(cell.y)); }
+
+CM_FN uvec3 cm_voxel_cell(ivec3 v, uint slot) { return uvec3(uint(v.x) | (uint(v.y) << 16), uint(v.z), slot); }
+
+CM_FN uvec3 cm_march_enter(vec3 p) {
+  ivec3 low = ivec3(cm.box_min.xyz);
+  ivec3 high = ivec3(cm.box_max.xyz) - ivec3(1, 1, 1);
+  return cm_voxel_cell(clamp(ivec3(floor(p)), low, high), CM_NONE);
+}
+
+CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT(float) t_1, CM_OUT(float) r_0,
+                         CM_OUT(float) r_1, CM_OUT(uvec3) next) {
+  ivec3 voxel = cm_voxel_of(cell);
+  ivec3 low = voxel;
+  int size = 1;
+#if CM_MARCH == 2
+  uint slot = cell.z;
+  if (slot == CM_NONE) slot = cm_brick_slot(voxel >> 3);
+  bool empty = slot == CM_EMPTY_BRICK;
+  if (empty) {
+    low = voxel & ivec3(~7, ~7, ~7);
+    size = 8;
+  }
+  float density = 0.0f;
+  if (!empty) {
+    density = cm_brick_voxel(slot, uint(((voxel.x & 7) << 6) | ((voxel.y & 7) << 3) | (voxel.z & 7)));
+  }
+#else
+  float density = cm_voxel(voxel);
+#endif
+  // The plane that the ray meets on each axis, from the integer, so that both sides agree; axis of the nearest.
+  vec3 plane = vec3(float(low.x + (d.x > 0.0f ? size : 0)), float(low.y + (d.y > 0.0f ? size : 0)),
+                    float(low.z + (d.z > 0.0f ? size : 0)));
+  float t_x = d.x != 0.0f ? (plane.x - o.x) * inv_d.x : 3.0e38f;
+  float t_y = d.y != 0.0f ? (plane.y - o.y) * inv_d.y : 3.0e38f;
+  float t_z = d.z != 0.0f ? (plane.z - o.z) * inv_d.z : 3.0e38f;
+  float t_exit = min(t_x, min(t_y, t_z));
+  t_1 = max(t, t_exit);
+  r_0 = density;
+  r_1 = density;
+  ivec3 v = voxel;
+#if CM_MARCH == 2
+  if (empty) v = clamp(ivec3(floor(o + t_1 * d)), low, low + ivec3(7, 7, 7));
+#endif
+  if (t_exit == t_x) {
+    v.x = d.x > 0.0f ? low.x + size : low.x - 1;
+  } else if (t_exit == t_y) {
+    v.y = d.y > 0.0f ? low.y + size : low.y - 1;
+  } else {
+    v.z = d.z > 0.0f ? low.z + size : low.z - 1;
+  }
+  ivec3 box_low = ivec3(cm.box_min.xyz);
+  ivec3 box_high = ivec3(cm.box_max.xyz);
+  bool outside = v.x < box_low.x || v.y < box_low.y || v.z < box_low.z || v.x >= box_high.x || v.y >= box_high.y ||
+                 v.z >= box_high.z;
+#if CM_MARCH == 2
+  bool same = (v.x >> 3) == (voxel.x >> 3) && (v.y >> 3) == (voxel.y >> 3) && (v.z >> 3) == (voxel.z >> 3);
+  next = cm_voxel_cell(v, same ? slot : CM_NONE);
+#else
+  next = cm_voxel_cell(v, CM_NONE);
+#endif
+  if (outside) next.x = CM_NONE;
+}
+
+#endif

@@ -1,0 +1,37 @@
+// Everything a trace needs beside the buffers: a std140 block, and the same struct in C++ (all members are 16 bytes).
+#ifndef CM_PARAMETERS_GLSL
+#define CM_PARAMETERS_GLSL
+
+#ifdef __cplusplus
+struct CmParameters {
+#else
+layout(std140, binding = 0) uniform CmParameters {
+#endif
+  vec4 eye;             // cube space
+  vec4 forward;         // world space; with right and up spans the image plane at distance 1
+  vec4 right;           // scaled by the tangent of half the horizontal field of view
+  vec4 up;              // likewise, vertical
+  vec4 to_cube_x;       // columns of the linear part of world to cube space
+  vec4 to_cube_y;
+  vec4 to_cube_z;
+  vec4 box_min;         // cube space: no density outside
+  vec4 box_max;
+  vec4 sun_world;       // unit vector towards the sun
+  vec4 sun_cube;
+  vec4 sun_irradiance;
+  vec4 sky_radiance;
+  vec4 albedo;
+  vec4 medium;          // x: extinction of density 1, 1 / world unit; y: anisotropy; z: probability of next-event
+                        // estimation towards the sky (the sun has the rest)
+  uvec4 image;          // width, height, seed, target samples
+  uvec4 tile;           // x, y, width, height
+  uvec4 march;          // x: iterations a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of cells a page,
+                        // w: 1 where a pass begins
+  uvec4 cube;           // x: exponent of the root cells, y: number of cells, z: number of tree nodes, w: levels
+#ifdef __cplusplus
+};
+#else
+} cm;
+#endif
+
+#endif

@@ -1,0 +1,30 @@
+// Henyey-Greenstein phase function. Shared by GLSL and C++. Cosines are between the directions of flight before and
+// after, so g > 0 scatters forward; the function integrates to 1 over the sphere.
+#ifndef CM_PHASE_GLSL
+#define CM_PHASE_GLSL
+
+CM_FN float cm_phase(float g, float cosine) {
+  float d = 1.0f + g * g - 2.0f * g * cosine;
+  return 0.0795774715f * (1.0f - g * g) / (d * sqrt(d));
+}
+
+// Cosine with density 2 pi cm_phase(g, .), by inversion.
+CM_FN float cm_phase_cosine(float g, float u) {
+  if (abs(g) < 1e-3f) return 1.0f - 2.0f * u;
+  float s = (1.0f - g * g) / (1.0f - g + 2.0f * g * u);
+  return clamp((1.0f + g * g - s * s) / (2.0f * g), -1.0f, 1.0f);
+}
+
+// Unit vector at the cosine and angle around unit vector w. Frame: Duff et al., "Building an Orthonormal Basis,
+// Revisited", JCGT 6(1), 2017.
+CM_FN vec3 cm_around(vec3 w, float cosine, float angle) {
+  float sign_z = w.z >= 0.0f ? 1.0f : -1.0f;
+  float a = -1.0f / (sign_z + w.z);
+  float b = w.x * w.y * a;
+  vec3 u = vec3(1.0f + sign_z * w.x * w.x * a, sign_z * b, -sign_z * w.x);
+  vec3 v = vec3(b, sign_z + w.y * w.y * a, -w.y);
+  float sine = sqrt(max(0.0f, 1.0f - cosine * cosine));
+  return normalize(u * (sine * cos(angle)) + v * (sine * sin(angle)) + w * cosine);
+}
+
+#endif

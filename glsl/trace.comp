@@ -1,0 +1,102 @@
+#version 450
+// One lane a pixel of the tile: loads its path, runs it for a bounded number of steps, stores it.
+// variant: CM_MARCH=0 CM_LINEAR=0 CM_PAGES=1
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8
+// variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1
+// variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#include "shared.glsl"
+#include "parameters.glsl"
+#include "cell.glsl"
+#include "random.glsl"
+#include "phase.glsl"
+#include "buffers.glsl"
+#if CM_MARCH == 0
+#include "march_tet.glsl"
+#else
+#include "march_voxel.glsl"
+#endif
+#include "path.glsl"
+
+layout(std430, binding = 0) buffer CmPaths { uvec4 cm_paths[]; };  // 8 planes of one word-quad a lane
+layout(std430, binding = 1) buffer CmCounter { uint cm_unfinished; };
+layout(rgba32f, binding = 0) uniform image2D cm_sum;
+layout(rg32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps
+
+uvec4 cm_pack(vec3 v, uint w) { return uvec4(floatBitsToUint(v), w); }
+
+void main() {
+  uvec2 local = gl_GlobalInvocationID.xy;
+  if (local.x >= cm.tile.z || local.y >= cm.tile.w) return;
+  uint lanes = cm.tile.z * cm.tile.w;
+  uint lane = local.y * cm.tile.z + local.x;
+  uvec2 pixel = cm.tile.xy + local;
+  ivec2 texel = ivec2(pixel);
+
+  CmPath p;
+  if (cm.march.w != 0u) {
+    // A pass begins: every pixel goes on from the samples it has.
+    uvec4 counts = imageLoad(cm_counts, texel);
+    p.samples = counts.x;
+    p.steps = counts.y;
+    p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
+    p.o = vec3(0.0);
+    p.t = 0.0;
+    p.d = vec3(0.0);
+    p.depth = 0.0;
+    p.w = vec3(0.0);
+    p.depth_0 = 0.0;
+    p.throughput = vec3(0.0);
+    p.radiance = vec3(0.0);
+    p.bounce = 0u;
+    p.light = vec3(0.0);
+    p.random = 0u;
+    p.cell = uvec3(0u);
+    p.stream = 0u;
+    p.home = uvec2(0u);
+  } else {
+    uvec4 a3 = cm_paths[3u * lanes + lane];
+    p.mode = a3.w;
+    if (p.mode == CM_MODE_DONE) return;
+    uvec4 a0 = cm_paths[lane];
+    uvec4 a1 = cm_paths[lanes + lane];
+    uvec4 a2 = cm_paths[2u * lanes + lane];
+    uvec4 a4 = cm_paths[4u * lanes + lane];
+    uvec4 a5 = cm_paths[5u * lanes + lane];
+    uvec4 a6 = cm_paths[6u * lanes + lane];
+    uvec4 a7 = cm_paths[7u * lanes + lane];
+    p.o = uintBitsToFloat(a0.xyz);
+    p.t = uintBitsToFloat(a0.w);
+    p.d = uintBitsToFloat(a1.xyz);
+    p.depth = uintBitsToFloat(a1.w);
+    p.w = uintBitsToFloat(a2.xyz);
+    p.depth_0 = uintBitsToFloat(a2.w);
+    p.throughput = uintBitsToFloat(a3.xyz);
+    p.radiance = uintBitsToFloat(a4.xyz);
+    p.bounce = a4.w;
+    p.light = uintBitsToFloat(a5.xyz);
+    p.random = a5.w;
+    p.cell = uvec3(a6.xy, CM_NONE);
+    p.stream = a6.w;
+    p.home = a7.xy;
+    p.samples = a7.z;
+    p.steps = a7.w;
+  }
+
+  vec4 sum = imageLoad(cm_sum, texel);
+  cm_run(p, pixel, cm.march.x, sum);
+  imageStore(cm_sum, texel, sum);
+  imageStore(cm_counts, texel, uvec4(p.samples, p.steps, 0u, 0u));
+
+  cm_paths[lane] = cm_pack(p.o, floatBitsToUint(p.t));
+  cm_paths[lanes + lane] = cm_pack(p.d, floatBitsToUint(p.depth));
+  cm_paths[2u * lanes + lane] = cm_pack(p.w, floatBitsToUint(p.depth_0));
+  cm_paths[3u * lanes + lane] = cm_pack(p.throughput, p.mode);
+  cm_paths[4u * lanes + lane] = cm_pack(p.radiance, p.bounce);
+  cm_paths[5u * lanes + lane] = cm_pack(p.light, p.random);
+  cm_paths[6u * lanes + lane] = uvec4(p.cell.xy, 0u, p.stream);
+  cm_paths[7u * lanes + lane] = uvec4(p.home, p.samples, p.steps);
+  if (p.mode != CM_MODE_DONE) atomicAdd(cm_unfinished, 1u);
+}

@@ -1,0 +1,72 @@
+#include "gl/api.hpp"
+
+#include "base/error.hpp"
+
+namespace cumulet::gl {
+
+namespace {
+
+struct Loader {
+  void* (*get_proc)(void* user, const char* name);
+  void* user;
+};
+
+GLADapiproc load_one(void* loader, const char* name) {
+  const auto* l = static_cast<const Loader*>(loader);
+  return reinterpret_cast<GLADapiproc>(l->get_proc(l->user, name));
+}
+
+}  // namespace
+
+std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user) {
+  auto gl = std::make_shared<Functions>();
+  Loader loader{get_proc, user};
+  const int version = gladLoadGLContextUserPtr(gl.get(), load_one, &loader);
+  if (version == 0) {
+    throw Error(ErrorCode::unsupported, "no OpenGL: get_proc gave no glGetString, or no context is current");
+  }
+  if (version < GLAD_MAKE_VERSION(4, 5)) {
+    throw Error(ErrorCode::unsupported, "OpenGL 4.5 is needed; the context has " +
+                                            std::to_string(GLAD_VERSION_MAJOR(version)) + "." +
+                                            std::to_string(GLAD_VERSION_MINOR(version)));
+  }
+  if (gl->DispatchCompute == nullptr || gl->CreateBuffers == nullptr || gl->TextureBuffer == nullptr) {
+    throw Error(ErrorCode::unsupported, "the context says OpenGL 4.5 but get_proc lacks functions of it");
+  }
+  return gl;
+}
+
+Limits query_limits(const Functions& gl) {
+  Limits limits;
+  GLint64 value = 0;
+  gl.GetInteger64v(GL_MAX_TEXTURE_BUFFER_SIZE, &value);
+  limits.texture_buffer_texels = value;
+  gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &value);
+  limits.storage_block_bytes = value;
+  gl.GetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &limits.texture_size_3d);
+  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &limits.texture_size_2d);
+  return limits;
+}
+
+void check(const Functions& gl, const char* step) {
+  const GLenum first = gl.GetError();
+  if (first == GL_NO_ERROR) return;
+  clear_errors(gl);
+  if (first == GL_OUT_OF_MEMORY) {
+    throw Error(ErrorCode::out_of_memory, std::string("the GL driver is out of memory: ") + step);
+  }
+  throw Error(ErrorCode::gl, "GL error " + std::to_string(first) + ": " + step);
+}
+
+void clear_errors(const Functions& gl) {
+  // A lost context may report errors for ever.
+  for (int i = 0; i < 64 && gl.GetError() != GL_NO_ERROR; ++i) {
+  }
+}
+
+std::string string_of(const Functions& gl, GLenum name) {
+  const GLubyte* text = gl.GetString(name);
+  return text == nullptr ? std::string() : reinterpret_cast<const char*>(text);
+}
+
+}  // namespace cumulet::gl

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <glad/gl.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace cumulet::gl {
+
+/// The GL function table of one instance, loaded through the host's callback. Nothing is linked.
+using Functions = GladGLContext;
+
+/// What the library needs of the context's limits.
+struct Limits {
+  std::int64_t texture_buffer_texels = 0;
+  std::int64_t storage_block_bytes = 0;
+  int texture_size_3d = 0;
+  int texture_size_2d = 0;
+};
+
+/// Loads the table and checks version 4.5 and compute. Throws Error(unsupported) that says what is missing.
+std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user);
+Limits query_limits(const Functions& gl);
+
+/// Takes all pending GL errors; throws Error(out_of_memory or gl) that names the step.
+void check(const Functions& gl, const char* step);
+/// Drops errors that were pending before we came.
+void clear_errors(const Functions& gl);
+
+/// The GL name of a context string, "" if the driver gives none.
+std::string string_of(const Functions& gl, GLenum name);
+
+}  // namespace cumulet::gl

@@ -1,0 +1,26 @@
+#include "grid/cube.hpp"
+
+#include <algorithm>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "base/error.hpp"
+
+namespace cumulet::grid {
+
+Cube fit_cube(const volume::ScalarVolume& volume) {
+  Cube cube;
+  std::int64_t extent = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    cube.origin[axis] = volume.bounds_min[axis] & ~(volume::brick_size - 1);
+    extent = std::max<std::int64_t>(extent, std::int64_t{volume.bounds_max[axis]} - cube.origin[axis] + 1);
+  }
+  while ((std::int64_t{1} << cube.log2_size) < extent) ++cube.log2_size;
+  if (cube.log2_size > Cube::max_log2_size) {
+    throw Error(ErrorCode::unsupported, "grid '" + volume.name + "' is " + std::to_string(extent) +
+                                            " voxels wide; the limit is " + std::to_string(1 << Cube::max_log2_size));
+  }
+  cube.to_world = volume.index_to_world * glm::translate(glm::dmat4(1.0), glm::dvec3(cube.origin) - 0.5);
+  return cube;
+}
+
+}  // namespace cumulet::grid

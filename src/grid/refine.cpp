@@ -1,0 +1,372 @@
+#include "grid/refine.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/combinable.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <vector>
+
+#include "grid/cell.hpp"
+
+namespace cumulet::grid {
+
+namespace {
+
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+int trailing_zeros(const ivec3& v) { return std::countr_zero(static_cast<unsigned>(v.x | v.y | v.z)); }
+
+// A positive float's high half sorts like the float: 7 bits of mantissa, steps under one percent.
+std::uint16_t quantize(double squared) {
+  const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(squared));
+  return static_cast<std::uint16_t>(std::max<std::uint32_t>(bits >> 16U, 1));
+}
+
+// World length of the refinement edge of every shape, by class and frame: |M edge|.
+class EdgeLengths {
+ public:
+  explicit EdgeLengths(const glm::dmat4& to_world) : linear_(to_world) {}
+  [[nodiscard]] double operator()(std::uint32_t shape) const {
+    return glm::length(linear_ * dvec3(core::cm_cell_vertex(vec3(0.0F), shape, 1)));
+  }
+
+ private:
+  glm::dmat3 linear_;
+};
+
+// The criterion's squared value for a cell.
+class Measure {
+ public:
+  Measure(const Statistics& statistics, const RefineSettings& settings)
+      : settings_(&settings), mean_depth_(statistics.mean_optical_depth()) {
+    threshold_ = settings.threshold < 0.0 ? 0.0 : settings.threshold;
+  }
+
+  [[nodiscard]] double threshold_squared() const { return threshold_ * threshold_; }
+
+  // b: covariance of position and density in the frame, per unit.
+  [[nodiscard]] double squared(std::uint32_t shape, double mean, double variance, const dvec3& covariance, float min,
+                               float max, double edge) const {
+    if (min >= max) return 0.0;
+    if (settings_->criterion == Criterion::range_mean) {
+      const double ratio = (double(max) - min) / mean;
+      return ratio * ratio;
+    }
+    const double scale = edge * edge / (mean_depth_ * mean_depth_);
+    if (variance * scale <= threshold_squared()) return 0.0;  // the fit only lowers it
+    if (settings_->cells == CellKind::linear) {
+      variance = std::max(0.0, variance - fit_linear(core::cm_shape_class(shape), covariance, mean).explained);
+    }
+    return variance * scale;
+  }
+
+ private:
+  const RefineSettings* settings_;
+  double mean_depth_;
+  double threshold_;
+};
+
+// What the camera allows: the shortest world edge worth splitting in a sphere, or none at all.
+class CameraLimit {
+ public:
+  explicit CameraLimit(const RefineSettings& settings) : settings_(&settings) {
+    if (!settings.camera) return;
+    const RefineCamera& c = *settings.camera;
+    const auto side = [&](const dvec3& axis, double tangent) {
+      planes_.push_back(glm::normalize(c.forward * tangent - axis));
+    };
+    side(c.right, c.tan_half_x);
+    side(-c.right, c.tan_half_x);
+    side(c.up, c.tan_half_y);
+    side(-c.up, c.tan_half_y);
+  }
+
+  // Infinity: no split. 0: no limit.
+  [[nodiscard]] double shortest_edge(const dvec3& centre, double radius) const {
+    if (!settings_->camera) return 0.0;
+    const dvec3 to = centre - settings_->camera->eye;
+    for (const dvec3& plane : planes_) {
+      if (glm::dot(plane, to) < -radius) return std::numeric_limits<double>::infinity();
+    }
+    const double distance = std::max(0.0, glm::length(to) - radius);
+    return settings_->pixel_size * distance / settings_->camera->pixels_per_radian;
+  }
+
+ private:
+  const RefineSettings* settings_;
+  std::vector<dvec3> planes_;
+};
+
+dvec3 frame_covariance(const Moments& m, const vec3& v0, std::uint32_t shape) {
+  const std::uint32_t cell_class = core::cm_shape_class(shape);
+  const float unit = core::cm_shape_unit(shape);
+  const dvec3 centroid = dvec3(v0) + dvec3(core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape));
+  const dvec3 covariance = m.first / m.volume - centroid * m.mean();
+  return dvec3(core::cm_to_frame(vec3(covariance), shape)) / double(unit);
+}
+
+ivec3 midpoint(const vec3& v0, std::uint32_t shape) {
+  return ivec3(v0 + core::cm_from_frame(core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape),
+                                        shape));
+}
+
+}  // namespace
+
+DiamondSet::Address DiamondSet::address(const ivec3& vertex) {
+  const int scale = trailing_zeros(vertex) / 3;
+  const ivec3 lattice = vertex >> (3 * scale);
+  const ivec3 corner = lattice >> 3;
+  const ivec3 local = lattice & 7;
+  const std::uint64_t key = (std::uint64_t(scale) << 60U) | (std::uint64_t(std::uint32_t(corner.x)) << 40U) |
+                            (std::uint64_t(std::uint32_t(corner.y)) << 20U) | std::uint32_t(corner.z);
+  return {key, static_cast<unsigned>(local.x * 64 + local.y * 8 + local.z), scale, corner};
+}
+
+void DiamondSet::raise(const ivec3& vertex, std::uint16_t priority) {
+  const Address a = address(vertex);
+  auto found = map_.find(a.key);
+  if (found == map_.end()) {
+    auto block = std::make_unique<Block>();
+    block->scale = a.scale;
+    block->corner = a.corner;
+    found = map_.emplace(a.key, std::move(block)).first;
+  }
+  std::atomic<std::uint16_t>& slot = found->second->priority[a.local];
+  std::uint16_t old = slot.load(std::memory_order_relaxed);
+  while (old < priority && !slot.compare_exchange_weak(old, priority, std::memory_order_relaxed)) {
+  }
+}
+
+bool DiamondSet::is_split(const ivec3& vertex) const {
+  const Address a = address(vertex);
+  const auto found = map_.find(a.key);
+  return found != map_.end() && found->second->priority[a.local].load(std::memory_order_relaxed) >= cut_;
+}
+
+bool DiamondCursor::is_split(const ivec3& vertex) {
+  const DiamondSet::Address a = DiamondSet::address(vertex);
+  if (a.key != key_) {
+    const auto found = set_->map_.find(a.key);
+    key_ = a.key;
+    block_ = found == set_->map_.end() ? nullptr : found->second.get();
+  }
+  return block_ != nullptr && block_->priority[a.local].load(std::memory_order_relaxed) >= set_->cut_;
+}
+
+DiamondSet::DiamondSet(const Statistics& statistics, const RefineSettings& settings)
+    : log2_size_(statistics.cube().log2_size) {
+  const Measure measure(statistics, settings);
+  const EdgeLengths edge_length(statistics.cube().to_world);
+  const CameraLimit camera(settings);
+  const glm::dmat4& to_world = statistics.cube().to_world;
+  const auto world = [&](const dvec3& p) { return dvec3(to_world * glm::dvec4(p, 1.0)); };
+  const double threshold = measure.threshold_squared();
+  // A node's bounding sphere: half its world diagonal, the longest of four.
+  double unit_radius = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    const dvec3 diagonal(1.0, (i & 1) != 0 ? -1.0 : 1.0, (i & 2) != 0 ? -1.0 : 1.0);
+    unit_radius = std::max(unit_radius, 0.5 * glm::length(glm::dmat3(to_world) * diagonal));
+  }
+  const auto limit_of = [&](const Statistics::Node& node) {
+    const double size = 1 << node.log2_size;
+    return camera.shortest_edge(world(dvec3(node.corner) + 0.5 * size), unit_radius * size);
+  };
+
+  // Inside bricks: 511 cells in each of six trees.
+  const auto& bricks = statistics.nodes_of_size(3);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 16), [&](const auto& range) {
+    const auto sums = std::make_unique<BrickSums>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const Statistics::Node& node = statistics.nodes()[bricks[i]];
+      const double shortest = limit_of(node);
+      for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+        const Moments& whole = statistics.kuhn(node, permutation);
+        if (whole.min >= whole.max) continue;
+        const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
+        sums->compute(statistics.values(node), tree);
+        for (unsigned h = 1; h < 512; ++h) {
+          if (sums->min[h] >= sums->max[h]) continue;
+          const std::uint32_t shape = tree.shape[h];
+          const double edge = edge_length(shape);
+          if (edge < shortest) continue;
+          const double count = 512 >> (std::bit_width(h) - 1);
+          const double shifted_mean = sums->mass[h] / count;
+          const double variance = std::max(0.0, sums->square[h] / count - shifted_mean * shifted_mean);
+          const dvec3 covariance =
+              dvec3(sums->x[h], sums->y[h], sums->z[h]) / count - dvec3(tree.node_centroid[h]) * shifted_mean;
+          const dvec3 in_frame =
+              dvec3(core::cm_to_frame(vec3(covariance), shape)) / double(core::cm_shape_unit(shape));
+          const double squared = measure.squared(shape, sums->reference + shifted_mean, variance, in_frame, sums->min[h],
+                                                 sums->max[h], edge);
+          if (squared > threshold) raise(node.corner + ivec3(tree.midpoint[h]), quantize(squared));
+        }
+      }
+    }
+  });
+
+  // Above bricks: a Kuhn cell (B), its two halves (C) and four quarters (A); then the 24 roots.
+  const auto consider = [&](const vec3& v0, std::uint32_t shape, double shortest) {
+    const Moments m = statistics.moments(v0, shape);
+    const double edge = edge_length(shape);
+    if (edge < shortest) return;
+    const double squared =
+        measure.squared(shape, m.mean(), m.variance(), frame_covariance(m, v0, shape), m.min, m.max, edge);
+    if (squared > threshold) raise(midpoint(v0, shape), quantize(squared));
+  };
+  for (int size = 4; size < log2_size_; ++size) {
+    const auto& level = statistics.nodes_of_size(size);
+    tbb::parallel_for(std::size_t{0}, level.size(), [&](std::size_t i) {
+      const Statistics::Node& node = statistics.nodes()[level[i]];
+      const double shortest = limit_of(node);
+      for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+        const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
+        vec3 v0(node.corner);
+        for (int axis = 0; axis < 3; ++axis) {
+          if (((node.corner[axis] >> size) & 1) != 0) v0[axis] += static_cast<float>(1 << size);
+        }
+        const std::uint32_t shape = frame | (1U << 9U) | (static_cast<std::uint32_t>(size) << 11U);
+        consider(v0, shape, shortest);
+        for (unsigned a = 0; a < 2; ++a) {
+          const std::uint32_t child = core::cm_child_shape(shape, a);
+          const vec3 child_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
+          consider(child_v0, child, shortest);
+          for (unsigned b = 0; b < 2; ++b) {
+            consider(b == 0 ? child_v0 : core::cm_cell_vertex(child_v0, child, 1), core::cm_child_shape(child, b),
+                     shortest);
+          }
+        }
+      }
+    });
+  }
+  const double root_limit = limit_of(statistics.nodes()[0]);
+  if (!statistics.nodes()[0].is_uniform()) {
+    for (unsigned root = 0; root < 24; ++root) {
+      vec3 v0;
+      std::uint32_t shape = 0;
+      core::cm_root_cell(root, static_cast<std::uint32_t>(log2_size_ - 1), v0, shape);
+      consider(v0, shape, root_limit);
+    }
+  }
+  close();
+  choose_cut(settings.max_cells);
+}
+
+std::vector<DiamondSet::Block*> DiamondSet::blocks_of(int scale) const {
+  std::vector<Block*> blocks;
+  for (const auto& [key, block] : map_) {
+    if (block->scale == scale) blocks.push_back(block.get());
+  }
+  return blocks;
+}
+
+void DiamondSet::close() {
+  // From the finest level up: edge middles (A), face middles (C), cube middles (B), then twice the spacing.
+  for (int octave = 0; octave < log2_size_; ++octave) {
+    for (int odd = 1; odd <= 3; ++odd) {
+      if (octave == log2_size_ - 1) break;  // the control cube's own edges: their cells are there from the start
+      close_octave(octave, odd, blocks_of(octave / 3));
+    }
+  }
+}
+
+void DiamondSet::close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks) {
+  const int size = 1 << log2_size_;
+  const int h = 1 << octave;
+  const int step = 1 << (octave % 3);
+  const auto raise_inside = [&](const ivec3& v, std::uint16_t priority) {
+    if (glm::all(glm::greaterThanEqual(v, ivec3(0))) && glm::all(glm::lessThanEqual(v, ivec3(size)))) raise(v, priority);
+  };
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+    const Block& block = *blocks[b];
+    for (int x = 0; x < 8; x += step) {
+      for (int y = 0; y < 8; y += step) {
+        for (int z = 0; z < 8; z += step) {
+          const ivec3 local(x, y, z);
+          const ivec3 odd = (local / step) & 1;
+          if (odd.x + odd.y + odd.z != odd_coordinates) continue;
+          const std::uint16_t priority =
+              block.priority[static_cast<unsigned>(x * 64 + y * 8 + z)].load(std::memory_order_relaxed);
+          if (priority == 0) continue;
+          const ivec3 v = (block.corner * 8 + local) << (3 * block.scale);
+          if (odd_coordinates == 3) {
+            // Cube middle: of its corners, low is a multiple of 4 h and high is the opposite one.
+            ivec3 low;
+            ivec3 high;
+            for (int axis = 0; axis < 3; ++axis) {
+              const bool even = ((v[axis] - h) & (4 * h - 1)) == 0;
+              low[axis] = even ? v[axis] - h : v[axis] + h;
+              high[axis] = even ? v[axis] + h : v[axis] - h;
+            }
+            raise({high.x, low.y, low.z}, priority);
+            raise({low.x, high.y, low.z}, priority);
+            raise({low.x, low.y, high.z}, priority);
+          } else {
+            for (int axis = 0; axis < 3; ++axis) {
+              if (odd[axis] != 0) continue;
+              ivec3 offset(0);
+              offset[axis] = h;
+              raise_inside(v + offset, priority);
+              raise_inside(v - offset, priority);
+            }
+          }
+        }
+      }
+    }
+  });
+}
+
+unsigned DiamondSet::cells_around(const ivec3& vertex, int octave) const {
+  const int h = 1 << octave;
+  unsigned odd = 0;
+  unsigned outside = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (((vertex[axis] / h) & 1) != 0) {
+      ++odd;
+    } else if (vertex[axis] == 0 || vertex[axis] == 1 << log2_size_) {
+      ++outside;
+    }
+  }
+  constexpr std::array<unsigned, 4> inside{0, 8, 4, 6};
+  return inside[odd] >> outside;
+}
+
+void DiamondSet::choose_cut(std::uint64_t max_cells) {
+  // How many cells each priority adds; splitting a diamond adds one cell for each that it has.
+  std::vector<Block*> blocks;
+  blocks.reserve(map_.size());
+  for (const auto& [key, block] : map_) blocks.push_back(block.get());
+  tbb::combinable<std::vector<std::uint64_t>> partial([] { return std::vector<std::uint64_t>(65536); });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&](const auto& range) {
+    std::vector<std::uint64_t>& histogram = partial.local();
+    for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      const Block& block = *blocks[b];
+      for (unsigned i = 0; i < 512; ++i) {
+        const std::uint16_t priority = block.priority[i].load(std::memory_order_relaxed);
+        if (priority == 0) continue;
+        const ivec3 local(i / 64, (i / 8) % 8, i % 8);
+        const ivec3 v = (block.corner * 8 + local) << (3 * block.scale);
+        histogram[priority] += cells_around(v, trailing_zeros(v));
+      }
+    }
+  });
+  std::vector<std::uint64_t> histogram(65536);
+  partial.combine_each([&](const std::vector<std::uint64_t>& p) {
+    for (std::size_t i = 0; i < histogram.size(); ++i) histogram[i] += p[i];
+  });
+  cells_ = 24;
+  cut_ = 0xffff;
+  for (std::size_t i = 0xffff; i >= 1; --i) {
+    if (cells_ + histogram[i] > std::max<std::uint64_t>(max_cells, 24)) {
+      limited_ = true;
+      break;
+    }
+    cells_ += histogram[i];
+    cut_ = static_cast<std::uint16_t>(i);
+  }
+}
+
+}  // namespace cumulet::grid

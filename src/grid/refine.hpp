@@ -1,0 +1,102 @@
+#pragma once
+
+#include <tbb/concurrent_unordered_map.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+
+#include "grid/statistics.hpp"
+
+namespace cumulet::grid {
+
+enum class Criterion { deviation, range_mean };
+enum class CellKind { linear, constant };
+
+/// A pinhole camera for adaptive refinement, in world space.
+struct RefineCamera {
+  glm::dvec3 eye{0.0};
+  glm::dvec3 forward{0.0, 0.0, -1.0};  ///< unit, as are right and up
+  glm::dvec3 right{1.0, 0.0, 0.0};
+  glm::dvec3 up{0.0, 1.0, 0.0};
+  double tan_half_x = 0.5;
+  double tan_half_y = 0.5;
+  double pixels_per_radian = 1000.0;  ///< image height / (2 tan_half_y)
+};
+
+struct RefineSettings {
+  Criterion criterion = Criterion::deviation;
+  CellKind cells = CellKind::linear;
+  double threshold = 0.05;  ///< negative: split whatever varies, down to the voxel
+  std::uint64_t max_cells = 5'400'000;
+  std::optional<RefineCamera> camera;  ///< set: no split outside its frustum or under pixel_size
+  double pixel_size = 1.0;             ///< pixels that a cell's longest edge must cover to be split
+};
+
+/// The set of diamonds to split, each named by the vertex that its split makes.
+///
+/// All cells that share a refinement edge split together (a diamond), at the edge's middle: an integer point that
+/// belongs to no other diamond. With h = 2^(trailing zeros common to the three coordinates), the number of coordinates
+/// that are odd multiples of h tells the class: 3 the middle of a cube (class B cells), 2 of a face (C), 1 of an edge
+/// (A). The cells of a diamond exist when the 2 to 4 diamonds one level up are split (Weiss and De Floriani, "Diamond
+/// hierarchies", 2010). So a set that is closed under "parents of a diamond" gives a conforming grid, whatever the
+/// order: each vertex carries a priority, a parent's is raised to the maximum of its children's, and every cut of the
+/// priorities at one value is such a set.
+class DiamondSet {
+ public:
+  /// Evaluates the criterion for every cell of the statistics, in parallel. O(active nodes).
+  DiamondSet(const Statistics& statistics, const RefineSettings& settings);
+
+  [[nodiscard]] bool is_split(const glm::ivec3& vertex) const;
+  /// How many cells the grid has.
+  [[nodiscard]] std::uint64_t cell_count() const { return cells_; }
+  /// Whether max_cells, not the threshold, ended the refinement.
+  [[nodiscard]] bool limited() const { return limited_; }
+
+ private:
+  friend class DiamondCursor;
+  // Priorities of 8^3 lattice points. Octaves 3m to 3m + 2 of h share the lattice of spacing 8^m.
+  struct Block {
+    int scale = 0;
+    glm::ivec3 corner{0};  // in units of 8 lattice points
+    std::array<std::atomic<std::uint16_t>, 512> priority{};
+  };
+  using Map = tbb::concurrent_unordered_map<std::uint64_t, std::unique_ptr<Block>>;
+
+  struct Address {
+    std::uint64_t key;
+    unsigned local;
+    int scale;
+    glm::ivec3 corner;
+  };
+  static Address address(const glm::ivec3& vertex);
+  void raise(const glm::ivec3& vertex, std::uint16_t priority);
+  void close();
+  void close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks);
+  void choose_cut(std::uint64_t max_cells);
+  [[nodiscard]] unsigned cells_around(const glm::ivec3& vertex, int octave) const;
+  [[nodiscard]] std::vector<Block*> blocks_of(int scale) const;
+
+  int log2_size_;
+  Map map_;
+  std::uint16_t cut_ = 1;
+  std::uint64_t cells_ = 24;
+  bool limited_ = false;
+};
+
+/// Looks diamonds up; remembers the last block, so neighbouring look-ups are cheap. One a thread.
+class DiamondCursor {
+ public:
+  explicit DiamondCursor(const DiamondSet& set) : set_(&set) {}
+  [[nodiscard]] bool is_split(const glm::ivec3& vertex);
+
+ private:
+  const DiamondSet* set_;
+  std::uint64_t key_ = ~std::uint64_t{0};
+  const DiamondSet::Block* block_ = nullptr;
+};
+
+}  // namespace cumulet::grid

@@ -1,0 +1,442 @@
+#include "grid/statistics.hpp"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+#include <unordered_map>
+
+#include "base/error.hpp"
+#include "grid/cell.hpp"
+
+namespace cumulet::grid {
+
+namespace {
+
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+double cell_volume(std::uint32_t shape) {
+  const double unit = core::cm_shape_unit(shape);
+  constexpr std::array<double, 3> factor{1.0 / 3.0, 1.0 / 6.0, 2.0 / 3.0};
+  return factor[core::cm_shape_class(shape)] * unit * unit * unit;
+}
+
+vec3 cell_centroid(const vec3& v0, std::uint32_t shape) {
+  return v0 + core::cm_from_frame(core::cm_frame_centroid(core::cm_shape_class(shape)) * core::cm_shape_unit(shape),
+                                  shape);
+}
+
+constexpr std::uint32_t shape_word(std::uint32_t frame, std::uint32_t cell_class, int exponent) {
+  return frame | (cell_class << 9U) | (static_cast<std::uint32_t>(exponent) << 11U);
+}
+
+vec3 child_v0(const vec3& v0, std::uint32_t shape, unsigned child) {
+  return child == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
+}
+
+std::array<std::uint32_t, 3> axes_of(std::uint32_t permutation) {
+  const std::uint32_t px = permutation / 2;
+  const std::uint32_t low = px == 0 ? 1 : 0;
+  const std::uint32_t high = px == 2 ? 1 : 2;
+  return (permutation & 1U) == 0 ? std::array{px, low, high} : std::array{px, high, low};
+}
+
+// Bits 0-2 of a frame hold the signs of the frame's axes, but a cube corner gives the signs of the cube's.
+std::uint32_t frame_from(const std::array<bool, 3>& cube_axis_negative, std::uint32_t permutation) {
+  const auto axes = axes_of(permutation);
+  std::uint32_t frame = 0;
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    frame |= (cube_axis_negative[axes[i]] ? 1U : 0U) << i;
+    frame |= axes[i] << (3 + 2 * i);
+  }
+  return frame;
+}
+
+void fill_tree(BrickTree& tree, unsigned heap, const vec3& v0, std::uint32_t shape) {
+  const vec3 centroid = cell_centroid(v0, shape);
+  if (heap >= 512) {
+    const ivec3 voxel(centroid);
+    tree.voxel[heap - 512] = static_cast<std::uint16_t>((voxel.x * 8 + voxel.y) * 8 + voxel.z);
+    tree.centroid[heap - 512] = centroid;
+    return;
+  }
+  tree.shape[heap] = static_cast<std::uint16_t>(shape);
+  tree.node_centroid[heap] = centroid;
+  tree.midpoint[heap] = glm::u8vec3(
+      v0 + core::cm_from_frame(core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape), shape));
+  for (unsigned child = 0; child < 2; ++child) {
+    fill_tree(tree, 2 * heap + child, child_v0(v0, shape, child), core::cm_child_shape(shape, child));
+  }
+}
+
+std::array<bool, 3> signs_of_frame(std::uint32_t frame) {
+  std::array<bool, 3> negative{};
+  for (std::uint32_t i = 0; i < 3; ++i) negative[(frame >> (3 + 2 * i)) & 3U] = ((frame >> i) & 1U) != 0;
+  return negative;
+}
+
+struct BrickTrees {
+  std::array<BrickTree, 48> trees;
+  BrickTrees() {
+    for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+      for (std::uint32_t signs = 0; signs < 8; ++signs) {
+        const std::array<bool, 3> negative{(signs & 1U) != 0, (signs & 2U) != 0, (signs & 4U) != 0};
+        const std::uint32_t frame = frame_from(negative, permutation);
+        const vec3 v0(negative[0] ? 8.0F : 0.0F, negative[1] ? 8.0F : 0.0F, negative[2] ? 8.0F : 0.0F);
+        fill_tree(trees[permutation * 8 + signs], 1, v0, shape_word(frame, 1, 3));
+      }
+    }
+  }
+};
+
+// The inverse covariance matrices of the three reference tetrahedra: cov = sum (v - c)(v - c)^T / 20.
+struct ClassConstants {
+  std::array<glm::dmat3, 3> inverse_covariance;
+  ClassConstants() {
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      glm::dmat3 covariance(0.0);
+      const dvec3 centroid = core::cm_frame_centroid(k);
+      for (std::uint32_t i = 0; i < 4; ++i) {
+        const dvec3 v = dvec3(core::cm_frame_vertex(k, i)) - centroid;
+        covariance += glm::outerProduct(v, v) / 20.0;
+      }
+      inverse_covariance[k] = glm::inverse(covariance);
+    }
+  }
+};
+
+}  // namespace
+
+Moments& Moments::operator+=(const Moments& other) {
+  volume += other.volume;
+  mass += other.mass;
+  square += other.square;
+  first += other.first;
+  min = std::min(min, other.min);
+  max = std::max(max, other.max);
+  return *this;
+}
+
+double Moments::variance() const {
+  if (min >= max) return 0.0;
+  const double m = mean();
+  return std::max(0.0, square / volume - m * m);
+}
+
+LinearFit fit_linear(std::uint32_t cell_class, const dvec3& covariance, double mean) {
+  static const ClassConstants constants;
+  const dvec3 gradient = constants.inverse_covariance[cell_class] * covariance;
+  const dvec3 centroid = core::cm_frame_centroid(cell_class);
+  double lowest = 0.0;
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    lowest = std::min(lowest, glm::dot(gradient, dvec3(core::cm_frame_vertex(cell_class, i)) - centroid));
+  }
+  const double scale = lowest < 0.0 && mean < -lowest ? mean / -lowest : 1.0;
+  // Residual of the scaled fit: var - (2 s - s^2) g.cov
+  return {scale * gradient, (2.0 - scale) * scale * glm::dot(gradient, covariance)};
+}
+
+std::uint32_t permutation_of(std::uint32_t shape) {
+  const std::uint32_t px = (shape >> 3U) & 3U;
+  const std::uint32_t py = (shape >> 5U) & 3U;
+  return px * 2 + (py == (px == 0 ? 1U : 0U) ? 0U : 1U);
+}
+
+std::uint32_t kuhn_frame(const ivec3& corner, int size, std::uint32_t permutation) {
+  // v0 is the corner of the cube that is a multiple of twice its size.
+  std::array<bool, 3> negative{};
+  for (int axis = 0; axis < 3; ++axis) negative[axis] = ((corner[axis] / size) & 1) != 0;
+  return frame_from(negative, permutation);
+}
+
+const BrickTree& brick_tree(std::uint32_t frame) {
+  static const auto trees = std::make_unique<const BrickTrees>();
+  const auto negative = signs_of_frame(frame);
+  const unsigned signs = (negative[0] ? 1U : 0U) | (negative[1] ? 2U : 0U) | (negative[2] ? 4U : 0U);
+  return trees->trees[permutation_of(frame) * 8 + signs];
+}
+
+void BrickSums::compute(const float* values, const BrickTree& tree) {
+  double sum = 0.0;
+  for (unsigned i = 0; i < volume::brick_voxels; ++i) sum += values[i];
+  reference = static_cast<float>(sum / volume::brick_voxels);
+  for (unsigned i = 0; i < 512; ++i) {
+    const float value = values[tree.voxel[i]];
+    const float f = value - reference;
+    const vec3& c = tree.centroid[i];
+    mass[512 + i] = f;
+    square[512 + i] = f * f;
+    x[512 + i] = f * c.x;
+    y[512 + i] = f * c.y;
+    z[512 + i] = f * c.z;
+    min[512 + i] = value;
+    max[512 + i] = value;
+  }
+  for (unsigned level = 256; level >= 1; level /= 2) {
+    const auto add = [level](std::array<float, 1024>& a) {
+      for (unsigned h = level; h < 2 * level; ++h) a[h] = a[2 * h] + a[2 * h + 1];
+    };
+    add(mass);
+    add(square);
+    add(x);
+    add(y);
+    add(z);
+    for (unsigned h = level; h < 2 * level; ++h) min[h] = std::min(min[2 * h], min[2 * h + 1]);
+    for (unsigned h = level; h < 2 * level; ++h) max[h] = std::max(max[2 * h], max[2 * h + 1]);
+  }
+}
+
+Moments BrickSums::moments(unsigned h, const ivec3& corner) const {
+  const double leaves = 512 >> (std::bit_width(h) - 1);
+  constexpr double leaf_volume = 1.0 / 6.0;
+  Moments m;
+  m.volume = leaves * leaf_volume;
+  m.mass = (mass[h] + leaves * reference) * leaf_volume;
+  // square: sum (f' + r)^2 = sum f'^2 + 2 r sum f' + n r^2
+  m.square = (square[h] + 2.0 * reference * mass[h] + leaves * reference * static_cast<double>(reference)) * leaf_volume;
+  m.min = min[h];
+  m.max = max[h];
+  m.first = dvec3(x[h], y[h], z[h]) * leaf_volume + dvec3(corner) * m.mass;
+  return m;
+}
+
+Moments uniform_moments(const vec3& v0, std::uint32_t shape, float value) {
+  Moments m;
+  m.volume = cell_volume(shape);
+  m.mass = value * m.volume;
+  m.square = value * m.mass;
+  m.first = dvec3(cell_centroid(v0, shape)) * m.mass;
+  m.min = m.max = value;
+  return m;
+}
+
+Statistics::Statistics(const volume::ScalarVolume& volume, const Cube& cube)
+    : cube_(cube), by_size_(static_cast<std::size_t>(cube.log2_size) + 1), brick_values_(&volume.brick_values) {
+  build_topology(volume);
+  compute_mean_optical_depth(volume);
+  compute_moments();
+}
+
+const float* Statistics::values(const Node& node) const {
+  const auto count = static_cast<std::int32_t>(brick_values_->size() / volume::brick_voxels);
+  return node.values < count ? brick_values_->data() + std::size_t(node.values) * volume::brick_voxels
+                             : extra_values_.data() + std::size_t(node.values - count) * volume::brick_voxels;
+}
+
+void Statistics::build_topology(const volume::ScalarVolume& volume) {
+  struct Work {
+    std::uint32_t node;
+    std::uint32_t first, last;         // range of bricks_
+    std::vector<std::uint32_t> tiles;  // that meet the node
+  };
+  std::vector<std::uint32_t> bricks(volume.brick_origins.size());
+  for (std::uint32_t i = 0; i < bricks.size(); ++i) bricks[i] = i;
+  const auto file_bricks = static_cast<std::int32_t>(bricks.size());
+
+  std::vector<std::uint32_t> all_tiles(volume.tiles.size());
+  for (std::uint32_t i = 0; i < all_tiles.size(); ++i) all_tiles[i] = i;
+  nodes_.push_back({.corner = ivec3(0), .log2_size = cube_.log2_size});
+  std::vector<Work> stack;
+  stack.push_back({0, 0, static_cast<std::uint32_t>(bricks.size()), std::move(all_tiles)});
+
+  while (!stack.empty()) {
+    Work work = std::move(stack.back());
+    stack.pop_back();
+    const ivec3 corner = nodes_[work.node].corner;
+    const int log2_size = nodes_[work.node].log2_size;
+    const ivec3 low = corner + cube_.origin;
+    const ivec3 high = low + ((1 << log2_size) - 1);
+    const bool outside = glm::any(glm::greaterThan(low, volume.bounds_max)) ||
+                         glm::any(glm::lessThan(high, volume.bounds_min));
+    const bool inside = glm::all(glm::greaterThanEqual(low, volume.bounds_min)) &&
+                        glm::all(glm::lessThanEqual(high, volume.bounds_max));
+    std::erase_if(work.tiles, [&](std::uint32_t t) {
+      return glm::any(glm::greaterThan(low, volume.tiles[t].max)) || glm::any(glm::lessThan(high, volume.tiles[t].min));
+    });
+    const bool no_bricks = work.first == work.last;
+    Node& node = nodes_[work.node];
+    if (outside) continue;  // uniform zero
+    if (no_bricks && work.tiles.empty() && (volume.background == 0.0F || inside)) {
+      node.uniform = volume.background;
+      continue;
+    }
+    if (no_bricks && work.tiles.size() == 1) {
+      const volume::Tile& tile = volume.tiles[work.tiles[0]];
+      if (glm::all(glm::greaterThanEqual(low, tile.min)) && glm::all(glm::lessThanEqual(high, tile.max))) {
+        node.uniform = tile.value;
+        continue;
+      }
+    }
+    by_size_[static_cast<std::size_t>(log2_size)].push_back(work.node);
+    if (log2_size == 3) {
+      if (!no_bricks) {
+        node.values = static_cast<std::int32_t>(bricks[work.first]);
+      } else {
+        node.values = file_bricks + static_cast<std::int32_t>(extra_values_.size() / volume::brick_voxels);
+        for (int v = 0; v < volume::brick_voxels; ++v) {
+          const ivec3 p = low + ivec3(v / 64, (v / 8) % 8, v % 8);
+          float value = volume.background;
+          for (const std::uint32_t t : work.tiles) {
+            const volume::Tile& tile = volume.tiles[t];
+            if (glm::all(glm::greaterThanEqual(p, tile.min)) && glm::all(glm::lessThanEqual(p, tile.max))) {
+              value = tile.value;
+            }
+          }
+          const bool in_bounds = glm::all(glm::greaterThanEqual(p, volume.bounds_min)) &&
+                                 glm::all(glm::lessThanEqual(p, volume.bounds_max));
+          extra_values_.push_back(in_bounds ? value : 0.0F);
+        }
+      }
+      continue;
+    }
+    const auto child = static_cast<std::uint32_t>(nodes_.size());
+    node.child = child;
+    const int half = 1 << (log2_size - 1);
+    const ivec3 middle = low + half;
+    // Sort the node's bricks by octant: three partitions.
+    const auto split = [&](std::uint32_t first, std::uint32_t last, int axis) {
+      return static_cast<std::uint32_t>(
+          std::partition(bricks.begin() + first, bricks.begin() + last,
+                         [&](std::uint32_t b) { return volume.brick_origins[b][axis] < middle[axis]; }) -
+          bricks.begin());
+    };
+    std::array<std::uint32_t, 9> ends{};
+    ends[0] = work.first;
+    ends[8] = work.last;
+    ends[4] = split(ends[0], ends[8], 2);
+    for (unsigned i : {0U, 4U}) ends[i + 2] = split(ends[i], ends[i + 4], 1);
+    for (unsigned i : {0U, 2U, 4U, 6U}) ends[i + 1] = split(ends[i], ends[i + 2], 0);
+    for (unsigned i = 0; i < 8; ++i) {
+      nodes_.push_back({.corner = corner + half * ivec3(i & 1U, (i >> 1U) & 1U, (i >> 2U) & 1U), .log2_size = log2_size - 1});
+      stack.push_back({child + i, ends[i], ends[i + 1], work.tiles});
+    }
+  }
+}
+
+const Statistics::Node& Statistics::node_at(const ivec3& p, int min_log2_size) const {
+  const Node* node = nodes_.data();
+  while (node->child != 0 && node->log2_size > min_log2_size) {
+    const int bit = node->log2_size - 1;
+    const unsigned octant = ((p.x >> bit) & 1) | (((p.y >> bit) & 1) << 1) | (((p.z >> bit) & 1) << 2);
+    node = &nodes_[node->child + octant];
+  }
+  return *node;
+}
+
+Moments Statistics::moments(const vec3& v0, std::uint32_t shape) const {
+  const vec3 centroid = cell_centroid(v0, shape);
+  const ivec3 voxel(centroid);
+  const std::uint32_t cell_class = core::cm_shape_class(shape);
+  const int exponent = static_cast<int>(core::cm_shape_exponent(shape));
+  if (cell_class == 1) {
+    const Node& node = node_at(voxel, exponent);
+    if (node.is_uniform()) return uniform_moments(v0, shape, node.uniform);
+    if (node.log2_size == exponent) return kuhn(node, permutation_of(shape));
+    throw Error(ErrorCode::internal, "statistics of a cell inside a brick");
+  }
+  Moments sum = moments(v0, core::cm_child_shape(shape, 0));
+  sum += moments(child_v0(v0, shape, 1), core::cm_child_shape(shape, 1));
+  return sum;
+}
+
+void Statistics::compute_moments() {
+  std::uint32_t count = 0;
+  for (const auto& level : by_size_) {
+    for (const std::uint32_t n : level) {
+      nodes_[n].moments = count;
+      count += 6;
+    }
+  }
+  moments_.resize(count);
+  const auto& bricks = by_size_[3];
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 16), [&](const auto& range) {
+    const auto sums = std::make_unique<BrickSums>();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const Node& node = nodes_[bricks[i]];
+      for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+        sums->compute(values(node), brick_tree(kuhn_frame(node.corner, 8, permutation)));
+        moments_[node.moments + permutation] = sums->moments(1, node.corner);
+      }
+    }
+  });
+  for (std::size_t size = 4; size < by_size_.size(); ++size) {
+    const auto& level = by_size_[size];
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, level.size(), 64), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        const Node& node = nodes_[level[i]];
+        for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+          const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
+          const auto negative = signs_of_frame(frame);
+          const vec3 v0 = vec3(node.corner) + static_cast<float>(1 << size) * vec3(negative[0], negative[1], negative[2]);
+          const std::uint32_t shape = shape_word(frame, 1, static_cast<int>(size));
+          Moments sum = moments(v0, core::cm_child_shape(shape, 0));
+          sum += moments(child_v0(v0, shape, 1), core::cm_child_shape(shape, 1));
+          moments_[node.moments + permutation] = sum;
+        }
+      }
+    });
+  }
+}
+
+void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume) {
+  // Columns of voxels that meet any density, as 8 x 8 bits for a column of bricks, for each axis.
+  std::array<std::unordered_map<std::uint64_t, std::uint64_t>, 3> columns;
+  const auto mark = [&](const ivec3& brick, const std::array<std::uint64_t, 3>& masks) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (masks[axis] == 0) continue;
+      const auto key = (std::uint64_t(std::uint32_t(brick[(axis + 1) % 3])) << 32U) | std::uint32_t(brick[(axis + 2) % 3]);
+      columns[axis][key] |= masks[axis];
+    }
+  };
+  struct Projection {
+    double sum = 0.0;
+    std::array<std::uint64_t, 3> masks{};
+  };
+  const auto& bricks = by_size_[3];
+  std::vector<Projection> projections(bricks.size());
+  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {
+    const float* data = values(nodes_[bricks[i]]);
+    Projection& p = projections[i];
+    for (unsigned v = 0; v < volume::brick_voxels; ++v) {
+      if (!(data[v] > 0.0F)) continue;
+      p.sum += data[v];
+      const std::array<unsigned, 3> xyz{v / 64, (v / 8) % 8, v % 8};
+      for (unsigned axis = 0; axis < 3; ++axis) {
+        p.masks[axis] |= std::uint64_t{1} << (xyz[(axis + 1) % 3] * 8 + xyz[(axis + 2) % 3]);
+      }
+    }
+  });
+  double mass = 0.0;
+  for (std::size_t i = 0; i < bricks.size(); ++i) {
+    mass += projections[i].sum;
+    mark(nodes_[bricks[i]].corner / 8, projections[i].masks);
+  }
+  constexpr std::uint64_t full = ~std::uint64_t{0};
+  for (const Node& node : nodes_) {
+    if (!node.is_uniform() || !(node.uniform > 0.0F)) continue;
+    const int side = (1 << node.log2_size) / 8;
+    mass += node.uniform * std::pow(double(1 << node.log2_size), 3.0);
+    for (int a = 0; a < side; ++a) {
+      for (int b = 0; b < side; ++b) {
+        const ivec3 base = node.corner / 8;
+        mark(base + ivec3(0, a, b), {full, 0, 0});
+        mark(base + ivec3(b, 0, a), {0, full, 0});
+        mark(base + ivec3(a, b, 0), {0, 0, full});
+      }
+    }
+  }
+  double sum = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::uint64_t hit = 0;
+    for (const auto& [key, mask] : columns[axis]) hit += static_cast<std::uint64_t>(std::popcount(mask));
+    if (hit == 0) return;
+    sum += mass * glm::length(dvec3(volume.index_to_world[axis])) / static_cast<double>(hit);
+  }
+  mean_optical_depth_ = sum / 3.0;
+}
+
+}  // namespace cumulet::grid

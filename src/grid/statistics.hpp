@@ -1,0 +1,120 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "grid/cube.hpp"
+#include "volume/volume.hpp"
+
+namespace cumulet::grid {
+
+/// Exact integrals of the voxel field f over a region, in cube space (unit: voxel).
+struct Moments {
+  double volume = 0.0;
+  double mass = 0.0;          ///< integral of f
+  double square = 0.0;        ///< integral of f^2
+  glm::dvec3 first{0.0};      ///< integral of f x, about the cube's origin
+  float min = 3.0e38F;        ///< over all voxels that the region covers
+  float max = -3.0e38F;
+
+  Moments& operator+=(const Moments& other);
+  [[nodiscard]] double mean() const { return mass / volume; }
+  [[nodiscard]] double variance() const;
+};
+
+/// The least-squares linear fit of f over a cell, scaled so that it is nowhere negative; the mean is kept.
+struct LinearFit {
+  glm::dvec3 gradient{0.0};  ///< along the cell's frame axes, per frame unit
+  double explained = 0.0;    ///< the part of the variance that the fit removes
+};
+
+/// covariance: integral of (f - mean)(x - centroid) / volume, in the cell's frame and unit.
+/// Normal equations with the tetrahedron's own covariance matrix, a constant of its class.
+LinearFit fit_linear(std::uint32_t cell_class, const glm::dvec3& covariance, double mean);
+
+/// How a brick's Kuhn tetrahedron (class B, unit 8) falls into 512 sixths of voxels; one table for each of the 48 frames.
+/// Heap order: 1 is the whole, 2h and 2h + 1 are the children of h, 512 to 1023 are the sixths.
+struct BrickTree {
+  std::array<std::uint16_t, 512> voxel;       ///< index into the brick's values, a leaf
+  std::array<glm::vec3, 512> centroid;        ///< of a leaf, from the brick's low corner
+  std::array<std::uint16_t, 512> shape;       ///< of internal node h
+  std::array<glm::u8vec3, 512> midpoint;      ///< of its refinement edge, from the brick's low corner
+  std::array<glm::vec3, 512> node_centroid;   ///< of internal node h, from the brick's low corner
+};
+const BrickTree& brick_tree(std::uint32_t frame);
+
+/// Index 0..5 of a frame's axis permutation.
+std::uint32_t permutation_of(std::uint32_t shape);
+/// The frame (bits 0-8 of a shape word) of the Kuhn tetrahedron with this permutation in the octree cube at corner.
+std::uint32_t kuhn_frame(const glm::ivec3& corner, int size, std::uint32_t permutation);
+
+/// Sums over the heap of one brick tetrahedron, relative to a reference value (so that float loses nothing).
+struct BrickSums {
+  float reference = 0.0F;
+  std::array<float, 1024> mass;    ///< sum of (f - reference) over the leaves below
+  std::array<float, 1024> square;  ///< sum of (f - reference)^2
+  std::array<float, 1024> x, y, z; ///< sum of (f - reference) * leaf centroid, from the brick's low corner
+  std::array<float, 1024> min, max;
+
+  void compute(const float* values, const BrickTree& tree);
+  /// Moments of heap node h of a brick whose low corner is at corner.
+  [[nodiscard]] Moments moments(unsigned h, const glm::ivec3& corner) const;
+};
+
+/// The volume's octree down to bricks, with exact moments of the six Kuhn tetrahedra of every cube.
+///
+/// Only cubes that are not uniform have nodes: O(active nodes) memory.
+class Statistics {
+ public:
+  struct Node {
+    glm::ivec3 corner{0};
+    int log2_size = 0;
+    std::uint32_t child = 0;        ///< first of 8 children (x fastest bit), 0: none
+    std::int32_t values = -1;       ///< brick payload: index into brick_values(), -1: none
+    float uniform = 0.0F;           ///< the value where there are neither children nor payload
+    std::uint32_t moments = none;   ///< index of six Moments, none for a uniform node
+    static constexpr std::uint32_t none = 0xffffffffU;
+    [[nodiscard]] bool is_uniform() const { return child == 0 && values < 0; }
+  };
+
+  Statistics(const volume::ScalarVolume& volume, const Cube& cube);
+
+  [[nodiscard]] const Cube& cube() const { return cube_; }
+  [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
+  /// The 512 values of a brick node.
+  [[nodiscard]] const float* values(const Node& node) const;
+  /// Exact moments of any cell no smaller than a brick's Kuhn tetrahedron, or in a uniform part.
+  [[nodiscard]] Moments moments(const glm::vec3& v0, std::uint32_t shape) const;
+  /// The smallest node that holds voxel p of the cube.
+  [[nodiscard]] const Node& node_at(const glm::ivec3& p, int min_log2_size = 3) const;
+  [[nodiscard]] const Moments& kuhn(const Node& node, std::uint32_t permutation) const {
+    return moments_[node.moments + permutation];
+  }
+  /// Optical depth per unit extinction scale, in grid value x world unit: the mean over the rays along the three axes
+  /// that meet any density.
+  [[nodiscard]] double mean_optical_depth() const { return mean_optical_depth_; }
+  /// Nodes of one size, coarse ones computed from fine ones.
+  [[nodiscard]] const std::vector<std::uint32_t>& nodes_of_size(int log2_size) const {
+    return by_size_[static_cast<std::size_t>(log2_size)];
+  }
+
+ private:
+  void build_topology(const volume::ScalarVolume& volume);
+  void compute_moments();
+  void compute_mean_optical_depth(const volume::ScalarVolume& volume);
+
+  Cube cube_;
+  std::vector<Node> nodes_;
+  std::vector<std::vector<std::uint32_t>> by_size_;
+  std::vector<Moments> moments_;
+  const std::vector<float>* brick_values_;
+  std::vector<float> extra_values_;  // payloads made here: where a tile or the background ends inside a brick
+  double mean_optical_depth_ = 0.0;
+};
+
+/// Moments of a cell in which f is one value.
+Moments uniform_moments(const glm::vec3& v0, std::uint32_t shape, float value);
+
+}  // namespace cumulet::grid

@@ -1,0 +1,353 @@
+#include "grid/tet_grid.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/combinable.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "base/error.hpp"
+#include "grid/cell.hpp"
+
+namespace cumulet::grid {
+
+namespace {
+
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+vec3 v0_of(const std::array<std::uint16_t, 3>& v) { return {v[0], v[1], v[2]}; }
+
+std::array<std::uint16_t, 3> pack_v0(const vec3& v) {
+  return {static_cast<std::uint16_t>(v.x), static_cast<std::uint16_t>(v.y), static_cast<std::uint16_t>(v.z)};
+}
+
+// Vertex opposite to each face (faces 0 to 3), by class: see the frame of glsl/cell.glsl.
+constexpr std::array<std::array<std::uint32_t, 4>, 3> opposite{{{3, 1, 2, 0}, {1, 3, 2, 0}, {3, 2, 1, 0}}};
+
+// How a split hands faces down. whole[class][child]: the child's face that is a whole face of the parent, and which.
+struct WholeFace {
+  unsigned face;
+  unsigned parent_face;
+};
+constexpr std::array<std::array<WholeFace, 2>, 3> whole_face{
+    {{{{1, 1}, {1, 3}}}, {{{0, 0}, {0, 3}}}, {{{2, 2}, {2, 3}}}}};
+// half_face[class][child][k]: the two faces that are halves of the parent's faces at the refinement edge.
+constexpr std::array<std::array<std::array<WholeFace, 2>, 2>, 3> half_face{{
+    {{{{{0, 0}, {2, 2}}}, {{{0, 0}, {2, 2}}}}},
+    {{{{{1, 1}, {2, 2}}}, {{{1, 2}, {2, 1}}}}},
+    {{{{{0, 0}, {1, 1}}}, {{{0, 0}, {1, 1}}}}},
+}};
+
+}  // namespace
+
+GridBuilder::GridBuilder(const Statistics& statistics, const DiamondSet& diamonds)
+    : statistics_(&statistics), diamonds_(&diamonds) {}
+
+void GridBuilder::make_roots() {
+  std::array<std::array<vec3, 4>, 24> vertices;
+  for (unsigned root = 0; root < 24; ++root) {
+    vec3 v0;
+    std::uint32_t shape = 0;
+    core::cm_root_cell(root, static_cast<std::uint32_t>(statistics_->cube().log2_size - 1), v0, shape);
+    nodes_[root] = {.links = {CM_NONE, CM_NONE, CM_NONE, CM_NONE},
+                    .child = 0,
+                    .v0 = pack_v0(v0),
+                    .shape = static_cast<std::uint16_t>(shape),
+                    .heap = 0,
+                    .permutation = 0};
+    for (unsigned i = 0; i < 4; ++i) vertices[root][i] = core::cm_cell_vertex(v0, shape, i);
+  }
+  for (unsigned a = 0; a < 24; ++a) {
+    for (unsigned face = 0; face < 4; ++face) {
+      for (unsigned b = 0; b < 24; ++b) {
+        unsigned shared = 0;
+        for (unsigned i = 0; i < 4; ++i) {
+          if (i == opposite[0][face]) continue;
+          shared += std::count(vertices[b].begin(), vertices[b].end(), vertices[a][i]) > 0 ? 1U : 0U;
+        }
+        if (a != b && shared == 3) nodes_[a].links[face] = b;
+      }
+    }
+  }
+}
+
+void GridBuilder::bisect() {
+  const std::uint64_t count = 24 + 2 * (diamonds_->cell_count() - 24);
+  if (count >= (std::uint64_t{1} << 31U)) {
+    throw Error(ErrorCode::unsupported, "a grid of " + std::to_string(diamonds_->cell_count()) +
+                                            " cells: the limit is 2^30; lower max_cells or raise the threshold");
+  }
+  nodes_.resize(count);
+  make_roots();
+  level_first_ = {0, 24};
+  while (level_first_.back() != level_first_[level_first_.size() - 2]) {
+    split_level(level_first_[level_first_.size() - 2], level_first_.back());
+  }
+  level_first_.pop_back();
+  if (level_first_.back() != count) throw Error(ErrorCode::internal, "bisection missed diamonds: the set is not closed");
+  order();
+}
+
+void GridBuilder::split_level(std::uint32_t first, std::uint32_t last) {
+  constexpr std::uint32_t chunk = 4096;
+  const std::uint32_t chunks = (last - first + chunk - 1) / chunk;
+  std::vector<std::uint32_t> splits(chunks);
+  // Mark what splits; then children get consecutive places in the order of their parents.
+  tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
+    DiamondCursor cursor(*diamonds_);
+    const std::uint32_t end = std::min(last, first + (c + 1) * chunk);
+    std::uint32_t n = 0;
+    for (std::uint32_t i = first + c * chunk; i < end; ++i) {
+      Node& node = nodes_[i];
+      const std::uint32_t cell_class = core::cm_shape_class(node.shape);
+      node.child = 0;
+      if (cell_class == 1 && core::cm_shape_exponent(node.shape) == 0) continue;  // a sixth of a voxel
+      const vec3 middle = v0_of(node.v0) + core::cm_from_frame(core::cm_frame_midpoint(cell_class) *
+                                                                   core::cm_shape_unit(node.shape), node.shape);
+      if (cursor.is_split(ivec3(middle))) {
+        node.child = 1;
+        ++n;
+      }
+    }
+    splits[c] = n;
+  });
+  std::uint32_t next = last;
+  for (std::uint32_t& n : splits) {
+    const std::uint32_t here = n;
+    n = next;
+    next += 2 * here;
+  }
+  if (next > nodes_.size()) throw Error(ErrorCode::internal, "bisection overran its count: the set is not closed");
+  tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
+    const std::uint32_t end = std::min(last, first + (c + 1) * chunk);
+    std::uint32_t child = splits[c];
+    for (std::uint32_t i = first + c * chunk; i < end; ++i) {
+      if (nodes_[i].child == 0) continue;
+      nodes_[i].child = child;
+      child += 2;
+    }
+  });
+  tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
+    const std::uint32_t end = std::min(last, first + (c + 1) * chunk);
+    for (std::uint32_t i = first + c * chunk; i < end; ++i) {
+      const Node node = nodes_[i];
+      if (node.child == 0) continue;
+      const std::uint32_t cell_class = core::cm_shape_class(node.shape);
+      for (unsigned side = 0; side < 2; ++side) {
+        Node& child = nodes_[node.child + side];
+        const std::uint32_t shape = core::cm_child_shape(node.shape, side);
+        child.child = 0;
+        child.shape = static_cast<std::uint16_t>(shape);
+        child.v0 = side == 0 ? node.v0 : pack_v0(core::cm_cell_vertex(v0_of(node.v0), node.shape, 1));
+        child.heap = static_cast<std::uint16_t>(node.heap == 0 ? 0 : 2 * node.heap + side);
+        child.permutation = node.permutation;
+        if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 3) {
+          child.heap = 1;
+          child.permutation = static_cast<std::uint16_t>(permutation_of(shape));
+        }
+        child.links[3] = node.child + 1 - side;
+        for (const auto& [face, parent_face] : half_face[cell_class][side]) {
+          const std::uint32_t other = node.links[parent_face];
+          if (other == CM_NONE) {
+            child.links[face] = CM_NONE;
+            continue;
+          }
+          // The neighbour is of the same diamond and splits too: its child at the same end of the edge.
+          const Node& neighbour = nodes_[other];
+          child.links[face] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
+        }
+        const auto [face, parent_face] = whole_face[cell_class][side];
+        child.links[face] = node.links[parent_face];
+        if (child.links[face] != CM_NONE) child.links[face] = resolve(node.child + side, face);
+      }
+    }
+  });
+  level_first_.push_back(next);
+}
+
+// A link may point to a cell that has split since: go down to the child that has the face. No edge that is bisected lies
+// in the face (the grid conforms), so the face has exactly one end of it.
+std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
+  const Node& node = nodes_[from];
+  std::uint32_t other = node.links[face];
+  while (other != CM_NONE && nodes_[other].child != 0) {
+    const vec3 end = v0_of(nodes_[other].v0);
+    bool has_end = false;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      if (i == opposite[core::cm_shape_class(node.shape)][face]) continue;
+      has_end = has_end || core::cm_cell_vertex(v0_of(node.v0), node.shape, i) == end;
+    }
+    other = nodes_[other].child + (has_end ? 0 : 1);
+  }
+  return other;
+}
+
+void GridBuilder::order() {
+  const auto count = static_cast<std::uint32_t>(nodes_.size());
+  leaves_below_.assign(count, 1);
+  first_leaf_.assign(count, 0);
+  for (std::size_t level = level_first_.size() - 1; level-- > 0;) {
+    tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
+                      [&](const auto& range) {
+                        for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
+                          const std::uint32_t child = nodes_[i].child;
+                          if (child != 0) leaves_below_[i] = leaves_below_[child] + leaves_below_[child + 1];
+                        }
+                      });
+  }
+  for (unsigned root = 1; root < 24; ++root) first_leaf_[root] = first_leaf_[root - 1] + leaves_below_[root - 1];
+  leaf_nodes_.resize(diamonds_->cell_count());
+  for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
+    tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
+                      [&](const auto& range) {
+                        for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
+                          const std::uint32_t child = nodes_[i].child;
+                          if (child == 0) {
+                            leaf_nodes_[first_leaf_[i]] = i;
+                          } else {
+                            first_leaf_[child] = first_leaf_[i];
+                            first_leaf_[child + 1] = first_leaf_[i] + leaves_below_[child];
+                          }
+                        }
+                      });
+  }
+}
+
+TetGrid GridBuilder::records(CellKind cells, float max_value) {
+  TetGrid grid;
+  grid.cube = statistics_->cube();
+  grid.limited = diamonds_->limited();
+  grid.levels = static_cast<std::uint32_t>(level_first_.size() - 2);
+  grid.density_unit = max_value > 0.0F ? max_value : 1.0F;
+  const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
+  grid.cells.resize(count);
+  grid.tree.resize(count - 24);
+
+  // Depth-first number of an internal node: leaves before it minus roots before it, plus its internal ancestors... which
+  // a walk per level hands down: child 0 comes next, child 1 after all of child 0.
+  for (unsigned root = 0; root < 24; ++root) {
+    grid.roots[root] = {first_leaf_[root], first_leaf_[root] - root};
+  }
+  grid.roots[24] = {count, count - 24};
+  std::vector<std::uint32_t> place(nodes_.size());
+  for (unsigned root = 0; root < 24; ++root) place[root] = grid.roots[root].first_internal;
+  for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
+    tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
+                      [&](const auto& range) {
+                        for (std::uint32_t i = range.begin(); i != range.end(); ++i) {
+                          const std::uint32_t child = nodes_[i].child;
+                          if (child == 0) continue;
+                          grid.tree[place[i]] = leaves_below_[child] - 1;
+                          place[child] = place[i] + 1;
+                          place[child + 1] = place[i] + leaves_below_[child];
+                        }
+                      });
+  }
+  place = {};
+
+  struct Box {
+    vec3 low{3.0e38F};
+    vec3 high{-3.0e38F};
+  };
+  tbb::combinable<Box> boxes;
+  const double to_relative = 1.0 / grid.density_unit;
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
+    const auto sums = std::make_unique<BrickSums>();
+    const Statistics::Node* brick = nullptr;
+    unsigned brick_permutation = 6;
+    Box& box = boxes.local();
+    for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
+      const std::uint32_t index = leaf_nodes_[rank];
+      const Node& node = nodes_[index];
+      const vec3 v0 = v0_of(node.v0);
+      const std::uint32_t shape = node.shape;
+      const std::uint32_t cell_class = core::cm_shape_class(shape);
+      const float unit = core::cm_shape_unit(shape);
+      const vec3 centroid = v0 + core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape);
+
+      Moments m;
+      if (node.heap == 0) {
+        m = statistics_->moments(v0, shape);
+      } else {
+        const Statistics::Node& holder = statistics_->node_at(ivec3(centroid));
+        if (holder.is_uniform()) {
+          m = uniform_moments(v0, shape, holder.uniform);
+        } else {
+          if (&holder != brick || node.permutation != brick_permutation) {
+            brick = &holder;
+            brick_permutation = node.permutation;
+            sums->compute(statistics_->values(holder),
+                          brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation)));
+          }
+          m = sums->moments(node.heap, holder.corner);
+        }
+      }
+      const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
+      vec3 gradient(0.0F);
+      if (cells == CellKind::linear && m.min < m.max) {
+        const dvec3 covariance = m.first / m.volume - dvec3(centroid) * m.mean();
+        const dvec3 in_frame = dvec3(core::cm_to_frame(vec3(covariance), shape)) / double(unit);
+        gradient = vec3(fit_linear(cell_class, in_frame, mean).gradient * to_relative);
+      }
+      if (m.max > 0.0F) {
+        for (std::uint32_t i = 0; i < 4; ++i) {
+          const vec3 vertex = core::cm_cell_vertex(v0, shape, i);
+          box.low = glm::min(box.low, vertex);
+          box.high = glm::max(box.high, vertex);
+        }
+      }
+      CellRecord& record = grid.cells[rank];
+      for (unsigned face = 0; face < 4; ++face) {
+        const std::uint32_t other = resolve(index, face);
+        record.links[static_cast<int>(face)] = other == CM_NONE ? CM_NONE : first_leaf_[other];
+      }
+      record.data.x = node.v0[0] | (std::uint32_t{node.v0[1]} << 16U);
+      record.data.y = node.v0[2] | (shape << 16U);
+      record.data.z = glm::packHalf2x16({static_cast<float>(mean * to_relative), gradient.x});
+      record.data.w = glm::packHalf2x16({gradient.y, gradient.z});
+    }
+  });
+  Box all;
+  boxes.combine_each([&](const Box& box) {
+    all.low = glm::min(all.low, box.low);
+    all.high = glm::max(all.high, box.high);
+  });
+  if (all.low.x <= all.high.x) {
+    grid.content_min = all.low;
+    grid.content_max = all.high;
+  }
+  return grid;
+}
+
+std::uint32_t locate(const TetGrid& grid, const vec3& p) {
+  const auto size = static_cast<float>(grid.cube.size());
+  if (!glm::all(glm::greaterThanEqual(p, vec3(0.0F))) || !glm::all(glm::lessThanEqual(p, vec3(size)))) return CM_NONE;
+  const std::uint32_t root = core::cm_root_of(p, 0.5F * size);
+  vec3 v0;
+  std::uint32_t shape = 0;
+  core::cm_root_cell(root, static_cast<std::uint32_t>(grid.cube.log2_size - 1), v0, shape);
+  std::uint32_t leaf = grid.roots[root].first_leaf;
+  std::uint32_t internal = grid.roots[root].first_internal;
+  std::uint32_t inside = grid.roots[root + 1].first_internal - internal;
+  while (inside > 0) {
+    const std::uint32_t left = grid.tree[internal];
+    const bool second = core::cm_on_child_1(core::cm_shape_class(shape),
+                                            core::cm_to_frame(p - v0, shape) * core::cm_shape_inverse_unit(shape));
+    if (second) {
+      v0 = core::cm_cell_vertex(v0, shape, 1);
+      leaf += left + 1;
+      internal += left + 1;
+      inside -= left + 1;
+    } else {
+      internal += 1;
+      inside = left;
+    }
+    shape = core::cm_child_shape(shape, second ? 1 : 0);
+  }
+  return leaf;
+}
+
+}  // namespace cumulet::grid

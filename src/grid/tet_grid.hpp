@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "grid/refine.hpp"
+#include "grid/statistics.hpp"
+
+namespace cumulet::grid {
+
+/// One cell as the shaders read it: glsl/cell.glsl has the layout.
+struct CellRecord {
+  glm::uvec4 links;
+  glm::uvec4 data;
+};
+static_assert(sizeof(CellRecord) == 32);
+
+/// Where in the leaves and in the tree a root cell's part begins.
+struct RootEntry {
+  std::uint32_t first_leaf = 0;
+  std::uint32_t first_internal = 0;
+};
+
+/// The adaptive grid: a conforming tetrahedral partition of the control cube, in bisection (depth-first) order.
+struct TetGrid {
+  Cube cube;
+  std::vector<CellRecord> cells;
+  /// Point location: for each internal node of the bisection forest in depth-first order, how many internal nodes its
+  /// child 0 has. A leaf has none, a subtree has one leaf more than internal nodes: so this one number says where both
+  /// children's nodes and leaves begin.
+  std::vector<std::uint32_t> tree;
+  std::array<RootEntry, 25> roots{};  ///< 24 and an end mark
+  std::uint32_t levels = 0;           ///< deepest bisection level of a cell; the roots are level 0
+  float density_unit = 1.0F;          ///< grid value of a record's density 1
+  glm::vec3 content_min{0.0F};        ///< cube-space box that holds every cell with density
+  glm::vec3 content_max{0.0F};
+  bool limited = false;               ///< max_cells ended the refinement
+
+  [[nodiscard]] std::uint64_t bytes() const { return cells.size() * sizeof(CellRecord) + tree.size() * 4 + 200; }
+};
+
+/// Bisects the control cube by the set's diamonds, links neighbours as it goes, and fits densities.
+/// The same input gives the same grid, whatever the number of threads. O(cells).
+class GridBuilder {
+ public:
+  GridBuilder(const Statistics& statistics, const DiamondSet& diamonds);
+  /// Throws Error(unsupported) for more than 2^31 nodes.
+  void bisect();
+  TetGrid records(CellKind cells, float max_value);
+
+ private:
+  struct Node {
+    std::array<std::uint32_t, 4> links;
+    std::uint32_t child;         // 0: a leaf
+    std::array<std::uint16_t, 3> v0;
+    std::uint16_t shape;
+    std::uint16_t heap;          // place in the brick's tree, 0 above bricks
+    std::uint16_t permutation;   // of that tree
+  };
+  static_assert(sizeof(Node) == 32);
+
+  void make_roots();
+  void split_level(std::uint32_t first, std::uint32_t last);
+  [[nodiscard]] std::uint32_t resolve(std::uint32_t from, unsigned face) const;
+  void order();
+
+  const Statistics* statistics_;
+  const DiamondSet* diamonds_;
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> level_first_;
+  std::vector<std::uint32_t> leaves_below_;
+  std::vector<std::uint32_t> first_leaf_;
+  std::vector<std::uint32_t> leaf_nodes_;
+};
+
+/// The cell that holds p (cube space); on a face, edge or vertex one of those that share it. CM_NONE outside the cube.
+std::uint32_t locate(const TetGrid& grid, const glm::vec3& p);
+
+}  // namespace cumulet::grid

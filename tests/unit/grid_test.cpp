@@ -1,0 +1,503 @@
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <random>
+#include <set>
+
+#include "grid/cell.hpp"
+#include "grid/refine.hpp"
+#include "grid/statistics.hpp"
+#include "grid/tet_grid.hpp"
+#include "support/volumes.hpp"
+
+namespace {
+
+using namespace cumulet;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+struct Built {
+  std::unique_ptr<grid::Statistics> statistics;
+  grid::TetGrid grid;
+};
+
+Built build(const volume::ScalarVolume& volume, const grid::RefineSettings& settings) {
+  Built built;
+  built.statistics = std::make_unique<grid::Statistics>(volume, grid::fit_cube(volume));
+  const grid::DiamondSet diamonds(*built.statistics, settings);
+  grid::GridBuilder builder(*built.statistics, diamonds);
+  builder.bisect();
+  built.grid = builder.records(settings.cells, volume.max_value);
+  EXPECT_EQ(built.grid.cells.size(), diamonds.cell_count());
+  return built;
+}
+
+std::array<vec3, 4> vertices_of(const grid::CellRecord& cell) {
+  const vec3 v0 = core::cm_record_v0(cell.data);
+  const std::uint32_t shape = core::cm_record_shape(cell.data);
+  return {v0, core::cm_cell_vertex(v0, shape, 1), core::cm_cell_vertex(v0, shape, 2), core::cm_cell_vertex(v0, shape, 3)};
+}
+
+double volume_of(const std::array<vec3, 4>& v) {
+  return std::abs(glm::dot(dvec3(v[1] - v[0]), glm::cross(dvec3(v[2] - v[0]), dvec3(v[3] - v[0])))) / 6.0;
+}
+
+constexpr std::array<std::array<unsigned, 4>, 3> opposite{{{3, 1, 2, 0}, {1, 3, 2, 0}, {3, 2, 1, 0}}};
+
+using Face = std::array<std::array<float, 3>, 3>;
+Face face_of(const grid::CellRecord& cell, unsigned face) {
+  const auto v = vertices_of(cell);
+  const unsigned skip = opposite[core::cm_shape_class(core::cm_record_shape(cell.data))][face];
+  Face f{};
+  unsigned n = 0;
+  for (unsigned i = 0; i < 4; ++i) {
+    if (i != skip) f[n++] = {v[i].x, v[i].y, v[i].z};
+  }
+  std::sort(f.begin(), f.end());
+  return f;
+}
+
+// Every interior face is shared by exactly two cells that link to each other across it; volumes add up to the cube.
+void expect_conforming(const grid::TetGrid& grid) {
+  double volume = 0.0;
+  std::size_t wrong = 0;
+  const auto size = static_cast<float>(grid.cube.size());
+  for (std::uint32_t c = 0; c < grid.cells.size(); ++c) {
+    const grid::CellRecord& cell = grid.cells[c];
+    const auto v = vertices_of(cell);
+    volume += volume_of(v);
+    for (unsigned face = 0; face < 4; ++face) {
+      const std::uint32_t other = cell.links[static_cast<int>(face)];
+      const Face mine = face_of(cell, face);
+      if (other == CM_NONE) {
+        bool on_boundary = false;
+        for (unsigned axis = 0; axis < 3; ++axis) {
+          on_boundary = on_boundary || (mine[0][axis] == mine[1][axis] && mine[1][axis] == mine[2][axis] &&
+                                        (mine[0][axis] == 0.0F || mine[0][axis] == size));
+        }
+        wrong += on_boundary ? 0 : 1;
+        continue;
+      }
+      if (other >= grid.cells.size()) {
+        ++wrong;
+        continue;
+      }
+      bool matched = false;
+      for (unsigned back = 0; back < 4; ++back) {
+        matched = matched || (grid.cells[other].links[static_cast<int>(back)] == c && face_of(grid.cells[other], back) == mine);
+      }
+      wrong += matched ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(wrong, 0U);
+  EXPECT_NEAR(volume / std::pow(double(size), 3.0), 1.0, 1e-9);
+}
+
+// Walks a bisection by brute force down to voxel sixths and sums them: slow, independent of bricks and octrees.
+grid::Moments brute_moments(const volume::ScalarVolume& volume, const grid::Cube& cube, const vec3& v0,
+                            std::uint32_t shape) {
+  grid::Moments m;
+  if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 0) {
+    const vec3 centroid = v0 + core::cm_from_frame(core::cm_frame_centroid(1), shape);
+    const float f = test::value_at(volume, ivec3(centroid) + cube.origin);
+    m.volume = 1.0 / 6.0;
+    m.mass = f / 6.0;
+    m.square = double(f) * f / 6.0;
+    m.first = dvec3(centroid) * m.mass;
+    m.min = m.max = f;
+    return m;
+  }
+  m = brute_moments(volume, cube, v0, core::cm_child_shape(shape, 0));
+  m += brute_moments(volume, cube, core::cm_cell_vertex(v0, shape, 1), core::cm_child_shape(shape, 1));
+  return m;
+}
+
+TEST(Shapes, AreClosedUnderBisection) {
+  std::set<std::uint32_t> seen;
+  std::vector<std::pair<vec3, std::uint32_t>> todo;
+  for (unsigned root = 0; root < 24; ++root) {
+    vec3 v0;
+    std::uint32_t shape = 0;
+    core::cm_root_cell(root, 8, v0, shape);
+    todo.emplace_back(v0, shape);
+  }
+  for (int level = 0; level < 12; ++level) {
+    std::vector<std::pair<vec3, std::uint32_t>> next;
+    for (const auto& [v0, shape] : todo) {
+      seen.insert(shape & 0x7ffU);
+      std::array<vec3, 4> v;
+      for (unsigned i = 0; i < 4; ++i) v[i] = core::cm_cell_vertex(v0, shape, i);
+      // v0 v1 is the longest edge.
+      for (unsigned i = 0; i < 4; ++i) {
+        for (unsigned j = i + 1; j < 4; ++j) EXPECT_LE(glm::distance(v[i], v[j]), glm::distance(v[0], v[1]) * 1.00001F);
+      }
+      for (unsigned child = 0; child < 2; ++child) {
+        const vec3 child_v0 = child == 0 ? v[0] : v[1];
+        const std::uint32_t child_shape = core::cm_child_shape(shape, child);
+        std::multiset<std::array<float, 3>> expected;
+        std::multiset<std::array<float, 3>> got;
+        const vec3 middle = 0.5F * (v[0] + v[1]);
+        for (const vec3& p : {child_v0, v[2], v[3], middle}) expected.insert({p.x, p.y, p.z});
+        for (unsigned i = 0; i < 4; ++i) {
+          const vec3 p = core::cm_cell_vertex(child_v0, child_shape, i);
+          got.insert({p.x, p.y, p.z});
+        }
+        EXPECT_EQ(expected, got);
+        if (next.size() < 2000) next.emplace_back(child_v0, child_shape);
+      }
+    }
+    todo = std::move(next);
+  }
+  EXPECT_EQ(seen.size(), 144U);
+}
+
+TEST(Statistics, MatchBruteForceOnEveryCellAboveAndInsideBricks) {
+  const auto volume = test::noise_volume({21, 13, 60}, ivec3(-5, 3, 17), 7);
+  const grid::Cube cube = grid::fit_cube(volume);
+  ASSERT_EQ(cube.size(), 64);
+  const grid::Statistics statistics(volume, cube);
+  test::Random random(3);
+  int brick_level = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    vec3 v0;
+    std::uint32_t shape = 0;
+    core::cm_root_cell(random() % 24, static_cast<std::uint32_t>(cube.log2_size - 1), v0, shape);
+    const int depth = static_cast<int>(random() % 8);
+    for (int i = 0; i < depth; ++i) {
+      if (random() % 2 != 0) {
+        const vec3 v1 = core::cm_cell_vertex(v0, shape, 1);
+        shape = core::cm_child_shape(shape, 1);
+        v0 = v1;
+      } else {
+        shape = core::cm_child_shape(shape, 0);
+      }
+    }
+    const grid::Moments a = statistics.moments(v0, shape);
+    const grid::Moments b = brute_moments(volume, cube, v0, shape);
+    EXPECT_NEAR(a.volume, b.volume, 1e-9);
+    EXPECT_NEAR(a.mass, b.mass, 1e-4 + 1e-5 * b.mass);
+    EXPECT_NEAR(a.square, b.square, 1e-4 + 1e-5 * b.square);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(a.first[axis], b.first[axis], 1e-2 + 1e-5 * b.first[axis]);
+    EXPECT_EQ(a.min, b.min);
+    EXPECT_EQ(a.max, b.max);
+    brick_level += core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 3 ? 1 : 0;
+  }
+  EXPECT_GT(brick_level, 0);
+  for (unsigned frame_trial = 0; frame_trial < 6; ++frame_trial) {
+    const auto& node = statistics.nodes()[statistics.nodes_of_size(3)[frame_trial]];
+    const std::uint32_t frame = grid::kuhn_frame(node.corner, 8, frame_trial);
+    grid::BrickSums sums;
+    sums.compute(statistics.values(node), grid::brick_tree(frame));
+    vec3 v0(node.corner);
+    for (int axis = 0; axis < 3; ++axis) v0[axis] += ((node.corner[axis] / 8) & 1) != 0 ? 8.0F : 0.0F;
+    std::uint32_t shape = frame | (1U << 9U) | (3U << 11U);
+    unsigned heap = 1;
+    for (int i = 0; i < 9; ++i) {
+      const grid::Moments a = sums.moments(heap, node.corner);
+      const grid::Moments b = brute_moments(volume, cube, v0, shape);
+      EXPECT_NEAR(a.mass, b.mass, 1e-4 + 1e-5 * b.mass);
+      EXPECT_NEAR(a.square, b.square, 1e-4 + 1e-5 * b.square);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(a.first[axis], b.first[axis], 1e-3 + 1e-5 * b.first[axis]);
+      const unsigned side = random() % 2;
+      const vec3 v1 = core::cm_cell_vertex(v0, shape, 1);
+      shape = core::cm_child_shape(shape, side);
+      if (side == 1) v0 = v1;
+      heap = 2 * heap + side;
+    }
+  }
+}
+
+TEST(Statistics, TilesAndBackgroundCountLikeVoxels) {
+  volume::ScalarVolume volume;
+  volume.name = "density";
+  volume.bounds_min = {3, 0, 0};
+  volume.bounds_max = {60, 40, 50};
+  volume.background = 0.25F;
+  volume.max_value = 2.0F;
+  volume.tiles.push_back({{16, 8, 8}, {40, 31, 31}, 2.0F});
+  volume.active_voxels = 1;
+  const grid::Cube cube = grid::fit_cube(volume);
+  const grid::Statistics statistics(volume, cube);
+  grid::Moments sum;
+  double brute = 0.0;
+  for (unsigned root = 0; root < 24; ++root) {
+    vec3 v0;
+    std::uint32_t shape = 0;
+    core::cm_root_cell(root, static_cast<std::uint32_t>(cube.log2_size - 1), v0, shape);
+    sum += statistics.moments(v0, shape);
+  }
+  for (int x = 0; x < 64; ++x) {
+    for (int y = 0; y < 64; ++y) {
+      for (int z = 0; z < 64; ++z) brute += test::value_at(volume, {x, y, z});
+    }
+  }
+  EXPECT_NEAR(sum.mass, brute, 1e-6 * brute);
+  EXPECT_EQ(sum.max, 2.0F);
+  EXPECT_EQ(sum.min, 0.0F);
+}
+
+TEST(LinearFit, RecoversALinearFieldAndStaysNonNegative) {
+  for (std::uint32_t cell_class = 0; cell_class < 3; ++cell_class) {
+    // f = 3 + g.(x - c): covariance = C g with C the tetrahedron's covariance, integrated here by its vertices.
+    const dvec3 g(0.3, -0.2, 0.5);
+    const dvec3 centroid = core::cm_frame_centroid(cell_class);
+    dvec3 covariance(0.0);
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      const dvec3 v = dvec3(core::cm_frame_vertex(cell_class, i)) - centroid;
+      covariance += v * glm::dot(v, g) / 20.0;
+    }
+    const grid::LinearFit fit = grid::fit_linear(cell_class, covariance, 3.0);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(fit.gradient[axis], g[axis], 1e-9);
+    EXPECT_NEAR(fit.explained, glm::dot(g, covariance), 1e-9);
+    const grid::LinearFit clamped = grid::fit_linear(cell_class, covariance, 0.1);
+    double lowest = 1e9;
+    for (std::uint32_t i = 0; i < 4; ++i) {
+      lowest = std::min(lowest, 0.1 + glm::dot(clamped.gradient, dvec3(core::cm_frame_vertex(cell_class, i)) - centroid));
+    }
+    EXPECT_NEAR(lowest, 0.0, 1e-9);
+  }
+}
+
+TEST(Grid, ConformsForEveryCriterionAndBudget) {
+  const auto volume = test::noise_volume({60, 45, 50}, ivec3(-20, 0, 9), 1);
+  for (const auto criterion : {grid::Criterion::deviation, grid::Criterion::range_mean}) {
+    for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
+      for (const double threshold : {-1.0, 0.02, 0.2, 1.5}) {
+        for (const std::uint64_t max_cells : {24ULL, 1000ULL, 20000ULL, 10000000ULL}) {
+          grid::RefineSettings settings;
+          settings.criterion = criterion;
+          settings.cells = cells;
+          settings.threshold = threshold;
+          settings.max_cells = max_cells;
+          const Built built = build(volume, settings);
+          EXPECT_LE(built.grid.cells.size(), max_cells);
+          expect_conforming(built.grid);
+        }
+      }
+    }
+  }
+}
+
+TEST(Grid, ConformsForASingleVoxelAnywhere) {
+  test::Random random(11);
+  for (int trial = 0; trial < 12; ++trial) {
+    auto volume = test::noise_volume({60, 60, 60}, ivec3(0), 5);
+    std::fill(volume.brick_values.begin(), volume.brick_values.end(), 0.0F);
+    const std::size_t hot = random() % volume.brick_values.size();
+    const ivec3 p = volume.brick_origins[hot / 512] + ivec3((hot % 512) / 64, (hot / 8) % 8, hot % 8);
+    if (p.x >= 60 || p.y >= 60 || p.z >= 60) continue;
+    volume.brick_values[hot] = 1.0F;
+    volume.max_value = 1.0F;
+    grid::RefineSettings settings;
+    settings.threshold = -1.0;
+    settings.cells = grid::CellKind::constant;
+    const Built built = build(volume, settings);
+    expect_conforming(built.grid);
+    // The voxel itself is resolved, exactly.
+    const std::uint32_t cell = grid::locate(built.grid, vec3(p) + vec3(0.4F, 0.5F, 0.6F));
+    EXPECT_EQ(glm::unpackHalf2x16(built.grid.cells[cell].data.z).x, 1.0F);
+    EXPECT_LT(built.grid.cells.size(), 4000U);
+  }
+}
+
+TEST(Grid, FullyRefinedConstantCellsAreTheVoxels) {
+  const auto volume = test::noise_volume({20, 30, 25}, ivec3(4, -9, 0), 2);
+  grid::RefineSettings settings;
+  settings.threshold = -1.0;
+  settings.cells = grid::CellKind::constant;
+  settings.max_cells = 100'000'000;
+  const Built built = build(volume, settings);
+  test::Random random(5);
+  std::uniform_real_distribution<float> uniform(0.0F, static_cast<float>(built.grid.cube.size()));
+  for (int i = 0; i < 20000; ++i) {
+    const vec3 p(uniform(random), uniform(random), uniform(random));
+    const std::uint32_t cell = grid::locate(built.grid, p);
+    ASSERT_NE(cell, CM_NONE);
+    const float got = glm::unpackHalf2x16(built.grid.cells[cell].data.z).x * built.grid.density_unit;
+    EXPECT_NEAR(got, test::value_at(volume, ivec3(p) + built.grid.cube.origin), 1e-3F);
+  }
+}
+
+TEST(Grid, KeepsTheMassAndIsNeverNegative) {
+  const auto volume = test::noise_volume({60, 45, 50}, ivec3(-20, 0, 9), 1);
+  double mass = 0.0;
+  for (const float v : volume.brick_values) mass += v;
+  for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
+    grid::RefineSettings settings;
+    settings.cells = cells;
+    settings.threshold = 0.05;
+    const Built built = build(volume, settings);
+    double sum = 0.0;
+    for (const grid::CellRecord& cell : built.grid.cells) {
+      const glm::vec2 low = glm::unpackHalf2x16(cell.data.z);
+      const glm::vec2 high = glm::unpackHalf2x16(cell.data.w);
+      sum += double(low.x) * volume_of(vertices_of(cell)) * built.grid.density_unit;
+      const std::uint32_t cell_class = core::cm_shape_class(core::cm_record_shape(cell.data));
+      for (unsigned i = 0; i < 4; ++i) {
+        const vec3 offset = core::cm_frame_vertex(cell_class, i) - core::cm_frame_centroid(cell_class);
+        EXPECT_GE(low.x + glm::dot(vec3(low.y, high.x, high.y), offset), -2e-3F);
+      }
+    }
+    EXPECT_NEAR(sum, mass, 1e-3 * mass);
+  }
+}
+
+TEST(Grid, IsTheSameWhateverTheThreads) {
+  const auto volume = test::noise_volume({90, 70, 80}, ivec3(0), 4);
+  grid::RefineSettings settings;
+  settings.threshold = 0.01;
+  settings.max_cells = 50000;
+  const auto run = [&](std::size_t threads) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    return build(volume, settings).grid;
+  };
+  const grid::TetGrid one = run(1);
+  const grid::TetGrid two = run(2);
+  ASSERT_EQ(one.cells.size(), two.cells.size());
+  EXPECT_EQ(std::memcmp(one.cells.data(), two.cells.data(), one.cells.size() * sizeof(grid::CellRecord)), 0);
+  EXPECT_EQ(one.tree, two.tree);
+}
+
+TEST(Grid, LocatesPointsInsideAndOnFacesEdgesAndVertices) {
+  const auto volume = test::noise_volume({60, 45, 50}, ivec3(0), 1);
+  grid::RefineSettings settings;
+  settings.threshold = 0.02;
+  const Built built = build(volume, settings);
+  const auto& cells = built.grid.cells;
+  const auto contains = [&](std::uint32_t c, const vec3& p) {
+    const auto v = vertices_of(cells[c]);
+    double sum = 0.0;
+    for (unsigned i = 0; i < 4; ++i) {
+      auto w = v;
+      w[i] = p;
+      sum += volume_of(w);
+    }
+    return sum <= volume_of(v) * (1.0 + 1e-5);
+  };
+  test::Random random(9);
+  for (int trial = 0; trial < 20000; ++trial) {
+    const std::uint32_t c = random() % static_cast<std::uint32_t>(cells.size());
+    const auto v = vertices_of(cells[c]);
+    const unsigned kind = random() % 4;  // vertex, edge, face, inside
+    std::array<float, 4> weight{};
+    for (unsigned i = 0; i <= kind; ++i) weight[i] = kind == 0 ? 1.0F : static_cast<float>(1 + random() % 3);
+    const float total = weight[0] + weight[1] + weight[2] + weight[3];
+    vec3 p(0.0F);
+    for (unsigned i = 0; i < 4; ++i) p += weight[i] / total * v[(i + trial) % 4];
+    const std::uint32_t found = grid::locate(built.grid, p);
+    ASSERT_NE(found, CM_NONE);
+    EXPECT_TRUE(contains(found, p));
+    if (kind == 3) {
+      EXPECT_EQ(found, c);
+    }
+  }
+  EXPECT_EQ(grid::locate(built.grid, vec3(-1.0F, 3.0F, 3.0F)), CM_NONE);
+}
+
+TEST(Grid, CameraStopsSplitsOutsideTheFrustumAndUnderAPixel) {
+  const auto volume = test::noise_volume({120, 120, 120}, ivec3(0), 1);
+  grid::RefineSettings settings;
+  settings.threshold = 0.01;
+  const std::size_t everywhere = build(volume, settings).grid.cells.size();
+  grid::RefineCamera camera;
+  camera.eye = {60.0, 60.0, 400.0};
+  camera.tan_half_x = camera.tan_half_y = 0.05;  // sees the middle only
+  camera.pixels_per_radian = 100000.0;
+  settings.camera = camera;
+  const Built narrow = build(volume, settings);
+  expect_conforming(narrow.grid);
+  EXPECT_LT(narrow.grid.cells.size(), everywhere / 3);
+  const auto finest_at = [&](const grid::TetGrid& g, const vec3& p) {
+    return core::cm_shape_exponent(core::cm_record_shape(g.cells[grid::locate(g, p)].data));
+  };
+  EXPECT_LE(finest_at(narrow.grid, {60.3F, 60.4F, 60.1F}), 1U);
+  EXPECT_GE(finest_at(narrow.grid, {4.3F, 4.1F, 100.2F}), 3U);
+  settings.camera->tan_half_x = settings.camera->tan_half_y = 1.0;
+  settings.camera->pixels_per_radian = 20.0;  // a pixel is about 15 voxels there
+  const Built far = build(volume, settings);
+  expect_conforming(far.grid);
+  EXPECT_LT(far.grid.cells.size(), everywhere / 20);
+}
+
+// A million rays: axis-aligned, in faces, along edges, through vertices. None stuck, none wrong.
+TEST(Traversal, AdversarialRaysReachTheOtherSideWithTheRightOpticalDepth) {
+  const auto volume = test::noise_volume({60, 45, 50}, ivec3(0), 1);
+  grid::RefineSettings settings;
+  settings.threshold = 0.05;
+  settings.cells = grid::CellKind::constant;
+  const Built built = build(volume, settings);
+  const auto& cells = built.grid.cells;
+  const auto size = static_cast<float>(built.grid.cube.size());
+  test::Random random(21);
+  const auto pick_vertex = [&] {
+    const auto v = vertices_of(cells[random() % static_cast<std::uint32_t>(cells.size())]);
+    return v;
+  };
+  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+  constexpr std::array<std::array<int, 3>, 13> lattice{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}, {1, -1, 0}, {1, 0, 1},
+                                                        {1, 0, -1}, {0, 1, 1}, {0, 1, -1}, {1, 1, 1}, {1, 1, -1},
+                                                        {1, -1, 1}, {-1, 1, 1}}};
+  std::size_t stuck = 0;
+  std::size_t wrong = 0;
+  const int rays = 1'000'000;
+  for (int ray = 0; ray < rays; ++ray) {
+    const auto v = pick_vertex();
+    vec3 o = v[0];
+    vec3 d;
+    const unsigned kind = ray % 6;
+    if (kind == 0) o = v[random() % 4];
+    if (kind == 1) o = 0.5F * (v[0] + v[1]);
+    if (kind == 2) o = (v[0] + v[1] + v[2]) / 3.0F;
+    if (kind == 3) o = 0.25F * (v[0] + v[1] + v[2] + v[3]);
+    const auto& l = lattice[random() % lattice.size()];
+    d = vec3(l[0], l[1], l[2]) * ((random() & 1U) != 0 ? 1.0F : -1.0F);
+    if (kind == 4) d = pick_vertex()[random() % 4] - o;              // from vertex to vertex
+    if (kind == 5) d = vec3(uniform(random), uniform(random), uniform(random));
+    if (glm::dot(d, d) == 0.0F) d = vec3(1.0F, 0.0F, 0.0F);
+    std::uint32_t cell = grid::locate(built.grid, o);
+    float t = 0.0F;
+    unsigned steps = 0;
+    double depth = 0.0;
+    bool tracked = true;
+    const unsigned limit = 4000;
+    while (cell != CM_NONE && steps < limit) {
+      float t_exit = 0.0F;
+      std::uint32_t face = 0;
+      const auto& data = cells[cell].data;
+      core::cm_cell_exit(core::cm_record_v0(data), core::cm_record_shape(data), o, d, t_exit, face);
+      const float t_next = std::max(t, t_exit);
+      // The middle of every segment lies in its cell.
+      if (ray % 97 == 0 && t_next - t > 1e-3F * std::abs(t_next)) {
+        const vec3 middle = o + 0.5F * (t + t_next) * d;
+        const auto w = vertices_of(cells[cell]);
+        double sum = 0.0;
+        for (unsigned i = 0; i < 4; ++i) {
+          auto u = w;
+          u[i] = middle;
+          sum += volume_of(u);
+        }
+        tracked = tracked && sum <= volume_of(w) * 1.001 + 1e-3;
+      }
+      depth += double(t_next - t) * glm::unpackHalf2x16(data.z).x;
+      t = t_next;
+      cell = core::cm_link(cells[cell].links, face);
+      ++steps;
+    }
+    if (steps >= limit) ++stuck;
+    // It left where the ray leaves the cube.
+    float t_cube = 3.0e38F;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (d[axis] > 0.0F) t_cube = std::min(t_cube, (size - o[axis]) / d[axis]);
+      if (d[axis] < 0.0F) t_cube = std::min(t_cube, -o[axis] / d[axis]);
+    }
+    if (!tracked || std::abs(t - t_cube) > 1e-4F * std::max(1.0F, t_cube) || !(depth >= 0.0)) ++wrong;
+  }
+  EXPECT_EQ(stuck, 0U);
+  EXPECT_EQ(wrong, 0U);
+}
+
+}  // namespace

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <glm/gtc/noise.hpp>
+#include <random>
+#include <tuple>
+
+#include "volume/volume.hpp"
+
+namespace cumulet::test {
+
+/// mt19937 with 32-bit results, the same everywhere.
+class Random {
+ public:
+  using result_type = std::uint32_t;
+  explicit Random(std::uint32_t seed) : engine_(seed) {}
+  result_type operator()() { return static_cast<result_type>(engine_()); }
+  static constexpr result_type min() { return 0; }
+  static constexpr result_type max() { return 0xffffffffU; }
+
+ private:
+  std::mt19937 engine_;
+};
+
+/// The reference medium's value at a voxel, by definition: zero outside bounds, else brick, tile or background.
+inline float value_at(const volume::ScalarVolume& v, const glm::ivec3& p) {
+  if (glm::any(glm::lessThan(p, v.bounds_min)) || glm::any(glm::greaterThan(p, v.bounds_max))) return 0.0F;
+  const glm::ivec3 origin = p & ~7;
+  const auto less = [](const glm::ivec3& a, const glm::ivec3& b) {
+    return std::make_tuple(a.x, a.y, a.z) < std::make_tuple(b.x, b.y, b.z);
+  };
+  const auto found = std::lower_bound(v.brick_origins.begin(), v.brick_origins.end(), origin, less);
+  if (found != v.brick_origins.end() && *found == origin) {
+    const auto brick = static_cast<std::size_t>(found - v.brick_origins.begin());
+    return v.brick_values[brick * 512 + static_cast<std::size_t>((p.x & 7) * 64 + (p.y & 7) * 8 + (p.z & 7))];
+  }
+  for (const volume::Tile& tile : v.tiles) {
+    if (glm::all(glm::greaterThanEqual(p, tile.min)) && glm::all(glm::lessThanEqual(p, tile.max))) return tile.value;
+  }
+  return v.background;
+}
+
+/// Fills bounds with function(index), brick by brick; bricks that are all zero are left out.
+template <class Function>
+volume::ScalarVolume make_volume(const glm::ivec3& size, const glm::ivec3& low, Function function) {
+  volume::ScalarVolume v;
+  v.name = "density";
+  v.bounds_min = low;
+  v.bounds_max = low + size - 1;
+  const glm::ivec3 first = v.bounds_min & ~7;
+  for (int x = first.x; x <= v.bounds_max.x; x += 8) {
+    for (int y = first.y; y <= v.bounds_max.y; y += 8) {
+      for (int z = first.z; z <= v.bounds_max.z; z += 8) {
+        std::array<float, 512> values{};
+        bool any = false;
+        for (int i = 0; i < 512; ++i) {
+          const glm::ivec3 p(x + i / 64, y + (i / 8) % 8, z + i % 8);
+          if (glm::any(glm::lessThan(p, v.bounds_min)) || glm::any(glm::greaterThan(p, v.bounds_max))) continue;
+          values[static_cast<std::size_t>(i)] = function(p);
+          any = any || values[static_cast<std::size_t>(i)] > 0.0F;
+          v.max_value = std::max(v.max_value, values[static_cast<std::size_t>(i)]);
+          ++v.active_voxels;
+        }
+        if (!any) continue;
+        v.brick_origins.emplace_back(x, y, z);
+        v.brick_values.insert(v.brick_values.end(), values.begin(), values.end());
+      }
+    }
+  }
+  return v;
+}
+
+/// A lumpy ball with empty parts, deterministic.
+inline volume::ScalarVolume noise_volume(const glm::ivec3& size, const glm::ivec3& low, int seed) {
+  const glm::vec3 centre = glm::vec3(low) + 0.5F * glm::vec3(size);
+  return make_volume(size, low, [=](const glm::ivec3& p) {
+    const glm::vec3 x(p);
+    const float radius = glm::length((x - centre) / (0.5F * glm::vec3(size)));
+    const float noise = glm::simplex(glm::vec3(0.11F * x) + 17.3F * static_cast<float>(seed));
+    return std::max(0.0F, 1.1F - radius + 0.5F * noise);
+  });
+}
+
+}  // namespace cumulet::test
