@@ -1,0 +1,475 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <numeric>
+#include <sstream>
+#include <tuple>
+
+#include "volume/import_detail.hpp"
+
+namespace cumulet::volume {
+
+using namespace detail;
+
+std::string detail::scalar_fog_refusal(std::string_view type, std::string_view grid_class, bool scalar) {
+  if (type == "points") return "holds points, not a fog volume";
+  if (!scalar) return "is of type " + std::string(type) + ", not a float or half scalar";
+  if (grid_class == "fog volume" || grid_class == "unknown") return {};
+  return "is a " + std::string(grid_class) + ", not a fog volume";
+}
+
+namespace {
+
+// Longer than any asset, short enough that every voxel count and index difference fits its integer.
+constexpr int max_extent = 1 << 20;
+constexpr int max_coordinate = 1 << 30;
+
+/// What a library says may hold line breaks and terminal controls; our messages are one line.
+std::string one_line(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool blank = static_cast<unsigned char>(c) <= ' ' || c == '\x7f';
+    if (!blank) {
+      out += c;
+    } else if (!out.empty() && out.back() != ' ') {
+      out += ' ';
+    }
+  }
+  while (!out.empty() && out.back() == ' ') out.pop_back();
+  return out;
+}
+
+[[noreturn]] void file_error(const std::filesystem::path& file, std::string_view cause) {
+  throw Error(ErrorCode::file, one_line(file.string() + ": " + std::string(cause)));
+}
+
+/// Runs f; whatever it throws leaves as one line that names the file.
+template <typename Function>
+auto naming_file(const std::filesystem::path& file, Function&& f) {
+  try {
+    return f();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::out_of_memory, one_line(file.string() + ": not enough memory to read it"));
+  } catch (const std::exception& e) {
+    file_error(file, e.what());
+  } catch (...) {
+    file_error(file, "unknown error while reading");
+  }
+}
+
+std::unique_ptr<Reader> open(const std::filesystem::path& file) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) fail("no such file");
+  if (status.type() == fs::file_type::none) fail(error.message());
+  if (status.type() == fs::file_type::directory) fail("is a directory");
+  if (status.type() != fs::file_type::regular) fail("is not a regular file");
+
+  // By content: a wrong extension is no reason to refuse a good file.
+  std::array<char, 8> magic{};
+  errno = 0;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail(errno != 0 ? std::strerror(errno) : "cannot be opened");
+  stream.read(magic.data(), magic.size());
+  const auto got = static_cast<std::size_t>(stream.gcount());
+  const std::string_view head(magic.data(), got);
+  if (got == 0) fail("is empty");
+  if (head.starts_with("NanoVDB")) return open_nanovdb(file);
+  if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(file);
+  if (got < magic.size()) fail("is too short to be a VDB or NanoVDB file");
+  fail("is not a VDB or NanoVDB file");
+}
+
+std::string describe(const GridEntry& entry) {
+  return "\"" + entry.unique_name + "\" (" + entry.info.type + ", " + entry.info.grid_class + ")";
+}
+
+std::string describe(const std::vector<GridEntry>& grids, const std::vector<std::size_t>& which) {
+  std::string out;
+  for (const std::size_t i : which) out += (out.empty() ? "" : ", ") + describe(grids[i]);
+  return out;
+}
+
+std::size_t choose_grid(const std::vector<GridEntry>& grids, const std::string& name) {
+  if (grids.empty()) fail("holds no grids");
+  std::vector<std::size_t> all(grids.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+
+  const auto where = [&](const auto& predicate) {
+    std::vector<std::size_t> found;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(found), [&](std::size_t i) { return predicate(grids[i]); });
+    return found;
+  };
+  const auto named = [&](const std::string& wanted) {
+    // "density[1]" picks one of several grids of the same name; an exact name comes first.
+    std::vector<std::size_t> found = where([&](const GridEntry& e) { return e.info.name == wanted; });
+    return found.empty() ? where([&](const GridEntry& e) { return e.unique_name == wanted; }) : found;
+  };
+  const auto only_usable = [&](const std::vector<std::size_t>& candidates) {
+    std::vector<std::size_t> usable;
+    for (const std::size_t i : candidates) {
+      if (grids[i].refusal.empty()) usable.push_back(i);
+    }
+    if (usable.empty()) fail("grid \"" + grids[candidates[0]].unique_name + "\" " + grids[candidates[0]].refusal);
+    if (usable.size() > 1) fail("several grids are called so, choose one by name: " + describe(grids, usable));
+    return usable[0];
+  };
+
+  if (!name.empty()) {
+    const auto found = named(name);
+    if (found.empty()) fail("has no grid \"" + name + "\"; it has " + describe(grids, all));
+    return only_usable(found);
+  }
+  if (const auto density = named("density"); !density.empty()) return only_usable(density);
+
+  const auto usable = where([](const GridEntry& e) { return e.refusal.empty(); });
+  if (usable.size() == 1) return usable[0];
+  if (usable.size() > 1)
+    fail("several scalar grids and none called density, choose one by name: " + describe(grids, usable));
+  if (grids.size() == 1) fail("grid \"" + grids[0].unique_name + "\" " + grids[0].refusal);
+  fail("no scalar fog volume among its grids: " + describe(grids, all));
+}
+
+struct Box {
+  glm::ivec3 min{std::numeric_limits<int>::max()};
+  glm::ivec3 max{std::numeric_limits<int>::min()};
+
+  [[nodiscard]] bool empty() const { return glm::any(glm::greaterThan(min, max)); }
+  void expand(const Box& b) {
+    min = glm::min(min, b.min);
+    max = glm::max(max, b.max);
+  }
+  [[nodiscard]] Box clipped(const Box& b) const { return {glm::max(min, b.min), glm::min(max, b.max)}; }
+  [[nodiscard]] bool contains(const Box& b) const {
+    return glm::all(glm::lessThanEqual(min, b.min)) && glm::all(glm::greaterThanEqual(max, b.max));
+  }
+  /// Only where neither side is longer than max_extent.
+  [[nodiscard]] std::uint64_t voxels() const {
+    if (empty()) return 0;
+    const glm::u64vec3 size(max - min + 1);
+    return size.x * size.y * size.z;
+  }
+};
+
+Box box_of_active(const ActiveMask& mask, glm::ivec3 origin) {
+  int x0 = brick_size;
+  int x1 = -1;
+  std::uint64_t slab = 0;  // bit y * 8 + z
+  for (int x = 0; x < brick_size; ++x) {
+    const std::uint64_t word = mask[static_cast<std::size_t>(x)];
+    if (word == 0) continue;
+    x0 = std::min(x0, x);
+    x1 = x;
+    slab |= word;
+  }
+  if (slab == 0) return {};
+  std::uint64_t row = slab | (slab >> 32U);
+  row |= row >> 16U;
+  row = (row | (row >> 8U)) & 0xFFU;
+  const glm::ivec3 min(x0, std::countr_zero(slab) / 8, std::countr_zero(row));
+  const glm::ivec3 max(x1, (63 - std::countl_zero(slab)) / 8, 63 - std::countl_zero(row));
+  return {origin + min, origin + max};
+}
+
+struct ActiveRegion {
+  Box box;
+  std::uint64_t voxels = 0;
+};
+
+ActiveRegion active_leaf_region(const LeafSource& leaves) {
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, leaves.count(), 256), ActiveRegion{},
+      [&](const tbb::blocked_range<std::size_t>& range, ActiveRegion sum) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          const ActiveMask mask = leaves.active(i);
+          for (const std::uint64_t word : mask) sum.voxels += static_cast<std::uint64_t>(std::popcount(word));
+          sum.box.expand(box_of_active(mask, leaves.origin(i)));
+        }
+        return sum;
+      },
+      [](ActiveRegion a, const ActiveRegion& b) {
+        a.box.expand(b.box);
+        a.voxels += b.voxels;
+        return a;
+      });
+}
+
+bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
+  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+}
+
+/// A leaf's values as the volume keeps them; zero outside bounds.
+struct CleanBrick {
+  std::array<float, brick_voxels> values;
+  std::uint64_t negative = 0;
+  float max = 0.0F;
+  bool constant = true;  ///< all voxels within bounds alike
+  float first = 0.0F;    ///< the first of them
+  int bad = -1;          ///< first voxel that is not finite
+  float bad_value = 0.0F;
+};
+
+void clean(const LeafSource& leaves, std::size_t leaf, const Box& bounds, CleanBrick& brick) {
+  leaves.values(leaf, brick.values.data());
+  brick.negative = 0;
+  brick.max = 0.0F;
+  brick.constant = true;
+  brick.bad = -1;
+  bool started = false;
+  const glm::ivec3 origin = leaves.origin(leaf);
+  const bool inside = bounds.contains({origin, origin + (brick_size - 1)});
+  for (int i = 0; i < brick_voxels; ++i) {
+    float& value = brick.values[static_cast<std::size_t>(i)];
+    if (!inside) {
+      const glm::ivec3 voxel = origin + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7);
+      if (!bounds.contains({voxel, voxel})) {
+        value = 0.0F;
+        continue;
+      }
+    }
+    if (!std::isfinite(value)) {
+      if (brick.bad < 0) {
+        brick.bad = i;
+        brick.bad_value = value;
+      }
+      continue;
+    }
+    if (value < 0.0F) ++brick.negative;
+    value = value > 0.0F ? value : 0.0F;  // turns -0 into 0 too
+    brick.max = std::max(brick.max, value);
+    if (!started) {
+      brick.first = value;
+      started = true;
+    }
+    brick.constant = brick.constant && value == brick.first;
+  }
+}
+
+struct BrickTotals {
+  std::uint64_t negative = 0;
+  std::uint64_t covered = 0;
+  float max = 0.0F;
+  std::size_t bad_brick = std::numeric_limits<std::size_t>::max();
+  int bad_voxel = 0;
+  float bad_value = 0.0F;
+
+  void add(const BrickTotals& b) {
+    negative += b.negative;
+    covered += b.covered;
+    max = std::max(max, b.max);
+    if (b.bad_brick < bad_brick) {
+      bad_brick = b.bad_brick;
+      bad_voxel = b.bad_voxel;
+      bad_value = b.bad_value;
+    }
+  }
+};
+
+std::string to_string(glm::ivec3 v) {
+  std::ostringstream out;
+  out << '(' << v.x << ", " << v.y << ", " << v.z << ')';
+  return out.str();
+}
+
+std::string to_string(float value) { return std::isnan(value) ? "nan" : value > 0.0F ? "infinity" : "-infinity"; }
+
+/// Leaf indices by origin; every origin a brick's, none twice.
+std::vector<std::size_t> sorted_leaves(const LeafSource& leaves) {
+  std::vector<std::size_t> order(leaves.count());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  tbb::parallel_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return lexicographic(leaves.origin(a), leaves.origin(b)); });
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const glm::ivec3 origin = leaves.origin(order[i]);
+    if (((origin.x | origin.y | origin.z) & (brick_size - 1)) != 0) fail("damaged tree: a leaf is out of place");
+    if (i > 0 && leaves.origin(order[i - 1]) == origin) fail("damaged tree: two leaves in one place");
+  }
+  return order;
+}
+
+void check_transform(const glm::dmat4& m) {
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) {
+      if (!std::isfinite(m[column][row])) fail("its transform is not finite");
+    }
+  }
+  // Relative to the axes' lengths, so that tiny voxels are no singular transform.
+  const glm::dvec3 x(m[0]);
+  const glm::dvec3 y(m[1]);
+  const glm::dvec3 z(m[2]);
+  const double volume = std::abs(glm::dot(glm::cross(x / glm::length(x), y / glm::length(y)), z / glm::length(z)));
+  if (!(volume > 1e-9)) fail("its transform is singular");
+}
+
+/// The shared half: from the tree as a file has it to the volume's contract.
+ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_prefix) {
+  check_transform(source.index_to_world);
+  if (!std::isfinite(source.background)) fail("its background value is " + to_string(source.background));
+
+  ScalarVolume out;
+  out.index_to_world = source.index_to_world;
+  out.background = std::max(source.background, 0.0F) + 0.0F;
+
+  ActiveRegion region = active_leaf_region(*source.leaves);
+  for (const SourceTile& tile : source.tiles) {
+    if (tile.active) region.box.expand({tile.box.min, tile.box.max});
+  }
+  const Box bounds = region.box;
+  if (bounds.empty()) fail("is empty: it has no active voxels");
+  const glm::i64vec3 extent = glm::i64vec3(bounds.max) - glm::i64vec3(bounds.min) + std::int64_t{1};
+  if (glm::any(glm::greaterThan(extent, glm::i64vec3(max_extent)))) {
+    fail("its active voxels span " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
+         std::to_string(extent.z) + " voxels; the limit is " + std::to_string(max_extent) + " an axis");
+  }
+  if (glm::any(glm::lessThan(bounds.min, glm::ivec3(-max_coordinate))) ||
+      glm::any(glm::greaterThan(bounds.max, glm::ivec3(max_coordinate)))) {
+    fail("its voxel indices exceed " + std::to_string(max_coordinate));
+  }
+  out.bounds_min = bounds.min;
+  out.bounds_max = bounds.max;
+  out.active_voxels = region.voxels;
+
+  // First look at every brick, then allocate exactly, then copy: reading twice is cheaper than
+  // holding the dropped ones.
+  const LeafSource& leaves = *source.leaves;
+  std::vector<std::size_t> order = sorted_leaves(leaves);
+  std::erase_if(order, [&](std::size_t leaf) {
+    const glm::ivec3 origin = leaves.origin(leaf);
+    return bounds.clipped({origin, origin + (brick_size - 1)}).empty();
+  });
+  const auto leaf_box = [&](std::size_t leaf) {
+    const glm::ivec3 origin = leaves.origin(leaf);
+    return bounds.clipped({origin, origin + (brick_size - 1)});
+  };
+  std::vector<char> constant(order.size());
+  std::vector<float> constant_value(order.size());
+  const BrickTotals bricks = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, order.size(), 64), BrickTotals{},
+      [&](const tbb::blocked_range<std::size_t>& range, BrickTotals sum) {
+        CleanBrick brick;
+        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+          clean(leaves, order[i], bounds, brick);
+          BrickTotals one;
+          one.negative = brick.negative;
+          one.covered = leaf_box(order[i]).voxels();
+          one.max = brick.max;
+          if (brick.bad >= 0) {
+            one.bad_brick = i;
+            one.bad_voxel = brick.bad;
+            one.bad_value = brick.bad_value;
+          }
+          sum.add(one);
+          constant[i] = brick.constant ? 1 : 0;
+          constant_value[i] = brick.first;
+        }
+        return sum;
+      },
+      [](BrickTotals a, const BrickTotals& b) {
+        a.add(b);
+        return a;
+      });
+  if (bricks.bad_brick < order.size()) {
+    const int i = bricks.bad_voxel;
+    fail("voxel " + to_string(leaves.origin(order[bricks.bad_brick]) + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7)) +
+         " is " + to_string(bricks.bad_value));
+  }
+
+  std::uint64_t negative = bricks.negative;
+  std::uint64_t covered = bricks.covered;
+  out.max_value = bricks.max;
+  for (const SourceTile& tile : source.tiles) {
+    const Box box = bounds.clipped({tile.box.min, tile.box.max});
+    if (box.empty()) continue;
+    if (!std::isfinite(tile.box.value)) {
+      fail("the tile at voxel " + to_string(tile.box.min) + " is " + to_string(tile.box.value));
+    }
+    if (tile.active) out.active_voxels += box.voxels();
+    covered += box.voxels();
+    if (tile.box.value < 0.0F) negative += box.voxels();
+    const float value = tile.box.value > 0.0F ? tile.box.value : 0.0F;
+    out.max_value = std::max(out.max_value, value);
+    if (value != out.background) out.tiles.push_back({box.min, box.max, value});
+  }
+  // What no brick and no tile covers has the background value.
+  const std::uint64_t uncovered = bounds.voxels() - std::min(covered, bounds.voxels());
+  if (uncovered > 0) {
+    out.max_value = std::max(out.max_value, out.background);
+    if (source.background < 0.0F) negative += uncovered;
+  }
+
+  // A brick of one value says no more than a tile, in a seventieth of the memory.
+  std::vector<std::size_t> kept;
+  kept.reserve(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (constant[i] == 0) {
+      kept.push_back(order[i]);
+    } else if (constant_value[i] != out.background) {
+      const Box box = leaf_box(order[i]);
+      out.tiles.push_back({box.min, box.max, constant_value[i]});
+    }
+  }
+  out.brick_origins.resize(kept.size());
+  out.brick_values.resize(kept.size() * brick_voxels);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kept.size(), 64),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      CleanBrick brick;
+                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                        clean(leaves, kept[i], bounds, brick);
+                        out.brick_origins[i] = leaves.origin(kept[i]);
+                        std::copy(brick.values.begin(), brick.values.end(), out.brick_values.data() + i * brick_voxels);
+                      }
+                    });
+  tbb::parallel_sort(out.tiles.begin(), out.tiles.end(),
+                     [](const Tile& a, const Tile& b) { return lexicographic(a.min, b.min); });
+  if (negative > 0) {
+    log.warning(log_prefix + std::to_string(negative) + (negative == 1 ? " negative voxel" : " negative voxels") +
+                " clamped to 0");
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<GridInfo> list_grids(const std::filesystem::path& file) {
+  return naming_file(file, [&] {
+    std::vector<GridInfo> infos;
+    const std::unique_ptr<Reader> reader = open(file);
+    for (const GridEntry& entry : reader->grids()) infos.push_back(entry.info);
+    return infos;
+  });
+}
+
+ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log) {
+  return naming_file(file, [&] {
+    std::unique_ptr<Reader> reader = open(file);
+    const std::size_t chosen = choose_grid(reader->grids(), grid_name);
+    const GridEntry entry = reader->grids()[chosen];
+    const std::string grid = "grid \"" + entry.unique_name + "\"";
+    const std::string prefix = one_line(file.string() + ": " + grid) + ": ";
+    try {
+      SourceGrid source = reader->read(chosen, log, prefix);
+      reader.reset();  // its buffers are not needed beside the volume's own
+      ScalarVolume volume = assemble(std::move(source), log, prefix);
+      volume.name = entry.info.name;
+      return volume;
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& e) {
+      fail(grid + ": " + e.what());
+    }
+  });
+}
+
+}  // namespace cumulet::volume

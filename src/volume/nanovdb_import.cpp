@@ -1,0 +1,387 @@
+#include <blosc.h>
+#include <nanovdb/NanoVDB.h>
+#include <nanovdb/util/GridChecksum.h>
+#include <nanovdb/util/GridHandle.h>
+#include <nanovdb/util/HostBuffer.h>
+#include <nanovdb/util/IO.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+#include "volume/import_detail.hpp"
+
+namespace cumulet::volume::detail {
+namespace {
+
+using nanovdb::io::Codec;
+using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
+
+std::string type_name(nanovdb::GridType type) {
+  if (type >= nanovdb::GridType::End) return "unknown type " + std::to_string(static_cast<std::uint32_t>(type));
+  return type == nanovdb::GridType::Unknown ? "unknown" : nanovdb::toStr(type);
+}
+
+std::string class_name(nanovdb::GridClass grid_class) {
+  switch (grid_class) {
+    case nanovdb::GridClass::LevelSet:
+      return "level set";
+    case nanovdb::GridClass::FogVolume:
+      return "fog volume";
+    case nanovdb::GridClass::Staggered:
+      return "staggered";
+    case nanovdb::GridClass::PointIndex:
+    case nanovdb::GridClass::PointData:
+      return "point grid";
+    case nanovdb::GridClass::Topology:
+      return "topology grid";
+    case nanovdb::GridClass::VoxelVolume:
+      return "voxel volume";
+    case nanovdb::GridClass::IndexGrid:
+      return "index grid";
+    default:
+      return "unknown";
+  }
+}
+
+bool is_scalar(nanovdb::GridType type) {
+  switch (type) {
+    case nanovdb::GridType::Float:
+    case nanovdb::GridType::Double:
+    case nanovdb::GridType::Fp4:
+    case nanovdb::GridType::Fp8:
+    case nanovdb::GridType::Fp16:
+    case nanovdb::GridType::FpN:
+      return true;
+    default:
+      return false;
+  }
+}
+
+glm::ivec3 child_offset(std::uint32_t i, unsigned log2_table, unsigned log2_child) {
+  const std::uint32_t mask = (1U << log2_table) - 1U;
+  return glm::ivec3(glm::uvec3(i >> (2U * log2_table), (i >> log2_table) & mask, i & mask) << log2_child);
+}
+
+template <typename BuildT>
+class NanoLeaves final : public LeafSource {
+ public:
+  using LeafT = nanovdb::NanoLeaf<BuildT>;
+
+  explicit NanoLeaves(Handle handle) : handle_(std::move(handle)) {}
+  void add(const LeafT* leaf, glm::ivec3 origin) {
+    leaves_.push_back(leaf);
+    origins_.push_back(origin);
+  }
+
+  [[nodiscard]] std::size_t count() const override { return leaves_.size(); }
+  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return origins_[leaf]; }
+  [[nodiscard]] ActiveMask active(std::size_t leaf) const override {
+    ActiveMask mask;
+    for (int x = 0; x < brick_size; ++x) {
+      mask[static_cast<std::size_t>(x)] = leaves_[leaf]->data()->mValueMask.template getWord<std::uint64_t>(x);
+    }
+    return mask;
+  }
+  void values(std::size_t leaf, float* out) const override {
+    const auto* data = leaves_[leaf]->data();
+    for (std::uint32_t i = 0; i < brick_voxels; ++i) out[i] = static_cast<float>(data->getValue(i));
+  }
+
+ private:
+  Handle handle_;  // owns the memory of the leaves
+  std::vector<const LeafT*> leaves_;
+  std::vector<glm::ivec3> origins_;
+};
+
+/// Walks a grid's buffer and believes none of its offsets: NanoVDB itself checks nothing.
+template <typename BuildT>
+class NanoWalk {
+ public:
+  using GridT = nanovdb::NanoGrid<BuildT>;
+  using TreeT = nanovdb::NanoTree<BuildT>;
+  using RootT = nanovdb::NanoRoot<BuildT>;
+  using UpperT = nanovdb::NanoUpper<BuildT>;
+  using LowerT = nanovdb::NanoLower<BuildT>;
+  using LeafT = nanovdb::NanoLeaf<BuildT>;
+
+  static SourceGrid run(Handle handle, const Log& log, const std::string& log_prefix) {
+    NanoWalk walk(handle.data(), handle.size());
+    walk.tree(log, log_prefix);
+    auto leaves = std::make_unique<NanoLeaves<BuildT>>(std::move(handle));
+    for (const auto& [leaf, origin] : walk.leaves_) leaves->add(leaf, origin);
+    walk.out_.leaves = std::move(leaves);
+    return std::move(walk.out_);
+  }
+
+ private:
+  NanoWalk(const std::uint8_t* begin, std::uint64_t size) : begin_(begin), size_(size) {}
+
+  [[noreturn]] static void damaged(const char* what) { fail(std::string("the file is damaged: ") + what); }
+
+  /// The object at this offset from another one, if it lies within the buffer.
+  template <typename T>
+  const T* at(const void* from, std::int64_t offset, std::uint64_t bytes = sizeof(T)) const {
+    const auto start = static_cast<const std::uint8_t*>(from) - begin_;
+    const auto limit = static_cast<std::int64_t>(size_);
+    if (offset < -limit || offset > limit) damaged("an offset leads outside of the grid");
+    const std::int64_t position = start + offset;
+    if (position < 0 || position > limit || bytes > size_ - static_cast<std::uint64_t>(position) ||
+        position % NANOVDB_DATA_ALIGNMENT != 0) {
+      damaged("an offset leads outside of the grid");
+    }
+    return reinterpret_cast<const T*>(begin_ + position);
+  }
+
+  /// Every node belongs to one parent, so more visits than nodes fit the buffer mean a forged tree.
+  void count(int level, std::uint64_t bytes) {
+    node_bytes_ += bytes;
+    if (++visited_[level] > declared_[level] || node_bytes_ > size_) damaged("its tree has more nodes than it says");
+  }
+
+  void tile(glm::ivec3 min, int size, float value, bool active) {
+    if (!active && value == out_.background) return;
+    out_.tiles.push_back({{min, min + (size - 1), value}, active});
+  }
+
+  void tree(const Log& log, const std::string& log_prefix) {
+    const auto* grid = at<GridT>(begin_, 0);
+    const auto* tree = at<TreeT>(begin_, sizeof(GridT));
+    std::copy_n(tree->data()->mNodeCount, 3, declared_);
+    const std::uint64_t root_offset = tree->data()->mNodeOffset[3];
+    if (root_offset > size_) damaged("an offset leads outside of the grid");
+    const auto* root = at<RootT>(tree, static_cast<std::int64_t>(root_offset));
+    const std::uint64_t tiles = root->data()->mTableSize;
+    at<RootT>(root, 0, sizeof(RootT) + tiles * sizeof(typename RootT::DataType::Tile));
+
+    nanovdb::GridChecksum stored(grid->data()->mChecksum, nanovdb::ChecksumMode::Partial);
+    // The header's sum is over grid, tree and root in one piece, which damage may have torn apart.
+    if (!stored.isEmpty() && root_offset == sizeof(TreeT)) {
+      nanovdb::GridChecksum computed;
+      computed(*grid, nanovdb::ChecksumMode::Partial);
+      if (!(computed == stored)) log.warning(log_prefix + "its checksum does not match, it may be damaged");
+    }
+
+    const nanovdb::Map& map = grid->data()->mMap;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) out_.index_to_world[column][row] = map.mMatD[row * 3 + column];
+      out_.index_to_world[3][row] = map.mVecD[row];
+    }
+    out_.background = static_cast<float>(root->data()->mBackground);
+
+    constexpr auto size = static_cast<int>(UpperT::DIM);
+    std::map<std::array<int, 3>, bool> regions;
+    for (std::uint32_t i = 0; i < tiles; ++i) {
+      const auto* entry = root->data()->tile(i);
+      const nanovdb::Coord key = entry->origin();
+      const glm::ivec3 origin(key[0], key[1], key[2]);
+      if (((origin.x | origin.y | origin.z) & (size - 1)) != 0) damaged("a root tile is out of place");
+      if (!regions.insert({{origin.x, origin.y, origin.z}, true}).second) damaged("two root tiles in one place");
+      if (entry->isChild()) {
+        upper(*at<UpperT>(root, entry->child), origin);
+      } else {
+        tile(origin, size, static_cast<float>(entry->value), entry->isActive());
+      }
+    }
+  }
+
+  void upper(const UpperT& node, glm::ivec3 origin) {
+    count(2, sizeof(UpperT));
+    const auto* data = node.data();
+    constexpr auto size = static_cast<int>(LowerT::DIM);
+    for (std::uint32_t i = 0; i < UpperT::SIZE; ++i) {
+      const glm::ivec3 child = origin + child_offset(i, UpperT::LOG2DIM, LowerT::TOTAL);
+      if (data->isChild(i)) {
+        lower(*at<LowerT>(data, data->mTable[i].child), child);
+      } else {
+        tile(child, size, static_cast<float>(data->getValue(i)), data->isActive(i));
+      }
+    }
+  }
+
+  void lower(const LowerT& node, glm::ivec3 origin) {
+    count(1, sizeof(LowerT));
+    const auto* data = node.data();
+    for (std::uint32_t i = 0; i < LowerT::SIZE; ++i) {
+      const glm::ivec3 child = origin + child_offset(i, LowerT::LOG2DIM, LeafT::TOTAL);
+      if (data->isChild(i)) {
+        const auto* leaf = at<LeafT>(data, data->mTable[i].child);
+        std::uint64_t bytes = sizeof(LeafT);
+        if constexpr (std::is_same_v<BuildT, nanovdb::FpN>) {
+          if (leaf->data()->mFlags >> 5U > 4) damaged("a leaf has an impossible bit width");
+          bytes = leaf->data()->memUsage();
+          at<LeafT>(data, data->mTable[i].child, bytes);
+        }
+        count(0, bytes);
+        leaves_.emplace_back(leaf, child);
+      } else {
+        tile(child, brick_size, static_cast<float>(data->getValue(i)), data->isActive(i));
+      }
+    }
+  }
+
+  const std::uint8_t* begin_;
+  std::uint64_t size_;
+  std::uint32_t declared_[3] = {};
+  std::uint64_t visited_[3] = {};
+  std::uint64_t node_bytes_ = 0;
+  SourceGrid out_;
+  std::vector<std::pair<const LeafT*, glm::ivec3>> leaves_;
+};
+
+/// A .nvdb file. Its directory is checked here before NanoVDB's own reader may trust it.
+class NanoReader final : public Reader {
+ public:
+  explicit NanoReader(const std::filesystem::path& file) : stream_(file, std::ios::binary) {
+    if (!stream_) fail("cannot be opened");
+    size_ = std::filesystem::file_size(file);
+    for (std::uint64_t position = 0; position < size_;) position = read_segment(position);
+
+    std::map<std::string, int> uses;
+    for (const GridEntry& entry : entries_) ++uses[entry.info.name];
+    std::map<std::string, int> seen;
+    for (GridEntry& entry : entries_) {
+      const std::string& name = entry.info.name;
+      entry.unique_name = uses[name] > 1 ? name + "[" + std::to_string(seen[name]++) + "]" : name;
+    }
+  }
+
+  [[nodiscard]] const std::vector<GridEntry>& grids() const override { return entries_; }
+
+  SourceGrid read(std::size_t index, const Log& log, const std::string& log_prefix) override {
+    check_frames(places_[index]);
+    stream_.clear();
+    stream_.seekg(0);
+    Handle handle = nanovdb::io::readGrid<nanovdb::HostBuffer>(stream_, index);
+    if (handle.size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
+    const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle.data());
+    if (grid->mMagic != NANOVDB_MAGIC_NUMBER) fail("the file is damaged: no grid where one should be");
+    if (grid->mGridType != places_[index].type) fail("the file is damaged: grid and directory differ in type");
+    switch (grid->mGridType) {
+      case nanovdb::GridType::Float:
+        return NanoWalk<float>::run(std::move(handle), log, log_prefix);
+      case nanovdb::GridType::Double:
+        return NanoWalk<double>::run(std::move(handle), log, log_prefix);
+      case nanovdb::GridType::Fp4:
+        return NanoWalk<nanovdb::Fp4>::run(std::move(handle), log, log_prefix);
+      case nanovdb::GridType::Fp8:
+        return NanoWalk<nanovdb::Fp8>::run(std::move(handle), log, log_prefix);
+      case nanovdb::GridType::Fp16:
+        return NanoWalk<nanovdb::Fp16>::run(std::move(handle), log, log_prefix);
+      case nanovdb::GridType::FpN:
+        return NanoWalk<nanovdb::FpN>::run(std::move(handle), log, log_prefix);
+      default:
+        fail("is of a type that cannot be read");
+    }
+  }
+
+ private:
+  struct Place {
+    std::uint64_t position;
+    std::uint64_t file_bytes;
+    std::uint64_t memory_bytes;
+    Codec codec;
+    nanovdb::GridType type;
+  };
+
+  void read_bytes(std::uint64_t position, void* to, std::uint64_t bytes) {
+    if (position > size_ || bytes > size_ - position) fail("the file is truncated or damaged: unexpected end of file");
+    stream_.seekg(static_cast<std::streamoff>(position));
+    stream_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
+    if (!stream_) fail("the file is truncated or damaged: unexpected end of file");
+  }
+
+  /// Lists the grids of the segment at this position; gives the position of the next one.
+  std::uint64_t read_segment(std::uint64_t position) {
+    nanovdb::io::Header header;
+    read_bytes(position, &header, sizeof header);
+    if (header.magic != NANOVDB_MAGIC_NUMBER) {
+      fail(position == 0 ? "was written by a NanoVDB version that is not supported" : "the file is damaged");
+    }
+    if (header.version.getMajor() != NANOVDB_MAJOR_VERSION_NUMBER) {
+      fail("was written by NanoVDB " + std::to_string(header.version.getMajor()) + ", this library reads " +
+           std::to_string(NANOVDB_MAJOR_VERSION_NUMBER));
+    }
+    if (header.codec >= Codec::END) fail("the file is damaged: unknown compression");
+    position += sizeof header;
+    const std::size_t first = places_.size();
+    for (int i = 0; i < header.gridCount; ++i) {
+      nanovdb::io::MetaData meta;
+      read_bytes(position, &meta, sizeof meta);
+      position += sizeof meta;
+      std::string name(std::min<std::uint64_t>(meta.nameSize, size_), '\0');
+      read_bytes(position, name.data(), meta.nameSize);
+      position += meta.nameSize;
+      // NanoVDB's reader trusts the terminator.
+      if (name.empty() || name.back() != '\0') fail("the file is damaged: a grid name has no end");
+      name.resize(name.find('\0'));
+      places_.push_back({0, meta.fileSize, meta.gridSize, header.codec, meta.gridType});
+      GridEntry entry;
+      entry.info = {name, type_name(meta.gridType), class_name(meta.gridClass)};
+      entry.refusal = scalar_fog_refusal(entry.info.type, entry.info.grid_class, is_scalar(meta.gridType));
+      entries_.push_back(std::move(entry));
+    }
+    for (std::size_t i = first; i < places_.size(); ++i) {
+      places_[i].position = position;
+      if (places_[i].file_bytes > size_ - position) {
+        fail("the file is truncated: " + std::to_string(size_) + " bytes of at least " +
+             std::to_string(position + std::min(places_[i].file_bytes, ~position)));
+      }
+      position += places_[i].file_bytes;
+    }
+    return position;
+  }
+
+  /// Checks the sizes that NanoVDB's decoder would take from the file.
+  void check_frames(const Place& place) {
+    constexpr const char* damaged = "the file is damaged: its sizes do not agree";
+    // No codec packs tighter than zlib's 1032 to 1: a larger claim is no reason to allocate.
+    constexpr std::uint64_t most_expansion = 1040;
+    if (place.memory_bytes == 0 || place.memory_bytes / most_expansion > place.file_bytes) fail(damaged);
+    std::uint64_t position = place.position;
+    std::uint64_t rest = place.file_bytes;
+    const auto next_frame = [&] {
+      std::uint64_t frame = 0;
+      if (rest < sizeof frame) fail(damaged);
+      read_bytes(position, &frame, sizeof frame);
+      position += sizeof frame;
+      rest -= sizeof frame;
+      if (frame > rest) fail(damaged);
+      rest -= frame;
+      return frame;
+    };
+    switch (place.codec) {
+      case Codec::ZIP:
+        next_frame();
+        break;
+      case Codec::BLOSC:
+        for (std::uint64_t left = place.memory_bytes; left > 0;) {
+          const std::uint64_t frame = next_frame();
+          const std::uint64_t chunk = std::min(left, nanovdb::io::Internal::MAX_SIZE);
+          std::array<char, BLOSC_MIN_HEADER_LENGTH> head{};
+          if (frame < head.size()) fail(damaged);
+          read_bytes(position, head.data(), head.size());
+          std::size_t bytes = 0;
+          if (blosc_cbuffer_validate(head.data(), frame, &bytes) != 0 || bytes != chunk) fail(damaged);
+          position += frame;
+          left -= chunk;
+        }
+        break;
+      default:
+        if (place.memory_bytes != place.file_bytes) fail(damaged);
+        rest = 0;
+    }
+    if (rest != 0) fail(damaged);
+  }
+
+  std::uint64_t size_ = 0;
+  std::ifstream stream_;
+  std::vector<Place> places_;
+  std::vector<GridEntry> entries_;
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file) { return std::make_unique<NanoReader>(file); }
+
+}  // namespace cumulet::volume::detail
