@@ -144,28 +144,40 @@ CM_FN vec3 cm_record_v0(uvec4 data) {
 }
 CM_FN uint cm_record_shape(uvec4 data) { return data.y >> 16; }
 
-// Where a ray leaves a cell: o, d and t in cube space. t_exit is the smallest (c - n.o) / (n.d) over the faces with
-// n.d > 0, each rounded the same way from both sides, so neighbours agree bit for bit; face is CM_NONE for a ray
-// that leaves through no face (d = 0).
-CM_FN void cm_cell_exit(vec3 v0, uint shape, vec3 o, vec3 d, CM_OUT(float) t_exit, CM_OUT(uint) face) {
-  vec3 fa = cm_to_frame(v0, shape);
-  vec3 fo = cm_to_frame(o, shape);
-  vec3 fd = cm_to_frame(d, shape);
+// A ray and a cell's v0 in the cell's frame, not scaled.
+struct CmFrame {
+  vec3 v0;
+  vec3 o;
+  vec3 d;
+};
+CM_FN CmFrame cm_cell_frame(vec3 v0, uint shape, vec3 o, vec3 d) {
+  CmFrame f;
+  f.v0 = cm_to_frame(v0, shape);
+  f.o = cm_to_frame(o, shape);
+  f.d = cm_to_frame(d, shape);
+  return f;
+}
+
+// Where a ray leaves a cell: t_exit is the smallest (c - n.o) / (n.d) over the faces with n.d > 0, each rounded the same
+// way from both sides, so neighbours agree bit for bit; face is CM_NONE for a ray that leaves through none (d = 0).
+CM_FN void cm_cell_exit(CmFrame f, uint shape, CM_OUT(float) t_exit, CM_OUT(uint) face) {
   uint cell_class = cm_shape_class(shape);
   float unit = cm_shape_unit(shape);
-  float cap_a = cell_class == 0u ? fa.y : (cell_class == 2u ? fa.z : 0.0f);
-  float cap_o = cell_class == 0u ? fo.y : (cell_class == 2u ? fo.z : 0.0f);
-  float cap_d = cell_class == 0u ? fd.y : (cell_class == 2u ? fd.z : 0.0f);
+  bool cap_y = cell_class == 0u;
+  bool cap_z = cell_class == 2u;
+  float cap_a = cap_y ? f.v0.y : (cap_z ? f.v0.z : 0.0f);
+  float cap_o = cap_y ? f.o.y : (cap_z ? f.o.z : 0.0f);
+  float cap_d = cap_y ? f.d.y : (cap_z ? f.d.z : 0.0f);
   float far_away = 3.0e38f;
-  float n_d_0 = -fd.z;
-  float n_d_1 = fd.y - fd.x;
-  float n_d_2 = fd.z - fd.y;
-  float n_d_3 = fd.x + cap_d;
-  float t_0 = n_d_0 > 0.0f ? (fo.z - fa.z) / n_d_0 : far_away;
-  float t_1 = n_d_1 > 0.0f ? ((fa.y - fa.x) - (fo.y - fo.x)) / n_d_1 : far_away;
-  float t_2 = n_d_2 > 0.0f ? ((fa.z - fa.y) - (fo.z - fo.y)) / n_d_2 : far_away;
-  float cap_c = (fa.x + cap_a) + (cell_class == 1u ? unit : 2.0f * unit);
-  float t_3 = n_d_3 > 0.0f ? (cap_c - (fo.x + cap_o)) / n_d_3 : far_away;
+  float n_d_0 = -f.d.z;
+  float n_d_1 = f.d.y - f.d.x;
+  float n_d_2 = f.d.z - f.d.y;
+  float n_d_3 = f.d.x + cap_d;
+  float t_0 = n_d_0 > 0.0f ? (f.o.z - f.v0.z) / n_d_0 : far_away;
+  float t_1 = n_d_1 > 0.0f ? ((f.v0.y - f.v0.x) - (f.o.y - f.o.x)) / n_d_1 : far_away;
+  float t_2 = n_d_2 > 0.0f ? ((f.v0.z - f.v0.y) - (f.o.z - f.o.y)) / n_d_2 : far_away;
+  float cap_c = (f.v0.x + cap_a) + (cell_class == 1u ? unit : 2.0f * unit);
+  float t_3 = n_d_3 > 0.0f ? (cap_c - (f.o.x + cap_o)) / n_d_3 : far_away;
   t_exit = min(min(t_0, t_1), min(t_2, t_3));
   face = t_exit >= far_away ? CM_NONE : (t_exit == t_0 ? 0u : (t_exit == t_1 ? 1u : (t_exit == t_2 ? 2u : 3u)));
 }
@@ -175,12 +187,13 @@ CM_FN uint cm_link(uvec4 links, uint face) {
 }
 
 // Density (relative) at o + t d, as a linear function of t: value at t = 0 in x, slope in y.
-CM_FN vec2 cm_cell_density(uvec4 data, vec3 v0, uint shape, vec3 o, vec3 d) {
+CM_FN vec2 cm_cell_density(uvec4 data, CmFrame f, uint shape) {
   vec2 low = unpackHalf2x16(data.z);
   vec2 high = unpackHalf2x16(data.w);
-  vec3 gradient = vec3(low.y, high.x, high.y) * cm_shape_inverse_unit(shape);
-  vec3 from_centroid = cm_to_frame(o - v0, shape) - cm_frame_centroid(cm_shape_class(shape)) * cm_shape_unit(shape);
-  return vec2(low.x + dot(gradient, from_centroid), dot(gradient, cm_to_frame(d, shape)));
+  float inverse_unit = cm_shape_inverse_unit(shape);
+  vec3 gradient = vec3(low.y, high.x, high.y);
+  vec3 from_centroid = (f.o - f.v0) * inverse_unit - cm_frame_centroid(cm_shape_class(shape));
+  return vec2(low.x + dot(gradient, from_centroid), dot(gradient, f.d) * inverse_unit);
 }
 
 #endif

@@ -37,14 +37,14 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
                          CM_OUT(float) r_1, CM_OUT(uvec3) next) {
   uvec4 links = cm_record(cell.x, 0u);
   uvec4 data = cm_record(cell.x, 1u);
-  vec3 v0 = cm_record_v0(data);
   uint shape = cm_record_shape(data);
+  CmFrame frame = cm_cell_frame(cm_record_v0(data), shape, o, d);
   float t_exit;
   uint face;
-  cm_cell_exit(v0, shape, o, d, t_exit, face);
+  cm_cell_exit(frame, shape, t_exit, face);
   t_1 = max(t, t_exit);
 #if CM_LINEAR
-  vec2 density = cm_cell_density(data, v0, shape, o, d);
+  vec2 density = cm_cell_density(data, frame, shape);
   r_0 = max(0.0f, density.x + density.y * t);
   r_1 = max(0.0f, density.x + density.y * t_1);
 #else

@@ -22,7 +22,7 @@ layout(std140, binding = 0) uniform CmParameters {
   vec4 sky_radiance;
   vec4 albedo;
   vec4 medium;          // x: extinction of density 1, 1 / world unit; y: anisotropy; z: probability of next-event
-                        // estimation towards the sky (the sun has the rest)
+                        // estimation towards the sky (the sun has the rest); w: 1 if there is any light
   uvec4 image;          // width, height, seed, target samples
   uvec4 tile;           // x, y, width, height
   uvec4 march;          // x: iterations a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of cells a page,

@@ -26,7 +26,11 @@
 
 // Cells marched before events are looked at: keeps neighbouring lanes together.
 #ifndef CM_CHUNK
-#define CM_CHUNK 16
+#define CM_CHUNK 8
+#endif
+// Events between looks at whether a new camera ray is due.
+#ifndef CM_EVENTS
+#define CM_EVENTS 8
 #endif
 
 struct CmPath {
@@ -43,13 +47,14 @@ struct CmPath {
   vec3 light;       // what the shadow ray carries if nothing stops it
   uint random;
   uvec3 cell;
+  float t_end;      // where the ray leaves the box
   uint stream;
   uvec2 home;       // the cell of o, while a shadow ray is under way
   uint samples;     // finished in this pixel
   uint steps;       // of all its samples
 };
 
-CM_FN vec3 cm_to_cube(vec3 v) { return cm.to_cube_x.xyz * v.x + cm.to_cube_y.xyz * v.y + cm.to_cube_z.xyz * v.z; }
+CM_FN vec3 cm_to_cube(vec3 v) { return vec3(cm.to_cube_x) * v.x + vec3(cm.to_cube_y) * v.y + vec3(cm.to_cube_z) * v.z; }
 
 // Where a ray is inside the box: t.x to t.y, empty if t.x > t.y.
 CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
@@ -68,117 +73,14 @@ CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
   return vec2(t_in, t_out);
 }
 
-CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
-  sum += vec4(p.radiance, p.bounce > 0u ? 1.0f : 0.0f);
-  p.samples += 1u;
-  p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
-}
-
 CM_FN vec3 cm_camera_direction(uvec2 pixel, vec2 within) {
   float x = 2.0f * (float(pixel.x) + within.x) / float(cm.image.x) - 1.0f;
   float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(cm.image.y);
-  return normalize(cm.forward.xyz + x * cm.right.xyz + y * cm.up.xyz);
-}
-
-CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
-  uvec3 h = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, p.samples, cm.image.z));
-  p.random = h.x;
-  p.stream = h.y | 1u;
-  float jitter_x = cm_random(p.random, p.stream);
-  float jitter_y = cm_random(p.random, p.stream);
-  p.w = cm_camera_direction(pixel, vec2(jitter_x, jitter_y));
-  p.o = cm.eye.xyz;
-  p.d = cm_to_cube(p.w);
-  p.throughput = vec3(1.0f, 1.0f, 1.0f);
-  p.radiance = vec3(0.0f, 0.0f, 0.0f);
-  p.bounce = 0u;
-  vec2 range = cm_box_range(p.o, p.d);
-  if (!(range.x < range.y)) {
-    p.radiance = cm.sky_radiance.xyz;
-    cm_finish(p, sum);
-    return;
-  }
-  p.t = range.x;
-  vec3 entry = p.o + range.x * p.d;
-  p.cell = cm_march_enter(clamp(entry, cm.box_min.xyz, cm.box_max.xyz));
-  p.depth_0 = cm_random_depth(p.random, p.stream);
-  p.depth = p.depth_0;
-  p.mode = CM_MODE_FLIGHT;
-}
-
-// A new direction from the phase function, and a new free path.
-CM_FN void cm_fly_on(CM_INOUT(CmPath) p) {
-  float cosine = cm_phase_cosine(cm.medium.y, cm_random(p.random, p.stream));
-  float angle = 6.28318531f * cm_random(p.random, p.stream);
-  p.w = cm_around(p.w, cosine, angle);
-  p.d = cm_to_cube(p.w);
-  p.t = 0.0f;
-  p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
-  p.depth_0 = cm_random_depth(p.random, p.stream);
-  p.depth = p.depth_0;
-  p.mode = CM_MODE_FLIGHT;
-}
-
-CM_FN void cm_collide(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
-  p.bounce += 1u;
-  p.throughput *= cm.albedo.xyz;
-  float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
-  bool alive = strongest > 0.0f && (cm.march.y == 0u || p.bounce <= cm.march.y);
-  if (alive && strongest < 0.5f) {
-    float survival = max(strongest, 0.05f);
-    alive = cm_random(p.random, p.stream) < survival;
-    p.throughput = p.throughput / survival;
-  }
-  if (!alive) {
-    cm_finish(p, sum);
-    return;
-  }
-  p.o = p.o + p.t * p.d;
-  p.t = 0.0f;
-  p.home = uvec2(p.cell.x, p.cell.y);
-  // One next-event estimate: to the sky with probability q, else to the sun.
-  float q = cm.medium.z;
-  bool to_sky = cm_random(p.random, p.stream) < q;
-  if (to_sky) {
-    float cosine = cm_phase_cosine(cm.medium.y, cm_random(p.random, p.stream));
-    float angle = 6.28318531f * cm_random(p.random, p.stream);
-    p.d = cm_to_cube(cm_around(p.w, cosine, angle));
-    p.light = p.throughput * cm.sky_radiance.xyz;
-    p.mode = CM_MODE_SHADOW_SKY;
-  } else {
-    p.d = cm.sun_cube.xyz;
-    float phase = cm_phase(cm.medium.y, dot(p.w, cm.sun_world.xyz));
-    p.light = p.throughput * cm.sun_irradiance.xyz * (phase / max(1.0f - q, 1e-6f));
-    p.mode = CM_MODE_SHADOW_SUN;
-  }
-  if (p.light.x + p.light.y + p.light.z > 0.0f) {
-    p.depth_0 = CM_SHADOW_DEPTH + cm_random_depth(p.random, p.stream);
-    p.depth = p.depth_0;
-    p.cell.z = CM_NONE;
-  } else {
-    cm_fly_on(p);
-  }
-}
-
-CM_FN void cm_escape(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
-  float depth = p.depth_0 - p.depth;
-  float transmittance = exp(-depth);
-  // Sky: the flight escapes with probability T, next-event estimation has density q of the same directions. The balance
-  // heuristic gives T / (q + T) to the one and q / (q + T), times T / q, to the other.
-  float balanced = transmittance / max(cm.medium.z + transmittance, 1e-30f);
-  if (p.mode == CM_MODE_FLIGHT) {
-    p.radiance += p.throughput * cm.sky_radiance.xyz * (p.bounce == 0u ? 1.0f : balanced);
-    cm_finish(p, sum);
-  } else {
-    float survival = min(1.0f, exp(CM_SHADOW_DEPTH - depth));
-    p.radiance += p.light * ((p.mode == CM_MODE_SHADOW_SKY ? balanced : transmittance) / survival);
-    cm_fly_on(p);
-  }
+  return normalize(vec3(cm.forward) + x * vec3(cm.right) + y * vec3(cm.up));
 }
 
 // Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
 CM_FN uint cm_march(CM_INOUT(CmPath) p) {
-  float t_end = cm_box_range(p.o, p.d).y;
   vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / p.d;
   uint event = CM_EVENT_NONE;
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
@@ -202,27 +104,103 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
       p.depth -= used;
       p.t = t_1;
       p.cell = next;
-      if (next.x == CM_NONE || t_1 >= t_end) event = CM_EVENT_ESCAPE;
+      if (next.x == CM_NONE || t_1 >= p.t_end) event = CM_EVENT_ESCAPE;
     }
   }
   return event;
 }
 
-// At most `iterations` chunks of this pixel's samples.
+CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
+  sum += vec4(p.radiance, p.bounce > 0u ? 1.0f : 0.0f);
+  p.samples += 1u;
+  p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
+}
+
+// A camera ray for the next sample; finishes at once if it misses the box.
+CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
+  uvec3 h = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, p.samples, cm.image.z));
+  p.random = h.x;
+  p.stream = h.y | 1u;
+  float jitter_x = cm_random(p.random, p.stream);
+  float jitter_y = cm_random(p.random, p.stream);
+  p.w = cm_camera_direction(pixel, vec2(jitter_x, jitter_y));
+  p.o = vec3(cm.eye);
+  p.d = cm_to_cube(p.w);
+  p.throughput = vec3(1.0f, 1.0f, 1.0f);
+  p.radiance = vec3(0.0f, 0.0f, 0.0f);
+  p.bounce = 0u;
+  p.depth_0 = cm_random_depth(p.random, p.stream);
+  p.depth = p.depth_0;
+  p.mode = CM_MODE_FLIGHT;
+  vec2 range = cm_box_range(p.o, p.d);
+  p.t = range.x;
+  p.t_end = range.y;
+  p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
+  if (!(range.x < range.y)) {
+    p.radiance = vec3(cm.sky_radiance);
+    cm_finish(p, sum);
+  }
+}
+
+// What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
+CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
+  float q = cm.medium.z;
+  bool flight = p.mode == CM_MODE_FLIGHT;
+  bool finished = false;
+  if (event == CM_EVENT_ESCAPE) {
+    // Sky: the flight escapes with probability T, next-event estimation has density q of the same directions. The
+    // balance heuristic gives T / (q + T) to the one, and q / (q + T), times T / q, to the other.
+    float depth = p.depth_0 - p.depth;
+    float transmittance = exp(-depth);
+    float balanced = transmittance / max(q + transmittance, 1e-30f);
+    float survival = flight ? 1.0f : min(1.0f, exp(CM_SHADOW_DEPTH - depth));
+    float weight = p.mode == CM_MODE_SHADOW_SUN ? transmittance : (p.bounce == 0u ? 1.0f : balanced);
+    vec3 light = flight ? p.throughput * vec3(cm.sky_radiance) : p.light;
+    p.radiance += light * (weight / survival);
+    finished = flight;
+  }
+  bool collided = flight && event == CM_EVENT_COLLISION;
+  if (collided) {
+    p.bounce += 1u;
+    p.throughput *= vec3(cm.albedo);
+    float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
+    float survival = strongest < 0.5f ? max(strongest, 0.05f) : 1.0f;
+    float u = cm_random(p.random, p.stream);
+    finished = !(strongest > 0.0f) || u >= survival || (cm.march.y != 0u && p.bounce > cm.march.y);
+    p.throughput = p.throughput / survival;
+    p.o = p.o + p.t * p.d;
+    p.home = uvec2(p.cell.x, p.cell.y);
+  }
+  if (finished) cm_finish(p, sum);
+  if (!finished && event != CM_EVENT_NONE) {
+    // A shadow ray after a collision (if there is light), a new flight after that: each along a direction of the phase
+    // function, but for the sun's. One next-event estimate: to the sky with probability q, else to the sun.
+    float u_0 = cm_random(p.random, p.stream);
+    float u_1 = cm_random(p.random, p.stream);
+    float u_2 = cm_random(p.random, p.stream);
+    vec3 w = cm_around(p.w, cm_phase_cosine(cm.medium.y, u_0), 6.28318531f * u_1);
+    bool shadow = collided && cm.medium.w > 0.0f;
+    bool to_sun = shadow && u_2 >= q;
+    float phase = cm_phase(cm.medium.y, dot(p.w, vec3(cm.sun_world)));
+    p.light = p.throughput * (to_sun ? vec3(cm.sun_irradiance) * (phase / max(1.0f - q, 1e-6f)) : vec3(cm.sky_radiance));
+    p.d = to_sun ? vec3(cm.sun_cube) : cm_to_cube(w);
+    if (!shadow) p.w = w;
+    p.mode = to_sun ? CM_MODE_SHADOW_SUN : (shadow ? CM_MODE_SHADOW_SKY : CM_MODE_FLIGHT);
+    p.depth_0 = cm_random_depth(p.random, p.stream) + (shadow ? CM_SHADOW_DEPTH : 0.0f);
+    p.depth = p.depth_0;
+    p.t = 0.0f;
+    p.t_end = cm_box_range(p.o, p.d).y;
+    p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
+  }
+}
+
+// At most `iterations` rounds of this pixel's samples; a round is a camera ray, if one is due, and a few events.
 CM_FN void cm_run(CM_INOUT(CmPath) p, uvec2 pixel, uint iterations, CM_INOUT(vec4) sum) {
   for (uint i = 0u; i < iterations && p.mode != CM_MODE_DONE; ++i) {
     if (p.mode == CM_MODE_START) cm_start(p, pixel, sum);
-    if (p.mode == CM_MODE_FLIGHT || p.mode == CM_MODE_SHADOW_SUN || p.mode == CM_MODE_SHADOW_SKY) {
+    for (int j = 0; j < CM_EVENTS && p.mode != CM_MODE_START && p.mode != CM_MODE_DONE; ++j) {
       uint event = cm_march(p);
-      if (event == CM_EVENT_COLLISION) {
-        if (p.mode == CM_MODE_FLIGHT) {
-          cm_collide(p, sum);
-        } else {
-          cm_fly_on(p);
-        }
-      } else if (event == CM_EVENT_ESCAPE) {
-        cm_escape(p, sum);
-      }
+      cm_handle(p, event, sum);
     }
   }
 }

@@ -54,6 +54,7 @@ void main() {
     p.light = vec3(0.0);
     p.random = 0u;
     p.cell = uvec3(0u);
+    p.t_end = 0.0;
     p.stream = 0u;
     p.home = uvec2(0u);
   } else {
@@ -79,6 +80,7 @@ void main() {
     p.light = uintBitsToFloat(a5.xyz);
     p.random = a5.w;
     p.cell = uvec3(a6.xy, CM_NONE);
+    p.t_end = uintBitsToFloat(a6.z);
     p.stream = a6.w;
     p.home = a7.xy;
     p.samples = a7.z;
@@ -96,7 +98,7 @@ void main() {
   cm_paths[3u * lanes + lane] = cm_pack(p.throughput, p.mode);
   cm_paths[4u * lanes + lane] = cm_pack(p.radiance, p.bounce);
   cm_paths[5u * lanes + lane] = cm_pack(p.light, p.random);
-  cm_paths[6u * lanes + lane] = uvec4(p.cell.xy, 0u, p.stream);
+  cm_paths[6u * lanes + lane] = uvec4(p.cell.xy, floatBitsToUint(p.t_end), p.stream);
   cm_paths[7u * lanes + lane] = uvec4(p.home, p.samples, p.steps);
   if (p.mode != CM_MODE_DONE) atomicAdd(cm_unfinished, 1u);
 }

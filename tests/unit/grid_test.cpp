@@ -468,7 +468,8 @@ TEST(Traversal, AdversarialRaysReachTheOtherSideWithTheRightOpticalDepth) {
       float t_exit = 0.0F;
       std::uint32_t face = 0;
       const auto& data = cells[cell].data;
-      core::cm_cell_exit(core::cm_record_v0(data), core::cm_record_shape(data), o, d, t_exit, face);
+      const std::uint32_t shape = core::cm_record_shape(data);
+      core::cm_cell_exit(core::cm_cell_frame(core::cm_record_v0(data), shape, o, d), shape, t_exit, face);
       const float t_next = std::max(t, t_exit);
       // The middle of every segment lies in its cell.
       if (ray % 97 == 0 && t_next - t > 1e-3F * std::abs(t_next)) {
