@@ -8,8 +8,8 @@ namespace cumulet::grid {
 
 /// The control cube over a volume: the smallest power-of-two cube of voxels, aligned to bricks, that holds the bounds.
 ///
-/// Cube space has the voxel as its unit: voxel (i,j,k) of the volume is the box [p, p + 1] with p = (i,j,k) - origin, so
-/// cells tile voxels exactly (six a voxel at the finest).
+/// Cube space has the voxel as its unit: voxel (i,j,k) of the volume is the box [p, p + 1] with p = (i,j,k) - origin,
+/// so cells tile voxels exactly (six a voxel at the finest).
 struct Cube {
   glm::ivec3 origin{0};  ///< index-space voxel at the cube's low corner, a multiple of 8
   int log2_size = 3;     ///< edge length is 2^log2_size voxels, 3 to max_log2_size

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <vector>
 
 #include "grid/cell.hpp"
@@ -41,33 +42,35 @@ class EdgeLengths {
 // The criterion's squared value for a cell.
 class Measure {
  public:
-  Measure(const Statistics& statistics, const RefineSettings& settings)
-      : settings_(&settings), mean_depth_(statistics.mean_optical_depth()) {
-    threshold_ = settings.threshold < 0.0 ? 0.0 : settings.threshold;
+  Measure(const Statistics& statistics, const RefineSettings& settings) : settings_(&settings) {
+    const double depth = statistics.mean_optical_depth();
+    scale_ = depth > 0.0 ? static_cast<float>(1.0 / (depth * depth)) : 0.0F;
   }
 
-  [[nodiscard]] double threshold_squared() const { return threshold_ * threshold_; }
+  // No cell of a region whose values lie in [min, max] exceeds this: a variance is at most a quarter of the range
+  // squared.
+  [[nodiscard]] float bound(float min, float max, float edge_squared) const {
+    if (settings_->criterion == Criterion::range_mean) return std::numeric_limits<float>::infinity();
+    return 0.25F * (max - min) * (max - min) * edge_squared * scale_;
+  }
 
-  // b: covariance of position and density in the frame, per unit.
-  [[nodiscard]] double squared(std::uint32_t shape, double mean, double variance, const dvec3& covariance, float min,
-                               float max, double edge) const {
-    if (min >= max) return 0.0;
+  // covariance: of position and density in the frame, per unit. No more than floor: the exact value does not matter.
+  [[nodiscard]] float squared(std::uint32_t cell_class, float mean, float variance, const vec3& covariance, float min,
+                              float max, float edge_squared, float floor) const {
+    if (min >= max) return 0.0F;
     if (settings_->criterion == Criterion::range_mean) {
-      const double ratio = (double(max) - min) / mean;
+      const float ratio = (max - min) / mean;
       return ratio * ratio;
     }
-    const double scale = edge * edge / (mean_depth_ * mean_depth_);
-    if (variance * scale <= threshold_squared()) return 0.0;  // the fit only lowers it
-    if (settings_->cells == CellKind::linear) {
-      variance = std::max(0.0, variance - fit_linear(core::cm_shape_class(shape), covariance, mean).explained);
-    }
-    return variance * scale;
+    const float value = variance * edge_squared * scale_;
+    if (value <= floor || settings_->cells == CellKind::constant) return value;
+    const float explained = fit_linear(cell_class, covariance, mean).explained;
+    return std::max(0.0F, variance - explained) * edge_squared * scale_;
   }
 
  private:
   const RefineSettings* settings_;
-  double mean_depth_;
-  double threshold_;
+  float scale_ = 0.0F;
 };
 
 // What the camera allows: the shortest world edge worth splitting in a sphere, or none at all.
@@ -101,17 +104,17 @@ class CameraLimit {
   std::vector<dvec3> planes_;
 };
 
-dvec3 frame_covariance(const Moments& m, const vec3& v0, std::uint32_t shape) {
+vec3 frame_covariance(const Moments& m, const vec3& v0, std::uint32_t shape) {
   const std::uint32_t cell_class = core::cm_shape_class(shape);
   const float unit = core::cm_shape_unit(shape);
   const dvec3 centroid = dvec3(v0) + dvec3(core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape));
   const dvec3 covariance = m.first / m.volume - centroid * m.mean();
-  return dvec3(core::cm_to_frame(vec3(covariance), shape)) / double(unit);
+  return core::cm_to_frame(vec3(covariance), shape) / unit;
 }
 
 ivec3 midpoint(const vec3& v0, std::uint32_t shape) {
-  return ivec3(v0 + core::cm_from_frame(core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape),
-                                        shape));
+  return ivec3(v0 + core::cm_from_frame(
+                        core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape), shape));
 }
 
 }  // namespace
@@ -126,16 +129,20 @@ DiamondSet::Address DiamondSet::address(const ivec3& vertex) {
   return {key, static_cast<unsigned>(local.x * 64 + local.y * 8 + local.z), scale, corner};
 }
 
-void DiamondSet::raise(const ivec3& vertex, std::uint16_t priority) {
+void DiamondSet::Raiser::operator()(const ivec3& vertex, std::uint16_t priority) {
   const Address a = address(vertex);
-  auto found = map_.find(a.key);
-  if (found == map_.end()) {
-    auto block = std::make_unique<Block>();
-    block->scale = a.scale;
-    block->corner = a.corner;
-    found = map_.emplace(a.key, std::move(block)).first;
+  if (a.key != key_) {
+    auto found = set_->map_.find(a.key);
+    if (found == set_->map_.end()) {
+      auto block = std::make_unique<Block>();
+      block->scale = a.scale;
+      block->corner = a.corner;
+      found = set_->map_.emplace(a.key, std::move(block)).first;
+    }
+    key_ = a.key;
+    block_ = found->second.get();
   }
-  std::atomic<std::uint16_t>& slot = found->second->priority[a.local];
+  std::atomic<std::uint16_t>& slot = block_->priority[a.local];
   std::uint16_t old = slot.load(std::memory_order_relaxed);
   while (old < priority && !slot.compare_exchange_weak(old, priority, std::memory_order_relaxed)) {
   }
@@ -157,102 +164,206 @@ bool DiamondCursor::is_split(const ivec3& vertex) {
   return block_ != nullptr && block_->priority[a.local].load(std::memory_order_relaxed) >= set_->cut_;
 }
 
+// The criterion over all cells of the statistics.
+class DiamondSet::Evaluation {
+ public:
+  Evaluation(const Statistics& statistics, const RefineSettings& settings)
+      : statistics_(&statistics),
+        measure_(statistics, settings),
+        camera_(settings),
+        edge_length_(statistics.cube().to_world) {
+    // A node's bounding sphere: half its world diagonal, the longest of four.
+    for (int i = 0; i < 4; ++i) {
+      const dvec3 diagonal(1.0, (i & 1) != 0 ? -1.0 : 1.0, (i & 2) != 0 ? -1.0 : 1.0);
+      unit_radius_ = std::max(unit_radius_, 0.5 * glm::length(glm::dmat3(statistics.cube().to_world) * diagonal));
+    }
+    for (std::uint32_t signs = 0; signs < 8; ++signs) {
+      for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+        const ivec3 corner(8 * static_cast<int>(signs & 1U), 8 * static_cast<int>((signs >> 1U) & 1U),
+                           8 * static_cast<int>(signs >> 2U));
+        const BrickTree& tree = brick_tree(kuhn_frame(corner, 8, permutation));
+        auto& edges = edge_squared_[signs * 6 + permutation];
+        for (unsigned h = 1; h < 512; ++h) {
+          const double edge = edge_length_(tree.shape[h]);
+          edges[h] = static_cast<float>(edge * edge);
+          float& longest = longest_[std::bit_width(h) - 1];
+          longest = std::max(longest, edges[h]);
+        }
+      }
+    }
+  }
+
+  [[nodiscard]] const Statistics& statistics() const { return *statistics_; }
+
+  // Calls visit(vertex, squared) for every cell of a brick whose criterion is above the floor.
+  template <class Visit>
+  void brick(const Statistics::Node& node, BrickSums& sums, float floor, Visit visit) const {
+    const double shortest = shortest_edge(node);
+    const auto shortest_squared = static_cast<float>(shortest * shortest);
+    const ivec3 odd = (node.corner / 8) & 1;
+    const unsigned signs = static_cast<unsigned>(odd.x + 2 * odd.y + 4 * odd.z);
+    for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+      const Moments& whole = statistics_->kuhn(node, permutation);
+      if (whole.min >= whole.max) continue;
+      const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
+      const auto& edges = edge_squared_[signs * 6 + permutation];
+      // Edges shrink from level to level: below some level nothing can exceed the floor.
+      unsigned end = 1;
+      while (end < 512 && measure_.bound(whole.min, whole.max, longest_[std::bit_width(end) - 1]) > floor) end *= 2;
+      if (end == 1) continue;
+      sums.compute(statistics_->values(node), tree);
+      for (unsigned h = 1; h < end; ++h) {
+        if (sums.min[h] >= sums.max[h] || edges[h] < shortest_squared) continue;
+        const std::uint32_t shape = tree.shape[h];
+        const float inverse_count = 1.0F / static_cast<float>(512U >> (static_cast<unsigned>(std::bit_width(h)) - 1U));
+        const float shifted_mean = sums.mass[h] * inverse_count;
+        const float variance = std::max(0.0F, sums.square[h] * inverse_count - shifted_mean * shifted_mean);
+        const vec3 covariance =
+            vec3(sums.x[h], sums.y[h], sums.z[h]) * inverse_count - tree.node_centroid[h] * shifted_mean;
+        const float squared =
+            measure_.squared(core::cm_shape_class(shape), sums.reference + shifted_mean, variance,
+                             core::cm_to_frame(covariance, shape) * core::cm_shape_inverse_unit(shape), sums.min[h],
+                             sums.max[h], edges[h], floor);
+        if (squared > floor) visit(node.corner + ivec3(tree.midpoint[h]), squared);
+      }
+    }
+  }
+
+  // Likewise for one cell above bricks.
+  template <class Visit>
+  void cell(const vec3& v0, std::uint32_t shape, double shortest, float floor, Visit visit) const {
+    const Moments m = statistics_->moments(v0, shape);
+    const double edge = edge_length_(shape);
+    if (edge < shortest) return;
+    const float squared =
+        measure_.squared(core::cm_shape_class(shape), static_cast<float>(m.mean()), static_cast<float>(m.variance()),
+                         frame_covariance(m, v0, shape), m.min, m.max, static_cast<float>(edge * edge), floor);
+    if (squared > floor) visit(midpoint(v0, shape), squared);
+  }
+
+  [[nodiscard]] double shortest_edge(const Statistics::Node& node) const {
+    const double size = 1 << node.log2_size;
+    const dvec3 centre = dvec3(node.corner) + 0.5 * size;
+    return camera_.shortest_edge(dvec3(statistics_->cube().to_world * glm::dvec4(centre, 1.0)), unit_radius_ * size);
+  }
+
+ private:
+  const Statistics* statistics_;
+  Measure measure_;
+  CameraLimit camera_;
+  EdgeLengths edge_length_;
+  double unit_radius_ = 0.0;
+  std::array<std::array<float, 512>, 48> edge_squared_{};  // of a brick tree's nodes
+  std::array<float, 9> longest_{};                         // of a level of those
+};
+
+namespace {
+
+// A value that the cut of max_cells will not fall below: the brick cells above it would alone be too many. From every
+// 16th brick; the closure only adds cells. Saves evaluating and keeping what is cut off anyway.
+template <class Evaluation>
+double estimate_floor(const Evaluation& evaluation, std::uint64_t max_cells, double threshold_squared) {
+  constexpr std::size_t stride = 16;
+  const Statistics& statistics = evaluation.statistics();
+  const auto& bricks = statistics.nodes_of_size(3);
+  if (bricks.size() < 64 * stride) return threshold_squared;
+  tbb::combinable<std::vector<std::uint64_t>> partial([] { return std::vector<std::uint64_t>(65536); });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size() / stride, 4), [&](const auto& range) {
+    const auto sums = std::make_unique<BrickSums>();
+    std::vector<std::uint64_t>& histogram = partial.local();
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      evaluation.brick(statistics.nodes()[bricks[i * stride]], *sums, static_cast<float>(threshold_squared),
+                       [&](const ivec3& /*vertex*/, float squared) { ++histogram[quantize(squared)]; });
+    }
+  });
+  std::vector<std::uint64_t> histogram(65536);
+  partial.combine_each([&](const std::vector<std::uint64_t>& p) {
+    for (std::size_t i = 0; i < histogram.size(); ++i) histogram[i] += p[i];
+  });
+  std::uint64_t cells = 0;
+  for (std::size_t i = 0xffff; i > 0; --i) {
+    cells += stride * histogram[i];
+    if (cells > max_cells) {
+      const auto bits = static_cast<std::uint32_t>(i) << 16U;
+      return std::max(threshold_squared, 0.5 * double(std::bit_cast<float>(bits)));
+    }
+  }
+  return threshold_squared;
+}
+
+}  // namespace
+
 DiamondSet::DiamondSet(const Statistics& statistics, const RefineSettings& settings)
     : log2_size_(statistics.cube().log2_size) {
-  const Measure measure(statistics, settings);
-  const EdgeLengths edge_length(statistics.cube().to_world);
-  const CameraLimit camera(settings);
-  const glm::dmat4& to_world = statistics.cube().to_world;
-  const auto world = [&](const dvec3& p) { return dvec3(to_world * glm::dvec4(p, 1.0)); };
-  const double threshold = measure.threshold_squared();
-  // A node's bounding sphere: half its world diagonal, the longest of four.
-  double unit_radius = 0.0;
-  for (int i = 0; i < 4; ++i) {
-    const dvec3 diagonal(1.0, (i & 1) != 0 ? -1.0 : 1.0, (i & 2) != 0 ? -1.0 : 1.0);
-    unit_radius = std::max(unit_radius, 0.5 * glm::length(glm::dmat3(to_world) * diagonal));
+  const auto evaluation = std::make_unique<const Evaluation>(statistics, settings);
+  const double threshold = std::max(settings.threshold, 0.0);
+  double floor = estimate_floor(*evaluation, settings.max_cells, threshold * threshold);
+  evaluate(*evaluation, floor);
+  choose_cut(settings.max_cells);
+  if (!limited_ && floor > threshold * threshold) {
+    // The estimate was too high after all.
+    map_.clear();
+    evaluate(*evaluation, threshold * threshold);
+    choose_cut(settings.max_cells);
   }
-  const auto limit_of = [&](const Statistics::Node& node) {
-    const double size = 1 << node.log2_size;
-    return camera.shortest_edge(world(dvec3(node.corner) + 0.5 * size), unit_radius * size);
-  };
+}
 
+void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared) {
+  const Statistics& statistics = evaluation.statistics();
+  const auto floor = static_cast<float>(floor_squared);
   // Inside bricks: 511 cells in each of six trees.
   const auto& bricks = statistics.nodes_of_size(3);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 16), [&](const auto& range) {
     const auto sums = std::make_unique<BrickSums>();
+    Raiser raise(*this);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const Statistics::Node& node = statistics.nodes()[bricks[i]];
-      const double shortest = limit_of(node);
-      for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
-        const Moments& whole = statistics.kuhn(node, permutation);
-        if (whole.min >= whole.max) continue;
-        const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
-        sums->compute(statistics.values(node), tree);
-        for (unsigned h = 1; h < 512; ++h) {
-          if (sums->min[h] >= sums->max[h]) continue;
-          const std::uint32_t shape = tree.shape[h];
-          const double edge = edge_length(shape);
-          if (edge < shortest) continue;
-          const double count = 512 >> (std::bit_width(h) - 1);
-          const double shifted_mean = sums->mass[h] / count;
-          const double variance = std::max(0.0, sums->square[h] / count - shifted_mean * shifted_mean);
-          const dvec3 covariance =
-              dvec3(sums->x[h], sums->y[h], sums->z[h]) / count - dvec3(tree.node_centroid[h]) * shifted_mean;
-          const dvec3 in_frame =
-              dvec3(core::cm_to_frame(vec3(covariance), shape)) / double(core::cm_shape_unit(shape));
-          const double squared = measure.squared(shape, sums->reference + shifted_mean, variance, in_frame, sums->min[h],
-                                                 sums->max[h], edge);
-          if (squared > threshold) raise(node.corner + ivec3(tree.midpoint[h]), quantize(squared));
-        }
-      }
+      evaluation.brick(statistics.nodes()[bricks[i]], *sums, floor,
+                       [&](const ivec3& vertex, float squared) { raise(vertex, quantize(squared)); });
     }
   });
 
   // Above bricks: a Kuhn cell (B), its two halves (C) and four quarters (A); then the 24 roots.
-  const auto consider = [&](const vec3& v0, std::uint32_t shape, double shortest) {
-    const Moments m = statistics.moments(v0, shape);
-    const double edge = edge_length(shape);
-    if (edge < shortest) return;
-    const double squared =
-        measure.squared(shape, m.mean(), m.variance(), frame_covariance(m, v0, shape), m.min, m.max, edge);
-    if (squared > threshold) raise(midpoint(v0, shape), quantize(squared));
-  };
   for (int size = 4; size < log2_size_; ++size) {
     const auto& level = statistics.nodes_of_size(size);
-    tbb::parallel_for(std::size_t{0}, level.size(), [&](std::size_t i) {
-      const Statistics::Node& node = statistics.nodes()[level[i]];
-      const double shortest = limit_of(node);
-      for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
-        const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
-        vec3 v0(node.corner);
-        for (int axis = 0; axis < 3; ++axis) {
-          if (((node.corner[axis] >> size) & 1) != 0) v0[axis] += static_cast<float>(1 << size);
-        }
-        const std::uint32_t shape = frame | (1U << 9U) | (static_cast<std::uint32_t>(size) << 11U);
-        consider(v0, shape, shortest);
-        for (unsigned a = 0; a < 2; ++a) {
-          const std::uint32_t child = core::cm_child_shape(shape, a);
-          const vec3 child_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
-          consider(child_v0, child, shortest);
-          for (unsigned b = 0; b < 2; ++b) {
-            consider(b == 0 ? child_v0 : core::cm_cell_vertex(child_v0, child, 1), core::cm_child_shape(child, b),
-                     shortest);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, level.size(), 16), [&](const auto& range) {
+      Raiser raise(*this);
+      const auto visit = [&](const ivec3& vertex, float squared) { raise(vertex, quantize(squared)); };
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        const Statistics::Node& node = statistics.nodes()[level[i]];
+        const double shortest = evaluation.shortest_edge(node);
+        for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+          const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
+          vec3 v0(node.corner);
+          for (int axis = 0; axis < 3; ++axis) {
+            if (((node.corner[axis] >> size) & 1) != 0) v0[axis] += static_cast<float>(1 << size);
+          }
+          const std::uint32_t shape = frame | (1U << 9U) | (static_cast<std::uint32_t>(size) << 11U);
+          evaluation.cell(v0, shape, shortest, floor, visit);
+          for (unsigned a = 0; a < 2; ++a) {
+            const std::uint32_t child = core::cm_child_shape(shape, a);
+            const vec3 child_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
+            evaluation.cell(child_v0, child, shortest, floor, visit);
+            for (unsigned b = 0; b < 2; ++b) {
+              evaluation.cell(b == 0 ? child_v0 : core::cm_cell_vertex(child_v0, child, 1),
+                              core::cm_child_shape(child, b), shortest, floor, visit);
+            }
           }
         }
       }
     });
   }
-  const double root_limit = limit_of(statistics.nodes()[0]);
   if (!statistics.nodes()[0].is_uniform()) {
+    Raiser raise(*this);
+    const double shortest = evaluation.shortest_edge(statistics.nodes()[0]);
     for (unsigned root = 0; root < 24; ++root) {
       vec3 v0;
       std::uint32_t shape = 0;
       core::cm_root_cell(root, static_cast<std::uint32_t>(log2_size_ - 1), v0, shape);
-      consider(v0, shape, root_limit);
+      evaluation.cell(v0, shape, shortest, floor,
+                      [&](const ivec3& vertex, float squared) { raise(vertex, quantize(squared)); });
     }
   }
   close();
-  choose_cut(settings.max_cells);
 }
 
 std::vector<DiamondSet::Block*> DiamondSet::blocks_of(int scale) const {
@@ -277,11 +388,14 @@ void DiamondSet::close_octave(int octave, int odd_coordinates, const std::vector
   const int size = 1 << log2_size_;
   const int h = 1 << octave;
   const int step = 1 << (octave % 3);
-  const auto raise_inside = [&](const ivec3& v, std::uint16_t priority) {
-    if (glm::all(glm::greaterThanEqual(v, ivec3(0))) && glm::all(glm::lessThanEqual(v, ivec3(size)))) raise(v, priority);
-  };
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
     const Block& block = *blocks[b];
+    Raiser raise(*this);
+    const auto raise_inside = [&](const ivec3& v, std::uint16_t priority) {
+      if (glm::all(glm::greaterThanEqual(v, ivec3(0))) && glm::all(glm::lessThanEqual(v, ivec3(size)))) {
+        raise(v, priority);
+      }
+    };
     for (int x = 0; x < 8; x += step) {
       for (int y = 0; y < 8; y += step) {
         for (int z = 0; z < 8; z += step) {
@@ -358,6 +472,7 @@ void DiamondSet::choose_cut(std::uint64_t max_cells) {
     for (std::size_t i = 0; i < histogram.size(); ++i) histogram[i] += p[i];
   });
   cells_ = 24;
+  limited_ = false;
   cut_ = 0xffff;
   for (std::size_t i = 0xffff; i >= 1; --i) {
     if (cells_ + histogram[i] > std::max<std::uint64_t>(max_cells, 24)) {

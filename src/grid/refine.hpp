@@ -30,7 +30,7 @@ struct RefineCamera {
 struct RefineSettings {
   Criterion criterion = Criterion::deviation;
   CellKind cells = CellKind::linear;
-  double threshold = 0.05;  ///< negative: split whatever varies, down to the voxel
+  double threshold = 0.02;  ///< negative: split whatever varies, down to the voxel
   std::uint64_t max_cells = 5'400'000;
   std::optional<RefineCamera> camera;  ///< set: no split outside its frustum or under pixel_size
   double pixel_size = 1.0;             ///< pixels that a cell's longest edge must cover to be split
@@ -64,7 +64,15 @@ class DiamondSet {
     glm::ivec3 corner{0};  // in units of 8 lattice points
     std::array<std::atomic<std::uint16_t>, 512> priority{};
   };
-  using Map = tbb::concurrent_unordered_map<std::uint64_t, std::unique_ptr<Block>>;
+  // Keys differ in few bits; the map's buckets need all of them mixed (MurmurHash3's finalizer).
+  struct Hash {
+    std::size_t operator()(std::uint64_t key) const {
+      key = (key ^ (key >> 33U)) * 0xff51afd7ed558ccdULL;
+      key = (key ^ (key >> 33U)) * 0xc4ceb9fe1a85ec53ULL;
+      return key ^ (key >> 33U);
+    }
+  };
+  using Map = tbb::concurrent_unordered_map<std::uint64_t, std::unique_ptr<Block>, Hash>;
 
   struct Address {
     std::uint64_t key;
@@ -73,7 +81,19 @@ class DiamondSet {
     glm::ivec3 corner;
   };
   static Address address(const glm::ivec3& vertex);
-  void raise(const glm::ivec3& vertex, std::uint16_t priority);
+  class Evaluation;
+  /// Raises vertices; remembers the last block.
+  class Raiser {
+   public:
+    explicit Raiser(DiamondSet& set) : set_(&set) {}
+    void operator()(const glm::ivec3& vertex, std::uint16_t priority);
+
+   private:
+    DiamondSet* set_;
+    std::uint64_t key_ = ~std::uint64_t{0};
+    Block* block_ = nullptr;
+  };
+  void evaluate(const Evaluation& evaluation, double floor_squared);
   void close();
   void close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks);
   void choose_cut(std::uint64_t max_cells);

@@ -26,8 +26,8 @@ double cell_volume(std::uint32_t shape) {
 }
 
 vec3 cell_centroid(const vec3& v0, std::uint32_t shape) {
-  return v0 + core::cm_from_frame(core::cm_frame_centroid(core::cm_shape_class(shape)) * core::cm_shape_unit(shape),
-                                  shape);
+  return v0 +
+         core::cm_from_frame(core::cm_frame_centroid(core::cm_shape_class(shape)) * core::cm_shape_unit(shape), shape);
 }
 
 constexpr std::uint32_t shape_word(std::uint32_t frame, std::uint32_t cell_class, int exponent) {
@@ -61,13 +61,14 @@ void fill_tree(BrickTree& tree, unsigned heap, const vec3& v0, std::uint32_t sha
   if (heap >= 512) {
     const ivec3 voxel(centroid);
     tree.voxel[heap - 512] = static_cast<std::uint16_t>((voxel.x * 8 + voxel.y) * 8 + voxel.z);
-    tree.centroid[heap - 512] = centroid;
+    for (int axis = 0; axis < 3; ++axis) tree.centroid[static_cast<std::size_t>(axis)][heap - 512] = centroid[axis];
     return;
   }
   tree.shape[heap] = static_cast<std::uint16_t>(shape);
   tree.node_centroid[heap] = centroid;
-  tree.midpoint[heap] = glm::u8vec3(
-      v0 + core::cm_from_frame(core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape), shape));
+  tree.midpoint[heap] =
+      glm::u8vec3(v0 + core::cm_from_frame(
+                           core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape), shape));
   for (unsigned child = 0; child < 2; ++child) {
     fill_tree(tree, 2 * heap + child, child_v0(v0, shape, child), core::cm_child_shape(shape, child));
   }
@@ -95,7 +96,8 @@ struct BrickTrees {
 
 // The inverse covariance matrices of the three reference tetrahedra: cov = sum (v - c)(v - c)^T / 20.
 struct ClassConstants {
-  std::array<glm::dmat3, 3> inverse_covariance;
+  std::array<glm::mat3, 3> inverse_covariance;
+  std::array<std::array<vec3, 4>, 3> vertex_offsets;  // from the centroid
   ClassConstants() {
     for (std::uint32_t k = 0; k < 3; ++k) {
       glm::dmat3 covariance(0.0);
@@ -103,8 +105,9 @@ struct ClassConstants {
       for (std::uint32_t i = 0; i < 4; ++i) {
         const dvec3 v = dvec3(core::cm_frame_vertex(k, i)) - centroid;
         covariance += glm::outerProduct(v, v) / 20.0;
+        vertex_offsets[k][i] = vec3(v);
       }
-      inverse_covariance[k] = glm::inverse(covariance);
+      inverse_covariance[k] = glm::mat3(glm::inverse(covariance));
     }
   }
 };
@@ -127,17 +130,14 @@ double Moments::variance() const {
   return std::max(0.0, square / volume - m * m);
 }
 
-LinearFit fit_linear(std::uint32_t cell_class, const dvec3& covariance, double mean) {
+LinearFit fit_linear(std::uint32_t cell_class, const vec3& covariance, float mean) {
   static const ClassConstants constants;
-  const dvec3 gradient = constants.inverse_covariance[cell_class] * covariance;
-  const dvec3 centroid = core::cm_frame_centroid(cell_class);
-  double lowest = 0.0;
-  for (std::uint32_t i = 0; i < 4; ++i) {
-    lowest = std::min(lowest, glm::dot(gradient, dvec3(core::cm_frame_vertex(cell_class, i)) - centroid));
-  }
-  const double scale = lowest < 0.0 && mean < -lowest ? mean / -lowest : 1.0;
+  const vec3 gradient = constants.inverse_covariance[cell_class] * covariance;
+  float lowest = 0.0F;
+  for (const vec3& offset : constants.vertex_offsets[cell_class]) lowest = std::min(lowest, glm::dot(gradient, offset));
+  const float scale = lowest < 0.0F && mean < -lowest ? mean / -lowest : 1.0F;
   // Residual of the scaled fit: var - (2 s - s^2) g.cov
-  return {scale * gradient, (2.0 - scale) * scale * glm::dot(gradient, covariance)};
+  return {scale * gradient, (2.0F - scale) * scale * glm::dot(gradient, covariance)};
 }
 
 std::uint32_t permutation_of(std::uint32_t shape) {
@@ -164,18 +164,14 @@ void BrickSums::compute(const float* values, const BrickTree& tree) {
   double sum = 0.0;
   for (unsigned i = 0; i < volume::brick_voxels; ++i) sum += values[i];
   reference = static_cast<float>(sum / volume::brick_voxels);
-  for (unsigned i = 0; i < 512; ++i) {
-    const float value = values[tree.voxel[i]];
-    const float f = value - reference;
-    const vec3& c = tree.centroid[i];
-    mass[512 + i] = f;
-    square[512 + i] = f * f;
-    x[512 + i] = f * c.x;
-    y[512 + i] = f * c.y;
-    z[512 + i] = f * c.z;
-    min[512 + i] = value;
-    max[512 + i] = value;
-  }
+  for (unsigned i = 0; i < 512; ++i) min[512 + i] = values[tree.voxel[i]];
+  std::copy(min.begin() + 512, min.end(), max.begin() + 512);
+  // Separate loops: each vectorizes.
+  for (unsigned i = 0; i < 512; ++i) mass[512 + i] = min[512 + i] - reference;
+  for (unsigned i = 0; i < 512; ++i) square[512 + i] = mass[512 + i] * mass[512 + i];
+  for (unsigned i = 0; i < 512; ++i) x[512 + i] = mass[512 + i] * tree.centroid[0][i];
+  for (unsigned i = 0; i < 512; ++i) y[512 + i] = mass[512 + i] * tree.centroid[1][i];
+  for (unsigned i = 0; i < 512; ++i) z[512 + i] = mass[512 + i] * tree.centroid[2][i];
   for (unsigned level = 256; level >= 1; level /= 2) {
     const auto add = [level](std::array<float, 1024>& a) {
       for (unsigned h = level; h < 2 * level; ++h) a[h] = a[2 * h] + a[2 * h + 1];
@@ -190,17 +186,20 @@ void BrickSums::compute(const float* values, const BrickTree& tree) {
   }
 }
 
-Moments BrickSums::moments(unsigned h, const ivec3& corner) const {
+Moments BrickSums::moments(unsigned h, const ivec3& corner, const BrickTree& tree) const {
   const double leaves = 512 >> (std::bit_width(h) - 1);
   constexpr double leaf_volume = 1.0 / 6.0;
   Moments m;
   m.volume = leaves * leaf_volume;
   m.mass = (mass[h] + leaves * reference) * leaf_volume;
   // square: sum (f' + r)^2 = sum f'^2 + 2 r sum f' + n r^2
-  m.square = (square[h] + 2.0 * reference * mass[h] + leaves * reference * static_cast<double>(reference)) * leaf_volume;
+  m.square =
+      (square[h] + 2.0 * reference * mass[h] + leaves * reference * static_cast<double>(reference)) * leaf_volume;
   m.min = min[h];
   m.max = max[h];
-  m.first = dvec3(x[h], y[h], z[h]) * leaf_volume + dvec3(corner) * m.mass;
+  const vec3 centroid = h < 512 ? tree.node_centroid[h]
+                                : vec3(tree.centroid[0][h - 512], tree.centroid[1][h - 512], tree.centroid[2][h - 512]);
+  m.first = dvec3(x[h], y[h], z[h]) * leaf_volume + dvec3(centroid) * (m.volume * reference) + dvec3(corner) * m.mass;
   return m;
 }
 
@@ -250,8 +249,8 @@ void Statistics::build_topology(const volume::ScalarVolume& volume) {
     const int log2_size = nodes_[work.node].log2_size;
     const ivec3 low = corner + cube_.origin;
     const ivec3 high = low + ((1 << log2_size) - 1);
-    const bool outside = glm::any(glm::greaterThan(low, volume.bounds_max)) ||
-                         glm::any(glm::lessThan(high, volume.bounds_min));
+    const bool outside =
+        glm::any(glm::greaterThan(low, volume.bounds_max)) || glm::any(glm::lessThan(high, volume.bounds_min));
     const bool inside = glm::all(glm::greaterThanEqual(low, volume.bounds_min)) &&
                         glm::all(glm::lessThanEqual(high, volume.bounds_max));
     std::erase_if(work.tiles, [&](std::uint32_t t) {
@@ -311,7 +310,8 @@ void Statistics::build_topology(const volume::ScalarVolume& volume) {
     for (unsigned i : {0U, 4U}) ends[i + 2] = split(ends[i], ends[i + 4], 1);
     for (unsigned i : {0U, 2U, 4U, 6U}) ends[i + 1] = split(ends[i], ends[i + 2], 0);
     for (unsigned i = 0; i < 8; ++i) {
-      nodes_.push_back({.corner = corner + half * ivec3(i & 1U, (i >> 1U) & 1U, (i >> 2U) & 1U), .log2_size = log2_size - 1});
+      nodes_.push_back(
+          {.corner = corner + half * ivec3(i & 1U, (i >> 1U) & 1U, (i >> 2U) & 1U), .log2_size = log2_size - 1});
       stack.push_back({child + i, ends[i], ends[i + 1], work.tiles});
     }
   }
@@ -358,8 +358,9 @@ void Statistics::compute_moments() {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Node& node = nodes_[bricks[i]];
       for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
-        sums->compute(values(node), brick_tree(kuhn_frame(node.corner, 8, permutation)));
-        moments_[node.moments + permutation] = sums->moments(1, node.corner);
+        const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
+        sums->compute(values(node), tree);
+        moments_[node.moments + permutation] = sums->moments(1, node.corner, tree);
       }
     }
   });
@@ -371,7 +372,8 @@ void Statistics::compute_moments() {
         for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
           const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
           const auto negative = signs_of_frame(frame);
-          const vec3 v0 = vec3(node.corner) + static_cast<float>(1 << size) * vec3(negative[0], negative[1], negative[2]);
+          const vec3 v0 =
+              vec3(node.corner) + static_cast<float>(1 << size) * vec3(negative[0], negative[1], negative[2]);
           const std::uint32_t shape = shape_word(frame, 1, static_cast<int>(size));
           Moments sum = moments(v0, core::cm_child_shape(shape, 0));
           sum += moments(child_v0(v0, shape, 1), core::cm_child_shape(shape, 1));
@@ -388,7 +390,8 @@ void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume) 
   const auto mark = [&](const ivec3& brick, const std::array<std::uint64_t, 3>& masks) {
     for (int axis = 0; axis < 3; ++axis) {
       if (masks[axis] == 0) continue;
-      const auto key = (std::uint64_t(std::uint32_t(brick[(axis + 1) % 3])) << 32U) | std::uint32_t(brick[(axis + 2) % 3]);
+      const auto key =
+          (std::uint64_t(std::uint32_t(brick[(axis + 1) % 3])) << 32U) | std::uint32_t(brick[(axis + 2) % 3]);
       columns[axis][key] |= masks[axis];
     }
   };

@@ -13,10 +13,10 @@ namespace cumulet::grid {
 /// Exact integrals of the voxel field f over a region, in cube space (unit: voxel).
 struct Moments {
   double volume = 0.0;
-  double mass = 0.0;          ///< integral of f
-  double square = 0.0;        ///< integral of f^2
-  glm::dvec3 first{0.0};      ///< integral of f x, about the cube's origin
-  float min = 3.0e38F;        ///< over all voxels that the region covers
+  double mass = 0.0;      ///< integral of f
+  double square = 0.0;    ///< integral of f^2
+  glm::dvec3 first{0.0};  ///< integral of f x, about the cube's origin
+  float min = 3.0e38F;    ///< over all voxels that the region covers
   float max = -3.0e38F;
 
   Moments& operator+=(const Moments& other);
@@ -26,22 +26,22 @@ struct Moments {
 
 /// The least-squares linear fit of f over a cell, scaled so that it is nowhere negative; the mean is kept.
 struct LinearFit {
-  glm::dvec3 gradient{0.0};  ///< along the cell's frame axes, per frame unit
-  double explained = 0.0;    ///< the part of the variance that the fit removes
+  glm::vec3 gradient{0.0F};  ///< along the cell's frame axes, per frame unit
+  float explained = 0.0F;    ///< the part of the variance that the fit removes
 };
 
 /// covariance: integral of (f - mean)(x - centroid) / volume, in the cell's frame and unit.
 /// Normal equations with the tetrahedron's own covariance matrix, a constant of its class.
-LinearFit fit_linear(std::uint32_t cell_class, const glm::dvec3& covariance, double mean);
+LinearFit fit_linear(std::uint32_t cell_class, const glm::vec3& covariance, float mean);
 
-/// How a brick's Kuhn tetrahedron (class B, unit 8) falls into 512 sixths of voxels; one table for each of the 48 frames.
-/// Heap order: 1 is the whole, 2h and 2h + 1 are the children of h, 512 to 1023 are the sixths.
+/// How a brick's Kuhn tetrahedron (class B, unit 8) falls into 512 sixths of voxels; one table for each of the 48
+/// frames. Heap order: 1 is the whole, 2h and 2h + 1 are the children of h, 512 to 1023 are the sixths.
 struct BrickTree {
-  std::array<std::uint16_t, 512> voxel;       ///< index into the brick's values, a leaf
-  std::array<glm::vec3, 512> centroid;        ///< of a leaf, from the brick's low corner
-  std::array<std::uint16_t, 512> shape;       ///< of internal node h
-  std::array<glm::u8vec3, 512> midpoint;      ///< of its refinement edge, from the brick's low corner
-  std::array<glm::vec3, 512> node_centroid;   ///< of internal node h, from the brick's low corner
+  std::array<std::uint16_t, 512> voxel;            ///< index into the brick's values, a leaf
+  std::array<std::array<float, 512>, 3> centroid;  ///< x, y and z of a leaf's, from the brick's low corner
+  std::array<std::uint16_t, 512> shape;            ///< of internal node h
+  std::array<glm::u8vec3, 512> midpoint;           ///< of its refinement edge, from the brick's low corner
+  std::array<glm::vec3, 512> node_centroid;        ///< of internal node h, from the brick's low corner
 };
 const BrickTree& brick_tree(std::uint32_t frame);
 
@@ -53,14 +53,14 @@ std::uint32_t kuhn_frame(const glm::ivec3& corner, int size, std::uint32_t permu
 /// Sums over the heap of one brick tetrahedron, relative to a reference value (so that float loses nothing).
 struct BrickSums {
   float reference = 0.0F;
-  std::array<float, 1024> mass;    ///< sum of (f - reference) over the leaves below
-  std::array<float, 1024> square;  ///< sum of (f - reference)^2
-  std::array<float, 1024> x, y, z; ///< sum of (f - reference) * leaf centroid, from the brick's low corner
+  std::array<float, 1024> mass;     ///< sum of (f - reference) over the leaves below
+  std::array<float, 1024> square;   ///< sum of (f - reference)^2
+  std::array<float, 1024> x, y, z;  ///< sum of (f - reference) * leaf centroid, from the brick's low corner
   std::array<float, 1024> min, max;
 
   void compute(const float* values, const BrickTree& tree);
   /// Moments of heap node h of a brick whose low corner is at corner.
-  [[nodiscard]] Moments moments(unsigned h, const glm::ivec3& corner) const;
+  [[nodiscard]] Moments moments(unsigned h, const glm::ivec3& corner, const BrickTree& tree) const;
 };
 
 /// The volume's octree down to bricks, with exact moments of the six Kuhn tetrahedra of every cube.
@@ -71,10 +71,10 @@ class Statistics {
   struct Node {
     glm::ivec3 corner{0};
     int log2_size = 0;
-    std::uint32_t child = 0;        ///< first of 8 children (x fastest bit), 0: none
-    std::int32_t values = -1;       ///< brick payload: index into brick_values(), -1: none
-    float uniform = 0.0F;           ///< the value where there are neither children nor payload
-    std::uint32_t moments = none;   ///< index of six Moments, none for a uniform node
+    std::uint32_t child = 0;       ///< first of 8 children (x fastest bit), 0: none
+    std::int32_t values = -1;      ///< brick payload: index into brick_values(), -1: none
+    float uniform = 0.0F;          ///< the value where there are neither children nor payload
+    std::uint32_t moments = none;  ///< index of six Moments, none for a uniform node
     static constexpr std::uint32_t none = 0xffffffffU;
     [[nodiscard]] bool is_uniform() const { return child == 0 && values < 0; }
   };

@@ -87,7 +87,8 @@ void GridBuilder::bisect() {
     split_level(level_first_[level_first_.size() - 2], level_first_.back());
   }
   level_first_.pop_back();
-  if (level_first_.back() != count) throw Error(ErrorCode::internal, "bisection missed diamonds: the set is not closed");
+  if (level_first_.back() != count)
+    throw Error(ErrorCode::internal, "bisection missed diamonds: the set is not closed");
   order();
 }
 
@@ -105,8 +106,9 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last) {
       const std::uint32_t cell_class = core::cm_shape_class(node.shape);
       node.child = 0;
       if (cell_class == 1 && core::cm_shape_exponent(node.shape) == 0) continue;  // a sixth of a voxel
-      const vec3 middle = v0_of(node.v0) + core::cm_from_frame(core::cm_frame_midpoint(cell_class) *
-                                                                   core::cm_shape_unit(node.shape), node.shape);
+      const vec3 middle =
+          v0_of(node.v0) +
+          core::cm_from_frame(core::cm_frame_midpoint(cell_class) * core::cm_shape_unit(node.shape), node.shape);
       if (cursor.is_split(ivec3(middle))) {
         node.child = 1;
         ++n;
@@ -160,16 +162,20 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last) {
           child.links[face] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
         }
         const auto [face, parent_face] = whole_face[cell_class][side];
-        child.links[face] = node.links[parent_face];
-        if (child.links[face] != CM_NONE) child.links[face] = resolve(node.child + side, face);
+        std::uint32_t whole = node.links[parent_face];
+        if (whole != CM_NONE && nodes_[whole].child != 0) {
+          // It splits in this round too, elsewhere: its cap (face 3) goes to child 1, its other whole face to child 0.
+          whole = nodes_[whole].child + (nodes_[whole].links[3] == i ? 1 : 0);
+        }
+        child.links[face] = whole;
       }
     }
   });
   level_first_.push_back(next);
 }
 
-// A link may point to a cell that has split since: go down to the child that has the face. No edge that is bisected lies
-// in the face (the grid conforms), so the face has exactly one end of it.
+// A link may point to a cell that has split since: go down to the child that has the face. No edge that is bisected
+// lies in the face (the grid conforms), so the face has exactly one end of it.
 std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
   const Node& node = nodes_[from];
   std::uint32_t other = node.links[face];
@@ -226,8 +232,8 @@ TetGrid GridBuilder::records(CellKind cells, float max_value) {
   grid.cells.resize(count);
   grid.tree.resize(count - 24);
 
-  // Depth-first number of an internal node: leaves before it minus roots before it, plus its internal ancestors... which
-  // a walk per level hands down: child 0 comes next, child 1 after all of child 0.
+  // Depth-first number of an internal node: leaves before it minus roots before it, plus its internal ancestors...
+  // which a walk per level hands down: child 0 comes next, child 1 after all of child 0.
   for (unsigned root = 0; root < 24; ++root) {
     grid.roots[root] = {first_leaf_[root], first_leaf_[root] - root};
   }
@@ -258,6 +264,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value) {
     const auto sums = std::make_unique<BrickSums>();
     const Statistics::Node* brick = nullptr;
     unsigned brick_permutation = 6;
+    const BrickTree* tree = nullptr;
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const std::uint32_t index = leaf_nodes_[rank];
@@ -279,18 +286,19 @@ TetGrid GridBuilder::records(CellKind cells, float max_value) {
           if (&holder != brick || node.permutation != brick_permutation) {
             brick = &holder;
             brick_permutation = node.permutation;
-            sums->compute(statistics_->values(holder),
-                          brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation)));
+            tree = &brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation));
+            sums->compute(statistics_->values(holder), *tree);
           }
-          m = sums->moments(node.heap, holder.corner);
+          m = sums->moments(node.heap, holder.corner, *tree);
         }
       }
       const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
       vec3 gradient(0.0F);
       if (cells == CellKind::linear && m.min < m.max) {
         const dvec3 covariance = m.first / m.volume - dvec3(centroid) * m.mean();
-        const dvec3 in_frame = dvec3(core::cm_to_frame(vec3(covariance), shape)) / double(unit);
-        gradient = vec3(fit_linear(cell_class, in_frame, mean).gradient * to_relative);
+        const vec3 in_frame = core::cm_to_frame(vec3(covariance), shape) / unit;
+        gradient =
+            fit_linear(cell_class, in_frame, static_cast<float>(mean)).gradient * static_cast<float>(to_relative);
       }
       if (m.max > 0.0F) {
         for (std::uint32_t i = 0; i < 4; ++i) {

@@ -36,7 +36,7 @@ struct TetGrid {
   float density_unit = 1.0F;          ///< grid value of a record's density 1
   glm::vec3 content_min{0.0F};        ///< cube-space box that holds every cell with density
   glm::vec3 content_max{0.0F};
-  bool limited = false;               ///< max_cells ended the refinement
+  bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const { return cells.size() * sizeof(CellRecord) + tree.size() * 4 + 200; }
 };
@@ -53,11 +53,11 @@ class GridBuilder {
  private:
   struct Node {
     std::array<std::uint32_t, 4> links;
-    std::uint32_t child;         // 0: a leaf
+    std::uint32_t child;  // 0: a leaf
     std::array<std::uint16_t, 3> v0;
     std::uint16_t shape;
-    std::uint16_t heap;          // place in the brick's tree, 0 above bricks
-    std::uint16_t permutation;   // of that tree
+    std::uint16_t heap;         // place in the brick's tree, 0 above bricks
+    std::uint16_t permutation;  // of that tree
   };
   static_assert(sizeof(Node) == 32);
 

@@ -20,7 +20,7 @@ constexpr std::int64_t max_pages = 8;
 constexpr GLuint tree_unit = 12;
 
 struct VoxelBox {
-  ivec3 low;   // cube space
+  ivec3 low;  // cube space
   ivec3 size;
 };
 
@@ -57,7 +57,8 @@ MarchData MarchData::upload_tet(const gl::FunctionsPtr& gl, const gl::Limits& li
 
   const std::int64_t texels = page_texels > 0 ? page_texels : limits.texture_buffer_texels;
   std::int64_t page_cells = texels / 2;
-  if (page_cells < cells) page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
+  if (page_cells < cells)
+    page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
   data.log2_page_cells_ = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
   const std::int64_t tree_texels = (static_cast<std::int64_t>(grid.tree.size()) + 3) / 4;
   if (cells > page_cells * max_pages || tree_texels > limits.texture_buffer_texels) {
@@ -93,7 +94,8 @@ MarchData MarchData::upload_dense(const gl::FunctionsPtr& gl, const gl::Limits& 
   require_3d(limits, box.size, "the dense march");
   data.box_min_ = vec3(box.low);
   data.box_max_ = vec3(box.low + box.size);
-  data.textures_[1] = gl::make_texture_3d(gl, GL_R16F, box.size.x, box.size.y, box.size.z, "creating the dense texture");
+  data.textures_[1] =
+      gl::make_texture_3d(gl, GL_R16F, box.size.x, box.size.y, box.size.z, "creating the dense texture");
   const float scale = relative_scale(volume);
   // One layer of bricks at a time: bounded memory.
   const auto row = static_cast<std::size_t>(box.size.x);

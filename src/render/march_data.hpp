@@ -17,16 +17,16 @@ enum class March { tet = 0, dense = 1, brick = 2 };
 /// What one march reads on the GPU, and the box that holds all density.
 class MarchData {
  public:
-  /// Records and tree as texture buffers, paged where the driver's texture buffer limit ends (page_texels 0: the driver's).
-  /// Throws Error(unsupported) that names the limit if the pages do not suffice.
+  /// Records and tree as texture buffers, paged where the driver's texture buffer limit ends (page_texels 0: the
+  /// driver's). Throws Error(unsupported) that names the limit if the pages do not suffice.
   static MarchData upload_tet(const gl::FunctionsPtr& gl, const gl::Limits& limits, const grid::TetGrid& grid,
                               bool linear, std::int64_t page_texels = 0);
   /// The bounds' voxels as one half-float 3D texture.
-  static MarchData upload_dense(const gl::FunctionsPtr& gl, const gl::Limits& limits, const grid::Statistics& statistics,
-                                const volume::ScalarVolume& volume);
+  static MarchData upload_dense(const gl::FunctionsPtr& gl, const gl::Limits& limits,
+                                const grid::Statistics& statistics, const volume::ScalarVolume& volume);
   /// Non-empty 8^3 bricks as half floats, and a 3D texture of their slots.
-  static MarchData upload_brick(const gl::FunctionsPtr& gl, const gl::Limits& limits, const grid::Statistics& statistics,
-                                const volume::ScalarVolume& volume);
+  static MarchData upload_brick(const gl::FunctionsPtr& gl, const gl::Limits& limits,
+                                const grid::Statistics& statistics, const volume::ScalarVolume& volume);
 
   [[nodiscard]] March march() const { return march_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }

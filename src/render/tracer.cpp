@@ -74,7 +74,8 @@ void Tracer::next_tile() {
   if (pass_target_ >= parameters_.image.w || view_ != View::shaded) {
     done_ = true;
   } else {
-    // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs little.
+    // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
+    // little.
     pass_target_ = std::min(parameters_.image.w, pass_target_ + std::min(pass_target_, longest_pass));
   }
 }

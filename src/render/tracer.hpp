@@ -20,8 +20,8 @@ struct Totals {
 
 /// Accumulates an image by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
 ///
-/// Samples come in passes that end in every tile before the next begins; within a dispatch a lane runs a bounded number of
-/// steps and keeps its path for the next. Each pixel belongs to one lane at a time and adds its samples in order, so
+/// Samples come in passes that end in every tile before the next begins; within a dispatch a lane runs a bounded number
+/// of steps and keeps its path for the next. Each pixel belongs to one lane at a time and adds its samples in order, so
 /// the image depends on seed and sample count alone, not on tiles, budgets or timing.
 class Tracer {
  public:

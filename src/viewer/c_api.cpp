@@ -154,10 +154,11 @@ cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc*
     require(in_range(d.pixel_size, 0.0, 1e6), "cumulet_grid_desc.pixel_size is not from 0 to 1e6");
     cumulet::viewer::GridSettings s;
     s.march = static_cast<cumulet::render::March>(d.march);
-    s.refine.cells = d.cells == CUMULET_CELLS_LINEAR ? cumulet::grid::CellKind::linear : cumulet::grid::CellKind::constant;
+    s.refine.cells =
+        d.cells == CUMULET_CELLS_LINEAR ? cumulet::grid::CellKind::linear : cumulet::grid::CellKind::constant;
     const bool deviation = d.criterion == CUMULET_CRITERION_DEVIATION;
     s.refine.criterion = deviation ? cumulet::grid::Criterion::deviation : cumulet::grid::Criterion::range_mean;
-    s.refine.threshold = d.threshold != 0.0 ? d.threshold : (deviation ? 0.05 : 1.0);
+    s.refine.threshold = d.threshold != 0.0 ? d.threshold : (deviation ? 0.02 : 1.0);
     if (d.max_cells != 0) s.refine.max_cells = d.max_cells;
     s.camera_adaptive = d.camera_adaptive == 1;
     s.refine.pixel_size = d.pixel_size > 0.0 ? d.pixel_size : 1.0;
@@ -212,8 +213,8 @@ cumulet_status cumulet_set_image(cumulet_viewer* viewer, const cumulet_image_des
   return guarded(viewer, [&] {
     const cumulet_image_desc d = read_desc(desc, "cumulet_image_desc");
     require(d.view <= CUMULET_VIEW_DENSITY, "cumulet_image_desc.view is unknown");
-    viewer->viewer.set_image({d.width, d.height, d.samples == 0 ? 64 : d.samples, d.seed,
-                              static_cast<cumulet::render::View>(d.view)});
+    viewer->viewer.set_image(
+        {d.width, d.height, d.samples == 0 ? 64 : d.samples, d.seed, static_cast<cumulet::render::View>(d.view)});
   });
 }
 

@@ -37,7 +37,8 @@ CameraFrame frame_of(const Camera& camera) {
   const dvec3 forward = glm::normalize(camera.target - camera.eye);
   dvec3 right = glm::cross(forward, camera.up);
   // Looking along up: any right will do.
-  if (glm::length(right) < 1e-9) right = glm::cross(forward, std::abs(forward.x) < 0.9 ? dvec3(1, 0, 0) : dvec3(0, 0, 1));
+  if (glm::length(right) < 1e-9)
+    right = glm::cross(forward, std::abs(forward.x) < 0.9 ? dvec3(1, 0, 0) : dvec3(0, 0, 1));
   right = glm::normalize(right);
   return {forward, right, glm::cross(right, forward)};
 }
@@ -89,10 +90,9 @@ void Viewer::set_camera(const Camera& camera) {
 void Viewer::set_image(const Image& image) {
   if (image.width < 1 || image.height < 1 || image.width > 16384 || image.height > 16384 ||
       static_cast<int>(std::max(image.width, image.height)) > limits_.texture_size_2d) {
-    throw Error(ErrorCode::invalid_argument, "an image of " + std::to_string(image.width) + " x " +
-                                                 std::to_string(image.height) + " pixels: 1 to " +
-                                                 std::to_string(std::min(16384, limits_.texture_size_2d)) +
-                                                 " each way are possible");
+    throw Error(ErrorCode::invalid_argument,
+                "an image of " + std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels: 1 to " +
+                    std::to_string(std::min(16384, limits_.texture_size_2d)) + " each way are possible");
   }
   image_ = image;
   picture_stale_ = true;
@@ -166,19 +166,30 @@ Bounds Viewer::bounds() const {
 
 Camera Viewer::placed_camera() const {
   if (camera_.eye != camera_.target) return camera_;
-  // Fit the bounding sphere, seen from +Z and a little above.
+  // As near as keeps all eight corners of the bounds in the picture, seen from +Z and a little above.
   const Bounds box = bounds();
-  const double radius = std::max(1e-30, 0.5 * glm::length(box.max - box.min));
-  const double aspect = image_.height > 0 ? double(image_.width) / image_.height : 1.0;
-  const double half = std::atan(std::tan(0.5 * radians(camera_.fovy_degrees)) * std::min(1.0, aspect));
   Camera camera = camera_;
   camera.target = 0.5 * (box.min + box.max);
-  camera.eye = camera.target + glm::normalize(dvec3(0.0, 0.2, 1.0)) * (0.85 * radius / std::sin(half));
+  const dvec3 back = glm::normalize(dvec3(0.0, 0.2, 1.0));
+  camera.eye = camera.target + back;
+  const CameraFrame frame = frame_of(camera);
+  const double tan_y = std::tan(0.5 * radians(camera.fovy_degrees));
+  const double tan_x = image_.height > 0 ? tan_y * image_.width / image_.height : tan_y;
+  double distance = 1e-30;
+  for (int corner = 0; corner < 8; ++corner) {
+    const dvec3 p((corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
+                  (corner & 4) != 0 ? box.max.z : box.min.z);
+    const dvec3 q = p - camera.target;
+    const double wide = std::max(std::abs(glm::dot(q, frame.right)) / tan_x, std::abs(glm::dot(q, frame.up)) / tan_y);
+    distance = std::max(distance, glm::dot(q, back) + wide);
+  }
+  camera.eye = camera.target + back * distance;
   return camera;
 }
 
 std::optional<grid::RefineCamera> Viewer::refine_camera() const {
-  if (image_.width == 0) throw Error(ErrorCode::invalid_argument, "a camera-adaptive grid needs the image's size first");
+  if (image_.width == 0)
+    throw Error(ErrorCode::invalid_argument, "a camera-adaptive grid needs the image's size first");
   const Camera camera = placed_camera();
   const CameraFrame frame = frame_of(camera);
   grid::RefineCamera refine;
@@ -210,7 +221,8 @@ core::CmParameters Viewer::parameters() const {
   p.to_cube_z = direction(linear[2]);
   const double azimuth = radians(light_.sun_azimuth_degrees);
   const double elevation = radians(light_.sun_elevation_degrees);
-  const dvec3 sun(std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation));
+  const dvec3 sun(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+                  std::cos(azimuth) * std::cos(elevation));
   p.sun_world = direction(sun);
   p.sun_cube = direction(linear * sun);
   p.sun_irradiance = glm::vec4(light_.sun_irradiance, 0.0F);
@@ -221,8 +233,8 @@ core::CmParameters Viewer::parameters() const {
   const float sun_power = luminance(light_.sun_irradiance);
   const float sky_power = 4.0F * std::numbers::pi_v<float> * luminance(light_.sky_radiance);
   const float to_sky = sun_power > 0.0F ? 0.5F * sky_power / (sky_power + sun_power) : (sky_power > 0.0F ? 1.0F : 0.0F);
-  p.medium = {static_cast<float>(medium_.density_scale * std::max(volume_->max_value, 1e-30F)), medium_.anisotropy, to_sky,
-              sun_power + sky_power > 0.0F ? 1.0F : 0.0F};
+  p.medium = {static_cast<float>(medium_.density_scale * std::max(volume_->max_value, 1e-30F)), medium_.anisotropy,
+              to_sky, sun_power + sky_power > 0.0F ? 1.0F : 0.0F};
   p.image = {image_.width, image_.height, image_.seed, std::max(1U, image_.samples)};
   p.march = {0U, medium_.max_bounces, 0U, 0U};
   return p;

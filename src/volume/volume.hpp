@@ -27,13 +27,13 @@ struct Tile {
 /// section 3). The field is zero outside bounds; inside, a voxel is in a brick, else in a tile,
 /// else it has the background value. Values are finite and not negative.
 struct ScalarVolume {
-  std::string name;                     ///< grid name, for messages
-  glm::dmat4 index_to_world{1.0};       ///< affine: world = index_to_world * (i,j,k,1)
-  glm::ivec3 bounds_min{0};             ///< first active voxel, inclusive
-  glm::ivec3 bounds_max{-1};            ///< last active voxel, inclusive
+  std::string name;                ///< grid name, for messages
+  glm::dmat4 index_to_world{1.0};  ///< affine: world = index_to_world * (i,j,k,1)
+  glm::ivec3 bounds_min{0};        ///< first active voxel, inclusive
+  glm::ivec3 bounds_max{-1};       ///< last active voxel, inclusive
   float background = 0.0F;
-  float max_value = 0.0F;               ///< over all voxels within bounds
-  std::uint64_t active_voxels = 0;      ///< active tiles count with all their voxels
+  float max_value = 0.0F;           ///< over all voxels within bounds
+  std::uint64_t active_voxels = 0;  ///< active tiles count with all their voxels
   /// Brick origins: multiples of 8, unique, sorted by (x, y, z) lexicographically.
   std::vector<glm::ivec3> brick_origins;
   /// 512 floats a brick, z fastest: index ((x & 7) * 8 + (y & 7)) * 8 + (z & 7), OpenVDB's leaf
@@ -47,7 +47,7 @@ struct ScalarVolume {
 /// One grid of a file, for listings and messages.
 struct GridInfo {
   std::string name;
-  std::string type;  ///< as the file says: "float", "half", "vec3s", ...
+  std::string type;        ///< as the file says: "float", "half", "vec3s", ...
   std::string grid_class;  ///< "fog volume", "level set", "unknown", ...
 };
 
@@ -61,7 +61,6 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file);
 /// throw Error(file) with one line that names file and cause. Negative voxels are clamped to zero
 /// with one warning that counts them. Any affine transform is accepted; a frustum transform is not.
 /// O(active nodes) time and memory.
-ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name,
-                           const Log& log);
+ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log);
 
 }  // namespace cumulet::volume

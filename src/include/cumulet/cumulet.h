@@ -129,7 +129,7 @@ typedef struct cumulet_grid_desc {
   cumulet_march march;
   cumulet_cells cells;
   cumulet_criterion criterion;
-  double threshold;        /* split above it. 0: 0.05 for deviation, 1 for range-mean; negative: split to the voxel */
+  double threshold;        /* split above it. 0: 0.02 for deviation, 1 for range-mean; negative: split to the voxel */
   uint64_t max_cells;      /* 0: 5,400,000. Spent where the criterion is largest */
   int32_t camera_adaptive; /* 1: do not split cells outside the frustum or under pixel_size pixels; 0: off */
   double pixel_size;       /* pixels a cell's longest edge must cover to be split; 0: 1 */

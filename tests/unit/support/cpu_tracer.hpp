@@ -17,8 +17,8 @@ struct CpuTetLinear {
   uint cm_tree(uint node) const { return grid->tree[node]; }
   uint cm_root_leaf(uint root) const { return grid->roots[root].first_leaf; }
   uint cm_root_node(uint root) const { return grid->roots[root].first_internal; }
-#include "random.glsl"
 #include "phase.glsl"
+#include "random.glsl"
 #define CM_LINEAR 1
 #include "march_tet.glsl"
 #include "path.glsl"
@@ -35,8 +35,8 @@ struct CpuDense {
   const volume::ScalarVolume* volume = nullptr;
   ivec3 origin{0};
   float cm_voxel(ivec3 voxel) const { return test::value_at(*volume, voxel + origin) / volume->max_value; }
-#include "random.glsl"
 #include "phase.glsl"
+#include "random.glsl"
 #define CM_MARCH 1
 #include "march_voxel.glsl"
 #include "path.glsl"
