@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "subject.hpp"
+
+namespace cumulet::bench {
+
+/// Root mean square error of the shaded picture, relative to the mean radiance of the pixels that show the medium.
+struct ImageError {
+  double value = 0.0;
+  double standard_error = 0.0;
+};
+
+/// The dense march's picture in two independent halves, and the error of another march against it.
+///
+/// With A1, B1 of one seed and A2, B2 of another, (A1 - B1)(A2 - B2) has the square of the true difference as its mean:
+/// Monte Carlo noise adds variance but no bias. One seed for A and B keeps their paths together, which is what makes
+/// A - B quiet: random directions do not depend on the march, and lengths do by little.
+class ImageReference {
+ public:
+  ImageReference(Subject& dense, std::uint32_t samples);
+  [[nodiscard]] ImageError error_of(Subject& subject) const;
+
+ private:
+  std::uint32_t samples_;
+  std::vector<float> first_, second_;
+  std::vector<char> shows_medium_;
+  std::size_t medium_pixels_ = 0;
+  double mean_ = 0.0;
+};
+
+/// Errors of the camera rays' optical depth and of the opacity 1 - exp(-depth); deterministic, root mean square over
+/// all pixels per pixel that shows the medium, relative to those pixels' mean.
+struct DepthError {
+  double depth = 0.0;
+  double opacity = 0.0;
+};
+
+class DepthReference {
+ public:
+  /// density_scale: of the shaded picture.
+  DepthReference(Subject& dense, double density_scale, double mean_depth);
+  [[nodiscard]] DepthError error_of(Subject& subject) const;
+
+ private:
+  [[nodiscard]] std::vector<double> depths(Subject& subject) const;
+
+  double ray_scale_;  ///< small, so that the opacity that is read back tells the depth
+  double density_scale_;
+  std::vector<double> depth_;
+  std::size_t medium_pixels_ = 0;
+  double mean_depth_ = 0.0;
+  double mean_opacity_ = 0.0;
+};
+
+}  // namespace cumulet::bench

@@ -1,0 +1,72 @@
+// cumulet-bench: the tetrahedral march against its opponents, one run, ratios.
+
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "measure.hpp"
+#include "report.hpp"
+
+namespace {
+
+using namespace cumulet;
+
+std::string cpu_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+bench::Machine machine_of(headless::Context& context) {
+  const viewer::Viewer viewer(headless::Context::get_proc, &context, Log());
+  const auto get = [&viewer](GLenum name) {
+    const GLubyte* text = viewer.gl().GetString(name);
+    return std::string(text != nullptr ? reinterpret_cast<const char*>(text) : "unknown");
+  };
+  return {get(GL_RENDERER), get(GL_VERSION), context.name(), cpu_name(), std::thread::hardware_concurrency()};
+}
+
+void run(const bench::Options& options) {
+  // What cannot be written should not fail after minutes of measuring.
+  if (!options.readme.empty() && !std::ifstream(options.readme)) {
+    throw std::runtime_error(options.readme.string() + ": cannot be read");
+  }
+  std::filesystem::create_directories(options.out);
+  headless::Context context = headless::Context::create(options.backend);
+  const bench::Machine machine = machine_of(context);
+  bench::progress(machine.gl_renderer);
+  std::vector<bench::AssetResult> results;
+  std::vector<std::string> skipped;
+  for (const bench::Input& input : options.inputs) {
+    if (input.optional && !std::filesystem::exists(input.file)) {
+      skipped.push_back(input.name + ", there is no " + input.file.string());
+      bench::progress("skipped: " + skipped.back());
+      continue;
+    }
+    bench::progress(input.name);
+    results.push_back(bench::measure(context, bench::load_asset(input), options));
+    bench::write_report(machine, options, results, skipped);  // what is done is not lost
+  }
+  bench::write_report(machine, options, results, skipped);
+  bench::progress("written: " + (options.out / "report.md").string());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const bench::ParseResult parsed = bench::parse(argc, argv);
+  if (parsed.status >= 0) return parsed.status;
+  try {
+    run(parsed.options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "cumulet-bench: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,270 @@
+#include "measure.hpp"
+
+#include <malloc.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+
+namespace cumulet::bench {
+
+namespace {
+
+constexpr double first_deviation = 1.6;
+constexpr double first_range_mean = 64.0;
+constexpr double finest_error = 0.007;
+
+std::string text(const char* format, double a, double b = 0.0, double c = 0.0) {
+  std::array<char, 160> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), format, a, b, c);
+  return buffer.data();
+}
+
+// Linux: the high-water mark of resident memory, and its reset. Where /proc lacks it, 0.
+void reset_peak() {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+double peak_bytes() {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  while (status >> word) {
+    if (word == "VmHWM:") {
+      double kib = 0.0;
+      status >> kib;
+      return kib * 1024.0;
+    }
+  }
+  return 0.0;
+}
+
+BuildRow measure_build(headless::Context& context, const Asset& asset, const Options& options, double density_scale) {
+  reset_peak();
+  Subject subject(context, asset.volume, Kind::tet_linear, options, density_scale);
+  subject.refine(grid::Criterion::deviation, 1e-6, options.build_cells);
+  const viewer::BuildSeconds& seconds = subject.viewer().build_seconds();
+  BuildRow row;
+  row.cells = subject.viewer().cells();
+  row.load = asset.load_seconds;
+  row.statistics = seconds.statistics;
+  row.refine = seconds.refine;
+  row.records = seconds.records;
+  row.upload = seconds.upload;
+  // The asset's own copy of the voxels is the benchmark's, not the viewer's.
+  row.peak_bytes = std::max(0.0, peak_bytes() - static_cast<double>(asset.volume.brick_values.size() * sizeof(float)));
+  return row;
+}
+
+SweepCurve sweep(Subject& subject, grid::Criterion criterion, const DepthReference& reference, const Options& options) {
+  SweepCurve curve;
+  curve.criterion = criterion;
+  curve.kind = subject.kind();
+  double threshold = criterion == grid::Criterion::deviation ? first_deviation : first_range_mean;
+  for (int i = 0; i < 14; ++i, threshold /= options.sweep_factor) {
+    subject.refine(criterion, threshold, 2 * options.sweep_cells);
+    SweepPoint point;
+    point.threshold = threshold;
+    point.cells = subject.viewer().cells();
+    point.bytes = subject.viewer().cell_bytes();
+    const bool limited = point.cells + 1000 > 2 * options.sweep_cells;
+    if (limited && !curve.points.empty()) break;
+    point.error = reference.error_of(subject);
+    const bool same = !curve.points.empty() && curve.points.back().cells == point.cells;
+    if (!same) curve.points.push_back(point);
+    if (point.cells > options.sweep_cells || point.error.depth < finest_error) break;
+  }
+  return curve;
+}
+
+struct Match {
+  double threshold = 0.0;
+  ImageError error;
+};
+
+/// The threshold whose image error is the target: a secant search in logarithms, kept inside what brackets the target.
+Match match(Subject& subject, const ImageReference& reference, double target, double guess, const Options& options) {
+  struct Point {
+    double threshold, error;
+  };
+  std::optional<Point> low, high;  // errors below and above the target
+  Match best;
+  double best_distance = 1e30;
+  double threshold = guess;
+  for (int i = 0; i < options.evaluations; ++i) {
+    subject.refine(grid::Criterion::deviation, threshold, options.max_cells);
+    const ImageError error = reference.error_of(subject);
+    const double value = std::max(error.value, 0.05 * target);
+    progress("    " + std::string(name_of(subject.kind())) +
+             text(": threshold %.4g, image error %.2f +- %.2f %%", threshold, 100.0 * error.value,
+                  100.0 * error.standard_error));
+    const double distance = std::abs(std::log(value / target));
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = {threshold, error};
+    }
+    if (distance < 0.04) break;
+    (value < target ? low : high) = Point{threshold, value};
+    if (low && high) {
+      const double part = std::log(target / low->error) / std::log(high->error / low->error);
+      threshold = low->threshold *
+                  std::pow(high->threshold / low->threshold, std::isfinite(part) ? std::clamp(part, 0.1, 0.9) : 0.5);
+    } else {
+      threshold *= std::clamp(target / value, 0.125, 8.0);
+    }
+  }
+  subject.refine(grid::Criterion::deviation, best.threshold, options.max_cells);
+  return best;
+}
+
+double threshold_for(const SweepCurve& curve, double error) {
+  for (const SweepPoint& point : curve.points) {
+    if (point.error.depth <= error) return point.threshold;
+  }
+  return curve.points.back().threshold;
+}
+
+/// Runs, in turn, until every subject has its repeats.
+template <class Measure>
+std::array<std::vector<Run>, 4> take_turns(int repeats, Measure measure_one) {
+  std::array<std::vector<Run>, 4> runs;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      Run run = measure_one(i, static_cast<std::uint32_t>(repeat));
+      run.rgba.clear();
+      runs[i].push_back(std::move(run));
+    }
+  }
+  return runs;
+}
+
+std::vector<double> rates(const std::vector<Run>& runs) {
+  std::vector<double> result;
+  for (const Run& run : runs) result.push_back(run.samples_per_second());
+  return result;
+}
+
+}  // namespace
+
+void progress(const std::string& line) {
+  static const auto start = std::chrono::steady_clock::now();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::fprintf(stderr, "[%6.1f s] %s\n", seconds, line.c_str());
+}
+
+std::optional<double> SweepCurve::cells_at(double error) const {
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const SweepPoint& a = points[i - 1];
+    const SweepPoint& b = points[i];
+    if (a.error.depth < error || b.error.depth > error || b.error.depth <= 0.0) continue;
+    const double part = std::log(a.error.depth / error) / std::log(a.error.depth / b.error.depth);
+    if (!std::isfinite(part)) return static_cast<double>(b.cells);
+    return static_cast<double>(a.cells) * std::pow(static_cast<double>(b.cells) / static_cast<double>(a.cells), part);
+  }
+  return std::nullopt;
+}
+
+const char* name_of(grid::Criterion criterion) {
+  return criterion == grid::Criterion::deviation ? "deviation" : "range-mean";
+}
+
+AssetResult measure(headless::Context& context, const Asset& asset, const Options& options) {
+  AssetResult result;
+  result.name = asset.name;
+  const glm::ivec3 voxels = asset.volume.bounds_max - asset.volume.bounds_min + 1;
+  result.voxels = {voxels.x, voxels.y, voxels.z};
+  result.active_voxels = asset.volume.active_voxels;
+  const double density_scale = options.optical_depth / std::max(asset.mean_optical_depth, 1e-30);
+  result.density_scale = density_scale;
+
+  progress("  build");
+  result.build = measure_build(context, asset, options, density_scale);
+
+  std::array<std::unique_ptr<Subject>, 4> subjects;
+  for (std::size_t i = 0; i < 4; ++i) {
+    subjects[i] = std::make_unique<Subject>(context, asset.volume, all_kinds[i], options, density_scale);
+  }
+  Subject& dense = *subjects[2];
+
+  progress("  cells against error");
+  {
+    const DepthReference reference(dense, density_scale, options.optical_depth);
+    for (const grid::Criterion criterion : {grid::Criterion::deviation, grid::Criterion::range_mean}) {
+      for (std::size_t i = 0; i < 2; ++i) {
+        result.curves.push_back(sweep(*subjects[i], criterion, reference, options));
+        const SweepPoint& last = result.curves.back().points.back();
+        progress(std::string("    ") + name_of(criterion) + ", " + name_of(all_kinds[i]) +
+                 text(": down to %.2f %% with %.0f cells", 100.0 * last.error.depth, static_cast<double>(last.cells)));
+      }
+    }
+  }
+
+  progress("  the reference picture");
+  const ImageReference image_reference(dense, options.error_samples);
+  const DepthReference depth_reference(dense, density_scale, options.optical_depth);
+  for (const double target : options.targets) {
+    TargetResult table;
+    table.target = target;
+    progress(text("  thresholds for an image error of %.2g %%", 100.0 * target));
+    for (std::size_t i = 0; i < 4; ++i) {
+      TraceRow& row = table.rows[i];
+      row.kind = all_kinds[i];
+      if (i < 2) {
+        const double guess = threshold_for(result.curves[i], target);
+        const Match found = match(*subjects[i], image_reference, target, guess, options);
+        row.threshold = found.threshold;
+        row.error = found.error;
+        row.matched = std::abs(std::log(std::max(found.error.value, 1e-9) / target)) < 0.1;
+        row.depth_error = depth_reference.error_of(*subjects[i]);
+      }
+    }
+
+    progress("  paths");
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Run warm = subjects[i]->shaded(1, 1);
+      if (i == 2) {
+        const double samples = options.seconds_a_run / std::max(warm.seconds, 1e-3);
+        table.samples = static_cast<std::uint32_t>(std::clamp(samples, 1.0, 16.0));
+      }
+    }
+    const auto runs = take_turns(options.repeats, [&](std::size_t i, std::uint32_t repeat) {
+      return subjects[i]->shaded(table.samples, 1000 + repeat);
+    });
+
+    progress("  camera rays");
+    for (const auto& subject : subjects) subject->primary(density_scale);
+    const auto rays = take_turns(2 * options.repeats + 1,
+                                 [&](std::size_t i, std::uint32_t) { return subjects[i]->primary(density_scale); });
+
+    for (std::size_t i = 0; i < 4; ++i) {
+      TraceRow& row = table.rows[i];
+      row.cells = subjects[i]->viewer().cells();
+      row.bytes = subjects[i]->viewer().cell_bytes();
+      row.bytes_of_dense = static_cast<double>(row.bytes) / static_cast<double>(dense.viewer().cell_bytes());
+      row.samples_per_second = spread_of(rates(runs[i]));
+      row.to_dense = ratio_of(rates(runs[i]), rates(runs[2]));
+      row.to_brick = ratio_of(rates(runs[i]), rates(runs[3]));
+      row.rays_per_second = spread_of(rates(rays[i]));
+      row.ray_to_dense = ratio_of(rates(rays[i]), rates(rays[2]));
+      row.ray_to_brick = ratio_of(rates(rays[i]), rates(rays[3]));
+      row.steps_per_ray = rays[i].front().steps_per_sample();
+      std::vector<double> steps;
+      std::vector<double> steps_a_second;
+      for (const Run& run : runs[i]) {
+        steps.push_back(run.steps_per_sample());
+        steps_a_second.push_back(static_cast<double>(run.steps) / run.seconds);
+      }
+      row.steps_per_path = spread_of(steps).median;
+      row.steps_per_second = spread_of(steps_a_second);
+      progress(std::string("    ") + name_of(row.kind) +
+               text(": %.0f samples/s, %.2f x dense, %.2f x brick", row.samples_per_second.median, row.to_dense.median,
+                    row.to_brick.median));
+    }
+    result.targets.push_back(std::move(table));
+  }
+  return result;
+}
+
+}  // namespace cumulet::bench

@@ -1,0 +1,112 @@
+#include "options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+namespace cumulet::bench {
+
+namespace {
+
+Input parse_input(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+    throw CLI::ValidationError("--input", "\"" + text + "\" is not NAME=FILE[:GRID] or NAME=@noise:SIZE");
+  }
+  Input input;
+  input.name = text.substr(0, equals);
+  for (char& c : input.name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
+    if (!plain) c = '_';  // it names files
+  }
+  std::string rest = text.substr(equals + 1);
+  const std::string noise = "@noise:";
+  if (rest.rfind(noise, 0) == 0) {
+    try {
+      input.noise_size = std::stoi(rest.substr(noise.size()));
+    } catch (const std::exception&) {
+      input.noise_size = 0;
+    }
+    if (input.noise_size < 8 || input.noise_size > 2048) {
+      throw CLI::ValidationError("--input", "a noise volume has 8 to 2048 voxels a side");
+    }
+    return input;
+  }
+  const std::size_t colon = rest.rfind(':');
+  if (colon != std::string::npos && rest.find('/', colon) == std::string::npos) {
+    input.grid = rest.substr(colon + 1);
+    rest.resize(colon);
+  }
+  input.file = rest;
+  return input;
+}
+
+}  // namespace
+
+ParseResult parse(int argc, char** argv) {
+  ParseResult result;
+  Options& o = result.options;
+  CLI::App app(
+      "Measures the marches against each other: one run, ratios, medians of interleaved repeats.\n"
+      "Writes report.md, results.csv and plots (SVG).");
+  std::vector<std::string> inputs;
+  std::string shared_data = "../shared/data";
+  std::string samples = "build/sample-full";
+  std::string backend = "auto";
+  app.add_option("--input", inputs,
+                 "NAME=FILE[:GRID] or NAME=@noise:SIZE, again and again (default: disney, cumulus, fire)");
+  app.add_option("--sample-dir", samples, "What cumulet-scene --full wrote (default: build/sample-full)");
+  app.add_option("--data-dir", shared_data, "Holds vdb/wdas/wdas_cloud_sixteenth.vdb (default: ../shared/data)");
+  app.add_option("--out", o.out, "Folder for what is written (default: bench-out)");
+  app.add_option("--update-readme", o.readme, "Put the main table between this file's bench:begin and bench:end");
+  const std::map<std::string, headless::Backend> backends{
+      {"auto", headless::Backend::automatic}, {"egl", headless::Backend::egl}, {"osmesa", headless::Backend::osmesa}};
+  app.add_option("--backend", backend, "auto|egl|osmesa")->check(CLI::IsMember({"auto", "egl", "osmesa"}));
+  app.add_flag("--quick", o.quick, "A rougher look, in at most three minutes");
+  auto* targets = app.add_option("--target", o.targets, "Image errors to match (default: 0.03; also 0.01)");
+  targets->check(CLI::Range(1e-4, 0.5));
+  auto* size = app.add_option("--size", o.size, "Pixels each way (default: 256; quick: 128)");
+  size->check(CLI::Range(8U, 4096U));
+  app.add_option("--optical-depth", o.optical_depth, "Mean optical depth of each asset (default: 10)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--albedo", o.albedo, "Single-scattering albedo (default: 1)")->check(CLI::Range(0.0F, 1.0F));
+  auto* repeats = app.add_option("--repeats", o.repeats, "Interleaved repeats (default: 5; quick: 3)");
+  repeats->check(CLI::Range(1, 99));
+  auto* seconds =
+      app.add_option("--seconds", o.seconds_a_run, "About, for one run of one march (default: 6; quick: 1)");
+  auto* error_samples =
+      app.add_option("--error-samples", o.error_samples, "Samples a pixel in each half of the error's estimate");
+  error_samples->check(CLI::Range(1U, 4096U));
+  auto* sweep_cells = app.add_option("--sweep-cells", o.sweep_cells, "Where a sweep of thresholds ends");
+  app.add_option("--max-cells", o.max_cells, "Most cells of a matched grid (default: 5400000)");
+  auto* build_cells = app.add_option("--build-cells", o.build_cells, "Cells of the timed build (default: 5000000)");
+  try {
+    app.parse(argc, argv);
+    for (const std::string& text : inputs) o.inputs.push_back(parse_input(text));
+  } catch (const CLI::Error& error) {
+    result.status = app.exit(error) == 0 ? 0 : 2;
+    return result;
+  }
+  o.backend = backends.at(backend);
+  if (o.quick) {
+    if (size->empty()) o.size = 128;
+    if (repeats->empty()) o.repeats = 3;
+    if (seconds->empty()) o.seconds_a_run = 1.0;
+    if (error_samples->empty()) o.error_samples = 4;
+    if (sweep_cells->empty()) o.sweep_cells = 300'000;
+    if (build_cells->empty()) o.build_cells = 1'000'000;
+    o.evaluations = 4;
+    o.sweep_factor = 4.0;
+  }
+  if (inputs.empty()) {
+    const std::filesystem::path sample_dir(samples);
+    o.inputs = {
+        {"disney", std::filesystem::path(shared_data) / "vdb/wdas/wdas_cloud_sixteenth.vdb", "density", 0, true},
+        {"cumulus", sample_dir / "cumulus.vdb", "density", 0, true},
+        {"fire", sample_dir / "fire.vdb", "density", 0, true}};
+  }
+  o.command = "cumulet-bench";
+  for (int i = 1; i < argc; ++i) o.command += std::string(" ") + argv[i];
+  return result;
+}
+
+}  // namespace cumulet::bench

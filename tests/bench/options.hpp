@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <headless.hpp>
+#include <string>
+#include <vector>
+
+namespace cumulet::bench {
+
+/// A volume to measure: a file, or a noise ball of our own.
+struct Input {
+  std::string name;
+  std::filesystem::path file;
+  std::string grid;
+  int noise_size = 0;     ///< not 0: a synthetic volume of this many voxels a side
+  bool optional = false;  ///< a default that may be absent
+};
+
+struct Options {
+  std::vector<Input> inputs;
+  std::filesystem::path out = "bench-out";
+  std::filesystem::path readme;
+  headless::Backend backend = headless::Backend::automatic;
+  std::string command;  ///< how to run this again
+
+  std::vector<double> targets{0.03};
+  std::uint32_t size = 256;
+  double optical_depth = 10.0;
+  float albedo = 1.0F;
+  int repeats = 5;
+  double seconds_a_run = 6.0;
+  std::uint32_t error_samples = 4;
+  int evaluations = 6;
+  double sweep_factor = 2.0;
+  std::uint64_t sweep_cells = 2'000'000;
+  std::uint64_t max_cells = 5'400'000;
+  std::uint64_t build_cells = 5'000'000;
+  bool quick = false;
+};
+
+/// The options, or the exit status that wrong usage (or --help) means; explains itself.
+struct ParseResult {
+  Options options;
+  int status = -1;  ///< not negative: exit with it
+};
+ParseResult parse(int argc, char** argv);
+
+}  // namespace cumulet::bench

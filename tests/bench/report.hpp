@@ -1,0 +1,21 @@
+#pragma once
+
+#include "options.hpp"
+#include "results.hpp"
+
+namespace cumulet::bench {
+
+struct Machine {
+  std::string gl_renderer;
+  std::string gl_version;
+  std::string context;
+  std::string cpu;
+  unsigned threads = 0;
+};
+
+/// report.md, results.csv and the plots, into options.out; the README's part, if asked for. Throws std::runtime_error
+/// that names the file.
+void write_report(const Machine& machine, const Options& options, const std::vector<AssetResult>& assets,
+                  const std::vector<std::string>& skipped);
+
+}  // namespace cumulet::bench

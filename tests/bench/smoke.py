@@ -1,0 +1,55 @@
+"""Runs cumulet-bench on a tiny volume and checks that what it writes exists and parses. Usage: smoke.py PROGRAM FOLDER"""
+
+import csv
+import pathlib
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree
+
+
+def main():
+    program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    readme = folder / "readme.md"
+    readme.write_text("before\n<!-- bench:begin -->\nold\n<!-- bench:end -->\nafter\n")
+    command = [program, "--quick", "--input", "ball=@noise:24", "--input", "gone/=@noise:16", "--size", "16"]
+    command += ["--seconds", "0.05", "--sweep-cells", "20000", "--build-cells", "20000", "--max-cells", "100000"]
+    command += ["--target", "0.1", "0.05", "--out", str(folder / "out"), "--update-readme", str(readme)]
+    subprocess.run(command, check=True)
+
+    rows = list(csv.DictReader((folder / "out/results.csv").open()))
+    quantities = {(row["march"], row["quantity"]) for row in rows if row["asset"] == "ball"}
+    for march in ("tet-constant", "tet-linear", "dense", "brick"):
+        for quantity in ("bytes", "steps_per_path", "samples_per_second", "camera_rays_per_second"):
+            assert (march, quantity) in quantities, (march, quantity)
+    for march in ("tet-constant", "tet-linear"):
+        for criterion in ("deviation", "range-mean"):
+            assert (f"{march}/{criterion}", "sweep_depth_error") in quantities, (march, criterion)
+    for row in rows:
+        value = float(row["value"])
+        assert value == value and float(row["min"]) <= value * (1 + 1e-6) + 1e-12, row
+    assert any(row["quantity"] == "samples_per_second" and float(row["value"]) > 0 for row in rows)
+
+    report = (folder / "out/report.md").read_text()
+    for heading in ("# Benchmark", "## Paths", "## The same grids", "## Cells", "## Build"):
+        assert heading in report, heading
+    assert "nan" not in report and "inf" not in report.replace("info", ""), report
+    plots = sorted((folder / "out").glob("*.svg"))
+    assert len(plots) == 4, plots
+    for plot in plots:
+        xml.etree.ElementTree.parse(plot)
+
+    text = readme.read_text()
+    assert text.startswith("before\n<!-- bench:begin -->\nPath tracing") and text.endswith("<!-- bench:end -->\nafter\n")
+    assert "old" not in text.split() and "| ball | tet-linear |" in text
+
+    for wrong in (["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--nonsense"]):
+        assert subprocess.run([program, *wrong], capture_output=True, check=False).returncode == 2, wrong
+    missing = subprocess.run([program, "--input", "x=missing.vdb", "--out", str(folder / "no")], capture_output=True,
+                             text=True, check=False)
+    assert missing.returncode == 1 and "missing.vdb" in missing.stderr, missing.stderr
+
+
+main()
