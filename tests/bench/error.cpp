@@ -20,9 +20,9 @@ std::vector<float> luminance(const std::vector<float>& rgba) {
 
 }  // namespace
 
-ImageReference::ImageReference(Subject& dense, std::uint32_t samples) : samples_(samples) {
-  const Run a = dense.shaded(samples, seed_1);
-  const Run b = dense.shaded(samples, seed_2);
+ImageReference::ImageReference(Subject& voxels, std::uint32_t samples) : samples_(samples) {
+  const Run a = voxels.shaded(samples, seed_1);
+  const Run b = voxels.shaded(samples, seed_2);
   first_ = luminance(a.rgba);
   second_ = luminance(b.rgba);
   shows_medium_.resize(first_.size());

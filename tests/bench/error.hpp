@@ -13,15 +13,19 @@ struct ImageError {
   double standard_error = 0.0;
 };
 
-/// The dense march's picture in two independent halves, and the error of another march against it.
+/// The voxels' picture in two independent halves, and the error of another march against it.
 ///
 /// With A1, B1 of one seed and A2, B2 of another, (A1 - B1)(A2 - B2) has the square of the true difference as its mean:
 /// Monte Carlo noise adds variance but no bias. One seed for A and B keeps their paths together, which is what makes
 /// A - B quiet: random directions do not depend on the march, and lengths do by little.
 class ImageReference {
  public:
-  ImageReference(Subject& dense, std::uint32_t samples);
+  ImageReference(Subject& voxels, std::uint32_t samples);
   [[nodiscard]] ImageError error_of(Subject& subject) const;
+  /// The part of all pixels that shows the medium.
+  [[nodiscard]] double coverage() const {
+    return static_cast<double>(medium_pixels_) / static_cast<double>(first_.size());
+  }
 
  private:
   std::uint32_t samples_;

@@ -15,6 +15,7 @@ namespace {
 constexpr double first_deviation = 1.6;
 constexpr double first_range_mean = 64.0;
 constexpr double finest_error = 0.007;
+constexpr double image_to_depth_error = 1.5;  // where the search for an image error begins
 
 std::string text(const char* format, double a, double b = 0.0, double c = 0.0) {
   std::array<char, 160> buffer{};
@@ -79,6 +80,12 @@ SweepCurve sweep(Subject& subject, grid::Criterion criterion, const DepthReferen
   return curve;
 }
 
+/// y at x, for a straight line in logarithms through (x_0, y_0) and (x_1, y_1).
+double log_between(double x_0, double x_1, double x, double y_0, double y_1) {
+  const double part = std::log(x_0 / x) / std::log(x_0 / x_1);
+  return std::isfinite(part) ? y_0 * std::pow(y_1 / y_0, part) : y_1;
+}
+
 struct Match {
   double threshold = 0.0;
   ImageError error;
@@ -96,7 +103,7 @@ Match match(Subject& subject, const ImageReference& reference, double target, do
   for (int i = 0; i < options.evaluations; ++i) {
     subject.refine(grid::Criterion::deviation, threshold, options.max_cells);
     const ImageError error = reference.error_of(subject);
-    const double value = std::max(error.value, 0.05 * target);
+    const double value = std::max(error.value, 0.25 * target);
     progress("    " + std::string(name_of(subject.kind())) +
              text(": threshold %.4g, image error %.2f +- %.2f %%", threshold, 100.0 * error.value,
                   100.0 * error.standard_error));
@@ -105,25 +112,18 @@ Match match(Subject& subject, const ImageReference& reference, double target, do
       best_distance = distance;
       best = {threshold, error};
     }
-    if (distance < 0.04) break;
+    if (distance < 0.05) break;
     (value < target ? low : high) = Point{threshold, value};
     if (low && high) {
       const double part = std::log(target / low->error) / std::log(high->error / low->error);
       threshold = low->threshold *
                   std::pow(high->threshold / low->threshold, std::isfinite(part) ? std::clamp(part, 0.1, 0.9) : 0.5);
     } else {
-      threshold *= std::clamp(target / value, 0.125, 8.0);
+      threshold *= std::clamp(target / value, 0.25, 4.0);
     }
   }
   subject.refine(grid::Criterion::deviation, best.threshold, options.max_cells);
   return best;
-}
-
-double threshold_for(const SweepCurve& curve, double error) {
-  for (const SweepPoint& point : curve.points) {
-    if (point.error.depth <= error) return point.threshold;
-  }
-  return curve.points.back().threshold;
 }
 
 /// Runs, in turn, until every subject has its repeats.
@@ -158,12 +158,21 @@ std::optional<double> SweepCurve::cells_at(double error) const {
   for (std::size_t i = 1; i < points.size(); ++i) {
     const SweepPoint& a = points[i - 1];
     const SweepPoint& b = points[i];
-    if (a.error.depth < error || b.error.depth > error || b.error.depth <= 0.0) continue;
-    const double part = std::log(a.error.depth / error) / std::log(a.error.depth / b.error.depth);
-    if (!std::isfinite(part)) return static_cast<double>(b.cells);
-    return static_cast<double>(a.cells) * std::pow(static_cast<double>(b.cells) / static_cast<double>(a.cells), part);
+    if (a.error.depth < error || b.error.depth > error) continue;
+    return log_between(a.error.depth, b.error.depth, error, static_cast<double>(a.cells), static_cast<double>(b.cells));
   }
   return std::nullopt;
+}
+
+double SweepCurve::threshold_at(double error) const {
+  if (points.front().error.depth <= error) return points.front().threshold;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const SweepPoint& a = points[i - 1];
+    const SweepPoint& b = points[i];
+    if (b.error.depth > error) continue;
+    return log_between(a.error.depth, b.error.depth, error, a.threshold, b.threshold);
+  }
+  return points.back().threshold;
 }
 
 const char* name_of(grid::Criterion criterion) {
@@ -202,7 +211,8 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
   }
 
   progress("  the reference picture");
-  const ImageReference image_reference(dense, options.error_samples);
+  const ImageReference image_reference(*subjects[3], options.error_samples);
+  result.coverage = image_reference.coverage();
   const DepthReference depth_reference(dense, density_scale, options.optical_depth);
   for (const double target : options.targets) {
     TargetResult table;
@@ -212,11 +222,11 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
       TraceRow& row = table.rows[i];
       row.kind = all_kinds[i];
       if (i < 2) {
-        const double guess = threshold_for(result.curves[i], target);
+        const double guess = result.curves[i].threshold_at(image_to_depth_error * target);
         const Match found = match(*subjects[i], image_reference, target, guess, options);
         row.threshold = found.threshold;
         row.error = found.error;
-        row.matched = std::abs(std::log(std::max(found.error.value, 1e-9) / target)) < 0.1;
+        row.matched = std::abs(found.error.value - target) < std::max(0.1 * target, found.error.standard_error);
         row.depth_error = depth_reference.error_of(*subjects[i]);
       }
     }
@@ -226,7 +236,8 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
       const Run warm = subjects[i]->shaded(1, 1);
       if (i == 2) {
         const double samples = options.seconds_a_run / std::max(warm.seconds, 1e-3);
-        table.samples = static_cast<std::uint32_t>(std::clamp(samples, 1.0, 16.0));
+        table.samples =
+            static_cast<std::uint32_t>(std::clamp(samples, static_cast<double>(options.fewest_samples), 16.0));
       }
     }
     const auto runs = take_turns(options.repeats, [&](std::size_t i, std::uint32_t repeat) {

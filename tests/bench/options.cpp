@@ -72,7 +72,7 @@ ParseResult parse(int argc, char** argv) {
   auto* repeats = app.add_option("--repeats", o.repeats, "Interleaved repeats (default: 5; quick: 3)");
   repeats->check(CLI::Range(1, 99));
   auto* seconds =
-      app.add_option("--seconds", o.seconds_a_run, "About, for one run of one march (default: 6; quick: 1)");
+      app.add_option("--seconds", o.seconds_a_run, "About, for one run of one march (default: 10; quick: 1)");
   auto* error_samples =
       app.add_option("--error-samples", o.error_samples, "Samples a pixel in each half of the error's estimate");
   error_samples->check(CLI::Range(1U, 4096U));
@@ -91,10 +91,10 @@ ParseResult parse(int argc, char** argv) {
     if (size->empty()) o.size = 128;
     if (repeats->empty()) o.repeats = 3;
     if (seconds->empty()) o.seconds_a_run = 1.0;
-    if (error_samples->empty()) o.error_samples = 4;
     if (sweep_cells->empty()) o.sweep_cells = 300'000;
     if (build_cells->empty()) o.build_cells = 1'000'000;
     o.evaluations = 4;
+    o.fewest_samples = 4;
     o.sweep_factor = 4.0;
   }
   if (inputs.empty()) {

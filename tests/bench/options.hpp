@@ -29,8 +29,9 @@ struct Options {
   double optical_depth = 10.0;
   float albedo = 1.0F;
   int repeats = 5;
-  double seconds_a_run = 6.0;
-  std::uint32_t error_samples = 4;
+  double seconds_a_run = 10.0;
+  std::uint32_t fewest_samples = 8;  ///< a pixel, in a timed run: with fewer, waiting for the longest path weighs most
+  std::uint32_t error_samples = 24;
   int evaluations = 6;
   double sweep_factor = 2.0;
   std::uint64_t sweep_cells = 2'000'000;

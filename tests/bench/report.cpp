@@ -68,12 +68,11 @@ std::string conditions(const Machine& machine, const Options& options) {
 
 std::string error_definition(const Options& options) {
   return format(
-      "Image error: root mean square difference from the dense march's shaded picture, relative to the mean radiance "
-      "over "
-      "the medium's pixels. Its square is the mean of (A1 - B1)(A2 - B2) over two independent halves of %u samples a "
-      "pixel, which Monte Carlo noise does not bias; +- is its standard error. Depth and opacity error: the same of "
-      "the "
-      "camera rays' optical depth and of 1 - exp(-depth), which are deterministic.\n",
+      "Image error: root mean square difference from the voxels' shaded picture (by the brick march, whose medium is "
+      "the dense one's), relative to the mean radiance over the medium's pixels. Its square is the mean of "
+      "(A1 - B1)(A2 - B2) over two independent halves of %u samples a pixel, which Monte Carlo noise does not bias; "
+      "+- is its standard error. Depth and opacity error: the same of the camera rays' optical depth and of "
+      "1 - exp(-depth), which are deterministic.\n",
       options.error_samples);
 }
 
@@ -343,9 +342,10 @@ void write_report(const Machine& machine, const Options& options, const std::vec
   std::string report = "# Benchmark\n\nMade by\n\n    " + options.command + "\n\n" + left_out +
                        conditions(machine, options) + "\n" + error_definition(options) + "\n";
   for (const AssetResult& asset : assets) {
-    report += "- " + asset.name + format(": %d x %d x %d voxels, ", asset.voxels[0], asset.voxels[1], asset.voxels[2]) +
-              number(static_cast<double>(asset.active_voxels)) +
-              format(" active; density scale %.4g", asset.density_scale);
+    report +=
+        "- " + asset.name + format(": %d x %d x %d voxels, ", asset.voxels[0], asset.voxels[1], asset.voxels[2]) +
+        number(static_cast<double>(asset.active_voxels)) +
+        format(" active, in %.0f %% of the pixels; density scale %.4g", 100.0 * asset.coverage, asset.density_scale);
     for (const TargetResult& target : asset.targets) {
       report += "; " + percent(target.target) + format(": %u samples a pixel a run", target.samples);
     }

@@ -51,8 +51,10 @@ struct SweepCurve {
   grid::Criterion criterion = grid::Criterion::deviation;
   Kind kind = Kind::tet_linear;
   std::vector<SweepPoint> points;  ///< coarse to fine
-  /// Cells (or bytes) at a depth error, log-log between points; none outside them.
+  /// Cells at a depth error, log-log between points; none outside them.
   [[nodiscard]] std::optional<double> cells_at(double error) const;
+  /// The threshold likewise; the nearest end's outside.
+  [[nodiscard]] double threshold_at(double error) const;
 };
 
 struct BuildRow {
@@ -71,6 +73,7 @@ struct AssetResult {
   std::array<int, 3> voxels{};
   std::uint64_t active_voxels = 0;
   double density_scale = 1.0;
+  double coverage = 0.0;  ///< part of the pixels that shows the medium
   std::vector<TargetResult> targets;
   std::vector<SweepCurve> curves;
   BuildRow build;

@@ -15,7 +15,7 @@ def main():
     readme = folder / "readme.md"
     readme.write_text("before\n<!-- bench:begin -->\nold\n<!-- bench:end -->\nafter\n")
     command = [program, "--quick", "--input", "ball=@noise:24", "--input", "gone/=@noise:16", "--size", "16"]
-    command += ["--seconds", "0.05", "--sweep-cells", "20000", "--build-cells", "20000", "--max-cells", "100000"]
+    command += ["--seconds", "0.05", "--sweep-cells", "20000", "--build-cells", "20000", "--max-cells", "100000", "--error-samples", "4"]
     command += ["--target", "0.1", "0.05", "--out", str(folder / "out"), "--update-readme", str(readme)]
     subprocess.run(command, check=True)
 
