@@ -210,10 +210,10 @@ SceneOptions::SceneOptions() {
 }
 
 void SceneOptions::set_daylight() {
-  light.sun_azimuth_degrees = 60.0f;
-  light.sun_elevation_degrees = 40.0f;
-  constexpr std::array<float, 3> sun = {2.6f, 2.5f, 2.3f};
-  constexpr std::array<float, 3> sky = {0.18f, 0.28f, 0.45f};
+  light.sun_azimuth_degrees = 65.0f;
+  light.sun_elevation_degrees = 38.0f;
+  constexpr std::array<float, 3> sun = {3.6f, 3.3f, 2.9f};
+  constexpr std::array<float, 3> sky = {0.10f, 0.18f, 0.34f};
   std::copy(sun.begin(), sun.end(), light.sun_irradiance);
   std::copy(sky.begin(), sky.end(), light.sky_radiance);
 }

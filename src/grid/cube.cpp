@@ -1,6 +1,7 @@
 #include "grid/cube.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "base/error.hpp"
@@ -8,6 +9,10 @@
 namespace cumulet::grid {
 
 Cube fit_cube(const volume::ScalarVolume& volume) {
+  const double determinant = glm::determinant(glm::dmat3(volume.index_to_world));
+  if (!std::isfinite(determinant) || determinant == 0.0) {
+    throw Error(ErrorCode::file, "grid '" + volume.name + "' has a transform that flattens space");
+  }
   Cube cube;
   std::int64_t extent = 1;
   for (int axis = 0; axis < 3; ++axis) {

@@ -113,8 +113,8 @@ vec3 frame_covariance(const Moments& m, const vec3& v0, std::uint32_t shape) {
 }
 
 ivec3 midpoint(const vec3& v0, std::uint32_t shape) {
-  return ivec3(v0 + core::cm_from_frame(
-                        core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape), shape));
+  const vec3 in_frame = core::cm_frame_midpoint(core::cm_shape_class(shape)) * core::cm_shape_unit(shape);
+  return {v0 + core::cm_from_frame(in_frame, shape)};
 }
 
 }  // namespace
@@ -201,7 +201,7 @@ class DiamondSet::Evaluation {
     const double shortest = shortest_edge(node);
     const auto shortest_squared = static_cast<float>(shortest * shortest);
     const ivec3 odd = (node.corner / 8) & 1;
-    const unsigned signs = static_cast<unsigned>(odd.x + 2 * odd.y + 4 * odd.z);
+    const auto signs = static_cast<unsigned>(odd.x + 2 * odd.y + 4 * odd.z);
     for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
       const Moments& whole = statistics_->kuhn(node, permutation);
       if (whole.min >= whole.max) continue;

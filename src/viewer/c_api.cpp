@@ -1,5 +1,6 @@
 // The C ABI: checks arguments, translates descriptors, keeps exceptions in.
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <new>
@@ -92,10 +93,7 @@ bool in_range(double value, double low, double high) { return value >= low && va
 
 template <class Values>
 bool all_finite(const Values& values) {
-  for (const auto value : values) {
-    if (!std::isfinite(value)) return false;
-  }
-  return true;
+  return std::ranges::all_of(values, [](auto value) { return std::isfinite(value); });
 }
 
 void require_colour(std::span<const float, 3> values, const char* what) {

@@ -233,8 +233,8 @@ core::CmParameters Viewer::parameters() const {
   const float sun_power = luminance(light_.sun_irradiance);
   const float sky_power = 4.0F * std::numbers::pi_v<float> * luminance(light_.sky_radiance);
   const float to_sky = sun_power > 0.0F ? 0.5F * sky_power / (sky_power + sun_power) : (sky_power > 0.0F ? 1.0F : 0.0F);
-  p.medium = {static_cast<float>(medium_.density_scale * std::max(volume_->max_value, 1e-30F)), medium_.anisotropy,
-              to_sky, sun_power + sky_power > 0.0F ? 1.0F : 0.0F};
+  p.medium = {static_cast<float>(std::min(1e30, medium_.density_scale * std::max(volume_->max_value, 1e-30F))),
+              medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F ? 1.0F : 0.0F};
   p.image = {image_.width, image_.height, image_.seed, std::max(1U, image_.samples)};
   p.march = {0U, medium_.max_bounces, 0U, 0U};
   return p;
