@@ -25,6 +25,8 @@ fi
 
 volume=$(find "$scene" -maxdepth 1 -name '*.vdb' | LC_ALL=C sort | awk '/cumul|cloud/ && !found {print; found = 1}')
 [ -n "$volume" ] || die "no cloud among the files of $scene"
+# About a minute on two cores without a GPU.
+[ $# -gt 0 ] || set -- --size 800x450 --spp 48 --threshold 0.01
 say "rendering $volume"
 "$bin/cumulet-render" --volume "$volume" -o cumulet.png "$@" || die "cumulet-render failed"
 say "the picture is in $root/cumulet.png"
