@@ -35,6 +35,7 @@ class Tracer {
   /// width * height * 4 floats: mean radiance and alpha, (0,0) top left.
   void read(float* rgba) const;
   [[nodiscard]] Totals totals() const;
+  [[nodiscard]] const core::CmParameters& parameters() const { return parameters_; }
   [[nodiscard]] std::uint32_t width() const { return parameters_.image.x; }
   [[nodiscard]] std::uint32_t height() const { return parameters_.image.y; }
 

@@ -96,6 +96,8 @@ class Viewer {
   [[nodiscard]] std::uint64_t active_voxels() const { return volume_ ? volume_->active_voxels : 0; }
   [[nodiscard]] Bounds bounds() const;
   [[nodiscard]] const gl::Functions& gl() const { return *gl_; }
+  /// What the shaders were told of the picture under way.
+  [[nodiscard]] const core::CmParameters& trace_parameters() const { return tracer_.parameters(); }
 
  private:
   [[nodiscard]] Camera placed_camera() const;

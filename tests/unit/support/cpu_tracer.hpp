@@ -7,6 +7,10 @@
 #include "render/parameters.hpp"
 #include "support/volumes.hpp"
 
+// Marches share one signature; each leaves some of it unused.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
 // The shaders' path tracer as C++: the same source, with the marches' data in memory.
 namespace cumulet::core {
 
@@ -44,3 +48,5 @@ struct CpuDense {
 };
 
 }  // namespace cumulet::core
+
+#pragma GCC diagnostic pop

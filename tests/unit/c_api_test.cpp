@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "cumulet/cumulet.h"
+#include "headless.hpp"
+
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+template <class Desc>
+Desc make_desc() {
+  Desc desc{};
+  desc.struct_size = sizeof(Desc);
+  return desc;
+}
+
+class CApi : public testing::Test {
+ protected:
+  CApi() : context_(cumulet::headless::Context::create(cumulet::headless::Backend::automatic)) {}
+
+  void SetUp() override {
+    auto desc = make_desc<cumulet_create_desc>();
+    desc.get_proc = cumulet::headless::Context::get_proc;
+    desc.get_proc_user = &context_;
+    ASSERT_EQ(cumulet_create(&desc, &viewer_, nullptr, 0), CUMULET_OK);
+  }
+  void TearDown() override { cumulet_destroy(viewer_); }
+
+  [[nodiscard]] std::string error() const { return cumulet_last_error(viewer_); }
+
+  cumulet::headless::Context context_;
+  cumulet_viewer* viewer_ = nullptr;
+};
+
+TEST(CApiCreate, SaysWhatIsMissing) {
+  char message[200] = "unchanged";
+  cumulet_viewer* viewer = reinterpret_cast<cumulet_viewer*>(1);
+  auto desc = make_desc<cumulet_create_desc>();
+  EXPECT_EQ(cumulet_create(&desc, &viewer, message, sizeof message), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(viewer, nullptr);
+  EXPECT_NE(std::string(message).find("get_proc"), std::string::npos);
+  desc.get_proc = [](void*, const char*) -> void* { return nullptr; };
+  EXPECT_EQ(cumulet_create(&desc, &viewer, message, sizeof message), CUMULET_ERROR_UNSUPPORTED);
+  EXPECT_NE(std::string(message).find("OpenGL"), std::string::npos);
+  char tiny[4];
+  EXPECT_EQ(cumulet_create(&desc, &viewer, tiny, sizeof tiny), CUMULET_ERROR_UNSUPPORTED);
+  EXPECT_EQ(std::strlen(tiny), 3U);
+  EXPECT_EQ(cumulet_create(nullptr, &viewer, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_create(&desc, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(CApiCreate, RefusesAContextWithoutComputeFunctions) {
+  auto context = cumulet::headless::Context::create(cumulet::headless::Backend::automatic);
+  auto desc = make_desc<cumulet_create_desc>();
+  desc.get_proc = [](void* user, const char* name) -> void* {
+    return std::strcmp(name, "glDispatchCompute") == 0 ? nullptr : cumulet::headless::Context::get_proc(user, name);
+  };
+  desc.get_proc_user = &context;
+  cumulet_viewer* viewer = nullptr;
+  char message[200];
+  EXPECT_EQ(cumulet_create(&desc, &viewer, message, sizeof message), CUMULET_ERROR_UNSUPPORTED);
+  EXPECT_EQ(viewer, nullptr);
+}
+
+TEST_F(CApi, NullHandlesAndPointersAreErrors) {
+  uint32_t flags = 0;
+  EXPECT_EQ(cumulet_render(nullptr, 1.0, &flags, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_load_volume(viewer_, nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_set_grid(viewer_, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_get_stats(viewer_, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_read_linear(viewer_, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(error(), "");
+  EXPECT_STREQ(cumulet_last_error(nullptr), "viewer is NULL");
+  cumulet_destroy(nullptr);
+}
+
+TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
+  auto grid = make_desc<cumulet_grid_desc>();
+  EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_OK);
+  EXPECT_EQ(error(), "");
+  grid.struct_size = sizeof grid + 8;
+  EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(error().find("struct_size"), std::string::npos);
+  grid.struct_size = 0;
+  EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_ERROR_INVALID_ARGUMENT);
+  grid.struct_size = sizeof(size_t) + sizeof(cumulet_march);  // an older, shorter struct
+  EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_OK);
+  grid = make_desc<cumulet_grid_desc>();
+  for (const int wrong : {3, 77}) {
+    std::memcpy(&grid.march, &wrong, sizeof wrong);
+    EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(error().find("march"), std::string::npos);
+  }
+  grid = make_desc<cumulet_grid_desc>();
+  grid.threshold = std::nan("");
+  EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_ERROR_INVALID_ARGUMENT);
+
+  auto medium = make_desc<cumulet_medium_desc>();
+  medium.anisotropy = 1.0F;
+  EXPECT_EQ(cumulet_set_medium(viewer_, &medium), CUMULET_ERROR_INVALID_ARGUMENT);
+  medium.anisotropy = 0.5F;
+  medium.coalbedo[1] = 1.5F;
+  EXPECT_EQ(cumulet_set_medium(viewer_, &medium), CUMULET_ERROR_INVALID_ARGUMENT);
+  auto light = make_desc<cumulet_light_desc>();
+  light.sky_radiance[2] = -1.0F;
+  EXPECT_EQ(cumulet_set_light(viewer_, &light), CUMULET_ERROR_INVALID_ARGUMENT);
+  auto camera = make_desc<cumulet_camera_desc>();
+  camera.fovy_degrees = 200.0;
+  EXPECT_EQ(cumulet_set_camera(viewer_, &camera), CUMULET_ERROR_INVALID_ARGUMENT);
+  camera.fovy_degrees = 0.0;
+  camera.eye[0] = INFINITY;
+  EXPECT_EQ(cumulet_set_camera(viewer_, &camera), CUMULET_ERROR_INVALID_ARGUMENT);
+  auto image = make_desc<cumulet_image_desc>();
+  EXPECT_EQ(cumulet_set_image(viewer_, &image), CUMULET_ERROR_INVALID_ARGUMENT);
+  image.width = image.height = 4;
+  EXPECT_EQ(cumulet_set_image(viewer_, &image), CUMULET_OK);
+  EXPECT_EQ(cumulet_render(viewer_, std::nan(""), nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_render(viewer_, 1.0, nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(error().find("volume"), std::string::npos);
+}
+
+TEST_F(CApi, MissingFileNamesIt) {
+  EXPECT_EQ(cumulet_load_volume(viewer_, "no such cloud.vdb", nullptr), CUMULET_ERROR_FILE);
+  EXPECT_NE(error().find("no such cloud.vdb"), std::string::npos);
+  EXPECT_EQ(error().find('\n'), std::string::npos);
+  auto stats = make_desc<cumulet_stats>();
+  EXPECT_EQ(cumulet_get_stats(viewer_, &stats), CUMULET_OK);
+  EXPECT_EQ(stats.cells, 0U);
+  EXPECT_NE(std::string(stats.gl_version), "");
+}
+
+TEST(CApiVersion, IsTheHeaders) { EXPECT_EQ(cumulet_version(), 100U); }
+
+}  // namespace

@@ -1,0 +1,566 @@
+// The tracer against analytic answers, an independent path tracer, its own source on the CPU, and itself.
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+#include <random>
+
+#include "base/error.hpp"
+#include "support/cpu_tracer.hpp"
+#include "support/gl_viewer.hpp"
+#include "support/volumes.hpp"
+
+// Mesa's OSMesa keeps its framebuffers for ever.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+using namespace cumulet;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+using render::March;
+
+class Trace : public test::ViewerTest {};
+CUMULET_ON_BACKENDS(Trace);
+
+struct Kind {
+  March march;
+  grid::CellKind cells;
+};
+constexpr std::array<Kind, 4> kinds{{{March::tet, grid::CellKind::linear},
+                                     {March::tet, grid::CellKind::constant},
+                                     {March::dense, grid::CellKind::constant},
+                                     {March::brick, grid::CellKind::constant}}};
+
+viewer::GridSettings settings_of(const Kind& kind, double threshold) {
+  viewer::GridSettings s;
+  s.march = kind.march;
+  s.refine.cells = kind.cells;
+  s.refine.threshold = threshold;
+  return s;
+}
+
+viewer::Camera camera_at(const dvec3& eye, const dvec3& target, double fovy = 30.0) {
+  viewer::Camera c;
+  c.eye = eye;
+  c.target = target;
+  c.fovy_degrees = fovy;
+  return c;
+}
+
+volume::ScalarVolume box_volume(const ivec3& size, float value = 1.0F) {
+  return test::make_volume(size, ivec3(0), [=](const ivec3& /*p*/) { return value; });
+}
+
+TEST_P(Trace, SlabFollowsBeerLambertInEveryMarch) {
+  const auto viewer = make();
+  viewer->set_volume(box_volume({64, 64, 8}));
+  viewer::Light light;
+  light.sky_radiance = vec3(2.0F);
+  viewer->set_light(light);
+  for (const Kind& kind : kinds) {
+    viewer->set_grid(settings_of(kind, -1.0));
+    for (const double sigma : {0.02, 0.1, 0.4}) {
+      viewer::Medium medium;
+      medium.density_scale = sigma;
+      medium.albedo = vec3(0.0F);
+      viewer->set_medium(medium);
+      // Straight through 8 voxels; then from the slab's middle plane through 4.
+      for (const double from : {500.0, 3.5}) {
+        viewer->set_camera(camera_at({31.5, 31.5, from}, {31.5, 31.5, from - 1.0}, 0.5));
+        const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
+        const double through = std::exp(-sigma * (from > 100.0 ? 8.0 : 4.0));
+        const double error = 4.0 * std::sqrt(through * (1.0 - through) / (256.0 * 64.0));
+        EXPECT_NEAR(picture.mean().x / 2.0, through, error);
+        EXPECT_NEAR(picture.mean().w, 0.0 + 1.0 - through, error);
+      }
+    }
+  }
+}
+
+TEST_P(Trace, WhiteFurnaceIsOneEverywhere) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3));
+  viewer::Light light;
+  light.sky_radiance = vec3(1.0F);
+  viewer->set_light(light);
+  for (const float g : {0.0F, 0.8F, -0.5F}) {
+    viewer::Medium medium;
+    medium.density_scale = 0.5;
+    medium.anisotropy = g;
+    viewer->set_medium(medium);
+    for (const Kind& kind : {kinds[0], kinds[3]}) {
+      viewer->set_grid(settings_of(kind, 0.02));
+      const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
+      double square = 0.0;
+      for (const glm::vec4& p : picture.pixels) square += (p.x - 1.0) * (p.x - 1.0);
+      const double mean = picture.mean().x;
+      const double error = std::sqrt(square / 576.0 / 576.0);
+      EXPECT_NEAR(mean, 1.0, 4.0 * error + 1e-5) << "g " << g;
+      EXPECT_LT(error, 0.004);
+      EXPECT_GT(picture.mean().w, 0.2);
+    }
+  }
+}
+
+// An independent path tracer: delta tracking over the voxels, no next-event estimation towards the sky, no roulette;
+// the sun by ratio of delta-tracked transmittance. Nothing shared with glsl/ but the definition of the medium.
+class Reference {
+ public:
+  Reference(const volume::ScalarVolume& volume, double scale, const dvec3& albedo, double g, const dvec3& sun,
+            const dvec3& irradiance, const dvec3& sky)
+      : volume_(&volume), scale_(scale), albedo_(albedo), g_(g), sun_(sun), irradiance_(irradiance), sky_(sky) {}
+
+  dvec3 path(dvec3 o, dvec3 d) {
+    dvec3 weight(1.0);
+    dvec3 radiance(0.0);
+    while (true) {
+      const auto hit = collide(o, d);
+      if (!hit) return radiance + weight * sky_;
+      o = *hit;
+      weight *= albedo_;
+      const double cosine = glm::dot(d, sun_);
+      const double phase =
+          (1.0 - g_ * g_) / (4.0 * std::numbers::pi * std::pow(1.0 + g_ * g_ - 2.0 * g_ * cosine, 1.5));
+      if (!collide(o, sun_)) radiance += weight * phase * irradiance_;
+      d = scatter(d);
+    }
+  }
+  double uniform() { return uniform_(engine_); }
+
+ private:
+  std::optional<dvec3> collide(const dvec3& o, const dvec3& d) {
+    const dvec3 low = dvec3(volume_->bounds_min) - 0.5;
+    const dvec3 high = dvec3(volume_->bounds_max) + 0.5;
+    double t0 = 0.0;
+    double t1 = 1e30;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double a = (low[axis] - o[axis]) / d[axis];
+      const double b = (high[axis] - o[axis]) / d[axis];
+      t0 = std::max(t0, std::min(a, b));
+      t1 = std::min(t1, std::max(a, b));
+    }
+    const double majorant = scale_ * volume_->max_value;
+    for (double t = t0;;) {
+      t -= std::log(1.0 - uniform()) / majorant;
+      if (t >= t1) return std::nullopt;
+      const dvec3 p = o + t * d;
+      const float density = test::value_at(*volume_, ivec3(glm::floor(p + 0.5)));
+      if (uniform() * volume_->max_value < density) return p;
+    }
+  }
+  dvec3 scatter(const dvec3& d) {
+    // Rejection, so that no inversion formula is shared.
+    while (true) {
+      const double z = 2.0 * uniform() - 1.0;
+      const double angle = 2.0 * std::numbers::pi * uniform();
+      const double r = std::sqrt(1.0 - z * z);
+      const dvec3 w(r * std::cos(angle), r * std::sin(angle), z);
+      const double value = (1.0 - g_ * g_) / std::pow(1.0 + g_ * g_ - 2.0 * g_ * glm::dot(d, w), 1.5);
+      const double most = (1.0 + std::abs(g_)) / ((1.0 - std::abs(g_)) * (1.0 - std::abs(g_)));
+      if (uniform() * most < value) return w;
+    }
+  }
+
+  const volume::ScalarVolume* volume_;
+  double scale_;
+  dvec3 albedo_;
+  double g_;
+  dvec3 sun_, irradiance_, sky_;
+  std::mt19937_64 engine_{12345};
+  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
+};
+
+TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
+  const auto volume = test::noise_volume({20, 18, 22}, ivec3(0), 5);
+  const dvec3 eye(60.0, 30.0, 70.0);
+  const dvec3 target(9.5, 8.5, 10.5);
+  const double fovy = 14.0;
+  const double azimuth = 40.0 * std::numbers::pi / 180.0;
+  const double elevation = 25.0 * std::numbers::pi / 180.0;
+  const dvec3 sun(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
+                  std::cos(azimuth) * std::cos(elevation));
+  const dvec3 albedo(0.95, 0.8, 0.5);
+  Reference reference(volume, 0.6, albedo, 0.4, sun, {3.0, 2.5, 2.0}, {0.3, 0.5, 0.8});
+  const dvec3 forward = glm::normalize(target - eye);
+  const dvec3 right = glm::normalize(glm::cross(forward, dvec3(0, 1, 0)));
+  const dvec3 up = glm::cross(right, forward);
+  const double tangent = std::tan(0.5 * fovy * std::numbers::pi / 180.0);
+  dvec3 sum(0.0);
+  dvec3 square(0.0);
+  const int paths = 400000;
+  for (int i = 0; i < paths; ++i) {
+    const dvec3 d = glm::normalize(forward + tangent * (2.0 * reference.uniform() - 1.0) * right +
+                                   tangent * (2.0 * reference.uniform() - 1.0) * up);
+    const dvec3 radiance = reference.path(eye, d);
+    sum += radiance;
+    square += radiance * radiance;
+  }
+  const dvec3 expected = sum / double(paths);
+  const dvec3 expected_error = glm::sqrt((square / double(paths) - expected * expected) / double(paths));
+
+  const auto viewer = make();
+  viewer->set_volume(volume);
+  viewer->set_medium({0.6, vec3(albedo), 0.4F, 0});
+  viewer->set_light({40.0F, 25.0F, {3.0F, 2.5F, 2.0F}, {0.3F, 0.5F, 0.8F}});
+  viewer->set_camera(camera_at(eye, target, fovy));
+  for (const Kind& kind : kinds) {
+    viewer->set_grid(settings_of(kind, -1.0));
+    const test::Picture a = test::render(*viewer, {32, 32, 96, 3, render::View::shaded});
+    const test::Picture b = test::render(*viewer, {32, 32, 96, 4, render::View::shaded});
+    for (int c = 0; c < 3; ++c) {
+      // The two renders' difference gives the noise of their mean.
+      double difference = 0.0;
+      for (std::size_t i = 0; i < a.pixels.size(); ++i) difference += std::pow(a.pixels[i][c] - b.pixels[i][c], 2.0);
+      const double error = 0.5 * std::sqrt(difference) / double(a.pixels.size());
+      const double got = 0.5 * (a.mean()[c] + b.mean()[c]);
+      EXPECT_NEAR(got, expected[c], 4.0 * std::hypot(error, expected_error[c])) << "channel " << c;
+      EXPECT_LT(error, 0.01 * expected[c]);
+    }
+  }
+}
+
+TEST_P(Trace, SingleScatteringMatchesQuadrature) {
+  // A homogeneous box, the sun straight above, a horizontal camera ray through the middle: every scattering point has
+  // the same way out. L = albedo phase E e^{-s h} (1 - e^{-s L}).
+  const auto viewer = make();
+  viewer->set_volume(box_volume({400, 16, 16}));
+  const double sigma = 0.15;
+  for (const float g : {0.0F, 0.6F}) {
+    viewer->set_medium({sigma, vec3(0.9F, 0.5F, 0.2F), g, 1});
+    viewer->set_light({0.0F, 90.0F, {5.0F, 5.0F, 5.0F}, {0.0F, 0.0F, 0.0F}});
+    viewer->set_camera(camera_at({199.5, 7.5, 900.0}, {199.5, 7.5, 0.0}, 0.01));
+    const double phase = (1.0 - g * g) / (4.0 * std::numbers::pi * std::pow(1.0 + g * g, 1.5));
+    const double expected = phase * 5.0 * std::exp(-sigma * 8.0) * (1.0 - std::exp(-sigma * 16.0));
+    for (const Kind& kind : {kinds[0], kinds[2]}) {
+      viewer->set_grid(settings_of(kind, 0.02));
+      const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
+      EXPECT_NEAR(picture.mean().x, 0.9 * expected, 0.02 * expected);
+      EXPECT_NEAR(picture.mean().y, 0.5 * expected, 0.02 * expected);
+      EXPECT_NEAR(picture.mean().z, 0.2 * expected, 0.02 * expected);
+    }
+  }
+}
+
+TEST_P(Trace, MarchesAgreeOnConstantCellsAtVoxelResolution) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(7, -3, 0), 2));
+  viewer->set_medium({0.4, vec3(0.98F), 0.5F, 0});
+  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  std::array<test::Picture, 4> pictures;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    viewer->set_grid(settings_of(kinds[i], i == 0 ? 0.01 : -1.0));
+    pictures[i] = test::render(*viewer, {32, 32, 16, 1, render::View::shaded});
+  }
+  // The same seed takes the same path, but for rounding.
+  for (const std::size_t other : {1U, 3U}) {
+    std::size_t same = 0;
+    for (std::size_t i = 0; i < 1024; ++i) {
+      same += glm::distance(pictures[2].pixels[i], pictures[other].pixels[i]) < 1e-3F ? 1 : 0;
+    }
+    EXPECT_GT(same, 900U);
+    EXPECT_NEAR(pictures[2].mean().x, pictures[other].mean().x, 2e-3 * pictures[2].mean().x);
+  }
+  EXPECT_NEAR(pictures[2].mean().x, pictures[0].mean().x, 0.02 * pictures[2].mean().x);
+}
+
+TEST_P(Trace, PagesChangeNothing) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(0), 2));
+  viewer->set_medium({0.4, vec3(1.0F), 0.0F, 0});
+  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  viewer::GridSettings settings = settings_of(kinds[0], 0.01);
+  viewer->set_grid(settings);
+  const viewer::Image image{24, 24, 8, 1, render::View::shaded};
+  const test::Picture whole = test::render(*viewer, image);
+  const auto cells = static_cast<std::int64_t>(viewer->cells());
+  for (const std::int64_t parts : {2, 3, 4}) {
+    settings.page_texels = 2 * (cells / parts + 1);
+    viewer->set_grid(settings);
+    const test::Picture paged = test::render(*viewer, image);
+    EXPECT_EQ(whole.pixels, paged.pixels);
+  }
+  settings.page_texels = 64;
+  viewer->set_grid(settings);
+  double progress = 0.0;
+  try {
+    viewer->render(1.0, progress);
+    FAIL() << "8 pages of 32 cells cannot hold " << cells;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::unsupported);
+    EXPECT_NE(std::string(error.what()).find("GL_MAX_TEXTURE_BUFFER_SIZE"), std::string::npos) << error.what();
+  }
+  settings.page_texels = 0;
+  viewer->set_grid(settings);
+  EXPECT_EQ(whole.pixels, test::render(*viewer, image).pixels);
+}
+
+TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
+  viewer->set_medium({0.4, vec3(1.0F), 0.3F, 0});
+  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  // Wider than a tile, so that several take part.
+  const viewer::Image image{600, 10, 5, 9, render::View::shaded};
+  const test::Picture one = test::render(*viewer, image);
+  EXPECT_EQ(one.pixels, test::render(*viewer, image, 0.5).pixels);
+  const auto other = make();
+  other->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
+  other->set_medium({0.4, vec3(1.0F), 0.3F, 0});
+  other->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  EXPECT_EQ(one.pixels, test::render(*other, image).pixels);
+  viewer::Image reseeded = image;
+  reseeded.seed = 10;
+  EXPECT_NE(one.pixels, test::render(*viewer, reseeded).pixels);
+}
+
+template <class Tracer>
+void expect_cpu_agrees(Tracer& cpu, const test::Picture& gpu, std::uint32_t samples) {
+  std::size_t same = 0;
+  for (std::uint32_t i = 0; i < gpu.pixels.size(); ++i) {
+    typename Tracer::CmPath path{};
+    glm::vec4 sum(0.0F);
+    cpu.cm_run(path, {i % gpu.width, i / gpu.width}, 1000000, sum);
+    same += glm::distance(sum / static_cast<float>(samples), gpu.pixels[i]) < 2e-3F ? 1 : 0;
+  }
+  // Where a logarithm or a cosine rounds the other way, a path may part from its twin.
+  EXPECT_GT(static_cast<double>(same), 0.95 * static_cast<double>(gpu.pixels.size()));
+}
+
+TEST_P(Trace, TheCpuTracesTheSamePaths) {
+  const auto volume = test::noise_volume({40, 36, 30}, ivec3(0), 2);
+  const auto viewer = make();
+  viewer->set_volume(volume);
+  viewer->set_medium({0.3, vec3(0.9F), 0.4F, 0});
+  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  const viewer::Image image{24, 24, 1, 5, render::View::shaded};
+
+  grid::RefineSettings refine;
+  refine.threshold = 0.02;
+  const grid::Statistics statistics(volume, grid::fit_cube(volume));
+  const grid::DiamondSet diamonds(statistics, refine);
+  grid::GridBuilder builder(statistics, diamonds);
+  builder.bisect();
+  const grid::TetGrid tets = builder.records(refine.cells, volume.max_value);
+  viewer->set_grid(settings_of(kinds[0], 0.02));
+  const test::Picture tet = test::render(*viewer, image);
+  core::CpuTetLinear cpu_tet;
+  cpu_tet.cm = viewer->trace_parameters();
+  cpu_tet.grid = &tets;
+  expect_cpu_agrees(cpu_tet, tet, 1);
+
+  viewer->set_grid(settings_of(kinds[2], 0.02));
+  const test::Picture dense = test::render(*viewer, image);
+  core::CpuDense cpu_dense;
+  cpu_dense.cm = viewer->trace_parameters();
+  cpu_dense.volume = &volume;
+  cpu_dense.origin = statistics.cube().origin;
+  expect_cpu_agrees(cpu_dense, dense, 1);
+}
+
+TEST_P(Trace, CameraInsideOnFacesEdgesAndVertices) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({32, 32, 32}, ivec3(0), 1));
+  viewer->set_medium({0.2, vec3(0.9F), 0.0F, 0});
+  viewer->set_light({30.0F, 30.0F, vec3(2.0F), vec3(0.5F)});
+  // Cube space is index space plus a half: halves are faces, edges and vertices of cells.
+  const std::array<dvec3, 6> eyes{{{15.5, 15.5, 15.5},
+                                   {16.0, 16.0, 16.0},
+                                   {7.5, 15.5, 11.0},
+                                   {15.5, 3.5, 20.3},
+                                   {-0.5, -0.5, -0.5},
+                                   {15.5, 15.5, 31.5}}};
+  for (const dvec3& eye : eyes) {
+    for (const dvec3& direction : {dvec3(0, 0, -1), dvec3(1, 1, 1), dvec3(0.3, -0.2, 0.9)}) {
+      viewer->set_camera(camera_at(eye, eye + direction, 60.0));
+      const viewer::Image image{16, 16, 32, 2, render::View::shaded};
+      viewer->set_grid(settings_of(kinds[1], -1.0));
+      const test::Picture tet = test::render(*viewer, image);
+      viewer->set_grid(settings_of(kinds[2], -1.0));
+      const test::Picture dense = test::render(*viewer, image);
+      EXPECT_TRUE(std::isfinite(tet.mean().x));
+      EXPECT_NEAR(tet.mean().x, dense.mean().x, 0.02 * dense.mean().x);
+    }
+  }
+}
+
+TEST_P(Trace, AnyAffineTransformKeepsWorldDistances) {
+  // A slab, sheared, turned, stretched and moved; the camera looks along its short axis' world image. Through the
+  // middle the path length is the thickness between its two faces.
+  auto volume = box_volume({64, 64, 8});
+  glm::dmat4 m = glm::translate(glm::dmat4(1.0), dvec3(1000.0, -40.0, 7.0));
+  m = glm::rotate(m, 0.7, glm::normalize(dvec3(1.0, 2.0, 0.5)));
+  m = m * glm::dmat4({0.5, 0, 0, 0}, {0.1, 0.4, 0, 0}, {0.2, -0.1, 2.0, 0}, {0, 0, 0, 1});
+  volume.index_to_world = m;
+  const dvec3 axis = dvec3(m[2]);
+  const dvec3 centre(m * glm::dvec4(31.5, 31.5, 3.5, 1.0));
+  const double sigma = 0.08;
+  const double through = std::exp(-sigma * 8.0 * glm::length(axis));
+  const auto viewer = make();
+  viewer->set_volume(volume);
+  viewer->set_medium({sigma, vec3(0.0F), 0.0F, 0});
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
+  viewer->set_camera(camera_at(centre + 20.0 * axis, centre, 0.2));
+  for (const Kind& kind : kinds) {
+    viewer->set_grid(settings_of(kind, -1.0));
+    const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
+    EXPECT_NEAR(picture.mean().x, through, 4.0 * std::sqrt(through * (1.0 - through) / (256.0 * 64.0)));
+  }
+}
+
+TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
+  const auto volume = test::noise_volume({30, 26, 34}, ivec3(0), 6);
+  auto turned = volume;
+  const glm::dmat4 rotation =
+      glm::rotate(glm::translate(glm::dmat4(1.0), dvec3(5, 6, 7)), 1.1, glm::normalize(dvec3(1, 1, 0)));
+  turned.index_to_world = rotation;
+  const auto viewer = make();
+  viewer->set_medium({0.5, vec3(0.9F), 0.5F, 0});
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
+  const viewer::Image image{32, 32, 8, 1, render::View::shaded};
+  viewer->set_grid(settings_of(kinds[0], 0.02));
+  viewer->set_volume(volume);
+  viewer->set_camera(camera_at({60, 40, 80}, {15, 13, 17}));
+  const test::Picture straight = test::render(*viewer, image);
+  viewer->set_volume(turned);
+  viewer::Camera camera =
+      camera_at(dvec3(rotation * glm::dvec4(60, 40, 80, 1)), dvec3(rotation * glm::dvec4(15, 13, 17, 1)));
+  camera.up = dvec3(rotation * glm::dvec4(0, 1, 0, 0));
+  viewer->set_camera(camera);
+  const test::Picture rotated = test::render(*viewer, image);
+  // Scattered directions are sampled around other axes, so pixels agree in the mean.
+  EXPECT_NEAR(straight.mean().x, rotated.mean().x, 0.01 * straight.mean().x);
+  EXPECT_NEAR(straight.mean().w, rotated.mean().w, 0.002);
+}
+
+TEST_P(Trace, DensityViewIsTheOpacity) {
+  const auto viewer = make();
+  viewer->set_volume(box_volume({64, 64, 8}));
+  viewer->set_medium({0.1, vec3(1.0F), 0.0F, 0});
+  viewer->set_camera(camera_at({31.5, 31.5, 500.0}, {31.5, 31.5, 0.0}, 0.5));
+  for (const Kind& kind : kinds) {
+    viewer->set_grid(settings_of(kind, 0.02));
+    const test::Picture picture = test::render(*viewer, {8, 8, 1, 1, render::View::density});
+    for (const glm::vec4& p : picture.pixels) EXPECT_NEAR(p.w, 1.0 - std::exp(-0.8), 1e-4);
+    for (const auto view : {render::View::cells, render::View::steps}) {
+      const test::Picture other = test::render(*viewer, {8, 8, 1, 1, view});
+      for (const glm::vec4& p : other.pixels) EXPECT_TRUE(std::isfinite(p.x + p.y + p.z));
+      EXPECT_GT(other.mean().x + other.mean().y + other.mean().z, 0.05);
+    }
+  }
+}
+
+TEST_P(Trace, AdaptsToTheCamera) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({96, 96, 96}, ivec3(0), 1));
+  viewer->set_image({64, 64, 1, 0, render::View::shaded});
+  viewer->set_camera(camera_at({48, 48, 6000}, {48, 48, 48}, 5.0));
+  viewer::GridSettings settings = settings_of(kinds[0], 0.005);
+  viewer->set_grid(settings);
+  viewer->build();
+  const std::uint64_t everywhere = viewer->cells();
+  settings.camera_adaptive = true;
+  viewer->set_grid(settings);
+  viewer->build();
+  EXPECT_LT(viewer->cells(), everywhere / 2);  // a pixel is 8 voxels wide
+}
+
+TEST_P(Trace, LeavesTheHostsStateAsItWas) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({16, 16, 16}, ivec3(0), 1));
+  const gl::Functions& gl = viewer->gl();
+  GLuint textures[3];
+  gl.GenTextures(3, textures);
+  GLuint buffer = 0;
+  gl.CreateBuffers(1, &buffer);
+  gl.NamedBufferStorage(buffer, 4096, nullptr, 0);
+  constexpr std::array<GLenum, 3> targets{GL_TEXTURE_BUFFER, GL_TEXTURE_2D, GL_TEXTURE_3D};
+  for (GLuint unit = 0; unit < 15; ++unit) {
+    gl.ActiveTexture(GL_TEXTURE0 + unit);
+    for (std::size_t i = 0; i < 3; ++i) gl.BindTexture(targets[i], textures[i]);
+  }
+  gl.TextureStorage2D(textures[1], 1, GL_RGBA8, 4, 4);
+  gl.ActiveTexture(GL_TEXTURE3);
+  gl.BindBufferRange(GL_SHADER_STORAGE_BUFFER, 0, buffer, 256, 512);
+  gl.BindBufferBase(GL_UNIFORM_BUFFER, 1, buffer);
+  gl.BindImageTexture(0, textures[1], 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA8);
+  gl.BindBuffer(GL_PIXEL_PACK_BUFFER, buffer);
+  gl.PixelStorei(GL_PACK_ROW_LENGTH, 77);
+  gl.PixelStorei(GL_UNPACK_ALIGNMENT, 8);
+  const auto snapshot = [&] {
+    std::vector<GLint64> state;
+    const auto get = [&](GLenum name) {
+      GLint64 value = 0;
+      gl.GetInteger64v(name, &value);
+      state.push_back(value);
+    };
+    for (const GLenum name :
+         {GL_CURRENT_PROGRAM, GL_ACTIVE_TEXTURE, GL_PIXEL_PACK_BUFFER_BINDING, GL_PIXEL_UNPACK_BUFFER_BINDING,
+          GL_PACK_ROW_LENGTH, GL_UNPACK_ALIGNMENT, GL_SHADER_STORAGE_BUFFER_BINDING, GL_UNIFORM_BUFFER_BINDING,
+          GL_DRAW_FRAMEBUFFER_BINDING, GL_READ_FRAMEBUFFER_BINDING}) {
+      get(name);
+    }
+    GLint64 value = 0;
+    for (GLuint i = 0; i < 2; ++i) {
+      for (const GLenum name :
+           {GL_SHADER_STORAGE_BUFFER_BINDING, GL_SHADER_STORAGE_BUFFER_START, GL_SHADER_STORAGE_BUFFER_SIZE,
+            GL_UNIFORM_BUFFER_BINDING, GL_IMAGE_BINDING_NAME, GL_IMAGE_BINDING_ACCESS}) {
+        gl.GetInteger64i_v(name, i, &value);
+        state.push_back(value);
+      }
+    }
+    GLint active = 0;
+    gl.GetIntegerv(GL_ACTIVE_TEXTURE, &active);
+    for (GLuint unit = 0; unit < 15; ++unit) {
+      gl.ActiveTexture(GL_TEXTURE0 + unit);
+      get(GL_TEXTURE_BINDING_BUFFER);
+      get(GL_TEXTURE_BINDING_2D);
+      get(GL_TEXTURE_BINDING_3D);
+    }
+    gl.ActiveTexture(static_cast<GLenum>(active));
+    return state;
+  };
+  const auto before = snapshot();
+  ASSERT_EQ(gl.GetError(), static_cast<GLenum>(GL_NO_ERROR));
+  for (const Kind& kind : kinds) {
+    viewer->set_grid(settings_of(kind, 0.05));
+    test::render(*viewer, {8, 8, 2, 1, render::View::shaded});
+    EXPECT_EQ(before, snapshot());
+    EXPECT_EQ(gl.GetError(), static_cast<GLenum>(GL_NO_ERROR));
+  }
+}
+
+TEST_P(Trace, RefusesWhatItCannotDoAndKeepsWhatItHad) {
+  const auto viewer = make();
+  double progress = 0.0;
+  EXPECT_THROW(viewer->render(1.0, progress), Error);
+  viewer->set_volume(test::noise_volume({16, 16, 16}, ivec3(0), 1));
+  EXPECT_THROW(viewer->render(1.0, progress), Error);  // no size yet
+  EXPECT_THROW(viewer->set_image({0, 10, 1, 0, render::View::shaded}), Error);
+  EXPECT_THROW(viewer->set_image({20000, 10, 1, 0, render::View::shaded}), Error);
+  const viewer::Image image{8, 8, 2, 1, render::View::shaded};
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
+  const test::Picture before = test::render(*viewer, image);
+  EXPECT_THROW(viewer->load_volume("no such file.vdb", ""), Error);
+  auto flat = test::noise_volume({16, 16, 16}, ivec3(0), 1);
+  flat.index_to_world[2] = flat.index_to_world[1];
+  EXPECT_THROW(viewer->set_volume(flat), Error);
+  EXPECT_EQ(before.pixels, test::render(*viewer, image).pixels);
+  // An empty medium shows the sky.
+  auto empty = test::noise_volume({16, 16, 16}, ivec3(0), 1);
+  empty.brick_origins.clear();
+  empty.brick_values.clear();
+  empty.max_value = 0.0F;
+  viewer->set_volume(empty);
+  for (const Kind& kind : kinds) {
+    viewer->set_grid(settings_of(kind, 0.05));
+    EXPECT_EQ(test::render(*viewer, image).mean().x, 1.0);
+  }
+}
+
+}  // namespace
