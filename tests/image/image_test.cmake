@@ -1,0 +1,42 @@
+# One image test: renders RENDER_A, and RENDER_B or the golden, and compares. Called by ctest with -P.
+#   RENDER, COMPARE  programs     NAME  of the test     OUT  folder for pictures     FLAGS_A, FLAGS_B  `|`-separated
+#   GOLDEN  picture in the source tree (BLESS in the environment: writes it)     EXACT  the pictures must be equal
+#   NEEDS  a file without which the test is skipped     LIMITS  flags of compare
+foreach(list FLAGS_A FLAGS_B LIMITS)
+  string(REPLACE "|" ";" ${list} "${${list}}")
+endforeach()
+if(NEEDS AND NOT EXISTS "${NEEDS}")
+  message("SKIPPED: ${NEEDS} is not here")
+  return()
+endif()
+
+function(render picture)
+  execute_process(COMMAND ${RENDER} ${ARGN} -o ${picture} RESULT_VARIABLE result)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "cumulet-render failed")
+  endif()
+endfunction()
+
+file(MAKE_DIRECTORY ${OUT})
+render(${OUT}/${NAME}.exr ${FLAGS_A})
+if(GOLDEN)
+  if(DEFINED ENV{CUMULET_BLESS})
+    file(COPY_FILE ${OUT}/${NAME}.exr ${GOLDEN})
+  endif()
+  if(NOT EXISTS ${GOLDEN})
+    message(FATAL_ERROR "no golden ${GOLDEN}; the picture is kept in ${OUT}/${NAME}.exr: look at it, then run the test "
+                        "with CUMULET_BLESS=1")
+  endif()
+  set(other ${GOLDEN})
+else()
+  set(other ${OUT}/${NAME}-b.exr)
+  render(${other} ${FLAGS_B})
+endif()
+if(EXACT)
+  execute_process(COMMAND ${CMAKE_COMMAND} -E compare_files ${OUT}/${NAME}.exr ${other} RESULT_VARIABLE result)
+else()
+  execute_process(COMMAND ${COMPARE} ${OUT}/${NAME}.exr ${other} ${LIMITS} RESULT_VARIABLE result)
+endif()
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "${OUT}/${NAME}.exr and ${other} differ")
+endif()
