@@ -243,6 +243,30 @@ TEST(Statistics, TilesAndBackgroundCountLikeVoxels) {
   EXPECT_EQ(sum.min, 0.0F);
 }
 
+TEST(Statistics, GrowWithTheActiveNodesNotWithTheBox) {
+  volume::ScalarVolume volume;
+  volume.name = "density";
+  volume.bounds_min = {0, 0, 0};
+  volume.bounds_max = {30007, 30007, 30007};
+  volume.max_value = 1.0F;
+  volume.brick_origins = {{0, 0, 0}, {30000, 30000, 30000}};
+  volume.brick_values.assign(1024, 0.0F);
+  volume.brick_values[0] = volume.brick_values[1023] = 1.0F;
+  const grid::Cube cube = grid::fit_cube(volume);
+  ASSERT_EQ(cube.log2_size, 15);
+  const grid::Statistics statistics(volume, cube);
+  EXPECT_LT(statistics.nodes().size(), 2U * 8U * 13U);
+  grid::RefineSettings settings;
+  settings.threshold = -1.0;
+  settings.cells = grid::CellKind::constant;
+  const Built built = build(volume, settings);
+  expect_conforming(built.grid);
+  EXPECT_LT(built.grid.cells.size(), 8000U);
+  EXPECT_EQ(
+      glm::unpackHalf2x16(built.grid.cells[grid::locate(built.grid, vec3(30007.3F, 30007.4F, 30007.6F))].data.z).x,
+      1.0F);
+}
+
 TEST(LinearFit, RecoversALinearFieldAndStaysNonNegative) {
   for (std::uint32_t cell_class = 0; cell_class < 3; ++cell_class) {
     // f = 3 + g.(x - c): covariance = C g with C the tetrahedron's covariance, integrated here by its vertices.

@@ -158,8 +158,8 @@ typedef struct cumulet_camera_desc {
   size_t struct_size;
   double eye[3];
   double target[3];
-  double up[3];         /* 0: +Y */
-  double fovy_degrees;  /* vertical field of view; 0: 40 */
+  double up[3];        /* 0: +Y */
+  double fovy_degrees; /* vertical field of view; 0: 40 */
 } cumulet_camera_desc;
 
 typedef enum cumulet_view {
@@ -171,7 +171,7 @@ typedef enum cumulet_view {
 
 typedef struct cumulet_image_desc {
   size_t struct_size;
-  uint32_t width;  /* pixels, 1 to 16384 */
+  uint32_t width; /* pixels, 1 to 16384 */
   uint32_t height;
   uint32_t samples; /* target samples a pixel; 0: 64 */
   uint32_t seed;    /* same seed, same samples, same driver: same image, bit for bit */
@@ -218,8 +218,8 @@ typedef struct cumulet_stats {
   double build_seconds_records;
   double build_seconds_upload;
   double trace_seconds;
-  uint64_t samples; /* camera paths finished */
-  uint64_t steps;   /* cells or voxels (or bricks) entered by all rays of those paths */
+  uint64_t samples;     /* camera paths finished */
+  uint64_t steps;       /* cells or voxels (or bricks) entered by all rays of those paths */
   double bounds_min[3]; /* world bounds of the volume */
   double bounds_max[3];
   char gl_vendor[128];
