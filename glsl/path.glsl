@@ -121,15 +121,17 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   uvec3 h = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, p.samples, cm.image.z));
   p.random = h.x;
   p.stream = h.y | 1u;
-  float jitter_x = cm_random(p.random, p.stream);
-  float jitter_y = cm_random(p.random, p.stream);
-  p.w = cm_camera_direction(pixel, vec2(jitter_x, jitter_y));
+  // A pixel's samples spread evenly over its area and over the first free path: the three-dimensional Kronecker sequence
+  // of Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018, shifted by a random offset a pixel.
+  uvec3 shift = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, 0x5bd1e995u, cm.image.z));
+  uvec3 even = shift + p.samples * uvec3(3518319155u, 2882110345u, 2360945575u);
+  p.w = cm_camera_direction(pixel, vec2(cm_unit_float(even.x), cm_unit_float(even.y)));
   p.o = vec3(cm.eye);
   p.d = cm_to_cube(p.w);
   p.throughput = vec3(1.0f, 1.0f, 1.0f);
   p.radiance = vec3(0.0f, 0.0f, 0.0f);
   p.bounce = 0u;
-  p.depth_0 = cm_random_depth(p.random, p.stream);
+  p.depth_0 = -log(1.0f - cm_unit_float(even.z));
   p.depth = p.depth_0;
   p.mode = CM_MODE_FLIGHT;
   vec2 range = cm_box_range(p.o, p.d);
