@@ -83,6 +83,9 @@ CM_FN vec3 cm_camera_direction(uvec2 pixel, vec2 within) {
 CM_FN uint cm_march(CM_INOUT(CmPath) p) {
   vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / p.d;
   uint event = CM_EVENT_NONE;
+  float e_0 = 0.0f;
+  float e_1 = 0.0f;
+  float span = 0.0f;
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
     float r_0 = 0.0f;
@@ -90,15 +93,11 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
     cm_march_step(p.cell, p.o, p.d, inv_d, p.t, t_1, r_0, r_1, next);
     p.steps += 1u;
-    float e_0 = cm.medium.x * r_0;
-    float e_1 = cm.medium.x * r_1;
-    float span = t_1 - p.t;
+    e_0 = cm.medium.x * r_0;
+    e_1 = cm.medium.x * r_1;
+    span = t_1 - p.t;
     float used = 0.5f * (e_0 + e_1) * span;
     if (used > p.depth) {
-      // e_0 s + (e_1 - e_0) s^2 / (2 span) = depth, in the form that loses nothing.
-      float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * p.depth));
-      p.t += min(span, 2.0f * p.depth / (e_0 + root));
-      p.depth = -1.0f;
       event = CM_EVENT_COLLISION;
     } else {
       p.depth -= used;
@@ -106,6 +105,13 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
       p.cell = next;
       if (next.x == CM_NONE || t_1 >= p.t_end) event = CM_EVENT_ESCAPE;
     }
+  }
+  // After the loop, not in it: software drivers run both sides of every branch, each step.
+  if (event == CM_EVENT_COLLISION) {
+    // e_0 s + (e_1 - e_0) s^2 / (2 span) = depth, in the form that loses nothing.
+    float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * p.depth));
+    p.t += min(span, 2.0f * p.depth / (e_0 + root));
+    p.depth = -1.0f;
   }
   return event;
 }

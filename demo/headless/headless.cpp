@@ -244,7 +244,7 @@ std::unique_ptr<Context::Driver> create_egl(bool debug) {
     }
   }
   if (platforms && has_extension(client, "EGL_MESA_platform_surfaceless")) {
-    const EGLDisplay display = egl.GetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, nullptr, nullptr);
+    EGLDisplay display = egl.GetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, nullptr, nullptr);
     if (auto driver = attempt(display, "egl-surfaceless", "surfaceless")) return driver;
   }
   if (auto driver = attempt(egl.GetDisplay(EGL_DEFAULT_DISPLAY), "egl-default", "default display")) return driver;

@@ -1,5 +1,5 @@
-// PNG by stb: two headers that build in, so the portable package carries no libpng beside OpenEXR's own zlib, and the
-// glTF importer brings stb along anyway. Its functions are made private to this file, out of the way of that copy.
+// PNG by stb: built in (stb.c), so the portable package carries no libpng beside OpenEXR's own zlib, and the glTF
+// importer brings stb along anyway.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -9,12 +9,8 @@
 #include "file.hpp"
 #include "image.hpp"
 
-#define STB_IMAGE_STATIC
-#define STB_IMAGE_IMPLEMENTATION
 #define STBI_ONLY_PNG
 #define STBI_NO_STDIO
-#define STB_IMAGE_WRITE_STATIC
-#define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STBI_WRITE_NO_STDIO
 #include <stb_image.h>
 #include <stb_image_write.h>
@@ -22,7 +18,9 @@
 namespace cumulet::image {
 namespace {
 
-std::uint8_t to_byte(float unit) { return static_cast<std::uint8_t>(std::clamp(unit, 0.0f, 1.0f) * 255.0f + 0.5f); }
+std::uint8_t to_byte(float unit) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(unit, 0.0f, 1.0f) * 255.0f));
+}
 
 /// A number that can be shown: not negative, and finite.
 float displayable(float value) {
