@@ -19,9 +19,6 @@ Object::~Object() {
     case Kind::program:
       gl_->DeleteProgram(name_);
       break;
-    case Kind::query:
-      gl_->DeleteQueries(1, &name_);
-      break;
   }
 }
 

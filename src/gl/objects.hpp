@@ -13,7 +13,7 @@ namespace cumulet::gl {
 /// A GL name with its deleter; movable, deleted with the context current.
 class Object {
  public:
-  enum class Kind { buffer, texture, program, query };
+  enum class Kind { buffer, texture, program };
   Object() = default;
   Object(std::shared_ptr<const Functions> gl, Kind kind, GLuint name) : gl_(std::move(gl)), kind_(kind), name_(name) {}
   Object(Object&& other) noexcept { swap(other); }

@@ -148,12 +148,6 @@ void DiamondSet::Raiser::operator()(const ivec3& vertex, std::uint16_t priority)
   }
 }
 
-bool DiamondSet::is_split(const ivec3& vertex) const {
-  const Address a = address(vertex);
-  const auto found = map_.find(a.key);
-  return found != map_.end() && found->second->priority[a.local].load(std::memory_order_relaxed) >= cut_;
-}
-
 bool DiamondCursor::is_split(const ivec3& vertex) {
   const DiamondSet::Address a = DiamondSet::address(vertex);
   if (a.key != key_) {

@@ -50,7 +50,6 @@ class DiamondSet {
   /// Evaluates the criterion for every cell of the statistics, in parallel. O(active nodes).
   DiamondSet(const Statistics& statistics, const RefineSettings& settings);
 
-  [[nodiscard]] bool is_split(const glm::ivec3& vertex) const;
   /// How many cells the grid has.
   [[nodiscard]] std::uint64_t cell_count() const { return cells_; }
   /// Whether max_cells, not the threshold, ended the refinement.

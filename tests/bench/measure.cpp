@@ -13,7 +13,7 @@ namespace cumulet::bench {
 namespace {
 
 constexpr double first_deviation = 1.6;
-constexpr double first_range_mean = 64.0;
+constexpr double first_range_mean = 16384.0;  // near 0 beside a few voxels, max / mean is large
 constexpr double finest_error = 0.007;
 constexpr double image_to_depth_error = 1.5;  // where the search for an image error begins
 
@@ -63,8 +63,10 @@ SweepCurve sweep(Subject& subject, grid::Criterion criterion, const DepthReferen
   SweepCurve curve;
   curve.criterion = criterion;
   curve.kind = subject.kind();
-  double threshold = criterion == grid::Criterion::deviation ? first_deviation : first_range_mean;
-  for (int i = 0; i < 14; ++i, threshold /= options.sweep_factor) {
+  const bool deviation = criterion == grid::Criterion::deviation;
+  const double factor = deviation ? options.sweep_factor : 2.0 * options.sweep_factor;
+  double threshold = deviation ? first_deviation : first_range_mean;
+  for (int i = 0; i < 16; ++i, threshold /= factor) {
     subject.refine(criterion, threshold, 2 * options.sweep_cells);
     SweepPoint point;
     point.threshold = threshold;
