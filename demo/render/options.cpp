@@ -184,6 +184,7 @@ std::vector<double> parse_numbers(std::string_view text, std::size_t count) {
   if (parts.size() != count)
     throw UsageError(in_quotes(text) + " is not " + std::to_string(count) + " numbers between commas");
   std::vector<double> values;
+  values.reserve(parts.size());
   for (const std::string_view part : parts) values.push_back(parse_number(part));
   return values;
 }

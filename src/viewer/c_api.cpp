@@ -89,6 +89,16 @@ void require(bool condition, const char* what) {
   if (!condition) refuse(what);
 }
 
+// The number in an enum that a C host filled: reading it as the enum would be undefined where it is not one of its
+// values.
+template <class Enum>
+unsigned number(const Enum& value) {
+  unsigned copy = 0;
+  static_assert(sizeof copy == sizeof value);
+  std::memcpy(&copy, &value, sizeof copy);
+  return copy;
+}
+
 bool in_range(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
 
 template <class Values>
@@ -144,9 +154,9 @@ cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, con
 cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc) {
   return guarded(viewer, [&] {
     const cumulet_grid_desc d = read_desc(desc, "cumulet_grid_desc");
-    require(d.march <= CUMULET_MARCH_BRICK, "cumulet_grid_desc.march is unknown");
-    require(d.cells <= CUMULET_CELLS_CONSTANT, "cumulet_grid_desc.cells is unknown");
-    require(d.criterion <= CUMULET_CRITERION_RANGE_MEAN, "cumulet_grid_desc.criterion is unknown");
+    require(number(d.march) <= CUMULET_MARCH_BRICK, "cumulet_grid_desc.march is unknown");
+    require(number(d.cells) <= CUMULET_CELLS_CONSTANT, "cumulet_grid_desc.cells is unknown");
+    require(number(d.criterion) <= CUMULET_CRITERION_RANGE_MEAN, "cumulet_grid_desc.criterion is unknown");
     require(std::isfinite(d.threshold), "cumulet_grid_desc.threshold is not finite");
     require(d.camera_adaptive == 0 || d.camera_adaptive == 1, "cumulet_grid_desc.camera_adaptive is not 0 or 1");
     require(in_range(d.pixel_size, 0.0, 1e6), "cumulet_grid_desc.pixel_size is not from 0 to 1e6");
@@ -210,7 +220,7 @@ cumulet_status cumulet_set_camera(cumulet_viewer* viewer, const cumulet_camera_d
 cumulet_status cumulet_set_image(cumulet_viewer* viewer, const cumulet_image_desc* desc) {
   return guarded(viewer, [&] {
     const cumulet_image_desc d = read_desc(desc, "cumulet_image_desc");
-    require(d.view <= CUMULET_VIEW_DENSITY, "cumulet_image_desc.view is unknown");
+    require(number(d.view) <= CUMULET_VIEW_DENSITY, "cumulet_image_desc.view is unknown");
     viewer->viewer.set_image(
         {d.width, d.height, d.samples == 0 ? 64 : d.samples, d.seed, static_cast<cumulet::render::View>(d.view)});
   });

@@ -60,7 +60,7 @@ bool is_scalar(nanovdb::GridType type) {
 
 glm::ivec3 child_offset(std::uint32_t i, unsigned log2_table, unsigned log2_child) {
   const std::uint32_t mask = (1U << log2_table) - 1U;
-  return glm::ivec3(glm::uvec3(i >> (2U * log2_table), (i >> log2_table) & mask, i & mask) << log2_child);
+  return {glm::uvec3(i >> (2U * log2_table), (i >> log2_table) & mask, i & mask) << log2_child};
 }
 
 template <typename BuildT>
