@@ -13,7 +13,7 @@ namespace cumulet::bench {
 namespace {
 
 constexpr double first_deviation = 1.6;
-constexpr double first_range_mean = 16384.0;  // near 0 beside a few voxels, max / mean is large
+constexpr double first_range_mean = 1048576.0;  // near 0 beside a few voxels, max / mean is large
 constexpr double finest_error = 0.007;
 constexpr double image_to_depth_error = 1.5;  // where the search for an image error begins
 
