@@ -28,6 +28,7 @@ layout(std140, binding = 0) uniform CmParameters {
   uvec4 march;          // x: iterations a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of cells a page,
                         // w: 1 where a pass begins
   uvec4 cube;           // x: exponent of the root cells, y: number of cells, z: number of tree nodes, w: levels
+  uvec4 order;          // x: row of work groups y of a dispatch works on row y x (mod rows)
 #ifdef __cplusplus
 };
 #else

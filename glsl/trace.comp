@@ -28,7 +28,10 @@ layout(rg32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps
 uvec4 cm_pack(vec3 v, uint w) { return uvec4(floatBitsToUint(v), w); }
 
 void main() {
-  uvec2 local = gl_GlobalInvocationID.xy;
+  // Rows are dealt out far apart: a driver that gives each core a run of work groups then gives each its share of the
+  // costly ones.
+  uint row = gl_WorkGroupID.y * cm.order.x % gl_NumWorkGroups.y;
+  uvec2 local = uvec2(gl_GlobalInvocationID.x, row * gl_WorkGroupSize.y + gl_LocalInvocationID.y);
   if (local.x >= cm.tile.z || local.y >= cm.tile.w) return;
   uint lanes = cm.tile.z * cm.tile.w;
   uint lane = local.y * cm.tile.z + local.x;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 
 #include "base/error.hpp"
 
@@ -17,6 +18,14 @@ constexpr std::uint32_t longest_pass = 64;
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+// A step through n rows that meets each once and lands far from the last: near n times the golden section, coprime to
+// n.
+std::uint32_t row_step(std::uint32_t rows) {
+  auto step = std::max(1U, static_cast<std::uint32_t>(0.618 * rows));
+  while (std::gcd(step, rows) != 1) ++step;
+  return step;
 }
 
 }  // namespace
@@ -95,6 +104,7 @@ bool Tracer::trace(const MarchData& data, double budget_ms) {
     core::CmParameters parameters = parameters_;
     parameters.tile = {corner, size};
     parameters.image.w = pass_target_;
+    parameters.order.x = row_step((size.y + 7) / 8);
     parameters.march.x = static_cast<std::uint32_t>(iterations_);
     parameters.march.w = tile_begins_ ? 1 : 0;
     const std::uint32_t zero = 0;
