@@ -1,0 +1,532 @@
+#include "viewer/camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_access.hpp>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "base/error.hpp"
+
+namespace cumulet::viewer {
+
+namespace {
+
+using glm::dmat3;
+using glm::dmat4;
+using glm::dvec3;
+using glm::dvec4;
+
+constexpr double pole_margin = 1e-4;  // radians: invisible, and far above what doubles round the direction by
+constexpr double farthest = 1e30;
+
+struct Axes {
+  dvec3 forward, right, up;
+};
+
+Axes axes_of(const CameraPose& pose) {
+  const dvec3 forward = glm::normalize(pose.target - pose.eye);
+  dvec3 right = glm::cross(forward, pose.up);
+  // Looking along up: any right will do.
+  if (glm::length(right) < 1e-9)
+    right = glm::cross(forward, std::abs(forward.x) < 0.9 ? dvec3(1, 0, 0) : dvec3(0, 0, 1));
+  right = glm::normalize(right);
+  return {forward, right, glm::cross(right, forward)};
+}
+
+double tan_half(const CameraPose& pose) { return std::tan(0.5 * (pose.fovy_degrees * std::numbers::pi / 180.0)); }
+
+double distance_of(const CameraPose& pose) { return glm::length(pose.target - pose.eye); }
+
+double height_at_target(const CameraPose& pose) {
+  return pose.orthographic_height > 0.0 ? pose.orthographic_height : 2.0 * distance_of(pose) * tan_half(pose);
+}
+
+double largest(const dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+bool in_range(const dvec3& v) { return glm::all(glm::lessThanEqual(glm::abs(v), dvec3(farthest))); }  // false for NaN
+
+double nearest_distance(const dvec3& target) { return std::max(1e-12, 1e-9 * largest(target)); }
+
+/// The look of pose, turned by yaw about up and raised by pitch.
+dvec3 turned(const CameraPose& pose, double yaw, double pitch) {
+  const Axes axes = axes_of(pose);
+  const dvec3 up = glm::normalize(pose.up);
+  const dvec3 level = glm::cross(up, axes.right);
+  const double limit = 0.5 * std::numbers::pi - pole_margin;
+  const double elevation = std::atan2(glm::dot(axes.forward, up), glm::dot(axes.forward, level)) + pitch;
+  const double held = std::clamp(elevation, -limit, limit);
+  const dvec3 ahead = level * std::cos(yaw) + glm::cross(up, level) * std::sin(yaw);
+  return ahead * std::cos(held) + up * std::sin(held);
+}
+
+/// How far an orthographic eye must be from the target so that no orbit brings the box behind its near plane.
+double orthographic_distance(const CameraPose& pose, const Bounds& box) {
+  const dvec3 centre = 0.5 * (box.min + box.max);
+  const double reach = glm::length(centre - pose.target) + 0.5 * glm::length(box.max - box.min);
+  return 1.01 * reach + std::max(0.0, pose.near_plane);
+}
+
+/// As near as keeps all eight corners of the box in the picture, seen from back (unit).
+CameraPose fitted(const CameraPose& from, const dvec3& back, const Bounds& box, double aspect) {
+  CameraPose pose = from;
+  pose.target = 0.5 * (box.min + box.max);
+  pose.eye = pose.target + back;
+  const Axes axes = axes_of(pose);
+  const double tan_y = tan_half(pose);
+  const double tan_x = tan_y * aspect;
+  double distance = 1e-30;
+  double half_height = 1e-30;
+  for (int corner = 0; corner < 8; ++corner) {
+    const dvec3 p((corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
+                  (corner & 4) != 0 ? box.max.z : box.min.z);
+    const dvec3 q = p - pose.target;
+    const double right = std::abs(glm::dot(q, axes.right));
+    const double up = std::abs(glm::dot(q, axes.up));
+    distance = std::max(distance, glm::dot(q, back) + std::max(right / tan_x, up / tan_y));
+    half_height = std::max({half_height, up, right / aspect});
+  }
+  const double nearest = nearest_distance(pose.target);
+  if (distance < nearest) {  // a point: as near as before
+    distance = from.eye == from.target ? 1.0 : std::max(nearest, distance_of(from));
+  } else if (pose.orthographic_height > 0.0) {
+    pose.orthographic_height = 2.0 * half_height;
+    distance = std::max(half_height / tan_y, orthographic_distance(pose, box));
+  }
+  pose.eye = pose.target + back * distance;
+  return pose;
+}
+
+/// Where a camera without bounds to fit looks from.
+CameraPose placed(const CameraPose& from, const std::optional<Bounds>& bounds, double aspect) {
+  if (from.eye != from.target) return from;
+  if (bounds) return fitted(from, glm::normalize(dvec3(0.0, 0.2, 1.0)), *bounds, aspect);
+  CameraPose pose = from;
+  pose.target = dvec3(0.0);
+  pose.eye = dvec3(0.0, 0.0, 5.0);
+  return pose;
+}
+
+struct Planes {
+  double near, far;
+};
+
+Planes planes_of(const CameraPose& pose) {
+  if (pose.orthographic_height > 0.0) {
+    const double far = pose.far_plane != 0.0 ? pose.far_plane : 1000.0 * pose.orthographic_height;
+    return {pose.near_plane, far > pose.near_plane ? far : pose.near_plane + 1000.0 * pose.orthographic_height};
+  }
+  const double near = pose.near_plane > 0.0 ? pose.near_plane : 0.1;
+  return {near, pose.far_plane > near ? pose.far_plane : std::numeric_limits<double>::infinity()};
+}
+
+ViewFrame frame_of(const CameraPose& pose, double aspect) {
+  const Axes axes = axes_of(pose);
+  const Planes planes = planes_of(pose);
+  const bool reversed = pose.depth == DepthConvention::reversed;
+  ViewFrame frame;
+  frame.forward = axes.forward;
+  frame.orthographic = pose.orthographic_height > 0.0;
+  if (frame.orthographic) {
+    const double half = 0.5 * pose.orthographic_height;
+    frame.eye = pose.eye + axes.forward * planes.near;
+    frame.right = axes.right * (half * aspect);
+    frame.up = axes.up * half;
+    const double slope = 1.0 / (planes.far - planes.near);
+    frame.depth_a = reversed ? 1.0 : 0.0;
+    frame.depth_b = reversed ? -slope : slope;
+    return frame;
+  }
+  const double tan_y = tan_half(pose);
+  const double tan_x = tan_y * aspect;
+  frame.eye = pose.eye;
+  frame.right = axes.right * tan_x;
+  frame.up = axes.up * tan_y;
+  const double near_share = std::isinf(planes.far) ? 0.0 : planes.near / (planes.far - planes.near);  // far's: 1 + it
+  frame.depth_a = reversed ? -near_share : 1.0 + near_share;
+  frame.depth_b = planes.near * (reversed ? 1.0 + near_share : -(1.0 + near_share));
+  return frame;
+}
+
+[[noreturn]] void refuse(const std::string& why) { throw Error(ErrorCode::invalid_argument, why); }
+
+bool finite(const dmat4& m) {
+  for (int i = 0; i < 16; ++i) {
+    if (!(std::abs(m[i / 4][i % 4]) <= farthest)) return false;
+  }
+  return true;
+}
+
+/// Refuses what is not a rotation and a translation, single precision's errors aside.
+void check_view(const dmat4& view) {
+  if (!finite(view)) refuse("the view matrix has entries that are not finite, or beyond 1e30");
+  const dvec4 last = glm::row(view, 3);
+  if (std::max(largest(dvec3(last)), std::abs(last.w - 1.0)) > 1e-6)
+    refuse("the view matrix's last row is not 0 0 0 1");
+  const dmat3 rotation(view);
+  const dmat3 gram = glm::transpose(rotation) * rotation;
+  for (int i = 0; i < 9; ++i) {
+    if (std::abs(gram[i / 3][i % 3] - (i / 3 == i % 3 ? 1.0 : 0.0)) > 1e-3) {
+      refuse("the view matrix scales, shears or is singular: a rotation and a translation are needed");
+    }
+  }
+  if (glm::determinant(rotation) < 0.0) refuse("the view matrix mirrors: a rotation and a translation are needed");
+}
+
+/// Depth as d = a + b x, where normalised device depth is a + b x.
+void to_window_depth(ClipDepth clip, double& a, double& b) {
+  if (clip == ClipDepth::zero_to_one) return;
+  a = 0.5 * a + 0.5;
+  b *= 0.5;
+}
+
+ViewFrame frame_of(const dmat4& view, const dmat4& projection, ClipDepth clip) {
+  check_view(view);
+  if (!finite(projection)) refuse("the projection matrix has entries that are not finite, or beyond 1e30");
+  dmat4 p = projection;
+  const double dirt = 1e-6 * std::max(std::abs(p[0][0]), std::abs(p[1][1]));
+  if (std::max(std::abs(p[0][1]), std::abs(p[1][0])) > dirt)
+    refuse("the projection matrix turns or shears the picture");
+  if (std::max(std::abs(p[0][2]), std::abs(p[1][2])) > dirt) refuse("the projection matrix has an oblique near plane");
+  if (std::max(std::abs(p[0][3]), std::abs(p[1][3])) > 1e-6 * std::max(std::abs(p[2][3]), std::abs(p[3][3]))) {
+    refuse("the projection matrix is neither perspective nor orthographic");
+  }
+
+  // In eye space first, where x_clip = p00 x + p20 z + p30 (column before row), and so on.
+  ViewFrame frame;
+  frame.orthographic = p[2][3] == 0.0;
+  const double w = frame.orthographic ? p[3][3] : std::abs(p[2][3]);
+  const char* const singular = "the projection matrix is singular";
+  if (!(w > 0.0) || p[0][0] == 0.0 || p[1][1] == 0.0) refuse(singular);
+  const double side = p[2][3] > 0.0 ? 1.0 : -1.0;
+  p /= w;
+  frame.right = dvec3(1.0 / p[0][0], 0.0, 0.0);
+  frame.up = dvec3(0.0, 1.0 / p[1][1], 0.0);
+  frame.forward = side * dvec3(-p[2][0] / p[0][0], -p[2][1] / p[1][1], 1.0);
+  if (frame.orthographic) {
+    frame.depth_a = p[3][2];
+    frame.depth_b = -p[2][2];
+    to_window_depth(clip, frame.depth_a, frame.depth_b);
+    const double at_near = frame.depth_b > 0.0 ? 0.0 : 1.0;
+    const double near = (at_near - frame.depth_a) / frame.depth_b;
+    frame.depth_a = at_near;
+    frame.eye = frame.forward * near - dvec3(p[3][0] / p[0][0], p[3][1] / p[1][1], 0.0);
+  } else {
+    // A translation before the projection, as stereo pairs have it, moves the eye.
+    const double behind = p[3][3] * side;
+    frame.eye = -dvec3((p[3][0] - p[2][0] * behind) / p[0][0], (p[3][1] - p[2][1] * behind) / p[1][1], behind);
+    frame.depth_a = side * p[2][2];
+    frame.depth_b = p[3][2] - p[2][2] * behind;
+    to_window_depth(clip, frame.depth_a, frame.depth_b);
+  }
+  const dmat3 to_world = glm::inverse(dmat3(view));
+  frame.eye = to_world * (frame.eye - dvec3(view[3]));
+  frame.forward = to_world * frame.forward;
+  frame.right = to_world * frame.right;
+  frame.up = to_world * frame.up;
+  if (!in_range(frame.eye) || !in_range(frame.forward) || !in_range(frame.right) || !in_range(frame.up) ||
+      !(std::abs(frame.depth_a) <= farthest && std::abs(frame.depth_b) >= 1.0 / farthest)) {
+    refuse(singular);
+  }
+  return frame;
+}
+
+/// The pose that sees most nearly what the frame does: the same in the picture's middle. before: what it does not tell.
+CameraPose nearest_pose(const ViewFrame& frame, const CameraPose& before) {
+  CameraPose pose;
+  const double length = glm::length(frame.forward);
+  const dvec3 forward = frame.forward / length;
+  const double half_height = glm::length(frame.up);
+  const bool reversed = frame.orthographic ? frame.depth_b < 0.0 : frame.depth_b > 0.0;
+  pose.depth = reversed ? DepthConvention::reversed : DepthConvention::standard;
+  if (frame.orthographic) {
+    pose.orthographic_height = 2.0 * half_height;
+    pose.fovy_degrees = before.fovy_degrees;
+    pose.eye = frame.eye;  // so near_plane is 0
+    pose.far_plane = 1.0 / std::abs(frame.depth_b);
+  } else {
+    const auto depth_at = [&](double depth) { return frame.depth_b / (depth - frame.depth_a); };
+    const double near = depth_at(reversed ? 1.0 : 0.0);
+    const double far = depth_at(reversed ? 0.0 : 1.0);
+    pose.eye = frame.eye;
+    pose.near_plane = near > 0.0 && near < farthest ? near : 0.0;
+    pose.far_plane = far > near && far < farthest ? far : 0.0;
+    pose.fovy_degrees = std::clamp(2.0 * std::atan(half_height / length) * 180.0 / std::numbers::pi, 0.01, 175.0);
+  }
+
+  // As far as the old target is from here.
+  const bool knows = before.eye != before.target;
+  const double old_distance = knows ? distance_of(before) : (frame.orthographic ? pose.orthographic_height : 1.0);
+  const double distance = knows ? glm::length(before.target - pose.eye) : 0.0;
+  pose.target = pose.eye + forward * (distance > 1e-3 * old_distance ? distance : old_distance);
+
+  // A level picture keeps the axis that orbits turn about.
+  const dvec3 right = glm::normalize(frame.right);
+  const dvec3 axis = glm::normalize(before.up);
+  dvec3 up = glm::normalize(frame.up - forward * glm::dot(frame.up, forward));
+  const bool mirrored = glm::dot(glm::cross(right, up), forward) > 0.0;
+  if (mirrored && glm::dot(up, axis) < 0.0) up = -up;
+  const double lean = glm::dot(axis, right);
+  const double level = glm::dot(axis, up);
+  pose.up = level > 1e-4 && std::abs(lean) < 1e-4 * level ? before.up : up;
+  return pose;
+}
+
+}  // namespace
+
+void Camera::set(const CameraPose& pose) {
+  const Edit edit(*this);
+  if (pose == pose_ && !matrices_) return;
+  pose_ = pose;
+  matrices_.reset();
+  ++revision_;
+}
+
+CameraPose Camera::pose() const {
+  const std::scoped_lock lock(mutex_);
+  return pose_;
+}
+
+void Camera::set_matrices(const dmat4& view, const dmat4& projection, ClipDepth clip) {
+  const Matrices matrices{view, projection, clip};
+  const ViewFrame frame = frame_of(view, projection, clip);
+  const Edit edit(*this);
+  if (matrices_ == matrices) return;
+  if (!matrices_) own_ = pose_;
+  pose_ = nearest_pose(frame, own_);
+  matrices_ = matrices;
+  matrices_frame_ = frame;
+  ++revision_;
+}
+
+void Camera::matrices(double aspect, ClipDepth clip, dmat4& view, dmat4& projection) const {
+  const std::scoped_lock lock(mutex_);
+  if (matrices_) {
+    view = matrices_->view;
+    projection = matrices_->projection;
+    if (clip == matrices_->clip) return;
+    for (int c = 0; c < 4; ++c) {
+      projection[c][2] = clip == ClipDepth::zero_to_one ? 0.5 * (projection[c][2] + projection[c][3])
+                                                        : 2.0 * projection[c][2] - projection[c][3];
+    }
+    return;
+  }
+  const CameraPose pose = placed(pose_, std::nullopt, aspect);
+  const ViewFrame frame = frame_of(pose, aspect);
+  const Axes axes = axes_of(pose);
+  const dmat3 rotation = glm::transpose(dmat3(axes.right, axes.up, -axes.forward));
+  view = dmat4(rotation);
+  view[3] = dvec4(rotation * -pose.eye, 1.0);
+
+  // Clip depth before the division: the frame's z is -z of eye space, counted from the near plane if orthographic.
+  double a = frame.depth_a;
+  double b = frame.depth_b;
+  if (clip == ClipDepth::negative_one_to_one) {
+    a = 2.0 * a - 1.0;
+    b *= 2.0;
+  }
+  projection = dmat4(0.0);
+  projection[0][0] = 1.0 / glm::length(frame.right);
+  projection[1][1] = 1.0 / glm::length(frame.up);
+  if (frame.orthographic) {
+    projection[2][2] = -b;
+    projection[3][2] = a - b * planes_of(pose).near;
+    projection[3][3] = 1.0;
+  } else {
+    projection[2][2] = -a;
+    projection[2][3] = -1.0;
+    projection[3][2] = b;
+  }
+}
+
+void Camera::change(const CameraPose& pose) {
+  if (!in_range(pose.eye) || !in_range(pose.target) || pose.eye == pose.target) {
+    refuse("the camera would leave the range of its coordinates");
+  }
+  pose_ = pose;
+  matrices_.reset();
+  ++revision_;
+}
+
+void Camera::orbit(double yaw, double pitch) {
+  const Edit edit(*this);
+  if (waits_for_bounds() || (yaw == 0.0 && pitch == 0.0)) return;
+  CameraPose pose = pose_;
+  pose.eye = pose.target - turned(pose, yaw, -pitch) * distance_of(pose);
+  change(pose);
+}
+
+void Camera::look(double yaw, double pitch) {
+  const Edit edit(*this);
+  if (waits_for_bounds() || (yaw == 0.0 && pitch == 0.0)) return;
+  CameraPose pose = pose_;
+  pose.target = pose.eye + turned(pose, yaw, pitch) * distance_of(pose);
+  change(pose);
+}
+
+void Camera::roll(double angle) {
+  const Edit edit(*this);
+  if (waits_for_bounds() || angle == 0.0) return;
+  CameraPose pose = pose_;
+  const Axes axes = axes_of(pose);
+  const dvec3 up = glm::normalize(pose.up);
+  const double along = glm::dot(up, axes.forward);
+  const dvec3 across = std::abs(along) < 1.0 - 1e-12 ? up - axes.forward * along : axes.up;
+  pose.up = axes.forward * along + across * std::cos(angle) + glm::cross(axes.forward, across) * std::sin(angle);
+  change(pose);
+}
+
+void Camera::pan(double right, double up) {
+  const Edit edit(*this);
+  if (waits_for_bounds() || (right == 0.0 && up == 0.0)) return;
+  CameraPose pose = pose_;
+  const Axes axes = axes_of(pose);
+  const dvec3 step = (axes.right * right + axes.up * up) * height_at_target(pose);
+  pose.eye -= step;
+  pose.target -= step;
+  change(pose);
+}
+
+void Camera::scale(double factor, bool keep_orthographic_eye) {
+  if (waits_for_bounds() || factor == 1.0) return;
+  CameraPose pose = pose_;
+  const double distance = distance_of(pose);
+  const bool by_height = keep_orthographic_eye && pose.orthographic_height > 0.0;
+  const double size = by_height ? pose.orthographic_height : distance;
+  const double low = std::min(size, nearest_distance(pose.target));
+  const double high = std::max(size, 1e12);
+  const double change_by = std::clamp(size * factor, low, high) / size;
+  if (change_by == 1.0) return;
+  if (!by_height) pose.eye = pose.target - axes_of(pose).forward * (distance * change_by);
+  pose.orthographic_height *= change_by;
+  change(pose);
+}
+
+void Camera::dolly(double factor) {
+  const Edit edit(*this);
+  scale(factor, false);
+}
+
+void Camera::zoom(double factor) {
+  const Edit edit(*this);
+  scale(factor, true);
+}
+
+void Camera::fly(double right, double up, double forward) {
+  const Edit edit(*this);
+  if (waits_for_bounds() || (right == 0.0 && up == 0.0 && forward == 0.0)) return;
+  CameraPose pose = pose_;
+  const Axes axes = axes_of(pose);
+  const dvec3 step = axes.right * right + axes.up * up + axes.forward * forward;
+  pose.eye += step;
+  pose.target += step;
+  change(pose);
+}
+
+void Camera::frame(const Bounds& box, double aspect) {
+  const Edit edit(*this);
+  change(waits_for_bounds() ? placed(pose_, box, aspect) : fitted(pose_, -axes_of(pose_).forward, box, aspect));
+}
+
+void Camera::look_from(AxisView side) {
+  const Edit edit(*this);
+  if (waits_for_bounds()) return;
+  CameraPose pose = pose_;
+  const double size = largest(pose.up);
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(pose.up[axis]) < size) continue;
+    const double sign = pose.up[axis] < 0.0 ? -1.0 : 1.0;
+    pose.up = dvec3(0.0);
+    pose.up[axis] = sign;
+    break;
+  }
+  const dvec3 front = pose.up.z != 0.0 ? dvec3(0.0, -pose.up.z, 0.0) : dvec3(0.0, 0.0, 1.0);
+  const dvec3 right = glm::cross(pose.up, front);
+  dvec3 back = front;
+  switch (side) {
+    case AxisView::front:
+      break;
+    case AxisView::back:
+      back = -front;
+      break;
+    case AxisView::right:
+      back = right;
+      break;
+    case AxisView::left:
+      back = -right;
+      break;
+    case AxisView::top:
+      back = pose.up * std::cos(pole_margin) + front * std::sin(pole_margin);
+      break;
+    case AxisView::bottom:
+      back = -pose.up * std::cos(pole_margin) + front * std::sin(pole_margin);
+      break;
+  }
+  pose.eye = pose.target + back * distance_of(pose);
+  change(pose);
+}
+
+void Camera::toggle_orthographic(const std::optional<Bounds>& bounds) {
+  const Edit edit(*this);
+  CameraPose pose = pose_;
+  const bool was_orthographic = pose.orthographic_height > 0.0;
+  if (waits_for_bounds()) {
+    pose_.orthographic_height = was_orthographic ? 0.0 : 1.0;  // its size comes with the bounds
+    ++revision_;
+    return;
+  }
+  const dvec3 forward = axes_of(pose).forward;
+  const double height = height_at_target(pose);
+  double distance = height / (2.0 * tan_half(pose));
+  pose.orthographic_height = was_orthographic ? 0.0 : height;
+  if (!was_orthographic && bounds) distance = std::max(distance, orthographic_distance(pose, *bounds));
+  pose.eye = pose.target - forward * distance;
+  change(pose);
+}
+
+ViewFrame Camera::view(double aspect, const std::optional<Bounds>& bounds) {
+  const Edit edit(*this);
+  if (matrices_) {
+    if (own_.eye == own_.target && bounds) {  // matrices came first: the bounds tell what they look at
+      const double distance = glm::length(0.5 * (bounds->min + bounds->max) - pose_.eye);
+      if (distance > nearest_distance(pose_.eye)) {
+        pose_.target = pose_.eye + axes_of(pose_).forward * distance;
+        own_ = pose_;
+      }
+    }
+    return matrices_frame_;
+  }
+  if (!(aspect > 0.0 && std::isfinite(aspect))) return frame_of(placed(pose_, std::nullopt, 1.0), 1.0);  // no picture
+  const CameraPose pose = placed(pose_, bounds, aspect);
+  if (bounds && pose != pose_) {
+    pose_ = pose;
+    ++revision_;
+  }
+  return frame_of(pose, aspect);
+}
+
+std::uint64_t Camera::revision() const {
+  const std::scoped_lock lock(mutex_);
+  return revision_;
+}
+
+Camera::Edit::~Edit() {
+  const bool changed = camera_.revision_ != before_;
+  lock_.unlock();
+  if (!changed) return;
+  const std::scoped_lock lock(camera_.listeners_->mutex);
+  for (const auto& call : camera_.listeners_->calls) call();
+}
+
+std::shared_ptr<void> Camera::listen(std::function<void()> changed) {
+  const std::scoped_lock lock(listeners_->mutex);
+  const auto place = listeners_->calls.insert(listeners_->calls.end(), std::move(changed));
+  return {nullptr, [listeners = listeners_, place](void*) {
+            const std::scoped_lock deleting(listeners->mutex);
+            listeners->calls.erase(place);
+          }};
+}
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "viewer/bounds.hpp"
+
+namespace cumulet::viewer {
+
+enum class DepthConvention { standard = 0, reversed = 1 };
+enum class ClipDepth { negative_one_to_one = 0, zero_to_one = 1 };
+enum class AxisView { front, back, right, left, top, bottom };
+
+/// cumulet_camera_desc, defaults filled in.
+struct CameraPose {
+  glm::dvec3 eye{0.0};
+  glm::dvec3 target{0.0};  // eye == target: fit the bounds
+  glm::dvec3 up{0.0, 1.0, 0.0};
+  double fovy_degrees = 40.0;
+  double orthographic_height = 0.0;  // 0: perspective
+  double near_plane = 0.0;           // 0: the default, see cumulet.h
+  double far_plane = 0.0;            // 0: the default
+  DepthConvention depth = DepthConvention::standard;
+  bool operator==(const CameraPose&) const = default;
+};
+
+/// What one picture is seen through, all in world space. A ray through (x, y), both -1 to 1, y up:
+/// perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along forward.
+/// forward has length 1 along the view axis (off-axis projections add a share of right and up to it), so that the ray's
+/// parameter is the distance z from the eye's plane; a depth buffer holds depth_a + depth_b / z, or + depth_b z where
+/// orthographic.
+struct ViewFrame {
+  glm::dvec3 eye{0.0};  // orthographic: in the near plane (z counts from there, and depth_a, depth_b say so)
+  glm::dvec3 forward{0.0, 0.0, -1.0};
+  glm::dvec3 right{1.0, 0.0, 0.0};  // scaled by half the picture's width at z = 1 (orthographic: half its width)
+  glm::dvec3 up{0.0, 1.0, 0.0};     // likewise
+  bool orthographic = false;
+  double depth_a = 1.0;
+  double depth_b = -0.1;
+  bool operator==(const ViewFrame&) const = default;
+};
+
+/// A camera that viewers may share: every call locks. Operations as in cumulet.h; arguments are finite. An operation
+/// goes on from the host's matrices as from the nearest pose, and throws Error(invalid_argument), changing nothing,
+/// where it would lead out of what doubles tell apart. A camera that still waits for bounds to fit has nothing to turn
+/// about: operations but frame and toggle_orthographic leave it waiting.
+class Camera {
+ public:
+  explicit Camera(const CameraPose& pose = {}) : pose_(pose) {}
+
+  void set(const CameraPose& pose);
+  [[nodiscard]] CameraPose pose() const;
+  /// Throws Error(invalid_argument) for what is no view or no projection. An orthographic view looks along -z of eye
+  /// space; a perspective one to where w grows. Signs of the projection may mirror the picture.
+  void set_matrices(const glm::dmat4& view, const glm::dmat4& projection, ClipDepth clip);
+  /// The host's own matrices come back as they are, whatever the aspect ratio; but for their clip depth.
+  void matrices(double aspect, ClipDepth clip, glm::dmat4& view, glm::dmat4& projection) const;
+
+  /// Turns about the pose's up and stops just short of it. yaw: anticlockwise as seen from above (an eye on +Z moves
+  /// towards +X, a look along -Z turns towards -X); pitch: raises the eye, or the look.
+  void orbit(double yaw, double pitch);
+  void look(double yaw, double pitch);
+  /// Leans clockwise, as seen from behind the camera; the picture turns anticlockwise.
+  void roll(double angle);
+  void pan(double right, double up);
+  /// factor > 0. The distance stays within 1e-12 (and what doubles resolve at the target) and 1e12, unless it was
+  /// outside; an orthographic height follows it.
+  void dolly(double factor);
+  /// As dolly, but an orthographic eye stays where it is: its near plane would come to cut the scene.
+  void zoom(double factor);
+  void fly(double right, double up, double forward);
+  void frame(const Bounds& box, double aspect);
+  /// Looks at the target from one side, the distance kept; the axis nearest to up becomes up. Where that is +Y, front
+  /// is +Z and right +X; where +Z, front is -Y.
+  void look_from(AxisView side);
+  /// Perspective to orthographic of the same size at the target, or back. An orthographic eye moves back until the
+  /// bounds are in front of it from wherever it may orbit to.
+  void toggle_orthographic(const std::optional<Bounds>& bounds);
+
+  /// The frame for a picture of this aspect ratio. A pose that fits the bounds (eye == target) is placed first, for
+  /// good, where bounds are known; without any it looks at the origin from +Z.
+  [[nodiscard]] ViewFrame view(double aspect, const std::optional<Bounds>& bounds);
+  /// Counts changes; setting what is set already is none.
+  [[nodiscard]] std::uint64_t revision() const;
+  /// Calls changed after every change, on the thread that made it, until the token is gone; then no call is under way
+  /// any more. It must not change a camera, nor throw.
+  [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed);
+
+ private:
+  /// Locks; on its end unlocks, and tells the listeners of a change.
+  class Edit {
+   public:
+    explicit Edit(Camera& camera) : camera_(camera), lock_(camera.mutex_), before_(camera.revision_) {}
+    ~Edit();
+    Edit(const Edit&) = delete;
+    Edit& operator=(const Edit&) = delete;
+
+   private:
+    Camera& camera_;
+    std::unique_lock<std::mutex> lock_;
+    std::uint64_t before_;
+  };
+  struct Listeners {
+    std::mutex mutex;
+    std::list<std::function<void()>> calls;
+  };
+  struct Matrices {
+    glm::dmat4 view{1.0};
+    glm::dmat4 projection{1.0};
+    ClipDepth clip = ClipDepth::negative_one_to_one;
+    bool operator==(const Matrices&) const = default;
+  };
+
+  [[nodiscard]] bool waits_for_bounds() const { return pose_.eye == pose_.target; }
+  void change(const CameraPose& pose);
+  void scale(double factor, bool keep_orthographic_eye);
+
+  mutable std::mutex mutex_;
+  CameraPose pose_;                   // with matrices_: the nearest to them
+  std::optional<Matrices> matrices_;  // the host's, until an operation
+  ViewFrame matrices_frame_;          // theirs
+  CameraPose own_;                    // the last pose that is not theirs: it knows the target
+  std::uint64_t revision_ = 1;
+  std::shared_ptr<Listeners> listeners_ = std::make_shared<Listeners>();
+};
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "viewer/camera.hpp"
+
+namespace cumulet::viewer {
+
+enum class NavigationStyle { simple = 0, blender = 1, maya = 2 };
+
+struct NavigationSettings {
+  NavigationStyle style = NavigationStyle::simple;
+  bool fly = false;
+  double speed = 1.0;
+  double turntable_degrees_per_second = 0.0;
+  bool operator==(const NavigationSettings&) const = default;
+};
+
+/// cumulet_event with its enums checked; numbers are finite.
+struct InputEvent {
+  enum class Type { pointer_move, button_down, button_up, wheel, key_down, key_up, focus_lost };
+  Type type = Type::pointer_move;
+  double x = 0.0;
+  double y = 0.0;
+  double wheel = 0.0;
+  int button = 0;
+  int key = 0;
+  std::uint32_t modifiers = 0;
+};
+
+/// Turns a viewer's input into operations of its camera. Buttons and keys mean something only with exactly the
+/// modifiers that a style names; a drag goes on, whatever is pressed meanwhile, until its own button is up. With speed
+/// 1 a drag over the picture's height orbits by half a turn, looks by a quarter, pans by the height at the target, or
+/// dollies by a factor of 10; a wheel step dollies by 1.15.
+///
+/// Keys, in every style: F, Home, keypad '.': frame the bounds; arrows: orbit by 15 degrees, with shift: pan by a
+/// twentieth; + (or =) and -: dolly as the wheel does. Blender's keypad besides: 1, 3, 7 (ctrl: the opposite), 5, and
+/// 2, 4, 6, 8 as arrows.
+class Navigation {
+ public:
+  /// Ends what is under way if style or fly changes.
+  void set(const NavigationSettings& settings);
+  [[nodiscard]] const NavigationSettings& settings() const { return settings_; }
+  /// width, height: of the picture, in pixels (0: not known yet). Returns whether the event meant something.
+  bool input(const InputEvent& event, Camera& camera, double width, double height, const std::optional<Bounds>& bounds);
+  /// Flies and turns for seconds that have gone by. Returns whether the camera moved.
+  bool advance(double seconds, Camera& camera, const std::optional<Bounds>& bounds);
+  /// Whether advance has anything to do: frames are needed though nothing else changes.
+  [[nodiscard]] bool moving() const;
+
+ private:
+  enum class Drag { none, orbit, pan, dolly, look };
+
+  [[nodiscard]] Drag drag_of(int button, std::uint32_t modifiers) const;
+  void drag_by(double dx, double dy, Camera& camera) const;
+  bool key_down(const InputEvent& event, Camera& camera, double aspect, const std::optional<Bounds>& bounds);
+  [[nodiscard]] glm::dvec3 flight() const;
+  void release();
+
+  NavigationSettings settings_;
+  Drag drag_ = Drag::none;
+  int drag_button_ = 0;
+  double last_x_ = 0.0;
+  double last_y_ = 0.0;
+  std::uint32_t keys_ = 0;  // fly keys held, by bit
+  bool fast_ = false;       // shift, as of the last event
+};
+
+}  // namespace cumulet::viewer
