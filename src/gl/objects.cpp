@@ -7,8 +7,71 @@
 
 namespace cumulet::gl {
 
+namespace {
+
+struct Stage {
+  GLenum type;
+  const std::string& name;
+};
+
+Object make_texture(const FunctionsPtr& gl, GLenum target) {
+  GLuint name = 0;
+  gl->CreateTextures(target, 1, &name);
+  return {gl, Object::Kind::texture, name};
+}
+
+Object finish_texture(const FunctionsPtr& gl, Object texture, const char* what) {
+  // No mipmaps and no filter: complete for texelFetch on every driver, in integer formats too.
+  gl->TextureParameteri(texture.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  gl->TextureParameteri(texture.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  check(*gl, what);
+  return texture;
+}
+
+Object make_program(const FunctionsPtr& gl, std::span<const Stage> stages, std::span<const std::string> defines) {
+  Object program(gl, Object::Kind::program, gl->CreateProgram());
+  std::vector<Object> shaders;
+  for (const Stage& stage : stages) {
+    const std::string_view source = shader_source(stage.name);
+    if (source.empty()) throw Error(ErrorCode::internal, "no shader named " + stage.name);
+    const std::size_t end = source.find('\n') + 1;  // #version stays first
+    std::string text(source.substr(0, end));
+    for (const std::string& define : defines) text += "#define " + define + "\n";
+    text += source.substr(end);
+    const Object& shader = shaders.emplace_back(gl, Object::Kind::shader, gl->CreateShader(stage.type));
+    const char* pointer = text.c_str();
+    gl->ShaderSource(shader.name(), 1, &pointer, nullptr);
+    gl->CompileShader(shader.name());
+    gl->AttachShader(program.name(), shader.name());
+  }
+  gl->LinkProgram(program.name());
+  GLint linked = 0;
+  gl->GetProgramiv(program.name(), GL_LINK_STATUS, &linked);
+  check(*gl, "building a shader program");
+  if (linked != 0) {
+    for (const Object& shader : shaders) gl->DetachShader(program.name(), shader.name());
+    return program;
+  }
+  // The first shader that has something to say, else the linker.
+  std::array<char, 2048> log{};
+  std::size_t culprit = 0;
+  for (std::size_t i = 0; i < shaders.size() && log[0] == '\0'; ++i) {
+    GLint compiled = 0;
+    gl->GetShaderiv(shaders[i].name(), GL_COMPILE_STATUS, &compiled);
+    if (compiled != 0) continue;
+    culprit = i;
+    gl->GetShaderInfoLog(shaders[i].name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
+  }
+  if (log[0] == '\0') gl->GetProgramInfoLog(program.name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
+  std::string line(log.data());
+  for (char& c : line) c = c == '\n' ? ' ' : c;
+  throw Error(ErrorCode::gl, "shader " + stages[culprit].name + " does not build on this driver: " + line);
+}
+
+}  // namespace
+
 Object::~Object() {
-  if (name_ == 0) return;
+  if (name_ == 0 || gl_->abandoned.load(std::memory_order_relaxed)) return;
   switch (kind_) {
     case Kind::buffer:
       gl_->DeleteBuffers(1, &name_);
@@ -16,8 +79,20 @@ Object::~Object() {
     case Kind::texture:
       gl_->DeleteTextures(1, &name_);
       break;
+    case Kind::sampler:
+      gl_->DeleteSamplers(1, &name_);
+      break;
+    case Kind::shader:
+      gl_->DeleteShader(name_);
+      break;
     case Kind::program:
       gl_->DeleteProgram(name_);
+      break;
+    case Kind::framebuffer:
+      gl_->DeleteFramebuffers(1, &name_);
+      break;
+    case Kind::vertex_array:
+      gl_->DeleteVertexArrays(1, &name_);
       break;
   }
 }
@@ -41,56 +116,67 @@ Object make_texture_buffer(const FunctionsPtr& gl, GLenum format, const Object& 
 }
 
 Object make_texture_2d(const FunctionsPtr& gl, GLenum format, int width, int height, const char* what) {
-  GLuint name = 0;
-  gl->CreateTextures(GL_TEXTURE_2D, 1, &name);
-  Object texture(gl, Object::Kind::texture, name);
-  gl->TextureStorage2D(name, 1, format, width, height);
+  Object texture = make_texture(gl, GL_TEXTURE_2D);
+  gl->TextureStorage2D(texture.name(), 1, format, width, height);
+  return finish_texture(gl, std::move(texture), what);
+}
+
+Object make_texture_2d_array(const FunctionsPtr& gl, GLenum format, int width, int height, int layers,
+                             const char* what) {
+  Object texture = make_texture(gl, GL_TEXTURE_2D_ARRAY);
+  gl->TextureStorage3D(texture.name(), 1, format, width, height, layers);
+  return finish_texture(gl, std::move(texture), what);
+}
+
+Object make_texture_2d_multisample(const FunctionsPtr& gl, GLenum format, int samples, int width, int height,
+                                   const char* what) {
+  Object texture = make_texture(gl, GL_TEXTURE_2D_MULTISAMPLE);
+  gl->TextureStorage2DMultisample(texture.name(), samples, format, width, height, GL_TRUE);
   check(*gl, what);
   return texture;
 }
 
 Object make_texture_3d(const FunctionsPtr& gl, GLenum format, int x, int y, int z, const char* what) {
-  GLuint name = 0;
-  gl->CreateTextures(GL_TEXTURE_3D, 1, &name);
-  Object texture(gl, Object::Kind::texture, name);
-  gl->TextureStorage3D(name, 1, format, x, y, z);
-  // No mipmaps and no filter: complete for texelFetch on every driver.
-  gl->TextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  gl->TextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  check(*gl, what);
-  return texture;
+  Object texture = make_texture(gl, GL_TEXTURE_3D);
+  gl->TextureStorage3D(texture.name(), 1, format, x, y, z);
+  return finish_texture(gl, std::move(texture), what);
 }
 
 Object make_compute_program(const FunctionsPtr& gl, const std::string& name, std::span<const std::string> defines) {
-  const std::string_view source = shader_source(name);
-  if (source.empty()) throw Error(ErrorCode::internal, "no shader named " + name);
-  const std::size_t end = source.find('\n') + 1;  // #version stays first
-  std::string text(source.substr(0, end));
-  for (const std::string& define : defines) text += "#define " + define + "\n";
-  text += source.substr(end);
+  const std::array<Stage, 1> stages{Stage{GL_COMPUTE_SHADER, name}};
+  return make_program(gl, stages, defines);
+}
 
-  const GLuint shader = gl->CreateShader(GL_COMPUTE_SHADER);
-  const char* pointer = text.c_str();
-  gl->ShaderSource(shader, 1, &pointer, nullptr);
-  gl->CompileShader(shader);
-  Object program(gl, Object::Kind::program, gl->CreateProgram());
-  gl->AttachShader(program.name(), shader);
-  gl->LinkProgram(program.name());
-  GLint linked = 0;
-  gl->GetProgramiv(program.name(), GL_LINK_STATUS, &linked);
-  std::array<char, 2048> log{};
-  if (linked == 0) {
-    gl->GetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
-    if (log[0] == '\0') gl->GetProgramInfoLog(program.name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
-  }
-  gl->DeleteShader(shader);
-  check(*gl, "building a shader program");
-  if (linked == 0) {
-    std::string line(log.data());
-    for (char& c : line) c = c == '\n' ? ' ' : c;
-    throw Error(ErrorCode::gl, "shader " + name + " does not build on this driver: " + line);
-  }
-  return program;
+Object make_graphics_program(const FunctionsPtr& gl, const std::string& vertex, const std::string& fragment,
+                             std::span<const std::string> defines) {
+  const std::array<Stage, 2> stages{Stage{GL_VERTEX_SHADER, vertex}, Stage{GL_FRAGMENT_SHADER, fragment}};
+  return make_program(gl, stages, defines);
+}
+
+Object make_framebuffer(const FunctionsPtr& gl) {
+  GLuint name = 0;
+  gl->CreateFramebuffers(1, &name);
+  Object framebuffer(gl, Object::Kind::framebuffer, name);
+  check(*gl, "creating a framebuffer");
+  return framebuffer;
+}
+
+Object make_vertex_array(const FunctionsPtr& gl) {
+  GLuint name = 0;
+  gl->CreateVertexArrays(1, &name);
+  Object vertex_array(gl, Object::Kind::vertex_array, name);
+  check(*gl, "creating a vertex array");
+  return vertex_array;
+}
+
+Object make_sampler(const FunctionsPtr& gl) {
+  GLuint name = 0;
+  gl->CreateSamplers(1, &name);
+  Object sampler(gl, Object::Kind::sampler, name);
+  gl->SamplerParameteri(name, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  gl->SamplerParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  check(*gl, "creating a sampler");
+  return sampler;
 }
 
 }  // namespace cumulet::gl

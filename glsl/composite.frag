@@ -1,0 +1,59 @@
+#version 450
+// An accumulation as displayed colour, or its depth.
+// variant: CM_DEPTH=0
+// variant: CM_DEPTH=1
+#include "shared.glsl"
+#include "display.glsl"
+
+layout(binding = 0) uniform sampler2D cm_sum;  // row 0 is the picture's top
+layout(binding = 1) uniform usampler2D cm_counts;
+layout(binding = 2) uniform sampler2D cm_volume_z;
+layout(location = 0) uniform ivec4 cm_viewport;
+layout(location = 1) uniform bool cm_flip_y;
+#if CM_DEPTH == 0
+layout(location = 2) uniform float cm_exposure;
+layout(location = 3) uniform uint cm_tone_map;
+layout(location = 4) uniform bool cm_encode;
+layout(location = 5) uniform bool cm_transparent;
+layout(location = 6) uniform vec3 cm_background;
+layout(location = 0) out vec4 cm_colour;
+
+vec4 cm_texel(ivec2 texel) {
+  uint samples = texelFetch(cm_counts, texel, 0).x;
+  if (samples == 0u) return vec4(0.0);
+  vec4 mean = texelFetch(cm_sum, texel, 0) / float(samples);
+  return cm_transparent ? mean : vec4(mean.rgb + cm_background * (1.0 - mean.a), 1.0);
+}
+#else
+layout(location = 2) uniform vec2 cm_depth;  // a, b
+layout(location = 3) uniform bool cm_orthographic;
+#endif
+
+void main() {
+  // Not gl_FragCoord itself: a host that shades every sample would move it off the pixel's centre.
+  ivec2 pixel = ivec2(floor(gl_FragCoord.xy)) - cm_viewport.xy;
+  if (!cm_flip_y) pixel.y = cm_viewport.w - 1 - pixel.y;
+  ivec2 size = textureSize(cm_sum, 0);
+  vec2 at = (vec2(pixel) + 0.5) * (vec2(size) / vec2(cm_viewport.zw));
+#if CM_DEPTH == 0
+  vec4 value;
+  if (size == cm_viewport.zw) {
+    value = cm_texel(pixel);
+  } else {
+    vec2 low = floor(at - 0.5);
+    vec2 weight = at - 0.5 - low;
+    ivec2 last = size - 1;
+    ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
+    ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);
+    value = mix(mix(cm_texel(p0), cm_texel(ivec2(p1.x, p0.y)), weight.x),
+                mix(cm_texel(ivec2(p0.x, p1.y)), cm_texel(p1), weight.x), weight.y);
+  }
+  float alpha = clamp(value.a, 0.0, 1.0);
+  vec3 straight = alpha > 0.0 ? value.rgb / alpha : vec3(0.0);
+  cm_colour = vec4(cm_display(straight, cm_exposure, cm_tone_map, cm_encode) * alpha, alpha);
+#else
+  float z = texelFetch(cm_volume_z, min(ivec2(at), size - 1), 0).x;
+  if (!(z > 0.0)) discard;
+  gl_FragDepth = clamp(cm_depth.x + (cm_orthographic ? cm_depth.y * z : cm_depth.y / z), 0.0, 1.0);
+#endif
+}

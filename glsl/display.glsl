@@ -1,0 +1,46 @@
+// How linear radiance becomes displayed colour. Shared by GLSL and C++.
+#ifndef CM_DISPLAY_GLSL
+#define CM_DISPLAY_GLSL
+
+#define CM_TONE_MAP_NEUTRAL 0u
+#define CM_TONE_MAP_FILMIC 1u
+#define CM_TONE_MAP_CLIP 2u
+#define CM_TONE_MAP_NONE 3u
+
+// Not negative, not NaN, finite.
+CM_FN float cm_displayable(float x) { return x > 0.0f ? min(x, 1e30f) : 0.0f; }
+
+// Khronos PBR Neutral: https://github.com/KhronosGroup/ToneMapping. To [0, 1].
+CM_FN vec3 cm_tone_map_neutral(vec3 c) {
+  float start = 0.8f - 0.04f;
+  float room = 1.0f - start;
+  float least = min(c.x, min(c.y, c.z));
+  c -= least < 0.08f ? least - 6.25f * least * least : 0.04f;
+  float peak = max(c.x, max(c.y, c.z));
+  if (peak < start) return c;
+  float new_peak = 1.0f - room * room / (peak + room - start);
+  float keep = 1.0f / (0.15f * (peak - new_peak) + 1.0f);
+  return new_peak + (c * (new_peak / peak) - new_peak) * keep;
+}
+
+// Narkowicz, "ACES Filmic Tone Mapping Curve", 2015: (x (a x + b)) / (x (c x + d) + e), to [0, 1].
+CM_FN vec3 cm_tone_map_filmic(vec3 c) {
+  c = min(c, vec3(1e6f));  // flat long before its square overflows
+  return clamp((c * (2.51f * c + 0.03f)) / (c * (2.43f * c + 0.59f) + 0.14f), vec3(0.0f), vec3(1.0f));
+}
+
+CM_FN float cm_srgb_encode(float x) {
+  return x <= 0.0031308f ? 12.92f * x : 1.055f * pow(x, 1.0f / 2.4f) - 0.055f;
+}
+
+// Straight (not premultiplied) radiance to colour; with encode by the sRGB curve.
+CM_FN vec3 cm_display(vec3 radiance, float exposure, uint tone_map, bool encode) {
+  vec3 c = radiance * exposure;
+  c = vec3(cm_displayable(c.x), cm_displayable(c.y), cm_displayable(c.z));
+  if (tone_map == CM_TONE_MAP_NEUTRAL) c = cm_tone_map_neutral(c);
+  if (tone_map == CM_TONE_MAP_FILMIC) c = cm_tone_map_filmic(c);
+  if (tone_map != CM_TONE_MAP_NONE) c = min(c, vec3(1.0f));
+  return encode ? vec3(cm_srgb_encode(c.x), cm_srgb_encode(c.y), cm_srgb_encode(c.z)) : c;
+}
+
+#endif

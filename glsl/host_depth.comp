@@ -1,0 +1,40 @@
+#version 450
+// A host's depth as view depth, one layer a sample, and whether it differs from before.
+// variant: CM_MULTISAMPLE=0
+// variant: CM_MULTISAMPLE=1
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#if CM_MULTISAMPLE
+layout(binding = 0) uniform sampler2DMS cm_source;
+#else
+layout(binding = 0) uniform sampler2D cm_source;
+#endif
+layout(r32f, binding = 0) uniform image2DArray cm_z;
+layout(std430, binding = 0) buffer CmChanged { uint cm_changed; };
+layout(location = 0) uniform ivec2 cm_origin;
+layout(location = 1) uniform bool cm_flip_y;
+layout(location = 2) uniform bool cm_orthographic;
+layout(location = 3) uniform vec3 cm_depth;  // a, what a lacks of its double, b
+
+// z = b / (d - a), or (d - a) / b where orthographic; infinite at the far value and beyond, and for NaN.
+float cm_view_depth(float d) {
+  float infinite = uintBitsToFloat(0x7f800000u);
+  bool rising = (cm_depth.z > 0.0) == cm_orthographic;
+  if (rising ? !(d < 1.0) : !(d > 0.0)) return infinite;
+  // d is often within rounding of a: its difference to the float nearest a is exact, the rest comes after.
+  precise float difference = d - cm_depth.x;
+  precise float rest = difference - cm_depth.y;
+  if (cm_orthographic) return rest / cm_depth.z;
+  float z = cm_depth.z / rest;
+  return z > 0.0 ? z : infinite;
+}
+
+void main() {
+  ivec3 size = imageSize(cm_z);
+  ivec3 p = ivec3(gl_GlobalInvocationID);
+  if (p.x >= size.x || p.y >= size.y) return;
+  ivec2 texel = cm_origin + ivec2(p.x, cm_flip_y ? p.y : size.y - 1 - p.y);
+  float z = cm_view_depth(texelFetch(cm_source, texel, p.z).x);
+  if (z != imageLoad(cm_z, p).x) cm_changed = 1u;
+  imageStore(cm_z, p, vec4(z));
+}

@@ -1,0 +1,89 @@
+#include "render/compositor.hpp"
+
+#include <array>
+#include <string>
+
+#include "base/error.hpp"
+
+namespace cumulet::render {
+
+namespace {
+
+GLint as_bool(bool value) { return value ? 1 : 0; }
+
+gl::Object make_program(const gl::FunctionsPtr& gl, const char* define) {
+  const std::array<std::string, 1> defines{define};
+  return gl::make_graphics_program(gl, "composite.vert", "composite.frag", defines);
+}
+
+}  // namespace
+
+void Compositor::draw(const PictureTextures& picture, const Display& display, const FrameTarget& target) {
+  const glm::ivec4 viewport = target.viewport;
+  if (picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0 || viewport.z <= 0 || viewport.w <= 0) return;
+  const auto& gl = *gl_;
+  if (target.framebuffer != 0 && gl.IsFramebuffer(target.framebuffer) == GL_FALSE) {
+    throw Error(ErrorCode::invalid_argument,
+                "the target, " + std::to_string(target.framebuffer) + ", is no framebuffer of the current context");
+  }
+  if (gl.CheckNamedFramebufferStatus(target.framebuffer, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+    throw Error(ErrorCode::invalid_argument,
+                "the target, framebuffer " + std::to_string(target.framebuffer) + ", is not complete");
+  }
+  if (!colour_) colour_ = make_program(gl_, "CM_DEPTH 0");
+  const gl::Object vertex_array = gl::make_vertex_array(gl_);
+  gl.BindVertexArray(vertex_array.name());
+  gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
+  gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
+                      static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
+  gl.BindTextureUnit(0, picture.sum);
+  gl.BindTextureUnit(1, picture.counts);
+
+  const GLuint colour = colour_.name();
+  gl.ProgramUniform4i(colour, 0, viewport.x, viewport.y, viewport.z, viewport.w);
+  gl.ProgramUniform1i(colour, 1, as_bool(target.flip_y));
+  gl.ProgramUniform1f(colour, 2, exposure_of(display));
+  gl.ProgramUniform1ui(colour, 3, curve_of(display));
+  gl.ProgramUniform1i(colour, 4, as_bool(display.encoding == ColourEncoding::srgb));
+  gl.ProgramUniform1i(colour, 5, as_bool(display.transparent));
+  const glm::vec3 background = display.legend ? glm::vec3(0.0F) : display.background;
+  gl.ProgramUniform3f(colour, 6, background.x, background.y, background.z);
+  if (display.encoding == ColourEncoding::srgb_framebuffer) {
+    gl.Enable(GL_FRAMEBUFFER_SRGB);
+  } else {
+    gl.Disable(GL_FRAMEBUFFER_SRGB);
+  }
+  if (target.blend_over) {
+    gl.Enablei(GL_BLEND, 0);
+    gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
+    gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  } else {
+    gl.Disablei(GL_BLEND, 0);
+  }
+  gl.Disable(GL_DEPTH_TEST);
+  gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  gl.UseProgram(colour);
+  gl.DrawArrays(GL_TRIANGLES, 0, 3);
+
+  if (target.write_depth && picture.volume_z != 0) {
+    if (!depth_) depth_ = make_program(gl_, "CM_DEPTH 1");
+    const GLuint depth = depth_.name();
+    gl.BindTextureUnit(2, picture.volume_z);
+    gl.ProgramUniform4i(depth, 0, viewport.x, viewport.y, viewport.z, viewport.w);
+    gl.ProgramUniform1i(depth, 1, as_bool(target.flip_y));
+    gl.ProgramUniform2f(depth, 2, static_cast<GLfloat>(target.depth_a), static_cast<GLfloat>(target.depth_b));
+    gl.ProgramUniform1i(depth, 3, as_bool(target.orthographic));
+    gl.ColorMaski(0, GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(target.reversed ? GL_GEQUAL : GL_LEQUAL);
+    gl.DepthMask(GL_TRUE);
+    gl.UseProgram(depth);
+    gl.DrawArrays(GL_TRIANGLES, 0, 3);
+    gl.Disable(GL_DEPTH_TEST);
+    gl.DepthMask(GL_FALSE);
+    gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  }
+  gl::check(gl, "drawing the picture");
+}
+
+}  // namespace cumulet::render

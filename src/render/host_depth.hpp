@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+
+#include "gl/objects.hpp"
+
+namespace cumulet::render {
+
+enum class DepthSource { none = 0, texture = 1, texture_multisample = 2, framebuffer = 3 };
+
+/// The host's depth of one frame, and what its numbers mean: d = a + b / z, or a + b z where orthographic.
+struct HostDepthInput {
+  DepthSource source = DepthSource::none;
+  GLuint name = 0;
+  glm::ivec4 viewport{0};  // of the frame, as glViewport
+  glm::uvec2 target_size{0U};
+  bool flip_y = false;
+  bool orthographic = false;
+  double depth_a = 0.0;
+  double depth_b = 0.0;
+  bool unchanged = false;  // the host says so: nothing is read if all else (but the name) is as before
+};
+
+/// Keeps the host's depth as view depth z, a layer a sample (at most 8), row 0 the picture's top; infinity where there
+/// is no surface (the far value, or beyond). Needs the context current and a StateGuard around; leaves any state it
+/// likes.
+class HostDepth {
+ public:
+  explicit HostDepth(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  /// Reads the input. Returns whether z differs from before anywhere (or size or layers do). Throws
+  /// Error(invalid_argument) for a name that is no such texture or framebuffer, does not hold depth, or is smaller than
+  /// the viewport; z is then what it was. O(pixels), and one readback of 4 bytes.
+  bool update(const HostDepthInput& input);
+  /// GL_TEXTURE_2D_ARRAY, r32f; 0 without input.
+  [[nodiscard]] GLuint texture() const { return z_.name(); }
+  [[nodiscard]] glm::uvec2 size() const { return size_; }
+  [[nodiscard]] unsigned layers() const { return layers_; }
+
+ private:
+  /// A texture to read, and from where.
+  struct Source {
+    GLuint texture = 0;
+    int samples = 0;  // 0: a GL_TEXTURE_2D
+    glm::ivec2 origin{0};
+  };
+  Source open_texture(const HostDepthInput& input);
+  Source open_framebuffer(const HostDepthInput& input);
+  Source copy(GLuint framebuffer, GLenum format, int samples, glm::ivec4 rectangle);
+
+  gl::FunctionsPtr gl_;
+  HostDepthInput last_;
+  gl::Object z_;
+  glm::uvec2 size_{0U};
+  unsigned layers_ = 0;
+  gl::Object copy_;  // of what cannot be read in place
+  glm::ivec2 copy_size_{0};
+  GLenum copy_format_ = 0;
+  int copy_samples_ = 0;
+  std::array<gl::Object, 2> programs_;  // single, multisampled
+  gl::Object sampler_;
+  gl::Object changed_;
+};
+
+}  // namespace cumulet::render

@@ -1,0 +1,519 @@
+// What a picture looks like in the host's framebuffer, pixel by pixel against a CPU evaluation.
+
+#include "render/compositor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "base/error.hpp"
+#include "gl/state_guard.hpp"
+#include "image.hpp"
+#include "support/gl_state.hpp"
+
+namespace {
+
+using cumulet::Error;
+using cumulet::ErrorCode;
+using cumulet::gl::Object;
+using cumulet::gl::StateGuard;
+using cumulet::render::ColourEncoding;
+using cumulet::render::Display;
+using cumulet::render::FrameTarget;
+using cumulet::render::PictureTextures;
+using cumulet::render::ToneMap;
+namespace core = cumulet::core;
+namespace gl = cumulet::gl;
+namespace image = cumulet::image;
+namespace render = cumulet::render;
+
+// ---- The shared source, as C++
+
+TEST(Display, NeutralAgreesWithThePngWriter) {
+  std::mt19937 random(1);
+  std::lognormal_distribution<float> radiance(-0.5F, 2.0F);
+  for (int i = 0; i < 100000; ++i) {
+    glm::vec3 c(radiance(random), radiance(random), radiance(random));
+    if (i % 5 == 0) c.y = 0.0F;
+    if (i % 7 == 0) c = glm::vec3(c.x);
+    const std::array<float, 3> expected = image::tone_map_neutral({c.x, c.y, c.z});
+    const glm::vec3 got = core::cm_display(c, 1.0F, CM_TONE_MAP_NEUTRAL, false);
+    for (int k = 0; k < 3; ++k) {
+      ASSERT_NEAR(got[k], std::min(expected[static_cast<std::size_t>(k)], 1.0F), 1e-6F);
+      ASSERT_GE(got[k], 0.0F);
+    }
+  }
+}
+
+TEST(Display, EncodesAsSrgb) {
+  for (int i = 0; i <= 4096; ++i) {
+    const float x = static_cast<float>(i) / 4096.0F;
+    EXPECT_NEAR(core::cm_srgb_encode(x), image::srgb_encode(x), 1e-6F);
+  }
+  EXPECT_NEAR(core::cm_srgb_encode(0.18F), 0.46135613F, 1e-6F);  // IEC 61966-2-1
+}
+
+TEST(Display, CurvesRiseFromBlackToWhite) {
+  for (const std::uint32_t curve : {CM_TONE_MAP_NEUTRAL, CM_TONE_MAP_FILMIC, CM_TONE_MAP_CLIP}) {
+    EXPECT_EQ(core::cm_display(glm::vec3(0.0F), 1.0F, curve, true), glm::vec3(0.0F));
+    float last = -1.0F;
+    for (float x = 1e-4F; x < 1e8F; x *= 1.1F) {
+      const float y = core::cm_display(glm::vec3(x), 1.0F, curve, false).x;
+      EXPECT_GE(y, last - 1e-6F) << x;
+      EXPECT_LE(y, 1.0F);
+      last = y;
+    }
+    EXPECT_NEAR(last, 1.0F, 1e-3F) << curve;
+  }
+  // Narkowicz's own formula at a point.
+  EXPECT_NEAR(core::cm_display(glm::vec3(0.5F), 1.0F, CM_TONE_MAP_FILMIC, false).x,
+              0.5 * (2.51 * 0.5 + 0.03) / (0.5 * (2.43 * 0.5 + 0.59) + 0.14), 1e-6);
+}
+
+TEST(Display, WhatCannotBeShownIsBlackOrWhite) {
+  const float infinite = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const std::uint32_t curve : {CM_TONE_MAP_NEUTRAL, CM_TONE_MAP_FILMIC, CM_TONE_MAP_CLIP}) {
+    EXPECT_EQ(core::cm_display(glm::vec3(nan), 1.0F, curve, true), glm::vec3(0.0F));
+    EXPECT_EQ(core::cm_display(glm::vec3(-1.0F), 1.0F, curve, true), glm::vec3(0.0F));
+    EXPECT_NEAR(core::cm_display(glm::vec3(infinite), 1.0F, curve, true).x, 1.0F, 1e-6F);
+  }
+}
+
+TEST(Display, BytesOfAReadback) {
+  const std::vector<float> linear{0.2F, 0.1F, 0.05F, 0.5F, 0.0F, 0.0F, 0.0F, 0.0F, 4.0F, 0.02F, 0.0F, 1.0F};
+  const auto byte = [](float unit) { return static_cast<int>(std::lround(255.0F * unit)); };
+  std::vector<std::uint8_t> bytes(linear.size());
+  Display display;
+  display.tone_map = ToneMap::clip;
+  display.exposure_stops = 1.0F;
+  display.encoding = ColourEncoding::hdr;  // does not count
+  render::to_display(linear, display, bytes);
+  EXPECT_EQ(bytes[0], byte(image::srgb_encode(0.4F)));
+  EXPECT_EQ(bytes[1], byte(image::srgb_encode(0.2F)));
+  EXPECT_EQ(bytes[3], 255);
+  EXPECT_EQ(bytes[7], 255);
+  EXPECT_EQ(bytes[8], 255);
+  display.transparent = true;  // straight: 0.2 / 0.5
+  render::to_display(linear, display, bytes);
+  EXPECT_EQ(bytes[0], byte(image::srgb_encode(0.8F)));
+  EXPECT_EQ(bytes[3], 128);
+  EXPECT_EQ(bytes[4], 0);
+  EXPECT_EQ(bytes[7], 0);
+  display.transparent = false;  // a legend's colours are what they are
+  display.legend = true;
+  render::to_display(linear, display, bytes);
+  EXPECT_EQ(bytes[0], byte(image::srgb_encode(0.2F)));
+  EXPECT_EQ(bytes[8], 255);
+}
+
+// ---- The compositor
+
+struct Picture {
+  glm::ivec2 size{0};
+  std::vector<glm::vec4> sum;
+  std::vector<glm::uvec4> counts;
+  std::vector<float> z;
+  Object sum_texture, counts_texture, z_texture;
+
+  Picture(const gl::FunctionsPtr& gl, int width, int height, bool legend) : size(width, height) {
+    std::mt19937 random(static_cast<unsigned>(width * 131 + height));
+    std::uniform_real_distribution<float> unit(0.0F, 1.0F);
+    for (int i = 0; i < width * height; ++i) {
+      const unsigned samples = i % 5 == 0 ? 0U : 1U + static_cast<unsigned>(random() % 7);
+      const float alpha = i % 7 == 1 ? 0.0F : (i % 7 == 2 ? 1.0F : unit(random));
+      const float bright = legend ? 1.0F : (i % 3 == 0 ? 6.0F : 0.8F);
+      const glm::vec3 radiance = alpha * bright * glm::vec3(unit(random), unit(random), unit(random));
+      sum.push_back(static_cast<float>(samples) * glm::vec4(radiance, alpha));
+      counts.emplace_back(samples, 9U, 9U, 9U);
+      z.push_back(i % 3 == 0 ? 0.0F : 0.5F + 20.0F * unit(random));
+    }
+    sum_texture = gl::make_texture_2d(gl, GL_RGBA32F, width, height, "sum");
+    counts_texture = gl::make_texture_2d(gl, GL_RGBA32UI, width, height, "counts");
+    z_texture = gl::make_texture_2d(gl, GL_R32F, width, height, "z");
+    gl->TextureSubImage2D(sum_texture.name(), 0, 0, 0, width, height, GL_RGBA, GL_FLOAT, sum.data());
+    gl->TextureSubImage2D(counts_texture.name(), 0, 0, 0, width, height, GL_RGBA_INTEGER, GL_UNSIGNED_INT,
+                          counts.data());
+    gl->TextureSubImage2D(z_texture.name(), 0, 0, 0, width, height, GL_RED, GL_FLOAT, z.data());
+  }
+  [[nodiscard]] PictureTextures textures() const {
+    return {sum_texture.name(), counts_texture.name(), glm::uvec2(size), z_texture.name()};
+  }
+  [[nodiscard]] std::size_t index(glm::ivec2 p) const {
+    p = glm::clamp(p, glm::ivec2(0), size - 1);
+    return static_cast<std::size_t>(p.y * size.x + p.x);
+  }
+  [[nodiscard]] glm::dvec4 texel(glm::ivec2 p, const Display& display) const {
+    const std::size_t i = index(p);
+    if (counts[i].x == 0) return glm::dvec4(0.0);
+    glm::dvec4 mean = glm::dvec4(sum[i]) / double(counts[i].x);
+    if (display.transparent) return mean;
+    if (!display.legend) mean += glm::dvec4(glm::dvec3(display.background) * (1.0 - mean.a), 0.0);
+    return {glm::dvec3(mean), 1.0};
+  }
+};
+
+/// What is written at a pixel of the viewport, before GL blends and encodes; row 0 is the picture's top.
+glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 pixel, glm::ivec2 viewport) {
+  glm::dvec4 value;
+  if (picture.size == viewport) {
+    value = picture.texel(pixel, display);
+  } else {
+    const glm::dvec2 at = (glm::dvec2(pixel) + 0.5) * glm::dvec2(picture.size) / glm::dvec2(viewport) - 0.5;
+    const glm::ivec2 low(glm::floor(at));
+    const glm::dvec2 weight = at - glm::dvec2(low);
+    value = glm::mix(glm::mix(picture.texel(low, display), picture.texel(low + glm::ivec2(1, 0), display), weight.x),
+                     glm::mix(picture.texel(low + glm::ivec2(0, 1), display),
+                              picture.texel(low + glm::ivec2(1, 1), display), weight.x),
+                     weight.y);
+  }
+  if (value.a <= 0.0) return glm::dvec4(0.0);
+  glm::dvec3 c = glm::dvec3(value) / value.a;
+  if (!display.legend) c *= std::exp2(double(display.exposure_stops));
+  if (display.encoding != ColourEncoding::hdr) {
+    if (!display.legend && display.tone_map == ToneMap::neutral) {
+      const auto mapped = image::tone_map_neutral({float(c.x), float(c.y), float(c.z)});
+      c = {mapped[0], mapped[1], mapped[2]};
+    } else if (!display.legend && display.tone_map == ToneMap::filmic) {
+      c = (c * (2.51 * c + 0.03)) / (c * (2.43 * c + 0.59) + 0.14);
+    }
+    c = glm::clamp(c, 0.0, 1.0);
+  }
+  if (display.encoding == ColourEncoding::srgb) {
+    for (int k = 0; k < 3; ++k) c[k] = image::srgb_encode(float(c[k]));
+  }
+  return {c * value.a, value.a};
+}
+
+class Compositing : public cumulet::test::GlTest {
+ protected:
+  static constexpr glm::ivec2 size{40, 28};
+
+  void SetUp() override {
+    GlTest::SetUp();
+    if (gl_) compositor_.emplace(gl_);
+  }
+
+  /// A framebuffer with a colour of that format (samples 0: a plain texture) and depth, cleared to known values.
+  struct Target {
+    Object colour, depth, framebuffer;
+  };
+  [[nodiscard]] Target make_target(GLenum format, int samples, float depth = 1.0F) const {
+    Target target;
+    if (samples > 0) {
+      target.colour = gl::make_texture_2d_multisample(gl_, format, samples, size.x, size.y, "colour");
+      target.depth = gl::make_texture_2d_multisample(gl_, GL_DEPTH_COMPONENT32F, samples, size.x, size.y, "depth");
+    } else {
+      target.colour = gl::make_texture_2d(gl_, format, size.x, size.y, "colour");
+      target.depth = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, size.x, size.y, "depth");
+    }
+    target.framebuffer = gl::make_framebuffer(gl_);
+    gl_->NamedFramebufferTexture(target.framebuffer.name(), GL_COLOR_ATTACHMENT0, target.colour.name(), 0);
+    gl_->NamedFramebufferTexture(target.framebuffer.name(), GL_DEPTH_ATTACHMENT, target.depth.name(), 0);
+    gl_->ClearNamedFramebufferfv(target.framebuffer.name(), GL_COLOR, 0, &before.x);
+    gl_->ClearNamedFramebufferfv(target.framebuffer.name(), GL_DEPTH, 0, &depth);
+    return target;
+  }
+  /// As stored: neither decoded nor clamped. Multisampled targets are resolved first.
+  [[nodiscard]] std::vector<glm::vec4> read(const Target& target, GLenum format, int samples) const {
+    GLuint texture = target.colour.name();
+    Target resolved;
+    if (samples > 0) {
+      resolved = make_target(format, 0);
+      gl_->BlitNamedFramebuffer(target.framebuffer.name(), resolved.framebuffer.name(), 0, 0, size.x, size.y, 0, 0,
+                                size.x, size.y, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+      texture = resolved.colour.name();
+    }
+    std::vector<glm::vec4> pixels(static_cast<std::size_t>(size.x * size.y));
+    if (format == GL_RGBA8 || format == GL_SRGB8_ALPHA8) {
+      std::vector<glm::u8vec4> bytes(pixels.size());
+      gl_->GetTextureImage(texture, 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(bytes.size() * 4), bytes.data());
+      for (std::size_t i = 0; i < bytes.size(); ++i) pixels[i] = glm::vec4(bytes[i]);
+    } else {
+      gl_->GetTextureImage(texture, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels.size() * 16), pixels.data());
+    }
+    return pixels;
+  }
+  [[nodiscard]] std::vector<float> read_depth(const Target& target) const {
+    std::vector<float> depths(static_cast<std::size_t>(size.x * size.y));
+    gl_->GetTextureImage(target.depth.name(), 0, GL_DEPTH_COMPONENT, GL_FLOAT, static_cast<GLsizei>(depths.size() * 4),
+                         depths.data());
+    return depths;
+  }
+
+  /// Draws, and compares every pixel of the target, inside the viewport and out. Bytes must be the nearest to the exact
+  /// value, but where that lies within slack of a half.
+  void check(const Picture& picture, const Display& display, const FrameTarget& wanted, GLenum format, int samples) {
+    const Target made = make_target(format, samples);
+    const std::vector<glm::vec4> untouched = read(made, format, samples);
+    FrameTarget target = wanted;
+    target.framebuffer = made.framebuffer.name();
+    {
+      const StateGuard guard(*gl_);
+      compositor_->draw(picture.textures(), display, target);
+    }
+    const std::vector<glm::vec4> got = read(made, format, samples);
+    const glm::ivec4 viewport = target.viewport;
+    const bool bytes = format == GL_RGBA8 || format == GL_SRGB8_ALPHA8;
+    const bool srgb_target = format == GL_SRGB8_ALPHA8;
+    for (int y = 0; y < size.y; ++y) {
+      for (int x = 0; x < size.x; ++x) {
+        const auto i = static_cast<std::size_t>(y * size.x + x);
+        const glm::ivec2 in(x - viewport.x, y - viewport.y);
+        if (in.x < 0 || in.y < 0 || in.x >= viewport.z || in.y >= viewport.w) {
+          ASSERT_EQ(got[i], untouched[i]) << x << ' ' << y;
+          continue;
+        }
+        const int row = target.flip_y ? in.y : viewport.w - 1 - in.y;
+        glm::dvec4 expected = evaluate(picture, display, {in.x, row}, {viewport.z, viewport.w});
+        if (target.blend_over) {
+          glm::dvec4 below = before;
+          if (bytes && !srgb_target) below = glm::dvec4(untouched[i]) / 255.0;
+          if (srgb_target) {
+            for (int k = 0; k < 3; ++k) below[k] = image::srgb_decode(untouched[i][k] / 255.0F);
+            below.a = untouched[i].a / 255.0;
+          }
+          expected += below * (1.0 - expected.a);
+        }
+        if (srgb_target) {
+          for (int k = 0; k < 3; ++k) expected[k] = image::srgb_encode(float(expected[k]));
+        }
+        for (int k = 0; k < 4; ++k) {
+          const double want = bytes ? 255.0 * std::min(expected[k], 1.0) : expected[k];
+          // llvmpipe blends bytes as bytes: source, alpha and product are rounded.
+          const double byte_slack = target.blend_over && expected.a < 1.0 ? 1.55 : 0.51;
+          const double slack = bytes ? (srgb_target ? 0.75 : byte_slack) : 4e-5 * std::max(1.0, expected[k]);
+          ASSERT_NEAR(got[i][k], want, slack) << "pixel " << x << ',' << y << " channel " << k;
+        }
+      }
+    }
+  }
+
+  glm::vec4 before{0.25F, 0.5F, 0.125F, 0.75F};
+  std::optional<render::Compositor> compositor_;
+};
+CUMULET_GL_ON_BACKENDS(Compositing);
+
+TEST_P(Compositing, EveryEncodingCurveAndBackground) {
+  const Picture picture(gl_, 21, 13, false);
+  FrameTarget target;
+  target.viewport = {7, 5, 21, 13};
+  for (const ColourEncoding encoding :
+       {ColourEncoding::srgb, ColourEncoding::srgb_framebuffer, ColourEncoding::linear, ColourEncoding::hdr}) {
+    for (const ToneMap curve : {ToneMap::neutral, ToneMap::filmic, ToneMap::clip}) {
+      for (const bool transparent : {false, true}) {
+        for (const bool over : {false, true}) {
+          SCOPED_TRACE(testing::Message() << "encoding " << int(encoding) << " curve " << int(curve) << " transparent "
+                                          << transparent << " over " << over);
+          Display display;
+          display.encoding = encoding;
+          display.tone_map = curve;
+          display.transparent = transparent;
+          display.background = {0.3F, 0.6F, 1.4F};
+          display.exposure_stops = -0.5F;
+          target.blend_over = over;
+          if (encoding == ColourEncoding::srgb_framebuffer) {
+            check(picture, display, target, GL_SRGB8_ALPHA8, 0);
+          } else {
+            check(picture, display, target, GL_RGBA32F, 0);
+            if (encoding != ColourEncoding::hdr) check(picture, display, target, GL_RGBA8, 0);
+          }
+          ASSERT_FALSE(HasFatalFailure());
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Compositing, SizesFlipsRectanglesAndSamples) {
+  const std::vector<Picture> pictures = [this] {
+    std::vector<Picture> made;
+    for (const glm::ivec2 s : {glm::ivec2(23, 17), glm::ivec2(6, 4), glm::ivec2(1, 1), glm::ivec2(37, 29)}) {
+      made.emplace_back(gl_, s.x, s.y, false);
+    }
+    return made;
+  }();
+  Display display;
+  display.transparent = true;
+  for (const Picture& picture : pictures) {
+    for (const glm::ivec4 viewport : {glm::ivec4(0, 0, 40, 28), glm::ivec4(3, 9, 23, 17), glm::ivec4(-5, 20, 30, 30)}) {
+      for (const bool flip : {false, true}) {
+        for (const int samples : {0, 4}) {
+          SCOPED_TRACE(testing::Message()
+                       << picture.size.x << " wide into " << viewport.z << " flip " << flip << " samples " << samples);
+          FrameTarget target;
+          target.viewport = viewport;
+          target.flip_y = flip;
+          check(picture, display, target, GL_RGBA32F, samples);
+          check(picture, display, target, GL_RGBA8, samples);
+          ASSERT_FALSE(HasFatalFailure());
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Compositing, LegendsAreShownAsTheyAre) {
+  const Picture picture(gl_, 21, 13, true);
+  FrameTarget target;
+  target.viewport = {7, 5, 21, 13};
+  for (const bool transparent : {false, true}) {
+    Display display;
+    display.legend = true;
+    display.transparent = transparent;
+    display.exposure_stops = 3.0F;
+    display.background = glm::vec3(0.7F);
+    check(picture, display, target, GL_RGBA8, 0);
+    display.encoding = ColourEncoding::linear;
+    check(picture, display, target, GL_RGBA32F, 0);
+  }
+}
+
+TEST_P(Compositing, OtherDrawBuffersAreNotWritten) {
+  const Picture picture(gl_, 16, 16, false);
+  const Target made = make_target(GL_RGBA32F, 0);
+  const Object other = gl::make_texture_2d(gl_, GL_RGBA32F, size.x, size.y, "another");
+  gl_->NamedFramebufferTexture(made.framebuffer.name(), GL_COLOR_ATTACHMENT1, other.name(), 0);
+  const std::array<GLenum, 2> buffers{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+  gl_->NamedFramebufferDrawBuffers(made.framebuffer.name(), 2, buffers.data());
+  gl_->ClearNamedFramebufferfv(made.framebuffer.name(), GL_COLOR, 1, &before.x);
+  FrameTarget target;
+  target.framebuffer = made.framebuffer.name();
+  target.viewport = {0, 0, size.x, size.y};
+  target.write_depth = true;
+  {
+    const StateGuard guard(*gl_);
+    compositor_->draw(picture.textures(), {}, target);
+  }
+  std::vector<glm::vec4> pixels(static_cast<std::size_t>(size.x * size.y));
+  gl_->GetTextureImage(other.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels.size() * 16), pixels.data());
+  for (const glm::vec4& pixel : pixels) ASSERT_EQ(pixel, before);
+  const std::vector<glm::vec4> drawn = read(made, GL_RGBA32F, 0);
+  EXPECT_LT(std::count(drawn.begin(), drawn.end(), before), size.x * size.y / 4);
+}
+
+TEST_P(Compositing, DepthIsWrittenByTheConvention) {
+  struct Convention {
+    bool reversed, orthographic;
+    double a, b;
+  };
+  const double near = 0.25;
+  const double far = 50.0;
+  const std::array<Convention, 4> conventions{{{false, false, far / (far - near), -far * near / (far - near)},
+                                               {true, false, 0.0, near},
+                                               {false, true, 0.0, 1.0 / far},
+                                               {true, true, 1.0, -1.0 / far}}};
+  const Picture picture(gl_, 20, 12, false);
+  for (const auto& [reversed, orthographic, a, b] : conventions) {
+    for (const bool flip : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "reversed " << reversed << " orthographic " << orthographic << " flip "
+                                      << flip);
+      // The host's surface stands at z = 8.
+      const auto surface = static_cast<float>(orthographic ? a + b * 8.0 : a + b / 8.0);
+      const Target made = make_target(GL_RGBA32F, 0, surface);
+      FrameTarget target;
+      target.framebuffer = made.framebuffer.name();
+      target.viewport = {10, 6, 20, 12};
+      target.flip_y = flip;
+      target.write_depth = true;
+      target.reversed = reversed;
+      target.orthographic = orthographic;
+      target.depth_a = a;
+      target.depth_b = b;
+      {
+        const StateGuard guard(*gl_);
+        compositor_->draw(picture.textures(), {}, target);
+        // What comes after starts from the same state.
+        EXPECT_EQ(gl_->IsEnabled(GL_DEPTH_TEST), GL_FALSE);
+      }
+      const std::vector<float> depths = read_depth(made);
+      const std::vector<glm::vec4> colours = read(made, GL_RGBA32F, 0);
+      int written = 0;
+      for (int y = 0; y < size.y; ++y) {
+        for (int x = 0; x < size.x; ++x) {
+          const auto i = static_cast<std::size_t>(y * size.x + x);
+          const glm::ivec2 in(x - 10, y - 6);
+          if (in.x < 0 || in.y < 0 || in.x >= 20 || in.y >= 12) {
+            ASSERT_EQ(depths[i], surface);
+            continue;
+          }
+          const std::size_t p = picture.index({in.x, flip ? in.y : 11 - in.y});
+          const double z = picture.z[p];
+          const bool in_front = z > 0.0 && z < 8.0;
+          written += in_front ? 1 : 0;
+          const double expected = in_front ? (orthographic ? a + b * z : a + b / z) : double(surface);
+          ASSERT_NEAR(depths[i], expected, 3e-7) << x << ' ' << y;
+          if (picture.counts[p].x > 0) {
+            ASSERT_NE(colours[i], before);  // hidden or not
+          }
+        }
+      }
+      EXPECT_GT(written, 20);
+    }
+  }
+}
+
+TEST_P(Compositing, DepthOutsideItsRangeIsClamped) {
+  const Picture picture(gl_, 8, 8, false);
+  const Target made = make_target(GL_RGBA32F, 0, 1.0F);
+  FrameTarget target;
+  target.framebuffer = made.framebuffer.name();
+  target.viewport = {0, 0, 8, 8};
+  target.write_depth = true;
+  target.depth_a = -3.0;
+  {
+    const StateGuard guard(*gl_);
+    compositor_->draw(picture.textures(), {}, target);
+  }
+  const std::vector<float> depths = read_depth(made);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      const bool surface = picture.z[picture.index({x, 7 - y})] > 0.0F;
+      ASSERT_EQ(depths[static_cast<std::size_t>(y * size.x + x)], surface ? 0.0F : 1.0F);
+    }
+  }
+}
+
+TEST_P(Compositing, NothingToDraw) {
+  const Picture picture(gl_, 8, 8, false);
+  const Target made = make_target(GL_RGBA8, 0);
+  const std::vector<glm::vec4> untouched = read(made, GL_RGBA8, 0);
+  FrameTarget target;
+  target.framebuffer = made.framebuffer.name();
+  target.blend_over = false;
+  const StateGuard guard(*gl_);
+  compositor_->draw(picture.textures(), {}, target);  // a viewport of size 0
+  target.viewport = {0, 0, 8, 8};
+  compositor_->draw({}, {}, target);
+  EXPECT_EQ(read(made, GL_RGBA8, 0), untouched);
+}
+
+TEST_P(Compositing, BadTargetsAreTold) {
+  const Picture picture(gl_, 8, 8, false);
+  const Object incomplete = gl::make_framebuffer(gl_);
+  FrameTarget target;
+  target.viewport = {0, 0, 8, 8};
+  const StateGuard guard(*gl_);
+  const auto cause = [&](GLuint name) -> std::string {
+    target.framebuffer = name;
+    try {
+      compositor_->draw(picture.textures(), {}, target);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::invalid_argument);
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(cause(4711), "the target, 4711, is no framebuffer of the current context");
+  EXPECT_EQ(cause(incomplete.name()),
+            "the target, framebuffer " + std::to_string(incomplete.name()) + ", is not complete");
+  EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
+}
+
+}  // namespace
