@@ -315,10 +315,15 @@ TEST(CameraMatrices, NearestPoseKeepsPlanesMiddleAndLevel) {
 TEST(CameraMatrices, KeepTheTargetInMindWhileTheHostLooksAround) {
   Camera camera(pose_at({0, 0, 10}, {0, 0, 1}));
   const dmat4 projection = glm::infinitePerspective(0.8, 1.4, 0.3);
-  for (const double turn : {0.5, 1.5, 2.5, 3.5, 0.0}) {
-    const dvec3 at(10 * std::sin(turn), 0, 10 - 10 * std::cos(turn));
-    camera.set_matrices(glm::lookAt(dvec3(0, 0, 10), at, dvec3(0, 1, 0)), projection, ClipDepth::negative_one_to_one);
-    EXPECT_NEAR(distance(camera.pose()), 9.0, 1e-9);
+  const dvec3 target(0, 0, 1);
+  const std::pair<dvec3, dvec3> views[] = {// eye, and what it looks at
+                                           {{0, 0, 10}, {9, 0, 10}},
+                                           {{5, 0, 10}, {5, 3, 90}},
+                                           {{-5, 2, -10}, {-9, 2, -10}},
+                                           {{0, 0, 10}, {0, 0, -7}}};
+  for (const auto& [eye, at] : views) {
+    camera.set_matrices(glm::lookAt(eye, at, dvec3(0, 1, 0)), projection, ClipDepth::negative_one_to_one);
+    EXPECT_NEAR(distance(camera.pose()), glm::length(target - eye), 1e-9);
   }
   expect_near(camera.pose().target, {0, 0, 1}, 1e-9);
 }
