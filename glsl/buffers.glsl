@@ -1,4 +1,13 @@
-// Bindings of the marches' data.
+// Bindings of the marches' data, and of the host's depth.
+layout(binding = 11) uniform sampler2DArray cm_surface;
+
+float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
+  if (cm.surface.x == 0u) return 3.0e38;
+  vec2 at = (vec2(pixel) + within) * vec2(cm.surface.yz) / vec2(cm.image.xy);
+  ivec2 texel = min(ivec2(at), ivec2(cm.surface.yz) - 1);
+  return texelFetch(cm_surface, ivec3(texel, int(layer % cm.surface.x)), 0).x;
+}
+
 #if CM_MARCH == 0
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
 layout(binding = 0) uniform usamplerBuffer cm_cells[CM_PAGES];

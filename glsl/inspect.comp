@@ -1,5 +1,6 @@
 #version 450
-// Views that show the grid rather than light: one deterministic ray a pixel through its centre.
+// What one deterministic ray a pixel, through its centre, tells: views that show the grid rather than light, and the
+// depth at half opacity.
 // variant: CM_MARCH=0 CM_LINEAR=0 CM_PAGES=1
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8
 // variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1
@@ -20,7 +21,14 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path.glsl"
 
 layout(rgba32f, binding = 0) uniform writeonly image2D cm_sum;
-layout(rg32ui, binding = 1) uniform writeonly uimage2D cm_counts;
+layout(rgba32ui, binding = 1) uniform writeonly uimage2D cm_counts;
+layout(r32f, binding = 2) uniform writeonly image2D cm_volume_z;
+
+#define CM_VIEW_CELLS 1u
+#define CM_VIEW_STEPS 2u
+#define CM_VIEW_DENSITY 3u
+#define CM_VIEW_WIREFRAME 4u
+#define CM_VIEW_DEPTH 5u
 
 // Dark blue, teal, green, yellow: rises in lightness, so it reads without colour too.
 vec3 cm_ramp(float x) {
@@ -42,70 +50,117 @@ float cm_edge(vec3 n, float c, vec3 p, uint axis) {
   return slope > 0.0 ? abs(c - dot(n, p)) / slope : 3.0e38;
 }
 
-// Colour of the cell at p and how far its edges are; levels count from the coarsest.
-vec3 cm_show_cell(vec3 p, uint axis, float pixel_size) {
-  uvec3 cell = cm_march_enter(p);
-  float edge = 3.0e38;
-  float level = 0.0;
-  float density = 0.0;
+// The four planes n.x = c of a cell, and its level from 0 (coarsest) to 1.
+struct CmFaces {
+  vec3 normal[4];
+  float c[4];
+  int count;
+  float level;
+  float size;
+};
+
+CmFaces cm_faces(uvec3 cell, vec3 p) {
+  CmFaces faces;
 #if CM_MARCH == 0
   uvec4 data = cm_record(cell.x, 1u);
   vec3 v0 = cm_record_v0(data);
   uint shape = cm_record_shape(data);
   uint cell_class = cm_shape_class(shape);
-  vec3 q = cm_to_frame(p - v0, shape);
   float unit = cm_shape_unit(shape);
   vec3 normal[4] = vec3[4](vec3(0, 0, 1), vec3(1, -1, 0), vec3(0, 1, -1),
                            vec3(1, cell_class == 0u ? 1 : 0, cell_class == 2u ? 1 : 0));
   for (int i = 0; i < 4; ++i) {
-    float c = i == 3 ? (cell_class == 1u ? unit : 2.0 * unit) : 0.0;
-    vec3 n = cm_from_frame(normal[i], shape);
-    edge = min(edge, cm_edge(n, c + dot(n, v0), p, axis));
+    faces.normal[i] = cm_from_frame(normal[i], shape);
+    faces.c[i] = (i == 3 ? (cell_class == 1u ? unit : 2.0 * unit) : 0.0) + dot(faces.normal[i], v0);
   }
+  faces.count = 4;
   float depth = 3.0 * float(cm.cube.x - cm_shape_exponent(shape)) +
                 (cell_class == 0u ? 0.0 : (cell_class == 1u ? 1.0 : -1.0));
-  level = depth / max(1.0, float(cm.cube.w));
-  density = unpackHalf2x16(data.z).x;
+  faces.level = depth / max(1.0, float(cm.cube.w));
+  faces.size = unit;
 #else
+  // The four nearest of a voxel's six faces: those that matter.
   vec3 low = vec3(cm_voxel_of(cell));
+  vec3 high = low + 1.0;
+  bvec3 upper = greaterThan(p - low, vec3(0.5));
   for (int i = 0; i < 3; ++i) {
-    vec3 n = vec3(i == 0, i == 1, i == 2);
-    edge = min(edge, min(cm_edge(n, low[i], p, axis), cm_edge(n, low[i] + 1.0, p, axis)));
+    faces.normal[i] = vec3(i == 0, i == 1, i == 2);
+    faces.c[i] = upper[i] ? high[i] : low[i];
   }
-  level = 1.0;
-  float t_1, r_1;
+  faces.normal[3] = faces.normal[2];
+  faces.c[3] = faces.c[2];
+  faces.count = 3;
+  faces.level = 1.0;
+  faces.size = 1.0;
+#endif
+  return faces;
+}
+
+float cm_density_at(uvec3 cell, vec3 p) {
+  float t_1, r_0, r_1;
   uvec3 next;
   vec3 d = vec3(1.0, 0.0, 0.0);
-  cm_march_step(cell, p, d, 1.0 / d, 0.0, t_1, density, r_1, next);
-#endif
-  vec3 colour = cm_ramp(level) * (density > 0.0 ? 1.0 : 0.35) + 0.35 * density;
+  cm_march_step(cell, p, d, 1.0 / d, 0.0, t_1, r_0, r_1, next);
+  return r_0;
+}
+
+// Colour of the cell at p, darkened towards its edges.
+vec3 cm_show_cell(vec3 p, uint axis, float pixel_size) {
+  uvec3 cell = cm_march_enter(p);
+  CmFaces faces = cm_faces(cell, p);
+  float edge = 3.0e38;
+  for (int i = 0; i < faces.count; ++i) edge = min(edge, cm_edge(faces.normal[i], faces.c[i], p, axis));
+  float density = cm_density_at(cell, p);
+  vec3 colour = cm_ramp(faces.level) * (density > 0.0 ? 1.0 : 0.35) + 0.35 * density;
   return mix(vec3(0.0), colour, clamp(0.35 + 0.65 * edge / pixel_size, 0.35, 1.0));
 }
 
+// How far p, on one of the cell's faces, is from that face's nearest edge.
+float cm_face_edge(CmFaces faces, vec3 p) {
+  int face = 0;
+  float nearest = 3.0e38;
+  for (int i = 0; i < faces.count; ++i) {
+    float distance = abs(faces.c[i] - dot(faces.normal[i], p)) * inversesqrt(dot(faces.normal[i], faces.normal[i]));
+    if (distance < nearest) {
+      nearest = distance;
+      face = i;
+    }
+  }
+  vec3 m = normalize(faces.normal[face]);
+  float edge = 3.0e38;
+  for (int i = 0; i < faces.count; ++i) {
+    vec3 in_plane = faces.normal[i] - dot(faces.normal[i], m) * m;
+    float slope = length(in_plane);
+    if (i != face && slope > 1e-4) edge = min(edge, abs(faces.c[i] - dot(faces.normal[i], p)) / slope);
+  }
+  return edge;
+}
+
 void main() {
-  uvec2 local = gl_GlobalInvocationID.xy;
-  if (local.x >= cm.tile.z || local.y >= cm.tile.w) return;
+  uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.order.z);
+  if (local.x >= cm.tile.z || local.y >= cm.order.w) return;
   uvec2 pixel = cm.tile.xy + local;
-  vec3 w = cm_camera_direction(pixel, vec2(0.5));
+  uint view = cm.march.y;
   CmPath p;
-  p.o = cm.eye.xyz;
+  vec3 w;
+  float t_per_z = cm_camera_ray(pixel, vec2(0.5), p.o, w);
   p.d = cm_to_cube(w);
   p.steps = 0u;
-  p.depth_0 = 3.0e38;
-  p.depth = 3.0e38;
   vec3 colour = vec3(0.02);
   float alpha = 0.0;
+  float half_t = 0.0;
   vec2 range = cm_box_range(p.o, p.d);
+  range.y = min(range.y, t_per_z * cm_surface_z(pixel, vec2(0.5), 0u));
   bool hit = range.x < range.y;
-  uint view = cm.march.y;
-  if (view == 1u) {
+  // Width of a pixel in cube space, over t where perspective.
+  float footprint = length(p.d) * 2.0 * length(cm.up.xyz) / float(cm.image.y);
+  if (view == CM_VIEW_CELLS) {
     vec3 f = abs(cm_to_cube(cm.forward.xyz));
     uint axis = f.x >= f.y && f.x >= f.z ? 0u : (f.y >= f.z ? 1u : 2u);
     float middle = cm_pick(0.5 * (cm.box_min.xyz + cm.box_max.xyz), axis) + 0.217;  // off the lattice
     float t = (middle - cm_pick(p.o, axis)) / cm_pick(p.d, axis);
     if (hit && t > range.x && t < range.y) {
-      float pixel_size = t * length(p.d) * 2.0 * length(cm.up.xyz) / float(cm.image.y);
-      colour = cm_show_cell(p.o + t * p.d, axis, pixel_size);
+      colour = cm_show_cell(p.o + t * p.d, axis, footprint * (cm.forward.w > 0.5 ? 1.0 : t));
       alpha = 1.0;
     }
   } else if (hit) {
@@ -113,18 +168,46 @@ void main() {
     float t = range.x;
     uvec3 cell = cm_march_enter(clamp(p.o + t * p.d, cm.box_min.xyz, cm.box_max.xyz));
     vec3 inv_d = 1.0 / p.d;
-    for (int i = 0; i < 100000 && cell.x != CM_NONE && t < range.y; ++i) {
+    vec3 lines = vec3(0.0);
+    float clear = 1.0;
+    for (int i = 0; i < 100000 && cell.x != CM_NONE && t < range.y && clear > 0.02; ++i) {
       float t_1, r_0, r_1;
       uvec3 next;
       cm_march_step(cell, p.o, p.d, inv_d, t, t_1, r_0, r_1, next);
-      used += 0.5 * cm.medium.x * (r_0 + r_1) * (t_1 - t);
+      float e_0 = cm.medium.x * r_0;
+      float e_1 = cm.medium.x * r_1;
+      float span = t_1 - t;
+      float depth = 0.5 * (e_0 + e_1) * span;
+      if (view == CM_VIEW_DEPTH && used + depth >= 0.69314718) {
+        // As cm_march inverts it.
+        float left = 0.69314718 - used;
+        float root = sqrt(max(0.0, e_0 * e_0 + 2.0 * (e_1 - e_0) / span * left));
+        half_t = t + min(span, 2.0 * left / (e_0 + root));
+        if (half_t >= range.y) half_t = 0.0;
+        break;
+      }
+      if (view == CM_VIEW_WIREFRAME && (r_0 > 0.0 || r_1 > 0.0)) {
+        vec3 at = p.o + t * p.d;
+        CmFaces faces = cm_faces(cell, at);
+        float size = max(footprint * (cm.forward.w > 0.5 ? 1.0 : t), 1e-20);
+        // Edges of cells that are a few pixels wide would cover all.
+        float line = clamp(1.2 - cm_face_edge(faces, at) / size, 0.0, 1.0) * smoothstep(0.0, 12.0, faces.size / size);
+        lines += clear * 0.8 * line * cm_ramp(faces.level);
+        clear *= (1.0 - 0.8 * line) * exp(-depth);
+      }
+      used += depth;
       t = t_1;
       cell = next;
       p.steps += 1u;
     }
     alpha = 1.0 - exp(-used);
     // Steps: each doubling is a tenth of the ramp, 1024 its end.
-    colour = view == 2u ? cm_ramp(log2(1.0 + float(p.steps)) * 0.1) : vec3(alpha);
+    colour = view == CM_VIEW_STEPS ? cm_ramp(log2(1.0 + float(p.steps)) * 0.1) : vec3(alpha);
+    if (view == CM_VIEW_WIREFRAME) colour = lines + clear * vec3(0.02) + 0.04 * alpha;
+  }
+  if (view == CM_VIEW_DEPTH) {
+    imageStore(cm_volume_z, ivec2(cm.order.y != 0u ? local : pixel), vec4(half_t / t_per_z));
+    return;
   }
   imageStore(cm_sum, ivec2(pixel), vec4(colour, alpha));
   imageStore(cm_counts, ivec2(pixel), uvec4(1u, p.steps, 0u, 0u));

@@ -8,9 +8,9 @@ struct CmParameters {
 layout(std140, binding = 0) uniform CmParameters {
 #endif
   vec4 eye;             // cube space
-  vec4 forward;         // world space; with right and up spans the image plane at distance 1
-  vec4 right;           // scaled by the tangent of half the horizontal field of view
-  vec4 up;              // likewise, vertical
+  vec4 forward;         // world space; with right and up spans the image plane at distance 1; w: 1 where orthographic
+  vec4 right;           // scaled by half the width of that plane
+  vec4 up;              // likewise, height
   vec4 to_cube_x;       // columns of the linear part of world to cube space
   vec4 to_cube_y;
   vec4 to_cube_z;
@@ -28,7 +28,9 @@ layout(std140, binding = 0) uniform CmParameters {
   uvec4 march;          // x: iterations a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of cells a page,
                         // w: 1 where a pass begins
   uvec4 cube;           // x: exponent of the root cells, y: number of cells, z: number of tree nodes, w: levels
-  uvec4 order;          // x: row of work groups y of a dispatch works on row y x (mod rows)
+  uvec4 order;          // x: row of work groups y of a dispatch works on row y x (mod rows); y: 1 to pick one pixel;
+                        // z, w: first row of the tile to trace, and the row after the last
+  uvec4 surface;        // the host's depth: x: layers (0: none), y: width, z: height
 #ifdef __cplusplus
 };
 #else

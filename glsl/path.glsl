@@ -3,6 +3,7 @@
 //   cm                                            the parameters
 //   uvec3 cm_march_enter(vec3 p)                  the cell (or voxel) that holds point p of cube space
 //   void cm_march_step(uvec3 cell, o, d, inv_d, t, t_1, r_0, r_1, next)
+//   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface there
 // which gives the part of the ray inside the cell, from t to t_1, the density at both ends (linear between them), and
 // the next cell; next.x == CM_NONE outside. The third word of a cell is the march's own cache, CM_NONE when unknown.
 //
@@ -52,6 +53,7 @@ struct CmPath {
   uvec2 home;       // the cell of o, while a shadow ray is under way
   uint samples;     // finished in this pixel
   uint steps;       // of all its samples
+  float square;     // sum over its samples of their squared luminance
 };
 
 CM_FN vec3 cm_to_cube(vec3 v) { return vec3(cm.to_cube_x) * v.x + vec3(cm.to_cube_y) * v.y + vec3(cm.to_cube_z) * v.z; }
@@ -73,10 +75,16 @@ CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
   return vec2(t_in, t_out);
 }
 
-CM_FN vec3 cm_camera_direction(uvec2 pixel, vec2 within) {
+// The ray through a point of a pixel: o in cube space, w a unit vector in world space. Returns the distance along it per
+// unit of view depth.
+CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3) w) {
   float x = 2.0f * (float(pixel.x) + within.x) / float(cm.image.x) - 1.0f;
   float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(cm.image.y);
-  return normalize(vec3(cm.forward) + x * vec3(cm.right) + y * vec3(cm.up));
+  vec3 aside = x * vec3(cm.right) + y * vec3(cm.up);
+  vec3 v = vec3(cm.forward) + (1.0f - cm.forward.w) * aside;
+  o = vec3(cm.eye) + cm.forward.w * cm_to_cube(aside);
+  w = normalize(v);
+  return length(v);
 }
 
 // Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
@@ -112,17 +120,22 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
     float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * p.depth));
     p.t += min(span, 2.0f * p.depth / (e_0 + root));
     p.depth = -1.0f;
+    if (p.t >= p.t_end) event = CM_EVENT_ESCAPE;  // behind a surface
   }
   return event;
 }
 
+// What lies behind the volume is added to the finished picture, not here.
 CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
-  sum += vec4(p.radiance, p.bounce > 0u ? 1.0f : 0.0f);
+  float alpha = p.bounce > 0u ? 1.0f : 0.0f;
+  sum += vec4(p.radiance, alpha);
+  float luminance = dot(p.radiance + (1.0f - alpha) * vec3(cm.sky_radiance), vec3(0.2126f, 0.7152f, 0.0722f));
+  p.square += luminance * luminance;
   p.samples += 1u;
   p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
 }
 
-// A camera ray for the next sample; finishes at once if it misses the box.
+// A camera ray for the next sample; finishes at once if it meets nothing of the box.
 CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   uvec3 h = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, p.samples, cm.image.z));
   p.random = h.x;
@@ -131,8 +144,8 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   // of Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018, shifted by a random offset a pixel.
   uvec3 shift = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, 0x5bd1e995u, cm.image.z));
   uvec3 even = shift + p.samples * uvec3(3518319155u, 2882110345u, 2360945575u);
-  p.w = cm_camera_direction(pixel, vec2(cm_unit_float(even.x), cm_unit_float(even.y)));
-  p.o = vec3(cm.eye);
+  vec2 within = vec2(cm_unit_float(even.x), cm_unit_float(even.y));
+  float t_per_z = cm_camera_ray(pixel, within, p.o, p.w);
   p.d = cm_to_cube(p.w);
   p.throughput = vec3(1.0f, 1.0f, 1.0f);
   p.radiance = vec3(0.0f, 0.0f, 0.0f);
@@ -142,12 +155,10 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   p.mode = CM_MODE_FLIGHT;
   vec2 range = cm_box_range(p.o, p.d);
   p.t = range.x;
-  p.t_end = range.y;
+  // Samples go through the layers in turn, each pixel from one of its own.
+  p.t_end = min(range.y, t_per_z * cm_surface_z(pixel, within, (shift.x >> 16) + p.samples));
   p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
-  if (!(range.x < range.y)) {
-    p.radiance = vec3(cm.sky_radiance);
-    cm_finish(p, sum);
-  }
+  if (!(range.x < p.t_end)) cm_finish(p, sum);
 }
 
 // What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
@@ -162,7 +173,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
     float transmittance = exp(-depth);
     float balanced = transmittance / max(q + transmittance, 1e-30f);
     float survival = flight ? 1.0f : min(1.0f, exp(CM_SHADOW_DEPTH - depth));
-    float weight = p.mode == CM_MODE_SHADOW_SUN ? transmittance : (p.bounce == 0u ? 1.0f : balanced);
+    float weight = p.mode == CM_MODE_SHADOW_SUN ? transmittance : (p.bounce == 0u ? 0.0f : balanced);
     vec3 light = flight ? p.throughput * vec3(cm.sky_radiance) : p.light;
     p.radiance += light * (weight / survival);
     finished = flight;

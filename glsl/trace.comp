@@ -1,5 +1,5 @@
 #version 450
-// One lane a pixel of the tile: loads its path, runs it for a bounded number of steps, stores it.
+// One lane a pixel of some rows of the tile: loads its path, runs it for a bounded number of steps, stores it.
 // variant: CM_MARCH=0 CM_LINEAR=0 CM_PAGES=1
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8
@@ -21,9 +21,13 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path.glsl"
 
 layout(std430, binding = 0) buffer CmPaths { uvec4 cm_paths[]; };  // 8 planes of one word-quad a lane
-layout(std430, binding = 1) buffer CmCounter { uint cm_unfinished; };
+layout(std430, binding = 1) buffer CmCounter {
+  uint cm_unfinished;  // pixels without their target samples
+  uint cm_empty;       // of these, pixels without any
+  uint cm_finished;    // samples finished in this dispatch
+};
 layout(rgba32f, binding = 0) uniform image2D cm_sum;
-layout(rg32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps
+layout(rgba32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps, sum of squared luminance (a float)
 
 uvec4 cm_pack(vec3 v, uint w) { return uvec4(floatBitsToUint(v), w); }
 
@@ -31,17 +35,18 @@ void main() {
   // Rows are dealt out far apart: a driver that gives each core a run of work groups then gives each its share of the
   // costly ones.
   uint row = gl_WorkGroupID.y * cm.order.x % gl_NumWorkGroups.y;
-  uvec2 local = uvec2(gl_GlobalInvocationID.x, row * gl_WorkGroupSize.y + gl_LocalInvocationID.y);
-  if (local.x >= cm.tile.z || local.y >= cm.tile.w) return;
+  uvec2 local = uvec2(gl_GlobalInvocationID.x, cm.order.z + row * gl_WorkGroupSize.y + gl_LocalInvocationID.y);
+  if (local.x >= cm.tile.z || local.y >= cm.order.w) return;
   uint lanes = cm.tile.z * cm.tile.w;
   uint lane = local.y * cm.tile.z + local.x;
   uvec2 pixel = cm.tile.xy + local;
   ivec2 texel = ivec2(pixel);
 
   CmPath p;
+  uvec4 counts = imageLoad(cm_counts, texel);
+  p.square = uintBitsToFloat(counts.z);
   if (cm.march.w != 0u) {
     // A pass begins: every pixel goes on from the samples it has.
-    uvec4 counts = imageLoad(cm_counts, texel);
     p.samples = counts.x;
     p.steps = counts.y;
     p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
@@ -90,10 +95,11 @@ void main() {
     p.steps = a7.w;
   }
 
+  uint samples = p.samples;
   vec4 sum = imageLoad(cm_sum, texel);
   cm_run(p, pixel, cm.march.x, sum);
   imageStore(cm_sum, texel, sum);
-  imageStore(cm_counts, texel, uvec4(p.samples, p.steps, 0u, 0u));
+  imageStore(cm_counts, texel, uvec4(p.samples, p.steps, floatBitsToUint(p.square), 0u));
 
   cm_paths[lane] = cm_pack(p.o, floatBitsToUint(p.t));
   cm_paths[lanes + lane] = cm_pack(p.d, floatBitsToUint(p.depth));
@@ -104,4 +110,6 @@ void main() {
   cm_paths[6u * lanes + lane] = uvec4(p.cell.xy, floatBitsToUint(p.t_end), p.stream);
   cm_paths[7u * lanes + lane] = uvec4(p.home, p.samples, p.steps);
   if (p.mode != CM_MODE_DONE) atomicAdd(cm_unfinished, 1u);
+  if (p.samples == 0u) atomicAdd(cm_empty, 1u);
+  if (p.samples != samples) atomicAdd(cm_finished, p.samples - samples);
 }

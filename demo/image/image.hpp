@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,8 @@ struct PngOptions {
 
 /// 8 bits a channel, sRGB.
 void write_png(const std::string& path, const Image& image, const PngOptions& options = {});
+/// The same from bytes, width x height x 4, first pixel top left, straight alpha.
+void write_png(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const std::uint8_t> rgba);
 /// OpenEXR: 32-bit float channels R, G, B, A, scanlines, ZIP; linear, untouched.
 void write_exr(const std::string& path, const Image& image);
 /// Portable float map: RGB (alpha is dropped), little-endian, bottom row first; linear, untouched.

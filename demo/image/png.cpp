@@ -28,6 +28,19 @@ float displayable(float value) {
   return std::min(value, 1e30f);
 }
 
+void write_bytes(const std::string& path, std::uint32_t width, std::uint32_t height, std::size_t channels,
+                 std::span<const std::uint8_t> bytes) {
+  std::string file;
+  const auto append = [](void* context, void* data, int size) {
+    static_cast<std::string*>(context)->append(static_cast<const char*>(data), static_cast<std::size_t>(size));
+  };
+  const auto row = static_cast<int>(width);
+  if (stbi_write_png_to_func(append, &file, row, static_cast<int>(height), static_cast<int>(channels), bytes.data(),
+                             row * static_cast<int>(channels)) == 0)
+    fail(path, "the PNG encoder failed: the picture may be too large for it");
+  replace_file(path, file);
+}
+
 }  // namespace
 
 std::array<float, 3> tone_map_neutral(std::array<float, 3> rgb) {
@@ -68,15 +81,14 @@ void write_png(const std::string& path, const Image& image, const PngOptions& op
     for (std::size_t c = 0; c < 3; ++c) out[c] = to_byte(srgb_encode(std::min(displayable(rgb[c]), 1.0f)));
     if (options.keep_alpha) out[3] = to_byte(displayable(in[3]));
   }
-  std::string file;
-  const auto append = [](void* context, void* data, int size) {
-    static_cast<std::string*>(context)->append(static_cast<const char*>(data), static_cast<std::size_t>(size));
-  };
-  const auto width = static_cast<int>(image.width);
-  if (stbi_write_png_to_func(append, &file, width, static_cast<int>(image.height), static_cast<int>(channels),
-                             bytes.data(), width * static_cast<int>(channels)) == 0)
-    fail(path, "the PNG encoder failed: the picture may be too large for it");
-  replace_file(path, file);
+  write_bytes(path, image.width, image.height, channels, bytes);
+}
+
+void write_png(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const std::uint8_t> rgba) {
+  check_size(path, width, height);
+  if (rgba.size() != std::size_t{4} * width * height)
+    throw std::logic_error(path + ": an image's size and its pixels disagree");
+  write_bytes(path, width, height, 4, rgba);
 }
 
 Image read_png(const std::string& path) {

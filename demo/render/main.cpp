@@ -87,10 +87,6 @@ void check(const Viewer& viewer, cumulet_status status) {
   throw std::runtime_error(cause.empty() ? "status " + std::to_string(status) : cause);
 }
 
-void check_not_interrupted() {
-  if (interrupted) throw std::runtime_error("interrupted before the first sample: nothing is written");
-}
-
 Backend backend_of(cumulet::demo::BackendChoice choice) {
   switch (choice) {
     case cumulet::demo::BackendChoice::egl:
@@ -115,6 +111,34 @@ const char* march_name(cumulet_march march) {
   return "tet";
 }
 
+void check_not_interrupted() {
+  if (interrupted) throw std::runtime_error("interrupted before the first sample: nothing is written");
+}
+
+void set_camera(const Viewer& viewer, const cumulet_camera_desc& desc) {
+  cumulet_camera* camera = nullptr;
+  check(viewer, cumulet_get_camera(viewer.get(), &camera));
+  const cumulet_status status = cumulet_camera_set(camera, &desc);
+  cumulet_camera_release(camera);
+  if (status != CUMULET_OK) throw std::runtime_error("the camera is not usable");
+}
+
+/// Until the library's worker is done. Throws its error.
+void wait(const Viewer& viewer, Progress& progress) {
+  cumulet_progress state{};
+  state.struct_size = sizeof state;
+  for (;;) {
+    const cumulet_status status = cumulet_wait(viewer.get(), 100.0);
+    if (status != CUMULET_ERROR_TIMEOUT) return check(viewer, status);
+    if (interrupted) {
+      cumulet_cancel(viewer.get());
+      check_not_interrupted();
+    }
+    cumulet_get_progress(viewer.get(), &state);
+    if (state.stage > CUMULET_STAGE_LOADING) progress.stage("building the grid");
+  }
+}
+
 cumulet_stats stats_of(const Viewer& viewer) {
   cumulet_stats stats{};
   stats.struct_size = sizeof stats;
@@ -122,26 +146,32 @@ cumulet_stats stats_of(const Viewer& viewer) {
   return stats;
 }
 
+cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& options, double budget_ms) {
+  cumulet_frame_desc frame{};
+  frame.struct_size = sizeof frame;
+  frame.target = CUMULET_TARGET_NONE;
+  frame.width = options.scene.width;
+  frame.height = options.scene.height;
+  frame.budget_ms = budget_ms;
+  cumulet_frame_result result{};
+  result.struct_size = sizeof result;
+  check(viewer, cumulet_render(viewer.get(), &frame, &result));
+  return result;
+}
+
 void write_picture(const Viewer& viewer, const RenderOptions& options) {
-  cumulet::image::Image image{options.scene.image.width, options.scene.image.height, {}};
-  image.rgba.resize(std::size_t{4} * image.width * image.height);
-  check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
-  switch (options.format) {
-    case OutputFormat::png: {
-      cumulet::image::PngOptions png;
-      png.exposure_stops = options.exposure_stops;
-      // The other views' colours are a legend, not light.
-      if (options.scene.image.view != CUMULET_VIEW_SHADED) png.tone_mapping = cumulet::image::ToneMapping::none;
-      cumulet::image::write_png(options.output, image, png);
-      break;
-    }
-    case OutputFormat::exr:
-      cumulet::image::write_exr(options.output, image);
-      break;
-    case OutputFormat::pfm:
-      cumulet::image::write_pfm(options.output, image);
-      break;
+  cumulet::image::Image image{options.scene.width, options.scene.height, {}};
+  const std::size_t count = std::size_t{4} * image.width * image.height;
+  if (options.format == OutputFormat::png) {
+    std::vector<std::uint8_t> bytes(count);
+    check(viewer, cumulet_read_display(viewer.get(), bytes.data(), bytes.size()));
+    cumulet::image::write_png(options.output, image.width, image.height, bytes);
+    return;
   }
+  image.rgba.resize(count);
+  check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
+  options.format == OutputFormat::exr ? cumulet::image::write_exr(options.output, image)
+                                      : cumulet::image::write_pfm(options.output, image);
 }
 
 /// The names and units are scripted against: design.md, section 6. What does not apply is left out.
@@ -190,31 +220,34 @@ void render(const RenderOptions& options) {
   progress.stage("loading " + options.scene.volume);
   Context context = Context::create(backend_of(options.backend));
   const Viewer viewer = create_viewer(context, progress);
-  const char* grid_name = options.scene.grid_name.empty() ? nullptr : options.scene.grid_name.c_str();
-  check(viewer, cumulet_load_volume(viewer.get(), options.scene.volume.c_str(), grid_name));
-  check_not_interrupted();
-  check(viewer, cumulet_set_grid(viewer.get(), &options.scene.grid));
-  check(viewer, cumulet_set_medium(viewer.get(), &options.scene.medium));
-  check(viewer, cumulet_set_light(viewer.get(), &options.scene.light));
-  check(viewer, cumulet_set_camera(viewer.get(), &options.scene.camera));
-  check(viewer, cumulet_set_image(viewer.get(), &options.scene.image));
+  const auto& scene = options.scene;
+  cumulet_sampling_desc sampling = scene.sampling;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  check(viewer, cumulet_set_grid(viewer.get(), &scene.grid));
+  check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
+  check(viewer, cumulet_set_light(viewer.get(), &scene.light));
+  check(viewer, cumulet_set_sampling(viewer.get(), &sampling));
+  check(viewer, cumulet_set_display(viewer.get(), &scene.display));
+  set_camera(viewer, scene.camera);
+  const char* grid_name = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();
+  check(viewer, cumulet_load_volume(viewer.get(), scene.volume.c_str(), grid_name));
+  wait(viewer, progress);
 
-  progress.stage("building the grid");
-  check(viewer, cumulet_build(viewer.get()));
-  check_not_interrupted();
-
-  const auto& image = options.scene.image;
-  const double total = static_cast<double>(image.width) * image.height * image.samples;
+  const double total = static_cast<double>(scene.width) * scene.height * sampling.samples;
   constexpr double budget_ms = 200.0;  // how often the bar moves, and how long Ctrl-C may take
-  std::uint32_t flags = 0;
-  double part = 0.0;
-  progress.render(part, total);
-  while (!interrupted && (flags & CUMULET_RENDER_CONVERGED) == 0) {
-    check(viewer, cumulet_render(viewer.get(), budget_ms, &flags, &part));
-    progress.render(part, total);
+  cumulet_frame_result frame{};
+  bool began = false;
+  while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
+    frame = render_frame(viewer, options, budget_ms);
+    // A camera-adaptive grid is built once the first frame has told the size.
+    if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
+    if (frame.width > 0 || frame.progress > 0.0) {
+      began = true;
+      progress.render(frame.progress, total);
+    }
   }
-  const bool complete = (flags & CUMULET_RENDER_CONVERGED) != 0;
-  if (!complete && part <= 0.0) check_not_interrupted();
+  const bool complete = (frame.flags & CUMULET_RENDER_CONVERGED) != 0;
+  if (!began) check_not_interrupted();
 
   progress.stage("writing " + options.output);
   write_picture(viewer, options);

@@ -6,7 +6,18 @@
 namespace cumulet {
 
 /// Why an operation failed. The C ABI maps each to one cumulet_status.
-enum class ErrorCode { invalid_argument, unsupported, file, out_of_memory, gl, internal };
+enum class ErrorCode {
+  invalid_argument,
+  unsupported,
+  file,
+  out_of_memory,
+  gl,
+  internal,
+  cancelled,
+  context_lost,
+  detached,
+  timeout
+};
 
 /// The library's one exception. It never crosses the C ABI. The message is one
 /// line that names the file (where there is one) and the cause.

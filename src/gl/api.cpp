@@ -52,10 +52,17 @@ void check(const Functions& gl, const char* step) {
   const GLenum first = gl.GetError();
   if (first == GL_NO_ERROR) return;
   clear_errors(gl);
+  if (first == GL_CONTEXT_LOST) throw Error(ErrorCode::context_lost, std::string("the GL context is lost: ") + step);
+  check_reset(gl);
   if (first == GL_OUT_OF_MEMORY) {
     throw Error(ErrorCode::out_of_memory, std::string("the GL driver is out of memory: ") + step);
   }
   throw Error(ErrorCode::gl, "GL error " + std::to_string(first) + ": " + step);
+}
+
+void check_reset(const Functions& gl) {
+  if (gl.GetGraphicsResetStatus == nullptr || gl.GetGraphicsResetStatus() == GL_NO_ERROR) return;
+  throw Error(ErrorCode::context_lost, "the driver reset the GL context");
 }
 
 void clear_errors(const Functions& gl) {

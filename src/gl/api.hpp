@@ -2,14 +2,18 @@
 
 #include <glad/gl.h>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
 
 namespace cumulet::gl {
 
-/// The GL function table of one instance, loaded through the host's callback. Nothing is linked.
-using Functions = GladGLContext;
+/// The GL function table of one context, loaded through the host's callback. Nothing is linked.
+struct Functions : GladGLContext {
+  /// The context is gone: objects are forgotten, not deleted.
+  mutable std::atomic<bool> abandoned = false;
+};
 
 /// What the library needs of the context's limits.
 struct Limits {
@@ -23,8 +27,10 @@ struct Limits {
 std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user);
 Limits query_limits(const Functions& gl);
 
-/// Takes all pending GL errors; throws Error(out_of_memory or gl) that names the step.
+/// Takes all pending GL errors; throws Error(out_of_memory, context_lost or gl) that names the step.
 void check(const Functions& gl, const char* step);
+/// Throws Error(context_lost) if the driver says that it reset the context.
+void check_reset(const Functions& gl);
 /// Drops errors that were pending before we came.
 void clear_errors(const Functions& gl);
 

@@ -18,16 +18,7 @@ using glm::vec3;
 
 constexpr std::int64_t max_pages = 8;
 constexpr GLuint tree_unit = 12;
-
-struct VoxelBox {
-  ivec3 low;  // cube space
-  ivec3 size;
-};
-
-VoxelBox voxel_box(const grid::Statistics& statistics, const volume::ScalarVolume& volume) {
-  const ivec3 low = volume.bounds_min - statistics.cube().origin;
-  return {low, volume.bounds_max - volume.bounds_min + 1};
-}
+constexpr std::size_t piece_bytes = std::size_t{2} << 20U;  // about a millisecond
 
 void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   const int widest = std::max({size.x, size.y, size.z});
@@ -38,154 +29,215 @@ void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   }
 }
 
-float relative_scale(const volume::ScalarVolume& volume) {
-  return volume.max_value > 0.0F ? 1.0F / volume.max_value : 1.0F;
-}
+float relative_scale(float max_value) { return max_value > 0.0F ? 1.0F / max_value : 1.0F; }
 
-}  // namespace
-
-MarchData MarchData::upload_tet(const gl::FunctionsPtr& gl, const gl::Limits& limits, const grid::TetGrid& grid,
-                                bool linear, std::int64_t page_texels) {
-  MarchData data;
-  data.march_ = March::tet;
-  data.linear_ = linear;
-  data.box_min_ = grid.content_min;
-  data.box_max_ = grid.content_max;
-  const auto cells = static_cast<std::int64_t>(grid.cells.size());
-  data.cube_ = {static_cast<unsigned>(grid.cube.log2_size - 1), static_cast<unsigned>(cells),
-                static_cast<unsigned>(grid.tree.size()), grid.levels};
-
-  const std::int64_t texels = page_texels > 0 ? page_texels : limits.texture_buffer_texels;
-  std::int64_t page_cells = texels / 2;
-  if (page_cells < cells)
-    page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
-  data.log2_page_cells_ = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
-  const std::int64_t tree_texels = (static_cast<std::int64_t>(grid.tree.size()) + 3) / 4;
-  if (cells > page_cells * max_pages || tree_texels > limits.texture_buffer_texels) {
-    throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " + std::to_string(max_pages) +
-                                            " texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
-                                            std::to_string(texels) + " texels");
-  }
-  const auto add = [&](const void* bytes, std::size_t size, GLenum format, const char* what) {
-    data.buffers_.push_back(gl::make_buffer(gl, size, bytes, 0, what));
-    data.bytes_ += size;
-    return gl::make_texture_buffer(gl, format, data.buffers_.back(), what);
-  };
-  for (std::int64_t first = 0; first < cells; first += page_cells) {
-    const std::int64_t count = std::min(page_cells, cells - first);
-    data.pages_.push_back(add(grid.cells.data() + first, static_cast<std::size_t>(count) * sizeof(grid::CellRecord),
-                              GL_RGBA32UI, "uploading cell records"));
-  }
-  std::vector<std::uint32_t> tree = grid.tree;
-  tree.resize(static_cast<std::size_t>(std::max<std::int64_t>(tree_texels, 1)) * 4);
-  data.textures_[0] = add(tree.data(), tree.size() * 4, GL_RGBA32UI, "uploading the point-location tree");
-  std::array<grid::RootEntry, 26> roots{};
-  std::copy(grid.roots.begin(), grid.roots.end(), roots.begin());
-  data.roots_ = gl::make_buffer(gl, sizeof(roots), roots.data(), 0, "uploading the root cells");
-  data.bytes_ += sizeof(roots);
-  return data;
-}
-
-MarchData MarchData::upload_dense(const gl::FunctionsPtr& gl, const gl::Limits& limits,
-                                  const grid::Statistics& statistics, const volume::ScalarVolume& volume) {
-  MarchData data;
-  data.march_ = March::dense;
-  const VoxelBox box = voxel_box(statistics, volume);
-  require_3d(limits, box.size, "the dense march");
-  data.box_min_ = vec3(box.low);
-  data.box_max_ = vec3(box.low + box.size);
-  data.textures_[1] =
-      gl::make_texture_3d(gl, GL_R16F, box.size.x, box.size.y, box.size.z, "creating the dense texture");
-  const float scale = relative_scale(volume);
-  // One layer of bricks at a time: bounded memory.
-  const auto row = static_cast<std::size_t>(box.size.x);
-  const std::size_t slice = row * static_cast<std::size_t>(box.size.y);
-  std::vector<std::uint16_t> slab(slice * volume::brick_size);
-  for (int z = box.low.z & ~7; z < box.low.z + box.size.z; z += volume::brick_size) {
-    const int first = std::max(z, box.low.z);
-    const int last = std::min(z + volume::brick_size, box.low.z + box.size.z);
-    const int bricks_y = ((box.low.y + box.size.y + 7) >> 3) - (box.low.y >> 3);
-    tbb::parallel_for(0, bricks_y, [&](int by) {
-      const int y = ((box.low.y >> 3) + by) * 8;
-      for (int x = box.low.x & ~7; x < box.low.x + box.size.x; x += volume::brick_size) {
-        const grid::Statistics::Node& node = statistics.node_at({x, y, z});
-        const float* values = node.is_uniform() ? nullptr : statistics.values(node);
-        const ivec3 from = glm::max(ivec3(x, y, z), box.low);
-        const ivec3 to = glm::min(ivec3(x, y, z) + 8, box.low + box.size);
-        for (int k = from.z; k < to.z; ++k) {
-          for (int j = from.y; j < to.y; ++j) {
-            for (int i = from.x; i < to.x; ++i) {
-              const float value = values == nullptr ? node.uniform : values[(i & 7) * 64 + (j & 7) * 8 + (k & 7)];
-              slab[static_cast<std::size_t>(k - first) * slice + static_cast<std::size_t>(j - box.low.y) * row +
-                   static_cast<std::size_t>(i - box.low.x)] = glm::packHalf1x16(value * scale);
-            }
-          }
-        }
-      }
-    });
-    gl->PixelStorei(GL_UNPACK_ALIGNMENT, 2);
-    gl->TextureSubImage3D(data.textures_[1].name(), 0, 0, 0, first - box.low.z, box.size.x, box.size.y, last - first,
-                          GL_RED, GL_HALF_FLOAT, slab.data());
-  }
-  gl::check(*gl, "uploading the dense texture");
-  data.bytes_ = slice * static_cast<std::size_t>(box.size.z) * 2;
-  return data;
-}
-
-MarchData MarchData::upload_brick(const gl::FunctionsPtr& gl, const gl::Limits& limits,
-                                  const grid::Statistics& statistics, const volume::ScalarVolume& volume) {
-  MarchData data;
-  data.march_ = March::brick;
-  const VoxelBox box = voxel_box(statistics, volume);
-  data.box_min_ = vec3(box.low);
-  data.box_max_ = vec3(box.low + box.size);
-  const ivec3 first = box.low >> 3;
-  const ivec3 bricks = ((box.low + box.size + 7) >> 3) - first;
-  require_3d(limits, bricks, "the brick march");
+void pack_bricks(MarchSource& source) {
+  const grid::Statistics& statistics = *source.statistics;
+  const ivec3 first = source.box_low >> 3;
+  source.brick_count = ((source.box_low + source.box_size + 7) >> 3) - first;
   constexpr std::uint32_t empty = 0xfffffffeU;
-  std::vector<std::uint32_t> slots;
-  std::vector<std::uint16_t> values;
   std::unordered_map<float, std::uint32_t> uniform_slots;
-  const float scale = relative_scale(volume);
+  const float scale = relative_scale(source.max_value);
   std::uint32_t count = 0;
-  for (int z = 0; z < bricks.z; ++z) {
-    for (int y = 0; y < bricks.y; ++y) {
-      for (int x = 0; x < bricks.x; ++x) {
+  for (int z = 0; z < source.brick_count.z; ++z) {
+    for (int y = 0; y < source.brick_count.y; ++y) {
+      for (int x = 0; x < source.brick_count.x; ++x) {
         const grid::Statistics::Node& node = statistics.node_at((first + ivec3(x, y, z)) * 8);
         if (node.is_uniform() && node.uniform == 0.0F) {
-          slots.push_back(empty);
+          source.brick_slots.push_back(empty);
           continue;
         }
         if (node.is_uniform()) {
           const auto [found, added] = uniform_slots.emplace(node.uniform, count);
-          slots.push_back(found->second);
+          source.brick_slots.push_back(found->second);
           if (!added) continue;
         } else {
-          slots.push_back(count);
+          source.brick_slots.push_back(count);
         }
         ++count;
-        const float* source = node.is_uniform() ? nullptr : statistics.values(node);
+        const float* values = node.is_uniform() ? nullptr : statistics.values(node);
         for (int i = 0; i < volume::brick_voxels; ++i) {
-          values.push_back(glm::packHalf1x16((source == nullptr ? node.uniform : source[i]) * scale));
+          source.brick_values.push_back(glm::packHalf1x16((values == nullptr ? node.uniform : values[i]) * scale));
         }
       }
     }
   }
-  if (static_cast<std::int64_t>(values.size()) > limits.texture_buffer_texels) {
-    throw Error(ErrorCode::unsupported, "the brick march needs " + std::to_string(values.size()) +
-                                            " texels; this driver's GL_MAX_TEXTURE_BUFFER_SIZE is " +
-                                            std::to_string(limits.texture_buffer_texels));
+  if (source.brick_values.empty()) source.brick_values.resize(volume::brick_voxels);
+}
+
+// Slices first to last (not included) of a dense volume, as half floats.
+void fill_slab(const MarchSource& source, int first, int last, std::vector<std::uint16_t>& slab) {
+  const grid::Statistics& statistics = *source.statistics;
+  const ivec3 low = source.box_low;
+  const ivec3 high = low + source.box_size;
+  const auto row = static_cast<std::size_t>(source.box_size.x);
+  const std::size_t slice = row * static_cast<std::size_t>(source.box_size.y);
+  slab.resize(slice * static_cast<std::size_t>(last - first));
+  const float scale = relative_scale(source.max_value);
+  tbb::parallel_for(low.y >> 3, (high.y + 7) >> 3, [&](int by) {
+    for (int x = low.x & ~7; x < high.x; x += volume::brick_size) {
+      const grid::Statistics::Node& node = statistics.node_at({x, by * 8, first & ~7});
+      const float* values = node.is_uniform() ? nullptr : statistics.values(node);
+      const ivec3 from = glm::max(ivec3(x, by * 8, first), low);
+      const ivec3 to = glm::min(ivec3(x + 8, by * 8 + 8, last), high);
+      for (int k = from.z; k < to.z; ++k) {
+        for (int j = from.y; j < to.y; ++j) {
+          for (int i = from.x; i < to.x; ++i) {
+            const float value = values == nullptr ? node.uniform : values[(i & 7) * 64 + (j & 7) * 8 + (k & 7)];
+            slab[static_cast<std::size_t>(k - first) * slice + static_cast<std::size_t>(j - low.y) * row +
+                 static_cast<std::size_t>(i - low.x)] = glm::packHalf1x16(value * scale);
+          }
+        }
+      }
+    }
+  });
+}
+
+}  // namespace
+
+MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value) {
+  MarchSource source;
+  source.cube = grid->cube;
+  source.max_value = max_value;
+  source.grid = std::move(grid);
+  source.linear = linear;
+  return source;
+}
+
+MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
+                              std::shared_ptr<const grid::Statistics> statistics) {
+  MarchSource source;
+  source.march = march;
+  source.cube = statistics->cube();
+  source.max_value = volume->max_value;
+  source.box_low = volume->bounds_min - source.cube.origin;
+  source.box_size = volume->bounds_max - volume->bounds_min + 1;
+  source.volume = std::move(volume);
+  source.statistics = std::move(statistics);
+  if (march == March::brick) pack_bricks(source);
+  return source;
+}
+
+MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, std::shared_ptr<const MarchSource> source,
+                         std::int64_t page_texels)
+    : gl_(std::move(gl)), limits_(limits), source_(std::move(source)) {
+  data_.march_ = source_->march;
+  if (source_->march == March::tet) {
+    plan_tet(page_texels);
+  } else {
+    data_.box_min_ = vec3(source_->box_low);
+    data_.box_max_ = vec3(source_->box_low + source_->box_size);
+    source_->march == March::dense ? plan_dense() : plan_brick();
   }
-  if (values.empty()) values.resize(volume::brick_voxels);
-  data.buffers_.push_back(gl::make_buffer(gl, values.size() * 2, values.data(), 0, "uploading bricks"));
-  data.textures_[1] = gl::make_texture_buffer(gl, GL_R16F, data.buffers_.back(), "uploading bricks");
-  data.textures_[2] = gl::make_texture_3d(gl, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
-  gl->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  gl->TextureSubImage3D(data.textures_[2].name(), 0, 0, 0, 0, bricks.x, bricks.y, bricks.z, GL_RED_INTEGER,
-                        GL_UNSIGNED_INT, slots.data());
-  gl::check(*gl, "uploading the brick slots");
-  data.bytes_ = values.size() * 2 + slots.size() * 4;
-  return data;
+}
+
+bool MarchUpload::advance(Deadline deadline) {
+  while (next_ < steps_.size()) {
+    steps_[next_]();
+    gl::check(*gl_, "uploading the volume");
+    ++next_;
+    if (std::chrono::steady_clock::now() >= deadline) break;
+  }
+  return next_ == steps_.size();
+}
+
+void MarchUpload::plan_texture_buffer(const void* bytes, std::size_t size, std::size_t capacity, GLenum format,
+                                      const char* what, std::function<void(gl::Object)> place) {
+  const std::size_t index = data_.buffers_.size();
+  data_.buffers_.emplace_back();
+  data_.bytes_ += capacity;
+  steps_.emplace_back([this, index, capacity, format, what, place = std::move(place)] {
+    data_.buffers_[index] = gl::make_buffer(gl_, capacity, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+    place(gl::make_texture_buffer(gl_, format, data_.buffers_[index], what));
+  });
+  for (std::size_t first = 0; first < size; first += piece_bytes) {
+    steps_.emplace_back([this, index, first, count = std::min(piece_bytes, size - first), bytes] {
+      gl_->NamedBufferSubData(data_.buffers_[index].name(), static_cast<GLintptr>(first),
+                              static_cast<GLsizeiptr>(count), static_cast<const char*>(bytes) + first);
+    });
+  }
+}
+
+void MarchUpload::plan_tet(std::int64_t page_texels) {
+  const grid::TetGrid& grid = *source_->grid;
+  data_.linear_ = source_->linear;
+  data_.box_min_ = grid.content_min;
+  data_.box_max_ = grid.content_max;
+  const auto cells = static_cast<std::int64_t>(grid.cells.size());
+  data_.cube_ = {static_cast<unsigned>(grid.cube.log2_size - 1), static_cast<unsigned>(cells),
+                 static_cast<unsigned>(grid.tree.size()), grid.levels};
+  const std::int64_t texels = page_texels > 0 ? page_texels : limits_.texture_buffer_texels;
+  std::int64_t page_cells = texels / 2;
+  if (page_cells < cells)
+    page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
+  data_.log2_page_cells_ = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
+  const std::int64_t tree_texels = std::max<std::int64_t>((static_cast<std::int64_t>(grid.tree.size()) + 3) / 4, 1);
+  if (cells > page_cells * max_pages || tree_texels > limits_.texture_buffer_texels) {
+    throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " + std::to_string(max_pages) +
+                                            " texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
+                                            std::to_string(texels) + " texels");
+  }
+  for (std::int64_t first = 0; first < cells; first += page_cells) {
+    const std::int64_t count = std::min(page_cells, cells - first);
+    const std::size_t bytes = static_cast<std::size_t>(count) * sizeof(grid::CellRecord);
+    plan_texture_buffer(grid.cells.data() + first, bytes, bytes, GL_RGBA32UI, "uploading cell records",
+                        [this](gl::Object page) { data_.pages_.push_back(std::move(page)); });
+  }
+  // Whole texels: the tree as it lies, its last texel filled up.
+  const std::size_t tree_bytes = grid.tree.size() * 4;
+  plan_texture_buffer(grid.tree.data(), tree_bytes, static_cast<std::size_t>(tree_texels) * 16, GL_RGBA32UI,
+                      "uploading the point-location tree",
+                      [this](gl::Object texture) { data_.textures_[0] = std::move(texture); });
+  data_.bytes_ += 26 * sizeof(grid::RootEntry);
+  steps_.emplace_back([this] {
+    std::array<grid::RootEntry, 26> roots{};
+    std::copy(source_->grid->roots.begin(), source_->grid->roots.end(), roots.begin());
+    data_.roots_ = gl::make_buffer(gl_, sizeof(roots), roots.data(), 0, "uploading the root cells");
+  });
+}
+
+void MarchUpload::plan_dense() {
+  const ivec3 size = source_->box_size;
+  require_3d(limits_, size, "the dense march");
+  data_.bytes_ =
+      static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z) * 2;
+  steps_.emplace_back([this, size] {
+    data_.textures_[1] = gl::make_texture_3d(gl_, GL_R16F, size.x, size.y, size.z, "creating the dense texture");
+  });
+  // One layer of bricks at a time: bounded memory.
+  const int low = source_->box_low.z;
+  for (int z = low & ~7; z < low + size.z; z += volume::brick_size) {
+    const int first = std::max(z, low);
+    const int last = std::min(z + volume::brick_size, low + size.z);
+    steps_.emplace_back([this, size, low, first, last] {
+      std::vector<std::uint16_t> slab;
+      fill_slab(*source_, first, last, slab);
+      gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 2);
+      gl_->TextureSubImage3D(data_.textures_[1].name(), 0, 0, 0, first - low, size.x, size.y, last - first, GL_RED,
+                             GL_HALF_FLOAT, slab.data());
+      gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    });
+  }
+}
+
+void MarchUpload::plan_brick() {
+  const ivec3 bricks = source_->brick_count;
+  require_3d(limits_, bricks, "the brick march");
+  if (static_cast<std::int64_t>(source_->brick_values.size()) > limits_.texture_buffer_texels) {
+    throw Error(ErrorCode::unsupported, "the brick march needs " + std::to_string(source_->brick_values.size()) +
+                                            " texels; this driver's GL_MAX_TEXTURE_BUFFER_SIZE is " +
+                                            std::to_string(limits_.texture_buffer_texels));
+  }
+  const std::size_t bytes = source_->brick_values.size() * 2;
+  plan_texture_buffer(source_->brick_values.data(), bytes, bytes, GL_R16F, "uploading bricks",
+                      [this](gl::Object texture) { data_.textures_[1] = std::move(texture); });
+  data_.bytes_ += source_->brick_slots.size() * 4;
+  steps_.emplace_back([this, bricks] {
+    data_.textures_[2] = gl::make_texture_3d(gl_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
+    gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    gl_->TextureSubImage3D(data_.textures_[2].name(), 0, 0, 0, 0, bricks.x, bricks.y, bricks.z, GL_RED_INTEGER,
+                           GL_UNSIGNED_INT, source_->brick_slots.data());
+  });
 }
 
 std::vector<std::string> MarchData::defines() const {

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
 
 #include "gl/objects.hpp"
@@ -14,20 +17,35 @@ namespace cumulet::render {
 
 enum class March { tet = 0, dense = 1, brick = 2 };
 
+using Deadline = std::chrono::steady_clock::time_point;
+
+/// What one march needs of the volume, in main memory: all that a new context needs too. No GL.
+struct MarchSource {
+  March march = March::tet;
+  grid::Cube cube;
+  float max_value = 0.0F;  // grid value of density 1
+
+  // tet
+  std::shared_ptr<const grid::TetGrid> grid;
+  bool linear = false;
+  // dense: read from these; brick: as packed by make_brick_source
+  std::shared_ptr<const volume::ScalarVolume> volume;
+  std::shared_ptr<const grid::Statistics> statistics;
+  glm::ivec3 box_low{0};  // voxels, cube space
+  glm::ivec3 box_size{0};
+  std::vector<std::uint16_t> brick_values;  // half floats, 512 a slot
+  std::vector<std::uint32_t> brick_slots;
+  glm::ivec3 brick_count{0};
+};
+
+MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value);
+/// dense and brick. O(voxels of the bounds) only when uploaded; brick: O(bricks) memory.
+MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
+                              std::shared_ptr<const grid::Statistics> statistics);
+
 /// What one march reads on the GPU, and the box that holds all density.
 class MarchData {
  public:
-  /// Records and tree as texture buffers, paged where the driver's texture buffer limit ends (page_texels 0: the
-  /// driver's). Throws Error(unsupported) that names the limit if the pages do not suffice.
-  static MarchData upload_tet(const gl::FunctionsPtr& gl, const gl::Limits& limits, const grid::TetGrid& grid,
-                              bool linear, std::int64_t page_texels = 0);
-  /// The bounds' voxels as one half-float 3D texture.
-  static MarchData upload_dense(const gl::FunctionsPtr& gl, const gl::Limits& limits,
-                                const grid::Statistics& statistics, const volume::ScalarVolume& volume);
-  /// Non-empty 8^3 bricks as half floats, and a 3D texture of their slots.
-  static MarchData upload_brick(const gl::FunctionsPtr& gl, const gl::Limits& limits,
-                                const grid::Statistics& statistics, const volume::ScalarVolume& volume);
-
   [[nodiscard]] March march() const { return march_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   /// The macros that select this march in a shader.
@@ -37,8 +55,7 @@ class MarchData {
   void describe(core::CmParameters& parameters) const;
 
  private:
-  MarchData() = default;
-
+  friend class MarchUpload;
   March march_ = March::tet;
   bool linear_ = false;
   int log2_page_cells_ = 0;
@@ -50,6 +67,35 @@ class MarchData {
   glm::vec3 box_max_{0.0F};
   glm::uvec4 cube_{0U};
   std::uint64_t bytes_ = 0;
+};
+
+/// Brings a source to GL piece by piece. All calls need the context current and a StateGuard around.
+class MarchUpload {
+ public:
+  /// page_texels: where a page of records ends; 0: where the driver's limit is. Throws Error(unsupported) that names
+  /// the limit that does not suffice; allocates nothing yet.
+  MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, std::shared_ptr<const MarchSource> source,
+              std::int64_t page_texels = 0);
+  /// Works until the deadline, one piece at least. Returns whether all is there. Throws Error(out_of_memory, gl).
+  bool advance(Deadline deadline);
+  [[nodiscard]] double progress() const { return steps_.empty() ? 1.0 : double(next_) / double(steps_.size()); }
+  /// Only after advance returned true.
+  MarchData take() { return std::move(data_); }
+
+ private:
+  void plan_tet(std::int64_t page_texels);
+  void plan_dense();
+  void plan_brick();
+  // Steps that make a texture buffer (of capacity bytes) and fill it from memory that lives as long as the source.
+  void plan_texture_buffer(const void* bytes, std::size_t size, std::size_t capacity, GLenum format, const char* what,
+                           std::function<void(gl::Object)> place);
+
+  gl::FunctionsPtr gl_;
+  gl::Limits limits_;
+  std::shared_ptr<const MarchSource> source_;
+  MarchData data_;
+  std::vector<std::function<void()>> steps_;
+  std::size_t next_ = 0;
 };
 
 }  // namespace cumulet::render

@@ -1,8 +1,8 @@
 #include "render/tracer.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include "base/error.hpp"
@@ -12,12 +12,16 @@ namespace cumulet::render {
 namespace {
 
 constexpr std::uint32_t tile_edge = 512;
-constexpr std::size_t lane_bytes = 8 * 16;
+constexpr double hasty_rest = 0.02;     // of a tile's pixels
 constexpr double dispatch_ms = 1000.0;  // well under any driver's watchdog, well over the cost of a dispatch
 constexpr std::uint32_t longest_pass = 64;
+constexpr std::uint32_t view_depth = 5;  // inspect.comp's
+constexpr GLuint surface_unit = 11;
 
-double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
 // A step through n rows that meets each once and lands far from the last: near n times the golden section, coprime to
@@ -28,139 +32,326 @@ std::uint32_t row_step(std::uint32_t rows) {
   return step;
 }
 
+void set_surface(core::CmParameters& parameters, const SurfaceDepth& surface) {
+  parameters.surface = {surface.texture != 0 ? surface.layers : 0, surface.size, 0};
+}
+
 }  // namespace
 
-void Tracer::begin(const MarchData& data, const core::CmParameters& parameters, View view) {
-  const glm::uvec4 image = parameters.image;
+double Picture::progress() const {
+  if (done_) return 1.0;
+  const double wanted = double(parameters_.image.w) * size_.x * size_.y;
+  return view_ == View::shaded && wanted > 0.0 ? static_cast<double>(samples_) / wanted : 0.0;
+}
+
+void Picture::extend(std::uint32_t samples) {
+  if (samples <= parameters_.image.w || view_ != View::shaded) return;
+  // Lanes that are done for good begin again; so do the others' present samples, with the same result.
+  if (done_ || tiles_ == glm::uvec2(1U)) {
+    tile_ = 0;
+    pass_target_ = tiles_ == glm::uvec2(1U)
+                       ? samples
+                       : std::min(samples, parameters_.image.w + std::clamp(parameters_.image.w, 1U, longest_pass));
+    begin_tile();
+  }
+  parameters_.image.w = samples;
+  done_ = false;
+}
+
+void Picture::begin_tile() {
+  windows_.clear();
+  window_ = 0;
+  const glm::uvec2 extent = tile_extent();
+  for (std::uint32_t row = 0; row < extent.y; row += window_rows_) {
+    const std::uint32_t end = std::min(extent.y, row + window_rows_);
+    windows_.push_back({row, end, (end - row) * extent.x, (end - row) * extent.x, true});
+  }
+}
+
+// Whether the tile, the pass, the picture end with what the last dispatch did.
+void Picture::end_dispatch() {
+  std::uint64_t unfinished = 0;
+  std::uint64_t empty = 0;
+  for (const Window& window : windows_) {
+    unfinished += window.unfinished;
+    empty += window.empty;
+  }
+  const glm::uvec2 extent = tile_extent();
+  const auto rest = hasty_ && !complete_ ? static_cast<std::uint64_t>(hasty_rest * extent.x * extent.y) : 0;
+  const bool one_tile = tiles_ == glm::uvec2(1U);
+  if (one_tile && empty <= rest) complete_ = true;
+  // The last few of a hasty first pass are left to the next.
+  const bool first_pass = pass_target_ == 1 || parameters_.image.w == 1;
+  if (unfinished > (first_pass ? rest : 0)) {
+    do window_ = (window_ + 1) % windows_.size();
+    while (windows_[window_].unfinished == 0);
+    return;
+  }
+  if (++tile_ == tiles_.x * tiles_.y) {
+    tile_ = 0;
+    complete_ = true;
+    const std::uint32_t target = parameters_.image.w;
+    if (pass_target_ >= target || view_ != View::shaded) {
+      done_ = true;
+    } else {
+      // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
+      // little.
+      pass_target_ = std::min(target, pass_target_ + std::min(pass_target_, longest_pass));
+    }
+  }
+  if (!done_) begin_tile();
+}
+
+std::uint64_t Picture::bytes() const {
+  return std::uint64_t{size_.x} * size_.y * (sum_ ? (volume_z_ ? 36U : 32U) : 0U);
+}
+
+GLuint Tracer::program(const MarchData& data, const char* name) {
   std::vector<std::string> key = data.defines();
-  key.emplace_back(view == View::shaded ? "trace.comp" : "inspect.comp");
-  if (key != program_key_) {
-    program_ = gl::make_compute_program(gl_, key.back(), std::span(key).first(key.size() - 1));
-    program_key_ = key;
+  key.emplace_back(name);
+  auto found = programs_.find(key);
+  if (found == programs_.end()) {
+    gl::Object made = gl::make_compute_program(gl_, name, std::span(key).first(key.size() - 1));
+    // Those of one march at most: a host that tries them all shall not collect them.
+    if (programs_.size() >= 8) programs_.clear();
+    found = programs_.emplace(std::move(key), std::move(made)).first;
     iterations_ = 16.0;
   }
-  if (!sum_ || image.x != width() || image.y != height()) {
-    gl::Object sum = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(image.x), static_cast<int>(image.y),
-                                         "creating the accumulation texture");
-    counts_ = gl::make_texture_2d(gl_, GL_RG32UI, static_cast<int>(image.x), static_cast<int>(image.y),
-                                  "creating the sample counts");
-    sum_ = std::move(sum);
-  }
-  tile_size_ = glm::min(glm::uvec2(image.x, image.y), glm::uvec2(tile_edge));
-  tiles_ = (glm::uvec2(image.x, image.y) + tile_size_ - 1U) / tile_size_;
-  const std::size_t lanes = std::size_t{tile_size_.x} * tile_size_.y;
-  if (lanes > paths_lanes_) {
+  return found->second.name();
+}
+
+void Tracer::make_shared_objects() {
+  if (!counter_)
+    counter_ = gl::make_buffer(gl_, sizeof(glm::uvec3), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counter");
+  if (!uniforms_)
+    uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
+}
+
+void Tracer::allocate(Picture& picture, glm::uvec2 size) const {
+  const int width = static_cast<int>(size.x);
+  const int height = static_cast<int>(size.y);
+  gl::Object sum = gl::make_texture_2d(gl_, GL_RGBA32F, width, height, "creating the accumulation texture");
+  gl::Object counts = gl::make_texture_2d(gl_, GL_RGBA32UI, width, height, "creating the sample counts");
+  picture.sum_ = std::move(sum);
+  picture.counts_ = std::move(counts);
+  picture.volume_z_ = {};
+  picture.size_ = size;
+}
+
+void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, View view,
+                   const SurfaceDepth& surface, double budget_ms, bool hasty) {
+  const glm::uvec2 size(parameters.image);
+  program(data, view == View::shaded ? "trace.comp" : "inspect.comp");
+  make_shared_objects();
+  const glm::uvec2 tile = glm::min(size, glm::uvec2(tile_edge));
+  const std::size_t lanes = std::size_t{tile.x} * tile.y;
+  if (view == View::shaded && lanes > paths_lanes_) {
+    paths_ = {};
+    paths_lanes_ = 0;
     paths_ = gl::make_buffer(gl_, lanes * lane_bytes, nullptr, 0, "creating the path buffer");
     paths_lanes_ = lanes;
   }
-  if (!counter_) {
-    counter_ = gl::make_buffer(gl_, 4, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counter");
-    uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
-  }
-  parameters_ = parameters;
-  data.describe(parameters_);
-  view_ = view;
-  if (view != View::shaded) parameters_.march.y = static_cast<std::uint32_t>(view);
-  tile_ = 0;
-  pass_begin_ = 0;
-  pass_target_ = std::min(1U, image.w);
-  tile_begins_ = true;
-  done_ = false;
-  unfinished_ = 1.0;
+  if (!picture.sum_ || size != picture.size_) allocate(picture, size);
+  picture.parameters_ = parameters;
+  data.describe(picture.parameters_);
+  set_surface(picture.parameters_, surface);
+  picture.view_ = view;
+  if (view != View::shaded) picture.parameters_.march.y = static_cast<std::uint32_t>(view);
+  picture.tile_size_ = tile;
+  picture.tiles_ = (size + tile - 1U) / tile;
+  // A window's shortest dispatch should fit the budget: its lanes each run some dozens of steps.
+  const double lanes_in_budget = 0.5 * rate_ * budget_ms;
+  picture.window_rows_ =
+      static_cast<std::uint32_t>(std::clamp(lanes_in_budget / tile.x, 8.0, double(tile_edge))) / 8U * 8U;
+  picture.tile_ = 0;
+  picture.hasty_ = hasty;
+  picture.pass_target_ = picture.tiles_ == glm::uvec2(1U) ? picture.parameters_.image.w : 1U;
+  picture.samples_ = 0;
+  picture.complete_ = false;
+  picture.done_ = false;
+  picture.begin_tile();
+  picture.depth_row_ = 0;
+  picture.depth_done_ = false;
   const glm::vec4 zero(0.0F);
-  const glm::uvec2 none(0U);
-  gl_->ClearTexImage(sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
-  gl_->ClearTexImage(counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &none);
+  const glm::uvec4 none(0U);
+  gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
+  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, &none);
   gl::check(*gl_, "clearing the accumulation");
 }
 
-void Tracer::next_tile() {
-  tile_begins_ = true;
-  unfinished_ = 1.0;
-  if (++tile_ < tiles_.x * tiles_.y) return;
-  tile_ = 0;
-  pass_begin_ = pass_target_;
-  if (pass_target_ >= parameters_.image.w || view_ != View::shaded) {
-    done_ = true;
-  } else {
-    // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
-    // little.
-    pass_target_ = std::min(parameters_.image.w, pass_target_ + std::min(pass_target_, longest_pass));
-  }
+void Tracer::clear(Picture& picture) {
+  allocate(picture, glm::uvec2(1));
+  picture.parameters_ = {};
+  picture.view_ = View::shaded;
+  picture.complete_ = picture.done_ = true;
+  const glm::vec4 zero(0.0F);
+  const glm::uvec4 one(1U, 0U, 0U, 0U);
+  gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
+  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, &one);
+  gl::check(*gl_, "making the empty picture");
 }
 
-bool Tracer::trace(const MarchData& data, double budget_ms) {
-  const auto start = std::chrono::steady_clock::now();
-  gl_->UseProgram(program_.name());
+void Tracer::bind(const MarchData& data, const SurfaceDepth& surface) const {
   data.bind(*gl_);
+  if (surface.texture != 0) gl_->BindTextureUnit(surface_unit, surface.texture);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.name());
-  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, paths_.name());
+}
+
+bool Tracer::trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline) {
+  if (picture.done_) return true;
+  const auto start = Clock::now();
+  const double budget_ms = std::max(0.0, std::chrono::duration<double, std::milli>(deadline - start).count());
+  const std::uint64_t samples_before = picture.samples_;
+  gl_->UseProgram(program(data, picture.view_ == View::shaded ? "trace.comp" : "inspect.comp"));
+  bind(data, surface);
+  if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, paths_.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, counter_.name());
-  gl_->BindImageTexture(0, sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  gl_->BindImageTexture(1, counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
-  while (!done_) {
-    const glm::uvec2 corner = glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_;
-    const glm::uvec2 size = glm::min(tile_size_, glm::uvec2(width(), height()) - corner);
-    core::CmParameters parameters = parameters_;
-    parameters.tile = {corner, size};
-    parameters.image.w = pass_target_;
-    parameters.order.x = row_step((size.y + 7) / 8);
-    parameters.march.x = static_cast<std::uint32_t>(iterations_);
-    parameters.march.w = tile_begins_ ? 1 : 0;
-    const std::uint32_t zero = 0;
-    gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
-    gl_->NamedBufferSubData(counter_.name(), 0, 4, &zero);
-    const auto dispatched = std::chrono::steady_clock::now();
-    gl_->DispatchCompute((size.x + 7) / 8, (size.y + 7) / 8, 1);
-    gl_->MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
-                       GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
-    std::uint32_t unfinished = 0;
-    gl_->GetNamedBufferSubData(counter_.name(), 0, 4, &unfinished);
-    gl::check(*gl_, "tracing");
-    const double spent = std::max(0.01, milliseconds_since(dispatched));
-    const double aim = std::clamp(budget_ms, 1.0, dispatch_ms);
-    // As few lanes remain, each may run longer; never more than twice as long as the last time.
-    iterations_ = std::clamp(iterations_ * std::clamp(aim / spent, 0.25, 2.0), 4.0, 65536.0);
-    tile_begins_ = false;
-    unfinished_ = static_cast<double>(unfinished) / (double(size.x) * size.y);
-    if (unfinished == 0) next_tile();
-    if (milliseconds_since(start) >= budget_ms) break;
+  gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
+  gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+  // What is bound shall fit the format, though this view does not write it.
+  gl_->BindImageTexture(2, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  const double aim = std::clamp(0.5 * budget_ms, 1.0, dispatch_ms);
+  while (!picture.done_) {
+    dispatch(picture, surface, aim);
+    if (Clock::now() >= deadline) break;
   }
-  return done_;
+  if (picture.view_ == View::shaded) {
+    const auto samples = static_cast<double>(picture.samples_ - samples_before);
+    const double spent = milliseconds_since(start);
+    if (spent > 0.5) rate_ = std::max(1.0, rate_ + 0.1 * (samples / spent - rate_));
+  }
+  return picture.done_;
 }
 
-double Tracer::progress() const {
-  if (done_) return 1.0;
-  if (view_ != View::shaded || parameters_.image.w == 0) return 0.0;
-  const double in_tile = tile_begins_ ? 0.0 : 1.0 - unfinished_;
-  const double in_pass = (tile_ + in_tile) / (double(tiles_.x) * tiles_.y);
-  return (pass_begin_ + (pass_target_ - pass_begin_) * in_pass) / parameters_.image.w;
+void Tracer::dispatch(Picture& picture, const SurfaceDepth& surface, double aim_ms) {
+  const glm::uvec2 extent = picture.tile_extent();
+  Picture::Window& window = picture.windows_[picture.window_];
+  const bool shaded = picture.view_ == View::shaded;
+  core::CmParameters parameters = picture.parameters_;
+  set_surface(parameters, surface);
+  parameters.tile = {picture.tile_corner(), extent};
+  parameters.image.w = picture.pass_target_;
+  const std::uint32_t groups = (window.end - window.first + 7) / 8;
+  parameters.order = {row_step(groups), 0U, window.first, window.end};
+  parameters.march.x = static_cast<std::uint32_t>(iterations_);
+  parameters.march.w = window.begins ? 1 : 0;
+  glm::uvec3 counter(0U);
+  gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
+  gl_->NamedBufferSubData(counter_.name(), 0, sizeof(counter), &counter);
+  const auto dispatched = Clock::now();
+  gl_->DispatchCompute((extent.x + 7) / 8, groups, 1);
+  gl_->MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
+                     GL_TEXTURE_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+  gl_->GetNamedBufferSubData(counter_.name(), 0, sizeof(counter), &counter);
+  gl::check(*gl_, "tracing");
+  window.begins = false;
+  window.unfinished = counter.x;
+  window.empty = counter.y;
+  picture.samples_ += shaded ? counter.z : extent.x * (window.end - window.first);
+  if (shaded) {
+    // As few lanes remain, each may run longer; never more than twice as long as the last time.
+    const double spent = std::max(0.01, milliseconds_since(dispatched));
+    iterations_ = std::clamp(iterations_ * std::clamp(aim_ms / spent, 0.25, 2.0), 1.0, 65536.0);
+  }
+  picture.end_dispatch();
 }
 
-void Tracer::read(float* rgba) const {
-  const std::size_t pixels = std::size_t{width()} * height();
-  std::vector<glm::uvec2> counts(pixels);
-  gl_->GetTextureImage(sum_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels * 16), rgba);
-  gl_->GetTextureImage(counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, static_cast<GLsizei>(pixels * 8),
+bool Tracer::trace_depth(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline) {
+  if (picture.depth_done_) return true;
+  if (!picture.volume_z_) {
+    picture.volume_z_ = gl::make_texture_2d(gl_, GL_R32F, static_cast<int>(picture.size_.x),
+                                            static_cast<int>(picture.size_.y), "creating the depth texture");
+  }
+  make_shared_objects();
+  gl_->UseProgram(program(data, "inspect.comp"));
+  bind(data, surface);
+  gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
+  gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+  gl_->BindImageTexture(2, picture.volume_z_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  core::CmParameters parameters = picture.parameters_;
+  set_surface(parameters, surface);
+  parameters.march.y = view_depth;
+  // Rows that a camera ray a pixel takes about a millisecond for.
+  const auto rows = static_cast<std::uint32_t>(std::clamp(rate_ / picture.size_.x, 8.0, 512.0)) / 8U * 8U;
+  while (picture.depth_row_ < picture.size_.y) {
+    const std::uint32_t height = std::min(rows, picture.size_.y - picture.depth_row_);
+    parameters.tile = {0U, 0U, picture.size_};
+    parameters.order = {0U, 0U, picture.depth_row_, picture.depth_row_ + height};
+    gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
+    gl_->DispatchCompute((picture.size_.x + 7) / 8, (height + 7) / 8, 1);
+    gl_->MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    gl_->Finish();
+    gl::check(*gl_, "finding the volume's depth");
+    picture.depth_row_ += height;
+    if (Clock::now() >= deadline) break;
+  }
+  picture.depth_done_ = picture.depth_row_ >= picture.size_.y;
+  return picture.depth_done_;
+}
+
+float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, const SurfaceDepth& surface,
+                   glm::uvec2 pixel) {
+  make_shared_objects();
+  if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
+  core::CmParameters p = parameters;
+  data.describe(p);
+  set_surface(p, surface);
+  p.march.y = view_depth;
+  p.tile = {pixel, 1U, 1U};
+  p.order = {0U, 1U, 0U, 1U};  // into the texture's one pixel
+  gl_->UseProgram(program(data, "inspect.comp"));
+  bind(data, surface);
+  gl_->BindImageTexture(0, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  gl_->BindImageTexture(1, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
+  gl_->BindImageTexture(2, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
+  gl_->DispatchCompute(1, 1, 1);
+  gl_->MemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  float z = 0.0F;
+  gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(z), &z);
+  gl::check(*gl_, "picking");
+  return z;
+}
+
+void Tracer::read(const Picture& picture, float* rgba) const {
+  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
+  std::vector<glm::uvec4> counts(pixels);
+  gl_->GetTextureImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels * 16), rgba);
+  gl_->GetTextureImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, static_cast<GLsizei>(pixels * 16),
                        counts.data());
-  gl::check(*gl_, "reading the image back");
+  gl::check(*gl_, "reading the picture back");
   for (std::size_t i = 0; i < pixels; ++i) {
     const float scale = counts[i].x > 0 ? 1.0F / static_cast<float>(counts[i].x) : 0.0F;
     for (std::size_t c = 0; c < 4; ++c) rgba[4 * i + c] *= scale;
   }
 }
 
-Totals Tracer::totals() const {
-  if (!counts_) return {};
-  const std::size_t pixels = std::size_t{width()} * height();
-  std::vector<glm::uvec2> counts(pixels);
-  gl_->GetTextureImage(counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, static_cast<GLsizei>(pixels * 8),
+Totals Tracer::totals(const Picture& picture) const {
+  if (!picture.counts_) return {};
+  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
+  std::vector<glm::uvec4> counts(pixels);
+  std::vector<glm::vec4> sums(pixels);
+  gl_->GetTextureImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels * 16), sums.data());
+  gl_->GetTextureImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, static_cast<GLsizei>(pixels * 16),
                        counts.data());
+  gl::check(*gl_, "reading the sample counts back");
   Totals totals;
-  for (const glm::uvec2& c : counts) {
-    totals.samples += c.x;
-    totals.steps += c.y;
+  const glm::dvec3 weights(0.2126, 0.7152, 0.0722);
+  const double sky = glm::dot(glm::dvec3(picture.parameters_.sky_radiance), weights);
+  double error = 0.0;
+  double luminance = 0.0;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const double n = counts[i].x;
+    totals.samples += counts[i].x;
+    totals.steps += counts[i].y;
+    if (n < 2.0) continue;
+    float square = 0.0F;
+    std::memcpy(&square, &counts[i].z, sizeof(square));
+    const double mean = (glm::dot(glm::dvec3(sums[i]), weights) + (n - double(sums[i].w)) * sky) / n;
+    error += std::max(0.0, double(square) / n - mean * mean) / (n - 1.0);
+    luminance += mean;
   }
+  if (luminance > 0.0) totals.noise = std::sqrt(error / double(pixels)) / (luminance / double(pixels));
   return totals;
 }
 

@@ -2,7 +2,8 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <optional>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "gl/objects.hpp"
@@ -11,57 +12,129 @@
 
 namespace cumulet::render {
 
-enum class View { shaded = 0, cells = 1, steps = 2, density = 3 };
+enum class View { shaded = 0, cells = 1, steps = 2, density = 3, wireframe = 4 };
 
 struct Totals {
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
+  /// Root of the mean over pixels of the squared standard error of their luminance, over the mean luminance.
+  double noise = 0.0;
 };
 
-/// Accumulates an image by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
+/// The host's depth as render::HostDepth keeps it, for passes that end at it.
+struct SurfaceDepth {
+  GLuint texture = 0;  // 0: none
+  unsigned layers = 0;
+  glm::uvec2 size{0U};
+};
+
+/// One accumulation under way.
 ///
-/// Samples come in passes that end in every tile before the next begins; within a dispatch a lane runs a bounded number
-/// of steps and keeps its path for the next. Each pixel belongs to one lane at a time and adds its samples in order, so
-/// the image depends on seed and sample count alone, not on tiles, budgets or timing.
+/// A tile is what paths are stored for; a window, some rows of it, is what one dispatch covers. Samples come in passes
+/// that end in every tile before the next begins (a picture of one tile has one pass); within a dispatch a lane runs a
+/// bounded number of steps and keeps its path for the next. Each pixel belongs to one lane at a time and adds its
+/// samples in order, and a sample that is begun anew ends the same: so the image depends on parameters and sample count
+/// alone, not on tiles, windows, budgets or timing.
+class Picture {
+ public:
+  [[nodiscard]] glm::uvec2 size() const { return size_; }
+  [[nodiscard]] const core::CmParameters& parameters() const { return parameters_; }
+  [[nodiscard]] View view() const { return view_; }
+  /// Whether every pixel (nearly every one, of a hasty picture) has a sample.
+  [[nodiscard]] bool complete() const { return complete_; }
+  /// Whether every pixel has its target samples.
+  [[nodiscard]] bool done() const { return done_; }
+  [[nodiscard]] double progress() const;
+  /// Camera paths finished.
+  [[nodiscard]] std::uint64_t samples() const { return samples_; }
+  /// Asks for this many samples, if that is more: goes on where it was.
+  void extend(std::uint32_t samples);
+  [[nodiscard]] GLuint sum() const { return sum_.name(); }
+  [[nodiscard]] GLuint counts() const { return counts_.name(); }
+  /// View depth z at half opacity, once Tracer::trace_depth is done; else 0.
+  [[nodiscard]] GLuint volume_z() const { return depth_done_ ? volume_z_.name() : 0; }
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  friend class Tracer;
+  core::CmParameters parameters_{};
+  View view_ = View::shaded;
+  glm::uvec2 size_{0U};
+  gl::Object sum_;
+  gl::Object counts_;
+  gl::Object volume_z_;
+  struct Window {
+    std::uint32_t first = 0;  // row of the tile
+    std::uint32_t end = 0;
+    std::uint32_t unfinished = 0;
+    std::uint32_t empty = 0;
+    bool begins = true;
+  };
+  [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
+  [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
+  void begin_tile();
+  void end_dispatch();
+
+  glm::uvec2 tile_size_{1U};
+  glm::uvec2 tiles_{1U};
+  std::uint32_t window_rows_ = 8;
+  std::uint32_t tile_ = 0;
+  std::vector<Window> windows_;  // of the tile under way
+  std::size_t window_ = 0;
+  std::uint32_t pass_target_ = 1;
+  std::uint64_t samples_ = 0;
+  bool hasty_ = false;
+  bool complete_ = false;
+  bool done_ = false;
+  std::uint32_t depth_row_ = 0;
+  bool depth_done_ = false;
+};
+
+/// Traces pictures by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
 class Tracer {
  public:
   explicit Tracer(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// Starts anew. parameters: camera, medium, lights, image; box and march fields are filled from data.
-  void begin(const MarchData& data, const core::CmParameters& parameters, View view);
-  /// Traces for about budget_ms. Returns whether every pixel has its target samples.
-  bool trace(const MarchData& data, double budget_ms);
-  [[nodiscard]] double progress() const;
-  /// width * height * 4 floats: mean radiance and alpha, (0,0) top left.
-  void read(float* rgba) const;
-  [[nodiscard]] Totals totals() const;
-  [[nodiscard]] const core::CmParameters& parameters() const { return parameters_; }
-  [[nodiscard]] std::uint32_t width() const { return parameters_.image.x; }
-  [[nodiscard]] std::uint32_t height() const { return parameters_.image.y; }
+  /// Starts a picture anew. parameters: camera, medium, lights, image; box and march fields are filled from data.
+  /// budget_ms is what trace will be given about: it chooses the size of windows. hasty: the first pass leaves the last
+  /// few pixels, those with the longest paths, to the second. Throws with the picture as it was.
+  void begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, View view,
+             const SurfaceDepth& surface, double budget_ms, bool hasty);
+  /// Traces until about the deadline. The last picture begun or traced goes on; another loses the paths under way.
+  /// Returns whether every pixel has its target samples.
+  bool trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline);
+  /// Finds the depth at half opacity until about the deadline; returns whether it is there.
+  bool trace_depth(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline);
+  /// View depth z at half opacity of one pixel of a picture with these parameters; 0: not so opaque.
+  float pick(const MarchData& data, const core::CmParameters& parameters, const SurfaceDepth& surface,
+             glm::uvec2 pixel);
+  /// A picture of one transparent pixel: what there is before the first.
+  void clear(Picture& picture);
+
+  /// width * height * 4 floats: mean radiance without background, and alpha; (0,0) top left.
+  void read(const Picture& picture, float* rgba) const;
+  [[nodiscard]] Totals totals(const Picture& picture) const;
+  /// Camera paths a millisecond that this driver traced lately.
+  [[nodiscard]] double rate() const { return rate_; }
+  [[nodiscard]] std::uint64_t bytes() const { return paths_lanes_ * lane_bytes; }
 
  private:
-  void next_tile();
+  static constexpr std::size_t lane_bytes = std::size_t{8} * 16;
+  void dispatch(Picture& picture, const SurfaceDepth& surface, double aim_ms);
+  GLuint program(const MarchData& data, const char* name);
+  void make_shared_objects();
+  void allocate(Picture& picture, glm::uvec2 size) const;
+  void bind(const MarchData& data, const SurfaceDepth& surface) const;
 
   gl::FunctionsPtr gl_;
-  core::CmParameters parameters_{};
-  View view_ = View::shaded;
-  std::vector<std::string> program_key_;
-  gl::Object program_;
-  gl::Object sum_;
-  gl::Object counts_;
+  std::map<std::vector<std::string>, gl::Object> programs_;
   gl::Object paths_;
   std::size_t paths_lanes_ = 0;
   gl::Object counter_;
   gl::Object uniforms_;
-  glm::uvec2 tile_size_{1U};
-  glm::uvec2 tiles_{1U};
-  std::uint32_t tile_ = 0;
-  std::uint32_t pass_target_ = 1;
-  std::uint32_t pass_begin_ = 0;
-  bool tile_begins_ = true;
-  bool done_ = false;
+  gl::Object pick_;
   double iterations_ = 16.0;
-  double unfinished_ = 1.0;
+  double rate_ = 1500.0;
 };
 
 }  // namespace cumulet::render

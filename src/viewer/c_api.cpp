@@ -1,286 +1,430 @@
-// The C ABI: checks arguments, translates descriptors, keeps exceptions in.
+// The C ABI's viewer: checks arguments, translates descriptors, keeps exceptions in.
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <new>
-#include <span>
-
-#include "base/error.hpp"
-#include "cumulet/cumulet.h"
+#include "viewer/c_handles.hpp"
+#include "viewer/c_support.hpp"
 #include "viewer/viewer.hpp"
 
 struct cumulet_viewer {
-  cumulet::viewer::Viewer viewer;
+  std::unique_ptr<cumulet::viewer::Viewer> viewer;
   std::string last_error;
 };
 
 namespace {
 
+using namespace cumulet::c_abi;
 using cumulet::Error;
 using cumulet::ErrorCode;
-
-cumulet_status status_of(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::invalid_argument:
-      return CUMULET_ERROR_INVALID_ARGUMENT;
-    case ErrorCode::unsupported:
-      return CUMULET_ERROR_UNSUPPORTED;
-    case ErrorCode::file:
-      return CUMULET_ERROR_FILE;
-    case ErrorCode::out_of_memory:
-      return CUMULET_ERROR_OUT_OF_MEMORY;
-    case ErrorCode::gl:
-      return CUMULET_ERROR_GL;
-    case ErrorCode::internal:
-      break;
-  }
-  return CUMULET_ERROR_INTERNAL;
-}
-
-// Runs a call and turns whatever it throws into a status and a line.
-template <class Call>
-cumulet_status guarded(std::string& message, Call&& call) noexcept {
-  try {
-    try {
-      call();
-      return CUMULET_OK;
-    } catch (const Error& error) {
-      message = error.what();
-      return status_of(error.code());
-    } catch (const std::bad_alloc&) {
-      message = "out of memory";
-      return CUMULET_ERROR_OUT_OF_MEMORY;
-    } catch (const std::exception& error) {
-      message = std::string("internal error: ") + error.what();
-      return CUMULET_ERROR_INTERNAL;
-    } catch (...) {
-      message = "internal error";
-      return CUMULET_ERROR_INTERNAL;
-    }
-  } catch (...) {
-    return CUMULET_ERROR_OUT_OF_MEMORY;  // not even the message could be kept
-  }
-}
+namespace core = cumulet::viewer;
+namespace render = cumulet::render;
 
 template <class Call>
 cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
-  if (viewer == nullptr) return CUMULET_ERROR_INVALID_ARGUMENT;
-  const cumulet_status status = guarded(viewer->last_error, std::forward<Call>(call));
-  if (status == CUMULET_OK) viewer->last_error.clear();
-  return status;
-}
-
-[[noreturn]] void refuse(const std::string& why) { throw Error(ErrorCode::invalid_argument, why); }
-
-// A host built against an older header passes a shorter struct: what it lacks is zero.
-template <class Desc>
-Desc read_desc(const Desc* desc, const char* name) {
-  if (desc == nullptr) refuse(std::string(name) + " is NULL");
-  if (desc->struct_size < sizeof(size_t) || desc->struct_size > sizeof(Desc)) {
-    refuse(std::string(name) + ".struct_size is " + std::to_string(desc->struct_size) + ", not sizeof(" + name + ")");
-  }
-  Desc copy{};
-  std::memcpy(&copy, desc, desc->struct_size);
-  return copy;
-}
-
-void require(bool condition, const char* what) {
-  if (!condition) refuse(what);
-}
-
-// The number in an enum that a C host filled: reading it as the enum would be undefined where it is not one of its
-// values.
-template <class Enum>
-unsigned number(const Enum& value) {
-  unsigned copy = 0;
-  static_assert(sizeof copy == sizeof value);
-  std::memcpy(&copy, &value, sizeof copy);
-  return copy;
-}
-
-bool in_range(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
-
-template <class Values>
-bool all_finite(const Values& values) {
-  return std::ranges::all_of(values, [](auto value) { return std::isfinite(value); });
+  // Not even the message may be touched from inside the callback: another thread may be in a call.
+  if (viewer == nullptr || viewer->viewer->in_update_callback()) return CUMULET_ERROR_INVALID_ARGUMENT;
+  return cumulet::c_abi::guarded(viewer->last_error, [&] { call(*viewer->viewer); });
 }
 
 void require_colour(std::span<const float, 3> values, const char* what) {
   for (const float value : values) require(in_range(value, 0.0, 1e30), what);
 }
 
-glm::vec3 to_vec3(std::span<const float, 3> v) { return {v[0], v[1], v[2]}; }
-glm::dvec3 to_dvec3(std::span<const double, 3> v) { return {v[0], v[1], v[2]}; }
+void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
+
+core::Frame read_frame(const cumulet_frame_desc* desc) {
+  const cumulet_frame_desc d = read_desc(desc, "cumulet_frame_desc");
+  require(std::isfinite(d.budget_ms) && d.budget_ms <= 1e9, "cumulet_frame_desc.budget_ms is not up to 1e9");
+  require(number(d.target) <= CUMULET_TARGET_NONE, "cumulet_frame_desc.target is unknown");
+  require(number(d.colour) <= CUMULET_COLOUR_HDR, "cumulet_frame_desc.colour is unknown");
+  require(number(d.blend) <= CUMULET_BLEND_REPLACE, "cumulet_frame_desc.blend is unknown");
+  require(number(d.depth_source) <= CUMULET_DEPTH_SOURCE_FRAMEBUFFER, "cumulet_frame_desc.depth_source is unknown");
+  require(d.width <= 16384 && d.height <= 16384, "cumulet_frame_desc.width or height is above 16384");
+  require_bool(d.flip_y, "cumulet_frame_desc.flip_y is not 0 or 1");
+  require_bool(d.write_depth, "cumulet_frame_desc.write_depth is not 0 or 1");
+  require_bool(d.depth_flip_y, "cumulet_frame_desc.depth_flip_y is not 0 or 1");
+  require_bool(d.depth_unchanged, "cumulet_frame_desc.depth_unchanged is not 0 or 1");
+  require(d.scale == 0.0 || in_range(d.scale, 0.1, 16.0), "cumulet_frame_desc.scale is not from 0.1 to 16");
+  core::Frame f;
+  f.budget_ms = d.budget_ms == 0.0 ? 10.0 : d.budget_ms;
+  f.target = static_cast<core::Target>(d.target);
+  f.framebuffer = d.framebuffer;
+  f.size = {d.width, d.height};
+  const auto& v = d.viewport;
+  if (v[0] == 0 && v[1] == 0 && v[2] == 0 && v[3] == 0) {
+    f.viewport = {0, 0, d.width, d.height};
+  } else {
+    const auto fits = [](std::int32_t first, std::int32_t count, std::uint32_t whole) {
+      return first >= 0 && count >= 0 && std::int64_t{first} + count <= std::int64_t{whole};
+    };
+    require(fits(v[0], v[2], d.width) && fits(v[1], v[3], d.height),
+            "cumulet_frame_desc.viewport is not inside the target");
+    f.viewport = {v[0], v[1], v[2], v[3]};
+  }
+  f.flip_y = d.flip_y == 1;
+  if (d.format != 0) f.format = d.format;
+  if (f.target == core::Target::texture) {
+    require(f.format == GL_RGBA8 || f.format == GL_SRGB8_ALPHA8 || f.format == GL_RGBA16F || f.format == GL_RGBA32F,
+            "cumulet_frame_desc.format is not GL_RGBA8, GL_SRGB8_ALPHA8, GL_RGBA16F or GL_RGBA32F");
+  }
+  f.encoding = static_cast<render::ColourEncoding>(d.colour);
+  f.blend_over = d.blend == CUMULET_BLEND_OVER;
+  f.write_depth = d.write_depth == 1;
+  f.depth_source = static_cast<render::DepthSource>(d.depth_source);
+  f.depth_name = d.depth_name;
+  f.depth_flip_y = d.depth_flip_y == 1;
+  f.depth_unchanged = d.depth_unchanged == 1;
+  return f;
+}
 
 }  // namespace
+
+const char* cumulet_status_text(cumulet_status status) {
+  switch (static_cast<int>(number(status))) {
+    case CUMULET_OK:
+      return "done";
+    case CUMULET_ERROR_INVALID_ARGUMENT:
+      return "invalid argument";
+    case CUMULET_ERROR_UNSUPPORTED:
+      return "not supported by this OpenGL context";
+    case CUMULET_ERROR_FILE:
+      return "unreadable or unsuitable file";
+    case CUMULET_ERROR_OUT_OF_MEMORY:
+      return "out of memory";
+    case CUMULET_ERROR_GL:
+      return "OpenGL error";
+    case CUMULET_ERROR_INTERNAL:
+      return "internal error";
+    case CUMULET_ERROR_CANCELLED:
+      return "cancelled";
+    case CUMULET_ERROR_CONTEXT_LOST:
+      return "the OpenGL context is lost";
+    case CUMULET_ERROR_DETACHED:
+      return "not attached to an OpenGL context";
+    case CUMULET_ERROR_TIMEOUT:
+      return "not ready in time";
+    default:
+      return "unknown status";
+  }
+}
 
 uint32_t cumulet_version(void) {
   return CUMULET_VERSION_MAJOR * 10000 + CUMULET_VERSION_MINOR * 100 + CUMULET_VERSION_PATCH;
 }
 
 cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** out, char* error, size_t error_size) {
-  std::string message;
-  const cumulet_status status = guarded(message, [&] {
+  return cumulet::c_abi::guarded(error, error_size, [&] {
     if (out == nullptr) refuse("out is NULL");
     *out = nullptr;
     const cumulet_create_desc d = read_desc(desc, "cumulet_create_desc");
-    if (d.get_proc == nullptr) refuse("cumulet_create_desc.get_proc is NULL");
+    require(number(d.gl_state) <= CUMULET_GL_STATE_HOST_RESETS, "cumulet_create_desc.gl_state is unknown");
     // The two level enums have the same values; the callback is wrapped by its type alone.
     const auto log = reinterpret_cast<cumulet::Log::Function>(reinterpret_cast<void (*)()>(d.log));
-    *out = new cumulet_viewer{{d.get_proc, d.get_proc_user, cumulet::Log(log, d.log_user)}, {}};
+    std::function<void()> update;
+    if (d.update != nullptr) update = [call = d.update, user = d.update_user] { call(user); };
+    auto viewer = std::make_unique<cumulet_viewer>();
+    viewer->viewer = std::make_unique<core::Viewer>(cumulet::Log(log, d.log_user), std::move(update),
+                                                    d.gl_state == CUMULET_GL_STATE_RESTORE);
+    if (d.get_proc != nullptr) viewer->viewer->attach(d.get_proc, d.get_proc_user);
+    *out = viewer.release();
   });
-  if (error != nullptr && error_size > 0) {
-    const size_t length = std::min(message.size(), error_size - 1);
-    std::memcpy(error, message.data(), length);
-    error[length] = '\0';
-  }
-  return status;
 }
 
-void cumulet_destroy(cumulet_viewer* viewer) { delete viewer; }
+void cumulet_destroy(cumulet_viewer* viewer) {
+  if (viewer == nullptr || viewer->viewer->in_update_callback()) return;
+  delete viewer;
+}
 
 const char* cumulet_last_error(const cumulet_viewer* viewer) {
   return viewer == nullptr ? "viewer is NULL" : viewer->last_error.c_str();
 }
 
-cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name) {
-  return guarded(viewer, [&] {
-    if (path == nullptr) refuse("path is NULL");
-    viewer->viewer.load_volume(path, grid_name == nullptr ? "" : grid_name);
+cumulet_status cumulet_attach(cumulet_viewer* viewer, cumulet_get_proc_fn get_proc, void* get_proc_user) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(get_proc != nullptr, "get_proc is NULL");
+    v.attach(get_proc, get_proc_user);
   });
 }
 
+cumulet_status cumulet_detach(cumulet_viewer* viewer) {
+  return guarded(viewer, [](core::Viewer& v) { v.detach(); });
+}
+
+cumulet_status cumulet_context_lost(cumulet_viewer* viewer) {
+  return guarded(viewer, [](core::Viewer& v) { v.context_lost(); });
+}
+
+// ---- volumes ----
+
+cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(path != nullptr && *path != '\0', "path is NULL or empty");
+    v.load_volume(path, grid_name == nullptr ? "" : grid_name);
+  });
+}
+
+cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_volume(volume == nullptr ? nullptr : volume->asset); });
+}
+
+cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(out != nullptr, "out is NULL");
+    *out = nullptr;
+    if (auto asset = v.volume()) {
+      *out = new cumulet_volume;
+      (*out)->asset = std::move(asset);
+    }
+  });
+}
+
+void cumulet_cancel(cumulet_viewer* viewer) {
+  if (viewer != nullptr) viewer->viewer->cancel();
+}
+
+cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* progress) {
+  if (viewer == nullptr) return CUMULET_ERROR_INVALID_ARGUMENT;
+  std::string unused;  // the last error belongs to the thread that renders
+  return cumulet::c_abi::guarded(unused, [&] {
+    const auto status = viewer->viewer->status();
+    cumulet_progress p{};
+    p.stage = static_cast<cumulet_stage>(status.stage);
+    p.fraction = status.fraction;
+    p.status = status.error ? status_of(*status.error) : CUMULET_OK;
+    copy_text(status.message, p.message, sizeof p.message);
+    write_desc(progress, p, "cumulet_progress");
+  });
+}
+
+cumulet_status cumulet_wait(cumulet_viewer* viewer, double timeout_ms) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(!std::isnan(timeout_ms), "timeout_ms is not a number");
+    v.wait(timeout_ms);
+  });
+}
+
+cumulet_status cumulet_rebuild(cumulet_viewer* viewer) {
+  return guarded(viewer, [](core::Viewer& v) { v.rebuild(); });
+}
+
+// ---- settings ----
+
 cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc) {
-  return guarded(viewer, [&] {
+  return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_grid_desc d = read_desc(desc, "cumulet_grid_desc");
     require(number(d.march) <= CUMULET_MARCH_BRICK, "cumulet_grid_desc.march is unknown");
     require(number(d.cells) <= CUMULET_CELLS_CONSTANT, "cumulet_grid_desc.cells is unknown");
     require(number(d.criterion) <= CUMULET_CRITERION_RANGE_MEAN, "cumulet_grid_desc.criterion is unknown");
     require(std::isfinite(d.threshold), "cumulet_grid_desc.threshold is not finite");
-    require(d.camera_adaptive == 0 || d.camera_adaptive == 1, "cumulet_grid_desc.camera_adaptive is not 0 or 1");
+    require_bool(d.camera_adaptive, "cumulet_grid_desc.camera_adaptive is not 0 or 1");
     require(in_range(d.pixel_size, 0.0, 1e6), "cumulet_grid_desc.pixel_size is not from 0 to 1e6");
-    cumulet::viewer::GridSettings s;
-    s.march = static_cast<cumulet::render::March>(d.march);
-    s.refine.cells =
+    core::GridSettings s;
+    s.build.march = static_cast<render::March>(d.march);
+    cumulet::grid::RefineSettings& refine = s.build.refine;
+    refine.cells =
         d.cells == CUMULET_CELLS_LINEAR ? cumulet::grid::CellKind::linear : cumulet::grid::CellKind::constant;
     const bool deviation = d.criterion == CUMULET_CRITERION_DEVIATION;
-    s.refine.criterion = deviation ? cumulet::grid::Criterion::deviation : cumulet::grid::Criterion::range_mean;
-    s.refine.threshold = d.threshold != 0.0 ? d.threshold : (deviation ? 0.02 : 1.0);
-    if (d.max_cells != 0) s.refine.max_cells = d.max_cells;
+    refine.criterion = deviation ? cumulet::grid::Criterion::deviation : cumulet::grid::Criterion::range_mean;
+    refine.threshold = d.threshold != 0.0 ? d.threshold : (deviation ? 0.02 : 1.0);
+    if (d.max_cells != 0) refine.max_cells = d.max_cells;
     s.camera_adaptive = d.camera_adaptive == 1;
-    s.refine.pixel_size = d.pixel_size > 0.0 ? d.pixel_size : 1.0;
-    viewer->viewer.set_grid(s);
+    refine.pixel_size = d.pixel_size > 0.0 ? d.pixel_size : 1.0;
+    v.set_grid(s);
   });
 }
 
 cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc) {
-  return guarded(viewer, [&] {
+  return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_medium_desc d = read_desc(desc, "cumulet_medium_desc");
     require(in_range(d.density_scale, 0.0, 1e30), "cumulet_medium_desc.density_scale is not from 0 to 1e30");
     require(d.anisotropy > -1.0F && d.anisotropy < 1.0F, "cumulet_medium_desc.anisotropy is not between -1 and 1");
     for (const float c : d.coalbedo) require(in_range(c, 0.0, 1.0), "cumulet_medium_desc.coalbedo is not from 0 to 1");
-    cumulet::viewer::Medium m;
+    core::Medium m;
     m.density_scale = d.density_scale > 0.0 ? d.density_scale : 1.0;
     m.albedo = 1.0F - to_vec3(d.coalbedo);
     m.anisotropy = d.anisotropy;
     m.max_bounces = d.max_bounces;
-    viewer->viewer.set_medium(m);
+    v.set_medium(m);
   });
 }
 
 cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc) {
-  return guarded(viewer, [&] {
+  return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_light_desc d = read_desc(desc, "cumulet_light_desc");
     require(std::isfinite(d.sun_azimuth_degrees), "cumulet_light_desc.sun_azimuth_degrees is not finite");
     require(in_range(d.sun_elevation_degrees, -90.0, 90.0),
             "cumulet_light_desc.sun_elevation_degrees is not from -90 to 90");
     require_colour(d.sun_irradiance, "cumulet_light_desc.sun_irradiance is negative or not finite");
     require_colour(d.sky_radiance, "cumulet_light_desc.sky_radiance is negative or not finite");
-    viewer->viewer.set_light(
-        {d.sun_azimuth_degrees, d.sun_elevation_degrees, to_vec3(d.sun_irradiance), to_vec3(d.sky_radiance)});
+    v.set_light({d.sun_azimuth_degrees, d.sun_elevation_degrees, to_vec3(d.sun_irradiance), to_vec3(d.sky_radiance)});
   });
 }
 
-cumulet_status cumulet_set_camera(cumulet_viewer* viewer, const cumulet_camera_desc* desc) {
-  return guarded(viewer, [&] {
-    const cumulet_camera_desc d = read_desc(desc, "cumulet_camera_desc");
-    require(all_finite(d.eye) && all_finite(d.target) && all_finite(d.up), "cumulet_camera_desc is not finite");
-    require(d.fovy_degrees == 0.0 || in_range(d.fovy_degrees, 0.01, 175.0),
-            "cumulet_camera_desc.fovy_degrees is not from 0.01 to 175");
-    cumulet::viewer::Camera c;
-    c.eye = to_dvec3(d.eye);
-    c.target = to_dvec3(d.target);
-    if (to_dvec3(d.up) != glm::dvec3(0.0)) c.up = to_dvec3(d.up);
-    if (d.fovy_degrees > 0.0) c.fovy_degrees = d.fovy_degrees;
-    viewer->viewer.set_camera(c);
+cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_sampling_desc d = read_desc(desc, "cumulet_sampling_desc");
+    require(number(d.view) <= CUMULET_VIEW_WIREFRAME, "cumulet_sampling_desc.view is unknown");
+    require(number(d.preview) <= CUMULET_PREVIEW_OFF, "cumulet_sampling_desc.preview is unknown");
+    v.set_sampling({d.samples == 0 ? 256 : d.samples, d.seed, static_cast<render::View>(d.view),
+                    d.preview == CUMULET_PREVIEW_AUTO});
   });
 }
 
-cumulet_status cumulet_set_image(cumulet_viewer* viewer, const cumulet_image_desc* desc) {
-  return guarded(viewer, [&] {
-    const cumulet_image_desc d = read_desc(desc, "cumulet_image_desc");
-    require(number(d.view) <= CUMULET_VIEW_DENSITY, "cumulet_image_desc.view is unknown");
-    viewer->viewer.set_image(
-        {d.width, d.height, d.samples == 0 ? 64 : d.samples, d.seed, static_cast<cumulet::render::View>(d.view)});
+cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_display_desc d = read_desc(desc, "cumulet_display_desc");
+    require(in_range(d.exposure_stops, -64.0, 64.0), "cumulet_display_desc.exposure_stops is not from -64 to 64");
+    require(number(d.tone_map) <= CUMULET_TONE_MAP_CLIP, "cumulet_display_desc.tone_map is unknown");
+    require(number(d.background) <= CUMULET_BACKGROUND_TRANSPARENT, "cumulet_display_desc.background is unknown");
+    v.set_display(
+        {d.exposure_stops, static_cast<render::ToneMap>(d.tone_map), d.background == CUMULET_BACKGROUND_TRANSPARENT});
   });
 }
 
-cumulet_status cumulet_build(cumulet_viewer* viewer) {
-  return guarded(viewer, [&] { viewer->viewer.build(); });
+// ---- camera and input ----
+
+cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_camera* camera) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(camera != nullptr, "camera is NULL");
+    v.set_camera(camera->camera);
+  });
 }
 
-cumulet_status cumulet_render(cumulet_viewer* viewer, double budget_ms, uint32_t* flags, double* progress) {
-  return guarded(viewer, [&] {
-    require(in_range(budget_ms, 0.0, 1e9), "budget_ms is not from 0 to 1e9");
-    double done = 0.0;
-    const bool converged = viewer->viewer.render(budget_ms, done);
-    if (flags != nullptr) *flags = converged ? CUMULET_RENDER_CONVERGED : CUMULET_RENDER_MORE;
-    if (progress != nullptr) *progress = done;
+cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_camera** out) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(out != nullptr, "out is NULL");
+    *out = nullptr;
+    *out = new cumulet_camera{v.camera()};
+  });
+}
+
+cumulet_status cumulet_frame_all(cumulet_viewer* viewer) {
+  return guarded(viewer, [](core::Viewer& v) { v.frame_all(); });
+}
+
+cumulet_status cumulet_set_navigation(cumulet_viewer* viewer, const cumulet_navigation_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_navigation_desc d = read_desc(desc, "cumulet_navigation_desc");
+    require(number(d.style) <= CUMULET_NAVIGATION_MAYA, "cumulet_navigation_desc.style is unknown");
+    require_bool(d.fly, "cumulet_navigation_desc.fly is not 0 or 1");
+    require(in_range(d.speed, 0.0, 1e6), "cumulet_navigation_desc.speed is not from 0 to 1e6");
+    require(in_range(d.turntable_degrees_per_second, -3600.0, 3600.0),
+            "cumulet_navigation_desc.turntable_degrees_per_second is not from -3600 to 3600");
+    v.set_navigation({static_cast<core::NavigationStyle>(d.style), d.fly == 1, d.speed > 0.0 ? d.speed : 1.0,
+                      d.turntable_degrees_per_second});
+  });
+}
+
+cumulet_status cumulet_input(cumulet_viewer* viewer, const cumulet_event* event, int32_t* handled) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_event e = read_desc(event, "cumulet_event");
+    require(number(e.type) <= CUMULET_EVENT_FOCUS_LOST, "cumulet_event.type is unknown");
+    require(number(e.button) <= CUMULET_BUTTON_RIGHT, "cumulet_event.button is unknown");
+    require(in_range(e.x, -1e9, 1e9) && in_range(e.y, -1e9, 1e9) && in_range(e.wheel, -1e4, 1e4),
+            "cumulet_event's position or wheel is not finite");
+    core::InputEvent i;
+    i.type = static_cast<core::InputEvent::Type>(e.type);
+    i.x = e.x;
+    i.y = e.y;
+    i.wheel = e.wheel;
+    i.button = static_cast<int>(e.button);
+    i.key = e.key;
+    i.modifiers = e.modifiers;
+    const bool used = v.input(i);
+    if (handled != nullptr) *handled = used ? 1 : 0;
+  });
+}
+
+// ---- frames ----
+
+cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_frame_desc* frame, cumulet_frame_result* result) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const core::Frame f = read_frame(frame);
+    if (result != nullptr) read_desc(result, "cumulet_frame_result");
+    const core::FrameResult r = v.render(f);
+    if (result == nullptr) return;
+    cumulet_frame_result out{};
+    const auto flag = [&out](bool set, std::uint32_t bit) { out.flags |= set ? bit : 0U; };
+    flag(r.more, CUMULET_RENDER_MORE);
+    flag(r.converged, CUMULET_RENDER_CONVERGED);
+    flag(r.loading, CUMULET_RENDER_LOADING);
+    flag(r.failed, CUMULET_RENDER_FAILED);
+    flag(r.preview, CUMULET_RENDER_PREVIEW);
+    out.progress = r.progress;
+    out.width = r.size.x;
+    out.height = r.size.y;
+    out.texture = r.texture;
+    out.depth_texture = r.depth_texture;
+    write_desc(result, out, "cumulet_frame_result");
+  });
+}
+
+cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    read_desc(pick, "cumulet_pick");
+    const core::Pick p = v.pick(x, y);
+    cumulet_pick out{};
+    out.hit = p.hit ? 1 : 0;
+    for (int axis = 0; axis < 3; ++axis) out.position[axis] = p.position[axis];
+    out.distance = p.distance;
+    write_desc(pick, out, "cumulet_pick");
+  });
+}
+
+cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], double box_max[3]) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(box_min != nullptr && box_max != nullptr, "box_min or box_max is NULL");
+    const core::Bounds box = v.bounds();
+    for (int axis = 0; axis < 3; ++axis) {
+      box_min[axis] = box.min[axis];
+      box_max[axis] = box.max[axis];
+    }
   });
 }
 
 cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count) {
-  return guarded(viewer, [&] { viewer->viewer.read(rgba, count); });
+  return guarded(viewer, [&](core::Viewer& v) { v.read_linear(rgba, count); });
 }
 
-cumulet_status cumulet_get_stats(const cumulet_viewer* viewer, cumulet_stats* stats) {
-  if (viewer == nullptr || stats == nullptr || stats->struct_size < sizeof(size_t) ||
-      stats->struct_size > sizeof(cumulet_stats)) {
-    return CUMULET_ERROR_INVALID_ARGUMENT;
-  }
-  std::string unused;
-  return guarded(unused, [&] {
-    const cumulet::viewer::Viewer& v = viewer->viewer;
+cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) { v.read_display(rgba, count); });
+}
+
+cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(noise != nullptr, "noise is NULL");
+    *noise = v.measure_noise();
+  });
+}
+
+cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    read_desc(stats, "cumulet_stats");
+    const core::Stats had = v.stats();
     cumulet_stats s{};
-    s.struct_size = stats->struct_size;
-    s.cells = v.cells();
-    s.levels = v.levels();
-    s.cell_bytes = v.cell_bytes();
-    s.active_voxels = v.active_voxels();
-    const auto& seconds = v.build_seconds();
+    s.cells = had.cells;
+    s.levels = had.levels;
+    s.limited = had.limited ? 1 : 0;
+    s.cell_bytes = had.cell_bytes;
+    s.gl_bytes = had.gl_bytes;
+    s.active_voxels = had.active_voxels;
+    const auto& seconds = had.build_seconds;
     s.build_seconds_load = seconds.load;
     s.build_seconds_statistics = seconds.statistics;
     s.build_seconds_refine = seconds.refine;
     s.build_seconds_records = seconds.records;
     s.build_seconds_upload = seconds.upload;
     s.build_seconds_total = seconds.load + seconds.statistics + seconds.refine + seconds.records + seconds.upload;
-    s.trace_seconds = v.trace_seconds();
-    const auto totals = v.totals();
-    s.samples = totals.samples;
-    s.steps = totals.steps;
-    const auto bounds = v.bounds();
-    for (int axis = 0; axis < 3; ++axis) {
-      s.bounds_min[axis] = bounds.min[axis];
-      s.bounds_max[axis] = bounds.max[axis];
+    s.trace_seconds = had.trace_seconds;
+    s.samples = had.samples;
+    s.steps = had.steps;
+    if (const auto volume = v.volume()) {
+      for (int axis = 0; axis < 3; ++axis) {
+        s.bounds_min[axis] = volume->bounds().min[axis];
+        s.bounds_max[axis] = volume->bounds().max[axis];
+      }
     }
-    const auto copy = [&](char* to, size_t size, GLenum name) {
-      const std::string text = cumulet::gl::string_of(v.gl(), name).substr(0, size - 1);
-      std::memcpy(to, text.c_str(), text.size() + 1);
-    };
-    copy(s.gl_vendor, sizeof(s.gl_vendor), GL_VENDOR);
-    copy(s.gl_renderer, sizeof(s.gl_renderer), GL_RENDERER);
-    copy(s.gl_version, sizeof(s.gl_version), GL_VERSION);
-    std::memcpy(stats, &s, stats->struct_size);
+    copy_text(had.strings.vendor, s.gl_vendor, sizeof s.gl_vendor);
+    copy_text(had.strings.renderer, s.gl_renderer, sizeof s.gl_renderer);
+    copy_text(had.strings.version, s.gl_version, sizeof s.gl_version);
+    write_desc(stats, s, "cumulet_stats");
   });
 }

@@ -1,221 +1,298 @@
 #include "viewer/viewer.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
+#include "render/display.hpp"
+#include "viewer/stopwatch.hpp"
 
 namespace cumulet::viewer {
 
 namespace {
 
 using glm::dvec3;
-
-class Stopwatch {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - start_).count();
-    start_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
+using Clock = std::chrono::steady_clock;
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-struct CameraFrame {
-  dvec3 forward, right, up;
-};
+double luminance(const glm::vec3& c) { return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z; }
 
-CameraFrame frame_of(const Camera& camera) {
-  const dvec3 forward = glm::normalize(camera.target - camera.eye);
-  dvec3 right = glm::cross(forward, camera.up);
-  // Looking along up: any right will do.
-  if (glm::length(right) < 1e-9)
-    right = glm::cross(forward, std::abs(forward.x) < 0.9 ? dvec3(1, 0, 0) : dvec3(0, 0, 1));
-  right = glm::normalize(right);
-  return {forward, right, glm::cross(right, forward)};
+render::Deadline deadline_after(double milliseconds) {
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                            std::chrono::duration<double, std::milli>(std::clamp(milliseconds, 0.0, 1e9)));
 }
+
+// A framebuffer of one context, for one call.
+class TransientFramebuffer {
+ public:
+  TransientFramebuffer(const gl::Functions& gl, GLuint colour, GLuint depth) : gl_(&gl) {
+    gl_->CreateFramebuffers(1, &name_);
+    gl_->NamedFramebufferTexture(name_, GL_COLOR_ATTACHMENT0, colour, 0);
+    if (depth != 0) gl_->NamedFramebufferTexture(name_, GL_DEPTH_ATTACHMENT, depth, 0);
+    gl::check(gl, "making the target's framebuffer");
+  }
+  ~TransientFramebuffer() { gl_->DeleteFramebuffers(1, &name_); }
+  TransientFramebuffer(const TransientFramebuffer&) = delete;
+  TransientFramebuffer& operator=(const TransientFramebuffer&) = delete;
+  [[nodiscard]] GLuint name() const { return name_; }
+
+ private:
+  const gl::Functions* gl_;
+  GLuint name_ = 0;
+};
 
 }  // namespace
 
-Viewer::Viewer(void* (*get_proc)(void* user, const char* name), void* user, const Log& log)
-    : log_(log), gl_(gl::load_functions(get_proc, user)), limits_(gl::query_limits(*gl_)), tracer_(gl_) {
-  gl::check(*gl_, "reading the context's limits");
+Viewer::Gl::Gl(gl::FunctionsPtr gl)
+    : functions(std::move(gl)),
+      limits(gl::query_limits(*functions)),
+      progressive(functions),
+      compositor(functions),
+      host_depth(functions) {
+  strings = {gl::string_of(*functions, GL_VENDOR), gl::string_of(*functions, GL_RENDERER),
+             gl::string_of(*functions, GL_VERSION)};
+  gl::check(*functions, "reading the context's limits");
+}
+
+Viewer::Viewer(Log log, std::function<void()> update, bool restore_state)
+    : log_(log), update_(std::move(update)), restore_state_(restore_state), builder_(log, [this] { notify(); }) {
+  set_camera(std::make_shared<Camera>());
 }
 
 Viewer::~Viewer() = default;
 
-void Viewer::load_volume(const std::filesystem::path& file, const std::string& grid_name) {
-  Stopwatch watch;
-  set_volume(volume::import_volume(file, grid_name, log_));
-  seconds_.load = watch.lap();
+// ---- context ----
+
+Viewer::Gl& Viewer::gl() const {
+  if (!gl_) throw Error(ErrorCode::detached, "the viewer is attached to no GL context");
+  return *gl_;
 }
 
-void Viewer::set_volume(volume::ScalarVolume volume) {
-  grid::fit_cube(volume);  // refuses what no cube can hold, before anything is given up
-  volume_ = std::make_unique<const volume::ScalarVolume>(std::move(volume));
-  statistics_.reset();
-  seconds_ = {};
-  data_stale_ = true;
+void Viewer::attach(GetProc get_proc, void* user) {
+  if (gl_) throw Error(ErrorCode::invalid_argument, "the viewer is attached to a GL context already");
+  auto functions = gl::load_functions(get_proc, user);
+  gl::clear_errors(*functions);
+  gl_ = std::make_unique<Gl>(std::move(functions));
+  ++generation_;
+  notify();
 }
+
+void Viewer::detach() {
+  if (!gl_) return;
+  const gl::FunctionsPtr functions = gl_->functions;
+  gl_.reset();
+  gl::clear_errors(*functions);
+}
+
+void Viewer::context_lost() {
+  if (gl_) gl_->functions->abandoned = true;
+  gl_.reset();
+}
+
+template <class Body>
+void Viewer::with_gl(Body&& body) {
+  Gl& g = gl();
+  const gl::FunctionsPtr functions = g.functions;
+  try {
+    gl::clear_errors(*functions);
+    gl::check_reset(*functions);
+    const gl::StateGuard guard(*functions, restore_state_);
+    body(g);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::context_lost) context_lost();
+    throw;
+  }
+  gl::clear_errors(*functions);
+}
+
+// ---- the host's callback ----
+
+void Viewer::notify() {
+  if (!update_ || update_pending_.exchange(true)) return;
+  callback_thread_ = std::this_thread::get_id();
+  update_();
+  callback_thread_ = std::thread::id();
+}
+
+// ---- volumes and building ----
+
+void Viewer::sync() {
+  if (auto loaded = builder_.take_loaded()) {
+    volume_ = std::move(*loaded);
+    built_view_.reset();
+  }
+  if (auto built = builder_.take_built()) {
+    // A rebuild keeps what the load took.
+    if (built->volume == built_.volume) {
+      if (built->seconds.load == 0.0) built->seconds.load = built_.seconds.load;
+      if (built->seconds.statistics == 0.0) built->seconds.statistics = built_.seconds.statistics;
+    }
+    built_ = std::move(*built);
+  }
+}
+
+std::optional<BuildSettings> Viewer::build_settings() const {
+  BuildSettings settings = grid_.build;
+  if (grid_.camera_adaptive) {
+    if (!view_ || frame_size_.x == 0) return std::nullopt;  // the next frame asks
+    settings.refine.camera = refine_camera();
+  }
+  return settings;
+}
+
+void Viewer::request_build() {
+  const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
+  if (builder_.configure_load(settings)) return;
+  built_view_.reset();
+  if (volume_ && settings) builder_.build(volume_, *settings);
+}
+
+void Viewer::load_volume(const std::string& path, const std::string& grid_name) {
+  sync();
+  builder_.load(path, grid_name, grid_.camera_adaptive ? std::nullopt : build_settings());
+  notify();
+}
+
+void Viewer::set_volume(VolumePtr volume) {
+  builder_.cancel();
+  sync();
+  volume_ = std::move(volume);
+  built_view_.reset();
+  if (!volume_) {
+    built_ = {};
+  } else if (!grid_.camera_adaptive) {
+    builder_.build(volume_, grid_.build);
+  }
+  notify();
+}
+
+VolumePtr Viewer::volume() {
+  sync();
+  return volume_;
+}
+
+void Viewer::rebuild() {
+  sync();
+  request_build();
+  notify();
+}
+
+void Viewer::wait(double timeout_ms) {
+  std::optional<Clock::time_point> until;
+  if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
+  if (!builder_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
+  sync();
+  const Builder::Status status = builder_.status();
+  if (status.error) throw Error(*status.error, status.message);
+}
+
+Builder::Status Viewer::status() const {
+  Builder::Status status = builder_.status();
+  const double upload = upload_progress_.load(std::memory_order_relaxed);
+  if (status.stage == Progress::Stage::idle && upload < 1.0) {
+    status.stage = Progress::Stage::uploading;
+    status.fraction = upload;
+  }
+  return status;
+}
+
+// ---- settings ----
 
 void Viewer::set_grid(const GridSettings& settings) {
+  sync();
   grid_ = settings;
-  data_stale_ = true;
+  request_build();
+  notify();
 }
 
 void Viewer::set_medium(const Medium& medium) {
   medium_ = medium;
-  picture_stale_ = true;
+  notify();
 }
 
 void Viewer::set_light(const Light& light) {
   light_ = light;
-  picture_stale_ = true;
+  notify();
 }
 
-void Viewer::set_camera(const Camera& camera) {
-  camera_ = camera;
-  picture_stale_ = true;
-  data_stale_ = data_stale_ || grid_.camera_adaptive;
+void Viewer::set_sampling(const Sampling& sampling) {
+  sampling_ = sampling;
+  notify();
 }
 
-void Viewer::set_image(const Image& image) {
-  if (image.width < 1 || image.height < 1 || image.width > 16384 || image.height > 16384 ||
-      static_cast<int>(std::max(image.width, image.height)) > limits_.texture_size_2d) {
-    throw Error(ErrorCode::invalid_argument,
-                "an image of " + std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels: 1 to " +
-                    std::to_string(std::min(16384, limits_.texture_size_2d)) + " each way are possible");
-  }
-  image_ = image;
-  picture_stale_ = true;
-  data_stale_ = data_stale_ || grid_.camera_adaptive;
+void Viewer::set_display(const DisplaySettings& display) {
+  display_ = display;
+  notify();
 }
 
-void Viewer::require_volume() const {
-  if (!volume_) throw Error(ErrorCode::invalid_argument, "no volume is loaded");
+void Viewer::set_camera(std::shared_ptr<Camera> camera) {
+  camera_listener_.reset();
+  camera_ = std::move(camera);
+  camera_listener_ = camera_->listen([this] { notify(); });
+  notify();
 }
 
-void Viewer::build() {
-  require_volume();
-  if (!data_stale_) return;
-  gl::clear_errors(*gl_);
-  Stopwatch watch;
-  if (!statistics_) {
-    statistics_ = std::make_unique<const grid::Statistics>(*volume_, grid::fit_cube(*volume_));
-    seconds_.statistics = watch.lap();
-  }
-  std::optional<render::MarchData> data;
-  std::uint64_t cells = 0;
-  std::uint32_t levels = 0;
-  BuildSeconds seconds = seconds_;
-  seconds.refine = seconds.records = 0.0;
-  const gl::StateGuard guard(*gl_);
-  if (grid_.march == render::March::tet) {
-    grid::RefineSettings refine = grid_.refine;
-    if (grid_.camera_adaptive) refine.camera = refine_camera();
-    const auto diamonds = std::make_unique<const grid::DiamondSet>(*statistics_, refine);
-    auto builder = std::make_unique<grid::GridBuilder>(*statistics_, *diamonds);
-    builder->bisect();
-    seconds.refine = watch.lap();
-    const grid::TetGrid grid = builder->records(refine.cells, volume_->max_value);
-    builder.reset();
-    seconds.records = watch.lap();
-    if (grid.limited) {
-      log_.info("max_cells (" + std::to_string(refine.max_cells) + ") ended the refinement before the threshold");
-    }
-    cells = grid.cells.size();
-    levels = grid.levels;
-    data = render::MarchData::upload_tet(gl_, limits_, grid, refine.cells == grid::CellKind::linear, grid_.page_texels);
-  } else if (grid_.march == render::March::dense) {
-    data = render::MarchData::upload_dense(gl_, limits_, *statistics_, *volume_);
-  } else {
-    data = render::MarchData::upload_brick(gl_, limits_, *statistics_, *volume_);
-  }
-  gl_->Finish();
-  seconds.upload = watch.lap();
-  data_ = std::move(data);
-  cells_ = cells;
-  levels_ = levels;
-  seconds_ = seconds;
-  data_stale_ = false;
-  picture_stale_ = true;
+void Viewer::set_navigation(const NavigationSettings& settings) {
+  navigation_.set(settings);
+  notify();
 }
 
-Bounds Viewer::bounds() const {
-  Bounds bounds;
-  if (!volume_) return bounds;
-  for (int corner = 0; corner < 8; ++corner) {
-    dvec3 p(volume_->bounds_min);
-    for (int axis = 0; axis < 3; ++axis) {
-      p[axis] = ((corner >> axis) & 1) != 0 ? volume_->bounds_max[axis] + 0.5 : volume_->bounds_min[axis] - 0.5;
-    }
-    const dvec3 world(volume_->index_to_world * glm::dvec4(p, 1.0));
-    bounds.min = corner == 0 ? world : glm::min(bounds.min, world);
-    bounds.max = corner == 0 ? world : glm::max(bounds.max, world);
-  }
-  return bounds;
+bool Viewer::input(const InputEvent& event) {
+  sync();
+  const auto box = volume_ ? std::optional(volume_->bounds()) : std::nullopt;
+  const bool handled = navigation_.input(event, *camera_, frame_size_.x, frame_size_.y, box);
+  if (navigation_.moving()) notify();
+  return handled;
 }
 
-Camera Viewer::placed_camera() const {
-  if (camera_.eye != camera_.target) return camera_;
-  // As near as keeps all eight corners of the bounds in the picture, seen from +Z and a little above.
-  const Bounds box = bounds();
-  Camera camera = camera_;
-  camera.target = 0.5 * (box.min + box.max);
-  const dvec3 back = glm::normalize(dvec3(0.0, 0.2, 1.0));
-  camera.eye = camera.target + back;
-  const CameraFrame frame = frame_of(camera);
-  const double tan_y = std::tan(0.5 * radians(camera.fovy_degrees));
-  const double tan_x = image_.height > 0 ? tan_y * image_.width / image_.height : tan_y;
-  double distance = 1e-30;
-  for (int corner = 0; corner < 8; ++corner) {
-    const dvec3 p((corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
-                  (corner & 4) != 0 ? box.max.z : box.min.z);
-    const dvec3 q = p - camera.target;
-    const double wide = std::max(std::abs(glm::dot(q, frame.right)) / tan_x, std::abs(glm::dot(q, frame.up)) / tan_y);
-    distance = std::max(distance, glm::dot(q, back) + wide);
-  }
-  camera.eye = camera.target + back * distance;
-  return camera;
+void Viewer::frame_all() { camera_->frame(bounds(), frame_size_.y > 0 ? double(frame_size_.x) / frame_size_.y : 1.0); }
+
+Bounds Viewer::bounds() {
+  sync();
+  if (!volume_) throw Error(ErrorCode::invalid_argument, "the viewer has no volume");
+  return volume_->bounds();
 }
 
-std::optional<grid::RefineCamera> Viewer::refine_camera() const {
-  if (image_.width == 0)
-    throw Error(ErrorCode::invalid_argument, "a camera-adaptive grid needs the image's size first");
-  const Camera camera = placed_camera();
-  const CameraFrame frame = frame_of(camera);
+// ---- frames ----
+
+grid::RefineCamera Viewer::refine_camera() const {
+  const ViewFrame& view = *view_;
   grid::RefineCamera refine;
-  refine.eye = camera.eye;
-  refine.forward = frame.forward;
-  refine.right = frame.right;
-  refine.up = frame.up;
-  refine.tan_half_y = std::tan(0.5 * radians(camera.fovy_degrees));
-  refine.tan_half_x = refine.tan_half_y * image_.width / image_.height;
-  refine.pixels_per_radian = image_.height / (2.0 * refine.tan_half_y);
+  refine.right = glm::normalize(view.right);
+  refine.up = glm::normalize(view.up);
+  refine.forward = glm::normalize(glm::cross(refine.up, refine.right));
+  // Off axis: the frustum about the axis that holds the picture's.
+  refine.tan_half_x = glm::length(view.right) + std::abs(glm::dot(view.forward, refine.right));
+  refine.tan_half_y = glm::length(view.up) + std::abs(glm::dot(view.forward, refine.up));
+  refine.eye = view.eye;
+  refine.pixels_per_radian = frame_size_.y / (2.0 * glm::length(view.up));
+  if (view.orthographic) {
+    // A pinhole so far back that its rays are as good as parallel.
+    const double back = 1e4 * glm::length(view.up);
+    refine.eye -= back * refine.forward;
+    refine.tan_half_x /= back;
+    refine.tan_half_y /= back;
+    refine.pixels_per_radian *= back;
+  }
   return refine;
 }
 
 core::CmParameters Viewer::parameters() const {
-  const Camera camera = placed_camera();
-  const CameraFrame frame = frame_of(camera);
-  const glm::dmat4 to_cube = glm::inverse(statistics_->cube().to_world);
+  const ViewFrame& view = *view_;
+  const render::MarchSource& source = *gl_->data_source;
+  const glm::dmat4 to_cube = glm::inverse(source.cube.to_world);
   const glm::dmat3 linear(to_cube);
-  const double tan_y = std::tan(0.5 * radians(camera.fovy_degrees));
-  const double tan_x = tan_y * image_.width / image_.height;
   const auto direction = [](const dvec3& v) { return glm::vec4(glm::vec3(v), 0.0F); };
   core::CmParameters p{};
-  p.eye = glm::vec4(glm::vec3(to_cube * glm::dvec4(camera.eye, 1.0)), 1.0F);
-  p.forward = direction(frame.forward);
-  p.right = direction(frame.right * tan_x);
-  p.up = direction(frame.up * tan_y);
+  p.eye = glm::vec4(glm::vec3(to_cube * glm::dvec4(view.eye, 1.0)), 1.0F);
+  p.forward = direction(view.forward);
+  p.forward.w = view.orthographic ? 1.0F : 0.0F;
+  p.right = direction(view.right);
+  p.up = direction(view.up);
   p.to_cube_x = direction(linear[0]);
   p.to_cube_y = direction(linear[1]);
   p.to_cube_z = direction(linear[2]);
@@ -229,47 +306,290 @@ core::CmParameters Viewer::parameters() const {
   p.sky_radiance = glm::vec4(light_.sky_radiance, 0.0F);
   p.albedo = glm::vec4(medium_.albedo, 1.0F);
   // Half of the sky's share of the light: its escaping paths sample it as well.
-  const auto luminance = [](const glm::vec3& c) { return 0.2126F * c.x + 0.7152F * c.y + 0.0722F * c.z; };
-  const float sun_power = luminance(light_.sun_irradiance);
-  const float sky_power = 4.0F * std::numbers::pi_v<float> * luminance(light_.sky_radiance);
+  const auto sun_power = static_cast<float>(luminance(light_.sun_irradiance));
+  const auto sky_power = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(light_.sky_radiance));
   const float to_sky = sun_power > 0.0F ? 0.5F * sky_power / (sky_power + sun_power) : (sky_power > 0.0F ? 1.0F : 0.0F);
-  p.medium = {static_cast<float>(std::min(1e30, medium_.density_scale * std::max(volume_->max_value, 1e-30F))),
+  p.medium = {static_cast<float>(std::min(1e30, medium_.density_scale * std::max(source.max_value, 1e-30F))),
               medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F ? 1.0F : 0.0F};
-  p.image = {image_.width, image_.height, image_.seed, std::max(1U, image_.samples)};
+  p.image = {frame_size_, sampling_.seed, std::max(1U, sampling_.samples)};
   p.march = {0U, medium_.max_bounces, 0U, 0U};
   return p;
 }
 
-bool Viewer::render(double budget_ms, double& progress) {
-  build();
-  if (image_.width == 0) throw Error(ErrorCode::invalid_argument, "no image size is set");
-  gl::clear_errors(*gl_);
-  const gl::StateGuard guard(*gl_);
-  Stopwatch watch;
-  if (picture_stale_) {
-    tracer_.begin(*data_, parameters(), image_.view);
-    picture_stale_ = false;
-    trace_seconds_ = 0.0;
-    watch.lap();  // compiling and clearing is not tracing
+void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
+  Gl& g = gl();
+  sync();
+  const auto now = Clock::now();
+  const double since = std::chrono::duration<double>(now - last_frame_time_).count();
+  last_frame_time_ = now;
+  const auto box = volume_ ? std::optional(volume_->bounds()) : std::nullopt;
+  navigation_.advance(std::min(since, 0.25), *camera_, box);
+
+  frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
+  last_view_ = view_;
+  view_.reset();
+  // Without a volume the camera may wait for its bounds.
+  if (frame_size_.x > 0 && volume_) view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
+
+  if (grid_.camera_adaptive && view_ && (view_ != built_view_ || frame_size_ != built_size_)) {
+    const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
+    if (rests) {
+      builder_.build(volume_, *build_settings());
+      built_view_ = view_;
+      built_size_ = frame_size_;
+    }
   }
-  const bool done = tracer_.trace(*data_, budget_ms);
-  trace_seconds_ += watch.lap();
-  progress = tracer_.progress();
-  return done;
+  if (frame.budget_ms >= 0.0) upload(g, deadline);
 }
 
-void Viewer::read(float* rgba, std::size_t count) const {
-  if (tracer_.width() == 0) throw Error(ErrorCode::invalid_argument, "nothing has been rendered yet");
-  const std::size_t needed = std::size_t{tracer_.width()} * tracer_.height() * 4;
-  if (rgba == nullptr || count < needed) {
-    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(needed) + " floats");
+void Viewer::upload(Gl& g, render::Deadline deadline) {
+  if (!built_.source) {
+    if (g.data) {
+      g.data.reset();
+      g.progressive.reset();
+      ++generation_;
+    }
+    g.data_source.reset();
+    g.upload_source.reset();
+    g.upload.reset();
+  } else if (g.data_source != built_.source) {
+    Stopwatch watch;
+    try {
+      if (g.upload_source != built_.source) {
+        g.upload.reset();
+        g.upload_source = built_.source;
+        g.upload = std::make_unique<render::MarchUpload>(g.functions, g.limits, built_.source, page_texels_);
+        built_.seconds.upload = 0.0;
+      }
+      if (g.upload && g.upload->advance(deadline)) {
+        g.data = g.upload->take();
+        g.data_source = built_.source;
+        g.upload.reset();
+        ++generation_;
+      }
+    } catch (const Error&) {
+      g.upload.reset();  // upload_source stays: tried again when there is another
+      throw;
+    }
+    built_.seconds.upload += watch.lap();
   }
-  gl::clear_errors(*gl_);
-  const gl::StateGuard guard(*gl_);
-  tracer_.read(rgba);
-  totals_ = tracer_.totals();
+  upload_progress_ = g.upload ? g.upload->progress() : 1.0;
 }
 
-render::Totals Viewer::totals() const { return totals_; }
+render::SurfaceDepth Viewer::surface() const {
+  const render::HostDepth& depth = gl_->host_depth;
+  if (depth.texture() == 0) return {};
+  return {depth.texture(), depth.layers(), depth.size()};
+}
+
+void Viewer::trace(const Frame& frame, render::Deadline deadline) {
+  Gl& g = gl();
+  if (!view_) return;
+  render::HostDepthInput input;
+  input.source = frame.depth_source;
+  input.name = frame.depth_name;
+  input.viewport = frame.viewport;
+  input.target_size = frame.size;
+  input.flip_y = frame.depth_flip_y;
+  input.orthographic = view_->orthographic;
+  input.depth_a = view_->depth_a;
+  input.depth_b = view_->depth_b;
+  input.unchanged = frame.depth_unchanged && view_ == last_view_;
+  if (g.host_depth.update(input)) ++surface_generation_;
+  if (!g.data) return;
+  render::PictureWish wish;
+  wish.parameters = parameters();
+  wish.view = sampling_.view;
+  wish.generation = generation_;
+  wish.surface_generation = surface_generation_;
+  wish.preview = sampling_.preview;
+  wish.depth = frame.write_depth;
+  g.progressive.advance(wish, *g.data, surface(), deadline, frame.budget_ms);
+}
+
+void Viewer::draw(const Frame& frame, FrameResult& result) {
+  Gl& g = gl();
+  const render::Picture* shown = g.progressive.shown();
+  if (shown != nullptr) result.size = shown->size();
+  if (frame.target == Target::none || frame_size_.x == 0 || frame_size_.y == 0) return;
+  if (shown == nullptr) {
+    if (g.empty.sum() == 0) g.progressive.tracer().clear(g.empty);
+    shown = &g.empty;
+  }
+  const bool legend = shown->view() != render::View::shaded;
+  render::Display display;
+  display.exposure_stops = display_.exposure_stops;
+  display.tone_map = display_.tone_map;
+  display.legend = legend;
+  display.transparent = display_.transparent;
+  display.background = shown == &g.empty ? light_.sky_radiance : glm::vec3(shown->parameters().sky_radiance);
+  display.encoding = frame.encoding;
+  render::FrameTarget target;
+  target.framebuffer = frame.framebuffer;
+  target.viewport = frame.viewport;
+  target.flip_y = frame.flip_y;
+  target.blend_over = frame.blend_over;
+  target.write_depth = frame.write_depth && shown->volume_z() != 0;
+  if (view_) {
+    target.orthographic = view_->orthographic;
+    target.depth_a = view_->depth_a;
+    target.depth_b = view_->depth_b;
+    target.reversed = view_->orthographic ? view_->depth_b < 0.0 : view_->depth_b > 0.0;
+  }
+  const render::PictureTextures picture{shown->sum(), shown->counts(), shown->size(), shown->volume_z()};
+  if (frame.target == Target::framebuffer) {
+    g.compositor.draw(picture, display, target);
+    return;
+  }
+  if (g.texture_size != frame.size || g.texture_format != frame.format || !g.colour) {
+    const int width = static_cast<int>(frame.size.x);
+    const int height = static_cast<int>(frame.size.y);
+    g.colour = gl::make_texture_2d(g.functions, frame.format, width, height, "creating the target texture");
+    g.depth = {};
+    g.texture_size = frame.size;
+    g.texture_format = frame.format;
+  }
+  if (frame.write_depth && !g.depth) {
+    g.depth = gl::make_texture_2d(g.functions, GL_DEPTH_COMPONENT32F, static_cast<int>(frame.size.x),
+                                  static_cast<int>(frame.size.y), "creating the target's depth");
+  }
+  const TransientFramebuffer framebuffer(*g.functions, g.colour.name(), frame.write_depth ? g.depth.name() : 0);
+  constexpr std::array<float, 4> nothing{};
+  g.functions->ClearNamedFramebufferfv(framebuffer.name(), GL_COLOR, 0, nothing.data());
+  if (frame.write_depth) {
+    const float far = target.reversed ? 0.0F : 1.0F;
+    g.functions->ClearNamedFramebufferfv(framebuffer.name(), GL_DEPTH, 0, &far);
+    result.depth_texture = g.depth.name();
+  }
+  target.framebuffer = framebuffer.name();
+  target.blend_over = false;
+  g.compositor.draw(picture, display, target);
+  result.texture = g.colour.name();
+}
+
+FrameResult Viewer::render(const Frame& frame) {
+  FrameResult result;
+  std::optional<Error> failure;
+  // Before anything new is seen, so that what comes later is told again.
+  update_pending_ = false;
+  with_gl([&](Gl& g) {
+    // Each part does what it can: a failure is told once, after what there was has been drawn.
+    const auto attempt = [&](auto&& part) {
+      try {
+        part();
+      } catch (const Error& error) {
+        if (error.code() == ErrorCode::context_lost) throw;
+        if (!failure) failure = error;
+        gl::clear_errors(*g.functions);
+      }
+    };
+    const render::Deadline deadline = deadline_after(frame.budget_ms);
+    attempt([&] { prepare(frame, deadline); });
+    if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
+    attempt([&] { draw(frame, result); });
+    const Builder::Status status = builder_.status();
+    result.loading = builder_.busy() || g.upload != nullptr;
+    result.failed = status.error && *status.error != ErrorCode::cancelled;
+    result.converged = !result.loading && g.data && view_ && g.progressive.converged();
+    const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
+    result.more =
+        navigation_.moving() || g.upload != nullptr || waits_to_build || (g.data && view_ && g.progressive.more());
+    result.progress = g.progressive.progress();
+    result.preview = result.size != glm::uvec2(0U) && result.size != frame_size_;
+  });
+  if (failure) throw Error(*failure);
+  return result;
+}
+
+Pick Viewer::pick(double x, double y) {
+  Pick pick;
+  with_gl([&](Gl& g) {
+    if (!g.data || !view_ || !(x >= 0.0 && y >= 0.0 && x < frame_size_.x && y < frame_size_.y)) return;
+    const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
+    const float z = g.progressive.tracer().pick(*g.data, parameters(), surface(), pixel);
+    if (!(z > 0.0F)) return;
+    const double right = 2.0 * (pixel.x + 0.5) / frame_size_.x - 1.0;
+    const double up = 1.0 - 2.0 * (pixel.y + 0.5) / frame_size_.y;
+    const dvec3 aside = right * view_->right + up * view_->up;
+    const dvec3 origin = view_->orthographic ? view_->eye + aside : view_->eye;
+    const dvec3 ray = view_->orthographic ? view_->forward : view_->forward + aside;
+    pick = {true, origin + double(z) * ray, double(z) * glm::length(ray)};
+  });
+  return pick;
+}
+
+const render::Picture& Viewer::readable() {
+  const render::Picture* picture = gl().progressive.newest();
+  if (picture == nullptr) throw Error(ErrorCode::invalid_argument, "nothing has been rendered yet");
+  return *picture;
+}
+
+void Viewer::read_linear(float* rgba, std::size_t count) {
+  with_gl([&](Gl& g) {
+    const render::Picture& picture = readable();
+    const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
+    if (rgba == nullptr || count < pixels * 4)
+      throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " floats");
+    g.progressive.tracer().read(picture, rgba);
+    totals_ = g.progressive.tracer().totals(picture);
+    if (display_.transparent || picture.view() != render::View::shaded) return;
+    const glm::vec3 sky(picture.parameters().sky_radiance);
+    for (std::size_t i = 0; i < pixels; ++i) {
+      for (int c = 0; c < 3; ++c) rgba[4 * i + static_cast<std::size_t>(c)] += (1.0F - rgba[4 * i + 3]) * sky[c];
+    }
+  });
+}
+
+void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
+  std::size_t pixels = 0;
+  bool legend = false;
+  with_gl([&](Gl&) {
+    const render::Picture& picture = readable();
+    pixels = std::size_t{picture.size().x} * picture.size().y;
+    legend = picture.view() != render::View::shaded;
+  });
+  if (rgba == nullptr || count < pixels * 4)
+    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " bytes");
+  std::vector<float> linear(pixels * 4);
+  read_linear(linear.data(), linear.size());
+  render::Display display;
+  display.exposure_stops = display_.exposure_stops;
+  display.tone_map = display_.tone_map;
+  display.legend = legend;
+  display.transparent = display_.transparent;
+  render::to_display(linear, display, {rgba, pixels * 4});
+}
+
+double Viewer::measure_noise() {
+  with_gl([&](Gl& g) { totals_ = g.progressive.tracer().totals(readable()); });
+  return totals_.noise;
+}
+
+Stats Viewer::stats() {
+  sync();
+  Stats s;
+  s.cells = built_.cells;
+  s.levels = built_.levels;
+  s.limited = built_.limited;
+  s.active_voxels = volume_ ? volume_->volume().active_voxels : 0;
+  s.build_seconds = built_.seconds;
+  s.steps = totals_.steps;
+  if (gl_) {
+    s.cell_bytes = gl_->data ? gl_->data->bytes() : 0;
+    const std::uint64_t target_pixels = std::uint64_t{gl_->texture_size.x} * gl_->texture_size.y;
+    const std::uint64_t colour_bytes =
+        gl_->texture_format == GL_RGBA32F ? 16 : (gl_->texture_format == GL_RGBA16F ? 8 : 4);
+    const glm::u64vec2 depth_size = gl_->host_depth.size();
+    s.gl_bytes = s.cell_bytes + gl_->progressive.bytes() + target_pixels * (colour_bytes + (gl_->depth ? 4 : 0)) +
+                 depth_size.x * depth_size.y * gl_->host_depth.layers() * 4;
+    s.strings = gl_->strings;
+    s.trace_seconds = gl_->progressive.trace_seconds();
+    const render::Picture* picture = gl_->progressive.newest();
+    s.samples = picture != nullptr ? picture->samples() : 0;
+  }
+  return s;
+}
+
+const core::CmParameters& Viewer::trace_parameters() { return readable().parameters(); }
 
 }  // namespace cumulet::viewer

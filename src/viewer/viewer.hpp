@@ -1,26 +1,29 @@
 #pragma once
 
-#include <filesystem>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "base/log.hpp"
 #include "gl/objects.hpp"
-#include "grid/statistics.hpp"
-#include "grid/tet_grid.hpp"
-#include "render/march_data.hpp"
-#include "render/tracer.hpp"
-#include "volume/volume.hpp"
+#include "render/compositor.hpp"
+#include "render/host_depth.hpp"
+#include "render/progressive.hpp"
+#include "viewer/builder.hpp"
+#include "viewer/camera.hpp"
+#include "viewer/navigation.hpp"
 
 namespace cumulet::viewer {
 
 struct GridSettings {
-  render::March march = render::March::tet;
-  grid::RefineSettings refine;  // camera is filled from the viewer's
+  BuildSettings build;  // refine.camera is filled from the viewer's
   bool camera_adaptive = false;
-  std::int64_t page_texels = 0;  // 0: the driver's limit; tests make pages smaller
 };
 
 struct Medium {
@@ -37,96 +40,202 @@ struct Light {
   glm::vec3 sky_radiance{0.0F};
 };
 
-struct Camera {
-  glm::dvec3 eye{0.0};
-  glm::dvec3 target{0.0};  // eye == target: fit the volume's bounds
-  glm::dvec3 up{0.0, 1.0, 0.0};
-  double fovy_degrees = 40.0;
-};
-
-struct Image {
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
-  std::uint32_t samples = 64;
+struct Sampling {
+  std::uint32_t samples = 256;
   std::uint32_t seed = 0;
   render::View view = render::View::shaded;
+  bool preview = true;
 };
 
-struct BuildSeconds {
-  double load = 0.0;
-  double statistics = 0.0;
-  double refine = 0.0;
-  double records = 0.0;
-  double upload = 0.0;
+struct DisplaySettings {
+  float exposure_stops = 0.0F;
+  render::ToneMap tone_map = render::ToneMap::neutral;
+  bool transparent = false;
 };
 
-struct Bounds {
-  glm::dvec3 min{0.0};
-  glm::dvec3 max{0.0};
+enum class Target { framebuffer = 0, texture = 1, none = 2 };
+
+/// cumulet_frame_desc, checked.
+struct Frame {
+  double budget_ms = 10.0;  // negative: trace nothing
+  Target target = Target::framebuffer;
+  GLuint framebuffer = 0;
+  glm::uvec2 size{0U};
+  glm::ivec4 viewport{0};  // never zero where size is not
+  bool flip_y = false;
+  GLenum format = GL_RGBA8;
+  render::ColourEncoding encoding = render::ColourEncoding::srgb;
+  bool blend_over = true;
+  bool write_depth = false;
+  render::DepthSource depth_source = render::DepthSource::none;
+  GLuint depth_name = 0;
+  bool depth_flip_y = false;
+  bool depth_unchanged = false;
 };
 
-/// The facade behind the C ABI: settings in, picture out. Rebuilds what a change makes out of date, and nothing else.
-/// Threads and GL state as cumulet.h says. Throws Error; a call that throws leaves the viewer as it was.
+struct FrameResult {
+  bool more = false;
+  bool converged = false;
+  bool loading = false;
+  bool failed = false;
+  bool preview = false;
+  double progress = 0.0;
+  glm::uvec2 size{0U};
+  GLuint texture = 0;
+  GLuint depth_texture = 0;
+};
+
+struct Pick {
+  bool hit = false;
+  glm::dvec3 position{0.0};
+  double distance = 0.0;
+};
+
+struct GlStrings {
+  std::string vendor;
+  std::string renderer;
+  std::string version;
+};
+
+struct Stats {
+  std::uint64_t cells = 0;
+  std::uint32_t levels = 0;
+  bool limited = false;
+  std::uint64_t cell_bytes = 0;
+  std::uint64_t gl_bytes = 0;
+  std::uint64_t active_voxels = 0;
+  BuildSeconds build_seconds;
+  double trace_seconds = 0.0;
+  std::uint64_t samples = 0;
+  std::uint64_t steps = 0;
+  GlStrings strings;
+};
+
+/// The facade behind the C ABI: settings in, pictures out. Rebuilds what a change makes out of date, and nothing else.
+/// Threads, context and GL state as cumulet.h says. Throws Error; a call that throws leaves the viewer as it was.
 class Viewer {
  public:
-  Viewer(void* (*get_proc)(void* user, const char* name), void* user, const Log& log);
+  using GetProc = void* (*)(void* user, const char* name);
+  /// restore_state: [GL] calls leave the GL state as they found it.
+  Viewer(Log log, std::function<void()> update, bool restore_state);
   ~Viewer();
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
-  void load_volume(const std::filesystem::path& file, const std::string& grid_name);
-  void set_volume(volume::ScalarVolume volume);
+  void attach(GetProc get_proc, void* user);
+  void detach();
+  void context_lost();
+  [[nodiscard]] bool attached() const { return gl_ != nullptr; }
+
+  void load_volume(const std::string& path, const std::string& grid_name);
+  void set_volume(VolumePtr volume);
+  /// The newest volume; null if there is none.
+  VolumePtr volume();
+  void rebuild();
+  void cancel() { builder_.cancel(); }
+  /// Throws how the last job ended, or Error(timeout).
+  void wait(double timeout_ms);
+  /// As Builder's, and uploading.
+  [[nodiscard]] Builder::Status status() const;
+
   void set_grid(const GridSettings& settings);
   void set_medium(const Medium& medium);
   void set_light(const Light& light);
-  void set_camera(const Camera& camera);
-  void set_image(const Image& image);
+  void set_sampling(const Sampling& sampling);
+  void set_display(const DisplaySettings& display);
+  void set_camera(std::shared_ptr<Camera> camera);
+  [[nodiscard]] const std::shared_ptr<Camera>& camera() const { return camera_; }
+  void set_navigation(const NavigationSettings& settings);
+  bool input(const InputEvent& event);
+  void frame_all();
 
-  void build();
-  /// Whether every pixel has its samples.
-  bool render(double budget_ms, double& progress);
-  void read(float* rgba, std::size_t count) const;
+  FrameResult render(const Frame& frame);
+  Pick pick(double x, double y);
+  /// Throws Error(invalid_argument) without a volume.
+  Bounds bounds();
+  void read_linear(float* rgba, std::size_t count);
+  void read_display(std::uint8_t* rgba, std::size_t count);
+  double measure_noise();
+  Stats stats();
 
-  [[nodiscard]] const BuildSeconds& build_seconds() const { return seconds_; }
-  [[nodiscard]] double trace_seconds() const { return trace_seconds_; }
-  [[nodiscard]] render::Totals totals() const;
-  [[nodiscard]] std::uint64_t cells() const { return cells_; }
-  [[nodiscard]] std::uint32_t levels() const { return levels_; }
-  [[nodiscard]] std::uint64_t cell_bytes() const { return data_ ? data_->bytes() : 0; }
-  [[nodiscard]] std::uint64_t active_voxels() const { return volume_ ? volume_->active_voxels : 0; }
-  [[nodiscard]] Bounds bounds() const;
-  [[nodiscard]] const gl::Functions& gl() const { return *gl_; }
-  /// What the shaders were told of the picture under way.
-  [[nodiscard]] const core::CmParameters& trace_parameters() const { return tracer_.parameters(); }
+  /// Tells the host that there is something new. Coalesced; any thread.
+  void notify();
+  /// Whether the calling thread is inside the update callback.
+  [[nodiscard]] bool in_update_callback() const { return callback_thread_.load() == std::this_thread::get_id(); }
+
+  /// What the shaders were told of the picture under way; for tests.
+  const core::CmParameters& trace_parameters();
+  /// Pages of cell records end after so many texels; 0: at the driver's limit; for tests.
+  void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
 
  private:
-  [[nodiscard]] Camera placed_camera() const;
+  // All that lives in one context.
+  struct Gl {
+    explicit Gl(gl::FunctionsPtr gl);
+    gl::FunctionsPtr functions;
+    gl::Limits limits;
+    GlStrings strings;
+    render::Progressive progressive;
+    render::Compositor compositor;
+    render::HostDepth host_depth;
+    std::optional<render::MarchData> data;
+    std::shared_ptr<const render::MarchSource> data_source;    // what data is of
+    std::shared_ptr<const render::MarchSource> upload_source;  // what upload is of, or what failed to be uploaded
+    std::unique_ptr<render::MarchUpload> upload;
+    render::Picture empty;
+    gl::Object colour;  // the texture target
+    gl::Object depth;
+    glm::uvec2 texture_size{0U};
+    GLenum texture_format = 0;
+  };
+
+  [[nodiscard]] Gl& gl() const;
+  // Runs a [GL] call's body between state guard and error handling.
+  template <class Body>
+  void with_gl(Body&& body);
+  void sync();
+  void request_build();
+  [[nodiscard]] std::optional<BuildSettings> build_settings() const;
+  [[nodiscard]] grid::RefineCamera refine_camera() const;
   [[nodiscard]] core::CmParameters parameters() const;
-  [[nodiscard]] std::optional<grid::RefineCamera> refine_camera() const;
-  void require_volume() const;
+  void prepare(const Frame& frame, render::Deadline deadline);
+  void trace(const Frame& frame, render::Deadline deadline);
+  void draw(const Frame& frame, FrameResult& result);
+  void upload(Gl& g, render::Deadline deadline);
+  [[nodiscard]] render::SurfaceDepth surface() const;
+  const render::Picture& readable();
 
   Log log_;
-  gl::FunctionsPtr gl_;
-  gl::Limits limits_;
+  std::function<void()> update_;
+  std::atomic<bool> update_pending_ = false;
+  std::atomic<std::thread::id> callback_thread_;
+  std::atomic<double> upload_progress_ = 1.0;
+  bool restore_state_;
+  std::int64_t page_texels_ = 0;
 
   GridSettings grid_;
   Medium medium_;
   Light light_;
-  Camera camera_;
-  Image image_;
+  Sampling sampling_;
+  DisplaySettings display_;
+  std::shared_ptr<Camera> camera_;
+  std::shared_ptr<void> camera_listener_;
+  Navigation navigation_;
+  std::chrono::steady_clock::time_point last_frame_time_{};
 
-  std::unique_ptr<const volume::ScalarVolume> volume_;
-  std::unique_ptr<const grid::Statistics> statistics_;
-  std::optional<render::MarchData> data_;
-  render::Tracer tracer_;
-  bool data_stale_ = true;
-  bool picture_stale_ = true;
+  VolumePtr volume_;                      // newest
+  Built built_;                           // newest, and what is uploaded again in a new context
+  std::uint64_t generation_ = 1;          // of the data in GL
+  std::uint64_t surface_generation_ = 1;  // of the host's depth
+  glm::uvec2 frame_size_{0U};             // of the last frame's picture
+  std::optional<ViewFrame> view_;         // of the last frame
+  std::optional<ViewFrame> last_view_;    // of the frame before
+  std::optional<ViewFrame> built_view_;   // camera-adaptive: what the grid was last asked for
+  glm::uvec2 built_size_{0U};
+  render::Totals totals_;
 
-  std::uint64_t cells_ = 0;
-  std::uint32_t levels_ = 0;
-  BuildSeconds seconds_;
-  double trace_seconds_ = 0.0;
-  mutable render::Totals totals_;
+  std::unique_ptr<Gl> gl_;
+  Builder builder_;  // last: its thread uses the above
 };
 
 }  // namespace cumulet::viewer

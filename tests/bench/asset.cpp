@@ -74,13 +74,14 @@ Asset load_asset(const Input& input) {
   Asset asset;
   asset.name = input.name;
   if (input.noise_size > 0) {
-    asset.volume = noise_volume(input.noise_size);
+    asset.volume = std::make_shared<const viewer::VolumeAsset>(noise_volume(input.noise_size));
   } else {
     const auto start = std::chrono::steady_clock::now();
-    asset.volume = volume::import_volume(input.file, input.grid, Log());
+    asset.volume = std::make_shared<const viewer::VolumeAsset>(volume::import_volume(input.file, input.grid, Log()));
     asset.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
-  asset.mean_optical_depth = grid::Statistics(asset.volume, grid::fit_cube(asset.volume)).mean_optical_depth();
+  asset.mean_optical_depth =
+      grid::Statistics(asset.volume->volume(), grid::fit_cube(asset.volume->volume())).mean_optical_depth();
   return asset;
 }
 

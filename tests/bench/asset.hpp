@@ -1,13 +1,13 @@
 #pragma once
 
 #include "options.hpp"
-#include "volume/volume.hpp"
+#include "viewer/volume_asset.hpp"
 
 namespace cumulet::bench {
 
 struct Asset {
   std::string name;
-  volume::ScalarVolume volume;
+  viewer::VolumePtr volume;
   double mean_optical_depth = 0.0;  ///< at density scale 1
   double load_seconds = 0.0;        ///< 0 for a synthetic one
 };

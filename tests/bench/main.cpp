@@ -24,12 +24,8 @@ std::string cpu_name() {
 }
 
 bench::Machine machine_of(headless::Context& context) {
-  const viewer::Viewer viewer(headless::Context::get_proc, &context, Log());
-  const auto get = [&viewer](GLenum name) {
-    const GLubyte* text = viewer.gl().GetString(name);
-    return std::string(text != nullptr ? reinterpret_cast<const char*>(text) : "unknown");
-  };
-  return {get(GL_RENDERER), get(GL_VERSION), context.name(), cpu_name(), std::thread::hardware_concurrency()};
+  const viewer::GlStrings gl = test::Still(context).viewer().stats().strings;
+  return {gl.renderer, gl.version, context.name(), cpu_name(), std::thread::hardware_concurrency()};
 }
 
 void run(const bench::Options& options) {

@@ -44,18 +44,22 @@ double peak_bytes() {
 
 BuildRow measure_build(headless::Context& context, const Asset& asset, const Options& options, double density_scale) {
   reset_peak();
-  Subject subject(context, asset.volume, Kind::tet_linear, options, density_scale);
+  // A copy, whose statistics nobody has computed yet.
+  const auto volume = std::make_shared<const viewer::VolumeAsset>(asset.volume->volume());
+  Subject subject(context, volume, Kind::tet_linear, options, density_scale);
   subject.refine(grid::Criterion::deviation, 1e-6, options.build_cells);
-  const viewer::BuildSeconds& seconds = subject.viewer().build_seconds();
+  const viewer::Stats stats = subject.stats();
+  const viewer::BuildSeconds& seconds = stats.build_seconds;
   BuildRow row;
-  row.cells = subject.viewer().cells();
+  row.cells = stats.cells;
   row.load = asset.load_seconds;
   row.statistics = seconds.statistics;
   row.refine = seconds.refine;
   row.records = seconds.records;
   row.upload = seconds.upload;
   // The asset's own copy of the voxels is the benchmark's, not the viewer's.
-  row.peak_bytes = std::max(0.0, peak_bytes() - static_cast<double>(asset.volume.brick_values.size() * sizeof(float)));
+  row.peak_bytes =
+      std::max(0.0, peak_bytes() - static_cast<double>(asset.volume->volume().brick_values.size() * sizeof(float)));
   return row;
 }
 
@@ -70,8 +74,8 @@ SweepCurve sweep(Subject& subject, grid::Criterion criterion, const DepthReferen
     subject.refine(criterion, threshold, 2 * options.sweep_cells);
     SweepPoint point;
     point.threshold = threshold;
-    point.cells = subject.viewer().cells();
-    point.bytes = subject.viewer().cell_bytes();
+    point.cells = subject.stats().cells;
+    point.bytes = subject.stats().cell_bytes;
     const bool limited = point.cells + 1000 > 2 * options.sweep_cells;
     if (limited && !curve.points.empty()) break;
     point.error = reference.error_of(subject);
@@ -184,9 +188,9 @@ const char* name_of(grid::Criterion criterion) {
 AssetResult measure(headless::Context& context, const Asset& asset, const Options& options) {
   AssetResult result;
   result.name = asset.name;
-  const glm::ivec3 voxels = asset.volume.bounds_max - asset.volume.bounds_min + 1;
+  const glm::ivec3 voxels = asset.volume->volume().bounds_max - asset.volume->volume().bounds_min + 1;
   result.voxels = {voxels.x, voxels.y, voxels.z};
-  result.active_voxels = asset.volume.active_voxels;
+  result.active_voxels = asset.volume->volume().active_voxels;
   const double density_scale = options.optical_depth / std::max(asset.mean_optical_depth, 1e-30);
   result.density_scale = density_scale;
 
@@ -253,9 +257,9 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
 
     for (std::size_t i = 0; i < 4; ++i) {
       TraceRow& row = table.rows[i];
-      row.cells = subjects[i]->viewer().cells();
-      row.bytes = subjects[i]->viewer().cell_bytes();
-      row.bytes_of_dense = static_cast<double>(row.bytes) / static_cast<double>(dense.viewer().cell_bytes());
+      row.cells = subjects[i]->stats().cells;
+      row.bytes = subjects[i]->stats().cell_bytes;
+      row.bytes_of_dense = static_cast<double>(row.bytes) / static_cast<double>(dense.stats().cell_bytes);
       row.samples_per_second = spread_of(rates(runs[i]));
       row.to_dense = ratio_of(rates(runs[i]), rates(runs[2]));
       row.to_brick = ratio_of(rates(runs[i]), rates(runs[3]));

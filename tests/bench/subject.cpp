@@ -25,29 +25,26 @@ viewer::Light bench_light() {
   return light;
 }
 
-Subject::Subject(headless::Context& context, volume::ScalarVolume volume, Kind kind, const Options& options,
+Subject::Subject(headless::Context& context, viewer::VolumePtr volume, Kind kind, const Options& options,
                  double density_scale)
-    : kind_(kind),
-      size_(options.size),
-      albedo_(options.albedo),
-      density_scale_(density_scale),
-      viewer_(std::make_unique<viewer::Viewer>(headless::Context::get_proc, &context, Log())) {
-  viewer_->set_volume(std::move(volume));
-  viewer_->set_light(bench_light());
+    : kind_(kind), size_(options.size), albedo_(options.albedo), density_scale_(density_scale), still_(context) {
+  still_.set_volume(std::move(volume));
+  still_.set_light(bench_light());
   viewer::GridSettings settings;
-  if (kind == Kind::dense) settings.march = render::March::dense;
-  if (kind == Kind::brick) settings.march = render::March::brick;
-  viewer_->set_grid(settings);
+  if (kind == Kind::dense) settings.build.march = render::March::dense;
+  if (kind == Kind::brick) settings.build.march = render::March::brick;
+  still_.set_grid(settings);
 }
 
 void Subject::refine(grid::Criterion criterion, double threshold, std::uint64_t max_cells) {
   viewer::GridSettings settings;
-  settings.refine.criterion = criterion;
-  settings.refine.cells = kind_ == Kind::tet_constant ? grid::CellKind::constant : grid::CellKind::linear;
-  settings.refine.threshold = threshold;
-  settings.refine.max_cells = max_cells;
-  viewer_->set_grid(settings);
-  viewer_->build();
+  grid::RefineSettings& refine = settings.build.refine;
+  refine.criterion = criterion;
+  refine.cells = kind_ == Kind::tet_constant ? grid::CellKind::constant : grid::CellKind::linear;
+  refine.threshold = threshold;
+  refine.max_cells = max_cells;
+  still_.set_grid(settings);
+  still_.build();
 }
 
 Run Subject::shaded(std::uint32_t samples, std::uint32_t seed) {
@@ -60,22 +57,17 @@ Run Subject::trace(double density_scale, std::uint32_t samples, std::uint32_t se
   viewer::Medium medium;
   medium.density_scale = density_scale;
   medium.albedo = albedo_;
-  viewer_->set_medium(medium);
-  viewer::Image image;
-  image.width = image.height = size_;
-  image.samples = samples;
-  image.seed = seed;
-  image.view = view;
-  viewer_->set_image(image);
-  double progress = 0.0;
-  while (!viewer_->render(500.0, progress)) {
+  still_.set_medium(medium);
+  still_.set_image({size_, size_, samples, seed, view});
+  still_.build();
+  while (!still_.render(500.0)) {
   }
   Run run;
-  run.rgba.resize(std::size_t{size_} * size_ * 4);
-  viewer_->read(run.rgba.data(), run.rgba.size());
-  run.seconds = viewer_->trace_seconds();
-  run.samples = viewer_->totals().samples;
-  run.steps = viewer_->totals().steps;
+  run.rgba = still_.read();
+  const viewer::Stats stats = still_.viewer().stats();
+  run.seconds = stats.trace_seconds;
+  run.samples = stats.samples;
+  run.steps = stats.steps;
   return run;
 }
 

@@ -3,11 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <headless.hpp>
-#include <memory>
 #include <vector>
 
 #include "options.hpp"
-#include "viewer/viewer.hpp"
+#include "support/still.hpp"
 
 namespace cumulet::bench {
 
@@ -28,8 +27,8 @@ struct Run {
 /// One march of one asset: a viewer of its own, so that marches can take turns without rebuilding anything.
 class Subject {
  public:
-  /// density_scale: of the shaded picture. Copies the volume. The context must be current, now and until the end.
-  Subject(headless::Context& context, volume::ScalarVolume volume, Kind kind, const Options& options,
+  /// density_scale: of the shaded picture. The context must be current, now and until the end.
+  Subject(headless::Context& context, viewer::VolumePtr volume, Kind kind, const Options& options,
           double density_scale);
 
   /// Makes the tetrahedral grid anew; not for dense and brick.
@@ -40,7 +39,7 @@ class Subject {
   Run primary(double density_scale);
 
   [[nodiscard]] Kind kind() const { return kind_; }
-  [[nodiscard]] const viewer::Viewer& viewer() const { return *viewer_; }
+  [[nodiscard]] viewer::Stats stats() { return still_.viewer().stats(); }
 
  private:
   Run trace(double density_scale, std::uint32_t samples, std::uint32_t seed, render::View view);
@@ -49,7 +48,7 @@ class Subject {
   std::uint32_t size_;
   glm::vec3 albedo_;
   double density_scale_;
-  std::unique_ptr<viewer::Viewer> viewer_;
+  test::Still still_;
 };
 
 /// The light of every measurement.

@@ -42,9 +42,11 @@ TEST(CApiCreate, SaysWhatIsMissing) {
   char message[200] = "unchanged";
   cumulet_viewer* viewer = reinterpret_cast<cumulet_viewer*>(1);
   auto desc = make_desc<cumulet_create_desc>();
+  desc.struct_size = 3;
   EXPECT_EQ(cumulet_create(&desc, &viewer, message, sizeof message), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(viewer, nullptr);
-  EXPECT_NE(std::string(message).find("get_proc"), std::string::npos);
+  EXPECT_NE(std::string(message).find("struct_size"), std::string::npos);
+  desc = make_desc<cumulet_create_desc>();
   desc.get_proc = [](void*, const char*) -> void* { return nullptr; };
   EXPECT_EQ(cumulet_create(&desc, &viewer, message, sizeof message), CUMULET_ERROR_UNSUPPORTED);
   EXPECT_NE(std::string(message).find("OpenGL"), std::string::npos);
@@ -69,8 +71,8 @@ TEST(CApiCreate, RefusesAContextWithoutComputeFunctions) {
 }
 
 TEST_F(CApi, NullHandlesAndPointersAreErrors) {
-  uint32_t flags = 0;
-  EXPECT_EQ(cumulet_render(nullptr, 1.0, &flags, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_render(nullptr, nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_render(viewer_, nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_load_volume(viewer_, nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_set_grid(viewer_, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_get_stats(viewer_, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
@@ -78,6 +80,13 @@ TEST_F(CApi, NullHandlesAndPointersAreErrors) {
   EXPECT_NE(error(), "");
   EXPECT_STREQ(cumulet_last_error(nullptr), "viewer is NULL");
   cumulet_destroy(nullptr);
+  cumulet_cancel(nullptr);
+}
+
+TEST_F(CApi, EveryStatusHasAText) {
+  for (int status = CUMULET_ERROR_TIMEOUT; status <= CUMULET_OK; ++status) {
+    EXPECT_STRNE(cumulet_status_text(static_cast<cumulet_status>(status)), "unknown status");
+  }
 }
 
 TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
@@ -110,31 +119,52 @@ TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   auto light = make_desc<cumulet_light_desc>();
   light.sky_radiance[2] = -1.0F;
   EXPECT_EQ(cumulet_set_light(viewer_, &light), CUMULET_ERROR_INVALID_ARGUMENT);
+  cumulet_camera* view = nullptr;
+  ASSERT_EQ(cumulet_get_camera(viewer_, &view), CUMULET_OK);
   auto camera = make_desc<cumulet_camera_desc>();
   camera.fovy_degrees = 200.0;
-  EXPECT_EQ(cumulet_set_camera(viewer_, &camera), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_camera_set(view, &camera), CUMULET_ERROR_INVALID_ARGUMENT);
   camera.fovy_degrees = 0.0;
   camera.eye[0] = INFINITY;
-  EXPECT_EQ(cumulet_set_camera(viewer_, &camera), CUMULET_ERROR_INVALID_ARGUMENT);
-  auto image = make_desc<cumulet_image_desc>();
-  EXPECT_EQ(cumulet_set_image(viewer_, &image), CUMULET_ERROR_INVALID_ARGUMENT);
-  image.width = image.height = 4;
-  EXPECT_EQ(cumulet_set_image(viewer_, &image), CUMULET_OK);
-  EXPECT_EQ(cumulet_render(viewer_, std::nan(""), nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(cumulet_render(viewer_, 1.0, nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_NE(error().find("volume"), std::string::npos);
+  EXPECT_EQ(cumulet_camera_set(view, &camera), CUMULET_ERROR_INVALID_ARGUMENT);
+  cumulet_camera_release(view);
+  auto frame = make_desc<cumulet_frame_desc>();
+  frame.target = CUMULET_TARGET_NONE;
+  EXPECT_EQ(cumulet_render(viewer_, &frame, nullptr), CUMULET_OK);  // size zero is legal
+  frame.width = frame.height = 4;
+  frame.viewport[2] = 5;
+  frame.viewport[3] = 1;
+  EXPECT_EQ(cumulet_render(viewer_, &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(error().find("viewport"), std::string::npos);
+  frame.viewport[2] = frame.viewport[3] = 0;
+  frame.budget_ms = std::nan("");
+  EXPECT_EQ(cumulet_render(viewer_, &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  frame.budget_ms = 1.0;
+  EXPECT_EQ(cumulet_render(viewer_, &frame, nullptr), CUMULET_OK);  // nothing is loaded: nothing is shown
+  float pixels[64];
+  EXPECT_EQ(cumulet_read_linear(viewer_, pixels, 64), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(CApi, MissingFileNamesIt) {
-  EXPECT_EQ(cumulet_load_volume(viewer_, "no such cloud.vdb", nullptr), CUMULET_ERROR_FILE);
+  EXPECT_EQ(cumulet_load_volume(viewer_, "no such cloud.vdb", nullptr), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_ERROR_FILE);
   EXPECT_NE(error().find("no such cloud.vdb"), std::string::npos);
   EXPECT_EQ(error().find('\n'), std::string::npos);
+  auto progress = make_desc<cumulet_progress>();
+  EXPECT_EQ(cumulet_get_progress(viewer_, &progress), CUMULET_OK);
+  EXPECT_EQ(progress.stage, CUMULET_STAGE_IDLE);
+  EXPECT_EQ(progress.status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(error(), std::string(progress.message));
+  auto frame = make_desc<cumulet_frame_desc>();
+  auto result = make_desc<cumulet_frame_result>();
+  EXPECT_EQ(cumulet_render(viewer_, &frame, &result), CUMULET_OK);
+  EXPECT_EQ(result.flags, static_cast<uint32_t>(CUMULET_RENDER_FAILED));
   auto stats = make_desc<cumulet_stats>();
   EXPECT_EQ(cumulet_get_stats(viewer_, &stats), CUMULET_OK);
   EXPECT_EQ(stats.cells, 0U);
   EXPECT_NE(std::string(stats.gl_version), "");
 }
 
-TEST(CApiVersion, IsTheHeaders) { EXPECT_EQ(cumulet_version(), 100U); }
+TEST(CApiVersion, IsTheHeaders) { EXPECT_EQ(cumulet_version(), 200U); }
 
 }  // namespace

@@ -3,30 +3,72 @@
  *
  * Overview
  * --------
- * A viewer turns one volume (an OpenVDB or NanoVDB file) into an adaptive, conforming tetrahedral grid
- * (Benyoub and Dupuy, "Adaptive Tetrahedral Grids for Volumetric Path-Tracing", SIGGRAPH Talks 2025) and
- * path-traces it progressively with compute shaders:
+ * A viewer turns one volume (an OpenVDB or NanoVDB file, or voxels in memory) into an adaptive, conforming tetrahedral
+ * grid (Benyoub and Dupuy, "Adaptive Tetrahedral Grids for Volumetric Path-Tracing", SIGGRAPH Talks 2025), path-traces
+ * it progressively with compute shaders, and draws the picture so far into whatever framebuffer the host names:
  *
- *     cumulet_create -> cumulet_load_volume -> cumulet_set_* -> cumulet_render, again and again, until
- *     CUMULET_RENDER_CONVERGED -> cumulet_read_linear -> cumulet_destroy
+ *     cumulet_create -> cumulet_load_volume -> each frame: cumulet_render -> cumulet_destroy
  *
- * Threads: one viewer may be used by one thread at a time. cumulet_create, cumulet_render, cumulet_read_linear
- * and cumulet_destroy need the OpenGL context that cumulet_create saw (or one that shares with it) current on
- * the calling thread; the other calls need no context. There are no globals: viewers do not know of each other.
+ * The library makes no window and no context and links no OpenGL: functions come from the host's get_proc callback.
+ * There are no globals: viewers, in one context or several, in one thread or several, do not know of each other.
  *
- * OpenGL: version 4.5 core, functions only from the host's get_proc callback. cumulet_render and
- * cumulet_read_linear change and restore: the current program, the shader storage, uniform and image bindings they
- * use, the texture bindings of the units they use and the pixel pack buffer and parameters. They draw into
- * textures of their own and never touch the host's framebuffers. Every GL error is taken and reported.
+ * Life cycle
+ *     A viewer is attached to a GL context or detached. cumulet_create attaches it if given get_proc, else
+ *     cumulet_attach does. Detached, it loads, builds and takes settings, but cannot render. When the host's context
+ *     goes away (a widget moved between windows), call cumulet_detach while it is still current, or
+ *     cumulet_context_lost when it is gone, and cumulet_attach in the new one: volume, grid, settings and camera are
+ *     kept, GL objects are made anew within the next frames. cumulet_destroy needs the context current if the viewer is
+ *     attached, and none if it is not.
  *
- * Errors: every function that can fail returns a cumulet_status; cumulet_last_error gives one line that names the
- * file (where there is one) and the cause. A call that fails leaves the viewer as it was.
+ * Threads
+ *     Calls for one viewer must not overlap, from whatever thread they come, with two exceptions that are safe at any
+ *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
+ *     objects with it, current on the calling thread; no other call touches GL. Camera and volume handles may be used
+ *     from any thread at any time. Files are read and grids are built on a worker thread of the viewer's own;
+ *     cumulet_render uploads what it made, within its time budget, and shows the last good picture until then.
+ *     The update callback comes from any thread, the worker's included. Neither it nor the log callback may call the
+ *     library: a call from the update callback is refused with CUMULET_ERROR_INVALID_ARGUMENT.
  *
- * Descriptors: set struct_size to sizeof the struct and zero the rest: zero means the default. Unknown enum values
- * are errors.
+ * OpenGL state
+ *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
+ *     reads no state but: pixel buffers and parameters, bindings and capabilities are set to what it needs first. It
+ *     uses, and so saves and restores:
+ *       - the current program and program pipeline, the vertex array binding, the draw and read framebuffer bindings
+ *       - active texture; on units 0-14 the 2D, 2D array, 2D multisample, 3D and buffer texture bindings and the
+ *         sampler
+ *       - storage buffer bindings 0-1, uniform buffer bindings 0-1 and their generic points, image units 0-2
+ *       - pixel pack and unpack buffers and all pixel store parameters
+ *       - viewport 0, scissor test and box 0, colour mask (of every draw buffer), depth mask, function, test and range,
+ *         depth clamp, stencil test, blending (enable, functions, equations, colour) of draw buffer 0 and the enable of
+ *         the others, cull face, front face, polygon mode, polygon offset enables, rasterizer discard, logic op,
+ *         multisample, sample alpha to coverage and to one, sample coverage and mask, primitive restart (both),
+ *         clip distances 0-7, clip control, dither, GL_FRAMEBUFFER_SRGB
+ *     and the contents of the frame's own target. It never touches: queries, transform feedback, sync objects of the
+ *     host, the debug callback and its filters, or any other object. Do not call it inside transform feedback,
+ *     conditional rendering or a query of the host's.
+ *     With CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: afterwards the state listed above is undefined.
+ *     glGetError is clean after every call; errors that were pending before are dropped.
  *
- * Units: world space is the VDB's own (metres, +Y up, right-handed). Extinction is density_scale x grid value in
- * 1 / world unit. Radiance and irradiance are linear RGB in any consistent unit.
+ * Ownership
+ *     Handles belong to the caller that got them and end with the function named beside the type; what a handle refers
+ *     to lives on while a viewer uses it. The host's textures and framebuffers stay the host's; a texture in a
+ *     cumulet_frame_result stays the viewer's. Strings and arrays that are passed in are copied.
+ *
+ * Errors
+ *     Every function that can fail returns a cumulet_status; cumulet_last_error (or the error buffer of a call without
+ *     a viewer) gives one line that names the file, where there is one, and the cause. A call that fails leaves the
+ *     viewer as it was, and it still draws what it had. No C++ exception leaves the library. Work that fails on the
+ *     worker thread is told by cumulet_get_progress and CUMULET_RENDER_FAILED.
+ *
+ * Descriptors
+ *     Set struct_size to sizeof the struct and zero the rest: zero means the default. Unknown enum values are errors.
+ *     A struct from an older header is shorter, and what it lacks is zero.
+ *
+ * Units and conventions
+ *     World space is the VDB's own (metres, +Y up, right-handed). Extinction is density_scale x grid value in
+ *     1 / world unit. Radiance and irradiance are linear Rec. 709 RGB in any consistent unit. Matrices are 16 doubles,
+ *     column-major, for column vectors, as OpenGL takes them. Sizes and positions on screen are physical pixels;
+ *     pixel (0, 0) is the top left, and positions are of a pixel's top left corner.
  */
 #ifndef CUMULET_CUMULET_H
 #define CUMULET_CUMULET_H
@@ -51,20 +93,33 @@ extern "C" {
 #endif
 
 #define CUMULET_VERSION_MAJOR 0
-#define CUMULET_VERSION_MINOR 1
+#define CUMULET_VERSION_MINOR 2
 #define CUMULET_VERSION_PATCH 0
 
-typedef struct cumulet_viewer cumulet_viewer;
+typedef struct cumulet_viewer cumulet_viewer; /* cumulet_destroy */
+typedef struct cumulet_volume cumulet_volume; /* cumulet_volume_release */
+typedef struct cumulet_camera cumulet_camera; /* cumulet_camera_release */
 
 typedef enum cumulet_status {
   CUMULET_OK = 0,
   CUMULET_ERROR_INVALID_ARGUMENT = -1, /* a null handle, a bad size, an unknown enum value, a bad number */
   CUMULET_ERROR_UNSUPPORTED = -2,      /* the context lacks a version, a function or a limit */
-  CUMULET_ERROR_FILE = -3,             /* unreadable, malformed or unsuitable file */
+  CUMULET_ERROR_FILE = -3,             /* unreadable, malformed or unsuitable file (or voxels in memory) */
   CUMULET_ERROR_OUT_OF_MEMORY = -4,    /* host or GL memory */
   CUMULET_ERROR_GL = -5,               /* any other GL error */
-  CUMULET_ERROR_INTERNAL = -6          /* a bug in Cumulet: please report it */
+  CUMULET_ERROR_INTERNAL = -6,         /* a bug in Cumulet: please report it */
+  CUMULET_ERROR_CANCELLED = -7,        /* by cumulet_cancel */
+  CUMULET_ERROR_CONTEXT_LOST = -8,     /* the driver reset the context: the viewer is detached now */
+  CUMULET_ERROR_DETACHED = -9,         /* a [GL] call on a viewer without a context */
+  CUMULET_ERROR_TIMEOUT = -10          /* cumulet_wait: not ready in time */
 } cumulet_status;
+
+/* A status in a few English words. Any thread. */
+CUMULET_API const char* cumulet_status_text(cumulet_status status);
+/* The library's version, as major * 10000 + minor * 100 + patch. Any thread. */
+CUMULET_API uint32_t cumulet_version(void);
+
+/* ---- Viewer ---------------------------------------------------------------------------------------------------- */
 
 typedef enum cumulet_log_level {
   CUMULET_LOG_DEBUG = 0,
@@ -73,39 +128,166 @@ typedef enum cumulet_log_level {
   CUMULET_LOG_ERROR = 3
 } cumulet_log_level;
 
-/* The address of a GL function, or NULL. Called during cumulet_create only. */
+/* The address of a GL function, or NULL. Called during cumulet_create and cumulet_attach only. */
 typedef void* (*cumulet_get_proc_fn)(void* user, const char* name);
-/* Called from the thread of the call that logs; message lives until return. May not call back in. */
+/* From the calling thread or the viewer's worker; message, one line, lives until return. */
 typedef void (*cumulet_log_fn)(void* user, cumulet_log_level level, const char* message);
+/*
+ * There is something new to render: a volume was loaded, a grid is ready, a setting or the camera changed. From any
+ * thread. Schedule a frame and return; do not call the library. Coalesced: not called again before the next
+ * cumulet_render.
+ */
+typedef void (*cumulet_update_fn)(void* user);
+
+typedef enum cumulet_gl_state {
+  CUMULET_GL_STATE_RESTORE = 0,    /* [GL] calls leave the state as they found it */
+  CUMULET_GL_STATE_HOST_RESETS = 1 /* they do not: the host sets all it needs afterwards (Qt's and GTK's do) */
+} cumulet_gl_state;
 
 typedef struct cumulet_create_desc {
   size_t struct_size;
-  cumulet_get_proc_fn get_proc; /* required */
+  cumulet_get_proc_fn get_proc; /* NULL: detached */
   void* get_proc_user;
   cumulet_log_fn log; /* NULL: silence */
   void* log_user;
+  cumulet_update_fn update; /* NULL: none */
+  void* update_user;
+  cumulet_gl_state gl_state;
 } cumulet_create_desc;
 
-/* The library's version, as major * 10000 + minor * 100 + patch. Any thread. */
-CUMULET_API uint32_t cumulet_version(void);
-
 /*
- * Checks the current context (version 4.5, compute limits), compiles nothing yet, allocates little.
- * On failure *out is NULL and, if error is not NULL, error_size bytes of it receive the zero-terminated cause.
+ * [GL] if get_proc is given: checks the current context (version 4.5, compute limits); compiles and allocates nothing
+ * yet. On failure *out is NULL and error (if not NULL) receives the zero-terminated cause in error_size bytes.
  */
 CUMULET_API cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** out, char* error,
                                           size_t error_size);
-/* Frees every GL object and all memory. The context must be current. NULL is allowed. */
+/* [GL] if attached. Cancels and waits for the worker, frees everything. NULL is allowed. */
 CUMULET_API void cumulet_destroy(cumulet_viewer* viewer);
-/* The last failure of this viewer in one line, "" if none; lives until the viewer's next call. */
+/* The last failed call of this viewer in one line, "" if the last call succeeded; lives until the next call. */
 CUMULET_API const char* cumulet_last_error(const cumulet_viewer* viewer);
 
+/* [GL] Attaches a detached viewer to the current context; checks as cumulet_create does. */
+CUMULET_API cumulet_status cumulet_attach(cumulet_viewer* viewer, cumulet_get_proc_fn get_proc, void* get_proc_user);
+/* [GL] Deletes the viewer's GL objects and detaches it. Nothing if it is detached already. */
+CUMULET_API cumulet_status cumulet_detach(cumulet_viewer* viewer);
+/* Detaches without touching GL: the context, and with it every object, is gone. */
+CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
+
+/* ---- Volumes --------------------------------------------------------------------------------------------------- */
+
 /*
- * Reads one scalar grid of a .vdb or .nvdb file (no GL, no context needed); the grid of cells is built at the next
- * cumulet_build or cumulet_render. grid_name NULL or "": "density", else the only scalar fog grid.
- * On failure the volume loaded before stays.
+ * A scalar fog volume in main memory: immutable, counted, free of GL, to be shown by any number of viewers. These
+ * calls are synchronous, for any thread; error as in cumulet_create. cumulet_load_volume is the asynchronous way.
+ * The medium is zero outside the bounds of the active voxels. Negative voxels count as zero, with a warning to log.
+ */
+
+/*
+ * Reads one scalar grid of a .vdb or .nvdb file. grid_name NULL or "": "density", else the only scalar fog grid;
+ * "name[1]" is the second of that name.
+ */
+CUMULET_API cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out,
+                                               char* error, size_t error_size);
+
+/* Voxels in a box. Active are those that are not zero. */
+typedef struct cumulet_dense_desc {
+  size_t struct_size;
+  const float* values; /* x fastest, then y, then z */
+  uint64_t value_count;
+  int32_t size[3];           /* value_count is their product */
+  double index_to_world[16]; /* affine; voxel (i,j,k) is the unit cube centred on (i,j,k); zero: identity */
+  const char* name;          /* for messages; NULL: "dense" */
+} cumulet_dense_desc;
+
+CUMULET_API cumulet_status cumulet_volume_from_dense(const cumulet_dense_desc* desc, cumulet_volume** out, char* error,
+                                                     size_t error_size);
+
+/* A box of voxels of one value, bounds inclusive. */
+typedef struct cumulet_tile {
+  int32_t min[3];
+  int32_t max[3];
+  float value;
+  int32_t active; /* 0 or 1 */
+} cumulet_tile;
+
+/* A tree as OpenVDB has it (cumulet_openvdb.hpp makes this of an openvdb grid): bricks of 8^3 voxels, and tiles. */
+typedef struct cumulet_sparse_desc {
+  size_t struct_size;
+  const int32_t* brick_origins; /* 3 a brick: its lowest voxel, multiples of 8, no two the same */
+  const float* brick_values;    /* 512 a brick, z fastest, then y, then x */
+  const uint64_t* brick_active; /* 8 words a brick, word x, bit y * 8 + z; NULL: all voxels are active */
+  uint64_t brick_count;
+  const cumulet_tile* tiles; /* disjoint, not over bricks */
+  uint64_t tile_count;
+  float background;          /* of voxels in no brick and no tile */
+  double index_to_world[16]; /* as above */
+  const char* name;          /* for messages; NULL: "sparse" */
+} cumulet_sparse_desc;
+
+CUMULET_API cumulet_status cumulet_volume_from_sparse(const cumulet_sparse_desc* desc, cumulet_volume** out,
+                                                      char* error, size_t error_size);
+
+CUMULET_API cumulet_volume* cumulet_volume_retain(cumulet_volume* volume); /* returns it; NULL is allowed */
+CUMULET_API void cumulet_volume_release(cumulet_volume* volume);           /* NULL is allowed */
+
+typedef struct cumulet_volume_info {
+  size_t struct_size;
+  char name[128];
+  uint64_t active_voxels;
+  double bounds_min[3]; /* world space */
+  double bounds_max[3];
+  float max_value;
+} cumulet_volume_info;
+
+CUMULET_API cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_volume_info* info);
+
+/* One grid of a file: refusal is "" if it can be shown, else why not. */
+typedef void (*cumulet_grid_fn)(void* user, const char* name, const char* type, const char* refusal);
+/* Calls fn for each grid of a .vdb or .nvdb file, reading no voxels. */
+CUMULET_API cumulet_status cumulet_list_grids(const char* path, cumulet_grid_fn fn, void* user, char* error,
+                                              size_t error_size);
+
+/* ---- A viewer's volume, and the work behind it ------------------------------------------------------------------ */
+
+/*
+ * Begins to read a file as cumulet_volume_open does, on the viewer's worker, and then to build its grid; replaces a
+ * load under way. Returns at once; the volume shown before stays until the new one is ready, for good if that fails.
  */
 CUMULET_API cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name);
+/* Begins to build this volume's grid, likewise. NULL: shows nothing, at once. Cancels a load under way. */
+CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume);
+/* The volume last loaded or set, retained for the caller, who releases it; NULL if there is none. */
+CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out);
+/* Stops loading and building, soon; what was shown stays, with the settings it was built with. Any thread, any time. */
+CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
+
+typedef enum cumulet_stage {
+  CUMULET_STAGE_IDLE = 0,
+  CUMULET_STAGE_LOADING = 1,    /* reading the file */
+  CUMULET_STAGE_STATISTICS = 2, /* exact moments of the voxels */
+  CUMULET_STAGE_REFINING = 3,   /* where to bisect, and bisection */
+  CUMULET_STAGE_RECORDS = 4,    /* the cells' records */
+  CUMULET_STAGE_UPLOADING = 5   /* to GL, within cumulet_render */
+} cumulet_stage;
+
+typedef struct cumulet_progress {
+  size_t struct_size;
+  cumulet_stage stage;
+  double fraction;       /* of the stage, 0 to 1 */
+  cumulet_status status; /* of the last load or build that ended: CUMULET_OK, its error, or CANCELLED */
+  char message[512];     /* its cause in one line, "" if it succeeded */
+} cumulet_progress;
+
+/* What the worker does. Any thread, any time. */
+CUMULET_API cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* progress);
+/*
+ * Waits until the worker is idle, at most timeout_ms milliseconds (negative: for ever), and returns how the last load
+ * or build ended, with its line as the last error. What is ready is uploaded by the next cumulet_render.
+ */
+CUMULET_API cumulet_status cumulet_wait(cumulet_viewer* viewer, double timeout_ms);
+/* Builds the grid anew though nothing asks for it. */
+CUMULET_API cumulet_status cumulet_rebuild(cumulet_viewer* viewer);
+
+/* ---- Settings --------------------------------------------------------------------------------------------------- */
 
 typedef enum cumulet_march {
   CUMULET_MARCH_TET = 0,   /* the adaptive tetrahedral grid */
@@ -123,7 +305,7 @@ typedef enum cumulet_criterion {
   CUMULET_CRITERION_RANGE_MEAN = 1 /* (max - min) / mean > threshold (the paper's) */
 } cumulet_criterion;
 
-/* How the cells are made. A change rebuilds them at the next cumulet_build or cumulet_render. */
+/* How the cells are made. A change rebuilds them on the worker; the old ones are shown meanwhile. */
 typedef struct cumulet_grid_desc {
   size_t struct_size;
   cumulet_march march;
@@ -131,11 +313,12 @@ typedef struct cumulet_grid_desc {
   cumulet_criterion criterion;
   double threshold;        /* split above it. 0: 0.02 for deviation, 1 for range-mean; negative: split to the voxel */
   uint64_t max_cells;      /* 0: 5,400,000. Spent where the criterion is largest */
-  int32_t camera_adaptive; /* 1: do not split cells outside the frustum or under pixel_size pixels; 0: off */
+  int32_t camera_adaptive; /* 1: do not split cells outside the frustum or under pixel_size pixels; 0: off. Needs the
+                              size of a frame; built anew when the camera comes to rest elsewhere */
   double pixel_size;       /* pixels a cell's longest edge must cover to be split; 0: 1 */
 } cumulet_grid_desc;
 
-/* The participating medium. A change restarts accumulation only. */
+/* The participating medium. A change restarts accumulation; the cells stay. */
 typedef struct cumulet_medium_desc {
   size_t struct_size;
   double density_scale; /* extinction = density_scale x grid value, 1 / world unit; 0: 1 */
@@ -144,7 +327,7 @@ typedef struct cumulet_medium_desc {
   uint32_t max_bounces; /* scattering events a path may have; 0: no limit */
 } cumulet_medium_desc;
 
-/* A distant sun (a delta direction, invisible to camera rays) and a sky of constant radiance. */
+/* A distant sun (a delta direction, invisible to camera rays) and a sky of constant radiance. Restarts accumulation. */
 typedef struct cumulet_light_desc {
   size_t struct_size;
   float sun_azimuth_degrees;   /* direction towards the sun, from +Z towards +X */
@@ -153,56 +336,287 @@ typedef struct cumulet_light_desc {
   float sky_radiance[3];       /* 0: black */
 } cumulet_light_desc;
 
-/* A pinhole camera. All zero: fit the volume's bounds from +Z, a little above. */
-typedef struct cumulet_camera_desc {
-  size_t struct_size;
-  double eye[3];
-  double target[3];
-  double up[3];        /* 0: +Y */
-  double fovy_degrees; /* vertical field of view; 0: 40 */
-} cumulet_camera_desc;
-
 typedef enum cumulet_view {
   CUMULET_VIEW_SHADED = 0,
-  CUMULET_VIEW_CELLS = 1,  /* the cells on a cut through the middle, coloured by level, with their edges */
-  CUMULET_VIEW_STEPS = 2,  /* march steps of the camera ray, as a heat map */
-  CUMULET_VIEW_DENSITY = 3 /* optical depth along the camera ray: 1 - exp(-depth), grey */
+  CUMULET_VIEW_CELLS = 1,    /* the cells on a cut through the middle, coloured by level, with their edges */
+  CUMULET_VIEW_STEPS = 2,    /* march steps of the camera ray, as a heat map */
+  CUMULET_VIEW_DENSITY = 3,  /* optical depth along the camera ray: 1 - exp(-depth), grey */
+  CUMULET_VIEW_WIREFRAME = 4 /* the edges of the cells that hold density, over the density */
 } cumulet_view;
 
-typedef struct cumulet_image_desc {
+typedef enum cumulet_preview {
+  CUMULET_PREVIEW_AUTO = 0, /* after a change: as coarse as the budget needs, then finer and finer as things rest */
+  CUMULET_PREVIEW_OFF = 1   /* always at full resolution: what is read back depends on the settings alone */
+} cumulet_preview;
+
+/* How pictures are sampled. Restarts accumulation, but for a larger number of samples, which goes on. */
+typedef struct cumulet_sampling_desc {
   size_t struct_size;
-  uint32_t width; /* pixels, 1 to 16384 */
-  uint32_t height;
-  uint32_t samples; /* target samples a pixel; 0: 64 */
-  uint32_t seed;    /* same seed, same samples, same driver: same image, bit for bit */
+  uint32_t samples; /* target samples a pixel; 0: 256 */
+  uint32_t seed;    /* same seed, samples, size and driver: same picture, bit for bit */
   cumulet_view view;
-} cumulet_image_desc;
+  cumulet_preview preview;
+} cumulet_sampling_desc;
+
+typedef enum cumulet_tone_map {
+  CUMULET_TONE_MAP_NEUTRAL = 0, /* Khronos PBR Neutral */
+  CUMULET_TONE_MAP_FILMIC = 1,  /* Narkowicz's fit of the ACES curve, 2015 */
+  CUMULET_TONE_MAP_CLIP = 2     /* clamped to [0, 1] */
+} cumulet_tone_map;
+
+typedef enum cumulet_background {
+  CUMULET_BACKGROUND_SKY = 0,        /* the sky's radiance behind the volume: opaque */
+  CUMULET_BACKGROUND_TRANSPARENT = 1 /* premultiplied colour and alpha: what the framebuffer holds shows through */
+} cumulet_background;
+
+/* How a picture is shown. Restarts nothing. */
+typedef struct cumulet_display_desc {
+  size_t struct_size;
+  float exposure_stops; /* radiance is multiplied by 2^stops */
+  cumulet_tone_map tone_map;
+  cumulet_background background;
+} cumulet_display_desc;
 
 CUMULET_API cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc);
 CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc);
 CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
-CUMULET_API cumulet_status cumulet_set_camera(cumulet_viewer* viewer, const cumulet_camera_desc* desc);
-CUMULET_API cumulet_status cumulet_set_image(cumulet_viewer* viewer, const cumulet_image_desc* desc);
+CUMULET_API cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc);
+CUMULET_API cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc);
 
-/* Builds and uploads what the settings need and is out of date. cumulet_render does it by itself otherwise. */
-CUMULET_API cumulet_status cumulet_build(cumulet_viewer* viewer);
+/* ---- Camera and input ------------------------------------------------------------------------------------------- */
+
+typedef enum cumulet_depth {
+  CUMULET_DEPTH_STANDARD = 0, /* depth buffers hold 0 at the near plane, 1 at the far plane */
+  CUMULET_DEPTH_REVERSED = 1  /* 1 at the near plane, 0 at the far plane */
+} cumulet_depth;
+
+typedef enum cumulet_clip {
+  CUMULET_CLIP_NEGATIVE_ONE_TO_ONE = 0, /* clip-space z of OpenGL's default */
+  CUMULET_CLIP_ZERO_TO_ONE = 1          /* of glClipControl(..., GL_ZERO_TO_ONE) */
+} cumulet_clip;
+
+/*
+ * A pinhole or orthographic camera. eye == target: fits the volume's bounds, from +Z and a little above, as soon as
+ * they are known. Near and far plane do not clip the volume: they say what depth buffers mean (d = f (z - n) / (z (f -
+ * n)), reversed: 1 - d), and where an orthographic ray begins (at the near plane).
+ */
+typedef struct cumulet_camera_desc {
+  size_t struct_size;
+  double eye[3];
+  double target[3];           /* what orbiting turns about */
+  double up[3];               /* 0: +Y */
+  double fovy_degrees;        /* vertical field of view; 0: 40 */
+  double orthographic_height; /* world units from bottom to top of the picture; 0: perspective */
+  double near_plane;          /* 0: 0.1 for perspective, 0 for orthographic */
+  double far_plane;           /* 0: infinite for perspective, 1000 x orthographic_height for orthographic */
+  cumulet_depth depth;
+} cumulet_camera_desc;
+
+/* Cameras may be shared by viewers. A viewer is made with one of its own. */
+CUMULET_API cumulet_status cumulet_camera_create(const cumulet_camera_desc* desc, cumulet_camera** out);
+CUMULET_API void cumulet_camera_release(cumulet_camera* camera); /* NULL is allowed */
+/* The viewer looks through this camera from now on. */
+CUMULET_API cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_camera* camera);
+/* The viewer's camera; the caller releases it. */
+CUMULET_API cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_camera** out);
+
+CUMULET_API cumulet_status cumulet_camera_set(cumulet_camera* camera, const cumulet_camera_desc* desc);
+/* A camera that fits the bounds is told as where it came to stand, if a viewer has placed it. */
+CUMULET_API cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_desc* desc);
+/*
+ * The host's own matrices: view is world to eye space (a rotation and a translation), projection any perspective, off
+ * axis, infinite or reversed too, or orthographic; clip says what it was made for. The depth convention is the
+ * projection's. Camera operations go on from here as from the nearest cumulet_camera_desc.
+ */
+CUMULET_API cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, const double view[16],
+                                                       const double projection[16], cumulet_clip clip);
+/* The matrices for a picture of this aspect ratio (width / height), for the host's own drawing and gizmos. */
+CUMULET_API cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double aspect, cumulet_clip clip,
+                                                       double view[16], double projection[16]);
+
+/* Operations, apart from input. Angles in radians; fractions are of the picture's height at the target. */
+CUMULET_API cumulet_status cumulet_camera_orbit(cumulet_camera* camera, double yaw, double pitch);
+CUMULET_API cumulet_status cumulet_camera_look(cumulet_camera* camera, double yaw, double pitch); /* about the eye */
+CUMULET_API cumulet_status cumulet_camera_roll(cumulet_camera* camera, double angle);
+CUMULET_API cumulet_status cumulet_camera_pan(cumulet_camera* camera, double right, double up); /* the scene's move */
+/* The distance to the target is multiplied by factor (> 0). */
+CUMULET_API cumulet_status cumulet_camera_dolly(cumulet_camera* camera, double factor);
+/* Moves eye and target by world units along the camera's own axes. */
+CUMULET_API cumulet_status cumulet_camera_fly(cumulet_camera* camera, double right, double up, double forward);
+/* Keeps the direction and moves so that the box just fills the picture. */
+CUMULET_API cumulet_status cumulet_camera_frame(cumulet_camera* camera, const double box_min[3],
+                                                const double box_max[3], double aspect);
+/* Frames the viewer's volume. */
+CUMULET_API cumulet_status cumulet_frame_all(cumulet_viewer* viewer);
+
+/* Whose habits the mouse follows. In all of them: wheel, + and -: dolly; arrows: orbit by 15 degrees (shift: pan);
+ * F, Home, keypad period: frame all. */
+typedef enum cumulet_navigation_style {
+  CUMULET_NAVIGATION_SIMPLE = 0,  /* left: orbit; middle, or shift + left: pan; right: dolly */
+  CUMULET_NAVIGATION_BLENDER = 1, /* middle: orbit; shift + middle: pan; ctrl + middle: dolly; keypad 1, 3, 7: front,
+                                     right, top (ctrl: the opposite); keypad 5: perspective or orthographic; keypad 2,
+                                     4, 6, 8: orbit */
+  CUMULET_NAVIGATION_MAYA = 2     /* alt + left: orbit; alt + middle: pan; alt + right: dolly */
+} cumulet_navigation_style;
+
+typedef struct cumulet_navigation_desc {
+  size_t struct_size;
+  cumulet_navigation_style style;
+  int32_t fly;                         /* 1: any button looks around, W A S D E Q move, shift is faster */
+  double speed;                        /* of all motion; 0: 1 */
+  double turntable_degrees_per_second; /* the camera circles the target while frames are rendered; 0: off */
+} cumulet_navigation_desc;
+
+CUMULET_API cumulet_status cumulet_set_navigation(cumulet_viewer* viewer, const cumulet_navigation_desc* desc);
+
+typedef enum cumulet_event_type {
+  CUMULET_EVENT_POINTER_MOVE = 0,
+  CUMULET_EVENT_BUTTON_DOWN = 1,
+  CUMULET_EVENT_BUTTON_UP = 2,
+  CUMULET_EVENT_WHEEL = 3,
+  CUMULET_EVENT_KEY_DOWN = 4,
+  CUMULET_EVENT_KEY_UP = 5,
+  CUMULET_EVENT_FOCUS_LOST = 6 /* all buttons and keys are up */
+} cumulet_event_type;
+
+typedef enum cumulet_button {
+  CUMULET_BUTTON_LEFT = 0,
+  CUMULET_BUTTON_MIDDLE = 1,
+  CUMULET_BUTTON_RIGHT = 2
+} cumulet_button;
+
+/* Letters and digits are their upper-case ASCII codes ('A', '7'). */
+typedef enum cumulet_key {
+  CUMULET_KEY_NONE = 0,
+  CUMULET_KEY_HOME = 256,
+  CUMULET_KEY_KEYPAD_0 = 260, /* to CUMULET_KEY_KEYPAD_0 + 9 */
+  CUMULET_KEY_KEYPAD_PERIOD = 270,
+  CUMULET_KEY_LEFT = 280,
+  CUMULET_KEY_RIGHT = 281,
+  CUMULET_KEY_UP = 282,
+  CUMULET_KEY_DOWN = 283
+} cumulet_key;
+
+enum { CUMULET_MODIFIER_SHIFT = 1, CUMULET_MODIFIER_CTRL = 2, CUMULET_MODIFIER_ALT = 4 };
+
+typedef struct cumulet_event {
+  size_t struct_size;
+  cumulet_event_type type;
+  double x; /* of the pointer, from the picture's top left, physical pixels; pointer, button and wheel events */
+  double y;
+  double wheel; /* steps; positive: towards the scene */
+  cumulet_button button;
+  int32_t key;        /* a cumulet_key or an ASCII code; others are not handled */
+  uint32_t modifiers; /* CUMULET_MODIFIER_*, as they are at this event */
+} cumulet_event;
+
+/* Feeds one event to the viewer's camera. *handled (if not NULL): whether it meant something. */
+CUMULET_API cumulet_status cumulet_input(cumulet_viewer* viewer, const cumulet_event* event, int32_t* handled);
+
+/* ---- Frames ----------------------------------------------------------------------------------------------------- */
+
+typedef enum cumulet_target {
+  CUMULET_TARGET_FRAMEBUFFER = 0, /* the host's, named by framebuffer */
+  CUMULET_TARGET_TEXTURE = 1,     /* textures of the viewer's own, told in the result */
+  CUMULET_TARGET_NONE = 2         /* nothing is drawn: for readback */
+} cumulet_target;
+
+/* What the target's colours mean. The first three take tone-mapped colours. */
+typedef enum cumulet_colour {
+  CUMULET_COLOUR_SRGB = 0,             /* encoded by us; for a format that stores what it is given (GL_RGBA8) */
+  CUMULET_COLOUR_SRGB_FRAMEBUFFER = 1, /* encoded by GL (GL_FRAMEBUFFER_SRGB); for sRGB formats (GL_SRGB8_ALPHA8) */
+  CUMULET_COLOUR_LINEAR = 2,           /* tone-mapped but not encoded: the host encodes later */
+  CUMULET_COLOUR_HDR = 3               /* radiance x exposure, neither tone-mapped nor encoded; for float formats */
+} cumulet_colour;
+
+typedef enum cumulet_blend {
+  CUMULET_BLEND_OVER = 0,   /* premultiplied over what the target holds */
+  CUMULET_BLEND_REPLACE = 1 /* colour and alpha replace it, for a host that composites by itself */
+} cumulet_blend;
+
+typedef enum cumulet_depth_source {
+  CUMULET_DEPTH_SOURCE_NONE = 0,
+  CUMULET_DEPTH_SOURCE_TEXTURE = 1,             /* a GL_TEXTURE_2D of a depth format, or of GL_R32F */
+  CUMULET_DEPTH_SOURCE_TEXTURE_MULTISAMPLE = 2, /* a GL_TEXTURE_2D_MULTISAMPLE of a depth format */
+  CUMULET_DEPTH_SOURCE_FRAMEBUFFER = 3          /* the depth attachment of a framebuffer: copied */
+} cumulet_depth_source;
+
+typedef struct cumulet_frame_desc {
+  size_t struct_size;
+  double budget_ms; /* for uploads and tracing; 0: 10; negative: draw what there is, trace nothing */
+
+  cumulet_target target;
+  uint32_t framebuffer; /* GL name; 0 is the context's default framebuffer, if the host says so */
+  uint32_t width;       /* of the whole target, 0 to 16384; with 0 nothing is drawn */
+  uint32_t height;
+  int32_t viewport[4]; /* x, y, width, height in the target, as glViewport takes them; zero: all of it */
+  int32_t flip_y;      /* 0: the picture's top row is at the largest y, as OpenGL has it; 1: at y = 0 */
+  double scale;        /* physical pixels a logical one; widths of lines and clicks follow it; 0: 1 */
+  uint32_t format;     /* internal format of the target's colour, for its own textures GL_RGBA8, GL_SRGB8_ALPHA8,
+                          GL_RGBA16F or GL_RGBA32F; 0: GL_RGBA8 */
+  cumulet_colour colour;
+  cumulet_blend blend;
+  int32_t write_depth; /* 1: where the volume is at least half opaque, its depth there, in the camera's convention,
+                          is written to the target's depth (depth test as the convention has it) */
+
+  cumulet_depth_source depth_source; /* the host's scene, in the camera's convention: volume behind it is hidden */
+  uint32_t depth_name;               /* the texture's or the framebuffer's GL name; same size as the viewport, or as the
+                                        target if larger: then the same rectangle of it */
+  int32_t depth_flip_y;              /* as flip_y, of that depth */
+  int32_t depth_unchanged;           /* 1: its contents are as in the last frame: accumulation goes on. 0: whatever is
+                                        behind surfaces is traced anew when the depth differs */
+} cumulet_frame_desc;
 
 enum {
-  CUMULET_RENDER_MORE = 1,     /* the target samples are not reached yet */
-  CUMULET_RENDER_CONVERGED = 2 /* they are, in every pixel */
+  CUMULET_RENDER_MORE = 1,      /* there is more to do: render again soon */
+  CUMULET_RENDER_CONVERGED = 2, /* every pixel has its samples, at full resolution, of the newest settings */
+  CUMULET_RENDER_LOADING = 4,   /* the worker is busy: see cumulet_get_progress */
+  CUMULET_RENDER_FAILED = 8,    /* the last load or build failed: see cumulet_get_progress */
+  CUMULET_RENDER_PREVIEW = 16   /* what is shown is coarser than the frame */
 };
 
-/*
- * Traces for about budget_ms milliseconds in bounded dispatches and waits for them. flags receives CUMULET_RENDER_*;
- * progress, if not NULL, the part of all samples done, 0 to 1.
- */
-CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, double budget_ms, uint32_t* flags, double* progress);
+typedef struct cumulet_frame_result {
+  size_t struct_size;
+  uint32_t flags;         /* CUMULET_RENDER_* */
+  double progress;        /* part of all samples done, 0 to 1 */
+  uint32_t width;         /* of the picture that is shown: less than the frame's in a preview, 0 if there is none */
+  uint32_t height;        /* likewise */
+  uint32_t texture;       /* CUMULET_TARGET_TEXTURE: GL name, valid until the next render or detach */
+  uint32_t depth_texture; /* likewise, if write_depth: GL_DEPTH_COMPONENT32F */
+} cumulet_frame_result;
 
 /*
- * The picture so far: width x height x 4 floats, first pixel top left, linear RGB radiance and alpha (the fraction of
- * camera paths that met the volume). A pixel without samples is 0. count is the number of floats at rgba.
+ * [GL] One frame: takes up what the worker has made, uploads and traces for about budget_ms in bounded dispatches, and
+ * draws the newest picture. result may be NULL. Fails, once, when something cannot be made (GL memory, a limit), still
+ * having drawn what there was before; later frames go on with that until a setting changes.
+ */
+CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_frame_desc* frame,
+                                          cumulet_frame_result* result);
+
+typedef struct cumulet_pick {
+  size_t struct_size;
+  int32_t hit;        /* 1: the volume reaches half opacity along the pixel's ray */
+  double position[3]; /* world space, where it does */
+  double distance;    /* from the ray's origin */
+} cumulet_pick;
+
+/* [GL] What is at the position x, y of the picture last rendered, in pixels of its frame. */
+CUMULET_API cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick);
+/* World bounds of the viewer's volume. CUMULET_ERROR_INVALID_ARGUMENT if it has none. */
+CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], double box_max[3]);
+
+/*
+ * [GL] The picture so far: width x height (of the result) x 4 floats, first pixel top left, linear radiance in front of
+ * the background (premultiplied if that is transparent), and the volume's alpha. A pixel without samples is 0. count is
+ * the number of floats at rgba.
  */
 CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count);
+/* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque in
+ * front of the sky). */
+CUMULET_API cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count);
+/* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
+ * their luminance, over the mean luminance. Reads the picture back: now and then, not every frame. */
+CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise);
 
 /* What happened, in SI units; fields without a value are 0. */
 typedef struct cumulet_stats {
@@ -217,17 +631,19 @@ typedef struct cumulet_stats {
   double build_seconds_refine;
   double build_seconds_records;
   double build_seconds_upload;
-  double trace_seconds;
-  uint64_t samples;     /* camera paths finished */
-  uint64_t steps;       /* cells or voxels (or bricks) entered by all rays of those paths */
+  double trace_seconds; /* of the picture under way */
+  uint64_t samples;     /* camera paths finished in it, as of the last cumulet_render */
+  uint64_t steps;       /* cells or voxels entered by all rays of those paths, as of the last readback */
   double bounds_min[3]; /* world bounds of the volume */
   double bounds_max[3];
   char gl_vendor[128];
   char gl_renderer[128];
   char gl_version[128];
+  int32_t limited;   /* 1: max_cells, not the threshold, ended the refinement */
+  uint64_t gl_bytes; /* all GL memory the viewer holds */
 } cumulet_stats;
 
-CUMULET_API cumulet_status cumulet_get_stats(const cumulet_viewer* viewer, cumulet_stats* stats);
+CUMULET_API cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats);
 
 #ifdef __cplusplus
 }

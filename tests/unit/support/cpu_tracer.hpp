@@ -17,6 +17,7 @@ namespace cumulet::core {
 struct CpuTetLinear {
   CmParameters cm{};
   const grid::TetGrid* grid = nullptr;
+  float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
   uvec4 cm_record(uint cell, uint part) const { return part == 0 ? grid->cells[cell].links : grid->cells[cell].data; }
   uint cm_tree(uint node) const { return grid->tree[node]; }
   uint cm_root_leaf(uint root) const { return grid->roots[root].first_leaf; }
@@ -38,6 +39,7 @@ struct CpuDense {
   CmParameters cm{};
   const volume::ScalarVolume* volume = nullptr;
   ivec3 origin{0};
+  float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
   float cm_voxel(ivec3 voxel) const { return test::value_at(*volume, voxel + origin) / volume->max_value; }
 #include "phase.glsl"
 #include "random.glsl"

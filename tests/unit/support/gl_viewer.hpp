@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "headless.hpp"
-#include "viewer/viewer.hpp"
+#include "support/still.hpp"
 
 namespace cumulet::test {
 
@@ -22,9 +22,7 @@ class ViewerTest : public testing::TestWithParam<headless::Backend> {
     }
   }
 
-  std::unique_ptr<viewer::Viewer> make() const {
-    return std::make_unique<viewer::Viewer>(headless::Context::get_proc, context_.get(), Log());
-  }
+  std::unique_ptr<Still> make() const { return std::make_unique<Still>(*context_); }
 
   std::unique_ptr<headless::Context> context_;
 };
@@ -40,15 +38,15 @@ struct Picture {
   }
 };
 
-inline Picture render(viewer::Viewer& viewer, const viewer::Image& image, double budget_ms = 1e9) {
-  viewer.set_image(image);
-  double progress = 0.0;
-  while (!viewer.render(budget_ms, progress)) {
+inline Picture render(Still& still, const Image& image, double budget_ms = 1e9) {
+  still.set_image(image);
+  still.build();
+  while (!still.render(budget_ms)) {
   }
   Picture picture;
   picture.width = image.width;
   picture.pixels.resize(std::size_t{image.width} * image.height);
-  viewer.read(&picture.pixels[0].x, picture.pixels.size() * 4);
+  still.viewer().read_linear(&picture.pixels[0].x, picture.pixels.size() * 4);
   return picture;
 }
 

@@ -1,0 +1,149 @@
+#include "render/progressive.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "base/error.hpp"
+
+namespace cumulet::render {
+
+namespace {
+
+constexpr std::uint32_t coarsest_divisor = 16;
+using Clock = std::chrono::steady_clock;
+
+}  // namespace
+
+bool Progressive::same(const PictureWish& wish) const {
+  core::CmParameters a = wish.parameters;
+  core::CmParameters b = wish_.parameters;
+  a.image.w = b.image.w = 0;  // more samples go on
+  return wished_ && std::memcmp(&a, &b, sizeof(a)) == 0 && wish.view == wish_.view &&
+         wish.generation == wish_.generation && wish.surface_generation == wish_.surface_generation &&
+         wish.preview == wish_.preview;
+}
+
+std::uint32_t Progressive::coarsest(double budget_ms) const {
+  if (!wish_.preview) return 1;
+  const double pixels = double(wish_.parameters.image.x) * wish_.parameters.image.y;
+  std::uint32_t divisor = finest_;
+  while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > 0.6 * tracer_.rate() * budget_ms)
+    divisor *= 2;
+  return divisor;
+}
+
+Picture& Progressive::acquire(glm::uvec2 size) {
+  const auto is_free = [this](const auto& picture) { return picture.get() != shown_; };
+  // working_ itself, if it is not shown: it is to be given up.
+  for (const auto& picture : pictures_) {
+    if (is_free(picture) && picture->size() == size) return *picture;
+  }
+  for (const auto& picture : pictures_) {
+    if (is_free(picture) && pictures_.size() >= 3) return *picture;
+  }
+  return *pictures_.emplace_back(std::make_unique<Picture>());
+}
+
+void Progressive::start(std::uint32_t divisor, const MarchData& data, const SurfaceDepth& surface, double budget_ms) {
+  core::CmParameters parameters = wish_.parameters;
+  parameters.image.x = (parameters.image.x + divisor - 1) / divisor;
+  parameters.image.y = (parameters.image.y + divisor - 1) / divisor;
+  if (divisor > finest_) parameters.image.w = std::min(parameters.image.w, 1U);
+  Picture& picture = acquire(glm::uvec2(parameters.image));
+  working_ = nullptr;
+  try {
+    tracer_.begin(picture, data, parameters, wish_.view, surface, budget_ms, wish_.preview);
+  } catch (const Error& error) {
+    const bool memory = error.code() == ErrorCode::out_of_memory && wish_.preview && divisor < coarsest_divisor;
+    if (memory) {
+      finest_ = divisor * 2;
+      stale_ = true;
+    } else {
+      failed_ = true;
+    }
+    throw;
+  }
+  working_ = &picture;
+  working_generation_ = wish_.generation;
+  divisor_ = divisor;
+  stale_ = false;
+  if (divisor == finest_) trace_seconds_ = 0.0;
+}
+
+bool Progressive::needs_depth() const {
+  return wish_.depth && shown_ != nullptr && shown_->volume_z() == 0 && shown_generation_ == wish_.generation;
+}
+
+void Progressive::advance(const PictureWish& wish, const MarchData& data, const SurfaceDepth& surface,
+                          Deadline deadline, double budget_ms) {
+  const bool resized = glm::uvec2(wish.parameters.image) != glm::uvec2(wish_.parameters.image);
+  if (!same(wish)) {
+    stale_ = true;
+    failed_ = false;
+    if (resized || wish.generation != wish_.generation) finest_ = 1;
+    // Paths of the old data lead nowhere in the new.
+    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview) working_ = nullptr;
+  } else if (working_ != nullptr && divisor_ == finest_) {
+    if (!wish.preview && wish.parameters.image.w < working_->parameters().image.w) {
+      stale_ = true;
+    } else {
+      working_->extend(wish.parameters.image.w);
+    }
+  }
+  wish_ = wish;
+  wished_ = true;
+  if (failed_) return;
+  try {
+    do {
+      // The first answer to a change is finished, whatever changes meanwhile: else nothing would ever be shown.
+      const bool answering = wish_.preview && answering_ && working_ != nullptr && !working_->complete();
+      if (working_ == nullptr || (stale_ && !answering)) {
+        start(coarsest(budget_ms), data, surface, budget_ms);
+        answering_ = true;
+      } else if (!stale_ && working_->complete() && divisor_ > finest_) {
+        start(divisor_ / 2, data, surface, budget_ms);
+        answering_ = false;
+      }
+      const auto begun = Clock::now();
+      const bool done = tracer_.trace(*working_, data, surface, deadline);
+      trace_seconds_ += std::chrono::duration<double>(Clock::now() - begun).count();
+      if (working_->complete()) {
+        shown_ = working_;
+        shown_generation_ = working_generation_;
+        if (needs_depth()) tracer_.trace_depth(*shown_, data, surface, deadline);
+      }
+      if (done && !stale_ && divisor_ == finest_) break;
+    } while (Clock::now() < deadline);
+  } catch (const Error& error) {
+    working_ = nullptr;
+    if (finest_ == 1 || error.code() != ErrorCode::out_of_memory) failed_ = true;
+    throw;
+  }
+}
+
+void Progressive::reset() {
+  shown_ = working_ = nullptr;
+  pictures_.clear();
+  wished_ = false;
+  stale_ = failed_ = false;
+  finest_ = 1;
+}
+
+bool Progressive::more() const {
+  if (!wished_ || failed_) return false;
+  return working_ == nullptr || stale_ || !working_->done() || divisor_ > finest_ || needs_depth();
+}
+
+bool Progressive::converged() const { return wished_ && !failed_ && !more() && divisor_ == 1; }
+
+double Progressive::progress() const {
+  return working_ != nullptr && !stale_ && divisor_ == finest_ ? working_->progress() : 0.0;
+}
+
+std::uint64_t Progressive::bytes() const {
+  std::uint64_t bytes = tracer_.bytes();
+  for (const auto& picture : pictures_) bytes += picture->bytes();
+  return bytes;
+}
+
+}  // namespace cumulet::render

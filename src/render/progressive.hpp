@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "render/tracer.hpp"
+
+namespace cumulet::render {
+
+/// What a picture shall show.
+struct PictureWish {
+  core::CmParameters parameters{};  // at full resolution; image.w: target samples
+  View view = View::shaded;
+  std::uint64_t generation = 0;          // of the data
+  std::uint64_t surface_generation = 0;  // of the host's depth
+  bool preview = true;                   // coarse first; else at full resolution only
+  bool depth = false;                    // find the volume's depth at half opacity as well
+};
+
+/// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
+/// of a frame, then ones of twice the resolution, then the full one, which goes on to its target samples. As long as
+/// wishes change faster than a coarse picture takes, each is finished before the newest wish is taken up. All calls
+/// need the context current and a StateGuard around.
+class Progressive {
+ public:
+  explicit Progressive(gl::FunctionsPtr gl) : tracer_(std::move(gl)) {}
+
+  /// Works on the wish until about the deadline. Throws once where a picture cannot be made, and goes on with what
+  /// there is, or coarser, later.
+  void advance(const PictureWish& wish, const MarchData& data, const SurfaceDepth& surface, Deadline deadline,
+               double budget_ms);
+  /// Forgets all pictures.
+  void reset();
+
+  /// The newest whole picture; null before the first.
+  [[nodiscard]] const Picture* shown() const { return shown_; }
+  /// What is to be read back: without preview the picture under way.
+  [[nodiscard]] const Picture* newest() const { return wish_.preview || working_ == nullptr ? shown_ : working_; }
+  [[nodiscard]] bool converged() const;
+  /// Whether advance has anything left to do.
+  [[nodiscard]] bool more() const;
+  [[nodiscard]] double progress() const;
+  [[nodiscard]] Tracer& tracer() { return tracer_; }
+  [[nodiscard]] const Tracer& tracer() const { return tracer_; }
+  [[nodiscard]] std::uint64_t bytes() const;
+  /// Seconds spent on the picture at full resolution.
+  [[nodiscard]] double trace_seconds() const { return trace_seconds_; }
+
+ private:
+  [[nodiscard]] bool same(const PictureWish& wish) const;
+  [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
+  Picture& acquire(glm::uvec2 size);
+  void start(std::uint32_t divisor, const MarchData& data, const SurfaceDepth& surface, double budget_ms);
+  [[nodiscard]] bool needs_depth() const;
+
+  Tracer tracer_;
+  std::vector<std::unique_ptr<Picture>> pictures_;
+  Picture* shown_ = nullptr;
+  std::uint64_t shown_generation_ = 0;
+  Picture* working_ = nullptr;
+  std::uint64_t working_generation_ = 0;
+  std::uint32_t divisor_ = 1;  // of working_
+  std::uint32_t finest_ = 1;   // finer ones do not fit the driver's memory
+  PictureWish wish_;
+  bool wished_ = false;
+  bool stale_ = false;      // working_ is of an older wish
+  bool answering_ = false;  // working_ is the first picture after a change
+  bool failed_ = false;     // until the wish changes
+  double trace_seconds_ = 0.0;
+};
+
+}  // namespace cumulet::render

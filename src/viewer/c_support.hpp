@@ -1,0 +1,134 @@
+#pragma once
+
+// What every file of the C ABI needs: argument checks, descriptors, and walls that no exception passes.
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <glm/glm.hpp>
+#include <new>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "base/error.hpp"
+#include "cumulet/cumulet.h"
+
+namespace cumulet::c_abi {
+
+inline cumulet_status status_of(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::invalid_argument:
+      return CUMULET_ERROR_INVALID_ARGUMENT;
+    case ErrorCode::unsupported:
+      return CUMULET_ERROR_UNSUPPORTED;
+    case ErrorCode::file:
+      return CUMULET_ERROR_FILE;
+    case ErrorCode::out_of_memory:
+      return CUMULET_ERROR_OUT_OF_MEMORY;
+    case ErrorCode::gl:
+      return CUMULET_ERROR_GL;
+    case ErrorCode::cancelled:
+      return CUMULET_ERROR_CANCELLED;
+    case ErrorCode::context_lost:
+      return CUMULET_ERROR_CONTEXT_LOST;
+    case ErrorCode::detached:
+      return CUMULET_ERROR_DETACHED;
+    case ErrorCode::timeout:
+      return CUMULET_ERROR_TIMEOUT;
+    case ErrorCode::internal:
+      break;
+  }
+  return CUMULET_ERROR_INTERNAL;
+}
+
+/// Runs a call and turns whatever it throws into a status and a line.
+template <class Call>
+cumulet_status guarded(std::string& message, Call&& call) noexcept {
+  try {
+    try {
+      call();
+      message.clear();
+      return CUMULET_OK;
+    } catch (const Error& error) {
+      message = error.what();
+      return status_of(error.code());
+    } catch (const std::bad_alloc&) {
+      message = "out of memory";
+      return CUMULET_ERROR_OUT_OF_MEMORY;
+    } catch (const std::exception& error) {
+      message = std::string("internal error: ") + error.what();
+      return CUMULET_ERROR_INTERNAL;
+    } catch (...) {
+      message = "internal error";
+      return CUMULET_ERROR_INTERNAL;
+    }
+  } catch (...) {
+    return CUMULET_ERROR_OUT_OF_MEMORY;  // not even the message could be kept
+  }
+}
+
+/// Copies text into a fixed buffer, cut to fit and zero-terminated.
+inline void copy_text(const std::string& text, char* to, size_t size) {
+  if (to == nullptr || size == 0) return;
+  const size_t length = std::min(text.size(), size - 1);
+  std::memcpy(to, text.data(), length);
+  to[length] = '\0';
+}
+
+/// The same for calls that tell their cause in the caller's buffer.
+template <class Call>
+cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
+  std::string message;
+  const cumulet_status status = guarded(message, std::forward<Call>(call));
+  copy_text(message, error, error_size);
+  return status;
+}
+
+[[noreturn]] inline void refuse(const std::string& why) { throw Error(ErrorCode::invalid_argument, why); }
+
+inline void require(bool condition, const char* what) {
+  if (!condition) refuse(what);
+}
+
+/// A host built against an older header passes a shorter struct: what it lacks is zero.
+template <class Desc>
+Desc read_desc(const Desc* desc, const char* name) {
+  if (desc == nullptr) refuse(std::string(name) + " is NULL");
+  if (desc->struct_size < sizeof(size_t) || desc->struct_size > sizeof(Desc)) {
+    refuse(std::string(name) + ".struct_size is " + std::to_string(desc->struct_size) + ", not sizeof(" + name + ")");
+  }
+  Desc copy{};
+  std::memcpy(&copy, desc, desc->struct_size);
+  return copy;
+}
+
+/// Fills as much of a caller's struct as its struct_size says it has.
+template <class Desc>
+void write_desc(Desc* out, Desc value, const char* name) {
+  read_desc(out, name);
+  value.struct_size = out->struct_size;
+  std::memcpy(out, &value, value.struct_size);
+}
+
+/// The number in an enum that a C host filled: reading it as the enum would be undefined where it is not one of its
+/// values.
+template <class Enum>
+unsigned number(const Enum& value) {
+  unsigned copy = 0;
+  static_assert(sizeof copy == sizeof value);
+  std::memcpy(&copy, &value, sizeof copy);
+  return copy;
+}
+
+inline bool in_range(double value, double low, double high) { return value >= low && value <= high; }  // false for NaN
+
+template <class Values>
+bool all_finite(const Values& values) {
+  return std::ranges::all_of(values, [](auto value) { return std::isfinite(value); });
+}
+
+inline glm::vec3 to_vec3(std::span<const float, 3> v) { return {v[0], v[1], v[2]}; }
+inline glm::dvec3 to_dvec3(std::span<const double, 3> v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace cumulet::c_abi

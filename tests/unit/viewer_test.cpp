@@ -1,0 +1,312 @@
+// What the viewer makes of settings and frames: which change restarts what, previews, cameras, surfaces, picking.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "base/error.hpp"
+#include "support/gl_viewer.hpp"
+#include "support/volumes.hpp"
+
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+using namespace cumulet;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+class ViewerFrames : public test::ViewerTest {
+ protected:
+  void SetUp() override {
+    ViewerTest::SetUp();
+    if (IsSkipped()) return;
+    still_ = make();
+    still_->set_medium({0.4, vec3(1.0F), 0.3F, 0});
+    still_->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  }
+  [[nodiscard]] viewer::Viewer& viewer() const { return still_->viewer(); }
+  void show_noise() const {
+    still_->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
+    still_->build();
+  }
+  static viewer::Frame frame(std::uint32_t width, std::uint32_t height, double budget_ms = 20.0) {
+    viewer::Frame f;
+    f.target = viewer::Target::none;
+    f.size = {width, height};
+    f.viewport = {0, 0, width, height};
+    f.budget_ms = budget_ms;
+    return f;
+  }
+  viewer::FrameResult converge(const viewer::Frame& f) const {
+    viewer::FrameResult result;
+    for (int i = 0; i < 20000; ++i) {
+      result = viewer().render(f);
+      if (result.converged) return result;
+    }
+    ADD_FAILURE() << "does not converge";
+    return result;
+  }
+  [[nodiscard]] std::vector<float> read(glm::uvec2 size) const {
+    std::vector<float> rgba(std::size_t{size.x} * size.y * 4);
+    viewer().read_linear(rgba.data(), rgba.size());
+    return rgba;
+  }
+  static double mean_alpha(const std::vector<float>& rgba) {
+    double sum = 0.0;
+    for (std::size_t i = 3; i < rgba.size(); i += 4) sum += rgba[i];
+    return 4.0 * sum / static_cast<double>(rgba.size());
+  }
+  std::unique_ptr<test::Still> still_;
+};
+
+TEST_P(ViewerFrames, PreviewsEndInThePictureThatThereIsWithoutThem) {
+  show_noise();
+  // One tile, and several.
+  for (const glm::uvec2 size : {glm::uvec2(60, 44), glm::uvec2(600, 20)}) {
+    viewer().set_sampling({5, 3, render::View::shaded, false});
+    converge(frame(size.x, size.y));
+    const auto off = read(size);
+    viewer().set_sampling({5, 3, render::View::shaded, true});
+    bool preview = false;
+    viewer::FrameResult result;
+    while (!result.converged) {
+      result = viewer().render(frame(size.x, size.y, 0.01));
+      preview = preview || result.preview;
+    }
+    EXPECT_TRUE(preview);
+    EXPECT_FALSE(result.preview || result.more || result.loading || result.failed);
+    EXPECT_EQ(result.progress, 1.0);
+    EXPECT_EQ(off, read(size));
+  }
+}
+
+TEST_P(ViewerFrames, ShowsSomethingWhileTheCameraNeverRests) {
+  show_noise();
+  viewer().render(frame(256, 256, 0.01));
+  int pictures = 0;
+  float last = 0.0F;
+  for (int i = 0; i < 2000 && pictures < 5; ++i) {
+    viewer().camera()->orbit(0.01, 0.0);
+    const viewer::FrameResult result = viewer().render(frame(256, 256, 0.01));
+    EXPECT_FALSE(result.converged);
+    if (result.size.x == 0) continue;
+    const float now = read(result.size)[std::size_t{4} * (result.size.x / 2 + result.size.x * (result.size.y / 2))];
+    pictures += now != last ? 1 : 0;
+    last = now;
+  }
+  EXPECT_EQ(pictures, 5);
+}
+
+TEST_P(ViewerFrames, MoreSamplesGoOn) {
+  show_noise();
+  for (const glm::uvec2 size : {glm::uvec2(40, 30), glm::uvec2(600, 10)}) {
+    viewer().set_sampling({9, 3, render::View::shaded, false});
+    converge(frame(size.x, size.y));
+    const auto nine = read(size);
+    viewer().set_sampling({2, 3, render::View::shaded, false});
+    converge(frame(size.x, size.y));
+    EXPECT_NE(nine, read(size));
+    const std::uint64_t before = viewer().stats().samples;
+    viewer().set_sampling({9, 3, render::View::shaded, false});
+    const viewer::FrameResult result = viewer().render(frame(size.x, size.y, 0.001));
+    EXPECT_FALSE(result.converged);
+    EXPECT_GE(viewer().stats().samples, before);
+    converge(frame(size.x, size.y));
+    EXPECT_EQ(nine, read(size));
+  }
+}
+
+TEST_P(ViewerFrames, ChangesRestartOnlyWhatDependsOnThem) {
+  show_noise();
+  viewer().set_sampling({3, 0, render::View::shaded, true});
+  const viewer::Frame f = frame(48, 48);
+  converge(f);
+  const std::uint64_t cells = viewer().stats().cells;
+  const auto still_converged = [&] {
+    return viewer().render(frame(48, 48, -1.0)).converged && viewer().render(f).converged;
+  };
+  EXPECT_TRUE(still_converged());
+  viewer().set_display({2.0F, render::ToneMap::filmic, true});
+  EXPECT_TRUE(still_converged());
+  viewer().set_medium({0.4, vec3(1.0F), 0.3F, 0});  // the same again
+  viewer().set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  EXPECT_TRUE(still_converged());
+  viewer().set_medium({0.8, vec3(1.0F), 0.3F, 0});
+  const viewer::FrameResult result = viewer().render(frame(48, 48, 0.001));
+  EXPECT_FALSE(result.converged);
+  EXPECT_FALSE(result.loading);  // the cells stay
+  converge(f);
+  EXPECT_EQ(viewer().stats().cells, cells);
+  viewer::GridSettings grid;
+  grid.build.refine.threshold = 0.2;
+  viewer().set_grid(grid);
+  viewer().wait(-1.0);
+  converge(f);
+  EXPECT_LT(viewer().stats().cells, cells);
+}
+
+TEST_P(ViewerFrames, NoVolumeShowsNothingAgain) {
+  show_noise();
+  converge(frame(16, 16));
+  viewer().set_volume(nullptr);
+  const viewer::FrameResult result = viewer().render(frame(16, 16));
+  EXPECT_EQ(result.size, glm::uvec2(0U));
+  EXPECT_FALSE(result.converged || result.more || result.loading);
+  EXPECT_EQ(viewer().volume(), nullptr);
+  EXPECT_THROW(read({16, 16}), Error);
+}
+
+// A slab of 16 voxels, from z = -0.5 to 15.5.
+class ViewerSlab : public ViewerFrames {
+ protected:
+  void SetUp() override {
+    ViewerFrames::SetUp();
+    if (IsSkipped()) return;
+    still_->set_volume(test::make_volume({64, 64, 16}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
+    viewer().set_medium({0.1, vec3(0.0F), 0.0F, 0});
+    viewer().set_sampling({64, 1, render::View::shaded, false});
+    viewer::CameraPose pose;
+    pose.eye = {31.5, 31.5, 215.5};
+    pose.target = {31.5, 31.5, 15.5};
+    pose.fovy_degrees = 4.0;
+    viewer().camera()->set(pose);
+    still_->build();
+  }
+};
+
+TEST_P(ViewerSlab, OrthographicAndOffAxisCamerasObeyBeerAndLambert) {
+  const double expected = 1.0 - std::exp(-1.6);
+  viewer::CameraPose pose = viewer().camera()->pose();
+  pose.orthographic_height = 20.0;
+  viewer().camera()->set(pose);
+  converge(frame(32, 32));
+  EXPECT_NEAR(mean_alpha(read({32, 32})), expected, 0.01);
+  // Sheared by the projection: eye straight above the slab's middle, the picture looks at its edge.
+  const glm::dmat4 view = glm::lookAt(dvec3(31.5, 31.5, 215.5), dvec3(31.5, 31.5, 0.0), dvec3(0, 1, 0));
+  const glm::dmat4 projection = glm::frustum(0.0 * 1.0, 0.01, -0.005, 0.005, 0.1, 1000.0);
+  viewer().camera()->set_matrices(view, projection, viewer::ClipDepth::negative_one_to_one);
+  converge(frame(32, 32));
+  EXPECT_NEAR(mean_alpha(read({32, 32})), expected, 0.01);
+  // A cone of which half misses.
+  const glm::dmat4 half = glm::frustum(0.0, 0.1 * 2.0 * 32.0 / 200.0, -0.005, 0.005, 0.1, 1000.0);
+  viewer().camera()->set_matrices(view, half, viewer::ClipDepth::negative_one_to_one);
+  converge(frame(32, 32));
+  EXPECT_NEAR(mean_alpha(read({32, 32})), 0.5 * expected, 0.02);
+}
+
+TEST_P(ViewerSlab, AnOrthographicRayBeginsAtTheNearPlane) {
+  viewer::CameraPose pose = viewer().camera()->pose();
+  pose.orthographic_height = 20.0;
+  pose.near_plane = 200.0 + 8.0;  // in the slab's middle
+  pose.far_plane = 1000.0;
+  viewer().camera()->set(pose);
+  converge(frame(32, 32));
+  EXPECT_NEAR(mean_alpha(read({32, 32})), 1.0 - std::exp(-0.8), 0.01);
+}
+
+TEST_P(ViewerSlab, TheHostsSurfaceEndsCameraRays) {
+  auto functions = gl::load_functions(headless::Context::get_proc, context_.get());
+  gl::Object depth = gl::make_texture_2d(functions, GL_R32F, 32, 32, "depth");
+  const viewer::ViewFrame view = viewer().camera()->view(1.0, std::nullopt);
+  viewer::Frame f = frame(32, 32);
+  f.depth_source = render::DepthSource::texture;
+  f.depth_name = depth.name();
+  for (const double part : {0.25, 0.75, 2.0}) {
+    // Half of the rows: nothing is in front there.
+    std::vector<float> values(std::size_t{32} * 32, static_cast<float>(view.depth_a));
+    for (std::size_t i = 0; i < values.size() / 2; ++i)
+      values[i] = static_cast<float>(view.depth_a + view.depth_b / (200.0 + 16.0 * part));
+    functions->TextureSubImage2D(depth.name(), 0, 0, 0, 32, 32, GL_RED, GL_FLOAT, values.data());
+    converge(f);
+    const auto rgba = read({32, 32});
+    const std::vector<float> top(rgba.begin(), rgba.begin() + static_cast<std::ptrdiff_t>(rgba.size() / 2));
+    const std::vector<float> bottom(rgba.begin() + static_cast<std::ptrdiff_t>(rgba.size() / 2), rgba.end());
+    EXPECT_NEAR(mean_alpha(top), 1.0 - std::exp(-1.6), 0.012);
+    EXPECT_NEAR(mean_alpha(bottom), 1.0 - std::exp(-1.6 * std::min(part, 1.0)), 0.012) << part;
+  }
+  // The same depth again restarts nothing.
+  EXPECT_TRUE(viewer().render(f).converged);
+  f.depth_source = render::DepthSource::none;
+  EXPECT_FALSE(viewer().render(frame(32, 32, 0.001)).converged);
+}
+
+TEST_P(ViewerSlab, PickingFindsHalfOpacity) {
+  converge(frame(32, 32));
+  const viewer::Pick pick = viewer().pick(16.2, 15.9);
+  ASSERT_TRUE(pick.hit);
+  const double depth = std::log(2.0) / 0.1;
+  EXPECT_NEAR(pick.position.z, 15.5 - depth, 0.02);
+  EXPECT_NEAR(pick.position.x, 31.5, 0.5);
+  EXPECT_NEAR(pick.distance, 200.0 + depth, 0.05);
+  EXPECT_FALSE(viewer().pick(-1.0, 3.0).hit);
+  EXPECT_FALSE(viewer().pick(std::nan(""), 3.0).hit);
+  viewer().set_medium({0.01, vec3(0.0F), 0.0F, 0});  // never half opaque
+  converge(frame(32, 32));
+  EXPECT_FALSE(viewer().pick(16.0, 16.0).hit);
+}
+
+TEST_P(ViewerSlab, WritesItsDepthForTheHost) {
+  viewer::Frame f = frame(24, 24);
+  f.target = viewer::Target::texture;
+  f.write_depth = true;
+  for (const auto convention : {viewer::DepthConvention::standard, viewer::DepthConvention::reversed}) {
+    viewer::CameraPose pose = viewer().camera()->pose();
+    pose.depth = convention;
+    pose.near_plane = 1.0;
+    pose.far_plane = 1000.0;
+    viewer().camera()->set(pose);
+    const viewer::FrameResult result = converge(f);
+    ASSERT_NE(result.depth_texture, 0U);
+    ASSERT_NE(result.texture, 0U);
+    const auto functions = gl::load_functions(headless::Context::get_proc, context_.get());
+    std::vector<float> depth(std::size_t{24} * 24);
+    functions->GetTextureImage(result.depth_texture, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
+                               static_cast<GLsizei>(depth.size() * 4), depth.data());
+    const double z = 200.0 + std::log(2.0) / 0.1;
+    const double standard = 1000.0 * (z - 1.0) / (z * 999.0);
+    const double expected = convention == viewer::DepthConvention::standard ? standard : 1.0 - standard;
+    for (const float d : depth) EXPECT_NEAR(d, expected, 1e-5);
+  }
+}
+
+TEST_P(ViewerSlab, NoiseIsTheSpreadBetweenSeeds) {
+  viewer().set_medium({0.1, vec3(0.9F), 0.0F, 0});
+  std::vector<std::vector<float>> pictures;
+  double told = 0.0;
+  for (std::uint32_t seed = 0; seed < 12; ++seed) {
+    viewer().set_sampling({32, seed, render::View::shaded, false});
+    converge(frame(24, 24));
+    pictures.push_back(read({24, 24}));
+    told += viewer().measure_noise() / 12.0;
+  }
+  double variance = 0.0;
+  double mean = 0.0;
+  const std::size_t pixels = std::size_t{24} * 24;
+  const auto luminance = [](const std::vector<float>& p, std::size_t i) {
+    return 0.2126 * p[4 * i] + 0.7152 * p[4 * i + 1] + 0.0722 * p[4 * i + 2];
+  };
+  for (std::size_t i = 0; i < pixels; ++i) {
+    double sum = 0.0;
+    double square = 0.0;
+    for (const auto& picture : pictures) {
+      const double y = luminance(picture, i);
+      sum += y;
+      square += y * y;
+    }
+    variance += (square - sum * sum / 12.0) / 11.0 / double(pixels);
+    mean += sum / 12.0 / double(pixels);
+  }
+  const double seen = std::sqrt(variance) / mean;
+  // Stratified samples do a little better than their own spread says.
+  EXPECT_LT(seen, 1.1 * told);
+  EXPECT_GT(seen, 0.6 * told);
+}
+
+CUMULET_ON_BACKENDS(ViewerFrames);
+CUMULET_ON_BACKENDS(ViewerSlab);
+
+}  // namespace
