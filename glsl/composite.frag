@@ -1,6 +1,8 @@
 #version 450
 // An accumulation as displayed colour, or its depth.
-// variant: CM_DEPTH=0
+// Variants, not uniforms, choose what a pixel does: software drivers run both sides of every branch.
+// variant: CM_DEPTH=0 CM_BILINEAR=0 CM_TONE_MAP=0u CM_ENCODE=true
+// variant: CM_DEPTH=0 CM_BILINEAR=1 CM_TONE_MAP=3u CM_ENCODE=false
 // variant: CM_DEPTH=1
 #include "shared.glsl"
 #include "display.glsl"
@@ -12,10 +14,8 @@ layout(location = 0) uniform ivec4 cm_viewport;
 layout(location = 1) uniform bool cm_flip_y;
 #if CM_DEPTH == 0
 layout(location = 2) uniform float cm_exposure;
-layout(location = 3) uniform uint cm_tone_map;
-layout(location = 4) uniform bool cm_encode;
-layout(location = 5) uniform bool cm_transparent;
-layout(location = 6) uniform vec3 cm_background;
+layout(location = 3) uniform bool cm_transparent;
+layout(location = 4) uniform vec3 cm_background;
 layout(location = 0) out vec4 cm_colour;
 
 vec4 cm_texel(ivec2 texel) {
@@ -36,21 +36,20 @@ void main() {
   ivec2 size = textureSize(cm_sum, 0);
   vec2 at = (vec2(pixel) + 0.5) * (vec2(size) / vec2(cm_viewport.zw));
 #if CM_DEPTH == 0
-  vec4 value;
-  if (size == cm_viewport.zw) {
-    value = cm_texel(pixel);
-  } else {
-    vec2 low = floor(at - 0.5);
-    vec2 weight = at - 0.5 - low;
-    ivec2 last = size - 1;
-    ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
-    ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);
-    value = mix(mix(cm_texel(p0), cm_texel(ivec2(p1.x, p0.y)), weight.x),
-                mix(cm_texel(ivec2(p0.x, p1.y)), cm_texel(p1), weight.x), weight.y);
-  }
+#if CM_BILINEAR
+  vec2 low = floor(at - 0.5);
+  vec2 weight = at - 0.5 - low;
+  ivec2 last = size - 1;
+  ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
+  ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);
+  vec4 value = mix(mix(cm_texel(p0), cm_texel(ivec2(p1.x, p0.y)), weight.x),
+                   mix(cm_texel(ivec2(p0.x, p1.y)), cm_texel(p1), weight.x), weight.y);
+#else
+  vec4 value = cm_texel(pixel);
+#endif
   float alpha = clamp(value.a, 0.0, 1.0);
   vec3 straight = alpha > 0.0 ? value.rgb / alpha : vec3(0.0);
-  cm_colour = vec4(cm_display(straight, cm_exposure, cm_tone_map, cm_encode) * alpha, alpha);
+  cm_colour = vec4(cm_display(straight, cm_exposure, CM_TONE_MAP, CM_ENCODE) * alpha, alpha);
 #else
   float z = texelFetch(cm_volume_z, min(ivec2(at), size - 1), 0).x;
   if (!(z > 0.0)) discard;

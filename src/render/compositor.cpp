@@ -11,8 +11,7 @@ namespace {
 
 GLint as_bool(bool value) { return value ? 1 : 0; }
 
-gl::Object make_program(const gl::FunctionsPtr& gl, const char* define) {
-  const std::array<std::string, 1> defines{define};
+gl::Object make_program(const gl::FunctionsPtr& gl, std::span<const std::string> defines) {
   return gl::make_graphics_program(gl, "composite.vert", "composite.frag", defines);
 }
 
@@ -30,7 +29,13 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     throw Error(ErrorCode::invalid_argument,
                 "the target, framebuffer " + std::to_string(target.framebuffer) + ", is not complete");
   }
-  if (!colour_) colour_ = make_program(gl_, "CM_DEPTH 0");
+  const bool bilinear = glm::ivec2(picture.size) != glm::ivec2(viewport.z, viewport.w);
+  const std::vector<std::string> defines{
+      "CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
+      "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
+      display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
+  gl::Object& program = colours_[defines];
+  if (!program) program = make_program(gl_, defines);
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
@@ -39,15 +44,13 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   gl.BindTextureUnit(0, picture.sum);
   gl.BindTextureUnit(1, picture.counts);
 
-  const GLuint colour = colour_.name();
+  const GLuint colour = program.name();
   gl.ProgramUniform4i(colour, 0, viewport.x, viewport.y, viewport.z, viewport.w);
   gl.ProgramUniform1i(colour, 1, as_bool(target.flip_y));
   gl.ProgramUniform1f(colour, 2, exposure_of(display));
-  gl.ProgramUniform1ui(colour, 3, curve_of(display));
-  gl.ProgramUniform1i(colour, 4, as_bool(display.encoding == ColourEncoding::srgb));
-  gl.ProgramUniform1i(colour, 5, as_bool(display.transparent));
+  gl.ProgramUniform1i(colour, 3, as_bool(display.transparent));
   const glm::vec3 background = display.legend ? glm::vec3(0.0F) : display.background;
-  gl.ProgramUniform3f(colour, 6, background.x, background.y, background.z);
+  gl.ProgramUniform3f(colour, 4, background.x, background.y, background.z);
   if (display.encoding == ColourEncoding::srgb_framebuffer) {
     gl.Enable(GL_FRAMEBUFFER_SRGB);
   } else {
@@ -66,7 +69,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
 
   if (target.write_depth && picture.volume_z != 0) {
-    if (!depth_) depth_ = make_program(gl_, "CM_DEPTH 1");
+    if (!depth_) depth_ = make_program(gl_, std::array<std::string, 1>{"CM_DEPTH 1"});
     const GLuint depth = depth_.name();
     gl.BindTextureUnit(2, picture.volume_z);
     gl.ProgramUniform4i(depth, 0, viewport.x, viewport.y, viewport.z, viewport.w);

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "gl/objects.hpp"
 #include "render/display.hpp"
@@ -41,7 +44,7 @@ class Compositor {
 
  private:
   gl::FunctionsPtr gl_;
-  gl::Object colour_;
+  std::map<std::vector<std::string>, gl::Object> colours_;  // by their macros: made when first needed
   gl::Object depth_;
 };
 

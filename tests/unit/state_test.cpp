@@ -47,7 +47,7 @@ class Scribbler {
     sampler_ = gl::make_sampler(gl);
     vertex_array_ = gl::make_vertex_array(gl);
     framebuffer_ = gl::make_framebuffer(gl);
-    const std::vector<std::string> defines{"CM_DEPTH 0"};
+    const std::vector<std::string> defines{"CM_DEPTH 1"};
     program_ = gl::make_graphics_program(gl, "composite.vert", "composite.frag", defines);
   }
   void scribble() const {
@@ -300,7 +300,7 @@ GLint integer(const gl::Functions& gl, GLenum name) {
 
 TEST_P(State, ProgramsThatCannotBeUsedAgain) {
   const Scribbler scribbler(gl_);
-  const std::vector<std::string> defines{"CM_DEPTH 0"};
+  const std::vector<std::string> defines{"CM_DEPTH 1"};
   Object program = gl::make_graphics_program(gl_, "composite.vert", "composite.frag", defines);
   const GLuint name = program.name();
   // Relinked without success, it can run on but not be used anew.
