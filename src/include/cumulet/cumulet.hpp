@@ -1,0 +1,983 @@
+/*
+ * Cumulet for C++20: a thin, header-only layer over cumulet.h, and nothing that C cannot do. Owners release what they
+ * hold, spans stand for pointer and count, enum classes for enums, std::array for C arrays, and a Result for a status.
+ *
+ * Names
+ *     Every call and member is one of cumulet.h's, where its meaning, units, threads and [GL] mark are told:
+ *     Viewer::set_grid is cumulet_set_grid, GridDesc::threshold is cumulet_grid_desc.threshold. Members begin as zero,
+ *     which means the default here too, and descriptors convert to their C counterparts, struct_size filled in:
+ *
+ *         viewer.set_medium({.density_scale = 4, .anisotropy = 0.7F}).value();
+ *
+ * Errors
+ *     Nothing here throws, so that it also serves where exceptions are off. What can fail returns a Result, which the
+ *     compiler wants looked at; value() of a failed one calls std::terminate. A handle that is empty (default
+ *     constructed or moved from) makes every call fail with StatusCode::invalid_argument.
+ *
+ * Callbacks
+ *     They are function objects, kept where they stay while the viewer is moved, until it is destroyed. cumulet.h says
+ *     when and on which thread they are called. One that throws ends the program.
+ */
+#ifndef CUMULET_CUMULET_HPP
+#define CUMULET_CUMULET_HPP
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <new>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+#include "cumulet.h"
+
+namespace cumulet {
+// Parts of one program may be compiled against different versions of this header: their inline functions stay apart.
+inline namespace v0_2 {
+static_assert(CUMULET_VERSION_MAJOR == 0 && CUMULET_VERSION_MINOR == 2, "the namespace names the version");
+
+// ---- Enums ----------------------------------------------------------------------------------------------------------
+
+/// Not "Status", which is a macro of Xlib's.
+enum class StatusCode {
+  ok = CUMULET_OK,
+  invalid_argument = CUMULET_ERROR_INVALID_ARGUMENT,
+  unsupported = CUMULET_ERROR_UNSUPPORTED,
+  file = CUMULET_ERROR_FILE,
+  out_of_memory = CUMULET_ERROR_OUT_OF_MEMORY,
+  gl = CUMULET_ERROR_GL,
+  internal = CUMULET_ERROR_INTERNAL,
+  cancelled = CUMULET_ERROR_CANCELLED,
+  context_lost = CUMULET_ERROR_CONTEXT_LOST,
+  detached = CUMULET_ERROR_DETACHED,
+  timeout = CUMULET_ERROR_TIMEOUT
+};
+enum class LogLevel {
+  debug = CUMULET_LOG_DEBUG,
+  info = CUMULET_LOG_INFO,
+  warning = CUMULET_LOG_WARNING,
+  error = CUMULET_LOG_ERROR
+};
+enum class GlState { restore = CUMULET_GL_STATE_RESTORE, host_resets = CUMULET_GL_STATE_HOST_RESETS };
+enum class Stage {
+  idle = CUMULET_STAGE_IDLE,
+  loading = CUMULET_STAGE_LOADING,
+  statistics = CUMULET_STAGE_STATISTICS,
+  refining = CUMULET_STAGE_REFINING,
+  records = CUMULET_STAGE_RECORDS,
+  uploading = CUMULET_STAGE_UPLOADING
+};
+enum class March { tet = CUMULET_MARCH_TET, dense = CUMULET_MARCH_DENSE, brick = CUMULET_MARCH_BRICK };
+enum class Cells { linear = CUMULET_CELLS_LINEAR, constant = CUMULET_CELLS_CONSTANT };
+enum class Criterion { deviation = CUMULET_CRITERION_DEVIATION, range_mean = CUMULET_CRITERION_RANGE_MEAN };
+enum class View {
+  shaded = CUMULET_VIEW_SHADED,
+  cells = CUMULET_VIEW_CELLS,
+  steps = CUMULET_VIEW_STEPS,
+  density = CUMULET_VIEW_DENSITY,
+  wireframe = CUMULET_VIEW_WIREFRAME
+};
+enum class Preview { automatic = CUMULET_PREVIEW_AUTO, off = CUMULET_PREVIEW_OFF };
+enum class ToneMap {
+  neutral = CUMULET_TONE_MAP_NEUTRAL,
+  filmic = CUMULET_TONE_MAP_FILMIC,
+  clip = CUMULET_TONE_MAP_CLIP
+};
+enum class Background { sky = CUMULET_BACKGROUND_SKY, transparent = CUMULET_BACKGROUND_TRANSPARENT };
+enum class Depth { standard = CUMULET_DEPTH_STANDARD, reversed = CUMULET_DEPTH_REVERSED };
+enum class Clip { negative_one_to_one = CUMULET_CLIP_NEGATIVE_ONE_TO_ONE, zero_to_one = CUMULET_CLIP_ZERO_TO_ONE };
+enum class NavigationStyle {
+  simple = CUMULET_NAVIGATION_SIMPLE,
+  blender = CUMULET_NAVIGATION_BLENDER,
+  maya = CUMULET_NAVIGATION_MAYA
+};
+enum class EventType {
+  pointer_move = CUMULET_EVENT_POINTER_MOVE,
+  button_down = CUMULET_EVENT_BUTTON_DOWN,
+  button_up = CUMULET_EVENT_BUTTON_UP,
+  wheel = CUMULET_EVENT_WHEEL,
+  key_down = CUMULET_EVENT_KEY_DOWN,
+  key_up = CUMULET_EVENT_KEY_UP,
+  focus_lost = CUMULET_EVENT_FOCUS_LOST
+};
+enum class Button { left = CUMULET_BUTTON_LEFT, middle = CUMULET_BUTTON_MIDDLE, right = CUMULET_BUTTON_RIGHT };
+/// Letters and digits are their upper-case ASCII codes: Key{'A'}.
+enum class Key : std::int32_t {
+  none = CUMULET_KEY_NONE,
+  home = CUMULET_KEY_HOME,
+  keypad_0 = CUMULET_KEY_KEYPAD_0,
+  keypad_1,
+  keypad_2,
+  keypad_3,
+  keypad_4,
+  keypad_5,
+  keypad_6,
+  keypad_7,
+  keypad_8,
+  keypad_9,
+  keypad_period = CUMULET_KEY_KEYPAD_PERIOD,
+  left = CUMULET_KEY_LEFT,
+  right = CUMULET_KEY_RIGHT,
+  up = CUMULET_KEY_UP,
+  down = CUMULET_KEY_DOWN
+};
+/// Combined with |.
+enum class Modifiers : std::uint32_t {
+  none = 0,
+  shift = CUMULET_MODIFIER_SHIFT,
+  ctrl = CUMULET_MODIFIER_CTRL,
+  alt = CUMULET_MODIFIER_ALT
+};
+enum class Target {
+  framebuffer = CUMULET_TARGET_FRAMEBUFFER,
+  texture = CUMULET_TARGET_TEXTURE,
+  none = CUMULET_TARGET_NONE
+};
+enum class Colour {
+  srgb = CUMULET_COLOUR_SRGB,
+  srgb_framebuffer = CUMULET_COLOUR_SRGB_FRAMEBUFFER,
+  linear = CUMULET_COLOUR_LINEAR,
+  hdr = CUMULET_COLOUR_HDR
+};
+enum class Blend { over = CUMULET_BLEND_OVER, replace = CUMULET_BLEND_REPLACE };
+enum class DepthSource {
+  none = CUMULET_DEPTH_SOURCE_NONE,
+  texture = CUMULET_DEPTH_SOURCE_TEXTURE,
+  texture_multisample = CUMULET_DEPTH_SOURCE_TEXTURE_MULTISAMPLE,
+  framebuffer = CUMULET_DEPTH_SOURCE_FRAMEBUFFER
+};
+/// Combined with |.
+enum class RenderFlags : std::uint32_t {
+  none = 0,
+  more = CUMULET_RENDER_MORE,
+  converged = CUMULET_RENDER_CONVERGED,
+  loading = CUMULET_RENDER_LOADING,
+  failed = CUMULET_RENDER_FAILED,
+  preview = CUMULET_RENDER_PREVIEW
+};
+
+[[nodiscard]] constexpr Modifiers operator|(Modifiers a, Modifiers b) noexcept {
+  return Modifiers{static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b)};
+}
+[[nodiscard]] constexpr RenderFlags operator|(RenderFlags a, RenderFlags b) noexcept {
+  return RenderFlags{static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b)};
+}
+
+// ---- Results --------------------------------------------------------------------------------------------------------
+
+/// Zero-terminated text in an array of its own, cut to fit.
+template <std::size_t Size>
+class Text {
+ public:
+  constexpr Text() noexcept = default;
+  constexpr explicit Text(std::string_view text) noexcept {
+    std::copy_n(text.data(), text.size() < Size ? text.size() : Size - 1, chars_.data());
+  }
+  [[nodiscard]] constexpr const char* c_str() const noexcept { return chars_.data(); }
+  [[nodiscard]] constexpr std::string_view view() const noexcept { return chars_.data(); }
+  [[nodiscard]] constexpr bool empty() const noexcept { return chars_[0] == '\0'; }
+
+ private:
+  std::array<char, Size> chars_{};
+};
+
+/// Why a call failed: a status, and one line that names the file, where there is one, and the cause.
+struct Error {
+  StatusCode status = StatusCode::ok;
+  Text<512> message;
+};
+
+/// A value, or the error that came instead: std::expected in little, for C++20.
+template <class T = void>
+class [[nodiscard]] Result {
+ public:
+  Result(T value) noexcept : value_(std::move(value)) {}
+  Result(const Error& error) noexcept : error_(error) {}
+
+  [[nodiscard]] bool has_value() const noexcept { return value_.has_value(); }
+  [[nodiscard]] explicit operator bool() const noexcept { return has_value(); }
+  /// Terminates if there is none; so do * and ->.
+  [[nodiscard]] T& value() & noexcept {
+    if (!value_) std::terminate();
+    return *value_;
+  }
+  [[nodiscard]] const T& value() const& noexcept {
+    if (!value_) std::terminate();
+    return *value_;
+  }
+  [[nodiscard]] T value() && noexcept { return std::move(value()); }
+  [[nodiscard]] T& operator*() & noexcept { return value(); }
+  [[nodiscard]] const T& operator*() const& noexcept { return value(); }
+  [[nodiscard]] T operator*() && noexcept { return std::move(value()); }
+  [[nodiscard]] T* operator->() noexcept { return &value(); }
+  [[nodiscard]] const T* operator->() const noexcept { return &value(); }
+  /// StatusCode::ok and "" if there is a value.
+  [[nodiscard]] const Error& error() const& noexcept { return error_; }
+  [[nodiscard]] Error error() && noexcept { return error_; }
+
+ private:
+  std::optional<T> value_;
+  Error error_;
+};
+
+template <>
+class [[nodiscard]] Result<void> {
+ public:
+  Result() noexcept = default;
+  Result(const Error& error) noexcept : error_(error) {}
+
+  [[nodiscard]] bool has_value() const noexcept { return error_.status == StatusCode::ok; }
+  [[nodiscard]] explicit operator bool() const noexcept { return has_value(); }
+  /// Terminates if the call failed.
+  void value() const noexcept {
+    if (!has_value()) std::terminate();
+  }
+  /// StatusCode::ok and "" if the call succeeded.
+  [[nodiscard]] const Error& error() const& noexcept { return error_; }
+  [[nodiscard]] Error error() && noexcept { return error_; }
+
+ private:
+  Error error_;
+};
+
+[[nodiscard]] inline const char* status_text(StatusCode status) noexcept {
+  return cumulet_status_text(static_cast<cumulet_status>(status));
+}
+/// The library's, as major * 10000 + minor * 100 + patch.
+[[nodiscard]] inline std::uint32_t version() noexcept { return cumulet_version(); }
+
+namespace detail {
+
+[[nodiscard]] inline Result<> result(cumulet_status status, const char* cause) noexcept {
+  if (status == CUMULET_OK) return {};
+  return Error{static_cast<StatusCode>(status), Text<512>(cause)};
+}
+/// For calls that tell no cause.
+[[nodiscard]] inline Result<> result(cumulet_status status) noexcept {
+  return result(status, cumulet_status_text(status));
+}
+
+/// For calls that make a handle and tell the cause in a buffer: make(&out, error, error_size).
+template <class Owner, class Make>
+[[nodiscard]] Result<Owner> made(Make&& make) noexcept {
+  decltype(std::declval<Owner>().handle()) out = nullptr;
+  std::array<char, 512> cause{};
+  const cumulet_status status = make(&out, cause.data(), cause.size());
+  if (auto done = result(status, cause.data()); !done) return done.error();
+  return Owner::adopt(out);
+}
+
+/// Descriptors that the library fills.
+template <class Desc>
+[[nodiscard]] Desc sized() noexcept {
+  Desc desc{};
+  desc.struct_size = sizeof desc;
+  return desc;
+}
+
+[[nodiscard]] inline const char* or_null(const std::string& text) noexcept {
+  return text.empty() ? nullptr : text.c_str();
+}
+
+}  // namespace detail
+
+// ---- Volumes --------------------------------------------------------------------------------------------------------
+
+using Vector = std::array<double, 3>;
+using Rgb = std::array<float, 3>;
+/// Column-major.
+using Matrix = std::array<double, 16>;
+
+/// World space.
+struct Bounds {
+  Vector min{};
+  Vector max{};
+};
+
+struct DenseDesc {
+  std::span<const float> values{};
+  std::array<std::int32_t, 3> size{};
+  Matrix index_to_world{};
+  const char* name = nullptr;
+
+  operator cumulet_dense_desc() const noexcept {
+    cumulet_dense_desc c{.struct_size = sizeof c,
+                         .values = values.data(),
+                         .value_count = values.size(),
+                         .size = {size[0], size[1], size[2]},
+                         .index_to_world = {},
+                         .name = name};
+    std::ranges::copy(index_to_world, c.index_to_world);
+    return c;
+  }
+};
+
+/// brick_count is brick_origins.size() / 3; Volume::from_sparse checks that the other spans agree. Tiles are C's own,
+/// whose active is 0 or 1, so that none need be copied.
+struct SparseDesc {
+  std::span<const std::int32_t> brick_origins{};
+  std::span<const float> brick_values{};
+  std::span<const std::uint64_t> brick_active{};
+  std::span<const cumulet_tile> tiles{};
+  float background = 0.0F;
+  Matrix index_to_world{};
+  const char* name = nullptr;
+
+  operator cumulet_sparse_desc() const noexcept {
+    cumulet_sparse_desc c{.struct_size = sizeof c,
+                          .brick_origins = brick_origins.data(),
+                          .brick_values = brick_values.data(),
+                          .brick_active = brick_active.data(),
+                          .brick_count = brick_origins.size() / 3,
+                          .tiles = tiles.data(),
+                          .tile_count = tiles.size(),
+                          .background = background,
+                          .index_to_world = {},
+                          .name = name};
+    std::ranges::copy(index_to_world, c.index_to_world);
+    return c;
+  }
+};
+
+struct VolumeInfo {
+  Text<128> name;
+  std::uint64_t active_voxels = 0;
+  Bounds bounds;
+  float max_value = 0.0F;
+};
+
+/// A share in an immutable volume: a copy is one more.
+class Volume {
+ public:
+  Volume() noexcept = default;
+  Volume(const Volume& other) noexcept : handle_(cumulet_volume_retain(other.handle_)) {}
+  Volume(Volume&& other) noexcept : handle_(other.release()) {}
+  Volume& operator=(Volume other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Volume() { cumulet_volume_release(handle_); }
+
+  [[nodiscard]] static Result<Volume> open(const std::string& path, const std::string& grid_name = {}) noexcept {
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_open(path.c_str(), detail::or_null(grid_name), out, error, size);
+    });
+  }
+  [[nodiscard]] static Result<Volume> from_dense(const DenseDesc& desc) noexcept {
+    const cumulet_dense_desc c = desc;
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_from_dense(&c, out, error, size);
+    });
+  }
+  [[nodiscard]] static Result<Volume> from_sparse(const SparseDesc& desc) noexcept {
+    const cumulet_sparse_desc c = desc;
+    if (desc.brick_origins.size() % 3 != 0 || desc.brick_values.size() / 512 != c.brick_count ||
+        desc.brick_values.size() % 512 != 0 ||
+        (!desc.brick_active.empty() && desc.brick_active.size() != c.brick_count * 8)) {
+      return Error{StatusCode::invalid_argument,
+                   Text<512>("a brick is 3 brick_origins, 512 brick_values and 8 brick_active (or none at all)")};
+    }
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_from_sparse(&c, out, error, size);
+    });
+  }
+
+  [[nodiscard]] Result<VolumeInfo> info() const noexcept {
+    auto c = detail::sized<cumulet_volume_info>();
+    if (auto done = detail::result(cumulet_volume_get_info(handle_, &c)); !done) return done.error();
+    const auto& [struct_size, name, active_voxels, bounds_min, bounds_max, max_value] = c;
+    return VolumeInfo{.name = Text<128>(name),
+                      .active_voxels = active_voxels,
+                      .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)},
+                      .max_value = max_value};
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_volume* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_volume* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Volume adopt(cumulet_volume* handle) noexcept {
+    Volume volume;
+    volume.handle_ = handle;
+    return volume;
+  }
+
+ private:
+  cumulet_volume* handle_ = nullptr;
+};
+
+/// Calls visit(name, type, refusal), three const char*, for each grid of the file.
+template <class Visit>
+[[nodiscard]] Result<> list_grids(const std::string& path, Visit&& visit) noexcept {
+  std::array<char, 512> cause{};
+  const auto call = [](void* user, const char* name, const char* type, const char* refusal) noexcept {
+    (*static_cast<std::remove_reference_t<Visit>*>(user))(name, type, refusal);
+  };
+  void* user = const_cast<void*>(static_cast<const void*>(std::addressof(visit)));
+  const cumulet_status status = cumulet_list_grids(path.c_str(), call, user, cause.data(), cause.size());
+  return detail::result(status, cause.data());
+}
+
+// ---- Settings -------------------------------------------------------------------------------------------------------
+
+struct GridDesc {
+  March march{};
+  Cells cells{};
+  Criterion criterion{};
+  double threshold = 0.0;
+  std::uint64_t max_cells = 0;
+  bool camera_adaptive = false;
+  double pixel_size = 0.0;
+
+  operator cumulet_grid_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_grid_desc),
+            .march = static_cast<cumulet_march>(march),
+            .cells = static_cast<cumulet_cells>(cells),
+            .criterion = static_cast<cumulet_criterion>(criterion),
+            .threshold = threshold,
+            .max_cells = max_cells,
+            .camera_adaptive = camera_adaptive,
+            .pixel_size = pixel_size};
+  }
+};
+
+struct MediumDesc {
+  double density_scale = 0.0;
+  Rgb coalbedo{};
+  float anisotropy = 0.0F;
+  std::uint32_t max_bounces = 0;
+
+  operator cumulet_medium_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_medium_desc),
+            .density_scale = density_scale,
+            .coalbedo = {coalbedo[0], coalbedo[1], coalbedo[2]},
+            .anisotropy = anisotropy,
+            .max_bounces = max_bounces};
+  }
+};
+
+struct LightDesc {
+  float sun_azimuth_degrees = 0.0F;
+  float sun_elevation_degrees = 0.0F;
+  Rgb sun_irradiance{};
+  Rgb sky_radiance{};
+
+  operator cumulet_light_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_light_desc),
+            .sun_azimuth_degrees = sun_azimuth_degrees,
+            .sun_elevation_degrees = sun_elevation_degrees,
+            .sun_irradiance = {sun_irradiance[0], sun_irradiance[1], sun_irradiance[2]},
+            .sky_radiance = {sky_radiance[0], sky_radiance[1], sky_radiance[2]}};
+  }
+};
+
+struct SamplingDesc {
+  std::uint32_t samples = 0;
+  std::uint32_t seed = 0;
+  View view{};
+  Preview preview{};
+
+  operator cumulet_sampling_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_sampling_desc),
+            .samples = samples,
+            .seed = seed,
+            .view = static_cast<cumulet_view>(view),
+            .preview = static_cast<cumulet_preview>(preview)};
+  }
+};
+
+struct DisplayDesc {
+  float exposure_stops = 0.0F;
+  ToneMap tone_map{};
+  Background background{};
+
+  operator cumulet_display_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_display_desc),
+            .exposure_stops = exposure_stops,
+            .tone_map = static_cast<cumulet_tone_map>(tone_map),
+            .background = static_cast<cumulet_background>(background)};
+  }
+};
+
+// ---- Camera and input -----------------------------------------------------------------------------------------------
+
+struct CameraDesc {
+  Vector eye{};
+  Vector target{};
+  Vector up{};
+  double fovy_degrees = 0.0;
+  double orthographic_height = 0.0;
+  double near_plane = 0.0;
+  double far_plane = 0.0;
+  Depth depth{};
+
+  operator cumulet_camera_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_camera_desc),
+            .eye = {eye[0], eye[1], eye[2]},
+            .target = {target[0], target[1], target[2]},
+            .up = {up[0], up[1], up[2]},
+            .fovy_degrees = fovy_degrees,
+            .orthographic_height = orthographic_height,
+            .near_plane = near_plane,
+            .far_plane = far_plane,
+            .depth = static_cast<cumulet_depth>(depth)};
+  }
+};
+
+struct CameraMatrices {
+  Matrix view{};
+  Matrix projection{};
+};
+
+/// Move-only. Viewers that look through it keep it alive.
+class Camera {
+ public:
+  Camera() noexcept = default;
+
+  [[nodiscard]] static Result<Camera> create(const CameraDesc& desc = {}) noexcept {
+    const cumulet_camera_desc c = desc;
+    cumulet_camera* out = nullptr;
+    if (auto done = detail::result(cumulet_camera_create(&c, &out)); !done) return done.error();
+    return adopt(out);
+  }
+
+  // NOLINTBEGIN(readability-make-member-function-const): what they change is behind the handle
+  [[nodiscard]] Result<> set(const CameraDesc& desc) noexcept {
+    const cumulet_camera_desc c = desc;
+    return detail::result(cumulet_camera_set(handle(), &c));
+  }
+  [[nodiscard]] Result<CameraDesc> get() const noexcept {
+    auto c = detail::sized<cumulet_camera_desc>();
+    if (auto done = detail::result(cumulet_camera_get(handle(), &c)); !done) return done.error();
+    const auto& [struct_size, eye, target, up, fovy_degrees, orthographic_height, near_plane, far_plane, depth] = c;
+    return CameraDesc{.eye = std::to_array(eye),
+                      .target = std::to_array(target),
+                      .up = std::to_array(up),
+                      .fovy_degrees = fovy_degrees,
+                      .orthographic_height = orthographic_height,
+                      .near_plane = near_plane,
+                      .far_plane = far_plane,
+                      .depth = static_cast<Depth>(depth)};
+  }
+  [[nodiscard]] Result<> set_matrices(const CameraMatrices& matrices, Clip clip) noexcept {
+    return detail::result(cumulet_camera_set_matrices(handle(), matrices.view.data(), matrices.projection.data(),
+                                                      static_cast<cumulet_clip>(clip)));
+  }
+  [[nodiscard]] Result<CameraMatrices> get_matrices(double aspect, Clip clip) const noexcept {
+    CameraMatrices matrices;
+    if (auto done = detail::result(cumulet_camera_get_matrices(handle(), aspect, static_cast<cumulet_clip>(clip),
+                                                               matrices.view.data(), matrices.projection.data()));
+        !done) {
+      return done.error();
+    }
+    return matrices;
+  }
+
+  [[nodiscard]] Result<> orbit(double yaw, double pitch) noexcept {
+    return detail::result(cumulet_camera_orbit(handle(), yaw, pitch));
+  }
+  [[nodiscard]] Result<> look(double yaw, double pitch) noexcept {
+    return detail::result(cumulet_camera_look(handle(), yaw, pitch));
+  }
+  [[nodiscard]] Result<> roll(double angle) noexcept { return detail::result(cumulet_camera_roll(handle(), angle)); }
+  [[nodiscard]] Result<> pan(double right, double up) noexcept {
+    return detail::result(cumulet_camera_pan(handle(), right, up));
+  }
+  [[nodiscard]] Result<> dolly(double factor) noexcept {
+    return detail::result(cumulet_camera_dolly(handle(), factor));
+  }
+  [[nodiscard]] Result<> fly(double right, double up, double forward) noexcept {
+    return detail::result(cumulet_camera_fly(handle(), right, up, forward));
+  }
+  [[nodiscard]] Result<> frame(const Bounds& box, double aspect) noexcept {
+    return detail::result(cumulet_camera_frame(handle(), box.min.data(), box.max.data(), aspect));
+  }
+  // NOLINTEND(readability-make-member-function-const)
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_camera* handle() const noexcept { return handle_.get(); }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_camera* release() noexcept { return handle_.release(); }
+  /// Takes the caller's.
+  [[nodiscard]] static Camera adopt(cumulet_camera* handle) noexcept {
+    Camera camera;
+    camera.handle_.reset(handle);
+    return camera;
+  }
+
+ private:
+  struct Release {
+    void operator()(cumulet_camera* handle) const noexcept { cumulet_camera_release(handle); }
+  };
+  std::unique_ptr<cumulet_camera, Release> handle_;
+};
+
+struct NavigationDesc {
+  NavigationStyle style{};
+  bool fly = false;
+  double speed = 0.0;
+  double turntable_degrees_per_second = 0.0;
+
+  operator cumulet_navigation_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_navigation_desc),
+            .style = static_cast<cumulet_navigation_style>(style),
+            .fly = fly,
+            .speed = speed,
+            .turntable_degrees_per_second = turntable_degrees_per_second};
+  }
+};
+
+struct Event {
+  EventType type{};
+  double x = 0.0;
+  double y = 0.0;
+  double wheel = 0.0;
+  Button button{};
+  Key key{};
+  Modifiers modifiers{};
+
+  operator cumulet_event() const noexcept {
+    return {.struct_size = sizeof(cumulet_event),
+            .type = static_cast<cumulet_event_type>(type),
+            .x = x,
+            .y = y,
+            .wheel = wheel,
+            .button = static_cast<cumulet_button>(button),
+            .key = static_cast<std::int32_t>(key),
+            .modifiers = static_cast<std::uint32_t>(modifiers)};
+  }
+};
+
+// ---- Frames ---------------------------------------------------------------------------------------------------------
+
+struct FrameDesc {
+  double budget_ms = 0.0;
+  Target target{};
+  std::uint32_t framebuffer = 0;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::array<std::int32_t, 4> viewport{};
+  bool flip_y = false;
+  double scale = 0.0;
+  std::uint32_t format = 0;
+  Colour colour{};
+  Blend blend{};
+  bool write_depth = false;
+  DepthSource depth_source{};
+  std::uint32_t depth_name = 0;
+  bool depth_flip_y = false;
+  bool depth_unchanged = false;
+
+  operator cumulet_frame_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_frame_desc),
+            .budget_ms = budget_ms,
+            .target = static_cast<cumulet_target>(target),
+            .framebuffer = framebuffer,
+            .width = width,
+            .height = height,
+            .viewport = {viewport[0], viewport[1], viewport[2], viewport[3]},
+            .flip_y = flip_y,
+            .scale = scale,
+            .format = format,
+            .colour = static_cast<cumulet_colour>(colour),
+            .blend = static_cast<cumulet_blend>(blend),
+            .write_depth = write_depth,
+            .depth_source = static_cast<cumulet_depth_source>(depth_source),
+            .depth_name = depth_name,
+            .depth_flip_y = depth_flip_y,
+            .depth_unchanged = depth_unchanged};
+  }
+};
+
+struct FrameResult {
+  RenderFlags flags{};
+  double progress = 0.0;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t texture = 0;
+  std::uint32_t depth_texture = 0;
+
+  /// Whether any of these is set.
+  [[nodiscard]] constexpr bool has(RenderFlags any) const noexcept {
+    return (static_cast<std::uint32_t>(flags) & static_cast<std::uint32_t>(any)) != 0;
+  }
+};
+
+struct Pick {
+  bool hit = false;
+  Vector position{};
+  double distance = 0.0;
+};
+
+struct Progress {
+  Stage stage{};
+  double fraction = 0.0;
+  StatusCode status{};
+  Text<512> message;
+};
+
+struct Stats {
+  std::uint64_t cells = 0;
+  std::uint32_t levels = 0;
+  std::uint64_t cell_bytes = 0;
+  std::uint64_t active_voxels = 0;
+  double build_seconds_total = 0.0;
+  double build_seconds_load = 0.0;
+  double build_seconds_statistics = 0.0;
+  double build_seconds_refine = 0.0;
+  double build_seconds_records = 0.0;
+  double build_seconds_upload = 0.0;
+  double trace_seconds = 0.0;
+  std::uint64_t samples = 0;
+  std::uint64_t steps = 0;
+  Bounds bounds;
+  Text<128> gl_vendor;
+  Text<128> gl_renderer;
+  Text<128> gl_version;
+  bool limited = false;
+  std::uint64_t gl_bytes = 0;
+};
+
+// ---- Viewer ---------------------------------------------------------------------------------------------------------
+
+/// Finds OpenGL functions: whatever takes a name and returns an address, be that a void* or a pointer to function
+/// (glfwGetProcAddress, eglGetProcAddress, a lambda), or C's callback and user pointer. Empty: there is no context.
+class GetProc {
+ public:
+  GetProc() noexcept = default;
+  GetProc(cumulet_get_proc_fn get_proc, void* user) noexcept
+      : find_(get_proc == nullptr ? decltype(find_)()
+                                  : [get_proc, user](const char* name) { return get_proc(user, name); }) {}
+  template <class Find>
+  requires std::is_invocable_v<Find&, const char*> GetProc(Find find)
+      : find_([find = std::move(find)](const char* name) mutable { return address(find(name)); }) {}
+
+  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(find_); }
+
+ private:
+  friend class Viewer;
+  template <class Pointer>
+  static void* address(Pointer* pointer) noexcept {
+    return reinterpret_cast<void*>(pointer);
+  }
+  [[nodiscard]] cumulet_get_proc_fn function() const noexcept {
+    if (!find_) return nullptr;
+    return [](void* user, const char* name) noexcept { return static_cast<const GetProc*>(user)->find_(name); };
+  }
+  [[nodiscard]] void* user() const noexcept { return const_cast<GetProc*>(this); }
+
+  std::function<void*(const char*)> find_;
+};
+
+struct CreateDesc {
+  GetProc get_proc{};
+  std::function<void(LogLevel, std::string_view)> log{};
+  std::function<void()> update{};
+  GlState gl_state{};
+};
+
+/// Move-only.
+class Viewer {
+ public:
+  Viewer() noexcept = default;
+  Viewer(Viewer&&) noexcept = default;
+  Viewer& operator=(Viewer&& other) noexcept {
+    handle_ = std::move(other.handle_);  // first: the old viewer calls the old callbacks until it is gone
+    callbacks_ = std::move(other.callbacks_);
+    return *this;
+  }
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
+  /// [GL] if attached, as cumulet_destroy.
+  ~Viewer() = default;
+
+  [[nodiscard]] static Result<Viewer> create(CreateDesc desc = {}) noexcept {
+    std::unique_ptr<Callbacks> callbacks(new (std::nothrow) Callbacks{std::move(desc.log), std::move(desc.update)});
+    if (!callbacks) return detail::result(CUMULET_ERROR_OUT_OF_MEMORY).error();
+    const cumulet_create_desc c{.struct_size = sizeof c,
+                                .get_proc = desc.get_proc.function(),
+                                .get_proc_user = desc.get_proc.user(),
+                                .log = callbacks->log ? Callbacks::call_log : nullptr,
+                                .log_user = callbacks.get(),
+                                .update = callbacks->update ? Callbacks::call_update : nullptr,
+                                .update_user = callbacks.get(),
+                                .gl_state = static_cast<cumulet_gl_state>(desc.gl_state)};
+    auto viewer = detail::made<Viewer>(
+        [&](cumulet_viewer** out, char* error, std::size_t size) { return cumulet_create(&c, out, error, size); });
+    if (viewer) viewer->callbacks_ = std::move(callbacks);
+    return viewer;
+  }
+
+  [[nodiscard]] Result<> attach(const GetProc& get_proc) noexcept {
+    return result(cumulet_attach(handle(), get_proc.function(), get_proc.user()));
+  }
+  [[nodiscard]] Result<> detach() noexcept { return result(cumulet_detach(handle())); }
+  [[nodiscard]] Result<> context_lost() noexcept { return result(cumulet_context_lost(handle())); }
+
+  [[nodiscard]] Result<> load_volume(const std::string& path, const std::string& grid_name = {}) noexcept {
+    return result(cumulet_load_volume(handle(), path.c_str(), detail::or_null(grid_name)));
+  }
+  /// An empty volume: shows nothing.
+  [[nodiscard]] Result<> set_volume(const Volume& volume) noexcept {
+    return result(cumulet_set_volume(handle(), volume.handle()));
+  }
+  /// Empty if there is none.
+  [[nodiscard]] Result<Volume> get_volume() noexcept {
+    cumulet_volume* out = nullptr;
+    if (auto done = result(cumulet_get_volume(handle(), &out)); !done) return done.error();
+    return Volume::adopt(out);
+  }
+  void cancel() const noexcept { cumulet_cancel(handle()); }
+  [[nodiscard]] Result<Progress> get_progress() const noexcept {
+    auto c = detail::sized<cumulet_progress>();
+    // Safe at any time, which the last error is not.
+    if (auto done = detail::result(cumulet_get_progress(handle(), &c)); !done) return done.error();
+    const auto& [struct_size, stage, fraction, status, message] = c;
+    return Progress{.stage = static_cast<Stage>(stage),
+                    .fraction = fraction,
+                    .status = static_cast<StatusCode>(status),
+                    .message = Text<512>(message)};
+  }
+  [[nodiscard]] Result<> wait(double timeout_ms = -1.0) noexcept { return result(cumulet_wait(handle(), timeout_ms)); }
+  [[nodiscard]] Result<> rebuild() noexcept { return result(cumulet_rebuild(handle())); }
+
+  [[nodiscard]] Result<> set_grid(const GridDesc& desc) noexcept { return set(cumulet_set_grid, desc); }
+  [[nodiscard]] Result<> set_medium(const MediumDesc& desc) noexcept { return set(cumulet_set_medium, desc); }
+  [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
+  [[nodiscard]] Result<> set_sampling(const SamplingDesc& desc) noexcept { return set(cumulet_set_sampling, desc); }
+  [[nodiscard]] Result<> set_display(const DisplayDesc& desc) noexcept { return set(cumulet_set_display, desc); }
+
+  [[nodiscard]] Result<> set_camera(const Camera& camera) noexcept {
+    return result(cumulet_set_camera(handle(), camera.handle()));
+  }
+  [[nodiscard]] Result<Camera> get_camera() noexcept {
+    cumulet_camera* out = nullptr;
+    if (auto done = result(cumulet_get_camera(handle(), &out)); !done) return done.error();
+    return Camera::adopt(out);
+  }
+  [[nodiscard]] Result<> frame_all() noexcept { return result(cumulet_frame_all(handle())); }
+  [[nodiscard]] Result<> set_navigation(const NavigationDesc& desc) noexcept {
+    return set(cumulet_set_navigation, desc);
+  }
+  /// Whether the event meant something.
+  [[nodiscard]] Result<bool> input(const Event& event) noexcept {
+    const cumulet_event c = event;
+    std::int32_t handled = 0;
+    if (auto done = result(cumulet_input(handle(), &c, &handled)); !done) return done.error();
+    return handled != 0;
+  }
+
+  [[nodiscard]] Result<FrameResult> render(const FrameDesc& frame) noexcept {
+    const cumulet_frame_desc desc = frame;
+    auto c = detail::sized<cumulet_frame_result>();
+    if (auto done = result(cumulet_render(handle(), &desc, &c)); !done) return done.error();
+    const auto& [struct_size, flags, progress, width, height, texture, depth_texture] = c;
+    return FrameResult{.flags = RenderFlags{flags},
+                       .progress = progress,
+                       .width = width,
+                       .height = height,
+                       .texture = texture,
+                       .depth_texture = depth_texture};
+  }
+  [[nodiscard]] Result<Pick> pick_at(double x, double y) noexcept {
+    auto c = detail::sized<cumulet_pick>();
+    if (auto done = result(cumulet_pick_at(handle(), x, y, &c)); !done) return done.error();
+    const auto& [struct_size, hit, position, distance] = c;
+    return Pick{.hit = hit != 0, .position = std::to_array(position), .distance = distance};
+  }
+  [[nodiscard]] Result<Bounds> get_bounds() noexcept {
+    Bounds bounds;
+    if (auto done = result(cumulet_get_bounds(handle(), bounds.min.data(), bounds.max.data())); !done) {
+      return done.error();
+    }
+    return bounds;
+  }
+  [[nodiscard]] Result<> read_linear(std::span<float> rgba) noexcept {
+    return result(cumulet_read_linear(handle(), rgba.data(), rgba.size()));
+  }
+  [[nodiscard]] Result<> read_display(std::span<std::uint8_t> rgba) noexcept {
+    return result(cumulet_read_display(handle(), rgba.data(), rgba.size()));
+  }
+  [[nodiscard]] Result<double> measure_noise() noexcept {
+    double noise = 0.0;
+    if (auto done = result(cumulet_measure_noise(handle(), &noise)); !done) return done.error();
+    return noise;
+  }
+  [[nodiscard]] Result<Stats> get_stats() const noexcept {
+    auto c = detail::sized<cumulet_stats>();
+    if (auto done = result(cumulet_get_stats(handle(), &c)); !done) return done.error();
+    const auto& [struct_size, cells, levels, cell_bytes, active_voxels, total, load, statistics, refine, records,
+                 upload, trace, samples, steps, bounds_min, bounds_max, vendor, renderer, gl_version, limited,
+                 gl_bytes] = c;
+    return Stats{.cells = cells,
+                 .levels = levels,
+                 .cell_bytes = cell_bytes,
+                 .active_voxels = active_voxels,
+                 .build_seconds_total = total,
+                 .build_seconds_load = load,
+                 .build_seconds_statistics = statistics,
+                 .build_seconds_refine = refine,
+                 .build_seconds_records = records,
+                 .build_seconds_upload = upload,
+                 .trace_seconds = trace,
+                 .samples = samples,
+                 .steps = steps,
+                 .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)},
+                 .gl_vendor = Text<128>(vendor),
+                 .gl_renderer = Text<128>(renderer),
+                 .gl_version = Text<128>(gl_version),
+                 .limited = limited != 0,
+                 .gl_bytes = gl_bytes};
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_viewer* handle() const noexcept { return handle_.get(); }
+  /// Takes the caller's, whose callbacks stay the caller's. There is no release(): the callbacks live here.
+  [[nodiscard]] static Viewer adopt(cumulet_viewer* handle) noexcept {
+    Viewer viewer;
+    viewer.handle_.reset(handle);
+    return viewer;
+  }
+
+ private:
+  struct Callbacks {
+    std::function<void(LogLevel, std::string_view)> log;
+    std::function<void()> update;
+
+    static void call_log(void* user, cumulet_log_level level, const char* message) noexcept {
+      static_cast<const Callbacks*>(user)->log(static_cast<LogLevel>(level), message);
+    }
+    static void call_update(void* user) noexcept { static_cast<const Callbacks*>(user)->update(); }
+  };
+  struct Destroy {
+    void operator()(cumulet_viewer* handle) const noexcept { cumulet_destroy(handle); }
+  };
+
+  [[nodiscard]] Result<> result(cumulet_status status) const noexcept {
+    return detail::result(status, cumulet_last_error(handle()));
+  }
+  template <class Desc>
+  [[nodiscard]] Result<> set(cumulet_status (*setter)(cumulet_viewer*, const Desc*),
+                             const std::type_identity_t<Desc>& desc) noexcept {
+    return result(setter(handle(), &desc));
+  }
+
+  std::unique_ptr<Callbacks> callbacks_;  // outlives the viewer below
+  std::unique_ptr<cumulet_viewer, Destroy> handle_;
+};
+
+}  // namespace v0_2
+}  // namespace cumulet
+
+#endif

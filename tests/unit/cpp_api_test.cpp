@@ -1,0 +1,578 @@
+// cumulet.hpp: that it passes everything through, and nothing gets lost between owners.
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "cumulet/cumulet.hpp"
+#include "headless.hpp"
+
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+using namespace cumulet;  // NOLINT(google-build-using-namespace)
+
+// A ball of density in 16^3 voxels.
+std::vector<float> ball() {
+  std::vector<float> values;
+  for (int z = 0; z < 16; ++z) {
+    for (int y = 0; y < 16; ++y) {
+      for (int x = 0; x < 16; ++x) {
+        values.push_back((x - 8) * (x - 8) + (y - 8) * (y - 8) + (z - 8) * (z - 8) < 50 ? 1.0F : 0.0F);
+      }
+    }
+  }
+  return values;
+}
+
+Volume ball_volume() {
+  const std::vector<float> values = ball();
+  return Volume::from_dense({.values = values, .size = {16, 16, 16}, .name = "ball"}).value();
+}
+
+// The ball as grid "density" of a file that goes with this object; corner is one more voxel's value, if not zero.
+class BallFile {
+ public:
+  explicit BallFile(float corner = 0.0F) {
+    openvdb::initialize();
+    auto grid = openvdb::FloatGrid::create();
+    grid->setName("density");
+    grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+    const std::vector<float> values = ball();
+    for (int i = 0; i < 4096; ++i) {
+      if (values[i] > 0.0F) grid->tree().setValue({i % 16, i / 16 % 16, i / 256}, values[i]);
+    }
+    if (corner != 0.0F) grid->tree().setValue({0, 0, 0}, corner);
+    openvdb::io::File(path()).write(openvdb::GridCPtrVec{grid});
+  }
+  ~BallFile() { std::filesystem::remove(path()); }
+  BallFile(const BallFile&) = delete;
+  BallFile& operator=(const BallFile&) = delete;
+
+  [[nodiscard]] std::string path() const { return path_; }
+
+ private:
+  std::string path_ =
+      (std::filesystem::temp_directory_path() / ("cpp_api_test_" + std::to_string(getpid()) + ".vdb")).string();
+};
+
+template <class Range, class Values>
+void expect_same(const Range& range, const Values& values) {
+  EXPECT_TRUE(std::ranges::equal(range, values)) << testing::PrintToString(range);
+}
+
+static_assert(!std::is_copy_constructible_v<Viewer> && std::is_nothrow_move_constructible_v<Viewer> &&
+              std::is_nothrow_move_assignable_v<Viewer>);
+static_assert(!std::is_copy_constructible_v<Camera> && std::is_nothrow_move_constructible_v<Camera>);
+static_assert(std::is_nothrow_copy_constructible_v<Volume> && std::is_nothrow_move_constructible_v<Volume>);
+static_assert(!std::is_convertible_v<Viewer, bool> && !std::is_convertible_v<Result<>, bool>);
+
+TEST(CppResult, HoldsAValueOrAnError) {
+  Result<std::string> good = std::string("here");
+  EXPECT_TRUE(good);
+  EXPECT_EQ(*good, "here");
+  EXPECT_EQ(good->size(), 4U);
+  EXPECT_EQ(good.error().status, StatusCode::ok);
+  EXPECT_EQ(std::move(good).value(), "here");
+
+  const Result<std::string> bad = Error{StatusCode::file, Text<512>("cloud.vdb: no such file")};
+  EXPECT_FALSE(bad.has_value());
+  EXPECT_EQ(bad.error().status, StatusCode::file);
+  EXPECT_EQ(bad.error().message.view(), "cloud.vdb: no such file");
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_DEATH((void)bad.value(), "");
+  EXPECT_DEATH(Result<>(bad.error()).value(), "");
+  EXPECT_NO_FATAL_FAILURE(Result<>().value());
+}
+
+TEST(CppResult, TextIsCutToFit) {
+  EXPECT_EQ(Text<4>("abcdef").view(), "abc");
+  EXPECT_EQ(Text<4>("abc").view(), "abc");
+  EXPECT_TRUE(Text<4>().empty());
+}
+
+TEST(CppDescs, BecomeTheirCounterparts) {
+  const cumulet_grid_desc grid = GridDesc{.march = March::brick,
+                                          .cells = Cells::constant,
+                                          .criterion = Criterion::range_mean,
+                                          .threshold = 1.5,
+                                          .max_cells = 7,
+                                          .camera_adaptive = true,
+                                          .pixel_size = 2.5};
+  EXPECT_EQ(grid.struct_size, sizeof grid);
+  EXPECT_EQ(grid.march, CUMULET_MARCH_BRICK);
+  EXPECT_EQ(grid.cells, CUMULET_CELLS_CONSTANT);
+  EXPECT_EQ(grid.criterion, CUMULET_CRITERION_RANGE_MEAN);
+  EXPECT_EQ(grid.threshold, 1.5);
+  EXPECT_EQ(grid.max_cells, 7U);
+  EXPECT_EQ(grid.camera_adaptive, 1);
+  EXPECT_EQ(grid.pixel_size, 2.5);
+
+  const cumulet_medium_desc medium =
+      MediumDesc{.density_scale = 2, .coalbedo = {0.1F, 0.2F, 0.3F}, .anisotropy = 0.5F, .max_bounces = 9};
+  EXPECT_EQ(medium.struct_size, sizeof medium);
+  EXPECT_EQ(medium.density_scale, 2.0);
+  expect_same(medium.coalbedo, Rgb{0.1F, 0.2F, 0.3F});
+  EXPECT_EQ(medium.anisotropy, 0.5F);
+  EXPECT_EQ(medium.max_bounces, 9U);
+
+  const cumulet_light_desc light = LightDesc{
+      .sun_azimuth_degrees = 1, .sun_elevation_degrees = 2, .sun_irradiance = {3, 4, 5}, .sky_radiance = {6, 7, 8}};
+  EXPECT_EQ(light.struct_size, sizeof light);
+  EXPECT_EQ(light.sun_azimuth_degrees, 1.0F);
+  EXPECT_EQ(light.sun_elevation_degrees, 2.0F);
+  expect_same(light.sun_irradiance, Rgb{3, 4, 5});
+  expect_same(light.sky_radiance, Rgb{6, 7, 8});
+
+  const cumulet_sampling_desc sampling =
+      SamplingDesc{.samples = 3, .seed = 4, .view = View::wireframe, .preview = Preview::off};
+  EXPECT_EQ(sampling.struct_size, sizeof sampling);
+  EXPECT_EQ(sampling.samples, 3U);
+  EXPECT_EQ(sampling.seed, 4U);
+  EXPECT_EQ(sampling.view, CUMULET_VIEW_WIREFRAME);
+  EXPECT_EQ(sampling.preview, CUMULET_PREVIEW_OFF);
+
+  const cumulet_display_desc display =
+      DisplayDesc{.exposure_stops = -1.5F, .tone_map = ToneMap::clip, .background = Background::transparent};
+  EXPECT_EQ(display.struct_size, sizeof display);
+  EXPECT_EQ(display.exposure_stops, -1.5F);
+  EXPECT_EQ(display.tone_map, CUMULET_TONE_MAP_CLIP);
+  EXPECT_EQ(display.background, CUMULET_BACKGROUND_TRANSPARENT);
+
+  const cumulet_camera_desc camera = CameraDesc{.eye = {1, 2, 3},
+                                                .target = {4, 5, 6},
+                                                .up = {7, 8, 9},
+                                                .fovy_degrees = 10,
+                                                .orthographic_height = 11,
+                                                .near_plane = 12,
+                                                .far_plane = 13,
+                                                .depth = Depth::reversed};
+  EXPECT_EQ(camera.struct_size, sizeof camera);
+  expect_same(camera.eye, Vector{1, 2, 3});
+  expect_same(camera.target, Vector{4, 5, 6});
+  expect_same(camera.up, Vector{7, 8, 9});
+  EXPECT_EQ(camera.fovy_degrees, 10.0);
+  EXPECT_EQ(camera.orthographic_height, 11.0);
+  EXPECT_EQ(camera.near_plane, 12.0);
+  EXPECT_EQ(camera.far_plane, 13.0);
+  EXPECT_EQ(camera.depth, CUMULET_DEPTH_REVERSED);
+
+  const cumulet_navigation_desc navigation =
+      NavigationDesc{.style = NavigationStyle::maya, .fly = true, .speed = 2, .turntable_degrees_per_second = 3};
+  EXPECT_EQ(navigation.struct_size, sizeof navigation);
+  EXPECT_EQ(navigation.style, CUMULET_NAVIGATION_MAYA);
+  EXPECT_EQ(navigation.fly, 1);
+  EXPECT_EQ(navigation.speed, 2.0);
+  EXPECT_EQ(navigation.turntable_degrees_per_second, 3.0);
+
+  const cumulet_event event = Event{.type = EventType::key_down,
+                                    .x = 1,
+                                    .y = 2,
+                                    .wheel = 3,
+                                    .button = Button::right,
+                                    .key = Key{'F'},
+                                    .modifiers = Modifiers::shift | Modifiers::alt};
+  EXPECT_EQ(event.struct_size, sizeof event);
+  EXPECT_EQ(event.type, CUMULET_EVENT_KEY_DOWN);
+  EXPECT_EQ(event.x, 1.0);
+  EXPECT_EQ(event.y, 2.0);
+  EXPECT_EQ(event.wheel, 3.0);
+  EXPECT_EQ(event.button, CUMULET_BUTTON_RIGHT);
+  EXPECT_EQ(event.key, 'F');
+  EXPECT_EQ(event.modifiers, CUMULET_MODIFIER_SHIFT | CUMULET_MODIFIER_ALT);
+  EXPECT_EQ(static_cast<int>(Key::keypad_7), CUMULET_KEY_KEYPAD_0 + 7);
+
+  const cumulet_frame_desc frame = FrameDesc{.budget_ms = 1,
+                                             .target = Target::texture,
+                                             .framebuffer = 2,
+                                             .width = 3,
+                                             .height = 4,
+                                             .viewport = {5, 6, 7, 8},
+                                             .flip_y = true,
+                                             .scale = 9,
+                                             .format = 10,
+                                             .colour = Colour::hdr,
+                                             .blend = Blend::replace,
+                                             .write_depth = true,
+                                             .depth_source = DepthSource::framebuffer,
+                                             .depth_name = 11,
+                                             .depth_flip_y = true,
+                                             .depth_unchanged = true};
+  EXPECT_EQ(frame.struct_size, sizeof frame);
+  EXPECT_EQ(frame.budget_ms, 1.0);
+  EXPECT_EQ(frame.target, CUMULET_TARGET_TEXTURE);
+  EXPECT_EQ(frame.framebuffer, 2U);
+  EXPECT_EQ(frame.width, 3U);
+  EXPECT_EQ(frame.height, 4U);
+  expect_same(frame.viewport, std::array{5, 6, 7, 8});
+  EXPECT_EQ(frame.flip_y, 1);
+  EXPECT_EQ(frame.scale, 9.0);
+  EXPECT_EQ(frame.format, 10U);
+  EXPECT_EQ(frame.colour, CUMULET_COLOUR_HDR);
+  EXPECT_EQ(frame.blend, CUMULET_BLEND_REPLACE);
+  EXPECT_EQ(frame.write_depth, 1);
+  EXPECT_EQ(frame.depth_source, CUMULET_DEPTH_SOURCE_FRAMEBUFFER);
+  EXPECT_EQ(frame.depth_name, 11U);
+  EXPECT_EQ(frame.depth_flip_y, 1);
+  EXPECT_EQ(frame.depth_unchanged, 1);
+
+  Matrix matrix{};
+  std::iota(matrix.begin(), matrix.end(), 1.0);
+  const std::array<float, 3> values{1, 2, 3};
+  const cumulet_dense_desc dense =
+      DenseDesc{.values = values, .size = {1, 2, 3}, .index_to_world = matrix, .name = "a"};
+  EXPECT_EQ(dense.struct_size, sizeof dense);
+  EXPECT_EQ(dense.values, values.data());
+  EXPECT_EQ(dense.value_count, 3U);
+  expect_same(dense.size, std::array{1, 2, 3});
+  expect_same(dense.index_to_world, matrix);
+  EXPECT_STREQ(dense.name, "a");
+
+  const std::vector<std::int32_t> origins(6);
+  const std::vector<float> bricks(1024);
+  const std::vector<std::uint64_t> active(16);
+  const std::array<cumulet_tile, 3> tiles{};
+  const cumulet_sparse_desc sparse = SparseDesc{.brick_origins = origins,
+                                                .brick_values = bricks,
+                                                .brick_active = active,
+                                                .tiles = tiles,
+                                                .background = 0.5F,
+                                                .index_to_world = matrix,
+                                                .name = "b"};
+  EXPECT_EQ(sparse.struct_size, sizeof sparse);
+  EXPECT_EQ(sparse.brick_origins, origins.data());
+  EXPECT_EQ(sparse.brick_values, bricks.data());
+  EXPECT_EQ(sparse.brick_active, active.data());
+  EXPECT_EQ(sparse.brick_count, 2U);
+  EXPECT_EQ(sparse.tiles, tiles.data());
+  EXPECT_EQ(sparse.tile_count, 3U);
+  EXPECT_EQ(sparse.background, 0.5F);
+  expect_same(sparse.index_to_world, matrix);
+  EXPECT_STREQ(sparse.name, "b");
+}
+
+TEST(CppLibrary, TellsVersionAndStatus) {
+  EXPECT_EQ(version(), cumulet_version());
+  EXPECT_STREQ(status_text(StatusCode::cancelled), cumulet_status_text(CUMULET_ERROR_CANCELLED));
+}
+
+TEST(CppVolume, IsSharedByCopies) {
+  Volume copy;
+  EXPECT_FALSE(copy);
+  {
+    Volume first = ball_volume();
+    copy = first;
+    EXPECT_EQ(copy.handle(), first.handle());
+    const Volume moved = std::move(first);
+    EXPECT_FALSE(first);  // NOLINT(bugprone-use-after-move): that is what is tested
+    EXPECT_EQ(moved.handle(), copy.handle());
+  }
+  const VolumeInfo info = copy.info().value();  // still alive
+  const std::vector<float> values = ball();
+  EXPECT_EQ(info.name.view(), "ball");
+  EXPECT_EQ(info.active_voxels, static_cast<std::uint64_t>(std::ranges::count(values, 1.0F)));
+  EXPECT_EQ(info.bounds.min, (Vector{0.5, 0.5, 0.5}));
+  EXPECT_EQ(info.bounds.max, (Vector{15.5, 15.5, 15.5}));
+  EXPECT_EQ(info.max_value, 1.0F);
+
+  cumulet_volume* raw = copy.release();
+  EXPECT_FALSE(copy);
+  EXPECT_TRUE(Volume::adopt(raw));
+  EXPECT_EQ(Volume().info().error().status, StatusCode::invalid_argument);
+}
+
+TEST(CppVolume, OfBricksAndTiles) {
+  const std::array<std::int32_t, 3> origin{8, 0, 0};
+  const std::vector<float> values(512, 2.0F);
+  const std::vector<std::uint64_t> active(8, ~std::uint64_t{0});
+  const std::array tiles{cumulet_tile{.min = {0, 0, 0}, .max = {7, 7, 7}, .value = 3.0F, .active = 1}};
+  const auto volume =
+      Volume::from_sparse({.brick_origins = origin, .brick_values = values, .brick_active = active, .tiles = tiles});
+  ASSERT_TRUE(volume) << volume.error().message.c_str();
+  EXPECT_EQ(volume->info()->active_voxels, 1024U);
+  EXPECT_EQ(volume->info()->max_value, 3.0F);
+
+  const std::span<const float> few(values.data(), 511);
+  EXPECT_EQ(Volume::from_sparse({.brick_origins = origin, .brick_values = few}).error().status,
+            StatusCode::invalid_argument);
+  EXPECT_EQ(Volume::from_sparse({.brick_values = values}).error().status, StatusCode::invalid_argument);
+}
+
+TEST(CppVolume, FromAFile) {
+  const BallFile file;
+  const auto volume = Volume::open(file.path());
+  ASSERT_TRUE(volume) << volume.error().message.c_str();
+  EXPECT_EQ(volume->info()->name.view(), "density");
+
+  const auto absent = Volume::open("no such cloud.vdb");
+  EXPECT_EQ(absent.error().status, StatusCode::file);
+  EXPECT_NE(absent.error().message.view().find("no such cloud.vdb"), std::string_view::npos);
+  const auto unnamed = Volume::open(file.path(), "temperature");
+  EXPECT_NE(unnamed.error().message.view().find("temperature"), std::string_view::npos);
+
+  std::string seen;
+  EXPECT_TRUE(list_grids(file.path(), [&seen](const char* name, const char* type, const char* refusal) {
+    seen += std::string(name) + " " + type + " " + refusal + ";";
+  }));
+  EXPECT_EQ(seen.substr(0, 8), "density ");
+  EXPECT_EQ(std::ranges::count(seen, ';'), 1);
+  EXPECT_EQ(list_grids("no such cloud.vdb", [](auto...) {}).error().status, StatusCode::file);
+}
+
+TEST(CppCamera, IsSetAndMoved) {
+  Camera camera = Camera::create({.eye = {0, 0, 10}, .fovy_degrees = 30}).value();
+  const CameraDesc desc = camera.get().value();
+  EXPECT_EQ(desc.eye, (Vector{0, 0, 10}));
+  EXPECT_EQ(desc.fovy_degrees, 30.0);
+  const CameraMatrices matrices = camera.get_matrices(1.0, Clip::zero_to_one).value();
+  EXPECT_NEAR(matrices.view[14], -10.0, 1e-12);
+
+  // Each moves what it says.
+  camera.dolly(0.5).value();
+  EXPECT_NEAR(camera.get()->eye[2], 5.0, 1e-12);
+  camera.fly(1.0, 0.0, 0.0).value();
+  EXPECT_NEAR(camera.get()->target[0], 1.0, 1e-12);
+  camera.fly(-1.0, 2.0, 1.0).value();
+  EXPECT_NEAR(camera.get()->eye[1], 2.0, 1e-12);
+  EXPECT_NEAR(camera.get()->eye[2], 4.0, 1e-12);
+  camera.set(desc).value();
+  EXPECT_EQ(camera.get()->eye, desc.eye);
+  camera.orbit(0.5, 0.25).value();
+  EXPECT_NE(camera.get()->eye, desc.eye);
+  EXPECT_EQ(camera.get()->target, desc.target);
+  camera.set(desc).value();
+  camera.look(0.5, 0.25).value();
+  EXPECT_EQ(camera.get()->eye, desc.eye);
+  EXPECT_NE(camera.get()->target, desc.target);
+  camera.set(desc).value();
+  camera.roll(0.5).value();
+  EXPECT_EQ(camera.get()->eye, desc.eye);
+  EXPECT_NE(camera.get()->up, desc.up);
+  camera.set(desc).value();
+  camera.pan(0.5, 0.0).value();
+  EXPECT_NE(camera.get()->target[0], 0.0);
+  camera.frame({.min = {9, 9, 9}, .max = {11, 11, 11}}, 1.0).value();
+  EXPECT_NEAR(camera.get()->target[0], 10.0, 1e-9);
+
+  camera.set_matrices(matrices, Clip::zero_to_one).value();
+  const CameraMatrices again = camera.get_matrices(1.0, Clip::zero_to_one).value();
+  for (int i = 0; i < 16; ++i) {
+    EXPECT_NEAR(again.view[i], matrices.view[i], 1e-9) << i;
+    EXPECT_NEAR(again.projection[i], matrices.projection[i], 1e-9) << i;
+  }
+
+  EXPECT_EQ(camera.dolly(-1.0).error().status, StatusCode::invalid_argument);
+  cumulet_camera* raw = camera.release();
+  EXPECT_FALSE(camera);
+  EXPECT_TRUE(Camera::adopt(raw));
+  EXPECT_EQ(Camera().orbit(1, 1).error().status, StatusCode::invalid_argument);
+}
+
+class CppViewer : public testing::Test {
+ protected:
+  [[nodiscard]] GetProc get_proc() { return {headless::Context::get_proc, &context_}; }
+
+  static FrameResult converge(Viewer& viewer, std::uint32_t width, std::uint32_t height) {
+    viewer.wait().value();
+    FrameResult frame;
+    do {
+      frame = viewer.render({.budget_ms = 1000, .target = Target::none, .width = width, .height = height}).value();
+    } while (frame.has(RenderFlags::more | RenderFlags::loading));
+    return frame;
+  }
+
+  headless::Context context_ = headless::Context::create(headless::Backend::automatic);
+};
+
+TEST_F(CppViewer, ShowsAVolume) {
+  const BallFile file;
+  Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
+  viewer.set_sampling({.samples = 8, .preview = Preview::off}).value();
+  viewer.set_grid({.threshold = 0.1}).value();
+  viewer.set_medium({.density_scale = 2, .anisotropy = 0.3F}).value();
+  viewer.set_light({.sun_elevation_degrees = 45, .sun_irradiance = {2, 2, 2}, .sky_radiance = {1, 0.5F, 0.25F}})
+      .value();
+  viewer.set_display({.exposure_stops = 1, .tone_map = ToneMap::clip}).value();
+  viewer.load_volume(file.path(), "density").value();
+
+  const FrameResult frame = converge(viewer, 24, 16);
+  EXPECT_TRUE(frame.has(RenderFlags::converged));
+  EXPECT_FALSE(frame.has(RenderFlags::failed | RenderFlags::preview));
+  EXPECT_EQ(frame.progress, 1.0);
+  EXPECT_EQ(frame.width, 24U);
+  EXPECT_EQ(frame.height, 16U);
+
+  std::vector<float> linear(24 * 16 * 4);
+  viewer.read_linear(linear).value();
+  EXPECT_EQ(linear[0], 1.0F);  // the sky, at the corner
+  EXPECT_EQ(linear[2], 0.25F);
+  EXPECT_EQ(linear[3], 0.0F);
+  EXPECT_GT(linear[(8 * 24 + 12) * 4 + 3], 0.9F);  // the ball's alpha, in the middle
+  std::vector<std::uint8_t> display(linear.size());
+  viewer.read_display(display).value();
+  EXPECT_EQ(display[0], 255);  // 1 x 2^1, clipped
+  EXPECT_EQ(display[3], 255);
+  EXPECT_EQ(viewer.read_display(std::span(display).first(4)).error().status, StatusCode::invalid_argument);
+  EXPECT_GT(viewer.measure_noise().value(), 0.0);
+
+  const Pick pick = viewer.pick_at(12, 8).value();
+  EXPECT_TRUE(pick.hit);
+  EXPECT_NEAR(pick.position[0], 8.0, 2.0);
+  EXPECT_GT(pick.distance, 0.0);
+  EXPECT_FALSE(viewer.pick_at(0, 0)->hit);
+  EXPECT_EQ(viewer.get_bounds()->min, viewer.get_volume()->info()->bounds.min);
+  EXPECT_EQ(viewer.get_bounds()->max, viewer.get_volume()->info()->bounds.max);
+
+  const Stats stats = viewer.get_stats().value();
+  EXPECT_GT(stats.cells, 24U);
+  EXPECT_GT(stats.levels, 0U);
+  EXPECT_GT(stats.cell_bytes, 0U);
+  EXPECT_GE(stats.gl_bytes, stats.cell_bytes);
+  EXPECT_EQ(stats.active_voxels, viewer.get_volume()->info()->active_voxels);
+  EXPECT_GT(stats.build_seconds_total, 0.0);
+  EXPECT_GT(stats.trace_seconds, 0.0);
+  EXPECT_EQ(stats.samples, 8U * 24 * 16);
+  EXPECT_GT(stats.steps, 0U);
+  EXPECT_EQ(stats.bounds.max, viewer.get_bounds()->max);
+  EXPECT_FALSE(stats.gl_vendor.empty());
+  EXPECT_FALSE(stats.gl_renderer.empty());
+  EXPECT_EQ(stats.gl_version.view().substr(0, 2), "4.");
+  EXPECT_FALSE(stats.limited);
+
+  const Progress progress = viewer.get_progress().value();
+  EXPECT_EQ(progress.stage, Stage::idle);
+  EXPECT_EQ(progress.status, StatusCode::ok);
+  EXPECT_TRUE(progress.message.empty());
+  viewer.rebuild().value();
+  EXPECT_TRUE(converge(viewer, 24, 16).has(RenderFlags::converged));
+
+  const FrameResult textured =
+      viewer.render({.target = Target::texture, .width = 24, .height = 16, .write_depth = true}).value();
+  EXPECT_NE(textured.texture, 0U);
+  EXPECT_NE(textured.depth_texture, 0U);
+}
+
+TEST_F(CppViewer, TellsWhyACallFailed) {
+  const auto context_of_nothing = Viewer::create({.get_proc = [](const char*) -> void* { return nullptr; }});
+  EXPECT_EQ(context_of_nothing.error().status, StatusCode::unsupported);
+  EXPECT_FALSE(context_of_nothing.error().message.empty());
+
+  Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
+  EXPECT_EQ(viewer.set_grid({.march = March{77}}).error().status, StatusCode::invalid_argument);
+  const auto refused = viewer.set_medium({.anisotropy = 1.0F});
+  EXPECT_EQ(refused.error().message.view(), cumulet_last_error(viewer.handle()));
+  EXPECT_NE(refused.error().message.view().find("anisotropy"), std::string_view::npos);
+  EXPECT_FALSE(viewer.get_bounds());
+  EXPECT_FALSE(viewer.get_volume().value());
+
+  viewer.load_volume("no such cloud.vdb").value();
+  EXPECT_EQ(viewer.wait().error().status, StatusCode::file);
+  EXPECT_NE(viewer.get_progress()->message.view().find("no such cloud.vdb"), std::string_view::npos);
+
+  const Viewer moved = std::move(viewer);
+  EXPECT_TRUE(moved);
+  EXPECT_FALSE(viewer);  // NOLINT(bugprone-use-after-move): that is what is tested
+  EXPECT_EQ(viewer.rebuild().error().status, StatusCode::invalid_argument);
+  viewer.cancel();
+}
+
+TEST_F(CppViewer, CallsBackWhereverItIsMoved) {
+  std::atomic<int> updates = 0;
+  std::vector<std::string> warnings;  // written while wait() has this thread wait
+  auto holder = std::make_unique<Viewer>(Viewer::create({.log =
+                                                             [&](LogLevel level, std::string_view message) {
+                                                               if (level == LogLevel::warning)
+                                                                 warnings.emplace_back(message);
+                                                             },
+                                                         .update = [&] { ++updates; }})
+                                             .value());
+  Viewer viewer = std::move(*holder);
+  holder.reset();
+  const BallFile file(-1.0F);  // worth a warning
+  viewer.load_volume(file.path()).value();
+  viewer.wait().value();
+  EXPECT_GT(updates, 0);
+  EXPECT_EQ(warnings.size(), 1U) << testing::PrintToString(warnings);
+}
+
+// Its worker may be in one when the viewer is replaced.
+TEST_F(CppViewer, OutlivesNoCallback) {
+  struct Captured {
+    std::atomic<bool>& gone;
+    ~Captured() { gone = true; }
+  };
+  std::atomic<bool> gone = false;
+  std::atomic<bool> in_log = false;
+  std::atomic<bool> gone_in_log = false;
+  std::shared_ptr<Captured> captured(new Captured{gone});
+  Viewer viewer = Viewer::create({.log = [&in_log, &gone, &gone_in_log, captured](LogLevel, std::string_view) {
+                    in_log = true;
+                    in_log.notify_one();
+                    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+                    gone_in_log = gone.load();
+                  }}).value();
+  captured.reset();
+  const BallFile file(-1.0F);
+  viewer.load_volume(file.path()).value();
+  in_log.wait(false);
+  viewer = Viewer();
+  EXPECT_TRUE(gone);
+  EXPECT_FALSE(gone_in_log);
+}
+
+TEST_F(CppViewer, ComesAndGoesWithContexts) {
+  Viewer viewer = Viewer::create().value();  // detached
+  EXPECT_EQ(viewer.render({.width = 8, .height = 8}).error().status, StatusCode::detached);
+  viewer.set_volume(ball_volume()).value();
+  viewer.set_sampling({.samples = 1}).value();
+  viewer.attach(get_proc()).value();
+  EXPECT_TRUE(converge(viewer, 8, 8).has(RenderFlags::converged));
+  viewer.detach().value();
+  EXPECT_EQ(viewer.measure_noise().error().status, StatusCode::detached);
+  viewer.attach([this](const char* name) { return headless::Context::get_proc(&context_, name); }).value();
+  EXPECT_TRUE(converge(viewer, 8, 8).has(RenderFlags::converged));
+  {
+    headless::Context other = headless::Context::create(headless::Backend::automatic);
+    viewer.context_lost().value();
+    viewer.attach({headless::Context::get_proc, &other}).value();
+    EXPECT_TRUE(converge(viewer, 8, 8).has(RenderFlags::converged));
+    viewer.detach().value();
+  }
+  EXPECT_EQ(viewer.attach({}).error().status, StatusCode::invalid_argument);
+}
+
+TEST_F(CppViewer, LooksThroughACamera) {
+  Viewer viewer = Viewer::create({.get_proc = get_proc(), .gl_state = GlState::host_resets}).value();
+  viewer.set_volume(ball_volume()).value();
+  Camera camera = Camera::create({.eye = {8, 8, 50}, .target = {8, 8, 8}}).value();
+  viewer.set_camera(camera).value();
+  EXPECT_EQ(viewer.get_camera()->get()->eye, (Vector{8, 8, 50}));
+  camera = Camera();  // the viewer keeps it
+  viewer.set_navigation({.style = NavigationStyle::maya}).value();
+  (void)converge(viewer, 32, 32);
+
+  const auto drag = [&](Modifiers modifiers) {
+    const auto down = viewer.input({.type = EventType::button_down, .x = 4, .y = 4, .modifiers = modifiers});
+    const auto move = viewer.input({.type = EventType::pointer_move, .x = 12, .y = 4, .modifiers = modifiers});
+    const auto up = viewer.input({.type = EventType::button_up, .x = 12, .y = 4, .modifiers = modifiers});
+    return down.has_value() && move.has_value() && up.has_value() && *move;
+  };
+  EXPECT_FALSE(drag(Modifiers::none));
+  EXPECT_EQ(viewer.get_camera()->get()->eye, (Vector{8, 8, 50}));
+  EXPECT_TRUE(drag(Modifiers::alt));
+  EXPECT_NE(viewer.get_camera()->get()->eye, (Vector{8, 8, 50}));
+  viewer.frame_all().value();
+  EXPECT_NEAR(viewer.get_camera()->get()->target[0], 8.0, 1e-6);
+}
+
+}  // namespace
