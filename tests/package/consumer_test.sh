@@ -1,8 +1,8 @@
 #!/bin/bash
-# A C and a C++ program build against an install tree, by find_package and by pkg-config, also after it was moved.
-# Usage: consumer_test.sh BUILD_DIR VERSION
+# Programs build against an install tree that was moved, by find_package and by pkg-config: C, C++, and C++ with its
+# own OpenVDB, found in OPENVDB_MODULE_PATH. Usage: consumer_test.sh BUILD_DIR VERSION OPENVDB_MODULE_PATH
 set -euo pipefail
-build=$1 version=$2
+build=$1 version=$2 openvdb_module_path=$3
 here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -17,19 +17,23 @@ expect_version() { # PROGRAM: it runs and prints the version
   [ "$said" = "$version" ] || { echo "consumer_test: $1 printed '$said', not '$version'" >&2; exit 1; }
 }
 
-cmake -S "$here/consumer" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DWANTED_VERSION="$version"
+cmake -S "$here/consumer" -B "$work/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix" -DWANTED_VERSION="$version" \
+  -DOPENVDB_MODULE_PATH="$openvdb_module_path"
 cmake --build "$work/build"
 expect_version "$work/build/consumer_c"
 expect_version "$work/build/consumer_cpp"
+"$work/build/consumer_openvdb"
 
 config=$(find "$prefix" -name cumulet.pc -printf %h)
 export PKG_CONFIG_PATH=$config
 [ "$(pkg-config --modversion cumulet)" = "$version" ]
 library_dir=$(pkg-config --variable=libdir cumulet)
 read -ra flags <<<"$(pkg-config --cflags --libs cumulet)"
-cc -std=c99 -pedantic -Wall -Wextra -Werror "$here/consumer/main.c" -o "$work/pc_c" "${flags[@]}" \
-  "-Wl,-rpath,$library_dir"
-c++ -std=c++11 -pedantic -Wall -Wextra -Werror "$here/consumer/main.cpp" -o "$work/pc_cpp" "${flags[@]}" \
-  "-Wl,-rpath,$library_dir"
-expect_version "$work/pc_c"
-expect_version "$work/pc_cpp"
+build_by_pkg_config() { # COMPILER STANDARD LANGUAGE SOURCE: it builds without a warning, and runs
+  "$1" "-std=$2" -pedantic -Wall -Wextra -Werror -x "$3" "$here/consumer/$4" -x none -o "$work/pc" "${flags[@]}" \
+    "-Wl,-rpath,$library_dir"
+  expect_version "$work/pc"
+}
+build_by_pkg_config cc c99 c main.c
+build_by_pkg_config c++ c++11 c++ main.c
+build_by_pkg_config c++ c++20 c++ main.cpp

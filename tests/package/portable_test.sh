@@ -28,7 +28,8 @@ tar -tzf "$tarball" >"$work/list"
 if grep -E '/lib(c|m|pthread|dl|rt|GL|GLX|EGL|OSMesa|X11|xcb|gbm|drm)(-[0-9.]+)?\.so|/ld-linux' "$work/list"; then
   fail "the tarball holds libraries that must be the system's"
 fi
-for wanted in lib/libcumulet.so.0 lib/fallback/libstdc++.so.6 share/doc/cumulet/LICENSE include/cumulet/cumulet.h; do
+for wanted in lib/libcumulet.so.0 lib/fallback/libstdc++.so.6 share/doc/cumulet/LICENSE include/cumulet/cumulet.h \
+  include/cumulet/cumulet.hpp include/cumulet/cumulet_openvdb.hpp; do
   grep -q "/$wanted\$" "$work/list" || fail "the tarball lacks $wanted"
 done
 

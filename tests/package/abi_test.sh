@@ -1,0 +1,53 @@
+#!/bin/bash
+# The C ABI (functions, structs, enums and their values) is as tests/package/cumulet.abi has it, and cumulet.hpp
+# covers all of it. After a change that is meant, CUMULET_BLESS=1 writes cumulet.abi anew.
+# Usage: abi_test.sh INCLUDE_DIR
+set -euo pipefail
+include=$1
+here=$(cd "$(dirname "$0")" && pwd)
+committed=$here/cumulet.abi
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+if ! command -v abidw >/dev/null || [ "$(uname -m)" != x86_64 ]; then
+  echo "abi_test: skipped: it needs abidw (Debian: abigail-tools) on x86_64"
+  exit 77
+fi
+
+# The header's types are the ABI's, and the compiler holds the library to them. So a library of stubs, one for every
+# prototype, is described instead of libcumulet, which then needs no debug information. -ffreestanding: the integer
+# types are the compiler's own, not the C library's. Enums of flags, which no prototype names, are kept by their use.
+header=$include/cumulet/cumulet.h
+{
+  echo "#include <cumulet/cumulet.h>"
+  awk '/^CUMULET_API/ { on = 1 }
+       on { line = line " " $0 }
+       on && /;/ { sub(/;.*/, "", line); print line " { __builtin_trap(); }"; line = ""; on = 0 }' "$header"
+  echo "const unsigned long uses[] = {"
+  grep -oE 'CUMULET_[A-Z0-9_]+ = ' "$header" | sed 's/\(.*\) = /sizeof \1,/'
+  echo "};"
+} >"$work/stubs.c"
+cc -std=c11 -g -shared -fPIC -fvisibility=hidden -ffreestanding -I "$include" -x c - -o "$work/stubs.so" \
+  <"$work/stubs.c"
+abidw --headers-dir "$include/cumulet" --drop-private-types --load-all-types --no-show-locs --no-comp-dir-path \
+  --no-corpus-path --no-elf-needed --no-write-default-sizes --out-file "$work/cumulet.abi" "$work/stubs.so"
+
+if [ "${CUMULET_BLESS:-}" = 1 ]; then
+  cp "$work/cumulet.abi" "$committed"
+  echo "abi_test: wrote $committed"
+fi
+status=0
+difference=$(abidiff --harmless --non-reachable-types "$committed" "$work/cumulet.abi") || status=$?
+if [ -n "$difference" ] || [ "$status" -ne 0 ]; then
+  echo "$difference"
+  echo "abi_test: the ABI is not tests/package/cumulet.abi's; if that is meant, run this test with CUMULET_BLESS=1" >&2
+  exit 1
+fi
+
+# Whatever has a name in the ABI is named in cumulet.hpp.
+missing=$(sed -nE "s/.*<(elf-symbol|enumerator|var-decl) name='([^']*)'.*/\2/p" "$committed" | LC_ALL=C sort -u |
+  LC_ALL=C comm -23 - <(grep -oE '[A-Za-z_][A-Za-z0-9_]*' "$include/cumulet/cumulet.hpp" | LC_ALL=C sort -u))
+if [ -n "$missing" ]; then
+  echo "abi_test: cumulet.hpp lacks $(tr '\n' ' ' <<<"$missing")" >&2
+  exit 1
+fi
