@@ -1,13 +1,13 @@
 #version 450
 // An accumulation as displayed colour, or its depth.
 // Variants, not uniforms, choose what a pixel does: software drivers run both sides of every branch.
-// variant: CM_DEPTH=0 CM_BILINEAR=0 CM_TONE_MAP=0u CM_ENCODE=true
-// variant: CM_DEPTH=0 CM_BILINEAR=1 CM_TONE_MAP=3u CM_ENCODE=false
+// variant: CM_DEPTH=0 CM_BILINEAR=0 CM_RESOLVED=0 CM_TONE_MAP=0u CM_ENCODE=true
+// variant: CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=1 CM_TONE_MAP=3u CM_ENCODE=false
 // variant: CM_DEPTH=1
 #include "shared.glsl"
 #include "display.glsl"
 
-layout(binding = 0) uniform sampler2D cm_sum;  // row 0 is the picture's top
+layout(binding = 0) uniform sampler2D cm_sum;  // row 0 is the picture's top; CM_RESOLVED: already the mean
 layout(binding = 1) uniform usampler2D cm_counts;
 layout(binding = 2) uniform sampler2D cm_volume_z;
 layout(location = 0) uniform ivec4 cm_viewport;
@@ -19,9 +19,13 @@ layout(location = 4) uniform vec3 cm_background;
 layout(location = 0) out vec4 cm_colour;
 
 vec4 cm_texel(ivec2 texel) {
+#if CM_RESOLVED
+  vec4 mean = texelFetch(cm_sum, texel, 0);
+#else
   uint samples = texelFetch(cm_counts, texel, 0).x;
   if (samples == 0u) return vec4(0.0);
   vec4 mean = texelFetch(cm_sum, texel, 0) / float(samples);
+#endif
   return cm_transparent ? mean : vec4(mean.rgb + cm_background * (1.0 - mean.a), 1.0);
 }
 #else

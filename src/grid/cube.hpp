@@ -12,7 +12,7 @@ namespace cumulet::grid {
 /// so cells tile voxels exactly (six a voxel at the finest).
 struct Cube {
   glm::ivec3 origin{0};  ///< index-space voxel at the cube's low corner, a multiple of 8
-  int log2_size = 3;     ///< edge length is 2^log2_size voxels, 3 to max_log2_size
+  int log2_size = 4;     ///< edge length is 2^log2_size voxels, 4 (the first cells hold a brick) to max_log2_size
   glm::dmat4 to_world{1.0};
 
   static constexpr int max_log2_size = 15;  // a record keeps vertex coordinates in 16 bits

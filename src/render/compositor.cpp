@@ -17,6 +17,21 @@ gl::Object make_program(const gl::FunctionsPtr& gl, std::span<const std::string>
 
 }  // namespace
 
+void Compositor::resolve(const PictureTextures& picture) {
+  if (!resolve_) resolve_ = gl::make_compute_program(gl_, "resolve.comp", {});
+  if (!mean_ || mean_size_ != picture.size) {
+    mean_ = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(picture.size.x), static_cast<int>(picture.size.y),
+                                "creating the texture of means");
+    mean_size_ = picture.size;
+  }
+  gl_->UseProgram(resolve_.name());
+  gl_->BindTextureUnit(0, picture.sum);
+  gl_->BindTextureUnit(1, picture.counts);
+  gl_->BindImageTexture(0, mean_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  gl_->DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
+  gl_->MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
 void Compositor::draw(const PictureTextures& picture, const Display& display, const FrameTarget& target) {
   const glm::ivec4 viewport = target.viewport;
   if (picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0 || viewport.z <= 0 || viewport.w <= 0) return;
@@ -30,8 +45,11 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
                 "the target, framebuffer " + std::to_string(target.framebuffer) + ", is not complete");
   }
   const bool bilinear = glm::ivec2(picture.size) != glm::ivec2(viewport.z, viewport.w);
+  // Where means are read more than once, they are made once.
+  const bool resolved = bilinear || picture.holes;
+  if (resolved) resolve(picture);
   const std::vector<std::string> defines{
-      "CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
+      "CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0", resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
       "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
       display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
   gl::Object& program = colours_[defines];
@@ -41,7 +59,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
                       static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
-  gl.BindTextureUnit(0, picture.sum);
+  gl.BindTextureUnit(0, resolved ? mean_.name() : picture.sum);
   gl.BindTextureUnit(1, picture.counts);
 
   const GLuint colour = program.name();

@@ -15,6 +15,7 @@ struct PictureTextures {
   GLuint sum = 0;     // rgba32f: sums of radiance (without any background) and alpha; row 0 is the top
   GLuint counts = 0;  // rgba32ui: .x is the number of samples summed; a pixel with none is transparent black
   glm::uvec2 size{0U};
+  bool holes = false;   // some pixels may have no sample yet: they take after those around them
   GLuint volume_z = 0;  // r32f, same size, or 0: view depth z at half opacity, 0 where the volume is not so opaque
 };
 
@@ -43,8 +44,13 @@ class Compositor {
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
 
  private:
+  void resolve(const PictureTextures& picture);
+
   gl::FunctionsPtr gl_;
   std::map<std::vector<std::string>, gl::Object> colours_;  // by their macros: made when first needed
+  gl::Object resolve_;
+  gl::Object mean_;
+  glm::uvec2 mean_size_{0U};
   gl::Object depth_;
 };
 

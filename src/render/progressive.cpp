@@ -10,6 +10,10 @@ namespace cumulet::render {
 namespace {
 
 constexpr std::uint32_t coarsest_divisor = 16;
+// Lanes whose first path was short go on with further samples while others' are under way.
+constexpr std::uint32_t preview_samples = 16;
+// Frames that the first answer to a change may take.
+constexpr double answer_frames = 2.0;
 using Clock = std::chrono::steady_clock;
 
 }  // namespace
@@ -27,7 +31,7 @@ std::uint32_t Progressive::coarsest(double budget_ms) const {
   if (!wish_.preview) return 1;
   const double pixels = double(wish_.parameters.image.x) * wish_.parameters.image.y;
   std::uint32_t divisor = finest_;
-  while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > 0.6 * tracer_.rate() * budget_ms)
+  while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > answer_frames * answer_rate_ * budget_ms)
     divisor *= 2;
   return divisor;
 }
@@ -48,7 +52,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
   core::CmParameters parameters = wish_.parameters;
   parameters.image.x = (parameters.image.x + divisor - 1) / divisor;
   parameters.image.y = (parameters.image.y + divisor - 1) / divisor;
-  if (divisor > finest_) parameters.image.w = std::min(parameters.image.w, 1U);
+  if (divisor > finest_) parameters.image.w = std::min(parameters.image.w, preview_samples);
   Picture& picture = acquire(glm::uvec2(parameters.image));
   working_ = nullptr;
   try {
@@ -67,6 +71,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
   working_generation_ = wish_.generation;
   divisor_ = divisor;
   stale_ = false;
+  answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
 
@@ -105,9 +110,16 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
         answering_ = false;
       }
       const auto begun = Clock::now();
-      const bool done = tracer_.trace(*working_, data, surface, deadline);
-      trace_seconds_ += std::chrono::duration<double>(Clock::now() - begun).count();
+      const bool was_complete = working_->complete();
+      const bool done = tracer_.trace(*working_, data, surface, deadline, divisor_ > finest_);
+      const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
+      trace_seconds_ += seconds;
+      if (!was_complete) answer_seconds_ += seconds;
       if (working_->complete()) {
+        if (!was_complete && wish_.view == View::shaded) {
+          const glm::dvec2 size(working_->size());
+          answer_rate_ += 0.3 * (size.x * size.y / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
+        }
         shown_ = working_;
         shown_generation_ = working_generation_;
         if (needs_depth()) tracer_.trace_depth(*shown_, data, surface, deadline);

@@ -68,6 +68,8 @@ class Progressive {
   bool answering_ = false;  // working_ is the first picture after a change
   bool failed_ = false;     // until the wish changes
   double trace_seconds_ = 0.0;
+  double answer_seconds_ = 0.0;  // that working_ took until it was complete
+  double answer_rate_ = 100.0;   // pixels a millisecond, until complete
 };
 
 }  // namespace cumulet::render

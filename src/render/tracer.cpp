@@ -12,7 +12,7 @@ namespace cumulet::render {
 namespace {
 
 constexpr std::uint32_t tile_edge = 512;
-constexpr double hasty_rest = 0.02;     // of a tile's pixels
+constexpr double hasty_rest = 0.03;     // of a tile's pixels
 constexpr double dispatch_ms = 1000.0;  // well under any driver's watchdog, well over the cost of a dispatch
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t view_depth = 5;  // inspect.comp's
@@ -72,16 +72,19 @@ void Picture::begin_tile() {
 void Picture::end_dispatch() {
   std::uint64_t unfinished = 0;
   std::uint64_t empty = 0;
+  bool begun = true;
   for (const Window& window : windows_) {
+    begun = begun && !window.begins;
     unfinished += window.unfinished;
     empty += window.empty;
   }
   const glm::uvec2 extent = tile_extent();
-  const auto rest = hasty_ && !complete_ ? static_cast<std::uint64_t>(hasty_rest * extent.x * extent.y) : 0;
+  const auto rest = hasty_ && !complete_ && begun ? static_cast<std::uint64_t>(hasty_rest * extent.x * extent.y) : 0;
   const bool one_tile = tiles_ == glm::uvec2(1U);
   if (one_tile && empty <= rest) complete_ = true;
+  holes_ = one_tile ? empty > 0 : hasty_ && pass_ < 2;
   // The last few of a hasty first pass are left to the next.
-  const bool first_pass = pass_target_ == 1 || parameters_.image.w == 1;
+  const bool first_pass = pass_target_ == 1 && parameters_.image.w > 1;
   if (unfinished > (first_pass ? rest : 0)) {
     do window_ = (window_ + 1) % windows_.size();
     while (windows_[window_].unfinished == 0);
@@ -90,6 +93,7 @@ void Picture::end_dispatch() {
   if (++tile_ == tiles_.x * tiles_.y) {
     tile_ = 0;
     complete_ = true;
+    ++pass_;
     const std::uint32_t target = parameters_.image.w;
     if (pass_target_ >= target || view_ != View::shaded) {
       done_ = true;
@@ -165,6 +169,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
       static_cast<std::uint32_t>(std::clamp(lanes_in_budget / tile.x, 8.0, double(tile_edge))) / 8U * 8U;
   picture.tile_ = 0;
   picture.hasty_ = hasty;
+  picture.pass_ = 0;
+  picture.holes_ = true;
   picture.pass_target_ = picture.tiles_ == glm::uvec2(1U) ? picture.parameters_.image.w : 1U;
   picture.samples_ = 0;
   picture.complete_ = false;
@@ -184,6 +190,7 @@ void Tracer::clear(Picture& picture) {
   picture.parameters_ = {};
   picture.view_ = View::shaded;
   picture.complete_ = picture.done_ = true;
+  picture.holes_ = false;
   const glm::vec4 zero(0.0F);
   const glm::uvec4 one(1U, 0U, 0U, 0U);
   gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
@@ -197,7 +204,8 @@ void Tracer::bind(const MarchData& data, const SurfaceDepth& surface) const {
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.name());
 }
 
-bool Tracer::trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline) {
+bool Tracer::trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline,
+                   bool until_complete) {
   if (picture.done_) return true;
   const auto start = Clock::now();
   const double budget_ms = std::max(0.0, std::chrono::duration<double, std::milli>(deadline - start).count());
@@ -211,7 +219,7 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const SurfaceDepth& 
   // What is bound shall fit the format, though this view does not write it.
   gl_->BindImageTexture(2, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   const double aim = std::clamp(0.5 * budget_ms, 1.0, dispatch_ms);
-  while (!picture.done_) {
+  while (!picture.done_ && !(until_complete && picture.complete_)) {
     dispatch(picture, surface, aim);
     if (Clock::now() >= deadline) break;
   }
@@ -251,7 +259,7 @@ void Tracer::dispatch(Picture& picture, const SurfaceDepth& surface, double aim_
   if (shaded) {
     // As few lanes remain, each may run longer; never more than twice as long as the last time.
     const double spent = std::max(0.01, milliseconds_since(dispatched));
-    iterations_ = std::clamp(iterations_ * std::clamp(aim_ms / spent, 0.25, 2.0), 1.0, 65536.0);
+    iterations_ = std::clamp(iterations_ * std::clamp(aim_ms / spent, 0.25, 2.0), 4.0, 65536.0);
   }
   picture.end_dispatch();
 }

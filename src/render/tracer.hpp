@@ -44,6 +44,8 @@ class Picture {
   [[nodiscard]] bool complete() const { return complete_; }
   /// Whether every pixel has its target samples.
   [[nodiscard]] bool done() const { return done_; }
+  /// Whether pixels without a sample may be left.
+  [[nodiscard]] bool has_holes() const { return holes_; }
   [[nodiscard]] double progress() const;
   /// Camera paths finished.
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
@@ -84,6 +86,8 @@ class Picture {
   std::uint32_t pass_target_ = 1;
   std::uint64_t samples_ = 0;
   bool hasty_ = false;
+  std::uint32_t pass_ = 0;  // the one under way
+  bool holes_ = true;
   bool complete_ = false;
   bool done_ = false;
   std::uint32_t depth_row_ = 0;
@@ -101,8 +105,9 @@ class Tracer {
   void begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, View view,
              const SurfaceDepth& surface, double budget_ms, bool hasty);
   /// Traces until about the deadline. The last picture begun or traced goes on; another loses the paths under way.
-  /// Returns whether every pixel has its target samples.
-  bool trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline);
+  /// until_complete: no further than every pixel's first sample. Returns whether every pixel has its target samples.
+  bool trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline,
+             bool until_complete = false);
   /// Finds the depth at half opacity until about the deadline; returns whether it is there.
   bool trace_depth(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline);
   /// View depth z at half opacity of one pixel of a picture with these parameters; 0: not so opaque.

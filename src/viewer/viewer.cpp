@@ -436,7 +436,8 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
     target.depth_b = view_->depth_b;
     target.reversed = view_->orthographic ? view_->depth_b < 0.0 : view_->depth_b > 0.0;
   }
-  const render::PictureTextures picture{shown->sum(), shown->counts(), shown->size(), shown->volume_z()};
+  const render::PictureTextures picture{shown->sum(), shown->counts(), shown->size(), shown->has_holes(),
+                                        shown->volume_z()};
   if (frame.target == Target::framebuffer) {
     g.compositor.draw(picture, display, target);
     return;

@@ -117,6 +117,7 @@ TEST(Display, BytesOfAReadback) {
 
 struct Picture {
   glm::ivec2 size{0};
+  bool holes = false;
   std::vector<glm::vec4> sum;
   std::vector<glm::uvec4> counts;
   std::vector<float> z;
@@ -143,16 +144,28 @@ struct Picture {
     gl->TextureSubImage2D(z_texture.name(), 0, 0, 0, width, height, GL_RED, GL_FLOAT, z.data());
   }
   [[nodiscard]] PictureTextures textures() const {
-    return {sum_texture.name(), counts_texture.name(), glm::uvec2(size), z_texture.name()};
+    return {sum_texture.name(), counts_texture.name(), glm::uvec2(size), holes, z_texture.name()};
   }
   [[nodiscard]] std::size_t index(glm::ivec2 p) const {
     p = glm::clamp(p, glm::ivec2(0), size - 1);
     return static_cast<std::size_t>(p.y * size.x + p.x);
   }
-  [[nodiscard]] glm::dvec4 texel(glm::ivec2 p, const Display& display) const {
+  [[nodiscard]] glm::dvec4 around(glm::ivec2 p) const {
+    glm::dvec4 total(0.0);
+    double n = 0.0;
+    for (int k = 0; k < 9; ++k) {
+      const std::size_t i = index(p + glm::ivec2(k % 3 - 1, k / 3 - 1));
+      if (counts[i].x == 0) continue;
+      total += glm::dvec4(sum[i]) / double(counts[i].x);
+      n += 1.0;
+    }
+    return n > 0.0 ? total / n : total;
+  }
+  [[nodiscard]] glm::dvec4 texel(glm::ivec2 p, const Display& display, bool filled) const {
     const std::size_t i = index(p);
-    if (counts[i].x == 0) return glm::dvec4(0.0);
-    glm::dvec4 mean = glm::dvec4(sum[i]) / double(counts[i].x);
+    if (counts[i].x == 0 && !filled) return glm::dvec4(0.0);
+    glm::dvec4 mean =
+        counts[i].x == 0 ? around(glm::clamp(p, glm::ivec2(0), size - 1)) : glm::dvec4(sum[i]) / double(counts[i].x);
     if (display.transparent) return mean;
     if (!display.legend) mean += glm::dvec4(glm::dvec3(display.background) * (1.0 - mean.a), 0.0);
     return {glm::dvec3(mean), 1.0};
@@ -163,15 +176,16 @@ struct Picture {
 glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 pixel, glm::ivec2 viewport) {
   glm::dvec4 value;
   if (picture.size == viewport) {
-    value = picture.texel(pixel, display);
+    value = picture.texel(pixel, display, picture.holes);
   } else {
     const glm::dvec2 at = (glm::dvec2(pixel) + 0.5) * glm::dvec2(picture.size) / glm::dvec2(viewport) - 0.5;
     const glm::ivec2 low(glm::floor(at));
     const glm::dvec2 weight = at - glm::dvec2(low);
-    value = glm::mix(glm::mix(picture.texel(low, display), picture.texel(low + glm::ivec2(1, 0), display), weight.x),
-                     glm::mix(picture.texel(low + glm::ivec2(0, 1), display),
-                              picture.texel(low + glm::ivec2(1, 1), display), weight.x),
-                     weight.y);
+    value = glm::mix(
+        glm::mix(picture.texel(low, display, true), picture.texel(low + glm::ivec2(1, 0), display, true), weight.x),
+        glm::mix(picture.texel(low + glm::ivec2(0, 1), display, true),
+                 picture.texel(low + glm::ivec2(1, 1), display, true), weight.x),
+        weight.y);
   }
   if (value.a <= 0.0) return glm::dvec4(0.0);
   glm::dvec3 c = glm::dvec3(value) / value.a;
@@ -355,6 +369,21 @@ TEST_P(Compositing, SizesFlipsRectanglesAndSamples) {
           ASSERT_FALSE(HasFatalFailure());
         }
       }
+    }
+  }
+}
+
+TEST_P(Compositing, HolesTakeAfterTheirNeighbours) {
+  for (const glm::ivec2 s : {glm::ivec2(40, 28), glm::ivec2(11, 9), glm::ivec2(1, 1)}) {
+    Picture picture(gl_, s.x, s.y, false);
+    picture.holes = true;
+    FrameTarget target;
+    target.viewport = {0, 0, 40, 28};
+    for (const bool transparent : {false, true}) {
+      Display display;
+      display.transparent = transparent;
+      display.background = {0.2F, 0.4F, 0.9F};
+      check(picture, display, target, GL_RGBA32F, 0);
     }
   }
 }

@@ -444,6 +444,20 @@ TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
   EXPECT_NEAR(straight.mean().w, rotated.mean().w, 0.002);
 }
 
+TEST_P(Trace, AFewVoxelsAreAVolume) {
+  const auto viewer = make();
+  viewer->set_medium({1.0, vec3(0.0F), 0.0F, 0});
+  for (const int size : {1, 3, 8, 9}) {
+    viewer->set_volume(box_volume(ivec3(size)));
+    viewer->set_camera(camera_at(dvec3(0.5 * size - 0.5) + dvec3(0, 0, 100.0 + size), dvec3(0.5 * size - 0.5), 0.1));
+    for (const Kind& kind : kinds) {
+      viewer->set_grid(settings_of(kind, 0.02));
+      const test::Picture picture = test::render(*viewer, {4, 4, 1, 1, render::View::density});
+      for (const glm::vec4& p : picture.pixels) EXPECT_NEAR(p.w, 1.0 - std::exp(-size), 1e-3);
+    }
+  }
+}
+
 TEST_P(Trace, DensityViewIsTheOpacity) {
   const auto viewer = make();
   viewer->set_volume(box_volume({64, 64, 8}));
