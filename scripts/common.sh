@@ -49,17 +49,15 @@ install_packages() {
     { tail -n 20 "$log" >&2; die "apt-get could not install ${missing[*]} (all of it: $log)"; }
 }
 
-# build PRESET [TARGET...]: configured if it is not yet; ninja shows its own progress.
+# build PRESET [TARGET...]: configured each time, since packages may have come; ninja shows its own progress.
 build() {
   local preset=$1
   shift
   local folder=build/$preset since=$SECONDS
-  if [ ! -f "$folder/build.ninja" ]; then
-    say "configuring $folder"
-    mkdir -p "$folder"
-    cmake --preset "$preset" >"$folder/configure.log" 2>&1 ||
-      { tail -n 30 "$folder/configure.log" >&2; echo "configuring failed (all of it: $folder/configure.log)" >&2; return 1; }
-  fi
+  say "configuring $folder"
+  mkdir -p "$folder"
+  cmake --preset "$preset" >"$folder/configure.log" 2>&1 ||
+    { tail -n 30 "$folder/configure.log" >&2; echo "configuring failed (all of it: $folder/configure.log)" >&2; return 1; }
   say "building $folder with $jobs jobs"
   cmake --build "$folder" --parallel "$jobs" ${1:+--target "$@"} || return 1
   say "built $folder in $(elapsed "$since")"

@@ -113,6 +113,7 @@ void Builder::run() {
     if (stopping_) return;
     const Job job = *std::exchange(next_, std::nullopt);
     const auto progress = std::make_shared<Progress>();
+    progress->begin(job.path.empty() ? Progress::Stage::refining : Progress::Stage::loading);
     current_ = progress;
     loading_ = !job.path.empty();
     load_settings_ = job.settings;
@@ -152,7 +153,6 @@ void Builder::work(const Job& job, Progress& progress) {
   Stopwatch watch;
   double load_seconds = 0.0;
   if (!job.path.empty()) {
-    progress.begin(Progress::Stage::loading);
     volume = std::make_shared<const VolumeAsset>(volume::import_volume(job.path, job.grid_name, log_, &progress));
     load_seconds = watch.lap();
     const std::scoped_lock lock(mutex_);

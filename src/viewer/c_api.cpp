@@ -7,6 +7,8 @@
 struct cumulet_viewer {
   std::unique_ptr<cumulet::viewer::Viewer> viewer;
   std::string last_error;
+  // The handle of the viewer's volume, once a host has had it: asked again, it is the same.
+  std::unique_ptr<cumulet_volume, void (*)(cumulet_volume*)> volume{nullptr, cumulet_volume_release};
 };
 
 namespace {
@@ -162,17 +164,23 @@ cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, con
 }
 
 cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_volume(volume == nullptr ? nullptr : volume->asset); });
+  return guarded(viewer, [&](core::Viewer& v) {
+    v.set_volume(volume == nullptr ? nullptr : volume->asset);
+    viewer->volume.reset(cumulet_volume_retain(volume));
+  });
 }
 
 cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
-    if (auto asset = v.volume()) {
-      *out = new cumulet_volume;
-      (*out)->asset = std::move(asset);
+    auto asset = v.volume();
+    if (!asset) return;
+    if (!viewer->volume || viewer->volume->asset != asset) {
+      viewer->volume.reset(new cumulet_volume);
+      viewer->volume->asset = std::move(asset);
     }
+    *out = cumulet_volume_retain(viewer->volume.get());
   });
 }
 
