@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "base/progress_part.hpp"
 #include "grid/cell.hpp"
 
 namespace cumulet::grid {
@@ -256,13 +257,15 @@ namespace {
 // A value that the cut of max_cells will not fall below: the brick cells above it would alone be too many. From every
 // 16th brick; the closure only adds cells. Saves evaluating and keeping what is cut off anyway.
 template <class Evaluation>
-double estimate_floor(const Evaluation& evaluation, std::uint64_t max_cells, double threshold_squared) {
+double estimate_floor(const Evaluation& evaluation, std::uint64_t max_cells, double threshold_squared,
+                      const Progress* progress) {
   constexpr std::size_t stride = 16;
   const Statistics& statistics = evaluation.statistics();
   const auto& bricks = statistics.nodes_of_size(3);
   if (bricks.size() < 64 * stride) return threshold_squared;
   tbb::combinable<std::vector<std::uint64_t>> partial([] { return std::vector<std::uint64_t>(65536); });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size() / stride, 4), [&](const auto& range) {
+    check(progress);
     const auto sums = std::make_unique<BrickSums>();
     std::vector<std::uint64_t>& histogram = partial.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
@@ -287,23 +290,29 @@ double estimate_floor(const Evaluation& evaluation, std::uint64_t max_cells, dou
 
 }  // namespace
 
-DiamondSet::DiamondSet(const Statistics& statistics, const RefineSettings& settings)
+DiamondSet::DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress)
     : log2_size_(statistics.cube().log2_size) {
+  check(progress);
   const auto evaluation = std::make_unique<const Evaluation>(statistics, settings);
   const double threshold = std::max(settings.threshold, 0.0);
-  double floor = estimate_floor(*evaluation, settings.max_cells, threshold * threshold);
-  evaluate(*evaluation, floor);
-  choose_cut(settings.max_cells);
+  double floor = estimate_floor(*evaluation, settings.max_cells, threshold * threshold, progress);
+  evaluate(*evaluation, floor, progress, 0.02, 0.5);
+  choose_cut(settings.max_cells, progress);
   if (!limited_ && floor > threshold * threshold) {
     // The estimate was too high after all.
     map_.clear();
-    evaluate(*evaluation, threshold * threshold);
-    choose_cut(settings.max_cells);
+    evaluate(*evaluation, threshold * threshold, progress, 0.5, progress_part);
+    choose_cut(settings.max_cells, progress);
   }
 }
 
-void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared) {
+void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared, Progress* progress, double from,
+                          double to) {
   const Statistics& statistics = evaluation.statistics();
+  std::uint64_t nodes = 0;
+  for (int size = 3; size < log2_size_; ++size) nodes += statistics.nodes_of_size(size).size();
+  const double closing = from + 0.8 * (to - from);
+  ProgressPart part(progress, from, closing, nodes);
   const auto floor = static_cast<float>(floor_squared);
   // Inside bricks: 511 cells in each of six trees.
   const auto& bricks = statistics.nodes_of_size(3);
@@ -314,6 +323,7 @@ void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared) {
       evaluation.brick(statistics.nodes()[bricks[i]], *sums, floor,
                        [&](const ivec3& vertex, float squared) { raise(vertex, quantize(squared)); });
     }
+    part.add(range.size());
   });
 
   // Above bricks: a Kuhn cell (B), its two halves (C) and four quarters (A); then the 24 roots.
@@ -344,6 +354,7 @@ void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared) {
           }
         }
       }
+      part.add(range.size());
     });
   }
   if (!statistics.nodes()[0].is_uniform()) {
@@ -357,32 +368,37 @@ void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared) {
                       [&](const ivec3& vertex, float squared) { raise(vertex, quantize(squared)); });
     }
   }
-  close();
+  close(progress, closing, to);
 }
 
-std::vector<DiamondSet::Block*> DiamondSet::blocks_of(int scale) const {
+std::vector<DiamondSet::Block*> DiamondSet::blocks_of(int scale, const Progress* progress) const {
   std::vector<Block*> blocks;
   for (const auto& [key, block] : map_) {
+    check(progress);
     if (block->scale == scale) blocks.push_back(block.get());
   }
   return blocks;
 }
 
-void DiamondSet::close() {
+void DiamondSet::close(Progress* progress, double from, double to) {
+  ProgressPart part(progress, from, to, static_cast<std::uint64_t>(3 * log2_size_));
   // From the finest level up: edge middles (A), face middles (C), cube middles (B), then twice the spacing.
   for (int octave = 0; octave < log2_size_; ++octave) {
     for (int odd = 1; odd <= 3; ++odd) {
       if (octave == log2_size_ - 1) break;  // the control cube's own edges: their cells are there from the start
-      close_octave(octave, odd, blocks_of(octave / 3));
+      close_octave(octave, odd, blocks_of(octave / 3, progress), progress);
+      part.add(1);
     }
   }
 }
 
-void DiamondSet::close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks) {
+void DiamondSet::close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks,
+                              const Progress* progress) {
   const int size = 1 << log2_size_;
   const int h = 1 << octave;
   const int step = 1 << (octave % 3);
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+    check(progress);
     const Block& block = *blocks[b];
     Raiser raise(*this);
     const auto raise_inside = [&](const ivec3& v, std::uint16_t priority) {
@@ -442,7 +458,7 @@ unsigned DiamondSet::cells_around(const ivec3& vertex, int octave) const {
   return inside[odd] >> outside;
 }
 
-void DiamondSet::choose_cut(std::uint64_t max_cells) {
+void DiamondSet::choose_cut(std::uint64_t max_cells, const Progress* progress) {
   // How many cells each priority adds; splitting a diamond adds one cell for each that it has.
   std::vector<Block*> blocks;
   blocks.reserve(map_.size());
@@ -451,6 +467,7 @@ void DiamondSet::choose_cut(std::uint64_t max_cells) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&](const auto& range) {
     std::vector<std::uint64_t>& histogram = partial.local();
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      check(progress);
       const Block& block = *blocks[b];
       for (unsigned i = 0; i < 512; ++i) {
         const std::uint16_t priority = block.priority[i].load(std::memory_order_relaxed);

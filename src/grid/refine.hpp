@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "base/progress.hpp"
 #include "grid/statistics.hpp"
 
 namespace cumulet::grid {
@@ -47,8 +48,11 @@ struct RefineSettings {
 /// priorities at one value is such a set.
 class DiamondSet {
  public:
-  /// Evaluates the criterion for every cell of the statistics, in parallel. O(active nodes).
-  DiamondSet(const Statistics& statistics, const RefineSettings& settings);
+  /// Evaluates the criterion for every cell of the statistics, in parallel. O(active nodes). progress: as for
+  /// Statistics; the fraction ends at progress_part, and GridBuilder::bisect goes on from there.
+  DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress = nullptr);
+
+  static constexpr double progress_part = 0.6;
 
   /// How many cells the grid has.
   [[nodiscard]] std::uint64_t cell_count() const { return cells_; }
@@ -92,12 +96,12 @@ class DiamondSet {
     std::uint64_t key_ = ~std::uint64_t{0};
     Block* block_ = nullptr;
   };
-  void evaluate(const Evaluation& evaluation, double floor_squared);
-  void close();
-  void close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks);
-  void choose_cut(std::uint64_t max_cells);
+  void evaluate(const Evaluation& evaluation, double floor_squared, Progress* progress, double from, double to);
+  void close(Progress* progress, double from, double to);
+  void close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks, const Progress* progress);
+  void choose_cut(std::uint64_t max_cells, const Progress* progress);
   [[nodiscard]] unsigned cells_around(const glm::ivec3& vertex, int octave) const;
-  [[nodiscard]] std::vector<Block*> blocks_of(int scale) const;
+  [[nodiscard]] std::vector<Block*> blocks_of(int scale, const Progress* progress) const;
 
   int log2_size_;
   Map map_;

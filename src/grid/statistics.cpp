@@ -7,8 +7,10 @@
 #include <bit>
 #include <memory>
 #include <unordered_map>
+#include <utility>
 
 #include "base/error.hpp"
+#include "base/progress_part.hpp"
 #include "grid/cell.hpp"
 
 namespace cumulet::grid {
@@ -213,11 +215,11 @@ Moments uniform_moments(const vec3& v0, std::uint32_t shape, float value) {
   return m;
 }
 
-Statistics::Statistics(const volume::ScalarVolume& volume, const Cube& cube)
+Statistics::Statistics(const volume::ScalarVolume& volume, const Cube& cube, Progress* progress)
     : cube_(cube), by_size_(static_cast<std::size_t>(cube.log2_size) + 1), brick_values_(&volume.brick_values) {
-  build_topology(volume);
-  compute_mean_optical_depth(volume);
-  compute_moments();
+  build_topology(volume, progress);
+  compute_mean_optical_depth(volume, progress);
+  compute_moments(progress);
 }
 
 const float* Statistics::values(const Node& node) const {
@@ -226,7 +228,8 @@ const float* Statistics::values(const Node& node) const {
                              : extra_values_.data() + std::size_t(node.values - count) * volume::brick_voxels;
 }
 
-void Statistics::build_topology(const volume::ScalarVolume& volume) {
+void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* progress) {
+  ProgressPart part(progress, 0.0, 0.1, volume.brick_origins.size());
   struct Work {
     std::uint32_t node;
     std::uint32_t first, last;         // range of bricks_
@@ -242,7 +245,10 @@ void Statistics::build_topology(const volume::ScalarVolume& volume) {
   std::vector<Work> stack;
   stack.push_back({0, 0, static_cast<std::uint32_t>(bricks.size()), std::move(all_tiles)});
 
+  std::uint64_t rounds = 0;
+  std::uint64_t placed = 0;
   while (!stack.empty()) {
+    if (++rounds % 256 == 0) part.add(std::exchange(placed, 0));
     Work work = std::move(stack.back());
     stack.pop_back();
     const ivec3 corner = nodes_[work.node].corner;
@@ -274,6 +280,7 @@ void Statistics::build_topology(const volume::ScalarVolume& volume) {
     if (log2_size == 3) {
       if (!no_bricks) {
         node.values = static_cast<std::int32_t>(bricks[work.first]);
+        ++placed;
       } else {
         node.values = file_bricks + static_cast<std::int32_t>(extra_values_.size() / volume::brick_voxels);
         for (int v = 0; v < volume::brick_voxels; ++v) {
@@ -343,7 +350,7 @@ Moments Statistics::moments(const vec3& v0, std::uint32_t shape) const {
   return sum;
 }
 
-void Statistics::compute_moments() {
+void Statistics::compute_moments(Progress* progress) {
   std::uint32_t count = 0;
   for (const auto& level : by_size_) {
     for (const std::uint32_t n : level) {
@@ -351,8 +358,9 @@ void Statistics::compute_moments() {
       count += 6;
     }
   }
-  moments_.resize(count);
   const auto& bricks = by_size_[3];
+  ProgressPart part(progress, 0.3, 1.0, count / 6);
+  part.resize(moments_, count);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 16), [&](const auto& range) {
     const auto sums = std::make_unique<BrickSums>();
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
@@ -363,6 +371,7 @@ void Statistics::compute_moments() {
         moments_[node.moments + permutation] = sums->moments(1, node.corner, tree);
       }
     }
+    part.add(range.size());
   });
   for (std::size_t size = 4; size < by_size_.size(); ++size) {
     const auto& level = by_size_[size];
@@ -380,11 +389,12 @@ void Statistics::compute_moments() {
           moments_[node.moments + permutation] = sum;
         }
       }
+      part.add(range.size());
     });
   }
 }
 
-void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume) {
+void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume, Progress* progress) {
   // Columns of voxels that meet any density, as 8 x 8 bits for a column of bricks, for each axis.
   std::array<std::unordered_map<std::uint64_t, std::uint64_t>, 3> columns;
   const auto mark = [&](const ivec3& brick, const std::array<std::uint64_t, 3>& masks) {
@@ -401,29 +411,40 @@ void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume) 
   };
   const auto& bricks = by_size_[3];
   std::vector<Projection> projections(bricks.size());
-  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {
-    const float* data = values(nodes_[bricks[i]]);
-    Projection& p = projections[i];
-    for (unsigned v = 0; v < volume::brick_voxels; ++v) {
-      if (!(data[v] > 0.0F)) continue;
-      p.sum += data[v];
-      const std::array<unsigned, 3> xyz{v / 64, (v / 8) % 8, v % 8};
-      for (unsigned axis = 0; axis < 3; ++axis) {
-        p.masks[axis] |= std::uint64_t{1} << (xyz[(axis + 1) % 3] * 8 + xyz[(axis + 2) % 3]);
+  const auto bricks_along = [](const Node& node) {
+    return node.is_uniform() && node.uniform > 0.0F ? (1 << node.log2_size) / 8 : 0;
+  };
+  std::uint64_t total = 2 * bricks.size();
+  for (const Node& node : nodes_) total += static_cast<std::uint64_t>(bricks_along(node)) * bricks_along(node);
+  ProgressPart part(progress, 0.1, 0.3, total);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 64), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const float* data = values(nodes_[bricks[i]]);
+      Projection& p = projections[i];
+      for (unsigned v = 0; v < volume::brick_voxels; ++v) {
+        if (!(data[v] > 0.0F)) continue;
+        p.sum += data[v];
+        const std::array<unsigned, 3> xyz{v / 64, (v / 8) % 8, v % 8};
+        for (unsigned axis = 0; axis < 3; ++axis) {
+          p.masks[axis] |= std::uint64_t{1} << (xyz[(axis + 1) % 3] * 8 + xyz[(axis + 2) % 3]);
+        }
       }
     }
+    part.add(range.size());
   });
   double mass = 0.0;
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     mass += projections[i].sum;
     mark(nodes_[bricks[i]].corner / 8, projections[i].masks);
+    if (i % 1024 == 1023) part.add(1024);
   }
   constexpr std::uint64_t full = ~std::uint64_t{0};
   for (const Node& node : nodes_) {
-    if (!node.is_uniform() || !(node.uniform > 0.0F)) continue;
-    const int side = (1 << node.log2_size) / 8;
+    const int side = bricks_along(node);
+    if (side == 0) continue;
     mass += node.uniform * std::pow(double(1 << node.log2_size), 3.0);
     for (int a = 0; a < side; ++a) {
+      part.add(static_cast<std::uint64_t>(side));
       for (int b = 0; b < side; ++b) {
         const ivec3 base = node.corner / 8;
         mark(base + ivec3(0, a, b), {full, 0, 0});

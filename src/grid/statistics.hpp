@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "base/progress.hpp"
 #include "grid/cube.hpp"
 #include "volume/volume.hpp"
 
@@ -79,7 +80,8 @@ class Statistics {
     [[nodiscard]] bool is_uniform() const { return child == 0 && values < 0; }
   };
 
-  Statistics(const volume::ScalarVolume& volume, const Cube& cube);
+  /// progress, here and below: receives the fraction done; cancelled, Error(cancelled) is thrown.
+  Statistics(const volume::ScalarVolume& volume, const Cube& cube, Progress* progress = nullptr);
 
   [[nodiscard]] const Cube& cube() const { return cube_; }
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
@@ -101,9 +103,9 @@ class Statistics {
   }
 
  private:
-  void build_topology(const volume::ScalarVolume& volume);
-  void compute_moments();
-  void compute_mean_optical_depth(const volume::ScalarVolume& volume);
+  void build_topology(const volume::ScalarVolume& volume, Progress* progress);
+  void compute_moments(Progress* progress);
+  void compute_mean_optical_depth(const volume::ScalarVolume& volume, Progress* progress);
 
   Cube cube_;
   std::vector<Node> nodes_;

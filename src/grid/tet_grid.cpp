@@ -74,30 +74,32 @@ void GridBuilder::make_roots() {
   }
 }
 
-void GridBuilder::bisect() {
+void GridBuilder::bisect(Progress* progress) {
   const std::uint64_t count = 24 + 2 * (diamonds_->cell_count() - 24);
   if (count >= (std::uint64_t{1} << 31U)) {
     throw Error(ErrorCode::unsupported, "a grid of " + std::to_string(diamonds_->cell_count()) +
                                             " cells: the limit is 2^30; lower max_cells or raise the threshold");
   }
-  nodes_.resize(count);
+  ProgressPart part(progress, DiamondSet::progress_part, 0.95, count);
+  part.resize(nodes_, count, {});
   make_roots();
   level_first_ = {0, 24};
   while (level_first_.back() != level_first_[level_first_.size() - 2]) {
-    split_level(level_first_[level_first_.size() - 2], level_first_.back());
+    split_level(level_first_[level_first_.size() - 2], level_first_.back(), part);
   }
   level_first_.pop_back();
   if (level_first_.back() != count)
     throw Error(ErrorCode::internal, "bisection missed diamonds: the set is not closed");
-  order();
+  order(progress);
 }
 
-void GridBuilder::split_level(std::uint32_t first, std::uint32_t last) {
+void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressPart& part) {
   constexpr std::uint32_t chunk = 4096;
   const std::uint32_t chunks = (last - first + chunk - 1) / chunk;
   std::vector<std::uint32_t> splits(chunks);
   // Mark what splits; then children get consecutive places in the order of their parents.
   tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
+    part.check();
     DiamondCursor cursor(*diamonds_);
     const std::uint32_t end = std::min(last, first + (c + 1) * chunk);
     std::uint32_t n = 0;
@@ -170,6 +172,7 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last) {
         child.links[face] = whole;
       }
     }
+    part.add(end - (first + c * chunk));
   });
   level_first_.push_back(next);
 }
@@ -191,10 +194,11 @@ std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
   return other;
 }
 
-void GridBuilder::order() {
+void GridBuilder::order(Progress* progress) {
   const auto count = static_cast<std::uint32_t>(nodes_.size());
-  leaves_below_.assign(count, 1);
-  first_leaf_.assign(count, 0);
+  ProgressPart part(progress, 0.95, 1.0, 2 * std::uint64_t{count});
+  part.resize(leaves_below_, count, 1U);
+  part.resize(first_leaf_, count);
   for (std::size_t level = level_first_.size() - 1; level-- > 0;) {
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
                       [&](const auto& range) {
@@ -202,10 +206,11 @@ void GridBuilder::order() {
                           const std::uint32_t child = nodes_[i].child;
                           if (child != 0) leaves_below_[i] = leaves_below_[child] + leaves_below_[child + 1];
                         }
+                        part.add(range.size());
                       });
   }
   for (unsigned root = 1; root < 24; ++root) first_leaf_[root] = first_leaf_[root - 1] + leaves_below_[root - 1];
-  leaf_nodes_.resize(diamonds_->cell_count());
+  part.resize(leaf_nodes_, diamonds_->cell_count());
   for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
                       [&](const auto& range) {
@@ -218,19 +223,21 @@ void GridBuilder::order() {
                             first_leaf_[child + 1] = first_leaf_[i] + leaves_below_[child];
                           }
                         }
+                        part.add(range.size());
                       });
   }
 }
 
-TetGrid GridBuilder::records(CellKind cells, float max_value) {
+TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress) {
   TetGrid grid;
   grid.cube = statistics_->cube();
   grid.limited = diamonds_->limited();
   grid.levels = static_cast<std::uint32_t>(level_first_.size() - 2);
   grid.density_unit = max_value > 0.0F ? max_value : 1.0F;
   const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
-  grid.cells.resize(count);
-  grid.tree.resize(count - 24);
+  ProgressPart places(progress, 0.0, 0.1, nodes_.size());
+  places.resize(grid.cells, count);
+  places.resize(grid.tree, count - 24);
 
   // Depth-first number of an internal node: leaves before it minus roots before it, plus its internal ancestors...
   // which a walk per level hands down: child 0 comes next, child 1 after all of child 0.
@@ -238,7 +245,8 @@ TetGrid GridBuilder::records(CellKind cells, float max_value) {
     grid.roots[root] = {first_leaf_[root], first_leaf_[root] - root};
   }
   grid.roots[24] = {count, count - 24};
-  std::vector<std::uint32_t> place(nodes_.size());
+  std::vector<std::uint32_t> place;
+  places.resize(place, nodes_.size());
   for (unsigned root = 0; root < 24; ++root) place[root] = grid.roots[root].first_internal;
   for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
@@ -250,6 +258,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value) {
                           place[child] = place[i] + 1;
                           place[child + 1] = place[i] + leaves_below_[child];
                         }
+                        places.add(range.size());
                       });
   }
   place = {};
@@ -260,6 +269,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value) {
   };
   tbb::combinable<Box> boxes;
   const double to_relative = 1.0 / grid.density_unit;
+  ProgressPart part(progress, 0.1, 1.0, count);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
     const auto sums = std::make_unique<BrickSums>();
     const Statistics::Node* brick = nullptr;
@@ -317,6 +327,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value) {
       record.data.z = glm::packHalf2x16({static_cast<float>(mean * to_relative), gradient.x});
       record.data.w = glm::packHalf2x16({gradient.y, gradient.z});
     }
+    part.add(range.size());
   });
   Box all;
   boxes.combine_each([&](const Box& box) {

@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "base/progress_part.hpp"
 #include "grid/refine.hpp"
 #include "grid/statistics.hpp"
 
@@ -46,9 +47,10 @@ struct TetGrid {
 class GridBuilder {
  public:
   GridBuilder(const Statistics& statistics, const DiamondSet& diamonds);
-  /// Throws Error(unsupported) for more than 2^31 nodes.
-  void bisect();
-  TetGrid records(CellKind cells, float max_value);
+  /// Throws Error(unsupported) for more than 2^31 nodes. progress, here and below: as for Statistics. Cancelled, the
+  /// builder is of no use; but records() may be called again.
+  void bisect(Progress* progress = nullptr);
+  TetGrid records(CellKind cells, float max_value, Progress* progress = nullptr);
 
  private:
   struct Node {
@@ -62,9 +64,9 @@ class GridBuilder {
   static_assert(sizeof(Node) == 32);
 
   void make_roots();
-  void split_level(std::uint32_t first, std::uint32_t last);
+  void split_level(std::uint32_t first, std::uint32_t last, ProgressPart& part);
   [[nodiscard]] std::uint32_t resolve(std::uint32_t from, unsigned face) const;
-  void order();
+  void order(Progress* progress);
 
   const Statistics* statistics_;
   const DiamondSet* diamonds_;

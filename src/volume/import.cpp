@@ -14,6 +14,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "base/progress_part.hpp"
 #include "volume/import_detail.hpp"
 
 namespace cumulet::volume {
@@ -27,14 +28,7 @@ std::string detail::scalar_fog_refusal(std::string_view type, std::string_view g
   return "is a " + std::string(grid_class) + ", not a fog volume";
 }
 
-namespace {
-
-// Longer than any asset, short enough that every voxel count and index difference fits its integer.
-constexpr int max_extent = 1 << 20;
-constexpr int max_coordinate = 1 << 30;
-
-/// What a library says may hold line breaks and terminal controls; our messages are one line.
-std::string one_line(std::string_view text) {
+std::string detail::one_line(std::string_view text) {
   std::string out;
   for (const char c : text) {
     const bool blank = static_cast<unsigned char>(c) <= ' ' || c == '\x7f';
@@ -48,27 +42,19 @@ std::string one_line(std::string_view text) {
   return out;
 }
 
-[[noreturn]] void file_error(const std::filesystem::path& file, std::string_view cause) {
-  throw Error(ErrorCode::file, one_line(file.string() + ": " + std::string(cause)));
+std::string detail::to_string(glm::ivec3 v) {
+  std::ostringstream out;
+  out << '(' << v.x << ", " << v.y << ", " << v.z << ')';
+  return out.str();
 }
 
-/// Runs f; whatever it throws leaves as one line that names the file.
-template <typename Function>
-auto naming_file(const std::filesystem::path& file, Function&& f) {
-  try {
-    return f();
-  } catch (const Error&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw Error(ErrorCode::out_of_memory, one_line(file.string() + ": not enough memory to read it"));
-  } catch (const std::exception& e) {
-    file_error(file, e.what());
-  } catch (...) {
-    file_error(file, "unknown error while reading");
-  }
-}
+namespace {
 
-std::unique_ptr<Reader> open(const std::filesystem::path& file) {
+// Longer than any asset, short enough that every voxel count and index difference fits its integer.
+constexpr int max_extent = 1 << 20;
+constexpr int max_coordinate = 1 << 30;
+
+std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress) {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
@@ -86,23 +72,23 @@ std::unique_ptr<Reader> open(const std::filesystem::path& file) {
   const auto got = static_cast<std::size_t>(stream.gcount());
   const std::string_view head(magic.data(), got);
   if (got == 0) fail("is empty");
-  if (head.starts_with("NanoVDB")) return open_nanovdb(file);
-  if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(file);
+  if (head.starts_with("NanoVDB")) return open_nanovdb(file, progress);
+  if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(file, progress);
   if (got < magic.size()) fail("is too short to be a VDB or NanoVDB file");
   fail("is not a VDB or NanoVDB file");
 }
 
-std::string describe(const GridEntry& entry) {
-  return "\"" + entry.unique_name + "\" (" + entry.info.type + ", " + entry.info.grid_class + ")";
+std::string describe(const GridInfo& entry) {
+  return "\"" + entry.unique_name + "\" (" + entry.type + ", " + entry.grid_class + ")";
 }
 
-std::string describe(const std::vector<GridEntry>& grids, const std::vector<std::size_t>& which) {
+std::string describe(const std::vector<GridInfo>& grids, const std::vector<std::size_t>& which) {
   std::string out;
   for (const std::size_t i : which) out += (out.empty() ? "" : ", ") + describe(grids[i]);
   return out;
 }
 
-std::size_t choose_grid(const std::vector<GridEntry>& grids, const std::string& name) {
+std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name) {
   if (grids.empty()) fail("holds no grids");
   std::vector<std::size_t> all(grids.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
@@ -114,8 +100,8 @@ std::size_t choose_grid(const std::vector<GridEntry>& grids, const std::string& 
   };
   const auto named = [&](const std::string& wanted) {
     // "density[1]" picks one of several grids of the same name; an exact name comes first.
-    std::vector<std::size_t> found = where([&](const GridEntry& e) { return e.info.name == wanted; });
-    return found.empty() ? where([&](const GridEntry& e) { return e.unique_name == wanted; }) : found;
+    std::vector<std::size_t> found = where([&](const GridInfo& e) { return e.name == wanted; });
+    return found.empty() ? where([&](const GridInfo& e) { return e.unique_name == wanted; }) : found;
   };
   const auto only_usable = [&](const std::vector<std::size_t>& candidates) {
     std::vector<std::size_t> usable;
@@ -134,7 +120,7 @@ std::size_t choose_grid(const std::vector<GridEntry>& grids, const std::string& 
   }
   if (const auto density = named("density"); !density.empty()) return only_usable(density);
 
-  const auto usable = where([](const GridEntry& e) { return e.refusal.empty(); });
+  const auto usable = where([](const GridInfo& e) { return e.refusal.empty(); });
   if (usable.size() == 1) return usable[0];
   if (usable.size() > 1)
     fail("several scalar grids and none called density, choose one by name: " + describe(grids, usable));
@@ -188,7 +174,7 @@ struct ActiveRegion {
   std::uint64_t voxels = 0;
 };
 
-ActiveRegion active_leaf_region(const LeafSource& leaves) {
+ActiveRegion active_leaf_region(const LeafSource& leaves, ProgressPart& part) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, leaves.count(), 256), ActiveRegion{},
       [&](const tbb::blocked_range<std::size_t>& range, ActiveRegion sum) {
@@ -197,6 +183,7 @@ ActiveRegion active_leaf_region(const LeafSource& leaves) {
           for (const std::uint64_t word : mask) sum.voxels += static_cast<std::uint64_t>(std::popcount(word));
           sum.box.expand(box_of_active(mask, leaves.origin(i)));
         }
+        part.add(range.size());
         return sum;
       },
       [](ActiveRegion a, const ActiveRegion& b) {
@@ -277,24 +264,24 @@ struct BrickTotals {
   }
 };
 
-std::string to_string(glm::ivec3 v) {
-  std::ostringstream out;
-  out << '(' << v.x << ", " << v.y << ", " << v.z << ')';
-  return out.str();
+std::string name_of_non_finite(float value) {
+  return std::isnan(value) ? "nan" : value > 0.0F ? "infinity" : "-infinity";
 }
 
-std::string to_string(float value) { return std::isnan(value) ? "nan" : value > 0.0F ? "infinity" : "-infinity"; }
-
 /// Leaf indices by origin; every origin a brick's, none twice.
-std::vector<std::size_t> sorted_leaves(const LeafSource& leaves) {
+std::vector<std::size_t> sorted_leaves(const LeafSource& leaves, const Progress* progress) {
   std::vector<std::size_t> order(leaves.count());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  tbb::parallel_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return lexicographic(leaves.origin(a), leaves.origin(b)); });
+  tbb::parallel_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    check(progress);
+    return lexicographic(leaves.origin(a), leaves.origin(b));
+  });
   for (std::size_t i = 0; i < order.size(); ++i) {
     const glm::ivec3 origin = leaves.origin(order[i]);
-    if (((origin.x | origin.y | origin.z) & (brick_size - 1)) != 0) fail("damaged tree: a leaf is out of place");
-    if (i > 0 && leaves.origin(order[i - 1]) == origin) fail("damaged tree: two leaves in one place");
+    if (((origin.x | origin.y | origin.z) & (brick_size - 1)) != 0)
+      fail("damaged tree: a brick is out of place, at " + to_string(origin));
+    if (i > 0 && leaves.origin(order[i - 1]) == origin)
+      fail("damaged tree: two bricks in one place, at " + to_string(origin));
   }
   return order;
 }
@@ -313,16 +300,20 @@ void check_transform(const glm::dmat4& m) {
   if (!(volume > 1e-9)) fail("its transform is singular");
 }
 
-/// The shared half: from the tree as a file has it to the volume's contract.
-ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_prefix) {
+}  // namespace
+
+ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::string& log_prefix, Progress* progress,
+                              double from) {
+  const auto at = [&](double part) { return from + part * (1.0 - from); };
   check_transform(source.index_to_world);
-  if (!std::isfinite(source.background)) fail("its background value is " + to_string(source.background));
+  if (!std::isfinite(source.background)) fail("its background value is " + name_of_non_finite(source.background));
 
   ScalarVolume out;
   out.index_to_world = source.index_to_world;
   out.background = std::max(source.background, 0.0F) + 0.0F;
 
-  ActiveRegion region = active_leaf_region(*source.leaves);
+  ProgressPart looking(progress, at(0.0), at(0.2), source.leaves->count());
+  ActiveRegion region = active_leaf_region(*source.leaves, looking);
   for (const SourceTile& tile : source.tiles) {
     if (tile.active) region.box.expand({tile.box.min, tile.box.max});
   }
@@ -344,7 +335,7 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
   // First look at every brick, then allocate exactly, then copy: reading twice is cheaper than
   // holding the dropped ones.
   const LeafSource& leaves = *source.leaves;
-  std::vector<std::size_t> order = sorted_leaves(leaves);
+  std::vector<std::size_t> order = sorted_leaves(leaves, progress);
   std::erase_if(order, [&](std::size_t leaf) {
     const glm::ivec3 origin = leaves.origin(leaf);
     return bounds.clipped({origin, origin + (brick_size - 1)}).empty();
@@ -355,6 +346,7 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
   };
   std::vector<char> constant(order.size());
   std::vector<float> constant_value(order.size());
+  ProgressPart checking(progress, at(0.3), at(0.6), order.size());
   const BrickTotals bricks = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, order.size(), 64), BrickTotals{},
       [&](const tbb::blocked_range<std::size_t>& range, BrickTotals sum) {
@@ -374,6 +366,7 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
           constant[i] = brick.constant ? 1 : 0;
           constant_value[i] = brick.first;
         }
+        checking.add(range.size());
         return sum;
       },
       [](BrickTotals a, const BrickTotals& b) {
@@ -383,7 +376,7 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
   if (bricks.bad_brick < order.size()) {
     const int i = bricks.bad_voxel;
     fail("voxel " + to_string(leaves.origin(order[bricks.bad_brick]) + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7)) +
-         " is " + to_string(bricks.bad_value));
+         " is " + name_of_non_finite(bricks.bad_value));
   }
 
   std::uint64_t negative = bricks.negative;
@@ -393,7 +386,7 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
     const Box box = bounds.clipped({tile.box.min, tile.box.max});
     if (box.empty()) continue;
     if (!std::isfinite(tile.box.value)) {
-      fail("the tile at voxel " + to_string(tile.box.min) + " is " + to_string(tile.box.value));
+      fail("the tile at voxel " + to_string(tile.box.min) + " is " + name_of_non_finite(tile.box.value));
     }
     if (tile.active) out.active_voxels += box.voxels();
     covered += box.voxels();
@@ -421,7 +414,8 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
     }
   }
   out.brick_origins.resize(kept.size());
-  out.brick_values.resize(kept.size() * brick_voxels);
+  ProgressPart copying(progress, at(0.6), 1.0, kept.size());
+  copying.resize(out.brick_values, kept.size() * brick_voxels);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kept.size(), 64),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       CleanBrick brick;
@@ -430,6 +424,7 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
                         out.brick_origins[i] = leaves.origin(kept[i]);
                         std::copy(brick.values.begin(), brick.values.end(), out.brick_values.data() + i * brick_voxels);
                       }
+                      copying.add(range.size());
                     });
   tbb::parallel_sort(out.tiles.begin(), out.tiles.end(),
                      [](const Tile& a, const Tile& b) { return lexicographic(a.min, b.min); });
@@ -440,35 +435,24 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
   return out;
 }
 
-}  // namespace
-
 std::vector<GridInfo> list_grids(const std::filesystem::path& file) {
-  return naming_file(file, [&] {
-    std::vector<GridInfo> infos;
-    const std::unique_ptr<Reader> reader = open(file);
-    for (const GridEntry& entry : reader->grids()) infos.push_back(entry.info);
-    return infos;
-  });
+  return naming(file.string(), [&] { return open(file, nullptr)->grids(); });
 }
 
-ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log) {
-  return naming_file(file, [&] {
-    std::unique_ptr<Reader> reader = open(file);
+ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
+                           Progress* progress) {
+  return naming(file.string(), [&] {
+    std::unique_ptr<Reader> reader = open(file, progress);
     const std::size_t chosen = choose_grid(reader->grids(), grid_name);
-    const GridEntry entry = reader->grids()[chosen];
-    const std::string grid = "grid \"" + entry.unique_name + "\"";
-    const std::string prefix = one_line(file.string() + ": " + grid) + ": ";
-    try {
-      SourceGrid source = reader->read(chosen, log, prefix);
+    const GridInfo entry = reader->grids()[chosen];
+    const std::string name = one_line(file.string() + ": grid \"" + entry.unique_name + "\"");
+    return naming(name, [&] {
+      SourceGrid source = reader->read(chosen, log, name + ": ");
       reader.reset();  // its buffers are not needed beside the volume's own
-      ScalarVolume volume = assemble(std::move(source), log, prefix);
-      volume.name = entry.info.name;
+      ScalarVolume volume = assemble(std::move(source), log, name + ": ", progress, read_part);
+      volume.name = entry.name;
       return volume;
-    } catch (const std::bad_alloc&) {
-      throw;
-    } catch (const std::exception& e) {
-      fail(grid + ": " + e.what());
-    }
+    });
   });
 }
 

@@ -4,12 +4,14 @@
 #include <nanovdb/util/GridHandle.h>
 #include <nanovdb/util/HostBuffer.h>
 #include <nanovdb/util/IO.h>
+#include <tbb/parallel_for.h>
+#include <zlib.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 
 #include "volume/import_detail.hpp"
+#include "volume/source_file.hpp"
 
 namespace cumulet::volume::detail {
 namespace {
@@ -105,8 +107,8 @@ class NanoWalk {
   using LowerT = nanovdb::NanoLower<BuildT>;
   using LeafT = nanovdb::NanoLeaf<BuildT>;
 
-  static SourceGrid run(Handle handle, const Log& log, const std::string& log_prefix) {
-    NanoWalk walk(handle.data(), handle.size());
+  static SourceGrid run(Handle handle, const Log& log, const std::string& log_prefix, const Progress* progress) {
+    NanoWalk walk(handle.data(), handle.size(), progress);
     walk.tree(log, log_prefix);
     auto leaves = std::make_unique<NanoLeaves<BuildT>>(std::move(handle));
     for (const auto& [leaf, origin] : walk.leaves_) leaves->add(leaf, origin);
@@ -115,7 +117,8 @@ class NanoWalk {
   }
 
  private:
-  NanoWalk(const std::uint8_t* begin, std::uint64_t size) : begin_(begin), size_(size) {}
+  NanoWalk(const std::uint8_t* begin, std::uint64_t size, const Progress* progress)
+      : begin_(begin), size_(size), progress_(progress) {}
 
   [[noreturn]] static void damaged(const char* what) { fail(std::string("the file is damaged: ") + what); }
 
@@ -200,6 +203,7 @@ class NanoWalk {
   }
 
   void lower(const LowerT& node, glm::ivec3 origin) {
+    check(progress_);
     count(1, sizeof(LowerT));
     const auto* data = node.data();
     for (std::uint32_t i = 0; i < LowerT::SIZE; ++i) {
@@ -222,6 +226,7 @@ class NanoWalk {
 
   const std::uint8_t* begin_;
   std::uint64_t size_;
+  const Progress* progress_;
   std::uint32_t declared_[3] = {};
   std::uint64_t visited_[3] = {};
   std::uint64_t node_bytes_ = 0;
@@ -232,44 +237,40 @@ class NanoWalk {
 /// A .nvdb file. Its directory is checked here before NanoVDB's own reader may trust it.
 class NanoReader final : public Reader {
  public:
-  explicit NanoReader(const std::filesystem::path& file) : stream_(file, std::ios::binary) {
-    if (!stream_) fail("cannot be opened");
-    size_ = std::filesystem::file_size(file);
+  NanoReader(const std::filesystem::path& file, Progress* progress)
+      : progress_(progress), stream_(file, progress), size_(static_cast<std::uint64_t>(stream_.size())) {
     for (std::uint64_t position = 0; position < size_;) position = read_segment(position);
 
     std::map<std::string, int> uses;
-    for (const GridEntry& entry : entries_) ++uses[entry.info.name];
+    for (const GridInfo& entry : entries_) ++uses[entry.name];
     std::map<std::string, int> seen;
-    for (GridEntry& entry : entries_) {
-      const std::string& name = entry.info.name;
+    for (GridInfo& entry : entries_) {
+      const std::string& name = entry.name;
       entry.unique_name = uses[name] > 1 ? name + "[" + std::to_string(seen[name]++) + "]" : name;
     }
   }
 
-  [[nodiscard]] const std::vector<GridEntry>& grids() const override { return entries_; }
+  [[nodiscard]] const std::vector<GridInfo>& grids() const override { return entries_; }
 
   SourceGrid read(std::size_t index, const Log& log, const std::string& log_prefix) override {
-    check_frames(places_[index]);
-    stream_.clear();
-    stream_.seekg(0);
-    Handle handle = nanovdb::io::readGrid<nanovdb::HostBuffer>(stream_, index);
+    Handle handle = load(places_[index]);
     if (handle.size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
     const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle.data());
     if (grid->mMagic != NANOVDB_MAGIC_NUMBER) fail("the file is damaged: no grid where one should be");
     if (grid->mGridType != places_[index].type) fail("the file is damaged: grid and directory differ in type");
     switch (grid->mGridType) {
       case nanovdb::GridType::Float:
-        return NanoWalk<float>::run(std::move(handle), log, log_prefix);
+        return NanoWalk<float>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::Double:
-        return NanoWalk<double>::run(std::move(handle), log, log_prefix);
+        return NanoWalk<double>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::Fp4:
-        return NanoWalk<nanovdb::Fp4>::run(std::move(handle), log, log_prefix);
+        return NanoWalk<nanovdb::Fp4>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::Fp8:
-        return NanoWalk<nanovdb::Fp8>::run(std::move(handle), log, log_prefix);
+        return NanoWalk<nanovdb::Fp8>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::Fp16:
-        return NanoWalk<nanovdb::Fp16>::run(std::move(handle), log, log_prefix);
+        return NanoWalk<nanovdb::Fp16>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::FpN:
-        return NanoWalk<nanovdb::FpN>::run(std::move(handle), log, log_prefix);
+        return NanoWalk<nanovdb::FpN>::run(std::move(handle), log, log_prefix, progress_);
       default:
         fail("is of a type that cannot be read");
     }
@@ -285,10 +286,9 @@ class NanoReader final : public Reader {
   };
 
   void read_bytes(std::uint64_t position, void* to, std::uint64_t bytes) {
-    if (position > size_ || bytes > size_ - position) fail("the file is truncated or damaged: unexpected end of file");
+    if (position > size_ || bytes > size_ - position) fail(end_of_file);
     stream_.seekg(static_cast<std::streamoff>(position));
     stream_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
-    if (!stream_) fail("the file is truncated or damaged: unexpected end of file");
   }
 
   /// Lists the grids of the segment at this position; gives the position of the next one.
@@ -316,9 +316,11 @@ class NanoReader final : public Reader {
       if (name.empty() || name.back() != '\0') fail("the file is damaged: a grid name has no end");
       name.resize(name.find('\0'));
       places_.push_back({0, meta.fileSize, meta.gridSize, header.codec, meta.gridType});
-      GridEntry entry;
-      entry.info = {name, type_name(meta.gridType), class_name(meta.gridClass)};
-      entry.refusal = scalar_fog_refusal(entry.info.type, entry.info.grid_class, is_scalar(meta.gridType));
+      GridInfo entry;
+      entry.name = name;
+      entry.type = type_name(meta.gridType);
+      entry.grid_class = class_name(meta.gridClass);
+      entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_scalar(meta.gridType));
       entries_.push_back(std::move(entry));
     }
     for (std::size_t i = first; i < places_.size(); ++i) {
@@ -332,56 +334,119 @@ class NanoReader final : public Reader {
     return position;
   }
 
-  /// Checks the sizes that NanoVDB's decoder would take from the file.
-  void check_frames(const Place& place) {
-    constexpr const char* damaged = "the file is damaged: its sizes do not agree";
+  /// Reads and decodes a grid, believing no size: NanoVDB's own reader does, and cannot be stopped.
+  Handle load(const Place& place) {
     // No codec packs tighter than zlib's 1032 to 1: a larger claim is no reason to allocate.
     constexpr std::uint64_t most_expansion = 1040;
-    if (place.memory_bytes == 0 || place.memory_bytes / most_expansion > place.file_bytes) fail(damaged);
+    if (place.memory_bytes == 0 || place.memory_bytes / most_expansion > place.file_bytes) fail(sizes_differ);
+    if (place.codec == Codec::NONE && place.memory_bytes != place.file_bytes) fail(sizes_differ);
+    ProgressPart& part =
+        stream_.begin(0.0, read_part, place.file_bytes + (place.codec == Codec::NONE ? 0 : place.memory_bytes));
+    auto buffer = nanovdb::HostBuffer::create(place.memory_bytes);
     std::uint64_t position = place.position;
     std::uint64_t rest = place.file_bytes;
     const auto next_frame = [&] {
-      std::uint64_t frame = 0;
-      if (rest < sizeof frame) fail(damaged);
-      read_bytes(position, &frame, sizeof frame);
-      position += sizeof frame;
-      rest -= sizeof frame;
-      if (frame > rest) fail(damaged);
-      rest -= frame;
-      return frame;
+      std::uint64_t bytes = 0;
+      if (rest < sizeof bytes) fail(sizes_differ);
+      read_bytes(position, &bytes, sizeof bytes);
+      position += sizeof bytes;
+      rest -= sizeof bytes;
+      if (bytes > rest) fail(sizes_differ);
+      position += bytes;
+      rest -= bytes;
+      return bytes;
     };
     switch (place.codec) {
-      case Codec::ZIP:
-        next_frame();
+      case Codec::ZIP: {
+        const std::uint64_t frame = next_frame();
+        inflate_frame(frame, buffer.data(), place.memory_bytes, part);
         break;
+      }
       case Codec::BLOSC:
-        for (std::uint64_t left = place.memory_bytes; left > 0;) {
+        for (std::uint64_t done = 0; done < place.memory_bytes;) {
+          const std::uint64_t chunk = std::min<std::uint64_t>(place.memory_bytes - done, most_chunk);
           const std::uint64_t frame = next_frame();
-          const std::uint64_t chunk = std::min(left, nanovdb::io::Internal::MAX_SIZE);
-          std::array<char, BLOSC_MIN_HEADER_LENGTH> head{};
-          if (frame < head.size()) fail(damaged);
-          read_bytes(position, head.data(), head.size());
-          std::size_t bytes = 0;
-          if (blosc_cbuffer_validate(head.data(), frame, &bytes) != 0 || bytes != chunk) fail(damaged);
-          position += frame;
-          left -= chunk;
+          unpack_frame(frame, buffer.data() + done, chunk, part);
+          done += chunk;
         }
         break;
       default:
-        if (place.memory_bytes != place.file_bytes) fail(damaged);
+        read_bytes(position, buffer.data(), place.memory_bytes);
         rest = 0;
     }
-    if (rest != 0) fail(damaged);
+    if (rest != 0) fail(sizes_differ);
+    return Handle(std::move(buffer));
   }
 
-  std::uint64_t size_ = 0;
-  std::ifstream stream_;
+  /// Decodes the zlib frame that the stream stands at.
+  void inflate_frame(std::uint64_t frame, std::uint8_t* to, std::uint64_t bytes, ProgressPart& part) {
+    z_stream zip{};
+    if (inflateInit(&zip) != Z_OK) throw std::bad_alloc();
+    const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&zip, inflateEnd);
+    std::vector<Bytef> input(std::size_t{64} << 10U);
+    std::uint64_t done = 0;
+    for (int status = Z_OK; status != Z_STREAM_END;) {
+      if (zip.avail_in == 0) {
+        const std::uint64_t n = std::min<std::uint64_t>(frame, input.size());
+        if (n == 0) fail(sizes_differ);
+        stream_.read(reinterpret_cast<char*>(input.data()), static_cast<std::streamsize>(n));
+        frame -= n;
+        zip.next_in = input.data();
+        zip.avail_in = static_cast<uInt>(n);
+      }
+      const auto room = static_cast<uInt>(std::min<std::uint64_t>(bytes - done, most_piece));
+      zip.next_out = to + done;
+      zip.avail_out = room;
+      status = inflate(&zip, Z_NO_FLUSH);
+      const uInt got = room - zip.avail_out;
+      if (status != Z_OK && status != Z_STREAM_END) fail(sizes_differ);
+      done += got;
+      part.add(got);
+    }
+    if (done != bytes) fail(sizes_differ);
+  }
+
+  /// Decodes the Blosc frame that the stream stands at.
+  void unpack_frame(std::uint64_t frame, std::uint8_t* to, std::uint64_t bytes, ProgressPart& part) {
+    std::vector<char> packed;
+    part.resize(packed, frame);
+    stream_.read(packed.data(), static_cast<std::streamsize>(frame));
+    std::size_t whole = 0;
+    std::size_t block = 0;
+    std::size_t item = 0;
+    int flags = 0;
+    if (frame < BLOSC_MIN_HEADER_LENGTH || blosc_cbuffer_validate(packed.data(), frame, &whole) != 0 || whole != bytes)
+      fail(sizes_differ);
+    blosc_cbuffer_sizes(packed.data(), &whole, &frame, &block);
+    blosc_cbuffer_metainfo(packed.data(), &item, &flags);
+    if (block == 0 || item == 0 || block % item != 0 || bytes % item != 0) fail(sizes_differ);
+    // Blocks are packed each for itself.
+    const std::uint64_t piece = std::max<std::uint64_t>(most_piece / block, 1) * block;
+    tbb::parallel_for(std::uint64_t{0}, (bytes + piece - 1) / piece, [&](std::uint64_t i) {
+      part.check();
+      const std::uint64_t n = std::min(piece, bytes - i * piece);
+      const int got =
+          blosc_getitem(packed.data(), static_cast<int>(i * piece / item), static_cast<int>(n / item), to + i * piece);
+      if (got < 0 || static_cast<std::uint64_t>(got) != n) fail(sizes_differ);
+      part.add(n);
+    });
+  }
+
+  static constexpr const char* sizes_differ = "the file is damaged: its sizes do not agree";
+  static constexpr std::uint64_t most_chunk = std::uint64_t{1} << 30U;  ///< that NanoVDB packs into one Blosc frame
+  static constexpr std::uint64_t most_piece = std::uint64_t{4} << 20U;  ///< decoded between looks at the cancel flag
+
+  Progress* progress_;
+  SourceFile stream_;
+  std::uint64_t size_;
   std::vector<Place> places_;
-  std::vector<GridEntry> entries_;
+  std::vector<GridInfo> entries_;
 };
 
 }  // namespace
 
-std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file) { return std::make_unique<NanoReader>(file); }
+std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file, Progress* progress) {
+  return std::make_unique<NanoReader>(file, progress);
+}
 
 }  // namespace cumulet::volume::detail

@@ -4,10 +4,11 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
-#include <fstream>
+#include <bit>
 #include <mutex>
 
 #include "volume/import_detail.hpp"
+#include "volume/source_file.hpp"
 
 namespace cumulet::volume::detail {
 namespace {
@@ -80,16 +81,66 @@ void take_tree(const openvdb::GridBase& grid, SourceGrid& out) {
   using TreeT = typename GridT::TreeType;
   const auto tree = static_cast<const GridT&>(grid).treePtr();
   const auto& root = tree->root();
-  // A damaged root table could hold the same region twice under two keys.
-  constexpr int region_mask = static_cast<int>(TreeT::RootNodeType::ChildNodeType::DIM) - 1;
-  for (auto it = root.cbeginChildAll(); it; ++it) {
-    const openvdb::Coord key = it.getCoord();
-    if (((key.x() | key.y() | key.z()) & region_mask) != 0) fail("damaged root node");
-  }
   out.background = static_cast<float>(root.background());
   collect_tiles(root, out.background, out.tiles);
   out.leaves = std::make_unique<VdbLeaves<TreeT>>(tree);
 }
+
+/// The same tree, but one that frees what it has read when its stream throws: OpenVDB's own root forgets the child that
+/// it was reading, with all that is below.
+template <typename TreeT>
+class OwningTree final : public TreeT {
+ public:
+  void readTopology(std::istream& in, bool from_half) override {
+    using RootT = typename TreeT::RootNodeType;
+    using ChildT = typename RootT::ChildNodeType;
+    using ValueT = typename TreeT::ValueType;
+    const auto read = [&]<typename T>(T& value) { in.read(reinterpret_cast<char*>(&value), sizeof value); };
+    this->clear();
+    openvdb::TreeBase::readTopology(in, from_half);
+    RootT& root = this->root();
+    ValueT background{};
+    read(background);
+    root.setBackground(background, false);
+    openvdb::io::setGridBackgroundValuePtr(in, &root.background());
+    // A node that is not read to its end holds the background where children should be: it can be freed if those are
+    // null pointers. If not, it has to be read to its end, or is lost if the file ends before.
+    const bool frees = std::all_of(reinterpret_cast<const char*>(&background),
+                                   reinterpret_cast<const char*>(&background + 1), [](char c) { return c == 0; });
+    auto& file = dynamic_cast<SourceFile&>(in);
+    openvdb::Index tiles = 0;
+    openvdb::Index children = 0;
+    read(tiles);
+    read(children);
+    const auto read_key = [&] {
+      std::array<std::int32_t, 3> key{};
+      read(key);
+      // A damaged table could hold the same region twice under two keys.
+      if (((key[0] | key[1] | key[2]) & static_cast<int>(ChildT::DIM - 1)) != 0) fail("damaged root node");
+      return openvdb::Coord(key.data());
+    };
+    for (openvdb::Index i = 0; i < tiles; ++i) {
+      const openvdb::Coord key = read_key();
+      ValueT value{};
+      std::uint8_t active = 0;
+      read(value);
+      read(active);
+      root.addTile(key, value, active != 0);
+    }
+    for (openvdb::Index i = 0; i < children; ++i) {
+      auto child = std::make_unique<ChildT>(openvdb::PartialCreate(), read_key(), background);
+      file.hold(!frees);
+      try {
+        child->readTopology(in, from_half);
+      } catch (...) {
+        if (!frees) (void)child.release();
+        throw;
+      }
+      file.hold(false);
+      root.addChild(child.release());
+    }
+  }
+};
 
 /// A .vdb file read through openvdb's archive.
 ///
@@ -98,51 +149,36 @@ void take_tree(const openvdb::GridBase& grid, SourceGrid& out) {
 /// offset is checked against the file's size and the stream throws at its end.
 class VdbReader final : public Reader, private openvdb::io::Archive {
  public:
-  explicit VdbReader(const std::filesystem::path& file) {
+  VdbReader(const std::filesystem::path& file, Progress* progress) : stream_(file, progress), size_(stream_.size()) {
     initialize_openvdb();
-    size_ = static_cast<std::int64_t>(std::filesystem::file_size(file));
-    stream_.open(file, std::ios::binary);
-    if (!stream_) fail("cannot be opened");
-    stream_.exceptions(std::ios::failbit | std::ios::badbit);
-    at_end_means_truncated([this] { read_directory(); });
+    read_directory();
   }
-  [[nodiscard]] const std::vector<GridEntry>& grids() const override { return entries_; }
+  [[nodiscard]] const std::vector<GridInfo>& grids() const override { return entries_; }
 
   SourceGrid read(std::size_t index, const Log& /*log*/, const std::string& /*log_prefix*/) override {
     SourceGrid out;
-    at_end_means_truncated([&] {
-      openvdb::GridBase::Ptr grid = read_grid(descriptors_[index]);
-      if (descriptors_[index].isInstance()) {
-        const auto parent = std::find_if(descriptors_.begin(), descriptors_.end(), [&](const auto& d) {
-          return d.uniqueName() == descriptors_[index].instanceParentName();
-        });
-        if (parent == descriptors_.end() || parent->isInstance()) fail("it shares the tree of a grid that is missing");
-        grid->setTree(read_grid(*parent)->baseTreePtr());
-      }
-      const auto matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
-      // OpenVDB multiplies row vectors from the left: its rows are our columns.
-      for (int column = 0; column < 4; ++column) {
-        for (int row = 0; row < 4; ++row) out.index_to_world[column][row] = matrix(column, row);
-      }
-      if (grid->isType<openvdb::FloatGrid>()) {
-        take_tree<openvdb::FloatGrid>(*grid, out);
-      } else {
-        take_tree<openvdb::DoubleGrid>(*grid, out);
-      }
-    });
+    openvdb::GridBase::Ptr grid = read_grid(descriptors_[index]);
+    if (descriptors_[index].isInstance()) {
+      const auto parent = std::find_if(descriptors_.begin(), descriptors_.end(), [&](const auto& d) {
+        return d.uniqueName() == descriptors_[index].instanceParentName();
+      });
+      if (parent == descriptors_.end() || parent->isInstance()) fail("it shares the tree of a grid that is missing");
+      grid->setTree(read_grid(*parent)->baseTreePtr());
+    }
+    const auto matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
+    // OpenVDB multiplies row vectors from the left: its rows are our columns.
+    for (int column = 0; column < 4; ++column) {
+      for (int row = 0; row < 4; ++row) out.index_to_world[column][row] = matrix(column, row);
+    }
+    if (grid->isType<openvdb::FloatGrid>()) {
+      take_tree<openvdb::FloatGrid>(*grid, out);
+    } else {
+      take_tree<openvdb::DoubleGrid>(*grid, out);
+    }
     return out;
   }
 
  private:
-  template <typename Function>
-  void at_end_means_truncated(Function&& function) {
-    try {
-      function();
-    } catch (const std::ios_base::failure&) {
-      fail("the file is truncated or damaged: unexpected end of file");
-    }
-  }
-
   template <typename T>
   T read_value() {
     T value;
@@ -152,7 +188,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
 
   void skip_string() {
     const auto length = read_value<std::uint32_t>();
-    if (length > size_ - stream_.tellg()) fail("the file is truncated or damaged: unexpected end of file");
+    if (length > size_ - stream_.tellg()) fail(end_of_file);
     stream_.seekg(length, std::ios::cur);
   }
 
@@ -199,6 +235,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     check_lengths([this] { skip_metadata(); });
     openvdb::MetaMap().readMeta(stream_);
     const std::int32_t count = readGridCount(stream_);
+    if (!inputHasGridOffsets()) stream_.begin(0.0, 0.5 * read_part, static_cast<std::uint64_t>(size_));
     if (count < 0) fail("the file is damaged: negative grid count");
     for (std::int32_t i = 0; i < count; ++i) read_entry();
   }
@@ -231,13 +268,13 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
       descriptor.setGridPos(body);
     }
 
-    GridEntry entry;
-    entry.info.name = descriptor.gridName();
+    GridInfo entry;
+    entry.name = descriptor.gridName();
     entry.unique_name = openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName());
     if (!grid) {
-      entry.info.type = descriptor.gridType();
-      entry.info.grid_class = "unknown";
-      entry.refusal = scalar_fog_refusal(entry.info.type, entry.info.grid_class, false);
+      entry.type = descriptor.gridType();
+      entry.grid_class = "unknown";
+      entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, false);
     } else {
       if (inputHasGridOffsets()) {
         stream_.seekg(descriptor.getGridPos());
@@ -248,7 +285,9 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
       } else {
         // Written to a pipe: where the next grid begins is known only after reading this one.
         check_grid_head();
+        stream_.hold(!own_tree(*grid));
         readGrid(grid, descriptor, stream_);
+        stream_.hold(false);
       }
       describe(*grid, descriptor, entry);
     }
@@ -259,35 +298,57 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     entries_.push_back(std::move(entry));
   }
 
-  static void describe(const openvdb::GridBase& grid, const openvdb::io::GridDescriptor& descriptor, GridEntry& entry) {
+  static void describe(const openvdb::GridBase& grid, const openvdb::io::GridDescriptor& descriptor, GridInfo& entry) {
     const bool is_float = grid.isType<openvdb::FloatGrid>();
     const bool points = grid.type().find("ptdataidx") != std::string::npos;
-    entry.info.type = is_float && descriptor.saveFloatAsHalf() ? "half" : points ? "points" : grid.valueType();
-    entry.info.grid_class = class_name(grid.getGridClass());
-    entry.refusal =
-        scalar_fog_refusal(entry.info.type, entry.info.grid_class, is_float || grid.isType<openvdb::DoubleGrid>());
+    entry.type = is_float && descriptor.saveFloatAsHalf() ? "half" : points ? "points" : grid.valueType();
+    entry.grid_class = class_name(grid.getGridClass());
+    entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_float || grid.isType<openvdb::DoubleGrid>());
     if (entry.refusal.empty() && !grid.transform().isLinear()) {
       entry.refusal = "has a frustum transform, which is not affine";
     }
   }
 
+  /// Whether the grid is of a type that can be read here at all, and so cancelled.
+  static bool own_tree(openvdb::GridBase& grid) {
+    if (grid.isType<openvdb::FloatGrid>()) {
+      grid.setTree(std::make_shared<OwningTree<openvdb::FloatTree>>());
+    } else if (grid.isType<openvdb::DoubleGrid>()) {
+      grid.setTree(std::make_shared<OwningTree<openvdb::DoubleTree>>());
+    } else {
+      return false;
+    }
+    return true;
+  }
+
   openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor) {
+    // An instance holds no tree. Without offsets the directory was a whole reading of the file, and this one may come
+    // close to another.
+    if (descriptor.isInstance()) {
+    } else if (inputHasGridOffsets()) {
+      stream_.begin(0.0, read_part, static_cast<std::uint64_t>(descriptor.getEndPos() - descriptor.getGridPos()));
+    } else {
+      stream_.begin(0.5 * read_part, read_part, static_cast<std::uint64_t>(size_));
+    }
     openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(descriptor.gridType());
+    own_tree(*grid);
     grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
     stream_.seekg(descriptor.getGridPos());
     readGrid(grid, descriptor, stream_);
     return grid;
   }
 
-  std::int64_t size_ = 0;
   openvdb::io::StreamMetadata::Ptr metadata_;  // the stream points to it
-  std::ifstream stream_;  // small buffer on purpose: OpenVDB seeks at every leaf, and a seek drops the buffer
+  SourceFile stream_;
+  std::int64_t size_;
   std::vector<openvdb::io::GridDescriptor> descriptors_;
-  std::vector<GridEntry> entries_;
+  std::vector<GridInfo> entries_;
 };
 
 }  // namespace
 
-std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file) { return std::make_unique<VdbReader>(file); }
+std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* progress) {
+  return std::make_unique<VdbReader>(file, progress);
+}
 
 }  // namespace cumulet::volume::detail

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/log.hpp"
+#include "base/progress.hpp"
 
 namespace cumulet::volume {
 
@@ -47,8 +48,10 @@ struct ScalarVolume {
 /// One grid of a file, for listings and messages.
 struct GridInfo {
   std::string name;
-  std::string type;        ///< as the file says: "float", "half", "vec3s", ...
-  std::string grid_class;  ///< "fog volume", "level set", "unknown", ...
+  std::string type;         ///< as the file says: "float", "half", "vec3s", ...
+  std::string grid_class;   ///< "fog volume", "level set", "unknown", ...
+  std::string unique_name;  ///< "name[n]" where a file repeats a name
+  std::string refusal;      ///< why it is no scalar fog volume; empty: it is one
 };
 
 /// The grids of a .vdb or .nvdb file, without their voxels. Throws Error(file).
@@ -60,7 +63,8 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file);
 /// lists them. Level sets, vector grids, points, empty grids, non-finite voxels and unreadable files
 /// throw Error(file) with one line that names file and cause. Negative voxels are clamped to zero
 /// with one warning that counts them. Any affine transform is accepted; a frustum transform is not.
-/// O(active nodes) time and memory.
-ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log);
+/// O(active nodes) time and memory. progress receives the fraction done; cancelled, Error(cancelled) is thrown.
+ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
+                           Progress* progress = nullptr);
 
 }  // namespace cumulet::volume

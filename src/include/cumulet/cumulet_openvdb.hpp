@@ -1,0 +1,139 @@
+/*
+ * Cumulet volumes of OpenVDB grids that a host has in memory.
+ *
+ * Header-only, on top of cumulet_volume_from_sparse, and compiled with the host's own OpenVDB: that may be of another
+ * version or ABI than the one inside Cumulet. C++17; link OpenVDB and TBB, which every user of OpenVDB links.
+ */
+#ifndef CUMULET_CUMULET_OPENVDB_HPP
+#define CUMULET_CUMULET_OPENVDB_HPP
+
+#include <cumulet/cumulet.h>
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
+
+#include <cstring>
+#include <memory>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace cumulet {
+namespace openvdb_detail {
+
+/* What cumulet_sparse_desc takes, flat. */
+struct Flat {
+  std::vector<int32_t> origins;
+  std::unique_ptr<float[]> values; /* not a vector: that would fill it first */
+  std::unique_ptr<uint64_t[]> active;
+  std::vector<cumulet_tile> tiles;
+  float background = 0.0F;
+};
+
+template <class TreeT>
+void flatten(const TreeT& tree, Flat& flat) {
+  using LeafT = typename TreeT::LeafNodeType;
+  static_assert(LeafT::DIM == 8, "Cumulet's bricks are OpenVDB's usual leaves");
+  flat.background = static_cast<float>(tree.background());
+
+  std::vector<const LeafT*> leaves;
+  tree.getNodes(leaves);
+  flat.origins.resize(3 * leaves.size());
+  flat.values.reset(new float[512 * leaves.size()]);
+  flat.active.reset(new uint64_t[8 * leaves.size()]);
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) {
+    const LeafT& leaf = *leaves[i];
+    for (int axis = 0; axis < 3; ++axis) flat.origins[3 * i + static_cast<std::size_t>(axis)] = leaf.origin()[axis];
+    for (openvdb::Index x = 0; x < 8; ++x) flat.active[8 * i + x] = leaf.valueMask().template getWord<uint64_t>(x);
+    const auto* values = leaf.buffer().data(); /* reads it now if its loading was delayed */
+    for (std::size_t n = 0; n < 512; ++n) flat.values[512 * i + n] = static_cast<float>(values[n]);
+  });
+
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(TreeT::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    const auto value = static_cast<float>(*tile);
+    if (!tile.isValueOn() && value == flat.background) continue;
+    openvdb::CoordBBox box;
+    tile.getBoundingBox(box);
+    cumulet_tile out{};
+    for (int axis = 0; axis < 3; ++axis) {
+      out.min[axis] = box.min()[axis];
+      out.max[axis] = box.max()[axis];
+    }
+    out.value = value;
+    out.active = tile.isValueOn() ? 1 : 0;
+    flat.tiles.push_back(out);
+  }
+}
+
+template <class TreeT>
+bool flatten_if(const openvdb::TreeBase& tree, Flat& flat) {
+  if (tree.type() != TreeT::treeType()) return false;
+  flatten(static_cast<const TreeT&>(tree), flat);
+  return true;
+}
+
+} /* namespace openvdb_detail */
+
+/*
+ * The volume of a float, half or double grid, with the grid's name; as if it had been written to a file and opened.
+ * The grid is copied (once, flat, for the time of the call) and not kept. Level sets, other value types and frustum
+ * transforms are refused: CUMULET_ERROR_FILE, with one line in error, as cumulet_create has it. Any thread.
+ */
+inline cumulet_status volume_from_openvdb(const openvdb::GridBase::ConstPtr& grid, cumulet_volume** out,
+                                          char* error = nullptr, size_t error_size = 0) {
+  std::string name = "openvdb";
+  const auto refuse = [&](cumulet_status status, const std::string& cause) {
+    if (out != nullptr) *out = nullptr;
+    if (error == nullptr || error_size == 0) return status;
+    std::string line = name + ": " + cause;
+    for (char& c : line) c = static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+    const size_t length = line.size() < error_size ? line.size() : error_size - 1;
+    std::memcpy(error, line.data(), length);
+    error[length] = '\0';
+    return status;
+  };
+  try {
+    if (!grid) return refuse(CUMULET_ERROR_INVALID_ARGUMENT, "grid is NULL");
+    if (!grid->getName().empty()) name = grid->getName();
+    const openvdb::GridClass grid_class = grid->getGridClass();
+    if (grid_class != openvdb::GRID_FOG_VOLUME && grid_class != openvdb::GRID_UNKNOWN) {
+      return refuse(CUMULET_ERROR_FILE,
+                    "is a " + openvdb::GridBase::gridClassToString(grid_class) + ", not a fog volume");
+    }
+    if (!grid->transform().isLinear()) {
+      return refuse(CUMULET_ERROR_FILE, "has a frustum transform, which is not affine");
+    }
+    const openvdb::TreeBase& tree = grid->constBaseTree();
+    openvdb_detail::Flat flat;
+    using HalfTree = openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type;
+    if (!openvdb_detail::flatten_if<openvdb::FloatTree>(tree, flat) &&
+        !openvdb_detail::flatten_if<openvdb::DoubleTree>(tree, flat) &&
+        !openvdb_detail::flatten_if<HalfTree>(tree, flat)) {
+      return refuse(CUMULET_ERROR_FILE, "is of type " + grid->valueType() + ", not a float or half scalar");
+    }
+    cumulet_sparse_desc desc{};
+    desc.struct_size = sizeof desc;
+    desc.brick_origins = flat.origins.data();
+    desc.brick_values = flat.values.get();
+    desc.brick_active = flat.active.get();
+    desc.brick_count = flat.origins.size() / 3;
+    desc.tiles = flat.tiles.data();
+    desc.tile_count = flat.tiles.size();
+    desc.background = flat.background;
+    desc.name = name.c_str();
+    /* OpenVDB multiplies row vectors from the left: its rows are columns here. */
+    const openvdb::Mat4d matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
+    for (int i = 0; i < 16; ++i) desc.index_to_world[i] = matrix(i / 4, i % 4);
+    return cumulet_volume_from_sparse(&desc, out, error, error_size);
+  } catch (const std::bad_alloc&) {
+    return refuse(CUMULET_ERROR_OUT_OF_MEMORY, "not enough memory to copy it");
+  } catch (const std::exception& e) {
+    return refuse(CUMULET_ERROR_FILE, e.what());
+  }
+}
+
+} /* namespace cumulet */
+
+#endif

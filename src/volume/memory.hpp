@@ -1,0 +1,38 @@
+#pragma once
+
+#include <span>
+
+#include "volume/volume.hpp"
+
+namespace cumulet::volume {
+
+/// A tile as a tree has it: not clipped to the active voxels, perhaps of the background value, perhaps inactive.
+struct SourceTile {
+  Tile box;
+  bool active;
+};
+
+/// Voxels in a box from (0,0,0) on; active are those that are not zero.
+struct DenseVoxels {
+  std::span<const float> values;  ///< x fastest, then y, then z
+  glm::ivec3 size{0};             ///< values.size() is their product
+  glm::dmat4 index_to_world{1.0};
+};
+
+/// A tree as OpenVDB has it.
+struct SparseVoxels {
+  std::span<const std::int32_t> brick_origins;  ///< 3 a brick: multiples of 8, no two bricks in one place
+  std::span<const float> brick_values;          ///< 512 a brick, z fastest, then y, then x
+  std::span<const std::uint64_t> brick_active;  ///< 8 words a brick, word x, bit y * 8 + z; empty: all are active
+  std::vector<SourceTile> tiles;                ///< disjoint, not over bricks
+  float background = 0.0F;
+  glm::dmat4 index_to_world{1.0};
+};
+
+/// The same as import_volume for voxels in memory, which are copied; name begins every message. Throws
+/// Error(invalid_argument) for spans and sizes that do not agree, else Error(file) as for a file.
+ScalarVolume import_dense(const DenseVoxels& voxels, const std::string& name, const Log& log,
+                          Progress* progress = nullptr);
+ScalarVolume import_sparse(SparseVoxels voxels, const std::string& name, const Log& log, Progress* progress = nullptr);
+
+}  // namespace cumulet::volume

@@ -1,0 +1,286 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+
+#include "base/progress_part.hpp"
+#include "volume/import_detail.hpp"
+#include "volume/memory.hpp"
+
+namespace cumulet::volume {
+
+using namespace detail;
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& name, const std::string& cause) {
+  throw Error(ErrorCode::invalid_argument, one_line(name + ": " + cause));
+}
+
+void check_affine(const glm::dmat4& m) {
+  if (m[0].w != 0.0 || m[1].w != 0.0 || m[2].w != 0.0 || m[3].w != 1.0) fail("its transform is not affine");
+}
+
+class DenseLeaves final : public LeafSource {
+ public:
+  DenseLeaves(const DenseVoxels& voxels, std::vector<glm::ivec3> origins)
+      : voxels_(voxels), origins_(std::move(origins)) {}
+
+  [[nodiscard]] std::size_t count() const override { return origins_.size(); }
+  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return origins_[leaf]; }
+  [[nodiscard]] ActiveMask active(std::size_t leaf) const override {
+    std::array<float, brick_voxels> brick;
+    values(leaf, brick.data());
+    ActiveMask mask{};
+    for (std::size_t i = 0; i < brick.size(); ++i) {
+      mask[i / 64] |= std::uint64_t{brick[i] != 0.0F ? 1U : 0U} << (i % 64);
+    }
+    return mask;
+  }
+  void values(std::size_t leaf, float* out) const override {
+    const glm::ivec3 origin = origins_[leaf];
+    const glm::ivec3 size = glm::min(voxels_.size - origin, brick_size);
+    if (size != glm::ivec3(brick_size)) std::fill_n(out, brick_voxels, 0.0F);
+    for (int z = 0; z < size.z; ++z) {
+      for (int y = 0; y < size.y; ++y) {
+        const float* row = &voxels_.values[row_index(voxels_.size, origin + glm::ivec3(0, y, z))];
+        for (int x = 0; x < size.x; ++x) out[(x * brick_size + y) * brick_size + z] = row[x];
+      }
+    }
+  }
+
+  static std::size_t row_index(const glm::ivec3& size, const glm::ivec3& p) {
+    const glm::u64vec3 u(p);
+    return (u.z * static_cast<std::uint64_t>(size.y) + u.y) * static_cast<std::uint64_t>(size.x) + u.x;
+  }
+
+ private:
+  DenseVoxels voxels_;
+  std::vector<glm::ivec3> origins_;
+};
+
+/// Origins of the bricks that hold any voxel but zero.
+std::vector<glm::ivec3> dense_bricks(const DenseVoxels& voxels, Progress* progress, double to) {
+  const glm::ivec3 bricks = (voxels.size - 1) / brick_size + 1;
+  const auto rows = static_cast<std::size_t>(bricks.y) * static_cast<std::size_t>(bricks.z);
+  const auto columns = static_cast<std::size_t>(bricks.x);
+  std::vector<std::vector<glm::ivec3>> found(rows);
+  ProgressPart part(progress, 0.0, to, rows);
+  tbb::parallel_for(std::size_t{0}, rows, [&](std::size_t row) {
+    const glm::ivec3 low(0, brick_size * static_cast<int>(row % static_cast<std::size_t>(bricks.y)),
+                         brick_size * static_cast<int>(row / static_cast<std::size_t>(bricks.y)));
+    const glm::ivec3 high = glm::min(low + brick_size, voxels.size);
+    std::vector<char> any(columns);
+    for (int z = low.z; z < high.z; ++z) {
+      for (int y = low.y; y < high.y; ++y) {
+        part.check();
+        const float* values = &voxels.values[DenseLeaves::row_index(voxels.size, {0, y, z})];
+        for (std::size_t x = 0; x < static_cast<std::size_t>(voxels.size.x); ++x) {
+          if (values[x] != 0.0F) any[x / brick_size] = 1;
+        }
+      }
+    }
+    for (std::size_t x = 0; x < columns; ++x) {
+      if (any[x] != 0) found[row].emplace_back(brick_size * static_cast<int>(x), low.y, low.z);
+    }
+    part.add(1);
+  });
+  std::vector<glm::ivec3> origins;
+  for (const auto& row : found) origins.insert(origins.end(), row.begin(), row.end());
+  return origins;
+}
+
+glm::ivec3 origin_of(std::span<const std::int32_t> origins, std::size_t brick) {
+  return {origins[3 * brick], origins[3 * brick + 1], origins[3 * brick + 2]};
+}
+
+class SparseLeaves final : public LeafSource {
+ public:
+  explicit SparseLeaves(const SparseVoxels& voxels)
+      : origins_(voxels.brick_origins), values_(voxels.brick_values), active_(voxels.brick_active) {}
+
+  [[nodiscard]] std::size_t count() const override { return origins_.size() / 3; }
+  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return origin_of(origins_, leaf); }
+  [[nodiscard]] ActiveMask active(std::size_t leaf) const override {
+    ActiveMask mask;
+    mask.fill(~std::uint64_t{0});
+    if (!active_.empty()) std::copy_n(&active_[leaf * mask.size()], mask.size(), mask.begin());
+    return mask;
+  }
+  void values(std::size_t leaf, float* out) const override {
+    std::copy_n(&values_[leaf * brick_voxels], brick_voxels, out);
+  }
+
+ private:
+  std::span<const std::int32_t> origins_;
+  std::span<const float> values_;
+  std::span<const std::uint64_t> active_;
+};
+
+bool meet(const Tile& a, const Tile& b) {
+  return glm::all(glm::lessThanEqual(a.min, b.max)) && glm::all(glm::lessThanEqual(b.min, a.max));
+}
+
+/// Fails unless the tiles are disjoint and not over bricks. Cuts space between tiles until few are left on a side.
+class Disjointness {
+ public:
+  Disjointness(const SparseVoxels& voxels, const Progress* progress) : voxels_(&voxels), progress_(progress) {}
+
+  void check() {
+    std::vector<Part> parts(1);
+    parts[0].tiles.resize(voxels_->tiles.size());
+    std::iota(parts[0].tiles.begin(), parts[0].tiles.end(), std::uint32_t{0});
+    if (!parts[0].tiles.empty()) {
+      parts[0].bricks.resize(voxels_->brick_origins.size() / 3);
+      std::iota(parts[0].bricks.begin(), parts[0].bricks.end(), std::uint32_t{0});
+    }
+    while (!parts.empty()) {
+      cumulet::check(progress_);
+      const Part part = std::move(parts.back());
+      parts.pop_back();
+      constexpr std::size_t few = 8;
+      if (part.tiles.size() <= few) {
+        compare(part);
+        continue;
+      }
+      const Plane plane = between(part);
+      Part low;
+      Part high;
+      for (const std::uint32_t t : part.tiles) {
+        if (tile(t).min[plane.axis] <= plane.last) low.tiles.push_back(t);
+        if (tile(t).max[plane.axis] > plane.last) high.tiles.push_back(t);
+      }
+      for (const std::uint32_t b : part.bricks) {
+        if (brick(b).min[plane.axis] <= plane.last) low.bricks.push_back(b);
+        if (brick(b).max[plane.axis] > plane.last) high.bricks.push_back(b);
+      }
+      parts.push_back(std::move(low));
+      parts.push_back(std::move(high));
+    }
+  }
+
+ private:
+  struct Part {
+    std::vector<std::uint32_t> tiles, bricks;
+  };
+  struct Plane {
+    int axis;
+    int last;  ///< the last voxel below it
+  };
+
+  [[nodiscard]] const Tile& tile(std::uint32_t t) const { return voxels_->tiles[t].box; }
+  [[nodiscard]] Tile brick(std::uint32_t b) const {
+    const glm::ivec3 origin = origin_of(voxels_->brick_origins, b);
+    return {origin, origin + (brick_size - 1), 0.0F};
+  }
+
+  void compare(const Part& part) const {
+    for (std::size_t i = 0; i < part.tiles.size(); ++i) {
+      const Tile& a = tile(part.tiles[i]);
+      for (std::size_t j = 0; j < i; ++j) {
+        if (meet(a, tile(part.tiles[j]))) overlap(a, tile(part.tiles[j]));
+      }
+      for (const std::uint32_t b : part.bricks) {
+        if (meet(a, brick(b)))
+          fail("its tile at " + to_string(a.min) + " lies over the brick at " + to_string(brick(b).min));
+      }
+    }
+  }
+
+  [[noreturn]] static void overlap(const Tile& a, const Tile& b) {
+    fail("its tiles at " + to_string(a.min) + " and " + to_string(b.min) + " overlap");
+  }
+
+  /// The plane at the middle one of the tiles' upper ends that leaves fewest tiles on its fuller side; where none
+  /// leaves fewer than there are, one between two of them.
+  [[nodiscard]] Plane between(const Part& part) const {
+    Plane best{0, 0};
+    std::size_t fewest = part.tiles.size();
+    std::vector<int> ends(part.tiles.size());
+    for (int axis = 0; axis < 3; ++axis) {
+      std::transform(part.tiles.begin(), part.tiles.end(), ends.begin(), [&](auto t) { return tile(t).max[axis]; });
+      const auto middle = ends.begin() + static_cast<std::ptrdiff_t>(ends.size() / 2);
+      std::nth_element(ends.begin(), middle, ends.end());
+      std::size_t low = 0;
+      std::size_t high = 0;
+      for (const std::uint32_t t : part.tiles) {
+        low += tile(t).min[axis] <= *middle ? 1 : 0;
+        high += tile(t).max[axis] > *middle ? 1 : 0;
+      }
+      if (std::max(low, high) < fewest) {
+        fewest = std::max(low, high);
+        best = {axis, *middle};
+      }
+    }
+    if (fewest < part.tiles.size()) return best;
+    const Tile& a = tile(part.tiles[0]);
+    const Tile& b = tile(part.tiles[1]);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (a.max[axis] < b.min[axis]) return {axis, a.max[axis]};
+      if (b.max[axis] < a.min[axis]) return {axis, b.max[axis]};
+    }
+    overlap(a, b);
+  }
+
+  const SparseVoxels* voxels_;
+  const Progress* progress_;
+};
+
+ScalarVolume finish(SourceGrid source, const std::string& name, const Log& log, Progress* progress, double from) {
+  ScalarVolume volume = assemble(std::move(source), log, one_line(name) + ": ", progress, from);
+  volume.name = name;
+  return volume;
+}
+
+}  // namespace
+
+ScalarVolume import_dense(const DenseVoxels& voxels, const std::string& name, const Log& log, Progress* progress) {
+  if (glm::any(glm::lessThanEqual(voxels.size, glm::ivec3(0)))) refuse(name, "its size is " + to_string(voxels.size));
+  // Divided, because the product may be too large for any integer.
+  const glm::u64vec3 size(voxels.size);
+  const std::uint64_t count = voxels.values.size();
+  if (count % size.x != 0 || count / size.x % size.y != 0 || count / size.x / size.y != size.z) {
+    refuse(name, "has " + std::to_string(count) + " values for a size of " + to_string(voxels.size));
+  }
+  return naming(name, [&] {
+    check_affine(voxels.index_to_world);
+    constexpr double finding = 0.3;
+    SourceGrid source;
+    source.index_to_world = voxels.index_to_world;
+    source.leaves = std::make_unique<DenseLeaves>(voxels, dense_bricks(voxels, progress, finding));
+    return finish(std::move(source), name, log, progress, finding);
+  });
+}
+
+ScalarVolume import_sparse(SparseVoxels voxels, const std::string& name, const Log& log, Progress* progress) {
+  const std::size_t count = voxels.brick_origins.size() / 3;
+  if (voxels.brick_origins.size() != 3 * count || voxels.brick_values.size() != count * brick_voxels ||
+      (!voxels.brick_active.empty() && voxels.brick_active.size() != count * brick_size)) {
+    refuse(name, "its numbers of brick origins, values and masks differ");
+  }
+  return naming(name, [&] {
+    check_affine(voxels.index_to_world);
+    for (std::size_t i = 0; i < count; ++i) {
+      const glm::ivec3 origin = origin_of(voxels.brick_origins, i);
+      if (((origin.x | origin.y | origin.z) & (brick_size - 1)) != 0) {
+        fail("its brick origin " + to_string(origin) + " is no multiple of 8");
+      }
+    }
+    for (const SourceTile& tile : voxels.tiles) {
+      if (glm::any(glm::greaterThan(tile.box.min, tile.box.max))) {
+        fail("its tile at " + to_string(tile.box.min) + " ends before it begins, at " + to_string(tile.box.max));
+      }
+    }
+    Disjointness(voxels, progress).check();
+    SourceGrid source;
+    source.index_to_world = voxels.index_to_world;
+    source.background = voxels.background;
+    source.leaves = std::make_unique<SparseLeaves>(voxels);
+    source.tiles = std::move(voxels.tiles);
+    return finish(std::move(source), name, log, progress, 0.0);
+  });
+}
+
+}  // namespace cumulet::volume

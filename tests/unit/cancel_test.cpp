@@ -1,0 +1,355 @@
+// Progress and cancel through everything that a worker does with a volume before GL sees it.
+
+#define NANOVDB_USE_ZIP
+#define NANOVDB_USE_BLOSC
+
+#include <gtest/gtest.h>
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <thread>
+
+#include "base/progress.hpp"
+#include "grid/tet_grid.hpp"
+#include "support/volumes.hpp"
+#include "viewer/volume_asset.hpp"
+#include "volume/memory.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace cumulet;
+using Work = std::function<void(Progress&)>;
+
+/// The fraction never falls, stays within [0, 1], arrives at 1, and stands at many places on the way.
+void expect_steady_progress(const Work& work) {
+  Progress progress;
+  std::atomic<bool> done = false;
+  std::vector<double> seen;
+  std::thread watcher([&] {
+    while (!done) {
+      seen.push_back(progress.fraction());
+      std::this_thread::yield();
+    }
+    seen.push_back(progress.fraction());
+  });
+  work(progress);
+  done = true;
+  watcher.join();
+  EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
+  EXPECT_GE(seen.front(), 0.0);
+  EXPECT_DOUBLE_EQ(seen.back(), 1.0);
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  EXPECT_GE(seen.size(), 5U);
+}
+
+double processor_milliseconds() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// Cancels at many fractions, and between them: the work stops soon, by Error(cancelled) and nothing else.
+void expect_cancels(const Work& work) {
+  constexpr int moments = 16;
+  std::vector<double> delays;
+  int cancelled = 0;
+  test::Random random(5);
+  for (int i = 0; i < moments; ++i) {
+    Progress progress;
+    std::atomic<bool> done = false;
+    double asked = 0.0;
+    const auto extra = std::chrono::microseconds(random() % 3000);
+    std::thread canceller([&] {
+      while (!done && progress.fraction() < 0.99 * i / moments) std::this_thread::yield();
+      if (i > 0) std::this_thread::sleep_for(extra);
+      asked = processor_milliseconds();
+      progress.cancel();
+    });
+    bool threw = false;
+    try {
+      work(progress);
+    } catch (const Error& e) {
+      threw = true;
+      EXPECT_EQ(e.code(), ErrorCode::cancelled) << e.what();
+      EXPECT_STREQ(e.what(), "cancelled");
+    }
+    const double stopped = processor_milliseconds();
+    done = true;
+    canceller.join();
+    if (!threw) continue;
+    ++cancelled;
+    delays.push_back(stopped - asked);
+  }
+  EXPECT_GE(cancelled, moments / 3);
+  ASSERT_FALSE(delays.empty());
+  std::sort(delays.begin(), delays.end());
+  std::string list;
+  for (const double delay : delays) list += std::to_string(delay).substr(0, 5) + " ";
+  testing::Test::RecordProperty("milliseconds_to_stop", list);
+#if !defined(__SANITIZE_ADDRESS__)
+  // In processor time of all threads, which a busy machine does not change much.
+  EXPECT_LT(delays[delays.size() / 2], 30.0) << list;
+  EXPECT_LT(delays.back(), 250.0) << list;
+#endif
+}
+
+void expect_both(const Work& work) {
+  expect_steady_progress(work);
+  expect_cancels(work);
+}
+
+/// About 7 million voxels, no two bricks alike.
+float density(const glm::ivec3& p) {
+  const glm::vec3 x = glm::vec3(p) / 40.0F;
+  return std::max(0.0F, std::sin(x.x) * std::sin(1.3F * x.y) * std::sin(0.7F * x.z) +
+                            0.01F * static_cast<float>((p.x * 7 + p.y * 13 + p.z * 29) % 17));
+}
+constexpr glm::ivec3 size{208, 192, 176};
+
+const volume::ScalarVolume& large_volume() {
+  static const volume::ScalarVolume volume = test::make_volume(size, {-30, -20, 5}, density);
+  return volume;
+}
+
+struct Built {
+  grid::Statistics statistics{large_volume(), grid::fit_cube(large_volume())};
+  grid::RefineSettings settings = [] {
+    grid::RefineSettings s;
+    s.threshold = 0.001;
+    s.max_cells = 1'000'000;
+    return s;
+  }();
+  grid::DiamondSet diamonds{statistics, settings};
+};
+const Built& built() {
+  static const Built all;
+  return all;
+}
+
+TEST(Cancel, Statistics) {
+  expect_both([](Progress& progress) {
+    const grid::Statistics statistics(large_volume(), grid::fit_cube(large_volume()), &progress);
+  });
+}
+
+TEST(Cancel, StatisticsOfHugeTiles) {
+  // Few nodes, but millions of columns of bricks.
+  volume::ScalarVolume volume;
+  volume.bounds_min = glm::ivec3(0);
+  volume.bounds_max = glm::ivec3(4095);
+  volume.background = 0.5F;
+  volume.max_value = 1.0F;
+  volume.tiles.push_back({glm::ivec3(0), glm::ivec3(2047), 1.0F});
+  expect_cancels(
+      [&](Progress& progress) { const grid::Statistics statistics(volume, grid::fit_cube(volume), &progress); });
+}
+
+TEST(Cancel, DiamondsAndBisection) {
+  for (const double threshold : {0.001, 0.05}) {  // ended by max_cells and not
+    grid::RefineSettings settings = built().settings;
+    settings.threshold = threshold;
+    expect_both([&](Progress& progress) {
+      progress.begin(Progress::Stage::refining);
+      const grid::DiamondSet diamonds(built().statistics, settings, &progress);
+      grid::GridBuilder builder(built().statistics, diamonds);
+      builder.bisect(&progress);
+    });
+  }
+}
+
+TEST(Cancel, Records) {
+  grid::GridBuilder builder(built().statistics, built().diamonds);
+  builder.bisect();
+  grid::TetGrid last;
+  // A cancelled call leaves the builder as it was: the next one succeeds.
+  expect_both([&](Progress& progress) {
+    progress.begin(Progress::Stage::records);
+    last = builder.records(grid::CellKind::linear, large_volume().max_value, &progress);
+  });
+  const grid::TetGrid whole = builder.records(grid::CellKind::linear, large_volume().max_value);
+  ASSERT_EQ(last.cells.size(), whole.cells.size());
+  EXPECT_EQ(last.tree, whole.tree);
+  EXPECT_TRUE(std::equal(last.cells.begin(), last.cells.end(), whole.cells.begin(),
+                         [](const auto& a, const auto& b) { return a.links == b.links && a.data == b.data; }));
+}
+
+TEST(Cancel, DenseVoxels) {
+  const glm::ivec3 dense_size(300, 290, 280);
+  std::vector<float> values;
+  values.reserve(static_cast<std::size_t>(dense_size.x) * 290 * 280);
+  for (int z = 0; z < dense_size.z; ++z) {
+    for (int y = 0; y < dense_size.y; ++y) {
+      for (int x = 0; x < dense_size.x; ++x) values.push_back(static_cast<float>((x * 7 + y * 13 + z * 29) % 17));
+    }
+  }
+  const volume::DenseVoxels voxels{.values = values, .size = dense_size, .index_to_world = glm::dmat4(1.0)};
+  expect_both([&](Progress& progress) { (void)volume::import_dense(voxels, "dense", {}, &progress); });
+}
+
+TEST(Cancel, SparseVoxels) {
+  const volume::ScalarVolume& large = large_volume();
+  std::vector<std::int32_t> origins;
+  for (const glm::ivec3& o : large.brick_origins) origins.insert(origins.end(), {o.x, o.y, o.z});
+  volume::SparseVoxels voxels{.brick_origins = origins,
+                              .brick_values = large.brick_values,
+                              .brick_active = {},
+                              .tiles = {},
+                              .background = 0.0F,
+                              .index_to_world = glm::dmat4(1.0)};
+  // Tiles beside the bricks, enough to be looked at for a while.
+  for (int i = 0; i < 20000; ++i) {
+    const glm::ivec3 low(1000 + 9 * (i % 100), 9 * (i / 100 % 100), 9 * (i / 10000));
+    voxels.tiles.push_back({{low, low + 7, 1.0F}, true});
+  }
+  expect_both([&](Progress& progress) { (void)volume::import_sparse(voxels, "sparse", {}, &progress); });
+}
+
+class CancelImport : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    openvdb::initialize();
+    folder_ = fs::temp_directory_path() / ("cumulet_cancel_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    grid_ = make(0.0F);
+  }
+  static void TearDownTestSuite() {
+    grid_.reset();
+    fs::remove_all(folder_);
+  }
+
+  static openvdb::FloatGrid::Ptr make(float background) {
+    auto grid = openvdb::FloatGrid::create(background);
+    grid->setName("density");
+    grid->tree().denseFill(openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(size.x, size.y, size.z)), 1.0F, true);
+    for (auto leaf = grid->tree().beginLeaf(); leaf; ++leaf) {
+      for (auto it = leaf->beginValueOn(); it; ++it) {
+        const openvdb::Coord c = it.getCoord();
+        it.setValue(density({c.x(), c.y(), c.z()}));
+      }
+    }
+    return grid;
+  }
+  static fs::path write(std::uint32_t compression, const openvdb::GridCPtrVec& grids) {
+    const fs::path file = folder_ / "test.vdb";
+    openvdb::io::File out(file.string());
+    out.setCompression(compression);
+    out.write(grids);
+    return file;
+  }
+  static void expect_import(const fs::path& file) {
+    expect_both([&](Progress& progress) { (void)volume::import_volume(file, "density", {}, &progress); });
+  }
+
+  static inline fs::path folder_;
+  static inline openvdb::FloatGrid::Ptr grid_;
+};
+
+TEST_F(CancelImport, VdbOfEveryCompression) {
+  for (const int flags : {int{openvdb::io::COMPRESS_NONE}, int{openvdb::io::COMPRESS_ZIP},
+                          openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK}) {
+    expect_import(write(static_cast<std::uint32_t>(flags), {grid_}));
+  }
+}
+
+TEST_F(CancelImport, VdbWithABackground) {
+  // Its nodes cannot be freed half read.
+  expect_import(write(openvdb::io::COMPRESS_NONE, {make(0.25F)}));
+}
+
+TEST_F(CancelImport, VdbWithoutOffsets) {
+  const fs::path file = folder_ / "pipe.vdb";
+  const auto vectors = openvdb::Vec3SGrid::create();
+  vectors->setName("vel");
+  vectors->tree().denseFill(openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(90)), openvdb::Vec3s(1, 2, 3), true);
+  {
+    std::ofstream out(file, std::ios::binary);
+    openvdb::io::Stream(out).write(openvdb::GridCPtrVec{vectors, grid_});
+  }
+  expect_import(file);
+}
+
+TEST_F(CancelImport, NanoVdbOfEveryCodec) {
+  const auto nano = nanovdb::openToNanoVDB(*grid_);
+  const fs::path file = folder_ / "test.nvdb";
+  for (const auto codec : {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP, nanovdb::io::Codec::BLOSC}) {
+    nanovdb::io::writeGrid(file.string(), nano, codec);
+    expect_import(file);
+  }
+}
+
+TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {
+  const viewer::VolumeAsset asset(large_volume());
+  double seconds = 0.0;
+  expect_cancels([&](Progress& progress) {
+    // A fresh asset each time would leave nothing to compute again.
+    const viewer::VolumeAsset other(test::make_volume({64, 64, 64}, {0, 0, 0}, density));
+    double s = 0.0;
+    (void)other.statistics(progress, s);
+    progress.begin(Progress::Stage::statistics);
+    const grid::Statistics statistics(asset.volume(), grid::fit_cube(asset.volume()), &progress);
+  });
+  Progress cancelled;
+  std::thread canceller([&] {
+    while (cancelled.fraction() < 0.2) std::this_thread::yield();
+    cancelled.cancel();
+  });
+  EXPECT_THROW((void)asset.statistics(cancelled, seconds), Error);
+  canceller.join();
+  EXPECT_EQ(seconds, 0.0);
+
+  Progress next;
+  const auto statistics = asset.statistics(next, seconds);
+  EXPECT_GT(seconds, 0.0);
+  EXPECT_DOUBLE_EQ(next.fraction(), 1.0);
+  EXPECT_EQ(statistics->mean_optical_depth(), built().statistics.mean_optical_depth());
+  EXPECT_EQ(asset.statistics(next, seconds), statistics);
+  EXPECT_EQ(seconds, 0.0);
+}
+
+TEST(VolumeAsset, CallersWaitForOneAnotherUnlessCancelled) {
+  const viewer::VolumeAsset asset(large_volume());
+  Progress first;
+  std::thread computing([&] {
+    double seconds = 0.0;
+    (void)asset.statistics(first, seconds);
+  });
+  while (first.fraction() < 0.1) std::this_thread::yield();
+  Progress second;
+  second.cancel();
+  double seconds = 0.0;
+  EXPECT_THROW((void)asset.statistics(second, seconds), Error);
+  EXPECT_LT(first.fraction(), 1.0);  // it did not wait
+  Progress third;
+  const auto statistics = asset.statistics(third, seconds);
+  EXPECT_EQ(seconds, 0.0);  // it did
+  EXPECT_NE(statistics, nullptr);
+  computing.join();
+}
+
+TEST(VolumeAsset, TheFirstOfTwoIsCancelledAndTheSecondComputes) {
+  const viewer::VolumeAsset asset(large_volume());
+  Progress first;
+  std::thread computing([&] {
+    double seconds = 0.0;
+    EXPECT_THROW((void)asset.statistics(first, seconds), Error);
+  });
+  while (first.fraction() < 0.1) std::this_thread::yield();
+  std::thread canceller([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    first.cancel();
+  });
+  Progress second;
+  double seconds = 0.0;
+  EXPECT_NE(asset.statistics(second, seconds), nullptr);
+  canceller.join();
+  computing.join();
+}
+
+}  // namespace
