@@ -1,0 +1,239 @@
+// A host that sets every state to something unusual before every [GL] call of the ABI, and compares all of it after.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/c_host.hpp"
+#include "support/gl_state.hpp"
+
+namespace {
+
+using cumulet::headless::Context;
+using cumulet::test::converge;
+using cumulet::test::GlTest;
+using cumulet::test::HostTarget;
+using cumulet::test::make_desc;
+using cumulet::test::read_gl_state;
+using cumulet::test::ScramblingHost;
+using cumulet::test::state_differences;
+using cumulet::test::ViewerPtr;
+
+constexpr int side = 24;
+
+class Scramble : public GlTest {
+ protected:
+  /// Scrambles, calls, and compares; an error of the host's own may be pending before.
+  void expect_kept(ScramblingHost& host, std::uint32_t seed, const std::string& what,
+                   const std::function<cumulet_status()>& call) {
+    SCOPED_TRACE(what + ", seed " + std::to_string(seed));
+    host.scramble(seed);
+    const auto before = read_gl_state(*gl_);
+    const cumulet_status status = call();
+    EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
+    EXPECT_EQ(state_differences(before, read_gl_state(*gl_)), "");
+    EXPECT_EQ(status, CUMULET_OK);
+  }
+  [[nodiscard]] cumulet_create_desc create_desc() const {
+    auto create = make_desc<cumulet_create_desc>();
+    create.get_proc = Context::get_proc;
+    create.get_proc_user = context_.get();
+    return create;
+  }
+};
+
+TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
+  ScramblingHost host(gl_);
+  const HostTarget target(*gl_, side, side);
+  const auto small = cumulet::test::make_ball(12);
+  const auto large = cumulet::test::make_ball(16);
+  std::uint32_t seed = 0;
+
+  cumulet_viewer* made = nullptr;
+  const cumulet_create_desc create = create_desc();
+  expect_kept(host, ++seed, "create", [&] { return cumulet_create(&create, &made, nullptr, 0); });
+  ASSERT_NE(made, nullptr);
+  cumulet_destroy(made);
+  ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
+  cumulet_viewer* v = viewer.get();
+  expect_kept(host, ++seed, "detach", [&] { return cumulet_detach(v); });
+  expect_kept(host, ++seed, "attach", [&] { return cumulet_attach(v, Context::get_proc, context_.get()); });
+
+  const auto render = [&](const std::string& what, const cumulet_frame_desc& frame) {
+    for (int i = 0; i < 2; ++i) {
+      expect_kept(host, ++seed, "render " + what, [&] { return cumulet_render(v, &frame, nullptr); });
+    }
+  };
+  render("nothing", target.frame());
+  // Every march and view: their uploads, their first frames, and frames that draw only.
+  for (const cumulet_march march : {CUMULET_MARCH_TET, CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK}) {
+    auto grid = make_desc<cumulet_grid_desc>();
+    grid.march = march;
+    ASSERT_EQ(cumulet_set_grid(v, &grid), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_volume(v, march == CUMULET_MARCH_DENSE ? large.get() : small.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
+    for (const cumulet_view view :
+         {CUMULET_VIEW_CELLS, CUMULET_VIEW_STEPS, CUMULET_VIEW_DENSITY, CUMULET_VIEW_WIREFRAME, CUMULET_VIEW_SHADED}) {
+      auto sampling = make_desc<cumulet_sampling_desc>();
+      sampling.samples = 2;
+      sampling.view = view;
+      ASSERT_EQ(cumulet_set_sampling(v, &sampling), CUMULET_OK);
+      render("march " + std::to_string(march) + " view " + std::to_string(view), target.frame());
+    }
+  }
+  converge(v, target.frame());
+
+  cumulet_frame_desc frame = target.frame();
+  for (const cumulet_colour colour :
+       {CUMULET_COLOUR_SRGB, CUMULET_COLOUR_SRGB_FRAMEBUFFER, CUMULET_COLOUR_LINEAR, CUMULET_COLOUR_HDR}) {
+    frame.colour = colour;
+    render("colour " + std::to_string(colour), frame);
+  }
+  frame = target.frame();
+  frame.blend = CUMULET_BLEND_REPLACE;
+  frame.flip_y = 1;
+  render("replace, flipped", frame);
+  frame.viewport[0] = 3;
+  frame.viewport[1] = 4;
+  frame.viewport[2] = frame.viewport[3] = 9;
+  render("in a rectangle", frame);
+  frame = target.frame();
+  frame.target = CUMULET_TARGET_TEXTURE;
+  frame.write_depth = 1;
+  render("into its own texture", frame);
+  frame.width = side + 8;
+  render("into another texture", frame);
+  frame.target = CUMULET_TARGET_NONE;
+  render("into nothing", frame);
+  frame.width = 0;
+  render("of no size", frame);
+
+  // The host's depth, in each way.
+  frame = target.frame();
+  frame.write_depth = 1;
+  frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE;
+  frame.depth_name = target.depth_texture();
+  render("with a depth texture", frame);
+  frame.depth_source = CUMULET_DEPTH_SOURCE_FRAMEBUFFER;
+  frame.depth_name = target.framebuffer();
+  render("with a framebuffer's depth", frame);
+  GLuint multisampled = 0;
+  gl_->CreateTextures(GL_TEXTURE_2D_MULTISAMPLE, 1, &multisampled);
+  gl_->TextureStorage2DMultisample(multisampled, 4, GL_DEPTH_COMPONENT32F, side, side, GL_TRUE);
+  frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE_MULTISAMPLE;
+  frame.depth_name = multisampled;
+  render("with multisampled depth", frame);
+
+  converge(v, target.frame());
+  std::vector<float> rgba(std::size_t{side} * side * 4);
+  std::vector<std::uint8_t> bytes(rgba.size());
+  auto pick = make_desc<cumulet_pick>();
+  double noise = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    expect_kept(host, ++seed, "pick_at", [&] { return cumulet_pick_at(v, side / 2.0, side / 2.0, &pick); });
+    expect_kept(host, ++seed, "read_linear", [&] { return cumulet_read_linear(v, rgba.data(), rgba.size()); });
+    expect_kept(host, ++seed, "read_display", [&] { return cumulet_read_display(v, bytes.data(), bytes.size()); });
+    expect_kept(host, ++seed, "measure_noise", [&] { return cumulet_measure_noise(v, &noise); });
+  }
+  expect_kept(host, ++seed, "detach", [&] { return cumulet_detach(v); });
+  expect_kept(host, ++seed, "attach", [&] { return cumulet_attach(v, Context::get_proc, context_.get()); });
+  render("anew", target.frame());
+  expect_kept(host, ++seed, "destroy", [&] {
+    viewer.reset();
+    return CUMULET_OK;
+  });
+  gl_->DeleteTextures(1, &multisampled);
+}
+
+// A failing call is a call as well.
+TEST_P(Scramble, FailuresLeaveTheStateToo) {
+  ScramblingHost host(gl_);
+  const HostTarget target(*gl_, side, side);
+  const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
+  const auto volume = cumulet::test::make_ball(12);
+  cumulet::test::picture_of(viewer.get(), volume.get(), target);
+  const auto fails = [&](std::uint32_t seed, const std::function<cumulet_status()>& call) {
+    expect_kept(host, seed, "a failing call", [&] {
+      EXPECT_NE(call(), CUMULET_OK);
+      return CUMULET_OK;
+    });
+  };
+  cumulet_frame_desc frame = target.frame();
+  frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE;
+  frame.depth_name = 4321;  // no such texture
+  fails(100, [&] { return cumulet_render(viewer.get(), &frame, nullptr); });
+  frame = target.frame();
+  frame.framebuffer = 4321;
+  fails(101, [&] { return cumulet_render(viewer.get(), &frame, nullptr); });
+  float one = 0.0F;
+  fails(102, [&] { return cumulet_read_linear(viewer.get(), &one, 1); });
+}
+
+// What is drawn does not depend on the state either.
+TEST_P(Scramble, ThePictureIsTheSameFromAnyState) {
+  const HostTarget target(*gl_, side, side);
+  const auto volume = cumulet::test::make_ball(12);
+  const auto draw = [&] {
+    auto viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get(), .samples = 2});
+    if (cumulet_set_volume(viewer.get(), volume.get()) != CUMULET_OK) throw std::runtime_error("set_volume");
+    auto frame = target.frame();
+    frame.write_depth = 1;
+    converge(viewer.get(), frame);
+  };
+  target.clear({}, 1.0F);
+  draw();
+  const auto pixels = target.pixels();
+  const auto depths = target.depths();
+  EXPECT_GT(*std::max_element(pixels.begin(), pixels.end()), 60);
+  EXPECT_LT(*std::min_element(depths.begin(), depths.end()), 1.0F);
+  ScramblingHost host(gl_);
+  for (std::uint32_t seed = 200; seed < 212; ++seed) {
+    SCOPED_TRACE(seed);
+    target.clear({}, 1.0F);
+    host.scramble(seed);
+    draw();
+    // Read with everything as the host needs it.
+    for (const GLenum name : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_PIXELS, GL_PACK_SKIP_ROWS, GL_PACK_SWAP_BYTES,
+                              GL_PACK_LSB_FIRST, GL_PACK_IMAGE_HEIGHT, GL_PACK_SKIP_IMAGES})
+      gl_->PixelStorei(name, 0);
+    gl_->BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    EXPECT_EQ(target.pixels(), pixels);
+    EXPECT_EQ(target.depths(), depths);
+    gl_->ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    gl_->DepthMask(GL_TRUE);
+    gl_->Disable(GL_SCISSOR_TEST);
+    gl_->Disable(GL_RASTERIZER_DISCARD);
+  }
+}
+
+// The host's errors from before are dropped, its debug callback and its filters stay.
+TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
+  const HostTarget target(*gl_, side, side);
+  const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
+  const auto volume = cumulet::test::make_ball(12);
+  int told = 0;
+  const auto callback = [](GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar*, const void* user) {
+    if (type == GL_DEBUG_TYPE_ERROR) ++*static_cast<int*>(const_cast<void*>(user));
+  };
+  gl_->Enable(GL_DEBUG_OUTPUT);
+  gl_->DebugMessageCallback(callback, &told);
+  ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
+  gl_->Enable(GL_FLOAT);  // no capability
+  converge(viewer.get(), target.frame());
+  EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
+  void* function = nullptr;
+  void* user = nullptr;
+  gl_->GetPointerv(GL_DEBUG_CALLBACK_FUNCTION, &function);
+  gl_->GetPointerv(GL_DEBUG_CALLBACK_USER_PARAM, &user);
+  const GLDEBUGPROC expected = callback;
+  EXPECT_EQ(function, reinterpret_cast<void*>(expected));
+  EXPECT_EQ(user, &told);
+  EXPECT_LE(told, 1);  // the host's own error; none of ours
+  gl_->DebugMessageCallback(nullptr, nullptr);
+}
+
+CUMULET_GL_ON_BACKENDS(Scramble);
+
+}  // namespace

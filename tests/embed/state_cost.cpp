@@ -1,0 +1,70 @@
+// What saving and restoring the GL state costs a frame: CUMULET_GL_STATE_RESTORE against HOST_RESETS, frames that only
+// draw, interleaved. By hand:
+//
+//     cumulet-state-cost [FRAMES]
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <vector>
+
+#include "support/c_host.hpp"
+
+namespace {
+
+using cumulet::headless::Context;
+
+double median(std::vector<double>& values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+void measure(int frames, int side) {
+  Context context = Context::create(cumulet::headless::Backend::automatic);
+  const GladGLContext gl = cumulet::test::load_gl(Context::get_proc, &context);
+  const cumulet::test::HostTarget target(gl, side, side);
+  const auto volume = cumulet::test::make_ball(16);
+  const auto viewer = [&](cumulet_gl_state state) {
+    auto made = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = &context, .gl_state = state});
+    cumulet::test::picture_of(made.get(), volume.get(), target);
+    return made;
+  };
+  const auto restoring = viewer(CUMULET_GL_STATE_RESTORE);
+  const auto resetting = viewer(CUMULET_GL_STATE_HOST_RESETS);
+  cumulet_frame_desc frame = target.frame();
+  frame.budget_ms = -1.0;  // draws what there is
+  const auto once = [&](cumulet_viewer* v) {
+    const auto begin = std::chrono::steady_clock::now();
+    if (cumulet_render(v, &frame, nullptr) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(v));
+    const auto submitted = std::chrono::steady_clock::now();
+    gl.Finish();
+    return std::chrono::duration<double, std::micro>(submitted - begin).count();
+  };
+  std::vector<double> with, without, difference;
+  for (int i = 0; i < frames + 20; ++i) {
+    // Each comes first in turn.
+    const double first = once(i % 2 == 0 ? restoring.get() : resetting.get());
+    const double second = once(i % 2 == 0 ? resetting.get() : restoring.get());
+    if (i < 20) continue;
+    with.push_back(i % 2 == 0 ? first : second);
+    without.push_back(i % 2 == 0 ? second : first);
+    difference.push_back(with.back() - without.back());
+  }
+  const double a = median(with);
+  const double b = median(without);
+  std::printf("%4d x %-4d  restore %7.1f us  host resets %7.1f us  ratio %.2f  difference %6.1f us (medians of %d)\n",
+              side, side, a, b, a / b, median(difference), frames);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    for (const int side : {1, 64, 512}) measure(argc > 1 ? std::max(std::atoi(argv[1]), 1) : 2000, side);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "cumulet-state-cost: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,227 @@
+#pragma once
+
+#include <glad/gl.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "cumulet/cumulet.h"
+#include "headless.hpp"
+
+/// What a test needs to be a host by cumulet.h alone.
+namespace cumulet::test {
+
+template <class Desc>
+Desc make_desc() {
+  Desc desc{};
+  desc.struct_size = sizeof(Desc);
+  return desc;
+}
+
+struct DestroyViewer {
+  void operator()(cumulet_viewer* viewer) const { cumulet_destroy(viewer); }
+};
+using ViewerPtr = std::unique_ptr<cumulet_viewer, DestroyViewer>;
+struct ReleaseVolume {
+  void operator()(cumulet_volume* volume) const { cumulet_volume_release(volume); }
+};
+using VolumeRef = std::unique_ptr<cumulet_volume, ReleaseVolume>;
+struct ReleaseCamera {
+  void operator()(cumulet_camera* camera) const { cumulet_camera_release(camera); }
+};
+using CameraRef = std::unique_ptr<cumulet_camera, ReleaseCamera>;
+
+/// A lumpy ball of size^3 voxels centred on the origin, as a dense array.
+inline VolumeRef make_ball(int size, float density = 0.4F) {
+  std::vector<float> values;
+  const float middle = 0.5F * static_cast<float>(size - 1);
+  for (int z = 0; z < size; ++z) {
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        const std::array<float, 3> p{static_cast<float>(x) - middle, static_cast<float>(y) - middle,
+                                     static_cast<float>(z) - middle};
+        const float radius = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / (middle + 0.5F);
+        const float lumps = 1.0F + 0.3F * std::sin(p[0]) * std::sin(1.3F * p[1]) * std::sin(0.7F * p[2]);
+        values.push_back(radius < 1.0F ? density * lumps * (1.0F - radius * radius) : 0.0F);
+      }
+    }
+  }
+  auto desc = make_desc<cumulet_dense_desc>();
+  desc.values = values.data();
+  desc.value_count = values.size();
+  for (int& side : desc.size) side = size;
+  for (int i = 0; i < 4; ++i) desc.index_to_world[i * 5] = 1.0;
+  for (int i = 0; i < 3; ++i) desc.index_to_world[12 + i] = -middle;
+  desc.name = "ball";
+  cumulet_volume* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_volume_from_dense(&desc, &out, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return VolumeRef(out);
+}
+
+inline GladGLContext load_gl(cumulet_get_proc_fn get_proc, void* user) {
+  std::pair<cumulet_get_proc_fn, void*> loader(get_proc, user);
+  GladGLContext gl{};
+  const auto load = [](void* l, const char* name) {
+    const auto& [function, its_user] = *static_cast<std::pair<cumulet_get_proc_fn, void*>*>(l);
+    return reinterpret_cast<GLADapiproc>(function(its_user, name));
+  };
+  if (gladLoadGLContextUserPtr(&gl, load, &loader) == 0) throw std::runtime_error("no OpenGL");
+  return gl;
+}
+
+/// A host's framebuffer: colour and depth, read back as bytes from the bottom row up.
+class HostTarget {
+ public:
+  HostTarget(const GladGLContext& gl, int width, int height, GLenum format = GL_RGBA8)
+      : gl_(gl), width_(width), height_(height) {
+    gl_.CreateTextures(GL_TEXTURE_2D, 1, &colour_);
+    gl_.TextureStorage2D(colour_, 1, format, width, height);
+    gl_.CreateTextures(GL_TEXTURE_2D, 1, &depth_);
+    gl_.TextureStorage2D(depth_, 1, GL_DEPTH_COMPONENT32F, width, height);
+    gl_.CreateFramebuffers(1, &framebuffer_);
+    gl_.NamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, colour_, 0);
+    gl_.NamedFramebufferTexture(framebuffer_, GL_DEPTH_ATTACHMENT, depth_, 0);
+    clear({0.0F, 0.0F, 0.0F, 0.0F}, 1.0F);
+  }
+  HostTarget(const HostTarget&) = delete;
+  HostTarget& operator=(const HostTarget&) = delete;
+  ~HostTarget() {
+    gl_.DeleteFramebuffers(1, &framebuffer_);
+    gl_.DeleteTextures(1, &colour_);
+    gl_.DeleteTextures(1, &depth_);
+  }
+
+  void clear(const std::array<float, 4>& colour, float depth = 1.0F) const {
+    gl_.ClearNamedFramebufferfv(framebuffer_, GL_COLOR, 0, colour.data());
+    gl_.ClearNamedFramebufferfv(framebuffer_, GL_DEPTH, 0, &depth);
+  }
+  /// A frame of all of it.
+  [[nodiscard]] cumulet_frame_desc frame() const {
+    auto desc = make_desc<cumulet_frame_desc>();
+    desc.budget_ms = 50.0;
+    desc.framebuffer = framebuffer_;
+    desc.width = static_cast<std::uint32_t>(width_);
+    desc.height = static_cast<std::uint32_t>(height_);
+    return desc;
+  }
+  [[nodiscard]] std::vector<std::uint8_t> pixels() const {
+    std::vector<std::uint8_t> bytes(std::size_t(width_) * std::size_t(height_) * 4);
+    gl_.GetTextureImage(colour_, 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(bytes.size()), bytes.data());
+    return bytes;
+  }
+  [[nodiscard]] std::vector<float> floats() const {
+    std::vector<float> values(std::size_t(width_) * std::size_t(height_) * 4);
+    gl_.GetTextureImage(colour_, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(values.size() * sizeof(float)),
+                        values.data());
+    return values;
+  }
+  [[nodiscard]] std::vector<float> depths() const {
+    std::vector<float> values(std::size_t(width_) * std::size_t(height_));
+    gl_.GetTextureImage(depth_, 0, GL_DEPTH_COMPONENT, GL_FLOAT, static_cast<GLsizei>(values.size() * sizeof(float)),
+                        values.data());
+    return values;
+  }
+  [[nodiscard]] GLuint framebuffer() const { return framebuffer_; }
+  [[nodiscard]] GLuint colour_texture() const { return colour_; }
+  [[nodiscard]] GLuint depth_texture() const { return depth_; }
+
+ private:
+  const GladGLContext& gl_;
+  int width_;
+  int height_;
+  GLuint colour_ = 0;
+  GLuint depth_ = 0;
+  GLuint framebuffer_ = 0;
+};
+
+struct ViewerOptions {
+  cumulet_get_proc_fn get_proc = nullptr;
+  void* user = nullptr;
+  cumulet_update_fn update = nullptr;
+  void* update_user = nullptr;
+  cumulet_log_fn log = nullptr;
+  void* log_user = nullptr;
+  cumulet_gl_state gl_state = CUMULET_GL_STATE_RESTORE;
+  std::uint32_t samples = 4;
+};
+
+/// A viewer with light, a camera before make_ball, few samples a pixel and no preview. Throws std::runtime_error.
+inline ViewerPtr make_viewer(const ViewerOptions& options) {
+  auto create = make_desc<cumulet_create_desc>();
+  create.get_proc = options.get_proc;
+  create.get_proc_user = options.user;
+  create.update = options.update;
+  create.update_user = options.update_user;
+  create.log = options.log;
+  create.log_user = options.log_user;
+  create.gl_state = options.gl_state;
+  std::array<char, 256> error{};
+  cumulet_viewer* out = nullptr;
+  if (cumulet_create(&create, &out, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
+  ViewerPtr viewer(out);
+  auto light = make_desc<cumulet_light_desc>();
+  light.sun_azimuth_degrees = 60.0F;
+  light.sun_elevation_degrees = 40.0F;
+  for (float& value : light.sun_irradiance) value = 2.5F;
+  for (float& value : light.sky_radiance) value = 0.3F;
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = options.samples;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  auto stand = make_desc<cumulet_camera_desc>();
+  stand.eye[1] = 6.0;
+  stand.eye[2] = 32.0;
+  cumulet_camera* camera = nullptr;
+  if (cumulet_camera_create(&stand, &camera) != CUMULET_OK) throw std::runtime_error("no camera");
+  const CameraRef owner(camera);
+  if (cumulet_set_light(out, &light) != CUMULET_OK || cumulet_set_sampling(out, &sampling) != CUMULET_OK ||
+      cumulet_set_camera(out, camera) != CUMULET_OK)
+    throw std::runtime_error(cumulet_last_error(out));
+  return viewer;
+}
+
+/// Renders until the picture has all its samples. Throws std::runtime_error for an error, or after a minute.
+inline cumulet_frame_result converge(cumulet_viewer* viewer, const cumulet_frame_desc& frame) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+  constexpr std::uint32_t moving = CUMULET_RENDER_MORE | CUMULET_RENDER_LOADING | CUMULET_RENDER_CONVERGED;
+  auto result = make_desc<cumulet_frame_result>();
+  if (cumulet_wait(viewer, -1.0) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+  do {
+    if (cumulet_render(viewer, &frame, &result) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+    if ((result.flags & moving) == 0) throw std::runtime_error("gives up before it converges");
+    if (std::chrono::steady_clock::now() > until) throw std::runtime_error("does not converge");
+  } while ((result.flags & CUMULET_RENDER_CONVERGED) == 0);
+  return result;
+}
+
+/// How two pictures differ, "" if they do not.
+inline std::string difference(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
+  if (a.size() != b.size()) return "their sizes";
+  std::size_t bytes = 0;
+  int largest = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    bytes += a[i] != b[i] ? 1U : 0U;
+    largest = std::max(largest, std::abs(int{a[i]} - int{b[i]}));
+  }
+  if (bytes == 0) return "";
+  return std::to_string(bytes) + " of " + std::to_string(a.size()) + " bytes, by at most " + std::to_string(largest);
+}
+
+/// Sets the volume and renders all of the picture. The bytes of the target.
+inline std::vector<std::uint8_t> picture_of(cumulet_viewer* viewer, cumulet_volume* volume, const HostTarget& target) {
+  if (cumulet_set_volume(viewer, volume) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+  target.clear({0.0F, 0.0F, 0.0F, 0.0F});
+  converge(viewer, target.frame());
+  return target.pixels();
+}
+
+}  // namespace cumulet::test

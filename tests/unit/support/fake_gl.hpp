@@ -1,0 +1,240 @@
+#pragma once
+
+#include <glad/gl.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <unordered_map>
+#include <utility>
+
+namespace cumulet::test {
+
+/// A get_proc that stands between the library and a context: it counts calls and objects, can refuse the n-th
+/// allocation, and can lose the context at the n-th call.
+///
+/// GL functions have no user pointer, so their wrappers find the fake that is current on their thread (the one made
+/// current last, or asked last for a function). A GL call on a thread without one is counted in strays() and does
+/// nothing: no such call is allowed.
+class FakeGl {
+ public:
+  using GetProc = void* (*)(void* user, const char* name);
+
+  FakeGl(GetProc real_get_proc, void* user) : get_proc_(real_get_proc), user_(user) {
+    std::pair<GetProc, void*> real(real_get_proc, user);
+    const auto load = [](void* loader, const char* name) {
+      const auto& [function, its_user] = *static_cast<std::pair<GetProc, void*>*>(loader);
+      return reinterpret_cast<GLADapiproc>(function(its_user, name));
+    };
+    gladLoadGLContextUserPtr(&real_, load, &real);
+    make_current();
+  }
+  FakeGl(const FakeGl&) = delete;
+  FakeGl& operator=(const FakeGl&) = delete;
+  ~FakeGl() {
+    if (current() == this) current() = nullptr;
+  }
+
+  void make_current() { current() = this; }
+
+  /// Fits cumulet_get_proc_fn; user is the FakeGl.
+  static void* get_proc(void* user, const char* name) {
+    auto* fake = static_cast<FakeGl*>(user);
+    fake->make_current();
+    void* real = fake->get_proc_(fake->user_, name);
+    const auto found = wrappers().find(name);
+    return real == nullptr || found == wrappers().end() ? real : found->second;
+  }
+
+  /// The functions themselves, uncounted, for the host's own use.
+  [[nodiscard]] const GladGLContext& real() const { return real_; }
+
+  [[nodiscard]] std::uint64_t calls() const { return calls_; }
+  [[nodiscard]] std::uint64_t calls(const std::string& name) const {
+    const auto found = std::find(fn_names.begin(), fn_names.end(), name);
+    return found == fn_names.end() ? 0 : calls_of_[static_cast<std::size_t>(found - fn_names.begin())];
+  }
+  [[nodiscard]] std::uint64_t allocations() const { return allocations_; }
+  /// The allocation that was refused last, "" if none was.
+  [[nodiscard]] const std::string& refused() const { return refused_; }
+  /// Objects made and not deleted, by kind: "Buffers", "Textures", "Shader", "Sync", ...
+  [[nodiscard]] std::map<std::string, std::size_t> alive() const {
+    std::map<std::string, std::size_t> counts;
+    for (const auto& [kind, names] : alive_)
+      if (!names.empty()) counts[kind] = names.size();
+    return counts;
+  }
+  /// Deletions of names that were not alive.
+  [[nodiscard]] std::uint64_t wrong_deletes() const { return wrong_deletes_; }
+  static std::uint64_t strays() { return stray_counter(); }
+
+  /// The n-th allocation from now (0 is the next) fails: nothing is made, and glGetError says GL_OUT_OF_MEMORY, or the
+  /// shader does not compile or link. Negative: none.
+  void fail_allocation(std::int64_t n) { fail_at_ = n < 0 ? -1 : static_cast<std::int64_t>(allocations_) + n; }
+  /// From now on every allocation of storage for a buffer or texture fails, and nothing else.
+  void fail_storage(bool fail) { fail_storage_ = fail; }
+  /// The n-th call from now (0 is the next) finds the context lost. Negative: never. From then on calls do nothing.
+  void lose_context(std::int64_t n) { lose_at_ = n < 0 ? -1 : static_cast<std::int64_t>(calls_) + n; }
+  [[nodiscard]] bool lost() const { return lost_; }
+
+ private:
+  static FakeGl*& current() {
+    static thread_local FakeGl* fake = nullptr;
+    return fake;
+  }
+  static std::atomic<std::uint64_t>& stray_counter() {
+    static std::atomic<std::uint64_t> count = 0;
+    return count;
+  }
+
+  static constexpr bool starts(std::string_view name, std::string_view with) {
+    return name.substr(0, with.size()) == with;
+  }
+  static constexpr bool contains(std::string_view name, std::string_view part) {
+    return name.find(part) != std::string_view::npos;
+  }
+  static constexpr bool makes(std::string_view name) {
+    return starts(name, "Create") || name == "FenceSync" || (starts(name, "Gen") && !starts(name, "Generate"));
+  }
+  static constexpr bool allocates(std::string_view name) {
+    return makes(name) || contains(name, "Storage") || name == "NamedBufferData" || name == "BufferData" ||
+           starts(name, "TexImage") || starts(name, "CopyTexImage") || starts(name, "MapBuffer") ||
+           starts(name, "MapNamedBuffer") || name == "CompileShader" || name == "LinkProgram";
+  }
+  static std::string kind_of(std::string_view name) {
+    if (name == "FenceSync") return "Sync";
+    if (name == "CreateShaderProgramv") return "Program";
+    return std::string(name.substr(starts(name, "Gen") ? 3 : 6));
+  }
+
+  void made(const std::string& kind, std::uintptr_t name) {
+    if (name != 0) alive_[kind].insert(name);
+  }
+  void made(const std::string& kind, GLsizei n, const GLuint* names) {
+    for (GLsizei i = 0; i < n; ++i) made(kind, names[i]);
+  }
+  void made(const std::string& kind, GLenum, GLsizei n, const GLuint* names) { made(kind, n, names); }
+  void deleted(const std::string& kind, std::uintptr_t name) {
+    if (name != 0 && alive_[kind].erase(name) == 0) ++wrong_deletes_;
+  }
+  void deleted(const std::string& kind, GLsizei n, const GLuint* names) {
+    for (GLsizei i = 0; i < n; ++i) deleted(kind, names[i]);
+  }
+
+  template <class Result>
+  static std::uintptr_t id(Result result) {
+    if constexpr (std::is_pointer_v<Result>) {
+      return reinterpret_cast<std::uintptr_t>(result);
+    } else {
+      return result;
+    }
+  }
+
+  enum class Fn : std::uint16_t {
+#define FAKE_GL(name) name,
+#include "fake_gl_functions.inc"
+#undef FAKE_GL
+    count
+  };
+  static constexpr std::array<std::string_view, static_cast<std::size_t>(Fn::count)> fn_names{
+#define FAKE_GL(name) #name,
+#include "fake_gl_functions.inc"
+#undef FAKE_GL
+  };
+
+  template <auto Member, Fn F>
+  struct Wrapper;
+  template <class Result, class... Args, Result (*GladGLContext::*Member)(Args...), Fn F>
+  struct Wrapper<Member, F> {
+    static constexpr std::string_view name = fn_names[static_cast<std::size_t>(F)];
+
+    static Result call(Args... args) {
+      FakeGl* fake = current();
+      if (fake == nullptr) {
+        ++stray_counter();
+        return Result();
+      }
+      if (static_cast<std::int64_t>(fake->calls_) == fake->lose_at_) fake->lost_ = true;
+      ++fake->calls_;
+      ++fake->calls_of_[static_cast<std::size_t>(F)];
+      if (fake->lost_) return lost(args...);
+      if constexpr (F == Fn::GetError) {
+        if (fake->error_ != GL_NO_ERROR) return std::exchange(fake->error_, GLenum{GL_NO_ERROR});
+      }
+      if constexpr (allocates(name)) {
+        const auto n = static_cast<std::int64_t>(fake->allocations_++);
+        if (n == fake->fail_at_ || (fake->fail_storage_ && contains(name, "Storage"))) {
+          fake->refused_ = name;
+          if constexpr (F != Fn::CompileShader && F != Fn::LinkProgram) fake->error_ = GL_OUT_OF_MEMORY;
+          return Result();
+        }
+      }
+      if constexpr (starts(name, "Delete")) fake->deleted(kind_of(name), convert(args)...);
+      if constexpr (std::is_void_v<Result>) {
+        (fake->real_.*Member)(args...);
+        if constexpr (makes(name)) fake->made(kind_of(name), args...);
+      } else {
+        const Result result = (fake->real_.*Member)(args...);
+        if constexpr (makes(name)) fake->made(kind_of(name), id(result));
+        return result;
+      }
+    }
+
+   private:
+    template <class Value>
+    static auto convert(Value value) {
+      if constexpr (std::is_same_v<Value, GLsync>) {
+        return reinterpret_cast<std::uintptr_t>(value);
+      } else {
+        return value;
+      }
+    }
+    /// As OpenGL 4.5, section 2.3.2: a lost context's calls do nothing, and what a host might poll says it is done.
+    static Result lost([[maybe_unused]] Args... args) {
+      if constexpr (F == Fn::GetGraphicsResetStatus) return GL_GUILTY_CONTEXT_RESET;
+      if constexpr (F == Fn::GetError) return GL_CONTEXT_LOST;
+      if constexpr (F == Fn::GetSynciv) poll_done(args..., GL_SIGNALED);
+      if constexpr (F == Fn::GetQueryObjectuiv || F == Fn::GetQueryObjectiv) poll_done(args..., GL_TRUE);
+      return Result();
+    }
+    static void poll_done(GLsync, GLenum, GLsizei size, GLsizei*, GLint* values, GLint done) {
+      if (size > 0) *values = done;
+    }
+    template <class Value>
+    static void poll_done(GLuint, GLenum parameter, Value* value, GLint done) {
+      if (parameter == GL_QUERY_RESULT_AVAILABLE) *value = static_cast<Value>(done);
+    }
+  };
+
+  static const std::unordered_map<std::string, void*>& wrappers() {
+    static const std::unordered_map<std::string, void*> map{
+#define FAKE_GL(name) {"gl" #name, reinterpret_cast<void*>(&Wrapper<&GladGLContext::name, Fn::name>::call)},
+#include "fake_gl_functions.inc"
+#undef FAKE_GL
+    };
+    return map;
+  }
+
+  GetProc get_proc_;
+  void* user_;
+  GladGLContext real_{};
+  std::uint64_t calls_ = 0;
+  std::array<std::uint64_t, static_cast<std::size_t>(Fn::count)> calls_of_{};
+  std::uint64_t allocations_ = 0;
+  std::int64_t fail_at_ = -1;
+  bool fail_storage_ = false;
+  std::int64_t lose_at_ = -1;
+  bool lost_ = false;
+  GLenum error_ = GL_NO_ERROR;
+  std::string refused_;
+  std::map<std::string, std::set<std::uintptr_t>> alive_;
+  std::uint64_t wrong_deletes_ = 0;
+};
+
+}  // namespace cumulet::test
