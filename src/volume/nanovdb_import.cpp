@@ -375,7 +375,7 @@ class NanoReader final : public Reader {
         rest = 0;
     }
     if (rest != 0) fail(sizes_differ);
-    return Handle(std::move(buffer));
+    return {std::move(buffer)};
   }
 
   /// Decodes the zlib frame that the stream stands at.

@@ -97,7 +97,8 @@ class OwningTree final : public TreeT {
     using ValueT = typename TreeT::ValueType;
     const auto read = [&]<typename T>(T& value) { in.read(reinterpret_cast<char*>(&value), sizeof value); };
     this->clear();
-    openvdb::TreeBase::readTopology(in, from_half);
+    std::int32_t buffers = 0;  // of a leaf, which says it again
+    read(buffers);
     RootT& root = this->root();
     ValueT background{};
     read(background);
