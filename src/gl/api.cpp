@@ -1,5 +1,7 @@
 #include "gl/api.hpp"
 
+#include <cstring>
+
 #include "base/error.hpp"
 
 namespace cumulet::gl {
@@ -11,8 +13,12 @@ struct Loader {
   void* user;
 };
 
+// glad lists the extensions, of which we use none; a lost context gives null for their names, which glad would read.
+const GLubyte* no_string(GLenum /*name*/, GLuint /*index*/) { return reinterpret_cast<const GLubyte*>(""); }
+
 GLADapiproc load_one(void* loader, const char* name) {
   const auto* l = static_cast<const Loader*>(loader);
+  if (std::strcmp(name, "glGetStringi") == 0) return reinterpret_cast<GLADapiproc>(no_string);
   return reinterpret_cast<GLADapiproc>(l->get_proc(l->user, name));
 }
 
@@ -30,6 +36,7 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
                                             std::to_string(GLAD_VERSION_MAJOR(version)) + "." +
                                             std::to_string(GLAD_VERSION_MINOR(version)));
   }
+  gl->GetStringi = reinterpret_cast<PFNGLGETSTRINGIPROC>(get_proc(user, "glGetStringi"));
   if (gl->DispatchCompute == nullptr || gl->CreateBuffers == nullptr || gl->TextureBuffer == nullptr) {
     throw Error(ErrorCode::unsupported, "the context says OpenGL 4.5 but get_proc lacks functions of it");
   }
@@ -60,9 +67,12 @@ void check(const Functions& gl, const char* step) {
   throw Error(ErrorCode::gl, "GL error " + std::to_string(first) + ": " + step);
 }
 
+bool was_reset(const Functions& gl) {
+  return gl.GetGraphicsResetStatus != nullptr && gl.GetGraphicsResetStatus() != GL_NO_ERROR;
+}
+
 void check_reset(const Functions& gl) {
-  if (gl.GetGraphicsResetStatus == nullptr || gl.GetGraphicsResetStatus() == GL_NO_ERROR) return;
-  throw Error(ErrorCode::context_lost, "the driver reset the GL context");
+  if (was_reset(gl)) throw Error(ErrorCode::context_lost, reset_message);
 }
 
 void clear_errors(const Functions& gl) {

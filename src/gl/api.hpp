@@ -29,6 +29,9 @@ Limits query_limits(const Functions& gl);
 
 /// Takes all pending GL errors; throws Error(out_of_memory, context_lost or gl) that names the step.
 void check(const Functions& gl, const char* step);
+/// Whether the driver says that it reset the context.
+bool was_reset(const Functions& gl);
+inline constexpr const char* reset_message = "the driver reset the GL context";
 /// Throws Error(context_lost) if the driver says that it reset the context.
 void check_reset(const Functions& gl);
 /// Drops errors that were pending before we came.

@@ -17,19 +17,23 @@ gl::Object make_program(const gl::FunctionsPtr& gl, std::span<const std::string>
 
 }  // namespace
 
-void Compositor::resolve(const PictureTextures& picture) {
+bool Compositor::resolve(const PictureTextures& picture) {
   if (!resolve_) resolve_ = gl::make_compute_program(gl_, "resolve.comp", {});
-  if (!mean_ || mean_size_ != picture.size) {
-    mean_ = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(picture.size.x), static_cast<int>(picture.size.y),
-                                "creating the texture of means");
-    mean_size_ = picture.size;
-  }
+  if (!mean_ || mean_size_ != picture.size) try {
+      mean_ = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(picture.size.x), static_cast<int>(picture.size.y),
+                                  "creating the texture of means");
+      mean_size_ = picture.size;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::out_of_memory) throw;
+      return false;  // slower and with holes, but drawn
+    }
   gl_->UseProgram(resolve_.name());
   gl_->BindTextureUnit(0, picture.sum);
   gl_->BindTextureUnit(1, picture.counts);
   gl_->BindImageTexture(0, mean_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
   gl_->MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+  return true;
 }
 
 void Compositor::draw(const PictureTextures& picture, const Display& display, const FrameTarget& target) {
@@ -46,8 +50,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   }
   const bool bilinear = glm::ivec2(picture.size) != glm::ivec2(viewport.z, viewport.w);
   // Where means are read more than once, they are made once.
-  const bool resolved = bilinear || picture.holes;
-  if (resolved) resolve(picture);
+  const bool resolved = (bilinear || picture.holes) && resolve(picture);
   const std::vector<std::string> defines{
       "CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0", resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
       "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",

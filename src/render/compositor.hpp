@@ -44,7 +44,8 @@ class Compositor {
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
 
  private:
-  void resolve(const PictureTextures& picture);
+  // Whether there is memory for it.
+  bool resolve(const PictureTextures& picture);
 
   gl::FunctionsPtr gl_;
   std::map<std::vector<std::string>, gl::Object> colours_;  // by their macros: made when first needed

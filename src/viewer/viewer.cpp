@@ -103,7 +103,10 @@ void Viewer::with_gl(Body&& body) {
     const gl::StateGuard guard(*functions, restore_state_);
     body(g);
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::context_lost) context_lost();
+    // Whatever failed: in a lost context everything does.
+    const bool lost = error.code() == ErrorCode::context_lost || gl::was_reset(*functions);
+    if (lost) context_lost();
+    if (lost && error.code() != ErrorCode::context_lost) throw Error(ErrorCode::context_lost, gl::reset_message);
     throw;
   }
   gl::clear_errors(*functions);
@@ -113,9 +116,24 @@ void Viewer::with_gl(Body&& body) {
 
 void Viewer::notify() {
   if (!update_ || update_pending_.exchange(true)) return;
-  callback_thread_ = std::this_thread::get_id();
+  const auto self = std::this_thread::get_id();
+  {
+    const std::scoped_lock lock(callback_mutex_);
+    callback_threads_.push_back(self);
+  }
   update_();
-  callback_thread_ = std::thread::id();
+  const std::scoped_lock lock(callback_mutex_);
+  callback_threads_.erase(std::ranges::find(callback_threads_, self));
+}
+
+bool Viewer::in_update_callback() const {
+  const std::scoped_lock lock(callback_mutex_);
+  return std::ranges::find(callback_threads_, std::this_thread::get_id()) != callback_threads_.end();
+}
+
+void Viewer::touch() {
+  ++settings_revision_;
+  notify();
 }
 
 // ---- volumes and building ----
@@ -138,7 +156,7 @@ void Viewer::sync() {
 std::optional<BuildSettings> Viewer::build_settings() const {
   BuildSettings settings = grid_.build;
   if (grid_.camera_adaptive) {
-    if (!view_ || frame_size_.x == 0) return std::nullopt;  // the next frame asks
+    if (!view_) return std::nullopt;  // the next frame asks
     settings.refine.camera = refine_camera();
   }
   return settings;
@@ -154,7 +172,7 @@ void Viewer::request_build() {
 void Viewer::load_volume(const std::string& path, const std::string& grid_name) {
   sync();
   builder_.load(path, grid_name, grid_.camera_adaptive ? std::nullopt : build_settings());
-  notify();
+  touch();
 }
 
 void Viewer::set_volume(VolumePtr volume) {
@@ -167,7 +185,7 @@ void Viewer::set_volume(VolumePtr volume) {
   } else if (!grid_.camera_adaptive) {
     builder_.build(volume_, grid_.build);
   }
-  notify();
+  touch();
 }
 
 VolumePtr Viewer::volume() {
@@ -178,7 +196,7 @@ VolumePtr Viewer::volume() {
 void Viewer::rebuild() {
   sync();
   request_build();
-  notify();
+  touch();
 }
 
 void Viewer::wait(double timeout_ms) {
@@ -206,39 +224,39 @@ void Viewer::set_grid(const GridSettings& settings) {
   sync();
   grid_ = settings;
   request_build();
-  notify();
+  touch();
 }
 
 void Viewer::set_medium(const Medium& medium) {
   medium_ = medium;
-  notify();
+  touch();
 }
 
 void Viewer::set_light(const Light& light) {
   light_ = light;
-  notify();
+  touch();
 }
 
 void Viewer::set_sampling(const Sampling& sampling) {
   sampling_ = sampling;
-  notify();
+  touch();
 }
 
 void Viewer::set_display(const DisplaySettings& display) {
   display_ = display;
-  notify();
+  touch();
 }
 
 void Viewer::set_camera(std::shared_ptr<Camera> camera) {
   camera_listener_.reset();
   camera_ = std::move(camera);
   camera_listener_ = camera_->listen([this] { notify(); });
-  notify();
+  touch();
 }
 
 void Viewer::set_navigation(const NavigationSettings& settings) {
   navigation_.set(settings);
-  notify();
+  touch();
 }
 
 bool Viewer::input(const InputEvent& event) {
@@ -329,7 +347,8 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   last_view_ = view_;
   view_.reset();
   // Without a volume the camera may wait for its bounds.
-  if (frame_size_.x > 0 && volume_) view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
+  if (frame_size_.x > 0 && frame_size_.y > 0 && volume_)
+    view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
 
   if (grid_.camera_adaptive && view_ && (view_ != built_view_ || frame_size_ != built_size_)) {
     const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
@@ -355,9 +374,11 @@ void Viewer::upload(Gl& g, render::Deadline deadline) {
   } else if (g.data_source != built_.source) {
     Stopwatch watch;
     try {
-      if (g.upload_source != built_.source) {
+      const bool failed = g.upload_source == built_.source && !g.upload;
+      if (g.upload_source != built_.source || (failed && g.upload_revision != settings_revision_)) {
         g.upload.reset();
         g.upload_source = built_.source;
+        g.upload_revision = settings_revision_;
         g.upload = std::make_unique<render::MarchUpload>(g.functions, g.limits, built_.source, page_texels_);
         built_.seconds.upload = 0.0;
       }
@@ -368,7 +389,7 @@ void Viewer::upload(Gl& g, render::Deadline deadline) {
         ++generation_;
       }
     } catch (const Error&) {
-      g.upload.reset();  // upload_source stays: tried again when there is another
+      g.upload.reset();  // upload_source stays: tried again when there is another, or a setting changes
       throw;
     }
     built_.seconds.upload += watch.lap();
@@ -407,6 +428,30 @@ void Viewer::trace(const Frame& frame, render::Deadline deadline) {
   g.progressive.advance(wish, *g.data, surface(), deadline, frame.budget_ms);
 }
 
+void Viewer::make_target_textures(Gl& g, const Frame& frame) {
+  const bool fits =
+      g.colour && g.texture_size == frame.size && g.texture_format == frame.format && (g.depth || !frame.write_depth);
+  // What failed once is tried again when something changes: until then the old ones serve.
+  const bool failed =
+      g.failed_size == frame.size && g.failed_format == frame.format && g.failed_revision == settings_revision_;
+  if (fits || failed) return;
+  g.failed_size = frame.size;
+  g.failed_format = frame.format;
+  g.failed_revision = settings_revision_;
+  const int width = static_cast<int>(frame.size.x);
+  const int height = static_cast<int>(frame.size.y);
+  gl::Object colour = gl::make_texture_2d(g.functions, frame.format, width, height, "creating the target texture");
+  gl::Object depth;
+  if (frame.write_depth) {
+    depth = gl::make_texture_2d(g.functions, GL_DEPTH_COMPONENT32F, width, height, "creating the target's depth");
+  }
+  g.colour = std::move(colour);
+  g.depth = std::move(depth);
+  g.texture_size = frame.size;
+  g.texture_format = frame.format;
+  g.failed_size = glm::uvec2(0U);
+}
+
 void Viewer::draw(const Frame& frame, FrameResult& result) {
   Gl& g = gl();
   const render::Picture* shown = g.progressive.shown();
@@ -442,22 +487,14 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
     g.compositor.draw(picture, display, target);
     return;
   }
-  if (g.texture_size != frame.size || g.texture_format != frame.format || !g.colour) {
-    const int width = static_cast<int>(frame.size.x);
-    const int height = static_cast<int>(frame.size.y);
-    g.colour = gl::make_texture_2d(g.functions, frame.format, width, height, "creating the target texture");
-    g.depth = {};
-    g.texture_size = frame.size;
-    g.texture_format = frame.format;
-  }
-  if (frame.write_depth && !g.depth) {
-    g.depth = gl::make_texture_2d(g.functions, GL_DEPTH_COMPONENT32F, static_cast<int>(frame.size.x),
-                                  static_cast<int>(frame.size.y), "creating the target's depth");
-  }
-  const TransientFramebuffer framebuffer(*g.functions, g.colour.name(), frame.write_depth ? g.depth.name() : 0);
+  make_target_textures(g, frame);
+  if (!g.colour) return;
+  target.viewport = g.texture_size == frame.size ? frame.viewport : glm::ivec4(0, 0, g.texture_size);
+  const bool depth = frame.write_depth && g.depth;
+  const TransientFramebuffer framebuffer(*g.functions, g.colour.name(), depth ? g.depth.name() : 0);
   constexpr std::array<float, 4> nothing{};
   g.functions->ClearNamedFramebufferfv(framebuffer.name(), GL_COLOR, 0, nothing.data());
-  if (frame.write_depth) {
+  if (depth) {
     const float far = target.reversed ? 0.0F : 1.0F;
     g.functions->ClearNamedFramebufferfv(framebuffer.name(), GL_DEPTH, 0, &far);
     result.depth_texture = g.depth.name();
@@ -480,6 +517,7 @@ FrameResult Viewer::render(const Frame& frame) {
         part();
       } catch (const Error& error) {
         if (error.code() == ErrorCode::context_lost) throw;
+        gl::check_reset(*g.functions);
         if (!failure) failure = error;
         gl::clear_errors(*g.functions);
       }

@@ -6,9 +6,11 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "base/log.hpp"
 #include "gl/objects.hpp"
@@ -161,7 +163,7 @@ class Viewer {
   /// Tells the host that there is something new. Coalesced; any thread.
   void notify();
   /// Whether the calling thread is inside the update callback.
-  [[nodiscard]] bool in_update_callback() const { return callback_thread_.load() == std::this_thread::get_id(); }
+  [[nodiscard]] bool in_update_callback() const;
 
   /// What the shaders were told of the picture under way; for tests.
   const core::CmParameters& trace_parameters();
@@ -187,9 +189,16 @@ class Viewer {
     gl::Object depth;
     glm::uvec2 texture_size{0U};
     GLenum texture_format = 0;
+    // What could not be made, and at which settings.
+    std::uint64_t upload_revision = 0;
+    glm::uvec2 failed_size{0U};
+    GLenum failed_format = 0;
+    std::uint64_t failed_revision = 0;
   };
 
   [[nodiscard]] Gl& gl() const;
+  // A setting changed.
+  void touch();
   // Runs a [GL] call's body between state guard and error handling.
   template <class Body>
   void with_gl(Body&& body);
@@ -201,6 +210,7 @@ class Viewer {
   void prepare(const Frame& frame, render::Deadline deadline);
   void trace(const Frame& frame, render::Deadline deadline);
   void draw(const Frame& frame, FrameResult& result);
+  void make_target_textures(Gl& g, const Frame& frame);
   void upload(Gl& g, render::Deadline deadline);
   [[nodiscard]] render::SurfaceDepth surface() const;
   const render::Picture& readable();
@@ -208,7 +218,8 @@ class Viewer {
   Log log_;
   std::function<void()> update_;
   std::atomic<bool> update_pending_ = false;
-  std::atomic<std::thread::id> callback_thread_;
+  mutable std::mutex callback_mutex_;
+  std::vector<std::thread::id> callback_threads_;
   std::atomic<double> upload_progress_ = 1.0;
   bool restore_state_;
   std::int64_t page_texels_ = 0;
@@ -223,9 +234,10 @@ class Viewer {
   Navigation navigation_;
   std::chrono::steady_clock::time_point last_frame_time_{};
 
-  VolumePtr volume_;                      // newest
-  Built built_;                           // newest, and what is uploaded again in a new context
-  std::uint64_t generation_ = 1;          // of the data in GL
+  VolumePtr volume_;              // newest
+  Built built_;                   // newest, and what is uploaded again in a new context
+  std::uint64_t generation_ = 1;  // of the data in GL
+  std::uint64_t settings_revision_ = 1;
   std::uint64_t surface_generation_ = 1;  // of the host's depth
   glm::uvec2 frame_size_{0U};             // of the last frame's picture
   std::optional<ViewFrame> view_;         // of the last frame

@@ -27,7 +27,8 @@
  *     from any thread at any time. Files are read and grids are built on a worker thread of the viewer's own;
  *     cumulet_render uploads what it made, within its time budget, and shows the last good picture until then.
  *     The update callback comes from any thread, the worker's included. Neither it nor the log callback may call the
- *     library: a call from the update callback is refused with CUMULET_ERROR_INVALID_ARGUMENT.
+ *     library (but for the two exceptions): a call from the update callback is refused with
+ *     CUMULET_ERROR_INVALID_ARGUMENT.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It

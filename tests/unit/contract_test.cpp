@@ -1,0 +1,848 @@
+// The embedding contract, design.md section 5: one test a point, by cumulet.h and cumulet.hpp alone. What needs more
+// than a test (every state, every allocation, threads, windows) is in robust_test.cpp and tests/embed.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <thread>
+
+#include "cumulet/cumulet.hpp"
+#include "support/c_host.hpp"
+#include "support/fake_gl.hpp"
+
+namespace {
+
+using cumulet::headless::Backend;
+using cumulet::headless::Context;
+using cumulet::test::CameraRef;
+using cumulet::test::converge;
+using cumulet::test::difference;
+using cumulet::test::FakeGl;
+using cumulet::test::HostTarget;
+using cumulet::test::make_ball;
+using cumulet::test::make_desc;
+using cumulet::test::picture_of;
+using cumulet::test::ViewerPtr;
+using cumulet::test::VolumeRef;
+using Picture = std::vector<std::uint8_t>;
+
+constexpr int side = 32;
+
+class Contract : public testing::Test {
+ protected:
+  [[nodiscard]] ViewerPtr viewer(cumulet::test::ViewerOptions options = {}) {
+    options.get_proc = FakeGl::get_proc;
+    options.user = &fake_;
+    return cumulet::test::make_viewer(options);
+  }
+  void show(cumulet_viewer* v, cumulet_background background) {
+    auto display = make_desc<cumulet_display_desc>();
+    display.background = background;
+    ASSERT_EQ(cumulet_set_display(v, &display), CUMULET_OK);
+  }
+  [[nodiscard]] std::array<int, 4> at(const Picture& pixels, int x, int y) const {
+    std::array<int, 4> rgba{};
+    for (std::size_t c = 0; c < 4; ++c) rgba[c] = pixels[static_cast<std::size_t>(y * side + x) * 4 + c];
+    return rgba;
+  }
+
+  Context context_ = Context::create(Backend::automatic);
+  FakeGl fake_{Context::get_proc, &context_};
+  const GladGLContext& gl_ = fake_.real();
+  HostTarget target_{gl_, side, side};
+  VolumeRef volume_ = make_ball(16, 2.0F);
+  ViewerPtr viewer_ = viewer();
+  cumulet_viewer* v_ = viewer_.get();
+};
+
+TEST_F(Contract, Contract01OpaqueHandlesAndAThinLayerOverThem) {
+  const Picture by_c = picture_of(v_, volume_.get(), target_);
+  auto made = cumulet::Viewer::create({.get_proc = {FakeGl::get_proc, &fake_}});
+  ASSERT_TRUE(made);
+  cumulet::Viewer& viewer = *made;
+  ASSERT_TRUE(viewer.set_light({.sun_azimuth_degrees = 60.0F,
+                                .sun_elevation_degrees = 40.0F,
+                                .sun_irradiance = {2.5F, 2.5F, 2.5F},
+                                .sky_radiance = {0.3F, 0.3F, 0.3F}}));
+  ASSERT_TRUE(viewer.set_sampling({.samples = 4, .preview = cumulet::Preview::off}));
+  const auto camera = cumulet::Camera::create({.eye = {0.0, 6.0, 32.0}});
+  ASSERT_TRUE(viewer.set_camera(*camera));
+  ASSERT_TRUE(viewer.set_volume(cumulet::Volume::adopt(cumulet_volume_retain(volume_.get()))));
+  ASSERT_TRUE(viewer.wait());
+  target_.clear({});
+  cumulet::FrameResult result;
+  do {
+    const auto frame =
+        viewer.render({.budget_ms = 50.0, .framebuffer = target_.framebuffer(), .width = side, .height = side});
+    ASSERT_TRUE(frame) << frame.error().message.c_str();
+    result = *frame;
+  } while (!result.has(cumulet::RenderFlags::converged));
+  EXPECT_EQ(difference(target_.pixels(), by_c), "");
+}
+
+/// Each descriptor: its call takes a whole one and any that ends after a member, and refuses other sizes.
+template <class Desc>
+void check_sizes(const char* name, Desc desc, const std::function<cumulet_status(const Desc*)>& call,
+                 std::size_t least = sizeof(std::size_t)) {
+  SCOPED_TRACE(name);
+  EXPECT_EQ(call(&desc), CUMULET_OK);
+  for (const std::size_t wrong : {std::size_t{0}, std::size_t{4}, sizeof(Desc) + 8, std::size_t{1} << 40U}) {
+    desc.struct_size = wrong;
+    EXPECT_EQ(call(&desc), CUMULET_ERROR_INVALID_ARGUMENT) << wrong;
+  }
+  for (std::size_t shorter = least; shorter < sizeof(Desc); shorter += 8) {
+    // Only as many bytes as it says are there.
+    std::vector<unsigned char> bytes(shorter);
+    desc.struct_size = shorter;
+    std::memcpy(bytes.data(), &desc, shorter);
+    EXPECT_EQ(call(reinterpret_cast<const Desc*>(bytes.data())), CUMULET_OK) << shorter;
+  }
+  EXPECT_EQ(call(nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+/// An enum member takes no value but its own.
+template <class Desc, class Enum>
+void check_enum(const char* name, Enum Desc::*member, int values,
+                const std::function<cumulet_status(const Desc*)>& call, Desc desc = make_desc<Desc>()) {
+  SCOPED_TRACE(name);
+  for (int value = -1; value <= values; ++value) {
+    std::memcpy(&(desc.*member), &value, sizeof value);
+    const bool known = value >= 0 && value < values;
+    if (!known) {
+      EXPECT_EQ(call(&desc), CUMULET_ERROR_INVALID_ARGUMENT) << value;
+    }
+  }
+}
+
+TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
+  picture_of(v_, volume_.get(), target_);
+  cumulet_viewer* out = nullptr;
+  const std::function create = [&](const cumulet_create_desc* d) {
+    const cumulet_status status = cumulet_create(d, &out, nullptr, 0);
+    cumulet_destroy(out);
+    out = nullptr;
+    return status;
+  };
+  const std::function grid = [&](const cumulet_grid_desc* d) { return cumulet_set_grid(v_, d); };
+  const std::function medium = [&](const cumulet_medium_desc* d) { return cumulet_set_medium(v_, d); };
+  const std::function light = [&](const cumulet_light_desc* d) { return cumulet_set_light(v_, d); };
+  const std::function sampling = [&](const cumulet_sampling_desc* d) { return cumulet_set_sampling(v_, d); };
+  const std::function display = [&](const cumulet_display_desc* d) { return cumulet_set_display(v_, d); };
+  const std::function navigation = [&](const cumulet_navigation_desc* d) { return cumulet_set_navigation(v_, d); };
+  const std::function event = [&](const cumulet_event* e) { return cumulet_input(v_, e, nullptr); };
+  const std::function frame = [&](const cumulet_frame_desc* d) { return cumulet_render(v_, d, nullptr); };
+  const std::function camera = [&](const cumulet_camera_desc* d) {
+    cumulet_camera* made = nullptr;
+    const cumulet_status status = cumulet_camera_create(d, &made);
+    cumulet_camera_release(made);
+    return status;
+  };
+  const std::array<float, 8> voxels{1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F};
+  auto dense_desc = make_desc<cumulet_dense_desc>();
+  dense_desc.values = voxels.data();
+  dense_desc.value_count = voxels.size();
+  for (int& length : dense_desc.size) length = 2;
+  const std::function dense = [&](const cumulet_dense_desc* d) {
+    cumulet_volume* made = nullptr;
+    const cumulet_status status = cumulet_volume_from_dense(d, &made, nullptr, 0);
+    cumulet_volume_release(made);
+    return status;
+  };
+  const std::array<std::int32_t, 3> origin{0, 0, 0};
+  const std::vector<float> brick(512, 1.0F);
+  auto sparse_desc = make_desc<cumulet_sparse_desc>();
+  sparse_desc.brick_origins = origin.data();
+  sparse_desc.brick_values = brick.data();
+  sparse_desc.brick_count = 1;
+  const std::function sparse = [&](const cumulet_sparse_desc* d) {
+    cumulet_volume* made = nullptr;
+    const cumulet_status status = cumulet_volume_from_sparse(d, &made, nullptr, 0);
+    cumulet_volume_release(made);
+    return status;
+  };
+  check_sizes("create", make_desc<cumulet_create_desc>(), create);
+  check_sizes("grid", make_desc<cumulet_grid_desc>(), grid);
+  check_sizes("medium", make_desc<cumulet_medium_desc>(), medium);
+  check_sizes("light", make_desc<cumulet_light_desc>(), light);
+  check_sizes("sampling", make_desc<cumulet_sampling_desc>(), sampling);
+  check_sizes("display", make_desc<cumulet_display_desc>(), display);
+  check_sizes("navigation", make_desc<cumulet_navigation_desc>(), navigation);
+  check_sizes("event", make_desc<cumulet_event>(), event);
+  check_sizes("camera", make_desc<cumulet_camera_desc>(), camera);
+  check_sizes("frame", make_desc<cumulet_frame_desc>(), frame);
+  check_sizes("dense", dense_desc, dense, offsetof(cumulet_dense_desc, index_to_world));
+  check_sizes("sparse", sparse_desc, sparse, offsetof(cumulet_sparse_desc, tiles));
+
+  // What the library fills: no more than the caller has.
+  const auto filled = [&](auto desc, const auto& call) {
+    using Desc = decltype(desc);
+    EXPECT_EQ(call(&desc), CUMULET_OK);
+    EXPECT_EQ(desc.struct_size, sizeof(Desc));
+    for (std::size_t shorter = 8; shorter < sizeof(Desc); shorter += 8) {
+      std::vector<unsigned char> bytes(shorter + 8, 0xCD);
+      std::memcpy(bytes.data(), &shorter, sizeof shorter);
+      EXPECT_EQ(call(reinterpret_cast<Desc*>(bytes.data())), CUMULET_OK);
+      for (std::size_t i = shorter; i < shorter + 8; ++i) EXPECT_EQ(bytes[i], 0xCD) << "written past " << shorter;
+    }
+    desc.struct_size = 0;
+    EXPECT_EQ(call(&desc), CUMULET_ERROR_INVALID_ARGUMENT);
+  };
+  filled(make_desc<cumulet_progress>(), [&](cumulet_progress* p) { return cumulet_get_progress(v_, p); });
+  filled(make_desc<cumulet_stats>(), [&](cumulet_stats* s) { return cumulet_get_stats(v_, s); });
+  filled(make_desc<cumulet_pick>(), [&](cumulet_pick* p) { return cumulet_pick_at(v_, 1.0, 1.0, p); });
+  filled(make_desc<cumulet_volume_info>(),
+         [&](cumulet_volume_info* i) { return cumulet_volume_get_info(volume_.get(), i); });
+  const cumulet_frame_desc whole = target_.frame();
+  filled(make_desc<cumulet_frame_result>(), [&](cumulet_frame_result* r) { return cumulet_render(v_, &whole, r); });
+
+  check_enum("gl_state", &cumulet_create_desc::gl_state, 2, create);
+  check_enum("march", &cumulet_grid_desc::march, 3, grid);
+  check_enum("cells", &cumulet_grid_desc::cells, 2, grid);
+  check_enum("criterion", &cumulet_grid_desc::criterion, 2, grid);
+  check_enum("view", &cumulet_sampling_desc::view, 5, sampling);
+  check_enum("preview", &cumulet_sampling_desc::preview, 2, sampling);
+  check_enum("tone_map", &cumulet_display_desc::tone_map, 3, display);
+  check_enum("background", &cumulet_display_desc::background, 2, display);
+  check_enum("depth", &cumulet_camera_desc::depth, 2, camera);
+  check_enum("style", &cumulet_navigation_desc::style, 3, navigation);
+  check_enum("type", &cumulet_event::type, 7, event);
+  check_enum("button", &cumulet_event::button, 3, event);
+  check_enum("target", &cumulet_frame_desc::target, 3, frame, whole);
+  check_enum("colour", &cumulet_frame_desc::colour, 4, frame, whole);
+  check_enum("blend", &cumulet_frame_desc::blend, 2, frame, whole);
+  check_enum("depth_source", &cumulet_frame_desc::depth_source, 4, frame, whole);
+  std::array<double, 16> matrix{};
+  const CameraRef owner([] {
+    cumulet_camera* made = nullptr;
+    const auto desc = make_desc<cumulet_camera_desc>();
+    cumulet_camera_create(&desc, &made);
+    return made;
+  }());
+  for (const int clip : {-1, 2}) {
+    cumulet_clip value{};
+    std::memcpy(&value, &clip, sizeof clip);
+    EXPECT_EQ(cumulet_camera_get_matrices(owner.get(), 1.0, value, matrix.data(), matrix.data()),
+              CUMULET_ERROR_INVALID_ARGUMENT);
+  }
+}
+
+TEST_F(Contract, Contract03FunctionsComeFromEachInstancesCallback) {
+  Context other_context = Context::create(Backend::automatic);
+  FakeGl other(Context::get_proc, &other_context);
+  const std::uint64_t others = other.calls();
+  context_.make_current();
+  fake_.make_current();
+  picture_of(v_, volume_.get(), target_);
+  EXPECT_GT(fake_.calls(), 100U);
+  EXPECT_EQ(other.calls(), others) << "a viewer called by another's table";
+  EXPECT_EQ(FakeGl::strays(), 0U);
+  const std::uint64_t mine = fake_.calls();
+  {
+    other_context.make_current();
+    other.make_current();
+    const HostTarget target(other.real(), side, side);
+    const ViewerPtr second = cumulet::test::make_viewer({.get_proc = FakeGl::get_proc, .user = &other});
+    picture_of(second.get(), volume_.get(), target);
+  }
+  EXPECT_GT(other.calls(), others);
+  EXPECT_EQ(fake_.calls(), mine);
+  context_.make_current();
+  fake_.make_current();
+}
+
+TEST_F(Contract, Contract04CreationSaysWhatIsMissing) {
+  const auto refusal = [&](cumulet_get_proc_fn get_proc) {
+    auto create = make_desc<cumulet_create_desc>();
+    create.get_proc = get_proc;
+    create.get_proc_user = &context_;
+    std::array<char, 256> error{};
+    cumulet_viewer* out = v_;
+    EXPECT_EQ(cumulet_create(&create, &out, error.data(), error.size()), CUMULET_ERROR_UNSUPPORTED);
+    EXPECT_EQ(out, nullptr);
+    return std::string(error.data());
+  };
+  EXPECT_NE(refusal([](void*, const char*) -> void* { return nullptr; }), "");
+  EXPECT_NE(refusal([](void* user, const char* name) -> void* {
+              return std::strcmp(name, "glDispatchCompute") == 0 ? nullptr : Context::get_proc(user, name);
+            }).find("4.5"),
+            std::string::npos);
+  const std::string old = refusal([](void* user, const char* name) -> void* {
+    if (std::strcmp(name, "glGetString") != 0) return Context::get_proc(user, name);
+    const auto get_string = +[](GLenum) { return reinterpret_cast<const GLubyte*>("3.3 (a test's)"); };
+    return reinterpret_cast<void*>(get_string);
+  });
+  EXPECT_NE(old.find("4.5"), std::string::npos) << old;
+  EXPECT_NE(old.find("3.3"), std::string::npos) << old;
+}
+
+TEST(ContractDetached, Contract05NoWindowAndNoContextAreMade) {
+  // No context is current, and none comes: yet files are read and grids are built.
+  const ViewerPtr viewer = cumulet::test::make_viewer({});
+  const VolumeRef volume = make_ball(16);
+  ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  auto stats = make_desc<cumulet_stats>();
+  ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+  EXPECT_GT(stats.cells, 24U);
+  EXPECT_STREQ(stats.gl_version, "");
+  const auto frame = make_desc<cumulet_frame_desc>();
+  EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_ERROR_DETACHED);
+  EXPECT_EQ(FakeGl::strays(), 0U);
+}
+
+// All of the state, from all calls: tests/embed/scramble.cpp. Here, that the two modes differ as they say.
+TEST_F(Contract, Contract06StateIsRestoredOrTheHostResetsIt) {
+  GLuint buffer = 0;
+  gl_.CreateBuffers(1, &buffer);
+  GLuint program = 0;
+  const auto disturb = [&] {
+    gl_.BindBuffer(GL_PIXEL_PACK_BUFFER, buffer);
+    gl_.PixelStorei(GL_PACK_ROW_LENGTH, 7);
+    gl_.Enable(GL_CULL_FACE);
+    gl_.Viewport(1, 2, 3, 4);
+    gl_.UseProgram(program);
+  };
+  disturb();
+  picture_of(v_, volume_.get(), target_);
+  std::array<GLint, 4> viewport{};
+  GLint row_length = 0;
+  GLint bound = 0;
+  gl_.GetIntegerv(GL_VIEWPORT, viewport.data());
+  gl_.GetIntegerv(GL_PACK_ROW_LENGTH, &row_length);
+  gl_.GetIntegerv(GL_PIXEL_PACK_BUFFER_BINDING, &bound);
+  EXPECT_EQ(viewport, (std::array<GLint, 4>{1, 2, 3, 4}));
+  EXPECT_EQ(row_length, 7);
+  EXPECT_EQ(static_cast<GLuint>(bound), buffer);
+  EXPECT_EQ(gl_.IsEnabled(GL_CULL_FACE), GL_TRUE);
+
+  const auto calls_a_frame = [&](cumulet_viewer* v) {
+    auto frame = target_.frame();
+    frame.budget_ms = -1.0;
+    const std::uint64_t before = fake_.calls();
+    EXPECT_EQ(cumulet_render(v, &frame, nullptr), CUMULET_OK);
+    return fake_.calls() - before;
+  };
+  gl_.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+  gl_.PixelStorei(GL_PACK_ROW_LENGTH, 0);
+  const Picture restored = target_.pixels();
+  const ViewerPtr resetting = viewer({.gl_state = CUMULET_GL_STATE_HOST_RESETS});
+  disturb();
+  picture_of(resetting.get(), volume_.get(), target_);
+  gl_.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+  gl_.PixelStorei(GL_PACK_ROW_LENGTH, 0);
+  EXPECT_EQ(difference(target_.pixels(), restored), "");
+  EXPECT_LT(2 * calls_a_frame(resetting.get()), calls_a_frame(v_)) << "nothing is saved";
+  gl_.DeleteBuffers(1, &buffer);
+}
+
+// Scrambling is tests/embed/scramble.cpp's. Here: objects of the host keep what is theirs.
+TEST_F(Contract, Contract07HostObjectsAreNotChanged) {
+  const GLenum none = GL_NONE;
+  const HostTarget bystander(gl_, 4, 4);
+  gl_.NamedFramebufferDrawBuffers(bystander.framebuffer(), 1, &none);
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, bystander.framebuffer());
+  const auto before = bystander.pixels();
+  picture_of(v_, volume_.get(), target_);
+  GLint draw_buffer = -1;
+  gl_.GetIntegerv(GL_DRAW_BUFFER, &draw_buffer);
+  EXPECT_EQ(draw_buffer, GL_NONE);
+  GLint bound = 0;
+  gl_.GetIntegerv(GL_DRAW_FRAMEBUFFER_BINDING, &bound);
+  EXPECT_EQ(static_cast<GLuint>(bound), bystander.framebuffer());
+  EXPECT_EQ(difference(bystander.pixels(), before), "");
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, 0);
+}
+
+TEST_F(Contract, Contract08ErrorsAreCleanAndTheDebugCallbackIsTheHosts) {
+  int told = 0;
+  const GLDEBUGPROC callback = [](GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar*, const void* user) {
+    if (type == GL_DEBUG_TYPE_ERROR) ++*static_cast<int*>(const_cast<void*>(user));
+  };
+  gl_.Enable(GL_DEBUG_OUTPUT);
+  gl_.Enable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+  gl_.DebugMessageCallback(callback, &told);
+  gl_.Enable(GL_FLOAT);  // pending: INVALID_ENUM
+  const int own = told;
+  picture_of(v_, volume_.get(), target_);
+  EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
+  EXPECT_EQ(told, own) << "errors of ours went to the host";
+  auto frame = target_.frame();
+  frame.framebuffer = 999;  // a failing call
+  EXPECT_NE(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+  EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
+  void* function = nullptr;
+  gl_.GetPointerv(GL_DEBUG_CALLBACK_FUNCTION, &function);
+  EXPECT_EQ(function, reinterpret_cast<void*>(callback));
+  EXPECT_EQ(fake_.calls("DebugMessageCallback") + fake_.calls("DebugMessageControl"), 0U);
+  gl_.DebugMessageCallback(nullptr, nullptr);
+}
+
+TEST_F(Contract, Contract09TheTargetIsGivenWithEveryFrame) {
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  const HostTarget second(gl_, side, side);
+  converge(v_, second.frame());
+  EXPECT_EQ(difference(second.pixels(), picture), "");
+  const HostTarget wide(gl_, 2 * side, side, GL_RGBA16F);
+  converge(v_, wide.frame());
+  const auto wide_pixels = wide.floats();
+  // Its own camera's picture, not a stretched one: the middle column's colours are the same.
+  converge(v_, target_.frame());
+  EXPECT_EQ(difference(target_.pixels(), picture), "") << "the first target's again";
+  EXPECT_GT(std::ranges::max(wide_pixels), 0.3F);
+}
+
+TEST_F(Contract, Contract10FramebufferZeroIsNotAssumed) {
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, 0);
+  picture_of(v_, volume_.get(), target_);
+  EXPECT_GT(std::ranges::max(target_.pixels()), 60);
+  // An incomplete or foreign framebuffer is an error, not a picture somewhere else.
+  GLuint empty = 0;
+  gl_.CreateFramebuffers(1, &empty);
+  auto frame = target_.frame();
+  frame.framebuffer = empty;
+  EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(cumulet_last_error(v_)).find(std::to_string(empty)), std::string::npos);
+  gl_.DeleteFramebuffers(1, &empty);
+}
+
+TEST_F(Contract, Contract11ATextureOfTheViewersOwn) {
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  for (const GLenum format : {GL_RGBA8, GL_RGBA16F, GL_RGBA32F}) {
+    auto frame = target_.frame();
+    frame.target = CUMULET_TARGET_TEXTURE;
+    frame.format = format;
+    frame.write_depth = 1;
+    const auto result = converge(v_, frame);
+    ASSERT_EQ(gl_.IsTexture(result.texture), GL_TRUE);
+    GLint width = 0;
+    GLint internal = 0;
+    gl_.GetTextureLevelParameteriv(result.texture, 0, GL_TEXTURE_WIDTH, &width);
+    gl_.GetTextureLevelParameteriv(result.texture, 0, GL_TEXTURE_INTERNAL_FORMAT, &internal);
+    EXPECT_EQ(width, side);
+    EXPECT_EQ(static_cast<GLenum>(internal), format);
+    gl_.GetTextureLevelParameteriv(result.depth_texture, 0, GL_TEXTURE_INTERNAL_FORMAT, &internal);
+    EXPECT_EQ(internal, GL_DEPTH_COMPONENT32F);
+    Picture pixels(picture.size());
+    gl_.GetTextureImage(result.texture, 0, GL_RGBA, GL_UNSIGNED_BYTE, static_cast<GLsizei>(pixels.size()),
+                        pixels.data());
+    int largest = 0;
+    for (std::size_t i = 0; i < pixels.size(); ++i) largest = std::max(largest, std::abs(pixels[i] - picture[i]));
+    EXPECT_LE(largest, 1);
+  }
+  auto frame = target_.frame();
+  frame.target = CUMULET_TARGET_TEXTURE;
+  frame.format = GL_R8;
+  EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Contract, Contract12FlippedAndInARectangle) {
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  auto frame = target_.frame();
+  frame.flip_y = 1;
+  converge(v_, frame);
+  Picture upside_down;
+  for (int y = side; y-- > 0;) {
+    const auto row = picture.begin() + y * side * 4;
+    upside_down.insert(upside_down.end(), row, row + side * 4);
+  }
+  EXPECT_EQ(difference(target_.pixels(), upside_down), "");
+  EXPECT_NE(difference(picture, upside_down), "");
+
+  const HostTarget larger(gl_, side + 20, side + 10);
+  larger.clear({1.0F, 0.0F, 1.0F, 1.0F});
+  frame = larger.frame();
+  frame.viewport[0] = 13;
+  frame.viewport[1] = 3;
+  frame.viewport[2] = frame.viewport[3] = side;
+  converge(v_, frame);
+  const Picture pixels = larger.pixels();
+  Picture inside;
+  int outside_changed = 0;
+  for (int y = 0; y < side + 10; ++y) {
+    for (int x = 0; x < side + 20; ++x) {
+      const auto pixel = pixels.begin() + (y * (side + 20) + x) * 4;
+      if (x >= 13 && x < 13 + side && y >= 3 && y < 3 + side) {
+        inside.insert(inside.end(), pixel, pixel + 4);
+      } else {
+        outside_changed += pixel[0] == 255 && pixel[1] == 0 && pixel[2] == 255 ? 0 : 1;
+      }
+    }
+  }
+  EXPECT_EQ(outside_changed, 0);
+  EXPECT_EQ(difference(inside, picture), "");
+  frame.viewport[0] = 21;
+  EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT) << "not inside the target";
+}
+
+// Conventions, multisampling and real geometry: tests/embed/reversed_z.cpp.
+TEST_F(Contract, Contract13HostDepthHidesWhatIsBehindIt) {
+  show(v_, CUMULET_BACKGROUND_TRANSPARENT);
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  const Picture nothing(picture.size(), 0);
+  for (const cumulet_depth convention : {CUMULET_DEPTH_STANDARD, CUMULET_DEPTH_REVERSED}) {
+    cumulet_camera* camera = nullptr;
+    ASSERT_EQ(cumulet_get_camera(v_, &camera), CUMULET_OK);
+    const CameraRef owner(camera);
+    auto pose = make_desc<cumulet_camera_desc>();
+    ASSERT_EQ(cumulet_camera_get(camera, &pose), CUMULET_OK);
+    pose.depth = convention;
+    ASSERT_EQ(cumulet_camera_set(camera, &pose), CUMULET_OK);
+    const bool reversed = convention == CUMULET_DEPTH_REVERSED;
+    auto frame = target_.frame();
+    frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE;
+    frame.depth_name = target_.depth_texture();
+    // Nothing of the host's; then something just before the eye.
+    for (const bool near : {false, true}) {
+      frame.target = CUMULET_TARGET_NONE;
+      target_.clear({}, near != reversed ? 0.0F : 1.0F);
+      converge(v_, frame);
+      frame.target = CUMULET_TARGET_FRAMEBUFFER;
+      ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+      EXPECT_EQ(difference(target_.pixels(), near ? nothing : picture), "") << (near ? "near" : "far");
+    }
+  }
+}
+
+TEST_F(Contract, Contract14PremultipliedAlphaAndDepthOut) {
+  show(v_, CUMULET_BACKGROUND_TRANSPARENT);
+  const HostTarget black(gl_, side, side, GL_RGBA32F);
+  const HostTarget white(gl_, side, side, GL_RGBA32F);
+  ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
+  auto frame = black.frame();
+  frame.colour = CUMULET_COLOUR_LINEAR;
+  frame.target = CUMULET_TARGET_NONE;
+  frame.write_depth = 1;
+  converge(v_, frame);
+  frame.target = CUMULET_TARGET_FRAMEBUFFER;
+  black.clear({0.0F, 0.0F, 0.0F, 0.0F});
+  white.clear({1.0F, 1.0F, 1.0F, 1.0F});
+  ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+  frame.framebuffer = white.framebuffer();
+  ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+  const auto over_black = black.floats();
+  const auto over_white = white.floats();
+  int partly = 0;
+  for (std::size_t i = 0; i < over_black.size(); i += 4) {
+    const float alpha = over_black[i + 3];
+    partly += alpha > 0.05F && alpha < 0.95F ? 1 : 0;
+    for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(over_white[i + c], over_black[i + c] + 1.0F - alpha, 1e-5F);
+  }
+  EXPECT_GT(partly, 10);
+
+  // Its depth, where it is half opaque, is where the pick says; nowhere else.
+  const auto depths = black.depths();
+  auto pick = make_desc<cumulet_pick>();
+  ASSERT_EQ(cumulet_pick_at(v_, side / 2.0, side / 2.0, &pick), CUMULET_OK);
+  ASSERT_EQ(pick.hit, 1);
+  cumulet_camera* camera = nullptr;
+  ASSERT_EQ(cumulet_get_camera(v_, &camera), CUMULET_OK);
+  const CameraRef owner(camera);
+  std::array<double, 16> view{}, projection{};
+  ASSERT_EQ(cumulet_camera_get_matrices(camera, 1.0, CUMULET_CLIP_NEGATIVE_ONE_TO_ONE, view.data(), projection.data()),
+            CUMULET_OK);
+  const auto multiply = [](const std::array<double, 16>& m, const std::array<double, 4>& v) {
+    std::array<double, 4> r{};
+    for (std::size_t row = 0; row < 4; ++row)
+      for (std::size_t k = 0; k < 4; ++k) r[row] += m[k * 4 + row] * v[k];
+    return r;
+  };
+  const auto clip = multiply(projection, multiply(view, {pick.position[0], pick.position[1], pick.position[2], 1.0}));
+  const double expected = 0.5 + 0.5 * clip[2] / clip[3];
+  // Pixel (16, 16) from the top is row 15 from the bottom.
+  EXPECT_NEAR(depths[static_cast<std::size_t>((side - 1 - side / 2) * side + side / 2)], expected, 1e-5);
+  EXPECT_EQ(depths[0], 1.0F);
+}
+
+TEST_F(Contract, Contract15Colours) {
+  ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
+  const auto draw = [&](cumulet_colour colour, GLenum format) {
+    const HostTarget target(gl_, side, side, format);
+    auto frame = target.frame();
+    frame.colour = colour;
+    converge(v_, frame);
+    return target.floats();  // decoded, where the format is sRGB
+  };
+  const auto decode = [](float e) { return e <= 0.04045F ? e / 12.92F : std::pow((e + 0.055F) / 1.055F, 2.4F); };
+  const auto linear = draw(CUMULET_COLOUR_LINEAR, GL_RGBA32F);
+  const auto encoded = draw(CUMULET_COLOUR_SRGB, GL_RGBA32F);
+  const auto by_gl = draw(CUMULET_COLOUR_SRGB_FRAMEBUFFER, GL_SRGB8_ALPHA8);
+  const auto hdr = draw(CUMULET_COLOUR_HDR, GL_RGBA32F);
+  for (std::size_t i = 0; i < linear.size(); ++i) {
+    if (i % 4 == 3) continue;
+    ASSERT_NEAR(decode(encoded[i]), linear[i], 1e-4F);
+    // Of the 8 bits a stored colour has. (What reads it back may decode it or not.)
+    const float half_a_step = 0.5F / 255.0F + 1e-3F;
+    ASSERT_TRUE(std::abs(by_gl[i] - encoded[i]) < half_a_step || std::abs(decode(encoded[i]) - by_gl[i]) < 0.005F);
+  }
+  EXPECT_LE(std::ranges::max(linear), 1.0F);
+  // Exposure doubles what is not tone-mapped, and restarts nothing.
+  auto display = make_desc<cumulet_display_desc>();
+  display.exposure_stops = 1.0F;
+  auto stats = make_desc<cumulet_stats>();
+  ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+  const std::uint64_t samples = stats.samples;
+  ASSERT_EQ(cumulet_set_display(v_, &display), CUMULET_OK);
+  const auto exposed = draw(CUMULET_COLOUR_HDR, GL_RGBA32F);
+  for (std::size_t i = 0; i < hdr.size(); ++i) {
+    const float factor = i % 4 == 3 ? 1.0F : 2.0F;
+    ASSERT_NEAR(exposed[i], factor * hdr[i], 1e-4F + 1e-4F * hdr[i]);
+  }
+  ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+  EXPECT_EQ(stats.samples, samples);
+  EXPECT_EQ(gl_.IsEnabled(GL_FRAMEBUFFER_SRGB), GL_FALSE);
+}
+
+TEST_F(Contract, Contract16SizesArePhysicalAndMayBeZero) {
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  auto frame = target_.frame();
+  frame.scale = 2.0;
+  target_.clear({});
+  converge(v_, frame);
+  EXPECT_EQ(difference(target_.pixels(), picture), "") << "a scale changes no pixel of a shaded picture";
+  for (const auto& [width, height] : {std::pair(0, 0), {0, side}, {side, 0}}) {
+    frame = target_.frame();
+    frame.width = static_cast<std::uint32_t>(width);
+    frame.height = static_cast<std::uint32_t>(height);
+    EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << width << " x " << height;
+  }
+  target_.clear({});
+  converge(v_, target_.frame());
+  EXPECT_EQ(difference(target_.pixels(), picture), "");
+}
+
+// Coalescing and refusals: UpdateCallback in robust_test.cpp.
+TEST_F(Contract, Contract17TheUpdateCallbackTellsOfWhatTheWorkerMade) {
+  std::atomic<int> updates = 0;
+  const ViewerPtr told =
+      viewer({.update = [](void* user) { ++*static_cast<std::atomic<int>*>(user); }, .update_user = &updates});
+  auto frame = target_.frame();
+  ASSERT_EQ(cumulet_render(told.get(), &frame, nullptr), CUMULET_OK);
+  updates = 0;
+  ASSERT_EQ(cumulet_set_volume(told.get(), volume_.get()), CUMULET_OK);
+  EXPECT_GE(updates, 1);
+  ASSERT_EQ(cumulet_render(told.get(), &frame, nullptr), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(told.get(), -1.0), CUMULET_OK);
+  for (int i = 0; i < 1000 && updates < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_GE(updates, 1);
+  EXPECT_LE(updates, 2);
+}
+
+TEST_F(Contract, Contract18ProgressiveWithinItsBudget) {
+  const HostTarget large(gl_, 512, 512);
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 100000;
+  ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK);
+  auto frame = large.frame();
+  frame.budget_ms = 5.0;
+  auto result = make_desc<cumulet_frame_result>();
+  double progress = -1.0;
+  std::vector<double> spent;
+  for (int i = 0; i < 30; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+    spent.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
+    EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U);
+    EXPECT_EQ(result.flags & CUMULET_RENDER_CONVERGED, 0U);
+    progress = result.progress;
+  }
+  EXPECT_LT(progress, 0.9);
+  std::ranges::sort(spent);
+  // A busy machine's medians, and no watchdog's second: a dispatch is bounded.
+  EXPECT_LT(spent[15], 150.0);
+  EXPECT_LT(spent[28], 1000.0);
+  // A negative budget traces nothing.
+  auto stats = make_desc<cumulet_stats>();
+  ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+  const std::uint64_t samples = stats.samples;
+  frame.budget_ms = -1.0;
+  ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+  ASSERT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+  EXPECT_EQ(stats.samples, samples);
+}
+
+TEST_F(Contract, Contract19FlagsTellWhatIsToCome) {
+  auto result = make_desc<cumulet_frame_result>();
+  const auto frame = target_.frame();
+  ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+  EXPECT_EQ(result.flags, 0U) << "nothing is there, nothing is to come";
+  EXPECT_EQ(result.width, 0U);
+  const VolumeRef large = make_ball(96, 1.0F);
+  ASSERT_EQ(cumulet_set_volume(v_, large.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+  EXPECT_NE(result.flags & CUMULET_RENDER_LOADING, 0U);
+  EXPECT_EQ(result.flags & CUMULET_RENDER_CONVERGED, 0U);
+  result = converge(v_, frame);
+  EXPECT_EQ(result.flags, unsigned{CUMULET_RENDER_CONVERGED});
+  EXPECT_EQ(result.progress, 1.0);
+  EXPECT_EQ(result.width, unsigned{side});
+  ASSERT_EQ(cumulet_load_volume(v_, "no such file.vdb", nullptr), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_FILE);
+  ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+  EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
+}
+
+TEST_F(Contract, Contract20AnyThreadAndLoadingIsAsynchronous) {
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  const VolumeRef large = make_ball(160, 1.0F);
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.threshold = 0.001;
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_EQ(cumulet_set_volume(v_, large.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(1));
+  auto progress = make_desc<cumulet_progress>();
+  std::thread([&] {
+    EXPECT_EQ(cumulet_get_progress(v_, &progress), CUMULET_OK);
+    cumulet_cancel(v_);
+  }).join();
+  EXPECT_NE(progress.stage, CUMULET_STAGE_IDLE);
+  EXPECT_GE(progress.fraction, 0.0);
+  EXPECT_LE(progress.fraction, 1.0);
+  EXPECT_EQ(cumulet_wait(v_, 60000.0), CUMULET_ERROR_CANCELLED);
+  target_.clear({});
+  auto frame = target_.frame();
+  frame.budget_ms = -1.0;
+  ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+  EXPECT_EQ(difference(target_.pixels(), picture), "");
+  EXPECT_EQ(cumulet_wait(v_, 0.0), CUMULET_ERROR_CANCELLED) << "how the last one ended";
+}
+
+// At every call: ContextLossAt in robust_test.cpp.
+TEST_F(Contract, Contract21AContextGoesAndAnotherComes) {
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  for (const bool lost : {false, true}) {
+    ASSERT_EQ(lost ? cumulet_context_lost(v_) : cumulet_detach(v_), CUMULET_OK);
+    const auto frame = target_.frame();
+    EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_ERROR_DETACHED);
+    ASSERT_EQ(cumulet_attach(v_, FakeGl::get_proc, &fake_), CUMULET_OK);
+    EXPECT_EQ(cumulet_attach(v_, FakeGl::get_proc, &fake_), CUMULET_ERROR_INVALID_ARGUMENT) << "attached already";
+    target_.clear({});
+    converge(v_, frame);
+    EXPECT_EQ(difference(target_.pixels(), picture), "");
+  }
+  ASSERT_EQ(cumulet_context_lost(v_), CUMULET_OK);
+  const std::uint64_t calls = fake_.calls();
+  viewer_.reset();
+  EXPECT_EQ(fake_.calls(), calls);
+}
+
+// Threads and share groups: tests/embed/two_threads.cpp.
+TEST_F(Contract, Contract22InstancesDoNotKnowOfEachOther) {
+  const VolumeRef other = make_ball(12);
+  const Picture alone = picture_of(v_, volume_.get(), target_);
+  const ViewerPtr second = viewer({.samples = 2});
+  auto medium = make_desc<cumulet_medium_desc>();
+  medium.density_scale = 5.0;
+  ASSERT_EQ(cumulet_set_medium(second.get(), &medium), CUMULET_OK);
+  picture_of(second.get(), other.get(), target_);
+  EXPECT_NE(cumulet_load_volume(second.get(), nullptr, nullptr), CUMULET_OK);
+  EXPECT_NE(std::string(cumulet_last_error(second.get())), "");
+  EXPECT_EQ(std::string(cumulet_last_error(v_)), "");
+  target_.clear({});
+  ASSERT_EQ(cumulet_rebuild(v_), CUMULET_OK);
+  converge(v_, target_.frame());
+  EXPECT_EQ(difference(target_.pixels(), alone), "");
+}
+
+TEST_F(Contract, Contract23EventsMoveTheCameraAndMatricesSetIt) {
+  const Picture picture = picture_of(v_, volume_.get(), target_);
+  cumulet_camera* camera = nullptr;
+  ASSERT_EQ(cumulet_get_camera(v_, &camera), CUMULET_OK);
+  const CameraRef owner(camera);
+  std::array<double, 16> view{}, projection{}, moved{};
+  ASSERT_EQ(cumulet_camera_get_matrices(camera, 1.0, CUMULET_CLIP_ZERO_TO_ONE, view.data(), projection.data()),
+            CUMULET_OK);
+  const auto feed = [&](cumulet_event_type type, double x, double y) {
+    auto event = make_desc<cumulet_event>();
+    event.type = type;
+    event.x = x;
+    event.y = y;
+    std::int32_t handled = -1;
+    EXPECT_EQ(cumulet_input(v_, &event, &handled), CUMULET_OK);
+    return handled;
+  };
+  feed(CUMULET_EVENT_POINTER_MOVE, 10, 10);
+  EXPECT_EQ(feed(CUMULET_EVENT_BUTTON_DOWN, 10, 10), 1);
+  EXPECT_EQ(feed(CUMULET_EVENT_POINTER_MOVE, 22, 13), 1);
+  EXPECT_EQ(feed(CUMULET_EVENT_BUTTON_UP, 22, 13), 1);
+  ASSERT_EQ(cumulet_camera_get_matrices(camera, 1.0, CUMULET_CLIP_ZERO_TO_ONE, moved.data(), projection.data()),
+            CUMULET_OK);
+  EXPECT_NE(view, moved);
+  target_.clear({});
+  converge(v_, target_.frame());
+  EXPECT_NE(difference(target_.pixels(), picture), "");
+  ASSERT_EQ(cumulet_camera_set_matrices(camera, view.data(), projection.data(), CUMULET_CLIP_ZERO_TO_ONE), CUMULET_OK);
+  target_.clear({});
+  converge(v_, target_.frame());
+  // Noise apart, for a matrix's last bits may differ.
+  double sum = 0.0;
+  const Picture back = target_.pixels();
+  for (std::size_t i = 0; i < back.size(); ++i) sum += std::abs(back[i] - picture[i]);
+  EXPECT_LT(sum / double(back.size()), 4.0);
+  // A host that had no event to forward feeds nonsense, and is told.
+  auto event = make_desc<cumulet_event>();
+  event.x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(cumulet_input(v_, &event, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Contract, Contract24LogsErrorsAndNoExceptions) {
+  std::vector<std::string> lines;
+  const ViewerPtr logging =
+      viewer({.log = [](void* user, cumulet_log_level,
+                        const char* line) { static_cast<std::vector<std::string>*>(user)->emplace_back(line); },
+              .log_user = &lines});
+  cumulet_viewer* v = logging.get();
+  EXPECT_STREQ(cumulet_last_error(v), "");
+  EXPECT_EQ(cumulet_load_volume(v, "", nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(cumulet_last_error(v)), "");
+  EXPECT_EQ(cumulet_load_volume(v, "/nowhere/cloud.vdb", nullptr), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(v, -1.0), CUMULET_ERROR_FILE);
+  const std::string error = cumulet_last_error(v);
+  EXPECT_NE(error.find("/nowhere/cloud.vdb"), std::string::npos);
+  EXPECT_EQ(error.find('\n'), std::string::npos);
+  EXPECT_EQ(cumulet_set_volume(v, volume_.get()), CUMULET_OK);
+  EXPECT_STREQ(cumulet_last_error(v), "") << "of the last call";
+  // Nothing comes of what would throw inside: sizes that no memory holds, wrong pointers' NULLs, bad numbers.
+  auto dense = make_desc<cumulet_dense_desc>();
+  const float one = 1.0F;
+  dense.values = &one;
+  dense.value_count = std::uint64_t{1} << 62U;
+  for (int& length : dense.size) length = std::numeric_limits<int>::max();
+  cumulet_volume* out = nullptr;
+  std::array<char, 64> small{};
+  EXPECT_NE(cumulet_volume_from_dense(&dense, &out, small.data(), small.size()), CUMULET_OK);
+  EXPECT_EQ(out, nullptr);
+  EXPECT_LT(std::strlen(small.data()), small.size());
+  EXPECT_NE(cumulet_volume_open("/nowhere/cloud.vdb", nullptr, &out, nullptr, 0), CUMULET_OK);
+  for (const cumulet_status status : {CUMULET_OK, CUMULET_ERROR_FILE, CUMULET_ERROR_TIMEOUT})
+    EXPECT_NE(std::string(cumulet_status_text(status)), "");
+}
+
+// Every example host runs in tests/embed; here the smallest, if it is built.
+TEST(ContractHosts, Contract25TheSmallestHostRuns) {
+  namespace fs = std::filesystem;
+  const fs::path host = fs::read_symlink("/proc/self/exe").parent_path() / "cumulet-embed-egl";
+  if (!fs::exists(host)) GTEST_SKIP() << "cumulet-embed-egl is not built";
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    execl(host.c_str(), host.c_str(), "--volume", "/nowhere/cloud.vdb", nullptr);
+    _exit(127);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 1) << "a file that is not there is told in a line";
+}
+
+}  // namespace
