@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <names.hpp>
 #include <ostream>
 #include <utility>
 
@@ -63,16 +64,6 @@ void parse_light(std::string_view text, float (&rgb)[3]) {
   for (std::size_t i = 0; i < 3; ++i) rgb[i] = static_cast<float>(values[i]);
 }
 
-template <class Value>
-using Choices = std::vector<std::pair<const char*, Value>>;
-
-template <class Value>
-std::string list(const Choices<Value>& choices, const char* separator) {
-  std::string text;
-  for (const auto& [name, value] : choices) text += (text.empty() ? "" : separator) + std::string(name);
-  return text;
-}
-
 /// A flag with a value. Repeating it is an error, as is a bad value, which names the flag.
 CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, const std::string& type,
                  std::function<void(const std::string&)> parse, const std::string& help) {
@@ -87,31 +78,31 @@ CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, cons
   return app.add_option_function<std::string>(flag, checked, help)->type_name(type)->group(group);
 }
 
-template <class Value, class Target>
-CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& flag, const Choices<Value>& choices,
-                        Target& target, const std::string& help) {
+template <class Names, class Target>
+CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& flag, const Names& names, Target& target,
+                        const std::string& help) {
   return add(
-      app, group, flag, list(choices, "|"),
-      [choices, &target](const std::string& text) {
-        for (const auto& [name, value] : choices) {
-          if (text == name) {
-            target = value;
+      app, group, flag, list_names(names, "|"),
+      [names, &target](const std::string& text) {
+        for (const auto& name : names) {
+          if (text == name.text) {
+            target = name.value;
             return;
           }
         }
-        throw UsageError(in_quotes(text) + " is none of " + list(choices, ", "));
+        throw UsageError(in_quotes(text) + " is none of " + list_names(names, ", "));
       },
       help);
 }
 
-void parse_size(std::string_view text, cumulet_image_desc& image) {
+void parse_size(std::string_view text, SceneOptions& scene) {
   const std::vector<std::string_view> sides = split(text, 'x');
   if (sides.size() != 2) throw UsageError(in_quotes(text) + " is not WIDTHxHEIGHT, such as 1280x720");
-  image.width = static_cast<std::uint32_t>(parse_integer(sides[0], 1, 16384));
-  image.height = static_cast<std::uint32_t>(parse_integer(sides[1], 1, 16384));
+  scene.width = static_cast<std::uint32_t>(parse_integer(sides[0], 1, 16384));
+  scene.height = static_cast<std::uint32_t>(parse_integer(sides[1], 1, 16384));
 }
 
-void parse_camera(std::string_view text, cumulet_camera_desc& camera) {
+cumulet_camera_desc parse_camera(std::string_view text) {
   const std::vector<std::string_view> parts = words(text);
   if (parts.size() != 3) throw UsageError(in_quotes(text) + " is not \"ex,ey,ez tx,ty,tz fovy\"");
   const std::vector<double> eye = parse_numbers(parts[0], 3);
@@ -120,9 +111,12 @@ void parse_camera(std::string_view text, cumulet_camera_desc& camera) {
   const double fovy = parse_number(parts[2]);
   if (!(fovy > 0.0 && fovy < 180.0))
     throw UsageError(in_quotes(parts[2]) + " is not an angle between 0 and 180 degrees");
+  cumulet_camera_desc camera{};
+  camera.struct_size = sizeof camera;
   std::copy(eye.begin(), eye.end(), camera.eye);
   std::copy(target.begin(), target.end(), camera.target);
   camera.fovy_degrees = fovy;
+  return camera;
 }
 
 void parse_sun(std::string_view text, cumulet_light_desc& light) {
@@ -163,8 +157,8 @@ OutputFormat format_of(const std::string& path) {
   throw UsageError(in_quotes(path) + " ends in none of .png, .exr, .pfm");
 }
 
-std::string version_text() {
-  return "cumulet-render " + std::to_string(CUMULET_VERSION_MAJOR) + "." + std::to_string(CUMULET_VERSION_MINOR) + "." +
+std::string version_text(const std::string& program) {
+  return program + " " + std::to_string(CUMULET_VERSION_MAJOR) + "." + std::to_string(CUMULET_VERSION_MINOR) + "." +
          std::to_string(CUMULET_VERSION_PATCH);
 }
 
@@ -199,42 +193,25 @@ std::uint64_t parse_integer(std::string_view text, std::uint64_t least, std::uin
   return value;
 }
 
-SceneOptions::SceneOptions() {
-  grid.struct_size = sizeof grid;
-  medium.struct_size = sizeof medium;
-  light.struct_size = sizeof light;
-  camera.struct_size = sizeof camera;
-  image.struct_size = sizeof image;
-  image.width = 1280;
-  image.height = 720;
-  image.samples = 64;
-}
-
-void SceneOptions::set_daylight() {
-  light.sun_azimuth_degrees = 65.0f;
-  light.sun_elevation_degrees = 38.0f;
-  constexpr std::array<float, 3> sun = {3.6f, 3.3f, 2.9f};
-  constexpr std::array<float, 3> sky = {0.10f, 0.18f, 0.34f};
-  std::copy(sun.begin(), sun.end(), light.sun_irradiance);
-  std::copy(sky.begin(), sky.end(), light.sky_radiance);
-}
-
 void add_scene_options(CLI::App& app, SceneOptions& scene) {
   const char* group = "Scene";
+  // The first: flags take effect in the order they are added in, so that all others override what the file says.
+  add(
+      app, group, "--scene", "FILE.json", [&](const std::string& text) { scene = load_scene(text); },
+      "Scene file, as cumulet-demo saves it; the other flags override what it says");
   add(
       app, group, "--volume", "FILE",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
         scene.volume = text;
       },
-      "OpenVDB or NanoVDB file (.vdb, .nvdb)")
-      ->required();
+      "OpenVDB or NanoVDB file (.vdb, .nvdb)");
   add(
       app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
       "Grid to show (default: density, else the only scalar one)");
   add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
-      [&](const std::string& text) { parse_camera(text, scene.camera); },
+      [&](const std::string& text) { scene.camera = parse_camera(text); },
       "Eye, target and vertical field of view in degrees (default: fit the volume)");
 
   group = "Medium";
@@ -274,17 +251,11 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       "Radiance, the same from everywhere");
 
   group = "Grid";
-  add_choice<cumulet_march>(
-      app, group, "--march",
-      {{"tet", CUMULET_MARCH_TET}, {"dense", CUMULET_MARCH_DENSE}, {"brick", CUMULET_MARCH_BRICK}}, scene.grid.march,
-      "Adaptive tetrahedra (default), every voxel, or voxels that skip empty 8^3 bricks");
-  add_choice<cumulet_cells>(app, group, "--cells",
-                            {{"constant", CUMULET_CELLS_CONSTANT}, {"linear", CUMULET_CELLS_LINEAR}}, scene.grid.cells,
-                            "Density inside a tetrahedron (default: linear)");
-  add_choice<cumulet_criterion>(
-      app, group, "--criterion",
-      {{"range-mean", CUMULET_CRITERION_RANGE_MEAN}, {"deviation", CUMULET_CRITERION_DEVIATION}}, scene.grid.criterion,
-      "What is compared with the threshold (default: deviation)");
+  add_choice(app, group, "--march", march_names, scene.grid.march,
+             "Adaptive tetrahedra (default), every voxel, or voxels that skip empty 8^3 bricks");
+  add_choice(app, group, "--cells", cells_names, scene.grid.cells, "Density inside a tetrahedron (default: linear)");
+  add_choice(app, group, "--criterion", criterion_names, scene.grid.criterion,
+             "What is compared with the threshold (default: deviation)");
   add(
       app, group, "--threshold", "T",
       [&](const std::string& text) {
@@ -293,49 +264,75 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         // Zero means the default in the API and "always split" to whoever types it.
         scene.grid.threshold = threshold == 0.0 ? -1.0 : threshold;
       },
-      "Split cells above it; 0: down to the voxel (default: 0.05, for range-mean 1)");
+      "Split cells above it; 0: down to the voxel (default: 0.02, for range-mean 1)");
   add(
       app, group, "--max-cells", "N",
       [&](const std::string& text) { scene.grid.max_cells = parse_integer(text, 1, max_u64); },
       "Stop splitting there (default: 5400000)");
-  add_choice<int>(app, group, "--camera-adaptive", {{"on", 1}, {"off", 0}}, scene.grid.camera_adaptive,
-                  "Keep cells coarse that are out of sight or under a pixel (default: off)");
+  add_choice(app, group, "--camera-adaptive", std::array{Name{"on", 1}, Name{"off", 0}}, scene.grid.camera_adaptive,
+             "Keep cells coarse that are out of sight or under a pixel (default: off)");
   add(
       app, group, "--pixel-size", "P", [&](const std::string& text) { scene.grid.pixel_size = parse_positive(text); },
       "Pixels that a split cell's longest edge must cover (default: 1)");
 
   group = "Picture";
   add(
-      app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene.image); },
+      app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene); },
       "Pixels (default: 1280x720)");
   add(
       app, group, "--spp", "N",
       [&](const std::string& text) {
-        scene.image.samples = static_cast<std::uint32_t>(parse_integer(text, 1, max_u32));
+        scene.sampling.samples = static_cast<std::uint32_t>(parse_integer(text, 1, max_u32));
       },
       "Samples a pixel (default: 64)");
   add(
       app, group, "--seed", "S",
-      [&](const std::string& text) { scene.image.seed = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32)); },
+      [&](const std::string& text) {
+        scene.sampling.seed = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32));
+      },
       "Same seed, same driver: same picture (default: 0)");
-  add_choice<cumulet_view>(app, group, "--view",
-                           {{"shaded", CUMULET_VIEW_SHADED},
-                            {"cells", CUMULET_VIEW_CELLS},
-                            {"steps", CUMULET_VIEW_STEPS},
-                            {"density", CUMULET_VIEW_DENSITY}},
-                           scene.image.view, "The picture (default), or a look at the grid that made it");
+  add_choice(app, group, "--view", view_names, scene.sampling.view,
+             "The picture (default), or a look at the grid that made it");
+  add(
+      app, group, "--exposure", "STOPS",
+      [&](const std::string& text) {
+        const double stops = parse_number(text);
+        if (std::abs(stops) > 64.0) throw UsageError(in_quotes(text) + " is not from -64 to 64");
+        scene.display.exposure_stops = static_cast<float>(stops);
+      },
+      "Brightens what is shown, and a .png, by 2^STOPS (default: 0)");
+  add_choice(app, group, "--tone-map", tone_map_names, scene.display.tone_map,
+             "From radiance to the screen and a .png (default: neutral, the Khronos PBR one)");
 }
 
 void finish_scene_options(const CLI::App& app, SceneOptions& scene) {
-  if (app.count("--sun") == 0 && app.count("--sky") == 0) scene.set_daylight();
+  if (app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0) scene.set_daylight();
+}
+
+bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {
+  const std::string version = version_text(app.get_name());
+  app.set_help_flag("-h,--help", "Show this and exit");
+  app.set_version_flag("--version", version, "Show the version and exit");
+  app.get_formatter()->column_width(44);
+  try {
+    std::vector<std::string> reversed = glue_negative_fractions(std::move(arguments));
+    std::reverse(reversed.begin(), reversed.end());  // as CLI11 wants them
+    app.parse(std::move(reversed));
+  } catch (const CLI::CallForHelp&) {
+    out << app.help();
+    return false;
+  } catch (const CLI::CallForVersion&) {
+    out << version << '\n';
+    return false;
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(one_line(error.what()));
+  }
+  return true;
 }
 
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
   RenderOptions options;
   CLI::App app("Path-traces a volume into a picture, without a display.", "cumulet-render");
-  app.set_help_flag("-h,--help", "Show this and exit");
-  app.set_version_flag("--version", version_text(), "Show the version and exit");
-  app.get_formatter()->column_width(44);
   app.footer(
       "Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.\n"
       "Ctrl-C writes the samples so far and exits 1; a second one stops at once.");
@@ -348,15 +345,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.format = format_of(text);
         options.output = text;
       },
-      ".png is tone-mapped (Khronos PBR Neutral); .exr and .pfm hold linear radiance")
+      ".png is exposed and tone-mapped; .exr and .pfm hold linear radiance")
       ->required();
-  add(
-      app, group, "--exposure", "STOPS",
-      [&](const std::string& text) {
-        options.exposure_stops = parse_number(text);
-        if (std::abs(options.exposure_stops) > 64.0) throw UsageError(in_quotes(text) + " is not from -64 to 64");
-      },
-      "Brightens a .png by 2^STOPS (default: 0)");
   add(
       app, group, "--stats", "FILE.json",
       [&](const std::string& text) {
@@ -364,25 +354,14 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.stats = text;
       },
       "What was built and how long it took, in SI units");
-  add_choice<BackendChoice>(
-      app, group, "--backend",
-      {{"auto", BackendChoice::automatic}, {"egl", BackendChoice::egl}, {"osmesa", BackendChoice::osmesa}},
-      options.backend, "OpenGL without a display (default: auto: EGL, then OSMesa)");
+  add_choice(app, group, "--backend",
+             std::array{Name{"auto", BackendChoice::automatic}, Name{"egl", BackendChoice::egl},
+                        Name{"osmesa", BackendChoice::osmesa}},
+             options.backend, "OpenGL without a display (default: auto: EGL, then OSMesa)");
 
-  try {
-    std::vector<std::string> reversed = glue_negative_fractions(std::move(arguments));
-    std::reverse(reversed.begin(), reversed.end());  // as CLI11 wants them
-    app.parse(std::move(reversed));
-  } catch (const CLI::CallForHelp&) {
-    out << app.help();
-    return std::nullopt;
-  } catch (const CLI::CallForVersion&) {
-    out << version_text() << '\n';
-    return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw UsageError(one_line(error.what()));
-  }
+  if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene);
+  if (options.scene.volume.empty()) throw UsageError("--volume is required, or a --scene that names one");
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
   return options;
 }

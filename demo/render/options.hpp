@@ -1,9 +1,9 @@
 #pragma once
 
-#include <cumulet/cumulet.h>
-
+#include <cstdint>
 #include <iosfwd>
 #include <optional>
+#include <scene_file.hpp>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -21,27 +21,15 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What every demo program can show, as the library's own descriptors with struct_size set. Zero is the library's
-/// default, as there.
-struct SceneOptions {
-  std::string volume;
-  std::string grid_name;
-  cumulet_grid_desc grid{};
-  cumulet_medium_desc medium{};
-  cumulet_light_desc light{};
-  cumulet_camera_desc camera{};
-  cumulet_image_desc image{};
-
-  SceneOptions();
-  /// A pleasant day: what is lit when neither --sun nor --sky is given.
-  void set_daylight();
-};
-
-/// Adds the flags that fill the scene. Light stays dark if none is given: see finish_scene_options.
-/// The scene must outlive the app's parse.
+/// Adds the flags that fill the scene, --scene among them: the values of that file are what the other flags override.
+/// Light stays dark if none is given: see finish_scene_options. The scene must outlive the app's parse, which throws
+/// what load_scene does.
 void add_scene_options(CLI::App& app, SceneOptions& scene);
-/// What can be said only after the parse: default daylight. Throws UsageError.
+/// What can be said only after the parse: default daylight.
 void finish_scene_options(const CLI::App& app, SceneOptions& scene);
+
+/// Parses, with --help and --version, for which it gives false after their text went to out. Throws UsageError.
+[[nodiscard]] bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out);
 
 enum class OutputFormat { png, exr, pfm };
 enum class BackendChoice { automatic, egl, osmesa };
@@ -49,7 +37,6 @@ enum class BackendChoice { automatic, egl, osmesa };
 struct RenderOptions {
   SceneOptions scene;
   BackendChoice backend = BackendChoice::automatic;
-  double exposure_stops = 0.0;
   std::string output;
   OutputFormat format = OutputFormat::png;
   std::string stats;  // empty: none

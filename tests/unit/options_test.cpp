@@ -4,6 +4,7 @@
 
 #include <clocale>
 #include <cstdint>
+#include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -55,20 +56,22 @@ TEST(Options, DefaultsAreTheLibrarysOwn) {
   EXPECT_EQ(scene.medium.struct_size, sizeof(cumulet_medium_desc));
   EXPECT_EQ(scene.light.struct_size, sizeof(cumulet_light_desc));
   EXPECT_EQ(scene.camera.struct_size, sizeof(cumulet_camera_desc));
-  EXPECT_EQ(scene.image.struct_size, sizeof(cumulet_image_desc));
+  EXPECT_EQ(scene.sampling.struct_size, sizeof(cumulet_sampling_desc));
+  EXPECT_EQ(scene.display.struct_size, sizeof(cumulet_display_desc));
   EXPECT_EQ(scene.grid.march, CUMULET_MARCH_TET);
   EXPECT_EQ(scene.grid.cells, CUMULET_CELLS_LINEAR);
   EXPECT_EQ(scene.grid.threshold, 0.0);
   EXPECT_EQ(scene.grid.max_cells, 0u);
   EXPECT_EQ(scene.medium.density_scale, 0.0);
   EXPECT_EQ(scene.camera.fovy_degrees, 0.0);
-  EXPECT_EQ(scene.image.width, 1280u);
-  EXPECT_EQ(scene.image.height, 720u);
-  EXPECT_EQ(scene.image.samples, 64u);
+  EXPECT_EQ(scene.width, 1280u);
+  EXPECT_EQ(scene.height, 720u);
+  EXPECT_EQ(scene.sampling.samples, 64u);
   EXPECT_EQ(options.output, "out.png");
   EXPECT_EQ(options.format, OutputFormat::png);
   EXPECT_EQ(options.backend, BackendChoice::automatic);
-  EXPECT_EQ(options.exposure_stops, 0.0);
+  EXPECT_EQ(scene.display.exposure_stops, 0.0f);
+  EXPECT_EQ(scene.display.tone_map, CUMULET_TONE_MAP_NEUTRAL);
   EXPECT_EQ(options.stats, "");
 }
 
@@ -115,15 +118,17 @@ TEST(Options, EveryFlag) {
                                        "osmesa",
                                        "--exposure",
                                        "-1.5",
+                                       "--tone-map",
+                                       "filmic",
                                        "--stats",
                                        "s.json"});
   const SceneOptions& scene = options.scene;
   EXPECT_EQ(scene.grid_name, "smoke");
-  EXPECT_EQ(scene.image.width, 320u);
-  EXPECT_EQ(scene.image.height, 200u);
-  EXPECT_EQ(scene.image.samples, 7u);
-  EXPECT_EQ(scene.image.seed, 4294967295u);
-  EXPECT_EQ(scene.image.view, CUMULET_VIEW_STEPS);
+  EXPECT_EQ(scene.width, 320u);
+  EXPECT_EQ(scene.height, 200u);
+  EXPECT_EQ(scene.sampling.samples, 7u);
+  EXPECT_EQ(scene.sampling.seed, 4294967295u);
+  EXPECT_EQ(scene.sampling.view, CUMULET_VIEW_STEPS);
   EXPECT_EQ(scene.camera.eye[2], 3.0);
   EXPECT_EQ(scene.camera.target[0], -4.0);
   EXPECT_EQ(scene.camera.target[1], 0.5);
@@ -144,7 +149,8 @@ TEST(Options, EveryFlag) {
   expect_rgb(scene.light.sun_irradiance, 1.0f, 2.0f, 3.0f);
   expect_rgb(scene.light.sky_radiance, 0.1f, 0.2f, 0.3f);
   EXPECT_EQ(options.backend, BackendChoice::osmesa);
-  EXPECT_EQ(options.exposure_stops, -1.5);
+  EXPECT_EQ(scene.display.exposure_stops, -1.5f);
+  EXPECT_EQ(scene.display.tone_map, CUMULET_TONE_MAP_FILMIC);
   EXPECT_EQ(options.stats, "s.json");
 }
 
@@ -158,6 +164,73 @@ TEST(Options, LightGivenIsTheOnlyLight) {
   expect_rgb(sun.scene.light.sky_radiance, 0.0f, 0.0f, 0.0f);
   const RenderOptions night = parse({"--sky", "0,0,0"});
   expect_rgb(night.scene.light.sky_radiance, 0.0f, 0.0f, 0.0f);
+}
+
+TEST(Options, ViewNames) {
+  EXPECT_EQ(parse({"--view", "wireframe"}).scene.sampling.view, CUMULET_VIEW_WIREFRAME);
+  EXPECT_EQ(parse({"--view", "cells"}).scene.sampling.view, CUMULET_VIEW_CELLS);
+  EXPECT_EQ(parse({"--view", "density"}).scene.sampling.view, CUMULET_VIEW_DENSITY);
+}
+
+/// A scene file in the test's own folder.
+std::string write_scene(const std::string& text) {
+  std::string path = ::testing::TempDir() + "options_test_scene.json";
+  std::ofstream(path) << text;
+  return path;
+}
+
+TEST(Options, FlagsOverrideTheSceneFileWhereverTheyStand) {
+  const std::string path = write_scene(R"({"cumulet_scene": 1, "volume": {"file": "/a/smoke.vdb", "grid": "smoke"},
+    "camera": {"eye": [0, 0, 9], "target": [0, 0, 0], "orthographic_height": 4},
+    "medium": {"density_scale": 7, "anisotropy": 0.25},
+    "light": {"sun": {"azimuth_degrees": 10, "elevation_degrees": 20, "irradiance": [1, 2, 3]},
+              "sky": {"radiance": [4, 5, 6]}},
+    "picture": {"width": 64, "height": 32, "samples": 5}, "display": {"exposure_stops": 2}})");
+  std::ostringstream out;
+  const auto file = parse_render_options({"--scene", path, "-o", "a.png"}, out);
+  ASSERT_TRUE(file.has_value());
+  EXPECT_EQ(file->scene.volume, "/a/smoke.vdb");
+  EXPECT_EQ(file->scene.grid_name, "smoke");
+  EXPECT_EQ(file->scene.width, 64u);
+  EXPECT_EQ(file->scene.sampling.samples, 5u);
+  EXPECT_EQ(file->scene.camera.orthographic_height, 4.0);
+  expect_rgb(file->scene.light.sun_irradiance, 1.0f, 2.0f, 3.0f);
+
+  const auto mixed = parse_render_options({"--density-scale", "2", "--sky", "0,0,1", "--volume", "b.vdb", "--camera",
+                                           "1,0,0 0,0,0 30", "-o", "a.png", "--scene", path},
+                                          out);
+  ASSERT_TRUE(mixed.has_value());
+  EXPECT_EQ(mixed->scene.volume, "b.vdb");
+  EXPECT_EQ(mixed->scene.medium.density_scale, 2.0);
+  EXPECT_FLOAT_EQ(mixed->scene.medium.anisotropy, 0.25f);
+  expect_rgb(mixed->scene.light.sky_radiance, 0.0f, 0.0f, 1.0f);
+  expect_rgb(mixed->scene.light.sun_irradiance, 1.0f, 2.0f, 3.0f);
+  EXPECT_EQ(mixed->scene.camera.eye[0], 1.0);
+  EXPECT_EQ(mixed->scene.camera.orthographic_height, 0.0);
+  EXPECT_EQ(mixed->scene.display.exposure_stops, 2.0f);
+}
+
+TEST(Options, ASceneFileMustNameAVolumeOrAFlag) {
+  const std::string path = write_scene(R"({"cumulet_scene": 1})");
+  EXPECT_NE(usage_error({"--scene", path, "-o", "a.png"}).find("--volume"), std::string::npos);
+  std::ostringstream out;
+  EXPECT_GT(parse_render_options({"--scene", path, "-o", "a.png", "--volume", "v"}, out)->scene.light.sky_radiance[2],
+            0.0f);
+}
+
+TEST(Options, ABadSceneFileIsNoUsageError) {
+  std::ostringstream out;
+  const std::string path = write_scene("{");
+  for (const std::string& name : {path, std::string("/nowhere/scene.json")}) {
+    try {
+      static_cast<void>(parse_render_options({"--scene", name, "-o", "a.png"}, out));
+      ADD_FAILURE() << name;
+    } catch (const UsageError& error) {
+      ADD_FAILURE() << error.what();
+    } catch (const std::runtime_error& error) {
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST(Options, ThresholdZeroIsTheVoxel) { EXPECT_LT(parse({"--threshold", "0"}).scene.grid.threshold, 0.0); }
@@ -230,6 +303,7 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--backend", "glx"},
                                         {"--exposure", "1,5"},
                                         {"--exposure", "65"},
+                                        {"--tone-map", "aces"},
                                         {"--stats", ""},
                                         {"--spp"},
                                         {"--volume", ""}};
@@ -250,11 +324,11 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
 TEST(Options, HelpAndVersionNeedNothingElse) {
   std::ostringstream help;
   EXPECT_FALSE(parse_render_options({"--help"}, help).has_value());
-  for (const char* flag : {"--volume", "--march", "--sun", "--stats", "--exposure", "--view"})
+  for (const char* flag : {"--volume", "--march", "--sun", "--stats", "--exposure", "--view", "--scene", "--tone-map"})
     EXPECT_NE(help.str().find(flag), std::string::npos) << flag;
   std::ostringstream version;
   EXPECT_FALSE(parse_render_options({"--version"}, version).has_value());
-  EXPECT_EQ(version.str(), "cumulet-render 0.1.0\n");
+  EXPECT_EQ(version.str(), "cumulet-render 0.2.0\n");
 }
 
 TEST(Options, NumbersAreTheSameInEveryLocale) {

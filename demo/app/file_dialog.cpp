@@ -1,0 +1,162 @@
+#include "file_dialog.hpp"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+namespace cumulet::demo {
+
+namespace fs = std::filesystem;
+
+void FileDialog::open(const std::string& title, Action done, std::vector<std::string> endings,
+                      const std::string& suggestion) {
+  opening_ = true;
+  title_ = title;
+  done_ = done;
+  endings_ = std::move(endings);
+  trouble_.clear();
+  std::error_code error;
+  const fs::path start(suggestion);
+  fs::path folder = saving() ? start.parent_path() : start;
+  if (folder.empty() || !fs::is_directory(folder, error)) folder = fs::current_path(error);
+  enter(folder.string());
+  path_ = saving() ? (folder / start.filename()).string() : "";
+}
+
+void FileDialog::enter(const std::string& folder) {
+  std::error_code error;
+  const fs::path there = fs::absolute(folder, error).lexically_normal();
+  std::vector<Entry> entries;
+  fs::directory_iterator iterator(there, fs::directory_options::skip_permission_denied, error);
+  if (error) {
+    trouble_ = there.string() + ": " + error.message();
+    return;
+  }
+  for (; iterator != fs::directory_iterator(); iterator.increment(error)) {
+    if (error) break;
+    const std::string name = iterator->path().filename().string();
+    if (name.empty() || name[0] == '.') continue;
+    std::error_code ignored;
+    const bool is_folder = iterator->is_directory(ignored);
+    const bool wanted = std::any_of(endings_.begin(), endings_.end(),
+                                    [&](const std::string& ending) { return has_ending(name, ending); });
+    if (is_folder || wanted) entries.push_back({name, is_folder});
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+    return std::make_tuple(!a.folder, a.name) < std::make_tuple(!b.folder, b.name);
+  });
+  if (there.has_parent_path() && there != there.root_path()) entries.insert(entries.begin(), {"..", true});
+  folder_ = there.string();
+  entries_ = std::move(entries);
+  trouble_.clear();
+}
+
+void FileDialog::choose(std::vector<Command>& commands) {
+  if (path_.empty()) return;
+  std::error_code error;
+  if (fs::is_directory(path_, error)) {
+    enter(path_);
+    if (!saving()) path_.clear();
+    return;
+  }
+  if (saving()) {
+    const bool ended = std::any_of(endings_.begin(), endings_.end(),
+                                   [&](const std::string& ending) { return has_ending(path_, ending); });
+    if (!ended) path_ += endings_.front();
+  } else if (!fs::exists(path_, error)) {
+    trouble_ = path_ + ": there is no such file";
+    return;
+  }
+  commands.push_back({done_, path_});
+  close();
+}
+
+void FileDialog::close() {
+  open_ = false;
+  ImGui::CloseCurrentPopup();
+}
+
+void FileDialog::list(Ui& ui, std::vector<Command>& commands) {
+  ImGui::BeginChild("files", {0.0f, ui.px(240.0f)}, true, ImGuiWindowFlags_NavFlattened);
+  std::string entered;
+  for (const Entry& entry : entries_) {
+    const std::string shown = entry.folder ? entry.name + "/" : entry.name;
+    const fs::path path = (fs::path(folder_) / entry.name).lexically_normal();
+    if (ImGui::Selectable(shown.c_str(), !entry.folder && path.string() == path_,
+                          ImGuiSelectableFlags_DontClosePopups)) {
+      if (entry.folder)
+        entered = path.string();
+      else
+        path_ = path.string();
+    }
+    ui.remember(shown.c_str(), entry.folder ? "Open the folder." : "Choose; a double click takes it.");
+    if (!entry.folder && ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(0)) choose(commands);
+  }
+  ImGui::EndChild();
+  if (entered.empty()) return;
+  const std::string name = fs::path(path_).filename().string();
+  enter(entered);
+  path_ = saving() ? (fs::path(folder_) / name).string() : "";
+}
+
+void FileDialog::recent(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
+  if (saving() || preferences.recent.empty()) return;
+  Ui::heading("Recent");
+  for (const std::string& file : preferences.recent) {
+    const std::string name = fs::path(file).filename().string();
+    if (ImGui::Selectable(std::string(name).append("##recent").append(file).c_str(), false,
+                          ImGuiSelectableFlags_DontClosePopups)) {
+      path_ = file;
+      choose(commands);
+    }
+    ui.remember(("Recent/" + name).c_str(), file.c_str());
+  }
+  ImGui::Spacing();
+}
+
+void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
+  const std::string id = title_ + "###dialog";
+  if (opening_) ImGui::OpenPopup(id.c_str());
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x * 0.5f, screen.y * 0.5f}, ImGuiCond_Always, {0.5f, 0.5f});
+  ImGui::SetNextWindowSize({std::min(ui.px(560.0f), screen.x * 0.95f), 0.0f});
+  open_ = ImGui::BeginPopupModal(
+      id.c_str(), nullptr, ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_AlwaysAutoResize);
+  if (!open_) {
+    opening_ = false;
+    return;
+  }
+  if (opening_) ImGui::SetKeyboardFocusHere();
+  opening_ = false;
+  const std::string endings = [this] {
+    std::string text;
+    for (const std::string& ending : endings_) text += (text.empty() ? "" : ", ") + ending;
+    return text;
+  }();
+  if (ui.text("Path", ("The file's full path: " + endings + ". Enter takes it.").c_str(),
+              saving() ? "Where to save" : "Type, or choose below", path_))
+    choose(commands);
+  ImGui::Spacing();
+  recent(ui, preferences, commands);
+  Ui::heading(folder_.c_str());
+  list(ui, commands);
+  std::error_code error;
+  if (!trouble_.empty())
+    ImGui::TextColored({0.95f, 0.55f, 0.45f, 1.0f}, "%s", trouble_.c_str());
+  else if (saving() && fs::exists(path_, error) && !fs::is_directory(path_, error))
+    ImGui::TextColored({0.95f, 0.75f, 0.45f, 1.0f}, "This file will be replaced.");
+  else
+    Ui::heading(endings.c_str());
+  ImGui::Spacing();
+  if (ui.button(saving() ? "Save file" : "Open file", "Takes the path above.", {ui.px(110.0f), 0.0f})) choose(commands);
+  ImGui::SameLine();
+  const bool escape = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape)) && !ImGui::IsAnyItemActive();
+  if (ui.button("Close", "Escape does the same.", {ui.px(110.0f), 0.0f}) || escape) close();
+  ImGui::EndPopup();
+}
+
+}  // namespace cumulet::demo

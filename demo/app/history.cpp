@@ -1,0 +1,33 @@
+#include "history.hpp"
+
+#include <algorithm>
+
+namespace cumulet::demo {
+
+bool is_unplaced(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
+
+void History::offer(const SceneOptions& scene, bool held) {
+  SceneOptions& now = states_[now_];
+  if (is_unplaced(now.camera) && !is_unplaced(scene.camera)) now.camera = scene.camera;
+  if (held || same_scene(scene, now)) return;
+  states_.resize(now_ + 1);
+  states_.push_back(scene);
+  if (states_.size() > most_) states_.erase(states_.begin());
+  now_ = states_.size() - 1;
+}
+
+std::optional<SceneOptions> History::undo(const SceneOptions& scene) {
+  offer(scene, false);
+  if (now_ == 0) return std::nullopt;
+  return states_[--now_];
+}
+
+std::optional<SceneOptions> History::redo(const SceneOptions& scene) {
+  offer(scene, false);
+  if (!can_redo()) return std::nullopt;
+  return states_[++now_];
+}
+
+bool History::can_undo(const SceneOptions& scene) const { return now_ > 0 || !same_scene(scene, states_[now_]); }
+
+}  // namespace cumulet::demo

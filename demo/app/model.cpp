@@ -1,0 +1,130 @@
+#include "model.hpp"
+
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "input.hpp"
+
+namespace cumulet::demo {
+
+namespace fs = std::filesystem;
+
+const std::vector<Shortcut>& shortcuts() {
+  constexpr unsigned ctrl = modifier_ctrl;
+  constexpr unsigned shift = modifier_shift;
+  static const std::vector<Shortcut> all = {
+      {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume or a scene"},
+      {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
+      {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
+      {GLFW_KEY_F12, 0, {Action::png_dialog}, "F12", "Save the picture as PNG"},
+      {GLFW_KEY_F12, shift, {Action::exr_dialog}, "Shift+F12", "Save the picture as linear OpenEXR"},
+      {GLFW_KEY_Z, ctrl, {Action::undo}, "Ctrl+Z", "Undo"},
+      {GLFW_KEY_Z, ctrl | shift, {Action::redo}, "Ctrl+Shift+Z, Ctrl+Y", "Redo"},
+      {GLFW_KEY_Y, ctrl, {Action::redo}, "", ""},
+      {GLFW_KEY_F, 0, {Action::frame_all}, "F, Home", "Frame all"},
+      {GLFW_KEY_HOME, 0, {Action::frame_all}, "", ""},
+      {GLFW_KEY_G, 0, {Action::toggle_fly}, "G", "Fly, and back"},
+      {GLFW_KEY_T, 0, {Action::toggle_turntable}, "T", "Turntable"},
+      {GLFW_KEY_1,
+       0,
+       {Action::view, "", CUMULET_VIEW_SHADED},
+       "1 to 5",
+       "View: shaded, cells, steps, density, wireframe"},
+      {GLFW_KEY_2, 0, {Action::view, "", CUMULET_VIEW_CELLS}, "", ""},
+      {GLFW_KEY_3, 0, {Action::view, "", CUMULET_VIEW_STEPS}, "", ""},
+      {GLFW_KEY_4, 0, {Action::view, "", CUMULET_VIEW_DENSITY}, "", ""},
+      {GLFW_KEY_5, 0, {Action::view, "", CUMULET_VIEW_WIREFRAME}, "", ""},
+      {GLFW_KEY_M, 0, {Action::next_march}, "M", "Next march"},
+      {GLFW_KEY_LEFT_BRACKET, 0, {Action::darker}, "[  ]", "Exposure, a third of a stop"},
+      {GLFW_KEY_RIGHT_BRACKET, 0, {Action::brighter}, "", ""},
+      {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel"},
+      {GLFW_KEY_F2, 0, {Action::focus_panel}, "F2", "Keyboard to the panel: arrows, Space, Enter; Escape leaves"},
+      {GLFW_KEY_F1, 0, {Action::toggle_help}, "F1", "This help"},
+      {GLFW_KEY_ESCAPE, 0, {Action::cancel}, "Escape", "Close the help, dismiss a message, cancel a load"},
+      {GLFW_KEY_Q, ctrl, {Action::quit}, "Ctrl+Q", "Quit"},
+  };
+  return all;
+}
+
+std::optional<Command> command_of(int key, unsigned modifiers, bool typing) {
+  for (const Shortcut& shortcut : shortcuts()) {
+    if (shortcut.key != key || shortcut.modifiers != modifiers) continue;
+    const bool text_key = shortcut.modifiers == 0 && key < GLFW_KEY_F1;
+    const bool text_undo = key == GLFW_KEY_Z || key == GLFW_KEY_Y;
+    if (typing && (text_key || text_undo)) return std::nullopt;
+    return shortcut.command;
+  }
+  return std::nullopt;
+}
+
+void Series::add(float value) {
+  if (values_.size() == most_) values_.erase(values_.begin());
+  values_.push_back(value);
+}
+
+Model::Model() {
+  navigation.struct_size = sizeof navigation;
+  navigation.speed = 1.0;
+  status.frame.struct_size = sizeof status.frame;
+  status.work.struct_size = sizeof status.work;
+  status.stats.struct_size = sizeof status.stats;
+}
+
+double default_threshold(cumulet_criterion criterion) { return criterion == CUMULET_CRITERION_RANGE_MEAN ? 1.0 : 0.02; }
+
+void spell_out_defaults(SceneOptions& scene) {
+  if (scene.grid.threshold == 0.0) scene.grid.threshold = default_threshold(scene.grid.criterion);
+  if (scene.grid.max_cells == 0) scene.grid.max_cells = 5'400'000;
+  if (scene.grid.pixel_size == 0.0) scene.grid.pixel_size = 1.0;
+  if (scene.medium.density_scale == 0.0) scene.medium.density_scale = 1.0;
+  if (scene.camera.fovy_degrees == 0.0) scene.camera.fovy_degrees = 40.0;
+  if (scene.sampling.samples == 0) scene.sampling.samples = 256;
+}
+
+const char* stage_text(cumulet_stage stage) {
+  switch (stage) {
+    case CUMULET_STAGE_LOADING:
+      return "Reading the file";
+    case CUMULET_STAGE_STATISTICS:
+      return "Measuring the voxels";
+    case CUMULET_STAGE_REFINING:
+      return "Refining the grid";
+    case CUMULET_STAGE_RECORDS:
+      return "Fitting the cells";
+    case CUMULET_STAGE_UPLOADING:
+      return "Uploading";
+    case CUMULET_STAGE_IDLE:
+      break;
+  }
+  return "Starting";
+}
+
+std::string suggest_path(const Model& model, const std::string& ending) {
+  std::string stem = fs::path(model.scene.volume).stem().string();
+  if (stem.empty()) stem = "cumulet";
+  const fs::path folder(model.preferences.folder);
+  constexpr int most = 1000;
+  for (int i = 1; i < most; ++i) {
+    std::array<char, 16> number{};
+    std::snprintf(number.data(), number.size(), "-%03d", i);
+    const fs::path path = folder / std::string(stem).append(number.data()).append(ending);
+    std::error_code error;
+    if (!fs::exists(path, error)) return path.string();
+  }
+  return (folder / (stem + ending)).string();
+}
+
+bool has_ending(const std::string& path, const std::string& ending) {
+  if (path.size() < ending.size()) return false;
+  return std::equal(ending.rbegin(), ending.rend(), path.rbegin(), [](char a, char b) {
+    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+    return lower(a) == lower(b);
+  });
+}
+
+}  // namespace cumulet::demo

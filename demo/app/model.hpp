@@ -1,0 +1,133 @@
+#pragma once
+
+#include <cumulet/cumulet.h>
+
+#include <cstddef>
+#include <optional>
+#include <scene_file.hpp>
+#include <string>
+#include <vector>
+
+#include "preferences.hpp"
+#include "replay.hpp"
+
+namespace cumulet::demo {
+
+/// What the user can ask for besides changing a setting.
+enum class Action {
+  open_dialog,
+  open,  // a volume or a scene file: text
+  save_scene,
+  save_scene_dialog,
+  save_scene_as,  // text
+  png_dialog,
+  save_png,  // text
+  exr_dialog,
+  save_exr,  // text
+  undo,
+  redo,
+  frame_all,
+  cancel,  // what Escape does: the help, a message or a load goes away
+  cancel_load,
+  dismiss,
+  toggle_panel,
+  focus_panel,
+  toggle_help,
+  toggle_fly,
+  toggle_turntable,
+  brighter,
+  darker,
+  next_march,
+  view,  // value: a cumulet_view
+  quit
+};
+
+struct Command {
+  Action action;
+  std::string text = {};
+  int value = 0;
+};
+
+struct Shortcut {
+  int key;             // GLFW's
+  unsigned modifiers;  // exactly these
+  Command command;
+  const char* keys;  // as the help spells it; "" if it is told elsewhere
+  const char* what;
+};
+
+[[nodiscard]] const std::vector<Shortcut>& shortcuts();
+/// The command of a key, if it has one. While a text is typed only those that a text field has no use for.
+[[nodiscard]] std::optional<Command> command_of(int key, unsigned modifiers, bool typing);
+
+struct GridInfo {
+  std::string name;
+  std::string type;
+  std::string refusal;  // "": can be shown
+};
+
+struct Message {
+  bool error = false;
+  std::string text;
+  double until = 0.0;  // seconds; errors stay until dismissed
+};
+
+/// Values over time, the newest last.
+class Series {
+ public:
+  void add(float value);
+  void clear() { values_.clear(); }
+  [[nodiscard]] const std::vector<float>& values() const { return values_; }
+  [[nodiscard]] float latest() const { return values_.empty() ? 0.0f : values_.back(); }
+
+ private:
+  static constexpr std::size_t most_ = 160;
+  std::vector<float> values_;
+};
+
+/// What the viewer has told last.
+struct Status {
+  cumulet_frame_result frame{};
+  cumulet_progress work{};
+  cumulet_stats stats{};
+  bool busy = false;  // a file is read or a grid is built
+  bool has_volume = false;
+  double noise = 0.0;  // relative standard error, 0: not known
+  Series frame_ms;
+  Series samples_per_second;
+  Series noise_percent;
+};
+
+/// All that the user interface shows and changes.
+struct Model {
+  SceneOptions scene;  // with no default left to the library but the camera's place
+  cumulet_navigation_desc navigation{};
+  bool adaptive_resolution = true;
+  bool panel = true;
+  bool help = false;
+  bool can_undo = false;
+  bool can_redo = false;
+  std::string scene_path;  // of the scene file last opened or saved
+  std::vector<GridInfo> grids;
+  Status status;
+  std::vector<Message> messages;
+  Preferences preferences;
+
+  Model();
+};
+
+/// Replaces the zeros that stand for a default by what they stand for (cumulet.h), so that controls can show them.
+void spell_out_defaults(SceneOptions& scene);
+/// The threshold that 0 stands for.
+[[nodiscard]] double default_threshold(cumulet_criterion criterion);
+
+/// "Reading the file", "Refining the grid", ...
+[[nodiscard]] const char* stage_text(cumulet_stage stage);
+
+/// Where a new file may go: the volume's name, a free number and the ending, in the folder used last.
+[[nodiscard]] std::string suggest_path(const Model& model, const std::string& ending);
+
+/// Whether a name ends so, whatever its case; with the dot.
+[[nodiscard]] bool has_ending(const std::string& path, const std::string& ending);
+
+}  // namespace cumulet::demo

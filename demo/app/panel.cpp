@@ -1,0 +1,511 @@
+#include "panel.hpp"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <names.hpp>
+#include <numbers>
+
+namespace cumulet::demo {
+namespace {
+
+constexpr float panel_width = 372.0f;
+constexpr ImGuiWindowFlags overlay = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing |
+                                     ImGuiWindowFlags_NoNav | ImGuiWindowFlags_AlwaysAutoResize;
+
+template <class... Values>
+std::string print(const char* format, Values... values) {
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), format, values...);  // NOLINT(cppcoreguidelines-pro-type-vararg)
+  return text.data();
+}
+
+/// A choice that is an enum of the C interface.
+template <class Enum>
+bool choose(Ui& ui, const char* label, const char* tip, const std::vector<Choice>& choices, Enum& value) {
+  int number = static_cast<int>(value);
+  if (!ui.choose(label, tip, choices, number)) return false;
+  value = static_cast<Enum>(number);
+  return true;
+}
+
+/// Leaves out the middle of a line that is too wide: a message begins with a file and ends with a cause.
+std::string shorten(const std::string& text, float width) {
+  if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
+  const auto split = [](unsigned char c) { return (c & 0xC0U) == 0x80U; };  // within a character
+  std::size_t head = text.size() / 2;
+  std::size_t tail = head;
+  const auto shown = [&] { return text.substr(0, head) + "..." + text.substr(tail); };
+  while (head > 0 && ImGui::CalcTextSize(shown().c_str()).x > width) {
+    do --head;
+    while (head > 0 && split(static_cast<unsigned char>(text[head])));
+    do tail = std::min(tail + 1, text.size());
+    while (tail < text.size() && split(static_cast<unsigned char>(text[tail])));
+  }
+  return shown();
+}
+
+std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+
+}  // namespace
+
+Rectangle Panel::viewport(const Model& model, double width, double height, float scale) {
+  const double side = model.panel ? std::min(std::round(static_cast<double>(panel_width * scale)), width * 0.5) : 0.0;
+  return {0.0, 0.0, std::max(width - side, 0.0), height};
+}
+
+void Panel::draw(Model& model, float scale, double time, std::vector<Command>& commands) {
+  time_ = time;
+  ui_.begin(scale, time);
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  view_ = viewport(model, static_cast<double>(screen.x), static_cast<double>(screen.y), scale);
+  if (model.panel) side(model, commands);
+  if (!model.status.has_volume && !model.status.busy) hint();
+  if (model.status.busy) loading(model, commands);
+  if (model.status.has_volume) state_line(model);
+  messages(model, commands);
+  if (model.help) help(model);
+  help_was_closed_ = !model.help;
+  dialog_.draw(ui_, model.preferences, commands);
+}
+
+void Panel::side(Model& model, std::vector<Command>& commands) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  const auto left = static_cast<float>(view_.width);
+  ImGui::SetNextWindowPos({left, 0.0f});
+  ImGui::SetNextWindowSize({screen.x - left, screen.y});
+  if (focus_) ImGui::SetNextWindowFocus();
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
+  ImGui::Begin("Settings", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing);
+  ImGui::PopStyleVar();
+  toolbar(model, commands);
+  ImGui::Spacing();
+  ImGui::BeginChild("sections", {0.0f, 0.0f}, false, ImGuiWindowFlags_NavFlattened | ImGuiWindowFlags_NoBackground);
+  const auto section = [this](const char* label, bool open, const auto& content) {
+    if (ui_.section(label, open)) {
+      ImGui::Spacing();
+      content();
+      ImGui::Dummy({0.0f, ui_.px(6.0f)});
+    }
+  };
+  section("File", true, [&] { file(model, commands); });
+  section("Display", true, [&] { display(model); });
+  section("Light", true, [&] { light(model); });
+  section("Medium", true, [&] { medium(model); });
+  section("Grid", true, [&] { grid(model); });
+  section("Camera", true, [&] { camera(model, commands); });
+  section("Sampling", true, [&] { sampling(model); });
+  section("Statistics", true, [&] { statistics(model); });
+  ImGui::EndChild();
+  ImGui::End();
+}
+
+void Panel::toolbar(Model& model, std::vector<Command>& commands) {
+  const float spacing = ImGui::GetStyle().ItemSpacing.x;
+  const float width = (ImGui::GetContentRegionAvail().x - 4.0f * spacing) / 5.0f;
+  const auto button = [&](const char* label, const char* tip, Action action, bool enabled) {
+    ImGui::BeginDisabled(!enabled);
+    if (ui_.button(label, tip, {width, 0.0f})) commands.push_back({action});
+    ImGui::EndDisabled();
+  };
+  if (focus_) ImGui::SetKeyboardFocusHere();
+  focus_ = false;
+  button("Open", "Open a volume or a scene file (Ctrl+O). Files can be dropped on the window, too.",
+         Action::open_dialog, true);
+  ImGui::SameLine();
+  button("Save", "Save the scene: every setting and the camera (Ctrl+S; under another name: Ctrl+Shift+S).",
+         Action::save_scene, true);
+  ImGui::SameLine();
+  button("Undo", "Take back the last change (Ctrl+Z).", Action::undo, model.can_undo);
+  ImGui::SameLine();
+  button("Redo", "Make it again (Ctrl+Shift+Z).", Action::redo, model.can_redo);
+  ImGui::SameLine();
+  button("Help", "All keys and mouse buttons (F1).", Action::toggle_help, true);
+}
+
+void Panel::file(Model& model, std::vector<Command>& commands) {
+  if (path_of_ != model.scene.volume) path_ = path_of_ = model.scene.volume;
+  if (ui_.text("Volume", "The file to show: .vdb or .nvdb, or a scene's .json. Enter opens it.", "A file's path",
+               path_))
+    commands.push_back({Action::open, path_});
+
+  std::vector<Choice> recent;
+  std::vector<std::string> names;
+  names.reserve(model.preferences.recent.size());
+  for (const std::string& path : model.preferences.recent) names.push_back(file_name(path));
+  for (std::size_t i = 0; i < names.size(); ++i)
+    recent.push_back({names[i].c_str(), static_cast<int>(i), model.preferences.recent[i].c_str()});
+  int chosen = -1;
+  ImGui::BeginDisabled(recent.empty());
+  if (ui_.choose("Recent", "The files opened last.", recent, chosen))
+    commands.push_back({Action::open, model.preferences.recent[static_cast<std::size_t>(chosen)]});
+  ImGui::EndDisabled();
+
+  std::vector<Choice> grids;
+  std::vector<std::string> tips;
+  tips.reserve(model.grids.size());
+  int now = -1;
+  for (std::size_t i = 0; i < model.grids.size(); ++i) {
+    const GridInfo& grid = model.grids[i];
+    tips.push_back(grid.refusal.empty() ? grid.type : grid.type + ": " + grid.refusal);
+    grids.push_back({grid.name.c_str(), static_cast<int>(i), tips.back().c_str()});
+    const bool is_default = model.scene.grid_name.empty() && now < 0 && grid.refusal.empty();
+    const bool density = model.scene.grid_name.empty() && grid.name == "density";
+    if (grid.name == model.scene.grid_name || is_default || density) now = static_cast<int>(i);
+  }
+  ImGui::BeginDisabled(grids.empty());
+  if (ui_.choose("Grid name", "Which of the file's grids is shown: it must be a scalar fog volume.", grids, now))
+    model.scene.grid_name = model.grids[static_cast<std::size_t>(now)].name;
+  ImGui::EndDisabled();
+
+  const float spacing = ImGui::GetStyle().ItemSpacing.x;
+  const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
+  ImGui::BeginDisabled(!model.status.has_volume);
+  if (ui_.button("Save PNG", "Save the picture as it is shown (F12).", {width, 0.0f}))
+    commands.push_back({Action::png_dialog});
+  ImGui::SameLine();
+  if (ui_.button("Save EXR", "Save the picture's linear radiance as OpenEXR (Shift+F12).", {width, 0.0f}))
+    commands.push_back({Action::exr_dialog});
+  ImGui::EndDisabled();
+}
+
+void Panel::display(Model& model) {
+  cumulet_display_desc& display = model.scene.display;
+  choose(ui_, "View", "The picture, or a look at the grid that makes it (keys 1 to 5).",
+         {{"Shaded", CUMULET_VIEW_SHADED, "The path-traced picture."},
+          {"Cells", CUMULET_VIEW_CELLS, "The cells on a cut through the middle, coloured by level."},
+          {"Steps", CUMULET_VIEW_STEPS, "How many cells a camera ray passes, as a heat map."},
+          {"Density", CUMULET_VIEW_DENSITY, "The opacity along each camera ray."},
+          {"Wireframe", CUMULET_VIEW_WIREFRAME, "The edges of the cells that hold density."}},
+         model.scene.sampling.view);
+  ui_.slider("Exposure", "Brightness in stops: each doubles the light. Restarts nothing (keys [ and ]).",
+             display.exposure_stops, -10.0f, 10.0f, "%.2f stops");
+  choose(ui_, "Tone map", "How radiance becomes what the screen can show.",
+         {{"Neutral", CUMULET_TONE_MAP_NEUTRAL, "Khronos PBR Neutral: keeps colours, rolls off highlights."},
+          {"Filmic", CUMULET_TONE_MAP_FILMIC, "A fit of the ACES curve: more contrast."},
+          {"Clip", CUMULET_TONE_MAP_CLIP, "What is above 1 is white."}},
+         display.tone_map);
+  choose(ui_, "Background", "What is behind the volume.",
+         {{"Sky", CUMULET_BACKGROUND_SKY, "The sky's radiance."},
+          {"Transparent", CUMULET_BACKGROUND_TRANSPARENT, "Nothing: saved pictures have an alpha channel."}},
+         display.background);
+}
+
+/// Colour and strength of three numbers whose largest is the strength.
+void Panel::light_source(const char* colour, const char* colour_tip, const char* strength, const char* strength_tip,
+                         float (&rgb)[3], float (&remembered)[3], float most) {
+  float power = std::max({rgb[0], rgb[1], rgb[2]});
+  if (power > 0.0f)
+    for (std::size_t i = 0; i < 3; ++i) remembered[i] = rgb[i] / power;
+  bool changed = ui_.colour(colour, colour_tip, remembered);
+  changed |= ui_.slider(strength, strength_tip, power, 0.0f, most, "%.3f", ImGuiSliderFlags_Logarithmic);
+  if (!changed) return;
+  for (std::size_t i = 0; i < 3; ++i) rgb[i] = remembered[i] * power;
+}
+
+void Panel::light(Model& model) {
+  cumulet_light_desc& light = model.scene.light;
+  const auto& camera = model.scene.camera;
+  const double azimuth =
+      std::atan2(camera.eye[0] - camera.target[0], camera.eye[2] - camera.target[2]) * 180.0 / std::numbers::pi;
+  ui_.sun_dial("Sun dial",
+               "Drag the sun: the direction is its azimuth, the rim the horizon, the centre overhead. By keyboard: "
+               "Space, then the arrows, then Space. The triangle is the camera.",
+               light.sun_azimuth_degrees, light.sun_elevation_degrees, static_cast<float>(azimuth));
+  ui_.slider("Sun azimuth", "From +Z towards +X.", light.sun_azimuth_degrees, -180.0f, 180.0f, "%.1f°");
+  ui_.slider("Sun elevation", "Above the horizon.", light.sun_elevation_degrees, -90.0f, 90.0f, "%.1f°");
+  light_source("Sun colour", "The sun's colour, as it looks on the screen.", "Sun strength",
+               "Irradiance on a surface that faces the sun; 0: no sun.", light.sun_irradiance, sun_colour_, 1000.0f);
+  light_source("Sky colour", "The sky's colour, as it looks on the screen.", "Sky strength",
+               "Radiance from everywhere; 0: black.", light.sky_radiance, sky_colour_, 100.0f);
+}
+
+void Panel::medium(Model& model) {
+  cumulet_medium_desc& medium = model.scene.medium;
+  ui_.slider("Density scale", "Extinction is this times the grid's value, per world unit.", medium.density_scale, 1e-4,
+             1e4, "%.4g", ImGuiSliderFlags_Logarithmic);
+  float albedo[3];
+  for (std::size_t i = 0; i < 3; ++i) albedo[i] = 1.0f - medium.coalbedo[i];
+  if (ui_.colour("Albedo",
+                 "Single-scattering albedo: the part of light that goes on after a collision. White: "
+                 "nothing is absorbed.",
+                 albedo))
+    for (std::size_t i = 0; i < 3; ++i) medium.coalbedo[i] = std::clamp(1.0f - albedo[i], 0.0f, 1.0f);
+  // Absorption of a cloud is far below what a colour field can say.
+  float absorption = (medium.coalbedo[0] + medium.coalbedo[1] + medium.coalbedo[2]) / 3.0f;
+  const float before = absorption;
+  if (ui_.slider("Absorption", "The mean part of light that is lost at a collision: 1 - albedo.", absorption, 0.0f,
+                 1.0f, "%.4g", ImGuiSliderFlags_Logarithmic))
+    for (float& coalbedo : medium.coalbedo)
+      coalbedo = before > 0.0f ? std::min(coalbedo * absorption / before, 1.0f) : absorption;
+  ui_.slider("Anisotropy", "Henyey-Greenstein g: below 0 light turns back, above 0 it goes on forward.",
+             medium.anisotropy, -0.99f, 0.99f, "%.3f");
+  ui_.slider("Max bounces", "Scattering events a path may have.", medium.max_bounces, 0U, 256U,
+             medium.max_bounces == 0 ? "no limit" : "%u", ImGuiSliderFlags_Logarithmic);
+}
+
+void Panel::grid(Model& model) {
+  cumulet_grid_desc& grid = model.scene.grid;
+  choose(ui_, "March", "What rays step through (key M).",
+         {{"Tetrahedra", CUMULET_MARCH_TET, "The adaptive grid."},
+          {"Dense voxels", CUMULET_MARCH_DENSE, "Every voxel: the reference."},
+          {"Bricks", CUMULET_MARCH_BRICK, "Voxels, with empty 8x8x8 bricks skipped."}},
+         grid.march);
+  const bool tet = grid.march == CUMULET_MARCH_TET;
+  ImGui::BeginDisabled(!tet);
+  choose(ui_, "Cells", "The density inside a tetrahedron.",
+         {{"Linear", CUMULET_CELLS_LINEAR, "A least-squares fit: fewer cells for the same error."},
+          {"Constant", CUMULET_CELLS_CONSTANT, "The mean."}},
+         grid.cells);
+  if (choose(ui_, "Criterion", "What is compared with the threshold, to decide whether a cell is split.",
+             {{"Deviation", CUMULET_CRITERION_DEVIATION, "Standard deviation x edge length, against the mean depth."},
+              {"Range / mean", CUMULET_CRITERION_RANGE_MEAN, "(max - min) / mean, as in the paper."}},
+             grid.criterion))
+    grid.threshold = default_threshold(grid.criterion);
+  bool to_voxel = grid.threshold < 0.0;
+  if (ui_.checkbox("To the voxel", "Splits wherever the density varies at all, until the cells tile the voxels.",
+                   to_voxel))
+    grid.threshold = to_voxel ? -1.0 : default_threshold(grid.criterion);
+  ImGui::BeginDisabled(to_voxel);
+  double threshold = to_voxel ? 0.0 : grid.threshold;
+  const bool deviation = grid.criterion == CUMULET_CRITERION_DEVIATION;
+  if (ui_.slider("Threshold", "Cells above it are split: smaller is finer.", threshold, deviation ? 1e-4 : 1e-2,
+                 deviation ? 1.0 : 100.0, "%.4g", ImGuiSliderFlags_Logarithmic))
+    grid.threshold = threshold;
+  ImGui::EndDisabled();
+  ui_.slider("Cell budget", "The most cells: spent where the criterion is largest.", grid.max_cells,
+             std::uint64_t{1000}, std::uint64_t{50'000'000}, "%llu", ImGuiSliderFlags_Logarithmic);
+  bool adaptive = grid.camera_adaptive != 0;
+  if (ui_.checkbox("Camera adaptive", "Keeps cells coarse that are out of sight or smaller than a few pixels.",
+                   adaptive))
+    grid.camera_adaptive = adaptive ? 1 : 0;
+  ImGui::BeginDisabled(!adaptive);
+  ui_.slider("Pixel size", "Pixels that a cell's longest edge must cover to be split.", grid.pixel_size, 0.25, 32.0,
+             "%.2f", ImGuiSliderFlags_Logarithmic);
+  ImGui::EndDisabled();
+  ImGui::EndDisabled();
+
+  const cumulet_stats& stats = model.status.stats;
+  if (tet) {
+    const std::string limited = stats.limited != 0 ? " (at the budget)" : "";
+    ui_.fact("Live cells", model.status.has_volume ? short_count(static_cast<double>(stats.cells)) + limited : "-");
+    ui_.fact("Levels", model.status.has_volume ? std::to_string(stats.levels) : "-");
+  }
+  ui_.fact("March data", model.status.has_volume ? short_bytes(static_cast<double>(stats.cell_bytes)) : "-");
+}
+
+void Panel::camera(Model& model, std::vector<Command>& commands) {
+  cumulet_navigation_desc& navigation = model.navigation;
+  if (choose(ui_, "Navigation", "Whose habits the mouse follows; Help (F1) lists them.",
+             {{"Simple", CUMULET_NAVIGATION_SIMPLE, "Left: orbit; middle or Shift+left: pan; right: dolly."},
+              {"Blender", CUMULET_NAVIGATION_BLENDER, "Middle: orbit; Shift: pan; Ctrl: dolly; keypad views."},
+              {"Maya", CUMULET_NAVIGATION_MAYA, "Alt + left: orbit; Alt + middle: pan; Alt + right: dolly."}},
+             navigation.style))
+    model.preferences.style = navigation.style;
+  bool fly = navigation.fly != 0;
+  if (ui_.checkbox("Fly", "Any button looks around; W A S D move, E and Q rise and sink, Shift is faster (G).", fly))
+    commands.push_back({Action::toggle_fly});
+  ui_.slider("Speed", "Of all camera motion.", navigation.speed, 0.05, 20.0, "%.2f", ImGuiSliderFlags_Logarithmic);
+  bool turntable = navigation.turntable_degrees_per_second != 0.0;
+  if (ui_.checkbox("Turntable", "The camera circles the target (T).", turntable))
+    commands.push_back({Action::toggle_turntable});
+  ImGui::BeginDisabled(!turntable);
+  double speed = turntable ? navigation.turntable_degrees_per_second : 0.0;
+  if (ui_.slider("Turn speed", "Degrees a second; negative: the other way.", speed, -90.0, 90.0, "%.1f°/s") &&
+      turntable)
+    navigation.turntable_degrees_per_second = speed == 0.0 ? 0.1 : speed;
+  ImGui::EndDisabled();
+
+  cumulet_camera_desc& view = model.scene.camera;
+  ui_.slider("Field of view", "From bottom to top of the picture.", view.fovy_degrees, 2.0, 150.0, "%.1f°");
+  bool orthographic = view.orthographic_height > 0.0;
+  if (ui_.checkbox("Orthographic", "Parallel rays.", orthographic)) {
+    const double distance =
+        std::hypot(view.eye[0] - view.target[0], view.eye[1] - view.target[1], view.eye[2] - view.target[2]);
+    const double half = std::tan(view.fovy_degrees * std::numbers::pi / 360.0);
+    view.orthographic_height = orthographic ? std::max(2.0 * distance * half, 1e-6) : 0.0;
+    // Defaults that depend on the projection.
+    view.near_plane = view.far_plane = 0.0;
+  }
+  ImGui::BeginDisabled(!model.status.has_volume);
+  if (ui_.button("Frame all", "The whole volume in the picture (F, Home).", {-1.0f, 0.0f}))
+    commands.push_back({Action::frame_all});
+  ImGui::EndDisabled();
+}
+
+void Panel::sampling(Model& model) {
+  cumulet_sampling_desc& sampling = model.scene.sampling;
+  ui_.slider("Samples", "A pixel; more go on from where it is.", sampling.samples, 1U, 65536U, "%u",
+             ImGuiSliderFlags_Logarithmic);
+  ui_.integer("Seed", "The same seed and settings give the same picture.", sampling.seed);
+  ui_.checkbox("Fast preview", "Coarser pictures while things change, then finer and finer. Off: always full size.",
+               model.adaptive_resolution);
+}
+
+void Panel::statistics(const Model& model) {
+  const Status& status = model.status;
+  const cumulet_stats& stats = status.stats;
+  ui_.plot("Frame time", "Milliseconds a frame took, the newest on the right.", status.frame_ms.values(),
+           print("%.1f ms", static_cast<double>(status.frame_ms.latest())));
+  ui_.plot("Samples per second", "Camera paths finished.", status.samples_per_second.values(),
+           short_count(static_cast<double>(status.samples_per_second.latest())) + "/s");
+  ui_.plot("Noise", "Relative standard error of the picture, measured each second while it refines.",
+           status.noise_percent.values(),
+           status.noise > 0.0 ? print("%.2f %%", 100.0 * status.noise) : std::string("-"));
+  ImGui::Spacing();
+  if (!status.has_volume) return;
+  ui_.fact("Active voxels", short_count(static_cast<double>(stats.active_voxels)));
+  ui_.fact("Build", print("%.2f s", stats.build_seconds_total));
+  ui_.fact("Trace", print("%.1f s", stats.trace_seconds));
+  if (stats.steps > 0 && stats.samples > 0)
+    ui_.fact("Steps a path", print("%.1f", static_cast<double>(stats.steps) / static_cast<double>(stats.samples)));
+  ui_.fact("OpenGL memory", short_bytes(static_cast<double>(stats.gl_bytes)));
+  ui_.fact("Renderer", stats.gl_renderer);
+}
+
+void Panel::hint() const {
+  const ImVec2 middle(static_cast<float>(view_.width) * 0.5f, static_cast<float>(view_.height) * 0.5f);
+  ImGui::SetNextWindowPos(middle, ImGuiCond_Always, {0.5f, 0.5f});
+  ImGui::SetNextWindowBgAlpha(0.75f);
+  ImGui::Begin("hint", nullptr, overlay | ImGuiWindowFlags_NoInputs);
+  for (const char* line :
+       {"Drop a volume (.vdb, .nvdb) or a scene (.json) here", "or press Ctrl+O.  F1 shows all keys."}) {
+    const float width = ImGui::CalcTextSize(line).x;
+    ImGui::SetCursorPosX(std::max(ImGui::GetCursorPosX(), (ImGui::GetWindowWidth() - width) * 0.5f));
+    ImGui::TextUnformatted(line);
+  }
+  ImGui::End();
+}
+
+void Panel::loading(const Model& model, std::vector<Command>& commands) {
+  const Status& status = model.status;
+  const float width = std::min(ui_.px(380.0f), static_cast<float>(view_.width) - ui_.px(24.0f));
+  ImGui::SetNextWindowPos({static_cast<float>(view_.width) * 0.5f, ui_.px(12.0f)}, ImGuiCond_Always, {0.5f, 0.0f});
+  ImGui::SetNextWindowSize({width, 0.0f});
+  ImGui::SetNextWindowBgAlpha(0.88f);
+  ImGui::Begin("loading", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
+  const float button = ui_.px(76.0f);
+  const std::string name = file_name(model.scene.volume);
+  ImGui::TextUnformatted(stage_text(status.work.stage));
+  if (!name.empty()) {
+    ImGui::SameLine();
+    ImGui::TextDisabled("%s", name.c_str());
+  }
+  ImGui::ProgressBar(static_cast<float>(std::clamp(status.work.fraction, 0.0, 1.0)),
+                     {-button - ImGui::GetStyle().ItemSpacing.x, ImGui::GetFrameHeight()});
+  ImGui::SameLine();
+  if (ui_.button("Cancel", "Stops; what is shown stays (Escape).", {button, 0.0f}))
+    commands.push_back({Action::cancel_load});
+  ImGui::End();
+}
+
+void Panel::messages(Model& model, std::vector<Command>& commands) {
+  std::erase_if(model.messages, [this](const Message& message) { return !message.error && message.until < time_; });
+  if (model.messages.empty()) return;
+  const float width = static_cast<float>(view_.width) - ui_.px(24.0f);
+  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(44.0f)}, ImGuiCond_Always,
+                          {0.0f, 1.0f});
+  ImGui::SetNextWindowSize({width, 0.0f});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(10.0f), ui_.px(7.0f)});
+  ImGui::Begin("messages", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
+  const float button = ui_.px(76.0f);
+  for (std::size_t i = 0; i < model.messages.size(); ++i) {
+    const Message& message = model.messages[i];
+    ImGui::PushID(static_cast<int>(i));
+    const float line = ImGui::GetFrameHeight();
+    const ImVec2 corner = ImGui::GetCursorScreenPos();
+    const ImU32 mark = message.error ? IM_COL32(230, 105, 85, 255) : IM_COL32(127, 180, 230, 255);
+    ImGui::GetWindowDrawList()->AddRectFilled({corner.x, corner.y + line * 0.12f},
+                                              {corner.x + ui_.px(4.0f), corner.y + line * 0.88f}, mark, ui_.px(2.0f));
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ui_.px(12.0f));
+    ImGui::AlignTextToFramePadding();
+    const float room = ImGui::GetContentRegionAvail().x - button - ui_.px(8.0f);
+    ImGui::TextUnformatted(shorten(message.text, room).c_str());
+    ui_.remember("Message", message.text.c_str());
+    ImGui::SameLine();
+    ImGui::SetCursorPosX(ImGui::GetWindowWidth() - button - ui_.px(10.0f));
+    if (ui_.button("Dismiss", "Hides the message (Escape).", {button, 0.0f}))
+      commands.push_back({Action::dismiss, message.text});
+    ImGui::PopID();
+  }
+  ImGui::End();
+  ImGui::PopStyleVar();
+}
+
+void Panel::state_line(const Model& model) {
+  const Status& status = model.status;
+  const double part = std::clamp(status.frame.progress, 0.0, 1.0);
+  std::string text =
+      print("%.0f of %u samples", std::floor(part * model.scene.sampling.samples), model.scene.sampling.samples);
+  if ((status.frame.flags & CUMULET_RENDER_CONVERGED) != 0) text = print("%u samples", model.scene.sampling.samples);
+  for (const auto& view : view_names)
+    if (view.value == model.scene.sampling.view && view.value != CUMULET_VIEW_SHADED) text = view.text;
+  if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0)
+    text += print("   preview %ux%u", status.frame.width, status.frame.height);
+  else
+    text += print("   %ux%u", status.frame.width, status.frame.height);
+  if (status.noise > 0.0) text += print("   noise %.2f %%", 100.0 * status.noise);
+  if (model.navigation.fly != 0) text += "   flying";
+  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
+                          {0.0f, 1.0f});
+  ImGui::SetNextWindowBgAlpha(0.55f);
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(9.0f), ui_.px(4.0f)});
+  ImGui::Begin("state", nullptr, overlay | ImGuiWindowFlags_NoInputs);
+  ImGui::TextUnformatted(text.c_str());
+  ImGui::End();
+  ImGui::PopStyleVar();
+  ImGui::GetForegroundDrawList()->AddRectFilled(
+      {0.0f, static_cast<float>(view_.height) - ui_.px(2.0f)},
+      {static_cast<float>(view_.width * part), static_cast<float>(view_.height)}, IM_COL32(95, 143, 191, 200));
+}
+
+void Panel::help(Model& model) {
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x * 0.5f, screen.y * 0.5f}, ImGuiCond_Always, {0.5f, 0.5f});
+  ImGui::SetNextWindowBgAlpha(0.97f);
+  ImGui::SetNextWindowSizeConstraints({0.0f, 0.0f}, screen);
+  if (help_was_closed_) ImGui::SetNextWindowFocus();
+  ImGui::Begin("Keys and mouse", &model.help,
+               ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_AlwaysAutoResize |
+                   ImGuiWindowFlags_HorizontalScrollbar);
+  const auto row = [this](const char* keys, const char* what) {
+    ImGui::TextUnformatted(keys);
+    ImGui::SameLine(ui_.px(178.0f));
+    Ui::heading(what);
+  };
+  for (const Shortcut& shortcut : shortcuts())
+    if (shortcut.keys[0] != '\0') row(shortcut.keys, shortcut.what);
+  row("Arrows,  -  =", "Orbit and dolly, when the picture has the keyboard");
+  ImGui::Spacing();
+  ImGui::Separator();
+  ImGui::Spacing();
+  if (model.navigation.fly != 0) {
+    row("Any button", "Look around");
+    row("W A S D  E Q", "Move, rise and sink; Shift is faster");
+  } else if (model.navigation.style == CUMULET_NAVIGATION_BLENDER) {
+    row("Middle", "Orbit;  Shift: pan,  Ctrl: dolly");
+    row("Keypad 1 3 7", "Front, right, top;  Ctrl: the opposite");
+    row("Keypad 5", "Perspective or orthographic");
+  } else if (model.navigation.style == CUMULET_NAVIGATION_MAYA) {
+    row("Alt+left", "Orbit");
+    row("Alt+middle", "Pan");
+    row("Alt+right", "Dolly");
+  } else {
+    row("Left", "Orbit");
+    row("Middle, Shift+left", "Pan");
+    row("Right", "Dolly");
+  }
+  row("Wheel", "Dolly");
+  row("Ctrl+click", "Type a number into a slider");
+  ImGui::End();
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "file_dialog.hpp"
+#include "model.hpp"
+#include "ui.hpp"
+
+namespace cumulet::demo {
+
+/// The user interface: changes the model's settings, and tells what else was asked for.
+class Panel {
+ public:
+  /// Between ImGui's new frame and its render.
+  void draw(Model& model, float scale, double time, std::vector<Command>& commands);
+
+  /// The part of a window of this size that the picture has.
+  [[nodiscard]] static Rectangle viewport(const Model& model, double width, double height, float scale);
+
+  void focus() { focus_ = true; }
+  [[nodiscard]] FileDialog& dialog() { return dialog_; }
+  [[nodiscard]] Ui& ui() { return ui_; }
+
+ private:
+  void side(Model& model, std::vector<Command>& commands);
+  void toolbar(Model& model, std::vector<Command>& commands);
+  void file(Model& model, std::vector<Command>& commands);
+  void camera(Model& model, std::vector<Command>& commands);
+  void display(Model& model);
+  void light(Model& model);
+  void medium(Model& model);
+  void grid(Model& model);
+  void sampling(Model& model);
+  void statistics(const Model& model);
+  void light_source(const char* colour, const char* colour_tip, const char* strength, const char* strength_tip,
+                    float (&rgb)[3], float (&remembered)[3], float most);
+
+  void hint() const;
+  void loading(const Model& model, std::vector<Command>& commands);
+  void messages(Model& model, std::vector<Command>& commands);
+  void state_line(const Model& model);
+  void help(Model& model);
+
+  Ui ui_;
+  FileDialog dialog_;
+  bool focus_ = false;
+  bool help_was_closed_ = true;
+  double time_ = 0.0;
+  Rectangle view_;
+  std::string path_;  // as typed
+  std::string path_of_;
+  // What a light of strength 0 was before.
+  float sun_colour_[3] = {1.0f, 1.0f, 1.0f};
+  float sky_colour_[3] = {1.0f, 1.0f, 1.0f};
+};
+
+}  // namespace cumulet::demo

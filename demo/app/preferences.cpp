@@ -1,0 +1,84 @@
+#include "preferences.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <exception>
+#include <file.hpp>
+#include <filesystem>
+#include <names.hpp>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <system_error>
+
+namespace cumulet::demo {
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+constexpr std::size_t most_recent = 10;
+constexpr int least_side = 320;
+constexpr int most_side = 16384;
+
+constexpr std::array style_names = {Name{"simple", CUMULET_NAVIGATION_SIMPLE},
+                                    Name{"blender", CUMULET_NAVIGATION_BLENDER}, Name{"maya", CUMULET_NAVIGATION_MAYA}};
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before any thread is started
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace
+
+void Preferences::remember(const std::string& path) {
+  std::error_code error;
+  const fs::path absolute = fs::absolute(fs::path(path), error).lexically_normal();
+  if (error) return;
+  const std::string text = absolute.string();
+  std::erase(recent, text);
+  recent.insert(recent.begin(), text);
+  if (recent.size() > most_recent) recent.resize(most_recent);
+  folder = absolute.parent_path().string();
+}
+
+std::string preferences_path() {
+  std::string folder = environment("XDG_CONFIG_HOME");
+  if (folder.empty() && !environment("HOME").empty()) folder = environment("HOME") + "/.config";
+  return folder.empty() ? "" : folder + "/cumulet/demo.json";
+}
+
+Preferences load_preferences(const std::string& path) {
+  Preferences preferences;
+  try {
+    const Json json = Json::parse(image::read_file(path));
+    if (const auto recent = json.find("recent"); recent != json.end())
+      for (const Json& file : *recent)
+        if (file.is_string() && preferences.recent.size() < most_recent) preferences.recent.push_back(file);
+    preferences.folder = json.value("folder", preferences.folder);
+    const std::string style = json.value("navigation", std::string());
+    for (const auto& name : style_names)
+      if (style == name.text) preferences.style = name.value;
+    preferences.width = std::clamp(json.value("width", preferences.width), least_side, most_side);
+    preferences.height = std::clamp(json.value("height", preferences.height), least_side, most_side);
+  } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): a first run, or nothing worth a complaint
+  }
+  return preferences;
+}
+
+void save_preferences(const Preferences& preferences, const std::string& path) {
+  if (path.empty()) return;
+  Json json;
+  json["recent"] = preferences.recent;
+  json["folder"] = preferences.folder;
+  for (const auto& name : style_names)
+    if (name.value == preferences.style) json["navigation"] = name.text;
+  json["width"] = preferences.width;
+  json["height"] = preferences.height;
+  std::error_code error;
+  fs::create_directories(fs::path(path).parent_path(), error);
+  if (error) throw std::runtime_error(path + ": " + error.message());
+  image::replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,426 @@
+#include "ui.hpp"
+
+#include <imgui_internal.h>
+#include <imgui_stdlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <image.hpp>
+#include <iterator>
+#include <system_error>
+#include <type_traits>
+
+#include "sun_dial.hpp"
+
+namespace cumulet::demo {
+namespace {
+
+constexpr float font_size = 15.0f;
+constexpr float tip_delay = 0.5f;
+
+ImU32 colour_of(ImGuiCol index, float alpha = 1.0f) { return ImGui::GetColorU32(index, alpha); }
+
+std::string in_words(double value, const char* const* units, std::size_t count, const char* space) {
+  std::size_t unit = 0;
+  while (value >= 999.5 && unit + 1 < count) {
+    value /= 1000.0;
+    ++unit;
+  }
+  std::array<char, 48> text{};
+  const bool whole = unit == 0 && value == std::floor(value);
+  const char* format = whole || value >= 99.95 ? "%.0f%s%s" : value >= 9.995 ? "%.1f%s%s" : "%.2f%s%s";
+  std::snprintf(text.data(), text.size(), format, value, units[unit][0] == '\0' ? "" : space, units[unit]);
+  return text.data();
+}
+
+}  // namespace
+
+std::string short_count(double count) {
+  constexpr std::array units = {"", "k", "M", "G", "T"};
+  return in_words(count, units.data(), units.size(), " ");
+}
+
+std::string short_bytes(double bytes) {
+  constexpr std::array units = {"B", "kB", "MB", "GB", "TB"};
+  return in_words(bytes, units.data(), units.size(), " ");
+}
+
+void Ui::begin(float scale, double time) {
+  scale_ = scale;
+  time_ = time;
+  last_ = std::move(drawn_);
+  drawn_.clear();
+  if (!hovered_now_) hovered_.clear();
+  hovered_now_ = false;
+}
+
+std::optional<Rectangle> Ui::find(const std::string& label) const {
+  const auto control = last_.find(label);
+  if (control == last_.end() || !control->second.in_view) return std::nullopt;
+  return control->second.place;
+}
+
+void Ui::remember(const char* label, const char* tip) {
+  if (wanted_ == label) {
+    if (!ImGui::IsItemVisible()) ImGui::SetScrollHereY(0.5f);
+    wanted_.clear();
+  }
+  const ImVec2 least = ImGui::GetItemRectMin();
+  const ImVec2 most = ImGui::GetItemRectMax();
+  const ImVec2 centre((least.x + most.x) * 0.5f, (least.y + most.y) * 0.5f);
+  // In view: the middle can be clicked.
+  Control& control = drawn_[label];
+  control.place = {least.x, least.y, most.x - least.x, most.y - least.y};
+  control.in_view = ImGui::GetCurrentWindow()->ClipRect.Contains(centre);
+  control.has_tip = tip != nullptr && tip[0] != '\0';
+  if (!control.has_tip || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
+  hovered_now_ = true;
+  if (hovered_ != label) {
+    hovered_ = label;
+    hovered_since_ = time_;
+  }
+  if (time_ - hovered_since_ < static_cast<double>(tip_delay) || ImGui::IsItemActive()) return;
+  ImGui::BeginTooltip();
+  ImGui::PushTextWrapPos(px(300.0f));
+  ImGui::TextUnformatted(tip);
+  ImGui::PopTextWrapPos();
+  ImGui::EndTooltip();
+}
+
+bool Ui::section(const char* label, bool open) {
+  const bool is_open = ImGui::CollapsingHeader(label, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
+  remember(label, nullptr);
+  return is_open;
+}
+
+void Ui::heading(const char* text) {
+  ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+  ImGui::TextUnformatted(text);
+  ImGui::PopStyleColor();
+}
+
+void Ui::begin_row(const char* label) const {
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted(label);
+  ImGui::SameLine(px(132.0f));
+  ImGui::SetNextItemWidth(-1.0f);
+}
+
+bool Ui::button(const char* label, const char* tip, ImVec2 size) {
+  const bool pressed = ImGui::Button(label, size);
+  remember(label, tip);
+  return pressed;
+}
+
+bool Ui::checkbox(const char* label, const char* tip, bool& value) {
+  begin_row(label);
+  const bool changed = ImGui::Checkbox((std::string("##") + label).c_str(), &value);
+  remember(label, tip);
+  return changed;
+}
+
+template <class Number>
+bool Ui::slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
+               const char* format, ImGuiSliderFlags flags) {
+  begin_row(label);
+  Number edited = value;
+  const bool changed =
+      ImGui::SliderScalar((std::string("##") + label).c_str(), type, &edited, &least, &most, format, flags);
+  remember(label, tip);
+  if (!changed) return false;
+  if constexpr (std::is_floating_point_v<Number>)
+    if (!std::isfinite(edited)) return false;
+  value = std::clamp(edited, least, most);
+  return true;
+}
+
+bool Ui::slider(const char* label, const char* tip, float& value, float least, float most, const char* format,
+                ImGuiSliderFlags flags) {
+  return slide(label, tip, ImGuiDataType_Float, value, least, most, format, flags);
+}
+
+bool Ui::slider(const char* label, const char* tip, double& value, double least, double most, const char* format,
+                ImGuiSliderFlags flags) {
+  return slide(label, tip, ImGuiDataType_Double, value, least, most, format, flags);
+}
+
+bool Ui::slider(const char* label, const char* tip, std::uint32_t& value, std::uint32_t least, std::uint32_t most,
+                const char* format, ImGuiSliderFlags flags) {
+  return slide(label, tip, ImGuiDataType_U32, value, least, most, format, flags);
+}
+
+bool Ui::slider(const char* label, const char* tip, std::uint64_t& value, std::uint64_t least, std::uint64_t most,
+                const char* format, ImGuiSliderFlags flags) {
+  return slide(label, tip, ImGuiDataType_U64, value, least, most, format, flags);
+}
+
+bool Ui::integer(const char* label, const char* tip, std::uint32_t& value) {
+  begin_row(label);
+  const std::uint32_t step = 1;
+  const bool changed =
+      ImGui::InputScalar((std::string("##") + label).c_str(), ImGuiDataType_U32, &value, &step, nullptr, "%u");
+  remember(label, tip);
+  return changed;
+}
+
+bool Ui::choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value) {
+  begin_row(label);
+  const auto now = std::find_if(choices.begin(), choices.end(), [&](const Choice& c) { return c.value == value; });
+  bool changed = false;
+  const bool open = ImGui::BeginCombo((std::string("##") + label).c_str(),
+                                      now != choices.end() ? now->text
+                                      : choices.empty()    ? ""
+                                                           : "Choose",
+                                      ImGuiComboFlags_HeightLarge);
+  remember(label, tip);
+  if (!open) return false;
+  for (const Choice& choice : choices) {
+    const bool chosen = choice.value == value;
+    if (ImGui::Selectable(choice.text, chosen) && !chosen) {
+      value = choice.value;
+      changed = true;
+    }
+    remember((std::string(label) + "/" + choice.text).c_str(), choice.tip);
+    if (chosen) ImGui::SetItemDefaultFocus();
+  }
+  ImGui::EndCombo();
+  return changed;
+}
+
+bool Ui::colour(const char* label, const char* tip, float (&rgb)[3]) {
+  begin_row(label);
+  float shown[3];
+  for (std::size_t i = 0; i < 3; ++i) shown[i] = image::srgb_encode(std::clamp(rgb[i], 0.0f, 1.0f));
+  const bool changed = ImGui::ColorEdit3((std::string("##") + label).c_str(), shown,
+                                         ImGuiColorEditFlags_Float | ImGuiColorEditFlags_PickerHueWheel);
+  remember(label, tip);
+  if (!changed) return false;
+  for (std::size_t i = 0; i < 3; ++i) rgb[i] = image::srgb_decode(std::clamp(shown[i], 0.0f, 1.0f));
+  return true;
+}
+
+bool Ui::text(const char* label, const char* tip, const char* hint, std::string& value, float room_right) {
+  begin_row(label);
+  ImGui::SetNextItemWidth(room_right > 0.0f ? -room_right : -1.0f);
+  const bool entered =
+      ImGui::InputTextWithHint((std::string("##") + label).c_str(), hint, &value,
+                               ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
+  remember(label, tip);
+  return entered;
+}
+
+bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& elevation, float camera_azimuth) {
+  ImGuiContext& g = *ImGui::GetCurrentContext();
+  ImGuiWindow* window = ImGui::GetCurrentWindow();
+  const float radius = px(62.0f);
+  const float margin = px(16.0f);  // for the letters around it
+  const float side = 2.0f * (radius + margin);
+  const ImVec2 corner(window->DC.CursorPos.x + std::max(0.0f, (ImGui::GetContentRegionAvail().x - side) * 0.5f),
+                      window->DC.CursorPos.y);
+  const ImRect box(corner, ImVec2(corner.x + side, corner.y + side));
+  const ImVec2 centre = box.GetCenter();
+  const ImGuiID id = window->GetID(label);
+  ImGui::ItemSize(ImVec2(side, side));
+  if (!ImGui::ItemAdd(box, id)) {
+    remember(label, tip);
+    return false;
+  }
+
+  // As ImGui's own sliders: a drag by the mouse, or arrow keys between two presses of Space or Enter.
+  SunAngles sun = {static_cast<double>(azimuth), static_cast<double>(elevation)};
+  bool changed = false;
+  const bool hovered = ImGui::ItemHoverable(box, id);
+  if ((hovered && g.IO.MouseClicked[0]) || g.NavActivateId == id) {
+    ImGui::SetActiveID(id, window);
+    ImGui::SetFocusID(id, window);
+    ImGui::FocusWindow(window);
+    g.ActiveIdUsingNavDirMask |=
+        (1 << ImGuiDir_Left) | (1 << ImGuiDir_Right) | (1 << ImGuiDir_Up) | (1 << ImGuiDir_Down);
+  }
+  if (g.ActiveId == id && g.ActiveIdSource == ImGuiInputSource_Mouse) {
+    if (!g.IO.MouseDown[0]) {
+      ImGui::ClearActiveID();
+    } else {
+      sun = dial_angles({static_cast<double>((g.IO.MousePos.x - centre.x) / radius),
+                         static_cast<double>((g.IO.MousePos.y - centre.y) / radius)},
+                        sun.azimuth);
+      changed = true;
+    }
+  } else if (g.ActiveId == id && g.ActiveIdSource == ImGuiInputSource_Nav) {
+    const ImVec2 step = ImGui::GetNavInputAmount2d(ImGuiNavDirSourceFlags_Keyboard | ImGuiNavDirSourceFlags_PadDPad,
+                                                   ImGuiInputReadMode_RepeatFast, 0.2f, 5.0f);
+    if (step.x != 0.0f || step.y != 0.0f) {
+      sun = dial_step(sun, 2.0 * static_cast<double>(step.x), -2.0 * static_cast<double>(step.y));
+      changed = true;
+    }
+    if (g.NavActivatePressedId == id && !g.ActiveIdIsJustActivated) ImGui::ClearActiveID();
+  }
+  if (changed) {
+    azimuth = static_cast<float>(sun.azimuth);
+    elevation = static_cast<float>(sun.elevation);
+  }
+
+  ImDrawList& draw = *window->DrawList;
+  constexpr int segments = 48;
+  const bool lit = hovered || g.ActiveId == id;
+  draw.AddCircleFilled(centre, radius, colour_of(lit ? ImGuiCol_FrameBgHovered : ImGuiCol_FrameBg), segments);
+  for (const float ring : {1.0f / 3.0f, 2.0f / 3.0f})
+    draw.AddCircle(centre, radius * ring, colour_of(ImGuiCol_Text, 0.12f), segments, px(1.0f));
+  draw.AddLine({centre.x - radius, centre.y}, {centre.x + radius, centre.y}, colour_of(ImGuiCol_Text, 0.12f), px(1.0f));
+  draw.AddLine({centre.x, centre.y - radius}, {centre.x, centre.y + radius}, colour_of(ImGuiCol_Text, 0.12f), px(1.0f));
+  draw.AddCircle(centre, radius, colour_of(ImGuiCol_Text, 0.35f), segments, px(1.5f));
+  struct Letter {
+    const char* text;
+    float x, y;
+  };
+  for (const Letter& letter : {Letter{"+X", 1, 0}, Letter{"-X", -1, 0}, Letter{"+Z", 0, 1}, Letter{"-Z", 0, -1}}) {
+    const ImVec2 size = ImGui::CalcTextSize(letter.text);
+    const float at = radius + px(10.0f);
+    draw.AddText({centre.x + letter.x * at - size.x * 0.5f, centre.y + letter.y * at - size.y * 0.5f},
+                 colour_of(ImGuiCol_TextDisabled), letter.text);
+  }
+  const DialPoint camera = dial_point({static_cast<double>(camera_azimuth), 0.0});
+  const ImVec2 eye(centre.x + static_cast<float>(camera.x) * radius, centre.y + static_cast<float>(camera.y) * radius);
+  const ImVec2 inward((centre.x - eye.x) / radius, (centre.y - eye.y) / radius);
+  const float wing = px(5.0f);
+  draw.AddTriangleFilled({eye.x + inward.x * wing * 1.8f, eye.y + inward.y * wing * 1.8f},
+                         {eye.x - inward.y * wing, eye.y + inward.x * wing},
+                         {eye.x + inward.y * wing, eye.y - inward.x * wing}, colour_of(ImGuiCol_TextDisabled));
+  const DialPoint at = dial_point({static_cast<double>(azimuth), static_cast<double>(elevation)});
+  const ImVec2 disc(centre.x + static_cast<float>(at.x) * radius, centre.y + static_cast<float>(at.y) * radius);
+  const ImU32 gold = elevation < 0.0f ? IM_COL32(150, 120, 80, 255) : IM_COL32(255, 205, 110, 255);
+  draw.AddLine(centre, disc, colour_of(ImGuiCol_Text, 0.25f), px(1.0f));
+  draw.AddCircleFilled(disc, px(11.0f), (gold & 0x00FFFFFFu) | 0x38000000u, segments);
+  draw.AddCircleFilled(disc, px(6.5f), gold, segments);
+  ImGui::RenderNavHighlight(box, id);
+  remember(label, tip);
+  return changed;
+}
+
+void Ui::plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest) {
+  const float height = px(46.0f);
+  const float width = ImGui::GetContentRegionAvail().x;
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  ImGui::InvisibleButton((std::string("##") + label).c_str(), {width, height});
+  remember(label, tip);
+  ImDrawList& draw = *ImGui::GetWindowDrawList();
+  const ImVec2 end(corner.x + width, corner.y + height);
+  draw.AddRectFilled(corner, end, colour_of(ImGuiCol_FrameBg), px(4.0f));
+  const float line = ImGui::GetTextLineHeight();
+  const float pad = px(7.0f);
+  const float top = corner.y + line + px(5.0f);
+  const float bottom = end.y - px(4.0f);
+  float most = 0.0f;
+  for (const float value : values) most = std::max(most, value);
+  if (values.size() > 1 && most > 0.0f) {
+    const float step = (width - 2.0f * px(3.0f)) / static_cast<float>(values.size() - 1);
+    const auto point = [&](std::size_t i) {
+      return ImVec2(corner.x + px(3.0f) + step * static_cast<float>(i), bottom - (bottom - top) * values[i] / most);
+    };
+    for (std::size_t i = 0; i + 1 < values.size(); ++i) {
+      const ImVec2 a = point(i);
+      const ImVec2 b = point(i + 1);
+      draw.AddQuadFilled(a, b, {b.x, bottom}, {a.x, bottom}, colour_of(ImGuiCol_PlotLines, 0.18f));
+      draw.AddLine(a, b, colour_of(ImGuiCol_PlotLines), px(1.3f));
+    }
+  }
+  draw.AddText({corner.x + pad, corner.y + px(3.0f)}, colour_of(ImGuiCol_TextDisabled), label);
+  const ImVec2 size = ImGui::CalcTextSize(latest.c_str());
+  draw.AddText({end.x - pad - size.x, corner.y + px(3.0f)}, colour_of(ImGuiCol_Text), latest.c_str());
+}
+
+void Ui::fact(const char* label, const std::string& value) {
+  heading(label);
+  ImGui::SameLine(px(132.0f));
+  ImGui::PushTextWrapPos(0.0f);
+  ImGui::TextUnformatted(value.c_str());
+  ImGui::PopTextWrapPos();
+  remember(label, nullptr);
+}
+
+void apply_theme(float scale) {
+  ImGuiStyle style;
+  style.WindowPadding = {12, 12};
+  style.FramePadding = {8, 4};
+  style.ItemSpacing = {8, 6};
+  style.ItemInnerSpacing = {6, 4};
+  style.IndentSpacing = 16;
+  style.ScrollbarSize = 12;
+  style.GrabMinSize = 10;
+  style.WindowMinSize = {16, 16};
+  style.WindowRounding = 6;
+  style.ChildRounding = 4;
+  style.FrameRounding = 4;
+  style.PopupRounding = 6;
+  style.GrabRounding = 4;
+  style.ScrollbarRounding = 6;
+  style.WindowBorderSize = 0;
+  style.PopupBorderSize = 1;
+  style.WindowTitleAlign = {0.5f, 0.5f};
+  style.ScaleAllSizes(scale);
+  ImGui::StyleColorsDark(&style);
+  const auto set = [&style](ImGuiCol index, unsigned rgb, float alpha = 1.0f) {
+    style.Colors[index] = {static_cast<float>(rgb >> 16 & 255) / 255.0f, static_cast<float>(rgb >> 8 & 255) / 255.0f,
+                           static_cast<float>(rgb & 255) / 255.0f, alpha};
+  };
+  set(ImGuiCol_Text, 0xD8DCE2);
+  set(ImGuiCol_TextDisabled, 0x868D98);
+  set(ImGuiCol_WindowBg, 0x1C1F24);
+  set(ImGuiCol_ChildBg, 0x17191D);
+  set(ImGuiCol_PopupBg, 0x23272D, 0.98f);
+  set(ImGuiCol_Border, 0x3A4049);
+  set(ImGuiCol_FrameBg, 0x2A2E35);
+  set(ImGuiCol_FrameBgHovered, 0x343A43);
+  set(ImGuiCol_FrameBgActive, 0x3B424D);
+  set(ImGuiCol_TitleBg, 0x23272D);
+  set(ImGuiCol_TitleBgActive, 0x2A2F37);
+  set(ImGuiCol_ScrollbarBg, 0x000000, 0.0f);
+  set(ImGuiCol_ScrollbarGrab, 0x3A4049);
+  set(ImGuiCol_ScrollbarGrabHovered, 0x4A515C);
+  set(ImGuiCol_ScrollbarGrabActive, 0x5A626E);
+  set(ImGuiCol_CheckMark, 0x7FB4E6);
+  set(ImGuiCol_SliderGrab, 0x4A7299);
+  set(ImGuiCol_SliderGrabActive, 0x5F8FBF);
+  set(ImGuiCol_Button, 0x333A44);
+  set(ImGuiCol_ButtonHovered, 0x3F4854);
+  set(ImGuiCol_ButtonActive, 0x4C5766);
+  set(ImGuiCol_Header, 0x262B32);
+  set(ImGuiCol_HeaderHovered, 0x313842);
+  set(ImGuiCol_HeaderActive, 0x3A424E);
+  set(ImGuiCol_Separator, 0x33383F);
+  set(ImGuiCol_PlotLines, 0x7FB4E6);
+  set(ImGuiCol_PlotHistogram, 0x5F8FBF);
+  set(ImGuiCol_TextSelectedBg, 0x3D5F82);
+  set(ImGuiCol_NavHighlight, 0x7FB4E6);
+  set(ImGuiCol_ModalWindowDimBg, 0x000000, 0.45f);
+  ImGui::GetStyle() = style;
+}
+
+void load_fonts(float scale) {
+  constexpr std::array folders = {"/usr/share/fonts/truetype/dejavu/", "/usr/share/fonts/dejavu/",
+                                  "/usr/share/fonts/dejavu-sans-fonts/", "/usr/share/fonts/TTF/",
+                                  "/usr/local/share/fonts/dejavu/"};
+  // Latin, Greek and Cyrillic, for files' names; dashes, arrows, geometry.
+  static constexpr std::array<ImWchar, 13> glyphs = {0x0020, 0x024F, 0x0370, 0x052F, 0x2010, 0x2044, 0x2190,
+                                                     0x21FF, 0x2200, 0x22FF, 0x25A0, 0x25FF, 0};
+  ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
+  fonts.Clear();
+  for (const char* folder : folders) {
+    const std::string path = std::string(folder) + "DejaVuSans.ttf";
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(path, error)) continue;
+    ImFontConfig config;
+    config.OversampleH = scale < 1.5f ? 2 : 1;
+    config.OversampleV = 1;
+    if (fonts.AddFontFromFileTTF(path.c_str(), std::round(font_size * scale), &config, glyphs.data()) != nullptr)
+      return;
+  }
+  ImFontConfig config;
+  config.SizePixels = 13.0f * std::max(1.0f, std::round(scale));
+  fonts.AddFontDefault(&config);
+}
+
+}  // namespace cumulet::demo

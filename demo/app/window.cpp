@@ -1,0 +1,220 @@
+#include "window.hpp"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <stdexcept>
+
+#include "ui.hpp"
+
+namespace cumulet::demo {
+namespace {
+
+std::string glfw_error() {
+  const char* text = nullptr;
+  glfwGetError(&text);
+  return text == nullptr ? "unknown cause" : text;
+}
+
+Input& input_of(GLFWwindow* window) { return static_cast<Window*>(glfwGetWindowUserPointer(window))->input(); }
+
+Event make(Event::Type type) {
+  Event event;
+  event.type = type;
+  return event;
+}
+
+}  // namespace
+
+Window::Terminate::Terminate() {
+  if (glfwInit() != GLFW_TRUE) throw std::runtime_error("no display: " + glfw_error());
+}
+
+Window::Terminate::~Terminate() { glfwTerminate(); }
+
+void Window::DestroyWindow::operator()(GLFWwindow* window) const { glfwDestroyWindow(window); }
+
+Window::Window(int width, int height) {
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  glfwWindowHint(GLFW_DEPTH_BITS, 0);
+  glfwWindowHint(GLFW_STENCIL_BITS, 0);
+  window_.reset(glfwCreateWindow(width, height, "Cumulet", nullptr, nullptr));
+  if (window_ == nullptr) throw std::runtime_error("no window with OpenGL 4.5: " + glfw_error());
+  const auto [across, down] = pixels_per_unit();
+  if (across != 1.0 || down != 1.0) resize(width, height);
+  glfwSetWindowUserPointer(window_.get(), this);
+  glfwSetWindowSizeLimits(window_.get(), 320, 240, GLFW_DONT_CARE, GLFW_DONT_CARE);
+  glfwMakeContextCurrent(window_.get());
+  glfwSwapInterval(1);
+  listen();
+  IMGUI_CHECKVERSION();
+  ImGui::CreateContext();
+  ImGuiIO& io = ImGui::GetIO();
+  io.IniFilename = nullptr;
+  io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
+  io.ConfigWindowsMoveFromTitleBarOnly = true;
+  ImGui_ImplGlfw_InitForOpenGL(window_.get(), false);
+  ImGui_ImplOpenGL3_Init("#version 450 core");
+}
+
+Window::~Window() {
+  ImGui_ImplOpenGL3_Shutdown();
+  ImGui_ImplGlfw_Shutdown();
+  ImGui::DestroyContext();
+}
+
+void Window::listen() {
+  GLFWwindow* window = window_.get();
+  glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+    const auto [across, down] = static_cast<Window*>(glfwGetWindowUserPointer(w))->pixels_per_unit();
+    Event event = make(Event::Type::move);
+    event.x = x * across;
+    event.y = y * down;
+    input_of(w).push(event);
+  });
+  glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
+    if (button >= Input::buttons) return;
+    Event event = make(Event::Type::button);
+    event.code = button;
+    event.down = action == GLFW_PRESS;
+    input_of(w).push(event);
+  });
+  glfwSetScrollCallback(window, [](GLFWwindow* w, double, double y) {
+    Event event = make(Event::Type::wheel);
+    event.y = y;
+    input_of(w).push(event);
+  });
+  glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
+    // ImGui repeats keys by itself.
+    if (key < 0 || key >= Input::keys || action == GLFW_REPEAT) return;
+    Event event = make(Event::Type::key);
+    event.code = key;
+    event.down = action == GLFW_PRESS;
+    input_of(w).push(event);
+  });
+  glfwSetCharCallback(window, [](GLFWwindow* w, unsigned code) {
+    Event event = make(Event::Type::character);
+    event.code = static_cast<int>(code);
+    input_of(w).push(event);
+  });
+  glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
+    // One volume is shown at a time: the first.
+    if (count < 1) return;
+    Event event = make(Event::Type::drop);
+    event.path = paths[0];
+    input_of(w).push(event);
+  });
+  glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {
+    if (focused == GLFW_FALSE) input_of(w).push(make(Event::Type::focus_lost));
+  });
+}
+
+bool Window::should_close() const { return glfwWindowShouldClose(window_.get()) == GLFW_TRUE; }
+
+std::pair<int, int> Window::size() const {
+  int width = 0;
+  int height = 0;
+  glfwGetFramebufferSize(window_.get(), &width, &height);
+  return {width, height};
+}
+
+std::pair<double, double> Window::pixels_per_unit() const {
+  int width = 0;
+  int height = 0;
+  glfwGetWindowSize(window_.get(), &width, &height);
+  const auto [across, down] = size();
+  if (width <= 0 || height <= 0 || across <= 0 || down <= 0) return {1.0, 1.0};
+  return {static_cast<double>(across) / width, static_cast<double>(down) / height};
+}
+
+void Window::resize(int width, int height) {
+  const auto [across, down] = pixels_per_unit();
+  glfwSetWindowSize(window_.get(), static_cast<int>(std::lround(width / across)),
+                    static_cast<int>(std::lround(height / down)));
+}
+
+void Window::set_title(const std::string& title) {
+  if (title == title_) return;
+  title_ = title;
+  glfwSetWindowTitle(window_.get(), title.c_str());
+}
+
+float Window::content_scale() const {
+  float across = 1.0f;
+  float down = 1.0f;
+  glfwGetWindowContentScale(window_.get(), &across, &down);
+  return std::clamp(std::max(across, down), 0.5f, 4.0f);
+}
+
+void Window::wait(double seconds) {
+  if (seconds <= 0.0)
+    glfwPollEvents();
+  else if (std::isinf(seconds))
+    glfwWaitEvents();
+  else
+    glfwWaitEventsTimeout(seconds);
+}
+
+void Window::wake() { glfwPostEmptyEvent(); }
+
+void Window::set_ui_scale(float scale) {
+  apply_theme(scale);
+  load_fonts(scale);
+  ImGui_ImplOpenGL3_DestroyFontsTexture();
+}
+
+void Window::begin_frame(const std::vector<Event>& events, double frame_seconds) {
+  ImGuiIO& io = ImGui::GetIO();
+  for (const Event& event : events) {
+    switch (event.type) {
+      case Event::Type::wheel:
+        io.MouseWheel += static_cast<float>(event.y);
+        break;
+      case Event::Type::key:
+        ImGui_ImplGlfw_KeyCallback(window_.get(), event.code, 0, event.down ? GLFW_PRESS : GLFW_RELEASE, 0);
+        break;
+      case Event::Type::character:
+        io.AddInputCharacter(static_cast<unsigned>(event.code));
+        break;
+      case Event::Type::focus_lost:
+        std::fill(std::begin(io.KeysDown), std::end(io.KeysDown), false);
+        io.KeyCtrl = io.KeyShift = io.KeyAlt = io.KeySuper = false;
+        break;
+      case Event::Type::move:
+      case Event::Type::button:
+      case Event::Type::drop:
+      case Event::Type::resize:
+        break;
+    }
+  }
+  if (!io.Fonts->IsBuilt() || io.Fonts->TexID == nullptr) ImGui_ImplOpenGL3_CreateFontsTexture();
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  // The backend asks the window system where the mouse is; replayed events are known to our own input alone.
+  const auto [width, height] = size();
+  io.DisplaySize = {static_cast<float>(width), static_cast<float>(height)};
+  io.DisplayFramebufferScale = {1.0f, 1.0f};
+  io.MousePos = {static_cast<float>(input_.x()), static_cast<float>(input_.y())};
+  for (int i = 0; i < Input::buttons; ++i) io.MouseDown[i] = input_.button(i);
+  if (frame_seconds > 0.0) io.DeltaTime = static_cast<float>(frame_seconds);
+  ImGui::NewFrame();
+}
+
+void Window::draw_ui() {
+  ImGui::Render();
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+}
+
+void Window::swap() { glfwSwapBuffers(window_.get()); }
+
+void* Window::get_proc(void*, const char* name) { return reinterpret_cast<void*>(glfwGetProcAddress(name)); }
+
+}  // namespace cumulet::demo

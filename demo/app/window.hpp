@@ -1,0 +1,67 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "input.hpp"
+
+struct GLFWwindow;
+struct ImGuiContext;
+
+namespace cumulet::demo {
+
+/// The one window: GLFW, an OpenGL 4.5 context current on this thread, and Dear ImGui in it. Everything is in
+/// framebuffer pixels.
+class Window {
+ public:
+  /// width and height in framebuffer pixels. Throws std::runtime_error, one line, without a display or OpenGL 4.5.
+  Window(int width, int height);
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
+  ~Window();
+
+  [[nodiscard]] bool should_close() const;
+  [[nodiscard]] std::pair<int, int> size() const;
+  void resize(int width, int height);
+  void set_title(const std::string& title);
+  /// How much larger than on an ordinary screen things are to be drawn.
+  [[nodiscard]] float content_scale() const;
+
+  /// Takes what has happened; sleeps until something happens, for at most so many seconds (infinity: for ever).
+  static void wait(double seconds);
+  /// Ends a wait. From any thread.
+  static void wake();
+  [[nodiscard]] Input& input() { return input_; }
+
+  /// The theme and the fonts for this scale.
+  static void set_ui_scale(float scale);
+  /// Begins ImGui's frame with these events. frame_seconds: 0 for the time that has passed.
+  void begin_frame(const std::vector<Event>& events, double frame_seconds);
+  /// Draws what ImGui has.
+  static void draw_ui();
+  void swap();
+
+  /// Of a GL function, for cumulet.h and glad.
+  static void* get_proc(void* user, const char* name);
+
+ private:
+  struct Terminate {
+    Terminate();
+    Terminate(const Terminate&) = delete;
+    Terminate& operator=(const Terminate&) = delete;
+    ~Terminate();
+  };
+  struct DestroyWindow {
+    void operator()(GLFWwindow* window) const;
+  };
+  void listen();
+  [[nodiscard]] std::pair<double, double> pixels_per_unit() const;
+
+  Terminate glfw_;
+  std::unique_ptr<GLFWwindow, DestroyWindow> window_;
+  Input input_;
+  std::string title_;
+};
+
+}  // namespace cumulet::demo

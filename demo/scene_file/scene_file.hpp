@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cumulet/cumulet.h>
+
+#include <cstdint>
+#include <string>
+
+namespace cumulet::demo {
+
+/// What every demo program can show, as the library's own descriptors with struct_size set. Zero is the library's
+/// default, as there.
+struct SceneOptions {
+  std::string volume;
+  std::string grid_name;
+  std::uint32_t width = 1280;
+  std::uint32_t height = 720;
+  cumulet_grid_desc grid{};
+  cumulet_medium_desc medium{};
+  cumulet_light_desc light{};
+  cumulet_camera_desc camera{};
+  cumulet_sampling_desc sampling{};
+  cumulet_display_desc display{};
+
+  SceneOptions();
+  /// A pleasant day: what is lit when nothing says how.
+  void set_daylight();
+};
+
+/// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
+/// volume is taken from its folder. What the text does not say is as in SceneOptions(), in daylight. Throws
+/// std::runtime_error, one line with the path, the key and the cause.
+[[nodiscard]] SceneOptions parse_scene(const std::string& text, const std::string& path);
+/// Reads a file. Throws likewise.
+[[nodiscard]] SceneOptions load_scene(const std::string& path);
+
+/// The text that parse_scene reads: every setting is spelled out but those left to the library. A volume in the
+/// file's folder, or below it, is named relative to it.
+[[nodiscard]] std::string scene_text(const SceneOptions& scene, const std::string& path);
+/// Writes it in one step: a failure leaves the old file. Throws likewise.
+void save_scene(const SceneOptions& scene, const std::string& path);
+
+/// Whether two scenes say the same.
+[[nodiscard]] bool same_scene(const SceneOptions& a, const SceneOptions& b);
+
+}  // namespace cumulet::demo

@@ -1,0 +1,473 @@
+#include <GLFW/glfw3.h>
+#include <gtest/gtest.h>
+#include <imgui.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "demo_options.hpp"
+#include "history.hpp"
+#include "input.hpp"
+#include "model.hpp"
+#include "panel.hpp"
+#include "preferences.hpp"
+#include "replay.hpp"
+#include "sun_dial.hpp"
+
+namespace {
+
+using namespace cumulet::demo;
+
+SceneOptions scene_with(double density) {
+  SceneOptions scene;
+  scene.medium.density_scale = density;
+  return scene;
+}
+
+TEST(History, OneStepADragAndBack) {
+  History history(scene_with(1));
+  for (const double density : {1.5, 2.0, 3.0}) history.offer(scene_with(density), true);
+  history.offer(scene_with(3), false);
+  EXPECT_EQ(history.depth(), 1u);
+  EXPECT_EQ(history.undo(scene_with(3))->medium.density_scale, 1.0);
+  EXPECT_FALSE(history.undo(scene_with(1)).has_value());
+  EXPECT_EQ(history.redo(scene_with(1))->medium.density_scale, 3.0);
+  EXPECT_FALSE(history.redo(scene_with(3)).has_value());
+}
+
+TEST(History, WhatChangedSinceIsAStepOfItsOwn) {
+  History history(scene_with(1));
+  history.offer(scene_with(2), false);
+  history.offer(scene_with(4), true);
+  EXPECT_TRUE(history.can_undo(scene_with(4)));
+  EXPECT_EQ(history.undo(scene_with(4))->medium.density_scale, 2.0);
+  EXPECT_EQ(history.undo(scene_with(2))->medium.density_scale, 1.0);
+  history.offer(scene_with(5), false);
+  EXPECT_FALSE(history.can_redo());
+}
+
+TEST(History, TheFirstPlaceOfACameraIsNoStep) {
+  History history(scene_with(1));
+  SceneOptions placed = scene_with(1);
+  placed.camera.eye[2] = 5.0;
+  history.offer(placed, false);
+  EXPECT_EQ(history.depth(), 0u);
+  placed.camera.eye[2] = 6.0;
+  history.offer(placed, false);
+  EXPECT_EQ(history.undo(placed)->camera.eye[2], 5.0);
+}
+
+TEST(History, IsBounded) {
+  History history(scene_with(1));
+  for (int i = 2; i < 1000; ++i) history.offer(scene_with(i), false);
+  EXPECT_LT(history.depth(), 300u);
+  EXPECT_EQ(history.undo(scene_with(999))->medium.density_scale, 998.0);
+}
+
+Event button(int code, bool down) {
+  Event event;
+  event.type = Event::Type::button;
+  event.code = code;
+  event.down = down;
+  return event;
+}
+
+Event key(int code, bool down) {
+  Event event = button(code, down);
+  event.type = Event::Type::key;
+  return event;
+}
+
+Event move(double x) {
+  Event event;
+  event.x = x;
+  return event;
+}
+
+TEST(Input, AFrameSeesAButtonChangeOnce) {
+  Input input;
+  for (const Event& event : {move(1), button(0, true), move(2), button(0, false), button(0, true)}) input.push(event);
+  EXPECT_EQ(input.take().size(), 2u);
+  EXPECT_TRUE(input.button(0));
+  EXPECT_EQ(input.x(), 1.0);
+  EXPECT_EQ(input.take().size(), 2u);
+  EXPECT_FALSE(input.button(0));
+  EXPECT_TRUE(input.pending());
+  EXPECT_EQ(input.take().size(), 1u);
+  EXPECT_TRUE(input.button(0));
+  EXPECT_FALSE(input.pending());
+}
+
+TEST(Input, ModifiersFollowTheKeysUntilTheFocusIsLost) {
+  Input input;
+  input.push(key(GLFW_KEY_RIGHT_CONTROL, true));
+  input.push(key(GLFW_KEY_LEFT_SHIFT, true));
+  input.push(button(2, true));
+  static_cast<void>(input.take());
+  EXPECT_EQ(input.modifiers(), static_cast<unsigned>(modifier_ctrl | modifier_shift));
+  Event lost;
+  lost.type = Event::Type::focus_lost;
+  input.push(lost);
+  static_cast<void>(input.take());
+  EXPECT_EQ(input.modifiers(), 0u);
+  EXPECT_FALSE(input.any_button());
+}
+
+TEST(Input, EveryKeyHasTheNameItIsFoundBy) {
+  int named = 0;
+  for (int code = 0; code < Input::keys; ++code) {
+    const std::string name = key_name(code);
+    if (name.empty()) continue;
+    ++named;
+    EXPECT_EQ(key_of(name), code) << name;
+  }
+  EXPECT_GT(named, 80);
+  EXPECT_EQ(key_of("nonsense"), -1);
+  EXPECT_EQ(key_of(""), -1);
+  for (const Shortcut& shortcut : shortcuts()) EXPECT_NE(key_name(shortcut.key), "") << shortcut.what;
+  EXPECT_EQ(viewer_key(GLFW_KEY_W), 'W');
+  EXPECT_EQ(viewer_key(GLFW_KEY_KP_5), CUMULET_KEY_KEYPAD_0 + 5);
+  EXPECT_EQ(viewer_key(GLFW_KEY_F1), CUMULET_KEY_NONE);
+}
+
+std::string replay_error(const std::string& text) {
+  try {
+    static_cast<void>(parse_replay(text, "r"));
+    return "";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+TEST(Replay, ErrorsNameTheLine) {
+  EXPECT_EQ(replay_error("# a comment\n\n  frames 2\nwait loaded\r\n"), "");
+  for (const char* line : {"jump",
+                           "wait",
+                           "wait long",
+                           "frames",
+                           "frames 0",
+                           "frames -1",
+                           "frames 1 2",
+                           "move",
+                           "move 1",
+                           "move here 1",
+                           "move \"a",
+                           "down sideways",
+                           "drag 1 2 3 4",
+                           "drag 1 2 to",
+                           "key",
+                           "key ctrl+nothing",
+                           "press",
+                           "text",
+                           "text \"a",
+                           "drop",
+                           "resize 0 1",
+                           "resize 1",
+                           "screenshot",
+                           "idle 0",
+                           "idle 61",
+                           "wheel up",
+                           "click viewport 1"})
+    EXPECT_EQ(replay_error("frames 1\n" + std::string(line) + "\n").rfind("r:2: ", 0), 0u)
+        << line << ": " << replay_error("frames 1\n" + std::string(line));
+}
+
+/// The events that a file comes to, all frames' together.
+std::vector<Event> play(const std::string& text, const ReplayHost& host, std::vector<Player::Order>* orders = nullptr) {
+  Player player(parse_replay(text, "r"), "r");
+  Input input;
+  std::vector<Event> events;
+  for (int frame = 0; frame < 1000; ++frame) {
+    const Player::Order order = player.next(host, input);
+    for (Event& event : input.take()) events.push_back(std::move(event));
+    if (orders != nullptr) orders->push_back(order);
+    if (order.quit) return events;
+  }
+  throw std::runtime_error("the replay does not end");
+}
+
+ReplayHost host_with_control() {
+  ReplayHost host;
+  host.viewport = {0, 0, 200, 100};
+  host.find = [](const std::string& label) -> std::optional<Rectangle> {
+    if (label == "Exposure") return Rectangle{300, 40, 100, 20};
+    return std::nullopt;
+  };
+  return host;
+}
+
+TEST(Replay, PlacesAreOfTheWindowTheViewportAndControls) {
+  const auto events =
+      play("move 5 6\nmove viewport 0.5 0.25\nmove \"Exposure\"\nmove \"Exposure\" 0 1\nquit", host_with_control());
+  ASSERT_EQ(events.size(), 4u);
+  EXPECT_EQ(std::make_pair(events[0].x, events[0].y), std::make_pair(5.0, 6.0));
+  EXPECT_EQ(std::make_pair(events[1].x, events[1].y), std::make_pair(100.0, 25.0));
+  EXPECT_EQ(std::make_pair(events[2].x, events[2].y), std::make_pair(350.0, 50.0));
+  EXPECT_EQ(std::make_pair(events[3].x, events[3].y), std::make_pair(300.0, 60.0));
+  EXPECT_THROW(play("click \"Nothing\"\n", host_with_control()), std::runtime_error);
+}
+
+TEST(Replay, ADragIsAPressMovesAndARelease) {
+  const auto events = play("drag viewport 0 0 to viewport 1 1 middle\n", host_with_control());
+  ASSERT_EQ(events.size(), 11u);
+  EXPECT_TRUE(events[1].down);
+  EXPECT_EQ(events[1].code, GLFW_MOUSE_BUTTON_MIDDLE);
+  EXPECT_EQ(events[9].x, 200.0);
+  EXPECT_FALSE(events[10].down);
+}
+
+TEST(Replay, AChordIsHeldInOrder) {
+  const auto events = play("key ctrl+shift+z\ntext \"\xC3\xA4\\\"b\"", host_with_control());
+  ASSERT_EQ(events.size(), 9u);
+  EXPECT_EQ(events[2].code, GLFW_KEY_Z);
+  EXPECT_TRUE(events[2].down);
+  EXPECT_EQ(events[3].code, GLFW_KEY_Z);
+  EXPECT_FALSE(events[3].down);
+  EXPECT_EQ(events[5].code, GLFW_KEY_LEFT_CONTROL);
+  EXPECT_EQ(events[6].code, 0xE4);
+  EXPECT_EQ(events[7].code, '"');
+}
+
+TEST(Replay, OrdersComeInTheirFrame) {
+  std::vector<Player::Order> orders;
+  play("frames 3\nscreenshot \"a.png\"\nreport \"a.json\"\nquit\n", host_with_control(), &orders);
+  ASSERT_EQ(orders.size(), 6u);
+  EXPECT_EQ(orders[3].screenshot, "a.png");
+  EXPECT_EQ(orders[4].report, "a.json");
+  EXPECT_TRUE(orders[5].quit);
+}
+
+TEST(Replay, WhatIsRecordedPlaysTheSame) {
+  const std::string path = ::testing::TempDir() + "demo_test.replay";
+  const std::string text =
+      "move 12.5 40\ndown left\nmove 13 41\nup left\nwheel -2\nkey ctrl+f12\ntext \"a \xE2\x82\xAC\\\\\"\ndrop \"/a "
+      "b/c.vdb\"\n";
+  const std::vector<Event> played = play(text, host_with_control());
+  {
+    Recorder recorder(path);
+    for (const Event& event : played) recorder.frame({event}, false);
+    recorder.frame({}, true);
+    recorder.frame({}, false);
+  }
+  std::ifstream file(path);
+  std::stringstream recorded;
+  recorded << file.rdbuf();
+  EXPECT_NE(recorded.str().find("wait loaded"), std::string::npos);
+  const std::vector<Event> again = play(recorded.str(), host_with_control());
+  ASSERT_EQ(again.size(), played.size());
+  for (std::size_t i = 0; i < again.size(); ++i) {
+    EXPECT_EQ(again[i].type, played[i].type) << i;
+    EXPECT_EQ(again[i].code, played[i].code) << i;
+    EXPECT_EQ(again[i].down, played[i].down) << i;
+    EXPECT_EQ(again[i].x, played[i].x) << i;
+    EXPECT_EQ(again[i].y, played[i].y) << i;
+    EXPECT_EQ(again[i].path, played[i].path) << i;
+  }
+  std::filesystem::remove(path);
+  EXPECT_THROW(Recorder("/nowhere/a.replay"), std::runtime_error);
+}
+
+TEST(SunDial, PointsAndAnglesAgree) {
+  for (int azimuth = -179; azimuth <= 180; azimuth += 7) {
+    for (int elevation = 0; elevation < 90; elevation += 4) {
+      const SunAngles sun = dial_angles(dial_point({1.0 * azimuth, 1.0 * elevation}), 0.0);
+      EXPECT_NEAR(sun.azimuth, azimuth, 1e-9);
+      EXPECT_NEAR(sun.elevation, elevation, 1e-9);
+    }
+  }
+  // +Z is at the bottom, +X on the right.
+  EXPECT_NEAR(dial_point({0.0, 0.0}).y, 1.0, 1e-12);
+  EXPECT_NEAR(dial_point({90.0, 0.0}).x, 1.0, 1e-12);
+  EXPECT_NEAR(dial_point({42.0, 90.0}).x, 0.0, 1e-12);
+  EXPECT_EQ(dial_angles({0.0, 0.0}, 42.0).azimuth, 42.0);
+  EXPECT_EQ(dial_angles({0.0, 5.0}, 42.0).elevation, 0.0);
+  EXPECT_EQ(dial_point({0.0, -30.0}).y, 1.0);
+  EXPECT_NEAR(dial_step({179.0, 89.0}, 2.0, 2.0).azimuth, -179.0, 1e-9);
+  EXPECT_EQ(dial_step({0.0, 89.0}, 2.0, 2.0).elevation, 90.0);
+}
+
+TEST(Preferences, AreKeptAndForgiving) {
+  const std::string folder = ::testing::TempDir() + "demo_test_config";
+  std::filesystem::remove_all(folder);
+  const std::string path = folder + "/cumulet/demo.json";
+  Preferences preferences;
+  for (int i = 0; i < 20; ++i) preferences.remember("/a/" + std::to_string(i) + ".vdb");
+  preferences.remember("/a/../b/15.vdb");
+  preferences.remember("/a/15.vdb");
+  EXPECT_EQ(preferences.recent.size(), 10u);
+  EXPECT_EQ(preferences.recent[0], "/a/15.vdb");
+  EXPECT_EQ(preferences.recent[1], "/b/15.vdb");
+  EXPECT_EQ(std::set<std::string>(preferences.recent.begin(), preferences.recent.end()).size(), 10u);
+  preferences.style = CUMULET_NAVIGATION_BLENDER;
+  preferences.width = 1000;
+  save_preferences(preferences, path);
+  const Preferences read = load_preferences(path);
+  EXPECT_EQ(read.recent, preferences.recent);
+  EXPECT_EQ(read.folder, "/a");
+  EXPECT_EQ(read.style, CUMULET_NAVIGATION_BLENDER);
+  EXPECT_EQ(read.width, 1000);
+  for (const char* text :
+       {"", "{", "[]", "3", R"({"recent": 3, "width": "x"})", R"({"recent": [1, {}], "width": -5})"}) {
+    std::ofstream(path) << text;
+    EXPECT_GE(load_preferences(path).width, 320) << text;
+  }
+  EXPECT_TRUE(load_preferences("/nowhere/demo.json").recent.empty());
+  EXPECT_THROW(save_preferences(preferences, "/proc/nowhere/demo.json"), std::runtime_error);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(DemoOptions, TakeTheSceneFlagsAndAFile) {
+  std::ostringstream out;
+  const auto options =
+      parse_demo_options({"cloud.vdb", "--density-scale", "3", "--ui-scale", "1.5", "--size", "800x600"}, out);
+  ASSERT_TRUE(options.has_value());
+  EXPECT_EQ(options->open, "cloud.vdb");
+  EXPECT_EQ(options->scene.medium.density_scale, 3.0);
+  EXPECT_EQ(options->ui_scale, 1.5);
+  EXPECT_TRUE(options->sized);
+  EXPECT_EQ(options->scene.sampling.samples, 256u);
+  EXPECT_GT(options->scene.light.sky_radiance[2], 0.0f);
+  EXPECT_FALSE(parse_demo_options({}, out)->sized);
+  EXPECT_THROW(static_cast<void>(parse_demo_options({"a.vdb", "--volume", "b.vdb"}, out)), UsageError);
+  EXPECT_THROW(static_cast<void>(parse_demo_options({"--ui-scale", "nan"}, out)), UsageError);
+}
+
+TEST(Model, DefaultsAreSpelledOut) {
+  SceneOptions scene;
+  scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
+  spell_out_defaults(scene);
+  EXPECT_EQ(scene.grid.threshold, 1.0);
+  EXPECT_GT(scene.grid.max_cells, 0u);
+  EXPECT_EQ(scene.medium.density_scale, 1.0);
+  EXPECT_GT(scene.camera.fovy_degrees, 0.0);
+  SceneOptions twice = scene;
+  spell_out_defaults(twice);
+  EXPECT_TRUE(same_scene(scene, twice));
+}
+
+TEST(Model, TypingKeepsItsKeys) {
+  EXPECT_TRUE(command_of(GLFW_KEY_F, 0, false).has_value());
+  EXPECT_FALSE(command_of(GLFW_KEY_F, 0, true).has_value());
+  EXPECT_FALSE(command_of(GLFW_KEY_Z, modifier_ctrl, true).has_value());
+  EXPECT_TRUE(command_of(GLFW_KEY_S, modifier_ctrl, true).has_value());
+  EXPECT_TRUE(command_of(GLFW_KEY_F1, 0, true).has_value());
+  EXPECT_FALSE(command_of(GLFW_KEY_F, modifier_ctrl, false).has_value());
+}
+
+/// The panel without a window: ImGui lays it out, nothing draws it.
+class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
+ public:
+  PanelTest(const PanelTest&) = delete;
+  PanelTest& operator=(const PanelTest&) = delete;
+
+ protected:
+  PanelTest() {
+    ImGui::CreateContext();
+    ImGuiIO& io = ImGui::GetIO();
+    io.IniFilename = nullptr;
+    io.DisplaySize = GetParam().second;
+    apply_theme(GetParam().first);
+    load_fonts(GetParam().first);
+    unsigned char* pixels = nullptr;
+    int width = 0;
+    int height = 0;
+    io.Fonts->GetTexDataAsAlpha8(&pixels, &width, &height);
+    model_.status.has_volume = true;
+    model_.status.stats.gl_renderer[0] = 'x';
+    model_.status.stats.samples = model_.status.stats.steps = 1;
+    model_.grids = {{"density", "float", ""}, {"velocity", "vec3s", "not a scalar"}};
+    model_.preferences.recent = {"/a/cloud.vdb"};
+    spell_out_defaults(model_.scene);
+  }
+  ~PanelTest() override { ImGui::DestroyContext(); }
+
+  void frame(const ImVec2& mouse = {-1.0f, -1.0f}) {
+    ImGuiIO& io = ImGui::GetIO();
+    io.DeltaTime = 1.0f / 60.0f;
+    io.MousePos = mouse;
+    time_ += 1.0 / 60.0;
+    ImGui::NewFrame();
+    panel_.draw(model_, GetParam().first, time_, commands_);
+    ImGui::Render();
+  }
+
+  Model model_;
+  Panel panel_;
+  std::vector<Command> commands_;
+  double time_ = 1.0;
+};
+
+TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
+  frame();
+  frame();
+  const auto& controls = panel_.ui().controls();
+  const std::set<std::string> without_tip = {"File",     "Display",     "Light",         "Medium",     "Grid",
+                                             "Camera",   "Sampling",    "Statistics",    "Live cells", "Levels",
+                                             "Build",    "March data",  "Active voxels", "Trace",      "OpenGL memory",
+                                             "Renderer", "Steps a path"};
+  EXPECT_GT(controls.size(), 50u);
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  for (const auto& [name, control] : controls) {
+    EXPECT_EQ(control.has_tip, !without_tip.contains(name)) << name;
+    const Rectangle& a = control.place;
+    EXPECT_GE(a.x, 0.0) << name;
+    EXPECT_LE(a.x + a.width, static_cast<double>(screen.x) + 0.5) << name;
+    EXPECT_GT(a.width, 2.0) << name;
+    for (const auto& [other, control_b] : controls) {
+      const Rectangle& b = control_b.place;
+      const bool apart = a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
+      // The toolbar stands still, what scrolls passes below it.
+      if (name < other && control.in_view && control_b.in_view) {
+        EXPECT_TRUE(apart) << name << " and " << other;
+      }
+    }
+  }
+}
+
+TEST_P(PanelTest, LabelsFitBesideTheirControls) {
+  frame();
+  frame();
+  for (const char* label : {"Camera adaptive", "Sun elevation", "Density scale", "OpenGL memory", "Background"}) {
+    EXPECT_LT(ImGui::GetFont()->CalcTextSizeA(ImGui::GetFontSize(), 1e9f, 0.0f, label).x, panel_.ui().px(126.0f))
+        << label;
+  }
+}
+
+TEST_P(PanelTest, DrawingChangesNothing) {
+  const SceneOptions before = model_.scene;
+  for (int i = 0; i < 5; ++i) frame();
+  EXPECT_TRUE(same_scene(before, model_.scene));
+  EXPECT_TRUE(commands_.empty());
+}
+
+TEST_P(PanelTest, AButtonSaysWhatItIsFor) {
+  frame();
+  frame();
+  const Rectangle place = *panel_.ui().find("Open");
+  const ImVec2 middle(static_cast<float>(place.x + place.width / 2), static_cast<float>(place.y + place.height / 2));
+  ImGuiIO& io = ImGui::GetIO();
+  frame(middle);
+  io.MouseDown[0] = true;
+  frame(middle);
+  io.MouseDown[0] = false;
+  frame(middle);
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_EQ(commands_[0].action, Action::open_dialog);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
+                         ::testing::Values(std::make_pair(1.0f, ImVec2(1440, 900)),
+                                           std::make_pair(2.0f, ImVec2(1680, 1040)),
+                                           std::make_pair(1.0f, ImVec2(640, 400)),
+                                           std::make_pair(1.25f, ImVec2(1024, 3000))));
+
+}  // namespace

@@ -1,0 +1,305 @@
+"""Drives cumulet-demo by replay files on a display of its own (Xvfb), and judges its screenshots and reports.
+
+Usage: session.py DEMO RENDER XVFB SCENE_FOLDER OUT_FOLDER TEST
+Pictures, reports and replay files stay in OUT_FOLDER/TEST.
+"""
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from png import Picture, difference
+
+ALIKE = (3.0, 16.0)  # mean and largest difference of blocks that noise alone makes, of 255
+SIZE = ["--size", "640x304"]
+
+
+class Session:
+    def __init__(self, demo, render, scene, out):
+        self.demo, self.renderer, self.scene, self.out = demo, render, scene, out
+        self.cumulus, self.fire = f"{scene}/cumulus.vdb", f"{scene}/fire.vdb"
+        self.environment = dict(os.environ, XDG_CONFIG_HOME=str(out / "config"))
+
+    def start(self, arguments, **more):
+        return subprocess.run([self.demo, *arguments], cwd=self.out, env=self.environment, timeout=900,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
+
+    def play(self, name, replay, *arguments, size=SIZE):
+        (self.out / f"{name}.replay").write_text("\n".join(replay) + "\n")
+        samples = [] if "--spp" in arguments else ["--spp", "6"]
+        done = self.start([*size, *samples, *arguments, "--replay", f"{name}.replay"])
+        assert done.returncode == 0, f"{name}: {done.returncode}: {done.stderr}"
+
+    def picture(self, name):
+        return Picture(self.out / f"{name}.png")
+
+    def report(self, name):
+        return json.loads((self.out / f"{name}.json").read_text())
+
+
+def shot(name):
+    return [f'screenshot "{name}.png"', f'report "{name}.json"']
+
+
+def look(s, name):
+    """A screenshot and its report, with the picture's place in it."""
+    report, picture = s.report(name), s.picture(name)
+    # The line of text at the bottom changes all the time.
+    x, y, width, height = report["viewport"]
+    return picture, report, (x, y, width, height - 48)
+
+
+def assert_alike(a, b, area, other=None):
+    mean, most = difference(a, b, area, other)
+    assert mean < ALIKE[0] and most < ALIKE[1], f"the pictures differ: mean {mean:.2f}, largest {most:.2f}"
+
+
+def assert_differ(a, b, area):
+    mean, most = difference(a, b, area)
+    assert mean > ALIKE[0] and most > 2 * ALIKE[1], f"the pictures are alike: mean {mean:.2f}, largest {most:.2f}"
+
+
+def assert_drawn(picture, area):
+    lights = [sum(b) / 3 for b in picture.blocks(area)]
+    assert max(lights) - min(lights) > 25, "the picture is blank"
+
+
+def test_orbit_undo(s):
+    orbit = ["drag viewport 0.4 0.5 to viewport 0.7 0.4"]
+    converge = ["wait loaded", "wait converged"]
+    s.play("replay", [*converge, *shot("first"), *orbit, *converge, *shot("orbited"), "key ctrl+z", *converge,
+                      *shot("undone"), "key ctrl+shift+z", *converge, *shot("redone"), "wheel 3", "wheel 2",
+                      "move viewport 0.5 0.5", *converge, *shot("closer"), "key f", *converge, *shot("framed")],
+           "--volume", s.cumulus)
+    first, report, area = look(s, "first")
+    assert report["converged"] and report["undo_steps"] == 0, report
+    assert_drawn(first, area)
+    orbited, report, _ = look(s, "orbited")
+    assert report["undo_steps"] == 1, "a drag is one step"
+    assert_differ(first, orbited, area)
+    undone, report, _ = look(s, "undone")
+    assert report["undo_steps"] == 0
+    assert report["scene"]["camera"] == s.report("first")["scene"]["camera"]
+    assert_alike(first, undone, area)
+    assert_alike(orbited, look(s, "redone")[0], area)
+    near, far = (s.report(n)["scene"]["camera"] for n in ("closer", "redone"))
+    distance = lambda c: sum((e - t) ** 2 for e, t in zip(c["eye"], c["target"]))
+    assert distance(near) < 0.8 * distance(far), "the wheel comes closer"
+
+
+def test_change(s):
+    settle = ["frames 3", "wait loaded", "wait converged"]
+    s.play("replay", [*settle, *shot("first"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.3 0.5', *settle,
+                      *shot("thin"), "key ctrl+z", *settle, *shot("thick"), "key n", *settle, *shot("wide"), "key n",
+                      'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *settle, *shot("sun"), 'click "Tone map"',
+                      "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), 'click "Threshold"',
+                      'drag "Threshold" to "Threshold" 0.75 0.5', *settle, *shot("coarse"), "key 2", *settle, *shot("cells"),
+                      "key 3", *settle, *shot("steps"), "key 5", *settle, *shot("wireframe"), "key 1"],
+           "--volume", s.cumulus)
+    first, report, area = look(s, "first")
+    thin, thin_report, _ = look(s, "thin")
+    assert thin_report["scene"]["medium"]["density_scale"] < 0.5 * report["scene"]["medium"]["density_scale"]
+    assert thin_report["undo_steps"] == 1, "a drag of a control is one step"
+    assert thin_report["cells"] == report["cells"], "the density scale rebuilds no cells"
+    assert_differ(first, thin, area)
+    assert_alike(first, look(s, "thick")[0], area)
+    wide = s.report("wide")["viewport"]
+    assert wide[2] == 640, "without the panel the picture has all of the window"
+    sun = s.report("sun")["scene"]["light"]["sun"]
+    assert -150 < sun["azimuth_degrees"] < -60 and 20 < sun["elevation_degrees"] < 60, sun
+    assert_differ(first, look(s, "sun")[0], area)
+    assert s.report("filmic")["scene"]["display"]["tone_map"] == "filmic"
+    assert s.report("coarse")["cells"] < 0.5 * report["cells"], "a larger threshold makes fewer cells"
+    views = [look(s, name)[0] for name in ("coarse", "cells", "steps", "wireframe")]
+    for i, a in enumerate(views):
+        assert_drawn(a, area)
+        for b in views[:i]:
+            assert_differ(a, b, area)
+
+
+def test_exposure(s):
+    s.play("replay", ["wait loaded", "wait converged", *shot("first"), 'drag "Exposure" to "Exposure" 0.6 0.5', "frames 3",
+                      *shot("bright"), "key ctrl+z", "frames 3", *shot("undone")], "--volume", s.cumulus)
+    first, report, area = look(s, "first")
+    bright, bright_report, _ = look(s, "bright")
+    assert bright_report["samples"] == report["samples"] and bright_report["converged"], "exposure restarts nothing"
+    assert bright.mean(area) > first.mean(area) + 10
+    undone = look(s, "undone")[0]
+    assert difference(first, undone, area) == (0, 0), "the same samples make the same picture"
+
+
+def test_scene_file(s):
+    s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
+                    "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
+                    "wait loaded", "wait converged", *shot("saved"), "key f12", "frames 2", "key ctrl+a", 'text "picture.png"',
+                    "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", 'text "picture.exr"', "key enter",
+                    "frames 3", *shot("messages")],
+           "--volume", s.cumulus)
+    assert [m for m in s.report("messages")["messages"] if m["error"]] == []
+    assert (s.out / "picture.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"
+    scene = json.loads((s.out / "scene.json").read_text())
+    assert scene["display"]["exposure_stops"] > 0.3 and scene["medium"]["density_scale"] > 1, scene
+    saved, report, area = look(s, "saved")
+    x, y, width, height = report["viewport"]
+    assert [scene["picture"]["width"], scene["picture"]["height"]] == [width, height]
+    assert_alike(saved, s.picture("picture"), area)
+    subprocess.run([s.renderer, "--scene", "scene.json", "-o", "rendered.png"], cwd=s.out, check=True)
+    assert_alike(saved, s.picture("rendered"), area)
+    s.play("open", ["wait loaded", f'drop "{s.out}/scene.json"', "wait loaded", "wait converged", *shot("opened"),
+                    "key ctrl+z", "wait loaded", *shot("back")], "--volume", s.fire)
+    assert_alike(saved, look(s, "opened")[0], area)
+    assert s.report("opened")["scene"]["medium"] == scene["medium"]
+    assert s.report("back")["scene"]["volume"]["file"].endswith("fire.vdb"), "opening a scene can be undone"
+
+
+def test_bad_files(s):
+    volume = pathlib.Path(s.cumulus).read_bytes()
+    (s.out / "cut.vdb").write_bytes(volume[: len(volume) // 2])
+    (s.out / "empty.vdb").write_bytes(b"")
+    (s.out / "text.nvdb").write_text("this is no volume")
+    (s.out / "bad.json").write_text('{"cumulet_scene": 1, "medium": {"albedo": 1}}')
+    names = ["cut.vdb", "empty.vdb", "text.nvdb", "bad.json", "missing.vdb"]
+    replay = ["wait loaded", "wait converged", *shot("before")]
+    for name in names:
+        replay += [f'drop "{s.out}/{name}"', "frames 2", "wait loaded", *shot(name), "key escape", "frames 2"]
+    s.play("replay", [*replay, "wait converged", *shot("after")], "--volume", s.cumulus)
+    for name in names:
+        (message,) = [m for m in s.report(name)["messages"] if m["error"]]
+        assert name in message["text"] and "\n" not in message["text"], message
+    before, report, area = look(s, "before")
+    after, after_report, _ = look(s, "after")
+    assert after_report["messages"] == [], "a message can be dismissed"
+    assert after_report["scene"] == report["scene"]
+    assert_alike(before, after, area)
+
+
+def test_keyboard(s):
+    s.play("replay", ["key f2", "frames 2", "key space", "frames 3", *shot("dialog"), "key ctrl+a", f'text "{s.cumulus}"',
+                      "key enter", "wait loaded", "wait converged", *shot("loaded"), "key f1", "frames 3", *shot("help"),
+                      "key escape", "frames 2", "key 4", "key m", "frames 3", "wait loaded", *shot("keys"), "key t",
+                      "frames 20", *shot("turning"), "key t", "key g", "frames 2", "press w", "frames 10", "release w",
+                      "frames 2", *shot("flown"), "key g", "key right", "key right", "frames 2", *shot("turned"),
+                      "key f2", "frames 2", "press tab", "release tab", "frames 2", *shot("panel"), "key ctrl+q", "frames 50",
+                      'screenshot "never.png"'])
+    for name in ("dialog", "help"):
+        assert_differ(s.picture(name), s.picture("loaded"), look(s, name)[2])
+    assert s.report("loaded")["has_volume"]
+    keys = s.report("keys")["scene"]
+    assert keys["picture"]["view"] == "density" and keys["grid"]["march"] == "dense", keys
+    eyes = [s.report(name)["scene"]["camera"]["eye"] for name in ("keys", "turning", "flown", "turned")]
+    for a, b in zip(eyes, eyes[1:]):
+        assert a != b, eyes
+    assert s.report("turning")["undo_steps"] == s.report("keys")["undo_steps"], "a turntable makes no steps"
+    assert not (s.out / "never.png").exists(), "Ctrl+Q quits"
+
+
+def test_moving(s):
+    drag = ["move viewport 0.3 0.5", "down left"]
+    for i in range(12):
+        drag += [f"move viewport {0.3 + 0.03 * i:.2f} 0.5"]
+    s.play("replay", ["wait loaded", "frames 10", *drag, *shot("moving"), "up left", "wait converged", *shot("rest")],
+           "--volume", s.cumulus, "--spp", "2", size=["--size", "1172x600"])
+    moving, report, area = look(s, "moving")
+    assert report["preview"] and report["picture"][0] < report["viewport"][2], "a moving picture is coarser"
+    assert_drawn(moving, area)
+    rest = s.report("rest")
+    assert rest["picture"] == rest["viewport"][2:] and not rest["preview"], rest
+    times = sorted(report["frame_ms"][-12:])
+    print(f"median frame while moving: {times[len(times) // 2]:.1f} ms")
+
+
+def test_idle(s):
+    s.play("replay", ["wait loaded", "wait converged", "frames 5", "idle 1.5", "idle 3", *shot("idle")], "--volume",
+           s.cumulus)
+    assert s.report("idle")["idle_frames"] <= 3, s.report("idle")["idle_frames"]
+
+
+def test_record(s):
+    steps = ["wait loaded", "drag viewport 0.4 0.5 to viewport 0.6 0.6", "frames 5", "key ]", 'click "View"', "frames 3",
+             'click "View/Steps"', "frames 3", "key ctrl+o", "frames 3", f'text "{s.fire}"', "key enter", "wait loaded"]
+    s.play("replay", [*steps, *shot("played")], "--volume", s.cumulus, "--record", "recorded.replay")
+    recorded = (s.out / "recorded.replay").read_text().splitlines()
+    assert recorded[-1] == "quit"
+    s.play("again", [*recorded[:-1], *shot("again")], "--volume", s.cumulus)
+    a, b = s.report("played")["scene"], s.report("again")["scene"]
+    for section in ("volume", "camera", "display", "picture"):
+        assert a[section] == b[section], (section, a[section], b[section])
+
+
+def test_looks(s):
+    """Pictures to be looked at, at 1x and 2x; here only that something is drawn everywhere."""
+    for name, scale, size in (("1x", "1", "1440x900"), ("2x", "2", "1680x1040"), ("small", "1", "640x400")):
+        parts = [*shot(f"{name}_top"), 'move "Pixel size"', "frames 60", *shot(f"{name}_grid"), 'move "Renderer"',
+                 "frames 3", *shot(f"{name}_statistics"), 'drop "/nowhere/cloud.vdb"', "frames 3", "key f1", "frames 3",
+                 *shot(f"{name}_help"), "key f1", "key ctrl+o", "frames 3", *shot(f"{name}_open")]
+        s.play(name, ["frames 3", *shot(f"{name}_empty"), f'drop "{s.cumulus}"', "wait loaded", "frames 30", *parts],
+               "--ui-scale", scale, size=["--size", size])
+        for part in ("top", "grid", "statistics", "help", "open"):
+            picture, report, _ = look(s, f"{name}_{part}")
+            x, _, width, height = report["viewport"]
+            assert_drawn(picture, (x + width, 0, picture.width - x - width, height))
+
+
+def test_status(s):
+    """What scripts rely on: one line on standard error, and the exit status."""
+    (s.out / "bad.replay").write_text("frames 1\nclick nowhere\n")
+    (s.out / "gone.replay").write_text('click "No such control"\n')
+    (s.out / "bad.json").write_text("{")
+    cases = [(["--march", "fast"], 2, "--march"), (["--ui-scale", "9"], 2, "--ui-scale"), (["a", "b"], 2, "b"),
+             (["a.vdb", "--volume", "b.vdb"], 2, "a.vdb"), (["--replay", "bad.replay"], 1, "bad.replay:2"),
+             (["--replay", "gone.replay"], 1, "No such control"), (["--replay", "missing"], 1, "missing"),
+             (["--scene", "bad.json"], 1, "bad.json")]
+    for arguments, status, named in cases:
+        done = s.start(arguments)
+        lines = done.stderr.splitlines()
+        assert done.returncode == status and len(lines) == 1 and named in lines[0], (arguments, done)
+    s.environment.pop("DISPLAY")
+    s.environment.pop("WAYLAND_DISPLAY", None)
+    done = s.start([])
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done
+    done = s.start(["--help"])
+    assert done.returncode == 0 and "--replay" in done.stdout and "--scene" in done.stdout, done
+
+
+def test_settings(s):
+    s.play("replay", ["wait loaded", 'click "Navigation"', "frames 2", 'click "Navigation/Maya"', "frames 2"], "--volume",
+           s.cumulus)
+    file = s.out / "config/cumulet/demo.json"
+    kept = json.loads(file.read_text())
+    assert kept["navigation"] == "maya" and kept["recent"][0].endswith("cumulus.vdb"), kept
+    s.play("again", ["wait loaded", 'click "Recent"', "frames 2", 'click "Recent/cumulus.vdb"', "wait loaded", *shot("recent"),
+                     "drag viewport 0.3 0.5 to viewport 0.6 0.5", "frames 2", *shot("plain"), "press alt",
+                     "drag viewport 0.3 0.5 to viewport 0.6 0.5", "release alt", "frames 2", *shot("alt")])
+    assert s.report("recent")["has_volume"]
+    eye = lambda name: s.report(name)["scene"]["camera"]["eye"]
+    assert eye("plain") == eye("recent"), "Maya's left button alone does nothing"
+    assert eye("alt") != eye("plain")
+    file.write_text("{ damaged")
+    s.play("damaged", ["frames 3", *shot("damaged")])
+    json.loads(file.read_text())
+
+
+def main():
+    demo, render, xvfb, scene, out, test = sys.argv[1:]
+    out = pathlib.Path(out) / test
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    session = Session(demo, render, scene, out)
+    read, write = os.pipe()
+    server = subprocess.Popen([xvfb, "-displayfd", str(write), "-screen", "0", "1800x1200x24", "-nolisten", "tcp"],
+                              pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    try:
+        with os.fdopen(read) as display:
+            session.environment["DISPLAY"] = ":" + display.readline().strip()
+        globals()[f"test_{test}"](session)
+    finally:
+        server.terminate()
+        server.wait()
+
+
+main()

@@ -1,0 +1,212 @@
+#include "scene_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+namespace {
+
+using namespace cumulet::demo;
+
+std::string error_of(const std::string& text) {
+  try {
+    static_cast<void>(parse_scene(text, "dir/s.json"));
+    return "";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    return error.what();
+  }
+}
+
+/// A scene with this one more section.
+std::string with(const std::string& more) { return R"({"cumulet_scene": 1, )" + more + "}"; }
+
+SceneOptions full_scene() {
+  SceneOptions scene;
+  scene.volume = "/data/cloud.vdb";
+  scene.grid_name = "density[1]";
+  scene.width = 333;
+  scene.height = 222;
+  scene.camera.eye[0] = 0.1;
+  scene.camera.eye[1] = -2e-7;
+  scene.camera.eye[2] = 1e6;
+  scene.camera.target[0] = 1.0 / 3.0;
+  scene.camera.up[2] = 1.0;
+  scene.camera.fovy_degrees = 33.3;
+  scene.camera.orthographic_height = 12.5;
+  scene.medium.density_scale = 0.1;
+  scene.medium.coalbedo[0] = 0.01f;
+  scene.medium.coalbedo[1] = 1e-9f;
+  scene.medium.coalbedo[2] = 1.0f;
+  scene.medium.anisotropy = -0.85f;
+  scene.medium.max_bounces = 4294967295u;
+  scene.light.sun_azimuth_degrees = -123.4f;
+  scene.light.sun_elevation_degrees = -5.6f;
+  for (int i = 0; i < 3; ++i) scene.light.sun_irradiance[i] = 0.7f * static_cast<float>(i);
+  for (int i = 0; i < 3; ++i) scene.light.sky_radiance[i] = 1e-3f * static_cast<float>(i);
+  scene.grid.march = CUMULET_MARCH_BRICK;
+  scene.grid.cells = CUMULET_CELLS_CONSTANT;
+  scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
+  scene.grid.threshold = -1.0;
+  scene.grid.max_cells = 123456789;
+  scene.grid.camera_adaptive = 1;
+  scene.grid.pixel_size = 2.5;
+  scene.sampling.samples = 7;
+  scene.sampling.seed = 4000000000u;
+  scene.sampling.view = CUMULET_VIEW_WIREFRAME;
+  scene.display.exposure_stops = -1.1f;
+  scene.display.tone_map = CUMULET_TONE_MAP_CLIP;
+  scene.display.background = CUMULET_BACKGROUND_TRANSPARENT;
+  return scene;
+}
+
+TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
+  const SceneOptions scene = full_scene();
+  const SceneOptions read = parse_scene(scene_text(scene, "/elsewhere/s.json"), "/elsewhere/s.json");
+  EXPECT_TRUE(same_scene(scene, read));
+  // same_scene compares what is written: the numbers themselves, too.
+  EXPECT_EQ(read.volume, scene.volume);
+  EXPECT_EQ(read.grid_name, scene.grid_name);
+  EXPECT_EQ(read.width, scene.width);
+  EXPECT_EQ(read.height, scene.height);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(read.camera.eye[i], scene.camera.eye[i]);
+    EXPECT_EQ(read.camera.target[i], scene.camera.target[i]);
+    EXPECT_EQ(read.camera.up[i], scene.camera.up[i]);
+    EXPECT_EQ(read.medium.coalbedo[i], scene.medium.coalbedo[i]) << i;
+    EXPECT_EQ(read.light.sun_irradiance[i], scene.light.sun_irradiance[i]);
+    EXPECT_EQ(read.light.sky_radiance[i], scene.light.sky_radiance[i]);
+  }
+  EXPECT_EQ(read.camera.fovy_degrees, scene.camera.fovy_degrees);
+  EXPECT_EQ(read.camera.orthographic_height, scene.camera.orthographic_height);
+  EXPECT_EQ(read.medium.density_scale, scene.medium.density_scale);
+  EXPECT_EQ(read.medium.anisotropy, scene.medium.anisotropy);
+  EXPECT_EQ(read.medium.max_bounces, scene.medium.max_bounces);
+  EXPECT_EQ(read.light.sun_azimuth_degrees, scene.light.sun_azimuth_degrees);
+  EXPECT_EQ(read.light.sun_elevation_degrees, scene.light.sun_elevation_degrees);
+  EXPECT_EQ(read.grid.march, scene.grid.march);
+  EXPECT_EQ(read.grid.cells, scene.grid.cells);
+  EXPECT_EQ(read.grid.criterion, scene.grid.criterion);
+  EXPECT_EQ(read.grid.threshold, scene.grid.threshold);
+  EXPECT_EQ(read.grid.max_cells, scene.grid.max_cells);
+  EXPECT_EQ(read.grid.camera_adaptive, scene.grid.camera_adaptive);
+  EXPECT_EQ(read.grid.pixel_size, scene.grid.pixel_size);
+  EXPECT_EQ(read.sampling.samples, scene.sampling.samples);
+  EXPECT_EQ(read.sampling.seed, scene.sampling.seed);
+  EXPECT_EQ(read.sampling.view, scene.sampling.view);
+  EXPECT_EQ(read.display.exposure_stops, scene.display.exposure_stops);
+  EXPECT_EQ(read.display.tone_map, scene.display.tone_map);
+  EXPECT_EQ(read.display.background, scene.display.background);
+}
+
+TEST(SceneFile, NumbersAreWrittenAsOneWouldTypeThem) {
+  SceneOptions scene;
+  scene.medium.coalbedo[0] = 0.01f;
+  scene.light.sky_radiance[0] = 0.1f;
+  const std::string text = scene_text(scene, "s.json");
+  EXPECT_NE(text.find("0.99,"), std::string::npos) << text;
+  EXPECT_EQ(text.find("0.100000"), std::string::npos) << text;
+}
+
+TEST(SceneFile, EveryDifferenceCounts) {
+  const SceneOptions scene = full_scene();
+  const auto differs = [&](auto change) {
+    SceneOptions other = scene;
+    change(other);
+    return !same_scene(scene, other);
+  };
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.volume += "x"; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.camera.eye[1] *= 1.0000001; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.medium.coalbedo[1] *= 2.0f; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.light.sky_radiance[2] += 1e-6f; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.grid.threshold = 0.5; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.sampling.seed = 1; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.display.exposure_stops = 0.0f; }));
+  EXPECT_FALSE(differs([](SceneOptions&) {}));
+}
+
+TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
+  const SceneOptions read = parse_scene(R"({"cumulet_scene": 1})", "s.json");
+  SceneOptions day;
+  day.set_daylight();
+  EXPECT_TRUE(same_scene(read, day));
+  EXPECT_EQ(read.grid.threshold, 0.0);
+  EXPECT_EQ(read.grid.max_cells, 0u);
+  EXPECT_EQ(read.camera.fovy_degrees, 0.0);
+  const SceneOptions dark = parse_scene(with(R"("light": {})"), "s.json");
+  EXPECT_EQ(dark.light.sky_radiance[2], 0.0f);
+}
+
+TEST(SceneFile, AVolumeIsFoundFromTheFilesFolder) {
+  EXPECT_EQ(parse_scene(with(R"("volume": {"file": "a/cloud.vdb"})"), "dir/s.json").volume, "dir/a/cloud.vdb");
+  EXPECT_EQ(parse_scene(with(R"("volume": {"file": "/a/cloud.vdb"})"), "dir/s.json").volume, "/a/cloud.vdb");
+  SceneOptions scene;
+  scene.volume = "/p/a/cloud.vdb";
+  EXPECT_NE(scene_text(scene, "/p/s.json").find("\"a/cloud.vdb\""), std::string::npos);
+  EXPECT_NE(scene_text(scene, "/q/s.json").find("\"/p/a/cloud.vdb\""), std::string::npos);
+  EXPECT_EQ(parse_scene(scene_text(scene, "/p/s.json"), "/p/s.json").volume, "/p/a/cloud.vdb");
+}
+
+TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
+  struct Case {
+    const char* section;
+    const char* key;
+  };
+  for (const Case& c : {Case{R"("medium": {"density": 1})", "medium.density"},
+                        Case{R"("colour": {})", "colour"},
+                        Case{R"("medium": [])", "medium"},
+                        Case{R"("medium": {"density_scale": 0})", "medium.density_scale"},
+                        Case{R"("medium": {"density_scale": "1"})", "medium.density_scale"},
+                        Case{R"("medium": {"density_scale": null})", "medium.density_scale"},
+                        Case{R"("medium": {"albedo": [1, 1]})", "medium.albedo"},
+                        Case{R"("medium": {"albedo": [1, 1, 1.01]})", "medium.albedo"},
+                        Case{R"("medium": {"albedo": [1, 1, "1"]})", "medium.albedo"},
+                        Case{R"("medium": {"anisotropy": 1})", "medium.anisotropy"},
+                        Case{R"("medium": {"anisotropy": 0.9999999999})", "medium.anisotropy"},
+                        Case{R"("medium": {"max_bounces": 1.5})", "medium.max_bounces"},
+                        Case{R"("medium": {"max_bounces": -1})", "medium.max_bounces"},
+                        Case{R"("medium": {"max_bounces": 4294967296})", "medium.max_bounces"},
+                        Case{R"("light": {"sun": {"elevation_degrees": 91}})", "light.sun.elevation_degrees"},
+                        Case{R"("light": {"sun": {"irradiance": [1, -1, 1]}})", "light.sun.irradiance"},
+                        Case{R"("light": {"sky": {"radiance": [1, 1e31, 1]}})", "light.sky.radiance"},
+                        Case{R"("camera": {"eye": [1, 2, 3]})", "camera.target"},
+                        Case{R"("camera": {"target": [1, 2, 3]})", "camera.eye"},
+                        Case{R"("camera": {"eye": [1, 2, 3], "target": [1, 2, 3]})", "camera.target"},
+                        Case{R"("camera": {"up": [0, 0, 0]})", "camera.up"},
+                        Case{R"("camera": {"fovy_degrees": 180})", "camera.fovy_degrees"},
+                        Case{R"("grid": {"march": "fast"})", "grid.march"},
+                        Case{R"("grid": {"march": 1})", "grid.march"},
+                        Case{R"("grid": {"threshold": -1})", "grid.threshold"},
+                        Case{R"("grid": {"max_cells": 0})", "grid.max_cells"},
+                        Case{R"("grid": {"camera_adaptive": 1})", "grid.camera_adaptive"},
+                        Case{R"("picture": {"width": 0})", "picture.width"},
+                        Case{R"("picture": {"height": 99999})", "picture.height"},
+                        Case{R"("display": {"exposure_stops": 65})", "display.exposure_stops"},
+                        Case{R"("display": {"tone_map": "aces"})", "display.tone_map"},
+                        Case{R"("volume": {"file": 3})", "volume.file"},
+                        Case{R"("volume": {"file": "a\u0000b"})", "volume.file"}}) {
+    const std::string error = error_of(with(c.section));
+    EXPECT_EQ(error.rfind(std::string("dir/s.json: ") + c.key, 0), 0u) << c.section << " -> " << error;
+  }
+  for (const char* text : {"", "{", "[]", "1", "nonsense", R"({"cumulet_scene": 1,})", R"({"cumulet_scene": 2})", "{}",
+                           R"({"cumulet_scene": "1"})", R"({"medium": {"density_scale": 1e999}})", "\xff\xfe"})
+    EXPECT_EQ(error_of(text).rfind("dir/s.json: ", 0), 0u) << text;
+  // A hostile depth ends in an error, not on the stack.
+  EXPECT_NE(error_of(std::string(500000, '[')), "");
+}
+
+TEST(SceneFile, FilesAreWrittenAndReadWhole) {
+  const std::string path = ::testing::TempDir() + "scene_file_test.json";
+  save_scene(full_scene(), path);
+  EXPECT_TRUE(same_scene(load_scene(path), full_scene()));
+  EXPECT_THROW(static_cast<void>(load_scene("/nowhere/s.json")), std::runtime_error);
+  EXPECT_THROW(save_scene(full_scene(), "/nowhere/s.json"), std::runtime_error);
+  std::ofstream(path) << std::string(2 << 20, ' ');
+  EXPECT_THROW(static_cast<void>(load_scene(path)), std::runtime_error);
+  std::filesystem::remove(path);
+}
+
+}  // namespace
