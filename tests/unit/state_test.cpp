@@ -142,7 +142,7 @@ struct Frame {
     to.depth_b = -1.0;
     render::Display display;
     display.transparent = true;
-    compositor.draw({sum.name(), counts.name(), {8U, 8U}, z.name()}, display, to);
+    compositor.draw({sum.name(), counts.name(), {8U, 8U}, false, z.name()}, display, to);
   }
   /// Colours, then depths.
   [[nodiscard]] std::vector<float> read() const {
