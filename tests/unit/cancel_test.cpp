@@ -237,7 +237,7 @@ class CancelImport : public ::testing::Test {
     return grid;
   }
   static fs::path write(std::uint32_t compression, const openvdb::GridCPtrVec& grids) {
-    const fs::path file = folder_ / "test.vdb";
+    fs::path file = folder_ / "test.vdb";
     openvdb::io::File out(file.string());
     out.setCompression(compression);
     out.write(grids);
