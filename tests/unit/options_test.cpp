@@ -172,9 +172,9 @@ TEST(Options, ViewNames) {
   EXPECT_EQ(parse({"--view", "density"}).scene.sampling.view, CUMULET_VIEW_DENSITY);
 }
 
-/// A scene file in the test's own folder.
+/// A scene file of this process's own: tests run beside each other.
 std::string write_scene(const std::string& text) {
-  std::string path = ::testing::TempDir() + "options_test_scene.json";
+  std::string path = ::testing::TempDir() + "options_test_" + std::to_string(getpid()) + ".json";
   std::ofstream(path) << text;
   return path;
 }
