@@ -135,8 +135,8 @@ def test_exposure(s):
 def test_scene_file(s):
     s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
                     "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
-                    "wait loaded", "wait converged", *shot("saved"), "key f12", "frames 2", "key ctrl+a", 'text "picture.png"',
-                    "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", 'text "picture.exr"', "key enter",
+                    "wait loaded", "wait converged", "key escape", "frames 2", *shot("saved"), "key f12", "frames 2",
+                    "key ctrl+a", 'text "picture.png"', "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", 'text "picture.exr"', "key enter",
                     "frames 3", *shot("messages")],
            "--volume", s.cumulus)
     assert [m for m in s.report("messages")["messages"] if m["error"]] == []
@@ -149,7 +149,8 @@ def test_scene_file(s):
     assert_alike(saved, s.picture("picture"), area)
     subprocess.run([s.renderer, "--scene", "scene.json", "-o", "rendered.png"], cwd=s.out, check=True)
     assert_alike(saved, s.picture("rendered"), area)
-    s.play("open", ["wait loaded", f'drop "{s.out}/scene.json"', "wait loaded", "wait converged", *shot("opened"),
+    s.play("open", ["wait loaded", f'drop "{s.out}/scene.json"', "wait loaded", "wait converged", "key escape", "frames 2",
+                    *shot("opened"),
                     "key ctrl+z", "wait loaded", *shot("back")], "--volume", s.fire)
     assert_alike(saved, look(s, "opened")[0], area)
     assert s.report("opened")["scene"]["medium"] == scene["medium"]
