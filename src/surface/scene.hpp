@@ -1,0 +1,172 @@
+#pragma once
+
+// What a glTF 2.0 file holds, as the passes want it: plain arrays, checked once on import, so that nobody downstream
+// meets an index out of range, a NaN or a cycle. No GL.
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/log.hpp"
+#include "base/progress.hpp"
+
+namespace cumulet::surface {
+
+/// Eight bits a channel, rows from the top, straight alpha. Whether it is sRGB depends on who reads it (glTF 2.0, 3.9).
+struct Image {
+  std::string name;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::uint8_t> rgba;
+};
+
+enum class Wrap : std::uint8_t { repeat, mirrored, clamp };
+enum class Filter : std::uint8_t { nearest, linear };
+
+struct Sampler {
+  Wrap wrap_s = Wrap::repeat;
+  Wrap wrap_t = Wrap::repeat;
+  Filter magnify = Filter::linear;
+  Filter minify = Filter::linear;
+  bool mipmaps = true;
+  Filter between_mipmaps = Filter::linear;
+};
+
+struct Texture {
+  std::uint32_t image = 0;
+  Sampler sampler;
+};
+
+/// A material's use of a texture; KHR_texture_transform is folded in: uv' = transform * (uv, 1).
+struct TextureUse {
+  std::int32_t texture = -1;  ///< -1: none
+  std::uint32_t uv_set = 0;   ///< 0 or 1
+  glm::mat3x2 transform{1.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.0F};
+};
+
+enum class AlphaMode : std::uint8_t { opaque, mask, blend };
+
+/// Metallic-roughness (glTF 2.0, 3.9 and appendix B) with the extensions that Cumulet reads. Colours are linear.
+struct Material {
+  std::string name;
+  glm::vec4 base_color{1.0F};
+  TextureUse base_color_texture;
+  float metallic = 1.0F;
+  float roughness = 1.0F;
+  TextureUse metallic_roughness_texture;  ///< B metallic, G roughness
+  TextureUse normal_texture;
+  float normal_scale = 1.0F;
+  TextureUse occlusion_texture;  ///< R
+  float occlusion_strength = 1.0F;
+  glm::vec3 emission{0.0F};  ///< emissiveFactor times KHR_materials_emissive_strength
+  TextureUse emission_texture;
+  AlphaMode alpha_mode = AlphaMode::opaque;
+  float alpha_cutoff = 0.5F;
+  bool double_sided = false;
+  bool unlit = false;
+  float ior = 1.5F;
+  float specular = 1.0F;
+  TextureUse specular_texture;  ///< A
+  glm::vec3 specular_color{1.0F};
+  TextureUse specular_color_texture;
+  float clearcoat = 0.0F;
+  TextureUse clearcoat_texture;  ///< R
+  float clearcoat_roughness = 0.0F;
+  TextureUse clearcoat_roughness_texture;  ///< G
+  float transmission = 0.0F;
+  TextureUse transmission_texture;  ///< R
+};
+
+/// KHR_lights_punctual, in the scene's units: candela for point and spot, lux for directional; Cumulet takes both as
+/// radiant (W/sr, W/m2).
+struct PunctualLight {
+  enum class Kind : std::uint8_t { directional, point, spot };
+  Kind kind = Kind::point;
+  glm::vec3 intensity{1.0F};  ///< colour times intensity
+  float range = 0.0F;         ///< 0: no limit
+  float inner_cone = 0.0F;    ///< radians
+  float outer_cone = 0.785398F;
+  glm::vec3 position{0.0F};       ///< world
+  glm::vec3 direction{0, 0, -1};  ///< world, where it shines, unit
+};
+
+struct SceneCamera {
+  std::string name;
+  bool orthographic = false;
+  double vertical_fov = 0.8;  ///< radians; of perspective
+  double aspect = 0.0;        ///< 0: of the window
+  double near_plane = 0.1;
+  double far_plane = 0.0;  ///< 0: infinite
+  double height = 2.0;     ///< world units, of orthographic
+  glm::dmat4 to_world{1.0};
+};
+
+/// Triangles of one material and one node, a range of Scene::indices.
+struct Draw {
+  std::uint32_t first_index = 0;
+  std::uint32_t index_count = 0;  ///< a multiple of 3
+  std::uint32_t material = 0;
+  std::uint32_t node = 0;
+};
+
+/// What does not move: shared by every pose.
+struct VertexAttributes {
+  glm::vec2 uv[2] = {};
+  glm::vec4 color{1.0F};  ///< linear
+};
+
+/// What moves, in world space.
+struct PosedVertex {
+  glm::vec3 position;
+  glm::vec3 normal;   ///< unit
+  glm::vec4 tangent;  ///< unit; w: sign of the bitangent; 0 where the material has no normal map
+};
+
+/// The scene at one time. Triangles wind counter-clockwise seen from their front, mirrored nodes too.
+struct Pose {
+  double time = 0.0;
+  std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
+  std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
+  std::vector<PunctualLight> lights;
+  std::vector<SceneCamera> cameras;
+  glm::dvec3 low{0.0};  ///< bounds of all triangles
+  glm::dvec3 high{0.0};
+};
+
+struct Animation {
+  std::string name;
+  double duration = 0.0;  ///< seconds
+};
+
+/// A checked glTF scene. Immutable: any thread may pose it.
+class Scene {
+ public:
+  virtual ~Scene() = default;
+
+  std::vector<Image> images;
+  std::vector<Texture> textures;
+  std::vector<Material> materials;  ///< at least one
+  std::vector<Draw> draws;          ///< in the order of the file
+  std::vector<std::uint32_t> indices;
+  std::vector<VertexAttributes> attributes;
+  std::vector<Animation> animations;
+
+  [[nodiscard]] std::size_t triangle_count() const { return indices.size() / 3; }
+
+  /// The scene `time` seconds into animation `animation` (looped past its end); without animations, as it rests.
+  /// Linear, step and cubic spline interpolation, skins and morph targets (glTF 2.0, 3.7.3, 3.7.2.2, 3.11).
+  [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0) const = 0;
+};
+
+using ScenePtr = std::shared_ptr<const Scene>;
+
+/// Reads a .gltf or .glb. Throws Error(file), one line that names the file and the cause, for what cannot be read or is
+/// malformed; Error(unsupported) by name for an extensionsRequired that is not known; logs a warning for
+/// extensionsUsed that are ignored. Checks `progress` (may be null) for cancellation.
+ScenePtr import_gltf(const std::string& path, const Log& log, Progress* progress = nullptr);
+
+}  // namespace cumulet::surface
