@@ -2,6 +2,7 @@
 // after, so g > 0 scatters forward; the function integrates to 1 over the sphere.
 #ifndef CM_PHASE_GLSL
 #define CM_PHASE_GLSL
+#include "frame.glsl"
 
 CM_FN float cm_phase(float g, float cosine) {
   float d = 1.0f + g * g - 2.0f * g * cosine;
@@ -15,14 +16,11 @@ CM_FN float cm_phase_cosine(float g, float u) {
   return clamp((1.0f + g * g - s * s) / (2.0f * g), -1.0f, 1.0f);
 }
 
-// Unit vector at the cosine and angle around unit vector w. Frame: Duff et al., "Building an Orthonormal Basis,
-// Revisited", JCGT 6(1), 2017.
+// Unit vector at the cosine and angle around unit vector w.
 CM_FN vec3 cm_around(vec3 w, float cosine, float angle) {
-  float sign_z = w.z >= 0.0f ? 1.0f : -1.0f;
-  float a = -1.0f / (sign_z + w.z);
-  float b = w.x * w.y * a;
-  vec3 u = vec3(1.0f + sign_z * w.x * w.x * a, sign_z * b, -sign_z * w.x);
-  vec3 v = vec3(b, sign_z + w.y * w.y * a, -w.y);
+  vec3 u;
+  vec3 v;
+  cm_frame(w, u, v);
   float sine = sqrt(max(0.0f, 1.0f - cosine * cosine));
   return normalize(u * (sine * cos(angle)) + v * (sine * sin(angle)) + w * cosine);
 }
