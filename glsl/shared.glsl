@@ -5,5 +5,6 @@
 #define CM_FN
 #define CM_INOUT(T) inout T
 #define CM_OUT(T) out T
+#define CM_PRECISE precise  // every shader rounds it alike
 #endif
 #endif

@@ -11,6 +11,7 @@
 #define CM_FN inline
 #define CM_INOUT(T) T&
 #define CM_OUT(T) T&
+#define CM_PRECISE
 
 namespace cumulet::core {
 using namespace glm;  // GLSL's own names: vec3, uvec4, floatBitsToUint, ...
