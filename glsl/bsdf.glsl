@@ -190,6 +190,12 @@ CM_FN bool cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2, CM
   return cm_max3(weight) > 0.0f;
 }
 
+// A shading normal, bent towards the viewer as far as it must be for the surface to be seen from its front.
+CM_FN vec3 cm_bend_normal(vec3 normal, vec3 wo) {
+  float cosine = dot(normal, wo);
+  return cosine >= 1e-3f ? normal : normalize(normal + wo * (1e-3f - cosine));
+}
+
 // What a sky of constant radiance 1 comes back as, nothing in its way: the integral of cm_bsdf_eval over wi. base and
 // coat: the shares that the two GGX lobes reflect, f0 x + f90 y (Karis, "Real Shading in Unreal Engine 4", SIGGRAPH 2013;
 // surface/ggx_albedo.hpp has the table).

@@ -196,6 +196,7 @@ void StateGuard::save_raster() {
   for (std::size_t i = 0; i < blend_equations.size(); ++i) {
     gl_->GetIntegeri_v(blend_equations[i], 0, &blend_equation_[i]);
   }
+  cull_face_ = get(GL_CULL_FACE_MODE);
   front_face_ = get(GL_FRONT_FACE);
   gl_->GetIntegerv(GL_POLYGON_MODE, polygon_mode_.data());
   clip_origin_ = get(GL_CLIP_ORIGIN);
@@ -219,6 +220,7 @@ void StateGuard::set_known() const {
   gl_->DepthFunc(GL_LESS);
   gl_->BlendFuncSeparatei(0, GL_ONE, GL_ZERO, GL_ONE, GL_ZERO);
   gl_->BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
+  gl_->CullFace(GL_BACK);
   gl_->FrontFace(GL_CCW);
   gl_->PolygonMode(GL_FRONT_AND_BACK, GL_FILL);
   gl_->ClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
@@ -311,6 +313,7 @@ void StateGuard::restore_raster() const {
   gl_->BlendFuncSeparatei(0, static_cast<GLenum>(blend_function_[0]), static_cast<GLenum>(blend_function_[1]),
                           static_cast<GLenum>(blend_function_[2]), static_cast<GLenum>(blend_function_[3]));
   gl_->BlendEquationSeparatei(0, static_cast<GLenum>(blend_equation_[0]), static_cast<GLenum>(blend_equation_[1]));
+  gl_->CullFace(static_cast<GLenum>(cull_face_));
   gl_->FrontFace(static_cast<GLenum>(front_face_));
   const auto front = static_cast<GLenum>(polygon_mode_[0]);
   const auto back = static_cast<GLenum>(polygon_mode_[1]);

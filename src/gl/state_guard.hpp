@@ -95,6 +95,7 @@ class StateGuard {
   GLint depth_function_ = 0;
   std::array<GLint, 4> blend_function_{};  // source and destination of colour, then of alpha
   std::array<GLint, 2> blend_equation_{};
+  GLint cull_face_ = 0;
   GLint front_face_ = 0;
   std::array<GLint, 2> polygon_mode_{};  // some drivers tell front and back, core ones have only one
   GLint clip_origin_ = 0;

@@ -1,0 +1,140 @@
+#version 450
+// A surface as it is lit without shadows: by the sun, the scene's lights and a constant sky. Linear, premultiplied.
+// CM_ALPHA: 0 opaque, 1 mask, 2 blend, which transmission is drawn as too.
+// variant: CM_ALPHA=0
+// variant: CM_ALPHA=1
+// variant: CM_ALPHA=2
+#include "shared.glsl"
+#include "surface_parameters.glsl"
+#include "bsdf.glsl"
+#include "punctual.glsl"
+
+layout(location = 0) in vec3 cm_from_eye;  // world axes
+layout(location = 1) in vec3 cm_shading_normal;
+layout(location = 2) in vec4 cm_shading_tangent;
+layout(location = 3) in vec4 cm_texture_uv;
+layout(location = 4) in vec4 cm_vertex_color;
+layout(location = 5) in float cm_z;
+
+layout(binding = 0) uniform sampler2D cm_maps[10];
+layout(binding = 10) uniform sampler2D cm_albedo_table;  // cosine, roughness
+layout(std430, binding = 0) readonly buffer CmLights { CmLight cm_lights[]; };  // from the eye
+
+layout(location = 0) out vec4 cm_colour;
+#if CM_ALPHA != 2
+layout(location = 1) out float cm_depth_z;
+#endif
+
+bool cm_has(int map) { return (cm_material.flags.x >> uint(map) & 1u) != 0u; }
+
+vec2 cm_uv_of(int map) {
+  vec3 uv = vec3((cm_material.flags.y >> uint(map) & 1u) != 0u ? cm_texture_uv.zw : cm_texture_uv.xy, 1.0);
+  return vec2(dot(cm_material.uv_rows[2 * map].xyz, uv), dot(cm_material.uv_rows[2 * map + 1].xyz, uv));
+}
+
+#define CM_SAMPLE(map) texture(cm_maps[map], cm_uv_of(map))
+
+// Unit, on the viewer's side: the front's, which back faces turn over.
+vec3 cm_normal_here(vec3 wo) {
+  vec3 dx = dFdx(cm_from_eye);
+  vec3 dy = dFdy(cm_from_eye);
+  float side = gl_FrontFacing ? 1.0 : -1.0;
+  vec3 n = cm_shading_normal;
+  if (dot(n, n) > 1e-12) {
+    n = normalize(n);
+  } else {
+    n = cross(dx, dy);
+    n = dot(n, n) > 0.0 ? normalize(n) : wo;
+    if (dot(n, wo) * side < 0.0) n = -n;
+  }
+  if (cm_has(CM_MAP_NORMAL)) {
+    vec3 t = cm_shading_tangent.xyz;
+    float turn = cm_shading_tangent.w;
+    if (turn == 0.0) {
+      // Along growing u; v grows downwards in a texture, a normal map's y upwards.
+      vec2 uv = cm_uv_of(CM_MAP_NORMAL);
+      vec2 ux = dFdx(uv);
+      vec2 uy = dFdy(uv);
+      float area = ux.x * uy.y - uy.x * ux.y < 0.0 ? -1.0 : 1.0;
+      t = (dx * uy.y - dy * ux.y) * area;
+      turn = dot(cross(n, t), (dy * ux.x - dx * uy.x) * area) > 0.0 ? -1.0 : 1.0;
+    }
+    t -= n * dot(n, t);
+    float length2 = dot(t, t);
+    if (length2 > 0.0) {
+      t *= inversesqrt(length2);
+      vec3 m = CM_SAMPLE(CM_MAP_NORMAL).xyz * 2.0 - 1.0;
+      m.xy *= cm_material.reflection.z;
+      vec3 mapped = t * m.x + cross(n, t) * (turn * m.y) + n * m.z;
+      if (dot(mapped, mapped) > 1e-12) n = normalize(mapped);
+    }
+  }
+  return cm_bend_normal(n * side, wo);
+}
+
+vec2 cm_ggx_share(float roughness, float cosine) {
+  vec2 size = vec2(textureSize(cm_albedo_table, 0));
+  return textureLod(cm_albedo_table, vec2(cosine, (0.5 + roughness * (size.y - 1.0)) / size.y), 0.0).xy;
+}
+
+void main() {
+  vec4 base = cm_material.base_color * cm_vertex_color;
+  if (cm_has(CM_MAP_BASE_COLOR)) base *= CM_SAMPLE(CM_MAP_BASE_COLOR);
+  vec3 colour = base.rgb;
+  float alpha = CM_ALPHA == 2 ? clamp(base.a, 0.0, 1.0) : 1.0;
+  if (cm_material.flags.z == 0u) {
+    vec3 wo = cm_view.depth.w != 0.0 ? -cm_view.forward.xyz : -normalize(cm_from_eye);
+    vec4 reflection = cm_material.reflection;
+    if (cm_has(CM_MAP_METALLIC_ROUGHNESS)) reflection.xy *= CM_SAMPLE(CM_MAP_METALLIC_ROUGHNESS).zy;
+    vec4 specular = cm_material.specular;
+    if (cm_has(CM_MAP_SPECULAR)) specular.w *= CM_SAMPLE(CM_MAP_SPECULAR).a;
+    if (cm_has(CM_MAP_SPECULAR_COLOR)) specular.rgb *= CM_SAMPLE(CM_MAP_SPECULAR_COLOR).rgb;
+    vec4 coat = cm_material.coat;
+    if (cm_has(CM_MAP_CLEARCOAT)) coat.x *= CM_SAMPLE(CM_MAP_CLEARCOAT).r;
+    if (cm_has(CM_MAP_CLEARCOAT_ROUGHNESS)) coat.y *= CM_SAMPLE(CM_MAP_CLEARCOAT_ROUGHNESS).g;
+    if (cm_has(CM_MAP_TRANSMISSION)) coat.z *= CM_SAMPLE(CM_MAP_TRANSMISSION).r;
+
+    CmSurface s;
+    s.base_color = clamp(base.rgb, 0.0, 1.0);
+    s.metallic = reflection.x;
+    s.roughness = reflection.y;
+    s.normal = cm_normal_here(wo);
+    s.f0 = min(specular.rgb, vec3(1.0)) * specular.w;
+    s.specular = specular.w;
+    s.clearcoat = coat.x;
+    s.clearcoat_roughness = coat.y;
+    float cosine = clamp(dot(s.normal, wo), 0.0, 1.0);
+#if CM_ALPHA == 2
+    // What is transmitted is not scattered back; thin, unrefracted, and of one colour: an approximation.
+    float through = coat.z * (1.0 - s.metallic);
+    alpha *= 1.0 - through * (1.0 - cm_interface_fresnel(s, cosine)) * dot(s.base_color, vec3(0.2126, 0.7152, 0.0722));
+    s.base_color *= 1.0 - through;
+    float covered = clamp(base.a, 0.0, 1.0);
+#else
+    const float covered = 1.0;
+#endif
+    float occlusion = 1.0;
+    if (cm_has(CM_MAP_OCCLUSION)) occlusion += reflection.w * (CM_SAMPLE(CM_MAP_OCCLUSION).r - 1.0);
+    colour = cm_view.sky_radiance.rgb * occlusion *
+             cm_bsdf_albedo(s, wo, cm_ggx_share(s.roughness, cosine), cm_ggx_share(s.clearcoat_roughness, cosine));
+    colour += cm_view.sun_irradiance.rgb * cm_bsdf_eval(s, wo, cm_view.sun_direction.xyz);
+    for (uint i = 0u; i < cm_view.counts.x; ++i) {
+      vec3 wi;
+      float reach;
+      vec3 irradiance = cm_punctual_irradiance(cm_lights[i], cm_from_eye, wi, reach);
+      if (cm_max3(irradiance) > 0.0) colour += irradiance * cm_bsdf_eval(s, wo, wi);
+    }
+    vec3 emission = cm_material.emission.rgb;
+    if (cm_has(CM_MAP_EMISSION)) emission *= CM_SAMPLE(CM_MAP_EMISSION).rgb;
+    colour = (colour + emission) * covered;
+  } else {
+    colour *= alpha;
+  }
+#if CM_ALPHA == 1
+  if (base.a < cm_material.emission.w) discard;  // not before the last derivative
+#endif
+  cm_colour = vec4(clamp(colour, 0.0, 65000.0), alpha);
+#if CM_ALPHA != 2
+  cm_depth_z = cm_z;
+#endif
+}

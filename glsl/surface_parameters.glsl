@@ -1,0 +1,59 @@
+// What the surface pass knows of a view and of a material: std140 blocks, and the same structs in C++ (all members are
+// 16 bytes, or arrays of such).
+#ifndef CM_SURFACE_PARAMETERS_GLSL
+#define CM_SURFACE_PARAMETERS_GLSL
+
+// Textures of a material.
+const int CM_MAP_BASE_COLOR = 0;
+const int CM_MAP_METALLIC_ROUGHNESS = 1;
+const int CM_MAP_NORMAL = 2;
+const int CM_MAP_OCCLUSION = 3;
+const int CM_MAP_EMISSION = 4;
+const int CM_MAP_SPECULAR = 5;
+const int CM_MAP_SPECULAR_COLOR = 6;
+const int CM_MAP_CLEARCOAT = 7;
+const int CM_MAP_CLEARCOAT_ROUGHNESS = 8;
+const int CM_MAP_TRANSMISSION = 9;
+const int CM_MAPS = 10;
+
+#ifdef __cplusplus
+struct CmSurfaceView {
+#else
+layout(std140, binding = 0) uniform CmSurfaceView {
+#endif
+  vec4 eye_high;        // world; with eye_low a sum of more digits than a float has
+  vec4 eye_low;
+  vec4 to_view_x;       // columns of world (from the eye) to picture: x and y are -1 to 1 (times z in perspective), z is
+  vec4 to_view_y;       // the view depth
+  vec4 to_view_z;
+  vec4 depth;           // clip-space depth is x + y z over w; w: z, or 1 where orthographic; w: 1 where orthographic
+  vec4 forward;         // unit
+  vec4 sun_direction;   // unit, towards the sun
+  vec4 sun_irradiance;
+  vec4 sky_radiance;
+  uvec4 counts;         // x: lights
+#ifdef __cplusplus
+};
+#else
+} cm_view;
+#endif
+
+#ifdef __cplusplus
+struct CmMaterial {
+#else
+layout(std140, binding = 1) uniform CmMaterial {
+#endif
+  vec4 base_color;
+  vec4 emission;        // w: alpha cutoff
+  vec4 reflection;      // metallic, roughness, normal scale, occlusion strength
+  vec4 specular;        // specular colour times ((ior - 1) / (ior + 1))^2, and the weight
+  vec4 coat;            // clearcoat, its roughness, transmission
+  uvec4 flags;          // bits: x: maps there are, y: those by the second uv set; z: 1 where unlit
+  vec4 uv_rows[20];     // two a map: uv' = (dot(row, (uv, 1)), dot(row, (uv, 1)))
+#ifdef __cplusplus
+};
+#else
+} cm_material;
+#endif
+
+#endif

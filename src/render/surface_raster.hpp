@@ -1,0 +1,139 @@
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "gl/objects.hpp"
+#include "surface/scene.hpp"
+
+namespace cumulet::render {
+
+/// What the surfaces are seen through: viewer::ViewFrame without its depth. World space. A ray through (x, y), both -1
+/// to 1, y up: perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along
+/// forward. The ray's parameter is the view depth z.
+struct SurfaceView {
+  glm::dvec3 eye{0.0};
+  glm::dvec3 forward{0.0, 0.0, -1.0};
+  glm::dvec3 right{1.0, 0.0, 0.0};
+  glm::dvec3 up{0.0, 1.0, 0.0};
+  bool orthographic = false;
+  bool operator==(const SurfaceView&) const = default;
+};
+
+/// Beside the lights of the pose.
+struct SurfaceLighting {
+  glm::vec3 sun_direction{0.0F, 1.0F, 0.0F};  ///< unit, towards the sun
+  glm::vec3 sun_irradiance{0.0F};             ///< on a plane that faces it
+  glm::vec3 sky_radiance{0.0F};               ///< the same from everywhere
+};
+
+/// Where in its pixel a layer is sampled: x to the right, y down the picture, from the pixel's corner, both in (0, 1).
+/// Of `layers` (1 to 8) layers each column and each row of layers x layers cells has one (n rooks). See
+/// glsl/jitter.glsl.
+glm::vec2 surface_jitter(unsigned layer, unsigned layers);
+
+/// Draws a glTF scene: linear colour and view depth, a layer a sub-pixel place; their mean is the anti-aliased picture.
+///
+/// Materials are metallic-roughness with KHR_materials_ior, _specular, _clearcoat, _emissive_strength and _unlit, as
+/// glsl/bsdf.glsl has them, normal and occlusion maps (occlusion dims the sky alone) and vertex colours. Nothing casts
+/// a shadow. Where a normal map's vertices have no tangent, screen-space derivatives serve.
+///
+/// OPAQUE and MASK write z. BLEND does not: such triangles are drawn over the others, tested against their z, from the
+/// back to the front by the view depth of their centres, those of all draws together. That is right for triangles that
+/// neither intersect nor overlap in depth; ties keep the file's order. KHR_materials_transmission is approximated as
+/// BLEND of one colour's coverage: thin, not refracted.
+///
+/// Needs the context current and a StateGuard around; leaves any state that the guard puts back. GL 4.5 core.
+class SurfaceRaster {
+ public:
+  explicit SurfaceRaster(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+
+  /// Uploads what does not move; null: no surfaces. The pose is gone then. Throws Error(out_of_memory), or
+  /// Error(unsupported) for an image that is larger than the driver's textures, and keeps what was.
+  void set_scene(surface::ScenePtr scene);
+  /// Uploads what moves. The pose is of the scene. Throws Error(out_of_memory); Error(internal) for one that is not.
+  void set_pose(const surface::Pose& pose);
+  /// Renders layers 1 to 8 of size > 0. Without scene or pose they are empty. Throws Error(out_of_memory), and
+  /// Error(internal) for a view that spans no space. O(layers (triangles + pixels)).
+  void draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers);
+
+  /// GL_TEXTURE_2D_ARRAY, rgba16f, row 0 the picture's top: radiance, and coverage in alpha (1 where opaque), which the
+  /// radiance is multiplied with. 0 before the first draw.
+  [[nodiscard]] GLuint colour() const { return colour_.name(); }
+  /// GL_TEXTURE_2D_ARRAY, r32f: view depth z of the nearest OPAQUE or MASK surface, infinity where there is none; as
+  /// HostDepth::texture.
+  [[nodiscard]] GLuint depth() const { return depth_.name(); }
+  [[nodiscard]] glm::uvec2 size() const { return size_; }
+  [[nodiscard]] unsigned layers() const { return layers_; }
+
+ private:
+  /// A range of indices with one state.
+  struct Batch {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    std::uint32_t draw = 0;
+  };
+  /// One use of a texture: names are into Assets.
+  struct Map {
+    GLuint texture = 0;
+    GLuint sampler = 0;
+  };
+  struct Material {
+    std::array<Map, 10> maps{};
+    surface::AlphaMode pass = surface::AlphaMode::opaque;
+    bool double_sided = false;
+  };
+  struct Assets {
+    surface::ScenePtr scene;
+    gl::Object attributes;
+    gl::Object indices;
+    gl::Object material_block;
+    GLintptr material_stride = 0;
+    std::vector<gl::Object> textures;
+    std::vector<gl::Object> samplers;
+    std::vector<Material> materials;
+    std::vector<Batch> solid;    // OPAQUE, then MASK
+    std::vector<Batch> blended;  // a triangle each
+    gl::Object posed;            // vertices
+    gl::Object sorted_indices;   // of blended triangles
+  };
+
+  void upload_textures(Assets& assets) const;
+  void upload_materials(Assets& assets) const;
+  void prepare_draws(Assets& assets) const;
+  void sort_blended(const SurfaceView& view);
+  void make_targets(glm::uvec2 size, unsigned layers);
+  void make_fixtures();
+  void upload_view(const SurfaceView& view, const SurfaceLighting& lighting);
+  void draw_batches(std::span<const Batch> batches, bool mirrored) const;
+
+  gl::FunctionsPtr gl_;
+  Assets assets_;
+  bool posed_ = false;
+  std::vector<std::uint8_t> flipped_;
+  std::vector<surface::PunctualLight> lights_;
+  glm::dvec3 low_{0.0};
+  glm::dvec3 high_{0.0};
+  std::vector<glm::vec3> centres_;  // of blended triangles
+  std::vector<Batch> sorted_;       // of blended triangles, into sorted_indices
+  std::optional<SurfaceView> sorted_view_;
+
+  std::array<gl::Object, 3> programs_;  // by AlphaMode
+  gl::Object white_;
+  gl::Object albedo_table_;
+  gl::Object table_sampler_;
+  gl::Object view_block_;
+  gl::Object light_buffer_;
+  std::size_t light_bytes_ = 0;
+
+  gl::Object colour_;
+  gl::Object depth_;
+  gl::Object depth_test_;
+  glm::uvec2 size_{0U};
+  unsigned layers_ = 0;
+};
+
+}  // namespace cumulet::render
