@@ -42,7 +42,8 @@ layout(binding = 0) uniform usamplerBuffer nodes;
 layout(binding = 1) uniform usamplerBuffer triangles;
 struct Ray { vec4 from; vec4 along; };
 layout(std430, binding = 0) readonly buffer Rays { Ray rays[]; };
-layout(std430, binding = 1) writeonly buffer Hits { uvec4 hits[]; };
+layout(std430, binding = 1) buffer Hits { uint hits[]; };
+layout(location = 0) uniform uint any;
 uvec4 cm_bvh_node(uint texel) { return texelFetch(nodes, int(texel)); }
 uvec4 cm_bvh_triangle(uint texel) { return texelFetch(triangles, int(texel)); }
 )";
@@ -55,11 +56,19 @@ void main() {
   if (i >= rays.length()) return;
   vec3 o = rays[i].from.xyz;
   vec3 d = rays[i].along.xyz;
+  if (any != 0u) {
+    hits[8u * i + 7u] = uint(cm_bvh_occluded(o, d, rays[i].from.w, rays[i].along.w));
+    return;
+  }
   CmHit hit;
   cm_bvh_closest(o, d, rays[i].from.w, rays[i].along.w, hit);
-  bool occluded = cm_bvh_occluded(o, d, rays[i].from.w, rays[i].along.w);
-  hits[2u * i] = uvec4(floatBitsToUint(hit.t), hit.triangle, floatBitsToUint(hit.barycentrics));
-  hits[2u * i + 1u] = uvec4(hit.record, hit.flags, uint(hit.front), uint(occluded));
+  hits[8u * i] = floatBitsToUint(hit.t);
+  hits[8u * i + 1u] = hit.triangle;
+  hits[8u * i + 2u] = floatBitsToUint(hit.barycentrics.x);
+  hits[8u * i + 3u] = floatBitsToUint(hit.barycentrics.y);
+  hits[8u * i + 4u] = hit.record;
+  hits[8u * i + 5u] = hit.flags;
+  hits[8u * i + 6u] = uint(hit.front);
 }
 )";
     const gl::Object shader(gl_, gl::Object::Kind::shader, gl_->CreateShader(GL_COMPUTE_SHADER));
@@ -78,28 +87,51 @@ void main() {
     }
   }
 
-  [[nodiscard]] std::vector<GlHit> trace(const surface::Bvh& bvh, std::span<const GlRay> rays) const {
-    const auto upload = [&](const void* data, std::size_t bytes) {
+  /// What run() works on.
+  struct Scene {
+    std::array<gl::Object, 6> objects;  // nodes, records, their textures, rays, hits
+    std::size_t rays = 0;
+  };
+  [[nodiscard]] Scene upload(const surface::Bvh& bvh, std::span<const GlRay> rays) const {
+    const auto buffer = [&](const void* data, std::size_t bytes) {
       return gl::make_buffer(gl_, std::max<std::size_t>(bytes, 16), bytes == 0 ? nullptr : data, 0, "rays");
     };
-    const gl::Object nodes = upload(bvh.nodes().data(), bvh.nodes().size_bytes());
-    const gl::Object records = upload(bvh.records().data(), bvh.records().size_bytes());
-    const gl::Object node_texels = gl::make_texture_buffer(gl_, GL_RGBA32UI, nodes, "nodes");
-    const gl::Object record_texels = gl::make_texture_buffer(gl_, GL_RGBA32UI, records, "records");
-    const gl::Object from = upload(rays.data(), rays.size_bytes());
-    std::vector<GlHit> hits(rays.size());
-    const gl::Object to = upload(hits.data(), hits.size() * sizeof(GlHit));
+    Scene scene;
+    auto& o = scene.objects;
+    o[0] = buffer(bvh.nodes().data(), bvh.nodes().size_bytes());
+    o[1] = buffer(bvh.records().data(), bvh.records().size_bytes());
+    o[2] = gl::make_texture_buffer(gl_, GL_RGBA32UI, o[0], "nodes");
+    o[3] = gl::make_texture_buffer(gl_, GL_RGBA32UI, o[1], "records");
+    o[4] = buffer(rays.data(), rays.size_bytes());
+    const std::vector<GlHit> hits(rays.size());
+    o[5] = buffer(hits.data(), hits.size() * sizeof(GlHit));
+    scene.rays = rays.size();
+    return scene;
+  }
+  /// Any hit sets only `occluded`, nearest ones only the rest. Waits for the end.
+  void run(const Scene& scene, bool any) const {
     gl_->UseProgram(program_.name());
-    gl_->BindTextureUnit(0, node_texels.name());
-    gl_->BindTextureUnit(1, record_texels.name());
-    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, from.name());
-    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, to.name());
-    gl_->DispatchCompute(static_cast<GLuint>((rays.size() + 63) / 64), 1, 1);
-    gl_->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    gl_->GetNamedBufferSubData(to.name(), 0, static_cast<GLsizeiptr>(hits.size() * sizeof(GlHit)), hits.data());
+    gl_->ProgramUniform1ui(program_.name(), 0, any ? 1 : 0);
+    gl_->BindTextureUnit(0, scene.objects[2].name());
+    gl_->BindTextureUnit(1, scene.objects[3].name());
+    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, scene.objects[4].name());
+    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, scene.objects[5].name());
+    gl_->DispatchCompute(static_cast<GLuint>((scene.rays + 63) / 64), 1, 1);
+    gl_->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    gl_->Finish();
+  }
+  /// Both.
+  [[nodiscard]] std::vector<GlHit> trace(const surface::Bvh& bvh, std::span<const GlRay> rays) const {
+    const Scene scene = upload(bvh, rays);
+    run(scene, false);
+    run(scene, true);
+    std::vector<GlHit> hits(rays.size());
+    gl_->GetNamedBufferSubData(scene.objects[5].name(), 0, static_cast<GLsizeiptr>(hits.size() * sizeof(GlHit)),
+                               hits.data());
     gl::check(*gl_, "tracing rays");
     return hits;
   }
+  [[nodiscard]] std::string renderer() const { return gl::string_of(*gl_, GL_RENDERER); }
 
  private:
   static std::string file(const std::string& name) {
