@@ -168,9 +168,9 @@ class Bvh::Builder {
   };
 
   static constexpr unsigned bin_count = 16;
+  static constexpr std::size_t sweep_most = 16;  // triangles whose splits are all tried, without bins
   struct Bin {
     Bounds box;
-    Bounds centres;
     std::uint32_t count = 0;
   };
   // Where the centres' box is cut into bins along each axis.
@@ -197,7 +197,6 @@ class Bvh::Builder {
       for (unsigned axis = 0; axis < 3; ++axis) {
         Bin& bin = bins[axis][grid.bin(centre, axis)];
         bin.box.add(box);
-        bin.centres.add(centre);
         ++bin.count;
       }
     }
@@ -205,7 +204,6 @@ class Bvh::Builder {
       for (unsigned axis = 0; axis < 3; ++axis) {
         for (unsigned i = 0; i < bin_count; ++i) {
           bins[axis][i].box.add(other.bins[axis][i].box);
-          bins[axis][i].centres.add(other.bins[axis][i].centres);
           bins[axis][i].count += other.bins[axis][i].count;
         }
       }
@@ -280,7 +278,6 @@ class Bvh::Builder {
       const unsigned half = i < best.bin ? 0 : 1;
       const Bin& bin = bins.bins[best.axis][i];
       best.box[half].add(bin.box);
-      best.centres[half].add(bin.centres);
       best.count[half] += bin.count;
     }
     return best;
@@ -351,10 +348,18 @@ class Bvh::Builder {
         visit(c, p.begin + c * grain, std::min(p.end, p.begin + (c + 1) * grain));
       });
     };
+    std::vector<std::array<Bounds, 2>> centres(chunks);
     each_chunk([&](std::size_t c, std::size_t from, std::size_t to) {
-      for (std::size_t i = from; i < to; ++i) first_in[c + 1] += in_first(ids_[i]) ? 1 : 0;
+      for (std::size_t i = from; i < to; ++i) {
+        const bool first = in_first(ids_[i]);
+        first_in[c + 1] += first ? 1 : 0;
+        centres[c][first ? 0 : 1].add(boxes_[ids_[i]].centre());
+      }
     });
-    for (std::size_t c = 0; c < chunks; ++c) first_in[c + 1] += first_in[c];
+    for (std::size_t c = 0; c < chunks; ++c) {
+      first_in[c + 1] += first_in[c];
+      for (unsigned half = 0; half < 2; ++half) split.centres[half].add(centres[c][half]);
+    }
     each_chunk([&](std::size_t c, std::size_t from, std::size_t to) {
       std::size_t first = p.begin + first_in[c];
       std::size_t second = from + split.count[0] - first_in[c];
@@ -398,21 +403,60 @@ class Bvh::Builder {
     [[nodiscard]] std::size_t count() const { return end - begin; }
   };
 
-  // Appends its nodes, the top one first, and returns the link to it.
-  static std::uint32_t subtree(std::vector<Node>& nodes, std::vector<Item>& items, std::size_t base, const Small& s) {
-    if (s.count() == 1 || s.level == max_depth) return leaf_link(base + s.begin, s.count());
+  // Few triangles, all splits between neighbours along each axis: reorders the items.
+  static Split sweep(std::vector<Item>& items, const Small& s, std::size_t half_capacity) {
+    std::array<std::array<std::uint8_t, sweep_most>, 3> order{};
+    std::array<float, sweep_most> above{};
+    Split best;
+    float best_cost = std::numeric_limits<float>::infinity();
+    const std::size_t n = s.count();
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      std::array<float, sweep_most> centre{};
+      for (std::size_t i = 0; i < n; ++i) {
+        const Bounds& box = items[s.begin + i].box;
+        const float c = box.low[axis] + box.high[axis];
+        std::size_t to = i;
+        for (; to > 0 && centre[to - 1] > c; --to) {
+          centre[to] = centre[to - 1];
+          order[axis][to] = order[axis][to - 1];
+        }
+        centre[to] = c;
+        order[axis][to] = static_cast<std::uint8_t>(i);
+      }
+      Bounds box;
+      for (std::size_t i = n - 1; i > 0; --i) {
+        box.add(items[s.begin + order[axis][i]].box);
+        above[i] = box.area();
+      }
+      box = Bounds();
+      for (std::size_t i = 1; i < n; ++i) {
+        box.add(items[s.begin + order[axis][i - 1]].box);
+        if (i > half_capacity || n - i > half_capacity) continue;
+        const float cost = box.area() * static_cast<float>(i) + above[i] * static_cast<float>(n - i);
+        if (cost < best_cost) {
+          best_cost = cost;
+          best.axis = axis;
+          best.count = {i, n - i};
+        }
+      }
+    }
+    std::array<Item, sweep_most> sorted;
+    for (std::size_t i = 0; i < n; ++i) sorted[i] = items[s.begin + order[best.axis][i]];
+    for (std::size_t i = 0; i < n; ++i) {
+      const unsigned half = i < best.count[0] ? 0 : 1;
+      best.box[half].add(sorted[i].box);
+      best.centres[half].add(sorted[i].box.centre());
+      items[s.begin + i] = sorted[i];
+    }
+    return best;
+  }
+
+  // Many: bins, else the median.
+  static Split cut(std::vector<Item>& items, const Small& s, std::size_t half_capacity) {
     const Grid grid(s.centres);
     Bins bins;
     for (std::size_t i = s.begin; i < s.end; ++i) bins.add(grid, items[i].box);
-    Split split = best_split(bins, capacity(s.level + 1));
-    if (s.count() <= max_leaf) {
-      const float area = s.box.area();
-      const float leaf = area * static_cast<float>(s.count());
-      if (!split.found || leaf <= visit_cost * area + split.box[0].area() * static_cast<float>(split.count[0]) +
-                                      split.box[1].area() * static_cast<float>(split.count[1])) {
-        return leaf_link(base + s.begin, s.count());
-      }
-    }
+    Split split = best_split(bins, half_capacity);
     const auto begin = items.begin() + static_cast<std::ptrdiff_t>(s.begin);
     const auto end = items.begin() + static_cast<std::ptrdiff_t>(s.end);
     if (split.found) {
@@ -420,10 +464,26 @@ class Bvh::Builder {
     } else {
       median(begin, end, widest(s.centres), [](const Item& item) { return std::pair(item.box.centre(), item.id); });
       split.count = {s.count() / 2, s.count() - s.count() / 2};
-      for (std::size_t i = s.begin; i < s.end; ++i) {
-        const unsigned half = i < s.begin + split.count[0] ? 0 : 1;
-        split.box[half].add(items[i].box);
-        split.centres[half].add(items[i].box.centre());
+    }
+    for (std::size_t i = s.begin; i < s.end; ++i) {
+      const unsigned half = i < s.begin + split.count[0] ? 0 : 1;
+      if (!split.found) split.box[half].add(items[i].box);
+      split.centres[half].add(items[i].box.centre());
+    }
+    return split;
+  }
+
+  // Appends its nodes, the top one first, and returns the link to it.
+  static std::uint32_t subtree(std::vector<Node>& nodes, std::vector<Item>& items, std::size_t base, const Small& s) {
+    if (s.count() == 1 || s.level == max_depth) return leaf_link(base + s.begin, s.count());
+    const std::size_t half_capacity = capacity(s.level + 1);
+    const Split split = s.count() <= sweep_most ? sweep(items, s, half_capacity) : cut(items, s, half_capacity);
+    if (s.count() <= max_leaf) {
+      const float area = s.box.area();
+      if (area * static_cast<float>(s.count()) <= visit_cost * area +
+                                                      split.box[0].area() * static_cast<float>(split.count[0]) +
+                                                      split.box[1].area() * static_cast<float>(split.count[1])) {
+        return leaf_link(base + s.begin, s.count());
       }
     }
     const std::size_t at = nodes.size();

@@ -15,8 +15,13 @@
 #include <random>
 
 #include "base/error.hpp"
+#include "support/gl_rays.hpp"
 #include "support/meshes.hpp"
 #include "surface/bvh_rays.hpp"
+
+// Mesa's OSMesa keeps its framebuffers for ever.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 // The same source with a cm_hit_accept.
 #undef CM_BVH_GLSL
@@ -162,15 +167,13 @@ TEST(Bvh, MeshesAreHitWhereBruteForceSays) {
 
 TEST(Bvh, SliversAreHitWhereBruteForceSays) { expect_like_brute_force(test::slivers(1500, 8), 4000, 8, 0.7); }
 
-// Nothing slips out of a closed mesh: rays from inside, at what is hardest.
-std::size_t slips(const Mesh& mesh, std::size_t count, unsigned seed) {
-  const Bvh bvh = build(mesh);
-  BvhRays rays{&bvh};
+// Rays from inside a closed mesh at what is hardest.
+std::vector<Ray> rays_out_of(const Mesh& mesh, std::size_t count, unsigned seed) {
   const auto [low, high] = mesh.bounds();
   const vec3 middle = 0.5F * (low + high);
   std::mt19937 engine(seed);
   std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
-  std::size_t slipped = 0;
+  std::vector<Ray> rays;
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t triangle = engine() % (mesh.indices.size() / 3);
     const vec3 a = mesh.corner(triangle, i % 3);
@@ -199,9 +202,19 @@ std::size_t slips(const Mesh& mesh, std::size_t count, unsigned seed) {
     }
     if (i % 13 == 0) d *= std::exp2(30.0F * uniform(engine) - 15.0F);
     if (!(glm::length(d) > 0.0F)) continue;
+    rays.push_back({o, d, std::numeric_limits<float>::infinity()});
+  }
+  return rays;
+}
+
+std::size_t slips(const Mesh& mesh, std::size_t count, unsigned seed) {
+  const Bvh bvh = build(mesh);
+  BvhRays rays{&bvh};
+  std::size_t slipped = 0;
+  for (const Ray& ray : rays_out_of(mesh, count, seed)) {
     Hit hit{};
-    const bool met = rays.cm_bvh_closest(o, d, 0.0F, std::numeric_limits<float>::infinity(), hit);
-    slipped += met && !hit.front && rays.cm_bvh_occluded(o, d, 0.0F, std::numeric_limits<float>::infinity()) ? 0 : 1;
+    const bool met = rays.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, hit);
+    slipped += met && !hit.front && rays.cm_bvh_occluded(ray.o, ray.d, 0.0F, ray.t_max) ? 0 : 1;
   }
   return slipped;
 }
@@ -527,6 +540,87 @@ TEST(Bvh, OriginsLeaveTheirSurface) {
       EXPECT_EQ(again, 0U) << scale << " " << away;
     }
   }
+}
+
+class BvhGl : public testing::TestWithParam<headless::Backend> {
+ protected:
+  void SetUp() override {
+    try {
+      context_ = std::make_unique<headless::Context>(headless::Context::create(GetParam()));
+    } catch (const std::exception& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+  std::unique_ptr<headless::Context> context_;
+};
+INSTANTIATE_TEST_SUITE_P(Gl, BvhGl, testing::Values(headless::Backend::egl, headless::Backend::osmesa),
+                         [](const auto& of) { return of.param == headless::Backend::egl ? "egl" : "osmesa"; });
+
+TEST_P(BvhGl, ShadersHitWhatTheCpuHits) {
+  const test::GlRays gl(*context_, "");
+  for (const Mesh& mesh : {test::soup(20000, 0.05F, 31), test::terrain(60), test::slivers(2000, 33), test::icosphere(4),
+                           test::soup(1, 1.0F, 35), Mesh()}) {
+    const Bvh bvh = build(mesh);
+    BvhRays rays{&bvh};
+    std::vector<test::GlRay> all;
+    for (const Ray& r : rays_at(mesh.indices.empty() ? test::cube(1) : mesh, 20000, 34)) {
+      all.push_back({r.o, 0.0F, r.d, r.t_max});
+    }
+    const std::vector<test::GlHit> hits = gl.trace(bvh, all);
+    std::size_t different = 0;
+    std::size_t met = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      Hit hit{};
+      const bool expected = rays.cm_bvh_closest(all[i].o, all[i].d, 0.0F, all[i].t_max, hit);
+      met += expected ? 1 : 0;
+      ASSERT_EQ(hits[i].triangle != CM_BVH_NONE, hits[i].occluded != 0) << i;
+      // Division may round otherwise there: a hit at an edge, a needle or the ray's end may differ.
+      if (hits[i].triangle != hit.triangle) {
+        ++different;
+        continue;
+      }
+      if (!expected) continue;
+      ASSERT_NEAR(hits[i].t, hit.t, 1e-5F * (1.0F + std::abs(hit.t))) << i;
+      ASSERT_EQ(hits[i].front != 0, hit.front) << i;
+      ASSERT_NEAR(hits[i].barycentrics.x, hit.barycentrics.x, 1e-2F) << i;
+      ASSERT_NEAR(hits[i].barycentrics.y, hit.barycentrics.y, 1e-2F) << i;
+    }
+    EXPECT_LE(different, all.size() / 500) << mesh.indices.size();
+    EXPECT_GE(met, mesh.indices.size() < 4 ? 0U : all.size() / 20);
+  }
+}
+
+TEST_P(BvhGl, NoRaySlipsOutOfAClosedMesh) {
+  // Whatever the driver contracts into fused operations.
+  const test::GlRays gl(*context_, "");
+  for (const Mesh& mesh : {test::icosphere(4), test::cube(5),
+                           test::moved(test::icosphere(3), vec3(1.0F), vec3(1000.0F, -300.0F, 77.0F))}) {
+    const Bvh bvh = build(mesh);
+    std::vector<test::GlRay> all;
+    for (const Ray& r : rays_out_of(mesh, 200000, 41)) all.push_back({r.o, 0.0F, r.d, r.t_max});
+    std::size_t slipped = 0;
+    for (const test::GlHit& hit : gl.trace(bvh, all)) slipped += hit.occluded != 0 && hit.front == 0 ? 0 : 1;
+    EXPECT_EQ(slipped, 0U);
+  }
+}
+
+TEST_P(BvhGl, IncludersDecideOnHitsOfFlaggedTriangles) {
+  const test::GlRays gl(*context_, "return (triangle & 1u) == 1u && barycentrics.x > 0.3;");
+  const Mesh mesh = test::soup(5000, 0.1F, 51);
+  std::vector<std::uint32_t> flags(5000);
+  for (std::size_t i = 0; i < flags.size(); ++i) flags[i] = i % 3 == 0 ? 0 : TriangleFlags::ask;
+  const Bvh bvh = Bvh::build(mesh.vertices, mesh.indices, flags);
+  std::vector<test::GlRay> all;
+  for (const Ray& r : rays_at(mesh, 20000, 52)) all.push_back({r.o, 0.0F, r.d, r.t_max});
+  std::array<std::size_t, 3> kinds{};
+  for (const test::GlHit& hit : gl.trace(bvh, all)) {
+    if (hit.triangle == CM_BVH_NONE) continue;
+    ++kinds[flags[hit.triangle] == 0 ? 0 : 1];
+    kinds[2] += flags[hit.triangle] != 0 && (hit.triangle % 2 == 0 || hit.barycentrics.x <= 0.3F) ? 1 : 0;
+  }
+  EXPECT_GT(kinds[0], 1000U);
+  EXPECT_GT(kinds[1], 500U);
+  EXPECT_EQ(kinds[2], 0U);
 }
 
 }  // namespace
