@@ -58,7 +58,7 @@ glm::dvec2 depth_of(const SurfaceView& view, const glm::dmat3& matrix, const glm
   }
   const double extent = std::max(glm::length(high - low), 1e-12);
   // Reversed floats resolve all depths alike, so that perspective's near plane may be anywhere in front of the scene.
-  if (!view.orthographic) return {nearest > 0.0 ? std::max(0.5 * nearest, 1e-30) : 1e-5 * extent, 0.0};
+  if (!view.orthographic) return {nearest > 0.0 ? std::max(0.5 * nearest, 1e-30) : 1e-7 * extent, 0.0};
   const double margin = 0.01 * extent;
   const double near = std::max(0.0, nearest - margin);
   const double far = std::max(farthest, near) + margin;
