@@ -17,6 +17,12 @@ endif()
 find_package(OpenVDB REQUIRED)
 find_path(CUMULET_NANOVDB_INCLUDE_DIR nanovdb/NanoVDB.h REQUIRED)
 
+# glTF: its structure, and what compresses its buffers.
+find_package(TinyGLTF CONFIG REQUIRED)
+find_package(draco CONFIG REQUIRED)
+find_package(meshoptimizer CONFIG REQUIRED)
+find_path(CUMULET_JSON_INCLUDE_DIR nlohmann/json.hpp REQUIRED)
+
 find_path(CUMULET_GLM_INCLUDE_DIR glm/glm.hpp REQUIRED)
 add_library(cumulet_glm INTERFACE)
 target_include_directories(cumulet_glm SYSTEM INTERFACE ${CUMULET_GLM_INCLUDE_DIR})

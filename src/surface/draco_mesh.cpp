@@ -1,0 +1,118 @@
+#include "surface/draco_mesh.hpp"
+
+#include <draco/compression/decode.h>
+#include <draco/compression/point_cloud/point_cloud_decoder.h>
+#include <draco/core/varint_decoding.h>
+#include <draco/metadata/metadata_decoder.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace cumulet::surface::detail {
+
+struct DracoMesh::State {
+  std::unique_ptr<draco::Mesh> mesh;
+};
+
+namespace {
+
+/// The number of triangles that the stream says it holds; the decoder would allocate for as many.
+std::uint64_t face_count(std::span<const std::uint8_t> bytes, const std::string& what) {
+  const std::string broken = what + " cannot be decompressed (KHR_draco_mesh_compression)";
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  draco::DracoHeader header{};
+  if (!draco::PointCloudDecoder::DecodeHeader(&buffer, &header).ok()) malformed(broken);
+  if (header.encoder_type != draco::TRIANGULAR_MESH || header.version_major != 2 || header.version_minor != 2) {
+    malformed(what + ": its Draco stream is not a mesh of version 2.2");
+  }
+  buffer.set_bitstream_version(DRACO_BITSTREAM_VERSION(header.version_major, header.version_minor));
+  if ((header.flags & METADATA_FLAG_MASK) != 0) {
+    draco::GeometryMetadata metadata;
+    draco::MetadataDecoder decoder;
+    if (!decoder.DecodeGeometryMetadata(&buffer, &metadata)) malformed(broken);
+  }
+  std::uint32_t faces = 0;
+  if (header.encoder_method == draco::MESH_EDGEBREAKER_ENCODING) {
+    std::uint8_t traversal = 0;
+    std::uint32_t vertices = 0;
+    if (!buffer.Decode(&traversal) || !draco::DecodeVarint(&vertices, &buffer)) malformed(broken);
+  }
+  if (!draco::DecodeVarint(&faces, &buffer)) malformed(broken);
+  return faces;
+}
+
+double largest(draco::DataType type) {
+  switch (type) {
+    case draco::DT_INT8:
+      return std::numeric_limits<std::int8_t>::max();
+    case draco::DT_UINT8:
+      return std::numeric_limits<std::uint8_t>::max();
+    case draco::DT_INT16:
+      return std::numeric_limits<std::int16_t>::max();
+    case draco::DT_UINT16:
+      return std::numeric_limits<std::uint16_t>::max();
+    default:
+      return 1.0;
+  }
+}
+
+}  // namespace
+
+DracoMesh::DracoMesh(std::span<const std::uint8_t> bytes, const std::string& what, Budget& budget)
+    : state_(std::make_unique<State>()) {
+  const std::uint64_t faces = face_count(bytes, what);
+  // Far more than regular meshes compress to.
+  if (faces > bytes.size() * 1024) {
+    malformed(what + ": " + std::to_string(bytes.size()) + " bytes cannot hold " + std::to_string(faces) +
+              " triangles");
+  }
+  constexpr std::uint64_t bytes_per_face = 256;  // of the decoder's tables
+  budget.take(faces, bytes_per_face, what);
+  draco::DecoderBuffer buffer;
+  buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  draco::Decoder decoder;
+  auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
+  if (!decoded.ok()) {
+    malformed(what +
+              " cannot be decompressed (KHR_draco_mesh_compression): " + one_line(decoded.status().error_msg_string()));
+  }
+  state_->mesh = std::move(decoded).value();
+}
+
+DracoMesh::~DracoMesh() = default;
+
+std::size_t DracoMesh::vertex_count() const { return state_->mesh->num_points(); }
+
+std::vector<std::uint32_t> DracoMesh::indices() const {
+  std::vector<std::uint32_t> result;
+  result.reserve(std::size_t{state_->mesh->num_faces()} * 3);
+  for (std::uint32_t f = 0; f < state_->mesh->num_faces(); ++f) {
+    for (const draco::PointIndex& point : state_->mesh->face(draco::FaceIndex(f))) result.push_back(point.value());
+  }
+  return result;
+}
+
+void DracoMesh::read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
+                     float* to, std::size_t step, const std::string& what) const {
+  draco::Mesh& mesh = *state_->mesh;
+  draco::PointAttribute* attribute = mesh.attribute(mesh.GetAttributeIdByUniqueId(id));
+  if (attribute == nullptr) malformed(what + ": there is no Draco attribute " + std::to_string(id));
+  if (attribute->num_components() < components) malformed(what + " has the wrong type of element");
+  // Draco's own flag may say something else than the accessor's.
+  attribute->set_normalized(false);
+  const double divisor = normalized ? largest(attribute->data_type()) : 1.0;
+  std::vector<float> element(attribute->num_components());
+  for (std::size_t n = 0; n < which.size(); ++n) {
+    const draco::AttributeValueIndex index = attribute->mapped_index(draco::PointIndex(which[n]));
+    if (index.value() >= attribute->size() ||
+        !attribute->ConvertValue(index, static_cast<std::int8_t>(element.size()), element.data())) {
+      malformed(what + " has fewer elements than vertices");
+    }
+    for (std::size_t c = 0; c < components; ++c) {
+      to[n * step + c] = divisor == 1.0 ? element[c] : static_cast<float>(std::max(element[c] / divisor, -1.0));
+    }
+  }
+}
+
+}  // namespace cumulet::surface::detail

@@ -1,0 +1,35 @@
+#pragma once
+
+// Private to surface/: a primitive of KHR_draco_mesh_compression.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "surface/gltf_file.hpp"
+
+namespace cumulet::surface::detail {
+
+class DracoMesh {
+ public:
+  /// Throws Error(file) if the bytes are no mesh of Draco 2.2, or one too large for them.
+  DracoMesh(std::span<const std::uint8_t> bytes, const std::string& what, Budget& budget);
+  ~DracoMesh();
+  DracoMesh(const DracoMesh&) = delete;
+  DracoMesh& operator=(const DracoMesh&) = delete;
+
+  [[nodiscard]] std::size_t vertex_count() const;
+  [[nodiscard]] std::vector<std::uint32_t> indices() const;
+  /// Components of the vertices `which` of the attribute with Draco's number `id`, `step` apart for a vertex each;
+  /// integers divided as glTF's normalised ones if `normalized`. Throws Error(file) if there are not so many.
+  void read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
+            float* to, std::size_t step, const std::string& what) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace cumulet::surface::detail

@@ -1,0 +1,482 @@
+#include "surface/gltf_file.hpp"
+
+#include <meshoptimizer.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "base/progress_part.hpp"
+#include "surface/gltf_schema.hpp"
+
+namespace cumulet::surface::detail {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array known_extensions = {"KHR_lights_punctual",
+                                         "KHR_materials_unlit",
+                                         "KHR_materials_emissive_strength",
+                                         "KHR_materials_ior",
+                                         "KHR_materials_specular",
+                                         "KHR_materials_clearcoat",
+                                         "KHR_materials_transmission",
+                                         "KHR_materials_pbrSpecularGlossiness",
+                                         "KHR_texture_transform",
+                                         "KHR_mesh_quantization",
+                                         "KHR_draco_mesh_compression",
+                                         "EXT_meshopt_compression"};
+
+bool known(const std::string& extension) {
+  return std::find(known_extensions.begin(), known_extensions.end(), extension) != known_extensions.end();
+}
+
+void check_extensions(const json& root, const Log& log, const std::string& name) {
+  for (const json& required : root.value("extensionsRequired", json::array())) {
+    const auto extension = required.get<std::string>();
+    if (known(extension)) continue;
+    throw Error(ErrorCode::unsupported, "needs the extension " + one_line(extension) + ", which Cumulet does not read");
+  }
+  std::set<std::string> ignored;
+  for (const json& used : root.value("extensionsUsed", json::array())) {
+    const auto extension = used.get<std::string>();
+    if (!known(extension)) ignored.insert(one_line(extension));
+  }
+  if (ignored.empty()) return;
+  std::string list;
+  for (const std::string& extension : ignored) list += (list.empty() ? "" : ", ") + extension;
+  log.warning(name + ": drawn without " + one_line(list));
+}
+
+void check_version(const json& root) {
+  const auto asset = root.find("asset");
+  if (asset == root.end() || !asset->contains("version")) malformed("asset.version is missing");
+  const auto version = asset->at("version").get<std::string>();
+  const auto oldest = asset->value("minVersion", std::string("2.0"));
+  if (!version.starts_with("2.") || oldest != "2.0") {
+    throw Error(ErrorCode::unsupported,
+                "is glTF " + one_line(version.starts_with("2.") ? oldest : version) + ", not 2.0");
+  }
+}
+
+struct Container {
+  std::string_view json;
+  std::optional<std::span<const std::uint8_t>> binary;
+};
+
+std::uint32_t little_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
+  return std::uint32_t{bytes[at]} | std::uint32_t{bytes[at + 1]} << 8U | std::uint32_t{bytes[at + 2]} << 16U |
+         std::uint32_t{bytes[at + 3]} << 24U;
+}
+
+/// The chunks of a .glb (glTF 2.0, 4.4), or all of a .gltf.
+Container unpack(std::span<const std::uint8_t> bytes) {
+  const auto text = [](std::span<const std::uint8_t> part) {
+    return std::string_view(reinterpret_cast<const char*>(part.data()), part.size());
+  };
+  constexpr std::string_view magic = "glTF";
+  if (bytes.size() < magic.size() || text(bytes.first(magic.size())) != magic) {
+    if (bytes.empty()) malformed("is empty");
+    std::string_view all = text(bytes);
+    if (all.starts_with("\xEF\xBB\xBF")) all.remove_prefix(3);
+    return {all, std::nullopt};
+  }
+  if (bytes.size() < 12) malformed("ends within the header of a .glb");
+  const std::uint32_t version = little_endian(bytes, 4);
+  if (version != 2) throw Error(ErrorCode::unsupported, "is binary glTF " + std::to_string(version) + ", not 2");
+  const std::uint32_t length = little_endian(bytes, 8);
+  if (length > bytes.size()) {
+    malformed("is cut short: " + std::to_string(bytes.size()) + " of " + std::to_string(length) + " bytes");
+  }
+  bytes = bytes.first(std::max<std::size_t>(length, 12));
+  Container container;
+  constexpr std::uint32_t json_chunk = 0x4E4F534A;
+  constexpr std::uint32_t binary_chunk = 0x004E4942;
+  for (std::size_t at = 12, chunk = 0; at < bytes.size(); ++chunk) {
+    if (bytes.size() - at < 8) malformed("ends within the header of chunk " + std::to_string(chunk));
+    const std::uint32_t size = little_endian(bytes, at);
+    const std::uint32_t type = little_endian(bytes, at + 4);
+    at += 8;
+    if (size > bytes.size() - at) malformed("ends within chunk " + std::to_string(chunk));
+    const auto content = bytes.subspan(at, size);
+    if (chunk == 0 && type != json_chunk) malformed("does not begin with a chunk of JSON");
+    if (chunk == 0) container.json = text(content);
+    if (chunk == 1 && type == binary_chunk) container.binary = content;
+    at += size;
+  }
+  if (container.json.empty()) malformed("has no chunk of JSON");
+  return container;
+}
+
+std::vector<std::uint8_t> decode_base64(std::string_view text) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(text.size() / 4 * 3 + 3);
+  std::uint32_t bits = 0;
+  int count = 0;
+  while (!text.empty() && (text.back() == '=' || std::isspace(static_cast<unsigned char>(text.back())) != 0)) {
+    text.remove_suffix(1);
+  }
+  for (const char c : text) {
+    std::uint32_t value = 0;
+    if (c >= 'A' && c <= 'Z') {
+      value = static_cast<std::uint32_t>(c - 'A');
+    } else if (c >= 'a' && c <= 'z') {
+      value = static_cast<std::uint32_t>(c - 'a') + 26;
+    } else if (c >= '0' && c <= '9') {
+      value = static_cast<std::uint32_t>(c - '0') + 52;
+    } else if (c == '+' || c == '-') {
+      value = 62;
+    } else if (c == '/' || c == '_') {
+      value = 63;
+    } else {
+      malformed("a data URI is not base64");
+    }
+    bits = bits << 6U | value;
+    count += 6;
+    if (count >= 8) {
+      count -= 8;
+      bytes.push_back(static_cast<std::uint8_t>(bits >> static_cast<unsigned>(count)));
+    }
+  }
+  return bytes;
+}
+
+std::string decode_percent(std::string_view uri) {
+  const auto digit = [](char c) {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+    return -1;
+  };
+  std::string text;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    if (uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0) {
+      text += static_cast<char>(digit(uri[i + 1]) * 16 + digit(uri[i + 2]));
+      i += 2;
+    } else {
+      text += uri[i];
+    }
+  }
+  return text;
+}
+
+/// Takes what tinygltf must not see out of the JSON: bytes, which are loaded here with checks; channels that name no
+/// node, and indices in no buffer view, both of which it takes for errors. What it is to have back is returned.
+struct SetAside {
+  struct Indices {
+    std::size_t mesh;
+    std::size_t primitive;
+    int accessor;
+  };
+  json buffers = json::array();
+  json images = json::array();
+  std::vector<Indices> indices;
+  std::size_t channels = 0;
+};
+
+SetAside set_aside(json& root) {
+  SetAside aside;
+  for (const char* name : {"buffers", "images"}) {
+    const auto found = root.find(name);
+    if (found == root.end()) continue;
+    (name == std::string_view("buffers") ? aside.buffers : aside.images) = std::move(*found);
+    root.erase(found);
+  }
+  const auto accessors = root.find("accessors");
+  if (root.contains("meshes")) {
+    std::size_t m = 0;
+    for (json& mesh : root["meshes"]) {
+      std::size_t p = 0;
+      if (mesh.is_object() && mesh.contains("primitives")) {
+        for (json& primitive : mesh["primitives"]) {
+          const auto indices = primitive.is_object() ? primitive.find("indices") : primitive.end();
+          if (indices != primitive.end()) {
+            const auto accessor = indices->get<std::size_t>();
+            if (accessors == root.end() || accessor >= accessors->size()) {
+              malformed("mesh " + std::to_string(m) + ", primitive " + std::to_string(p) + ": there is no accessor " +
+                        std::to_string(accessor));
+            }
+            if (!accessors->at(accessor).contains("bufferView")) {
+              aside.indices.push_back({m, p, static_cast<int>(accessor)});
+              primitive.erase(indices);
+            }
+          }
+          ++p;
+        }
+      }
+      ++m;
+    }
+  }
+  if (root.contains("animations")) {
+    for (json& animation : root["animations"]) {
+      if (!animation.is_object() || !animation.contains("channels")) continue;
+      json kept = json::array();
+      for (json& channel : animation["channels"]) {
+        if (channel.is_object() && channel.contains("target") && !channel["target"].contains("node")) {
+          ++aside.channels;
+        } else {
+          kept.push_back(std::move(channel));
+        }
+      }
+      animation["channels"] = std::move(kept);
+    }
+  }
+  return aside;
+}
+
+json parse_json(std::string_view text) {
+  check_nesting(text);
+  try {
+    return json::parse(text);
+  } catch (const json::exception& error) {
+    malformed("is not JSON: " + one_line(error.what()));
+  }
+}
+
+/// All but buffers and images.
+tinygltf::Model parse_model(const json& root) {
+  const std::string text = root.dump();
+  if (text.size() > std::numeric_limits<std::uint32_t>::max()) malformed("has more than 4 GiB of JSON");
+  tinygltf::Model model;
+  std::string error;
+  std::string warning;
+  const bool good = tinygltf::TinyGLTF().LoadASCIIFromString(&model, &error, &warning, text.data(),
+                                                             static_cast<unsigned>(text.size()), "");
+  // What it complains about it leaves out, even where it goes on.
+  if (!good || !error.empty()) malformed(error.empty() ? "cannot be parsed" : one_line(error));
+  return model;
+}
+
+class Loader {
+ public:
+  Loader(GltfFile& file, Budget& budget, Progress* progress) : file_(file), budget_(budget), progress_(progress) {}
+
+  void load_buffers(const json& buffers, std::optional<std::span<const std::uint8_t>> binary) {
+    for (std::size_t i = 0; i < buffers.size(); ++i) {
+      cumulet::check(progress_);
+      const json& buffer = buffers[i];
+      if (!buffer.contains("byteLength")) malformed(numbered("buffer", i) + " has no byteLength");
+      const auto length = buffer["byteLength"].get<std::uint64_t>();
+      std::span<const std::uint8_t> bytes;
+      if (buffer.contains("uri")) {
+        const auto uri = buffer["uri"].get<std::string>();
+        try {
+          bytes = file_.storage.emplace_back(resolve_uri(uri, file_.folder, budget_));
+        } catch (const Error& error) {
+          throw Error(error.code(), numbered("buffer", i) + ": " + error.what());
+        }
+      } else if (i == 0 && binary) {
+        bytes = *binary;
+      } else {
+        // A place-holder of EXT_meshopt_compression; a view of it that is not compressed reaches beyond its end.
+        buffers_.emplace_back();
+        continue;
+      }
+      if (bytes.size() < length) {
+        malformed(numbered("buffer", i) + " has " + std::to_string(bytes.size()) + " bytes, not " +
+                  std::to_string(length));
+      }
+      buffers_.push_back(bytes.first(length));
+    }
+  }
+
+  void load_views() {
+    const auto& views = file_.model.bufferViews;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      cumulet::check(progress_);
+      const tinygltf::BufferView& view = views[i];
+      const std::string what = numbered("buffer view", i);
+      const auto compressed = view.extensions.find("EXT_meshopt_compression");
+      if (compressed == view.extensions.end()) {
+        file_.views.push_back(part(view.buffer, view.byteOffset, view.byteLength, what));
+        continue;
+      }
+      const tinygltf::Value& extension = compressed->second;
+      const auto number = [&extension](const char* key) {
+        return extension.Has(key) ? extension.Get(key).GetNumberAsDouble() : 0.0;
+      };
+      if (!extension.Has("buffer")) malformed(what + ": EXT_meshopt_compression names no buffer");
+      const auto from = part(static_cast<int>(number("buffer")), static_cast<std::uint64_t>(number("byteOffset")),
+                             static_cast<std::uint64_t>(number("byteLength")), what);
+      file_.views.emplace_back(file_.storage.emplace_back(decode_meshopt(extension, from, what, budget_)));
+    }
+  }
+
+ private:
+  std::span<const std::uint8_t> part(int buffer, std::uint64_t offset, std::uint64_t length, const std::string& what) {
+    if (buffer < 0 || static_cast<std::size_t>(buffer) >= buffers_.size()) {
+      malformed(what + ": there is no buffer " + std::to_string(buffer));
+    }
+    const auto bytes = buffers_[static_cast<std::size_t>(buffer)];
+    if (offset > bytes.size() || length > bytes.size() - offset) {
+      malformed(what + " reaches beyond the " + std::to_string(bytes.size()) + " bytes of buffer " +
+                std::to_string(buffer));
+    }
+    return bytes.subspan(offset, length);
+  }
+
+  GltfFile& file_;
+  Budget& budget_;
+  Progress* progress_;
+  std::vector<std::span<const std::uint8_t>> buffers_;
+};
+
+}  // namespace
+
+void malformed(const std::string& cause) { throw Error(ErrorCode::file, cause); }
+
+std::string one_line(std::string_view text) {
+  constexpr std::size_t longest = 200;
+  std::string line;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool blank = byte <= 0x20 || byte == 0x7F;
+    if (blank && (line.empty() || line.back() == ' ')) continue;
+    line += blank ? ' ' : c;
+    if (line.size() >= longest) {
+      line += "...";
+      break;
+    }
+  }
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  return line;
+}
+
+void Budget::take(std::uint64_t count, std::uint64_t size, std::string_view what) {
+  if (size != 0 && count > left_ / size) {
+    malformed(std::string(what) + " would need more than the " + std::to_string(limits_.memory >> 20U) +
+              " MiB that a glTF file may take");
+  }
+  left_ -= count * size;
+}
+
+std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& budget) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) malformed("no such file");
+  // A device or a pipe may have no end.
+  if (!std::filesystem::is_regular_file(status)) malformed("is not a file");
+  const std::uint64_t size = std::filesystem::file_size(path, error);
+  if (error) malformed("cannot be read");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) malformed("cannot be opened");
+  budget.take(size, 1, "the file");
+  std::vector<std::uint8_t> bytes(size);
+  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  if (static_cast<std::uint64_t>(file.gcount()) != size) malformed("cannot be read");
+  return bytes;
+}
+
+std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::filesystem::path& folder, Budget& budget) {
+  if (uri.starts_with("data:")) {
+    const std::size_t comma = uri.find(',');
+    if (comma == std::string::npos) malformed("a data URI has no data");
+    const std::string_view head = std::string_view(uri).substr(0, comma);
+    if (!head.ends_with(";base64")) malformed("a data URI is not base64");
+    budget.take(uri.size() - comma, 1, "a data URI");
+    return decode_base64(std::string_view(uri).substr(comma + 1));
+  }
+  const std::string text = decode_percent(uri);
+  if (text.empty()) malformed("its URI is empty");
+  const std::size_t end_of_scheme = text.find(':');
+  if (end_of_scheme != std::string::npos && text.find('/') > end_of_scheme) {
+    malformed("\"" + one_line(uri) + "\" is not a relative path");
+  }
+  if (text.front() == '/' || text.front() == '\\' || text.find('\0') != std::string::npos) {
+    malformed("\"" + one_line(uri) + "\" is not a relative path");
+  }
+  try {
+    return read_file(folder / text, budget);
+  } catch (const Error& error) {
+    throw Error(error.code(), one_line(uri) + ": " + error.what());
+  }
+}
+
+std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::span<const std::uint8_t> from,
+                                         const std::string& what, Budget& budget) {
+  const auto number = [&extension](const char* key) {
+    return extension.Has(key) ? static_cast<std::size_t>(extension.Get(key).GetNumberAsDouble()) : std::size_t{0};
+  };
+  const auto text = [&extension](const char* key, const char* otherwise) {
+    return extension.Has(key) ? extension.Get(key).Get<std::string>() : std::string(otherwise);
+  };
+  const std::size_t count = number("count");
+  const std::size_t stride = number("byteStride");
+  const std::string mode = text("mode", "");
+  const std::string filter = text("filter", "NONE");
+  const bool attributes = mode == "ATTRIBUTES";
+  const bool triangles = mode == "TRIANGLES";
+  // The decoders assert all of this.
+  bool good = attributes ? stride > 0 && stride <= 256 && stride % 4 == 0
+                         : (triangles || mode == "INDICES") && (stride == 2 || stride == 4) && filter == "NONE";
+  if (triangles) good = good && count % 3 == 0;
+  if (filter == "OCTAHEDRAL") {
+    good = good && (stride == 4 || stride == 8);
+  } else if (filter == "QUATERNION") {
+    good = good && stride == 8;
+  } else if (filter != "EXPONENTIAL" && filter != "NONE") {
+    good = false;
+  }
+  if (!good) malformed(what + ": EXT_meshopt_compression is malformed");
+  // The format's best case is one byte for 64 (16 vertices a group, 4 groups' headers a byte).
+  if (count > (from.size() * 128 + 65536) / stride) {
+    malformed(what + ": " + std::to_string(from.size()) + " bytes cannot hold " + std::to_string(count) + " elements");
+  }
+  budget.take(count, stride, what);
+  std::vector<std::uint8_t> bytes(count * stride);
+  int status = 0;
+  if (count != 0) {
+    if (attributes) status = meshopt_decodeVertexBuffer(bytes.data(), count, stride, from.data(), from.size());
+    if (triangles) status = meshopt_decodeIndexBuffer(bytes.data(), count, stride, from.data(), from.size());
+    if (mode == "INDICES") {
+      status = meshopt_decodeIndexSequence(bytes.data(), count, stride, from.data(), from.size());
+    }
+  }
+  if (status != 0) malformed(what + " cannot be decompressed (EXT_meshopt_compression)");
+  if (filter == "OCTAHEDRAL") meshopt_decodeFilterOct(bytes.data(), count, stride);
+  if (filter == "QUATERNION") meshopt_decodeFilterQuat(bytes.data(), count, stride);
+  if (filter == "EXPONENTIAL") meshopt_decodeFilterExp(bytes.data(), count, stride);
+  return bytes;
+}
+
+GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::filesystem::path& folder, const Log& log,
+                    const std::string& name, Budget& budget, Progress* progress) {
+  GltfFile file;
+  file.folder = folder;
+  const Container container = unpack(file.storage.emplace_back(std::move(bytes)));
+  json root = parse_json(container.json);
+  check_schema(root);
+  check_version(root);
+  check_extensions(root, log, name);
+  SetAside aside = set_aside(root);
+  if (aside.channels > 0) {
+    log.warning(name + ": " + std::to_string(aside.channels) + " animation channels that move no node are ignored");
+  }
+
+  file.model = parse_model(root);
+  root = json();
+  for (const auto& [mesh, primitive, accessor] : aside.indices) {
+    if (mesh >= file.model.meshes.size() || primitive >= file.model.meshes[mesh].primitives.size()) {
+      malformed(numbered("mesh", mesh) + " is malformed");
+    }
+    file.model.meshes[mesh].primitives[primitive].indices = accessor;
+  }
+
+  Loader loader(file, budget, progress);
+  loader.load_buffers(aside.buffers, container.binary);
+  loader.load_views();
+  for (const json& image : aside.images) {
+    file.images.push_back({one_line(image.value("name", std::string())), image.value("uri", std::string()),
+                           image.value("bufferView", std::int64_t{-1})});
+  }
+  return file;
+}
+
+}  // namespace cumulet::surface::detail

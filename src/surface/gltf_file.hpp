@@ -1,0 +1,78 @@
+#pragma once
+
+// Private to surface/: a glTF file as tinygltf sees it, with its bytes, before anything is made of them.
+
+#include <tiny_gltf.h>
+
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/log.hpp"
+#include "base/progress.hpp"
+#include "surface/gltf_import.hpp"
+
+namespace cumulet::surface::detail {
+
+/// Ends an import; import_gltf() puts the file's name in front. One line.
+[[noreturn]] void malformed(const std::string& cause);
+/// A text of the file's or a library's as a part of one line: no control characters, not too long.
+std::string one_line(std::string_view text);
+/// "node 3" and the like.
+inline std::string numbered(std::string_view what, std::size_t number) {
+  return std::string(what) + " " + std::to_string(number);
+}
+
+/// What an import may still allocate. Counts in a file are checked against it before memory is asked for.
+class Budget {
+ public:
+  explicit Budget(const GltfLimits& limits) : limits_(limits), left_(limits.memory) {}
+
+  /// Throws if count * size bytes are too many.
+  void take(std::uint64_t count, std::uint64_t size, std::string_view what);
+  [[nodiscard]] std::uint64_t left() const { return left_; }
+  [[nodiscard]] const GltfLimits& limits() const { return limits_; }
+
+ private:
+  GltfLimits limits_;
+  std::uint64_t left_;
+};
+
+/// Where an image's bytes are: in a buffer view, in a data URI or in a file beside the glTF file.
+struct ImageSource {
+  std::string name;
+  std::string uri;
+  std::int64_t view = -1;
+};
+
+struct GltfFile {
+  /// All but buffers and images, which stay empty. An index in it is -1 or at least 0, but not checked further.
+  tinygltf::Model model;
+  std::vector<std::span<const std::uint8_t>> views;  ///< a buffer view each, decompressed
+  std::vector<ImageSource> images;
+  std::filesystem::path folder;
+
+  std::deque<std::vector<std::uint8_t>> storage;  ///< what views point into
+};
+
+/// Bytes of a data URI, or of a file named by a URI relative to `folder`. Throws Error(file).
+std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::filesystem::path& folder, Budget& budget);
+
+/// Reads a whole regular file. Throws Error(file) that names the cause only.
+std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& budget);
+
+/// Parses a .gltf or .glb, told apart by content, checks types of all JSON members that are read, loads buffers and
+/// checks views.
+GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::filesystem::path& folder, const Log& log,
+                    const std::string& name, Budget& budget, Progress* progress);
+
+/// EXT_meshopt_compression, of one buffer view: its bytes in `from`. Throws Error(file).
+std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::span<const std::uint8_t> from,
+                                         const std::string& what, Budget& budget);
+
+}  // namespace cumulet::surface::detail

@@ -1,0 +1,17 @@
+#pragma once
+
+// Private to surface/: is every member that the importer reads of the type that glTF 2.0 says?
+
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+
+namespace cumulet::surface::detail {
+
+/// Throws Error(file) if brackets nest deeper than any glTF needs: what reads JSON later recurses.
+void check_nesting(std::string_view json);
+
+/// Throws Error(file) that names the member. Drops `extras`, makes integers of integral numbers where integers belong,
+/// and numbers with a fraction of integers where tinygltf would cut them to 32 bits.
+void check_schema(nlohmann::json& root);
+
+}  // namespace cumulet::surface::detail

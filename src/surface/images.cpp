@@ -1,0 +1,115 @@
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+
+#include "surface/materials.hpp"
+
+namespace cumulet::surface::detail {
+
+namespace {
+
+/// What an image's header says.
+struct Header {
+  std::uint64_t width = 0;
+  std::uint64_t height = 0;
+  std::uint64_t least_bytes = 0;  ///< that the file must have to hold so many pixels
+};
+
+std::uint64_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t count) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) value = value << 8U | bytes[at + i];
+  return value;
+}
+
+constexpr std::array<std::uint8_t, 8> png_signature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+
+Header png_header(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() < 33) malformed("is a PNG cut short");
+  Header header;
+  header.width = big_endian(bytes, 16, 4);
+  header.height = big_endian(bytes, 20, 4);
+  // Deflate makes at most 1032 bytes of one; a pixel has at least one bit.
+  header.least_bytes = header.width * header.height / 8 / 1032;
+  return header;
+}
+
+/// Looks for a frame header, of any coding (ITU-T T.81, B.2.2).
+Header jpeg_header(std::span<const std::uint8_t> bytes) {
+  std::size_t at = 2;
+  while (at + 4 <= bytes.size()) {
+    if (bytes[at] != 0xFF) malformed("is a malformed JPEG");
+    const std::uint8_t marker = bytes[at + 1];
+    if (marker == 0xFF) {
+      ++at;
+      continue;
+    }
+    const std::uint64_t length = big_endian(bytes, at + 2, 2);
+    const bool frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
+    if (frame && at + 9 <= bytes.size()) {
+      Header header;
+      header.height = big_endian(bytes, at + 5, 2);
+      header.width = big_endian(bytes, at + 7, 2);
+      // A block of 8 x 8 has at least one bit, and a component at least one block of 32 x 32 pixels.
+      header.least_bytes = header.width * header.height / 8192;
+      return header;
+    }
+    at += 2 + length;
+  }
+  malformed("is a JPEG cut short");
+}
+
+Header read_header(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() >= png_signature.size() && std::equal(png_signature.begin(), png_signature.end(), bytes.begin())) {
+    return png_header(bytes);
+  }
+  if (bytes.size() >= 4 && bytes[0] == 0xFF && bytes[1] == 0xD8) return jpeg_header(bytes);
+  constexpr std::array<std::uint8_t, 4> ktx2 = {0xAB, 'K', 'T', 'X'};
+  if (bytes.size() >= ktx2.size() && std::equal(ktx2.begin(), ktx2.end(), bytes.begin())) {
+    malformed("is a KTX2 image, of which Cumulet reads none");
+  }
+  malformed("is neither PNG nor JPEG");
+}
+
+}  // namespace
+
+Image decode_image(std::span<const std::uint8_t> bytes, Budget& budget) {
+  // The library reads more formats, and trusts sizes; this lets pass what glTF knows and memory holds.
+  const Header header = read_header(bytes);
+  const std::string size = std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels";
+  const std::uint32_t side = budget.limits().image_side;
+  if (header.width == 0 || header.height == 0) malformed("has no pixels");
+  if (header.width > side || header.height > side || header.width * header.height * 8 > std::uint64_t{INT32_MAX} ||
+      bytes.size() > std::uint64_t{INT32_MAX}) {
+    malformed(size + " are too many");
+  }
+  if (header.least_bytes > bytes.size())
+    malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");
+  budget.take(header.width * header.height, 4, "an image of " + size);
+
+  tinygltf::Image image;
+  std::string error;
+  std::string warning;
+  const bool good =
+      tinygltf::LoadImageData(&image, 0, &error, &warning, 0, 0, bytes.data(), static_cast<int>(bytes.size()), nullptr);
+  if (!good || image.width <= 0 || image.height <= 0 || image.component != 4) malformed("cannot be decoded");
+  Image result;
+  result.width = static_cast<std::uint32_t>(image.width);
+  result.height = static_cast<std::uint32_t>(image.height);
+  const std::size_t count = std::size_t{result.width} * result.height * 4;
+  if (image.bits == 16 && image.image.size() == 2 * count) {
+    result.rgba.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      std::uint16_t wide = 0;
+      std::memcpy(&wide, &image.image[2 * i], sizeof wide);
+      result.rgba[i] = static_cast<std::uint8_t>((wide * 255U + 32767U) / 65535U);
+    }
+  } else if (image.bits == 8 && image.image.size() == count) {
+    result.rgba = std::move(image.image);
+  } else {
+    malformed("cannot be decoded");
+  }
+  return result;
+}
+
+}  // namespace cumulet::surface::detail

@@ -1,0 +1,216 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <new>
+
+#include "base/progress_part.hpp"
+#include "surface/gltf_file.hpp"
+#include "surface/gltf_import.hpp"
+#include "surface/materials.hpp"
+#include "surface/posable_scene.hpp"
+
+namespace cumulet::surface {
+
+namespace detail {
+
+namespace {
+
+/// Meshes, nodes and all else, put together.
+class Assembler {
+ public:
+  Assembler(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress)
+      : file_(file), log_(log), name_(name), budget_(budget), progress_(progress) {}
+
+  ScenePtr assemble() {
+    import_materials(file_, log_, name_, budget_, progress_, *scene_);
+    scene_->rig = import_rig(file_, log_, name_, budget_, progress_, *scene_);
+    plan();
+    meshes();
+    place();
+    lights_and_cameras();
+    remark();
+    check_rest();
+    return scene_;
+  }
+
+ private:
+  /// Which meshes the displayed nodes show.
+  void plan() {
+    used_.resize(file_.model.meshes.size(), false);
+    for (const std::uint32_t node : scene_->rig.displayed) {
+      const tinygltf::Node& from = file_.model.nodes[node];
+      if (from.mesh >= 0) used_[static_cast<std::size_t>(from.mesh)] = true;
+      if (from.skin >= 0 && static_cast<std::size_t>(from.skin) >= scene_->rig.skins.size()) {
+        malformed(numbered("node", node) + ": there is no skin " + std::to_string(from.skin));
+      }
+    }
+  }
+
+  void meshes() {
+    parts_of_.resize(used_.size());
+    for (std::size_t m = 0; m < used_.size(); ++m) {
+      if (!used_[m]) continue;
+      check(progress_);
+      if (progress_ != nullptr) progress_->at(static_cast<double>(m) / static_cast<double>(used_.size()));
+      for (MeshPart& part : import_mesh(file_, m, scene_->materials, budget_, remarks_)) {
+        parts_of_[m].push_back(scene_->parts.size());
+        scene_->parts.push_back(std::move(part));
+      }
+    }
+  }
+
+  /// A draw for every part under every node.
+  void place() {
+    std::uint64_t vertices = 0;
+    std::uint64_t indices = 0;
+    for_each_instance([&](std::uint32_t, const MeshPart& part, std::size_t) {
+      vertices += part.positions.size();
+      indices += part.indices.size();
+    });
+    constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+    if (vertices > most || indices > most) malformed("has more than 2^32 vertices or indices");
+    budget_.take(vertices, sizeof(VertexAttributes) + sizeof(PosedVertex), "all vertices");
+    budget_.take(indices, sizeof(std::uint32_t), "all indices");
+    scene_->attributes.reserve(vertices);
+    scene_->indices.reserve(indices);
+    for_each_instance([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
+      check(progress_);
+      const auto first_vertex = static_cast<std::uint32_t>(scene_->attributes.size());
+      Instance instance;
+      instance.part = place;
+      instance.node = node;
+      instance.first_vertex = first_vertex;
+      const int skin = file_.model.nodes[node].skin;
+      if (skin >= 0 && part.influences > 0) {
+        instance.skin = skin;
+        const std::size_t joints = scene_->rig.skins[static_cast<std::size_t>(skin)].joints.size();
+        if (part.joint_count > joints) {
+          malformed(numbered("node", node) + ": a vertex is bound to joint " + std::to_string(part.joint_count - 1) +
+                    " of " + std::to_string(joints) + " in " + numbered("skin", static_cast<std::size_t>(skin)));
+        }
+      }
+      scene_->instances.push_back(instance);
+      scene_->draws.push_back({static_cast<std::uint32_t>(scene_->indices.size()),
+                               static_cast<std::uint32_t>(part.indices.size()), part.material, node});
+      scene_->attributes.insert(scene_->attributes.end(), part.attributes.begin(), part.attributes.end());
+      for (const std::uint32_t index : part.indices) scene_->indices.push_back(first_vertex + index);
+    });
+    // What the vertices hold now is the scene's; the parts keep what moves.
+    for (MeshPart& part : scene_->parts) part.attributes = {};
+  }
+
+  template <class Visit>
+  void for_each_instance(const Visit& visit) const {
+    for (const std::uint32_t node : scene_->rig.displayed) {
+      const int mesh = file_.model.nodes[node].mesh;
+      if (mesh < 0) continue;
+      for (const std::size_t place : parts_of_[static_cast<std::size_t>(mesh)]) {
+        visit(node, scene_->parts[place], place);
+      }
+    }
+  }
+
+  void lights_and_cameras() {
+    const tinygltf::Model& model = file_.model;
+    for (const std::uint32_t node : scene_->rig.displayed) {
+      const tinygltf::Node& from = model.nodes[node];
+      if (from.camera >= 0) {
+        const auto camera = static_cast<std::size_t>(from.camera);
+        if (camera >= model.cameras.size()) {
+          malformed(numbered("node", node) + ": there is no camera " + std::to_string(camera));
+        }
+        SceneCamera to = import_camera(model.cameras[camera], numbered("camera", camera));
+        if (to.name.empty()) to.name = one_line(from.name);
+        scene_->cameras.emplace_back(node, std::move(to));
+      }
+      const auto extension = from.extensions.find("KHR_lights_punctual");
+      if (extension == from.extensions.end() || !extension->second.Has("light")) continue;
+      const auto light = static_cast<std::size_t>(extension->second.Get("light").GetNumberAsInt());
+      if (light >= model.lights.size()) {
+        malformed(numbered("node", node) + ": there is no light " + std::to_string(light));
+      }
+      scene_->lights.emplace_back(node, import_light(model.lights[light], numbered("light", light)));
+    }
+  }
+
+  void remark() const {
+    if (remarks_.not_triangles > 0) {
+      log_.info(name_ + ": " + std::to_string(remarks_.not_triangles) +
+                " primitives of points or lines, or without positions, are not drawn");
+    }
+    if (remarks_.incomplete > 0) {
+      log_.warning(name_ + ": " + std::to_string(remarks_.incomplete) + " primitives end within a triangle");
+    }
+    if (remarks_.not_finite > 0) {
+      log_.warning(name_ + ": " + std::to_string(remarks_.not_finite) +
+                   " primitives have numbers that are not finite, taken as 0");
+    }
+    if (scene_->indices.empty()) log_.warning(name_ + ": has no triangles");
+  }
+
+  /// Transforms may be of any size, each of them, and too large together.
+  void check_rest() const {
+    const Stance rest = stance(scene_->rig, nullptr, 0.0);
+    for (std::size_t i = 0; i < rest.to_world.size(); ++i) {
+      for (int n = 0; n < 16; ++n) {
+        if (!(std::abs(rest.to_world[i][n / 4][n % 4]) < 1e18)) {
+          malformed(numbered("node", i) + ": its transform is too large");
+        }
+      }
+    }
+    for (const MeshPart& part : scene_->parts) {
+      for (const glm::vec3& p : part.positions) {
+        if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1e18F)) {
+          malformed("a position is too large");
+        }
+      }
+    }
+  }
+
+  const GltfFile& file_;
+  const Log& log_;
+  const std::string& name_;
+  Budget& budget_;
+  Progress* progress_;
+  std::shared_ptr<PosableScene> scene_ = std::make_shared<PosableScene>();
+  std::vector<bool> used_;
+  std::vector<std::vector<std::size_t>> parts_of_;
+  MeshRemarks remarks_;
+};
+
+}  // namespace
+
+}  // namespace detail
+
+ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& name, const std::filesystem::path& folder,
+                     const Log& log, Progress* progress, const GltfLimits& limits) {
+  try {
+    detail::Budget budget(limits);
+    const detail::GltfFile file = detail::parse_gltf(std::move(bytes), folder, log, name, budget, progress);
+    return detail::Assembler(file, log, name, budget, progress).assemble();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::file && error.code() != ErrorCode::unsupported) throw;
+    throw Error(error.code(), name + ": " + error.what());
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::out_of_memory, name + ": there is not enough memory for it");
+  } catch (const std::exception& error) {
+    throw Error(ErrorCode::file, name + ": " + detail::one_line(error.what()));
+  }
+}
+
+ScenePtr import_gltf(const std::string& path, const Log& log, Progress* progress) {
+  std::vector<std::uint8_t> bytes;
+  try {
+    GltfLimits limits;
+    detail::Budget budget(limits);
+    bytes = detail::read_file(path, budget);
+  } catch (const Error& error) {
+    throw Error(error.code(), path + ": " + error.what());
+  } catch (const std::bad_alloc&) {
+    throw Error(ErrorCode::out_of_memory, path + ": there is not enough memory for it");
+  }
+  return import_gltf(std::move(bytes), path, std::filesystem::path(path).parent_path(), log, progress);
+}
+
+}  // namespace cumulet::surface

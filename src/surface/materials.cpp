@@ -1,0 +1,361 @@
+#include "surface/materials.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include "base/progress_part.hpp"
+
+namespace cumulet::surface::detail {
+
+namespace {
+
+/// Members of an extension's object, whose types check_schema() has seen to.
+double number(const tinygltf::Value& object, const char* key, double otherwise) {
+  return object.Has(key) ? object.Get(key).GetNumberAsDouble() : otherwise;
+}
+
+std::vector<double> numbers(const tinygltf::Value& object, const char* key, std::vector<double> otherwise,
+                            const std::string& what) {
+  if (!object.Has(key)) return otherwise;
+  const tinygltf::Value& array = object.Get(key);
+  if (array.ArrayLen() != otherwise.size()) {
+    malformed(what + ": " + key + " has not " + std::to_string(otherwise.size()) + " numbers");
+  }
+  for (std::size_t i = 0; i < otherwise.size(); ++i) otherwise[i] = array.Get(static_cast<int>(i)).GetNumberAsDouble();
+  return otherwise;
+}
+
+const tinygltf::Value* find(const tinygltf::ExtensionMap& extensions, const char* name) {
+  const auto found = extensions.find(name);
+  return found == extensions.end() || !found->second.IsObject() ? nullptr : &found->second;
+}
+
+float unit(double value) { return narrow(std::clamp(value, 0.0, 1.0)); }
+float positive(double value) { return narrow(std::max(value, 0.0)); }
+
+glm::vec3 color(const std::vector<double>& values) {
+  return {positive(values[0]), positive(values[1]), positive(values[2])};
+}
+
+/// One texture use as glTF writes it, in the core or in an extension.
+struct Use {
+  int index = -1;
+  int uv_set = 0;
+  const tinygltf::Value* transform = nullptr;
+};
+
+template <class Info>
+Use use_of(const Info& info) {
+  return {info.index, info.texCoord, find(info.extensions, "KHR_texture_transform")};
+}
+
+Use use_of(const tinygltf::Value& object, const char* key) {
+  Use use;
+  if (!object.Has(key)) return use;
+  const tinygltf::Value& info = object.Get(key);
+  use.index = static_cast<int>(number(info, "index", -1));
+  use.uv_set = static_cast<int>(number(info, "texCoord", 0));
+  if (info.Has("extensions")) {
+    const tinygltf::Value& extensions = info.Get("extensions");
+    if (extensions.Has("KHR_texture_transform")) use.transform = &extensions.Get("KHR_texture_transform");
+  }
+  return use;
+}
+
+class Materials {
+ public:
+  Materials(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress,
+            Scene& scene)
+      : file_(file), log_(log), name_(name), budget_(budget), progress_(progress), scene_(scene) {}
+
+  void import() {
+    for (std::size_t i = 0; i < file_.model.materials.size(); ++i) {
+      check(progress_);
+      scene_.materials.push_back(material(file_.model.materials[i], numbered("material", i)));
+    }
+    scene_.materials.emplace_back();
+    if (approximated_ > 0) {
+      log_.warning(name_ + ": KHR_materials_pbrSpecularGlossiness is approximated: its diffuse colour as base colour");
+    }
+  }
+
+ private:
+  Material material(const tinygltf::Material& from, const std::string& what) {
+    Material to;
+    to.name = one_line(from.name);
+    const auto& pbr = from.pbrMetallicRoughness;
+    if (pbr.baseColorFactor.size() != 4) malformed(what + ": baseColorFactor has not 4 numbers");
+    to.base_color = glm::vec4(color(pbr.baseColorFactor), unit(pbr.baseColorFactor[3]));
+    to.base_color_texture = texture(use_of(pbr.baseColorTexture), what);
+    to.metallic = unit(pbr.metallicFactor);
+    to.roughness = unit(pbr.roughnessFactor);
+    to.metallic_roughness_texture = texture(use_of(pbr.metallicRoughnessTexture), what);
+    to.normal_texture = texture(use_of(from.normalTexture), what);
+    to.normal_scale = narrow(from.normalTexture.scale);
+    to.occlusion_texture = texture(use_of(from.occlusionTexture), what);
+    to.occlusion_strength = unit(from.occlusionTexture.strength);
+    to.emission = color(from.emissiveFactor);
+    to.emission_texture = texture(use_of(from.emissiveTexture), what);
+    to.alpha_cutoff = positive(from.alphaCutoff);
+    to.double_sided = from.doubleSided;
+    if (from.alphaMode == "MASK") {
+      to.alpha_mode = AlphaMode::mask;
+    } else if (from.alphaMode == "BLEND") {
+      to.alpha_mode = AlphaMode::blend;
+    } else if (from.alphaMode != "OPAQUE") {
+      malformed(what + ": alphaMode \"" + one_line(from.alphaMode) + "\" is none of glTF's");
+    }
+    extensions(from.extensions, what, to);
+    return to;
+  }
+
+  void extensions(const tinygltf::ExtensionMap& from, const std::string& what, Material& to) {
+    to.unlit = find(from, "KHR_materials_unlit") != nullptr;
+    if (const auto* strength = find(from, "KHR_materials_emissive_strength")) {
+      const float factor = positive(number(*strength, "emissiveStrength", 1.0));
+      for (int c = 0; c < 3; ++c) to.emission[c] = narrow(double{to.emission[c]} * factor);
+    }
+    if (const auto* ior = find(from, "KHR_materials_ior")) {
+      const double index = number(*ior, "ior", 1.5);
+      if (index != 0.0 && index < 1.0) malformed(what + ": ior is below 1");
+      to.ior = narrow(index);
+    }
+    if (const auto* specular = find(from, "KHR_materials_specular")) {
+      to.specular = unit(number(*specular, "specularFactor", 1.0));
+      to.specular_texture = texture(use_of(*specular, "specularTexture"), what);
+      to.specular_color = color(numbers(*specular, "specularColorFactor", {1.0, 1.0, 1.0}, what));
+      to.specular_color_texture = texture(use_of(*specular, "specularColorTexture"), what);
+    }
+    if (const auto* clearcoat = find(from, "KHR_materials_clearcoat")) {
+      to.clearcoat = unit(number(*clearcoat, "clearcoatFactor", 0.0));
+      to.clearcoat_texture = texture(use_of(*clearcoat, "clearcoatTexture"), what);
+      to.clearcoat_roughness = unit(number(*clearcoat, "clearcoatRoughnessFactor", 0.0));
+      to.clearcoat_roughness_texture = texture(use_of(*clearcoat, "clearcoatRoughnessTexture"), what);
+    }
+    if (const auto* transmission = find(from, "KHR_materials_transmission")) {
+      to.transmission = unit(number(*transmission, "transmissionFactor", 0.0));
+      to.transmission_texture = texture(use_of(*transmission, "transmissionTexture"), what);
+    }
+    if (const auto* glossiness = find(from, "KHR_materials_pbrSpecularGlossiness")) {
+      const auto diffuse = numbers(*glossiness, "diffuseFactor", {1.0, 1.0, 1.0, 1.0}, what);
+      const auto reflected = numbers(*glossiness, "specularFactor", {1.0, 1.0, 1.0}, what);
+      to.base_color = glm::vec4(color(diffuse), unit(diffuse[3]));
+      to.base_color_texture = texture(use_of(*glossiness, "diffuseTexture"), what);
+      to.metallic = 0.0F;
+      to.roughness = 1.0F - unit(number(*glossiness, "glossinessFactor", 1.0));
+      to.metallic_roughness_texture = {};
+      // F0 = 0.04 * specular_color; the specular-glossiness texture is not read, so that a full factor with one would
+      // make a mirror.
+      if (!glossiness->Has("specularGlossinessTexture")) {
+        to.specular_color = glm::min(color(reflected) / 0.04F, glm::vec3(25.0F));
+      } else {
+        to.roughness = std::max(to.roughness, 0.5F);
+      }
+      ++approximated_;
+    }
+  }
+
+  TextureUse texture(const Use& from, const std::string& what) {
+    TextureUse to;
+    if (from.index < 0) return to;
+    if (static_cast<std::size_t>(from.index) >= file_.model.textures.size()) {
+      malformed(what + ": there is no texture " + std::to_string(from.index));
+    }
+    int uv_set = from.uv_set;
+    if (from.transform != nullptr) {
+      uv_set = static_cast<int>(number(*from.transform, "texCoord", uv_set));
+      // uv' = T * R * S * uv, as the extension says it.
+      const auto offset = numbers(*from.transform, "offset", {0.0, 0.0}, what);
+      const auto scale = numbers(*from.transform, "scale", {1.0, 1.0}, what);
+      const double angle = number(*from.transform, "rotation", 0.0);
+      const double cosine = std::cos(angle);
+      const double sine = std::sin(angle);
+      to.transform = glm::mat3x2(narrow(cosine * scale[0]), narrow(-sine * scale[0]), narrow(sine * scale[1]),
+                                 narrow(cosine * scale[1]), narrow(offset[0]), narrow(offset[1]));
+    }
+    if (uv_set > 1) {
+      log_.warning(name_ + ": " + what + " uses TEXCOORD_" + std::to_string(uv_set) +
+                   " for a texture: only sets 0 and 1 are read, and it is drawn without");
+      return {};
+    }
+    to.uv_set = static_cast<std::uint32_t>(uv_set);
+    to.texture = texture_of(static_cast<std::size_t>(from.index));
+    return to;
+  }
+
+  /// The place of a glTF texture in Scene::textures; -1 if its image cannot be had.
+  std::int32_t texture_of(std::size_t index) {
+    const auto known = textures_.find(index);
+    if (known != textures_.end()) return known->second;
+    const tinygltf::Texture& from = file_.model.textures[index];
+    std::int32_t place = -1;
+    const std::int64_t image = image_of(from, index);
+    if (image >= 0) {
+      place = static_cast<std::int32_t>(scene_.textures.size());
+      scene_.textures.push_back({static_cast<std::uint32_t>(image), sampler(from.sampler, index)});
+    }
+    textures_[index] = place;
+    return place;
+  }
+
+  std::int64_t image_of(const tinygltf::Texture& from, std::size_t index) {
+    if (from.source < 0) {
+      // KHR_texture_basisu, EXT_texture_webp and the like; what none of them names is white by right.
+      if (!from.extensions.empty()) {
+        log_.warning(name_ + ": " + numbered("texture", index) + " has only an image of " +
+                     one_line(from.extensions.begin()->first) + ", and is left out");
+      }
+      return -1;
+    }
+    const auto source = static_cast<std::size_t>(from.source);
+    if (source >= file_.images.size()) {
+      malformed(numbered("texture", index) + ": there is no image " + std::to_string(source));
+    }
+    const auto known = images_.find(source);
+    if (known != images_.end()) return known->second;
+    check(progress_);
+    const ImageSource& image = file_.images[source];
+    std::int64_t place = -1;
+    try {
+      Image decoded = load(image);
+      decoded.name = image.name;
+      place = static_cast<std::int64_t>(scene_.images.size());
+      scene_.images.push_back(std::move(decoded));
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::file) throw;
+      const std::string named = image.name.empty() ? "" : " (" + image.name + ")";
+      log_.warning(name_ + ": " + numbered("image", source) + named + " is left out: " + error.what());
+    }
+    images_[source] = place;
+    return place;
+  }
+
+  Image load(const ImageSource& image) {
+    if (image.view >= 0) {
+      if (static_cast<std::size_t>(image.view) >= file_.views.size()) {
+        malformed("there is no buffer view " + std::to_string(image.view));
+      }
+      return decode_image(file_.views[static_cast<std::size_t>(image.view)], budget_);
+    }
+    if (image.uri.empty()) malformed("it has neither a URI nor a buffer view");
+    const std::vector<std::uint8_t> bytes = resolve_uri(image.uri, file_.folder, budget_);
+    try {
+      return decode_image(bytes, budget_);
+    } catch (const Error& error) {
+      if (image.uri.starts_with("data:")) throw;
+      throw Error(error.code(), one_line(image.uri) + " " + error.what());
+    }
+  }
+
+  Sampler sampler(int index, std::size_t texture) {
+    Sampler to;
+    if (index < 0) return to;
+    if (static_cast<std::size_t>(index) >= file_.model.samplers.size()) {
+      malformed(numbered("texture", texture) + ": there is no sampler " + std::to_string(index));
+    }
+    const tinygltf::Sampler& from = file_.model.samplers[static_cast<std::size_t>(index)];
+    const auto wrap = [](int mode) {
+      if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::clamp;
+      return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::mirrored : Wrap::repeat;
+    };
+    to.wrap_s = wrap(from.wrapS);
+    to.wrap_t = wrap(from.wrapT);
+    if (from.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST) to.magnify = Filter::nearest;
+    switch (from.minFilter) {
+      case TINYGLTF_TEXTURE_FILTER_NEAREST:
+      case TINYGLTF_TEXTURE_FILTER_LINEAR:
+        to.mipmaps = false;
+        break;
+      case TINYGLTF_TEXTURE_FILTER_NEAREST_MIPMAP_NEAREST:
+      case TINYGLTF_TEXTURE_FILTER_LINEAR_MIPMAP_NEAREST:
+        to.between_mipmaps = Filter::nearest;
+        break;
+      default:
+        break;
+    }
+    if (from.minFilter == TINYGLTF_TEXTURE_FILTER_NEAREST ||
+        from.minFilter == TINYGLTF_TEXTURE_FILTER_NEAREST_MIPMAP_NEAREST ||
+        from.minFilter == TINYGLTF_TEXTURE_FILTER_NEAREST_MIPMAP_LINEAR) {
+      to.minify = Filter::nearest;
+    }
+    return to;
+  }
+
+  const GltfFile& file_;
+  const Log& log_;
+  const std::string& name_;
+  Budget& budget_;
+  Progress* progress_;
+  Scene& scene_;
+  std::map<std::size_t, std::int32_t> textures_;
+  std::map<std::size_t, std::int64_t> images_;
+  std::size_t approximated_ = 0;
+};
+
+}  // namespace
+
+float narrow(double value) {
+  // Products of a few such still are floats.
+  constexpr double most = 1e18;
+  return static_cast<float>(std::clamp(value, -most, most));
+}
+
+void import_materials(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress,
+                      Scene& scene) {
+  Materials(file, log, name, budget, progress, scene).import();
+}
+
+PunctualLight import_light(const tinygltf::Light& light, const std::string& what) {
+  PunctualLight to;
+  if (light.type == "directional") {
+    to.kind = PunctualLight::Kind::directional;
+  } else if (light.type == "spot") {
+    to.kind = PunctualLight::Kind::spot;
+  } else if (light.type != "point") {
+    malformed(what + ": type \"" + one_line(light.type) + "\" is none of KHR_lights_punctual's");
+  }
+  if (!light.color.empty() && light.color.size() != 3) malformed(what + ": color has not 3 numbers");
+  const glm::vec3 tint = light.color.empty() ? glm::vec3(1.0F) : color(light.color);
+  to.intensity = tint * positive(light.intensity);
+  to.range = positive(light.range);
+  if (to.kind == PunctualLight::Kind::spot) {
+    const double outer = std::clamp(light.spot.outerConeAngle, 0.0, std::numbers::pi / 2);
+    to.outer_cone = narrow(outer);
+    to.inner_cone = narrow(std::clamp(light.spot.innerConeAngle, 0.0, outer));
+  }
+  return to;
+}
+
+SceneCamera import_camera(const tinygltf::Camera& camera, const std::string& what) {
+  SceneCamera to;
+  to.name = one_line(camera.name);
+  if (camera.type == "perspective") {
+    const auto& from = camera.perspective;
+    if (!(from.yfov > 0.0) || from.yfov >= std::numbers::pi || !(from.znear > 0.0) || from.aspectRatio < 0.0 ||
+        (from.zfar != 0.0 && from.zfar <= from.znear)) {
+      malformed(what + " has a malformed perspective");
+    }
+    to.vertical_fov = from.yfov;
+    to.aspect = from.aspectRatio;
+    to.near_plane = from.znear;
+    to.far_plane = from.zfar;
+  } else if (camera.type == "orthographic") {
+    const auto& from = camera.orthographic;
+    if (from.ymag == 0.0 || from.xmag == 0.0 || from.znear < 0.0 || from.zfar <= from.znear) {
+      malformed(what + " has a malformed orthographic projection");
+    }
+    to.orthographic = true;
+    to.height = 2.0 * std::abs(from.ymag);
+    to.aspect = std::abs(from.xmag / from.ymag);
+    to.near_plane = from.znear;
+    to.far_plane = from.zfar;
+  } else {
+    malformed(what + ": type \"" + one_line(camera.type) + "\" is none of glTF's");
+  }
+  return to;
+}
+
+}  // namespace cumulet::surface::detail

@@ -1,0 +1,419 @@
+#include "surface/meshes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "surface/draco_mesh.hpp"
+
+namespace cumulet::surface::detail {
+
+namespace {
+
+constexpr std::size_t max_influence_sets = 4;
+
+bool finite(const glm::vec2& v) { return std::isfinite(v.x) && std::isfinite(v.y); }
+bool finite(const glm::vec4& v) { return detail::finite(glm::vec3(v)) && std::isfinite(v.w); }
+
+/// What is not finite becomes zero. True if there was any.
+template <class V>
+bool replace_not_finite(std::vector<V>& values) {
+  bool any = false;
+  for (V& value : values) {
+    bool good = false;
+    if constexpr (std::is_same_v<V, glm::vec3>) {
+      good = detail::finite(value);
+    } else {
+      good = finite(value);
+    }
+    if (good) continue;
+    value = V(0.0F);
+    any = true;
+  }
+  return any;
+}
+
+/// Triangles of a triangle list, strip or fan (glTF 2.0, 3.7.2.1), without those that name a vertex twice.
+std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& indices, int mode) {
+  std::vector<std::uint32_t> result;
+  const auto add = [&result](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    if (a != b && b != c && c != a) result.insert(result.end(), {a, b, c});
+  };
+  const std::size_t n = indices.size();
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    result.reserve(n);
+    for (std::size_t i = 0; i + 3 <= n; i += 3) add(indices[i], indices[i + 1], indices[i + 2]);
+  } else {
+    if (n > 2) result.reserve((n - 2) * 3);
+    for (std::size_t i = 0; i + 3 <= n; ++i) {
+      if (mode == TINYGLTF_MODE_TRIANGLE_FAN) {
+        add(indices[i + 1], indices[i + 2], indices[0]);
+      } else {
+        add(indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]);
+      }
+    }
+  }
+  return result;
+}
+
+/// Renumbers indices to the vertices that they name; returns those.
+std::vector<std::uint32_t> compact(std::vector<std::uint32_t>& indices, std::size_t count) {
+  std::vector<std::uint32_t> used;
+  if (count / 8 > indices.size()) {
+    used = indices;
+    std::sort(used.begin(), used.end());
+    used.erase(std::unique(used.begin(), used.end()), used.end());
+    for (std::uint32_t& index : indices) {
+      index = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), index) - used.begin());
+    }
+    return used;
+  }
+  constexpr std::uint32_t unused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> place(count, unused);
+  for (const std::uint32_t index : indices) place[index] = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (place[i] == unused) continue;
+    place[i] = static_cast<std::uint32_t>(used.size());
+    used.push_back(i);
+  }
+  for (std::uint32_t& index : indices) index = place[index];
+  return used;
+}
+
+class Primitive {
+ public:
+  Primitive(const GltfFile& file, const tinygltf::Primitive& primitive, std::string what,
+            const std::vector<Material>& materials, Budget& budget, MeshRemarks& remarks)
+      : file_(file),
+        from_(primitive),
+        what_(std::move(what)),
+        materials_(materials),
+        budget_(budget),
+        remarks_(remarks),
+        accessors_(file, budget) {}
+
+  /// Nothing if it draws no triangles.
+  std::optional<MeshPart> import() {
+    if (from_.mode < TINYGLTF_MODE_POINTS || from_.mode > TINYGLTF_MODE_TRIANGLE_FAN) {
+      malformed(what_ + ": mode " + std::to_string(from_.mode) + " is none of glTF's");
+    }
+    if (from_.mode < TINYGLTF_MODE_TRIANGLES || !has("POSITION")) {
+      ++remarks_.not_triangles;
+      return std::nullopt;
+    }
+    decompress();
+    part_.material = static_cast<std::uint32_t>(materials_.size() - 1);
+    if (from_.material >= 0) {
+      if (static_cast<std::size_t>(from_.material) + 1 >= materials_.size()) {
+        malformed(what_ + ": there is no material " + std::to_string(from_.material));
+      }
+      part_.material = static_cast<std::uint32_t>(from_.material);
+    }
+    count_ = draco_ ? draco_->vertex_count() : accessors_.count(from_.attributes.at("POSITION"), label("POSITION"));
+    check_counts();
+    read_triangles();
+    read_geometry();
+    read_attributes();
+    read_skin();
+    read_targets();
+    // What is not finite is replaced, but where it says where things are.
+    if (not_finite_) ++remarks_.not_finite;
+    return std::move(part_);
+  }
+
+ private:
+  [[nodiscard]] bool has(const std::string& attribute) const { return from_.attributes.contains(attribute); }
+  [[nodiscard]] std::string label(const std::string& attribute) const { return what_ + ", " + attribute; }
+
+  void decompress() {
+    const auto found = from_.extensions.find("KHR_draco_mesh_compression");
+    if (found == from_.extensions.end()) return;
+    const tinygltf::Value& extension = found->second;
+    if (!extension.Has("bufferView") || !extension.Has("attributes")) {
+      malformed(what_ + ": KHR_draco_mesh_compression is malformed");
+    }
+    const auto view = static_cast<std::size_t>(extension.Get("bufferView").GetNumberAsInt());
+    if (view >= file_.views.size()) malformed(what_ + ": there is no buffer view " + std::to_string(view));
+    draco_ = std::make_unique<DracoMesh>(file_.views[view], what_, budget_);
+    for (const auto& [name, id] : extension.Get("attributes").Get<tinygltf::Value::Object>()) {
+      draco_ids_[name] = static_cast<std::uint32_t>(id.GetNumberAsInt());
+    }
+  }
+
+  void check_counts() {
+    for (const auto& [name, accessor] : from_.attributes) {
+      if (name.starts_with('_')) continue;
+      std::size_t count = 0;
+      if (draco_ids_.contains(name)) {
+        // The accessor says how to take the numbers, and no more.
+        if (static_cast<std::size_t>(accessor) >= file_.model.accessors.size()) {
+          malformed(label(one_line(name)) + ": there is no accessor " + std::to_string(accessor));
+        }
+        continue;
+      }
+      count = accessors_.count(accessor, label(one_line(name)));
+      if (count != count_) {
+        malformed(label(one_line(name)) + " has " + std::to_string(count) + " elements for " + std::to_string(count_) +
+                  " vertices");
+      }
+    }
+  }
+
+  void read_triangles() {
+    std::vector<std::uint32_t> indices;
+    if (draco_) {
+      indices = draco_->indices();
+      budget_.take(indices.size(), sizeof(std::uint32_t), what_);
+    } else if (from_.indices >= 0) {
+      indices = accessors_.integers(from_.indices, 1, label("indices"));
+    } else {
+      budget_.take(count_, sizeof(std::uint32_t), what_);
+      indices.resize(count_);
+      for (std::uint32_t i = 0; i < count_; ++i) indices[i] = i;
+    }
+    for (const std::uint32_t index : indices) {
+      if (index >= count_) {
+        malformed(what_ + ": index " + std::to_string(index) + " is out of range, of " + std::to_string(count_) +
+                  " vertices");
+      }
+    }
+    const int mode = draco_ ? TINYGLTF_MODE_TRIANGLES : from_.mode;
+    if (mode == TINYGLTF_MODE_TRIANGLES ? indices.size() % 3 != 0 : indices.size() < 3) ++remarks_.incomplete;
+    budget_.take(indices.size(), 3 * sizeof(std::uint32_t), what_);
+    part_.indices = triangles(indices, mode);
+    part_.flat = !has("NORMAL");
+    budget_.take(count_, sizeof(std::uint32_t), what_);
+    if (part_.flat) {
+      which_ = part_.indices;
+      for (std::uint32_t i = 0; i < part_.indices.size(); ++i) part_.indices[i] = i;
+    } else {
+      which_ = compact(part_.indices, count_);
+    }
+  }
+
+  template <int N>
+  std::vector<glm::vec<N, float>> vectors(const std::string& name, float w = 1.0F) {
+    const int accessor = from_.attributes.at(name);
+    const auto id = draco_ids_.find(name);
+    if (id == draco_ids_.end()) return accessors_.vectors<N>(accessor, label(name), &which_, w);
+    budget_.take(which_.size(), sizeof(glm::vec<N, float>), what_);
+    std::vector<glm::vec<N, float>> result(which_.size());
+    const int type = accessors_.type(accessor, label(name));
+    int components = N;
+    if (N == 4 && type == TINYGLTF_TYPE_VEC3) {
+      components = 3;
+      for (auto& element : result) element[N - 1] = w;
+    } else if (type != N) {
+      malformed(label(name) + " has the wrong type of element");
+    }
+    if (!result.empty()) {
+      draco_->read(id->second, static_cast<std::size_t>(components),
+                   file_.model.accessors[static_cast<std::size_t>(accessor)].normalized, which_,
+                   glm::value_ptr(result[0]), N, label(name));
+    }
+    return result;
+  }
+
+  void read_geometry() {
+    part_.positions = vectors<3>("POSITION");
+    for (const glm::vec3& position : part_.positions) {
+      if (!detail::finite(position)) malformed(label("POSITION") + " is not finite");
+    }
+    if (!part_.flat) read_normals();
+    const TextureUse& map = materials_[part_.material].normal_texture;
+    if (map.texture < 0) return;
+    if (!part_.flat && has("TANGENT")) {
+      part_.tangents = vectors<4>("TANGENT");
+      not_finite_ |= replace_not_finite(part_.tangents);
+      for (std::size_t i = 0; i < part_.tangents.size(); ++i) {
+        glm::vec4& tangent = part_.tangents[i];
+        const float length = glm::length(glm::vec3(tangent));
+        const glm::vec3 direction =
+            length > 0.0F && std::isfinite(length) ? glm::vec3(tangent) / length : any_perpendicular(part_.normals[i]);
+        tangent = glm::vec4(direction, tangent.w < 0.0F ? -1.0F : 1.0F);
+      }
+      return;
+    }
+    const std::string set = "TEXCOORD_" + std::to_string(map.uv_set);
+    std::vector<glm::vec2> uvs(part_.positions.size());
+    if (has(set)) uvs = vectors<2>(set);
+    replace_not_finite(uvs);
+    for (glm::vec2& uv : uvs) uv = map.transform * glm::vec3(uv, 1.0F);
+    std::vector<std::uint32_t> origins;
+    budget_.take(part_.indices.size(), 96, what_);  // of its tables
+    part_.tangents =
+        make_tangents(part_.indices, part_.positions, part_.flat ? flat_normals() : part_.normals, uvs, origins);
+    for (const std::uint32_t origin : origins) {
+      which_.push_back(which_[origin]);
+      part_.positions.push_back(part_.positions[origin]);
+      if (!part_.flat) part_.normals.push_back(part_.normals[origin]);
+    }
+  }
+
+  void read_normals() {
+    part_.normals = vectors<3>("NORMAL");
+    not_finite_ |= replace_not_finite(part_.normals);
+    bool some_missing = false;
+    for (glm::vec3& normal : part_.normals) {
+      const float length = glm::length(normal);
+      const bool good = length > 0.0F && std::isfinite(length);
+      normal = good ? normal / length : glm::vec3(0.0F);
+      some_missing |= !good;
+    }
+    if (!some_missing) return;
+    // Those of no length: the average of the triangles around.
+    std::vector<glm::vec3> sums(part_.normals.size(), glm::vec3(0.0F));
+    for (std::size_t i = 0; i < part_.indices.size(); i += 3) {
+      const std::uint32_t* v = &part_.indices[i];
+      const glm::vec3 area =
+          glm::cross(part_.positions[v[1]] - part_.positions[v[0]], part_.positions[v[2]] - part_.positions[v[0]]);
+      for (int k = 0; k < 3; ++k) sums[v[k]] += area;
+    }
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      if (part_.normals[i] != glm::vec3(0.0F)) continue;
+      const float length = glm::length(sums[i]);
+      part_.normals[i] = length > 0.0F && std::isfinite(length) ? sums[i] / length : glm::vec3(0.0F, 1.0F, 0.0F);
+    }
+  }
+
+  [[nodiscard]] std::vector<glm::vec3> flat_normals() const {
+    std::vector<glm::vec3> normals(part_.positions.size(), glm::vec3(0.0F, 1.0F, 0.0F));
+    for (std::size_t i = 0; i + 3 <= normals.size(); i += 3) {
+      const glm::vec3 area =
+          glm::cross(part_.positions[i + 1] - part_.positions[i], part_.positions[i + 2] - part_.positions[i]);
+      const float length = glm::length(area);
+      if (!(length > 0.0F) || !std::isfinite(length)) continue;
+      for (std::size_t k = 0; k < 3; ++k) normals[i + k] = area / length;
+    }
+    return normals;
+  }
+
+  void read_attributes() {
+    budget_.take(which_.size(), sizeof(VertexAttributes), what_);
+    part_.attributes.resize(which_.size());
+    for (std::size_t set = 0; set < 2; ++set) {
+      const std::string name = "TEXCOORD_" + std::to_string(set);
+      if (!has(name)) continue;
+      std::vector<glm::vec2> uvs = vectors<2>(name);
+      not_finite_ |= replace_not_finite(uvs);
+      for (std::size_t i = 0; i < uvs.size(); ++i) part_.attributes[i].uv[set] = uvs[i];
+    }
+    if (!has("COLOR_0")) return;
+    std::vector<glm::vec4> colors = vectors<4>("COLOR_0");
+    not_finite_ |= replace_not_finite(colors);
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      part_.attributes[i].color = glm::clamp(colors[i], glm::vec4(0.0F), glm::vec4(glm::vec3(1e6F), 1.0F));
+    }
+  }
+
+  /// Integers as they are: joints.
+  std::vector<std::uint32_t> integers(const std::string& name) {
+    const int accessor = from_.attributes.at(name);
+    const auto id = draco_ids_.find(name);
+    if (id == draco_ids_.end()) return accessors_.integers(accessor, 4, label(name), &which_);
+    const std::vector<glm::vec4> values = vectors<4>(name);
+    std::vector<std::uint32_t> result;
+    result.reserve(values.size() * 4);
+    for (const glm::vec4& value : values) {
+      for (int c = 0; c < 4; ++c) {
+        if (!(value[c] >= 0.0F && value[c] <= 65535.0F)) malformed(label(name) + " is not of unsigned integers");
+        result.push_back(static_cast<std::uint32_t>(value[c]));
+      }
+    }
+    return result;
+  }
+
+  void read_skin() {
+    std::size_t sets = 0;
+    while (sets < max_influence_sets && has("JOINTS_" + std::to_string(sets)) &&
+           has("WEIGHTS_" + std::to_string(sets))) {
+      ++sets;
+    }
+    if (sets == 0) return;
+    const std::size_t n = which_.size();
+    part_.influences = 4 * sets;
+    budget_.take(n * part_.influences, sizeof(std::uint32_t) + sizeof(float), what_);
+    part_.joints.resize(n * part_.influences);
+    part_.weights.resize(n * part_.influences);
+    for (std::size_t set = 0; set < sets; ++set) {
+      const std::vector<std::uint32_t> joints = integers("JOINTS_" + std::to_string(set));
+      std::vector<glm::vec4> weights = vectors<4>("WEIGHTS_" + std::to_string(set), 0.0F);
+      not_finite_ |= replace_not_finite(weights);
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t c = 0; c < 4; ++c) {
+          const float weight = std::clamp(weights[i][static_cast<int>(c)], 0.0F, 1.0F);
+          const std::size_t to = i * part_.influences + 4 * set + c;
+          part_.weights[to] = weight;
+          part_.joints[to] = weight > 0.0F ? joints[4 * i + c] : 0;
+          if (weight > 0.0F) part_.joint_count = std::max(part_.joint_count, joints[4 * i + c] + 1);
+        }
+      }
+    }
+    part_.joint_count = std::max(part_.joint_count, 1U);
+    for (std::size_t i = 0; i < n; ++i) {
+      float* weights = &part_.weights[i * part_.influences];
+      float sum = 0.0F;
+      for (std::size_t c = 0; c < part_.influences; ++c) sum += weights[c];
+      // Held by nothing: by the first joint, which keeps it in one place with the rest.
+      if (!(sum > 0.0F)) weights[0] = sum = 1.0F;
+      for (std::size_t c = 0; c < part_.influences; ++c) weights[c] /= sum;
+    }
+  }
+
+  void read_targets() {
+    for (std::size_t t = 0; t < from_.targets.size(); ++t) {
+      const auto& target = from_.targets[t];
+      MorphTarget& to = part_.targets.emplace_back();
+      const auto read = [&](const char* name, std::vector<glm::vec3>& values) {
+        const auto found = target.find(name);
+        if (found == target.end()) return;
+        const std::string what = what_ + ", target " + std::to_string(t) + ", " + name;
+        if (accessors_.count(found->second, what) != count_) malformed(what + " has not an element a vertex");
+        values = accessors_.vectors<3>(found->second, what, &which_);
+        if (std::string_view(name) == "POSITION") {
+          for (const glm::vec3& value : values) {
+            if (!detail::finite(value)) malformed(what + " is not finite");
+          }
+        } else {
+          not_finite_ |= replace_not_finite(values);
+        }
+      };
+      read("POSITION", to.positions);
+      if (!part_.flat) read("NORMAL", to.normals);
+      if (!part_.flat && !part_.tangents.empty() && has("TANGENT")) read("TANGENT", to.tangents);
+    }
+  }
+
+  const GltfFile& file_;
+  const tinygltf::Primitive& from_;
+  std::string what_;
+  const std::vector<Material>& materials_;
+  Budget& budget_;
+  MeshRemarks& remarks_;
+  Accessors accessors_;
+  MeshPart part_;
+  std::unique_ptr<DracoMesh> draco_;
+  std::map<std::string, std::uint32_t> draco_ids_;
+  std::size_t count_ = 0;             ///< vertices in the file
+  std::vector<std::uint32_t> which_;  ///< of them, those that the part has, in its order
+  bool not_finite_ = false;
+};
+
+}  // namespace
+
+std::vector<MeshPart> import_mesh(const GltfFile& file, std::size_t mesh, const std::vector<Material>& materials,
+                                  Budget& budget, MeshRemarks& remarks) {
+  std::vector<MeshPart> parts;
+  const tinygltf::Mesh& from = file.model.meshes[mesh];
+  for (std::size_t p = 0; p < from.primitives.size(); ++p) {
+    auto part = Primitive(file, from.primitives[p], numbered("mesh", mesh) + ", " + numbered("primitive", p), materials,
+                          budget, remarks)
+                    .import();
+    if (part && !part->indices.empty()) parts.push_back(std::move(*part));
+  }
+  return parts;
+}
+
+}  // namespace cumulet::surface::detail

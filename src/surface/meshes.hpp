@@ -1,0 +1,60 @@
+#pragma once
+
+// Private to surface/: primitives as triangles, before they are posed.
+
+#include <glm/glm.hpp>
+
+#include "surface/accessors.hpp"
+#include "surface/scene.hpp"
+
+namespace cumulet::surface::detail {
+
+/// Displacements, a vertex each; empty: none.
+struct MorphTarget {
+  std::vector<glm::vec3> positions;
+  std::vector<glm::vec3> normals;
+  std::vector<glm::vec3> tangents;
+};
+
+/// The triangles of one primitive, at rest, in the space of its mesh.
+struct MeshPart {
+  std::uint32_t material = 0;
+  std::vector<std::uint32_t> indices;
+  std::vector<VertexAttributes> attributes;
+  std::vector<glm::vec3> positions;
+  std::vector<glm::vec3> normals;   ///< unit; not used if flat
+  std::vector<glm::vec4> tangents;  ///< empty: the material has no normal map
+  bool flat = false;                ///< normals are the triangles', of which no two share a vertex
+  std::size_t influences = 0;       ///< a vertex, of a skin
+  std::vector<std::uint32_t> joints;
+  std::vector<float> weights;     ///< of a vertex add up to 1
+  std::uint32_t joint_count = 0;  ///< that a skin must have
+  std::vector<MorphTarget> targets;
+};
+
+/// What of a file is not drawn as it was meant, for one line each.
+struct MeshRemarks {
+  std::size_t not_triangles = 0;  ///< primitives of points and lines
+  std::size_t incomplete = 0;     ///< primitives with indices left over
+  std::size_t not_finite = 0;     ///< primitives with normals, tangents, coordinates or colours that are not
+};
+
+/// All primitives of a mesh that draw triangles. Throws Error(file).
+std::vector<MeshPart> import_mesh(const GltfFile& file, std::size_t mesh, const std::vector<Material>& materials,
+                                  Budget& budget, MeshRemarks& remarks);
+
+/// Tangents where a normal map has none: per triangle the direction in which u grows, perpendicular to the vertex
+/// normal, averaged over the triangles around a vertex by their angle there; w such that the bitangent points against
+/// growing v, up in the image (glTF 2.0, 3.9.3). Vertices that agree in position, normal and coordinates count as one.
+/// One whose triangles are not all of the same side is split: indices of one side go to a copy, `origins` says of which
+/// vertex each copy is, and the tangents returned are those of all vertices, then of the copies. (As M. Mikkelsen's
+/// tangent space, which also tells apart triangles around a vertex that share no edge.)
+std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const std::vector<glm::vec3>& positions,
+                                     const std::vector<glm::vec3>& normals, const std::vector<glm::vec2>& uvs,
+                                     std::vector<std::uint32_t>& origins);
+
+/// Unit, perpendicular to a unit vector.
+glm::vec3 any_perpendicular(const glm::vec3& normal);
+inline bool finite(const glm::vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+}  // namespace cumulet::surface::detail

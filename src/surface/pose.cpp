@@ -1,0 +1,154 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "surface/posable_scene.hpp"
+
+namespace cumulet::surface::detail {
+
+namespace {
+
+/// Of the inverse transpose but for its length: det(M) * M^-T, which is finite for every M.
+glm::mat3 cofactors(const glm::mat3& m) {
+  return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
+}
+
+bool mirrors(const glm::dmat4& m) { return glm::determinant(glm::dmat3(m)) < 0.0; }
+
+/// Unit; `otherwise` if it has no direction.
+glm::vec3 direction(const glm::vec3& v, const glm::vec3& otherwise) {
+  const float largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  if (!(largest > 0.0F) || !std::isfinite(largest)) return otherwise;
+  return glm::normalize(v / largest);
+}
+
+/// A vertex before its node or skin moves it.
+struct Shape {
+  glm::vec3 position;
+  glm::vec3 normal;
+  glm::vec4 tangent;
+};
+
+Shape morph(const MeshPart& part, const std::vector<float>& weights, std::size_t v) {
+  Shape shape{part.positions[v], part.flat ? glm::vec3(0, 1, 0) : part.normals[v],
+              part.tangents.empty() ? glm::vec4(0.0F) : part.tangents[v]};
+  for (std::size_t t = 0; t < std::min(part.targets.size(), weights.size()); ++t) {
+    const float weight = weights[t];
+    if (weight == 0.0F) continue;
+    const MorphTarget& target = part.targets[t];
+    if (!target.positions.empty()) shape.position += weight * target.positions[v];
+    if (!target.normals.empty()) shape.normal += weight * target.normals[v];
+    if (!target.tangents.empty()) shape.tangent += glm::vec4(weight * target.tangents[v], 0.0F);
+  }
+  return shape;
+}
+
+}  // namespace
+
+bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose) const {
+  const MeshPart& part = parts[instance.part];
+  const std::vector<float>& weights = now.weights[instance.node];
+  std::vector<glm::mat4> joints;
+  bool flipped = false;
+  if (instance.skin >= 0) {
+    const Skin& skin = rig.skins[static_cast<std::size_t>(instance.skin)];
+    std::size_t mirrored = 0;
+    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+      const glm::dmat4 matrix = now.to_world[skin.joints[j]] * glm::dmat4(skin.inverse_bind[j]);
+      if (mirrors(matrix)) ++mirrored;
+      joints.emplace_back(matrix);
+    }
+    flipped = 2 * mirrored > joints.size();
+  } else {
+    flipped = mirrors(now.to_world[instance.node]);
+  }
+  const float side = flipped ? -1.0F : 1.0F;
+  const glm::mat4 rigid(now.to_world[instance.node]);
+  const glm::mat3 rigid_normals = cofactors(glm::mat3(rigid));
+
+  PosedVertex* const vertices = &pose.vertices[instance.first_vertex];
+  const auto at = [&](std::size_t v) {
+    const Shape shape = morph(part, weights, v);
+    glm::mat4 matrix = rigid;
+    glm::mat3 for_normals = rigid_normals;
+    if (instance.skin >= 0) {
+      matrix = glm::mat4(0.0F);
+      for (std::size_t i = v * part.influences; i < (v + 1) * part.influences; ++i) {
+        if (part.weights[i] != 0.0F) matrix += part.weights[i] * joints[part.joints[i]];
+      }
+      for_normals = cofactors(glm::mat3(matrix));
+    }
+    PosedVertex& to = vertices[v];
+    to.position = glm::vec3(matrix * glm::vec4(shape.position, 1.0F));
+    if (!finite(to.position)) to.position = glm::vec3(0.0F);
+    const glm::vec3 upright = direction(shape.normal, glm::vec3(0, 1, 0));
+    to.normal = direction(side * (for_normals * upright), upright);
+    to.tangent = glm::vec4(glm::mat3(matrix) * glm::vec3(shape.tangent), side * shape.tangent.w);
+  };
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.positions.size(), 4096), [&](const auto& range) {
+    for (std::size_t v = range.begin(); v != range.end(); ++v) at(v);
+  });
+
+  if (part.flat) {
+    for (std::size_t i = 0; i + 3 <= part.indices.size(); i += 3) {
+      const std::uint32_t* v = &part.indices[i];
+      const glm::vec3 area = glm::cross(vertices[v[1]].position - vertices[v[0]].position,
+                                        vertices[v[2]].position - vertices[v[0]].position);
+      const glm::vec3 normal = direction(side * area, vertices[v[0]].normal);
+      for (int k = 0; k < 3; ++k) vertices[v[k]].normal = normal;
+    }
+  }
+  if (!part.tangents.empty()) {
+    for (std::size_t v = 0; v < part.positions.size(); ++v) {
+      const glm::vec3 normal = vertices[v].normal;
+      const glm::vec3 tangent = direction(glm::vec3(vertices[v].tangent), glm::vec3(0.0F));
+      vertices[v].tangent =
+          glm::vec4(direction(tangent - normal * glm::dot(normal, tangent), any_perpendicular(normal)),
+                    vertices[v].tangent.w < 0.0F ? -1.0F : 1.0F);
+    }
+  }
+  return flipped;
+}
+
+Pose PosableScene::pose(double time, std::size_t animation) const {
+  const Track* track = animation < rig.tracks.size() ? &rig.tracks[animation] : nullptr;
+  if (track != nullptr && !std::isfinite(time)) time = 0.0;
+  if (track != nullptr && (time < 0.0 || time > track->duration)) {
+    time = track->duration > 0.0 ? std::fmod(time, track->duration) : 0.0;
+    if (time < 0.0) time += track->duration;
+  }
+  const Stance now = stance(rig, track, time);
+  Pose result;
+  result.time = time;
+  result.vertices.resize(attributes.size());
+  for (const Instance& instance : instances) {
+    result.flipped.push_back(place(instance, now, result) ? 1 : 0);
+  }
+  if (!result.vertices.empty()) {
+    glm::vec3 low(std::numeric_limits<float>::max());
+    glm::vec3 high(std::numeric_limits<float>::lowest());
+    for (const PosedVertex& vertex : result.vertices) {
+      low = glm::min(low, vertex.position);
+      high = glm::max(high, vertex.position);
+    }
+    result.low = low;
+    result.high = high;
+  }
+  for (const auto& [node, light] : lights) {
+    const glm::dmat4& to_world = now.to_world[node];
+    result.lights.push_back(light);
+    result.lights.back().position = glm::vec3(to_world[3]);
+    if (!finite(result.lights.back().position)) result.lights.back().position = glm::vec3(0.0F);
+    result.lights.back().direction = direction(-glm::vec3(to_world[2]), glm::vec3(0, 0, -1));
+  }
+  for (const auto& [node, camera] : cameras) {
+    result.cameras.push_back(camera);
+    result.cameras.back().to_world = now.to_world[node];
+  }
+  return result;
+}
+
+}  // namespace cumulet::surface::detail
