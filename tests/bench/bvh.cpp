@@ -27,7 +27,6 @@ namespace {
 
 using namespace cumulet;
 using glm::vec3;
-using test::GlHit;
 using test::GlRay;
 using test::Mesh;
 

@@ -83,7 +83,9 @@ struct Ray {
 std::vector<Ray> rays_at(const Mesh& mesh, std::size_t count, unsigned seed) {
   std::mt19937 engine(seed);
   std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
-  const auto [low, high] = mesh.bounds();
+  const auto bounds = mesh.bounds();
+  const vec3 low = bounds.first;
+  const vec3 high = bounds.second;
   const auto point = [&](float grow) {
     const vec3 r(uniform(engine), uniform(engine), uniform(engine));
     return low + (high - low) * (0.5F + grow * (r - 0.5F));
