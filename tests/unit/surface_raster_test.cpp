@@ -687,7 +687,7 @@ TEST_P(SurfaceRasters, NormalMapsWithAndWithoutTangents) {
 
 /// A row of spheres by roughness for each of some metallic values, smooth normals.
 std::shared_ptr<HandScene> sphere_grid(int columns, int rows) {
-  const auto scene = std::make_shared<HandScene>();
+  auto scene = std::make_shared<HandScene>();
   constexpr int stacks = 48;
   constexpr int slices = 96;
   for (int row = 0; row < rows; ++row) {
@@ -743,7 +743,8 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
                          (1.0F - 2.0F * (static_cast<float>(y) + 0.5F) / 300.0F) * 3.45F);
       for (std::size_t i = 0; i < scene->materials.size(); ++i) {
         const auto column = static_cast<float>(i % columns);
-        const auto row = static_cast<float>(i / columns);
+        const std::size_t line = i / columns;
+        const auto row = static_cast<float>(line);
         const glm::vec2 centre(2.2F * (column - 3.0F), 2.2F * (row - 1.0F));
         const glm::vec2 d = at - centre;
         if (glm::dot(d, d) > 0.9F) continue;
