@@ -303,16 +303,16 @@ TEST(Bsdf, ExtremesStayFinite) {
 TEST(Bsdf, AlbedoByTheTableIsTheIntegral) {
   constexpr int size = 32;
   const std::vector<vec2> table = cumulet::surface::make_ggx_albedo_table(size);
-  for (const int row : {8, 14, 22, 31}) {
+  for (const std::size_t row : {8U, 14U, 22U, 31U}) {
     for (const float metallic : {0.0F, 1.0F}) {
       CmSurface s = make_surface({0.9F, 0.5F, 0.1F}, metallic, static_cast<float>(row) / (size - 1));
       s.clearcoat = 0.5F;
       s.clearcoat_roughness = s.roughness;
-      for (const int column : {30, 18, 9, 4}) {
-        const vec3 wo = direction(s, (column + 0.5) / size, 0.0);
+      for (const std::size_t column : {30U, 18U, 9U, 4U}) {
+        const vec3 wo = direction(s, (static_cast<double>(column) + 0.5) / size, 0.0);
         dvec3 sum(0.0);
         integrate(s, 600, 900, [&](vec3 wi, double area) { sum += dvec3(cm_bsdf_eval(s, wo, wi)) * area; });
-        const vec2 lobe = table[static_cast<std::size_t>(row * size + column)];
+        const vec2 lobe = table[row * size + column];
         const vec3 albedo = cm_bsdf_albedo(s, wo, lobe, lobe);
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(albedo[c], sum[c], 0.05) << row << ' ' << metallic << ' ' << column;
         s.clearcoat = 0.0F;

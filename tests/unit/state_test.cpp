@@ -87,6 +87,7 @@ class Scribbler {
       gl_.ColorMaski(i, GL_TRUE, GL_FALSE, GL_TRUE, GL_FALSE);
       gl_.Enablei(GL_BLEND, i);
     }
+    gl_.CullFace(GL_FRONT_AND_BACK);
     gl_.FrontFace(GL_CW);
     gl_.PolygonMode(GL_FRONT_AND_BACK, GL_LINE);
     gl_.ClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
@@ -219,12 +220,11 @@ TEST_P(State, AFrameLeavesNothingAndReadsNothing) {
 TEST_P(State, KnownValuesDoNotDependOnTheHost) {
   ScramblingHost host(gl_);
   const auto is_known = [](const std::string& name) {
-    for (const char* prefix :
-         {"GL_PACK_", "GL_UNPACK_", "GL_BLEND[", "GL_COLOR_WRITEMASK", "GL_PIXEL_", "GL_DEPTH_TEST", "GL_DEPTH_CLAMP",
-          "GL_DEPTH_FUNC", "GL_DEPTH_WRITEMASK", "GL_CULL_FACE_", "GL_DITHER", "GL_FRAMEBUFFER_SRGB", "GL_CLIP_",
-          "GL_POLYGON_MODE", "GL_SCISSOR_TEST[0]", "GL_BLEND_SRC_RGB[0]", "GL_RASTERIZER_DISCARD", "GL_FRONT_FACE",
-          "GL_DEPTH_RANGE[0]"}) {
-      if (name.rfind(prefix, 0) == 0) return name != "GL_CULL_FACE_MODE";
+    for (const char* prefix : {"GL_PACK_", "GL_UNPACK_", "GL_BLEND[", "GL_COLOR_WRITEMASK", "GL_PIXEL_",
+                               "GL_DEPTH_TEST", "GL_DEPTH_CLAMP", "GL_DEPTH_FUNC", "GL_DEPTH_WRITEMASK", "GL_CULL_FACE",
+                               "GL_DITHER", "GL_FRAMEBUFFER_SRGB", "GL_CLIP_", "GL_POLYGON_MODE", "GL_SCISSOR_TEST[0]",
+                               "GL_BLEND_SRC_RGB[0]", "GL_RASTERIZER_DISCARD", "GL_FRONT_FACE", "GL_DEPTH_RANGE[0]"}) {
+      if (name.rfind(prefix, 0) == 0) return true;
     }
     return false;
   };

@@ -687,7 +687,7 @@ TEST_P(SurfaceRasters, NormalMapsWithAndWithoutTangents) {
 
 /// A row of spheres by roughness for each of some metallic values, smooth normals.
 std::shared_ptr<HandScene> sphere_grid(int columns, int rows) {
-  const auto scene = std::make_shared<HandScene>();
+  auto scene = std::make_shared<HandScene>();
   constexpr int stacks = 48;
   constexpr int slices = 96;
   for (int row = 0; row < rows; ++row) {
@@ -743,7 +743,8 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
                          (1.0F - 2.0F * (static_cast<float>(y) + 0.5F) / 300.0F) * 3.45F);
       for (std::size_t i = 0; i < scene->materials.size(); ++i) {
         const auto column = static_cast<float>(i % columns);
-        const auto row = static_cast<float>(i / columns);
+        const std::size_t line = i / columns;
+        const auto row = static_cast<float>(line);
         const glm::vec2 centre(2.2F * (column - 3.0F), 2.2F * (row - 1.0F));
         const glm::vec2 d = at - centre;
         if (glm::dot(d, d) > 0.9F) continue;
@@ -784,6 +785,41 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
     }
     const char* backend = GetParam() == cumulet::headless::Backend::egl ? "egl" : "osmesa";
     cumulet::image::write_png(std::string(folder) + "/spheres_" + backend + ".png", out);
+  }
+}
+
+TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
+  const auto scene = std::make_shared<HandScene>();
+  scene->add_matte(glm::vec3(0.5F)).base_color_texture.texture =
+      scene->add_texture(2, 2, {255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 99, 99, 99, 255});
+  surface::Material& blend = scene->add_matte(glm::vec3(0.5F));
+  blend.alpha_mode = surface::AlphaMode::blend;
+  blend.base_color.a = 0.5F;
+  surface::Material& mask = scene->add_matte(glm::vec3(0.5F));
+  mask.alpha_mode = surface::AlphaMode::mask;
+  mask.double_sided = true;
+  scene->add_wall(-3.0F, 1.0F, 0);
+  scene->add_wall(-2.0F, 0.5F, 1);
+  scene->add_wall(-4.0F, 1.8F, 2);
+  scene->posed.lights.emplace_back();
+  SurfaceLighting lighting;
+  lighting.sky_radiance = glm::vec3(1.0F);
+  set(scene);
+  const Picture expected = draw(straight({0, 0, 0}, 0.5), lighting, {16U, 16U}, 2);
+  cumulet::test::ScramblingHost host(gl_);
+  for (std::uint32_t seed = 0; seed < 12; ++seed) {
+    host.scramble(seed);
+    const cumulet::test::GlState before = cumulet::test::read_gl_state(*gl_);
+    {
+      // All of it again under this state: uploads too.
+      const StateGuard guard(*gl_);
+      raster_ = std::make_unique<SurfaceRaster>(gl_);
+    }
+    set(scene);
+    const Picture picture = draw(straight({0, 0, 0}, 0.5), lighting, {16U, 16U}, 2);
+    ASSERT_EQ(cumulet::test::state_differences(before, cumulet::test::read_gl_state(*gl_)), "") << seed;
+    ASSERT_EQ(picture.colours, expected.colours) << seed;
+    ASSERT_EQ(picture.depths, expected.depths) << seed;
   }
 }
 

@@ -41,13 +41,13 @@
  *       - pixel pack and unpack buffers and all pixel store parameters
  *       - viewport 0, scissor test and box 0, colour mask (of every draw buffer), depth mask, function, test and range,
  *         depth clamp, stencil test, blending (enable, functions, equations, colour) of draw buffer 0 and the enable of
- *         the others, cull face (enable, mode), front face, polygon mode and smoothing, polygon offset enables, rasterizer discard,
- * logic op, multisample, sample shading, sample alpha to coverage and to one, sample coverage and mask, primitive
- * restart (both), clip distances 0-7, clip control, dither, GL_FRAMEBUFFER_SRGB and the contents of the frame's own
- * target. It never touches: queries, transform feedback, sync objects of the host, the debug callback and its filters,
- * or any other object. Do not call it inside transform feedback, conditional rendering or a query of the host's. With
- * CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: afterwards the state listed above is undefined. glGetError
- * is clean after every call; errors that were pending before are dropped.
+ *         the others, cull face (enable, mode), front face, polygon mode and smoothing, polygon offset enables,
+ * rasterizer discard, logic op, multisample, sample shading, sample alpha to coverage and to one, sample coverage and
+ * mask, primitive restart (both), clip distances 0-7, clip control, dither, GL_FRAMEBUFFER_SRGB and the contents of the
+ * frame's own target. It never touches: queries, transform feedback, sync objects of the host, the debug callback and
+ * its filters, or any other object. Do not call it inside transform feedback, conditional rendering or a query of the
+ * host's. With CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: afterwards the state listed above is
+ * undefined. glGetError is clean after every call; errors that were pending before are dropped.
  *
  * Ownership
  *     Handles belong to the caller that got them and end with the function named beside the type; what a handle refers
