@@ -52,7 +52,7 @@ class Assembler {
     for (std::size_t m = 0; m < used_.size(); ++m) {
       if (!used_[m]) continue;
       check(progress_);
-      if (progress_ != nullptr) progress_->at(static_cast<double>(m) / static_cast<double>(used_.size()));
+      if (progress_ != nullptr) progress_->at(0.5 + 0.5 * static_cast<double>(m) / static_cast<double>(used_.size()));
       for (MeshPart& part : import_mesh(file_, m, scene_->materials, budget_, remarks_)) {
         parts_of_[m].push_back(scene_->parts.size());
         scene_->parts.push_back(std::move(part));

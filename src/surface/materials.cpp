@@ -73,7 +73,9 @@ class Materials {
 
   void import() {
     for (std::size_t i = 0; i < file_.model.materials.size(); ++i) {
-      check(progress_);
+      if (progress_ != nullptr) {
+        progress_->at(0.5 * static_cast<double>(i) / static_cast<double>(file_.model.materials.size()));
+      }
       scene_.materials.push_back(material(file_.model.materials[i], numbered("material", i)));
     }
     scene_.materials.emplace_back();

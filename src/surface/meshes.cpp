@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "surface/draco_mesh.hpp"
+#include "surface/materials.hpp"
 
 namespace cumulet::surface::detail {
 
@@ -343,7 +344,7 @@ class Primitive {
       not_finite_ |= replace_not_finite(weights);
       for (std::size_t i = 0; i < n; ++i) {
         for (std::size_t c = 0; c < 4; ++c) {
-          const float weight = std::clamp(weights[i][static_cast<int>(c)], 0.0F, 1.0F);
+          const float weight = narrow(std::max(weights[i][static_cast<int>(c)], 0.0F));
           const std::size_t to = i * part_.influences + 4 * set + c;
           part_.weights[to] = weight;
           part_.joints[to] = weight > 0.0F ? joints[4 * i + c] : 0;

@@ -16,12 +16,19 @@ glm::mat3 cofactors(const glm::mat3& m) {
   return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
 }
 
+bool finite(const glm::dmat4& m) {
+  for (int n = 0; n < 16; ++n) {
+    if (!std::isfinite(m[n / 4][n % 4])) return false;
+  }
+  return true;
+}
+
 bool mirrors(const glm::dmat4& m) { return glm::determinant(glm::dmat3(m)) < 0.0; }
 
 /// Unit; `otherwise` if it has no direction.
 glm::vec3 direction(const glm::vec3& v, const glm::vec3& otherwise) {
+  if (!detail::finite(v) || v == glm::vec3(0.0F)) return otherwise;
   const float largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  if (!(largest > 0.0F) || !std::isfinite(largest)) return otherwise;
   return glm::normalize(v / largest);
 }
 
@@ -83,7 +90,7 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
     }
     PosedVertex& to = vertices[v];
     to.position = glm::vec3(matrix * glm::vec4(shape.position, 1.0F));
-    if (!finite(to.position)) to.position = glm::vec3(0.0F);
+    if (!detail::finite(to.position)) to.position = glm::vec3(0.0F);
     const glm::vec3 upright = direction(shape.normal, glm::vec3(0, 1, 0));
     to.normal = direction(side * (for_normals * upright), upright);
     to.tangent = glm::vec4(glm::mat3(matrix) * glm::vec3(shape.tangent), side * shape.tangent.w);
@@ -141,12 +148,12 @@ Pose PosableScene::pose(double time, std::size_t animation) const {
     const glm::dmat4& to_world = now.to_world[node];
     result.lights.push_back(light);
     result.lights.back().position = glm::vec3(to_world[3]);
-    if (!finite(result.lights.back().position)) result.lights.back().position = glm::vec3(0.0F);
+    if (!detail::finite(result.lights.back().position)) result.lights.back().position = glm::vec3(0.0F);
     result.lights.back().direction = direction(-glm::vec3(to_world[2]), glm::vec3(0, 0, -1));
   }
   for (const auto& [node, camera] : cameras) {
     result.cameras.push_back(camera);
-    result.cameras.back().to_world = now.to_world[node];
+    if (finite(now.to_world[node])) result.cameras.back().to_world = now.to_world[node];
   }
   return result;
 }

@@ -126,7 +126,8 @@ struct PosedVertex {
   glm::vec4 tangent;  ///< unit; w: sign of the bitangent; 0 where the material has no normal map
 };
 
-/// The scene at one time. Triangles wind counter-clockwise seen from their front, mirrored nodes too.
+/// The scene at one time. Triangles wind counter-clockwise seen from their front, but where `flipped` says otherwise.
+/// Everything in it is finite.
 struct Pose {
   double time = 0.0;
   std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
@@ -157,7 +158,7 @@ class Scene {
 
   [[nodiscard]] std::size_t triangle_count() const { return indices.size() / 3; }
 
-  /// The scene `time` seconds into animation `animation` (looped past its end); without animations, as it rests.
+  /// The scene `time` seconds into animation `animation` (looped past its end); as it rests, if there is no such one.
   /// Linear, step and cubic spline interpolation, skins and morph targets (glTF 2.0, 3.7.3, 3.7.2.2, 3.11).
   [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0) const = 0;
 };
