@@ -25,6 +25,11 @@
 #define CM_TRIANGLE_LEFT_OUT 0x10000000u   // for the builder: not in the tree
 #define CM_TRIANGLE_USER 0x0fffffffu
 
+// Whether this ray passes the backs of one-sided triangles; the includer may say.
+#ifndef CM_BVH_CULLS
+#define CM_BVH_CULLS true
+#endif
+
 struct CmHit {
   float t;
   uint triangle;      // its number in the scene; CM_BVH_NONE: nothing hit
@@ -125,7 +130,7 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
       float t = (u * a.z + v * b.z + w * c.z) * inverse_determinant * inverse_z;
       bool front = (determinant < 0.0f) == ((turned.z < 0.0f) == ((texel_1.w & CM_TRIANGLE_CLOCKWISE) == 0u));
       bool meets = inside && determinant != 0.0f && t > t_first && t < hit.t &&
-                   (front || (texel_1.w & CM_TRIANGLE_ONE_SIDED) == 0u);
+                   (front || !CM_BVH_CULLS || (texel_1.w & CM_TRIANGLE_ONE_SIDED) == 0u);
 #ifdef CM_HIT_ACCEPT
       // A loop of one turn at most: software drivers run an if's body for every lane, wanted or not.
       for (bool ask = meets && (texel_1.w & CM_TRIANGLE_ASK) != 0u; ask; ask = false) {

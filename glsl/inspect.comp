@@ -5,6 +5,7 @@
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8
 // variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1
 // variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1 CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shared.glsl"
@@ -17,6 +18,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "march_tet.glsl"
 #else
 #include "march_voxel.glsl"
+#endif
+#if CM_SURFACES
+#include "bsdf.glsl"
+#include "surface.glsl"
 #endif
 #include "path.glsl"
 
@@ -150,7 +155,14 @@ void main() {
   float alpha = 0.0;
   float half_t = 0.0;
   vec2 range = cm_box_range(p.o, p.d);
-  range.y = min(range.y, t_per_z * cm_surface_z(pixel, vec2(0.5), 0u));
+  float surface_t = t_per_z * cm_surface_z(pixel, vec2(0.5), 0u);
+#if CM_SURFACES
+  CmHit triangle;
+  cm_hit_camera = true;
+  bool solid = cm_bvh_closest(cm_from_cube_point(p.o), w, 0.0, surface_t, triangle);
+  if (solid) surface_t = triangle.t;
+#endif
+  range.y = min(range.y, surface_t);
   bool hit = range.x < range.y;
   // Width of a pixel in cube space, over t where perspective.
   float footprint = length(p.d) * 2.0 * length(cm.up.xyz) / float(cm.image.y);
@@ -206,6 +218,9 @@ void main() {
     if (view == CM_VIEW_WIREFRAME) colour = lines + clear * vec3(0.02) + 0.04 * alpha;
   }
   if (view == CM_VIEW_DEPTH) {
+#if CM_SURFACES
+    if (solid && half_t == 0.0) half_t = triangle.t;
+#endif
     imageStore(cm_volume_z, ivec2(cm.order.y != 0u ? local : pixel), vec4(half_t / t_per_z));
     return;
   }

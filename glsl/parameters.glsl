@@ -31,6 +31,12 @@ layout(std140, binding = 0) uniform CmParameters {
   uvec4 order;          // x: row of work groups y of a dispatch works on row y x (mod rows); y: 1 to pick one pixel;
                         // z, w: first row of the tile to trace, and the row after the last
   uvec4 surface;        // the host's depth: x: layers (0: none), y: width, z: height
+  vec4 from_cube_x;     // columns of the linear part of cube to world space; w: of its origin
+  vec4 from_cube_y;
+  vec4 from_cube_z;
+  uvec4 scene;          // first words of the surfaces' tables: x: triangles, y: vertices, z: materials, w: textures
+  uvec4 lights;         // x: first word of the punctual lights, y: how many; z: 1 where surfaces pass light on;
+                        // w: triangles
 #ifdef __cplusplus
 };
 #else

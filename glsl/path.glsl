@@ -9,8 +9,15 @@
 //
 // Free paths are sampled exactly: an optical depth -ln(1 - u) is used up along the march; inside a cell the depth is a
 // quadratic in t, inverted in closed form. No majorant, no step size.
+//
+// With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has bvh.glsl, bsdf.glsl and
+// surface.glsl before this.
 #ifndef CM_PATH_GLSL
 #define CM_PATH_GLSL
+
+#ifndef CM_SURFACES
+#define CM_SURFACES 0
+#endif
 
 #define CM_MODE_START 0u
 #define CM_MODE_FLIGHT 1u
@@ -50,10 +57,15 @@ struct CmPath {
   uvec3 cell;
   float t_end;      // where the ray leaves the box
   uint stream;
-  uvec2 home;       // the cell of o, while a shadow ray is under way
+  uvec2 home;       // the cell of o, while a shadow ray is under way; x: CM_NONE where o is on a surface
   uint samples;     // finished in this pixel
   uint steps;       // of all its samples
   float square;     // sum over its samples of their squared luminance
+#if CM_SURFACES
+  uint triangle;    // that the flight ends at, or that o is on; CM_NONE: none
+  vec2 weights;     // of its second and third vertex
+  uint begins;      // 1: cm_begin_ray is due
+#endif
 };
 
 CM_FN vec3 cm_to_cube(vec3 v) { return vec3(cm.to_cube_x) * v.x + vec3(cm.to_cube_y) * v.y + vec3(cm.to_cube_z) * v.z; }
@@ -94,6 +106,9 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
   float e_0 = 0.0f;
   float e_1 = 0.0f;
   float span = 0.0f;
+#if CM_SURFACES
+  if (p.cell.x == CM_NONE) event = CM_EVENT_ESCAPE;
+#endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
     float r_0 = 0.0f;
@@ -105,6 +120,11 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
     e_1 = cm.medium.x * r_1;
     span = t_1 - p.t;
     float used = 0.5f * (e_0 + e_1) * span;
+#if CM_SURFACES
+    // To a surface or a lamp inside the cell, not beyond.
+    float part = min(1.0f, (p.t_end - p.t) / max(span, 1e-30f));
+    used = t_1 > p.t_end ? (e_0 + 0.5f * (e_1 - e_0) * part) * part * span : used;
+#endif
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
     } else {
@@ -135,6 +155,39 @@ CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
   p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
 }
 
+#if CM_SURFACES
+// Begins a ray from o along d that ends at t_end at the latest: finds what it meets of the surfaces, and its way through
+// the box.
+CM_FN void cm_begin_ray(CM_INOUT(CmPath) p) {
+  bool flight = p.mode == CM_MODE_FLIGHT;
+  vec3 d = cm_to_world(p.d);
+  vec3 o = cm_surface_origin(p.o, p.home.x == CM_NONE, p.triangle, p.weights, d);
+  cm_hit_seed = p.random;
+  cm_hit_camera = p.bounce == 0u;
+  bool stopped = false;
+  if (flight) {
+    CmHit hit;
+    bool met = cm_bvh_closest(o, d, 0.0f, p.t_end, hit);
+    p.triangle = hit.triangle;
+    p.weights = hit.barycentrics;
+    if (met) p.t_end = hit.t;
+  } else {
+    stopped = cm_bvh_occluded(o, d, 0.0f, p.t_end);
+    if (stopped) p.light = vec3(0.0f, 0.0f, 0.0f);
+  }
+  vec2 range = cm_box_range(p.o, p.d);
+  p.t = range.x;
+  p.t_end = min(range.y, p.t_end);
+  bool through = !stopped && range.x < p.t_end;
+  bool inside = p.home.x != CM_NONE && p.bounce > 0u;
+  if (through && !inside)
+    p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
+  if (through && inside) p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
+  if (!through) p.cell = uvec3(CM_NONE, 0u, CM_NONE);
+  p.begins = 0u;
+}
+#endif
+
 // A camera ray for the next sample; finishes at once if it meets nothing of the box.
 CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   uvec3 h = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, p.samples, cm.image.z));
@@ -153,12 +206,20 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   p.depth_0 = -log(1.0f - cm_unit_float(even.z));
   p.depth = p.depth_0;
   p.mode = CM_MODE_FLIGHT;
+  // Samples go through the layers in turn, each pixel from one of its own.
+  float surface_t = t_per_z * cm_surface_z(pixel, within, (shift.x >> 16) + p.samples);
+#if CM_SURFACES
+  p.t_end = surface_t;
+  p.home = uvec2(0u, 0u);
+  p.triangle = CM_NONE;
+  p.begins = 1u;
+#else
   vec2 range = cm_box_range(p.o, p.d);
   p.t = range.x;
-  // Samples go through the layers in turn, each pixel from one of its own.
-  p.t_end = min(range.y, t_per_z * cm_surface_z(pixel, within, (shift.x >> 16) + p.samples));
+  p.t_end = min(range.y, surface_t);
   p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
   if (!(range.x < p.t_end)) cm_finish(p, sum);
+#endif
 }
 
 // What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
@@ -166,7 +227,12 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
   float q = cm.medium.z;
   bool flight = p.mode == CM_MODE_FLIGHT;
   bool finished = false;
-  if (event == CM_EVENT_ESCAPE) {
+#if CM_SURFACES
+  bool met = flight && event == CM_EVENT_ESCAPE && p.triangle != CM_NONE;
+#else
+  const bool met = false;
+#endif
+  if (event == CM_EVENT_ESCAPE && !met) {
     // Sky: the flight escapes with probability T, next-event estimation has density q of the same directions. The
     // balance heuristic gives T / (q + T) to the one, and q / (q + T), times T / q, to the other.
     float depth = p.depth_0 - p.depth;
@@ -179,9 +245,19 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
     finished = flight;
   }
   bool collided = flight && event == CM_EVENT_COLLISION;
-  if (collided) {
+#if CM_SURFACES
+  bool on_surface = met || (!flight && p.home.x == CM_NONE);
+  CmSurfacePoint surface;
+  if (on_surface && event != CM_EVENT_NONE) {
+    surface = cm_surface_point(p.triangle, p.weights, p.w);
+    if (met) p.radiance += p.throughput * surface.emission;
+  }
+  // Without light between surfaces: what has left one sees the sky alone, and the volume sees none.
+  bool dark = cm.lights.z == 0u && p.bounce > 0u && (met || (collided && p.home.x == CM_NONE));
+#endif
+  if (collided || met) {
     p.bounce += 1u;
-    p.throughput *= vec3(cm.albedo);
+    if (collided) p.throughput *= vec3(cm.albedo);
     float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
     float survival = strongest < 0.5f ? max(strongest, 0.05f) : 1.0f;
     float u = cm_random(p.random, p.stream);
@@ -189,6 +265,14 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
     p.throughput = p.throughput / survival;
     p.o = p.o + p.t * p.d;
     p.home = uvec2(p.cell.x, p.cell.y);
+#if CM_SURFACES
+    if (met) {
+      p.o = cm_to_cube_point(surface.position);
+      p.home.x = CM_NONE;
+      finished = finished || surface.unlit;
+    }
+    finished = finished || dark;
+#endif
   }
   if (finished) cm_finish(p, sum);
   if (!finished && event != CM_EVENT_NONE) {
@@ -198,18 +282,52 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
     float u_1 = cm_random(p.random, p.stream);
     float u_2 = cm_random(p.random, p.stream);
     vec3 w = cm_around(p.w, cm_phase_cosine(cm.medium.y, u_0), 6.28318531f * u_1);
-    bool shadow = collided && cm.medium.w > 0.0f;
+    bool shadow = (collided || met) && cm.medium.w > 0.0f;
     bool to_sun = shadow && u_2 >= q;
-    float phase = cm_phase(cm.medium.y, dot(p.w, vec3(cm.sun_world)));
-    p.light = p.throughput * (to_sun ? vec3(cm.sun_irradiance) * (phase / max(1.0f - q, 1e-6f)) : vec3(cm.sky_radiance));
+    vec3 sky_light = vec3(cm.sky_radiance);
+    vec3 sun_light = vec3(cm.sun_irradiance);
+    vec3 to_light = vec3(cm.sun_world);
+#if CM_SURFACES
+    float light_distance = 3.0e38f;
+    if (to_sun && cm.lights.y > 0u) {
+      float u_light = cm_random(p.random, p.stream);
+      vec3 here = cm_from_cube_point(p.o);
+      cm_lamp(here, u_light, sun_light, to_light, light_distance);
+    }
+    vec3 scattered = vec3(1.0f, 1.0f, 1.0f);
+    vec3 facing = vec3(0.0f, 0.0f, 0.0f);
+    if (on_surface) {
+      float u_3 = cm_random(p.random, p.stream);
+      cm_surface_scatter(surface, p.w, u_0, u_1, u_3, w, scattered);
+      facing = cm_surface_eval(surface, p.w, to_light);
+    } else {
+      float phase = cm_phase(cm.medium.y, dot(p.w, to_light));
+      facing = vec3(phase, phase, phase);
+    }
+    sky_light *= scattered;
+    if (!shadow) p.throughput *= scattered;
+#else
+    float facing = cm_phase(cm.medium.y, dot(p.w, to_light));
+#endif
+    p.light = p.throughput * (to_sun ? sun_light * (facing / max(1.0f - q, 1e-6f)) : sky_light);
+    #if CM_SURFACES
+    p.d = cm_to_cube(to_sun ? to_light : w);
+#else
     p.d = to_sun ? vec3(cm.sun_cube) : cm_to_cube(w);
+#endif
     if (!shadow) p.w = w;
     p.mode = to_sun ? CM_MODE_SHADOW_SUN : (shadow ? CM_MODE_SHADOW_SKY : CM_MODE_FLIGHT);
     p.depth_0 = cm_random_depth(p.random, p.stream) + (shadow ? CM_SHADOW_DEPTH : 0.0f);
     p.depth = p.depth_0;
     p.t = 0.0f;
+#if CM_SURFACES
+    p.t_end = light_distance;
+    if (!to_sun) p.t_end = 3.0e38f;
+    p.begins = 1u;
+#else
     p.t_end = cm_box_range(p.o, p.d).y;
     p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
+#endif
   }
 }
 
@@ -218,6 +336,9 @@ CM_FN void cm_run(CM_INOUT(CmPath) p, uvec2 pixel, uint iterations, CM_INOUT(vec
   for (uint i = 0u; i < iterations && p.mode != CM_MODE_DONE; ++i) {
     if (p.mode == CM_MODE_START) cm_start(p, pixel, sum);
     for (int j = 0; j < CM_EVENTS && p.mode != CM_MODE_START && p.mode != CM_MODE_DONE; ++j) {
+#if CM_SURFACES
+      if (p.begins != 0u) cm_begin_ray(p);
+#endif
       uint event = cm_march(p);
       cm_handle(p, event, sum);
     }

@@ -5,6 +5,8 @@
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8
 // variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1
 // variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1 CM_SURFACES=1
+// variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1 CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shared.glsl"
@@ -18,9 +20,13 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #else
 #include "march_voxel.glsl"
 #endif
+#if CM_SURFACES
+#include "bsdf.glsl"
+#include "surface.glsl"
+#endif
 #include "path.glsl"
 
-layout(std430, binding = 0) buffer CmPaths { uvec4 cm_paths[]; };  // 8 planes of one word-quad a lane
+layout(std430, binding = 0) buffer CmPaths { uvec4 cm_paths[]; };  // 8 planes of one word-quad a lane; 9 with surfaces
 layout(std430, binding = 1) buffer CmCounter {
   uint cm_unfinished;  // pixels without their target samples
   uint cm_empty;       // of these, pixels without any
@@ -65,6 +71,11 @@ void main() {
     p.t_end = 0.0;
     p.stream = 0u;
     p.home = uvec2(0u);
+#if CM_SURFACES
+    p.triangle = CM_NONE;
+    p.weights = vec2(0.0);
+    p.begins = 0u;
+#endif
   } else {
     uvec4 a3 = cm_paths[3u * lanes + lane];
     p.mode = a3.w;
@@ -93,6 +104,12 @@ void main() {
     p.home = a7.xy;
     p.samples = a7.z;
     p.steps = a7.w;
+#if CM_SURFACES
+    uvec4 a8 = cm_paths[8u * lanes + lane];
+    p.triangle = a8.x;
+    p.weights = uintBitsToFloat(a8.yz);
+    p.begins = a8.w;
+#endif
   }
 
   uint samples = p.samples;
@@ -109,6 +126,9 @@ void main() {
   cm_paths[5u * lanes + lane] = cm_pack(p.light, p.random);
   cm_paths[6u * lanes + lane] = uvec4(p.cell.xy, floatBitsToUint(p.t_end), p.stream);
   cm_paths[7u * lanes + lane] = uvec4(p.home, p.samples, p.steps);
+#if CM_SURFACES
+  cm_paths[8u * lanes + lane] = uvec4(p.triangle, floatBitsToUint(p.weights), p.begins);
+#endif
   if (p.mode != CM_MODE_DONE) atomicAdd(cm_unfinished, 1u);
   if (p.samples == 0u) atomicAdd(cm_empty, 1u);
   if (p.samples != samples) atomicAdd(cm_finished, p.samples - samples);

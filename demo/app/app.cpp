@@ -261,7 +261,8 @@ void App::execute(const Command& command) {
   auto& navigation = model_.navigation;
   switch (command.action) {
     case Action::open_dialog:
-      panel_.dialog().open("Open", Action::open, {".vdb", ".nvdb", ".json"}, model_.preferences.folder);
+      panel_.dialog().open("Open", Action::open, {".vdb", ".nvdb", ".gltf", ".glb", ".json"},
+                           model_.preferences.folder);
       break;
     case Action::open:
       open(command.text);
@@ -355,6 +356,13 @@ void App::cancel() {
 
 void App::open(const std::string& path) {
   if (path.empty()) return;
+  if (has_ending(path, ".gltf") || has_ending(path, ".glb")) {
+    model_.scene.surfaces = path;
+    model_.scene.surface = {};
+    model_.scene.surface.struct_size = sizeof model_.scene.surface;
+    model_.scene.surface_camera = -1;
+    return;
+  }
   if (!has_ending(path, ".json")) {
     model_.scene.volume = path;
     model_.scene.grid_name.clear();

@@ -90,6 +90,7 @@ struct Status {
   cumulet_frame_result frame{};
   cumulet_progress work{};
   cumulet_stats stats{};
+  cumulet_surfaces_info surfaces{};
   bool busy = false;  // a file is read or a grid is built
   bool has_volume = false;
   double noise = 0.0;  // relative standard error, 0: not known

@@ -99,6 +99,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   section("Display", true, [&] { display(model); });
   section("Light", true, [&] { light(model); });
   section("Medium", true, [&] { medium(model); });
+  section("Surfaces", true, [&] { surfaces(model); });
   section("Grid", true, [&] { grid(model); });
   section("Camera", true, [&] { camera(model, commands); });
   section("Sampling", true, [&] { sampling(model); });
@@ -132,8 +133,9 @@ void Panel::toolbar(Model& model, std::vector<Command>& commands) {
 
 void Panel::file(Model& model, std::vector<Command>& commands) {
   if (path_of_ != model.scene.volume) path_ = path_of_ = model.scene.volume;
-  if (ui_.text("Volume", "The file to show: .vdb or .nvdb, or a scene's .json. Enter opens it.", "A file's path",
-               path_))
+  if (ui_.text("Volume",
+               "The file to show: .vdb or .nvdb, surfaces' .gltf or .glb, or a scene's .json. Enter opens it.",
+               "A file's path", path_))
     commands.push_back({Action::open, path_});
 
   std::vector<Choice> recent;
@@ -225,6 +227,24 @@ void Panel::light(Model& model) {
                "Irradiance on a surface that faces the sun; 0: no sun.", light.sun_irradiance, sun_colour_, 1000.0f);
   light_source("Sky colour", "The sky's colour, as it looks on the screen.", "Sky strength",
                "Radiance from everywhere; 0: black.", light.sky_radiance, sky_colour_, 100.0f);
+}
+
+void Panel::surfaces(Model& model) {
+  cumulet_surfaces_desc& surface = model.scene.surface;
+  const cumulet_surfaces_info& info = model.status.surfaces;
+  const bool any = !model.scene.surfaces.empty();
+  ui_.fact("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb here");
+  ImGui::BeginDisabled(!any);
+  choose(ui_, "Surface light", "What light the surfaces pass on.",
+         {{"Full", CUMULET_SURFACE_LIGHT_FULL, "To each other and to the volume, and back."},
+          {"Shadows", CUMULET_SURFACE_LIGHT_SHADOWS, "Sun, sky and lamps only, and the shadows of all: faster."}},
+         surface.light);
+  ImGui::BeginDisabled(info.animations == 0);
+  ui_.slider("Time", "Seconds into the model's animation.", surface.time, 0.0, std::max(info.duration, 1e-3), "%.2f s");
+  ImGui::EndDisabled();
+  if (any) ui_.fact("Triangles", short_count(double(info.triangles)));
+  if (ui_.button("Remove surfaces", "Shows the volume alone.")) model.scene.surfaces.clear();
+  ImGui::EndDisabled();
 }
 
 void Panel::medium(Model& model) {
@@ -375,8 +395,8 @@ void Panel::hint() const {
   ImGui::SetNextWindowPos(middle, ImGuiCond_Always, {0.5f, 0.5f});
   ImGui::SetNextWindowBgAlpha(0.75f);
   ImGui::Begin("hint", nullptr, overlay | ImGuiWindowFlags_NoInputs);
-  for (const char* line :
-       {"Drop a volume (.vdb, .nvdb) or a scene (.json) here", "or press Ctrl+O.  F1 shows all keys."}) {
+  for (const char* line : {"Drop a volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) here",
+                           "or press Ctrl+O.  F1 shows all keys."}) {
     const float width = ImGui::CalcTextSize(line).x;
     ImGui::SetCursorPosX(std::max(ImGui::GetCursorPosX(), (ImGui::GetWindowWidth() - width) * 0.5f));
     ImGui::TextUnformatted(line);

@@ -30,6 +30,7 @@ class Panel {
   void display(Model& model);
   void light(Model& model);
   void medium(Model& model);
+  void surfaces(Model& model);
   void grid(Model& model);
   void sampling(Model& model);
   void statistics(const Model& model);

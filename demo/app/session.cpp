@@ -47,6 +47,10 @@ bool same(const cumulet_display_desc& a, const cumulet_display_desc& b) {
   return std::tie(a.exposure_stops, a.tone_map, a.background) == std::tie(b.exposure_stops, b.tone_map, b.background);
 }
 
+bool same(const cumulet_surfaces_desc& a, const cumulet_surfaces_desc& b) {
+  return std::tie(a.time, a.animation, a.light) == std::tie(b.time, b.animation, b.light);
+}
+
 bool same(const cumulet_camera_desc& a, const cumulet_camera_desc& b) {
   return same(a.eye, b.eye) && same(a.target, b.target) && same(a.up, b.up) &&
          std::tie(a.fovy_degrees, a.orthographic_height, a.near_plane, a.far_plane) ==
@@ -138,7 +142,45 @@ void Session::follow(Model& model, bool held) {
   if (!same(known_->camera, scene.camera)) set_camera(model);
   if (!same(navigation_, model.navigation)) check(model, cumulet_set_navigation(viewer, &model.navigation));
   navigation_ = model.navigation;
+  follow_surfaces(model);
   follow_volume(model);
+}
+
+void Session::follow_surfaces(Model& model) {
+  SceneOptions& scene = model.scene;
+  if (!same(known_->surface, scene.surface)) check(model, cumulet_set_surfaces(viewer_.get(), &scene.surface));
+  known_->surface = scene.surface;
+  if (known_->surfaces == scene.surfaces) return;
+  known_->surfaces = scene.surfaces;
+  if (scene.surfaces.empty()) {
+    check(model, cumulet_load_surfaces(viewer_.get(), nullptr));
+    shown_surfaces_.clear();
+    model.status.surfaces = {};
+    return;
+  }
+  waiting_for_surfaces_ = check(model, cumulet_load_surfaces(viewer_.get(), scene.surfaces.c_str()));
+  if (!waiting_for_surfaces_) scene.surfaces = known_->surfaces = shown_surfaces_;
+}
+
+void Session::finish_surfaces(Model& model) {
+  waiting_for_surfaces_ = false;
+  SceneOptions& scene = model.scene;
+  const cumulet_progress& work = model.status.work;
+  const bool failed =
+      work.status != CUMULET_OK && std::string_view(static_cast<const char*>(work.message)).starts_with(scene.surfaces);
+  if (failed) {
+    tell(model, true, work.message, glfwGetTime());
+    scene.surfaces = known_->surfaces = shown_surfaces_;
+    return;
+  }
+  shown_surfaces_ = scene.surfaces;
+  model.preferences.remember(shown_surfaces_);
+  cumulet_surfaces_info& info = model.status.surfaces;
+  info = {};
+  info.struct_size = sizeof info;
+  check(model, cumulet_get_surfaces_info(viewer_.get(), &info));
+  if (scene.surface_camera >= 0)
+    check(model, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
 }
 
 void Session::set_camera(Model& model) {
@@ -187,6 +229,7 @@ void Session::render(Model& model, const cumulet_frame_desc& frame) {
   static_cast<void>(cumulet_get_stats(viewer_.get(), &status.stats));
   const bool was_busy = status.busy;
   status.busy = status.work.stage != CUMULET_STAGE_IDLE || (status.frame.flags & CUMULET_RENDER_LOADING) != 0;
+  if (waiting_for_surfaces_ && !status.busy) finish_surfaces(model);
   if (waiting_ && !status.busy)
     finish_load(model);
   else if (was_busy && !status.busy && status.work.status != CUMULET_OK &&

@@ -70,6 +70,8 @@ class Session {
   /// Tells a failed call in the message bar.
   bool check(Model& model, cumulet_status status);
   void follow_volume(Model& model);
+  void follow_surfaces(Model& model);
+  void finish_surfaces(Model& model);
   void finish_load(Model& model);
   void set_camera(Model& model);
 
@@ -79,7 +81,8 @@ class Session {
   std::optional<SceneOptions> known_;  // what the viewer was given last
   cumulet_navigation_desc navigation_{};
   cumulet_camera_desc seen_{};  // the viewer's camera
-  std::string shown_volume_, shown_grid_;
+  std::string shown_volume_, shown_grid_, shown_surfaces_;
+  bool waiting_for_surfaces_ = false;
   bool waiting_ = false;
   bool fit_ = false;
   bool camera_moved_ = false;

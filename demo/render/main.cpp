@@ -217,7 +217,7 @@ void render(const RenderOptions& options) {
   catch_signals();
 
   Progress progress;
-  progress.stage("loading " + options.scene.volume);
+  progress.stage("loading " + (options.scene.volume.empty() ? options.scene.surfaces : options.scene.volume));
   Context context = Context::create(backend_of(options.backend));
   const Viewer viewer = create_viewer(context, progress);
   const auto& scene = options.scene;
@@ -229,9 +229,15 @@ void render(const RenderOptions& options) {
   check(viewer, cumulet_set_sampling(viewer.get(), &sampling));
   check(viewer, cumulet_set_display(viewer.get(), &scene.display));
   set_camera(viewer, scene.camera);
+  if (!scene.surfaces.empty()) {
+    check(viewer, cumulet_set_surfaces(viewer.get(), &scene.surface));
+    check(viewer, cumulet_load_surfaces(viewer.get(), scene.surfaces.c_str()));
+  }
   const char* grid_name = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();
-  check(viewer, cumulet_load_volume(viewer.get(), scene.volume.c_str(), grid_name));
+  if (!scene.volume.empty()) check(viewer, cumulet_load_volume(viewer.get(), scene.volume.c_str(), grid_name));
   wait(viewer, progress);
+  if (scene.surface_camera >= 0)
+    check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));
 
   const double total = static_cast<double>(scene.width) * scene.height * sampling.samples;
   constexpr double budget_ms = 200.0;  // how often the bar moves, and how long Ctrl-C may take

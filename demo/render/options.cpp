@@ -210,9 +210,33 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
       "Grid to show (default: density, else the only scalar one)");
   add(
+      app, group, "--gltf", "FILE",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        scene.surfaces = text;
+      },
+      "glTF 2.0 scene (.gltf, .glb) around and in the volume");
+  add(
+      app, group, "--gltf-time", "SECONDS", [&](const std::string& text) { scene.surface.time = parse_number(text); },
+      "Moment of its animation (default: 0)");
+  add(
+      app, group, "--gltf-animation", "N",
+      [&](const std::string& text) {
+        scene.surface.animation = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32));
+      },
+      "Which animation of the file, from 0 (default: 0)");
+  add(
+      app, group, "--gltf-camera", "N",
+      [&](const std::string& text) {
+        scene.surface_camera = static_cast<std::int32_t>(parse_integer(text, 0, 1000000));
+      },
+      "Look through this camera of the file, from 0");
+  add_choice(app, group, "--surface-light", surface_light_names, scene.surface.light,
+             "Light between surfaces and volume (default: full), or only from sun, sky and lamps");
+  add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
       [&](const std::string& text) { scene.camera = parse_camera(text); },
-      "Eye, target and vertical field of view in degrees (default: fit the volume)");
+      "Eye, target and vertical field of view in degrees (default: fit the scene)");
 
   group = "Medium";
   add(
@@ -361,7 +385,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene);
-  if (options.scene.volume.empty()) throw UsageError("--volume is required, or a --scene that names one");
+  if (options.scene.volume.empty() && options.scene.surfaces.empty())
+    throw UsageError("--volume or --gltf is required, or a --scene that names one");
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
   return options;
 }

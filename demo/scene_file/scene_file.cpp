@@ -214,6 +214,13 @@ void read_scene(Section& root, SceneOptions& scene) {
     volume.text("file", scene.volume);
     volume.text("grid", scene.grid_name);
   });
+  root.section("surfaces", [&](Section& surfaces) {
+    surfaces.text("file", scene.surfaces);
+    surfaces.number("time", scene.surface.time);
+    surfaces.integer("animation", scene.surface.animation, 0.0, max_u32);
+    surfaces.integer("camera", scene.surface_camera, -1.0, 1e6);
+    surfaces.choice("light", surface_light_names, scene.surface.light);
+  });
   root.section("camera", [&](Section& camera) { read_camera(camera, scene.camera); });
   root.section("medium", [&](Section& medium) { read_medium(medium, scene.medium); });
   if (root.has("light"))
@@ -269,11 +276,20 @@ const char* name_of(const Names& names, Value value) {
   throw std::logic_error("a setting has no name");
 }
 
-Json to_json(const SceneOptions& scene, const std::string& volume) {
+Json to_json(const SceneOptions& scene, const std::string& volume, const std::string& surfaces) {
   Json json;
   json["cumulet_scene"] = format_version;
   json["volume"]["file"] = volume;
   if (!scene.grid_name.empty()) json["volume"]["grid"] = scene.grid_name;
+
+  if (!surfaces.empty()) {
+    Json& shown = json["surfaces"];
+    shown["file"] = surfaces;
+    shown["time"] = scene.surface.time;
+    shown["animation"] = scene.surface.animation;
+    if (scene.surface_camera >= 0) shown["camera"] = scene.surface_camera;
+    shown["light"] = name_of(surface_light_names, scene.surface.light);
+  }
 
   Json camera = Json::object();
   const auto& view = scene.camera;
@@ -330,11 +346,11 @@ fs::path folder_of(const std::string& path) {
 }
 
 /// As it is written into the file at path: relative if it lies in that folder or below.
-std::string portable_volume(const std::string& volume, const std::string& path) {
-  if (volume.empty()) return volume;
+std::string portable_file(const std::string& file, const std::string& path) {
+  if (file.empty()) return file;
   std::error_code error;
-  const fs::path absolute = fs::absolute(fs::path(volume), error).lexically_normal();
-  if (error) return volume;
+  const fs::path absolute = fs::absolute(fs::path(file), error).lexically_normal();
+  if (error) return file;
   const fs::path relative = absolute.lexically_relative(folder_of(path).lexically_normal());
   const bool below = !relative.empty() && *relative.begin() != fs::path("..");
   return (below ? relative : absolute).string();
@@ -347,6 +363,7 @@ SceneOptions::SceneOptions() {
   medium.struct_size = sizeof medium;
   light.struct_size = sizeof light;
   camera.struct_size = sizeof camera;
+  surface.struct_size = sizeof surface;
   sampling.struct_size = sizeof sampling;
   sampling.samples = 64;
   display.struct_size = sizeof display;
@@ -377,10 +394,9 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
   SceneOptions scene;
   Section root(path, "", json);
   read_scene(root, scene);
-  if (!scene.volume.empty() && fs::path(scene.volume).is_relative()) {
-    const fs::path folder = fs::path(path).parent_path();
-    scene.volume = (folder / scene.volume).string();
-  }
+  const fs::path folder = fs::path(path).parent_path();
+  for (std::string* file : {&scene.volume, &scene.surfaces})
+    if (!file->empty() && fs::path(*file).is_relative()) *file = (folder / *file).string();
   return scene;
 }
 
@@ -394,13 +410,17 @@ SceneOptions load_scene(const std::string& path) {
 
 std::string scene_text(const SceneOptions& scene, const std::string& path) {
   // A file's name may be in any encoding: what is not UTF-8 is replaced, not thrown at.
-  return to_json(scene, portable_volume(scene.volume, path)).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return to_json(scene, portable_file(scene.volume, path), portable_file(scene.surfaces, path))
+             .dump(2, ' ', false, Json::error_handler_t::replace) +
+         "\n";
 }
 
 void save_scene(const SceneOptions& scene, const std::string& path) {
   image::replace_file(path, scene_text(scene, path));
 }
 
-bool same_scene(const SceneOptions& a, const SceneOptions& b) { return to_json(a, a.volume) == to_json(b, b.volume); }
+bool same_scene(const SceneOptions& a, const SceneOptions& b) {
+  return to_json(a, a.volume, a.surfaces) == to_json(b, b.volume, b.surfaces);
+}
 
 }  // namespace cumulet::demo

@@ -12,12 +12,15 @@ namespace cumulet::demo {
 struct SceneOptions {
   std::string volume;
   std::string grid_name;
+  std::string surfaces;              // a glTF file; "": none
+  std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
   cumulet_medium_desc medium{};
   cumulet_light_desc light{};
   cumulet_camera_desc camera{};
+  cumulet_surfaces_desc surface{};
   cumulet_sampling_desc sampling{};
   cumulet_display_desc display{};
 

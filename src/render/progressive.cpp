@@ -48,7 +48,7 @@ Picture& Progressive::acquire(glm::uvec2 size) {
   return *pictures_.emplace_back(std::make_unique<Picture>());
 }
 
-void Progressive::start(std::uint32_t divisor, const MarchData& data, const SurfaceDepth& surface, double budget_ms) {
+void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms) {
   core::CmParameters parameters = wish_.parameters;
   parameters.image.x = (parameters.image.x + divisor - 1) / divisor;
   parameters.image.y = (parameters.image.y + divisor - 1) / divisor;
@@ -56,7 +56,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
   Picture& picture = acquire(glm::uvec2(parameters.image));
   working_ = nullptr;
   try {
-    tracer_.begin(picture, data, parameters, wish_.view, surface, budget_ms, wish_.preview);
+    tracer_.begin(picture, data, parameters, wish_.view, surfaces, budget_ms, wish_.preview);
   } catch (const Error& error) {
     const bool memory = error.code() == ErrorCode::out_of_memory && wish_.preview && divisor < coarsest_divisor;
     if (memory) {
@@ -79,8 +79,8 @@ bool Progressive::needs_depth() const {
   return wish_.depth && shown_ != nullptr && shown_->volume_z() == 0 && shown_generation_ == wish_.generation;
 }
 
-void Progressive::advance(const PictureWish& wish, const MarchData& data, const SurfaceDepth& surface,
-                          Deadline deadline, double budget_ms) {
+void Progressive::advance(const PictureWish& wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+                          double budget_ms) {
   const bool resized = glm::uvec2(wish.parameters.image) != glm::uvec2(wish_.parameters.image);
   if (!same(wish)) {
     stale_ = true;
@@ -103,15 +103,15 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
       // The first answer to a change is finished, whatever changes meanwhile: else nothing would ever be shown.
       const bool answering = wish_.preview && answering_ && working_ != nullptr && !working_->complete();
       if (working_ == nullptr || (stale_ && !answering)) {
-        start(coarsest(budget_ms), data, surface, budget_ms);
+        start(coarsest(budget_ms), data, surfaces, budget_ms);
         answering_ = true;
       } else if (!stale_ && working_->complete() && divisor_ > finest_) {
-        start(divisor_ / 2, data, surface, budget_ms);
+        start(divisor_ / 2, data, surfaces, budget_ms);
         answering_ = false;
       }
       const auto begun = Clock::now();
       const bool was_complete = working_->complete();
-      const bool done = tracer_.trace(*working_, data, surface, deadline, divisor_ > finest_);
+      const bool done = tracer_.trace(*working_, data, surfaces, deadline, divisor_ > finest_);
       const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
       trace_seconds_ += seconds;
       if (!was_complete) answer_seconds_ += seconds;
@@ -122,7 +122,7 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
         }
         shown_ = working_;
         shown_generation_ = working_generation_;
-        if (needs_depth()) tracer_.trace_depth(*shown_, data, surface, deadline);
+        if (needs_depth()) tracer_.trace_depth(*shown_, data, surfaces, deadline);
       }
       if (done && !stale_ && divisor_ == finest_) break;
     } while (Clock::now() < deadline);

@@ -28,7 +28,7 @@ class Progressive {
 
   /// Works on the wish until about the deadline. Throws once where a picture cannot be made, and goes on with what
   /// there is, or coarser, later.
-  void advance(const PictureWish& wish, const MarchData& data, const SurfaceDepth& surface, Deadline deadline,
+  void advance(const PictureWish& wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
                double budget_ms);
   /// Forgets all pictures.
   void reset();
@@ -51,7 +51,7 @@ class Progressive {
   [[nodiscard]] bool same(const PictureWish& wish) const;
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
   Picture& acquire(glm::uvec2 size);
-  void start(std::uint32_t divisor, const MarchData& data, const SurfaceDepth& surface, double budget_ms);
+  void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms);
   [[nodiscard]] bool needs_depth() const;
 
   Tracer tracer_;

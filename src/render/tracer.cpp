@@ -32,8 +32,9 @@ std::uint32_t row_step(std::uint32_t rows) {
   return step;
 }
 
-void set_surface(core::CmParameters& parameters, const SurfaceDepth& surface) {
-  parameters.surface = {surface.texture != 0 ? surface.layers : 0, surface.size, 0};
+void describe(const Surfaces& surfaces, core::CmParameters& parameters) {
+  parameters.surface = {surfaces.depth != 0 ? surfaces.layers : 0, surfaces.size, 0};
+  if (surfaces.scene != nullptr) surfaces.scene->describe(parameters);
 }
 
 }  // namespace
@@ -110,8 +111,9 @@ std::uint64_t Picture::bytes() const {
   return std::uint64_t{size_.x} * size_.y * (sum_ ? (volume_z_ ? 36U : 32U) : 0U);
 }
 
-GLuint Tracer::program(const MarchData& data, const char* name) {
+GLuint Tracer::program(const MarchData& data, const Surfaces& surfaces, const char* name) {
   std::vector<std::string> key = data.defines();
+  if (surfaces.scene != nullptr) key.emplace_back("CM_SURFACES 1");
   key.emplace_back(name);
   auto found = programs_.find(key);
   if (found == programs_.end()) {
@@ -143,9 +145,9 @@ void Tracer::allocate(Picture& picture, glm::uvec2 size) const {
 }
 
 void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, View view,
-                   const SurfaceDepth& surface, double budget_ms, bool hasty) {
+                   const Surfaces& surfaces, double budget_ms, bool hasty) {
   const glm::uvec2 size(parameters.image);
-  program(data, view == View::shaded ? "trace.comp" : "inspect.comp");
+  program(data, surfaces, view == View::shaded ? "trace.comp" : "inspect.comp");
   make_shared_objects();
   const glm::uvec2 tile = glm::min(size, glm::uvec2(tile_edge));
   const std::size_t lanes = std::size_t{tile.x} * tile.y;
@@ -158,7 +160,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   if (!picture.sum_ || size != picture.size_) allocate(picture, size);
   picture.parameters_ = parameters;
   data.describe(picture.parameters_);
-  set_surface(picture.parameters_, surface);
+  describe(surfaces, picture.parameters_);
   picture.view_ = view;
   if (view != View::shaded) picture.parameters_.march.y = static_cast<std::uint32_t>(view);
   picture.tile_size_ = tile;
@@ -198,20 +200,21 @@ void Tracer::clear(Picture& picture) {
   gl::check(*gl_, "making the empty picture");
 }
 
-void Tracer::bind(const MarchData& data, const SurfaceDepth& surface) const {
+void Tracer::bind(const MarchData& data, const Surfaces& surfaces) const {
   data.bind(*gl_);
-  if (surface.texture != 0) gl_->BindTextureUnit(surface_unit, surface.texture);
+  if (surfaces.depth != 0) gl_->BindTextureUnit(surface_unit, surfaces.depth);
+  if (surfaces.scene != nullptr) surfaces.scene->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.name());
 }
 
-bool Tracer::trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline,
+bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
                    bool until_complete) {
   if (picture.done_) return true;
   const auto start = Clock::now();
   const double budget_ms = std::max(0.0, std::chrono::duration<double, std::milli>(deadline - start).count());
   const std::uint64_t samples_before = picture.samples_;
-  gl_->UseProgram(program(data, picture.view_ == View::shaded ? "trace.comp" : "inspect.comp"));
-  bind(data, surface);
+  gl_->UseProgram(program(data, surfaces, picture.view_ == View::shaded ? "trace.comp" : "inspect.comp"));
+  bind(data, surfaces);
   if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, paths_.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, counter_.name());
   gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
@@ -220,7 +223,7 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const SurfaceDepth& 
   gl_->BindImageTexture(2, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   const double aim = std::clamp(0.5 * budget_ms, 1.0, dispatch_ms);
   while (!picture.done_ && !(until_complete && picture.complete_)) {
-    dispatch(picture, surface, aim);
+    dispatch(picture, surfaces, aim);
     if (Clock::now() >= deadline) break;
   }
   if (picture.view_ == View::shaded) {
@@ -231,12 +234,12 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const SurfaceDepth& 
   return picture.done_;
 }
 
-void Tracer::dispatch(Picture& picture, const SurfaceDepth& surface, double aim_ms) {
+void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, double aim_ms) {
   const glm::uvec2 extent = picture.tile_extent();
   Picture::Window& window = picture.windows_[picture.window_];
   const bool shaded = picture.view_ == View::shaded;
   core::CmParameters parameters = picture.parameters_;
-  set_surface(parameters, surface);
+  describe(surfaces, parameters);
   parameters.tile = {picture.tile_corner(), extent};
   parameters.image.w = picture.pass_target_;
   const std::uint32_t groups = (window.end - window.first + 7) / 8;
@@ -264,20 +267,20 @@ void Tracer::dispatch(Picture& picture, const SurfaceDepth& surface, double aim_
   picture.end_dispatch();
 }
 
-bool Tracer::trace_depth(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline) {
+bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
   if (picture.depth_done_) return true;
   if (!picture.volume_z_) {
     picture.volume_z_ = gl::make_texture_2d(gl_, GL_R32F, static_cast<int>(picture.size_.x),
                                             static_cast<int>(picture.size_.y), "creating the depth texture");
   }
   make_shared_objects();
-  gl_->UseProgram(program(data, "inspect.comp"));
-  bind(data, surface);
+  gl_->UseProgram(program(data, surfaces, "inspect.comp"));
+  bind(data, surfaces);
   gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
   gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
   gl_->BindImageTexture(2, picture.volume_z_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   core::CmParameters parameters = picture.parameters_;
-  set_surface(parameters, surface);
+  describe(surfaces, parameters);
   parameters.march.y = view_depth;
   // Rows that a camera ray a pixel takes about a millisecond for.
   const auto rows = static_cast<std::uint32_t>(std::clamp(rate_ / picture.size_.x, 8.0, 512.0)) / 8U * 8U;
@@ -297,18 +300,18 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const SurfaceD
   return picture.depth_done_;
 }
 
-float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, const SurfaceDepth& surface,
+float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces,
                    glm::uvec2 pixel) {
   make_shared_objects();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
   core::CmParameters p = parameters;
   data.describe(p);
-  set_surface(p, surface);
+  describe(surfaces, p);
   p.march.y = view_depth;
   p.tile = {pixel, 1U, 1U};
   p.order = {0U, 1U, 0U, 1U};  // into the texture's one pixel
-  gl_->UseProgram(program(data, "inspect.comp"));
-  bind(data, surface);
+  gl_->UseProgram(program(data, surfaces, "inspect.comp"));
+  bind(data, surfaces);
   gl_->BindImageTexture(0, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(1, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
   gl_->BindImageTexture(2, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);

@@ -9,6 +9,7 @@
 #include "gl/objects.hpp"
 #include "render/march_data.hpp"
 #include "render/parameters.hpp"
+#include "render/surface_data.hpp"
 
 namespace cumulet::render {
 
@@ -21,11 +22,12 @@ struct Totals {
   double noise = 0.0;
 };
 
-/// The host's depth as render::HostDepth keeps it, for passes that end at it.
-struct SurfaceDepth {
-  GLuint texture = 0;  // 0: none
+/// What paths end at beside the volume: the host's depth as render::HostDepth keeps it, and triangles.
+struct Surfaces {
+  GLuint depth = 0;  // 0: none
   unsigned layers = 0;
   glm::uvec2 size{0U};
+  const SurfaceData* scene = nullptr;
 };
 
 /// One accumulation under way.
@@ -103,16 +105,15 @@ class Tracer {
   /// budget_ms is what trace will be given about: it chooses the size of windows. hasty: the first pass leaves the last
   /// few pixels, those with the longest paths, to the second. Throws with the picture as it was.
   void begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, View view,
-             const SurfaceDepth& surface, double budget_ms, bool hasty);
+             const Surfaces& surfaces, double budget_ms, bool hasty);
   /// Traces until about the deadline. The last picture begun or traced goes on; another loses the paths under way.
   /// until_complete: no further than every pixel's first sample. Returns whether every pixel has its target samples.
-  bool trace(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline,
+  bool trace(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
              bool until_complete = false);
   /// Finds the depth at half opacity until about the deadline; returns whether it is there.
-  bool trace_depth(Picture& picture, const MarchData& data, const SurfaceDepth& surface, Deadline deadline);
+  bool trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline);
   /// View depth z at half opacity of one pixel of a picture with these parameters; 0: not so opaque.
-  float pick(const MarchData& data, const core::CmParameters& parameters, const SurfaceDepth& surface,
-             glm::uvec2 pixel);
+  float pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
   /// A picture of one transparent pixel: what there is before the first.
   void clear(Picture& picture);
 
@@ -124,12 +125,12 @@ class Tracer {
   [[nodiscard]] std::uint64_t bytes() const { return paths_lanes_ * lane_bytes; }
 
  private:
-  static constexpr std::size_t lane_bytes = std::size_t{8} * 16;
-  void dispatch(Picture& picture, const SurfaceDepth& surface, double aim_ms);
-  GLuint program(const MarchData& data, const char* name);
+  static constexpr std::size_t lane_bytes = std::size_t{9} * 16;  // the last of it with surfaces only
+  void dispatch(Picture& picture, const Surfaces& surfaces, double aim_ms);
+  GLuint program(const MarchData& data, const Surfaces& surfaces, const char* name);
   void make_shared_objects();
   void allocate(Picture& picture, glm::uvec2 size) const;
-  void bind(const MarchData& data, const SurfaceDepth& surface) const;
+  void bind(const MarchData& data, const Surfaces& surfaces) const;
 
   gl::FunctionsPtr gl_;
   std::map<std::vector<std::string>, gl::Object> programs_;

@@ -266,6 +266,48 @@ cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_des
   });
 }
 
+cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    if (path == nullptr) return v.show_surfaces(nullptr);
+    require(path[0] != '\0', "path is \"\"");
+    v.load_surfaces(path);
+  });
+}
+
+cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, const cumulet_surfaces_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_surfaces_desc d = read_desc(desc, "cumulet_surfaces_desc");
+    require(std::isfinite(d.time), "cumulet_surfaces_desc.time is not finite");
+    require(number(d.light) <= CUMULET_SURFACE_LIGHT_SHADOWS, "cumulet_surfaces_desc.light is unknown");
+    v.set_surfaces({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light)});
+  });
+}
+
+cumulet_status cumulet_get_surfaces_info(cumulet_viewer* viewer, cumulet_surfaces_info* info) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const auto source = v.surface_source();
+    require(source != nullptr, "the viewer has no surfaces");
+    const auto& scene = *source->scene;
+    cumulet_surfaces_info i{};
+    i.triangles = scene.triangle_count();
+    i.materials = static_cast<uint32_t>(scene.materials.size());
+    i.lights = static_cast<uint32_t>(source->pose.lights.size());
+    i.cameras = static_cast<uint32_t>(source->pose.cameras.size());
+    i.animations = static_cast<uint32_t>(scene.animations.size());
+    const std::size_t animation = v.surface_settings().moment.animation;
+    if (animation < scene.animations.size()) i.duration = scene.animations[animation].duration;
+    for (int axis = 0; axis < 3; ++axis) {
+      i.bounds_min[axis] = source->pose.low[axis];
+      i.bounds_max[axis] = source->pose.high[axis];
+    }
+    write_desc(info, i, "cumulet_surfaces_info");
+  });
+}
+
+cumulet_status cumulet_use_surface_camera(cumulet_viewer* viewer, uint32_t index) {
+  return guarded(viewer, [&](core::Viewer& v) { v.use_surface_camera(index); });
+}
+
 cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_sampling_desc d = read_desc(desc, "cumulet_sampling_desc");

@@ -59,7 +59,11 @@ Viewer::Gl::Gl(gl::FunctionsPtr gl)
 }
 
 Viewer::Viewer(Log log, std::function<void()> update, bool restore_state)
-    : log_(log), update_(std::move(update)), restore_state_(restore_state), builder_(log, [this] { notify(); }) {
+    : log_(log),
+      update_(std::move(update)),
+      restore_state_(restore_state),
+      builder_(log, [this] { notify(); }),
+      surface_builder_(log, [this] { notify(); }) {
   set_camera(std::make_shared<Camera>());
 }
 
@@ -151,6 +155,7 @@ void Viewer::sync() {
     }
     built_ = std::move(*built);
   }
+  if (auto surfaces = surface_builder_.take()) surface_source_ = std::move(*surfaces);
 }
 
 std::optional<BuildSettings> Viewer::build_settings() const {
@@ -199,11 +204,66 @@ void Viewer::rebuild() {
   touch();
 }
 
+void Viewer::cancel() {
+  builder_.cancel();
+  surface_builder_.cancel();
+}
+
+void Viewer::load_surfaces(const std::string& path) {
+  sync();
+  surface_builder_.load(path, surface_settings_.moment);
+  touch();
+}
+
+void Viewer::show_surfaces(SurfacePtr surfaces) {
+  surface_builder_.cancel();
+  sync();
+  surface_source_ = std::move(surfaces);
+  touch();
+}
+
+void Viewer::set_surfaces(const SurfaceSettings& settings) {
+  sync();
+  if (settings.moment != surface_settings_.moment) surface_builder_.pose(surface_source_, settings.moment);
+  surface_settings_ = settings;
+  touch();
+}
+
+SurfacePtr Viewer::surface_source() {
+  sync();
+  return surface_source_;
+}
+
+void Viewer::use_surface_camera(std::size_t index) {
+  sync();
+  const std::size_t count = surface_source_ ? surface_source_->pose.cameras.size() : 0;
+  if (index >= count) {
+    throw Error(ErrorCode::invalid_argument,
+                "there is no camera " + std::to_string(index) + ": the surfaces have " + std::to_string(count));
+  }
+  const surface::SceneCamera& seen = surface_source_->pose.cameras[index];
+  const dvec3 eye(seen.to_world[3]);
+  const dvec3 forward = -glm::normalize(dvec3(seen.to_world[2]));
+  CameraPose pose = camera_->pose();
+  pose.eye = eye;
+  // What it looks at, to orbit about: as far as the middle of the scene.
+  const Bounds all = bounds();
+  const double distance = glm::dot(0.5 * (all.min + all.max) - eye, forward);
+  pose.target = eye + forward * std::max(distance, 1e-3 * glm::length(all.max - all.min) + 1e-12);
+  pose.up = glm::normalize(dvec3(seen.to_world[1]));
+  pose.orthographic_height = seen.orthographic ? seen.height : 0.0;
+  if (!seen.orthographic) pose.fovy_degrees = glm::degrees(seen.vertical_fov);
+  pose.near_plane = seen.near_plane;
+  pose.far_plane = seen.far_plane;
+  camera_->set(pose);
+}
+
 void Viewer::wait(double timeout_ms) {
   std::optional<Clock::time_point> until;
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
-  if (!builder_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
+  if (!builder_.wait(until) || !surface_builder_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
   sync();
+  if (const auto failure = surface_builder_.failure()) throw Error(*failure);
   const Builder::Status status = builder_.status();
   if (status.error) throw Error(*status.error, status.message);
 }
@@ -211,6 +271,11 @@ void Viewer::wait(double timeout_ms) {
 Builder::Status Viewer::status() const {
   Builder::Status status = builder_.status();
   const double upload = upload_progress_.load(std::memory_order_relaxed);
+  if (const auto failure = surface_builder_.failure(); failure && !status.error) {
+    status.error = failure->code();
+    status.message = failure->what();
+  }
+  if (status.stage == Progress::Stage::idle && surface_builder_.working()) status.stage = Progress::Stage::loading;
   if (status.stage == Progress::Stage::idle && upload < 1.0) {
     status.stage = Progress::Stage::uploading;
     status.fraction = upload;
@@ -261,7 +326,7 @@ void Viewer::set_navigation(const NavigationSettings& settings) {
 
 bool Viewer::input(const InputEvent& event) {
   sync();
-  const auto box = volume_ ? std::optional(volume_->bounds()) : std::nullopt;
+  const auto box = this->box();
   const bool handled = navigation_.input(event, *camera_, frame_size_.x, frame_size_.y, box);
   if (navigation_.moving()) notify();
   return handled;
@@ -269,10 +334,21 @@ bool Viewer::input(const InputEvent& event) {
 
 void Viewer::frame_all() { camera_->frame(bounds(), frame_size_.y > 0 ? double(frame_size_.x) / frame_size_.y : 1.0); }
 
+std::optional<Bounds> Viewer::box() const {
+  std::optional<Bounds> box;
+  if (volume_) box = volume_->bounds();
+  if (surface_source_ && surface_source_->scene->triangle_count() > 0) {
+    const surface::Pose& pose = surface_source_->pose;
+    box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};
+  }
+  return box;
+}
+
 Bounds Viewer::bounds() {
   sync();
-  if (!volume_) throw Error(ErrorCode::invalid_argument, "the viewer has no volume");
-  return volume_->bounds();
+  const auto all = box();
+  if (!all) throw Error(ErrorCode::invalid_argument, "the viewer has nothing to show: no volume, no surfaces");
+  return *all;
 }
 
 // ---- frames ----
@@ -318,6 +394,11 @@ core::CmParameters Viewer::parameters() const {
   const double elevation = radians(light_.sun_elevation_degrees);
   const dvec3 sun(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
                   std::cos(azimuth) * std::cos(elevation));
+  const glm::dmat4& from_cube = source.cube.to_world;
+  p.from_cube_x = glm::vec4(glm::vec3(from_cube[0]), static_cast<float>(from_cube[3].x));
+  p.from_cube_y = glm::vec4(glm::vec3(from_cube[1]), static_cast<float>(from_cube[3].y));
+  p.from_cube_z = glm::vec4(glm::vec3(from_cube[2]), static_cast<float>(from_cube[3].z));
+  p.lights.z = surface_settings_.light == SurfaceLight::full ? 1U : 0U;
   p.sun_world = direction(sun);
   p.sun_cube = direction(linear * sun);
   p.sun_irradiance = glm::vec4(light_.sun_irradiance, 0.0F);
@@ -326,9 +407,12 @@ core::CmParameters Viewer::parameters() const {
   // Half of the sky's share of the light: its escaping paths sample it as well.
   const auto sun_power = static_cast<float>(luminance(light_.sun_irradiance));
   const auto sky_power = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(light_.sky_radiance));
-  const float to_sky = sun_power > 0.0F ? 0.5F * sky_power / (sky_power + sun_power) : (sky_power > 0.0F ? 1.0F : 0.0F);
+  const bool lamps = gl_->surfaces && gl_->surfaces->lamps();
+  const float to_sky = lamps && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
+                       : sun_power > 0.0F           ? 0.5F * sky_power / (sky_power + sun_power)
+                                                    : (sky_power > 0.0F ? 1.0F : 0.0F);
   p.medium = {static_cast<float>(std::min(1e30, medium_.density_scale * std::max(source.max_value, 1e-30F))),
-              medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F ? 1.0F : 0.0F};
+              medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F || lamps ? 1.0F : 0.0F};
   p.image = {frame_size_, sampling_.seed, std::max(1U, sampling_.samples)};
   p.march = {0U, medium_.max_bounces, 0U, 0U};
   return p;
@@ -340,17 +424,19 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   const auto now = Clock::now();
   const double since = std::chrono::duration<double>(now - last_frame_time_).count();
   last_frame_time_ = now;
-  const auto box = volume_ ? std::optional(volume_->bounds()) : std::nullopt;
+  const auto box = this->box();
   navigation_.advance(std::min(since, 0.25), *camera_, box);
+
+  // Surfaces alone are surfaces in an empty volume.
+  if (!volume_ && surface_source_ && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   last_view_ = view_;
   view_.reset();
-  // Without a volume the camera may wait for its bounds.
-  if (frame_size_.x > 0 && frame_size_.y > 0 && volume_)
-    view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
+  // Without anything to see the camera may wait for its bounds.
+  if (frame_size_.x > 0 && frame_size_.y > 0 && box) view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
 
-  if (grid_.camera_adaptive && view_ && (view_ != built_view_ || frame_size_ != built_size_)) {
+  if (grid_.camera_adaptive && view_ && volume_ && (view_ != built_view_ || frame_size_ != built_size_)) {
     const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
     if (rests) {
       builder_.build(volume_, *build_settings());
@@ -358,7 +444,23 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
       built_size_ = frame_size_;
     }
   }
-  if (frame.budget_ms >= 0.0) upload(g, deadline);
+  if (frame.budget_ms < 0.0) return;
+  upload_surfaces(g);
+  upload(g, deadline);
+}
+
+void Viewer::upload_surfaces(Gl& g) {
+  const bool failed = !g.surfaces && g.surfaces_source;
+  if (g.surfaces_source == surface_source_ && !(failed && g.surfaces_revision != settings_revision_)) return;
+  g.surfaces_source = surface_source_;
+  g.surfaces_revision = settings_revision_;
+  ++surface_generation_;
+  if (!surface_source_) {
+    g.surfaces.reset();
+    return;
+  }
+  const std::unique_ptr<render::SurfaceData> last = std::move(g.surfaces);
+  g.surfaces = std::make_unique<render::SurfaceData>(g.functions, g.limits, *surface_source_, last.get());
 }
 
 void Viewer::upload(Gl& g, render::Deadline deadline) {
@@ -397,10 +499,24 @@ void Viewer::upload(Gl& g, render::Deadline deadline) {
   upload_progress_ = g.upload ? g.upload->progress() : 1.0;
 }
 
-render::SurfaceDepth Viewer::surface() const {
+VolumePtr Viewer::empty_volume() {
+  if (!empty_volume_) {
+    volume::ScalarVolume empty;
+    empty.name = "nothing";
+    empty.bounds_max = glm::ivec3(0);
+    const dvec3 middle = 0.5 * (surface_source_->pose.low + surface_source_->pose.high);
+    empty.index_to_world[3] = glm::dvec4(middle, 1.0);
+    empty_volume_ = std::make_shared<const VolumeAsset>(std::move(empty));
+  }
+  return empty_volume_;
+}
+
+render::Surfaces Viewer::surfaces() const {
   const render::HostDepth& depth = gl_->host_depth;
-  if (depth.texture() == 0) return {};
-  return {depth.texture(), depth.layers(), depth.size()};
+  render::Surfaces surfaces;
+  if (depth.texture() != 0) surfaces = {depth.texture(), depth.layers(), depth.size(), nullptr};
+  surfaces.scene = gl_->surfaces.get();
+  return surfaces;
 }
 
 void Viewer::trace(const Frame& frame, render::Deadline deadline) {
@@ -425,7 +541,7 @@ void Viewer::trace(const Frame& frame, render::Deadline deadline) {
   wish.surface_generation = surface_generation_;
   wish.preview = sampling_.preview;
   wish.depth = frame.write_depth;
-  g.progressive.advance(wish, *g.data, surface(), deadline, frame.budget_ms);
+  g.progressive.advance(wish, *g.data, surfaces(), deadline, frame.budget_ms);
 }
 
 void Viewer::make_target_textures(Gl& g, const Frame& frame) {
@@ -527,8 +643,10 @@ FrameResult Viewer::render(const Frame& frame) {
     if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
     attempt([&] { draw(frame, result); });
     const Builder::Status status = builder_.status();
-    result.loading = builder_.busy() || g.upload != nullptr;
-    result.failed = status.error && *status.error != ErrorCode::cancelled;
+    result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
+    const auto surface_failure = surface_builder_.failure();
+    result.failed = (status.error && *status.error != ErrorCode::cancelled) ||
+                    (surface_failure && surface_failure->code() != ErrorCode::cancelled);
     result.converged = !result.loading && g.data && view_ && g.progressive.converged();
     const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
     result.more =
@@ -545,7 +663,7 @@ Pick Viewer::pick(double x, double y) {
   with_gl([&](Gl& g) {
     if (!g.data || !view_ || !(x >= 0.0 && y >= 0.0 && x < frame_size_.x && y < frame_size_.y)) return;
     const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
-    const float z = g.progressive.tracer().pick(*g.data, parameters(), surface(), pixel);
+    const float z = g.progressive.tracer().pick(*g.data, parameters(), surfaces(), pixel);
     if (!(z > 0.0F)) return;
     const double right = 2.0 * (pixel.x + 0.5) / frame_size_.x - 1.0;
     const double up = 1.0 - 2.0 * (pixel.y + 0.5) / frame_size_.y;

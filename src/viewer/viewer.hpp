@@ -20,6 +20,7 @@
 #include "viewer/builder.hpp"
 #include "viewer/camera.hpp"
 #include "viewer/navigation.hpp"
+#include "viewer/surface_builder.hpp"
 
 namespace cumulet::viewer {
 
@@ -40,6 +41,13 @@ struct Light {
   float sun_elevation_degrees = 0.0F;
   glm::vec3 sun_irradiance{0.0F};
   glm::vec3 sky_radiance{0.0F};
+};
+
+enum class SurfaceLight { full = 0, shadows = 1 };
+
+struct SurfaceSettings {
+  SurfaceMoment moment;
+  SurfaceLight light = SurfaceLight::full;
 };
 
 struct Sampling {
@@ -134,11 +142,21 @@ class Viewer {
   /// The newest volume; null if there is none.
   VolumePtr volume();
   void rebuild();
-  void cancel() { builder_.cancel(); }
+  void cancel();
   /// Throws how the last job ended, or Error(timeout).
   void wait(double timeout_ms);
   /// As Builder's, and uploading.
   [[nodiscard]] Builder::Status status() const;
+
+  void load_surfaces(const std::string& path);
+  /// Shows these at once, null: none. Cancels a load under way.
+  void show_surfaces(SurfacePtr surfaces);
+  void set_surfaces(const SurfaceSettings& settings);
+  [[nodiscard]] const SurfaceSettings& surface_settings() const { return surface_settings_; }
+  /// The newest; null if there are none.
+  SurfacePtr surface_source();
+  /// Looks through a camera of the newest surfaces. Throws Error(invalid_argument) if there is none such.
+  void use_surface_camera(std::size_t index);
 
   void set_grid(const GridSettings& settings);
   void set_medium(const Medium& medium);
@@ -184,6 +202,9 @@ class Viewer {
     std::shared_ptr<const render::MarchSource> data_source;    // what data is of
     std::shared_ptr<const render::MarchSource> upload_source;  // what upload is of, or what failed to be uploaded
     std::unique_ptr<render::MarchUpload> upload;
+    std::unique_ptr<render::SurfaceData> surfaces;
+    SurfacePtr surfaces_source;  // what surfaces is of, or what failed to be uploaded
+    std::uint64_t surfaces_revision = 0;
     render::Picture empty;
     gl::Object colour;  // the texture target
     gl::Object depth;
@@ -212,7 +233,10 @@ class Viewer {
   void draw(const Frame& frame, FrameResult& result);
   void make_target_textures(Gl& g, const Frame& frame);
   void upload(Gl& g, render::Deadline deadline);
-  [[nodiscard]] render::SurfaceDepth surface() const;
+  void upload_surfaces(Gl& g);
+  [[nodiscard]] std::optional<Bounds> box() const;
+  VolumePtr empty_volume();
+  [[nodiscard]] render::Surfaces surfaces() const;
   const render::Picture& readable();
 
   Log log_;
@@ -227,6 +251,8 @@ class Viewer {
   GridSettings grid_;
   Medium medium_;
   Light light_;
+  SurfaceSettings surface_settings_;
+  SurfacePtr surface_source_;  // newest
   Sampling sampling_;
   DisplaySettings display_;
   std::shared_ptr<Camera> camera_;
@@ -235,10 +261,11 @@ class Viewer {
   std::chrono::steady_clock::time_point last_frame_time_{};
 
   VolumePtr volume_;              // newest
+  VolumePtr empty_volume_;        // where there are surfaces alone
   Built built_;                   // newest, and what is uploaded again in a new context
   std::uint64_t generation_ = 1;  // of the data in GL
   std::uint64_t settings_revision_ = 1;
-  std::uint64_t surface_generation_ = 1;  // of the host's depth
+  std::uint64_t surface_generation_ = 1;  // of the host's depth and the surfaces
   glm::uvec2 frame_size_{0U};             // of the last frame's picture
   std::optional<ViewFrame> view_;         // of the last frame
   std::optional<ViewFrame> last_view_;    // of the frame before
@@ -247,7 +274,8 @@ class Viewer {
   render::Totals totals_;
 
   std::unique_ptr<Gl> gl_;
-  Builder builder_;  // last: its thread uses the above
+  Builder builder_;  // these last: their threads use the above
+  SurfaceBuilder surface_builder_;
 };
 
 }  // namespace cumulet::viewer

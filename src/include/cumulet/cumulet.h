@@ -40,14 +40,18 @@
  *       - storage buffer bindings 0-1, uniform buffer bindings 0-1 and their generic points, image units 0-2
  *       - pixel pack and unpack buffers and all pixel store parameters
  *       - viewport 0, scissor test and box 0, colour mask (of every draw buffer), depth mask, function, test and range,
- *         depth clamp, stencil test, blending (enable, functions, equations, colour) of draw buffer 0 and the enable of
- *         the others, cull face (enable, mode), front face, polygon mode and smoothing, polygon offset enables,
- * rasterizer discard, logic op, multisample, sample shading, sample alpha to coverage and to one, sample coverage and
- * mask, primitive restart (both), clip distances 0-7, clip control, dither, GL_FRAMEBUFFER_SRGB and the contents of the
- * frame's own target. It never touches: queries, transform feedback, sync objects of the host, the debug callback and
- * its filters, or any other object. Do not call it inside transform feedback, conditional rendering or a query of the
- * host's. With CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored: afterwards the state listed above is
- * undefined. glGetError is clean after every call; errors that were pending before are dropped.
+ *         depth clamp, stencil test
+ *       - blending (enable, functions, equations, colour) of draw buffer 0 and the enable of the others
+ *       - cull face (enable, mode), front face, polygon mode and smoothing, polygon offset enables
+ *       - rasterizer discard, logic op, multisample, sample shading, sample alpha to coverage and to one
+ *       - sample coverage and mask, primitive restart (both), clip distances 0-7, clip control, dither
+ *       - GL_FRAMEBUFFER_SRGB
+ *
+ *     and the contents of the frame's own target. It never touches: queries, transform feedback, sync objects of the
+ *     host, the debug callback and its filters, or any other object. Do not call it inside transform feedback,
+ *     conditional rendering or a query of the host's. With CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored:
+ *     afterwards the state listed above is undefined. glGetError is clean after every call; errors that were pending
+ *     before are dropped.
  *
  * Ownership
  *     Handles belong to the caller that got them and end with the function named beside the type; what a handle refers
@@ -260,6 +264,50 @@ CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_vo
 CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out);
 /* Stops loading and building, soon; what was shown stays, with the settings it was built with. Any thread, any time. */
 CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
+
+/*
+ * Begins to read a glTF 2.0 scene (.gltf or .glb) on a worker; the surfaces shown before stay until it is ready, for
+ * good if that fails. Surfaces and volume share one world space and one picture: rays end at triangles, and light goes
+ * both ways. The library reads all of glTF 2.0's triangles, materials, skins, morph targets, animations, cameras, and
+ * these extensions: KHR_lights_punctual, KHR_materials_unlit, _emissive_strength, _ior, _specular, _clearcoat and
+ * _transmission (thin and clear: what passes goes straight on), KHR_texture_transform, KHR_mesh_quantization,
+ * KHR_draco_mesh_compression, EXT_meshopt_compression. Watts per steradian and per square metre stand for KHR_lights_
+ * punctual's candela and lux. Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
+ * NULL: shows no surfaces, at once. cumulet_wait, cumulet_get_progress and cumulet_cancel are about this work, too.
+ */
+CUMULET_API cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path);
+
+typedef enum cumulet_surface_light {
+  CUMULET_SURFACE_LIGHT_FULL = 0,   /* light goes on between surfaces, and between them and the volume */
+  CUMULET_SURFACE_LIGHT_SHADOWS = 1 /* surfaces are lit by sun, sky and lamps alone, through the volume's shadow */
+} cumulet_surface_light;
+
+typedef struct cumulet_surfaces_desc {
+  size_t struct_size;
+  double time;        /* seconds into the animation; past its end it begins anew */
+  uint32_t animation; /* its number in the file; one that is not there: as the scene rests */
+  cumulet_surface_light light;
+} cumulet_surfaces_desc;
+
+/* Poses the surfaces on the worker if the moment changed; the last pose is shown until then. */
+CUMULET_API cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, const cumulet_surfaces_desc* desc);
+
+typedef struct cumulet_surfaces_info {
+  size_t struct_size;
+  uint64_t triangles;
+  uint32_t materials;
+  uint32_t lights;
+  uint32_t cameras;
+  uint32_t animations;
+  double duration;      /* seconds, of the animation that is set; 0 without */
+  double bounds_min[3]; /* world space, as posed last */
+  double bounds_max[3];
+} cumulet_surfaces_info;
+
+/* Of the surfaces that were read last; CUMULET_ERROR_INVALID_ARGUMENT if there are none. */
+CUMULET_API cumulet_status cumulet_get_surfaces_info(cumulet_viewer* viewer, cumulet_surfaces_info* info);
+/* Moves the viewer's camera to one of the surfaces' own, as posed last. */
+CUMULET_API cumulet_status cumulet_use_surface_camera(cumulet_viewer* viewer, uint32_t index);
 
 typedef enum cumulet_stage {
   CUMULET_STAGE_IDLE = 0,
@@ -596,14 +644,14 @@ CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_
 
 typedef struct cumulet_pick {
   size_t struct_size;
-  int32_t hit;        /* 1: the volume reaches half opacity along the pixel's ray */
+  int32_t hit;        /* 1: a surface is met, or the volume reaches half opacity, along the pixel's ray */
   double position[3]; /* world space, where it does */
   double distance;    /* from the ray's origin */
 } cumulet_pick;
 
 /* [GL] What is at the position x, y of the picture last rendered, in pixels of its frame. */
 CUMULET_API cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick);
-/* World bounds of the viewer's volume. CUMULET_ERROR_INVALID_ARGUMENT if it has none. */
+/* World bounds of the viewer's volume and surfaces. CUMULET_ERROR_INVALID_ARGUMENT if it has neither. */
 CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], double box_max[3]);
 
 /*

@@ -84,6 +84,7 @@ enum class View {
   density = CUMULET_VIEW_DENSITY,
   wireframe = CUMULET_VIEW_WIREFRAME
 };
+enum class SurfaceLight { full = CUMULET_SURFACE_LIGHT_FULL, shadows = CUMULET_SURFACE_LIGHT_SHADOWS };
 enum class Preview { automatic = CUMULET_PREVIEW_AUTO, off = CUMULET_PREVIEW_OFF };
 enum class ToneMap {
   neutral = CUMULET_TONE_MAP_NEUTRAL,
@@ -480,6 +481,19 @@ struct LightDesc {
   }
 };
 
+struct SurfacesDesc {
+  double time = 0.0;
+  std::uint32_t animation = 0;
+  SurfaceLight light{};
+
+  operator cumulet_surfaces_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_surfaces_desc),
+            .time = time,
+            .animation = animation,
+            .light = static_cast<cumulet_surface_light>(light)};
+  }
+};
+
 struct SamplingDesc {
   std::uint32_t samples = 0;
   std::uint32_t seed = 0;
@@ -726,6 +740,16 @@ struct Progress {
   Text<512> message;
 };
 
+struct SurfacesInfo {
+  std::uint64_t triangles = 0;
+  std::uint32_t materials = 0;
+  std::uint32_t lights = 0;
+  std::uint32_t cameras = 0;
+  std::uint32_t animations = 0;
+  double duration = 0.0;
+  Bounds bounds;
+};
+
 struct Stats {
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
@@ -853,6 +877,25 @@ class Viewer {
 
   [[nodiscard]] Result<> set_grid(const GridDesc& desc) noexcept { return set(cumulet_set_grid, desc); }
   [[nodiscard]] Result<> set_medium(const MediumDesc& desc) noexcept { return set(cumulet_set_medium, desc); }
+  /// An empty path: shows no surfaces.
+  [[nodiscard]] Result<> load_surfaces(const std::string& path) noexcept {
+    return result(cumulet_load_surfaces(handle(), detail::or_null(path)));
+  }
+  [[nodiscard]] Result<> set_surfaces(const SurfacesDesc& desc) noexcept { return set(cumulet_set_surfaces, desc); }
+  [[nodiscard]] Result<SurfacesInfo> get_surfaces_info() const noexcept {
+    auto c = detail::sized<cumulet_surfaces_info>();
+    if (auto done = result(cumulet_get_surfaces_info(handle(), &c)); !done) return done.error();
+    return SurfacesInfo{.triangles = c.triangles,
+                        .materials = c.materials,
+                        .lights = c.lights,
+                        .cameras = c.cameras,
+                        .animations = c.animations,
+                        .duration = c.duration,
+                        .bounds = {std::to_array(c.bounds_min), std::to_array(c.bounds_max)}};
+  }
+  [[nodiscard]] Result<> use_surface_camera(std::uint32_t index) noexcept {
+    return result(cumulet_use_surface_camera(handle(), index));
+  }
   [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
   [[nodiscard]] Result<> set_sampling(const SamplingDesc& desc) noexcept { return set(cumulet_set_sampling, desc); }
   [[nodiscard]] Result<> set_display(const DisplayDesc& desc) noexcept { return set(cumulet_set_display, desc); }

@@ -32,6 +32,7 @@ struct CpuTetLinear {
 
 #undef CM_RANDOM_GLSL
 #undef CM_PHASE_GLSL
+#undef CM_FRAME_GLSL
 #undef CM_MARCH_TET_GLSL
 #undef CM_PATH_GLSL
 

@@ -1,0 +1,290 @@
+// Triangles and materials as the path tracer meets them: what the tables of one buffer of words say of a point. The
+// order of the tables is that of src/render/surface_data.cpp. Includes bvh.glsl; needs bsdf.glsl before it.
+#ifndef CM_SURFACE_GLSL
+#define CM_SURFACE_GLSL
+
+layout(binding = 9) uniform usamplerBuffer cm_scene_words;
+layout(binding = 10) uniform sampler2DArray cm_atlas;
+
+#define CM_MATERIAL_WORDS 24u
+#define CM_VERTEX_WORDS 3u
+
+#define CM_ALPHA_MASK 1u
+#define CM_ALPHA_BLEND 2u
+#define CM_UNLIT 4u
+
+#define CM_USE_BASE_COLOR 6u
+#define CM_USE_METALLIC_ROUGHNESS 8u
+#define CM_USE_NORMAL 10u
+#define CM_USE_EMISSION 12u
+#define CM_USE_SPECULAR 14u
+#define CM_USE_SPECULAR_COLOR 16u
+#define CM_USE_CLEARCOAT 18u
+#define CM_USE_CLEARCOAT_ROUGHNESS 20u
+#define CM_USE_TRANSMISSION 22u
+
+uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(word)); }
+vec4 cm_floats(uint word) { return uintBitsToFloat(texelFetch(cm_scene_words, int(word))); }
+
+uvec4 cm_bvh_node(uint texel) { return cm_words(texel); }
+uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.lights.w + texel); }
+
+// What the ray under way is, for cm_hit_accept.
+uint cm_hit_seed = 0u;
+bool cm_hit_camera = false;
+
+vec3 cm_to_world(vec3 v) { return cm.from_cube_x.xyz * v.x + cm.from_cube_y.xyz * v.y + cm.from_cube_z.xyz * v.z; }
+vec3 cm_world_origin() { return vec3(cm.from_cube_x.w, cm.from_cube_y.w, cm.from_cube_z.w); }
+vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm_world_origin(); }
+vec3 cm_to_cube_point(vec3 p) {
+  vec3 v = p - cm_world_origin();
+  return cm.to_cube_x.xyz * v.x + cm.to_cube_y.xyz * v.y + cm.to_cube_z.xyz * v.z;
+}
+
+// Unit vector of two signed 16-bit octahedral coordinates (Cigolle et al., "A Survey of Efficient Representations for
+// Independent Unit Vectors", JCGT 3(2), 2014).
+vec3 cm_octahedral(uint word) {
+  vec2 e = unpackSnorm2x16(word);
+  vec3 v = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+  if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(v.xy, vec2(0.0)));
+  return normalize(v);
+}
+
+struct CmVertexMix {
+  uvec4 corner;  // the three vertices, and the material
+  vec3 weight;
+  vec2 uv_0;
+  vec2 uv_1;
+  vec4 color;
+};
+
+CmVertexMix cm_vertex_mix(uint triangle, vec2 weights) {
+  CmVertexMix m;
+  m.corner = cm_words(cm.scene.x + triangle);
+  m.weight = vec3(1.0 - weights.x - weights.y, weights);
+  vec4 uv = vec4(0.0);
+  m.color = vec4(0.0);
+  for (int i = 0; i < 3; ++i) {
+    uint vertex = cm.scene.y + CM_VERTEX_WORDS * m.corner[i];
+    uv += m.weight[i] * cm_floats(vertex + 1u);
+    uvec4 last = cm_words(vertex + 2u);
+    m.color += m.weight[i] * vec4(unpackUnorm2x16(last.z), unpackUnorm2x16(last.w));
+  }
+  m.uv_0 = uv.xy;
+  m.uv_1 = uv.zw;
+  return m;
+}
+
+int cm_wrap(int i, int size, uint mode) {
+  if (mode == 2u) return clamp(i, 0, size - 1);
+  int period = mode == 1u ? 2 * size : size;
+  i = i % period;
+  if (i < 0) i += period;
+  return i < size ? i : period - 1 - i;
+}
+
+vec4 cm_atlas_texel(uvec4 texture_words, ivec2 at) {
+  ivec2 size = ivec2(texture_words.y & 0xffffu, texture_words.y >> 16);
+  ivec2 corner = ivec2(texture_words.x & 0xffffu, texture_words.x >> 16);
+  at = ivec2(cm_wrap(at.x, size.x, texture_words.w & 3u), cm_wrap(at.y, size.y, (texture_words.w >> 2) & 3u));
+  return texelFetch(cm_atlas, ivec3(corner + at, int(texture_words.z)), 0);
+}
+
+vec3 cm_from_srgb(vec3 v) {
+  return mix(v / 12.92, pow((v + 0.055) / 1.055, vec3(2.4)), greaterThan(v, vec3(0.04045)));
+}
+
+// A material's texture at a point, filtered bilinearly (samples are spread over the pixel: that is the minification
+// filter); white where there is none.
+vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
+  uint word = cm.scene.z + CM_MATERIAL_WORDS * material + use;
+  uvec4 head = cm_words(word);
+  if (head.x == 0u) return vec4(1.0);
+  vec4 tail = cm_floats(word + 1u);
+  vec3 rest = uintBitsToFloat(head.yzw);
+  vec2 uv = (head.x & 0x80000000u) != 0u ? m.uv_1 : m.uv_0;
+  uv = vec2(rest.x * uv.x + rest.z * uv.y, rest.y * uv.x + tail.x * uv.y) + tail.yz;
+  uvec4 t = cm_words(cm.scene.w + (head.x & 0x7fffffffu) - 1u);
+  vec2 size = vec2(t.y & 0xffffu, t.y >> 16);
+  // Far outside, whole turns would lose the fraction's precision: each wrap mode repeats after two.
+  vec2 at = (uv - 2.0 * floor(0.5 * uv) * vec2((t.w & 3u) == 2u ? 0.0 : 1.0, ((t.w >> 2) & 3u) == 2u ? 0.0 : 1.0));
+  at = clamp(at, vec2(-4.0), vec2(4.0)) * size;
+  vec4 value;
+  if ((t.w & 16u) != 0u) {
+    value = cm_atlas_texel(t, ivec2(floor(at)));
+    return srgb ? vec4(cm_from_srgb(value.rgb), value.a) : value;
+  }
+  vec2 low = floor(at - 0.5);
+  vec2 f = at - 0.5 - low;
+  vec4 sum = vec4(0.0);
+  for (int i = 0; i < 4; ++i) {
+    ivec2 offset = ivec2(i & 1, i >> 1);
+    value = cm_atlas_texel(t, ivec2(low) + offset);
+    if (srgb) value.rgb = cm_from_srgb(value.rgb);
+    sum += value * (offset.x == 1 ? f.x : 1.0 - f.x) * (offset.y == 1 ? f.y : 1.0 - f.y);
+  }
+  return sum;
+}
+
+uint cm_material_flags(uint material) { return cm_words(cm.scene.z + CM_MATERIAL_WORDS * material + 5u).x; }
+
+// Whether a ray ends at a triangle that asks. Coverage (BLEND) and transmission are chances, so that no order of
+// surfaces and volume has to be found.
+bool cm_hit_accept(uint triangle, vec2 weights) {
+  CmVertexMix m = cm_vertex_mix(triangle, weights);
+  uint word = cm.scene.z + CM_MATERIAL_WORDS * m.corner.w;
+  uint flags = cm_words(word + 5u).x;
+  float transmission = cm_floats(word + 4u).y;
+  vec4 base = cm_floats(word) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
+  if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + 1u).w) return false;
+  float solid = (flags & CM_ALPHA_BLEND) != 0u ? base.a : 1.0;
+  if (transmission > 0.0) {
+    // Thin and clear: what passes goes straight on, in the share of the base colour's luminance.
+    float passes = transmission * cm_texture(m.corner.w, CM_USE_TRANSMISSION, m, false).r;
+    solid *= 1.0 - passes * clamp(dot(base.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0, 1.0);
+  }
+  return solid >= 1.0 || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x) < solid;
+}
+
+// Cameras see through the backs of single-sided materials; light does not.
+#define CM_HIT_ACCEPT
+#define CM_BVH_CULLS cm_hit_camera
+#include "bvh.glsl"
+
+struct CmSurfacePoint {
+  CmSurface material;
+  vec3 position;   // world
+  vec3 geometric;  // unit normal of the triangle, on the side the path came from
+  vec3 emission;
+  bool unlit;
+};
+
+// The point of a triangle that a path along w (world) has met.
+CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
+  CmSurfacePoint point;
+  CmVertexMix m = cm_vertex_mix(triangle, weights);
+  uint material = m.corner.w;
+  uint word = cm.scene.z + CM_MATERIAL_WORDS * material;
+  vec3 position[3];
+  vec3 normal = vec3(0.0);
+  vec4 tangent = vec4(0.0);
+  for (int i = 0; i < 3; ++i) {
+    uint vertex = cm.scene.y + CM_VERTEX_WORDS * m.corner[i];
+    uvec4 first = cm_words(vertex);
+    uvec4 last = cm_words(vertex + 2u);
+    position[i] = uintBitsToFloat(first.xyz);
+    normal += m.weight[i] * cm_octahedral(first.w);
+    float hand = uintBitsToFloat(last.y);
+    if (hand != 0.0) tangent += m.weight[i] * vec4(cm_octahedral(last.x), hand);
+  }
+  point.position = m.weight.x * position[0] + m.weight.y * position[1] + m.weight.z * position[2];
+  vec3 g = cross(position[1] - position[0], position[2] - position[0]);
+  // Scaled first: the cross product of a tiny triangle has no length in fp32.
+  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
+  point.geometric = dot(g, w) > 0.0 ? -g : g;
+  float normal_length = length(normal);
+  normal = normal_length > 1e-6 ? normal / normal_length : g;
+  bool back = dot(normal, point.geometric) < 0.0;
+
+  vec4 base = cm_floats(word) * cm_texture(material, CM_USE_BASE_COLOR, m, true) * m.color;
+  vec4 emission = cm_floats(word + 1u);
+  vec4 a = cm_floats(word + 2u);
+  vec4 b = cm_floats(word + 3u);
+  vec4 c = cm_floats(word + 4u);
+  uint flags = cm_words(word + 5u).x;
+  vec4 rough = cm_texture(material, CM_USE_METALLIC_ROUGHNESS, m, false);
+
+  if (cm_words(word + CM_USE_NORMAL).x != 0u) {
+    vec3 t = tangent.xyz - dot(tangent.xyz, normal) * normal;
+    float hand = tangent.w < 0.0 ? -1.0 : 1.0;
+    if (dot(t, t) > 1e-12) {
+      vec3 n = cm_texture(material, CM_USE_NORMAL, m, false).xyz * 2.0 - 1.0;
+      n.xy *= c.z;
+      t = normalize(t);
+      vec3 bumped = n.x * t + n.y * hand * cross(normal, t) + n.z * normal;
+      if (dot(bumped, bumped) > 1e-12) normal = normalize(bumped);
+    }
+  }
+  if (back) normal = -normal;
+  // A shading normal that faces away would reflect nothing to where the path came from.
+  float facing = dot(normal, -w);
+  if (facing < 0.02) normal = normalize(normal + (0.02 - facing) * -w);
+
+  point.unlit = (flags & CM_UNLIT) != 0u;
+  point.emission = emission.rgb * cm_texture(material, CM_USE_EMISSION, m, true).rgb;
+  if (point.unlit) point.emission = base.rgb;
+  point.material.base_color = base.rgb;
+  point.material.metallic = clamp(a.x * rough.b, 0.0, 1.0);
+  point.material.roughness = clamp(a.y * rough.g, 0.0, 1.0);
+  point.material.normal = normal;
+  float specular = a.w * cm_texture(material, CM_USE_SPECULAR, m, false).a;
+  point.material.f0 = min(a.z * b.rgb * cm_texture(material, CM_USE_SPECULAR_COLOR, m, true).rgb, vec3(1.0)) * specular;
+  point.material.specular = specular;
+  point.material.clearcoat = b.w * cm_texture(material, CM_USE_CLEARCOAT, m, false).r;
+  point.material.clearcoat_roughness = c.x * cm_texture(material, CM_USE_CLEARCOAT_ROUGHNESS, m, false).g;
+  return point;
+}
+
+// Reflected share of light from wi (world, unit) towards where the path came from, times the cosine.
+vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
+  return dot(point.geometric, wi) > 0.0 ? cm_bsdf_eval(point.material, -w, wi) : vec3(0.0);
+}
+
+// A direction to go on in, and its weight: share times cosine over density.
+void cm_surface_scatter(CmSurfacePoint point, vec3 w, float u_0, float u_1, float u_2, out vec3 wi, out vec3 weight) {
+  bool any = cm_bsdf_sample(point.material, -w, u_0, u_1, u_2, wi, weight);
+  if (!any || dot(point.geometric, wi) <= 0.0) {
+    wi = point.geometric;
+    weight = vec3(0.0);
+  }
+}
+
+// Where a ray from o (cube space) starts in the world; on a surface: beside it, on the side of its direction d (world).
+vec3 cm_surface_origin(vec3 o, bool on_surface, uint triangle, vec2 weights, vec3 d) {
+  if (!on_surface) return cm_from_cube_point(o);
+  uvec4 corner = cm_words(cm.scene.x + triangle);
+  vec3 a = cm_floats(cm.scene.y + CM_VERTEX_WORDS * corner.x).xyz;
+  vec3 b = cm_floats(cm.scene.y + CM_VERTEX_WORDS * corner.y).xyz;
+  vec3 c = cm_floats(cm.scene.y + CM_VERTEX_WORDS * corner.z).xyz;
+  vec3 g = cross(b - a, c - a);
+  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
+  vec3 p = (1.0 - weights.x - weights.y) * a + weights.x * b + weights.y * c;
+  return cm_offset_origin(p, dot(g, d) < 0.0 ? -g : g);
+}
+
+// One of the sun and the punctual lights, as likely as each other; divided by that chance. light: irradiance at right
+// angles to to_light (KHR_lights_punctual).
+void cm_lamp(vec3 here, float u, inout vec3 light, inout vec3 to_light, inout float distance) {
+  bool sun = max(light.x, max(light.y, light.z)) > 0.0;
+  uint count = cm.lights.y + (sun ? 1u : 0u);
+  uint choice = min(uint(u * float(count)), count - 1u);
+  if (choice == cm.lights.y) {
+    light *= float(count);
+    return;
+  }
+  uint word = cm.lights.x + 4u * choice;
+  vec4 head = cm_floats(word);
+  vec3 position = cm_floats(word + 1u).xyz;
+  vec3 shines = cm_floats(word + 2u).xyz;
+  light = cm_floats(word + 3u).xyz * float(count);
+  if (head.x == 0.0) {  // directional
+    to_light = -shines;
+    return;
+  }
+  vec3 way = position - here;
+  float square = max(dot(way, way), 1e-12);
+  distance = sqrt(square);
+  to_light = way / distance;
+  float falloff = 1.0 / square;
+  if (head.y > 0.0) {
+    float r = square / (head.y * head.y);
+    falloff *= clamp(1.0 - r * r, 0.0, 1.0);
+  }
+  if (head.x == 2.0) {  // spot: head.zw turn the cosine into 0 at the outer cone, 1 at the inner
+    float spot = clamp(dot(shines, -to_light) * head.z + head.w, 0.0, 1.0);
+    falloff *= spot * spot;
+  }
+  light *= falloff;
+}
+
+#endif

@@ -1,0 +1,304 @@
+#include "render/surface_data.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <span>
+
+#include "base/error.hpp"
+
+namespace cumulet::render {
+
+namespace {
+
+using glm::uvec2;
+using glm::uvec4;
+using glm::vec2;
+using glm::vec3;
+using glm::vec4;
+using surface::AlphaMode;
+using surface::Material;
+using surface::TextureUse;
+
+constexpr std::uint32_t usual_edge = 2048;
+constexpr std::uint32_t largest_layer = 16384;  // what any driver of GL 4.5 takes
+constexpr GLuint words_unit = 9;
+constexpr GLuint atlas_unit = 10;
+// As glsl/surface.glsl.
+constexpr std::uint32_t flag_mask = 1;
+constexpr std::uint32_t flag_blend = 2;
+constexpr std::uint32_t flag_unlit = 4;
+constexpr std::uint32_t use_second_uv = 0x80000000U;
+
+uvec4 bits(const vec4& v) { return glm::floatBitsToUint(v); }
+uvec4 bits(const vec3& v, float w) { return glm::floatBitsToUint(vec4(v, w)); }
+
+std::uint32_t snorm16(float v) {
+  return static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(std::clamp(v, -1.0F, 1.0F) * 32767.0F)));
+}
+
+std::uint32_t octahedral(const vec3& v) {
+  const float sum = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
+  if (!(sum > 0.0F)) return 0;
+  vec2 e = vec2(v) / sum;
+  if (v.z < 0.0F) {
+    e = (1.0F - glm::abs(vec2(e.y, e.x))) * vec2(e.x >= 0.0F ? 1.0F : -1.0F, e.y >= 0.0F ? 1.0F : -1.0F);
+  }
+  return snorm16(e.x) | snorm16(e.y) << 16U;
+}
+
+std::uint32_t unorm16(float v) { return static_cast<std::uint32_t>(std::lround(std::clamp(v, 0.0F, 1.0F) * 65535.0F)); }
+
+void add_use(std::vector<uvec4>& words, const TextureUse& use) {
+  const glm::mat3x2& m = use.transform;
+  const std::uint32_t head =
+      use.texture < 0 ? 0U : static_cast<std::uint32_t>(use.texture + 1) | (use.uv_set == 1 ? use_second_uv : 0U);
+  words.emplace_back(head, glm::floatBitsToUint(m[0][0]), glm::floatBitsToUint(m[0][1]), glm::floatBitsToUint(m[1][0]));
+  words.push_back(bits(vec4(m[1][1], m[2][0], m[2][1], 0.0F)));
+}
+
+void add_material(std::vector<uvec4>& words, const Material& m) {
+  const float f0 = (m.ior - 1.0F) / (m.ior + 1.0F);
+  words.push_back(bits(m.base_color));
+  words.push_back(bits(m.emission, m.alpha_cutoff));
+  words.push_back(bits(vec4(m.metallic, m.roughness, f0 * f0, m.specular)));
+  words.push_back(bits(m.specular_color, m.clearcoat));
+  words.push_back(bits(vec4(m.clearcoat_roughness, m.transmission, m.normal_scale, 0.0F)));
+  words.emplace_back((m.alpha_mode == AlphaMode::mask ? flag_mask : 0U) |
+                         (m.alpha_mode == AlphaMode::blend ? flag_blend : 0U) | (m.unlit ? flag_unlit : 0U),
+                     0U, 0U, 0U);
+  for (const TextureUse* use : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture,
+                                &m.emission_texture, &m.specular_texture, &m.specular_color_texture,
+                                &m.clearcoat_texture, &m.clearcoat_roughness_texture, &m.transmission_texture}) {
+    add_use(words, *use);
+  }
+}
+
+std::uint32_t wrap_bits(surface::Wrap wrap) {
+  return wrap == surface::Wrap::repeat ? 0U : (wrap == surface::Wrap::mirrored ? 1U : 2U);
+}
+
+std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
+
+void add_lights(std::vector<uvec4>& words, const std::vector<surface::PunctualLight>& lights) {
+  for (const surface::PunctualLight& light : lights) {
+    using Kind = surface::PunctualLight::Kind;
+    const float kind = light.kind == Kind::directional ? 0.0F : (light.kind == Kind::point ? 1.0F : 2.0F);
+    // The cosine's way from 0 to 1, as KHR_lights_punctual gives it.
+    const float scale = 1.0F / std::max(0.001F, std::cos(light.inner_cone) - std::cos(light.outer_cone));
+    words.push_back(bits(vec4(kind, light.range, scale, -std::cos(light.outer_cone) * scale)));
+    words.push_back(bits(light.position, 0.0F));
+    words.push_back(bits(light.direction, 0.0F));
+    words.push_back(bits(light.intensity, 0.0F));
+  }
+}
+
+void pack_words(SurfaceSource& source) {
+  const surface::Scene& scene = *source.scene;
+  std::vector<uvec4>& words = source.words;
+  const auto nodes = std::as_bytes(source.bvh.nodes());
+  const auto records = std::as_bytes(source.bvh.records());
+  source.lights.w = static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
+  words.resize((nodes.size() + records.size()) / sizeof(uvec4));
+  std::memcpy(words.data(), nodes.data(), nodes.size());
+  if (!records.empty()) std::memcpy(words.data() + source.lights.w, records.data(), records.size());
+
+  source.tables.x = size_of(words);
+  words.resize(words.size() + scene.triangle_count());
+  for (const surface::Draw& draw : scene.draws) {
+    for (std::uint32_t i = draw.first_index; i + 2 < draw.first_index + draw.index_count; i += 3) {
+      words[source.tables.x + i / 3] =
+          uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], draw.material);
+    }
+  }
+  source.tables.y = size_of(words);
+  words.resize(words.size() + 3 * scene.attributes.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const surface::PosedVertex& v = source.pose.vertices[i];
+      const surface::VertexAttributes& a = scene.attributes[i];
+      uvec4* to = &words[source.tables.y + 3 * i];
+      to[0] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
+      to[1] = bits(vec4(a.uv[0], a.uv[1]));
+      to[2] = uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),
+                    unorm16(a.color.x) | unorm16(a.color.y) << 16U, unorm16(a.color.z) | unorm16(a.color.w) << 16U);
+    }
+  });
+
+  source.tables.z = size_of(words);
+  for (const Material& material : scene.materials) add_material(words, material);
+  source.tables.w = size_of(words);
+  for (const surface::Texture& texture : scene.textures) {
+    const TextureAtlas::Place& place = source.atlas.places[texture.image];
+    words.emplace_back(place.corner.x | place.corner.y << 16U, place.size.x | place.size.y << 16U, place.layer,
+                       wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << 2U |
+                           (texture.sampler.magnify == surface::Filter::nearest ? 16U : 0U));
+  }
+  source.lights.x = size_of(words);
+  source.lights.y = static_cast<std::uint32_t>(source.pose.lights.size());
+  add_lights(words, source.pose.lights);
+}
+
+void build(SurfaceSource& source, const Progress* progress) {
+  const std::vector<std::uint32_t> flags = surface::triangle_flags(*source.scene, source.pose);
+  source.bvh = surface::Bvh::build(source.pose.vertices, source.scene->indices, flags, progress);
+  source.built_cost = source.bvh.cost();
+}
+
+uvec2 halved_to_fit(uvec2 size, std::uint32_t largest) {
+  while (std::max(size.x, size.y) > largest) size = glm::max(size / 2U, uvec2(1U));
+  return size;
+}
+
+// Every 2 x 2 texels to their mean; colours stay as they are encoded: for previews of very large images that will do.
+std::vector<std::uint8_t> halve(const std::vector<std::uint8_t>& rgba, uvec2 size) {
+  const uvec2 half = glm::max(size / 2U, uvec2(1U));
+  std::vector<std::uint8_t> out(std::size_t{half.x} * half.y * 4);
+  for (std::uint32_t y = 0; y < half.y; ++y) {
+    for (std::uint32_t x = 0; x < half.x; ++x) {
+      for (std::uint32_t c = 0; c < 4; ++c) {
+        unsigned sum = 0;
+        for (std::uint32_t i = 0; i < 4; ++i) {
+          const uvec2 from = glm::min(uvec2(2 * x + (i & 1U), 2 * y + (i >> 1U)), size - 1U);
+          sum += rgba[(std::size_t{from.y} * size.x + from.x) * 4 + c];
+        }
+        out[(std::size_t{y} * half.x + x) * 4 + c] = static_cast<std::uint8_t>((sum + 2) / 4);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+TextureAtlas pack_atlas(const std::vector<surface::Image>& images, std::uint32_t largest) {
+  TextureAtlas atlas;
+  atlas.places.resize(images.size());
+  if (images.empty()) return atlas;
+  std::uint32_t widest = 1;
+  std::uint64_t texels = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const uvec2 size = halved_to_fit({images[i].width, images[i].height}, largest);
+    atlas.places[i].size = size;
+    widest = std::max({widest, size.x, size.y});
+    texels += std::uint64_t{size.x} * size.y;
+  }
+  const auto square = std::bit_ceil(static_cast<std::uint32_t>(std::ceil(std::sqrt(double(texels)))));
+  atlas.edge = std::min(largest, std::max(widest, std::min(square, usual_edge)));
+  std::vector<std::size_t> order(images.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(
+      order, [&](std::size_t a, std::size_t b) { return atlas.places[a].size.y > atlas.places[b].size.y; });
+  uvec2 at(0U);
+  std::uint32_t shelf = 0;
+  for (const std::size_t i : order) {
+    TextureAtlas::Place& place = atlas.places[i];
+    if (at.x + place.size.x > atlas.edge) {
+      at = {0U, at.y + shelf};
+      shelf = 0;
+    }
+    if (at.y + place.size.y > atlas.edge) {
+      at = uvec2(0U);
+      shelf = 0;
+      ++atlas.layers;
+    }
+    place.corner = at;
+    place.layer = atlas.layers;
+    at.x += place.size.x;
+    shelf = std::max(shelf, place.size.y);
+  }
+  ++atlas.layers;
+  return atlas;
+}
+
+std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene, surface::Pose pose,
+                                                         Progress* progress) {
+  auto source = std::make_shared<SurfaceSource>();
+  source->scene = std::move(scene);
+  source->pose = std::move(pose);
+  build(*source, progress);
+  source->atlas = pack_atlas(source->scene->images, largest_layer);
+  pack_words(*source);
+  return source;
+}
+
+std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& last, surface::Pose pose,
+                                                         Progress* progress) {
+  auto source = std::make_shared<SurfaceSource>();
+  source->scene = last.scene;
+  source->pose = std::move(pose);
+  source->bvh = last.bvh;
+  source->built_cost = last.built_cost;
+  source->bvh.refit(source->pose.vertices, source->scene->indices);
+  // A node that turned inside out has other flags; a tree whose boxes have grown apart is slow.
+  if (source->pose.flipped != last.pose.flipped || source->bvh.cost() > 1.5 * source->built_cost)
+    build(*source, progress);
+  if (progress != nullptr) progress->check();
+  source->atlas = last.atlas;
+  pack_words(*source);
+  return source;
+}
+
+SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, const SurfaceSource& source,
+                         SurfaceData* last)
+    : scene_(source.scene.get()), tables_(source.tables), lights_(source.lights) {
+  const std::size_t count = std::max<std::size_t>(1, source.words.size());
+  if (static_cast<std::int64_t>(count) > limits.texture_buffer_texels) {
+    throw Error(ErrorCode::unsupported, "the surfaces need " + std::to_string(count) +
+                                            " texels of a texture buffer; this driver's "
+                                            "GL_MAX_TEXTURE_BUFFER_SIZE is " +
+                                            std::to_string(limits.texture_buffer_texels));
+  }
+  const uvec4 none(0U);
+  buffer_ = gl::make_buffer(gl, count * sizeof(uvec4), source.words.empty() ? &none : source.words.data(), 0,
+                            "creating the surfaces' tables");
+  words_ = gl::make_texture_buffer(gl, GL_RGBA32UI, buffer_, "creating the surfaces' tables");
+  bytes_ = count * sizeof(uvec4);
+  const TextureAtlas& atlas = source.atlas;
+  if (last != nullptr && last->scene_ == scene_) {
+    atlas_ = last->atlas_;
+  } else {
+    if (static_cast<int>(atlas.edge) > limits.texture_size_2d) {
+      throw Error(ErrorCode::unsupported, "the surfaces' images need textures " + std::to_string(atlas.edge) +
+                                              " wide; this driver's GL_MAX_TEXTURE_SIZE is " +
+                                              std::to_string(limits.texture_size_2d));
+    }
+    const int layers = static_cast<int>(std::max(1U, atlas.layers));
+    const int edge = static_cast<int>(atlas.edge);
+    atlas_ = std::make_shared<gl::Object>(
+        gl::make_texture_2d_array(gl, GL_RGBA8, edge, edge, layers, "creating the surfaces' images"));
+    for (std::size_t i = 0; i < atlas.places.size(); ++i) {
+      const surface::Image& image = source.scene->images[i];
+      const TextureAtlas::Place& place = atlas.places[i];
+      const std::vector<std::uint8_t>* rgba = &image.rgba;
+      std::vector<std::uint8_t> smaller;
+      for (uvec2 size(image.width, image.height); size != place.size; size = glm::max(size / 2U, uvec2(1U))) {
+        smaller = halve(*rgba, size);
+        rgba = &smaller;
+      }
+      gl->TextureSubImage3D(atlas_->name(), 0, static_cast<int>(place.corner.x), static_cast<int>(place.corner.y),
+                            static_cast<int>(place.layer), static_cast<int>(place.size.x),
+                            static_cast<int>(place.size.y), 1, GL_RGBA, GL_UNSIGNED_BYTE, rgba->data());
+    }
+  }
+  bytes_ += std::uint64_t{atlas.edge} * atlas.edge * std::max(1U, atlas.layers) * 4;
+  gl::check(*gl, "uploading the surfaces");
+}
+
+void SurfaceData::bind(const gl::Functions& gl) const {
+  gl.BindTextureUnit(words_unit, words_.name());
+  gl.BindTextureUnit(atlas_unit, atlas_->name());
+}
+
+void SurfaceData::describe(core::CmParameters& parameters) const {
+  parameters.scene = tables_;
+  const std::uint32_t passes_light_on = parameters.lights.z;
+  parameters.lights = lights_;
+  parameters.lights.z = passes_light_on;
+}
+
+}  // namespace cumulet::render

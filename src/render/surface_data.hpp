@@ -1,0 +1,72 @@
+#pragma once
+
+#include <glm/glm.hpp>
+#include <memory>
+#include <vector>
+
+#include "gl/objects.hpp"
+#include "render/march_data.hpp"
+#include "render/parameters.hpp"
+#include "surface/bvh.hpp"
+#include "surface/scene.hpp"
+
+namespace cumulet::render {
+
+/// Images packed into layers of one size, each placed once: glsl/surface.glsl wraps and filters by itself.
+struct TextureAtlas {
+  struct Place {
+    glm::uvec2 corner{0U};
+    glm::uvec2 size{0U};
+    std::uint32_t layer = 0;
+  };
+  std::uint32_t edge = 1;  // of a layer
+  std::uint32_t layers = 0;
+  std::vector<Place> places;  // of each image
+};
+
+/// Shelves of falling height. largest: the widest layer the driver takes; images beyond it are halved until they fit.
+TextureAtlas pack_atlas(const std::vector<surface::Image>& images, std::uint32_t largest);
+
+/// What the path tracer needs of one pose of a scene, in main memory. No GL.
+struct SurfaceSource {
+  surface::ScenePtr scene;
+  surface::Pose pose;
+  surface::Bvh bvh;
+  double built_cost = 0.0;        // of the tree before it was refitted
+  std::vector<glm::uvec4> words;  // the tables of glsl/surface.glsl
+  glm::uvec4 tables{0U};          // CmParameters::scene
+  glm::uvec4 lights{0U};          // CmParameters::lights, but z
+  TextureAtlas atlas;
+};
+
+/// Builds the BVH and the tables. Throws Error(cancelled).
+std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene, surface::Pose pose,
+                                                         Progress* progress);
+/// The same scene in another pose: refits and packs anew; images stay.
+std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& last, surface::Pose pose,
+                                                         Progress* progress);
+
+/// A SurfaceSource in GL. All calls need the context current and a StateGuard around.
+class SurfaceData {
+ public:
+  /// Uploads all of it; images are taken over from `last` (may be null) where the scene is the same. Throws Error(gl,
+  /// out_of_memory, unsupported).
+  SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, const SurfaceSource& source, SurfaceData* last);
+  void bind(const gl::Functions& gl) const;
+  /// Fills the tables' places.
+  void describe(core::CmParameters& parameters) const;
+  /// Whether there are punctual lights.
+  [[nodiscard]] bool lamps() const { return lights_.y > 0; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  gl::Object buffer_;
+  gl::Object words_;
+  std::shared_ptr<gl::Object> atlas_;
+  const surface::Scene* scene_ = nullptr;
+  glm::uvec4 tables_{0U};
+  glm::uvec4 lights_{0U};
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace cumulet::render

@@ -1,0 +1,249 @@
+// Surfaces and volume in one picture, against analytic answers.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "support/gl_viewer.hpp"
+#include "support/surfaces.hpp"
+#include "support/volumes.hpp"
+
+// Mesa's OSMesa keeps its framebuffers for ever.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+using namespace cumulet;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+using render::March;
+using surface::Material;
+using test::StillScene;
+
+constexpr double pi = std::numbers::pi;
+
+class SurfaceTrace : public test::ViewerTest {};
+CUMULET_ON_BACKENDS(SurfaceTrace);
+
+viewer::CameraPose camera_at(const dvec3& eye, const dvec3& target, double fovy = 30.0) {
+  viewer::CameraPose c;
+  c.eye = eye;
+  c.target = target;
+  c.fovy_degrees = fovy;
+  return c;
+}
+
+viewer::GridSettings march(March kind) {
+  viewer::GridSettings s;
+  s.build.march = kind;
+  s.build.refine.threshold = -1.0;
+  return s;
+}
+
+volume::ScalarVolume slab(float value = 1.0F) {
+  return test::make_volume({64, 8, 64}, ivec3(0), [=](const ivec3& /*p*/) { return value; });
+}
+
+viewer::Light sun_at(float elevation_degrees, const vec3& irradiance, const vec3& sky = vec3(0.0F)) {
+  viewer::Light light;
+  light.sun_elevation_degrees = elevation_degrees;
+  light.sun_irradiance = irradiance;
+  light.sky_radiance = sky;
+  return light;
+}
+
+/// A horizontal square at a height, its front up.
+std::array<vec3, 4> floor_at(float y, float half = 200.0F) {
+  return {{{32 - half, y, 32 + half}, {32 + half, y, 32 + half}, {32 + half, y, 32 - half}, {32 - half, y, 32 - half}}};
+}
+
+std::shared_ptr<StillScene> floor_scene(const Material& material, float y = -10.0F) {
+  auto scene = std::make_shared<StillScene>();
+  scene->add(material);
+  scene->add_quad(floor_at(y), 0);
+  return scene;
+}
+
+viewer::CameraPose looking_down(double fovy = 1.0) {
+  viewer::CameraPose c = camera_at({32.0, 300.0, 32.0}, {32.0, 0.0, 32.0}, fovy);
+  c.up = {0.0, 0.0, -1.0};
+  return c;
+}
+
+// Radiance of a white floor under an absorbing slab: albedo / pi * E cos * exp(-tau / cos) on the way in, exp(-tau)
+// out.
+TEST_P(SurfaceTrace, AFloorUnderASlabIsLitAndSeenThroughIt) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer->set_camera(looking_down());
+  for (const vec3 albedo : {vec3(1.0F), vec3(0.8F, 0.4F, 0.1F)}) {
+    viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(albedo))));
+    for (const March kind : {March::tet, March::brick, March::dense}) {
+      viewer->set_grid(march(kind));
+      for (const double sigma : {1e-6, 0.05, 0.2}) {
+        viewer::Medium medium;
+        medium.density_scale = sigma;
+        medium.albedo = vec3(0.0F);
+        viewer->set_medium(medium);
+        for (const float elevation : {90.0F, 70.0F}) {
+          viewer->set_light(sun_at(elevation, vec3(3.0F)));
+          const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
+          const double cosine = std::sin(elevation * pi / 180.0);
+          const double tau = 8.0 * sigma;
+          const double expected = 3.0 * cosine / pi * std::exp(-tau / cosine - tau);
+          const double error = 4.0 * expected * std::sqrt((std::exp(tau) + 1.0) / (256.0 * 64.0)) + 1e-5;
+          EXPECT_NEAR(picture.mean().x, albedo.x * expected, error) << sigma << " " << elevation;
+          EXPECT_NEAR(picture.mean().z, albedo.z * expected, error) << sigma << " " << elevation;
+          EXPECT_NEAR(picture.mean().w, 1.0, 1e-6);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(SurfaceTrace, TheSkyLightsAFloorAsMuchAsItReflects) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer->set_camera(looking_down());
+  viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.5F)))));
+  viewer::Medium medium;
+  medium.density_scale = 1e-6;
+  viewer->set_medium(medium);
+  for (const float sun : {0.0F, 1.0F}) {
+    viewer->set_light(sun_at(90.0F, vec3(sun), vec3(2.0F)));
+    const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
+    EXPECT_NEAR(picture.mean().x, 0.5 * (2.0 + sun / pi), 0.01);
+  }
+}
+
+// Nothing absorbs: whatever the surfaces and the medium do, everything is as bright as the sky.
+TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(0), 3));
+  viewer->set_light(sun_at(0.0F, vec3(0.0F), vec3(1.0F)));
+  Material mirror;
+  mirror.metallic = 1.0F;
+  mirror.roughness = 0.0F;
+  auto scene = std::make_shared<StillScene>();
+  scene->add(test::diffuse(vec3(1.0F)));
+  scene->add(mirror);
+  scene->add_sphere({8.0F, 10.0F, 11.0F}, 4.0F, 0);
+  scene->add_sphere({17.0F, 9.0F, 11.0F}, 4.0F, 1);
+  scene->add_quad({{{0, -3, 24}, {24, -3, 24}, {24, -3, 0}, {0, -3, 0}}}, 0);
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  viewer->set_camera(camera_at({12.0, 30.0, 60.0}, {12.0, 8.0, 11.0}, 32.0));
+  for (const double density : {1e-6, 0.5}) {
+    viewer::Medium medium;
+    medium.density_scale = density;
+    medium.anisotropy = 0.4F;
+    viewer->set_medium(medium);
+    for (const March kind : {March::tet, March::brick}) {
+      viewer->set_grid(march(kind));
+      const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
+      double square = 0.0;
+      for (const glm::vec4& p : picture.pixels) square += (p.x - 1.0) * (p.x - 1.0);
+      const double error = std::sqrt(square / 576.0 / 576.0);
+      EXPECT_NEAR(picture.mean().x, 1.0, 4.0 * error + 2e-3);
+      EXPECT_LT(error, 0.005);
+      EXPECT_GT(picture.mean().w, 0.2);
+    }
+  }
+}
+
+TEST_P(SurfaceTrace, LampsFallOffWithTheSquareOfTheDistance) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer->set_camera(looking_down(0.1));
+  viewer->set_light({});
+  viewer::Medium medium;
+  medium.albedo = vec3(0.0F);
+  viewer->set_medium(medium);
+  for (const double sigma : {1e-6, 0.1}) {
+    medium.density_scale = sigma;
+    viewer->set_medium(medium);
+    // Above the slab, inside it, and below.
+    for (const float height : {40.0F, 3.5F, -4.0F}) {
+      auto scene = floor_scene(test::diffuse(vec3(1.0F)));
+      surface::PunctualLight lamp;
+      lamp.intensity = vec3(1000.0F);
+      lamp.position = {32.0F, height, 32.0F};
+      scene->rest.lights = {lamp};
+      viewer->viewer().show_surfaces(test::source_of(scene));
+      const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
+      const double through = height > 10.0F ? 8.0 : (height > 0.0F ? 4.0 : 0.0);
+      const double distance = height + 10.0;
+      const double expected = 1000.0 / (distance * distance) / pi * std::exp(-sigma * (through + 8.0));
+      EXPECT_NEAR(picture.mean().x / expected, 1.0, 0.01) << sigma << " " << height;
+    }
+  }
+}
+
+TEST_P(SurfaceTrace, CoverageIsAShareOfTheRays) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer->set_camera(looking_down());
+  viewer->set_light({});
+  viewer::Medium medium;
+  medium.density_scale = 1e-6;
+  viewer->set_medium(medium);
+  Material below;
+  below.unlit = true;
+  Material veil = below;
+  veil.base_color = {0.5F, 0.0F, 0.0F, 0.25F};
+  for (const auto mode : {surface::AlphaMode::opaque, surface::AlphaMode::blend, surface::AlphaMode::mask}) {
+    veil.alpha_mode = mode;
+    auto scene = floor_scene(below);
+    scene->add(veil);
+    scene->add_quad(floor_at(20.0F), 1);
+    scene->add_quad(floor_at(-5.0F), 1);
+    viewer->viewer().show_surfaces(test::source_of(scene));
+    const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
+    const double seen = mode == surface::AlphaMode::opaque ? 1.0 : (mode == surface::AlphaMode::mask ? 0.0 : 0.4375);
+    EXPECT_NEAR(picture.mean().x, 0.5 * seen + (1.0 - seen), 0.01);
+    EXPECT_NEAR(picture.mean().y, 1.0 - seen, 0.01);
+  }
+}
+
+TEST_P(SurfaceTrace, SurfacesNeedNoVolume) {
+  const auto viewer = make();
+  viewer->set_light(sun_at(90.0F, vec3(1.0F), vec3(1.0F)));
+  viewer->set_camera(looking_down());
+  viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.5F)))));
+  const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
+  EXPECT_NEAR(picture.mean().x, 0.5 * (1.0 + 1.0 / pi), 0.01);
+  // As posed far from the origin, too, and with a volume that comes later.
+  viewer->set_volume(slab());
+  viewer::Medium medium;
+  medium.density_scale = 100.0;
+  medium.albedo = vec3(0.0F);
+  viewer->set_medium(medium);
+  EXPECT_NEAR(test::render(*viewer, {16, 16, 16, 1, render::View::shaded}).mean().x, 0.0, 1e-3);
+}
+
+TEST_P(SurfaceTrace, CamerasSeeThroughBacksAndLightDoesNot) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer->set_camera(looking_down());
+  viewer->set_light(sun_at(90.0F, vec3(1.0F)));
+  viewer::Medium medium;
+  medium.density_scale = 1e-6;
+  viewer->set_medium(medium);
+  auto scene = floor_scene(test::diffuse(vec3(1.0F)));
+  std::array<vec3, 4> ceiling = floor_at(20.0F);
+  std::swap(ceiling[1], ceiling[3]);
+  scene->add_quad(ceiling, 0);
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  // Its back is towards the camera: the floor is seen, in the ceiling's shadow.
+  const test::Picture shadowed = test::render(*viewer, {16, 16, 16, 1, render::View::shaded});
+  EXPECT_NEAR(shadowed.mean().x, 0.0, 1e-6);
+  EXPECT_NEAR(shadowed.mean().w, 1.0, 1e-6);
+  scene->materials[0].double_sided = true;
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  const test::Picture lit = test::render(*viewer, {16, 16, 16, 1, render::View::shaded});
+  EXPECT_NEAR(lit.mean().x, 1.0 / pi, 1e-3);
+}
+
+}  // namespace
