@@ -14,8 +14,6 @@ struct cumulet_viewer {
 namespace {
 
 using namespace cumulet::c_abi;
-using cumulet::Error;
-using cumulet::ErrorCode;
 namespace core = cumulet::viewer;
 namespace render = cumulet::render;
 

@@ -544,7 +544,7 @@ void Viewer::trace(const Frame& frame, render::Deadline deadline) {
   g.progressive.advance(wish, *g.data, surfaces(), deadline, frame.budget_ms);
 }
 
-void Viewer::make_target_textures(Gl& g, const Frame& frame) {
+void Viewer::make_target_textures(Gl& g, const Frame& frame) const {
   const bool fits =
       g.colour && g.texture_size == frame.size && g.texture_format == frame.format && (g.depth || !frame.write_depth);
   // What failed once is tried again when something changes: until then the old ones serve.

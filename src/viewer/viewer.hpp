@@ -231,7 +231,7 @@ class Viewer {
   void prepare(const Frame& frame, render::Deadline deadline);
   void trace(const Frame& frame, render::Deadline deadline);
   void draw(const Frame& frame, FrameResult& result);
-  void make_target_textures(Gl& g, const Frame& frame);
+  void make_target_textures(Gl& g, const Frame& frame) const;
   void upload(Gl& g, render::Deadline deadline);
   void upload_surfaces(Gl& g);
   [[nodiscard]] std::optional<Bounds> box() const;
