@@ -83,7 +83,9 @@ TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
         }
       }
       const auto count = triangles.find(name);
-      if (count != triangles.end()) EXPECT_EQ(scene->triangle_count(), count->second);
+      if (count != triangles.end()) {
+        EXPECT_EQ(scene->triangle_count(), count->second);
+      }
     } catch (const Error& error) {
       const std::string line = error.what();
       ASSERT_NE(expected, refused.end()) << line;
