@@ -96,8 +96,12 @@ std::vector<std::uint32_t> DracoMesh::indices() const {
 void DracoMesh::read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
                      float* to, std::size_t step, const std::string& what) const {
   draco::Mesh& mesh = *state_->mesh;
-  draco::PointAttribute* attribute = mesh.attribute(mesh.GetAttributeIdByUniqueId(id));
-  if (attribute == nullptr) malformed(what + ": there is no Draco attribute " + std::to_string(id));
+  const int place = mesh.GetAttributeIdByUniqueId(id);
+  if (place < 0) malformed(what + ": there is no Draco attribute " + std::to_string(id));
+  draco::PointAttribute* attribute = mesh.attribute(place);
+  if (!attribute->is_mapping_identity() && attribute->indices_map_size() < mesh.num_points()) {
+    malformed(what + " has fewer elements than vertices");
+  }
   if (attribute->num_components() < components) malformed(what + " has the wrong type of element");
   // Draco's own flag may say something else than the accessor's.
   attribute->set_normalized(false);

@@ -167,8 +167,9 @@ std::string decode_percent(std::string_view uri) {
   return text;
 }
 
-/// Takes what tinygltf must not see out of the JSON: bytes, which are loaded here with checks; channels that name no
-/// node, and indices in no buffer view, both of which it takes for errors. What it is to have back is returned.
+/// Takes what tinygltf must not see out of the JSON, whose types are checked: bytes, which are loaded here with checks,
+/// and what it takes for errors: channels that name no node, indices in no buffer view, skins without matrices.
+/// What it is to have back is returned.
 struct SetAside {
   struct Indices {
     std::size_t mesh;
@@ -194,9 +195,9 @@ SetAside set_aside(json& root) {
     std::size_t m = 0;
     for (json& mesh : root["meshes"]) {
       std::size_t p = 0;
-      if (mesh.is_object() && mesh.contains("primitives")) {
+      if (mesh.contains("primitives")) {
         for (json& primitive : mesh["primitives"]) {
-          const auto indices = primitive.is_object() ? primitive.find("indices") : primitive.end();
+          const auto indices = primitive.find("indices");
           if (indices != primitive.end()) {
             const auto accessor = indices->get<std::size_t>();
             if (accessors == root.end() || accessor >= accessors->size()) {
@@ -214,12 +215,21 @@ SetAside set_aside(json& root) {
       ++m;
     }
   }
+  // Optional in glTF, not in tinygltf.
+  if (root.contains("skins")) {
+    std::size_t s = 0;
+    for (json& skin : root["skins"]) {
+      if (!skin.contains("joints")) malformed(numbered("skin", s) + " has no joints");
+      if (!skin.contains("inverseBindMatrices")) skin["inverseBindMatrices"] = -1;
+      ++s;
+    }
+  }
   if (root.contains("animations")) {
     for (json& animation : root["animations"]) {
-      if (!animation.is_object() || !animation.contains("channels")) continue;
+      if (!animation.contains("channels")) continue;
       json kept = json::array();
       for (json& channel : animation["channels"]) {
-        if (channel.is_object() && channel.contains("target") && !channel["target"].contains("node")) {
+        if (channel.contains("target") && !channel["target"].contains("node")) {
           ++aside.channels;
         } else {
           kept.push_back(std::move(channel));

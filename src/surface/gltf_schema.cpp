@@ -213,7 +213,7 @@ class Schema {
     if (value.is_object()) {
       value.erase("extras");
       const bool any = kinds_.contains(type + ".*");
-      for (auto& [key, member] : value.items()) {
+      for (const auto& [key, member] : value.items()) {
         std::string place = type;
         if (!place.empty()) place += '.';
         place += any ? "*" : key;

@@ -8,7 +8,7 @@
 namespace cumulet::surface::detail {
 
 /// Throws Error(file) if brackets nest deeper than any glTF needs: what reads JSON later recurses.
-void check_nesting(std::string_view json);
+void check_nesting(std::string_view text);
 
 /// Throws Error(file) that names the member. Drops `extras`, makes integers of integral numbers where integers belong,
 /// and numbers with a fraction of integers where tinygltf would cut them to 32 bits.

@@ -194,10 +194,11 @@ class Materials {
     if (known != textures_.end()) return known->second;
     const tinygltf::Texture& from = file_.model.textures[index];
     std::int32_t place = -1;
+    const Sampler made = sampler(from.sampler, index);
     const std::int64_t image = image_of(from, index);
     if (image >= 0) {
       place = static_cast<std::int32_t>(scene_.textures.size());
-      scene_.textures.push_back({static_cast<std::uint32_t>(image), sampler(from.sampler, index)});
+      scene_.textures.push_back({static_cast<std::uint32_t>(image), made});
     }
     textures_[index] = place;
     return place;

@@ -93,6 +93,7 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
     if (!detail::finite(to.position)) to.position = glm::vec3(0.0F);
     const glm::vec3 upright = direction(shape.normal, glm::vec3(0, 1, 0));
     to.normal = direction(side * (for_normals * upright), upright);
+    if (part.tangents.empty()) return;
     to.tangent = glm::vec4(glm::mat3(matrix) * glm::vec3(shape.tangent), side * shape.tangent.w);
   };
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.positions.size(), 4096), [&](const auto& range) {

@@ -91,27 +91,27 @@ class Importer {
         parent = static_cast<std::int32_t>(i);
       }
     }
+    std::vector<bool> seen(count, false);
     for (std::uint32_t i = 0; i < count; ++i) {
-      if (rig_.nodes[i].parent < 0) descend(i, rig_.order);
+      if (rig_.nodes[i].parent < 0) descend(i, seen, rig_.order);
     }
     if (rig_.order.size() == count) return;
     // With one parent each, what no root leads to goes round.
-    std::vector<bool> reached(count, false);
-    for (const std::uint32_t i : rig_.order) reached[i] = true;
-    const auto lost = std::find(reached.begin(), reached.end(), false) - reached.begin();
+    const auto lost = std::find(seen.begin(), seen.end(), false) - seen.begin();
     malformed(numbered("node", static_cast<std::size_t>(lost)) + " descends from itself");
   }
 
-  void descend(std::uint32_t root, std::vector<std::uint32_t>& to) const {
+  /// Appends the nodes that a root leads to, parents first, but for those that were seen and what they lead to.
+  void descend(std::uint32_t root, std::vector<bool>& seen, std::vector<std::uint32_t>& to) const {
     std::vector<std::uint32_t> open = {root};
     while (!open.empty()) {
       const std::uint32_t i = open.back();
       open.pop_back();
+      if (seen[i]) continue;
+      seen[i] = true;
       to.push_back(i);
       const auto& children = model_.nodes[i].children;
-      for (auto child = children.rbegin(); child != children.rend(); ++child) {
-        open.push_back(static_cast<std::uint32_t>(*child));
-      }
+      open.insert(open.end(), children.rbegin(), children.rend());
     }
   }
 
@@ -129,18 +129,8 @@ class Importer {
       if (static_cast<std::size_t>(root) >= rig_.nodes.size()) {
         malformed(numbered("scene", index) + ": there is no node " + std::to_string(root));
       }
-      const std::size_t from = rig_.displayed.size();
       // A root that another root leads to, or is named twice, is not drawn twice.
-      if (seen[static_cast<std::size_t>(root)]) continue;
-      descend(static_cast<std::uint32_t>(root), rig_.displayed);
-      std::size_t kept = from;
-      for (std::size_t i = from; i < rig_.displayed.size(); ++i) {
-        const std::uint32_t node = rig_.displayed[i];
-        if (seen[node]) continue;
-        seen[node] = true;
-        rig_.displayed[kept++] = node;
-      }
-      rig_.displayed.resize(kept);
+      descend(static_cast<std::uint32_t>(root), seen, rig_.displayed);
     }
   }
 

@@ -50,7 +50,7 @@ void sample(const Channel& channel, double time, std::span<float> to);
 struct Rig {
   std::vector<Node> nodes;
   std::vector<std::uint32_t> order;      ///< of nodes, parents first
-  std::vector<std::uint32_t> displayed;  ///< nodes of the file's scene, parents first, in the order of the file
+  std::vector<std::uint32_t> displayed;  ///< nodes of the file's scene, in its order
   std::vector<Skin> skins;
   std::vector<Track> tracks;
 };

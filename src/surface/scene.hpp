@@ -123,7 +123,7 @@ struct VertexAttributes {
 struct PosedVertex {
   glm::vec3 position;
   glm::vec3 normal;   ///< unit
-  glm::vec4 tangent;  ///< unit; w: sign of the bitangent; 0 where the material has no normal map
+  glm::vec4 tangent{0.0F};  ///< unit; w: sign of the bitangent; 0 where the material has no normal map
 };
 
 /// The scene at one time. Triangles wind counter-clockwise seen from their front, but where `flipped` says otherwise.

@@ -1,0 +1,1108 @@
+// The glTF importer, by small files made here, against numbers worked out by hand.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+
+#include "base/error.hpp"
+#include "support/gltf_check.hpp"
+#include "support/gltf_model.hpp"
+#include "support/gltf_seeds.hpp"
+#include "surface/gltf_import.hpp"
+
+namespace cumulet::surface {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Bytes;
+using test::GltfModel;
+using test::json;
+
+struct Lines {
+  std::vector<std::string> infos;
+  std::vector<std::string> warnings;
+  Log log{[](void* user, LogLevel level, const char* message) {
+            auto* lines = static_cast<Lines*>(user);
+            (level >= LogLevel::warning ? lines->warnings : lines->infos).emplace_back(message);
+          },
+          this};
+};
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+ScenePtr imported(const Bytes& file, const Log& log = {}, const GltfLimits& limits = {}) {
+  ScenePtr scene = import_gltf(file, "made.gltf", "/nowhere", log, nullptr, limits);
+  EXPECT_EQ(test::broken(*scene), "");
+  EXPECT_EQ(test::broken(*scene, scene->pose(0.0)), "");
+  return scene;
+}
+ScenePtr imported(const GltfModel& model, const Log& log = {}) { return imported(model.gltf(), log); }
+
+/// The line with which a file is refused.
+std::string refused(const Bytes& file, ErrorCode code = ErrorCode::file, const GltfLimits& limits = {}) {
+  try {
+    import_gltf(file, "made.gltf", "/nowhere", {}, nullptr, limits);
+  } catch (const Error& error) {
+    const std::string line = error.what();
+    EXPECT_EQ(error.code(), code) << line;
+    EXPECT_TRUE(line.starts_with("made.gltf: ")) << line;
+    EXPECT_GT(line.size(), 12U) << line;
+    EXPECT_LT(line.size(), 600U) << line;
+    EXPECT_EQ(line.find_first_of("\n\r\t"), std::string::npos) << line;
+    return line;
+  }
+  ADD_FAILURE() << "was imported";
+  return "";
+}
+std::string refused(const GltfModel& model, ErrorCode code = ErrorCode::file) { return refused(model.gltf(), code); }
+
+void near(const glm::vec3& a, const glm::vec3& b, float within = 1e-5F) {
+  EXPECT_LT(glm::length(a - b), within) << a.x << " " << a.y << " " << a.z << ", not " << b.x << " " << b.y << " "
+                                        << b.z;
+}
+
+/// Where the corners of the first triangle are.
+std::array<glm::vec3, 3> corners(const Scene& scene, const Pose& pose, std::size_t triangle = 0) {
+  std::array<glm::vec3, 3> result{};
+  for (std::size_t k = 0; k < 3; ++k) result[k] = pose.vertices[scene.indices[3 * triangle + k]].position;
+  return result;
+}
+
+GltfModel triangle_model(const json& node = json::object(), const json& more = json::object()) {
+  GltfModel model;
+  json primitive = {{"attributes", {{"POSITION", model.triangle()}}}};
+  primitive.update(more);
+  model.show(primitive, node);
+  return model;
+}
+
+TEST(Gltf, OneTriangleAsGltfAndAsGlb) {
+  const GltfModel model = triangle_model();
+  for (const Bytes& file : {model.gltf(), model.glb()}) {
+    const ScenePtr scene = imported(file);
+    EXPECT_EQ(scene->triangle_count(), 1U);
+    ASSERT_EQ(scene->draws.size(), 1U);
+    EXPECT_EQ(scene->draws[0].index_count, 3U);
+    EXPECT_EQ(scene->materials.size(), 1U);
+    EXPECT_TRUE(scene->animations.empty());
+    const Pose pose = scene->pose(3.0);
+    near(corners(*scene, pose)[1], {1, 0, 0});
+    near(corners(*scene, pose)[2], {0, 1, 0});
+    near(pose.vertices[0].normal, {0, 0, 1});
+    EXPECT_EQ(pose.vertices[0].tangent, glm::vec4(0.0F));
+    EXPECT_EQ(pose.low, glm::dvec3(0.0));
+    EXPECT_EQ(pose.high, glm::dvec3(1, 1, 0));
+    EXPECT_EQ(pose.flipped, std::vector<std::uint8_t>{0});
+  }
+}
+
+TEST(Gltf, ExternalFilesAreRelativeToItAndPercentDecoded) {
+  const fs::path folder = fs::temp_directory_path() / ("cumulet_gltf_test_" + std::to_string(getpid()));
+  fs::create_directories(folder / "sub dir");
+  const auto write = [](const fs::path& path, const Bytes& bytes) {
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  };
+  GltfModel model = triangle_model();
+  Bytes padded = model.data();
+  padded.resize(padded.size() + 5);  // longer than byteLength is legal
+  write(folder / "sub dir" / "a+b.bin", padded);
+  json whole = model.root;
+  whole["buffers"] = json::array({{{"byteLength", model.data().size()}, {"uri", "sub%20dir/a+b.bin"}}});
+  const auto save = [&](const json& content) {
+    const std::string text = content.dump();
+    write(folder / "scene.gltf", Bytes(text.begin(), text.end()));
+    return (folder / "scene.gltf").string();
+  };
+  EXPECT_EQ(import_gltf(save(whole), Log())->triangle_count(), 1U);
+
+  const auto line = [&](const std::string& path) -> std::string {
+    try {
+      import_gltf(path, Log());
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::file);
+      EXPECT_TRUE(has(error.what(), path)) << error.what();
+      return error.what();
+    }
+    return "was imported";
+  };
+  EXPECT_TRUE(has(line((folder / "none.gltf").string()), "no such file"));
+  EXPECT_TRUE(has(line(folder.string()), "is not a file"));
+  for (const auto& [uri, cause] :
+       std::vector<std::pair<std::string, std::string>>{{"other.bin", "other.bin: no such file"},
+                                                        {"sub%20dir", "is not a file"},
+                                                        {"/etc/passwd", "not a relative path"},
+                                                        {"file:///etc/passwd", "not a relative path"},
+                                                        {"http://example.org/a.bin", "not a relative path"},
+                                                        {"..%2f..%00", "not a relative path"},
+                                                        {"", "its URI is empty"},
+                                                        {"data:application/octet-stream;base64,@@@@", "not base64"},
+                                                        {"data:application/octet-stream,abc", "not base64"},
+                                                        {"data:;base64", "no data"},
+                                                        {"data:;base64,AAAA", "has 3 bytes, not 36"}}) {
+    json bad = whole;
+    bad["buffers"][0]["uri"] = uri;
+    const std::string told = line(save(bad));
+    EXPECT_TRUE(has(told, cause)) << uri << ": " << told;
+  }
+  write(folder / "sub dir" / "a+b.bin", Bytes(10));
+  EXPECT_TRUE(has(line(save(whole)), "has 10 bytes, not 36"));
+  fs::remove_all(folder);
+}
+
+TEST(Gltf, NodesOfTranslationRotationScaleAndMatrix) {
+  // A child, twice as large, under a parent turned by 90 degrees about z and moved.
+  GltfModel model;
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}},
+             {{"scale", {2, 3, 4}}, {"translation", {0, 0, 5}}, {"name", "child"}});
+  model.add(
+      "nodes",
+      {{"rotation", {0, 0, 0.70710678, 0.70710678}}, {"translation", {10, 0, 0}}, {"children", json::array({0})}});
+  const ScenePtr scene = imported(model);
+  const Pose pose = scene->pose(0.0);
+  const auto at = corners(*scene, pose);
+  near(at[0], {10, 0, 5});
+  near(at[1], {10, 2, 5});  // x, doubled, is y
+  near(at[2], {7, 0, 5});   // y, tripled, is -x
+  near(pose.vertices[0].normal, {0, 0, 1});
+  EXPECT_EQ(scene->draws[0].node, 0U);
+
+  // The same as a matrix, column by column.
+  GltfModel other;
+  other.show({{"attributes", {{"POSITION", other.triangle()}}}},
+             {{"matrix", {0, 2, 0, 0, -3, 0, 0, 0, 0, 0, 4, 0, 10, 0, 5, 1}}});
+  const ScenePtr same = imported(other);
+  for (std::size_t k = 0; k < 3; ++k) near(corners(*same, same->pose(0.0))[k], at[k]);
+}
+
+TEST(Gltf, NormalsUnderNonUniformScale) {
+  GltfModel model;
+  const float h = std::sqrt(0.5F);
+  model.show({{"attributes", {{"POSITION", model.triangle()}, {"NORMAL", model.vec3({h, h, 0, h, h, 0, h, h, 0})}}}},
+             {{"scale", {2, 1, 1}}});
+  const ScenePtr scene = imported(model);
+  // The inverse transpose: (1/2, 1) instead of (1, 1).
+  near(scene->pose(0.0).vertices[0].normal, glm::normalize(glm::vec3(0.5F, 1.0F, 0.0F)));
+}
+
+TEST(Gltf, MirroredNodesAreFlippedAndKeepTheirSides) {
+  GltfModel model;
+  const json textured = {{"normalTexture", {{"index", 0}}}};
+  model.add("images", {{"bufferView", model.view(test::png(1, 1, 8, 2, {128, 128, 255}))}});
+  model.add("textures", {{"source", 0}});
+  model.add("materials", textured);
+  const json shape = {{"attributes",
+                       {{"POSITION", model.triangle()},
+                        {"NORMAL", model.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1})},
+                        {"TANGENT", model.accessor<float>("VEC4", 4, {1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1})},
+                        {"TEXCOORD_0", model.vec2({0, 0, 1, 0, 0, 1})}}},
+                      {"material", 0}};
+  const int mesh = model.add("meshes", {{"primitives", json::array({shape})}});
+  model.add("nodes", {{"mesh", mesh}});
+  model.add("nodes", {{"mesh", mesh}, {"scale", {-1, 1, 1}}});
+  model.add("nodes", {{"mesh", mesh}, {"scale", {-1, -1, 1}}});
+  const ScenePtr scene = imported(model);
+  const Pose pose = scene->pose(0.0);
+  EXPECT_EQ(pose.flipped, (std::vector<std::uint8_t>{0, 1, 0}));
+  for (const std::size_t v : {0U, 3U, 6U}) near(pose.vertices[v].normal, {0, 0, 1});
+  near(glm::vec3(pose.vertices[0].tangent), {1, 0, 0});
+  near(glm::vec3(pose.vertices[3].tangent), {-1, 0, 0});
+  // The bitangent, cross(n, t) * w, is +y before; mirrored in x it stays +y, turned it is -y.
+  const auto bitangent = [&](std::size_t v) {
+    return glm::cross(pose.vertices[v].normal, glm::vec3(pose.vertices[v].tangent)) * pose.vertices[v].tangent.w;
+  };
+  near(bitangent(0), {0, 1, 0});
+  near(bitangent(3), {0, 1, 0});
+  near(bitangent(6), {0, -1, 0});
+}
+
+TEST(Gltf, FlatNormalsFaceTheFrontOfMirroredTriangles) {
+  const ScenePtr scene = imported(triangle_model({{"scale", {-1, 1, 1}}}));
+  const Pose pose = scene->pose(0.0);
+  EXPECT_EQ(pose.flipped[0], 1);
+  near(pose.vertices[0].normal, {0, 0, 1});
+}
+
+TEST(Gltf, ListsStripsAndFansWithAndWithoutIndices) {
+  const std::vector<float> five = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 2, 0};
+  const auto drawn = [&](int mode, const std::vector<std::uint8_t>& indices) {
+    GltfModel model;
+    json primitive = {{"attributes", {{"POSITION", model.vec3(five)}}}, {"mode", mode}};
+    if (!indices.empty()) primitive["indices"] = model.accessor<std::uint8_t>("SCALAR", 1, indices);
+    model.show(primitive);
+    const ScenePtr scene = imported(model);
+    const Pose pose = scene->pose(0.0);
+    std::vector<int> vertices;  // numbers in the file, by place
+    for (const std::uint32_t index : scene->indices) {
+      for (std::size_t v = 0; v < 5; ++v) {
+        const glm::vec3 place(five[3 * v], five[3 * v + 1], five[3 * v + 2]);
+        if (pose.vertices[index].position == place) vertices.push_back(static_cast<int>(v));
+      }
+    }
+    return vertices;
+  };
+  using List = std::vector<int>;
+  EXPECT_EQ(drawn(4, {}), (List{0, 1, 2}));  // two vertices are left over
+  EXPECT_EQ(drawn(4, {2, 1, 3, 4, 2, 3}), (List{2, 1, 3, 4, 2, 3}));
+  EXPECT_EQ(drawn(5, {}), (List{0, 1, 2, 1, 3, 2, 2, 3, 4}));
+  EXPECT_EQ(drawn(5, {4, 3, 2, 1}), (List{4, 3, 2, 3, 1, 2}));
+  EXPECT_EQ(drawn(6, {}), (List{1, 2, 0, 2, 3, 0, 3, 4, 0}));
+  EXPECT_EQ(drawn(6, {1, 3, 4, 2}), (List{3, 4, 1, 4, 2, 1}));
+  EXPECT_EQ(drawn(4, {0, 1, 1, 0, 1, 2}), (List{0, 1, 2}));  // one names a vertex twice
+}
+
+TEST(Gltf, PointsAndLinesAreSkippedWithOneLine) {
+  GltfModel model;
+  const int positions = model.triangle();
+  for (const int mode : {0, 1, 2, 3, 4}) {
+    model.show({{"attributes", {{"POSITION", positions}}}, {"mode", mode}});
+  }
+  Lines lines;
+  EXPECT_EQ(imported(model, lines.log)->triangle_count(), 1U);
+  ASSERT_EQ(lines.infos.size(), 1U);
+  EXPECT_TRUE(has(lines.infos[0], "4 primitives")) << lines.infos[0];
+  EXPECT_TRUE(lines.warnings.empty());
+}
+
+template <class T>
+glm::vec3 read_as(bool normalized, std::array<T, 3> value) {
+  GltfModel model;
+  std::vector<T> values(9, T(0));
+  std::copy(value.begin(), value.end(), values.begin() + 3);
+  values[7] = T(1);
+  const int positions = model.accessor<T>("VEC3", 3, values, {{"normalized", normalized}});
+  model.show({{"attributes", {{"POSITION", positions}, {"NORMAL", model.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1})}}}});
+  return imported(model)->pose(0.0).vertices[1].position;
+}
+
+TEST(Gltf, EveryComponentTypePlainAndNormalised) {
+  near(read_as<std::int8_t>(false, {-128, 127, 5}), {-128, 127, 5});
+  near(read_as<std::int8_t>(true, {-128, 127, 64}), {-1, 1, 64.0F / 127.0F});
+  near(read_as<std::uint8_t>(false, {0, 255, 5}), {0, 255, 5});
+  near(read_as<std::uint8_t>(true, {0, 255, 51}), {0, 1, 0.2F});
+  near(read_as<std::int16_t>(false, {-32768, 32767, 5}), {-32768, 32767, 5});
+  near(read_as<std::int16_t>(true, {-32768, 32767, -16384}), {-1, 1, -16384.0F / 32767.0F});
+  near(read_as<std::uint16_t>(false, {0, 65535, 5}), {0, 65535, 5});
+  near(read_as<std::uint16_t>(true, {0, 65535, 13107}), {0, 1, 0.2F});
+  near(read_as<std::uint32_t>(false, {0, 1000000, 5}), {0, 1000000, 5});
+  near(read_as<float>(false, {-1.5F, 0.25F, 1e10F}), {-1.5F, 0.25F, 1e10F});
+}
+
+TEST(Gltf, IndicesOfEverySize) {
+  const auto count = [](auto zero) {
+    using T = decltype(zero);
+    GltfModel model;
+    model.show(
+        {{"attributes", {{"POSITION", model.triangle()}}}, {"indices", model.accessor<T>("SCALAR", 1, {2, 0, 1})}});
+    const ScenePtr scene = imported(model);
+    near(corners(*scene, scene->pose(0.0))[0], {0, 1, 0});
+    return scene->triangle_count();
+  };
+  EXPECT_EQ(count(std::uint8_t{}), 1U);
+  EXPECT_EQ(count(std::uint16_t{}), 1U);
+  EXPECT_EQ(count(std::uint32_t{}), 1U);
+}
+
+TEST(Gltf, InterleavedAttributes) {
+  GltfModel model;
+  // Position, then colour, padded to 20 bytes.
+  Bytes bytes;
+  const float places[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  for (std::size_t v = 0; v < 3; ++v) {
+    const Bytes position = test::bytes_of(std::vector<float>(places + 3 * v, places + 3 * v + 3));
+    bytes.insert(bytes.end(), position.begin(), position.end());
+    const auto shade = static_cast<std::uint8_t>(51 * (v + 1));
+    bytes.insert(bytes.end(), {shade, 0, 255, 0, 0, 0, 0, 0});
+  }
+  bytes.resize(bytes.size() - 5);  // the last element need not be padded
+  const int view = model.view(bytes, {{"byteStride", 20}});
+  const int positions =
+      model.add("accessors", {{"bufferView", view}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}});
+  const int colors = model.add("accessors", {{"bufferView", view},
+                                             {"byteOffset", 12},
+                                             {"componentType", 5121},
+                                             {"normalized", true},
+                                             {"count", 3},
+                                             {"type", "VEC3"}});
+  model.show({{"attributes", {{"POSITION", positions}, {"COLOR_0", colors}}}});
+  const ScenePtr scene = imported(model);
+  near(corners(*scene, scene->pose(0.0))[2], {0, 1, 0});
+  for (std::size_t v = 0; v < 3; ++v) {
+    near(glm::vec3(scene->attributes[v].color), {0.2F * static_cast<float>(v + 1), 0, 1});
+    EXPECT_EQ(scene->attributes[v].color.a, 1.0F);
+  }
+}
+
+TEST(Gltf, VerticesThatNothingNamesAreLeftOut) {
+  GltfModel model;
+  std::vector<float> many(300, 1000.0F);
+  for (std::size_t i = 0; i < 9; ++i) many[i + 30] = i == 3 || i == 7 ? 1.0F : 0.0F;
+  const std::vector<float> up = [] {
+    std::vector<float> normals;
+    for (int i = 0; i < 100; ++i) normals.insert(normals.end(), {0, 0, 1});
+    return normals;
+  }();
+  model.show({{"attributes", {{"POSITION", model.vec3(many)}, {"NORMAL", model.vec3(up)}}},
+              {"indices", model.accessor<std::uint8_t>("SCALAR", 1, {10, 11, 12})}});
+  const ScenePtr scene = imported(model);
+  EXPECT_EQ(scene->attributes.size(), 3U);
+  EXPECT_EQ(scene->pose(0.0).high, glm::dvec3(1, 1, 0));
+}
+
+TEST(Gltf, SparseAccessors) {
+  const Bytes bytes = test::seed_animated().gltf();
+  const ScenePtr scene = imported(bytes);
+  const Pose pose = scene->pose(0.0, 99);  // at rest: first target by one half
+  // Vertex 3 is (2, 2, 0) instead of (1, 1, 0); the target, of zeros, has (0, 0, 1) and (0, 0, 2) at 1 and 3.
+  ASSERT_EQ(pose.vertices.size(), 4U);
+  near(pose.vertices[0].position, {0, 0, 0});
+  near(pose.vertices[1].position, {1, 0, 0.5F});
+  near(pose.vertices[2].position, {0, 1, 0});
+  near(pose.vertices[3].position, {2, 2, 1});
+  // The target of normals: (0, 0, 1) + 1/2 (1, 0, 0).
+  near(pose.vertices[0].normal, glm::normalize(glm::vec3(0.5F, 0, 1)));
+  near(pose.vertices[1].normal, {0, 0, 1});
+}
+
+TEST(Gltf, AnimationsStepLinearAndCubic) {
+  const ScenePtr scene = imported(test::seed_animated().gltf());
+  ASSERT_EQ(scene->animations.size(), 2U);
+  EXPECT_EQ(scene->animations[0].name, "all");
+  EXPECT_EQ(scene->animations[0].duration, 2.0);
+
+  // Joint 0: scaled by steps. Joint 1, its child: moved by a cubic spline and turned about z by 0, 90 and 180 degrees.
+  // Its inverse bind matrix takes (0, 1, 0) off. The node of the mesh, at (100, 100, 100), must not count.
+  const auto check = [&](double time, double from) {
+    const Pose pose = scene->pose(time);
+    const double u = from;
+    const double scale = u < 1.0 ? 1.0 : (u < 2.0 ? 2.0 : 3.0);
+    // Hermite on [0, 1]: 0 to (1, 1, 0), tangents (3, 0, 0) and (0, 0, 0) after the first key.
+    glm::dvec3 moved(0.0);
+    if (u <= 1.0) {
+      moved.x = (u * u * u - 2 * u * u + u) * 3.0 + (-2 * u * u * u + 3 * u * u) * 1.0;
+      moved.y = (2 * u * u * u - 3 * u * u + 1) * 1.0 + (-2 * u * u * u + 3 * u * u) * 1.0;
+    } else {
+      const double s = u - 1.0;  // (1, 1, 0) to (2, 1, 0), without tangents
+      moved = glm::dvec3(1.0 + (-2 * s * s * s + 3 * s * s), 1.0, 0.0);
+    }
+    const double angle = u * 1.5707963267948966;
+    // Vertex 1, (1, 0, 0) and morphed along z by the weights: half of it is joint 0's, half joint 1's.
+    const double w0 = u <= 1.0 ? u : 2.0 - u;
+    const double w1 = u <= 1.0 ? 0.0 : u - 1.0;
+    const glm::dvec3 shape(1.0, 0.0, w0 * 1.0 + w1 * 1.0);
+    const glm::dvec3 bound = shape - glm::dvec3(0, 1, 0);
+    const glm::dvec3 turned(std::cos(angle) * bound.x - std::sin(angle) * bound.y,
+                            std::sin(angle) * bound.x + std::cos(angle) * bound.y, bound.z);
+    const glm::dvec3 expected = 0.5 * scale * shape + 0.5 * scale * (turned + moved);
+    near(pose.vertices[1].position, glm::vec3(expected), 1e-3F);
+    EXPECT_EQ(test::broken(*scene, pose), "");
+  };
+  for (const double time : {0.0, 0.25, 0.5, 0.99, 1.0, 1.5, 2.0}) {
+    SCOPED_TRACE(time);
+    check(time, time);
+  }
+  check(2.5, 0.5);  // looped
+  check(-0.5, 1.5);
+  EXPECT_EQ(scene->pose(2.5).time, 0.5);
+
+  // The second animation moves joint 0 alone, linearly.
+  near(scene->pose(0.5, 1).vertices[0].position, {1.5F, 1.5F, 1.5F});
+}
+
+TEST(Gltf, RotationsTakeTheShorterWay) {
+  GltfModel model = triangle_model();
+  // No turn, and 90 degrees about z with the sign of the quaternion reversed: half-way are 45 degrees.
+  const int turns = model.accessor<float>("VEC4", 4, {0, 0, 0, 1, 0, 0, -0.70710678F, -0.70710678F});
+  model.add("animations",
+            {{"samplers", json::array({{{"input", model.scalars({1, 3})}, {"output", turns}}})},
+             {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "rotation"}}}}})}});
+  const ScenePtr scene = imported(model);
+  const float h = std::sqrt(0.5F);
+  near(corners(*scene, scene->pose(2.0))[1], {h, h, 0});
+  near(corners(*scene, scene->pose(0.5))[1], {1, 0, 0});  // before the first key
+  near(corners(*scene, scene->pose(3.0))[1], {0, 1, 0});
+}
+
+TEST(Gltf, MorphedFlatTrianglesTurnTheirNormals) {
+  GltfModel model;
+  const int target = model.vec3({0, 0, 0, 0, 0, 0, 0, -1, 1});  // the third vertex: from (0, 1, 0) to (0, 0, 1)
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}, {"targets", json::array({{{"POSITION", target}}})}},
+             {{"weights", {1}}});
+  const ScenePtr scene = imported(model);
+  near(scene->pose(0.0).vertices[0].normal, {0, -1, 0});
+}
+
+/// A material with a normal map on a quad of two triangles.
+GltfModel mapped_quad(const std::vector<float>& uvs, const std::vector<std::uint8_t>& indices, bool normals) {
+  GltfModel model;
+  model.add("images", {{"bufferView", model.view(test::png(1, 1, 8, 2, {128, 128, 255}))}});
+  model.add("textures", {{"source", 0}});
+  model.add("materials", {{"normalTexture", {{"index", 0}}}});
+  json attributes = {{"POSITION", model.vec3({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0})}, {"TEXCOORD_0", model.vec2(uvs)}};
+  if (normals) attributes["NORMAL"] = model.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1});
+  model.show(
+      {{"attributes", attributes}, {"indices", model.accessor<std::uint8_t>("SCALAR", 1, indices)}, {"material", 0}});
+  return model;
+}
+
+TEST(Gltf, MissingTangentsFollowTheTexture) {
+  for (const bool normals : {true, false}) {
+    // u to the right, v down, as the image lies: the tangent is +x, the bitangent +y, up in the image.
+    const ScenePtr upright = imported(mapped_quad({0, 1, 1, 1, 1, 0, 0, 0}, {0, 1, 2, 0, 2, 3}, normals));
+    for (const PosedVertex& v : upright->pose(0.0).vertices) {
+      near(glm::vec3(v.tangent), {1, 0, 0});
+      EXPECT_EQ(v.tangent.w, 1.0F);
+    }
+    // u to the left: mirrored.
+    const ScenePtr mirrored = imported(mapped_quad({1, 1, 0, 1, 0, 0, 1, 0}, {0, 1, 2, 0, 2, 3}, normals));
+    for (const PosedVertex& v : mirrored->pose(0.0).vertices) {
+      near(glm::vec3(v.tangent), {-1, 0, 0});
+      EXPECT_EQ(v.tangent.w, -1.0F);
+    }
+    // The image turned by 90 degrees: u up.
+    const ScenePtr turned = imported(mapped_quad({0, 0, 0, 1, 1, 1, 1, 0}, {0, 1, 2, 0, 2, 3}, normals));
+    for (const PosedVertex& v : turned->pose(0.0).vertices) {
+      near(glm::vec3(v.tangent), {0, 1, 0});
+      EXPECT_EQ(v.tangent.w, 1.0F);
+    }
+    // No area in the texture: some tangent.
+    const ScenePtr point = imported(mapped_quad({0, 0, 0, 0, 0, 0, 0, 0}, {0, 1, 2, 0, 2, 3}, normals));
+    EXPECT_EQ(point->triangle_count(), 2U);
+  }
+}
+
+TEST(Gltf, VerticesOnASeamOfMirroredTexturesAreSplit) {
+  // The diagonal's ends have triangles of both sides: (0,1,2) with v down, (0,2,3) mirrored.
+  GltfModel model = mapped_quad({0, 1, 1, 1, 1, 0, 1, 1}, {0, 1, 2, 0, 2, 3}, true);
+  const ScenePtr scene = imported(model);
+  const Pose pose = scene->pose(0.0);
+  EXPECT_EQ(pose.vertices.size(), 6U);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(pose.vertices[scene->indices[k]].tangent.w, 1.0F);
+    EXPECT_EQ(pose.vertices[scene->indices[3 + k]].tangent.w, -1.0F);
+  }
+  near(corners(*scene, pose, 1)[0], {0, 0, 0});
+  near(corners(*scene, pose, 1)[1], {1, 1, 0});
+  near(corners(*scene, pose, 1)[2], {0, 1, 0});
+}
+
+TEST(Gltf, BrokenNormalsAreReplaced) {
+  GltfModel model;
+  const float nan = std::nanf("");
+  model.show(
+      {{"attributes", {{"POSITION", model.triangle()}, {"NORMAL", model.vec3({0, 0, 0, nan, 0, 0, 0, 0, -5})}}}});
+  Lines lines;
+  const ScenePtr scene = imported(model, lines.log);
+  const Pose pose = scene->pose(0.0);
+  near(pose.vertices[0].normal, {0, 0, 1});
+  near(pose.vertices[1].normal, {0, 0, 1});
+  near(pose.vertices[2].normal, {0, 0, -1});
+  EXPECT_EQ(lines.warnings.size(), 1U);
+}
+
+TEST(Gltf, MaterialsAreReadWhole) {
+  Lines lines;
+  const ScenePtr scene = imported(test::seed_materials().glb(), lines.log);
+  ASSERT_EQ(scene->materials.size(), 4U);
+  const Material& m = scene->materials[0];
+  EXPECT_EQ(m.name, "everything");
+  near(glm::vec3(m.base_color), {0.1F, 0.2F, 0.3F});
+  EXPECT_FLOAT_EQ(m.base_color.a, 0.4F);
+  EXPECT_FLOAT_EQ(m.metallic, 0.25F);
+  EXPECT_FLOAT_EQ(m.roughness, 0.75F);
+  EXPECT_FLOAT_EQ(m.normal_scale, 0.5F);
+  EXPECT_FLOAT_EQ(m.occlusion_strength, 0.6F);
+  near(m.emission, {4, 8, 0});
+  EXPECT_EQ(m.alpha_mode, AlphaMode::mask);
+  EXPECT_FLOAT_EQ(m.alpha_cutoff, 0.3F);
+  EXPECT_TRUE(m.double_sided);
+  EXPECT_FALSE(m.unlit);
+  EXPECT_FLOAT_EQ(m.ior, 1.33F);
+  EXPECT_FLOAT_EQ(m.specular, 0.7F);
+  near(m.specular_color, {0.9F, 0.8F, 0.7F});
+  EXPECT_FLOAT_EQ(m.clearcoat, 0.8F);
+  EXPECT_FLOAT_EQ(m.clearcoat_roughness, 0.15F);
+  EXPECT_FLOAT_EQ(m.transmission, 0.35F);
+  for (const TextureUse* use :
+       {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture,
+        &m.emission_texture, &m.specular_texture, &m.specular_color_texture, &m.clearcoat_texture,
+        &m.clearcoat_roughness_texture, &m.transmission_texture}) {
+    EXPECT_GE(use->texture, 0);
+  }
+  // KHR_texture_transform at uv = (1, 0) and (0, 1): scaled, turned by 0.5, moved.
+  const TextureUse& turned = m.base_color_texture;
+  EXPECT_EQ(turned.uv_set, 1U);
+  const float c = std::cos(0.5F);
+  const float s = std::sin(0.5F);
+  const glm::vec2 right = turned.transform * glm::vec3(1, 0, 1);
+  const glm::vec2 down = turned.transform * glm::vec3(0, 1, 1);
+  near({right, 0}, {2 * c + 0.5F, -2 * s + 0.25F, 0});
+  near({down, 0}, {3 * s + 0.5F, 3 * c + 0.25F, 0});
+
+  const Material& blend = scene->materials[1];
+  EXPECT_EQ(blend.alpha_mode, AlphaMode::blend);
+  EXPECT_TRUE(blend.unlit);
+
+  // KHR_materials_pbrSpecularGlossiness, by what comes near.
+  const Material& glossy = scene->materials[2];
+  near(glm::vec3(glossy.base_color), {0.4F, 0.5F, 0.6F});
+  EXPECT_EQ(glossy.metallic, 0.0F);
+  EXPECT_FLOAT_EQ(glossy.roughness, 0.25F);
+  near(glossy.specular_color, {2, 1, 0.5F});
+  EXPECT_GE(glossy.base_color_texture.texture, 0);
+  ASSERT_EQ(lines.warnings.size(), 1U);
+  EXPECT_TRUE(has(lines.warnings[0], "KHR_materials_pbrSpecularGlossiness")) << lines.warnings[0];
+
+  // The default one.
+  EXPECT_EQ(scene->materials[3].base_color, glm::vec4(1.0F));
+  EXPECT_EQ(scene->materials[3].metallic, 1.0F);
+
+  const Sampler& sampler = scene->textures[static_cast<std::size_t>(turned.texture)].sampler;
+  EXPECT_EQ(sampler.magnify, Filter::nearest);
+  EXPECT_EQ(sampler.minify, Filter::linear);
+  EXPECT_EQ(sampler.between_mipmaps, Filter::nearest);
+  EXPECT_TRUE(sampler.mipmaps);
+  EXPECT_EQ(sampler.wrap_s, Wrap::clamp);
+  EXPECT_EQ(sampler.wrap_t, Wrap::mirrored);
+
+  // Vertices: two sets of coordinates and a colour.
+  const VertexAttributes& v = scene->attributes[0];
+  EXPECT_EQ(v.uv[0], glm::vec2(0, 1));
+  EXPECT_EQ(v.uv[1], glm::vec2(0, 1));
+  near(glm::vec3(v.color), {1, 0, 0.2F});
+}
+
+TEST(Gltf, ImagesOfEightAndSixteenBitsAndJpeg) {
+  const ScenePtr scene = imported(test::seed_materials().gltf());
+  const auto image = [&](const TextureUse& use) -> const Image& {
+    return scene->images[scene->textures[static_cast<std::size_t>(use.texture)].image];
+  };
+  const Material& m = scene->materials[0];
+  const Image& png = image(m.base_color_texture);
+  EXPECT_EQ(png.name, "two");
+  EXPECT_EQ(png.width, 2U);
+  EXPECT_EQ(png.height, 1U);
+  EXPECT_EQ(png.rgba, (std::vector<std::uint8_t>{255, 0, 0, 255, 0, 255, 0, 128}));
+  const Image& wide = image(m.normal_texture);  // 0x8000, 0x007F, 0xFFFF of 65535
+  EXPECT_EQ(wide.rgba, (std::vector<std::uint8_t>{128, 0, 255, 255}));
+  const Image& jpeg = image(m.occlusion_texture);
+  EXPECT_EQ(jpeg.width, 8U);
+  for (std::size_t i = 0; i < 64; ++i) {
+    EXPECT_NEAR(jpeg.rgba[4 * i], 200, 4);
+    EXPECT_NEAR(jpeg.rgba[4 * i + 1], 40, 4);
+    EXPECT_NEAR(jpeg.rgba[4 * i + 2], 90, 4);
+    EXPECT_EQ(jpeg.rgba[4 * i + 3], 255);
+  }
+  EXPECT_EQ(scene->images.size(), 3U);  // however often they are used
+}
+
+TEST(Gltf, CamerasAndLightsStandWhereTheirNodesAre) {
+  const ScenePtr scene = imported(test::seed_materials().gltf());
+  const Pose pose = scene->pose(0.0);
+  ASSERT_EQ(pose.cameras.size(), 2U);
+  const SceneCamera& eye = pose.cameras[0];
+  EXPECT_EQ(eye.name, "eye");
+  EXPECT_FALSE(eye.orthographic);
+  EXPECT_EQ(eye.vertical_fov, 0.6);
+  EXPECT_EQ(eye.aspect, 1.5);
+  EXPECT_EQ(eye.near_plane, 0.5);
+  EXPECT_EQ(eye.far_plane, 90.0);
+  near(glm::vec3(eye.to_world[3]), {1, 2, 3});
+  near(-glm::vec3(eye.to_world[2]), {-1, 0, 0});
+  const SceneCamera& flat = pose.cameras[1];
+  EXPECT_TRUE(flat.orthographic);
+  EXPECT_EQ(flat.height, 4.0);
+  EXPECT_EQ(flat.aspect, 2.0);
+
+  ASSERT_EQ(pose.lights.size(), 3U);
+  const PunctualLight& sun = pose.lights[0];
+  EXPECT_EQ(sun.kind, PunctualLight::Kind::directional);
+  near(sun.intensity, {4, 2, 1});
+  near(sun.direction, {-1, 0, 0});
+  const PunctualLight& spot = pose.lights[1];
+  EXPECT_EQ(spot.kind, PunctualLight::Kind::spot);
+  EXPECT_FLOAT_EQ(spot.inner_cone, 0.1F);
+  EXPECT_FLOAT_EQ(spot.outer_cone, 0.2F);
+  near(spot.direction, {0, 0, -1});  // its node's scale does not stretch it
+  const PunctualLight& bulb = pose.lights[2];
+  EXPECT_EQ(bulb.kind, PunctualLight::Kind::point);
+  EXPECT_EQ(bulb.range, 7.0F);
+  near(bulb.position, {1, 7, 3});
+  near(bulb.intensity, {1, 1, 1});
+}
+
+TEST(Gltf, OnlyTheDefaultSceneIsShown) {
+  GltfModel model = triangle_model();
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}}, {{"translation", {5, 0, 0}}});
+  model.root["scenes"] = json::array({{{"nodes", json::array({0})}}, {{"nodes", json::array({1})}}});
+  EXPECT_EQ(imported(model)->pose(0.0).low.x, 0.0);
+  model.root["scene"] = 1;
+  EXPECT_EQ(imported(model)->pose(0.0).low.x, 5.0);
+  model.root.erase("scene");
+  model.root.erase("scenes");
+  EXPECT_EQ(imported(model)->triangle_count(), 2U);
+  model.root["scene"] = 2;
+  EXPECT_TRUE(has(refused(model), "there is no scene 2"));
+}
+
+TEST(Gltf, Draco) {
+  for (const int speed : {0, 3, 10}) {  // Edgebreaker in two ways, and sequential
+    SCOPED_TRACE(speed);
+    const GltfModel model = test::seed_draco(4, speed);
+    const ScenePtr scene = imported(model.glb());
+    EXPECT_EQ(scene->triangle_count(), 32U);
+    const Pose pose = scene->pose(0.0);
+    double area = 0.0;
+    for (std::size_t t = 0; t < 32; ++t) {
+      const auto at = corners(*scene, pose, t);
+      const glm::vec3 normal = glm::cross(at[1] - at[0], at[2] - at[0]);
+      EXPECT_GT(normal.z, 0.0F);
+      area += 0.5 * double{normal.z};
+    }
+    EXPECT_NEAR(area, 1.0, 1e-3);
+  }
+}
+
+TEST(Gltf, Meshopt) {
+  const ScenePtr scene = imported(test::seed_meshopt().gltf());
+  EXPECT_EQ(scene->triangle_count(), 64U);  // once by triangles, once by a list of indices
+  const Pose pose = scene->pose(0.0);
+  double area = 0.0;
+  for (std::size_t t = 0; t < 64; ++t) {
+    const auto at = corners(*scene, pose, t);
+    area += 0.5 * double{glm::cross(at[1] - at[0], at[2] - at[0]).z};
+  }
+  EXPECT_NEAR(area, 2.0, 1e-3);
+  for (const PosedVertex& v : pose.vertices) near(v.normal, {0, 0, 1}, 1e-2F);
+}
+
+TEST(Gltf, MeshoptExponentialAndQuaternionFilters) {
+  GltfModel model = triangle_model();
+  const auto compressed = [&](const Bytes& filtered, std::size_t stride, std::size_t count, const char* filter) {
+    Bytes bytes(meshopt_encodeVertexBufferBound(count, stride));
+    bytes.resize(meshopt_encodeVertexBuffer(bytes.data(), bytes.size(), filtered.data(), count, stride));
+    const int view = model.view(bytes);
+    json& made = model.root["bufferViews"][static_cast<std::size_t>(view)];
+    made = {{"buffer", 0},
+            {"byteLength", count * stride},
+            {"extensions",
+             {{"EXT_meshopt_compression",
+               {{"buffer", 0},
+                {"byteOffset", made["byteOffset"]},
+                {"byteLength", bytes.size()},
+                {"byteStride", stride},
+                {"count", count},
+                {"mode", "ATTRIBUTES"},
+                {"filter", filter}}}}}};
+    return view;
+  };
+  const std::vector<float> places = {0, 0, 0, 4, 2, -8};
+  Bytes exponential(24);
+  meshopt_encodeFilterExp(exponential.data(), 2, 12, 15, places.data());
+  const std::vector<float> turns = {0, 0, 0, 1, 0, 0, 0.70710678F, 0.70710678F};
+  Bytes quaternions(16);
+  meshopt_encodeFilterQuat(quaternions.data(), 2, 8, 14, turns.data());
+  const int moves = model.add("accessors", {{"bufferView", compressed(exponential, 12, 2, "EXPONENTIAL")},
+                                            {"componentType", 5126},
+                                            {"count", 2},
+                                            {"type", "VEC3"}});
+  const int rotations = model.add("accessors", {{"bufferView", compressed(quaternions, 8, 2, "QUATERNION")},
+                                                {"componentType", 5122},
+                                                {"normalized", true},
+                                                {"count", 2},
+                                                {"type", "VEC4"}});
+  const int times = model.scalars({0, 1});
+  model.add(
+      "animations",
+      {{"samplers", json::array({{{"input", times}, {"output", moves}}, {{"input", times}, {"output", rotations}}})},
+       {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}},
+                                 {{"sampler", 1}, {"target", {{"node", 0}, {"path", "rotation"}}}}})}});
+  const ScenePtr scene = imported(model);
+  near(corners(*scene, scene->pose(1.0))[1], {4, 3, -8}, 1e-2F);  // (1, 0, 0), turned to y and moved
+}
+
+TEST(Gltf, ExtensionsRequiredAreKnownOrRefusedByName) {
+  GltfModel model = triangle_model();
+  model.root["extensionsRequired"] = {"KHR_texture_transform", "VENDOR_secret"};
+  EXPECT_TRUE(has(refused(model, ErrorCode::unsupported), "VENDOR_secret"));
+  model.root["extensionsRequired"] = json::array({"KHR_texture_basisu"});
+  EXPECT_TRUE(has(refused(model, ErrorCode::unsupported), "KHR_texture_basisu"));
+  model.root.erase("extensionsRequired");
+  model.root["extensionsUsed"] = {"VENDOR_secret", "KHR_materials_ior", "KHR_materials_sheen"};
+  Lines lines;
+  imported(model, lines.log);
+  ASSERT_EQ(lines.warnings.size(), 1U);
+  EXPECT_TRUE(has(lines.warnings[0], "KHR_materials_sheen, VENDOR_secret")) << lines.warnings[0];
+  EXPECT_FALSE(has(lines.warnings[0], "ior"));
+}
+
+TEST(Gltf, TexturesThatCannotBeHadAreLeftOutWithALine) {
+  const auto with = [](const json& texture, const json& image) {
+    GltfModel model;
+    if (!image.is_null()) model.add("images", image);
+    model.add("textures", texture);
+    model.add("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+    model.show({{"attributes", {{"POSITION", model.triangle()}}}, {"material", 0}});
+    return model;
+  };
+  const auto line = [](const GltfModel& model) {
+    Lines lines;
+    const ScenePtr scene = imported(model, lines.log);
+    EXPECT_EQ(scene->materials[0].base_color_texture.texture, -1);
+    EXPECT_TRUE(scene->images.empty());
+    EXPECT_EQ(lines.warnings.size(), 1U);
+    return lines.warnings.empty() ? "" : lines.warnings[0];
+  };
+  const auto embedded = [&](const Bytes& bytes) {
+    return with({{"source", 0}}, {{"uri", "data:image/png;base64," + test::base64(bytes)}});
+  };
+  EXPECT_TRUE(
+      has(line(with({{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}}, nullptr)), "KHR_texture_basisu"));
+  EXPECT_TRUE(has(line(with({{"source", 0}}, {{"uri", "none.png"}})), "none.png: no such file"));
+  EXPECT_TRUE(has(line(with({{"source", 0}}, {{"name", "empty"}})), "neither a URI nor a buffer view"));
+  EXPECT_TRUE(has(line(embedded({0xAB, 'K', 'T', 'X', ' ', '2', '0'})), "KTX2"));
+  EXPECT_TRUE(has(line(embedded({'G', 'I', 'F', '8', '9', 'a', 0, 0, 0, 0})), "neither PNG nor JPEG"));
+  EXPECT_TRUE(has(line(embedded(test::png(0, 1, 8, 2, {}))), "no pixels"));
+  EXPECT_TRUE(has(line(embedded(test::png(1, 0x7FFFFFFF, 8, 2, {0, 0, 0}))), "too many"));
+  EXPECT_TRUE(has(line(embedded(test::png(16000, 16000, 8, 6, {0, 0, 0, 0}))), "do not fit into its"));
+  Bytes cut = test::png(2, 2, 8, 2, Bytes(12));
+  cut.resize(50);
+  EXPECT_TRUE(has(line(embedded(cut)), "cannot be decoded"));
+  EXPECT_TRUE(has(line(embedded({0xFF, 0xD8, 0xFF, 0xE0, 0, 16})), "JPEG cut short"));
+  // Set 2 of coordinates.
+  GltfModel far = embedded(test::png(1, 1, 8, 2, {1, 2, 3}));
+  far.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 2;
+  EXPECT_TRUE(has(line(far), "TEXCOORD_2"));
+  // What is out of range is malformed.
+  far.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 1;
+  EXPECT_TRUE(has(refused(far), "there is no texture 1"));
+  EXPECT_TRUE(has(refused(with({{"source", 3}}, nullptr)), "there is no image 3"));
+  EXPECT_TRUE(has(refused(with({{"source", 0}, {"sampler", 1}}, {{"bufferView", 0}})), "there is no sampler 1"));
+}
+
+struct Hostile {
+  const char* name;
+  std::function<void(GltfModel&)> change;
+  const char* cause;
+};
+
+TEST(Gltf, HostileFilesEndInOneLine) {
+  const auto accessor = [](GltfModel& m) -> json& { return m.root["accessors"][0]; };
+  const auto primitive = [](GltfModel& m) -> json& { return m.root["meshes"][0]["primitives"][0]; };
+  const Hostile cases[] = {
+      {"no asset", [](GltfModel& m) { m.root.erase("asset"); }, "asset.version is missing"},
+      {"asset is no object", [](GltfModel& m) { m.root["asset"] = 3; }, "asset is not an object"},
+      {"nodes is no array", [](GltfModel& m) { m.root["nodes"] = json::object(); }, "nodes is not an array"},
+      {"a node is no object", [](GltfModel& m) { m.root["nodes"][0] = 1; }, "nodes[0] is not an object"},
+      {"negative index", [&](GltfModel& m) { primitive(m)["attributes"]["POSITION"] = -1; }, "is not an index"},
+      {"index with a fraction", [&](GltfModel& m) { primitive(m)["attributes"]["POSITION"] = 0.5; }, "is not an index"},
+      {"huge index", [&](GltfModel& m) { primitive(m)["attributes"]["POSITION"] = 5e9; }, "is not an index"},
+      {"mode", [&](GltfModel& m) { primitive(m)["mode"] = 7; }, "mode 7 is none of glTF's"},
+      {"material", [&](GltfModel& m) { primitive(m)["material"] = 0; }, "there is no material 0"},
+      {"no such accessor", [&](GltfModel& m) { primitive(m)["attributes"]["POSITION"] = 9; }, "there is no accessor 9"},
+      {"no such indices", [&](GltfModel& m) { primitive(m)["indices"] = 9; }, "there is no accessor 9"},
+      {"indices are floats", [&](GltfModel& m) { primitive(m)["indices"] = 0; }, "is not of unsigned integers"},
+      {"count beyond the view", [&](GltfModel& m) { accessor(m)["count"] = 4; }, "reaches beyond the 36 bytes"},
+      {"count of 2^52", [&](GltfModel& m) { accessor(m)["count"] = std::uint64_t{1} << 52U; }, "2^32"},
+      {"count of 2^60", [&](GltfModel& m) { accessor(m)["count"] = std::uint64_t{1} << 60U; }, "is not a size"},
+      {"count of 0", [&](GltfModel& m) { accessor(m)["count"] = 0; }, "count of 0"},
+      {"count of a billion without bytes",
+       [&](GltfModel& m) {
+         accessor(m).erase("bufferView");
+         accessor(m)["count"] = 1000000000;
+       },
+       "without a buffer view are too many"},
+      {"offset", [&](GltfModel& m) { accessor(m)["byteOffset"] = (std::uint64_t{1} << 53U) - 1; }, "reaches beyond"},
+      {"element type", [&](GltfModel& m) { accessor(m)["type"] = "VEC2"; }, "wrong type of element"},
+      {"component type", [&](GltfModel& m) { accessor(m)["componentType"] = 5124; }, "component type 5124"},
+      {"double", [&](GltfModel& m) { accessor(m)["componentType"] = 5130; }, "component type 5130"},
+      {"no such view", [&](GltfModel& m) { accessor(m)["bufferView"] = 1; }, "there is no buffer view 1"},
+      {"view beyond the buffer", [](GltfModel& m) { m.root["bufferViews"][0]["byteOffset"] = 4; }, "reaches beyond"},
+      {"no such buffer", [](GltfModel& m) { m.root["bufferViews"][0]["buffer"] = 1; }, "there is no buffer 1"},
+      {"stride", [](GltfModel& m) { m.root["bufferViews"][0]["byteStride"] = 8; }, "is too small"},
+      {"stride of 2^31", [](GltfModel& m) { m.root["bufferViews"][0]["byteStride"] = 2147483648; }, "byteStride"},
+      {"sparse beyond",
+       [&](GltfModel& m) {
+         accessor(m)["sparse"] = {{"count", 1},
+                                  {"indices", {{"bufferView", 0}, {"byteOffset", 36}, {"componentType", 5125}}},
+                                  {"values", {{"bufferView", 0}}}};
+       },
+       "reaches beyond"},
+      {"sparse index beyond",
+       [&](GltfModel& m) {
+         accessor(m)["sparse"] = {{"count", 1},
+                                  {"indices", {{"bufferView", 0}, {"byteOffset", 12}, {"componentType", 5125}}},
+                                  {"values", {{"bufferView", 0}}}};
+       },
+       "sparse indices"},
+      {"sparse count",
+       [&](GltfModel& m) {
+         accessor(m)["sparse"] = {
+             {"count", 99}, {"indices", {{"bufferView", 0}, {"componentType", 5125}}}, {"values", {{"bufferView", 0}}}};
+       },
+       "where it is sparse"},
+      {"its own child", [](GltfModel& m) { m.root["nodes"][0]["children"] = json::array({0}); },
+       "descends from itself"},
+      {"two parents",
+       [](GltfModel& m) {
+         m.root["nodes"].push_back({{"children", json::array({0})}});
+         m.root["nodes"].push_back({{"children", json::array({0})}});
+       },
+       "node 0 has two parents"},
+      {"no such child", [](GltfModel& m) { m.root["nodes"][0]["children"] = json::array({7}); }, "there is no node 7"},
+      {"no such mesh", [](GltfModel& m) { m.root["nodes"][0]["mesh"] = 7; }, "there is no mesh 7"},
+      {"no such skin", [](GltfModel& m) { m.root["nodes"][0]["skin"] = 7; }, "there is no skin 7"},
+      {"no such camera", [](GltfModel& m) { m.root["nodes"][0]["camera"] = 7; }, "there is no camera 7"},
+      {"no such light", [](GltfModel& m) { m.root["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = 7; },
+       "there is no light 7"},
+      {"matrix of 15", [](GltfModel& m) { m.root["nodes"][0]["matrix"] = std::vector<int>(15, 1); }, "16 numbers"},
+      {"transform too large",
+       [](GltfModel& m) {
+         m.root["nodes"][0]["scale"] = {1e30, 1, 1};
+       },
+       "too large"},
+      {"number beyond double", [](GltfModel& m) { m.root["nodes"][0]["scale"] = "@"; },
+       "nodes[0].scale is not an array"},
+      {"skin without joints",
+       [](GltfModel& m) {
+         m.add("skins", {{"joints", json::array()}});
+       },
+       "no joints"},
+      {"joint",
+       [](GltfModel& m) {
+         m.add("skins", {{"joints", {5, 0}}});
+       },
+       "there is no node 5"},
+      {"camera",
+       [](GltfModel& m) {
+         m.add("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", -1}, {"znear", 1}}}});
+         m.root["nodes"][0]["camera"] = 0;
+       },
+       "malformed perspective"},
+      {"animation of no node",
+       [](GltfModel& m) {
+         m.add("animations",
+               {{"samplers", json::array({{{"input", 0}, {"output", 0}}})},
+                {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 5}, {"path", "scale"}}}}})}});
+       },
+       "there is no node 5"},
+      {"animation of few keys",
+       [](GltfModel& m) {
+         const int input = m.scalars({0, 1, 2, 3});
+         m.add("animations",
+               {{"samplers", json::array({{{"input", input}, {"output", 0}}})},
+                {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}})}});
+       },
+       "has 9 numbers, not 12"},
+      {"times that fall",
+       [](GltfModel& m) {
+         const int input = m.scalars({0, 2, 1});
+         m.add("animations",
+               {{"samplers", json::array({{{"input", input}, {"output", 0}}})},
+                {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}})}});
+       },
+       "times do not rise"},
+      {"version 1", [](GltfModel& m) { m.root["asset"]["version"] = "1.0"; }, "is glTF 1.0, not 2.0"},
+      {"morph target of another size",
+       [&](GltfModel& m) {
+         primitive(m)["targets"] = json::array({{{"POSITION", m.vec3({0, 0, 0})}}});
+       },
+       "has not an element a vertex"},
+      {"attribute of another size",
+       [&](GltfModel& m) {
+         primitive(m)["attributes"]["NORMAL"] = m.vec3({0, 0, 1});
+       },
+       "has 1 elements for 3 vertices"},
+      {"NaN",
+       [&](GltfModel& m) {
+         primitive(m)["attributes"]["POSITION"] = m.vec3({0, 0, 0, NAN, 0, 0, 0, 1, 0});
+       },
+       "POSITION is not finite"},
+      {"infinity",
+       [&](GltfModel& m) {
+         primitive(m)["attributes"]["POSITION"] = m.vec3({0, 0, 0, INFINITY, 0, 0, 0, 1, 0});
+       },
+       "POSITION is not finite"},
+      {"line breaks in names",
+       [&](GltfModel& m) {
+         m.root["materials"] = json::array({{{"alphaMode", "a\nb\r\n\tc"}}});
+       },
+       "\"a b c\" is none of glTF's"},
+  };
+  for (const Hostile& hostile : cases) {
+    SCOPED_TRACE(hostile.name);
+    GltfModel model = triangle_model();
+    hostile.change(model);
+    const bool version = std::string_view(hostile.name) == "version 1";
+    for (const Bytes& file : {model.gltf(), model.glb()}) {
+      const std::string line = refused(file, version ? ErrorCode::unsupported : ErrorCode::file);
+      EXPECT_TRUE(has(line, hostile.cause)) << line;
+    }
+  }
+}
+
+TEST(Gltf, HostileContainersEndInOneLine) {
+  const auto text = [](const std::string& content) { return Bytes(content.begin(), content.end()); };
+  EXPECT_TRUE(has(refused(Bytes{}), "is empty"));
+  EXPECT_TRUE(has(refused(text("{")), "is not JSON"));
+  EXPECT_TRUE(has(refused(text("[]")), "JSON is not an object"));
+  EXPECT_TRUE(has(refused(text("\x01\x02\xFF\xFE")), "is not JSON"));
+  EXPECT_TRUE(has(refused(text(std::string(1000000, '['))), "nests deeper"));
+  EXPECT_TRUE(has(refused(text(R"({"asset":{"version":"2.0"},"nodes":[{"scale":[1e999,1,1]}]})")), "is not JSON"));
+  const Bytes whole = triangle_model().glb();
+  for (std::size_t size = 0; size < whole.size(); size += size < 40 ? 1 : 7) {
+    const Bytes cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+    refused(cut);
+  }
+  Bytes lengths = whole;
+  lengths[12] = 0xFF;  // the length of the chunk of JSON
+  lengths[15] = 0xFF;
+  EXPECT_TRUE(has(refused(lengths), "ends within chunk 0"));
+  Bytes swapped = whole;
+  swapped[16] = 'X';
+  EXPECT_TRUE(has(refused(swapped), "does not begin with a chunk of JSON"));
+  Bytes old = whole;
+  old[4] = 1;
+  EXPECT_TRUE(has(refused(old, ErrorCode::unsupported), "binary glTF 1"));
+  // A byte order mark is nobody's fault.
+  Bytes marked = {0xEF, 0xBB, 0xBF};
+  const Bytes plain = triangle_model().gltf();
+  marked.insert(marked.end(), plain.begin(), plain.end());
+  EXPECT_EQ(imported(marked)->triangle_count(), 1U);
+}
+
+TEST(Gltf, CompressedDataOfHostileSizesIsRefused) {
+  GltfModel huge = test::seed_meshopt();
+  huge.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["count"] = 100000000;
+  EXPECT_TRUE(has(refused(huge), "cannot hold 100000000 elements"));
+  GltfModel odd = test::seed_meshopt();
+  odd.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["byteStride"] = 6;
+  EXPECT_TRUE(has(refused(odd), "EXT_meshopt_compression is malformed"));
+  GltfModel cut = test::seed_meshopt();
+  cut.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"]["byteLength"] = 20;
+  EXPECT_TRUE(has(refused(cut), "cannot be decompressed"));
+  GltfModel draco = test::seed_draco();
+  draco.root["bufferViews"][0]["byteLength"] = 30;
+  EXPECT_TRUE(has(refused(draco), "cannot be decompressed"));
+}
+
+TEST(Gltf, MemoryIsBounded) {
+  // A thousand nodes with a mesh of 33 thousand vertices: 2.5 GiB of vertices from half a megabyte.
+  GltfModel model;
+  const test::Grid grid(180);
+  const int mesh = model.add(
+      "meshes",
+      {{"primitives", json::array({{{"attributes", {{"POSITION", model.vec3(grid.positions)}}},
+                                    {"indices", model.accessor<std::uint32_t>("SCALAR", 1, grid.indices)}}})}});
+  for (int i = 0; i < 1000; ++i) model.add("nodes", {{"mesh", mesh}});
+  GltfLimits limits;
+  limits.memory = std::uint64_t{256} << 20U;
+  EXPECT_TRUE(has(refused(model.glb(), ErrorCode::file, limits), "would need more than the 256 MiB"));
+}
+
+TEST(Gltf, CancelledImportsEnd) {
+  Progress progress;
+  progress.cancel();
+  try {
+    import_gltf(triangle_model().gltf(), "made.gltf", "", {}, &progress);
+    FAIL() << "was imported";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::cancelled);
+  }
+}
+
+// --- mutations -------------------------------------------------------------------------------------------------------
+
+/// Changes a file in one to four places: bits, bytes, ranges, and numbers in its JSON.
+Bytes mutated(const Bytes& from, std::mt19937& random) {
+  constexpr const char* words[] = {"-1",   "0",    "1",     "2",     "255",  "65535", "4294967295", "9007199254740991",
+                                   "1e38", "1e18", "-1e38", "0.5",   "null", "true",  "\"\"",       "[]",
+                                   "{}",   "5120", "5126",  "[1,2]", "64",   "3"};
+  Bytes bytes = from;
+  const auto below = [&random](std::size_t n) { return n == 0 ? 0 : random() % n; };
+  for (std::size_t changes = 1 + below(4); changes > 0; --changes) {
+    if (bytes.size() < 8) break;
+    const auto at = static_cast<std::ptrdiff_t>(below(bytes.size()));
+    switch (below(6)) {
+      case 0:
+        bytes[static_cast<std::size_t>(at)] ^= static_cast<std::uint8_t>(1U << below(8));
+        break;
+      case 1:
+        bytes[static_cast<std::size_t>(at)] = static_cast<std::uint8_t>(random());
+        break;
+      case 2:
+        bytes.resize(static_cast<std::size_t>(at));
+        break;
+      case 3: {  // a range is overwritten by another
+        const std::size_t length = 1 + below(16);
+        const std::size_t source = below(bytes.size());
+        for (std::size_t k = 0; k < length; ++k) {
+          if (static_cast<std::size_t>(at) + k < bytes.size() && source + k < bytes.size()) {
+            bytes[static_cast<std::size_t>(at) + k] = bytes[source + k];
+          }
+        }
+        break;
+      }
+      default: {  // the next number becomes another of the same length, filled up with blanks
+        auto digit = std::find_if(bytes.begin() + at, bytes.end(), [](std::uint8_t c) { return c >= '0' && c <= '9'; });
+        auto end = std::find_if(digit, bytes.end(), [](std::uint8_t c) { return c < '0' || c > '9'; });
+        const std::string word = words[below(std::size(words))];
+        const auto place = digit - bytes.begin();
+        const auto length = end - digit;
+        if (word.size() <= static_cast<std::size_t>(length)) {
+          for (std::ptrdiff_t k = 0; k < length; ++k) {
+            bytes[static_cast<std::size_t>(place + k)] =
+                static_cast<std::size_t>(k) < word.size() ? static_cast<std::uint8_t>(word[static_cast<std::size_t>(k)])
+                                                          : ' ';
+          }
+        } else if (bytes[0] == '{') {  // where no length is written down, it may grow
+          bytes.erase(digit, end);
+          bytes.insert(bytes.begin() + place, word.begin(), word.end());
+        }
+        break;
+      }
+    }
+  }
+  return bytes;
+}
+
+TEST(Gltf, MutatedFilesAreImportedOrRefusedByOneLine) {
+  const GltfModel seeds[] = {test::seed_materials(), test::seed_animated(), test::seed_draco(), test::seed_meshopt(),
+                             triangle_model()};
+  GltfLimits limits;
+  limits.memory = std::uint64_t{64} << 20U;
+  limits.unbacked = 1U << 16U;
+  limits.image_side = 1024;
+  std::mt19937 random(7);
+  std::size_t good = 0;
+  std::size_t bad = 0;
+  for (const GltfModel& seed : seeds) {
+    for (const Bytes& file : {seed.gltf(), seed.glb()}) {
+      for (int i = 0; i < 2000; ++i) {
+        const Bytes changed = mutated(file, random);
+        try {
+          const ScenePtr scene = import_gltf(changed, "mutated", "/nowhere", {}, nullptr, limits);
+          ++good;
+          ASSERT_EQ(test::broken(*scene), "");
+          for (const double time : {0.0, 0.6}) ASSERT_EQ(test::broken(*scene, scene->pose(time)), "");
+        } catch (const Error& error) {
+          ++bad;
+          const std::string line = error.what();
+          ASSERT_TRUE(line.starts_with("mutated: ")) << line;
+          ASSERT_EQ(line.find_first_of("\n\r"), std::string::npos) << line;
+        }
+      }
+    }
+  }
+  // Neither all nor none: else the mutations look at nothing but the first check.
+  EXPECT_GT(good, 1000U);
+  EXPECT_GT(bad, 4000U);
+}
+
+}  // namespace
+}  // namespace cumulet::surface
