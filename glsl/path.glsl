@@ -62,9 +62,9 @@ struct CmPath {
   uint steps;       // of all its samples
   float square;     // sum over its samples of their squared luminance
 #if CM_SURFACES
-  uint triangle;    // that the flight ends at, or that o is on; CM_NONE: none
+  uint triangle;    // that o is on, if it is on one
   vec2 weights;     // of its second and third vertex
-  uint begins;      // 1: cm_begin_ray is due
+  float reach;      // the ray's own end: a lamp, the host's surface; t_end < 0: cm_begin_ray is due
 #endif
 };
 
@@ -156,35 +156,36 @@ CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
 }
 
 #if CM_SURFACES
-// Begins a ray from o along d that ends at t_end at the latest: finds what it meets of the surfaces, and its way through
-// the box.
+// Begins a ray from o along d: its way through the box, as far as it reaches.
 CM_FN void cm_begin_ray(CM_INOUT(CmPath) p) {
+  vec2 range = cm_box_range(p.o, p.d);
+  p.t = range.x;
+  p.t_end = max(0.0f, min(range.y, p.reach));
+  bool inside = p.home.x != CM_NONE && p.bounce > 0u;
+  p.cell = uvec3(CM_NONE, 0u, CM_NONE);
+  if (range.x < p.t_end) {
+    p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
+    if (!inside) p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
+  }
+}
+
+// Whether a triangle ends the ray before the event does: then o, once moved, is on it. Asked after the march, not before:
+// in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the medium.
+CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) {
   bool flight = p.mode == CM_MODE_FLIGHT;
+  if (event == CM_EVENT_NONE || (event == CM_EVENT_COLLISION && !flight)) return false;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_surface_origin(p.o, p.home.x == CM_NONE, p.triangle, p.weights, d);
   cm_hit_seed = p.random;
   cm_hit_camera = p.bounce == 0u;
-  bool stopped = false;
-  if (flight) {
-    CmHit hit;
-    bool met = cm_bvh_closest(o, d, 0.0f, p.t_end, hit);
+  CmHit hit;
+  bool met = cm_bvh_trace(o, d, 0.0f, event == CM_EVENT_COLLISION ? p.t : p.reach, !flight, hit);
+  if (met && flight) {
     p.triangle = hit.triangle;
     p.weights = hit.barycentrics;
-    if (met) p.t_end = hit.t;
-  } else {
-    stopped = cm_bvh_occluded(o, d, 0.0f, p.t_end);
-    if (stopped) p.light = vec3(0.0f, 0.0f, 0.0f);
   }
-  vec2 range = cm_box_range(p.o, p.d);
-  p.t = range.x;
-  p.t_end = min(range.y, p.t_end);
-  bool through = !stopped && range.x < p.t_end;
-  bool inside = p.home.x != CM_NONE && p.bounce > 0u;
-  if (through && !inside)
-    p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
-  if (through && inside) p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
-  if (!through) p.cell = uvec3(CM_NONE, 0u, CM_NONE);
-  p.begins = 0u;
+  if (met && !flight) p.light = vec3(0.0f, 0.0f, 0.0f);
+  return met && flight;
 }
 #endif
 
@@ -209,10 +210,9 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   // Samples go through the layers in turn, each pixel from one of its own.
   float surface_t = t_per_z * cm_surface_z(pixel, within, (shift.x >> 16) + p.samples);
 #if CM_SURFACES
-  p.t_end = surface_t;
+  p.reach = surface_t;
+  p.t_end = -1.0f;
   p.home = uvec2(0u, 0u);
-  p.triangle = CM_NONE;
-  p.begins = 1u;
 #else
   vec2 range = cm_box_range(p.o, p.d);
   p.t = range.x;
@@ -223,15 +223,11 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
 }
 
 // What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
-CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
+// met: a flight ends on a triangle, whatever event says.
+CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) sum) {
   float q = cm.medium.z;
   bool flight = p.mode == CM_MODE_FLIGHT;
   bool finished = false;
-#if CM_SURFACES
-  bool met = flight && event == CM_EVENT_ESCAPE && p.triangle != CM_NONE;
-#else
-  const bool met = false;
-#endif
   if (event == CM_EVENT_ESCAPE && !met) {
     // Sky: the flight escapes with probability T, next-event estimation has density q of the same directions. The
     // balance heuristic gives T / (q + T) to the one, and q / (q + T), times T / q, to the other.
@@ -244,7 +240,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
     p.radiance += light * (weight / survival);
     finished = flight;
   }
-  bool collided = flight && event == CM_EVENT_COLLISION;
+  bool collided = flight && event == CM_EVENT_COLLISION && !met;
 #if CM_SURFACES
   bool on_surface = met || (!flight && p.home.x == CM_NONE);
   CmSurfacePoint surface;
@@ -321,9 +317,8 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, CM_INOUT(vec4) sum) {
     p.depth = p.depth_0;
     p.t = 0.0f;
 #if CM_SURFACES
-    p.t_end = light_distance;
-    if (!to_sun) p.t_end = 3.0e38f;
-    p.begins = 1u;
+    p.reach = to_sun ? light_distance : 3.0e38f;
+    p.t_end = -1.0f;
 #else
     p.t_end = cm_box_range(p.o, p.d).y;
     p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
@@ -337,10 +332,13 @@ CM_FN void cm_run(CM_INOUT(CmPath) p, uvec2 pixel, uint iterations, CM_INOUT(vec
     if (p.mode == CM_MODE_START) cm_start(p, pixel, sum);
     for (int j = 0; j < CM_EVENTS && p.mode != CM_MODE_START && p.mode != CM_MODE_DONE; ++j) {
 #if CM_SURFACES
-      if (p.begins != 0u) cm_begin_ray(p);
-#endif
+      if (p.t_end < 0.0f) cm_begin_ray(p);
       uint event = cm_march(p);
-      cm_handle(p, event, sum);
+      cm_handle(p, event, cm_meet(p, event), sum);
+#else
+      uint event = cm_march(p);
+      cm_handle(p, event, false, sum);
+#endif
     }
   }
 }

@@ -72,9 +72,9 @@ void main() {
     p.stream = 0u;
     p.home = uvec2(0u);
 #if CM_SURFACES
-    p.triangle = CM_NONE;
+    p.triangle = 0u;
     p.weights = vec2(0.0);
-    p.begins = 0u;
+    p.reach = 0.0;
 #endif
   } else {
     uvec4 a3 = cm_paths[3u * lanes + lane];
@@ -108,7 +108,7 @@ void main() {
     uvec4 a8 = cm_paths[8u * lanes + lane];
     p.triangle = a8.x;
     p.weights = uintBitsToFloat(a8.yz);
-    p.begins = a8.w;
+    p.reach = uintBitsToFloat(a8.w);
 #endif
   }
 
@@ -127,7 +127,7 @@ void main() {
   cm_paths[6u * lanes + lane] = uvec4(p.cell.xy, floatBitsToUint(p.t_end), p.stream);
   cm_paths[7u * lanes + lane] = uvec4(p.home, p.samples, p.steps);
 #if CM_SURFACES
-  cm_paths[8u * lanes + lane] = uvec4(p.triangle, floatBitsToUint(p.weights), p.begins);
+  cm_paths[8u * lanes + lane] = uvec4(p.triangle, floatBitsToUint(p.weights), floatBitsToUint(p.reach));
 #endif
   if (p.mode != CM_MODE_DONE) atomicAdd(cm_unfinished, 1u);
   if (p.samples == 0u) atomicAdd(cm_empty, 1u);

@@ -233,6 +233,21 @@ TEST(Options, ABadSceneFileIsNoUsageError) {
   }
 }
 
+TEST(Options, SurfacesMayComeAlone) {
+  std::ostringstream out;
+  const auto options = parse_render_options({"--gltf", "a.glb", "--gltf-time", "1.5", "--gltf-animation", "2",
+                                             "--gltf-camera", "1", "--surface-light", "shadows", "-o", "a.png"},
+                                            out);
+  ASSERT_TRUE(options.has_value());
+  EXPECT_EQ(options->scene.surfaces, "a.glb");
+  EXPECT_EQ(options->scene.volume, "");
+  EXPECT_EQ(options->scene.surface.time, 1.5);
+  EXPECT_EQ(options->scene.surface.animation, 2U);
+  EXPECT_EQ(options->scene.surface_camera, 1);
+  EXPECT_EQ(options->scene.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
+  EXPECT_NE(usage_error(with({"--surface-light", "some"})).find("shadows"), std::string::npos);
+}
+
 TEST(Options, ThresholdZeroIsTheVoxel) { EXPECT_LT(parse({"--threshold", "0"}).scene.grid.threshold, 0.0); }
 
 TEST(Options, NegativeValuesAreNotFlags) {

@@ -28,6 +28,11 @@ SceneOptions full_scene() {
   SceneOptions scene;
   scene.volume = "/data/cloud.vdb";
   scene.grid_name = "density[1]";
+  scene.surfaces = "/models/a b.glb";
+  scene.surface.time = 1.25;
+  scene.surface.animation = 3;
+  scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
+  scene.surface_camera = 2;
   scene.width = 333;
   scene.height = 222;
   scene.camera.eye[0] = 0.1;
@@ -70,6 +75,11 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   // same_scene compares what is written: the numbers themselves, too.
   EXPECT_EQ(read.volume, scene.volume);
   EXPECT_EQ(read.grid_name, scene.grid_name);
+  EXPECT_EQ(read.surfaces, scene.surfaces);
+  EXPECT_EQ(read.surface.time, scene.surface.time);
+  EXPECT_EQ(read.surface.animation, scene.surface.animation);
+  EXPECT_EQ(read.surface.light, scene.surface.light);
+  EXPECT_EQ(read.surface_camera, scene.surface_camera);
   EXPECT_EQ(read.width, scene.width);
   EXPECT_EQ(read.height, scene.height);
   for (int i = 0; i < 3; ++i) {
