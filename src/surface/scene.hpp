@@ -122,7 +122,7 @@ struct VertexAttributes {
 /// What moves, in world space.
 struct PosedVertex {
   glm::vec3 position;
-  glm::vec3 normal;   ///< unit
+  glm::vec3 normal;         ///< unit
   glm::vec4 tangent{0.0F};  ///< unit; w: sign of the bitangent; 0 where the material has no normal map
 };
 

@@ -991,6 +991,39 @@ TEST(Gltf, CompressedDataOfHostileSizesIsRefused) {
   EXPECT_TRUE(has(refused(draco), "cannot be decompressed"));
 }
 
+TEST(Gltf, DracoAttributesThatAreNotThereAreRefused) {
+  GltfModel model = test::seed_draco();
+  model.root["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] = 77;
+  EXPECT_TRUE(has(refused(model), "there is no Draco attribute 77"));
+}
+
+TEST(Gltf, AnimationsBeyondFloatStayFinite) {
+  // Two nodes, each scaled by 1e18 and more, over an animated and skinned triangle, and a camera and a light.
+  GltfModel model = test::seed_animated();
+  const int huge = model.vec3({1, 1, 1, 1e30F, 1e30F, 1e30F, 1e18F, -1e18F, 1e18F});
+  json& samplers = model.root["animations"][0]["samplers"];
+  samplers[2]["output"] = huge;
+  samplers[2]["interpolation"] = "LINEAR";
+  const auto scale = [](int node) { return json{{"sampler", 2}, {"target", {{"node", node}, {"path", "scale"}}}}; };
+  for (const int node : {0, 1, 2}) model.root["animations"][0]["channels"].push_back(scale(node));
+  model.add("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 1}}}});
+  model.root["extensions"]["KHR_lights_punctual"]["lights"] =
+      json::array({{{"type", "spot"}, {"spot", json::object()}}});
+  model.root["nodes"][2]["camera"] = 0;
+  model.root["nodes"][2]["extensions"]["KHR_lights_punctual"]["light"] = 0;
+  const ScenePtr scene = imported(model);
+  for (const double time : {0.0, 0.3, 1.0, 1.7, 2.0}) EXPECT_EQ(test::broken(*scene, scene->pose(time)), "") << time;
+}
+
+TEST(Gltf, RootsThatLeadToEachOtherAreShownOnce) {
+  // A chain of 100000 nodes, all of which are roots of the scene, the deepest first.
+  GltfModel model = triangle_model();
+  json roots = json::array({0});
+  for (int i = 1; i < 100000; ++i) roots.push_back(model.add("nodes", {{"children", json::array({i - 1})}}));
+  model.root["scenes"] = json::array({{{"nodes", roots}}});
+  EXPECT_EQ(imported(model)->triangle_count(), 1U);
+}
+
 TEST(Gltf, MemoryIsBounded) {
   // A thousand nodes with a mesh of 33 thousand vertices: 2.5 GiB of vertices from half a megabyte.
   GltfModel model;
