@@ -26,7 +26,8 @@ std::uint64_t face_count(std::span<const std::uint8_t> bytes, const std::string&
   if (header.encoder_type != draco::TRIANGULAR_MESH || header.version_major != 2 || header.version_minor != 2) {
     malformed(what + ": its Draco stream is not a mesh of version 2.2");
   }
-  buffer.set_bitstream_version(DRACO_BITSTREAM_VERSION(header.version_major, header.version_minor));
+  buffer.set_bitstream_version(
+      static_cast<std::uint16_t>(DRACO_BITSTREAM_VERSION(header.version_major, header.version_minor)));
   if ((header.flags & METADATA_FLAG_MASK) != 0) {
     draco::GeometryMetadata metadata;
     draco::MetadataDecoder decoder;
