@@ -2,6 +2,7 @@
 // order of the tables is that of src/render/surface_data.cpp. Includes bvh.glsl; needs bsdf.glsl before it.
 #ifndef CM_SURFACE_GLSL
 #define CM_SURFACE_GLSL
+#include "punctual.glsl"
 
 layout(binding = 9) uniform usamplerBuffer cm_scene_words;
 layout(binding = 10) uniform sampler2DArray cm_atlas;
@@ -263,28 +264,8 @@ void cm_lamp(vec3 here, float u, inout vec3 light, inout vec3 to_light, inout fl
     return;
   }
   uint word = cm.lights.x + 4u * choice;
-  vec4 head = cm_floats(word);
-  vec3 position = cm_floats(word + 1u).xyz;
-  vec3 shines = cm_floats(word + 2u).xyz;
-  light = cm_floats(word + 3u).xyz * float(count);
-  if (head.x == 0.0) {  // directional
-    to_light = -shines;
-    return;
-  }
-  vec3 way = position - here;
-  float square = max(dot(way, way), 1e-12);
-  distance = sqrt(square);
-  to_light = way / distance;
-  float falloff = 1.0 / square;
-  if (head.y > 0.0) {
-    float r = square / (head.y * head.y);
-    falloff *= clamp(1.0 - r * r, 0.0, 1.0);
-  }
-  if (head.x == 2.0) {  // spot: head.zw turn the cosine into 0 at the outer cone, 1 at the inner
-    float spot = clamp(dot(shines, -to_light) * head.z + head.w, 0.0, 1.0);
-    falloff *= spot * spot;
-  }
-  light *= falloff;
+  CmLight lamp = CmLight(cm_floats(word), cm_floats(word + 1u), cm_floats(word + 2u), cm_floats(word + 3u));
+  light = cm_punctual_irradiance(lamp, here, to_light, distance) * float(count);
 }
 
 #endif

@@ -10,6 +10,7 @@
 #include <span>
 
 #include "base/error.hpp"
+#include "render/punctual.hpp"
 
 namespace cumulet::render {
 
@@ -86,14 +87,11 @@ std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std:
 
 void add_lights(std::vector<uvec4>& words, const std::vector<surface::PunctualLight>& lights) {
   for (const surface::PunctualLight& light : lights) {
-    using Kind = surface::PunctualLight::Kind;
-    const float kind = light.kind == Kind::directional ? 0.0F : (light.kind == Kind::point ? 1.0F : 2.0F);
-    // The cosine's way from 0 to 1, as KHR_lights_punctual gives it.
-    const float scale = 1.0F / std::max(0.001F, std::cos(light.inner_cone) - std::cos(light.outer_cone));
-    words.push_back(bits(vec4(kind, light.range, scale, -std::cos(light.outer_cone) * scale)));
-    words.push_back(bits(light.position, 0.0F));
-    words.push_back(bits(light.direction, 0.0F));
-    words.push_back(bits(light.intensity, 0.0F));
+    const core::CmLight record = punctual_light(light, glm::dvec3(0.0));
+    words.push_back(bits(record.position));
+    words.push_back(bits(record.direction));
+    words.push_back(bits(record.intensity));
+    words.push_back(bits(record.cone));
   }
 }
 

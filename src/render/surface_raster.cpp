@@ -11,11 +11,11 @@
 
 #include "base/error.hpp"
 #include "base/shared_code.hpp"
+#include "render/punctual.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
 #include "jitter.glsl"
-#include "punctual.glsl"
 #include "surface_parameters.glsl"
 }  // namespace cumulet::core
 
@@ -145,21 +145,6 @@ CmMaterial block_of(const surface::Material& m) {
     }
   }
   return block;
-}
-
-CmLight light_of(const surface::PunctualLight& light, const glm::dvec3& eye) {
-  using Kind = surface::PunctualLight::Kind;
-  CmLight result{};
-  result.position = glm::vec4(glm::dvec3(light.position) - eye, light.kind == Kind::directional ? 0.0 : 1.0);
-  result.direction = glm::vec4(light.direction, light.range);
-  result.intensity = glm::vec4(light.intensity, 0.0F);
-  result.cone = glm::vec4(0.0F, 1.0F, 0.0F, 0.0F);
-  if (light.kind == Kind::spot) {
-    const float outer = std::cos(light.outer_cone);
-    const float scale = 1.0F / std::max(0.001F, std::cos(light.inner_cone) - outer);
-    result.cone = glm::vec4(scale, -outer * scale, 0.0F, 0.0F);
-  }
-  return result;
 }
 
 }  // namespace
@@ -398,7 +383,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   }
   std::vector<CmLight> lights;
   lights.reserve(lights_.size());
-  for (const surface::PunctualLight& light : lights_) lights.push_back(light_of(light, view.eye));
+  for (const surface::PunctualLight& light : lights_) lights.push_back(punctual_light(light, view.eye));
   if (!lights.empty()) {
     gl_->NamedBufferSubData(light_buffer_.name(), 0, static_cast<GLsizeiptr>(lights.size() * sizeof(CmLight)),
                             lights.data());
