@@ -1,7 +1,8 @@
 #include "render/progressive.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <array>
+#include <bit>
 
 #include "base/error.hpp"
 
@@ -19,10 +20,11 @@ using Clock = std::chrono::steady_clock;
 }  // namespace
 
 bool Progressive::same(const PictureWish& wish) const {
+  using Words = std::array<std::uint32_t, sizeof(core::CmParameters) / sizeof(std::uint32_t)>;
   core::CmParameters a = wish.parameters;
   core::CmParameters b = wish_.parameters;
   a.image.w = b.image.w = 0;  // more samples go on
-  return wished_ && std::memcmp(&a, &b, sizeof(a)) == 0 && wish.view == wish_.view &&
+  return wished_ && std::bit_cast<Words>(a) == std::bit_cast<Words>(b) && wish.view == wish_.view &&
          wish.generation == wish_.generation && wish.surface_generation == wish_.surface_generation &&
          wish.preview == wish_.preview;
 }
