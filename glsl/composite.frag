@@ -79,27 +79,43 @@ void main() {
   vec2 low = floor(at - 0.5);
   vec2 weight = at - 0.5 - low;
   ivec2 last = size - 1;
-  ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
-  ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);
-  vec4 value = mix(mix(cm_texel(p0), cm_texel(ivec2(p1.x, p0.y)), weight.x),
-                   mix(cm_texel(ivec2(p0.x, p1.y)), cm_texel(p1), weight.x), weight.y);
 #if CM_LAYERS
   ivec2 layer_size = textureSize(cm_layer_z, 0).xy;
-  vec2 on_layer = (vec2(pixel) + 0.5) * (vec2(layer_size) / vec2(cm_viewport.zw));
+  vec2 share = (vec2(pixel) + 0.5) / vec2(cm_viewport.zw);
+  // Of the coarse pixels around, those count whose middle sees as far: no seam of the volume along silhouettes.
+  float here = 1.0 / texelFetch(cm_layer_z, ivec3(share * vec2(layer_size), 0), 0).x;
+  vec4 value = vec4(0.0);
+  float sum = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    ivec2 offset = ivec2(i & 1, i >> 1);
+    ivec2 tap = clamp(ivec2(low) + offset, ivec2(0), last);
+    float there = 1.0 / texelFetch(cm_layer_z, ivec3((vec2(tap) + 0.5) / vec2(size) * vec2(layer_size), 0), 0).x;
+    vec2 part = mix(1.0 - weight, weight, vec2(offset));
+    float alike = part.x * part.y / (0.01 + abs(here - there) / max(max(here, there), 1e-30));
+    value += alike * cm_texel(tap);
+    sum += alike;
+  }
+  value /= sum;
   vec4 behind = vec4(0.0);
   if (layer_size == cm_viewport.zw) {
     behind = cm_surfaces(pixel);
   } else {
+    vec2 on_layer = share * vec2(layer_size);
     vec2 corner = floor(on_layer - 0.5);
-    vec2 part = on_layer - 0.5 - corner;
+    vec2 within = on_layer - 0.5 - corner;
     for (int i = 0; i < 4; ++i) {
-      ivec2 step = ivec2(i & 1, i >> 1);
-      vec2 share = mix(1.0 - part, part, vec2(step));
-      behind += share.x * share.y * cm_surfaces(clamp(ivec2(corner) + step, ivec2(0), layer_size - 1));
+      ivec2 offset = ivec2(i & 1, i >> 1);
+      vec2 part = mix(1.0 - within, within, vec2(offset));
+      behind += part.x * part.y * cm_surfaces(clamp(ivec2(corner) + offset, ivec2(0), layer_size - 1));
     }
   }
   value += (1.0 - value.a) * behind;
   if (!cm_transparent) value = vec4(value.rgb + cm_background * (1.0 - value.a), 1.0);
+#else
+  ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
+  ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);
+  vec4 value = mix(mix(cm_texel(p0), cm_texel(ivec2(p1.x, p0.y)), weight.x),
+                   mix(cm_texel(ivec2(p0.x, p1.y)), cm_texel(p1), weight.x), weight.y);
 #endif
 #else
   vec4 value = cm_texel(pixel);
