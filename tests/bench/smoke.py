@@ -27,7 +27,7 @@ def main():
     for march in ("tet-constant", "tet-linear"):
         for criterion in ("deviation", "range-mean"):
             assert (f"{march}/{criterion}", "sweep_depth_error") in quantities, (march, criterion)
-    for light in ("full", "shadows"):
+    for light in ("full", "shadows", "none"):
         found = {row["quantity"]: float(row["value"]) for row in rows if row["march"] == f"tet-linear/surfaces-{light}"}
         assert found["samples_per_second"] > 0 and 0 < found["samples_per_second_to_alone"] < 100, found
     for mesh in ("terrain", "sphere", "soup"):

@@ -20,6 +20,8 @@ const char* name_of(viewer::SurfaceLight light) {
   switch (light) {
     case viewer::SurfaceLight::full:
       return "full";
+    case viewer::SurfaceLight::none:
+      return "none";
     case viewer::SurfaceLight::shadows:
       break;
   }

@@ -15,7 +15,8 @@ inline constexpr std::array<Kind, 4> all_kinds{Kind::tet_constant, Kind::tet_lin
 const char* name_of(Kind kind);
 
 /// The settings of surfaces that are measured.
-inline constexpr std::array surface_lights{viewer::SurfaceLight::full, viewer::SurfaceLight::shadows};
+inline constexpr std::array surface_lights{viewer::SurfaceLight::full, viewer::SurfaceLight::shadows,
+                                           viewer::SurfaceLight::none};
 const char* name_of(viewer::SurfaceLight light);
 
 /// A picture and what it cost.
