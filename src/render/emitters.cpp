@@ -26,6 +26,7 @@ using surface::Wrap;
 // miss.
 constexpr int looks = 16;
 constexpr float least_share = 0.05F;
+constexpr std::uint32_t certain = std::numeric_limits<std::uint32_t>::max();
 
 // Rec. 709
 float luminance(const vec3& v) { return glm::dot(v, vec3(0.2126F, 0.7152F, 0.0722F)); }
@@ -143,39 +144,39 @@ std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene) {
 EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const Scene& scene,
                            const surface::Pose& pose) {
   EmitterTable table;
+  std::vector<double> areas;
   std::vector<double> power;
+  double sum = 0.0;
   for (const EmissiveTriangle& t : triangles) {
     const std::size_t first = 3 * std::size_t{t.triangle};
     const dvec3 a = pose.vertices[scene.indices[first]].position;
     const dvec3 b = pose.vertices[scene.indices[first + 1]].position;
     const dvec3 c = pose.vertices[scene.indices[first + 2]].position;
     const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
-    const double per_area = double{t.luminance} * (scene.materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0);
-    if (!(area * per_area > 0.0) || !std::isfinite(area * per_area)) continue;
-    power.push_back(area * per_area);
-    const auto clockwise = pose.flipped[t.draw] != 0 ? -1.0F : 1.0F;
-    // By area, for now without the sum.
-    table.entries.emplace_back(t.triangle, 0U, 0U, glm::floatBitsToUint(clockwise * static_cast<float>(per_area)));
+    const double sides = scene.materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
+    const double emitted = area * t.luminance * sides;
+    if (!(emitted > 0.0) || !std::isfinite(emitted)) continue;
+    table.entries.emplace_back(t.triangle, certain, static_cast<std::uint32_t>(power.size()),
+                               pose.flipped[t.draw] != 0 ? 1U : 0U);
+    areas.push_back(area);
+    power.push_back(emitted);
+    sum += emitted;
   }
-  double sum = 0.0;
-  for (const double p : power) sum += p;
   table.flux = std::numbers::pi * sum;
 
   const std::size_t n = power.size();
   std::vector<std::uint32_t> small;
   std::vector<std::uint32_t> large;
   for (std::uint32_t i = 0; i < n; ++i) {
-    glm::uvec4& entry = table.entries[i];
-    entry.w = glm::floatBitsToUint(static_cast<float>(glm::uintBitsToFloat(entry.w) / sum));
     power[i] *= static_cast<double>(n) / sum;  // in units of the mean
     (power[i] < 1.0 ? small : large).push_back(i);
   }
-  constexpr std::uint32_t always = std::numeric_limits<std::uint32_t>::max();
+  // What is left at the end, by rounding alone or with the mean's power, stands for itself.
   while (!small.empty() && !large.empty()) {
     const std::uint32_t low = small.back();
     const std::uint32_t high = large.back();
     small.pop_back();
-    table.entries[low].y = static_cast<std::uint32_t>(power[low] * always);
+    table.entries[low].y = static_cast<std::uint32_t>(power[low] * certain);
     table.entries[low].z = high;
     power[high] -= 1.0 - power[low];
     if (power[high] < 1.0) {
@@ -183,9 +184,17 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
       small.push_back(high);
     }
   }
-  // Rounding alone leaves any of the small ones.
-  for (const std::vector<std::uint32_t>* rest : {&small, &large}) {
-    for (const std::uint32_t i : *rest) table.entries[i] = {table.entries[i].x, always, i, table.entries[i].w};
+  // Chances as the table's words give them, not as they were meant.
+  std::vector<double> chance(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double stays = (static_cast<double>(table.entries[i].y) + 1.0) / 4294967296.0;
+    chance[i] += stays;
+    chance[table.entries[i].z] += 1.0 - stays;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double density = chance[i] / static_cast<double>(n) / areas[i];
+    glm::uvec4& entry = table.entries[i];
+    entry.w = glm::floatBitsToUint(static_cast<float>(entry.w != 0U ? -density : density));
   }
   return table;
 }

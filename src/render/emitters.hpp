@@ -14,7 +14,8 @@ namespace cumulet::render {
 struct EmissiveTriangle {
   std::uint32_t triangle = 0;
   std::uint32_t draw = 0;
-  float luminance = 0.0F;  ///< of its radiance, the mean over the triangle as far as a few texels of its texture tell; > 0
+  float luminance =
+      0.0F;  ///< of its radiance, the mean over the triangle as far as a few texels of its texture tell; > 0
 };
 
 /// The scene's emissive triangles, in ascending order; those of unlit materials are not among them. O(n), and over the

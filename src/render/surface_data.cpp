@@ -266,7 +266,13 @@ std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& la
 
 SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, const SurfaceSource& source,
                          SurfaceData* last)
-    : scene_(source.scene.get()), tables_(source.tables), lights_(source.lights), emitters_(source.emitters), emitted_flux_(source.emitted_flux), lamp_flux_(source.lamp_flux), cross_section_(source.cross_section) {
+    : scene_(source.scene.get()),
+      tables_(source.tables),
+      lights_(source.lights),
+      emitters_(source.emitters),
+      emitted_flux_(source.emitted_flux),
+      lamp_flux_(source.lamp_flux),
+      cross_section_(source.cross_section) {
   const std::size_t count = std::max<std::size_t>(1, source.words.size());
   if (static_cast<std::int64_t>(count) > limits.texture_buffer_texels) {
     throw Error(ErrorCode::unsupported, "the surfaces need " + std::to_string(count) +

@@ -33,7 +33,7 @@ struct SurfaceSource {
   surface::ScenePtr scene;
   surface::Pose pose;
   surface::Bvh bvh;
-  double built_cost = 0.0;        // of the tree before it was refitted
+  double built_cost = 0.0;  // of the tree before it was refitted
   std::vector<EmissiveTriangle> emissive;
   std::vector<glm::uvec4> words;  // the tables of glsl/surface.glsl
   glm::uvec4 tables{0U};          // CmParameters::scene
@@ -64,8 +64,8 @@ class SurfaceData {
   /// Whether there are punctual lights, and emissive triangles.
   [[nodiscard]] bool lamps() const { return lights_.y > 0; }
   [[nodiscard]] bool emitters() const { return emitters_.y > 0; }
-  /// The chance that a look for light, but for the sky's, goes to an emissive triangle: their share of the flux of lamps
-  /// and sun as well, but 0.2 to 0.8 where there are others. sun: luminance of its irradiance.
+  /// The chance that a look for light, but for the sky's, goes to an emissive triangle: their share of the flux of
+  /// lamps and sun as well, but 0.2 to 0.8 where there are others. sun: luminance of its irradiance.
   [[nodiscard]] double emitter_share(double sun) const;
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
