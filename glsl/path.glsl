@@ -11,7 +11,7 @@
 // quadratic in t, inverted in closed form. No majorant, no step size.
 //
 // With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has bvh.glsl, bsdf.glsl and
-// surface.glsl before this.
+// surface.glsl before this. With 2 next-event estimates are for emissive triangles, too.
 #ifndef CM_PATH_GLSL
 #define CM_PATH_GLSL
 
@@ -247,14 +247,16 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
   CmSurfacePoint surface;
   if (on_surface && event != CM_EVENT_NONE) {
     surface = cm_surface_point(p.triangle, p.weights, p.w);
-    float weight = 1.0f;
+#if CM_SURFACES > 1
     // The flight that met it, and the next-event estimate before: the balance heuristic, whatever the medium between.
-    for (bool weigh = met && p.bounce > 0u && cm.emitters.y > 0u && !surface.unlit; weigh; weigh = false) {
+    // A loop of one turn at most, here and below: software drivers run an if's body for every lane, wanted or not.
+    for (bool weigh = met && p.bounce > 0u && !surface.unlit; weigh; weigh = false) {
       vec3 way = surface.position - cm_from_cube_point(p.o);
       float other = cm_emitter_met(p.triangle, way, dot(surface.geometric, p.w)) * (1.0f - q) * cm.sun_irradiance.w;
-      weight = p.light.x / max(p.light.x + other, 1e-30f);
+      surface.emission *= p.light.x / max(p.light.x + other, 1e-30f);
     }
-    if (met) p.radiance += p.throughput * surface.emission * weight;
+#endif
+    if (met) p.radiance += p.throughput * surface.emission;
   }
   // Without light between surfaces: what has left one sees the sky alone, and the volume sees none.
   bool dark = cm.lights.z == 0u && p.bounce > 0u && (met || (collided && p.home.x == CM_NONE));
@@ -294,16 +296,21 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
 #if CM_SURFACES
     float light_distance = 3.0e38f;
     float light_density = 1.0f - q;
-    float direction_density = 0.0f;
-    bool emitter = false;
     vec3 here = cm_from_cube_point(p.o);
-    if (to_sun && cm.lights.y + cm.emitters.y > 0u) {
+#if CM_SURFACES > 1
+    bool emitter = false;
+#endif
+    if (to_sun && (cm.lights.y > 0u || CM_SURFACES > 1)) {
       float u_light = cm_random(p.random, p.stream);
+#if CM_SURFACES > 1
       float share = cm.sun_irradiance.w;
       emitter = u_light < share;
       light_density *= emitter ? share : 1.0f - share;
-      cm_lamp(here, max(0.0f, u_light - share) / max(1.0f - share, 1e-6f), sun_light, to_light, light_distance);
+      u_light = max(0.0f, u_light - share) / max(1.0f - share, 1e-6f);
+#endif
+      cm_lamp(here, u_light, sun_light, to_light, light_distance);
     }
+#if CM_SURFACES > 1
     for (bool pick = emitter; pick; pick = false) {
       uvec2 words = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
       float u_a = cm_random(p.random, p.stream);
@@ -313,6 +320,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
       sun_light = cm_emitter_sample(here, words, vec2(u_a, u_b), to_light, light_distance, density);
       light_density *= density;
     }
+#endif
     vec3 scattered = vec3(1.0f, 1.0f, 1.0f);
     vec3 facing = vec3(0.0f, 0.0f, 0.0f);
     if (on_surface) {
@@ -323,11 +331,13 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
       float phase = cm_phase(cm.medium.y, dot(p.w, to_light));
       facing = vec3(phase, phase, phase);
     }
-    for (bool weigh = cm.emitters.y > 0u; weigh; weigh = false) {
-      vec3 wi = shadow ? to_light : w;
-      direction_density = on_surface ? cm_surface_pdf(surface, p.w, wi) : cm_phase(cm.medium.y, dot(p.w, wi));
-    }
+#if CM_SURFACES > 1
+    vec3 wi = shadow ? to_light : w;
+    float direction_density = 0.0f;
+    for (bool weigh = on_surface; weigh; weigh = false) direction_density = cm_surface_pdf(surface, p.w, wi);
+    if (!on_surface) direction_density = cm_phase(cm.medium.y, dot(p.w, wi));
     if (emitter) light_density += direction_density;
+#endif
     sky_light *= scattered;
     if (!shadow) p.throughput *= scattered;
 #else
@@ -335,8 +345,10 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
     float light_density = 1.0f - q;
 #endif
     p.light = p.throughput * (to_sun ? sun_light * (facing / max(light_density, 1e-30f)) : sky_light);
-#if CM_SURFACES
+#if CM_SURFACES > 1
     if (!shadow) p.light.x = direction_density;
+#endif
+#if CM_SURFACES
     p.d = cm_to_cube(to_sun ? to_light : w);
 #else
     p.d = to_sun ? vec3(cm.sun_cube) : cm_to_cube(w);

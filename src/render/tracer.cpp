@@ -113,7 +113,7 @@ std::uint64_t Picture::bytes() const {
 
 GLuint Tracer::program(const MarchData& data, const Surfaces& surfaces, const char* name) {
   std::vector<std::string> key = data.defines();
-  if (surfaces.scene != nullptr) key.emplace_back("CM_SURFACES 1");
+  if (surfaces.scene != nullptr) key.emplace_back(surfaces.scene->emitters() ? "CM_SURFACES 2" : "CM_SURFACES 1");
   key.emplace_back(name);
   auto found = programs_.find(key);
   if (found == programs_.end()) {
