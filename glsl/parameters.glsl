@@ -29,11 +29,11 @@ layout(std140, binding = 0) uniform CmParameters {
   vec4 box_max;
   vec4 sun_world;       // unit vector towards the sun
   vec4 sun_cube;
-  vec4 sun_irradiance;
+  vec4 sun_irradiance;  // w: share of the emissive triangles in next-event estimates that are not to the sky
   vec4 sky_radiance;
   vec4 albedo;
   vec4 medium;          // x: extinction of density 1, 1 / world unit; y: anisotropy; z: probability of next-event
-                        // estimation towards the sky (the sun has the rest); w: 1 if there is any light
+                        // estimation towards the sky (other lights have the rest); w: 1 if there is any light
   uvec4 image;          // width, height, seed, target samples
   uvec4 tile;           // x, y, width, height
   uvec4 march;          // x: iterations a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of cells a page,
@@ -50,6 +50,7 @@ layout(std140, binding = 0) uniform CmParameters {
                         // of their own after the others, 2: paths that end at it take up its colour
   uvec4 lights;         // x: first word of the punctual lights, y: how many; z: 1 where surfaces pass light on;
                         // w: triangles
+  uvec4 emitters;       // x: first word of the emissive triangles' table, y: how many
 #ifdef __cplusplus
 };
 #else

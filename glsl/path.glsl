@@ -11,7 +11,8 @@
 // quadratic in t, inverted in closed form. No majorant, no step size.
 //
 // With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has bvh.glsl, bsdf.glsl and
-// surface.glsl before this. With CM_LAYERS 1 (which CM_SURFACES implies) camera rays may end at the surface pass instead:
+// surface.glsl before this. With 2 next-event estimates are for emissive triangles, too. With CM_LAYERS 1 (which
+// CM_SURFACES implies) camera rays may end at the surface pass instead:
 //   float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour)   its view depth
 // With CM_AOVS 1 samples that first met the volume are summed apart, too.
 #ifndef CM_PATH_GLSL
@@ -50,7 +51,7 @@ struct CmPath {
   uint mode;
   vec3 radiance;    // of this sample so far
   uint bounce;
-  vec3 light;       // what the shadow ray carries if nothing stops it
+  vec3 light;       // what the shadow ray carries if nothing stops it; of a flight, x: density of its direction
   uint random;
   uvec3 cell;
   float t_end;      // where the ray leaves the box
@@ -194,6 +195,7 @@ CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) {
   if (met && flight) {
     p.triangle = hit.triangle;
     p.weights = hit.barycentrics;
+    cm_hit_back = !hit.front;
   }
   if (met && !flight) p.light = vec3(0.0f, 0.0f, 0.0f);
   return met && flight;
@@ -281,6 +283,15 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
   CmSurfacePoint surface;
   if (on_surface && event != CM_EVENT_NONE) {
     surface = cm_surface_point(p.triangle, p.weights, p.w);
+#if CM_SURFACES > 1
+    // The flight that met it, and the next-event estimate before: the balance heuristic, whatever the medium between.
+    // A loop of one turn at most, here and below: software drivers run an if's body for every lane, wanted or not.
+    for (bool weigh = met && p.bounce > 0u && !surface.unlit; weigh; weigh = false) {
+      vec3 way = surface.position - cm_from_cube_point(p.o);
+      float other = cm_emitter_met(p.triangle, way, dot(surface.geometric, p.w)) * (1.0f - q) * cm.sun_irradiance.w;
+      surface.emission *= p.light.x / max(p.light.x + other, 1e-30f);
+    }
+#endif
     if (met) p.radiance += p.throughput * surface.emission;
   }
   // Without light between surfaces: what has left one sees the sky alone, and the volume sees none.
@@ -323,11 +334,32 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
     vec3 to_light = vec3(cm.sun_world);
 #if CM_SURFACES
     float light_distance = 3.0e38f;
-    if (to_sun && cm.lights.y > 0u) {
+    float light_density = 1.0f - q;
+    vec3 here = cm_from_cube_point(p.o);
+#if CM_SURFACES > 1
+    bool emitter = false;
+#endif
+    if (to_sun && (cm.lights.y > 0u || CM_SURFACES > 1)) {
       float u_light = cm_random(p.random, p.stream);
-      vec3 here = cm_from_cube_point(p.o);
+#if CM_SURFACES > 1
+      float share = cm.sun_irradiance.w;
+      emitter = u_light < share;
+      light_density *= emitter ? share : 1.0f - share;
+      u_light = max(0.0f, u_light - share) / max(1.0f - share, 1e-6f);
+#endif
       cm_lamp(here, u_light, sun_light, to_light, light_distance);
     }
+#if CM_SURFACES > 1
+    for (bool pick = emitter; pick; pick = false) {
+      uvec2 words = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
+      float u_a = cm_random(p.random, p.stream);
+      float u_b = cm_random(p.random, p.stream);
+      if (on_surface) here = cm_offset_origin(surface.position, surface.geometric);
+      float density = 1.0f;
+      sun_light = cm_emitter_sample(here, words, vec2(u_a, u_b), to_light, light_distance, density);
+      light_density *= density;
+    }
+#endif
     vec3 scattered = vec3(1.0f, 1.0f, 1.0f);
     vec3 facing = vec3(0.0f, 0.0f, 0.0f);
     if (on_surface) {
@@ -338,13 +370,24 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
       float phase = cm_phase(cm.medium.y, dot(p.w, to_light));
       facing = vec3(phase, phase, phase);
     }
+#if CM_SURFACES > 1
+    vec3 wi = shadow ? to_light : w;
+    float direction_density = 0.0f;
+    for (bool weigh = on_surface; weigh; weigh = false) direction_density = cm_surface_pdf(surface, p.w, wi);
+    if (!on_surface) direction_density = cm_phase(cm.medium.y, dot(p.w, wi));
+    if (emitter) light_density += direction_density;
+#endif
     sky_light *= scattered;
     if (!shadow) p.throughput *= scattered;
 #else
     float facing = cm_phase(cm.medium.y, dot(p.w, to_light));
+    float light_density = 1.0f - q;
 #endif
-    p.light = p.throughput * (to_sun ? sun_light * (facing / max(1.0f - q, 1e-6f)) : sky_light);
-    #if CM_SURFACES
+    p.light = p.throughput * (to_sun ? sun_light * (facing / max(light_density, 1e-30f)) : sky_light);
+#if CM_SURFACES > 1
+    if (!shadow) p.light.x = direction_density;
+#endif
+#if CM_SURFACES
     p.d = cm_to_cube(to_sun ? to_light : w);
 #else
     p.d = to_sun ? vec3(cm.sun_cube) : cm_to_cube(w);
@@ -356,6 +399,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
     p.t = 0.0f;
 #if CM_SURFACES
     p.reach = to_sun ? light_distance : 3.0e38f;
+    if (shadow && !(max(p.light.x, max(p.light.y, p.light.z)) > 0.0f)) p.reach = 0.0f;  // no light to look for
     p.t_end = -1.0f;
 #else
     p.t_end = cm_box_range(p.o, p.d).y;

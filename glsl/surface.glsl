@@ -13,6 +13,7 @@ layout(binding = 10) uniform sampler2DArray cm_atlas;
 #define CM_ALPHA_MASK 1u
 #define CM_ALPHA_BLEND 2u
 #define CM_UNLIT 4u
+#define CM_ONE_SIDED 8u
 
 #define CM_USE_BASE_COLOR 6u
 #define CM_USE_METALLIC_ROUGHNESS 8u
@@ -33,6 +34,7 @@ uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.lights.w + texel); }
 // What the ray under way is, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
+bool cm_hit_back = false;  // what it met last
 
 vec3 cm_to_world(vec3 v) { return cm.from_cube_x.xyz * v.x + cm.from_cube_y.xyz * v.y + cm.from_cube_z.xyz * v.z; }
 vec3 cm_world_origin() { return vec3(cm.from_cube_x.w, cm.from_cube_y.w, cm.from_cube_z.w); }
@@ -129,21 +131,26 @@ vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
 
 uint cm_material_flags(uint material) { return cm_words(cm.scene.z + CM_MATERIAL_WORDS * material + 5u).x; }
 
-// Whether a ray ends at a triangle that asks. Coverage (BLEND) and transmission are chances, so that no order of
+// The share of rays that end at a point of a triangle. Coverage (BLEND) and transmission are chances, so that no order of
 // surfaces and volume has to be found.
-bool cm_hit_accept(uint triangle, vec2 weights) {
-  CmVertexMix m = cm_vertex_mix(triangle, weights);
+float cm_coverage(CmVertexMix m) {
   uint word = cm.scene.z + CM_MATERIAL_WORDS * m.corner.w;
   uint flags = cm_words(word + 5u).x;
   float transmission = cm_floats(word + 4u).y;
   vec4 base = cm_floats(word) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
-  if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + 1u).w) return false;
-  float solid = (flags & CM_ALPHA_BLEND) != 0u ? base.a : 1.0;
+  if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + 1u).w) return 0.0;
+  float solid = (flags & CM_ALPHA_BLEND) != 0u ? clamp(base.a, 0.0, 1.0) : 1.0;
   if (transmission > 0.0) {
     // Thin and clear: what passes goes straight on, in the share of the base colour's luminance.
     float passes = transmission * cm_texture(m.corner.w, CM_USE_TRANSMISSION, m, false).r;
     solid *= 1.0 - passes * clamp(dot(base.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0, 1.0);
   }
+  return solid;
+}
+
+// Whether a ray ends at a triangle that asks.
+bool cm_hit_accept(uint triangle, vec2 weights) {
+  float solid = cm_coverage(cm_vertex_mix(triangle, weights));
   return solid >= 1.0 || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x) < solid;
 }
 
@@ -156,11 +163,17 @@ struct CmSurfacePoint {
   CmSurface material;
   vec3 position;   // world
   vec3 geometric;  // unit normal of the triangle, on the side the path came from
-  vec3 emission;
+  vec3 emission;   // to that side
   bool unlit;
 };
 
-// The point of a triangle that a path along w (world) has met.
+// What a material emits where it is seen from its front.
+vec3 cm_emission(CmVertexMix m) {
+  vec3 emission = cm_floats(cm.scene.z + CM_MATERIAL_WORDS * m.corner.w + 1u).rgb;
+  return emission * cm_texture(m.corner.w, CM_USE_EMISSION, m, true).rgb;
+}
+
+// The point of a triangle that a path along w (world) has met. cm_hit_back: on its back.
 CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   CmSurfacePoint point;
   CmVertexMix m = cm_vertex_mix(triangle, weights);
@@ -188,7 +201,6 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   bool back = dot(normal, point.geometric) < 0.0;
 
   vec4 base = cm_floats(word) * cm_texture(material, CM_USE_BASE_COLOR, m, true) * m.color;
-  vec4 emission = cm_floats(word + 1u);
   vec4 a = cm_floats(word + 2u);
   vec4 b = cm_floats(word + 3u);
   vec4 c = cm_floats(word + 4u);
@@ -210,7 +222,7 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   normal = cm_bend_normal(normal, -w);
 
   point.unlit = (flags & CM_UNLIT) != 0u;
-  point.emission = emission.rgb * cm_texture(material, CM_USE_EMISSION, m, true).rgb;
+  point.emission = cm_hit_back && (flags & CM_ONE_SIDED) != 0u ? vec3(0.0) : cm_emission(m);
   if (point.unlit) point.emission = base.rgb;
   point.material.base_color = base.rgb;
   point.material.metallic = clamp(a.x * rough.b, 0.0, 1.0);
@@ -228,6 +240,9 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
 vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
   return dot(point.geometric, wi) > 0.0 ? cm_bsdf_eval(point.material, -w, wi) : vec3(0.0);
 }
+
+// Density of cm_surface_scatter's wi by solid angle.
+float cm_surface_pdf(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_pdf(point.material, -w, wi); }
 
 // A direction to go on in, and its weight: share times cosine over density.
 void cm_surface_scatter(CmSurfacePoint point, vec3 w, float u_0, float u_1, float u_2, out vec3 wi, out vec3 weight) {
@@ -264,6 +279,61 @@ void cm_lamp(vec3 here, float u, inout vec3 light, inout vec3 to_light, inout fl
   uint word = cm.lights.x + 4u * choice;
   CmLight lamp = CmLight(cm_floats(word), cm_floats(word + 1u), cm_floats(word + 2u), cm_floats(word + 3u));
   light = cm_punctual_irradiance(lamp, here, to_light, distance) * float(count);
+}
+
+// The emissive triangles' table, see src/render/emitters.hpp.
+uvec4 cm_emitter(uint i) { return cm_words(cm.emitters.x + i); }
+
+// Density by solid angle of a point on an emissive triangle, picked by power and then by area: `way` from where it is
+// looked at, under `cosine` to its normal.
+float cm_emitter_density(uvec4 entry, vec3 way, float cosine) {
+  return abs(uintBitsToFloat(entry.w)) * dot(way, way) / max(abs(cosine), 1e-12);
+}
+
+// The same of a triangle that a ray has met; 0 where it is not in the table. O(log n).
+float cm_emitter_met(uint triangle, vec3 way, float cosine) {
+  uint low = 0u;
+  uint high = cm.emitters.y;
+  while (low + 1u < high) {
+    uint middle = (low + high) >> 1u;
+    bool below = cm_emitter(middle).x <= triangle;
+    low = below ? middle : low;
+    high = below ? high : middle;
+  }
+  uvec4 entry = cm_emitter(low);
+  return entry.x == triangle ? cm_emitter_density(entry, way, cosine) : 0.0;
+}
+
+// A point on an emissive triangle: what it sends to `here`, from where and with which density by solid angle. distance:
+// to just before it. O(1).
+vec3 cm_emitter_sample(vec3 here, uvec2 pick, vec2 u, out vec3 to_light, out float distance, out float density) {
+  uint i;
+  uint unused;
+  umulExtended(pick.x, cm.emitters.y, i, unused);
+  uvec4 entry = cm_emitter(i);
+  if (pick.y > entry.y) entry = cm_emitter(entry.z);
+  float root = sqrt(u.x);
+  CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0 - u.y), root * u.y));
+  vec3 a = cm_floats(cm.scene.y + CM_VERTEX_WORDS * m.corner.x).xyz;
+  vec3 b = cm_floats(cm.scene.y + CM_VERTEX_WORDS * m.corner.y).xyz;
+  vec3 c = cm_floats(cm.scene.y + CM_VERTEX_WORDS * m.corner.z).xyz;
+  vec3 g = cross(b - a, c - a);
+  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
+  vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
+  bool along = dot(g, point - here) > 0.0;  // seen from where the vertices turn clockwise
+  vec3 way = cm_offset_origin(point, along ? -g : g) - here;
+  float length_2 = max(dot(way, way), 1e-24);
+  to_light = way * inversesqrt(length_2);
+  distance = sqrt(length_2) * 0.99999;
+  density = cm_emitter_density(entry, way, dot(g, to_light));
+  uint word = cm.scene.z + CM_MATERIAL_WORDS * m.corner.w;
+  uint flags = cm_words(word + 5u).x;
+  vec3 emission = cm_emission(m);
+  for (bool ask = (flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + 4u).y > 0.0; ask; ask = false) {
+    emission *= cm_coverage(m);
+  }
+  bool front = along == (uintBitsToFloat(entry.w) < 0.0);
+  return front || (flags & CM_ONE_SIDED) == 0u ? emission : vec3(0.0);
 }
 
 #endif

@@ -10,6 +10,7 @@
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8 CM_SURFACES=1 CM_AOVS=1
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8 CM_LAYERS=1
 // variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1 CM_LAYERS=1 CM_AOVS=1
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1 CM_SURFACES=2
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shared.glsl"

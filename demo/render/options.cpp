@@ -232,7 +232,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       },
       "Look through this camera of the file, from 0");
   add_choice(app, group, "--surface-light", surface_light_names, scene.surface.light,
-             "Light between surfaces and volume (default: full), or only from sun, sky and lamps");
+             "Light between surfaces and volume (default: full), or only from sun, sky, lamps and what glows");
   add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
       [&](const std::string& text) { scene.camera = parse_camera(text); },

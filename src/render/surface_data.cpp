@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <numeric>
 #include <span>
 
@@ -33,6 +34,7 @@ constexpr GLuint atlas_unit = 10;
 constexpr std::uint32_t flag_mask = 1;
 constexpr std::uint32_t flag_blend = 2;
 constexpr std::uint32_t flag_unlit = 4;
+constexpr std::uint32_t flag_one_sided = 8;
 constexpr std::uint32_t use_second_uv = 0x80000000U;
 
 uvec4 bits(const vec4& v) { return glm::floatBitsToUint(v); }
@@ -70,7 +72,8 @@ void add_material(std::vector<uvec4>& words, const Material& m) {
   words.push_back(bits(m.specular_color, m.clearcoat));
   words.push_back(bits(vec4(m.clearcoat_roughness, m.transmission, m.normal_scale, 0.0F)));
   words.emplace_back((m.alpha_mode == AlphaMode::mask ? flag_mask : 0U) |
-                         (m.alpha_mode == AlphaMode::blend ? flag_blend : 0U) | (m.unlit ? flag_unlit : 0U),
+                         (m.alpha_mode == AlphaMode::blend ? flag_blend : 0U) | (m.unlit ? flag_unlit : 0U) |
+                         (m.double_sided ? 0U : flag_one_sided),
                      0U, 0U, 0U);
   for (const TextureUse* use : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture,
                                 &m.emission_texture, &m.specular_texture, &m.specular_color_texture,
@@ -93,6 +96,14 @@ void add_lights(std::vector<uvec4>& words, const std::vector<surface::PunctualLi
     words.push_back(bits(record.intensity));
     words.push_back(bits(record.cone));
   }
+}
+
+double flux_of(const surface::PunctualLight& light, double cross_section) {
+  using Kind = surface::PunctualLight::Kind;
+  const double solid_angle =
+      2.0 * std::numbers::pi * (light.kind == Kind::spot ? 1.0 - std::cos(double{light.outer_cone}) : 2.0);
+  return glm::dot(glm::dvec3(light.intensity), glm::dvec3(0.2126, 0.7152, 0.0722)) *
+         (light.kind == Kind::directional ? cross_section : solid_angle);
 }
 
 void pack_words(SurfaceSource& source) {
@@ -139,6 +150,16 @@ void pack_words(SurfaceSource& source) {
   source.lights.x = size_of(words);
   source.lights.y = static_cast<std::uint32_t>(source.pose.lights.size());
   add_lights(words, source.pose.lights);
+
+  const EmitterTable table = emitter_table(source.emissive, scene, source.pose);
+  source.emitters = {size_of(words), size_of(table.entries), 0U, 0U};
+  words.insert(words.end(), table.entries.begin(), table.entries.end());
+  source.emitted_flux = table.flux;
+  const double radius = 0.5 * glm::length(source.pose.high - source.pose.low);
+  source.cross_section = std::numbers::pi * radius * radius;
+  for (const surface::PunctualLight& light : source.pose.lights) {
+    source.lamp_flux += flux_of(light, source.cross_section);
+  }
 }
 
 void build(SurfaceSource& source, const Progress* progress) {
@@ -219,6 +240,7 @@ std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene
   source->scene = std::move(scene);
   source->pose = std::move(pose);
   build(*source, progress);
+  source->emissive = emissive_triangles(*source->scene);
   source->atlas = pack_atlas(source->scene->images, largest_layer);
   pack_words(*source);
   return source;
@@ -236,6 +258,7 @@ std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& la
   if (source->pose.flipped != last.pose.flipped || source->bvh.cost() > 1.5 * source->built_cost)
     build(*source, progress);
   if (progress != nullptr) progress->check();
+  source->emissive = last.emissive;
   source->atlas = last.atlas;
   pack_words(*source);
   return source;
@@ -243,7 +266,13 @@ std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& la
 
 SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, const SurfaceSource& source,
                          SurfaceData* last)
-    : scene_(source.scene.get()), tables_(source.tables), lights_(source.lights) {
+    : scene_(source.scene.get()),
+      tables_(source.tables),
+      lights_(source.lights),
+      emitters_(source.emitters),
+      emitted_flux_(source.emitted_flux),
+      lamp_flux_(source.lamp_flux),
+      cross_section_(source.cross_section) {
   const std::size_t count = std::max<std::size_t>(1, source.words.size());
   if (static_cast<std::int64_t>(count) > limits.texture_buffer_texels) {
     throw Error(ErrorCode::unsupported, "the surfaces need " + std::to_string(count) +
@@ -297,6 +326,13 @@ void SurfaceData::describe(core::CmParameters& parameters) const {
   const std::uint32_t passes_light_on = parameters.lights.z;
   parameters.lights = lights_;
   parameters.lights.z = passes_light_on;
+  parameters.emitters = emitters_;
+}
+
+double SurfaceData::emitter_share(double sun) const {
+  if (!emitters()) return 0.0;
+  const double others = lamp_flux_ + sun * cross_section_;
+  return others > 0.0 ? std::clamp(emitted_flux_ / (emitted_flux_ + others), 0.2, 0.8) : 1.0;
 }
 
 }  // namespace cumulet::render

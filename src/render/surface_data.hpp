@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gl/objects.hpp"
+#include "render/emitters.hpp"
 #include "render/march_data.hpp"
 #include "render/parameters.hpp"
 #include "surface/bvh.hpp"
@@ -32,10 +33,15 @@ struct SurfaceSource {
   surface::ScenePtr scene;
   surface::Pose pose;
   surface::Bvh bvh;
-  double built_cost = 0.0;        // of the tree before it was refitted
+  double built_cost = 0.0;  // of the tree before it was refitted
+  std::vector<EmissiveTriangle> emissive;
   std::vector<glm::uvec4> words;  // the tables of glsl/surface.glsl
   glm::uvec4 tables{0U};          // CmParameters::scene
   glm::uvec4 lights{0U};          // CmParameters::lights, but z
+  glm::uvec4 emitters{0U};        // CmParameters::emitters
+  double emitted_flux = 0.0;      // luminance of all that emissive triangles emit
+  double lamp_flux = 0.0;         // and lamps
+  double cross_section = 0.0;     // of the scene's bounding sphere
   TextureAtlas atlas;
 };
 
@@ -55,8 +61,12 @@ class SurfaceData {
   void bind(const gl::Functions& gl) const;
   /// Fills the tables' places.
   void describe(core::CmParameters& parameters) const;
-  /// Whether there are punctual lights.
+  /// Whether there are punctual lights, and emissive triangles.
   [[nodiscard]] bool lamps() const { return lights_.y > 0; }
+  [[nodiscard]] bool emitters() const { return emitters_.y > 0; }
+  /// The chance that a look for light, but for the sky's, goes to an emissive triangle: their share of the flux of
+  /// lamps and sun as well, but 0.2 to 0.8 where there are others. sun: luminance of its irradiance.
+  [[nodiscard]] double emitter_share(double sun) const;
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
@@ -66,6 +76,10 @@ class SurfaceData {
   const surface::Scene* scene_ = nullptr;
   glm::uvec4 tables_{0U};
   glm::uvec4 lights_{0U};
+  glm::uvec4 emitters_{0U};
+  double emitted_flux_ = 0.0;
+  double lamp_flux_ = 0.0;
+  double cross_section_ = 0.0;
   std::uint64_t bytes_ = 0;
 };
 

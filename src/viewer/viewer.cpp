@@ -417,18 +417,20 @@ core::CmParameters Viewer::parameters() const {
                                                                : 0U;
   p.sun_world = direction(sun);
   p.sun_cube = direction(linear * sun);
-  p.sun_irradiance = glm::vec4(light_.sun_irradiance, 0.0F);
   p.sky_radiance = glm::vec4(light_.sky_radiance, 0.0F);
   p.albedo = glm::vec4(medium_.albedo, 1.0F);
   // Half of the sky's share of the light: its escaping paths sample it as well.
   const auto sun_power = static_cast<float>(luminance(light_.sun_irradiance));
+  const double to_emitters = gl_->surfaces ? gl_->surfaces->emitter_share(sun_power) : 0.0;
+  p.sun_irradiance = glm::vec4(light_.sun_irradiance, static_cast<float>(to_emitters));
   const auto sky_power = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(light_.sky_radiance));
-  const bool lamps = gl_->surfaces && gl_->surfaces->lamps() && surface_settings_.light != SurfaceLight::none;
-  const float to_sky = lamps && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
+  const bool local = gl_->surfaces && surface_settings_.light != SurfaceLight::none &&
+                     (gl_->surfaces->lamps() || gl_->surfaces->emitters());
+  const float to_sky = local && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
                        : sun_power > 0.0F           ? 0.5F * sky_power / (sky_power + sun_power)
                                                     : (sky_power > 0.0F ? 1.0F : 0.0F);
   p.medium = {static_cast<float>(std::min(1e30, medium_.density_scale * std::max(source.max_value, 1e-30F))),
-              medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F || lamps ? 1.0F : 0.0F};
+              medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F || local ? 1.0F : 0.0F};
   p.image = {frame_size_, sampling_.seed, std::max(1U, sampling_.samples)};
   p.march = {0U, medium_.max_bounces, 0U, 0U};
   return p;

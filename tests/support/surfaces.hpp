@@ -90,11 +90,10 @@ class StillScene : public surface::Scene {
     surface::Draw& draw = draws.back();
     draw.index_count = static_cast<std::uint32_t>(indices.size()) - draw.first_index;
     rest.flipped.push_back(0);
-    rest.low = glm::dvec3(1e30);
-    rest.high = glm::dvec3(-1e30);
-    for (const surface::PosedVertex& v : rest.vertices) {
-      rest.low = glm::min(rest.low, glm::dvec3(v.position));
-      rest.high = glm::max(rest.high, glm::dvec3(v.position));
+    if (draws.size() == 1) rest.low = rest.high = rest.vertices[0].position;
+    for (std::size_t i = draw.first_index; i < indices.size(); ++i) {
+      rest.low = glm::min(rest.low, glm::dvec3(rest.vertices[indices[i]].position));
+      rest.high = glm::max(rest.high, glm::dvec3(rest.vertices[indices[i]].position));
     }
   }
 };

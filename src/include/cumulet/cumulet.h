@@ -272,14 +272,16 @@ CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
  * these extensions: KHR_lights_punctual, KHR_materials_unlit, _emissive_strength, _ior, _specular, _clearcoat and
  * _transmission (thin and clear: what passes goes straight on), KHR_texture_transform, KHR_mesh_quantization,
  * KHR_draco_mesh_compression, EXT_meshopt_compression. Watts per steradian and per square metre stand for KHR_lights_
- * punctual's candela and lux. Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
+ * punctual's candela and lux. Emissive triangles are lights, to their front alone where the material is single-sided.
+ * Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
  * NULL: shows no surfaces, at once. cumulet_wait, cumulet_get_progress and cumulet_cancel are about this work, too.
  */
 CUMULET_API cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path);
 
 typedef enum cumulet_surface_light {
   CUMULET_SURFACE_LIGHT_FULL = 0,    /* light goes on between surfaces, and between them and the volume */
-  CUMULET_SURFACE_LIGHT_SHADOWS = 1, /* surfaces are lit by sun, sky and lamps alone, through the volume's shadow */
+  CUMULET_SURFACE_LIGHT_SHADOWS = 1, /* surfaces are lit by sun, sky, lamps and emissive triangles alone, through the
+                                        volume's shadow */
   /*
    * No light between surfaces and volume: surfaces are rasterised, lit by sun, sky and lamps without shadows, and hide
    * what is behind them; the volume is lit by sun and sky alone. The fastest, and what previews show of surfaces in

@@ -1,0 +1,202 @@
+#include "render/emitters.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace cumulet::render {
+
+namespace {
+
+using glm::dvec3;
+using glm::vec2;
+using glm::vec3;
+using surface::Image;
+using surface::Material;
+using surface::Scene;
+using surface::Wrap;
+
+// A triangle's texture is looked at in this many points; of an image's mean at least this share counts, for what they
+// miss.
+constexpr int looks = 16;
+constexpr float least_share = 0.05F;
+constexpr std::uint32_t certain = std::numeric_limits<std::uint32_t>::max();
+
+// Rec. 709
+float luminance(const vec3& v) { return glm::dot(v, vec3(0.2126F, 0.7152F, 0.0722F)); }
+
+using FromSrgb = std::array<float, 256>;
+
+FromSrgb from_srgb() {
+  FromSrgb table{};
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const double v = static_cast<double>(i) / 255.0;
+    table[i] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+  }
+  return table;
+}
+
+vec3 texel(const FromSrgb& linear, const Image& image, std::size_t i) {
+  return {linear[image.rgba[4 * i]], linear[image.rgba[4 * i + 1]], linear[image.rgba[4 * i + 2]]};
+}
+
+vec3 mean_colour(const FromSrgb& linear, const Image& image) {
+  const std::size_t texels = std::size_t{image.width} * image.height;
+  const dvec3 sum = tbb::parallel_deterministic_reduce(
+      tbb::blocked_range<std::size_t>(0, texels, 1U << 16U), dvec3(0.0),
+      [&](const auto& range, dvec3 part) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i) part += dvec3(texel(linear, image, i));
+        return part;
+      },
+      [](const dvec3& a, const dvec3& b) { return a + b; });
+  return vec3(sum / std::max(1.0, static_cast<double>(texels)));
+}
+
+std::uint32_t wrapped(float at, std::uint32_t size, Wrap wrap) {
+  float turns = at;
+  if (wrap == Wrap::repeat) turns = at - std::floor(at);
+  if (wrap == Wrap::mirrored) turns = 1.0F - std::abs(1.0F - (at - 2.0F * std::floor(0.5F * at)));
+  const float texel = std::clamp(turns, 0.0F, 1.0F) * static_cast<float>(size);
+  return std::min(size - 1U, static_cast<std::uint32_t>(texel));
+}
+
+// What a material emits, by place.
+class Emission {
+ public:
+  Emission(const FromSrgb& linear, const Scene& scene, const Material& material)
+      : linear_(&linear), scene_(&scene), material_(&material) {
+    const surface::TextureUse& use = material.emission_texture;
+    if (material.unlit || !(luminance(material.emission) > 0.0F)) return;
+    vec3 mean(1.0F);
+    if (use.texture >= 0) {
+      texture_ = &scene.textures[static_cast<std::size_t>(use.texture)];
+      image_ = &scene.images[texture_->image];
+      mean = mean_colour(linear, *image_);
+    }
+    mean_ = luminance(material.emission * mean);
+  }
+
+  /// 0: nothing, anywhere.
+  [[nodiscard]] float mean() const { return mean_; }
+
+  [[nodiscard]] float over(std::uint32_t triangle) const {
+    if (image_ == nullptr) return mean_;
+    const surface::TextureUse& use = material_->emission_texture;
+    std::array<vec2, 3> uv;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const surface::VertexAttributes& vertex = scene_->attributes[scene_->indices[3 * std::size_t{triangle} + i]];
+      uv[i] = use.transform * vec3(vertex.uv[use.uv_set == 1 ? 1 : 0], 1.0F);
+    }
+    vec3 sum(0.0F);
+    for (int i = 0; i < looks; ++i) {
+      // The R2 sequence, folded into the triangle.
+      vec2 b = glm::fract(vec2(0.5F) + static_cast<float>(i) * vec2(0.7548777F, 0.5698403F));
+      if (b.x + b.y > 1.0F) b = vec2(1.0F) - b;
+      const vec2 at = uv[0] + b.x * (uv[1] - uv[0]) + b.y * (uv[2] - uv[0]);
+      const std::size_t x = wrapped(at.x, image_->width, texture_->sampler.wrap_s);
+      const std::size_t y = wrapped(at.y, image_->height, texture_->sampler.wrap_t);
+      sum += texel(*linear_, *image_, y * image_->width + x);
+    }
+    return std::max(luminance(material_->emission * sum) / static_cast<float>(looks), least_share * mean_);
+  }
+
+ private:
+  const FromSrgb* linear_;
+  const Scene* scene_;
+  const Material* material_;
+  const surface::Texture* texture_ = nullptr;
+  const Image* image_ = nullptr;
+  float mean_ = 0.0F;
+};
+
+}  // namespace
+
+std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene) {
+  const FromSrgb linear = from_srgb();
+  std::vector<Emission> emissions;
+  emissions.reserve(scene.materials.size());
+  for (const Material& material : scene.materials) emissions.emplace_back(linear, scene, material);
+  std::vector<EmissiveTriangle> triangles;
+  for (std::size_t i = 0; i < scene.draws.size(); ++i) {
+    const surface::Draw& draw = scene.draws[i];
+    if (!(emissions[draw.material].mean() > 0.0F)) continue;
+    const std::uint32_t first = draw.first_index / 3;
+    for (std::uint32_t j = 0; j < draw.index_count / 3; ++j) {
+      triangles.push_back({first + j, static_cast<std::uint32_t>(i), 0.0F});
+    }
+  }
+  std::ranges::sort(triangles, {}, &EmissiveTriangle::triangle);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 1024), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      EmissiveTriangle& t = triangles[i];
+      t.luminance = emissions[scene.draws[t.draw].material].over(t.triangle);
+    }
+  });
+  return triangles;
+}
+
+EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const Scene& scene,
+                           const surface::Pose& pose) {
+  EmitterTable table;
+  std::vector<double> areas;
+  std::vector<double> power;
+  double sum = 0.0;
+  for (const EmissiveTriangle& t : triangles) {
+    const std::size_t first = 3 * std::size_t{t.triangle};
+    const dvec3 a = pose.vertices[scene.indices[first]].position;
+    const dvec3 b = pose.vertices[scene.indices[first + 1]].position;
+    const dvec3 c = pose.vertices[scene.indices[first + 2]].position;
+    const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
+    const double sides = scene.materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
+    const double emitted = area * t.luminance * sides;
+    if (!(emitted > 0.0) || !std::isfinite(emitted)) continue;
+    table.entries.emplace_back(t.triangle, certain, static_cast<std::uint32_t>(power.size()),
+                               pose.flipped[t.draw] != 0 ? 1U : 0U);
+    areas.push_back(area);
+    power.push_back(emitted);
+    sum += emitted;
+  }
+  table.flux = std::numbers::pi * sum;
+
+  const std::size_t n = power.size();
+  std::vector<std::uint32_t> small;
+  std::vector<std::uint32_t> large;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    power[i] *= static_cast<double>(n) / sum;  // in units of the mean
+    (power[i] < 1.0 ? small : large).push_back(i);
+  }
+  // What is left at the end, by rounding alone or with the mean's power, stands for itself.
+  while (!small.empty() && !large.empty()) {
+    const std::uint32_t low = small.back();
+    const std::uint32_t high = large.back();
+    small.pop_back();
+    table.entries[low].y = static_cast<std::uint32_t>(power[low] * certain);
+    table.entries[low].z = high;
+    power[high] -= 1.0 - power[low];
+    if (power[high] < 1.0) {
+      large.pop_back();
+      small.push_back(high);
+    }
+  }
+  // Chances as the table's words give them, not as they were meant.
+  std::vector<double> chance(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double stays = (static_cast<double>(table.entries[i].y) + 1.0) / 4294967296.0;
+    chance[i] += stays;
+    chance[table.entries[i].z] += 1.0 - stays;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double density = chance[i] / static_cast<double>(n) / areas[i];
+    glm::uvec4& entry = table.entries[i];
+    entry.w = glm::floatBitsToUint(static_cast<float>(entry.w != 0U ? -density : density));
+  }
+  return table;
+}
+
+}  // namespace cumulet::render

@@ -1,0 +1,39 @@
+#pragma once
+
+// Emissive triangles as lights: which there are, and how often the path tracer picks each. No GL.
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "surface/scene.hpp"
+
+namespace cumulet::render {
+
+/// A triangle whose material emits. What a pose does not change.
+struct EmissiveTriangle {
+  std::uint32_t triangle = 0;
+  std::uint32_t draw = 0;
+  float luminance =
+      0.0F;  ///< of its radiance, the mean over the triangle as far as a few texels of its texture tell; > 0
+};
+
+/// The scene's emissive triangles, in ascending order; those of unlit materials are not among them. O(n), and over the
+/// texels of emissive images, on TBB's threads.
+std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene);
+
+/// Picks triangles in proportion to their power (Walker's alias method: Vose, "A Linear Algorithm for Generating Random
+/// Numbers with a Given Distribution", IEEE Transactions on Software Engineering 17(9), 1991).
+struct EmitterTable {
+  /// One a triangle that has an area, in ascending order of x: x: triangle; y: entry i, drawn evenly, stands for itself
+  /// where a random word is at most y, z: else for this entry; w: a float, the chance to be picked per area, negative
+  /// where the triangle's front is where its vertices turn clockwise.
+  std::vector<glm::uvec4> entries;
+  double flux = 0.0;  ///< luminance of all that they emit: pi x radiance x area x sides
+};
+
+/// The table of a pose. O(n).
+EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const surface::Scene& scene,
+                           const surface::Pose& pose);
+
+}  // namespace cumulet::render
