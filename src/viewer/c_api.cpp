@@ -194,8 +194,8 @@ cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* pr
     cumulet_progress p{};
     p.stage = static_cast<cumulet_stage>(status.stage);
     p.fraction = status.fraction;
-    p.status = status.error ? status_of(*status.error) : CUMULET_OK;
-    copy_text(status.message, p.message, sizeof p.message);
+    p.status = status.failure ? status_of(status.failure->code()) : CUMULET_OK;
+    copy_text(status.failure ? status.failure->what() : "", p.message, sizeof p.message);
     write_desc(progress, p, "cumulet_progress");
   });
 }

@@ -1,16 +1,17 @@
 #pragma once
 
-#include <condition_variable>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
+#include <utility>
 
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "render/surface_data.hpp"
+#include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
 
@@ -27,47 +28,36 @@ struct SurfaceMoment {
 class SurfaceBuilder {
  public:
   /// notify: called on the worker after a job ended.
-  SurfaceBuilder(Log log, std::function<void()> notify) : log_(log), notify_(std::move(notify)) {}
-  /// Cancels and waits.
-  ~SurfaceBuilder();
-  SurfaceBuilder(const SurfaceBuilder&) = delete;
-  SurfaceBuilder& operator=(const SurfaceBuilder&) = delete;
+  SurfaceBuilder(Log log, std::function<void()> notify) : log_(log), worker_(std::move(notify)) {}
 
   /// Reads a file, then poses it. Replaces what is under way.
   void load(std::string path, SurfaceMoment moment);
-  /// Poses what was made last anew; a load under way takes the moment over.
+  /// Another moment for a load under way. Returns false if there is none: then take what it made, and call pose.
+  bool configure_load(SurfaceMoment moment);
+  /// Poses what was made last anew, after the pose under way: a moment that takes long is shown before the next.
   void pose(SurfacePtr last, SurfaceMoment moment);
-  void cancel();
+  void cancel() { worker_.cancel(); }
   /// The newest result, once.
   std::optional<SurfacePtr> take();
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
-  [[nodiscard]] bool working() const;
-  /// How the last job ended, if it failed.
-  [[nodiscard]] std::optional<Error> failure() const;
+  [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Until idle, at most until then. Returns whether it is.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
-  struct Job {
-    std::string path;  // empty: pose only
-    SurfacePtr last;
+  // What a load will be posed at: open until it is.
+  struct Load {
     SurfaceMoment moment;
+    bool open = true;
   };
-  void post(Job job);
-  void run();
+  void read(const std::string& path, Load& load, Progress& progress);
 
   Log log_;
-  std::function<void()> notify_;
   mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
-  std::optional<Job> next_;
-  std::optional<Job> under_way_;
-  std::shared_ptr<Progress> current_;
-  bool stopping_ = false;
+  std::weak_ptr<Load> load_;  // held by its job
   std::optional<SurfacePtr> result_;
-  std::optional<Error> failure_;
-  std::thread thread_;  // last: it uses all of the above
+  Worker worker_;  // last: its thread uses all of the above
 };
 
 }  // namespace cumulet::viewer

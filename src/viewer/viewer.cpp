@@ -170,6 +170,7 @@ std::optional<BuildSettings> Viewer::build_settings() const {
 void Viewer::request_build() {
   const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
   if (builder_.configure_load(settings)) return;
+  sync();
   built_view_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
 }
@@ -199,7 +200,6 @@ VolumePtr Viewer::volume() {
 }
 
 void Viewer::rebuild() {
-  sync();
   request_build();
   touch();
 }
@@ -223,8 +223,10 @@ void Viewer::show_surfaces(SurfacePtr surfaces) {
 }
 
 void Viewer::set_surfaces(const SurfaceSettings& settings) {
-  sync();
-  if (settings.moment != surface_settings_.moment) surface_builder_.pose(surface_source_, settings.moment);
+  if (settings.moment != surface_settings_.moment && !surface_builder_.configure_load(settings.moment)) {
+    sync();
+    if (surface_source_) surface_builder_.pose(surface_source_, settings.moment);
+  }
   surface_settings_ = settings;
   touch();
 }
@@ -263,19 +265,19 @@ void Viewer::wait(double timeout_ms) {
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   if (!builder_.wait(until) || !surface_builder_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
   sync();
-  if (const auto failure = surface_builder_.failure()) throw Error(*failure);
-  const Builder::Status status = builder_.status();
-  if (status.error) throw Error(*status.error, status.message);
+  if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
+  if (const auto failure = builder_.status().failure) throw Error(*failure);
 }
 
-Builder::Status Viewer::status() const {
-  Builder::Status status = builder_.status();
+Worker::Status Viewer::status() const {
+  Worker::Status status = builder_.status();
   const double upload = upload_progress_.load(std::memory_order_relaxed);
-  if (const auto failure = surface_builder_.failure(); failure && !status.error) {
-    status.error = failure->code();
-    status.message = failure->what();
+  const Worker::Status surfaces = surface_builder_.status();
+  if (!status.failure) status.failure = surfaces.failure;
+  if (status.stage == Progress::Stage::idle) {
+    status.stage = surfaces.stage;
+    status.fraction = surfaces.fraction;
   }
-  if (status.stage == Progress::Stage::idle && surface_builder_.working()) status.stage = Progress::Stage::loading;
   if (status.stage == Progress::Stage::idle && upload < 1.0) {
     status.stage = Progress::Stage::uploading;
     status.fraction = upload;
@@ -286,7 +288,6 @@ Builder::Status Viewer::status() const {
 // ---- settings ----
 
 void Viewer::set_grid(const GridSettings& settings) {
-  sync();
   grid_ = settings;
   request_build();
   touch();
@@ -642,11 +643,11 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt([&] { prepare(frame, deadline); });
     if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
     attempt([&] { draw(frame, result); });
-    const Builder::Status status = builder_.status();
     result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
-    const auto surface_failure = surface_builder_.failure();
-    result.failed = (status.error && *status.error != ErrorCode::cancelled) ||
-                    (surface_failure && surface_failure->code() != ErrorCode::cancelled);
+    const auto failed = [](const Worker::Status& status) {
+      return status.failure && status.failure->code() != ErrorCode::cancelled;
+    };
+    result.failed = failed(builder_.status()) || failed(surface_builder_.status());
     result.converged = !result.loading && g.data && view_ && g.progressive.converged();
     const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
     result.more =

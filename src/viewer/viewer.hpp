@@ -146,7 +146,7 @@ class Viewer {
   /// Throws how the last job ended, or Error(timeout).
   void wait(double timeout_ms);
   /// As Builder's, and uploading.
-  [[nodiscard]] Builder::Status status() const;
+  [[nodiscard]] Worker::Status status() const;
 
   void load_surfaces(const std::string& path);
   /// Shows these at once, null: none. Cancels a load under way.
