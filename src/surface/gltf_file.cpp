@@ -342,23 +342,6 @@ class Loader {
 
 void malformed(const std::string& cause) { throw Error(ErrorCode::file, cause); }
 
-std::string one_line(std::string_view text) {
-  constexpr std::size_t longest = 200;
-  std::string line;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool blank = byte <= 0x20 || byte == 0x7F;
-    if (blank && (line.empty() || line.back() == ' ')) continue;
-    line += blank ? ' ' : c;
-    if (line.size() >= longest) {
-      line += "...";
-      break;
-    }
-  }
-  while (!line.empty() && line.back() == ' ') line.pop_back();
-  return line;
-}
-
 void Budget::take(std::uint64_t count, std::uint64_t size, std::string_view what) {
   if (size != 0 && count > left_ / size) {
     malformed(std::string(what) + " would need more than the " + std::to_string(limits_.memory >> 20U) +

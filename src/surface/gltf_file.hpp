@@ -14,6 +14,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "base/one_line.hpp"
 #include "base/progress.hpp"
 #include "surface/gltf_import.hpp"
 
@@ -21,8 +22,8 @@ namespace cumulet::surface::detail {
 
 /// Ends an import; import_gltf() puts the file's name in front. One line.
 [[noreturn]] void malformed(const std::string& cause);
-/// A text of the file's or a library's as a part of one line: no control characters, not too long.
-std::string one_line(std::string_view text);
+/// A text of the file's or a library's as a part of one line, not too long.
+inline std::string one_line(std::string_view text) { return cumulet::one_line(text, 200); }
 /// "node 3" and the like.
 inline std::string numbered(std::string_view what, std::size_t number) {
   return std::string(what) + " " + std::to_string(number);
