@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <program.hpp>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -60,12 +61,6 @@ bool same(const cumulet_camera_desc& a, const cumulet_camera_desc& b) {
 bool same(const cumulet_navigation_desc& a, const cumulet_navigation_desc& b) {
   return std::tie(a.style, a.fly, a.speed, a.turntable_degrees_per_second) ==
          std::tie(b.style, b.fly, b.speed, b.turntable_degrees_per_second);
-}
-
-std::string one_line(std::string text) {
-  for (char& c : text)
-    if (c == '\n' || c == '\r') c = ' ';
-  return text;
 }
 
 }  // namespace

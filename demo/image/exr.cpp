@@ -12,6 +12,7 @@
 #include "checks.hpp"
 #include "file.hpp"
 #include "image.hpp"
+#include "program.hpp"
 
 namespace cumulet::image {
 namespace {
@@ -38,11 +39,6 @@ class MemoryOutput final : public Imf::OStream {
   std::uint64_t position_ = 0;
 };
 
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
 }  // namespace
 
 void write_exr(const std::string& path, const Image& image) {
@@ -62,7 +58,7 @@ void write_exr(const std::string& path, const Image& image) {
     file.setFrameBuffer(frame);
     file.writePixels(static_cast<int>(image.height));
   } catch (const std::exception& error) {
-    fail(path, one_line(error.what()));
+    fail(path, demo::one_line(error.what()));
   }
   replace_file(path, output.bytes());
 }
@@ -89,7 +85,7 @@ Image read_exr(const std::string& path) {
     file.readPixels(window.min.y, window.max.y);
     return image;
   } catch (const std::exception& error) {
-    fail(path, "not a readable OpenEXR file: " + one_line(error.what()));
+    fail(path, "not a readable OpenEXR file: " + demo::one_line(error.what()));
   }
 }
 
