@@ -224,7 +224,7 @@ void render(const RenderOptions& options) {
   check(viewer, cumulet_set_display(viewer.get(), &scene.display));
   set_camera(viewer, scene.camera);
   if (!scene.surfaces.empty()) {
-    check(viewer, cumulet_set_surfaces(viewer.get(), &scene.surface));
+    check(viewer, cumulet_set_surface_settings(viewer.get(), &scene.surface));
     check(viewer, cumulet_load_surfaces(viewer.get(), scene.surfaces.c_str()));
   }
   const char* grid_name = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();

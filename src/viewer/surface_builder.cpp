@@ -12,7 +12,7 @@ void SurfaceBuilder::load(std::string path, SurfaceMoment moment) {
 }
 
 void SurfaceBuilder::read(const std::string& path, Load& load, Progress& progress) {
-  surface::ScenePtr scene = surface::import_gltf(path, log_, &progress);
+  const auto asset = std::make_shared<const SurfaceAsset>(surface::import_gltf(path, log_, &progress), path);
   SurfacePtr made;
   SurfaceMoment moment;
   for (;;) {
@@ -21,14 +21,12 @@ void SurfaceBuilder::read(const std::string& path, Load& load, Progress& progres
       progress.check();
       if (made && moment == load.moment) {
         load.open = false;
-        result_ = std::move(made);
+        result_ = {asset, std::move(made)};
         return;
       }
       moment = load.moment;
     }
-    surface::Pose pose = scene->pose(moment.time, moment.animation);
-    made = made ? render::make_surface_source(*made, std::move(pose), &progress)
-                : render::make_surface_source(scene, std::move(pose), &progress);
+    made = asset->posed(moment, progress);
   }
 }
 
@@ -40,18 +38,17 @@ bool SurfaceBuilder::configure_load(SurfaceMoment moment) {
   return true;
 }
 
-void SurfaceBuilder::pose(SurfacePtr last, SurfaceMoment moment) {
+void SurfaceBuilder::pose(SurfaceAssetPtr asset, SurfaceMoment moment) {
   worker_.post(
-      {"posing the surfaces", Progress::Stage::loading, [this, last = std::move(last), moment](Progress& progress) {
-         surface::Pose pose = last->scene->pose(moment.time, moment.animation);
-         SurfacePtr made = render::make_surface_source(*last, std::move(pose), &progress);
+      {"posing the surfaces", Progress::Stage::loading, [this, asset = std::move(asset), moment](Progress& progress) {
+         PosedSurfaces made{asset, asset->posed(moment, progress)};
          const std::scoped_lock lock(mutex_);
          progress.check();
          result_ = std::move(made);
        }});
 }
 
-std::optional<SurfacePtr> SurfaceBuilder::take() {
+std::optional<PosedSurfaces> SurfaceBuilder::take() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(result_, std::nullopt);
 }

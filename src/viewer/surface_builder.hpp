@@ -10,18 +10,15 @@
 
 #include "base/log.hpp"
 #include "base/progress.hpp"
-#include "render/surface_data.hpp"
+#include "viewer/surface_asset.hpp"
 #include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
 
-using SurfacePtr = std::shared_ptr<const render::SurfaceSource>;
-
-/// Which moment of which animation.
-struct SurfaceMoment {
-  double time = 0.0;  // seconds
-  std::uint32_t animation = 0;
-  bool operator==(const SurfaceMoment&) const = default;
+/// A scene, and what is shown of it.
+struct PosedSurfaces {
+  SurfaceAssetPtr asset;
+  SurfacePtr source;
 };
 
 /// Reads glTF scenes and poses them on a thread of its own; the newest wish wins. All calls are safe from any thread.
@@ -34,11 +31,11 @@ class SurfaceBuilder {
   void load(std::string path, SurfaceMoment moment);
   /// Another moment for a load under way. Returns false if there is none: then take what it made, and call pose.
   bool configure_load(SurfaceMoment moment);
-  /// Poses what was made last anew, after the pose under way: a moment that takes long is shown before the next.
-  void pose(SurfacePtr last, SurfaceMoment moment);
+  /// Poses a scene, after the pose under way: a moment that takes long is shown before the next.
+  void pose(SurfaceAssetPtr asset, SurfaceMoment moment);
   void cancel() { worker_.cancel(); }
   /// The newest result, once.
-  std::optional<SurfacePtr> take();
+  std::optional<PosedSurfaces> take();
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
@@ -56,7 +53,7 @@ class SurfaceBuilder {
   Log log_;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;  // held by its job
-  std::optional<SurfacePtr> result_;
+  std::optional<PosedSurfaces> result_;
   Worker worker_;  // last: its thread uses all of the above
 };
 

@@ -155,7 +155,10 @@ void Viewer::sync() {
     }
     built_ = std::move(*built);
   }
-  if (auto surfaces = surface_builder_.take()) surface_source_ = std::move(*surfaces);
+  if (auto surfaces = surface_builder_.take()) {
+    surface_asset_ = std::move(surfaces->asset);
+    surface_source_ = std::move(surfaces->source);
+  }
 }
 
 std::optional<BuildSettings> Viewer::build_settings() const {
@@ -218,22 +221,35 @@ void Viewer::load_surfaces(const std::string& path) {
 void Viewer::show_surfaces(SurfacePtr surfaces) {
   surface_builder_.cancel();
   sync();
+  surface_asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
   surface_source_ = std::move(surfaces);
   touch();
 }
 
-void Viewer::set_surfaces(const SurfaceSettings& settings) {
-  if (settings.moment != surface_settings_.moment && !surface_builder_.configure_load(settings.moment)) {
-    sync();
-    if (surface_source_) surface_builder_.pose(surface_source_, settings.moment);
+void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
+  surface_builder_.cancel();
+  sync();
+  surface_asset_ = std::move(surfaces);
+  if (surface_asset_) {
+    surface_builder_.pose(surface_asset_, surface_settings_.moment);
+  } else {
+    surface_source_ = nullptr;
   }
-  surface_settings_ = settings;
   touch();
 }
 
-SurfacePtr Viewer::surface_source() {
+SurfaceAssetPtr Viewer::surfaces_asset() {
   sync();
-  return surface_source_;
+  return surface_asset_;
+}
+
+void Viewer::set_surface_settings(const SurfaceSettings& settings) {
+  if (settings.moment != surface_settings_.moment && !surface_builder_.configure_load(settings.moment)) {
+    sync();
+    if (surface_asset_) surface_builder_.pose(surface_asset_, settings.moment);
+  }
+  surface_settings_ = settings;
+  touch();
 }
 
 void Viewer::use_surface_camera(std::size_t index) {
@@ -428,8 +444,10 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   const auto box = this->box();
   navigation_.advance(std::min(since, 0.25), *camera_, box);
 
+  // Where nothing is left to see, the last picture goes as well.
+  if (!box) built_ = {};
   // Surfaces alone are surfaces in an empty volume.
-  if (!volume_ && surface_source_ && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
+  if (!volume_ && box && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   last_view_ = view_;
