@@ -15,7 +15,7 @@ void Builder::replace(Worker::Job job, std::weak_ptr<Load> load) {
   worker_.replace(std::move(job));
 }
 
-void Builder::load(std::string path, std::string grid_name, std::optional<BuildSettings> settings) {
+void Builder::load(const std::string& path, std::string grid_name, std::optional<BuildSettings> settings) {
   const auto load = std::make_shared<Load>(Load{settings});
   replace({path, Progress::Stage::loading,
            [this, path, grid_name = std::move(grid_name), load](Progress& progress) {

@@ -50,7 +50,7 @@ class Builder {
   Builder(Log log, std::function<void()> notify) : log_(log), worker_(std::move(notify)) {}
 
   /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way.
-  void load(std::string path, std::string grid_name, std::optional<BuildSettings> settings);
+  void load(const std::string& path, std::string grid_name, std::optional<BuildSettings> settings);
   /// Builds of this volume. Replaces what is under way.
   void build(VolumePtr volume, const BuildSettings& settings);
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.

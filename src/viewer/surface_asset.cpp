@@ -18,7 +18,7 @@ SurfaceAsset::Rest SurfaceAsset::rest() const {
 
 SurfacePtr SurfaceAsset::posed(SurfaceMoment moment, Progress& progress) const {
   const auto lock = patient_lock(mutex_, progress);
-  const SurfacePtr last = newest_.lock();
+  SurfacePtr last = newest_.lock();
   if (last && newest_moment_ == moment) return last;
   progress.check();
   surface::Pose pose = scene_->pose(moment.time, moment.animation);

@@ -2,7 +2,7 @@
 
 namespace cumulet::viewer {
 
-void SurfaceBuilder::load(std::string path, SurfaceMoment moment) {
+void SurfaceBuilder::load(const std::string& path, SurfaceMoment moment) {
   const auto load = std::make_shared<Load>(Load{moment});
   const std::scoped_lock lock(mutex_);
   load_ = load;

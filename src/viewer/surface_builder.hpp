@@ -28,7 +28,7 @@ class SurfaceBuilder {
   SurfaceBuilder(Log log, std::function<void()> notify) : log_(log), worker_(std::move(notify)) {}
 
   /// Reads a file, then poses it. Replaces what is under way.
-  void load(std::string path, SurfaceMoment moment);
+  void load(const std::string& path, SurfaceMoment moment);
   /// Another moment for a load under way. Returns false if there is none: then take what it made, and call pose.
   bool configure_load(SurfaceMoment moment);
   /// Poses a scene, after the pose under way: a moment that takes long is shown before the next.
