@@ -6,5 +6,5 @@
 
 namespace cumulet::core {
 #include "parameters.glsl"
-static_assert(sizeof(CmParameters) == 26 * 16);
+static_assert(sizeof(CmParameters) == 27 * 16);
 }  // namespace cumulet::core

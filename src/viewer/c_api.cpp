@@ -284,7 +284,7 @@ cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer, const cumule
   return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_surface_settings_desc d = read_desc(desc, "cumulet_surface_settings_desc");
     require(std::isfinite(d.time), "cumulet_surface_settings_desc.time is not finite");
-    require(number(d.light) <= CUMULET_SURFACE_LIGHT_SHADOWS, "cumulet_surface_settings_desc.light is unknown");
+    require(number(d.light) <= CUMULET_SURFACE_LIGHT_NONE, "cumulet_surface_settings_desc.light is unknown");
     v.set_surface_settings({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light)});
   });
 }
@@ -299,7 +299,7 @@ cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampli
     require(number(d.view) <= CUMULET_VIEW_WIREFRAME, "cumulet_sampling_desc.view is unknown");
     require(number(d.preview) <= CUMULET_PREVIEW_OFF, "cumulet_sampling_desc.preview is unknown");
     v.set_sampling({d.samples == 0 ? 256 : d.samples, d.seed, static_cast<render::View>(d.view),
-                    d.preview == CUMULET_PREVIEW_AUTO});
+                    d.preview == CUMULET_PREVIEW_AUTO, d.volume_alone != 0});
   });
 }
 
@@ -421,6 +421,13 @@ cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t c
 
 cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) { v.read_display(rgba, count); });
+}
+
+cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(number(aov) <= CUMULET_AOV_ALBEDO, "the AOV is unknown");
+    v.read_aov(static_cast<core::Aov>(aov), values, count);
+  });
 }
 
 cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {

@@ -47,9 +47,10 @@ void run(const bench::Options& options) {
     }
     bench::progress(input.name);
     results.push_back(bench::measure(context, bench::load_asset(input), options));
-    bench::write_report(machine, options, results, skipped);  // what is done is not lost
+    bench::write_report(machine, options, results, {}, skipped);  // what is done is not lost
   }
-  bench::write_report(machine, options, results, skipped);
+  bench::progress("triangle trees");
+  bench::write_report(machine, options, results, bench::measure_trees(options), skipped);
   bench::progress("written: " + (options.out / "report.md").string());
 }
 
