@@ -137,24 +137,6 @@ int GltfWriter::mesh(const std::string& name, const std::vector<std::pair<const 
   return append(model_.meshes, std::move(made));
 }
 
-int GltfWriter::point_light(const std::string& name, const glm::vec3& color, double intensity) {
-  tinygltf::Light made;
-  made.name = name;
-  made.type = "point";
-  made.color = numbers(color);
-  made.intensity = intensity;
-  return append(model_.lights, std::move(made));
-}
-
-int GltfWriter::spot_light(const std::string& name, const glm::vec3& color, double intensity, double outer_cone) {
-  const int made = point_light(name, color, intensity);
-  tinygltf::Light& light = model_.lights.back();
-  light.type = "spot";
-  light.spot.innerConeAngle = 0.6 * outer_cone;
-  light.spot.outerConeAngle = outer_cone;
-  return made;
-}
-
 int GltfWriter::node(const std::string& name, int parent, int mesh, const glm::vec3& at) {
   tinygltf::Node made;
   made.name = name;
@@ -163,12 +145,6 @@ int GltfWriter::node(const std::string& name, int parent, int mesh, const glm::v
   const int number = append(model_.nodes, std::move(made));
   (parent < 0 ? model_.scenes[0].nodes : model_.nodes[static_cast<std::size_t>(parent)].children).push_back(number);
   return number;
-}
-
-void GltfWriter::attach_light(int node, int light) {
-  model_.nodes[static_cast<std::size_t>(node)].extensions["KHR_lights_punctual"] =
-      tinygltf::Value(tinygltf::Value::Object{{"light", tinygltf::Value(light)}});
-  use("KHR_lights_punctual");
 }
 
 void GltfWriter::attach_camera(int node, const glm::vec3& target, double vertical_fov, double aspect) {

@@ -23,12 +23,9 @@ class GltfWriter {
   int glowing(const std::string& name, const glm::vec3& color, const glm::vec3& radiance);
   /// One primitive a material.
   int mesh(const std::string& name, const std::vector<std::pair<const Mesh*, int>>& parts);
-  int point_light(const std::string& name, const glm::vec3& color, double intensity);
-  int spot_light(const std::string& name, const glm::vec3& color, double intensity, double outer_cone);
 
   /// parent, mesh: -1 for none.
   int node(const std::string& name, int parent, int mesh, const glm::vec3& at = glm::vec3(0.0F));
-  void attach_light(int node, int light);
   /// The node looks from its place at `target`.
   void attach_camera(int node, const glm::vec3& target, double vertical_fov, double aspect);
   /// Turns the node about +Y once in `seconds`, for ever: animations loop.

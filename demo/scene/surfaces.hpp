@@ -17,8 +17,8 @@ struct View {
 constexpr glm::vec3 tower_foot{-26.0F, -12.0F, 13.0F};
 
 /// What stands in and around the cumulus of make_cumulus, as a .glb: a mountain ridge with a lake, a forest and an
-/// observation tower, lamps, a turning beacon, a camera. The tower is the same for every seed, the mountains are not.
-/// The same bytes for the same seed. Throws std::runtime_error.
+/// observation tower with lit windows, a beacon that turns, a camera. The tower is the same for every seed, the
+/// mountains are not. The same bytes for the same seed. Throws std::runtime_error.
 std::string make_surfaces(std::uint32_t seed);
 
 }  // namespace cumulet::scene

@@ -257,8 +257,7 @@ Mesh Terrain::forest() const {
     const float y = height(p.x, p.y);
     const vec3 n = normal(p.x, p.y);
     const float grove = flat_fbm(p * 0.035F, seed_ + 160);
-    if (y < lake_level + 1.2F || y > -9.0F + 14.0F * grove || n.y < 0.58F || random(2) > 0.40F + 2.2F * grove)
-      continue;
+    if (y < lake_level + 1.2F || y > -9.0F + 14.0F * grove || n.y < 0.58F || random(2) > 0.40F + 2.2F * grove) continue;
     const float tall = glm::mix(2.2F, 4.6F, random(3));
     const std::size_t first = mesh.position.size();
     // Two skirts of branches.
