@@ -1,6 +1,5 @@
 #include "surfaces.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -39,13 +38,17 @@ void pane(Mesh& mesh, float angle, float radius, float low, float high, float ha
 
 void add_shaft(Tower& tower) {
   std::vector<vec2> profile{{6.6F, -7.0F}, {6.6F, 0.6F}, {5.9F, 0.9F}};
-  for (float y = 1.0F; y <= 46.0F; y += 3.0F) profile.emplace_back(shaft_radius(y), y);
+  for (int ring = 0; ring <= 15; ++ring) {
+    const float y = 1.0F + 3.0F * static_cast<float>(ring);
+    profile.emplace_back(shaft_radius(y), y);
+  }
   tower.concrete.turned(vec3(0.0F), profile, 32);
   // Fins, and between them columns of windows: a stair, so that some are lit.
   for (int fin = 0; fin < 8; ++fin) {
     const float angle = turn * (static_cast<float>(fin) + 0.5F) / 8.0F;
-    for (float y = 1.0F; y < 46.0F; y += 3.0F) {
-      const float top = std::min(y + 3.0F, 46.0F);
+    for (int ring = 0; ring < 15; ++ring) {
+      const float y = 1.0F + 3.0F * static_cast<float>(ring);
+      const float top = y + 3.0F;
       tower.concrete.bar(around(angle, shaft_radius(y), y), around(angle, shaft_radius(top), top), 0.34F);
     }
     for (int storey = 0; storey < 14; ++storey) {
@@ -127,7 +130,9 @@ void add_station(Tower& tower) {
     const int windows = static_cast<int>(half.x / 0.9F);
     for (int i = 0; i < windows; ++i) {
       const float wx = at.x + half.x * ((static_cast<float>(i) + 0.5F) * 2.0F / static_cast<float>(windows) - 1.0F);
-      for (float wy = at.y + 0.9F; wy + 1.3F < eaves.y; wy += 2.6F) {
+      for (int storey = 0; storey < 2; ++storey) {
+        const float wy = at.y + 0.9F + 2.6F * static_cast<float>(storey);
+        if (wy + 1.3F >= eaves.y) continue;
         const bool lit = unit(hash({i, static_cast<int>(10.0F * wy), 2}, 77)) < 0.75F;
         const float wz = at.z + half.z + 0.06F;
         (lit ? tower.lit : tower.glass)

@@ -67,7 +67,9 @@ float relief(const vec2& p) {
   return height;
 }
 
-std::uint8_t byte(float value) { return static_cast<std::uint8_t>(glm::clamp(value, 0.0F, 1.0F) * 255.0F + 0.5F); }
+std::uint8_t byte(float value) {
+  return static_cast<std::uint8_t>(std::lround(glm::clamp(value, 0.0F, 1.0F) * 255.0F));
+}
 
 }  // namespace
 
