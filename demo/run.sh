@@ -23,7 +23,8 @@ if [ ! -f "$scene/.done" ] || [ "$bin/cumulet-scene" -nt "$scene/.done" ]; then
   touch "$scene/.done"
 fi
 
-# As the scene file says: about a minute on two cores without a GPU.
+# About a minute on two cores without a GPU.
+[ $# -gt 0 ] || set -- --spp 16
 say "rendering $scene/sample.json"
 "$bin/cumulet-render" --scene "$scene/sample.json" -o cumulet.png "$@" || die "cumulet-render failed"
 say "the picture is in $root/cumulet.png"

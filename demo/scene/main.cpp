@@ -70,7 +70,7 @@ void write_scene(const path& folder) {
   scene.grid.threshold = 0.01;
   scene.width = 800;
   scene.height = 450;
-  scene.sampling.samples = 32;
+  scene.sampling.samples = 64;
   const path file = folder / "sample.json";
   cumulet::demo::save_scene(scene, file.string());
   std::printf("%s\n", file.string().c_str());
