@@ -20,6 +20,8 @@ find_path(CUMULET_NANOVDB_INCLUDE_DIR nanovdb/NanoVDB.h REQUIRED)
 # glTF: its structure, and what compresses its buffers.
 find_package(TinyGLTF CONFIG REQUIRED)
 find_package(draco CONFIG REQUIRED)
+# Debian's libdraco exports an older tinygltf of its own: the right one comes first wherever both are linked.
+set_property(TARGET TinyGLTF::TinyGLTF APPEND PROPERTY INTERFACE_LINK_LIBRARIES draco::draco)
 find_package(meshoptimizer CONFIG REQUIRED)
 find_path(CUMULET_JSON_INCLUDE_DIR nlohmann/json.hpp REQUIRED)
 

@@ -23,15 +23,13 @@ if [ ! -f "$scene/.done" ] || [ "$bin/cumulet-scene" -nt "$scene/.done" ]; then
   touch "$scene/.done"
 fi
 
-volume=$(find "$scene" -maxdepth 1 -name '*.vdb' | LC_ALL=C sort | awk '/cumul|cloud/ && !found {print; found = 1}')
-[ -n "$volume" ] || die "no cloud among the files of $scene"
 # About a minute on two cores without a GPU.
-[ $# -gt 0 ] || set -- --size 800x450 --spp 48 --threshold 0.01
-say "rendering $volume"
-"$bin/cumulet-render" --volume "$volume" -o cumulet.png "$@" || die "cumulet-render failed"
+[ $# -gt 0 ] || set -- --spp 16
+say "rendering $scene/sample.json"
+"$bin/cumulet-render" --scene "$scene/sample.json" -o cumulet.png "$@" || die "cumulet-render failed"
 say "the picture is in $root/cumulet.png"
 
 if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ] && [ -x "$bin/cumulet-demo" ]; then
   say "opening the demo"
-  exec "$bin/cumulet-demo" --volume "$volume"
+  exec "$bin/cumulet-demo" --scene "$scene/sample.json"
 fi

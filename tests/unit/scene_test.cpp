@@ -3,8 +3,18 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "scene.hpp"
+#include "support/gltf_check.hpp"
+#include "surfaces.hpp"
 
 namespace {
 
@@ -94,6 +104,154 @@ TEST(Fire, HasSmokeAndTemperature) {
   EXPECT_GT(hottest, 1500.0F);
   EXPECT_LT(hottest, 2500.0F);
   EXPECT_GT(grids[0]->activeVoxelCount(), 20000U);
+}
+
+// The mountains as the importer has them, and the names of their nodes.
+class Mountains : public testing::Test {
+ protected:
+  Mountains() {
+    const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "mountains.glb";
+    std::ofstream(file, std::ios::binary) << glb_;
+    const auto note = [](void* lines, LogLevel level, const char* line) {
+      if (level >= LogLevel::warning) static_cast<std::vector<std::string>*>(lines)->emplace_back(line);
+    };
+    scene_ = surface::import_gltf(file.string(), Log(note, &warnings_));
+    pose_ = scene_->pose(0.0);
+    std::filesystem::remove(file);
+    std::uint32_t length = 0;
+    std::memcpy(&length, glb_.data() + 12, sizeof length);
+    json_ = nlohmann::json::parse(glb_.substr(20, length));
+  }
+
+  [[nodiscard]] std::optional<std::uint32_t> node(const char* name) const {
+    for (std::uint32_t i = 0; i < json_["nodes"].size(); ++i) {
+      if (json_["nodes"][i]["name"] == name) return i;
+    }
+    return std::nullopt;
+  }
+
+  // Of the triangles of a node, or of one material of it, in the order of the file.
+  [[nodiscard]] std::vector<glm::vec3> points(const char* name, const surface::Pose& pose,
+                                              const std::string& material = "") const {
+    std::vector<glm::vec3> found;
+    for (const surface::Draw& draw : scene_->draws) {
+      if (draw.node != node(name)) continue;
+      if (!material.empty() && scene_->materials[draw.material].name != material) continue;
+      for (std::size_t i = 0; i < draw.index_count; ++i) {
+        found.push_back(pose.vertices[scene_->indices[draw.first_index + i]].position);
+      }
+    }
+    return found;
+  }
+
+  std::string glb_ = scene::make_surfaces(1);
+  nlohmann::json json_;
+  std::vector<std::string> warnings_;
+  surface::ScenePtr scene_;
+  surface::Pose pose_;
+};
+
+TEST_F(Mountains, AreTheSameEachTime) {
+  EXPECT_TRUE(glb_ == scene::make_surfaces(1));
+  EXPECT_FALSE(glb_ == scene::make_surfaces(2));
+  EXPECT_LT(glb_.size(), 20000000U);
+}
+
+TEST_F(Mountains, AreImportedWithoutAWarning) {
+  EXPECT_EQ(warnings_, std::vector<std::string>());
+  EXPECT_EQ(test::broken(*scene_), "");
+  EXPECT_EQ(test::broken(*scene_, pose_), "");
+  for (const char* name : {"Terrain", "Forest", "Lake", "Tower", "Station", "Lantern"}) {
+    EXPECT_FALSE(points(name, pose_).empty()) << name;
+  }
+  bool glows = false;
+  bool metal = false;
+  for (const surface::Material& material : scene_->materials) {
+    glows = glows || material.emission.x > 1.0F;
+    metal = metal || material.metallic == 1.0F;
+  }
+  EXPECT_TRUE(glows);
+  EXPECT_TRUE(metal);
+  // What glTF asks of its writers and the importer does not.
+  for (const nlohmann::json& mesh : json_["meshes"]) {
+    for (const nlohmann::json& primitive : mesh["primitives"]) {
+      const nlohmann::json& positions = json_["accessors"][primitive["attributes"]["POSITION"].get<std::size_t>()];
+      ASSERT_EQ(positions["min"].size(), 3U);
+      ASSERT_EQ(positions["max"].size(), 3U);
+      EXPECT_EQ(positions["count"], json_["accessors"][primitive["attributes"]["NORMAL"].get<std::size_t>()]["count"]);
+    }
+  }
+  EXPECT_EQ(json_["extensionsUsed"], nlohmann::json({"KHR_materials_emissive_strength"}));
+}
+
+TEST_F(Mountains, HaveTheSceneFilesCameraAndALanternThatTurns) {
+  ASSERT_EQ(pose_.cameras.size(), 1U);
+  const surface::SceneCamera& camera = pose_.cameras[0];
+  const scene::View view;
+  EXPECT_NEAR(camera.vertical_fov, glm::radians(view.fovy_degrees), 1e-6);
+  EXPECT_LT(glm::distance(glm::dvec3(camera.to_world[3]), glm::dvec3(view.eye)), 1e-6);
+  const glm::dvec3 ahead = glm::normalize(glm::dvec3(view.target) - glm::dvec3(view.eye));
+  EXPECT_LT(glm::distance(-glm::dvec3(camera.to_world[2]), ahead), 1e-5);
+
+  ASSERT_EQ(scene_->animations.size(), 1U);
+  EXPECT_DOUBLE_EQ(scene_->animations[0].duration, 6.0);
+  const surface::Pose later = scene_->pose(1.5);
+  const std::vector<glm::vec3> before = points("Lantern", pose_);
+  const std::vector<glm::vec3> after = points("Lantern", later);
+  // A quarter of a turn about the tower: +X comes to -Z.
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const glm::vec3 from = before[i] - scene::tower_foot;
+    const glm::vec3 to = after[i] - scene::tower_foot;
+    ASSERT_LT(glm::distance(to, glm::vec3(from.z, from.y, -from.x)), 1e-3F);
+  }
+  EXPECT_EQ(points("Tower", pose_), points("Tower", later));
+}
+
+TEST_F(Mountains, StandInTheCloud) {
+  const auto cloud = cumulus(100000);
+  auto accessor = cloud->getConstAccessor();
+  const auto density = [&](const glm::vec3& p) {
+    return accessor.getValue(openvdb::Coord::round(cloud->worldToIndex(openvdb::Vec3d(p.x, p.y, p.z))));
+  };
+  const openvdb::CoordBBox voxels = cloud->evalActiveVoxelBoundingBox();
+  const openvdb::Vec3d low = cloud->indexToWorld(voxels.min());
+  const openvdb::Vec3d high = cloud->indexToWorld(voxels.max());
+
+  glm::vec3 bottom(1e9F);
+  glm::vec3 top(-1e9F);
+  int covered = 0;
+  const std::vector<glm::vec3> tower = points("Tower", pose_);
+  for (const glm::vec3& p : tower) {
+    bottom = glm::min(bottom, p);
+    top = glm::max(top, p);
+    covered += density(p) > 0.1F ? 1 : 0;
+  }
+  EXPECT_GT(bottom.x, low.x());
+  EXPECT_LT(top.x, high.x());
+  EXPECT_GT(bottom.z, low.z());
+  EXPECT_LT(top.z, high.z());
+  EXPECT_LT(bottom.y, low.y());
+  const std::vector<glm::vec3> roofs = points("Tower", pose_, "copper");
+  ASSERT_FALSE(roofs.empty());
+  for (const glm::vec3& p : roofs) {
+    ASSERT_GT(p.y, low.y());
+    ASSERT_LT(p.y, high.y());
+  }
+  // A part of it in the cloud, its top and its foot out of it.
+  EXPECT_GT(covered, static_cast<int>(tower.size() / 20));
+  EXPECT_LT(covered, static_cast<int>(tower.size() / 2));
+
+  // The ground: level under the tower, and up in the cloud elsewhere.
+  int level = 0;
+  int clouded = 0;
+  for (const glm::vec3& p : points("Terrain", pose_)) {
+    clouded += density(p) > 0.1F ? 1 : 0;
+    if (glm::distance(glm::vec2(p.x, p.z), glm::vec2(scene::tower_foot.x, scene::tower_foot.z)) > 8.0F) continue;
+    EXPECT_NEAR(p.y, scene::tower_foot.y, 0.1F);
+    ++level;
+  }
+  EXPECT_GT(level, 100);
+  EXPECT_GT(clouded, 100);
 }
 
 }  // namespace
