@@ -8,6 +8,29 @@ float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
   return texelFetch(cm_surface, ivec3(texel, int(layer % cm.surface.x)), 0).x;
 }
 
+#if CM_SURFACES || CM_LAYERS
+layout(binding = 8) uniform sampler2DArray cm_layer_colour;
+layout(binding = 15) uniform sampler2DArray cm_layer_z;
+
+// What a camera ray ends at: a layer's opaque surface, or, by the chance of its coverage, the blended ones before it,
+// which count as one at the nearest. z: where; colour: radiance, and 1 in alpha; 0 where there is none.
+float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour) {
+  vec2 at = (vec2(pixel) + within) * vec2(cm.layers.yz) / vec2(cm.image.xy);
+  ivec3 texel = ivec3(min(ivec2(at), ivec2(cm.layers.yz) - 1), int(sample_number % cm.layers.x));
+  colour = texelFetch(cm_layer_colour, texel, 0);
+  float z = texelFetch(cm_layer_z, texel, 0).x;
+  if ((cm.layers.w & 1u) != 0u) {
+    texel.z += int(cm.layers.x);
+    vec4 blended = texelFetch(cm_layer_colour, texel, 0);
+    if (u < blended.a) {
+      colour = vec4(blended.rgb / blended.a, 1.0);
+      z = texelFetch(cm_layer_z, texel, 0).x;
+    }
+  }
+  return z;
+}
+#endif
+
 #if CM_MARCH == 0
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
 layout(binding = 0) uniform usamplerBuffer cm_cells[CM_PAGES];

@@ -3,7 +3,11 @@
 // Variants, not uniforms, choose what a pixel does: software drivers run both sides of every branch.
 // variant: CM_DEPTH=0 CM_BILINEAR=0 CM_RESOLVED=0 CM_TONE_MAP=0u CM_ENCODE=true
 // variant: CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=1 CM_TONE_MAP=3u CM_ENCODE=false
+// variant: CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=1 CM_TONE_MAP=0u CM_ENCODE=true CM_LAYERS=1
 // variant: CM_DEPTH=1
+#ifndef CM_LAYERS
+#define CM_LAYERS 0
+#endif
 #include "shared.glsl"
 #include "display.glsl"
 
@@ -17,6 +21,33 @@ layout(location = 2) uniform float cm_exposure;
 layout(location = 3) uniform bool cm_transparent;
 layout(location = 4) uniform vec3 cm_background;
 layout(location = 0) out vec4 cm_colour;
+#if CM_LAYERS
+layout(binding = 3) uniform sampler2DArray cm_layer_colour;
+layout(binding = 4) uniform sampler2DArray cm_layer_z;
+layout(binding = 5) uniform sampler2DArray cm_host_z;
+layout(location = 5) uniform ivec4 cm_layers;  // how many, whether blended ones follow, how many the host has
+
+// The surface pass's mean at a texel, without what is behind the host's.
+vec4 cm_surfaces(ivec2 texel) {
+  vec2 share = (vec2(texel) + 0.5) / vec2(textureSize(cm_layer_z, 0).xy);
+  vec4 sum = vec4(0.0);
+  for (int i = 0; i < cm_layers.x; ++i) {
+    float host_z = uintBitsToFloat(0x7f800000u);
+    if (cm_layers.z > 0) {
+      ivec2 at = ivec2(share * vec2(textureSize(cm_host_z, 0).xy));
+      host_z = texelFetch(cm_host_z, ivec3(at, i % cm_layers.z), 0).x;
+    }
+    vec4 colour = vec4(0.0);
+    if (texelFetch(cm_layer_z, ivec3(texel, i), 0).x <= host_z) colour = texelFetch(cm_layer_colour, ivec3(texel, i), 0);
+    if (cm_layers.y > 0 && texelFetch(cm_layer_z, ivec3(texel, cm_layers.x + i), 0).x <= host_z) {
+      vec4 blended = texelFetch(cm_layer_colour, ivec3(texel, cm_layers.x + i), 0);
+      colour = blended + (1.0 - blended.a) * colour;
+    }
+    sum += colour;
+  }
+  return sum / float(cm_layers.x);
+}
+#endif
 
 vec4 cm_texel(ivec2 texel) {
 #if CM_RESOLVED
@@ -26,7 +57,11 @@ vec4 cm_texel(ivec2 texel) {
   if (samples == 0u) return vec4(0.0);
   vec4 mean = texelFetch(cm_sum, texel, 0) / float(samples);
 #endif
+#if CM_LAYERS
+  return mean;
+#else
   return cm_transparent ? mean : vec4(mean.rgb + cm_background * (1.0 - mean.a), 1.0);
+#endif
 }
 #else
 layout(location = 2) uniform vec2 cm_depth;  // a, b
@@ -44,10 +79,44 @@ void main() {
   vec2 low = floor(at - 0.5);
   vec2 weight = at - 0.5 - low;
   ivec2 last = size - 1;
+#if CM_LAYERS
+  ivec2 layer_size = textureSize(cm_layer_z, 0).xy;
+  vec2 share = (vec2(pixel) + 0.5) / vec2(cm_viewport.zw);
+  // Of the coarse pixels around, those count whose middle sees as far: no seam of the volume along silhouettes.
+  float here = 1.0 / texelFetch(cm_layer_z, ivec3(share * vec2(layer_size), 0), 0).x;
+  vec4 value = vec4(0.0);
+  float sum = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    ivec2 offset = ivec2(i & 1, i >> 1);
+    ivec2 tap = clamp(ivec2(low) + offset, ivec2(0), last);
+    float there = 1.0 / texelFetch(cm_layer_z, ivec3((vec2(tap) + 0.5) / vec2(size) * vec2(layer_size), 0), 0).x;
+    vec2 part = mix(1.0 - weight, weight, vec2(offset));
+    float alike = part.x * part.y / (0.01 + abs(here - there) / max(max(here, there), 1e-30));
+    value += alike * cm_texel(tap);
+    sum += alike;
+  }
+  value /= sum;
+  vec4 behind = vec4(0.0);
+  if (layer_size == cm_viewport.zw) {
+    behind = cm_surfaces(pixel);
+  } else {
+    vec2 on_layer = share * vec2(layer_size);
+    vec2 corner = floor(on_layer - 0.5);
+    vec2 within = on_layer - 0.5 - corner;
+    for (int i = 0; i < 4; ++i) {
+      ivec2 offset = ivec2(i & 1, i >> 1);
+      vec2 part = mix(1.0 - within, within, vec2(offset));
+      behind += part.x * part.y * cm_surfaces(clamp(ivec2(corner) + offset, ivec2(0), layer_size - 1));
+    }
+  }
+  value += (1.0 - value.a) * behind;
+  if (!cm_transparent) value = vec4(value.rgb + cm_background * (1.0 - value.a), 1.0);
+#else
   ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
   ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);
   vec4 value = mix(mix(cm_texel(p0), cm_texel(ivec2(p1.x, p0.y)), weight.x),
                    mix(cm_texel(ivec2(p0.x, p1.y)), cm_texel(p1), weight.x), weight.y);
+#endif
 #else
   vec4 value = cm_texel(pixel);
 #endif

@@ -2,6 +2,17 @@
 #ifndef CM_PARAMETERS_GLSL
 #define CM_PARAMETERS_GLSL
 
+// What path.glsl says of variants.
+#ifndef CM_SURFACES
+#define CM_SURFACES 0
+#endif
+#ifndef CM_LAYERS
+#define CM_LAYERS CM_SURFACES
+#endif
+#ifndef CM_AOVS
+#define CM_AOVS 0
+#endif
+
 #ifdef __cplusplus
 struct CmParameters {
 #else
@@ -35,6 +46,8 @@ layout(std140, binding = 0) uniform CmParameters {
   vec4 from_cube_y;
   vec4 from_cube_z;
   uvec4 scene;          // first words of the surfaces' tables: x: triangles, y: vertices, z: materials, w: textures
+  uvec4 layers;         // the surface pass: x: layers (0: none), y: width, z: height; w: 1: blended surfaces have layers
+                        // of their own after the others, 2: paths that end at it take up its colour
   uvec4 lights;         // x: first word of the punctual lights, y: how many; z: 1 where surfaces pass light on;
                         // w: triangles
   uvec4 emitters;       // x: first word of the emissive triangles' table, y: how many

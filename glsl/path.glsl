@@ -11,13 +11,12 @@
 // quadratic in t, inverted in closed form. No majorant, no step size.
 //
 // With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has bvh.glsl, bsdf.glsl and
-// surface.glsl before this. With 2 next-event estimates are for emissive triangles, too.
+// surface.glsl before this. With 2 next-event estimates are for emissive triangles, too. With CM_LAYERS 1 (which
+// CM_SURFACES implies) camera rays may end at the surface pass instead:
+//   float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour)   its view depth
+// With CM_AOVS 1 samples that first met the volume are summed apart, too.
 #ifndef CM_PATH_GLSL
 #define CM_PATH_GLSL
-
-#ifndef CM_SURFACES
-#define CM_SURFACES 0
-#endif
 
 #define CM_MODE_START 0u
 #define CM_MODE_FLIGHT 1u
@@ -57,10 +56,15 @@ struct CmPath {
   uvec3 cell;
   float t_end;      // where the ray leaves the box
   uint stream;
-  uvec2 home;       // the cell of o, while a shadow ray is under way; x: CM_NONE where o is on a surface
+  uvec2 home;       // the cell of o, while a shadow ray is under way; x: CM_NONE where o is on a surface, and on a camera
+                    // ray 1 where a layer's colour, in light, waits at its end
   uint samples;     // finished in this pixel
   uint steps;       // of all its samples
   float square;     // sum over its samples of their squared luminance
+#if CM_AOVS
+  uint in_volume;   // 1 once this sample has met the volume first
+  vec4 volume;      // sum of such samples, as cm_finish's
+#endif
 #if CM_SURFACES
   uint triangle;    // that o is on, if it is on one
   vec2 weights;     // of its second and third vertex
@@ -147,7 +151,14 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
 
 // What lies behind the volume is added to the finished picture, not here.
 CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
+#if CM_LAYERS
+  float alpha = p.bounce > 0u || p.home.x == 1u ? 1.0f : 0.0f;
+#else
   float alpha = p.bounce > 0u ? 1.0f : 0.0f;
+#endif
+#if CM_AOVS
+  if (p.in_volume != 0u) p.volume += vec4(p.radiance, 1.0f);
+#endif
   sum += vec4(p.radiance, alpha);
   float luminance = dot(p.radiance + (1.0f - alpha) * vec3(cm.sky_radiance), vec3(0.2126f, 0.7152f, 0.0722f));
   p.square += luminance * luminance;
@@ -174,6 +185,7 @@ CM_FN void cm_begin_ray(CM_INOUT(CmPath) p) {
 CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) {
   bool flight = p.mode == CM_MODE_FLIGHT;
   if (event == CM_EVENT_NONE || (event == CM_EVENT_COLLISION && !flight)) return false;
+  if (p.bounce == 0u && cm.layers.x != 0u) return false;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_surface_origin(p.o, p.home.x == CM_NONE, p.triangle, p.weights, d);
   cm_hit_seed = p.random;
@@ -209,17 +221,38 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   p.depth = p.depth_0;
   p.mode = CM_MODE_FLIGHT;
   // Samples go through the layers in turn, each pixel from one of its own.
-  float surface_t = t_per_z * cm_surface_z(pixel, within, (shift.x >> 16) + p.samples);
+  uint layer = (shift.x >> 16) + p.samples;
+  float surface_t = t_per_z * cm_surface_z(pixel, within, layer);
+  p.home = uvec2(0u, 0u);
+#if CM_AOVS
+  p.in_volume = 0u;
+#endif
+#if CM_LAYERS
+  if (cm.layers.x != 0u) {
+    vec4 colour = vec4(0.0f, 0.0f, 0.0f, 0.0f);
+    float layer_t = t_per_z * cm_layer_surface(pixel, within, layer, cm_unit_float(h.z), colour);
+    bool nearest = layer_t <= surface_t;
+    surface_t = min(surface_t, layer_t);
+    if (nearest && colour.a > 0.0f && (cm.layers.w & 2u) != 0u) {
+      p.home.x = 1u;
+      p.light = vec3(colour);
+    }
+  }
+#endif
 #if CM_SURFACES
   p.reach = surface_t;
   p.t_end = -1.0f;
-  p.home = uvec2(0u, 0u);
 #else
   vec2 range = cm_box_range(p.o, p.d);
   p.t = range.x;
   p.t_end = min(range.y, surface_t);
   p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
-  if (!(range.x < p.t_end)) cm_finish(p, sum);
+  if (!(range.x < p.t_end)) {
+#if CM_LAYERS
+    if (p.home.x == 1u) p.radiance = p.light;
+#endif
+    cm_finish(p, sum);
+  }
 #endif
 }
 
@@ -239,6 +272,9 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
     float weight = p.mode == CM_MODE_SHADOW_SUN ? transmittance : (p.bounce == 0u ? 0.0f : balanced);
     vec3 light = flight ? p.throughput * vec3(cm.sky_radiance) : p.light;
     p.radiance += light * (weight / survival);
+#if CM_LAYERS
+    if (p.bounce == 0u && p.home.x == 1u) p.radiance += p.light;
+#endif
     finished = flight;
   }
   bool collided = flight && event == CM_EVENT_COLLISION && !met;
@@ -262,6 +298,9 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
   bool dark = cm.lights.z == 0u && p.bounce > 0u && (met || (collided && p.home.x == CM_NONE));
 #endif
   if (collided || met) {
+#if CM_AOVS
+    if (collided && p.bounce == 0u) p.in_volume = 1u;
+#endif
     p.bounce += 1u;
     if (collided) p.throughput *= vec3(cm.albedo);
     float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));

@@ -21,9 +21,7 @@ layout(binding = 10) uniform sampler2D cm_albedo_table;  // cosine, roughness
 layout(std430, binding = 0) readonly buffer CmLights { CmLight cm_lights[]; };  // from the eye
 
 layout(location = 0) out vec4 cm_colour;
-#if CM_ALPHA != 2
 layout(location = 1) out float cm_depth_z;
-#endif
 
 bool cm_has(int map) { return (cm_material.flags.x >> uint(map) & 1u) != 0u; }
 
@@ -134,7 +132,6 @@ void main() {
   if (base.a < cm_material.emission.w) discard;  // not before the last derivative
 #endif
   cm_colour = vec4(clamp(colour, 0.0, 65000.0), alpha);
-#if CM_ALPHA != 2
-  cm_depth_z = cm_z;
-#endif
+  // What is as good as not there is nowhere.
+  cm_depth_z = CM_ALPHA != 2 || alpha > 0.002 ? cm_z : uintBitsToFloat(0x7f800000u);
 }

@@ -219,9 +219,7 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
     }
   }
   if (back) normal = -normal;
-  // A shading normal that faces away would reflect nothing to where the path came from.
-  float facing = dot(normal, -w);
-  if (facing < 0.02) normal = normalize(normal + (0.02 - facing) * -w);
+  normal = cm_bend_normal(normal, -w);
 
   point.unlit = (flags & CM_UNLIT) != 0u;
   point.emission = cm_hit_back && (flags & CM_ONE_SIDED) != 0u ? vec3(0.0) : cm_emission(m);

@@ -8,6 +8,9 @@
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1 CM_SURFACES=1
 // variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1 CM_SURFACES=1
 // variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1 CM_SURFACES=2
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8 CM_SURFACES=1 CM_AOVS=1
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8 CM_LAYERS=1
+// variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1 CM_LAYERS=1 CM_AOVS=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shared.glsl"
@@ -35,6 +38,9 @@ layout(std430, binding = 1) buffer CmCounter {
 };
 layout(rgba32f, binding = 0) uniform image2D cm_sum;
 layout(rgba32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps, sum of squared luminance (a float)
+#if CM_AOVS
+layout(rgba32f, binding = 2) uniform image2D cm_volume_sum;  // of the samples that met the volume first
+#endif
 
 uvec4 cm_pack(vec3 v, uint w) { return uvec4(floatBitsToUint(v), w); }
 
@@ -52,6 +58,10 @@ void main() {
   CmPath p;
   uvec4 counts = imageLoad(cm_counts, texel);
   p.square = uintBitsToFloat(counts.z);
+#if CM_AOVS
+  p.volume = imageLoad(cm_volume_sum, texel);
+  p.in_volume = 0u;
+#endif
   if (cm.march.w != 0u) {
     // A pass begins: every pixel goes on from the samples it has.
     p.samples = counts.x;
@@ -79,7 +89,10 @@ void main() {
 #endif
   } else {
     uvec4 a3 = cm_paths[3u * lanes + lane];
-    p.mode = a3.w;
+    p.mode = a3.w & 0xffu;
+#if CM_AOVS
+    p.in_volume = a3.w >> 8;
+#endif
     if (p.mode == CM_MODE_DONE) return;
     uvec4 a0 = cm_paths[lane];
     uvec4 a1 = cm_paths[lanes + lane];
@@ -117,12 +130,18 @@ void main() {
   vec4 sum = imageLoad(cm_sum, texel);
   cm_run(p, pixel, cm.march.x, sum);
   imageStore(cm_sum, texel, sum);
+#if CM_AOVS
+  imageStore(cm_volume_sum, texel, p.volume);
+  uint mode = p.mode | (p.in_volume << 8);
+#else
+  uint mode = p.mode;
+#endif
   imageStore(cm_counts, texel, uvec4(p.samples, p.steps, floatBitsToUint(p.square), 0u));
 
   cm_paths[lane] = cm_pack(p.o, floatBitsToUint(p.t));
   cm_paths[lanes + lane] = cm_pack(p.d, floatBitsToUint(p.depth));
   cm_paths[2u * lanes + lane] = cm_pack(p.w, floatBitsToUint(p.depth_0));
-  cm_paths[3u * lanes + lane] = cm_pack(p.throughput, p.mode);
+  cm_paths[3u * lanes + lane] = cm_pack(p.throughput, mode);
   cm_paths[4u * lanes + lane] = cm_pack(p.radiance, p.bounce);
   cm_paths[5u * lanes + lane] = cm_pack(p.light, p.random);
   cm_paths[6u * lanes + lane] = uvec4(p.cell.xy, floatBitsToUint(p.t_end), p.stream);

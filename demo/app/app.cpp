@@ -402,7 +402,7 @@ void App::save_scene(const std::string& path) {
 void App::save_picture(const Command& command) {
   try {
     if (command.action == Action::save_exr) {
-      image::write_exr(command.text, session_->read_linear(model_));
+      session_->write_exr(model_, command.text);
     } else {
       image::PngOptions png;
       png.tone_mapping = image::ToneMapping::none;

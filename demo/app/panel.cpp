@@ -237,7 +237,9 @@ void Panel::surfaces(Model& model) {
   ImGui::BeginDisabled(!any);
   choose(ui_, "Surface light", "What light the surfaces pass on.",
          {{"Full", CUMULET_SURFACE_LIGHT_FULL, "To each other and to the volume, and back."},
-          {"Shadows", CUMULET_SURFACE_LIGHT_SHADOWS, "Sun, sky, lamps and what glows only, and the shadows of all: faster."}},
+          {"Shadows", CUMULET_SURFACE_LIGHT_SHADOWS,
+           "Sun, sky, lamps and what glows only, and the shadows of all: faster."},
+          {"None", CUMULET_SURFACE_LIGHT_NONE, "Rasterised, without shadows: the fastest."}},
          surface.light);
   ImGui::BeginDisabled(info.animations == 0);
   ui_.slider("Time", "Seconds into the model's animation.", surface.time, 0.0, std::max(info.duration, 1e-3), "%.2f s");

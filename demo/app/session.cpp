@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
 
+#include "aovs.hpp"
 #include "history.hpp"
 
 namespace cumulet::demo {
@@ -294,13 +296,18 @@ bool Session::input(const cumulet_event& event) {
 void Session::orbit(double yaw, double pitch) { static_cast<void>(cumulet_camera_orbit(camera_.get(), yaw, pitch)); }
 void Session::dolly(double factor) { static_cast<void>(cumulet_camera_dolly(camera_.get(), factor)); }
 
-image::Image Session::read_linear(const Model& model) {
-  image::Image picture{model.status.frame.width, model.status.frame.height, {}};
-  if (picture.width == 0) throw std::runtime_error("there is no picture yet");
-  picture.rgba.resize(std::size_t{4} * picture.width * picture.height);
-  if (cumulet_read_linear(viewer_.get(), picture.rgba.data(), picture.rgba.size()) != CUMULET_OK)
+void Session::write_exr(const Model& model, const std::string& path) {
+  const std::uint32_t width = model.status.frame.width;
+  const std::uint32_t height = model.status.frame.height;
+  if (width == 0) throw std::runtime_error("there is no picture yet");
+  std::vector<float> rgba(std::size_t{4} * width * height);
+  if (cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()) != CUMULET_OK)
     throw std::runtime_error(cumulet_last_error(viewer_.get()));
-  return picture;
+  // All but the volume alone, which would cost every frame something.
+  constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
+                            CUMULET_AOV_NORMAL, CUMULET_AOV_ALBEDO};
+  const bool shaded = model.scene.sampling.view == CUMULET_VIEW_SHADED;
+  demo::write_exr(viewer_.get(), path, width, height, rgba, std::span(aovs).first(shaded ? aovs.size() : 0));
 }
 
 image::Image Session::read_display(const Model& model) {

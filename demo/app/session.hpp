@@ -47,7 +47,8 @@ class Session {
 
   /// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
   [[nodiscard]] image::Image read_display(const Model& model);
-  [[nodiscard]] image::Image read_linear(const Model& model);
+  /// The picture in linear radiance with its layers, as docs/aovs.md says; debug views have none.
+  void write_exr(const Model& model, const std::string& path);
   /// Measures it for the model's status.
   void measure_noise(Model& model);
 

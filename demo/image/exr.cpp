@@ -4,19 +4,20 @@
 #include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStandardAttributes.h>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <utility>
 
 #include "checks.hpp"
 #include "file.hpp"
 #include "image.hpp"
+#include "layers.hpp"
 
 namespace cumulet::image {
 namespace {
-
-constexpr std::array<const char*, 4> channel_names = {"R", "G", "B", "A"};
 
 /// OpenEXR writes its line table in a destructor, where a full disk passes unseen. So it writes to memory, and the
 /// file is written by replace_file, which looks.
@@ -43,31 +44,14 @@ std::string one_line(std::string text) {
   return text;
 }
 
-}  // namespace
-
-void write_exr(const std::string& path, const Image& image) {
-  check_image(path, image);
-  MemoryOutput output;
-  try {
-    Imf::Header header(static_cast<int>(image.width), static_cast<int>(image.height));
-    header.compression() = Imf::ZIP_COMPRESSION;
-    Imf::FrameBuffer frame;
-    // The library asks for a mutable pointer and only reads.
-    char* base = const_cast<char*>(reinterpret_cast<const char*>(image.rgba.data()));
-    for (std::size_t c = 0; c < channel_names.size(); ++c) {
-      header.channels().insert(channel_names[c], Imf::Channel(Imf::FLOAT));
-      frame.insert(channel_names[c], Imf::Slice(Imf::FLOAT, base + 4 * c, 16, std::size_t{16} * image.width));
-    }
-    Imf::OutputFile file(output, header);
-    file.setFrameBuffer(frame);
-    file.writePixels(static_cast<int>(image.height));
-  } catch (const std::exception& error) {
-    fail(path, one_line(error.what()));
-  }
-  replace_file(path, output.bytes());
+std::string full_name(const LayerName& layer, std::size_t channel) {
+  std::string name(layer.name);
+  if (!name.empty()) name += '.';
+  return name += layer.channels[channel];
 }
 
-Image read_exr(const std::string& path) {
+/// fill: what stands for a channel that the file lacks, one each; none: it is an error.
+Pixels read_layer(const std::string& path, const LayerName& layer, std::span<const float> fill) {
   static_cast<void>(read_file(path));  // the system's own cause for a file that cannot be opened
   try {
     Imf::InputFile file(path.c_str());
@@ -76,21 +60,75 @@ Image read_exr(const std::string& path) {
     const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
     if (width < 1 || height < 1 || width > max_side || height > max_side)
       throw std::runtime_error("unsupported size " + std::to_string(width) + "x" + std::to_string(height));
-    Image image{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
-    image.rgba.resize(std::size_t{4} * image.width * image.height);
+    const std::size_t channels = layer.channels.size();
+    Pixels pixels{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
+    pixels.values.resize(channels * pixels.width * pixels.height);
+    const std::size_t stride = channels * sizeof(float);
     // A slice's base is where pixel (0, 0) would be, which the data window may not contain.
-    const std::int64_t origin = (std::int64_t{window.min.y} * width + window.min.x) * 16;
-    char* base = reinterpret_cast<char*>(image.rgba.data()) - origin;
+    const std::int64_t origin = (std::int64_t{window.min.y} * width + window.min.x) * static_cast<std::int64_t>(stride);
+    char* base = reinterpret_cast<char*>(pixels.values.data()) - origin;
     Imf::FrameBuffer frame;
-    for (std::size_t c = 0; c < channel_names.size(); ++c)
-      frame.insert(channel_names[c], Imf::Slice(Imf::FLOAT, base + 4 * c, 16, static_cast<std::size_t>(16 * width), 1,
-                                                1, c == 3 ? 1.0 : 0.0));
+    for (std::size_t c = 0; c < channels; ++c) {
+      const std::string name = full_name(layer, c);
+      if (fill.empty() && file.header().channels().findChannel(name) == nullptr)
+        throw std::runtime_error("it has no channel " + name);
+      frame.insert(name, Imf::Slice(Imf::FLOAT, base + sizeof(float) * c, stride, stride * pixels.width, 1, 1,
+                                    fill.empty() ? 0.0 : double{fill[c]}));
+    }
     file.setFrameBuffer(frame);
     file.readPixels(window.min.y, window.max.y);
-    return image;
+    return pixels;
   } catch (const std::exception& error) {
     fail(path, "not a readable OpenEXR file: " + one_line(error.what()));
   }
+}
+
+}  // namespace
+
+void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers) {
+  check_size(path, width, height);
+  Imf::Header header(static_cast<int>(width), static_cast<int>(height));
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::addChromaticities(header, Imf::Chromaticities());  // the default is Rec. 709
+  Imf::FrameBuffer frame;
+  for (const Layer& layer : layers) {
+    const std::size_t channels = layer.name.channels.size();
+    if (layer.values.size() != channels * width * height)
+      throw std::logic_error(path + ": the picture's size and the pixels of layer \"" + std::string(layer.name.name) +
+                             "\" disagree");
+    // The library asks for a mutable pointer and only reads.
+    char* base = const_cast<char*>(reinterpret_cast<const char*>(layer.values.data()));
+    const std::size_t stride = channels * sizeof(float);
+    for (std::size_t c = 0; c < channels; ++c) {
+      const std::string name = full_name(layer.name, c);
+      if (header.channels().findChannel(name) != nullptr)
+        throw std::logic_error(path + ": two channels are called " + name);
+      header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+      frame.insert(name, Imf::Slice(Imf::FLOAT, base + sizeof(float) * c, stride, stride * width));
+    }
+  }
+  MemoryOutput output;
+  try {
+    Imf::OutputFile file(output, header);
+    file.setFrameBuffer(frame);
+    file.writePixels(static_cast<int>(height));
+  } catch (const std::exception& error) {
+    fail(path, one_line(error.what()));
+  }
+  replace_file(path, output.bytes());
+}
+
+void write_exr(const std::string& path, const Image& image) {
+  const Layer beauty{layers::beauty, image.rgba};
+  write_exr(path, image.width, image.height, {&beauty, 1});
+}
+
+Pixels read_exr(const std::string& path, const LayerName& layer) { return read_layer(path, layer, {}); }
+
+Image read_exr(const std::string& path) {
+  constexpr std::array<float, 4> fill{0.0f, 0.0f, 0.0f, 1.0f};
+  Pixels pixels = read_layer(path, layers::beauty, fill);
+  return {pixels.width, pixels.height, std::move(pixels.values)};
 }
 
 }  // namespace cumulet::image

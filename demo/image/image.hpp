@@ -43,7 +43,7 @@ struct PngOptions {
 void write_png(const std::string& path, const Image& image, const PngOptions& options = {});
 /// The same from bytes, width x height x 4, first pixel top left, straight alpha.
 void write_png(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const std::uint8_t> rgba);
-/// OpenEXR: 32-bit float channels R, G, B, A, scanlines, ZIP; linear, untouched.
+/// OpenEXR: the one layer of channels R, G, B, A, as layers.hpp writes it; linear, untouched.
 void write_exr(const std::string& path, const Image& image);
 /// Portable float map: RGB (alpha is dropped), little-endian, bottom row first; linear, untouched.
 void write_pfm(const std::string& path, const Image& image);

@@ -18,6 +18,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "aovs.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 
@@ -170,8 +171,11 @@ void write_picture(const Viewer& viewer, const RenderOptions& options) {
   }
   image.rgba.resize(count);
   check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
-  options.format == OutputFormat::exr ? cumulet::image::write_exr(options.output, image)
-                                      : cumulet::image::write_pfm(options.output, image);
+  if (options.format == OutputFormat::exr) {
+    cumulet::demo::write_exr(viewer.get(), options.output, image.width, image.height, image.rgba, options.aovs);
+  } else {
+    cumulet::image::write_pfm(options.output, image);
+  }
 }
 
 /// The names and units are scripted against: design.md, section 6. What does not apply is left out.
@@ -223,6 +227,7 @@ void render(const RenderOptions& options) {
   const auto& scene = options.scene;
   cumulet_sampling_desc sampling = scene.sampling;
   sampling.preview = CUMULET_PREVIEW_OFF;
+  if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.volume_alone = 1;
   check(viewer, cumulet_set_grid(viewer.get(), &scene.grid));
   check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   check(viewer, cumulet_set_light(viewer.get(), &scene.light));

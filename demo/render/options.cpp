@@ -372,6 +372,22 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       ".png is exposed and tone-mapped; .exr and .pfm hold linear radiance")
       ->required();
   add(
+      app, group, "--aovs", "NAME,...|all",
+      [&](const std::string& text) {
+        options.aovs.clear();
+        for (const std::string_view part : split(text, ',')) {
+          const auto before = options.aovs.size();
+          for (const auto& [name, aov] : aov_names) {
+            const bool meant = part == "all" || part == name;
+            if (meant && std::ranges::find(options.aovs, aov) == options.aovs.end()) options.aovs.push_back(aov);
+          }
+          const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.text; });
+          if (options.aovs.size() == before && !known && part != "all")
+            throw UsageError(in_quotes(part) + " is none of all, " + list_names(aov_names, ", "));
+        }
+      },
+      "Layers that an .exr gets beside the picture: volume, transmittance, depth, volume_depth, normal, albedo");
+  add(
       app, group, "--stats", "FILE.json",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");
@@ -387,6 +403,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   finish_scene_options(app, options.scene);
   if (options.scene.volume.empty() && options.scene.surfaces.empty())
     throw UsageError("--volume or --gltf is required, or a --scene that names one");
+  if (!options.aovs.empty() && options.format != OutputFormat::exr)
+    throw UsageError("--aovs needs an .exr to write to");
+  if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
+    throw UsageError("--aovs needs the shaded view");
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
   return options;
 }

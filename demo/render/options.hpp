@@ -39,7 +39,8 @@ struct RenderOptions {
   BackendChoice backend = BackendChoice::automatic;
   std::string output;
   OutputFormat format = OutputFormat::png;
-  std::string stats;  // empty: none
+  std::string stats;              // empty: none
+  std::vector<cumulet_aov> aovs;  // layers of an .exr beside the picture
 };
 
 /// cumulet-render's arguments, without the program's name. Nothing if they asked for --help or --version, whose text

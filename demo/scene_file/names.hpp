@@ -29,7 +29,12 @@ inline constexpr std::array tone_map_names = {Name{"neutral", CUMULET_TONE_MAP_N
                                               Name{"filmic", CUMULET_TONE_MAP_FILMIC},
                                               Name{"clip", CUMULET_TONE_MAP_CLIP}};
 inline constexpr std::array surface_light_names = {Name{"full", CUMULET_SURFACE_LIGHT_FULL},
-                                                   Name{"shadows", CUMULET_SURFACE_LIGHT_SHADOWS}};
+                                                   Name{"shadows", CUMULET_SURFACE_LIGHT_SHADOWS},
+                                                   Name{"none", CUMULET_SURFACE_LIGHT_NONE}};
+inline constexpr std::array aov_names = {
+    Name{"volume", CUMULET_AOV_VOLUME},       Name{"transmittance", CUMULET_AOV_TRANSMITTANCE},
+    Name{"depth", CUMULET_AOV_SURFACE_DEPTH}, Name{"volume_depth", CUMULET_AOV_VOLUME_DEPTH},
+    Name{"normal", CUMULET_AOV_NORMAL},       Name{"albedo", CUMULET_AOV_ALBEDO}};
 inline constexpr std::array background_names = {Name{"sky", CUMULET_BACKGROUND_SKY},
                                                 Name{"transparent", CUMULET_BACKGROUND_TRANSPARENT}};
 

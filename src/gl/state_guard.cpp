@@ -190,11 +190,14 @@ void StateGuard::save_raster() {
   gl_->GetDoublei_v(GL_DEPTH_RANGE, 0, depth_range_.data());
   gl_->GetBooleanv(GL_DEPTH_WRITEMASK, &depth_mask_);
   depth_function_ = get(GL_DEPTH_FUNC);
-  for (std::size_t i = 0; i < blend_functions.size(); ++i) {
-    gl_->GetIntegeri_v(blend_functions[i], 0, &blend_function_[i]);
-  }
-  for (std::size_t i = 0; i < blend_equations.size(); ++i) {
-    gl_->GetIntegeri_v(blend_equations[i], 0, &blend_equation_[i]);
+  for (GLuint buffer = 0; buffer < blended_buffers; ++buffer) {
+    Blend& saved = blends_[buffer];
+    for (std::size_t i = 0; i < blend_functions.size(); ++i) {
+      gl_->GetIntegeri_v(blend_functions[i], buffer, &saved.function[i]);
+    }
+    for (std::size_t i = 0; i < blend_equations.size(); ++i) {
+      gl_->GetIntegeri_v(blend_equations[i], buffer, &saved.equation[i]);
+    }
   }
   cull_face_ = get(GL_CULL_FACE_MODE);
   front_face_ = get(GL_FRONT_FACE);
@@ -218,8 +221,10 @@ void StateGuard::set_known() const {
   gl_->DepthRangeIndexed(0, 0.0, 1.0);
   gl_->DepthMask(GL_TRUE);
   gl_->DepthFunc(GL_LESS);
-  gl_->BlendFuncSeparatei(0, GL_ONE, GL_ZERO, GL_ONE, GL_ZERO);
-  gl_->BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
+  for (GLuint buffer = 0; buffer < blended_buffers; ++buffer) {
+    gl_->BlendFuncSeparatei(buffer, GL_ONE, GL_ZERO, GL_ONE, GL_ZERO);
+    gl_->BlendEquationSeparatei(buffer, GL_FUNC_ADD, GL_FUNC_ADD);
+  }
   gl_->CullFace(GL_BACK);
   gl_->FrontFace(GL_CCW);
   gl_->PolygonMode(GL_FRONT_AND_BACK, GL_FILL);
@@ -310,9 +315,12 @@ void StateGuard::restore_raster() const {
   gl_->DepthRangeIndexed(0, depth_range_[0], depth_range_[1]);
   gl_->DepthMask(depth_mask_);
   gl_->DepthFunc(static_cast<GLenum>(depth_function_));
-  gl_->BlendFuncSeparatei(0, static_cast<GLenum>(blend_function_[0]), static_cast<GLenum>(blend_function_[1]),
-                          static_cast<GLenum>(blend_function_[2]), static_cast<GLenum>(blend_function_[3]));
-  gl_->BlendEquationSeparatei(0, static_cast<GLenum>(blend_equation_[0]), static_cast<GLenum>(blend_equation_[1]));
+  for (GLuint buffer = 0; buffer < blended_buffers; ++buffer) {
+    const auto& [function, equation] = blends_[buffer];
+    gl_->BlendFuncSeparatei(buffer, static_cast<GLenum>(function[0]), static_cast<GLenum>(function[1]),
+                            static_cast<GLenum>(function[2]), static_cast<GLenum>(function[3]));
+    gl_->BlendEquationSeparatei(buffer, static_cast<GLenum>(equation[0]), static_cast<GLenum>(equation[1]));
+  }
   gl_->CullFace(static_cast<GLenum>(cull_face_));
   gl_->FrontFace(static_cast<GLenum>(front_face_));
   const auto front = static_cast<GLenum>(polygon_mode_[0]);

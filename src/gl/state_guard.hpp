@@ -25,9 +25,10 @@ class StateGuard {
   StateGuard(const StateGuard&) = delete;
   StateGuard& operator=(const StateGuard&) = delete;
 
-  static constexpr int units = 15;
+  static constexpr int units = 16;
   static constexpr int ranges = 2;  // of storage and of uniform buffers
   static constexpr int images = 3;
+  static constexpr int blended_buffers = 2;  // whose blend functions it keeps
 
  private:
   static constexpr std::size_t targets = 5;
@@ -48,6 +49,10 @@ class StateGuard {
   struct DrawBuffer {
     std::array<GLboolean, 4> mask{};
     GLboolean blend = GL_FALSE;
+  };
+  struct Blend {
+    std::array<GLint, 4> function{};  // source and destination of colour, then of alpha
+    std::array<GLint, 2> equation{};
   };
   struct TextureUnit {
     std::array<GLint, targets> textures{};
@@ -93,8 +98,7 @@ class StateGuard {
   std::array<GLdouble, 2> depth_range_{};
   GLboolean depth_mask_ = GL_FALSE;
   GLint depth_function_ = 0;
-  std::array<GLint, 4> blend_function_{};  // source and destination of colour, then of alpha
-  std::array<GLint, 2> blend_equation_{};
+  std::array<Blend, blended_buffers> blends_{};
   GLint cull_face_ = 0;
   GLint front_face_ = 0;
   std::array<GLint, 2> polygon_mode_{};  // some drivers tell front and back, core ones have only one

@@ -48,13 +48,15 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     throw Error(ErrorCode::invalid_argument,
                 "the target, framebuffer " + std::to_string(target.framebuffer) + ", is not complete");
   }
-  const bool bilinear = glm::ivec2(picture.size) != glm::ivec2(viewport.z, viewport.w);
+  const bool layered = picture.beneath != nullptr && picture.beneath->colour;
+  const bool bilinear = layered || glm::ivec2(picture.size) != glm::ivec2(viewport.z, viewport.w);
   // Where means are read more than once, they are made once.
   const bool resolved = (bilinear || picture.holes) && resolve(picture);
-  const std::vector<std::string> defines{
-      "CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0", resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
-      "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
-      display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
+  std::vector<std::string> defines{"CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
+                                   resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
+                                   "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
+                                   display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
+  if (layered) defines.emplace_back("CM_LAYERS 1");
   gl::Object& program = colours_[defines];
   if (!program) program = make_program(gl_, defines);
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
@@ -72,6 +74,14 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   gl.ProgramUniform1i(colour, 3, as_bool(display.transparent));
   const glm::vec3 background = display.legend ? glm::vec3(0.0F) : display.background;
   gl.ProgramUniform3f(colour, 4, background.x, background.y, background.z);
+  if (layered) {
+    const SurfaceLayers& layers = *picture.beneath;
+    gl.BindTextureUnit(3, layers.colour.name());
+    gl.BindTextureUnit(4, layers.z.name());
+    gl.BindTextureUnit(5, picture.host_z);
+    gl.ProgramUniform4i(colour, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
+                        picture.host_z != 0 ? static_cast<GLint>(picture.host_layers) : 0, 0);
+  }
   if (display.encoding == ColourEncoding::srgb_framebuffer) {
     gl.Enable(GL_FRAMEBUFFER_SRGB);
   } else {

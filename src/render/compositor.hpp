@@ -7,6 +7,7 @@
 
 #include "gl/objects.hpp"
 #include "render/display.hpp"
+#include "render/surface_raster.hpp"
 
 namespace cumulet::render {
 
@@ -17,6 +18,9 @@ struct PictureTextures {
   glm::uvec2 size{0U};
   bool holes = false;   // some pixels may have no sample yet: they take after those around them
   GLuint volume_z = 0;  // r32f, same size, or 0: view depth z at half opacity, 0 where the volume is not so opaque
+  const SurfaceLayers* beneath = nullptr;  // surfaces to draw beneath
+  GLuint host_z = 0;                       // as HostDepth's, that hides those behind it; 0: none
+  unsigned host_layers = 0;
 };
 
 struct FrameTarget {

@@ -6,5 +6,5 @@
 
 namespace cumulet::core {
 #include "parameters.glsl"
-static_assert(sizeof(CmParameters) == 27 * 16);
+static_assert(sizeof(CmParameters) == 28 * 16);
 }  // namespace cumulet::core

@@ -13,6 +13,8 @@ namespace {
 constexpr std::uint32_t coarsest_divisor = 16;
 // Lanes whose first path was short go on with further samples while others' are under way.
 constexpr std::uint32_t preview_samples = 16;
+// For the surface pass at full resolution: eight layers at 1080p.
+constexpr double most_layer_bytes = 256e6;
 // Frames that the first answer to a change may take.
 constexpr double answer_frames = 2.0;
 using Clock = std::chrono::steady_clock;
@@ -26,7 +28,7 @@ bool Progressive::same(const PictureWish& wish) const {
   a.image.w = b.image.w = 0;  // more samples go on
   return wished_ && std::bit_cast<Words>(a) == std::bit_cast<Words>(b) && wish.view == wish_.view &&
          wish.generation == wish_.generation && wish.surface_generation == wish_.surface_generation &&
-         wish.preview == wish_.preview;
+         wish.preview == wish_.preview && wish.volume_alone == wish_.volume_alone;
 }
 
 std::uint32_t Progressive::coarsest(double budget_ms) const {
@@ -50,6 +52,37 @@ Picture& Progressive::acquire(glm::uvec2 size) {
   return *pictures_.emplace_back(std::make_unique<Picture>());
 }
 
+PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms) {
+  PictureSettings settings;
+  const double affordable = tracer.raster_rate() * budget_ms;
+  const auto pixels = [&] { return double(settings.layer_size.x) * settings.layer_size.y; };
+  settings.layered = Layered::beneath;
+  settings.layer_size = size;
+  for (std::uint32_t divisor = 2; divisor <= coarsest_divisor && pixels() > affordable; divisor *= 2) {
+    settings.layer_size = (size + divisor - 1U) / divisor;
+  }
+  settings.layers = 4.0 * pixels() <= affordable ? 4 : 1;
+  return settings;
+}
+
+PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const {
+  const glm::uvec2 size(wish_.parameters.image);
+  PictureSettings settings;
+  if (surfaces.raster != nullptr && divisor > finest_) {
+    settings = quick_layers(tracer_, size, budget_ms);
+  } else if (surfaces.raster != nullptr && !surfaces.traced) {
+    settings.layered = Layered::within;
+    settings.layer_size = size;
+    const double layer_bytes = 12.0 * size.x * size.y;
+    settings.layers = static_cast<unsigned>(std::clamp(most_layer_bytes / layer_bytes, 1.0, 8.0));
+  }
+  settings.view = wish_.view;
+  settings.budget_ms = budget_ms;
+  settings.hasty = wish_.preview;
+  settings.volume_alone = wish_.volume_alone && divisor == finest_;
+  return settings;
+}
+
 void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms) {
   core::CmParameters parameters = wish_.parameters;
   parameters.image.x = (parameters.image.x + divisor - 1) / divisor;
@@ -58,7 +91,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
   Picture& picture = acquire(glm::uvec2(parameters.image));
   working_ = nullptr;
   try {
-    tracer_.begin(picture, data, parameters, wish_.view, surfaces, budget_ms, wish_.preview);
+    tracer_.begin(picture, data, parameters, surfaces, settings(divisor, surfaces, budget_ms));
   } catch (const Error& error) {
     const bool memory = error.code() == ErrorCode::out_of_memory && wish_.preview && divisor < coarsest_divisor;
     if (memory) {
@@ -71,6 +104,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
   }
   working_ = &picture;
   working_generation_ = wish_.generation;
+  traced_ = surfaces.scene != nullptr && surfaces.traced;
   divisor_ = divisor;
   stale_ = false;
   answer_seconds_ = 0.0;
@@ -89,7 +123,10 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
     failed_ = false;
     if (resized || wish.generation != wish_.generation) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
-    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview) working_ = nullptr;
+    const bool traced = surfaces.scene != nullptr && surfaces.traced;
+    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview || traced != traced_) {
+      working_ = nullptr;
+    }
   } else if (working_ != nullptr && divisor_ == finest_) {
     if (!wish.preview && wish.parameters.image.w < working_->parameters().image.w) {
       stale_ = true;

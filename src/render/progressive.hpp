@@ -16,6 +16,7 @@ struct PictureWish {
   std::uint64_t surface_generation = 0;  // of the host's depth
   bool preview = true;                   // coarse first; else at full resolution only
   bool depth = false;                    // find the volume's depth at half opacity as well
+  bool volume_alone = false;             // at full resolution, sum what met the volume first apart as well
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
@@ -24,6 +25,9 @@ struct PictureWish {
 /// need the context current and a StateGuard around.
 class Progressive {
  public:
+  /// Layers of the surface pass, and their size, for pictures that are to be there within a frame.
+  static PictureSettings quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms);
+
   explicit Progressive(gl::FunctionsPtr gl) : tracer_(std::move(gl)) {}
 
   /// Works on the wish until about the deadline. Throws once where a picture cannot be made, and goes on with what
@@ -36,7 +40,7 @@ class Progressive {
   /// The newest whole picture; null before the first.
   [[nodiscard]] const Picture* shown() const { return shown_; }
   /// What is to be read back: without preview the picture under way.
-  [[nodiscard]] const Picture* newest() const { return wish_.preview || working_ == nullptr ? shown_ : working_; }
+  [[nodiscard]] Picture* newest() { return wish_.preview || working_ == nullptr ? shown_ : working_; }
   [[nodiscard]] bool converged() const;
   /// Whether advance has anything left to do.
   [[nodiscard]] bool more() const;
@@ -50,6 +54,7 @@ class Progressive {
  private:
   [[nodiscard]] bool same(const PictureWish& wish) const;
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
+  [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const;
   Picture& acquire(glm::uvec2 size);
   void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms);
   [[nodiscard]] bool needs_depth() const;
@@ -64,6 +69,7 @@ class Progressive {
   std::uint32_t finest_ = 1;   // finer ones do not fit the driver's memory
   PictureWish wish_;
   bool wished_ = false;
+  bool traced_ = true;      // paths of working_ meet triangles
   bool stale_ = false;      // working_ is of an older wish
   bool answering_ = false;  // working_ is the first picture after a change
   bool failed_ = false;     // until the wish changes

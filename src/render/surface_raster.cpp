@@ -162,6 +162,7 @@ void SurfaceRaster::upload_textures(Assets& assets) const {
     GLuint& name = made[{image, srgb}];
     if (name == 0) {
       assets.textures.push_back(make_scene_texture(gl_, scene.images.at(image), srgb, most));
+      assets.bytes += scene.images.at(image).rgba.size() * 4 / 3;  // with its smaller levels
       name = assets.textures.back().name();
     }
     return name;
@@ -243,6 +244,8 @@ void SurfaceRaster::set_scene(surface::ScenePtr scene) {
                                        "uploading the scene's indices");
       assets.posed = gl::make_buffer(gl_, s.attributes.size() * sizeof(surface::PosedVertex), nullptr,
                                      GL_DYNAMIC_STORAGE_BIT, "creating the scene's posed vertices");
+      assets.bytes += s.attributes.size() * (sizeof(surface::VertexAttributes) + sizeof(surface::PosedVertex)) +
+                      (s.indices.size() + assets.blended.size() * 3) * sizeof(std::uint32_t);
     }
   }
   assets_ = std::move(assets);
@@ -311,30 +314,25 @@ void SurfaceRaster::sort_blended(const SurfaceView& view) {
   sorted_view_ = view;
 }
 
-void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers) {
-  if (colour_ && size == size_ && layers == layers_) return;
+void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into) {
   const auto width = static_cast<int>(size.x);
   const auto height = static_cast<int>(size.y);
-  const auto depth = static_cast<int>(layers);
-  if (size != size_) depth_test_ = {};
-  colour_ = {};
-  depth_ = {};
-  size_ = glm::uvec2(0U);
-  layers_ = 0;
-  try {
-    colour_ = gl::make_texture_2d_array(gl_, GL_RGBA16F, width, height, depth, "creating the surfaces' colour");
-    depth_ = gl::make_texture_2d_array(gl_, GL_R32F, width, height, depth, "creating the surfaces' depth");
-    if (!depth_test_) {
-      depth_test_ = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, width, height, "creating the surfaces' depth test");
-    }
-  } catch (const Error&) {
-    colour_ = {};
-    depth_ = {};
+  const bool blended = !assets_.blended.empty();
+  if (!depth_test_ || size != depth_test_size_) {
     depth_test_ = {};
-    throw;
+    depth_test_ = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, width, height, "creating the surfaces' depth test");
+    depth_test_size_ = size;
   }
-  size_ = size;
-  layers_ = layers;
+  if (into.colour && size == into.size && layers == into.layers && blended == into.blended) return;
+  into = {};
+  SurfaceLayers made;
+  const auto depth = static_cast<int>(blended ? 2 * layers : layers);
+  made.colour = gl::make_texture_2d_array(gl_, GL_RGBA16F, width, height, depth, "creating the surfaces' colour");
+  made.z = gl::make_texture_2d_array(gl_, GL_R32F, width, height, depth, "creating the surfaces' depth");
+  made.size = size;
+  made.layers = layers;
+  made.blended = blended;
+  into = std::move(made);
 }
 
 void SurfaceRaster::make_fixtures() {
@@ -426,11 +424,12 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
   }
 }
 
-void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers) {
+void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
+                         SurfaceLayers& into) {
   const auto& gl = *gl_;
   layers = std::clamp(layers, 1U, 8U);
   make_fixtures();
-  make_targets(size, layers);
+  make_targets(size, layers, into);
   upload_view(view, lighting);
   sort_blended(view);
 
@@ -465,33 +464,39 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
   gl.Enable(GL_DEPTH_TEST);
   gl.DepthFunc(GL_GREATER);
   gl.CullFace(GL_BACK);
+  // Blended ones: colours over each other, and the nearest z.
   gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
   gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  const bool mirrored = glm::dot(glm::cross(view.right, view.up), view.forward) > 0.0;
-  for (unsigned layer = 0; layer < layers; ++layer) {
-    gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT0, colour_.name(), 0, static_cast<GLint>(layer));
-    gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT1, depth_.name(), 0, static_cast<GLint>(layer));
-    gl.Disablei(GL_BLEND, 0);
-    gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    gl.ColorMaski(1, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    gl.DepthMask(GL_TRUE);
+  gl.BlendEquationSeparatei(1, GL_MIN, GL_MIN);
+  for (GLuint i = 0; i < buffers.size(); ++i) gl.ColorMaski(i, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  const auto clear_to = [&](unsigned layer) {
+    gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT0, into.colour.name(), 0, static_cast<GLint>(layer));
+    gl.NamedFramebufferTextureLayer(target, GL_COLOR_ATTACHMENT1, into.z.name(), 0, static_cast<GLint>(layer));
     const glm::vec4 black(0.0F);
     const glm::vec4 nowhere(std::numeric_limits<float>::infinity());
-    const float far = 0.0F;
     gl.ClearNamedFramebufferfv(target, GL_COLOR, 0, &black.x);
     gl.ClearNamedFramebufferfv(target, GL_COLOR, 1, &nowhere.x);
+  };
+  const bool mirrored = glm::dot(glm::cross(view.right, view.up), view.forward) > 0.0;
+  for (unsigned layer = 0; layer < layers; ++layer) {
+    clear_to(layer);
+    gl.DepthMask(GL_TRUE);
+    const float far = 0.0F;
     gl.ClearNamedFramebufferfv(target, GL_DEPTH, 0, &far);
-    if (!posed_) continue;
     const glm::vec2 shift = (glm::vec2(0.5F) - surface_jitter(layer, layers)) * 2.0F / glm::vec2(size);
     for (const gl::Object& program : programs_) gl.ProgramUniform2f(program.name(), 0, shift.x, shift.y);
-    gl.VertexArrayElementBuffer(vertex_array.name(), assets_.indices.name());
-    draw_batches(assets_.solid, mirrored);
-    if (sorted_.empty()) continue;
-    gl.Enablei(GL_BLEND, 0);
-    gl.ColorMaski(1, GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    if (posed_) {
+      gl.VertexArrayElementBuffer(vertex_array.name(), assets_.indices.name());
+      draw_batches(assets_.solid, mirrored);
+    }
+    if (!into.blended) continue;
+    clear_to(layers + layer);
+    if (!posed_) continue;
+    for (GLuint i = 0; i < buffers.size(); ++i) gl.Enablei(GL_BLEND, i);
     gl.DepthMask(GL_FALSE);
     gl.VertexArrayElementBuffer(vertex_array.name(), assets_.sorted_indices.name());
     draw_batches(sorted_, mirrored);
+    for (GLuint i = 0; i < buffers.size(); ++i) gl.Disablei(GL_BLEND, i);
   }
   gl::check(gl, "drawing the surfaces");
 }

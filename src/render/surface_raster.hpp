@@ -30,21 +30,31 @@ struct SurfaceLighting {
   glm::vec3 sky_radiance{0.0F};               ///< the same from everywhere
 };
 
+/// What the surface pass has drawn: linear colour and view depth, a layer a sub-pixel place.
+struct SurfaceLayers {
+  gl::Object colour;  ///< GL_TEXTURE_2D_ARRAY, rgba16f, row 0 the picture's top: radiance times coverage, coverage
+  gl::Object z;       ///< GL_TEXTURE_2D_ARRAY, r32f: view depth of the nearest surface, infinity without, as HostDepth
+  glm::uvec2 size{0U};
+  unsigned layers = 0;   ///< of the opaque surfaces (coverage 0 or 1)
+  bool blended = false;  ///< as many follow, of the BLEND surfaces in front of those: one over the other, nearest z
+  [[nodiscard]] std::uint64_t bytes() const { return std::uint64_t{size.x} * size.y * layers * (blended ? 24U : 12U); }
+};
+
 /// Where in its pixel a layer is sampled: x to the right, y down the picture, from the pixel's corner, both in (0, 1).
 /// Of `layers` (1 to 8) layers each column and each row of layers x layers cells has one (n rooks). See
 /// glsl/jitter.glsl.
 glm::vec2 surface_jitter(unsigned layer, unsigned layers);
 
-/// Draws a glTF scene: linear colour and view depth, a layer a sub-pixel place; their mean is the anti-aliased picture.
+/// Draws a glTF scene into layers; the mean of BLEND layers over the others is the anti-aliased picture.
 ///
 /// Materials are metallic-roughness with KHR_materials_ior, _specular, _clearcoat, _emissive_strength and _unlit, as
 /// glsl/bsdf.glsl has them, normal and occlusion maps (occlusion dims the sky alone) and vertex colours. Nothing casts
 /// a shadow. Where a normal map's vertices have no tangent, screen-space derivatives serve.
 ///
-/// OPAQUE and MASK write z. BLEND does not: such triangles are drawn over the others, tested against their z, from the
-/// back to the front by the view depth of their centres, those of all draws together. That is right for triangles that
-/// neither intersect nor overlap in depth; ties keep the file's order. KHR_materials_transmission is approximated as
-/// BLEND of one colour's coverage: thin, not refracted.
+/// BLEND triangles are drawn into layers of their own, tested against the others' z, from the back to the front by the
+/// view depth of their centres, those of all draws together. That is right for triangles that neither intersect nor
+/// overlap in depth; ties keep the file's order. Their z is the nearest's. KHR_materials_transmission is approximated
+/// as BLEND of one colour's coverage: thin, not refracted.
 ///
 /// Needs the context current and a StateGuard around; leaves any state that the guard puts back. GL 4.5 core.
 class SurfaceRaster {
@@ -56,18 +66,14 @@ class SurfaceRaster {
   void set_scene(surface::ScenePtr scene);
   /// Uploads what moves. The pose is of the scene. Throws Error(out_of_memory); Error(internal) for one that is not.
   void set_pose(const surface::Pose& pose);
-  /// Renders layers 1 to 8 of size > 0. Without scene or pose they are empty. Throws Error(out_of_memory), and
-  /// Error(internal) for a view that spans no space. O(layers (triangles + pixels)).
-  void draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers);
+  /// Renders layers 1 to 8 of size > 0, into textures that are made anew where they do not fit. Without scene or pose
+  /// they are empty. Throws Error(out_of_memory), the layers then gone or of an undefined content, and Error(internal)
+  /// for a view that spans no space. O(layers (triangles + pixels)).
+  void draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
+            SurfaceLayers& into);
 
-  /// GL_TEXTURE_2D_ARRAY, rgba16f, row 0 the picture's top: radiance, and coverage in alpha (1 where opaque), which the
-  /// radiance is multiplied with. 0 before the first draw.
-  [[nodiscard]] GLuint colour() const { return colour_.name(); }
-  /// GL_TEXTURE_2D_ARRAY, r32f: view depth z of the nearest OPAQUE or MASK surface, infinity where there is none; as
-  /// HostDepth::texture.
-  [[nodiscard]] GLuint depth() const { return depth_.name(); }
-  [[nodiscard]] glm::uvec2 size() const { return size_; }
-  [[nodiscard]] unsigned layers() const { return layers_; }
+  /// GL memory of the scene, without layers.
+  [[nodiscard]] std::uint64_t bytes() const { return assets_.bytes; }
 
  private:
   /// A range of indices with one state.
@@ -99,13 +105,14 @@ class SurfaceRaster {
     std::vector<Batch> blended;  // a triangle each
     gl::Object posed;            // vertices
     gl::Object sorted_indices;   // of blended triangles
+    std::uint64_t bytes = 0;
   };
 
   void upload_textures(Assets& assets) const;
   void upload_materials(Assets& assets) const;
   void prepare_draws(Assets& assets) const;
   void sort_blended(const SurfaceView& view);
-  void make_targets(glm::uvec2 size, unsigned layers);
+  void make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into);
   void make_fixtures();
   void upload_view(const SurfaceView& view, const SurfaceLighting& lighting);
   void draw_batches(std::span<const Batch> batches, bool mirrored) const;
@@ -129,11 +136,8 @@ class SurfaceRaster {
   gl::Object light_buffer_;
   std::size_t light_bytes_ = 0;
 
-  gl::Object colour_;
-  gl::Object depth_;
   gl::Object depth_test_;
-  glm::uvec2 size_{0U};
-  unsigned layers_ = 0;
+  glm::uvec2 depth_test_size_{0U};
 };
 
 }  // namespace cumulet::render

@@ -1,11 +1,13 @@
 #include "render/tracer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <numeric>
 
 #include "base/error.hpp"
+#include "gl/state_guard.hpp"
 
 namespace cumulet::render {
 
@@ -17,6 +19,9 @@ constexpr double dispatch_ms = 1000.0;  // well under any driver's watchdog, wel
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t view_depth = 5;  // inspect.comp's
 constexpr GLuint surface_unit = 11;
+constexpr GLuint layer_colour_unit = 8;
+constexpr GLuint layer_z_unit = 15;
+constexpr double rays_of_facts = 16.0;  // aovs.comp's, a pixel
 
 using Clock = std::chrono::steady_clock;
 
@@ -108,12 +113,14 @@ void Picture::end_dispatch() {
 }
 
 std::uint64_t Picture::bytes() const {
-  return std::uint64_t{size_.x} * size_.y * (sum_ ? (volume_z_ ? 36U : 32U) : 0U);
+  const std::uint64_t pixel =
+      (sum_ ? 32U : 0U) + (volume_z_ ? 4U : 0U) + (volume_sum_ ? 16U : 0U) + (facts_ ? 36U : 0U);
+  return std::uint64_t{size_.x} * size_.y * pixel + layers_.bytes();
 }
 
-GLuint Tracer::program(const MarchData& data, const Surfaces& surfaces, const char* name) {
+GLuint Tracer::program(const MarchData& data, const char* name, std::span<const std::string> more) {
   std::vector<std::string> key = data.defines();
-  if (surfaces.scene != nullptr) key.emplace_back(surfaces.scene->emitters() ? "CM_SURFACES 2" : "CM_SURFACES 1");
+  key.insert(key.end(), more.begin(), more.end());
   key.emplace_back(name);
   auto found = programs_.find(key);
   if (found == programs_.end()) {
@@ -124,6 +131,19 @@ GLuint Tracer::program(const MarchData& data, const Surfaces& surfaces, const ch
     iterations_ = 16.0;
   }
   return found->second.name();
+}
+
+GLuint Tracer::trace_program(const Picture& picture, const MarchData& data) {
+  std::vector<std::string> more;
+  if (picture.traced_) more.emplace_back(picture.emitters_ ? "CM_SURFACES 2" : "CM_SURFACES 1");
+  if (!picture.traced_ && picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
+  if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
+  return program(data, "trace.comp", more);
+}
+
+GLuint Tracer::inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name) {
+  const std::array<std::string, 1> more{"CM_SURFACES 1"};
+  return program(data, name, std::span(more).first(surfaces.scene != nullptr ? 1 : 0));
 }
 
 void Tracer::make_shared_objects() {
@@ -141,36 +161,85 @@ void Tracer::allocate(Picture& picture, glm::uvec2 size) const {
   picture.sum_ = std::move(sum);
   picture.counts_ = std::move(counts);
   picture.volume_z_ = {};
+  picture.volume_sum_ = {};
+  picture.facts_.reset();
   picture.size_ = size;
 }
 
-void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, View view,
-                   const Surfaces& surfaces, double budget_ms, bool hasty) {
+void Tracer::lay_beneath(Picture& picture, const Surfaces& surfaces, glm::uvec2 size, unsigned layers) {
+  // The surface pass leaves any state it likes; what comes after it in the frame counts on the known one.
+  struct Known {
+    const gl::Functions& gl;
+    explicit Known(const gl::Functions& functions) : gl(functions) {}
+    ~Known() { const gl::StateGuard known(gl, false); }
+    Known(const Known&) = delete;
+    Known& operator=(const Known&) = delete;
+  };
+  const Known known(*gl_);
+  picture.layered_ = Layered::no;
+  const auto start = Clock::now();
+  surfaces.raster->draw(surfaces.view, surfaces.lighting, size, layers, picture.layers_);
+  gl_->Finish();
+  const double pixels = double(size.x) * size.y * layers;
+  raster_rate_ += 0.3 * (pixels / std::max(1e-3, milliseconds_since(start)) - raster_rate_);
+  picture.layered_ = Layered::beneath;
+}
+
+void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters,
+                   const Surfaces& surfaces, const PictureSettings& settings) {
   const glm::uvec2 size(parameters.image);
-  program(data, surfaces, view == View::shaded ? "trace.comp" : "inspect.comp");
+  const bool shaded = settings.view == View::shaded;
   make_shared_objects();
   const glm::uvec2 tile = glm::min(size, glm::uvec2(tile_edge));
   const std::size_t lanes = std::size_t{tile.x} * tile.y;
-  if (view == View::shaded && lanes > paths_lanes_) {
+  if (shaded && lanes > paths_lanes_) {
     paths_ = {};
     paths_lanes_ = 0;
     paths_ = gl::make_buffer(gl_, lanes * lane_bytes, nullptr, 0, "creating the path buffer");
     paths_lanes_ = lanes;
   }
   if (!picture.sum_ || size != picture.size_) allocate(picture, size);
+  picture.complete_ = false;
+  picture.facts_.reset();
+  picture.traced_ = shaded && surfaces.scene != nullptr && surfaces.traced;
+  picture.emitters_ = picture.traced_ && surfaces.scene->emitters();
+  picture.layered_ = Layered::no;
+  if (shaded && settings.layered != Layered::no && surfaces.raster != nullptr) {
+    lay_beneath(picture, surfaces, settings.layer_size, settings.layers);
+    picture.layered_ = settings.layered;
+  } else {
+    picture.layers_ = {};
+  }
+  picture.volume_alone_ = shaded && settings.volume_alone;
+  if (!picture.volume_alone_) {
+    picture.volume_sum_ = {};
+  } else if (!picture.volume_sum_) {
+    picture.volume_sum_ = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
+                                              "creating the sum of the volume alone");
+  }
+  if (shaded) {
+    trace_program(picture, data);
+  } else {
+    inspect_program(data, surfaces, "inspect.comp");
+  }
   picture.parameters_ = parameters;
   data.describe(picture.parameters_);
   describe(surfaces, picture.parameters_);
-  picture.view_ = view;
-  if (view != View::shaded) picture.parameters_.march.y = static_cast<std::uint32_t>(view);
+  if (picture.layered_ != Layered::no) {
+    const SurfaceLayers& layers = picture.layers_;
+    picture.parameters_.layers = {layers.layers, layers.size,
+                                  (layers.blended ? 1U : 0U) | (picture.layered_ == Layered::within ? 2U : 0U)};
+  }
+  picture.view_ = settings.view;
+  if (!shaded) picture.parameters_.march.y = static_cast<std::uint32_t>(settings.view);
   picture.tile_size_ = tile;
   picture.tiles_ = (size + tile - 1U) / tile;
   // A window's shortest dispatch should fit the budget: its lanes each run some dozens of steps.
-  const double lanes_in_budget = 0.5 * rate_ * budget_ms;
+  const double lanes_in_budget = 0.5 * rate_ * settings.budget_ms;
   picture.window_rows_ =
       static_cast<std::uint32_t>(std::clamp(lanes_in_budget / tile.x, 8.0, double(tile_edge))) / 8U * 8U;
   picture.tile_ = 0;
-  picture.hasty_ = hasty;
+  picture.hasty_ = settings.hasty;
   picture.pass_ = 0;
   picture.holes_ = true;
   picture.pass_target_ = picture.tiles_ == glm::uvec2(1U) ? picture.parameters_.image.w : 1U;
@@ -184,6 +253,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   const glm::uvec4 none(0U);
   gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
   gl_->ClearTexImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, &none);
+  if (picture.volume_sum_) gl_->ClearTexImage(picture.volume_sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
   gl::check(*gl_, "clearing the accumulation");
 }
 
@@ -213,14 +283,20 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surf
   const auto start = Clock::now();
   const double budget_ms = std::max(0.0, std::chrono::duration<double, std::milli>(deadline - start).count());
   const std::uint64_t samples_before = picture.samples_;
-  gl_->UseProgram(program(data, surfaces, picture.view_ == View::shaded ? "trace.comp" : "inspect.comp"));
+  gl_->UseProgram(picture.view_ == View::shaded ? trace_program(picture, data)
+                                                : inspect_program(data, surfaces, "inspect.comp"));
   bind(data, surfaces);
+  if (picture.layered_ != Layered::no) {
+    gl_->BindTextureUnit(layer_colour_unit, picture.layers_.colour.name());
+    gl_->BindTextureUnit(layer_z_unit, picture.layers_.z.name());
+  }
   if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, paths_.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, counter_.name());
   gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
   gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
   // What is bound shall fit the format, though this view does not write it.
-  gl_->BindImageTexture(2, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  gl_->BindImageTexture(2, picture.volume_sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
+                        picture.volume_sum_ ? GL_RGBA32F : GL_R32F);
   const double aim = std::clamp(0.5 * budget_ms, 1.0, dispatch_ms);
   while (!picture.done_ && !(until_complete && picture.complete_)) {
     dispatch(picture, surfaces, aim);
@@ -267,6 +343,27 @@ void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, double aim_ms)
   picture.end_dispatch();
 }
 
+bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameters, double rays, std::uint32_t& row,
+                     Deadline deadline) {
+  core::CmParameters p = parameters;
+  // Rows that a camera ray a pixel takes about a millisecond for.
+  const double in_a_millisecond = rate_ / (rays * picture.size_.x);
+  const auto rows = static_cast<std::uint32_t>(std::clamp(in_a_millisecond, 8.0, 512.0)) / 8U * 8U;
+  while (row < picture.size_.y) {
+    const std::uint32_t height = std::min(rows, picture.size_.y - row);
+    p.tile = {0U, 0U, picture.size_};
+    p.order = {0U, 0U, row, row + height};
+    gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
+    gl_->DispatchCompute((picture.size_.x + 7) / 8, (height + 7) / 8, 1);
+    gl_->MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    gl_->Finish();
+    gl::check(*gl_, "looking at the pixels");
+    row += height;
+    if (Clock::now() >= deadline) break;
+  }
+  return row >= picture.size_.y;
+}
+
 bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
   if (picture.depth_done_) return true;
   if (!picture.volume_z_) {
@@ -274,7 +371,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
                                             static_cast<int>(picture.size_.y), "creating the depth texture");
   }
   make_shared_objects();
-  gl_->UseProgram(program(data, surfaces, "inspect.comp"));
+  gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp"));
   bind(data, surfaces);
   gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
   gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
@@ -282,22 +379,57 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
   parameters.march.y = view_depth;
-  // Rows that a camera ray a pixel takes about a millisecond for.
-  const auto rows = static_cast<std::uint32_t>(std::clamp(rate_ / picture.size_.x, 8.0, 512.0)) / 8U * 8U;
-  while (picture.depth_row_ < picture.size_.y) {
-    const std::uint32_t height = std::min(rows, picture.size_.y - picture.depth_row_);
-    parameters.tile = {0U, 0U, picture.size_};
-    parameters.order = {0U, 0U, picture.depth_row_, picture.depth_row_ + height};
-    gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
-    gl_->DispatchCompute((picture.size_.x + 7) / 8, (height + 7) / 8, 1);
-    gl_->MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-    gl_->Finish();
-    gl::check(*gl_, "finding the volume's depth");
-    picture.depth_row_ += height;
-    if (Clock::now() >= deadline) break;
-  }
-  picture.depth_done_ = picture.depth_row_ >= picture.size_.y;
+  picture.depth_done_ = inspect(picture, parameters, 1.0, picture.depth_row_, deadline);
   return picture.depth_done_;
+}
+
+void Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces) {
+  if (picture.facts_) return;
+  const int width = static_cast<int>(picture.size_.x);
+  const int height = static_cast<int>(picture.size_.y);
+  constexpr const char* what = "creating the textures of what is known of pixels";
+  Picture::Facts facts{gl::make_texture_2d(gl_, GL_RGBA32F, width, height, what),
+                       gl::make_texture_2d(gl_, GL_RGBA32UI, width, height, what),
+                       gl::make_texture_2d(gl_, GL_R32F, width, height, what)};
+  make_shared_objects();
+  gl_->UseProgram(inspect_program(data, surfaces, "aovs.comp"));
+  bind(data, surfaces);
+  gl_->BindImageTexture(0, facts.normal.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  gl_->BindImageTexture(1, facts.albedo.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
+  gl_->BindImageTexture(2, facts.volume_z.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  core::CmParameters parameters = picture.parameters_;
+  describe(surfaces, parameters);
+  std::uint32_t row = 0;
+  inspect(picture, parameters, rays_of_facts, row, Deadline::max());
+  picture.facts_ = std::move(facts);
+}
+
+void Tracer::read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact,
+                       float* values) {
+  find_facts(picture, data, surfaces);
+  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
+  if (fact == PixelFact::volume_z) {
+    gl_->GetTextureImage(picture.facts_->volume_z.name(), 0, GL_RED, GL_FLOAT, static_cast<GLsizei>(pixels * 4),
+                         values);
+    gl::check(*gl_, "reading what is known of pixels");
+    return;
+  }
+  std::vector<glm::vec4> texels(pixels);
+  const auto bytes = static_cast<GLsizei>(pixels * sizeof(glm::vec4));
+  if (fact == PixelFact::normal || fact == PixelFact::transmittance) {
+    gl_->GetTextureImage(picture.facts_->normal.name(), 0, GL_RGBA, GL_FLOAT, bytes, texels.data());
+  } else {
+    gl_->GetTextureImage(picture.facts_->albedo.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, bytes, texels.data());
+  }
+  gl::check(*gl_, "reading what is known of pixels");
+  const std::size_t channels = channels_of(fact);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    if (channels == 1) {
+      values[i] = texels[i].w;
+    } else {
+      for (int c = 0; c < 3; ++c) values[3 * i + static_cast<std::size_t>(c)] = texels[i][c];
+    }
+  }
 }
 
 float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces,
@@ -310,7 +442,7 @@ float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, 
   p.march.y = view_depth;
   p.tile = {pixel, 1U, 1U};
   p.order = {0U, 1U, 0U, 1U};  // into the texture's one pixel
-  gl_->UseProgram(program(data, surfaces, "inspect.comp"));
+  gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp"));
   bind(data, surfaces);
   gl_->BindImageTexture(0, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(1, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
@@ -324,10 +456,12 @@ float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, 
   return z;
 }
 
-void Tracer::read(const Picture& picture, float* rgba) const {
+void Tracer::read(const Picture& picture, float* rgba) const { read_means(picture, picture.sum_.name(), rgba); }
+
+void Tracer::read_means(const Picture& picture, GLuint sum, float* rgba) const {
   const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
   std::vector<glm::uvec4> counts(pixels);
-  gl_->GetTextureImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels * 16), rgba);
+  gl_->GetTextureImage(sum, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels * 16), rgba);
   gl_->GetTextureImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, static_cast<GLsizei>(pixels * 16),
                        counts.data());
   gl::check(*gl_, "reading the picture back");
@@ -335,6 +469,10 @@ void Tracer::read(const Picture& picture, float* rgba) const {
     const float scale = counts[i].x > 0 ? 1.0F / static_cast<float>(counts[i].x) : 0.0F;
     for (std::size_t c = 0; c < 4; ++c) rgba[4 * i + c] *= scale;
   }
+}
+
+void Tracer::read_volume(const Picture& picture, float* rgba) const {
+  read_means(picture, picture.volume_sum_.name(), rgba);
 }
 
 Totals Tracer::totals(const Picture& picture) const {

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,6 +12,7 @@
 #include "render/march_data.hpp"
 #include "render/parameters.hpp"
 #include "render/surface_data.hpp"
+#include "render/surface_raster.hpp"
 
 namespace cumulet::render {
 
@@ -28,7 +31,37 @@ struct Surfaces {
   unsigned layers = 0;
   glm::uvec2 size{0U};
   const SurfaceData* scene = nullptr;
+  bool traced = true;               // paths meet the scene's triangles; else only the surface pass knows of them
+  SurfaceRaster* raster = nullptr;  // the surface pass, and what it is drawn with
+  SurfaceView view;
+  SurfaceLighting lighting;
 };
+
+/// What camera rays of a picture do with the surface pass.
+enum class Layered {
+  no,       // nothing: they meet triangles, if any
+  within,   // they end at it, with its colour
+  beneath,  // they end at it; whoever shows the picture draws it beneath
+};
+
+struct PictureSettings {
+  View view = View::shaded;
+  /// What Tracer::trace will be given about: chooses the size of windows.
+  double budget_ms = 10.0;
+  /// The first pass leaves the last few pixels, those with the longest paths, to the second.
+  bool hasty = false;
+  Layered layered = Layered::no;
+  glm::uvec2 layer_size{0U};
+  unsigned layers = 1;
+  /// Samples that meet the volume before any surface are summed apart, too.
+  bool volume_alone = false;
+};
+
+/// What is known of a pixel without light: glsl/aovs.comp says of each what it is.
+enum class PixelFact { transmittance, surface_z, volume_z, normal, albedo };
+constexpr std::size_t channels_of(PixelFact fact) {
+  return fact == PixelFact::normal || fact == PixelFact::albedo ? 3 : 1;
+}
 
 /// One accumulation under way.
 ///
@@ -51,6 +84,10 @@ class Picture {
   [[nodiscard]] double progress() const;
   /// Camera paths finished.
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
+  /// The surface pass that camera rays ended at: no one's where layered is no.
+  [[nodiscard]] const SurfaceLayers& layers() const { return layers_; }
+  [[nodiscard]] Layered layered() const { return layered_; }
+  [[nodiscard]] bool volume_alone() const { return volume_alone_; }
   /// Asks for this many samples, if that is more: goes on where it was.
   void extend(std::uint32_t samples);
   [[nodiscard]] GLuint sum() const { return sum_.name(); }
@@ -67,6 +104,19 @@ class Picture {
   gl::Object sum_;
   gl::Object counts_;
   gl::Object volume_z_;
+  gl::Object volume_sum_;
+  bool volume_alone_ = false;
+  SurfaceLayers layers_;
+  Layered layered_ = Layered::no;
+  bool traced_ = false;    // paths meet triangles
+  bool emitters_ = false;  // and look for emissive ones
+  // Per-pixel facts of what is seen (aovs.comp), once made.
+  struct Facts {
+    gl::Object normal;  // and transmittance
+    gl::Object albedo;  // and surface z, as words
+    gl::Object volume_z;
+  };
+  std::optional<Facts> facts_;
   struct Window {
     std::uint32_t first = 0;  // row of the tile
     std::uint32_t end = 0;
@@ -102,10 +152,9 @@ class Tracer {
   explicit Tracer(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
   /// Starts a picture anew. parameters: camera, medium, lights, image; box and march fields are filled from data.
-  /// budget_ms is what trace will be given about: it chooses the size of windows. hasty: the first pass leaves the last
-  /// few pixels, those with the longest paths, to the second. Throws with the picture as it was.
-  void begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, View view,
-             const Surfaces& surfaces, double budget_ms, bool hasty);
+  /// Throws with the picture as it was, or not complete.
+  void begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces,
+             const PictureSettings& settings);
   /// Traces until about the deadline. The last picture begun or traced goes on; another loses the paths under way.
   /// until_complete: no further than every pixel's first sample. Returns whether every pixel has its target samples.
   bool trace(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
@@ -116,21 +165,36 @@ class Tracer {
   float pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
   /// A picture of one transparent pixel: what there is before the first.
   void clear(Picture& picture);
+  /// Draws the surface pass beneath such a picture.
+  void lay_beneath(Picture& picture, const Surfaces& surfaces, glm::uvec2 size, unsigned layers);
 
   /// width * height * 4 floats: mean radiance without background, and alpha; (0,0) top left.
   void read(const Picture& picture, float* rgba) const;
+  /// The same of samples that met the volume before any surface; alpha is their share.
+  void read_volume(const Picture& picture, float* rgba) const;
+  /// A fact a pixel (PixelFact), each channels_of(fact) floats. Finds them first, if need be.
+  void read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
   /// Camera paths a millisecond that this driver traced lately.
   [[nodiscard]] double rate() const { return rate_; }
+  /// Pixels a millisecond that the surface pass drew lately.
+  [[nodiscard]] double raster_rate() const { return raster_rate_; }
   [[nodiscard]] std::uint64_t bytes() const { return paths_lanes_ * lane_bytes; }
 
  private:
   static constexpr std::size_t lane_bytes = std::size_t{9} * 16;  // the last of it with surfaces only
   void dispatch(Picture& picture, const Surfaces& surfaces, double aim_ms);
-  GLuint program(const MarchData& data, const Surfaces& surfaces, const char* name);
+  GLuint program(const MarchData& data, const char* name, std::span<const std::string> more);
+  GLuint trace_program(const Picture& picture, const MarchData& data);
+  GLuint inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name);
+  // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
+  bool inspect(const Picture& picture, const core::CmParameters& parameters, double rays, std::uint32_t& row,
+               Deadline deadline);
   void make_shared_objects();
   void allocate(Picture& picture, glm::uvec2 size) const;
   void bind(const MarchData& data, const Surfaces& surfaces) const;
+  void read_means(const Picture& picture, GLuint sum, float* rgba) const;
+  void find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces);
 
   gl::FunctionsPtr gl_;
   std::map<std::vector<std::string>, gl::Object> programs_;
@@ -141,6 +205,7 @@ class Tracer {
   gl::Object pick_;
   double iterations_ = 16.0;
   double rate_ = 1500.0;
+  double raster_rate_ = 2e4;
 };
 
 }  // namespace cumulet::render

@@ -276,7 +276,7 @@ cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, const cumulet_surfac
   return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_surfaces_desc d = read_desc(desc, "cumulet_surfaces_desc");
     require(std::isfinite(d.time), "cumulet_surfaces_desc.time is not finite");
-    require(number(d.light) <= CUMULET_SURFACE_LIGHT_SHADOWS, "cumulet_surfaces_desc.light is unknown");
+    require(number(d.light) <= CUMULET_SURFACE_LIGHT_NONE, "cumulet_surfaces_desc.light is unknown");
     v.set_surfaces({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light)});
   });
 }
@@ -312,7 +312,7 @@ cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampli
     require(number(d.view) <= CUMULET_VIEW_WIREFRAME, "cumulet_sampling_desc.view is unknown");
     require(number(d.preview) <= CUMULET_PREVIEW_OFF, "cumulet_sampling_desc.preview is unknown");
     v.set_sampling({d.samples == 0 ? 256 : d.samples, d.seed, static_cast<render::View>(d.view),
-                    d.preview == CUMULET_PREVIEW_AUTO});
+                    d.preview == CUMULET_PREVIEW_AUTO, d.volume_alone != 0});
   });
 }
 
@@ -434,6 +434,13 @@ cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t c
 
 cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) { v.read_display(rgba, count); });
+}
+
+cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(number(aov) <= CUMULET_AOV_ALBEDO, "the AOV is unknown");
+    v.read_aov(static_cast<core::Aov>(aov), values, count);
+  });
 }
 
 cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {

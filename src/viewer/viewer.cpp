@@ -21,9 +21,26 @@ double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 double luminance(const glm::vec3& c) { return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z; }
 
+dvec3 to_sun(const Light& light) {
+  const double azimuth = radians(light.sun_azimuth_degrees);
+  const double elevation = radians(light.sun_elevation_degrees);
+  return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
+}
+
 render::Deadline deadline_after(double milliseconds) {
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(
                             std::chrono::duration<double, std::milli>(std::clamp(milliseconds, 0.0, 1e9)));
+}
+
+render::PictureTextures textures_of(const render::Picture& picture, const render::HostDepth& host) {
+  render::PictureTextures textures{picture.sum(), picture.counts(), picture.size(), picture.has_holes(),
+                                   picture.volume_z()};
+  if (picture.layered() == render::Layered::beneath) {
+    textures.beneath = &picture.layers();
+    textures.host_z = host.texture();
+    textures.host_layers = host.layers();
+  }
+  return textures;
 }
 
 // A framebuffer of one context, for one call.
@@ -390,25 +407,25 @@ core::CmParameters Viewer::parameters() const {
   p.to_cube_x = direction(linear[0]);
   p.to_cube_y = direction(linear[1]);
   p.to_cube_z = direction(linear[2]);
-  const double azimuth = radians(light_.sun_azimuth_degrees);
-  const double elevation = radians(light_.sun_elevation_degrees);
-  const dvec3 sun(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
-                  std::cos(azimuth) * std::cos(elevation));
+  const dvec3 sun = to_sun(light_);
   const glm::dmat4& from_cube = source.cube.to_world;
   p.from_cube_x = glm::vec4(glm::vec3(from_cube[0]), static_cast<float>(from_cube[3].x));
   p.from_cube_y = glm::vec4(glm::vec3(from_cube[1]), static_cast<float>(from_cube[3].y));
   p.from_cube_z = glm::vec4(glm::vec3(from_cube[2]), static_cast<float>(from_cube[3].z));
-  p.lights.z = surface_settings_.light == SurfaceLight::full ? 1U : 0U;
+  p.lights.z = surface_settings_.light == SurfaceLight::full   ? 1U
+               : surface_settings_.light == SurfaceLight::none ? 2U
+                                                               : 0U;
   p.sun_world = direction(sun);
   p.sun_cube = direction(linear * sun);
   p.sky_radiance = glm::vec4(light_.sky_radiance, 0.0F);
   p.albedo = glm::vec4(medium_.albedo, 1.0F);
   // Half of the sky's share of the light: its escaping paths sample it as well.
   const auto sun_power = static_cast<float>(luminance(light_.sun_irradiance));
-  const double to_emitters = gl_->surfaces ? gl_->surfaces->emitter_share(sun_power) : 0.0;
+  const render::SurfaceData* surfaces = surface_settings_.light != SurfaceLight::none ? gl_->surfaces.get() : nullptr;
+  const double to_emitters = surfaces != nullptr ? surfaces->emitter_share(sun_power) : 0.0;
   p.sun_irradiance = glm::vec4(light_.sun_irradiance, static_cast<float>(to_emitters));
   const auto sky_power = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(light_.sky_radiance));
-  const bool local = gl_->surfaces && (gl_->surfaces->lamps() || gl_->surfaces->emitters());
+  const bool local = surfaces != nullptr && (surfaces->lamps() || surfaces->emitters());
   const float to_sky = local && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
                        : sun_power > 0.0F           ? 0.5F * sky_power / (sky_power + sun_power)
                                                     : (sky_power > 0.0F ? 1.0F : 0.0F);
@@ -448,6 +465,29 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   if (frame.budget_ms < 0.0) return;
   upload_surfaces(g);
   upload(g, deadline);
+  upload_raster(g);
+}
+
+void Viewer::upload_raster(Gl& g) const {
+  const bool wanted = sampling_.preview || surface_settings_.light == SurfaceLight::none;
+  if (!wanted || !surface_source_) {
+    g.raster.reset();
+    g.raster_source.reset();
+    return;
+  }
+  if (g.raster_source == surface_source_) return;
+  const bool same_scene = g.raster && g.raster_source->scene == surface_source_->scene;
+  g.raster_source = surface_source_;
+  try {
+    if (!same_scene) {
+      g.raster = std::make_unique<render::SurfaceRaster>(g.functions);
+      g.raster->set_scene(surface_source_->scene);
+    }
+    g.raster->set_pose(surface_source_->pose);
+  } catch (const Error&) {
+    g.raster.reset();  // rays meet the triangles then
+    throw;
+  }
 }
 
 void Viewer::upload_surfaces(Gl& g) {
@@ -515,8 +555,16 @@ VolumePtr Viewer::empty_volume() {
 render::Surfaces Viewer::surfaces() const {
   const render::HostDepth& depth = gl_->host_depth;
   render::Surfaces surfaces;
-  if (depth.texture() != 0) surfaces = {depth.texture(), depth.layers(), depth.size(), nullptr};
+  if (depth.texture() != 0) {
+    surfaces.depth = depth.texture();
+    surfaces.layers = depth.layers();
+    surfaces.size = depth.size();
+  }
   surfaces.scene = gl_->surfaces.get();
+  surfaces.raster = gl_->raster.get();
+  surfaces.traced = surface_settings_.light != SurfaceLight::none || surfaces.raster == nullptr;
+  surfaces.view = {view_->eye, view_->forward, view_->right, view_->up, view_->orthographic};
+  surfaces.lighting = {glm::vec3(to_sun(light_)), light_.sun_irradiance, light_.sky_radiance};
   return surfaces;
 }
 
@@ -542,6 +590,7 @@ void Viewer::trace(const Frame& frame, render::Deadline deadline) {
   wish.surface_generation = surface_generation_;
   wish.preview = sampling_.preview;
   wish.depth = frame.write_depth;
+  wish.volume_alone = sampling_.volume_alone;
   g.progressive.advance(wish, *g.data, surfaces(), deadline, frame.budget_ms);
 }
 
@@ -577,6 +626,11 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
   if (shown == nullptr) {
     if (g.empty.sum() == 0) g.progressive.tracer().clear(g.empty);
     shown = &g.empty;
+    // The surfaces need not wait for the volume.
+    if (g.raster && view_ && frame.budget_ms >= 0.0) {
+      const auto quick = render::Progressive::quick_layers(g.progressive.tracer(), frame_size_, frame.budget_ms);
+      g.progressive.tracer().lay_beneath(g.empty, surfaces(), quick.layer_size, quick.layers);
+    }
   }
   const bool legend = shown->view() != render::View::shaded;
   render::Display display;
@@ -598,8 +652,7 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
     target.depth_b = view_->depth_b;
     target.reversed = view_->orthographic ? view_->depth_b < 0.0 : view_->depth_b > 0.0;
   }
-  const render::PictureTextures picture{shown->sum(), shown->counts(), shown->size(), shown->has_holes(),
-                                        shown->volume_z()};
+  const render::PictureTextures picture = textures_of(*shown, g.host_depth);
   if (frame.target == Target::framebuffer) {
     g.compositor.draw(picture, display, target);
     return;
@@ -676,10 +729,70 @@ Pick Viewer::pick(double x, double y) {
   return pick;
 }
 
-const render::Picture& Viewer::readable() {
-  const render::Picture* picture = gl().progressive.newest();
+render::Picture& Viewer::readable() {
+  render::Picture* picture = gl().progressive.newest();
   if (picture == nullptr) throw Error(ErrorCode::invalid_argument, "nothing has been rendered yet");
   return *picture;
+}
+
+// Mean radiance and alpha, with the surfaces that lie beneath a preview.
+void Viewer::read_means(Gl& g, const render::Picture& picture, float* rgba) {
+  if (picture.layered() != render::Layered::beneath) {
+    g.progressive.tracer().read(picture, rgba);
+    return;
+  }
+  const glm::ivec2 size(picture.size());
+  const gl::Object flat = gl::make_texture_2d(g.functions, GL_RGBA32F, size.x, size.y, "creating the texture to read");
+  const TransientFramebuffer framebuffer(*g.functions, flat.name(), 0);
+  render::Display display;
+  display.transparent = true;
+  display.encoding = render::ColourEncoding::hdr;
+  render::FrameTarget target;
+  target.framebuffer = framebuffer.name();
+  target.viewport = {0, 0, size};
+  target.flip_y = true;  // the first row is the top
+  target.blend_over = false;
+  g.compositor.draw(textures_of(picture, g.host_depth), display, target);
+  g.functions->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
+  gl::check(*g.functions, "reading the picture back");
+}
+
+void Viewer::read_aov(Aov aov, float* values, std::size_t count) {
+  using render::PixelFact;
+  with_gl([&](Gl& g) {
+    render::Picture& picture = readable();
+    if (picture.view() != render::View::shaded) {
+      throw Error(ErrorCode::invalid_argument, "the picture is a debug view: there are AOVs of shaded ones alone");
+    }
+    const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
+    const bool colour = aov == Aov::beauty || aov == Aov::volume;
+    const std::array<PixelFact, 7> facts{{{},
+                                          {},
+                                          PixelFact::transmittance,
+                                          PixelFact::surface_z,
+                                          PixelFact::volume_z,
+                                          PixelFact::normal,
+                                          PixelFact::albedo}};
+    const PixelFact fact = facts.at(static_cast<std::size_t>(aov));
+    const std::size_t floats = pixels * (colour ? 4 : render::channels_of(fact));
+    if (values == nullptr || count < floats) {
+      throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+    }
+    if (aov == Aov::beauty) {
+      read_means(g, picture, values);
+    } else if (aov == Aov::volume) {
+      if (!picture.volume_alone()) {
+        throw Error(
+            ErrorCode::invalid_argument,
+            "the volume alone was not gathered: set volume_alone of cumulet_sampling_desc, and wait for the full "
+            "resolution");
+      }
+      g.progressive.tracer().read_volume(picture, values);
+    } else {
+      if (!g.data) throw Error(ErrorCode::invalid_argument, "there is no volume and no surface to know anything of");
+      g.progressive.tracer().read_fact(picture, *g.data, surfaces(), fact, values);
+    }
+  });
 }
 
 void Viewer::read_linear(float* rgba, std::size_t count) {
@@ -688,7 +801,7 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
     const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
     if (rgba == nullptr || count < pixels * 4)
       throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " floats");
-    g.progressive.tracer().read(picture, rgba);
+    read_means(g, picture, rgba);
     totals_ = g.progressive.tracer().totals(picture);
     if (display_.transparent || picture.view() != render::View::shaded) return;
     const glm::vec3 sky(picture.parameters().sky_radiance);

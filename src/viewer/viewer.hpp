@@ -43,7 +43,7 @@ struct Light {
   glm::vec3 sky_radiance{0.0F};
 };
 
-enum class SurfaceLight { full = 0, shadows = 1 };
+enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
 
 struct SurfaceSettings {
   SurfaceMoment moment;
@@ -55,6 +55,18 @@ struct Sampling {
   std::uint32_t seed = 0;
   render::View view = render::View::shaded;
   bool preview = true;
+  bool volume_alone = false;
+};
+
+/// cumulet_aov.
+enum class Aov {
+  beauty = 0,
+  volume = 1,
+  transmittance = 2,
+  surface_depth = 3,
+  volume_depth = 4,
+  normal = 5,
+  albedo = 6
 };
 
 struct DisplaySettings {
@@ -175,6 +187,7 @@ class Viewer {
   Bounds bounds();
   void read_linear(float* rgba, std::size_t count);
   void read_display(std::uint8_t* rgba, std::size_t count);
+  void read_aov(Aov aov, float* values, std::size_t count);
   double measure_noise();
   Stats stats();
 
@@ -203,7 +216,9 @@ class Viewer {
     std::shared_ptr<const render::MarchSource> upload_source;  // what upload is of, or what failed to be uploaded
     std::unique_ptr<render::MarchUpload> upload;
     std::unique_ptr<render::SurfaceData> surfaces;
-    SurfacePtr surfaces_source;  // what surfaces is of, or what failed to be uploaded
+    std::unique_ptr<render::SurfaceRaster> raster;  // of surfaces_source, where it is of use and could be made
+    SurfacePtr raster_source;                       // what raster is of, or what failed
+    SurfacePtr surfaces_source;                     // what surfaces is of, or what failed to be uploaded
     std::uint64_t surfaces_revision = 0;
     render::Picture empty;
     gl::Object colour;  // the texture target
@@ -237,7 +252,9 @@ class Viewer {
   [[nodiscard]] std::optional<Bounds> box() const;
   VolumePtr empty_volume();
   [[nodiscard]] render::Surfaces surfaces() const;
-  const render::Picture& readable();
+  render::Picture& readable();
+  void read_means(Gl& g, const render::Picture& picture, float* rgba);
+  void upload_raster(Gl& g) const;
 
   Log log_;
   std::function<void()> update_;

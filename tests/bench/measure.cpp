@@ -8,6 +8,8 @@
 #include <fstream>
 #include <memory>
 
+#include "surfaces.hpp"
+
 namespace cumulet::bench {
 
 namespace {
@@ -132,12 +134,12 @@ Match match(Subject& subject, const ImageReference& reference, double target, do
   return best;
 }
 
-/// Runs, in turn, until every subject has its repeats.
+/// Runs of each subject, in turn, until all have their repeats.
 template <class Measure>
-std::array<std::vector<Run>, 4> take_turns(int repeats, Measure measure_one) {
-  std::array<std::vector<Run>, 4> runs;
+std::vector<std::vector<Run>> take_turns(std::size_t subjects, int repeats, Measure measure_one) {
+  std::vector<std::vector<Run>> runs(subjects);
   for (int repeat = 0; repeat < repeats; ++repeat) {
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < subjects; ++i) {
       Run run = measure_one(i, static_cast<std::uint32_t>(repeat));
       run.rgba.clear();
       runs[i].push_back(std::move(run));
@@ -146,9 +148,50 @@ std::array<std::vector<Run>, 4> take_turns(int repeats, Measure measure_one) {
   return runs;
 }
 
+/// Samples a pixel that take about as long as a run shall, where one takes so many seconds.
+std::uint32_t samples_within(const Options& options, double seconds) {
+  const double samples = options.seconds_a_run / std::max(seconds, 1e-3);
+  return static_cast<std::uint32_t>(std::clamp(samples, static_cast<double>(options.fewest_samples), 16.0));
+}
+
 std::vector<double> rates(const std::vector<Run>& runs) {
   std::vector<double> result;
   for (const Run& run : runs) result.push_back(run.samples_per_second());
+  return result;
+}
+
+/// What surfaces cost: the matched grid with them, in turn with the volume alone.
+SurfaceResult measure_surfaces(headless::Context& context, const Asset& asset, const Options& options, Subject& alone,
+                               const TargetResult& target, double density_scale) {
+  const viewer::SurfacePtr surfaces = surfaces_in(asset.volume->bounds());
+  Subject with(context, asset.volume, alone.kind(), options, density_scale);
+  with.refine(grid::Criterion::deviation, target.rows[static_cast<std::size_t>(alone.kind())].threshold,
+              options.max_cells);
+  with.show(surfaces);
+  const auto run = [&](std::size_t i, std::uint32_t samples, std::uint32_t seed) {
+    if (i == 0) return alone.shaded(samples, seed);
+    with.light_surfaces(surface_lights[i - 1]);
+    return with.shaded(samples, seed);
+  };
+  const std::size_t subjects = 1 + surface_lights.size();
+  double slowest = 1e-3;
+  for (std::size_t i = 0; i < subjects; ++i) slowest = std::max(slowest, run(i, 1, 1).seconds);
+  SurfaceResult result;
+  result.triangles = surfaces->scene->triangle_count();
+  result.samples = samples_within(options, slowest);
+  const auto runs = take_turns(subjects, options.repeats, [&](std::size_t i, std::uint32_t repeat) {
+    return run(i, result.samples, 2000 + repeat);
+  });
+  result.alone = spread_of(rates(runs[0]));
+  for (std::size_t i = 0; i < surface_lights.size(); ++i) {
+    SurfaceRow& row = result.rows[i];
+    row.light = surface_lights[i];
+    row.samples_per_second = spread_of(rates(runs[i + 1]));
+    row.to_alone = ratio_of(rates(runs[i + 1]), rates(runs[0]));
+    row.steps_per_path = runs[i + 1].front().steps_per_sample();
+    progress(std::string("    surfaces, ") + name_of(row.light) +
+             text(": %.0f samples/s, %.2f x the volume alone", row.samples_per_second.median, row.to_alone.median));
+  }
   return result;
 }
 
@@ -240,19 +283,15 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
     progress("  paths");
     for (std::size_t i = 0; i < 4; ++i) {
       const Run warm = subjects[i]->shaded(1, 1);
-      if (i == 2) {
-        const double samples = options.seconds_a_run / std::max(warm.seconds, 1e-3);
-        table.samples =
-            static_cast<std::uint32_t>(std::clamp(samples, static_cast<double>(options.fewest_samples), 16.0));
-      }
+      if (i == 2) table.samples = samples_within(options, warm.seconds);
     }
-    const auto runs = take_turns(options.repeats, [&](std::size_t i, std::uint32_t repeat) {
+    const auto runs = take_turns(4, options.repeats, [&](std::size_t i, std::uint32_t repeat) {
       return subjects[i]->shaded(table.samples, 1000 + repeat);
     });
 
     progress("  camera rays");
     for (const auto& subject : subjects) subject->primary(density_scale);
-    const auto rays = take_turns(2 * options.repeats + 1,
+    const auto rays = take_turns(4, 2 * options.repeats + 1,
                                  [&](std::size_t i, std::uint32_t) { return subjects[i]->primary(density_scale); });
 
     for (std::size_t i = 0; i < 4; ++i) {
@@ -280,8 +319,24 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
                     row.to_brick.median));
     }
     result.targets.push_back(std::move(table));
+    if (result.targets.size() > 1) continue;
+    progress("  surfaces");
+    result.surfaces = measure_surfaces(context, asset, options, *subjects[static_cast<std::size_t>(Kind::tet_linear)],
+                                       result.targets.front(), density_scale);
   }
   return result;
+}
+
+std::vector<TreeTimes> measure_trees(const Options& options) {
+  std::vector<TreeTimes> trees;
+  for (const TreeMesh& mesh : tree_meshes(options.tree_triangles)) {
+    trees.push_back(time_tree(mesh, options.repeats));
+    const TreeTimes& tree = trees.back();
+    progress("  " + tree.name +
+             text(": %.2f million triangles, build %.3f s a million, refit %.3f", tree.millions, tree.build.ours.median,
+                  tree.refit.ours.median));
+  }
+  return trees;
 }
 
 }  // namespace cumulet::bench

@@ -3,6 +3,7 @@
 #include <headless.hpp>
 
 #include "asset.hpp"
+#include "bvh_times.hpp"
 #include "results.hpp"
 
 namespace cumulet::bench {
@@ -12,5 +13,8 @@ void progress(const std::string& line);
 
 /// Everything about one asset.
 AssetResult measure(headless::Context& context, const Asset& asset, const Options& options);
+
+/// The triangle tree over each of its meshes.
+std::vector<TreeTimes> measure_trees(const Options& options);
 
 }  // namespace cumulet::bench

@@ -79,6 +79,9 @@ ParseResult parse(int argc, char** argv) {
   auto* sweep_cells = app.add_option("--sweep-cells", o.sweep_cells, "Where a sweep of thresholds ends");
   app.add_option("--max-cells", o.max_cells, "Most cells of a matched grid (default: 5400000)");
   auto* build_cells = app.add_option("--build-cells", o.build_cells, "Cells of the timed build (default: 5000000)");
+  auto* triangles = app.add_option("--triangles", o.tree_triangles,
+                                   "Triangles of each mesh that trees are built over (default: 1000000)");
+  triangles->check(CLI::Range(100, 20'000'000));
   try {
     app.parse(argc, argv);
     for (const std::string& text : inputs) o.inputs.push_back(parse_input(text));
@@ -93,6 +96,7 @@ ParseResult parse(int argc, char** argv) {
     if (seconds->empty()) o.seconds_a_run = 1.0;
     if (sweep_cells->empty()) o.sweep_cells = 300'000;
     if (build_cells->empty()) o.build_cells = 1'000'000;
+    if (triangles->empty()) o.tree_triangles = 100'000;
     o.evaluations = 4;
     o.fewest_samples = 4;
     o.sweep_factor = 4.0;

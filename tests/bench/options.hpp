@@ -37,6 +37,7 @@ struct Options {
   std::uint64_t sweep_cells = 2'000'000;
   std::uint64_t max_cells = 5'400'000;
   std::uint64_t build_cells = 5'000'000;
+  std::size_t tree_triangles = 1'000'000;
   bool quick = false;
 };
 

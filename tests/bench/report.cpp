@@ -183,6 +183,45 @@ std::string build_table(const std::vector<AssetResult>& assets) {
   return text;
 }
 
+std::string surface_text(const std::vector<AssetResult>& assets) {
+  const std::size_t triangles = assets.empty() ? 0 : assets.front().surfaces.triangles;
+  return "With surfaces under and in the volume (" + number(static_cast<double>(triangles)) +
+         " triangles, diffuse and glossy), tet-linear, samples/s x the volume alone:\n";
+}
+
+std::string surface_table(const std::vector<AssetResult>& assets, bool full) {
+  std::string text = "| Asset | Volume alone, samples/s |";
+  std::string rule = "\n|---|--:|";
+  for (const viewer::SurfaceLight light : surface_lights) {
+    text += std::string(" With surfaces, light `") + name_of(light) + "` |";
+    rule += "--:|";
+  }
+  text += rule + "\n";
+  for (const AssetResult& asset : assets) {
+    text += "| " + asset.name + " | " + number(asset.surfaces.alone.median) + " |";
+    for (const SurfaceRow& row : asset.surfaces.rows) {
+      text += format(" %s x |", full ? ratio(row.to_alone).c_str() : format("%.2f", row.to_alone.median).c_str());
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string tree_table(const std::vector<TreeTimes>& trees, bool full) {
+  std::string text =
+      "| Triangles | Millions | Build, s a million | x Embree | Refit, s a million | x Embree |\n"
+      "|---|--:|--:|--:|--:|--:|\n";
+  const auto cells = [full](const Duel& d) {
+    std::string other = "-";
+    if (d.ratio) other = full ? ratio(*d.ratio) : format("%.2f", d.ratio->median);
+    return format(" %.3g | ", d.ours.median) + other + " |";
+  };
+  for (const TreeTimes& tree : trees) {
+    text += "| " + tree.name + format(" | %.3g |", tree.millions) + cells(tree.build) + cells(tree.refit) + "\n";
+  }
+  return text;
+}
+
 std::string build_line(const std::vector<AssetResult>& assets) {
   if (assets.empty()) return "";
   const AssetResult* asset = &assets.front();
@@ -206,7 +245,7 @@ void write_file(const std::filesystem::path& path, const std::string& text) {
   if (!file) throw std::runtime_error(path.string() + ": cannot be written");
 }
 
-std::string csv(const Machine& machine, const std::vector<AssetResult>& assets) {
+std::string csv(const Machine& machine, const std::vector<AssetResult>& assets, const std::vector<TreeTimes>& trees) {
   std::string text = "asset,march,target,quantity,value,min,max\n";
   const auto line = [&text](const std::string& asset, const std::string& march, double target, const char* quantity,
                             double value, double min, double max) {
@@ -245,6 +284,16 @@ std::string csv(const Machine& machine, const std::vector<AssetResult>& assets) 
         spread("camera_rays_per_second_to_brick", row.ray_to_brick);
       }
     }
+    for (const SurfaceRow& row : asset.surfaces.rows) {
+      const std::string name = std::string("tet-linear/surfaces-") + name_of(row.light);
+      const double target = asset.targets.front().target;
+      const auto spread = [&](const char* quantity, const Spread& s) {
+        line(asset.name, name, target, quantity, s.median, s.min, s.max);
+      };
+      spread("samples_per_second", row.samples_per_second);
+      spread("samples_per_second_to_alone", row.to_alone);
+      line(asset.name, name, target, "steps_per_path", row.steps_per_path, row.steps_per_path, row.steps_per_path);
+    }
     for (const SweepCurve& curve : asset.curves) {
       const std::string name = std::string(name_of(curve.kind)) + "/" + name_of(curve.criterion);
       for (const SweepPoint& p : curve.points) {
@@ -268,6 +317,17 @@ std::string csv(const Machine& machine, const std::vector<AssetResult>& assets) 
     stage("build_seconds_records", b.records);
     stage("build_seconds_upload", b.upload);
     stage("build_peak_bytes", b.peak_bytes);
+  }
+  for (const TreeTimes& tree : trees) {
+    const auto spread = [&](const char* quantity, const Spread& s) {
+      line(tree.name, "bvh", 0.0, quantity, s.median, s.min, s.max);
+    };
+    const double triangles = 1e6 * tree.millions;
+    spread("triangles", {triangles, triangles, triangles});
+    spread("build_seconds_a_million", tree.build.ours);
+    spread("refit_seconds_a_million", tree.refit.ours);
+    if (tree.build.ratio) spread("build_to_embree", *tree.build.ratio);
+    if (tree.refit.ratio) spread("refit_to_embree", *tree.refit.ratio);
   }
   text +=
       "machine," + renderer + ",0,threads," + format("%u,%u,%u\n", machine.threads, machine.threads, machine.threads);
@@ -334,7 +394,7 @@ void update_readme(const std::filesystem::path& path, const std::string& part) {
 }  // namespace
 
 void write_report(const Machine& machine, const Options& options, const std::vector<AssetResult>& assets,
-                  const std::vector<std::string>& skipped) {
+                  const std::vector<TreeTimes>& trees, const std::vector<std::string>& skipped) {
   std::filesystem::create_directories(options.out);
   std::string left_out;
   for (const std::string& line : skipped) left_out += "Skipped: " + line + "\n\n";
@@ -358,16 +418,21 @@ void write_report(const Machine& machine, const Options& options, const std::vec
             "\n![camera rays per second](rays-per-second.svg)\n";
   report += "\n## Cells that an optical depth error needs\n\n" + sweep_table(assets);
   for (const AssetResult& asset : assets) report += "\n![" + asset.name + "](error-" + asset.name + ".svg)\n";
+  report += "\n## What surfaces cost\n\n" + surface_text(assets) + "\n" + surface_table(assets, true);
+  report += "\n## The triangle tree\n\n" + tree_table(trees, true);
   report += "\n## Build, linear cells, split until the number of cells is reached; seconds\n\n" + build_table(assets);
   write_file(options.out / "report.md", report);
-  write_file(options.out / "results.csv", csv(machine, assets));
+  write_file(options.out / "results.csv", csv(machine, assets, trees));
   write_plots(options, assets);
 
   if (!options.readme.empty()) {
     std::string part = "Path tracing at a matched image error of " + percent(options.targets.front()) +
                        " against the voxels (dense march), made by\n\n    " + options.command + "\n\n" + left_out +
-                       tracing_table(assets, false) + "\n" + build_line(assets) + "\n" + aim_line(assets) + "\n" +
-                       conditions(machine, options) + "`tests/bench/README.md` says what holds which march back.\n";
+                       tracing_table(assets, false) + "\n" + surface_text(assets) + "\n" +
+                       surface_table(assets, false) +
+                       "\nThe triangle tree, beside Embree 3 on the same triangles:\n\n" + tree_table(trees, false) +
+                       "\n" + build_line(assets) + "\n" + aim_line(assets) + "\n" + conditions(machine, options) +
+                       "`tests/bench/README.md` says what holds which march back.\n";
     update_readme(options.readme, part);
   }
 }

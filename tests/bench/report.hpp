@@ -1,5 +1,6 @@
 #pragma once
 
+#include "bvh_times.hpp"
 #include "options.hpp"
 #include "results.hpp"
 
@@ -16,6 +17,6 @@ struct Machine {
 /// report.md, results.csv and the plots, into options.out; the README's part, if asked for. Throws std::runtime_error
 /// that names the file.
 void write_report(const Machine& machine, const Options& options, const std::vector<AssetResult>& assets,
-                  const std::vector<std::string>& skipped);
+                  const std::vector<TreeTimes>& trees, const std::vector<std::string>& skipped);
 
 }  // namespace cumulet::bench

@@ -40,6 +40,21 @@ struct TargetResult {
   std::array<TraceRow, 4> rows;
 };
 
+/// The matched linear grid with surfaces in it.
+struct SurfaceRow {
+  viewer::SurfaceLight light = viewer::SurfaceLight::full;
+  double steps_per_path = 0.0;  ///< in the volume
+  Spread samples_per_second;
+  Spread to_alone;  ///< samples/s over those of the volume alone
+};
+
+struct SurfaceResult {
+  std::size_t triangles = 0;
+  std::uint32_t samples = 0;  ///< a pixel, in each timed run
+  Spread alone;               ///< samples/s
+  std::array<SurfaceRow, surface_lights.size()> rows;
+};
+
 struct SweepPoint {
   double threshold = 0.0;
   std::uint64_t cells = 0;
@@ -75,6 +90,7 @@ struct AssetResult {
   double density_scale = 1.0;
   double coverage = 0.0;  ///< part of the pixels that shows the medium
   std::vector<TargetResult> targets;
+  SurfaceResult surfaces;  ///< at the first target
   std::vector<SweepCurve> curves;
   BuildRow build;
 };

@@ -16,7 +16,7 @@ def main():
     readme.write_text("before\n<!-- bench:begin -->\nold\n<!-- bench:end -->\nafter\n")
     command = [program, "--quick", "--input", "ball=@noise:24", "--input", "gone/=@noise:16", "--size", "16"]
     command += ["--seconds", "0.05", "--sweep-cells", "20000", "--build-cells", "20000", "--max-cells", "100000", "--error-samples", "4"]
-    command += ["--target", "0.1", "0.05", "--out", str(folder / "out"), "--update-readme", str(readme)]
+    command += ["--target", "0.1", "0.05", "--triangles", "2000", "--out", str(folder / "out"), "--update-readme", str(readme)]
     subprocess.run(command, check=True)
 
     rows = list(csv.DictReader((folder / "out/results.csv").open()))
@@ -27,13 +27,23 @@ def main():
     for march in ("tet-constant", "tet-linear"):
         for criterion in ("deviation", "range-mean"):
             assert (f"{march}/{criterion}", "sweep_depth_error") in quantities, (march, criterion)
+    for light in ("full", "shadows", "none"):
+        found = {row["quantity"]: float(row["value"]) for row in rows if row["march"] == f"tet-linear/surfaces-{light}"}
+        assert found["samples_per_second"] > 0 and 0 < found["samples_per_second_to_alone"] < 100, found
+    for mesh in ("terrain", "sphere", "soup"):
+        found = {row["quantity"]: float(row["value"]) for row in rows if (row["asset"], row["march"]) == (mesh, "bvh")}
+        assert 500 < found["triangles"] < 8000, found
+        assert found["build_seconds_a_million"] > 0 and found["refit_seconds_a_million"] > 0, found
+        # Where Embree is found, the ratios are there, and in the report.
+        assert ("build_to_embree" in found) == ("refit_to_embree" in found), found
     for row in rows:
         value = float(row["value"])
         assert value == value and float(row["min"]) <= value * (1 + 1e-6) + 1e-12, row
     assert any(row["quantity"] == "samples_per_second" and float(row["value"]) > 0 for row in rows)
 
     report = (folder / "out/report.md").read_text()
-    for heading in ("# Benchmark", "## Paths", "## The same grids", "## Cells", "## Build"):
+    for heading in ("# Benchmark", "## Paths", "## The same grids", "## Cells", "## What surfaces", "## The triangle",
+                    "## Build"):
         assert heading in report, heading
     assert "nan" not in report and "inf" not in report.replace("info", ""), report
     plots = sorted((folder / "out").glob("*.svg"))
@@ -44,8 +54,9 @@ def main():
     text = readme.read_text()
     assert text.startswith("before\n<!-- bench:begin -->\nPath tracing") and text.endswith("<!-- bench:end -->\nafter\n")
     assert "old" not in text.split() and "| ball | tet-linear |" in text
+    assert "With surfaces, light `full`" in text and "| terrain | 0.0" in text
 
-    for wrong in (["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--nonsense"]):
+    for wrong in (["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--triangles", "0"], ["--nonsense"]):
         assert subprocess.run([program, *wrong], capture_output=True, check=False).returncode == 2, wrong
     missing = subprocess.run([program, "--input", "x=missing.vdb", "--out", str(folder / "no")], capture_output=True,
                              text=True, check=False)

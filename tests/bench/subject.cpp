@@ -16,6 +16,18 @@ const char* name_of(Kind kind) {
   return "brick";
 }
 
+const char* name_of(viewer::SurfaceLight light) {
+  switch (light) {
+    case viewer::SurfaceLight::full:
+      return "full";
+    case viewer::SurfaceLight::none:
+      return "none";
+    case viewer::SurfaceLight::shadows:
+      break;
+  }
+  return "shadows";
+}
+
 viewer::Light bench_light() {
   viewer::Light light;
   light.sun_azimuth_degrees = 60.0F;
@@ -45,6 +57,14 @@ void Subject::refine(grid::Criterion criterion, double threshold, std::uint64_t 
   refine.max_cells = max_cells;
   still_.set_grid(settings);
   still_.build();
+}
+
+void Subject::show(viewer::SurfacePtr surfaces) { still_.viewer().show_surfaces(std::move(surfaces)); }
+
+void Subject::light_surfaces(viewer::SurfaceLight light) {
+  viewer::SurfaceSettings settings;
+  settings.light = light;
+  still_.viewer().set_surfaces(settings);
 }
 
 Run Subject::shaded(std::uint32_t samples, std::uint32_t seed) {

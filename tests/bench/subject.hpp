@@ -14,6 +14,11 @@ enum class Kind { tet_constant = 0, tet_linear = 1, dense = 2, brick = 3 };
 inline constexpr std::array<Kind, 4> all_kinds{Kind::tet_constant, Kind::tet_linear, Kind::dense, Kind::brick};
 const char* name_of(Kind kind);
 
+/// The settings of surfaces that are measured.
+inline constexpr std::array surface_lights{viewer::SurfaceLight::full, viewer::SurfaceLight::shadows,
+                                           viewer::SurfaceLight::none};
+const char* name_of(viewer::SurfaceLight light);
+
 /// A picture and what it cost.
 struct Run {
   double seconds = 0.0;  ///< tracing alone: not compiling, building, reading back
@@ -33,6 +38,9 @@ class Subject {
 
   /// Makes the tetrahedral grid anew; not for dense and brick.
   void refine(grid::Criterion criterion, double threshold, std::uint64_t max_cells);
+  /// Surfaces in the picture from now on.
+  void show(viewer::SurfacePtr surfaces);
+  void light_surfaces(viewer::SurfaceLight light);
   /// Traces samples a pixel.
   Run shaded(std::uint32_t samples, std::uint32_t seed);
   /// One ray a pixel right through the medium: alpha is 1 - exp(-density_scale x depth).

@@ -1,3 +1,6 @@
+#include <ImfChannelList.h>
+#include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -9,11 +12,14 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "file.hpp"
 #include "image.hpp"
+#include "layers.hpp"
 
 namespace {
 
@@ -69,6 +75,93 @@ TEST_F(ImageIo, ExrRoundTripIsExact) {
   EXPECT_EQ(back.height, 19u);
   EXPECT_EQ(back.rgba, image.rgba);
   EXPECT_EQ(count(), 1u);
+}
+
+/// Every layer of a rendered picture, each with values of its own, some of them hard to keep.
+struct Rendered {
+  static constexpr std::uint32_t width = 13;
+  static constexpr std::uint32_t height = 7;
+  static constexpr LayerName names[] = {layers::beauty,       layers::volume, layers::transmittance, layers::depth,
+                                        layers::volume_depth, layers::normal, layers::albedo};
+  std::vector<std::vector<float>> values;
+  std::vector<Layer> all;
+
+  Rendered() {
+    for (const LayerName& name : names) {
+      std::vector<float>& v = values.emplace_back(name.channels.size() * width * height);
+      for (std::size_t i = 0; i < v.size(); ++i)
+        v[i] = 1e-3f * static_cast<float>(i) + 1000.0f * static_cast<float>(values.size());
+      v[0] = no_depth;
+      v[1] = 1e-38f;
+    }
+    for (std::size_t i = 0; i < values.size(); ++i) all.push_back({names[i], values[i]});
+  }
+};
+
+TEST_F(ImageIo, ExrLayersRoundTripIsExact) {
+  const Rendered rendered;
+  write_exr(path("a.exr"), Rendered::width, Rendered::height, rendered.all);
+  for (const Layer& layer : rendered.all) {
+    const Pixels back = read_exr(path("a.exr"), layer.name);
+    EXPECT_EQ(back.width, Rendered::width);
+    EXPECT_EQ(back.height, Rendered::height);
+    EXPECT_TRUE(std::equal(back.values.begin(), back.values.end(), layer.values.begin(), layer.values.end()))
+        << layer.name.name;
+  }
+  // What reads a plain picture reads the beauty and nothing else.
+  EXPECT_EQ(read_exr(path("a.exr")).rgba, rendered.values[0]);
+  EXPECT_EQ(count(), 1u);
+}
+
+TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
+  const Rendered rendered;
+  write_exr(path("a.exr"), Rendered::width, Rendered::height, rendered.all);
+  const Imf::InputFile file(path("a.exr").c_str());
+  const Imf::Header& header = file.header();
+  std::set<std::string> names;
+  for (auto i = header.channels().begin(); i != header.channels().end(); ++i) {
+    names.insert(i.name());
+    EXPECT_EQ(i.channel().type, Imf::FLOAT) << i.name();  // half ends at 65504: no_depth would be infinite
+    EXPECT_EQ(i.channel().xSampling, 1);
+    EXPECT_EQ(i.channel().ySampling, 1);
+  }
+  // The names that docs/aovs.md promises.
+  EXPECT_EQ(names, (std::set<std::string>{"R", "G", "B", "A", "volume.R", "volume.G", "volume.B", "volume.A",
+                                          "transmittance.Y", "depth.Z", "volume_depth.Z", "normal.X", "normal.Y",
+                                          "normal.Z", "albedo.R", "albedo.G", "albedo.B"}));
+  std::set<std::string> layer_names;
+  header.channels().layers(layer_names);
+  EXPECT_EQ(layer_names,
+            (std::set<std::string>{"volume", "transmittance", "depth", "volume_depth", "normal", "albedo"}));
+  EXPECT_EQ(header.dataWindow(), Imath::Box2i({0, 0}, {12, 6}));
+  EXPECT_EQ(header.displayWindow(), header.dataWindow());
+  EXPECT_EQ(header.pixelAspectRatio(), 1.0f);
+  EXPECT_EQ(header.compression(), Imf::ZIP_COMPRESSION);
+  EXPECT_FALSE(header.hasName());  // a single part: Blender would prefix its name to every layer's
+  ASSERT_TRUE(Imf::hasChromaticities(header));
+  EXPECT_EQ(Imf::chromaticities(header).red, Imath::V2f(0.64f, 0.33f));
+  EXPECT_EQ(Imf::chromaticities(header).white, Imath::V2f(0.3127f, 0.3290f));
+}
+
+TEST_F(ImageIo, ExrLayersReportWhatIsWrong) {
+  const std::vector<float> one(6);
+  const auto write = [&](const std::string& to, std::initializer_list<Layer> layers) {
+    write_exr(to, 3, 2, std::span<const Layer>(layers.begin(), layers.size()));
+  };
+  const std::string absent = failure([&] { write(path("absent/a.exr"), {{layers::depth, one}}); });
+  EXPECT_EQ(absent.rfind(path("absent/a.exr") + ": ", 0), 0u) << absent;
+  EXPECT_EQ(absent.find('\n'), std::string::npos) << absent;
+
+  EXPECT_THROW(write(path("a.exr"), {{layers::depth, one}, {layers::normal, one}}), std::logic_error);
+  EXPECT_THROW(write(path("a.exr"), {{layers::depth, one}, {layers::depth, one}}), std::logic_error);
+  EXPECT_NE(failure([&] { write_exr(path("a.exr"), 0, 2, {}); }), "");
+  EXPECT_EQ(count(), 0u);
+
+  write(path("a.exr"), {{layers::depth, one}});
+  const std::string missing = failure([&] { static_cast<void>(read_exr(path("a.exr"), layers::normal)); });
+  EXPECT_EQ(missing.rfind(path("a.exr") + ": ", 0), 0u) << missing;
+  EXPECT_NE(missing.find("normal.X"), std::string::npos) << missing;
+  EXPECT_EQ(missing.find('\n'), std::string::npos) << missing;
 }
 
 TEST_F(ImageIo, PfmRoundTripIsExactButForAlpha) {

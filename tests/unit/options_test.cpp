@@ -248,6 +248,16 @@ TEST(Options, SurfacesMayComeAlone) {
   EXPECT_NE(usage_error(with({"--surface-light", "some"})).find("shadows"), std::string::npos);
 }
 
+TEST(Options, AovsAreListedOrAll) {
+  const auto aovs_of = [](const char* text) {
+    std::ostringstream out;
+    return parse_render_options({"--volume", "a.vdb", "-o", "a.exr", "--aovs", text}, out)->aovs;
+  };
+  EXPECT_TRUE(parse({}).aovs.empty());
+  EXPECT_EQ(aovs_of("depth,normal,depth"), (std::vector<cumulet_aov>{CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_NORMAL}));
+  EXPECT_EQ(aovs_of("albedo,all").size(), 6U);
+}
+
 TEST(Options, ThresholdZeroIsTheVoxel) { EXPECT_LT(parse({"--threshold", "0"}).scene.grid.threshold, 0.0); }
 
 TEST(Options, NegativeValuesAreNotFlags) {
@@ -288,6 +298,7 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--camera", "0,0,nan 0,0,0 40"},
                                         {"--camera", "0,0 0,0,0 40"},
                                         {"--march", "fast"},
+                                        {"--aovs", "all"},  // of a .png
                                         {"--march", ""},
                                         {"--cells", "Linear"},
                                         {"--criterion", "best"},

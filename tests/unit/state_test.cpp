@@ -81,8 +81,10 @@ class Scribbler {
     gl_.DepthRangeIndexed(0, 0.125, 0.625);
     gl_.DepthMask(GL_FALSE);
     gl_.DepthFunc(GL_NOTEQUAL);
-    gl_.BlendFuncSeparatei(0, GL_DST_COLOR, GL_DST_ALPHA, GL_ZERO, GL_ONE);
-    gl_.BlendEquationSeparatei(0, GL_MIN, GL_FUNC_SUBTRACT);
+    for (GLuint i = 0; i < StateGuard::blended_buffers; ++i) {
+      gl_.BlendFuncSeparatei(i, GL_DST_COLOR, GL_DST_ALPHA, GL_ZERO, GL_ONE);
+      gl_.BlendEquationSeparatei(i, GL_MIN, GL_FUNC_SUBTRACT);
+    }
     for (GLuint i = 0; i < 8; ++i) {
       gl_.ColorMaski(i, GL_TRUE, GL_FALSE, GL_TRUE, GL_FALSE);
       gl_.Enablei(GL_BLEND, i);
@@ -220,10 +222,26 @@ TEST_P(State, AFrameLeavesNothingAndReadsNothing) {
 TEST_P(State, KnownValuesDoNotDependOnTheHost) {
   ScramblingHost host(gl_);
   const auto is_known = [](const std::string& name) {
-    for (const char* prefix : {"GL_PACK_", "GL_UNPACK_", "GL_BLEND[", "GL_COLOR_WRITEMASK", "GL_PIXEL_",
-                               "GL_DEPTH_TEST", "GL_DEPTH_CLAMP", "GL_DEPTH_FUNC", "GL_DEPTH_WRITEMASK", "GL_CULL_FACE",
-                               "GL_DITHER", "GL_FRAMEBUFFER_SRGB", "GL_CLIP_", "GL_POLYGON_MODE", "GL_SCISSOR_TEST[0]",
-                               "GL_BLEND_SRC_RGB[0]", "GL_RASTERIZER_DISCARD", "GL_FRONT_FACE", "GL_DEPTH_RANGE[0]"}) {
+    for (const char* prefix : {"GL_PACK_",
+                               "GL_UNPACK_",
+                               "GL_BLEND[",
+                               "GL_COLOR_WRITEMASK",
+                               "GL_PIXEL_",
+                               "GL_DEPTH_TEST",
+                               "GL_DEPTH_CLAMP",
+                               "GL_DEPTH_FUNC",
+                               "GL_DEPTH_WRITEMASK",
+                               "GL_CULL_FACE",
+                               "GL_DITHER",
+                               "GL_FRAMEBUFFER_SRGB",
+                               "GL_CLIP_",
+                               "GL_POLYGON_MODE",
+                               "GL_SCISSOR_TEST[0]",
+                               "GL_BLEND_SRC_RGB[0]",
+                               "GL_BLEND_EQUATION_RGB[1]",
+                               "GL_RASTERIZER_DISCARD",
+                               "GL_FRONT_FACE",
+                               "GL_DEPTH_RANGE[0]"}) {
       if (name.rfind(prefix, 0) == 0) return true;
     }
     return false;
@@ -266,9 +284,9 @@ TEST_P(State, WhereTheHostResetsNothingElseChanges) {
       EXPECT_NE(name.rfind(untouched, 0), 0U) << name;
     }
     for (const char* higher :
-         {"GL_VIEWPORT[1]", "GL_SCISSOR_BOX[1]", "GL_SCISSOR_TEST[1]", "GL_DEPTH_RANGE[1]", "GL_TEXTURE_BINDING_2D[15]",
-          "GL_SAMPLER_BINDING[15]", "GL_IMAGE_BINDING_NAME[3]", "GL_UNIFORM_BUFFER_BINDING[2]",
-          "GL_SHADER_STORAGE_BUFFER_BINDING[2]", "GL_BLEND_SRC_RGB[1]"}) {
+         {"GL_VIEWPORT[1]", "GL_SCISSOR_BOX[1]", "GL_SCISSOR_TEST[1]", "GL_DEPTH_RANGE[1]", "GL_TEXTURE_BINDING_2D[16]",
+          "GL_SAMPLER_BINDING[16]", "GL_IMAGE_BINDING_NAME[3]", "GL_UNIFORM_BUFFER_BINDING[2]",
+          "GL_SHADER_STORAGE_BUFFER_BINDING[2]", "GL_BLEND_SRC_RGB[2]"}) {
       EXPECT_NE(name, higher);
     }
   }

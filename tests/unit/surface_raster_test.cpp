@@ -32,6 +32,7 @@ using cumulet::Error;
 using cumulet::ErrorCode;
 using cumulet::gl::StateGuard;
 using cumulet::render::surface_jitter;
+using cumulet::render::SurfaceLayers;
 using cumulet::render::SurfaceLighting;
 using cumulet::render::SurfaceRaster;
 using cumulet::render::SurfaceView;
@@ -111,6 +112,7 @@ struct Picture {
   glm::uvec2 size{0U};
   std::vector<glm::vec4> colours;
   std::vector<float> depths;
+  std::vector<float> blended_depths;  // of the same pixels
   [[nodiscard]] std::size_t index(unsigned x, unsigned y, unsigned layer) const {
     return (std::size_t{layer} * size.y + y) * size.x + x;
   }
@@ -130,6 +132,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
   }
   void TearDown() override {
     raster_.reset();
+    layers_ = {};
     GlTest::TearDown();
   }
 
@@ -141,17 +144,26 @@ class SurfaceRasters : public cumulet::test::GlTest {
   Picture draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size = {32U, 32U},
                unsigned layers = 1) {
     const StateGuard guard(*gl_);
-    raster_->draw(view, lighting, size, layers);
-    EXPECT_EQ(raster_->size(), size);
-    EXPECT_EQ(raster_->layers(), layers);
+    raster_->draw(view, lighting, size, layers, layers_);
+    EXPECT_EQ(layers_.size, size);
+    EXPECT_EQ(layers_.layers, layers);
     Picture picture;
     picture.size = size;
     const std::size_t count = std::size_t{size.x} * size.y * layers;
+    const std::size_t all = layers_.blended ? 2 * count : count;
+    picture.colours.resize(all);
+    picture.depths.resize(all);
+    gl_->GetTextureImage(layers_.colour.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(all * 16),
+                         picture.colours.data());
+    gl_->GetTextureImage(layers_.z.name(), 0, GL_RED, GL_FLOAT, static_cast<GLsizei>(all * 4), picture.depths.data());
+    // The blended over the others.
+    for (std::size_t i = 0; i < all - count; ++i) {
+      const glm::vec4 over = picture.colours[count + i];
+      picture.colours[i] = over + (1.0F - over.a) * picture.colours[i];
+    }
+    picture.blended_depths.assign(picture.depths.begin() + static_cast<std::ptrdiff_t>(count), picture.depths.end());
     picture.colours.resize(count);
     picture.depths.resize(count);
-    gl_->GetTextureImage(raster_->colour(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(count * 16),
-                         picture.colours.data());
-    gl_->GetTextureImage(raster_->depth(), 0, GL_RED, GL_FLOAT, static_cast<GLsizei>(count * 4), picture.depths.data());
     return picture;
   }
   /// One wall at z = -2, seen from the origin.
@@ -162,6 +174,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
   }
 
   std::unique_ptr<SurfaceRaster> raster_;
+  SurfaceLayers layers_;
 };
 CUMULET_GL_ON_BACKENDS(SurfaceRasters);
 
@@ -411,7 +424,7 @@ TEST_P(SurfaceRasters, MasksCut) {
   EXPECT_NEAR(picture.z(24, 16), 2.0F, 1e-6F);
 }
 
-TEST_P(SurfaceRasters, BlendedTrianglesAreSortedAndWriteNoDepth) {
+TEST_P(SurfaceRasters, BlendedTrianglesAreSortedAndKeepTheNearestDepth) {
   const auto scene = std::make_shared<HandScene>();
   const auto glow = [&](glm::vec3 colour, float alpha) {
     surface::Material& material = scene->add_matte(glm::vec3(0.0F));
@@ -429,6 +442,7 @@ TEST_P(SurfaceRasters, BlendedTrianglesAreSortedAndWriteNoDepth) {
   set(scene);
   const Picture front = draw(straight({0, 0, 0}, 0.5), {}, {16U, 16U}, 2);
   EXPECT_NEAR(front.z(3, 3, 1), 4.0F, 1e-5F);
+  EXPECT_NEAR(front.blended_depths.at(front.index(3, 3, 1)), 2.0F, 1e-5F);
   expect_colour(front.colour(3, 3, 1), {4.0F, 0.5F * 2.0F, 0.5F * 0.75F * 8.0F, 1.0F});
   // From behind, single-sided: nothing; from in front without the wall: alpha adds up, and nothing has depth.
   EXPECT_EQ(draw(straight({0, 0, -20}, 0.1), {}).centre(), glm::vec4(0.0F));
@@ -847,7 +861,7 @@ TEST_P(SurfaceRasters, RefusesWhatDoesNotFit) {
   EXPECT_EQ(code_of([&] { raster_->set_scene(huge); }), ErrorCode::unsupported);
   SurfaceView flat = straight({0, 0, 0}, 0.5);
   flat.up = flat.right;
-  EXPECT_EQ(code_of([&] { raster_->draw(flat, {}, {4U, 4U}, 1); }), ErrorCode::internal);
+  EXPECT_EQ(code_of([&] { raster_->draw(flat, {}, {4U, 4U}, 1, layers_); }), ErrorCode::internal);
   // What was there still is.
   EXPECT_NEAR(draw(straight({0, 0, 0}, 0.1), {}).centre_z(), 2.0F, 1e-6F);
 }

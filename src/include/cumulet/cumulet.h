@@ -35,13 +35,13 @@
  *     reads no state but: pixel buffers and parameters, bindings and capabilities are set to what it needs first. It
  *     uses, and so saves and restores:
  *       - the current program and program pipeline, the vertex array binding, the draw and read framebuffer bindings
- *       - active texture; on units 0-14 the 2D, 2D array, 2D multisample, 3D and buffer texture bindings and the
+ *       - active texture; on units 0-15 the 2D, 2D array, 2D multisample, 3D and buffer texture bindings and the
  *         sampler
  *       - storage buffer bindings 0-1, uniform buffer bindings 0-1 and their generic points, image units 0-2
  *       - pixel pack and unpack buffers and all pixel store parameters
  *       - viewport 0, scissor test and box 0, colour mask (of every draw buffer), depth mask, function, test and range,
  *         depth clamp, stencil test
- *       - blending (enable, functions, equations, colour) of draw buffer 0 and the enable of the others
+ *       - blending (enable, functions, equations) of draw buffers 0 and 1 and the enable of the others
  *       - cull face (enable, mode), front face, polygon mode and smoothing, polygon offset enables
  *       - rasterizer discard, logic op, multisample, sample shading, sample alpha to coverage and to one
  *       - sample coverage and mask, primitive restart (both), clip distances 0-7, clip control, dither
@@ -279,9 +279,16 @@ CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
 CUMULET_API cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path);
 
 typedef enum cumulet_surface_light {
-  CUMULET_SURFACE_LIGHT_FULL = 0,   /* light goes on between surfaces, and between them and the volume */
-  CUMULET_SURFACE_LIGHT_SHADOWS = 1 /* surfaces are lit by sun, sky, lamps and emissive triangles alone, through the
-                                       volume's shadow */
+  CUMULET_SURFACE_LIGHT_FULL = 0,    /* light goes on between surfaces, and between them and the volume */
+  CUMULET_SURFACE_LIGHT_SHADOWS = 1, /* surfaces are lit by sun, sky, lamps and emissive triangles alone, through the
+                                        volume's shadow */
+  /*
+   * No light between surfaces and volume: surfaces are rasterised, lit by sun, sky and lamps without shadows, and hide
+   * what is behind them; the volume is lit by sun and sky alone. The fastest, and what previews show of surfaces in
+   * every mode. Surfaces of alphaMode BLEND are sorted among each other; in front of the volume, in it and behind it
+   * they count as one, at the nearest of a pixel.
+   */
+  CUMULET_SURFACE_LIGHT_NONE = 2
 } cumulet_surface_light;
 
 typedef struct cumulet_surfaces_desc {
@@ -407,6 +414,7 @@ typedef struct cumulet_sampling_desc {
   uint32_t seed;    /* same seed, samples, size and driver: same picture, bit for bit */
   cumulet_view view;
   cumulet_preview preview;
+  int32_t volume_alone; /* 1: at full resolution, also keep what cumulet_read_aov gives as CUMULET_AOV_VOLUME */
 } cumulet_sampling_desc;
 
 typedef enum cumulet_tone_map {
@@ -665,6 +673,28 @@ CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rg
 /* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque in
  * front of the sky). */
 CUMULET_API cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count);
+/* Arbitrary output variables: what a compositor wants beside the picture. z is the depth along the camera's axis. */
+typedef enum cumulet_aov {
+  CUMULET_AOV_BEAUTY = 0, /* 4 floats: premultiplied linear radiance without the background, and alpha: of the volume
+                             and our surfaces */
+  CUMULET_AOV_VOLUME = 1, /* 4 floats: the same of paths that met the volume first. Needs volume_alone of the sampling.
+                             Beauty less this is the surfaces as seen through the volume */
+  CUMULET_AOV_TRANSMITTANCE = 2, /* 1 float: of the volume, up to the nearest surface or right through; no noise */
+  CUMULET_AOV_SURFACE_DEPTH = 3, /* 1 float: z of the nearest surface, ours or the host's, at the pixel's centre;
+                                    infinite where there is none */
+  CUMULET_AOV_VOLUME_DEPTH = 4,  /* 1 float: z where the volume before that reaches half opacity, infinite where it does
+                                    not */
+  CUMULET_AOV_NORMAL = 5,        /* 3 floats: mean shading normal of our surfaces in the pixel, world space, towards the
+                                    eye, as if there were no volume; 0 where there is none */
+  CUMULET_AOV_ALBEDO = 6         /* 3 floats: mean linear base colour, likewise */
+} cumulet_aov;
+
+/*
+ * [GL] One of these, of the picture so far: width x height (of the result) pixels, first pixel top left. count is the
+ * number of floats at values. All but the first two are found when first asked for, by 16 rays a pixel; asking again
+ * costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views.
+ */
+CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
  * their luminance, over the mean luminance. Reads the picture back: now and then, not every frame. */
 CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise);

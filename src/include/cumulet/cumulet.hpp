@@ -84,7 +84,20 @@ enum class View {
   density = CUMULET_VIEW_DENSITY,
   wireframe = CUMULET_VIEW_WIREFRAME
 };
-enum class SurfaceLight { full = CUMULET_SURFACE_LIGHT_FULL, shadows = CUMULET_SURFACE_LIGHT_SHADOWS };
+enum class SurfaceLight {
+  full = CUMULET_SURFACE_LIGHT_FULL,
+  shadows = CUMULET_SURFACE_LIGHT_SHADOWS,
+  none = CUMULET_SURFACE_LIGHT_NONE
+};
+enum class Aov {
+  beauty = CUMULET_AOV_BEAUTY,
+  volume = CUMULET_AOV_VOLUME,
+  transmittance = CUMULET_AOV_TRANSMITTANCE,
+  surface_depth = CUMULET_AOV_SURFACE_DEPTH,
+  volume_depth = CUMULET_AOV_VOLUME_DEPTH,
+  normal = CUMULET_AOV_NORMAL,
+  albedo = CUMULET_AOV_ALBEDO
+};
 enum class Preview { automatic = CUMULET_PREVIEW_AUTO, off = CUMULET_PREVIEW_OFF };
 enum class ToneMap {
   neutral = CUMULET_TONE_MAP_NEUTRAL,
@@ -499,13 +512,15 @@ struct SamplingDesc {
   std::uint32_t seed = 0;
   View view{};
   Preview preview{};
+  bool volume_alone = false;
 
   operator cumulet_sampling_desc() const noexcept {
     return {.struct_size = sizeof(cumulet_sampling_desc),
             .samples = samples,
             .seed = seed,
             .view = static_cast<cumulet_view>(view),
-            .preview = static_cast<cumulet_preview>(preview)};
+            .preview = static_cast<cumulet_preview>(preview),
+            .volume_alone = volume_alone ? 1 : 0};
   }
 };
 
@@ -950,6 +965,9 @@ class Viewer {
   }
   [[nodiscard]] Result<> read_display(std::span<std::uint8_t> rgba) noexcept {
     return result(cumulet_read_display(handle(), rgba.data(), rgba.size()));
+  }
+  [[nodiscard]] Result<> read_aov(Aov aov, std::span<float> values) noexcept {
+    return result(cumulet_read_aov(handle(), static_cast<cumulet_aov>(aov), values.data(), values.size()));
   }
   [[nodiscard]] Result<double> measure_noise() noexcept {
     double noise = 0.0;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "render/surface_data.hpp"
+#include "support/meshes.hpp"
 
 namespace cumulet::test {
 
@@ -58,6 +59,25 @@ class StillScene : public surface::Scene {
         for (const std::uint32_t k : {at, at + row, at + row + 1, at, at + row + 1, at + 1}) indices.push_back(k);
       }
     }
+    end_draw();
+  }
+  /// Any triangles; a vertex's normal is the mean of its triangles', by area.
+  void add_mesh(const Mesh& mesh, std::uint32_t material) {
+    const auto first = static_cast<std::uint32_t>(attributes.size());
+    std::vector<glm::vec3> normals(mesh.vertices.size(), glm::vec3(0.0F));
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const glm::vec3 a = mesh.corner(i / 3, 0);
+      const glm::vec3 n = glm::cross(mesh.corner(i / 3, 1) - a, mesh.corner(i / 3, 2) - a);
+      for (std::size_t j = 0; j < 3; ++j) normals[mesh.indices[i + j]] += n;
+    }
+    for (std::size_t i = 0; i < normals.size(); ++i) {
+      const float length = glm::length(normals[i]);
+      const glm::vec3 n = length > 0.0F ? normals[i] / length : glm::vec3(0.0F, 1.0F, 0.0F);
+      attributes.push_back({});
+      rest.vertices.push_back({mesh.vertices[i].position, n, glm::vec4(0.0F)});
+    }
+    begin_draw(material);
+    for (const std::uint32_t i : mesh.indices) indices.push_back(first + i);
     end_draw();
   }
 

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cumulet::image {
+
+/// What a layer of an OpenEXR file is called. A channel's full name is "NAME.LETTER", or the letter alone in the layer
+/// without a name, which is the picture proper. Letters, for Blender 3 skips channels of longer names.
+struct LayerName {
+  std::string_view name;
+  std::string_view channels;  // one letter each
+};
+
+/// The layers of a rendered picture, in one place; docs/aovs.md says what they hold and why they are called so.
+namespace layers {
+inline constexpr LayerName beauty{"", "RGBA"};
+inline constexpr LayerName volume{"volume", "RGBA"};
+inline constexpr LayerName transmittance{"transmittance", "Y"};
+inline constexpr LayerName depth{"depth", "Z"};
+inline constexpr LayerName volume_depth{"volume_depth", "Z"};
+inline constexpr LayerName normal{"normal", "XYZ"};
+inline constexpr LayerName albedo{"albedo", "RGB"};
+}  // namespace layers
+
+/// In a depth layer: nothing there. Blender's own; finite, so that filters of a compositor make no NaN of it.
+inline constexpr float no_depth = 1e10f;
+
+/// A layer to write: width x height pixels of all its channels in turn, first pixel top left.
+struct Layer {
+  LayerName name;
+  std::span<const float> values;
+};
+
+/// OpenEXR, one part, scanlines, ZIP, 32-bit float channels with the layers' values untouched; Rec. 709 primaries.
+/// Replaces the file and throws as write_exr(path, image) does; std::logic_error for values that do not match the size
+/// and for two channels of one name.
+void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers);
+
+/// A layer read back.
+struct Pixels {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<float> values;  // as in Layer
+};
+
+/// Throws std::runtime_error, one line with the path and the cause; a channel that the file lacks is one.
+[[nodiscard]] Pixels read_exr(const std::string& path, const LayerName& layer);
+
+}  // namespace cumulet::image

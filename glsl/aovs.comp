@@ -1,0 +1,101 @@
+#version 450
+// What is known of a pixel without light, as AOVs: no noise but that of BLEND surfaces' chance, and anti-aliased by a
+// fixed set of rays.
+//   normal        mean shading normal of the nearest surface (world space, towards the eye), 0 where there is none
+//   albedo        mean base colour of the nearest surface, likewise; both as if there were no volume
+//   transmittance of the volume up to the nearest surface, ours or the host's, or beyond the volume; mean
+//   surface z     view depth of that surface at the pixel's centre, infinity where there is none
+//   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
+// variant: CM_MARCH=0 CM_LINEAR=0 CM_PAGES=1
+// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8 CM_SURFACES=1
+// variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1
+// variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1 CM_SURFACES=1
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#include "shared.glsl"
+#include "parameters.glsl"
+#include "cell.glsl"
+#include "random.glsl"
+#include "phase.glsl"
+#include "buffers.glsl"
+#if CM_MARCH == 0
+#include "march_tet.glsl"
+#else
+#include "march_voxel.glsl"
+#endif
+#if CM_SURFACES
+#include "bsdf.glsl"
+#include "surface.glsl"
+#endif
+#include "path.glsl"
+
+layout(rgba32f, binding = 0) uniform writeonly image2D cm_normal;     // and transmittance
+layout(rgba32ui, binding = 1) uniform writeonly uimage2D cm_albedo;   // and surface z: floats
+layout(r32f, binding = 2) uniform writeonly image2D cm_volume_z;
+
+#define CM_RAYS 16
+#define CM_INFINITE uintBitsToFloat(0x7f800000u)
+
+void main() {
+  uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, cm.order.z);
+  if (pixel.x >= cm.tile.z || pixel.y >= cm.order.w) return;
+  vec4 normal = vec4(0.0);
+  vec3 albedo = vec3(0.0);
+  float surface_z = CM_INFINITE;
+  float volume_z = CM_INFINITE;
+  for (int i = 0; i < CM_RAYS; ++i) {
+    // Roberts's two-dimensional sequence; the first ray is the centre's.
+    vec2 within = fract(0.5 + float(i) * vec2(0.7548776662, 0.5698402910));
+    vec3 o;
+    vec3 w;
+    float t_per_z = cm_camera_ray(pixel, within, o, w);
+    vec3 d = cm_to_cube(w);
+    float surface_t = t_per_z * cm_surface_z(pixel, within, uint(i));
+#if CM_SURFACES
+    CmHit hit;
+    cm_hit_seed = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, uint(i), cm.image.z)).x;
+    cm_hit_camera = true;
+    if (cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, hit)) {
+      surface_t = hit.t;
+      CmSurfacePoint point = cm_surface_point(hit.triangle, hit.barycentrics, w);
+      normal.xyz += point.material.normal;
+      albedo += point.material.base_color;
+    }
+#endif
+    if (i == 0 && surface_t < 1e37) surface_z = surface_t / t_per_z;
+    vec2 range = cm_box_range(o, d);
+    range.y = min(range.y, surface_t);
+    float used = 0.0;
+    if (range.x < range.y) {
+      float t = range.x;
+      uvec3 cell = cm_march_enter(clamp(o + t * d, cm.box_min.xyz, cm.box_max.xyz));
+      vec3 inv_d = 1.0 / d;
+      // Beyond e^-40 nothing is left to know.
+      for (int j = 0; j < 100000 && cell.x != CM_NONE && t < range.y && used < 40.0; ++j) {
+        float t_1, r_0, r_1;
+        uvec3 next;
+        cm_march_step(cell, o, d, inv_d, t, t_1, r_0, r_1, next);
+        float e_0 = cm.medium.x * r_0;
+        float e_1 = cm.medium.x * r_1;
+        float span = t_1 - t;
+        float part = min(1.0, (range.y - t) / max(span, 1e-30));
+        float depth = (e_0 + 0.5 * (e_1 - e_0) * part) * part * span;
+        if (i == 0 && volume_z == CM_INFINITE && used + depth >= 0.69314718) {
+          // As cm_march inverts it.
+          float left = 0.69314718 - used;
+          float root = sqrt(max(0.0, e_0 * e_0 + 2.0 * (e_1 - e_0) / span * left));
+          volume_z = (t + min(span, 2.0 * left / (e_0 + root))) / t_per_z;
+        }
+        used += depth;
+        t = t_1;
+        cell = next;
+      }
+    }
+    normal.w += exp(-used);
+  }
+  normal /= float(CM_RAYS);
+  albedo /= float(CM_RAYS);
+  imageStore(cm_normal, ivec2(pixel), normal);
+  imageStore(cm_albedo, ivec2(pixel), uvec4(floatBitsToUint(albedo), floatBitsToUint(surface_z)));
+  imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z));
+}

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "statistics.hpp"
+#include "support/meshes.hpp"
+
+namespace cumulet::bench {
+
+/// Something of ours and of Embree's, measured in turn. Without Embree: ours alone.
+struct Duel {
+  Spread ours;
+  std::optional<Spread> theirs;
+  std::optional<Spread> ratio;  ///< ours over theirs, repeat by repeat
+};
+
+/// Seconds for each of `amount`, or, of a rate, `amount` a second.
+Duel duel(int repeats, double amount, bool rate, const std::function<void()>& ours,
+          const std::function<void()>& theirs);
+
+/// A mesh that trees are measured over.
+struct TreeMesh {
+  std::string name;
+  test::Mesh mesh;
+  [[nodiscard]] double millions() const { return static_cast<double>(mesh.indices.size()) / 3e6; }
+};
+
+/// A terrain, a sphere and a soup of about so many triangles each.
+std::vector<TreeMesh> tree_meshes(std::size_t triangles);
+
+/// The triangle tree (src/surface/bvh.hpp), seconds a million triangles.
+struct TreeTimes {
+  std::string name;
+  double millions = 0.0;
+  Duel build;
+  Duel refit;
+};
+TreeTimes time_tree(const TreeMesh& mesh, int repeats);
+
+}  // namespace cumulet::bench
