@@ -102,7 +102,7 @@ void write_exr(const std::string& path, std::uint32_t width, std::uint32_t heigh
     for (std::size_t c = 0; c < channels; ++c) {
       const std::string name = full_name(layer.name, c);
       if (header.channels().findChannel(name) != nullptr)
-        throw std::logic_error(path + ": two channels are called " + name);
+        throw std::logic_error(std::string(path).append(": two channels are called ").append(name));
       header.channels().insert(name, Imf::Channel(Imf::FLOAT));
       frame.insert(name, Imf::Slice(Imf::FLOAT, base + sizeof(float) * c, stride, stride * width));
     }

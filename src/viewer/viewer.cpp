@@ -852,7 +852,8 @@ Stats Viewer::stats() {
         gl_->texture_format == GL_RGBA32F ? 16 : (gl_->texture_format == GL_RGBA16F ? 8 : 4);
     const glm::u64vec2 depth_size = gl_->host_depth.size();
     s.gl_bytes = s.cell_bytes + gl_->progressive.bytes() + target_pixels * (colour_bytes + (gl_->depth ? 4 : 0)) +
-                 depth_size.x * depth_size.y * gl_->host_depth.layers() * 4;
+                 depth_size.x * depth_size.y * gl_->host_depth.layers() * 4 + gl_->empty.bytes() +
+                 (gl_->surfaces ? gl_->surfaces->bytes() : 0) + (gl_->raster ? gl_->raster->bytes() : 0);
     s.strings = gl_->strings;
     s.trace_seconds = gl_->progressive.trace_seconds();
     const render::Picture* picture = gl_->progressive.newest();

@@ -37,8 +37,6 @@ void run(const bench::Options& options) {
   headless::Context context = headless::Context::create(options.backend);
   const bench::Machine machine = machine_of(context);
   bench::progress(machine.gl_renderer);
-  bench::progress("triangle trees");
-  const std::vector<bench::TreeTimes> trees = bench::measure_trees(options);
   std::vector<bench::AssetResult> results;
   std::vector<std::string> skipped;
   for (const bench::Input& input : options.inputs) {
@@ -49,9 +47,10 @@ void run(const bench::Options& options) {
     }
     bench::progress(input.name);
     results.push_back(bench::measure(context, bench::load_asset(input), options));
-    bench::write_report(machine, options, results, trees, skipped);  // what is done is not lost
+    bench::write_report(machine, options, results, {}, skipped);  // what is done is not lost
   }
-  bench::write_report(machine, options, results, trees, skipped);
+  bench::progress("triangle trees");
+  bench::write_report(machine, options, results, bench::measure_trees(options), skipped);
   bench::progress("written: " + (options.out / "report.md").string());
 }
 
