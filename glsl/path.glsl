@@ -257,8 +257,9 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
 }
 
 // What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
-// met: a flight ends on a triangle, whatever event says.
-CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) sum) {
+// on_surface, a constant where it is called: the path is on a triangle, or has just met one (met: a flight ends there,
+// whatever event says).
+CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, CM_INOUT(vec4) sum) {
   float q = cm.medium.z;
   bool flight = p.mode == CM_MODE_FLIGHT;
   bool finished = false;
@@ -279,9 +280,8 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
   }
   bool collided = flight && event == CM_EVENT_COLLISION && !met;
 #if CM_SURFACES
-  bool on_surface = met || (!flight && p.home.x == CM_NONE);
   CmSurfacePoint surface;
-  if (on_surface && event != CM_EVENT_NONE) {
+  if (on_surface) {
     surface = cm_surface_point(p.triangle, p.weights, p.w);
 #if CM_SURFACES > 1
     // The flight that met it, and the next-event estimate before: the balance heuristic, whatever the medium between.
@@ -412,16 +412,29 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool met, CM_INOUT(vec4) su
 CM_FN void cm_run(CM_INOUT(CmPath) p, uvec2 pixel, uint iterations, CM_INOUT(vec4) sum) {
   for (uint i = 0u; i < iterations && p.mode != CM_MODE_DONE; ++i) {
     if (p.mode == CM_MODE_START) cm_start(p, pixel, sum);
+#if CM_SURFACES
+    // Surfaces are shaded once a round: all lanes pay for what one needs, on software drivers always.
+    uint event = CM_EVENT_NONE;
+    bool met = false;
+    bool waits = false;
+    for (int j = 0; j < CM_EVENTS && p.mode != CM_MODE_START && p.mode != CM_MODE_DONE && !waits; ++j) {
+#else
     for (int j = 0; j < CM_EVENTS && p.mode != CM_MODE_START && p.mode != CM_MODE_DONE; ++j) {
+#endif
 #if CM_SURFACES
       if (p.t_end < 0.0f) cm_begin_ray(p);
-      uint event = cm_march(p);
-      cm_handle(p, event, cm_meet(p, event), sum);
+      event = cm_march(p);
+      met = cm_meet(p, event);
+      waits = event != CM_EVENT_NONE && (met || (p.mode != CM_MODE_FLIGHT && p.home.x == CM_NONE));
+      if (!waits) cm_handle(p, event, false, false, sum);
 #else
       uint event = cm_march(p);
-      cm_handle(p, event, false, sum);
+      cm_handle(p, event, false, false, sum);
 #endif
     }
+#if CM_SURFACES
+    if (waits) cm_handle(p, event, true, met, sum);
+#endif
   }
 }
 

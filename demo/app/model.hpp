@@ -91,7 +91,8 @@ struct Status {
   cumulet_progress work{};
   cumulet_stats stats{};
   cumulet_surfaces_info surfaces{};
-  bool busy = false;  // a file is read or a grid is built
+  cumulet_animation_info animation{};  // that is set, of those
+  bool busy = false;                   // a file is read or a grid is built
   bool has_volume = false;
   double noise = 0.0;  // relative standard error, 0: not known
   Series frame_ms;

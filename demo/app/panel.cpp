@@ -230,7 +230,7 @@ void Panel::light(Model& model) {
 }
 
 void Panel::surfaces(Model& model) {
-  cumulet_surfaces_desc& surface = model.scene.surface;
+  cumulet_surface_settings_desc& surface = model.scene.surface;
   const cumulet_surfaces_info& info = model.status.surfaces;
   const bool any = !model.scene.surfaces.empty();
   ui_.fact("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb here");
@@ -242,7 +242,8 @@ void Panel::surfaces(Model& model) {
           {"None", CUMULET_SURFACE_LIGHT_NONE, "Rasterised, without shadows: the fastest."}},
          surface.light);
   ImGui::BeginDisabled(info.animations == 0);
-  ui_.slider("Time", "Seconds into the model's animation.", surface.time, 0.0, std::max(info.duration, 1e-3), "%.2f s");
+  ui_.slider("Time", "Seconds into the model's animation.", surface.time, 0.0,
+             std::max(model.status.animation.duration, 1e-3), "%.2f s");
   ImGui::EndDisabled();
   if (any) ui_.fact("Triangles", short_count(double(info.triangles)));
   if (ui_.button("Remove surfaces", "Shows the volume alone.")) model.scene.surfaces.clear();

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <program.hpp>
 #include <span>
 #include <stdexcept>
 #include <tuple>
@@ -49,7 +50,7 @@ bool same(const cumulet_display_desc& a, const cumulet_display_desc& b) {
   return std::tie(a.exposure_stops, a.tone_map, a.background) == std::tie(b.exposure_stops, b.tone_map, b.background);
 }
 
-bool same(const cumulet_surfaces_desc& a, const cumulet_surfaces_desc& b) {
+bool same(const cumulet_surface_settings_desc& a, const cumulet_surface_settings_desc& b) {
   return std::tie(a.time, a.animation, a.light) == std::tie(b.time, b.animation, b.light);
 }
 
@@ -62,12 +63,6 @@ bool same(const cumulet_camera_desc& a, const cumulet_camera_desc& b) {
 bool same(const cumulet_navigation_desc& a, const cumulet_navigation_desc& b) {
   return std::tie(a.style, a.fly, a.speed, a.turntable_degrees_per_second) ==
          std::tie(b.style, b.fly, b.speed, b.turntable_degrees_per_second);
-}
-
-std::string one_line(std::string text) {
-  for (char& c : text)
-    if (c == '\n' || c == '\r') c = ' ';
-  return text;
 }
 
 }  // namespace
@@ -150,14 +145,15 @@ void Session::follow(Model& model, bool held) {
 
 void Session::follow_surfaces(Model& model) {
   SceneOptions& scene = model.scene;
-  if (!same(known_->surface, scene.surface)) check(model, cumulet_set_surfaces(viewer_.get(), &scene.surface));
+  if (!same(known_->surface, scene.surface)) check(model, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
   known_->surface = scene.surface;
   if (known_->surfaces == scene.surfaces) return;
   known_->surfaces = scene.surfaces;
   if (scene.surfaces.empty()) {
-    check(model, cumulet_load_surfaces(viewer_.get(), nullptr));
+    check(model, cumulet_set_surfaces(viewer_.get(), nullptr));
     shown_surfaces_.clear();
     model.status.surfaces = {};
+    model.status.animation = {};
     return;
   }
   waiting_for_surfaces_ = check(model, cumulet_load_surfaces(viewer_.get(), scene.surfaces.c_str()));
@@ -177,10 +173,18 @@ void Session::finish_surfaces(Model& model) {
   }
   shown_surfaces_ = scene.surfaces;
   model.preferences.remember(shown_surfaces_);
+  cumulet_surfaces* shown = nullptr;
+  check(model, cumulet_get_surfaces(viewer_.get(), &shown));
   cumulet_surfaces_info& info = model.status.surfaces;
   info = {};
   info.struct_size = sizeof info;
-  check(model, cumulet_get_surfaces_info(viewer_.get(), &info));
+  check(model, cumulet_surfaces_get_info(shown, &info));
+  cumulet_animation_info& animation = model.status.animation;
+  animation = {};
+  animation.struct_size = sizeof animation;
+  if (scene.surface.animation < info.animations)
+    check(model, cumulet_surfaces_get_animation(shown, scene.surface.animation, &animation));
+  cumulet_surfaces_release(shown);
   if (scene.surface_camera >= 0)
     check(model, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
 }

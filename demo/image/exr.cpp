@@ -6,7 +6,6 @@
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 #include <utility>
@@ -15,6 +14,7 @@
 #include "file.hpp"
 #include "image.hpp"
 #include "layers.hpp"
+#include "program.hpp"
 
 namespace cumulet::image {
 namespace {
@@ -38,11 +38,6 @@ class MemoryOutput final : public Imf::OStream {
   std::string bytes_;
   std::uint64_t position_ = 0;
 };
-
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
 
 std::string full_name(const LayerName& layer, std::size_t channel) {
   std::string name(layer.name);
@@ -79,7 +74,7 @@ Pixels read_layer(const std::string& path, const LayerName& layer, std::span<con
     file.readPixels(window.min.y, window.max.y);
     return pixels;
   } catch (const std::exception& error) {
-    fail(path, "not a readable OpenEXR file: " + one_line(error.what()));
+    fail(path, "not a readable OpenEXR file: " + demo::one_line(error.what()));
   }
 }
 
@@ -113,7 +108,7 @@ void write_exr(const std::string& path, std::uint32_t width, std::uint32_t heigh
     file.setFrameBuffer(frame);
     file.writePixels(static_cast<int>(height));
   } catch (const std::exception& error) {
-    fail(path, one_line(error.what()));
+    fail(path, demo::one_line(error.what()));
   }
   replace_file(path, output.bytes());
 }

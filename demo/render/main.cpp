@@ -7,14 +7,13 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
-#include <exception>
 #include <file.hpp>
 #include <headless.hpp>
 #include <image.hpp>
 #include <iostream>
 #include <memory>
-#include <new>
 #include <nlohmann/json.hpp>
+#include <program.hpp>
 #include <stdexcept>
 #include <string>
 
@@ -24,6 +23,7 @@
 
 namespace {
 
+using cumulet::demo::one_line;
 using cumulet::demo::OutputFormat;
 using cumulet::demo::Progress;
 using cumulet::demo::RenderOptions;
@@ -49,12 +49,6 @@ void catch_signals() {
   }
   // A file that outgrows its limit is a failed write with a cause, not the end of the process.
   std::signal(SIGXFSZ, SIG_IGN);
-}
-
-std::string one_line(std::string text) {
-  for (char& c : text)
-    if (c == '\n' || c == '\r') c = ' ';
-  return text;
 }
 
 void print_log(void* user, cumulet_log_level level, const char* message) {
@@ -235,7 +229,7 @@ void render(const RenderOptions& options) {
   check(viewer, cumulet_set_display(viewer.get(), &scene.display));
   set_camera(viewer, scene.camera);
   if (!scene.surfaces.empty()) {
-    check(viewer, cumulet_set_surfaces(viewer.get(), &scene.surface));
+    check(viewer, cumulet_set_surface_settings(viewer.get(), &scene.surface));
     check(viewer, cumulet_load_surfaces(viewer.get(), scene.surfaces.c_str()));
   }
   const char* grid_name = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();
@@ -272,22 +266,11 @@ void render(const RenderOptions& options) {
   }
 }
 
-int fail(const std::string& message, int status) {
-  std::fprintf(stderr, "cumulet-render: %s\n", one_line(message).c_str());
-  return status;
-}
-
 }  // namespace
 
-int main(int argc, char** argv) try {
-  const auto options = cumulet::demo::parse_render_options({argv + std::min(argc, 1), argv + argc}, std::cout);
-  if (options) render(*options);
-  std::cout.flush();
-  return std::cout.good() ? 0 : fail("standard output: cannot be written", 1);
-} catch (const cumulet::demo::UsageError& error) {
-  return fail(std::string(error.what()) + " (see --help)", 2);
-} catch (const std::bad_alloc&) {
-  return fail("out of memory", 1);
-} catch (const std::exception& error) {
-  return fail(error.what(), 1);
+int main(int argc, char** argv) {
+  return cumulet::demo::run_program("cumulet-render", [&] {
+    const auto options = cumulet::demo::parse_render_options({argv + std::min(argc, 1), argv + argc}, std::cout);
+    if (options) render(*options);
+  });
 }

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <iosfwd>
 #include <optional>
+#include <program.hpp>
 #include <scene_file.hpp>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,12 +14,6 @@ class App;
 }
 
 namespace cumulet::demo {
-
-/// The command line is wrong; what() is one line. Programs print it and exit 2.
-class UsageError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// Adds the flags that fill the scene, --scene among them: the values of that file are what the other flags override.
 /// Light stays dark if none is given: see finish_scene_options. The scene must outlive the app's parse, which throws

@@ -20,7 +20,7 @@ struct SceneOptions {
   cumulet_medium_desc medium{};
   cumulet_light_desc light{};
   cumulet_camera_desc camera{};
-  cumulet_surfaces_desc surface{};
+  cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
   cumulet_display_desc display{};
 

@@ -135,8 +135,8 @@ GLuint Tracer::program(const MarchData& data, const char* name, std::span<const 
 
 GLuint Tracer::trace_program(const Picture& picture, const MarchData& data) {
   std::vector<std::string> more;
-  if (picture.traced_) more.emplace_back(picture.emitters_ ? "CM_SURFACES 2" : "CM_SURFACES 1");
-  if (!picture.traced_ && picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
+  if (picture.traced_ > 0) more.emplace_back(picture.traced_ > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1");
+  if (picture.traced_ == 0 && picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
   return program(data, "trace.comp", more);
 }
@@ -201,8 +201,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   if (!picture.sum_ || size != picture.size_) allocate(picture, size);
   picture.complete_ = false;
   picture.facts_.reset();
-  picture.traced_ = shaded && surfaces.scene != nullptr && surfaces.traced;
-  picture.emitters_ = picture.traced_ && surfaces.scene->emitters();
+  const bool traced = shaded && surfaces.scene != nullptr && surfaces.traced;
+  picture.traced_ = traced ? (surfaces.scene->emitters() ? 2 : 1) : 0;
   picture.layered_ = Layered::no;
   if (shaded && settings.layered != Layered::no && surfaces.raster != nullptr) {
     lay_beneath(picture, surfaces, settings.layer_size, settings.layers);

@@ -108,8 +108,7 @@ class Picture {
   bool volume_alone_ = false;
   SurfaceLayers layers_;
   Layered layered_ = Layered::no;
-  bool traced_ = false;    // paths meet triangles
-  bool emitters_ = false;  // and look for emissive ones
+  unsigned traced_ = 0;  // 1: paths meet triangles; 2: and look for those that emit
   // Per-pixel facts of what is seen (aovs.comp), once made.
   struct Facts {
     gl::Object normal;  // and transmittance

@@ -342,23 +342,6 @@ class Loader {
 
 void malformed(const std::string& cause) { throw Error(ErrorCode::file, cause); }
 
-std::string one_line(std::string_view text) {
-  constexpr std::size_t longest = 200;
-  std::string line;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool blank = byte <= 0x20 || byte == 0x7F;
-    if (blank && (line.empty() || line.back() == ' ')) continue;
-    line += blank ? ' ' : c;
-    if (line.size() >= longest) {
-      line += "...";
-      break;
-    }
-  }
-  while (!line.empty() && line.back() == ' ') line.pop_back();
-  return line;
-}
-
 void Budget::take(std::uint64_t count, std::uint64_t size, std::string_view what) {
   if (size != 0 && count > left_ / size) {
     malformed(std::string(what) + " would need more than the " + std::to_string(limits_.memory >> 20U) +
@@ -384,7 +367,8 @@ std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& b
   return bytes;
 }
 
-std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::filesystem::path& folder, Budget& budget) {
+std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optional<std::filesystem::path>& folder,
+                                      Budget& budget) {
   if (uri.starts_with("data:")) {
     const std::size_t comma = uri.find(',');
     if (comma == std::string::npos) malformed("a data URI has no data");
@@ -402,8 +386,9 @@ std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::filesys
   if (text.front() == '/' || text.front() == '\\' || text.find('\0') != std::string::npos) {
     malformed("\"" + one_line(uri) + "\" is not a relative path");
   }
+  if (!folder) malformed("\"" + one_line(uri) + "\" is a file of its own, and there is no folder to look in");
   try {
-    return read_file(folder / text, budget);
+    return read_file(*folder / text, budget);
   } catch (const Error& error) {
     throw Error(error.code(), one_line(uri) + ": " + error.what());
   }
@@ -456,7 +441,7 @@ std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::
   return bytes;
 }
 
-GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::filesystem::path& folder, const Log& log,
+GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::filesystem::path>& folder, const Log& log,
                     const std::string& name, Budget& budget, Progress* progress) {
   GltfFile file;
   file.folder = folder;

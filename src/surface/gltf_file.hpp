@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +15,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "base/one_line.hpp"
 #include "base/progress.hpp"
 #include "surface/gltf_import.hpp"
 
@@ -21,8 +23,8 @@ namespace cumulet::surface::detail {
 
 /// Ends an import; import_gltf() puts the file's name in front. One line.
 [[noreturn]] void malformed(const std::string& cause);
-/// A text of the file's or a library's as a part of one line: no control characters, not too long.
-std::string one_line(std::string_view text);
+/// A text of the file's or a library's as a part of one line, not too long.
+inline std::string one_line(std::string_view text) { return cumulet::one_line(text, 200); }
 /// "node 3" and the like.
 inline std::string numbered(std::string_view what, std::size_t number) {
   return std::string(what) + " " + std::to_string(number);
@@ -55,20 +57,21 @@ struct GltfFile {
   tinygltf::Model model;
   std::vector<std::span<const std::uint8_t>> views;  ///< a buffer view each, decompressed
   std::vector<ImageSource> images;
-  std::filesystem::path folder;
+  std::optional<std::filesystem::path> folder;  ///< where files that it refers to are; none: nowhere
 
   std::deque<std::vector<std::uint8_t>> storage;  ///< what views point into
 };
 
 /// Bytes of a data URI, or of a file named by a URI relative to `folder`. Throws Error(file).
-std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::filesystem::path& folder, Budget& budget);
+std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optional<std::filesystem::path>& folder,
+                                      Budget& budget);
 
 /// Reads a whole regular file. Throws Error(file) that names the cause only.
 std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& budget);
 
 /// Parses a .gltf or .glb, told apart by content, checks types of all JSON members that are read, loads buffers and
 /// checks views.
-GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::filesystem::path& folder, const Log& log,
+GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::filesystem::path>& folder, const Log& log,
                     const std::string& name, Budget& budget, Progress* progress);
 
 /// EXT_meshopt_compression, of one buffer view: its bytes in `from`. Throws Error(file).

@@ -1,9 +1,10 @@
 #pragma once
 
-// import_gltf() for bytes in memory, as tests and fuzzers want it.
+// import_gltf() for bytes in memory.
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,8 +20,9 @@ struct GltfLimits {
 };
 
 /// As import_gltf(path), of the bytes of a .gltf or .glb. `name` stands for the path in errors and log lines; files
-/// that it refers to are looked for relative to `folder`.
-ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& name, const std::filesystem::path& folder,
-                     const Log& log, Progress* progress = nullptr, const GltfLimits& limits = {});
+/// that it refers to are looked for relative to `folder`; without one they are refused.
+ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& name,
+                     const std::optional<std::filesystem::path>& folder, const Log& log, Progress* progress = nullptr,
+                     const GltfLimits& limits = {});
 
 }  // namespace cumulet::surface

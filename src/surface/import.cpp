@@ -30,7 +30,7 @@ class Assembler {
     place();
     lights_and_cameras();
     remark();
-    check_rest();
+    scene_->finish();
     return scene_;
   }
 
@@ -68,36 +68,22 @@ class Assembler {
       vertices += part.positions.size();
       indices += part.indices.size();
     });
-    constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
-    if (vertices > most || indices > most) malformed("has more than 2^32 vertices or indices");
     budget_.take(vertices, sizeof(VertexAttributes) + sizeof(PosedVertex), "all vertices");
     budget_.take(indices, sizeof(std::uint32_t), "all indices");
     scene_->attributes.reserve(vertices);
     scene_->indices.reserve(indices);
     for_each_instance([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
       check(progress_);
-      const auto first_vertex = static_cast<std::uint32_t>(scene_->attributes.size());
-      Instance instance;
-      instance.part = place;
-      instance.node = node;
-      instance.first_vertex = first_vertex;
-      const int skin = file_.model.nodes[node].skin;
-      if (skin >= 0 && part.influences > 0) {
-        instance.skin = skin;
+      const int skin = part.influences > 0 ? file_.model.nodes[node].skin : -1;
+      if (skin >= 0) {
         const std::size_t joints = scene_->rig.skins[static_cast<std::size_t>(skin)].joints.size();
         if (part.joint_count > joints) {
           malformed(numbered("node", node) + ": a vertex is bound to joint " + std::to_string(part.joint_count - 1) +
                     " of " + std::to_string(joints) + " in " + numbered("skin", static_cast<std::size_t>(skin)));
         }
       }
-      scene_->instances.push_back(instance);
-      scene_->draws.push_back({static_cast<std::uint32_t>(scene_->indices.size()),
-                               static_cast<std::uint32_t>(part.indices.size()), part.material, node});
-      scene_->attributes.insert(scene_->attributes.end(), part.attributes.begin(), part.attributes.end());
-      for (const std::uint32_t index : part.indices) scene_->indices.push_back(first_vertex + index);
+      scene_->add_instance(place, node, skin);
     });
-    // What the vertices hold now is the scene's; the parts keep what moves.
-    for (MeshPart& part : scene_->parts) part.attributes = {};
   }
 
   template <class Visit>
@@ -149,25 +135,6 @@ class Assembler {
     if (scene_->indices.empty()) log_.warning(name_ + ": has no triangles");
   }
 
-  /// Transforms may be of any size, each of them, and too large together.
-  void check_rest() const {
-    const Stance rest = stance(scene_->rig, nullptr, 0.0);
-    for (std::size_t i = 0; i < rest.to_world.size(); ++i) {
-      for (int n = 0; n < 16; ++n) {
-        if (!(std::abs(rest.to_world[i][n / 4][n % 4]) < 1e18)) {
-          malformed(numbered("node", i) + ": its transform is too large");
-        }
-      }
-    }
-    for (const MeshPart& part : scene_->parts) {
-      for (const glm::vec3& p : part.positions) {
-        if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1e18F)) {
-          malformed("a position is too large");
-        }
-      }
-    }
-  }
-
   const GltfFile& file_;
   const Log& log_;
   const std::string& name_;
@@ -183,8 +150,9 @@ class Assembler {
 
 }  // namespace detail
 
-ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& name, const std::filesystem::path& folder,
-                     const Log& log, Progress* progress, const GltfLimits& limits) {
+ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& name,
+                     const std::optional<std::filesystem::path>& folder, const Log& log, Progress* progress,
+                     const GltfLimits& limits) {
   try {
     detail::Budget budget(limits);
     const detail::GltfFile file = detail::parse_gltf(std::move(bytes), folder, log, name, budget, progress);

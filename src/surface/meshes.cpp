@@ -36,29 +36,6 @@ bool replace_not_finite(std::vector<V>& values) {
   return any;
 }
 
-/// Triangles of a triangle list, strip or fan (glTF 2.0, 3.7.2.1), without those that name a vertex twice.
-std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& indices, int mode) {
-  std::vector<std::uint32_t> result;
-  const auto add = [&result](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    if (a != b && b != c && c != a) result.insert(result.end(), {a, b, c});
-  };
-  const std::size_t n = indices.size();
-  if (mode == TINYGLTF_MODE_TRIANGLES) {
-    result.reserve(n);
-    for (std::size_t i = 0; i + 3 <= n; i += 3) add(indices[i], indices[i + 1], indices[i + 2]);
-  } else {
-    if (n > 2) result.reserve((n - 2) * 3);
-    for (std::size_t i = 0; i + 3 <= n; ++i) {
-      if (mode == TINYGLTF_MODE_TRIANGLE_FAN) {
-        add(indices[i + 1], indices[i + 2], indices[0]);
-      } else {
-        add(indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]);
-      }
-    }
-  }
-  return result;
-}
-
 /// Renumbers indices to the vertices that they name; returns those.
 std::vector<std::uint32_t> compact(std::vector<std::uint32_t>& indices, std::size_t count) {
   std::vector<std::uint32_t> used;
@@ -186,12 +163,7 @@ class Primitive {
     part_.indices = triangles(indices, mode);
     part_.flat = !has("NORMAL");
     budget_.take(count_, sizeof(std::uint32_t), what_);
-    if (part_.flat) {
-      which_ = part_.indices;
-      for (std::uint32_t i = 0; i < part_.indices.size(); ++i) part_.indices[i] = i;
-    } else {
-      which_ = compact(part_.indices, count_);
-    }
+    which_ = own_vertices(part_, count_);
   }
 
   template <int N>
@@ -256,27 +228,7 @@ class Primitive {
   void read_normals() {
     part_.normals = vectors<3>("NORMAL");
     not_finite_ |= replace_not_finite(part_.normals);
-    bool some_missing = false;
-    for (glm::vec3& normal : part_.normals) {
-      const float length = glm::length(normal);
-      const bool good = length > 0.0F && std::isfinite(length);
-      normal = good ? normal / length : glm::vec3(0.0F);
-      some_missing |= !good;
-    }
-    if (!some_missing) return;
-    // Those of no length: the average of the triangles around.
-    std::vector<glm::vec3> sums(part_.normals.size(), glm::vec3(0.0F));
-    for (std::size_t i = 0; i < part_.indices.size(); i += 3) {
-      const std::uint32_t* v = &part_.indices[i];
-      const glm::vec3 area =
-          glm::cross(part_.positions[v[1]] - part_.positions[v[0]], part_.positions[v[2]] - part_.positions[v[0]]);
-      for (int k = 0; k < 3; ++k) sums[v[k]] += area;
-    }
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-      if (part_.normals[i] != glm::vec3(0.0F)) continue;
-      const float length = glm::length(sums[i]);
-      part_.normals[i] = length > 0.0F && std::isfinite(length) ? sums[i] / length : glm::vec3(0.0F, 1.0F, 0.0F);
-    }
+    make_unit(part_);
   }
 
   [[nodiscard]] std::vector<glm::vec3> flat_normals() const {
@@ -403,6 +355,59 @@ class Primitive {
 };
 
 }  // namespace
+
+std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& indices, int mode) {
+  std::vector<std::uint32_t> result;
+  const auto add = [&result](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    if (a != b && b != c && c != a) result.insert(result.end(), {a, b, c});
+  };
+  const std::size_t n = indices.size();
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    result.reserve(n);
+    for (std::size_t i = 0; i + 3 <= n; i += 3) add(indices[i], indices[i + 1], indices[i + 2]);
+  } else {
+    if (n > 2) result.reserve((n - 2) * 3);
+    for (std::size_t i = 0; i + 3 <= n; ++i) {
+      if (mode == TINYGLTF_MODE_TRIANGLE_FAN) {
+        add(indices[i + 1], indices[i + 2], indices[0]);
+      } else {
+        add(indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]);
+      }
+    }
+  }
+  return result;
+}
+
+std::vector<std::uint32_t> own_vertices(MeshPart& part, std::size_t count) {
+  if (!part.flat) return compact(part.indices, count);
+  std::vector<std::uint32_t> which = part.indices;
+  for (std::uint32_t i = 0; i < part.indices.size(); ++i) part.indices[i] = i;
+  return which;
+}
+
+void make_unit(MeshPart& part) {
+  bool some_missing = false;
+  for (glm::vec3& normal : part.normals) {
+    const float length = glm::length(normal);
+    const bool good = length > 0.0F && std::isfinite(length);
+    normal = good ? normal / length : glm::vec3(0.0F);
+    some_missing |= !good;
+  }
+  if (!some_missing) return;
+  // Those of no length: the average of the triangles around.
+  std::vector<glm::vec3> sums(part.normals.size(), glm::vec3(0.0F));
+  for (std::size_t i = 0; i < part.indices.size(); i += 3) {
+    const std::uint32_t* v = &part.indices[i];
+    const glm::vec3 area =
+        glm::cross(part.positions[v[1]] - part.positions[v[0]], part.positions[v[2]] - part.positions[v[0]]);
+    for (int k = 0; k < 3; ++k) sums[v[k]] += area;
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (part.normals[i] != glm::vec3(0.0F)) continue;
+    const float length = glm::length(sums[i]);
+    part.normals[i] = length > 0.0F && std::isfinite(length) ? sums[i] / length : glm::vec3(0.0F, 1.0F, 0.0F);
+  }
+}
 
 std::vector<MeshPart> import_mesh(const GltfFile& file, std::size_t mesh, const std::vector<Material>& materials,
                                   Budget& budget, MeshRemarks& remarks) {

@@ -43,6 +43,16 @@ struct MeshRemarks {
 std::vector<MeshPart> import_mesh(const GltfFile& file, std::size_t mesh, const std::vector<Material>& materials,
                                   Budget& budget, MeshRemarks& remarks);
 
+/// Triangles of a triangle list, strip or fan (glTF 2.0, 3.7.2.1), without those that name a vertex twice.
+std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& indices, int mode);
+
+/// Renumbers a part's indices, of `count` vertices, to vertices of its own: those that they name or, if it is flat,
+/// three a triangle. Returns which each of them was.
+std::vector<std::uint32_t> own_vertices(MeshPart& part, std::size_t count);
+
+/// Gives normals unit length; those of none become the average of the triangles around.
+void make_unit(MeshPart& part);
+
 /// Tangents where a normal map has none: per triangle the direction in which u grows, perpendicular to the vertex
 /// normal, averaged over the triangles around a vertex by their angle there; w such that the bitangent points against
 /// growing v, up in the image (glTF 2.0, 3.9.3). Vertices that agree in position, normal and coordinates count as one.

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to surface/: what import_gltf() makes.
+// Private to surface/: what imports make.
 
 #include <utility>
 
@@ -25,6 +25,12 @@ class PosableScene final : public Scene {
   std::vector<Instance> instances;
   std::vector<std::pair<std::uint32_t, PunctualLight>> lights;  ///< with their nodes
   std::vector<std::pair<std::uint32_t, SceneCamera>> cameras;
+
+  /// A draw of a part under a node, moved by a skin if that is not below 0. Throws Error(file) for too many vertices.
+  void add_instance(std::size_t part, std::uint32_t node, std::int32_t skin);
+  /// After the last instance: drops what only they needed. Throws Error(file) where transforms or positions are too
+  /// large to be multiplied.
+  void finish();
 
   [[nodiscard]] Pose pose(double time, std::size_t animation) const override;
 

@@ -55,6 +55,39 @@ Shape morph(const MeshPart& part, const std::vector<float>& weights, std::size_t
 
 }  // namespace
 
+void PosableScene::add_instance(std::size_t part, std::uint32_t node, std::int32_t skin) {
+  const MeshPart& from = parts[part];
+  constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+  if (attributes.size() + from.positions.size() > most || indices.size() + from.indices.size() > most) {
+    malformed("has more than 2^32 vertices or indices");
+  }
+  const auto first_vertex = static_cast<std::uint32_t>(attributes.size());
+  instances.push_back({part, node, first_vertex, skin});
+  draws.push_back({static_cast<std::uint32_t>(indices.size()), static_cast<std::uint32_t>(from.indices.size()),
+                   from.material, node});
+  attributes.insert(attributes.end(), from.attributes.begin(), from.attributes.end());
+  for (const std::uint32_t index : from.indices) indices.push_back(first_vertex + index);
+}
+
+void PosableScene::finish() {
+  // What the vertices hold now is the scene's; the parts keep what moves.
+  for (MeshPart& part : parts) part.attributes = {};
+  // Transforms may be of any size, each of them, and too large together.
+  const Stance rest = stance(rig, nullptr, 0.0);
+  for (std::size_t i = 0; i < rest.to_world.size(); ++i) {
+    for (int n = 0; n < 16; ++n) {
+      if (!(std::abs(rest.to_world[i][n / 4][n % 4]) < 1e18)) {
+        malformed(numbered("node", i) + ": its transform is too large");
+      }
+    }
+  }
+  for (const MeshPart& part : parts) {
+    for (const glm::vec3& p : part.positions) {
+      if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1e18F)) malformed("a position is too large");
+    }
+  }
+}
+
 bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose) const {
   const MeshPart& part = parts[instance.part];
   const std::vector<float>& weights = now.weights[instance.node];

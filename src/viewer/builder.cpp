@@ -1,6 +1,5 @@
 #include "viewer/builder.hpp"
 
-#include <new>
 #include <utility>
 
 #include "grid/tet_grid.hpp"
@@ -8,65 +7,47 @@
 
 namespace cumulet::viewer {
 
-Builder::Builder(Log log, std::function<void()> notify) : log_(log), notify_(std::move(notify)) {}
-
-Builder::~Builder() {
-  {
-    const std::scoped_lock lock(mutex_);
-    stopping_ = true;
-    next_.reset();
-    if (current_) current_->cancel();
-  }
-  changed_.notify_all();
-  if (thread_.joinable()) thread_.join();
+void Builder::replace(Worker::Job job, std::weak_ptr<Load> load) {
+  const std::scoped_lock lock(mutex_);
+  load_ = std::move(load);
+  // A result that nobody took is of an older wish.
+  built_.reset();
+  worker_.replace(std::move(job));
 }
 
-void Builder::post(Job job) {
-  {
-    const std::scoped_lock lock(mutex_);
-    if (current_) current_->cancel();
-    loading_ = false;
-    next_ = std::move(job);
-    error_.reset();
-    message_.clear();
-    // A result that nobody took is of an older wish.
-    built_.reset();
-    if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
-  }
-  changed_.notify_all();
+void Builder::load(const std::string& path, std::string grid_name, std::optional<BuildSettings> settings) {
+  const auto load = std::make_shared<Load>(Load{settings});
+  replace({path, Progress::Stage::loading,
+           [this, path, grid_name = std::move(grid_name), load](Progress& progress) {
+             Stopwatch watch;
+             const auto volume =
+                 std::make_shared<const VolumeAsset>(volume::import_volume(path, grid_name, log_, &progress));
+             const double seconds = watch.lap();
+             {
+               const std::scoped_lock lock(mutex_);
+               progress.check();
+               loaded_ = volume;
+               load->open = false;
+             }
+             // Closed: nobody else changes it now.
+             if (load->settings) build_of(volume, *load->settings, seconds, progress);
+           }},
+          load);
 }
 
-void Builder::load(std::string path, std::string grid_name, std::optional<BuildSettings> settings) {
-  post({std::move(path), std::move(grid_name), nullptr, settings});
+void Builder::build(VolumePtr volume, const BuildSettings& settings) {
+  replace(
+      {"building the grid", Progress::Stage::refining,
+       [this, volume = std::move(volume), settings](Progress& progress) { build_of(volume, settings, 0.0, progress); }},
+      {});
 }
-
-void Builder::build(VolumePtr volume, const BuildSettings& settings) { post({{}, {}, std::move(volume), settings}); }
 
 bool Builder::configure_load(const std::optional<BuildSettings>& settings) {
   const std::scoped_lock lock(mutex_);
-  if (next_ && !next_->path.empty()) {
-    next_->settings = settings;
-    return true;
-  }
-  if (!next_ && loading_) {
-    load_settings_ = settings;
-    return true;
-  }
-  return false;
-}
-
-void Builder::cancel() {
-  {
-    const std::scoped_lock lock(mutex_);
-    if (!next_ && !current_) return;
-    if (next_) {
-      next_.reset();
-      error_ = ErrorCode::cancelled;
-      message_ = "cancelled";
-    }
-    if (current_) current_->cancel();
-  }
-  changed_.notify_all();
+  const auto load = load_.lock();
+  if (!load || !load->open) return false;
+  load->settings = settings;
+  return true;
 }
 
 std::optional<VolumePtr> Builder::take_loaded() {
@@ -80,89 +61,15 @@ std::optional<Built> Builder::take_built() {
 }
 
 bool Builder::busy() const {
+  // In this order: what a job leaves is there before it ends.
+  if (worker_.busy()) return true;
   const std::scoped_lock lock(mutex_);
-  return next_ || current_ || loaded_ || built_;
+  return loaded_ || built_;
 }
 
-Builder::Status Builder::status() const {
-  const std::scoped_lock lock(mutex_);
-  Status status;
-  status.error = error_;
-  status.message = message_;
-  if (next_) {
-    status.stage = next_->path.empty() ? Progress::Stage::refining : Progress::Stage::loading;
-  } else if (current_) {
-    status.stage = current_->stage();
-    status.fraction = current_->fraction();
-  }
-  return status;
-}
-
-bool Builder::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
-  std::unique_lock lock(mutex_);
-  const auto idle = [this] { return !next_ && !current_; };
-  if (until) return changed_.wait_until(lock, *until, idle);
-  changed_.wait(lock, idle);
-  return true;
-}
-
-void Builder::run() {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    changed_.wait(lock, [this] { return stopping_ || next_; });
-    if (stopping_) return;
-    const Job job = *std::exchange(next_, std::nullopt);
-    const auto progress = std::make_shared<Progress>();
-    progress->begin(job.path.empty() ? Progress::Stage::refining : Progress::Stage::loading);
-    current_ = progress;
-    loading_ = !job.path.empty();
-    load_settings_ = job.settings;
-    lock.unlock();
-    std::optional<ErrorCode> error;
-    std::string message;
-    try {
-      work(job, *progress);
-    } catch (const Error& e) {
-      error = e.code();
-      message = e.what();
-    } catch (const std::bad_alloc&) {
-      error = ErrorCode::out_of_memory;
-      message = (job.path.empty() ? std::string("building the grid") : job.path) + ": out of memory";
-    } catch (const std::exception& e) {
-      error = ErrorCode::internal;
-      message = std::string("internal error: ") + e.what();
-    }
-    lock.lock();
-    current_.reset();
-    loading_ = false;
-    // A newer wish makes how this one ended old news.
-    if (!next_) {
-      error_ = error;
-      message_ = message;
-    }
-    lock.unlock();
-    changed_.notify_all();
-    notify_();
-    lock.lock();
-  }
-}
-
-void Builder::work(const Job& job, Progress& progress) {
-  VolumePtr volume = job.volume;
-  std::optional<BuildSettings> settings = job.settings;
-  Stopwatch watch;
-  double load_seconds = 0.0;
-  if (!job.path.empty()) {
-    volume = std::make_shared<const VolumeAsset>(volume::import_volume(job.path, job.grid_name, log_, &progress));
-    load_seconds = watch.lap();
-    const std::scoped_lock lock(mutex_);
-    progress.check();
-    loaded_ = volume;
-    loading_ = false;
-    settings = load_settings_;
-  }
-  if (!settings) return;
-  Built built = make(volume, *settings, progress);
+void Builder::build_of(const VolumePtr& volume, const BuildSettings& settings, double load_seconds,
+                       Progress& progress) {
+  Built built = make(volume, settings, progress);
   built.seconds.load = load_seconds;
   const std::scoped_lock lock(mutex_);
   progress.check();

@@ -1,20 +1,20 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
+#include <utility>
 
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "grid/refine.hpp"
 #include "render/march_data.hpp"
 #include "viewer/volume_asset.hpp"
+#include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
 
@@ -46,27 +46,16 @@ struct Built {
 /// calls are safe from any thread.
 class Builder {
  public:
-  struct Status {
-    Progress::Stage stage = Progress::Stage::idle;
-    double fraction = 0.0;
-    std::optional<ErrorCode> error;  // how the last job ended
-    std::string message;
-  };
-
   /// notify: called on the worker after a job ended.
-  Builder(Log log, std::function<void()> notify);
-  /// Cancels and waits.
-  ~Builder();
-  Builder(const Builder&) = delete;
-  Builder& operator=(const Builder&) = delete;
+  Builder(Log log, std::function<void()> notify) : log_(log), worker_(std::move(notify)) {}
 
   /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way.
-  void load(std::string path, std::string grid_name, std::optional<BuildSettings> settings);
+  void load(const std::string& path, std::string grid_name, std::optional<BuildSettings> settings);
   /// Builds of this volume. Replaces what is under way.
   void build(VolumePtr volume, const BuildSettings& settings);
-  /// Other settings for a load under way. Returns false if there is none: then call build.
+  /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
-  void cancel();
+  void cancel() { worker_.cancel(); }
 
   /// The newest volume that was read, once.
   std::optional<VolumePtr> take_loaded();
@@ -75,36 +64,26 @@ class Builder {
 
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
-  [[nodiscard]] Status status() const;
+  [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Until idle, at most until then. Returns whether it is.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
-  struct Job {
-    std::string path;  // empty: build only
-    std::string grid_name;
-    VolumePtr volume;
+  // What a load will build: open until the file is read.
+  struct Load {
     std::optional<BuildSettings> settings;
+    bool open = true;
   };
-  void post(Job job);
-  void run();
-  void work(const Job& job, Progress& progress);
+  void replace(Worker::Job job, std::weak_ptr<Load> load);
+  void build_of(const VolumePtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress);
   Built make(const VolumePtr& volume, const BuildSettings& settings, Progress& progress) const;
 
   Log log_;
-  std::function<void()> notify_;
   mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
-  std::optional<Job> next_;
-  std::shared_ptr<Progress> current_;  // of the job under way
-  bool loading_ = false;               // its settings are still open: load_settings_
-  std::optional<BuildSettings> load_settings_;
-  bool stopping_ = false;
+  std::weak_ptr<Load> load_;  // held by its job
   std::optional<VolumePtr> loaded_;
   std::optional<Built> built_;
-  std::optional<ErrorCode> error_;
-  std::string message_;
-  std::thread thread_;  // last: it uses all of the above
+  Worker worker_;  // last: its thread uses all of the above
 };
 
 }  // namespace cumulet::viewer

@@ -7,8 +7,8 @@
 struct cumulet_viewer {
   std::unique_ptr<cumulet::viewer::Viewer> viewer;
   std::string last_error;
-  // The handle of the viewer's volume, once a host has had it: asked again, it is the same.
-  std::unique_ptr<cumulet_volume, void (*)(cumulet_volume*)> volume{nullptr, cumulet_volume_release};
+  cumulet::c_abi::KeptHandle<cumulet_volume> volume;
+  cumulet::c_abi::KeptHandle<cumulet_surfaces> surfaces;
 };
 
 namespace {
@@ -164,7 +164,7 @@ cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, con
 cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume) {
   return guarded(viewer, [&](core::Viewer& v) {
     v.set_volume(volume == nullptr ? nullptr : volume->asset);
-    viewer->volume.reset(cumulet_volume_retain(volume));
+    viewer->volume.keep(volume);
   });
 }
 
@@ -172,13 +172,7 @@ cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) 
   return guarded(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
-    auto asset = v.volume();
-    if (!asset) return;
-    if (!viewer->volume || viewer->volume->asset != asset) {
-      viewer->volume.reset(new cumulet_volume);
-      viewer->volume->asset = std::move(asset);
-    }
-    *out = cumulet_volume_retain(viewer->volume.get());
+    *out = viewer->volume.of(v.volume());
   });
 }
 
@@ -194,8 +188,8 @@ cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* pr
     cumulet_progress p{};
     p.stage = static_cast<cumulet_stage>(status.stage);
     p.fraction = status.fraction;
-    p.status = status.error ? status_of(*status.error) : CUMULET_OK;
-    copy_text(status.message, p.message, sizeof p.message);
+    p.status = status.failure ? status_of(status.failure->code()) : CUMULET_OK;
+    copy_text(status.failure ? status.failure->what() : "", p.message, sizeof p.message);
     write_desc(progress, p, "cumulet_progress");
   });
 }
@@ -266,39 +260,32 @@ cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_des
 
 cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path) {
   return guarded(viewer, [&](core::Viewer& v) {
-    if (path == nullptr) return v.show_surfaces(nullptr);
-    require(path[0] != '\0', "path is \"\"");
+    require(path != nullptr && *path != '\0', "path is NULL or empty");
     v.load_surfaces(path);
   });
 }
 
-cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, const cumulet_surfaces_desc* desc) {
+cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, cumulet_surfaces* surfaces) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_surfaces_desc d = read_desc(desc, "cumulet_surfaces_desc");
-    require(std::isfinite(d.time), "cumulet_surfaces_desc.time is not finite");
-    require(number(d.light) <= CUMULET_SURFACE_LIGHT_NONE, "cumulet_surfaces_desc.light is unknown");
-    v.set_surfaces({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light)});
+    v.set_surfaces(surfaces == nullptr ? nullptr : surfaces->asset);
+    viewer->surfaces.keep(surfaces);
   });
 }
 
-cumulet_status cumulet_get_surfaces_info(cumulet_viewer* viewer, cumulet_surfaces_info* info) {
+cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** out) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const auto source = v.surface_source();
-    require(source != nullptr, "the viewer has no surfaces");
-    const auto& scene = *source->scene;
-    cumulet_surfaces_info i{};
-    i.triangles = scene.triangle_count();
-    i.materials = static_cast<uint32_t>(scene.materials.size());
-    i.lights = static_cast<uint32_t>(source->pose.lights.size());
-    i.cameras = static_cast<uint32_t>(source->pose.cameras.size());
-    i.animations = static_cast<uint32_t>(scene.animations.size());
-    const std::size_t animation = v.surface_settings().moment.animation;
-    if (animation < scene.animations.size()) i.duration = scene.animations[animation].duration;
-    for (int axis = 0; axis < 3; ++axis) {
-      i.bounds_min[axis] = source->pose.low[axis];
-      i.bounds_max[axis] = source->pose.high[axis];
-    }
-    write_desc(info, i, "cumulet_surfaces_info");
+    require(out != nullptr, "out is NULL");
+    *out = nullptr;
+    *out = viewer->surfaces.of(v.surfaces_asset());
+  });
+}
+
+cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer, const cumulet_surface_settings_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_surface_settings_desc d = read_desc(desc, "cumulet_surface_settings_desc");
+    require(std::isfinite(d.time), "cumulet_surface_settings_desc.time is not finite");
+    require(number(d.light) <= CUMULET_SURFACE_LIGHT_NONE, "cumulet_surface_settings_desc.light is unknown");
+    v.set_surface_settings({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light)});
   });
 }
 

@@ -5,10 +5,17 @@
 #include <atomic>
 #include <memory>
 
+#include "viewer/c_support.hpp"
+#include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
 
 struct cumulet_volume {
   cumulet::viewer::VolumePtr asset;
+  std::atomic<int> references = 1;
+};
+
+struct cumulet_surfaces {
+  cumulet::viewer::SurfaceAssetPtr asset;
   std::atomic<int> references = 1;
 };
 
@@ -19,3 +26,55 @@ class Camera;
 struct cumulet_camera {
   std::shared_ptr<cumulet::viewer::Camera> camera;
 };
+
+namespace cumulet::c_abi {
+
+// Counted handles, of an asset each.
+
+template <class Handle>
+Handle* retain(Handle* handle) {
+  if (handle != nullptr) handle->references.fetch_add(1, std::memory_order_relaxed);
+  return handle;
+}
+
+template <class Handle>
+void release(Handle* handle) {
+  if (handle != nullptr && handle->references.fetch_sub(1, std::memory_order_acq_rel) == 1) delete handle;
+}
+
+/// Hands the caller what make gives, or null and why not.
+template <class Handle, class Make>
+cumulet_status make_handle(Handle** out, char* error, size_t error_size, Make&& make) noexcept {
+  return guarded(error, error_size, [&] {
+    require(out != nullptr, "out is NULL");
+    *out = nullptr;
+    auto handle = std::make_unique<Handle>();
+    handle->asset = make();
+    *out = handle.release();
+  });
+}
+
+/// The handle of what a viewer shows, once a host has had it: asked again, it is the same.
+template <class Handle>
+class KeptHandle {
+ public:
+  void keep(Handle* handle) { handle_.reset(retain(handle)); }
+  /// Retained for the caller; null for no asset.
+  template <class Asset>
+  Handle* of(Asset asset) {
+    if (!asset) return nullptr;
+    if (!handle_ || handle_->asset != asset) {
+      handle_.reset(new Handle);
+      handle_->asset = std::move(asset);
+    }
+    return retain(handle_.get());
+  }
+
+ private:
+  struct End {
+    void operator()(Handle* handle) const { release(handle); }
+  };
+  std::unique_ptr<Handle, End> handle_;
+};
+
+}  // namespace cumulet::c_abi

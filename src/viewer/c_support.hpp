@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <glm/glm.hpp>
+#include <limits>
 #include <new>
 #include <span>
 #include <string>
@@ -130,5 +131,24 @@ bool all_finite(const Values& values) {
 
 inline glm::vec3 to_vec3(std::span<const float, 3> v) { return {v[0], v[1], v[2]}; }
 inline glm::dvec3 to_dvec3(std::span<const double, 3> v) { return {v[0], v[1], v[2]}; }
+
+inline std::string name_or(const char* name, const char* otherwise) {
+  return name == nullptr || *name == '\0' ? otherwise : name;
+}
+
+inline glm::dmat4 matrix_or_identity(const double (&m)[16]) {
+  if (std::ranges::all_of(m, [](double value) { return value == 0.0; })) return glm::dmat4(1.0);
+  glm::dmat4 matrix;
+  for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[i];
+  return matrix;
+}
+
+/// A host's array of count x each values.
+template <class T>
+std::span<const T> array_of(const T* values, uint64_t count, uint64_t each, const std::string& what) {
+  if (count > std::numeric_limits<size_t>::max() / sizeof(T) / each) refuse(what + " are more than memory holds");
+  if (values == nullptr && count != 0) refuse(what + " are NULL");
+  return {values, static_cast<size_t>(count * each)};
+}
 
 }  // namespace cumulet::c_abi

@@ -1,7 +1,5 @@
 // Volumes of the C ABI.
 
-#include <limits>
-
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
 #include "volume/memory.hpp"
@@ -11,18 +9,6 @@ using namespace cumulet::c_abi;
 
 namespace {
 
-/// Hands the caller a volume, or null and why not. make: gives a ScalarVolume; what() begins every message.
-template <class Make>
-cumulet_status make_volume(cumulet_volume** out, char* error, size_t error_size, Make&& make) noexcept {
-  return guarded(error, error_size, [&] {
-    require(out != nullptr, "out is NULL");
-    *out = nullptr;
-    auto handle = std::make_unique<cumulet_volume>();
-    handle->asset = make();
-    *out = handle.release();
-  });
-}
-
 viewer::VolumePtr asset_of(const std::string& name, volume::ScalarVolume volume) {
   try {
     return std::make_shared<const viewer::VolumeAsset>(std::move(volume));
@@ -31,30 +17,11 @@ viewer::VolumePtr asset_of(const std::string& name, volume::ScalarVolume volume)
   }
 }
 
-std::string name_or(const char* name, const char* otherwise) {
-  return name == nullptr || *name == '\0' ? otherwise : name;
-}
-
-glm::dmat4 matrix_or_identity(const double (&m)[16]) {
-  if (std::ranges::all_of(m, [](double value) { return value == 0.0; })) return glm::dmat4(1.0);
-  glm::dmat4 matrix;
-  for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[i];
-  return matrix;
-}
-
-/// A host's array of count x each values.
-template <class T>
-std::span<const T> array_of(const T* values, uint64_t count, uint64_t each, const std::string& what) {
-  if (count > std::numeric_limits<size_t>::max() / sizeof(T) / each) refuse(what + " are more than memory holds");
-  if (values == nullptr && count != 0) refuse(what + " are NULL");
-  return {values, static_cast<size_t>(count * each)};
-}
-
 }  // namespace
 
 cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out, char* error,
                                    size_t error_size) {
-  return make_volume(out, error, error_size, [&] {
+  return make_handle(out, error, error_size, [&] {
     require(path != nullptr, "path is NULL");
     return asset_of(path, volume::import_volume(path, grid_name == nullptr ? "" : grid_name, {}));
   });
@@ -62,7 +29,7 @@ cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumu
 
 cumulet_status cumulet_volume_from_dense(const cumulet_dense_desc* desc, cumulet_volume** out, char* error,
                                          size_t error_size) {
-  return make_volume(out, error, error_size, [&] {
+  return make_handle(out, error, error_size, [&] {
     const cumulet_dense_desc d = read_desc(desc, "cumulet_dense_desc");
     const std::string name = name_or(d.name, "dense");
     const volume::DenseVoxels voxels{.values = array_of(d.values, d.value_count, 1, name + ": values"),
@@ -74,7 +41,7 @@ cumulet_status cumulet_volume_from_dense(const cumulet_dense_desc* desc, cumulet
 
 cumulet_status cumulet_volume_from_sparse(const cumulet_sparse_desc* desc, cumulet_volume** out, char* error,
                                           size_t error_size) {
-  return make_volume(out, error, error_size, [&] {
+  return make_handle(out, error, error_size, [&] {
     const cumulet_sparse_desc d = read_desc(desc, "cumulet_sparse_desc");
     const std::string name = name_or(d.name, "sparse");
     volume::SparseVoxels voxels{
@@ -96,14 +63,9 @@ cumulet_status cumulet_volume_from_sparse(const cumulet_sparse_desc* desc, cumul
   });
 }
 
-cumulet_volume* cumulet_volume_retain(cumulet_volume* volume) {
-  if (volume != nullptr) volume->references.fetch_add(1, std::memory_order_relaxed);
-  return volume;
-}
+cumulet_volume* cumulet_volume_retain(cumulet_volume* volume) { return retain(volume); }
 
-void cumulet_volume_release(cumulet_volume* volume) {
-  if (volume != nullptr && volume->references.fetch_sub(1, std::memory_order_acq_rel) == 1) delete volume;
-}
+void cumulet_volume_release(cumulet_volume* volume) { release(volume); }
 
 cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_volume_info* info) {
   return guarded(nullptr, 0, [&] {

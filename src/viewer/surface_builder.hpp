@@ -1,73 +1,60 @@
 #pragma once
 
-#include <condition_variable>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
+#include <utility>
 
 #include "base/log.hpp"
 #include "base/progress.hpp"
-#include "render/surface_data.hpp"
+#include "viewer/surface_asset.hpp"
+#include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
 
-using SurfacePtr = std::shared_ptr<const render::SurfaceSource>;
-
-/// Which moment of which animation.
-struct SurfaceMoment {
-  double time = 0.0;  // seconds
-  std::uint32_t animation = 0;
-  bool operator==(const SurfaceMoment&) const = default;
+/// A scene, and what is shown of it.
+struct PosedSurfaces {
+  SurfaceAssetPtr asset;
+  SurfacePtr source;
 };
 
 /// Reads glTF scenes and poses them on a thread of its own; the newest wish wins. All calls are safe from any thread.
 class SurfaceBuilder {
  public:
   /// notify: called on the worker after a job ended.
-  SurfaceBuilder(Log log, std::function<void()> notify) : log_(log), notify_(std::move(notify)) {}
-  /// Cancels and waits.
-  ~SurfaceBuilder();
-  SurfaceBuilder(const SurfaceBuilder&) = delete;
-  SurfaceBuilder& operator=(const SurfaceBuilder&) = delete;
+  SurfaceBuilder(Log log, std::function<void()> notify) : log_(log), worker_(std::move(notify)) {}
 
   /// Reads a file, then poses it. Replaces what is under way.
-  void load(std::string path, SurfaceMoment moment);
-  /// Poses what was made last anew; a load under way takes the moment over.
-  void pose(SurfacePtr last, SurfaceMoment moment);
-  void cancel();
+  void load(const std::string& path, SurfaceMoment moment);
+  /// Another moment for a load under way. Returns false if there is none: then take what it made, and call pose.
+  bool configure_load(SurfaceMoment moment);
+  /// Poses a scene, after the pose under way: a moment that takes long is shown before the next.
+  void pose(SurfaceAssetPtr asset, SurfaceMoment moment);
+  void cancel() { worker_.cancel(); }
   /// The newest result, once.
-  std::optional<SurfacePtr> take();
+  std::optional<PosedSurfaces> take();
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
-  [[nodiscard]] bool working() const;
-  /// How the last job ended, if it failed.
-  [[nodiscard]] std::optional<Error> failure() const;
+  [[nodiscard]] Worker::Status status() const { return worker_.status(); }
   /// Until idle, at most until then. Returns whether it is.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const { return worker_.wait(until); }
 
  private:
-  struct Job {
-    std::string path;  // empty: pose only
-    SurfacePtr last;
+  // What a load will be posed at: open until it is.
+  struct Load {
     SurfaceMoment moment;
+    bool open = true;
   };
-  void post(Job job);
-  void run();
+  void read(const std::string& path, Load& load, Progress& progress);
 
   Log log_;
-  std::function<void()> notify_;
   mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
-  std::optional<Job> next_;
-  std::optional<Job> under_way_;
-  std::shared_ptr<Progress> current_;
-  bool stopping_ = false;
-  std::optional<SurfacePtr> result_;
-  std::optional<Error> failure_;
-  std::thread thread_;  // last: it uses all of the above
+  std::weak_ptr<Load> load_;  // held by its job
+  std::optional<PosedSurfaces> result_;
+  Worker worker_;  // last: its thread uses all of the above
 };
 
 }  // namespace cumulet::viewer

@@ -172,7 +172,10 @@ void Viewer::sync() {
     }
     built_ = std::move(*built);
   }
-  if (auto surfaces = surface_builder_.take()) surface_source_ = std::move(*surfaces);
+  if (auto surfaces = surface_builder_.take()) {
+    surface_asset_ = std::move(surfaces->asset);
+    surface_source_ = std::move(surfaces->source);
+  }
 }
 
 std::optional<BuildSettings> Viewer::build_settings() const {
@@ -187,6 +190,7 @@ std::optional<BuildSettings> Viewer::build_settings() const {
 void Viewer::request_build() {
   const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
   if (builder_.configure_load(settings)) return;
+  sync();
   built_view_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
 }
@@ -216,7 +220,6 @@ VolumePtr Viewer::volume() {
 }
 
 void Viewer::rebuild() {
-  sync();
   request_build();
   touch();
 }
@@ -235,20 +238,35 @@ void Viewer::load_surfaces(const std::string& path) {
 void Viewer::show_surfaces(SurfacePtr surfaces) {
   surface_builder_.cancel();
   sync();
+  surface_asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
   surface_source_ = std::move(surfaces);
   touch();
 }
 
-void Viewer::set_surfaces(const SurfaceSettings& settings) {
+void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
+  surface_builder_.cancel();
   sync();
-  if (settings.moment != surface_settings_.moment) surface_builder_.pose(surface_source_, settings.moment);
-  surface_settings_ = settings;
+  surface_asset_ = std::move(surfaces);
+  if (surface_asset_) {
+    surface_builder_.pose(surface_asset_, surface_settings_.moment);
+  } else {
+    surface_source_ = nullptr;
+  }
   touch();
 }
 
-SurfacePtr Viewer::surface_source() {
+SurfaceAssetPtr Viewer::surfaces_asset() {
   sync();
-  return surface_source_;
+  return surface_asset_;
+}
+
+void Viewer::set_surface_settings(const SurfaceSettings& settings) {
+  if (settings.moment != surface_settings_.moment && !surface_builder_.configure_load(settings.moment)) {
+    sync();
+    if (surface_asset_) surface_builder_.pose(surface_asset_, settings.moment);
+  }
+  surface_settings_ = settings;
+  touch();
 }
 
 void Viewer::use_surface_camera(std::size_t index) {
@@ -280,19 +298,19 @@ void Viewer::wait(double timeout_ms) {
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   if (!builder_.wait(until) || !surface_builder_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
   sync();
-  if (const auto failure = surface_builder_.failure()) throw Error(*failure);
-  const Builder::Status status = builder_.status();
-  if (status.error) throw Error(*status.error, status.message);
+  if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
+  if (const auto failure = builder_.status().failure) throw Error(*failure);
 }
 
-Builder::Status Viewer::status() const {
-  Builder::Status status = builder_.status();
+Worker::Status Viewer::status() const {
+  Worker::Status status = builder_.status();
   const double upload = upload_progress_.load(std::memory_order_relaxed);
-  if (const auto failure = surface_builder_.failure(); failure && !status.error) {
-    status.error = failure->code();
-    status.message = failure->what();
+  const Worker::Status surfaces = surface_builder_.status();
+  if (!status.failure) status.failure = surfaces.failure;
+  if (status.stage == Progress::Stage::idle) {
+    status.stage = surfaces.stage;
+    status.fraction = surfaces.fraction;
   }
-  if (status.stage == Progress::Stage::idle && surface_builder_.working()) status.stage = Progress::Stage::loading;
   if (status.stage == Progress::Stage::idle && upload < 1.0) {
     status.stage = Progress::Stage::uploading;
     status.fraction = upload;
@@ -303,7 +321,6 @@ Builder::Status Viewer::status() const {
 // ---- settings ----
 
 void Viewer::set_grid(const GridSettings& settings) {
-  sync();
   grid_ = settings;
   request_build();
   touch();
@@ -421,11 +438,11 @@ core::CmParameters Viewer::parameters() const {
   p.albedo = glm::vec4(medium_.albedo, 1.0F);
   // Half of the sky's share of the light: its escaping paths sample it as well.
   const auto sun_power = static_cast<float>(luminance(light_.sun_irradiance));
-  const render::SurfaceData* surfaces = surface_settings_.light != SurfaceLight::none ? gl_->surfaces.get() : nullptr;
-  const double to_emitters = surfaces != nullptr ? surfaces->emitter_share(sun_power) : 0.0;
+  const double to_emitters = gl_->surfaces ? gl_->surfaces->emitter_share(sun_power) : 0.0;
   p.sun_irradiance = glm::vec4(light_.sun_irradiance, static_cast<float>(to_emitters));
   const auto sky_power = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(light_.sky_radiance));
-  const bool local = surfaces != nullptr && (surfaces->lamps() || surfaces->emitters());
+  const bool local = gl_->surfaces && surface_settings_.light != SurfaceLight::none &&
+                     (gl_->surfaces->lamps() || gl_->surfaces->emitters());
   const float to_sky = local && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
                        : sun_power > 0.0F           ? 0.5F * sky_power / (sky_power + sun_power)
                                                     : (sky_power > 0.0F ? 1.0F : 0.0F);
@@ -445,8 +462,10 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   const auto box = this->box();
   navigation_.advance(std::min(since, 0.25), *camera_, box);
 
+  // Where nothing is left to see, the last picture goes as well.
+  if (!box) built_ = {};
   // Surfaces alone are surfaces in an empty volume.
-  if (!volume_ && surface_source_ && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
+  if (!volume_ && box && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   last_view_ = view_;
@@ -696,11 +715,11 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt([&] { prepare(frame, deadline); });
     if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
     attempt([&] { draw(frame, result); });
-    const Builder::Status status = builder_.status();
     result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
-    const auto surface_failure = surface_builder_.failure();
-    result.failed = (status.error && *status.error != ErrorCode::cancelled) ||
-                    (surface_failure && surface_failure->code() != ErrorCode::cancelled);
+    const auto failed = [](const Worker::Status& status) {
+      return status.failure && status.failure->code() != ErrorCode::cancelled;
+    };
+    result.failed = failed(builder_.status()) || failed(surface_builder_.status());
     result.converged = !result.loading && g.data && view_ && g.progressive.converged();
     const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
     result.more =

@@ -158,15 +158,16 @@ class Viewer {
   /// Throws how the last job ended, or Error(timeout).
   void wait(double timeout_ms);
   /// As Builder's, and uploading.
-  [[nodiscard]] Builder::Status status() const;
+  [[nodiscard]] Worker::Status status() const;
 
   void load_surfaces(const std::string& path);
-  /// Shows these at once, null: none. Cancels a load under way.
+  /// Shows these at once. Cancels a load under way.
   void show_surfaces(SurfacePtr surfaces);
-  void set_surfaces(const SurfaceSettings& settings);
-  [[nodiscard]] const SurfaceSettings& surface_settings() const { return surface_settings_; }
+  /// Poses these, then shows them; null: none, at once. Cancels a load under way.
+  void set_surfaces(SurfaceAssetPtr surfaces);
   /// The newest; null if there are none.
-  SurfacePtr surface_source();
+  SurfaceAssetPtr surfaces_asset();
+  void set_surface_settings(const SurfaceSettings& settings);
   /// Looks through a camera of the newest surfaces. Throws Error(invalid_argument) if there is none such.
   void use_surface_camera(std::size_t index);
 
@@ -269,7 +270,8 @@ class Viewer {
   Medium medium_;
   Light light_;
   SurfaceSettings surface_settings_;
-  SurfacePtr surface_source_;  // newest
+  SurfaceAssetPtr surface_asset_;  // newest
+  SurfacePtr surface_source_;      // newest that is posed
   Sampling sampling_;
   DisplaySettings display_;
   std::shared_ptr<Camera> camera_;

@@ -1,9 +1,9 @@
 #include "viewer/volume_asset.hpp"
 
 #include <chrono>
-#include <thread>
 
 #include "grid/cube.hpp"
+#include "viewer/patient_lock.hpp"
 
 namespace cumulet::viewer {
 
@@ -23,13 +23,7 @@ VolumeAsset::VolumeAsset(volume::ScalarVolume volume) : volume_(std::move(volume
 std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progress, double& seconds) const {
   seconds = 0.0;
   progress.begin(Progress::Stage::statistics);
-  std::unique_lock lock(mutex_, std::try_to_lock);
-  // Somebody else's computation may take seconds: who is cancelled does not wait for it.
-  while (!lock.owns_lock()) {
-    progress.check();
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    (void)lock.try_lock();
-  }
+  const auto lock = patient_lock(mutex_, progress);
   if (!statistics_) {
     const auto start = std::chrono::steady_clock::now();
     statistics_ = std::make_shared<const grid::Statistics>(volume_, grid::fit_cube(volume_), &progress);

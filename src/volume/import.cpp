@@ -28,20 +28,6 @@ std::string detail::scalar_fog_refusal(std::string_view type, std::string_view g
   return "is a " + std::string(grid_class) + ", not a fog volume";
 }
 
-std::string detail::one_line(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    const bool blank = static_cast<unsigned char>(c) <= ' ' || c == '\x7f';
-    if (!blank) {
-      out += c;
-    } else if (!out.empty() && out.back() != ' ') {
-      out += ' ';
-    }
-  }
-  while (!out.empty() && out.back() == ' ') out.pop_back();
-  return out;
-}
-
 std::string detail::to_string(glm::ivec3 v) {
   std::ostringstream out;
   out << '(' << v.x << ", " << v.y << ", " << v.z << ')';

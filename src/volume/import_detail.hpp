@@ -15,6 +15,7 @@
 
 #include "base/error.hpp"
 #include "base/log.hpp"
+#include "base/one_line.hpp"
 #include "base/progress.hpp"
 #include "volume/memory.hpp"
 
@@ -70,8 +71,6 @@ std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file, Progress
 ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_prefix, Progress* progress,
                       double from);
 
-/// What a library or a host says may hold line breaks and terminal controls; our messages are one line.
-std::string one_line(std::string_view text);
 std::string to_string(glm::ivec3 v);
 
 /// An error found by a reader itself; the caller puts the file's name in front.

@@ -64,7 +64,7 @@ void Subject::show(viewer::SurfacePtr surfaces) { still_.viewer().show_surfaces(
 void Subject::light_surfaces(viewer::SurfaceLight light) {
   viewer::SurfaceSettings settings;
   settings.light = light;
-  still_.viewer().set_surfaces(settings);
+  still_.viewer().set_surface_settings(settings);
 }
 
 Run Subject::shaded(std::uint32_t samples, std::uint32_t seed) {

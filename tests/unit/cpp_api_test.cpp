@@ -75,6 +75,7 @@ static_assert(!std::is_copy_constructible_v<Viewer> && std::is_nothrow_move_cons
               std::is_nothrow_move_assignable_v<Viewer>);
 static_assert(!std::is_copy_constructible_v<Camera> && std::is_nothrow_move_constructible_v<Camera>);
 static_assert(std::is_nothrow_copy_constructible_v<Volume> && std::is_nothrow_move_constructible_v<Volume>);
+static_assert(std::is_nothrow_copy_constructible_v<Surfaces> && std::is_nothrow_move_constructible_v<Surfaces>);
 static_assert(!std::is_convertible_v<Viewer, bool> && !std::is_convertible_v<Result<>, bool>);
 
 TEST(CppResult, HoldsAValueOrAnError) {
@@ -573,6 +574,103 @@ TEST_F(CppViewer, LooksThroughACamera) {
   EXPECT_NE(viewer.get_camera()->get()->eye, (Vector{8, 8, 50}));
   viewer.frame_all().value();
   EXPECT_NEAR(viewer.get_camera()->get()->target[0], 8.0, 1e-6);
+}
+
+TEST(CppSurfaces, AreAHostsTriangles) {
+  const std::array<float, 9> positions = {0, 0, 0, 2, 0, 0, 0, 1, 0};
+  const std::array<float, 9> normals = {0, 0, 1, 0, 0, 1, 0, 0, 1};
+  const std::array<float, 12> colors = {1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1};
+  const std::array<std::uint32_t, 6> indices = {0, 1, 2, 2, 1, 0};
+  const MeshDesc desc{.positions = positions,
+                      .normals = normals,
+                      .colors = colors,
+                      .indices = indices,
+                      .to_world = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 5, 1},
+                      .base_color = {0.1F, 0.2F, 0.3F, 0.4F},
+                      .metallic = 0.5F,
+                      .smoothness = 0.6F,
+                      .emission = {7, 8, 9},
+                      .double_sided = true};
+  const cumulet_mesh_desc c = desc;
+  EXPECT_EQ(c.struct_size, sizeof c);
+  EXPECT_EQ(c.positions, positions.data());
+  EXPECT_EQ(c.normals, normals.data());
+  EXPECT_EQ(c.colors, colors.data());
+  EXPECT_EQ(c.vertex_count, 3U);
+  EXPECT_EQ(c.indices, indices.data());
+  EXPECT_EQ(c.index_count, 6U);
+  expect_same(c.to_world, desc.to_world);
+  expect_same(c.base_color, desc.base_color);
+  EXPECT_EQ(c.metallic, 0.5F);
+  EXPECT_EQ(c.smoothness, 0.6F);
+  expect_same(c.emission, desc.emission);
+  EXPECT_EQ(c.double_sided, 1);
+  const cumulet_mesh_desc bare = MeshDesc{.positions = positions};
+  EXPECT_EQ(bare.normals, nullptr);
+  EXPECT_EQ(bare.colors, nullptr);
+
+  const std::array<MeshDesc, 2> meshes = {desc, MeshDesc{.positions = positions}};
+  const Surfaces surfaces = Surfaces::from_triangles({.meshes = meshes, .name = "made"}).value();
+  const SurfacesInfo info = surfaces.info().value();
+  EXPECT_EQ(info.name.view(), "made");
+  EXPECT_EQ(info.triangles, 3U);
+  EXPECT_EQ(info.materials, 2U);
+  EXPECT_EQ(info.lights + info.cameras + info.animations, 0U);
+  EXPECT_EQ(info.bounds.max, (Vector{4, 2, 5}));
+  EXPECT_EQ(surfaces.animation(0).error().status, StatusCode::invalid_argument);
+
+  EXPECT_TRUE(Surfaces::from_triangles({}));
+  for (const MeshDesc& bad :
+       {MeshDesc{.positions = std::span(positions).first(8)}, MeshDesc{.positions = positions, .normals = colors},
+        MeshDesc{.positions = positions, .colors = positions},
+        MeshDesc{.positions = positions, .indices = std::span(indices).first(4)}}) {
+    EXPECT_EQ(Surfaces::from_triangles({.meshes = {&bad, 1}}).error().status, StatusCode::invalid_argument);
+  }
+}
+
+TEST(CppSurfaces, AreFilesAndBytes) {
+  const std::string json = R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "buffers": [{"byteLength": 36, "uri": "corners.bin"}], "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+    "animations": [{"name": "still", "channels": [], "samplers": []}]})";
+  const auto bytes = std::as_bytes(std::span(json));
+  const auto nowhere = Surfaces::from_memory(bytes, nullptr, "json");
+  EXPECT_EQ(nowhere.error().status, StatusCode::file);
+  EXPECT_STREQ(nowhere.error().message.c_str(),
+               "json: buffer 0: \"corners.bin\" is a file of its own, and there is no folder to look in");
+  const auto missing = Surfaces::from_memory(bytes, "/nowhere");
+  EXPECT_STREQ(missing.error().message.c_str(), "memory: buffer 0: corners.bin: no such file");
+  EXPECT_EQ(Surfaces::open("no such model.glb").error().status, StatusCode::file);
+  EXPECT_EQ(Surfaces().info().error().status, StatusCode::invalid_argument);
+}
+
+TEST_F(CppViewer, SharesSurfaces) {
+  const std::array<float, 9> positions = {0, 0, 0, 2, 0, 0, 0, 1, 0};
+  const std::array<MeshDesc, 1> meshes = {MeshDesc{.positions = positions, .emission = {1, 0, 0}}};
+  Surfaces surfaces = Surfaces::from_triangles({.meshes = meshes}).value();
+  Viewer one = Viewer::create({.get_proc = get_proc()}).value();
+  Viewer two = Viewer::create({.get_proc = get_proc()}).value();
+  EXPECT_FALSE(one.get_surfaces().value());
+  for (Viewer* viewer : {&one, &two}) {
+    viewer->set_sampling({.samples = 4}).value();
+    viewer->set_surface_settings({.time = 1.0, .light = SurfaceLight::shadows}).value();
+    viewer->set_surfaces(surfaces).value();
+    EXPECT_EQ(viewer->get_surfaces()->handle(), surfaces.handle());
+    EXPECT_TRUE(converge(*viewer, 8, 8).has(RenderFlags::converged));
+  }
+  const Surfaces copy = surfaces;
+  EXPECT_EQ(copy.handle(), surfaces.handle());
+  Surfaces moved = std::move(surfaces);
+  EXPECT_FALSE(surfaces);  // NOLINT(bugprone-use-after-move): that is what is tested
+  surfaces = Surfaces::adopt(moved.release());
+  EXPECT_EQ(surfaces.handle(), copy.handle());
+  two.set_surfaces({}).value();
+  EXPECT_FALSE(two.get_surfaces().value());
+  EXPECT_EQ(two.get_bounds().error().status, StatusCode::invalid_argument);
+  EXPECT_EQ(one.get_bounds()->max, (Vector{2, 1, 0}));
+  EXPECT_EQ(one.use_surface_camera(0).error().status, StatusCode::invalid_argument);
+  EXPECT_EQ(one.load_surfaces({}).error().status, StatusCode::invalid_argument);
 }
 
 }  // namespace

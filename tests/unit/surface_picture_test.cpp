@@ -76,7 +76,7 @@ class SurfacePicture : public test::ViewerTest {
     return made;
   }
   void show(const std::shared_ptr<StillScene>& scene, SurfaceLight light) const {
-    viewer_->viewer().set_surfaces({{}, light});
+    viewer_->viewer().set_surface_settings({{}, light});
     viewer_->viewer().show_surfaces(test::source_of(scene));
   }
   [[nodiscard]] test::Picture render(std::uint32_t seed, std::uint32_t samples = 256) const {

@@ -28,14 +28,6 @@ constexpr double pi = std::numbers::pi;
 class SurfaceTrace : public test::ViewerTest {};
 CUMULET_ON_BACKENDS(SurfaceTrace);
 
-viewer::CameraPose camera_at(const dvec3& eye, const dvec3& target, double fovy = 30.0) {
-  viewer::CameraPose c;
-  c.eye = eye;
-  c.target = target;
-  c.fovy_degrees = fovy;
-  return c;
-}
-
 viewer::GridSettings march(March kind) {
   viewer::GridSettings s;
   s.build.march = kind;
@@ -68,7 +60,7 @@ std::shared_ptr<StillScene> floor_scene(const Material& material, float y = -10.
 }
 
 viewer::CameraPose looking_down(double fovy = 1.0) {
-  viewer::CameraPose c = camera_at({32.0, 300.0, 32.0}, {32.0, 0.0, 32.0}, fovy);
+  viewer::CameraPose c = test::camera_at({32.0, 300.0, 32.0}, {32.0, 0.0, 32.0}, fovy);
   c.up = {0.0, 0.0, -1.0};
   return c;
 }
@@ -134,7 +126,7 @@ TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
   scene->add_sphere({17.0F, 9.0F, 11.0F}, 4.0F, 1);
   scene->add_quad({{{0, -3, 24}, {24, -3, 24}, {24, -3, 0}, {0, -3, 0}}}, 0);
   viewer->viewer().show_surfaces(test::source_of(scene));
-  viewer->set_camera(camera_at({12.0, 30.0, 60.0}, {12.0, 8.0, 11.0}, 32.0));
+  viewer->set_camera(test::camera_at({12.0, 30.0, 60.0}, {12.0, 8.0, 11.0}, 32.0));
   for (const double density : {1e-6, 0.5}) {
     viewer::Medium medium;
     medium.density_scale = density;

@@ -47,14 +47,6 @@ viewer::GridSettings settings_of(const Kind& kind, double threshold) {
   return s;
 }
 
-viewer::CameraPose camera_at(const dvec3& eye, const dvec3& target, double fovy = 30.0) {
-  viewer::CameraPose c;
-  c.eye = eye;
-  c.target = target;
-  c.fovy_degrees = fovy;
-  return c;
-}
-
 volume::ScalarVolume box_volume(const ivec3& size, float value = 1.0F) {
   return test::make_volume(size, ivec3(0), [=](const ivec3& /*p*/) { return value; });
 }
@@ -74,7 +66,7 @@ TEST_P(Trace, SlabFollowsBeerLambertInEveryMarch) {
       viewer->set_medium(medium);
       // Straight through 8 voxels; then from the slab's middle plane through 4.
       for (const double from : {500.0, 3.5}) {
-        viewer->set_camera(camera_at({31.5, 31.5, from}, {31.5, 31.5, from - 1.0}, 0.5));
+        viewer->set_camera(test::camera_at({31.5, 31.5, from}, {31.5, 31.5, from - 1.0}, 0.5));
         const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
         const double through = std::exp(-sigma * (from > 100.0 ? 8.0 : 4.0));
         const double error = 4.0 * std::sqrt(through * (1.0 - through) / (256.0 * 64.0));
@@ -210,7 +202,7 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
   viewer->set_volume(volume);
   viewer->set_medium({0.6, vec3(albedo), 0.4F, 0});
   viewer->set_light({40.0F, 25.0F, {3.0F, 2.5F, 2.0F}, {0.3F, 0.5F, 0.8F}});
-  viewer->set_camera(camera_at(eye, target, fovy));
+  viewer->set_camera(test::camera_at(eye, target, fovy));
   for (const Kind& kind : kinds) {
     viewer->set_grid(settings_of(kind, -1.0));
     const test::Picture a = test::render(*viewer, {32, 32, 96, 3, render::View::shaded});
@@ -236,7 +228,7 @@ TEST_P(Trace, SingleScatteringMatchesQuadrature) {
   for (const float g : {0.0F, 0.6F}) {
     viewer->set_medium({sigma, vec3(0.9F, 0.5F, 0.2F), g, 1});
     viewer->set_light({0.0F, 90.0F, {5.0F, 5.0F, 5.0F}, {0.0F, 0.0F, 0.0F}});
-    viewer->set_camera(camera_at({199.5, 7.5, 900.0}, {199.5, 7.5, 0.0}, 0.01));
+    viewer->set_camera(test::camera_at({199.5, 7.5, 900.0}, {199.5, 7.5, 0.0}, 0.01));
     const double phase = (1.0 - g * g) / (4.0 * std::numbers::pi * std::pow(1.0 + g * g, 1.5));
     const double expected = phase * 5.0 * std::exp(-sigma * 8.0) * (1.0 - std::exp(-sigma * 16.0));
     for (const Kind& kind : {kinds[0], kinds[2]}) {
@@ -383,7 +375,7 @@ TEST_P(Trace, CameraInsideOnFacesEdgesAndVertices) {
                                    {15.5, 15.5, 31.5}}};
   for (const dvec3& eye : eyes) {
     for (const dvec3& direction : {dvec3(0, 0, -1), dvec3(1, 1, 1), dvec3(0.3, -0.2, 0.9)}) {
-      viewer->set_camera(camera_at(eye, eye + direction, 60.0));
+      viewer->set_camera(test::camera_at(eye, eye + direction, 60.0));
       const test::Image image{16, 16, 32, 2, render::View::shaded};
       viewer->set_grid(settings_of(kinds[1], -1.0));
       const test::Picture tet = test::render(*viewer, image);
@@ -411,7 +403,7 @@ TEST_P(Trace, AnyAffineTransformKeepsWorldDistances) {
   viewer->set_volume(volume);
   viewer->set_medium({sigma, vec3(0.0F), 0.0F, 0});
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
-  viewer->set_camera(camera_at(centre + 20.0 * axis, centre, 0.2));
+  viewer->set_camera(test::camera_at(centre + 20.0 * axis, centre, 0.2));
   for (const Kind& kind : kinds) {
     viewer->set_grid(settings_of(kind, -1.0));
     const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
@@ -431,11 +423,11 @@ TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
   const test::Image image{32, 32, 8, 1, render::View::shaded};
   viewer->set_grid(settings_of(kinds[0], 0.02));
   viewer->set_volume(volume);
-  viewer->set_camera(camera_at({60, 40, 80}, {15, 13, 17}));
+  viewer->set_camera(test::camera_at({60, 40, 80}, {15, 13, 17}));
   const test::Picture straight = test::render(*viewer, image);
   viewer->set_volume(turned);
   viewer::CameraPose camera =
-      camera_at(dvec3(rotation * glm::dvec4(60, 40, 80, 1)), dvec3(rotation * glm::dvec4(15, 13, 17, 1)));
+      test::camera_at(dvec3(rotation * glm::dvec4(60, 40, 80, 1)), dvec3(rotation * glm::dvec4(15, 13, 17, 1)));
   camera.up = dvec3(rotation * glm::dvec4(0, 1, 0, 0));
   viewer->set_camera(camera);
   const test::Picture rotated = test::render(*viewer, image);
@@ -449,7 +441,8 @@ TEST_P(Trace, AFewVoxelsAreAVolume) {
   viewer->set_medium({1.0, vec3(0.0F), 0.0F, 0});
   for (const int size : {1, 3, 8, 9}) {
     viewer->set_volume(box_volume(ivec3(size)));
-    viewer->set_camera(camera_at(dvec3(0.5 * size - 0.5) + dvec3(0, 0, 100.0 + size), dvec3(0.5 * size - 0.5), 0.1));
+    viewer->set_camera(
+        test::camera_at(dvec3(0.5 * size - 0.5) + dvec3(0, 0, 100.0 + size), dvec3(0.5 * size - 0.5), 0.1));
     for (const Kind& kind : kinds) {
       viewer->set_grid(settings_of(kind, 0.02));
       const test::Picture picture = test::render(*viewer, {4, 4, 1, 1, render::View::density});
@@ -462,7 +455,7 @@ TEST_P(Trace, DensityViewIsTheOpacity) {
   const auto viewer = make();
   viewer->set_volume(box_volume({64, 64, 8}));
   viewer->set_medium({0.1, vec3(1.0F), 0.0F, 0});
-  viewer->set_camera(camera_at({31.5, 31.5, 500.0}, {31.5, 31.5, 0.0}, 0.5));
+  viewer->set_camera(test::camera_at({31.5, 31.5, 500.0}, {31.5, 31.5, 0.0}, 0.5));
   for (const Kind& kind : kinds) {
     viewer->set_grid(settings_of(kind, 0.02));
     const test::Picture picture = test::render(*viewer, {8, 8, 1, 1, render::View::density});
@@ -479,7 +472,7 @@ TEST_P(Trace, AdaptsToTheCamera) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({96, 96, 96}, ivec3(0), 1));
   viewer->set_image({64, 64, 1, 0, render::View::shaded});
-  viewer->set_camera(camera_at({48, 48, 6000}, {48, 48, 48}, 5.0));
+  viewer->set_camera(test::camera_at({48, 48, 6000}, {48, 48, 48}, 5.0));
   viewer::GridSettings settings = settings_of(kinds[0], 0.005);
   viewer->set_grid(settings);
   viewer->build();

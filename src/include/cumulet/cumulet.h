@@ -9,6 +9,9 @@
  *
  *     cumulet_create -> cumulet_load_volume -> each frame: cumulet_render -> cumulet_destroy
  *
+ * Surfaces (a glTF 2.0 file, or a host's own triangles) may stand in the volume, or alone: one picture, with light
+ * between the two (cumulet_load_surfaces, cumulet_set_surfaces).
+ *
  * The library makes no window and no context and links no OpenGL: functions come from the host's get_proc callback.
  * There are no globals: viewers, in one context or several, in one thread or several, do not know of each other.
  *
@@ -16,18 +19,18 @@
  *     A viewer is attached to a GL context or detached. cumulet_create attaches it if given get_proc, else
  *     cumulet_attach does. Detached, it loads, builds and takes settings, but cannot render. When the host's context
  *     goes away (a widget moved between windows), call cumulet_detach while it is still current, or
- *     cumulet_context_lost when it is gone, and cumulet_attach in the new one: volume, grid, settings and camera are
- *     kept, GL objects are made anew within the next frames. cumulet_destroy needs the context current if the viewer is
- *     attached, and none if it is not.
+ *     cumulet_context_lost when it is gone, and cumulet_attach in the new one: volume, grid, surfaces, settings and
+ *     camera are kept, GL objects are made anew within the next frames. cumulet_destroy needs the context current if
+ *     the viewer is attached, and none if it is not.
  *
  * Threads
  *     Calls for one viewer must not overlap, from whatever thread they come, with two exceptions that are safe at any
  *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
- *     objects with it, current on the calling thread; no other call touches GL. Camera and volume handles may be used
- *     from any thread at any time. Files are read and grids are built on a worker thread of the viewer's own;
- *     cumulet_render uploads what it made, within its time budget, and shows the last good picture until then.
- *     The update callback comes from any thread, the worker's included. Neither it nor the log callback may call the
- *     library (but for the two exceptions): a call from the update callback is refused with
+ *     objects with it, current on the calling thread; no other call touches GL. Camera, volume and surfaces handles may
+ *     be used from any thread at any time. Files are read, grids are built and surfaces are posed on worker threads of
+ *     the viewer's own; cumulet_render uploads what they made, within its time budget, and shows the last good picture
+ *     until then. The update callback comes from any thread, a worker's included. Neither it nor the log callback may
+ *     call the library (but for the two exceptions): a call from the update callback is refused with
  *     CUMULET_ERROR_INVALID_ARGUMENT.
  *
  * OpenGL state
@@ -100,9 +103,10 @@ extern "C" {
 #define CUMULET_VERSION_MINOR 2
 #define CUMULET_VERSION_PATCH 0
 
-typedef struct cumulet_viewer cumulet_viewer; /* cumulet_destroy */
-typedef struct cumulet_volume cumulet_volume; /* cumulet_volume_release */
-typedef struct cumulet_camera cumulet_camera; /* cumulet_camera_release */
+typedef struct cumulet_viewer cumulet_viewer;     /* cumulet_destroy */
+typedef struct cumulet_volume cumulet_volume;     /* cumulet_volume_release */
+typedef struct cumulet_surfaces cumulet_surfaces; /* cumulet_surfaces_release */
+typedef struct cumulet_camera cumulet_camera;     /* cumulet_camera_release */
 
 typedef enum cumulet_status {
   CUMULET_OK = 0,
@@ -251,7 +255,90 @@ typedef void (*cumulet_grid_fn)(void* user, const char* name, const char* type, 
 CUMULET_API cumulet_status cumulet_list_grids(const char* path, cumulet_grid_fn fn, void* user, char* error,
                                               size_t error_size);
 
-/* ---- A viewer's volume, and the work behind it ------------------------------------------------------------------ */
+/* ---- Surfaces -------------------------------------------------------------------------------------------------- */
+
+/*
+ * Triangles with their materials, lights, cameras and animations in main memory: immutable, counted, free of GL, to be
+ * shown by any number of viewers, at one moment of an animation each. World space and units are the volume's. These
+ * calls are synchronous, for any thread; error as in cumulet_create. cumulet_load_surfaces is the asynchronous way.
+ *
+ * The library reads all of glTF 2.0's triangles, materials, skins, morph targets, animations, cameras, and these
+ * extensions: KHR_lights_punctual, KHR_materials_unlit, _emissive_strength, _ior, _specular, _clearcoat and
+ * _transmission (thin and clear: what passes goes straight on), KHR_texture_transform, KHR_mesh_quantization,
+ * KHR_draco_mesh_compression, EXT_meshopt_compression. Watts per steradian and per square metre stand for KHR_lights_
+ * punctual's candela and lux. Emissive triangles are lights, to their front alone where the material is single-sided.
+ * Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
+ */
+
+/* Reads a .gltf or .glb file. */
+CUMULET_API cumulet_status cumulet_surfaces_open(const char* path, cumulet_surfaces** out, char* error,
+                                                 size_t error_size);
+
+/*
+ * The same of a file's bytes, told apart by content. Files that it refers to are looked for in base_directory; NULL:
+ * such a file is an error. name stands for the path in messages; NULL: "memory". bytes are not used after the return.
+ */
+CUMULET_API cumulet_status cumulet_surfaces_from_memory(const void* bytes, size_t size, const char* base_directory,
+                                                        const char* name, cumulet_surfaces** out, char* error,
+                                                        size_t error_size);
+
+/* Triangles of one material (glTF's metallic-roughness model). */
+typedef struct cumulet_mesh_desc {
+  size_t struct_size;     /* of all meshes of an array the same: the distance between them */
+  const float* positions; /* 3 a vertex */
+  const float* normals;   /* 3 a vertex, of any length; NULL: flat, each triangle's own */
+  const float* colors;    /* 4 a vertex, each in [0, 1], linear, times base_color; NULL: white */
+  uint64_t vertex_count;
+  const uint32_t* indices; /* 3 a triangle, counter-clockwise as seen from its front */
+  uint64_t index_count;    /* 0: every three vertices are a triangle */
+  double to_world[16];     /* affine; zero: identity */
+  float base_color[4];     /* each in [0, 1], linear; below 1, alpha is the part that covers; all zero: white, opaque */
+  float metallic;          /* 0 to 1 */
+  float smoothness;        /* 1 - roughness, 0 to 1 */
+  float emission[3];       /* radiance of the front */
+  int32_t double_sided;    /* 0: the camera sees through it from behind; 1: both sides are fronts */
+} cumulet_mesh_desc;
+
+typedef struct cumulet_triangles_desc {
+  size_t struct_size;
+  const cumulet_mesh_desc* meshes;
+  uint64_t mesh_count;
+  const char* name; /* for messages; NULL: "triangles" */
+} cumulet_triangles_desc;
+
+/* A host's own meshes, copied. What moves is made anew. */
+CUMULET_API cumulet_status cumulet_surfaces_from_triangles(const cumulet_triangles_desc* desc, cumulet_surfaces** out,
+                                                           char* error, size_t error_size);
+
+CUMULET_API cumulet_surfaces* cumulet_surfaces_retain(cumulet_surfaces* surfaces); /* returns it; NULL is allowed */
+CUMULET_API void cumulet_surfaces_release(cumulet_surfaces* surfaces);             /* NULL is allowed */
+
+typedef struct cumulet_surfaces_info {
+  size_t struct_size;
+  char name[128]; /* the path, or what the host named it */
+  uint64_t triangles;
+  uint32_t materials;
+  uint32_t lights;
+  uint32_t cameras;
+  uint32_t animations;
+  double bounds_min[3]; /* world space, as it rests; zero without triangles */
+  double bounds_max[3];
+} cumulet_surfaces_info;
+
+/* The first call takes as long as a pose. */
+CUMULET_API cumulet_status cumulet_surfaces_get_info(const cumulet_surfaces* surfaces, cumulet_surfaces_info* info);
+
+typedef struct cumulet_animation_info {
+  size_t struct_size;
+  char name[128];  /* "" if it has none */
+  double duration; /* seconds */
+} cumulet_animation_info;
+
+/* CUMULET_ERROR_INVALID_ARGUMENT if there is none of this number. */
+CUMULET_API cumulet_status cumulet_surfaces_get_animation(const cumulet_surfaces* surfaces, uint32_t index,
+                                                          cumulet_animation_info* info);
+
+/* ---- What a viewer shows, and the work behind it ---------------------------------------------------------------- */
 
 /*
  * Begins to read a file as cumulet_volume_open does, on the viewer's worker, and then to build its grid; replaces a
@@ -266,17 +353,16 @@ CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_vo
 CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
 
 /*
- * Begins to read a glTF 2.0 scene (.gltf or .glb) on a worker; the surfaces shown before stay until it is ready, for
- * good if that fails. Surfaces and volume share one world space and one picture: rays end at triangles, and light goes
- * both ways. The library reads all of glTF 2.0's triangles, materials, skins, morph targets, animations, cameras, and
- * these extensions: KHR_lights_punctual, KHR_materials_unlit, _emissive_strength, _ior, _specular, _clearcoat and
- * _transmission (thin and clear: what passes goes straight on), KHR_texture_transform, KHR_mesh_quantization,
- * KHR_draco_mesh_compression, EXT_meshopt_compression. Watts per steradian and per square metre stand for KHR_lights_
- * punctual's candela and lux. Emissive triangles are lights, to their front alone where the material is single-sided.
- * Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
- * NULL: shows no surfaces, at once. cumulet_wait, cumulet_get_progress and cumulet_cancel are about this work, too.
+ * Begins to read a file as cumulet_surfaces_open does, on a worker, and then to pose it; replaces a load under way. The
+ * surfaces shown before stay until it is ready, for good if that fails. Surfaces and volume share one world space and
+ * one picture: rays end at triangles, and light goes both ways. cumulet_wait, cumulet_get_progress and cumulet_cancel
+ * are about this work, too.
  */
 CUMULET_API cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path);
+/* Begins to pose these surfaces, likewise. NULL: shows none, at once. Cancels a load under way. */
+CUMULET_API cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, cumulet_surfaces* surfaces);
+/* The surfaces last loaded or set, retained for the caller, who releases them; NULL if there are none. */
+CUMULET_API cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** out);
 
 typedef enum cumulet_surface_light {
   CUMULET_SURFACE_LIGHT_FULL = 0,    /* light goes on between surfaces, and between them and the volume */
@@ -291,31 +377,18 @@ typedef enum cumulet_surface_light {
   CUMULET_SURFACE_LIGHT_NONE = 2
 } cumulet_surface_light;
 
-typedef struct cumulet_surfaces_desc {
+typedef struct cumulet_surface_settings_desc {
   size_t struct_size;
   double time;        /* seconds into the animation; past its end it begins anew */
   uint32_t animation; /* its number in the file; one that is not there: as the scene rests */
   cumulet_surface_light light;
-} cumulet_surfaces_desc;
+} cumulet_surface_settings_desc;
 
-/* Poses the surfaces on the worker if the moment changed; the last pose is shown until then. */
-CUMULET_API cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, const cumulet_surfaces_desc* desc);
-
-typedef struct cumulet_surfaces_info {
-  size_t struct_size;
-  uint64_t triangles;
-  uint32_t materials;
-  uint32_t lights;
-  uint32_t cameras;
-  uint32_t animations;
-  double duration;      /* seconds, of the animation that is set; 0 without */
-  double bounds_min[3]; /* world space, as posed last */
-  double bounds_max[3];
-} cumulet_surfaces_info;
-
-/* Of the surfaces that were read last; CUMULET_ERROR_INVALID_ARGUMENT if there are none. */
-CUMULET_API cumulet_status cumulet_get_surfaces_info(cumulet_viewer* viewer, cumulet_surfaces_info* info);
-/* Moves the viewer's camera to one of the surfaces' own, as posed last. */
+/* How this viewer shows its surfaces. Poses them on the worker if the moment changed; the last pose is shown until
+ * then. */
+CUMULET_API cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer,
+                                                        const cumulet_surface_settings_desc* desc);
+/* Moves the viewer's camera to one of the surfaces' own, as posed last: see cumulet_wait. */
 CUMULET_API cumulet_status cumulet_use_surface_camera(cumulet_viewer* viewer, uint32_t index);
 
 typedef enum cumulet_stage {

@@ -441,6 +441,141 @@ template <class Visit>
   return detail::result(status, cause.data());
 }
 
+// ---- Surfaces -------------------------------------------------------------------------------------------------------
+
+/// vertex_count is positions.size() / 3; Surfaces::from_triangles checks that the other spans agree.
+struct MeshDesc {
+  std::span<const float> positions{};
+  std::span<const float> normals{};
+  std::span<const float> colors{};
+  std::span<const std::uint32_t> indices{};
+  Matrix to_world{};
+  std::array<float, 4> base_color{};
+  float metallic = 0.0F;
+  float smoothness = 0.0F;
+  Rgb emission{};
+  bool double_sided = false;
+
+  operator cumulet_mesh_desc() const noexcept {
+    cumulet_mesh_desc c{.struct_size = sizeof c,
+                        .positions = positions.data(),
+                        .normals = normals.empty() ? nullptr : normals.data(),
+                        .colors = colors.empty() ? nullptr : colors.data(),
+                        .vertex_count = positions.size() / 3,
+                        .indices = indices.data(),
+                        .index_count = indices.size(),
+                        .to_world = {},
+                        .base_color = {base_color[0], base_color[1], base_color[2], base_color[3]},
+                        .metallic = metallic,
+                        .smoothness = smoothness,
+                        .emission = {emission[0], emission[1], emission[2]},
+                        .double_sided = double_sided};
+    std::ranges::copy(to_world, c.to_world);
+    return c;
+  }
+};
+
+/// Becomes no cumulet_triangles_desc, whose meshes are C's own: see Surfaces::from_triangles.
+struct TrianglesDesc {
+  std::span<const MeshDesc> meshes{};
+  const char* name = nullptr;
+};
+
+struct SurfacesInfo {
+  Text<128> name;
+  std::uint64_t triangles = 0;
+  std::uint32_t materials = 0;
+  std::uint32_t lights = 0;
+  std::uint32_t cameras = 0;
+  std::uint32_t animations = 0;
+  Bounds bounds;
+};
+
+struct AnimationInfo {
+  Text<128> name;
+  double duration = 0.0;
+};
+
+/// A share in immutable surfaces: a copy is one more.
+class Surfaces {
+ public:
+  Surfaces() noexcept = default;
+  Surfaces(const Surfaces& other) noexcept : handle_(cumulet_surfaces_retain(other.handle_)) {}
+  Surfaces(Surfaces&& other) noexcept : handle_(other.release()) {}
+  Surfaces& operator=(Surfaces other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Surfaces() { cumulet_surfaces_release(handle_); }
+
+  [[nodiscard]] static Result<Surfaces> open(const std::string& path) noexcept {
+    return detail::made<Surfaces>([&](cumulet_surfaces** out, char* error, std::size_t size) {
+      return cumulet_surfaces_open(path.c_str(), out, error, size);
+    });
+  }
+  /// base_directory NULL: files that the bytes refer to are an error.
+  [[nodiscard]] static Result<Surfaces> from_memory(std::span<const std::byte> bytes,
+                                                    const char* base_directory = nullptr,
+                                                    const char* name = nullptr) noexcept {
+    return detail::made<Surfaces>([&](cumulet_surfaces** out, char* error, std::size_t size) {
+      return cumulet_surfaces_from_memory(bytes.data(), bytes.size(), base_directory, name, out, error, size);
+    });
+  }
+  [[nodiscard]] static Result<Surfaces> from_triangles(const TrianglesDesc& desc) noexcept {
+    const std::unique_ptr<cumulet_mesh_desc[]> meshes(new (std::nothrow) cumulet_mesh_desc[desc.meshes.size()]);
+    if (!meshes) return detail::result(CUMULET_ERROR_OUT_OF_MEMORY).error();
+    for (std::size_t i = 0; i < desc.meshes.size(); ++i) {
+      const MeshDesc& mesh = desc.meshes[i];
+      const std::size_t count = mesh.positions.size() / 3;
+      if (mesh.positions.size() % 3 != 0 || (!mesh.normals.empty() && mesh.normals.size() != 3 * count) ||
+          (!mesh.colors.empty() && mesh.colors.size() != 4 * count)) {
+        return Error{StatusCode::invalid_argument,
+                     Text<512>("a vertex is 3 positions, 3 normals (or none at all) and 4 colors (or none at all)")};
+      }
+      meshes[i] = mesh;
+    }
+    const cumulet_triangles_desc c{
+        .struct_size = sizeof c, .meshes = meshes.get(), .mesh_count = desc.meshes.size(), .name = desc.name};
+    return detail::made<Surfaces>([&](cumulet_surfaces** out, char* error, std::size_t size) {
+      return cumulet_surfaces_from_triangles(&c, out, error, size);
+    });
+  }
+
+  [[nodiscard]] Result<SurfacesInfo> info() const noexcept {
+    auto c = detail::sized<cumulet_surfaces_info>();
+    if (auto done = detail::result(cumulet_surfaces_get_info(handle_, &c)); !done) return done.error();
+    const auto& [struct_size, name, triangles, materials, lights, cameras, animations, bounds_min, bounds_max] = c;
+    return SurfacesInfo{.name = Text<128>(name),
+                        .triangles = triangles,
+                        .materials = materials,
+                        .lights = lights,
+                        .cameras = cameras,
+                        .animations = animations,
+                        .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)}};
+  }
+  [[nodiscard]] Result<AnimationInfo> animation(std::uint32_t index) const noexcept {
+    auto c = detail::sized<cumulet_animation_info>();
+    if (auto done = detail::result(cumulet_surfaces_get_animation(handle_, index, &c)); !done) return done.error();
+    const auto& [struct_size, name, duration] = c;
+    return AnimationInfo{.name = Text<128>(name), .duration = duration};
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_surfaces* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_surfaces* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Surfaces adopt(cumulet_surfaces* handle) noexcept {
+    Surfaces surfaces;
+    surfaces.handle_ = handle;
+    return surfaces;
+  }
+
+ private:
+  cumulet_surfaces* handle_ = nullptr;
+};
+
 // ---- Settings -------------------------------------------------------------------------------------------------------
 
 struct GridDesc {
@@ -494,13 +629,13 @@ struct LightDesc {
   }
 };
 
-struct SurfacesDesc {
+struct SurfaceSettingsDesc {
   double time = 0.0;
   std::uint32_t animation = 0;
   SurfaceLight light{};
 
-  operator cumulet_surfaces_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_surfaces_desc),
+  operator cumulet_surface_settings_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_surface_settings_desc),
             .time = time,
             .animation = animation,
             .light = static_cast<cumulet_surface_light>(light)};
@@ -755,16 +890,6 @@ struct Progress {
   Text<512> message;
 };
 
-struct SurfacesInfo {
-  std::uint64_t triangles = 0;
-  std::uint32_t materials = 0;
-  std::uint32_t lights = 0;
-  std::uint32_t cameras = 0;
-  std::uint32_t animations = 0;
-  double duration = 0.0;
-  Bounds bounds;
-};
-
 struct Stats {
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
@@ -892,21 +1017,21 @@ class Viewer {
 
   [[nodiscard]] Result<> set_grid(const GridDesc& desc) noexcept { return set(cumulet_set_grid, desc); }
   [[nodiscard]] Result<> set_medium(const MediumDesc& desc) noexcept { return set(cumulet_set_medium, desc); }
-  /// An empty path: shows no surfaces.
   [[nodiscard]] Result<> load_surfaces(const std::string& path) noexcept {
-    return result(cumulet_load_surfaces(handle(), detail::or_null(path)));
+    return result(cumulet_load_surfaces(handle(), path.c_str()));
   }
-  [[nodiscard]] Result<> set_surfaces(const SurfacesDesc& desc) noexcept { return set(cumulet_set_surfaces, desc); }
-  [[nodiscard]] Result<SurfacesInfo> get_surfaces_info() const noexcept {
-    auto c = detail::sized<cumulet_surfaces_info>();
-    if (auto done = result(cumulet_get_surfaces_info(handle(), &c)); !done) return done.error();
-    return SurfacesInfo{.triangles = c.triangles,
-                        .materials = c.materials,
-                        .lights = c.lights,
-                        .cameras = c.cameras,
-                        .animations = c.animations,
-                        .duration = c.duration,
-                        .bounds = {std::to_array(c.bounds_min), std::to_array(c.bounds_max)}};
+  /// Empty: shows no surfaces.
+  [[nodiscard]] Result<> set_surfaces(const Surfaces& surfaces) noexcept {
+    return result(cumulet_set_surfaces(handle(), surfaces.handle()));
+  }
+  /// Empty if there are none.
+  [[nodiscard]] Result<Surfaces> get_surfaces() noexcept {
+    cumulet_surfaces* out = nullptr;
+    if (auto done = result(cumulet_get_surfaces(handle(), &out)); !done) return done.error();
+    return Surfaces::adopt(out);
+  }
+  [[nodiscard]] Result<> set_surface_settings(const SurfaceSettingsDesc& desc) noexcept {
+    return set(cumulet_set_surface_settings, desc);
   }
   [[nodiscard]] Result<> use_surface_camera(std::uint32_t index) noexcept {
     return result(cumulet_use_surface_camera(handle(), index));

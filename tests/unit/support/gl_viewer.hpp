@@ -27,6 +27,14 @@ class ViewerTest : public testing::TestWithParam<headless::Backend> {
   std::unique_ptr<headless::Context> context_;
 };
 
+inline viewer::CameraPose camera_at(const glm::dvec3& eye, const glm::dvec3& target, double fovy = 30.0) {
+  viewer::CameraPose c;
+  c.eye = eye;
+  c.target = target;
+  c.fovy_degrees = fovy;
+  return c;
+}
+
 struct Picture {
   std::uint32_t width = 0;
   std::vector<glm::vec4> pixels;

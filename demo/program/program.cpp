@@ -1,0 +1,35 @@
+#include "program.hpp"
+
+#include <cstdio>
+#include <iostream>
+#include <new>
+
+namespace cumulet::demo {
+
+std::string one_line(std::string text) {
+  const auto breaks = [](char c) { return c == '\n' || c == '\r'; };
+  while (!text.empty() && breaks(text.back())) text.pop_back();
+  for (char& c : text)
+    if (breaks(c)) c = ' ';
+  return text;
+}
+
+int run_program(const char* name, const std::function<void()>& body) {
+  const auto fail = [name](const std::string& message, int status) {
+    std::fprintf(stderr, "%s: %s\n", name, one_line(message).c_str());
+    return status;
+  };
+  try {
+    body();
+    std::cout.flush();
+    return std::cout.good() ? 0 : fail("standard output: cannot be written", 1);
+  } catch (const UsageError& error) {
+    return fail(std::string(error.what()) + " (see --help)", 2);
+  } catch (const std::bad_alloc&) {
+    return fail("out of memory", 1);
+  } catch (const std::exception& error) {
+    return fail(error.what(), 1);
+  }
+}
+
+}  // namespace cumulet::demo

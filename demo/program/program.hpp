@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+
+namespace cumulet::demo {
+
+/// The command line is wrong; what() is one line. run_program prints it and gives 2.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Line breaks become blanks, but for those at the end, which go.
+[[nodiscard]] std::string one_line(std::string text);
+
+/// A main's whole body: calls it, and gives the exit status. What it throws, and a standard output that cannot be
+/// written, goes to standard error in one line after the program's name: 1; 2 for a UsageError.
+[[nodiscard]] int run_program(const char* name, const std::function<void()>& body);
+
+}  // namespace cumulet::demo

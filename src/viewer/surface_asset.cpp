@@ -1,0 +1,32 @@
+#include "viewer/surface_asset.hpp"
+
+#include <limits>
+
+#include "viewer/patient_lock.hpp"
+
+namespace cumulet::viewer {
+
+SurfaceAsset::Rest SurfaceAsset::rest() const {
+  const std::scoped_lock lock(rest_mutex_);
+  if (!rest_) {
+    // No scene has an animation of this number.
+    const surface::Pose pose = scene_->pose(0.0, std::numeric_limits<std::size_t>::max());
+    rest_ = Rest{pose.lights.size(), pose.cameras.size(), {pose.low, pose.high}};
+  }
+  return *rest_;
+}
+
+SurfacePtr SurfaceAsset::posed(SurfaceMoment moment, Progress& progress) const {
+  const auto lock = patient_lock(mutex_, progress);
+  SurfacePtr last = newest_.lock();
+  if (last && newest_moment_ == moment) return last;
+  progress.check();
+  surface::Pose pose = scene_->pose(moment.time, moment.animation);
+  SurfacePtr made = last ? render::make_surface_source(*last, std::move(pose), &progress)
+                         : render::make_surface_source(scene_, std::move(pose), &progress);
+  newest_ = made;
+  newest_moment_ = moment;
+  return made;
+}
+
+}  // namespace cumulet::viewer

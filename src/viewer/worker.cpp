@@ -1,0 +1,107 @@
+#include "viewer/worker.hpp"
+
+#include <new>
+#include <utility>
+
+namespace cumulet::viewer {
+
+namespace {
+
+std::optional<Error> failure_of(const Worker::Job& job, Progress& progress) {
+  try {
+    job.work(progress);
+    return std::nullopt;
+  } catch (const Error& error) {
+    return error;
+  } catch (const std::bad_alloc&) {
+    return Error(ErrorCode::out_of_memory, job.what + ": out of memory");
+  } catch (const std::exception& error) {
+    return Error(ErrorCode::internal, std::string("internal error: ") + error.what());
+  }
+}
+
+}  // namespace
+
+Worker::~Worker() {
+  {
+    const std::scoped_lock lock(mutex_);
+    stopping_ = true;
+    if (current_) current_->cancel();
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Worker::take(Job job, bool replaces) {
+  std::optional<Job> old;  // ends after the lock: what it holds may be large
+  {
+    const std::scoped_lock lock(mutex_);
+    if (replaces && current_) current_->cancel();
+    old = std::exchange(next_, std::move(job));
+    failure_.reset();
+    if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+  }
+  changed_.notify_all();
+}
+
+void Worker::cancel() {
+  std::optional<Job> old;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (next_) failure_ = Error(ErrorCode::cancelled, "cancelled");
+    old = std::exchange(next_, std::nullopt);
+    if (current_) current_->cancel();
+  }
+  changed_.notify_all();
+}
+
+bool Worker::busy() const {
+  const std::scoped_lock lock(mutex_);
+  return next_ || current_;
+}
+
+Worker::Status Worker::status() const {
+  const std::scoped_lock lock(mutex_);
+  Status status;
+  status.failure = failure_;
+  if (next_) {
+    status.stage = next_->stage;
+  } else if (current_) {
+    status.stage = current_->stage();
+    status.fraction = current_->fraction();
+  }
+  return status;
+}
+
+bool Worker::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
+  std::unique_lock lock(mutex_);
+  const auto idle = [this] { return !next_ && !current_; };
+  if (until) return changed_.wait_until(lock, *until, idle);
+  changed_.wait(lock, idle);
+  return true;
+}
+
+void Worker::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return stopping_ || next_; });
+    if (stopping_) return;
+    std::optional<Job> job = std::exchange(next_, std::nullopt);
+    const auto progress = std::make_shared<Progress>();
+    progress->begin(job->stage);
+    current_ = progress;
+    lock.unlock();
+    std::optional<Error> failure = failure_of(*job, *progress);
+    job.reset();
+    lock.lock();
+    current_.reset();
+    // A newer wish makes how this one ended old news.
+    if (!next_) failure_ = std::move(failure);
+    lock.unlock();
+    changed_.notify_all();
+    notify_();
+    lock.lock();
+  }
+}
+
+}  // namespace cumulet::viewer
