@@ -28,6 +28,7 @@ using render::EmissiveTriangle;
 using render::EmitterTable;
 using render::March;
 using surface::Material;
+using test::camera_at;
 using test::Picture;
 using test::StillScene;
 using viewer::SurfaceLight;
@@ -89,14 +90,6 @@ viewer::CameraPose looking_down() {
   c.target = {32.0, 0.0, 32.0};
   c.up = {0.0, 0.0, -1.0};
   c.fovy_degrees = 0.05;
-  return c;
-}
-
-viewer::CameraPose camera_at(const dvec3& eye, const dvec3& target, double fovy) {
-  viewer::CameraPose c;
-  c.eye = eye;
-  c.target = target;
-  c.fovy_degrees = fovy;
   return c;
 }
 
@@ -292,7 +285,7 @@ const auto constant = [](const dvec3& /*p*/) { return 3.0; };
 TEST_P(EmitterTrace, APatchLightsAFloorThroughASlab) {
   const auto viewer = dark(patch_over_floor(emitter(vec3(3.0F))));
   for (const SurfaceLight mode : {SurfaceLight::full, SurfaceLight::shadows}) {
-    viewer->viewer().set_surfaces(surface_light(mode));
+    viewer->viewer().set_surface_settings(surface_light(mode));
     for (const March kind : {March::tet, March::brick}) {
       viewer::GridSettings grid;
       grid.build.march = kind;
@@ -319,7 +312,7 @@ TEST_P(EmitterTrace, OneSidedTrianglesEmitFromTheirFront) {
           auto scene = patch_over_floor(patch, down);
           scene->rest.flipped[1] = flipped ? 1 : 0;
           const auto viewer = dark(scene);
-          viewer->viewer().set_surfaces(surface_light(mode));
+          viewer->viewer().set_surface_settings(surface_light(mode));
           // Under the patch: whatever of it faces up is not in the way.
           viewer->set_camera(camera_at({32.0, 5.0, 72.0}, {32.0, floor_y, 32.0}, 0.05));
           const Picture picture = test::render(*viewer, {8, 8, 64, 1, render::View::shaded});
@@ -360,7 +353,7 @@ TEST_P(EmitterTrace, APatchLightsAVolume) {
   scene->add_quad(square(patch_y, patch_half, true), 0);
   const auto viewer = dark(scene);
   for (const SurfaceLight mode : {SurfaceLight::full, SurfaceLight::shadows}) {
-    viewer->viewer().set_surfaces(surface_light(mode));
+    viewer->viewer().set_surface_settings(surface_light(mode));
     for (const double sigma : {0.02, 0.3}) {
       for (const double g : {0.0, -0.6}) {
         viewer->set_medium(medium(sigma, 0.8F, static_cast<float>(g), 1));
@@ -400,11 +393,11 @@ TEST_P(EmitterTrace, AGlowingBoxIsInBalance) {
   viewer->set_camera(camera_at({10.0, 12.0, 20.0}, {50.0, 2.0, 40.0}, 60.0));
   for (const double sigma : {1e-6, 0.1}) {
     viewer->set_medium(medium(sigma, 1.0F, 0.3F));
-    viewer->viewer().set_surfaces(surface_light(SurfaceLight::full));
+    viewer->viewer().set_surface_settings(surface_light(SurfaceLight::full));
     expect_mean(test::render(*viewer, {16, 16, 64, 1, render::View::shaded}), 2.0, 0.03, "full");
   }
   viewer->set_medium(medium(1e-6, 1.0F));
-  viewer->viewer().set_surfaces(surface_light(SurfaceLight::shadows));
+  viewer->viewer().set_surface_settings(surface_light(SurfaceLight::shadows));
   expect_mean(test::render(*viewer, {16, 16, 64, 1, render::View::shaded}), 1.5, 0.03, "shadows");
 }
 
@@ -469,7 +462,7 @@ TEST_P(EmitterTrace, AgreesWithWhatChanceMeets) {
     std::array<double, 2> noise{};
     for (const bool by_chance : {false, true}) {
       const auto viewer = dark(gallery(kind, by_chance));
-      viewer->viewer().set_surfaces(surface_light(kind.light));
+      viewer->viewer().set_surface_settings(surface_light(kind.light));
       viewer->set_camera(camera_at({32.0, 10.0, 110.0}, {32.0, 0.0, 32.0}, 30.0));
       viewer->set_medium(medium(0.04, 0.9F, 0.5F));
       if (kind.other_lights) {
