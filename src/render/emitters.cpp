@@ -46,7 +46,7 @@ vec3 texel(const FromSrgb& linear, const Image& image, std::size_t i) {
   return {linear[image.rgba[4 * i]], linear[image.rgba[4 * i + 1]], linear[image.rgba[4 * i + 2]]};
 }
 
-vec3 mean_colour(const FromSrgb& linear, const Image& image) {
+dvec3 mean_colour(const FromSrgb& linear, const Image& image) {
   const std::size_t texels = std::size_t{image.width} * image.height;
   const dvec3 sum = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, texels, 1U << 16U), dvec3(0.0),
@@ -55,7 +55,7 @@ vec3 mean_colour(const FromSrgb& linear, const Image& image) {
         return part;
       },
       [](const dvec3& a, const dvec3& b) { return a + b; });
-  return vec3(sum / std::max(1.0, static_cast<double>(texels)));
+  return sum / std::max(1.0, static_cast<double>(texels));
 }
 
 std::uint32_t wrapped(float at, std::uint32_t size, Wrap wrap) {
@@ -77,7 +77,7 @@ class Emission {
     if (use.texture >= 0) {
       texture_ = &scene.textures[static_cast<std::size_t>(use.texture)];
       image_ = &scene.images[texture_->image];
-      mean = mean_colour(linear, *image_);
+      mean = vec3(mean_colour(linear, *image_));
     }
     mean_ = luminance(material.emission * mean);
   }

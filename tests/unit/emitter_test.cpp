@@ -28,6 +28,7 @@ using render::EmissiveTriangle;
 using render::EmitterTable;
 using render::March;
 using surface::Material;
+using test::camera_at;
 using test::Picture;
 using test::StillScene;
 using viewer::SurfaceLight;
@@ -89,14 +90,6 @@ viewer::CameraPose looking_down() {
   c.target = {32.0, 0.0, 32.0};
   c.up = {0.0, 0.0, -1.0};
   c.fovy_degrees = 0.05;
-  return c;
-}
-
-viewer::CameraPose camera_at(const dvec3& eye, const dvec3& target, double fovy) {
-  viewer::CameraPose c;
-  c.eye = eye;
-  c.target = target;
-  c.fovy_degrees = fovy;
   return c;
 }
 
