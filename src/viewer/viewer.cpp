@@ -487,14 +487,18 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   upload_raster(g);
 }
 
-void Viewer::upload_raster(Gl& g) const {
+void Viewer::upload_raster(Gl& g) {
   const bool wanted = sampling_.preview || surface_settings_.light == SurfaceLight::none;
   if (!wanted || !surface_source_) {
     g.raster.reset();
     g.raster_source.reset();
     return;
   }
-  if (g.raster_source == surface_source_) return;
+  const bool failed = !g.raster && g.raster_source;
+  if (g.raster_source == surface_source_ && !(failed && g.raster_revision != settings_revision_)) return;
+  g.raster_revision = settings_revision_;
+  // Paths that met triangles for want of it end at it from now on.
+  if (!g.raster) ++surface_generation_;
   const bool same_scene = g.raster && g.raster_source->scene == surface_source_->scene;
   g.raster_source = surface_source_;
   try {

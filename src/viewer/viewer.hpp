@@ -219,7 +219,8 @@ class Viewer {
     std::unique_ptr<render::SurfaceData> surfaces;
     std::unique_ptr<render::SurfaceRaster> raster;  // of surfaces_source, where it is of use and could be made
     SurfacePtr raster_source;                       // what raster is of, or what failed
-    SurfacePtr surfaces_source;                     // what surfaces is of, or what failed to be uploaded
+    std::uint64_t raster_revision = 0;
+    SurfacePtr surfaces_source;  // what surfaces is of, or what failed to be uploaded
     std::uint64_t surfaces_revision = 0;
     render::Picture empty;
     gl::Object colour;  // the texture target
@@ -255,7 +256,7 @@ class Viewer {
   [[nodiscard]] render::Surfaces surfaces() const;
   render::Picture& readable();
   void read_means(Gl& g, const render::Picture& picture, float* rgba);
-  void upload_raster(Gl& g) const;
+  void upload_raster(Gl& g);
 
   Log log_;
   std::function<void()> update_;

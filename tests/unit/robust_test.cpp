@@ -30,6 +30,7 @@ using cumulet::test::make_ball;
 using cumulet::test::make_desc;
 using cumulet::test::make_viewer;
 using cumulet::test::picture_of;
+using cumulet::test::SurfacesRef;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
 using Picture = std::vector<std::uint8_t>;
@@ -68,6 +69,39 @@ Picture shown(const Host& host, cumulet_viewer* viewer, cumulet_status* status =
   if (status != nullptr) *status = got;
   if (flags != nullptr) *flags = result.flags;
   return host.target.pixels();
+}
+
+/// Two panes across a ball of make_ball(12): an opaque one and one that covers half.
+SurfacesRef make_panes() {
+  const std::array<float, 9> opaque{-4.0F, -4.0F, 0.0F, 4.0F, -4.0F, 0.0F, 0.0F, 5.0F, 1.0F};
+  const std::array<float, 9> veil{-9.0F, -2.0F, 9.0F, 9.0F, -2.0F, 9.0F, 0.0F, 2.0F, 9.0F};
+  std::array<cumulet_mesh_desc, 2> meshes{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
+  for (std::size_t i = 0; i < 2; ++i) {
+    meshes.at(i).positions = i == 0 ? opaque.data() : veil.data();
+    meshes.at(i).vertex_count = 3;
+    meshes.at(i).double_sided = 1;
+  }
+  const std::array<float, 4> half{0.9F, 0.2F, 0.1F, 0.5F};
+  std::copy(half.begin(), half.end(), meshes[1].base_color);
+  auto desc = make_desc<cumulet_triangles_desc>();
+  desc.meshes = meshes.data();
+  desc.mesh_count = meshes.size();
+  cumulet_surfaces* out = nullptr;
+  if (cumulet_surfaces_from_triangles(&desc, &out, nullptr, 0) != CUMULET_OK) throw std::runtime_error("no surfaces");
+  return SurfacesRef(out);
+}
+
+void light_surfaces(cumulet_viewer* viewer, cumulet_surface_light light) {
+  auto settings = make_desc<cumulet_surface_settings_desc>();
+  settings.light = light;
+  ASSERT_EQ(cumulet_set_surface_settings(viewer, &settings), CUMULET_OK);
+}
+
+void preview(cumulet_viewer* viewer, cumulet_preview preview) {
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 1;
+  sampling.preview = preview;
+  ASSERT_EQ(cumulet_set_sampling(viewer, &sampling), CUMULET_OK);
 }
 
 void change_medium(cumulet_viewer* viewer, double density_scale) {
@@ -154,6 +188,34 @@ TEST(Robust, NewVolumesSizesAndSettingsDoNotPileUpObjects) {
   EXPECT_EQ(host.fake.alive(), alive);
 }
 
+TEST(Robust, SurfacesLeaveNothing) {
+  Host host;
+  const SurfacesRef panes = make_panes();
+  Picture first;
+  for (int life = 0; life < (sanitized ? 4 : 24); ++life) {
+    {
+      const ViewerPtr viewer = host.viewer();
+      preview(viewer.get(), life % 2 == 0 ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF);
+      const VolumeRef volume = make_ball(12);
+      const Picture without = picture_of(viewer.get(), volume.get(), host.target);
+      ASSERT_EQ(cumulet_set_surfaces(viewer.get(), panes.get()), CUMULET_OK);
+      for (const auto light : {CUMULET_SURFACE_LIGHT_NONE, CUMULET_SURFACE_LIGHT_FULL}) {
+        light_surfaces(viewer.get(), light);
+        ASSERT_TRUE(converges(viewer.get(), host.target));
+      }
+      const Picture with = host.target.pixels();
+      ASSERT_NE(with, without);
+      if (life == 0) first = with;
+      ASSERT_EQ(difference(with, first), "") << "life " << life;
+      ASSERT_EQ(cumulet_set_surfaces(viewer.get(), nullptr), CUMULET_OK);
+      ASSERT_TRUE(converges(viewer.get(), host.target));
+      ASSERT_EQ(difference(host.target.pixels(), without), "");
+    }
+    ASSERT_TRUE(host.fake.alive().empty()) << host.fake.alive().begin()->first << " in life " << life;
+  }
+  EXPECT_EQ(host.fake.wrong_deletes(), 0U);
+}
+
 // ---- Out of memory ------------------------------------------------------------------------------------------------
 
 /// A viewer that shows a is made to show b, while each GL allocation in turn fails.
@@ -212,6 +274,53 @@ TEST_F(OutOfMemory, ANewVolumeThatDoesNotFitLeavesTheOldOne) {
     ASSERT_EQ(difference(picture_of(viewer_.get(), a_.get(), host_.target), picture_a_), "");
   }
   EXPECT_GT(refusals, 2);
+}
+
+// Previews and --surface-light none have textures of their own to lose.
+TEST_F(OutOfMemory, SurfacesThatDoNotFitLeaveTheVolume) {
+  const SurfacesRef panes = make_panes();
+  for (const auto mode : {CUMULET_PREVIEW_OFF, CUMULET_PREVIEW_AUTO}) {
+    preview(viewer_.get(), mode);
+    for (const auto light : {CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_NONE}) {
+      light_surfaces(viewer_.get(), light);
+      ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), panes.get()), CUMULET_OK);
+      ASSERT_TRUE(converges(viewer_.get(), host_.target));
+      const Picture with = host_.target.pixels();
+      ASSERT_NE(with, picture_a_);
+      int refusals = 0;
+      for (std::int64_t n = 0;; ++n) {
+        SCOPED_TRACE("light " + std::to_string(light) + ", allocation " + std::to_string(n));
+        ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), nullptr), CUMULET_OK);
+        ASSERT_TRUE(converges(viewer_.get(), host_.target));
+        ASSERT_EQ(difference(host_.target.pixels(), picture_a_), "");
+        ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), panes.get()), CUMULET_OK);
+        const auto failures = failing(n, viewer_.get(), host_.target);
+        if (!refused_) {
+          EXPECT_TRUE(failures.empty());
+          break;
+        }
+        ++refusals;
+        SCOPED_TRACE(host_.fake.refused());
+        ASSERT_FALSE(failures.empty());
+        const bool shader = host_.fake.refused() == "CompileShader" || host_.fake.refused() == "LinkProgram";
+        for (const cumulet_status failure : failures) {
+          ASSERT_EQ(failure, shader ? CUMULET_ERROR_GL : CUMULET_ERROR_OUT_OF_MEMORY);
+        }
+        cumulet_status status = CUMULET_OK;
+        shown(host_, viewer_.get(), &status);
+        ASSERT_EQ(status, CUMULET_OK);
+        // With memory again, a setting brings what was asked for; another size, where only a coarser picture fitted.
+        change_medium(viewer_.get(), 2.0);
+        cumulet_frame_desc smaller = host_.target.frame();
+        smaller.viewport[2] = smaller.viewport[3] = side / 2;
+        ASSERT_EQ(cumulet_render(viewer_.get(), &smaller, nullptr), CUMULET_OK);
+        change_medium(viewer_.get(), 1.0);
+        ASSERT_TRUE(converges(viewer_.get(), host_.target));
+        ASSERT_EQ(difference(shown(host_, viewer_.get()), with), "");
+      }
+      EXPECT_GT(refusals, 2);
+    }
+  }
 }
 
 TEST_F(OutOfMemory, WhileThereIsNoStorageTheOldVolumeStays) {
@@ -333,6 +442,9 @@ class ContextLossAt : public testing::Test {
  protected:
   void SetUp() override {
     ASSERT_EQ(cumulet_set_volume(viewer_.get(), volume_.get()), CUMULET_OK);
+    measure();
+  }
+  void measure() {
     Host host;
     ASSERT_EQ(host.attach(viewer_.get()), CUMULET_OK);
     attach_calls_ = host.fake.calls();
@@ -388,6 +500,15 @@ class ContextLossAt : public testing::Test {
 TEST_F(ContextLossAt, AnyCallWhileRendering) {
   RecordProperty("calls", static_cast<int>(calls_));
   const std::uint64_t step = sanitized ? std::max<std::uint64_t>(1, calls_ / 25) : 1;
+  for (std::uint64_t n = attach_calls_; n < calls_ && !HasFatalFailure(); n += step) lose(n);
+}
+
+TEST_F(ContextLossAt, AnyCallWithSurfaces) {
+  const SurfacesRef panes = make_panes();
+  ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), panes.get()), CUMULET_OK);
+  light_surfaces(viewer_.get(), CUMULET_SURFACE_LIGHT_NONE);
+  measure();
+  const std::uint64_t step = std::max<std::uint64_t>(1, calls_ / (sanitized ? 10 : 100));
   for (std::uint64_t n = attach_calls_; n < calls_ && !HasFatalFailure(); n += step) lose(n);
 }
 

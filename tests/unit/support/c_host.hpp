@@ -33,6 +33,10 @@ using ViewerPtr = std::unique_ptr<cumulet_viewer, DestroyViewer>;
 struct ReleaseVolume {
   void operator()(cumulet_volume* volume) const { cumulet_volume_release(volume); }
 };
+struct ReleaseSurfaces {
+  void operator()(cumulet_surfaces* surfaces) const { cumulet_surfaces_release(surfaces); }
+};
+using SurfacesRef = std::unique_ptr<cumulet_surfaces, ReleaseSurfaces>;
 using VolumeRef = std::unique_ptr<cumulet_volume, ReleaseVolume>;
 struct ReleaseCamera {
   void operator()(cumulet_camera* camera) const { cumulet_camera_release(camera); }
