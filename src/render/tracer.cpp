@@ -166,7 +166,7 @@ void Tracer::allocate(Picture& picture, glm::uvec2 size) const {
   picture.size_ = size;
 }
 
-void Tracer::lay_beneath(Picture& picture, const Surfaces& surfaces, glm::uvec2 size, unsigned layers) {
+void Tracer::draw_layers(Picture& picture, const Surfaces& surfaces, const PictureSettings& settings) {
   // The surface pass leaves any state it likes; what comes after it in the frame counts on the known one.
   struct Known {
     const gl::Functions& gl;
@@ -178,11 +178,12 @@ void Tracer::lay_beneath(Picture& picture, const Surfaces& surfaces, glm::uvec2 
   const Known known(*gl_);
   picture.layered_ = Layered::no;
   const auto start = Clock::now();
-  surfaces.raster->draw(surfaces.view, surfaces.lighting, size, layers, picture.layers_);
+  const glm::uvec2 size = settings.layer_size;
+  surfaces.raster->draw(surfaces.view, surfaces.lighting, size, settings.layers, picture.layers_);
   gl_->Finish();
-  const double pixels = double(size.x) * size.y * layers;
+  const double pixels = double(size.x) * size.y * settings.layers;
   raster_rate_ += 0.3 * (pixels / std::max(1e-3, milliseconds_since(start)) - raster_rate_);
-  picture.layered_ = Layered::beneath;
+  picture.layered_ = settings.layered;
 }
 
 void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters,
@@ -205,8 +206,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   picture.traced_ = traced ? (surfaces.scene->emitters() ? 2 : 1) : 0;
   picture.layered_ = Layered::no;
   if (shaded && settings.layered != Layered::no && surfaces.raster != nullptr) {
-    lay_beneath(picture, surfaces, settings.layer_size, settings.layers);
-    picture.layered_ = settings.layered;
+    draw_layers(picture, surfaces, settings);
   } else {
     picture.layers_ = {};
   }
@@ -259,6 +259,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
 
 void Tracer::clear(Picture& picture) {
   allocate(picture, glm::uvec2(1));
+  picture.layered_ = Layered::no;
+  picture.layers_ = {};
   picture.parameters_ = {};
   picture.view_ = View::shaded;
   picture.complete_ = picture.done_ = true;

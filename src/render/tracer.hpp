@@ -164,8 +164,8 @@ class Tracer {
   float pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
   /// A picture of one transparent pixel: what there is before the first.
   void clear(Picture& picture);
-  /// Draws the surface pass beneath such a picture.
-  void lay_beneath(Picture& picture, const Surfaces& surfaces, glm::uvec2 size, unsigned layers);
+  /// Draws the surface pass for a picture; begin does, and who shows one of clear's with the surfaces beneath.
+  void draw_layers(Picture& picture, const Surfaces& surfaces, const PictureSettings& settings);
 
   /// width * height * 4 floats: mean radiance without background, and alpha; (0,0) top left.
   void read(const Picture& picture, float* rgba) const;

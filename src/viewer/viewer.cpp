@@ -647,12 +647,13 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
   if (shown != nullptr) result.size = shown->size();
   if (frame.target == Target::none || frame_size_.x == 0 || frame_size_.y == 0) return;
   if (shown == nullptr) {
-    if (g.empty.sum() == 0) g.progressive.tracer().clear(g.empty);
+    const bool gone = g.empty.layered() != render::Layered::no && !g.raster;
+    if (g.empty.sum() == 0 || gone) g.progressive.tracer().clear(g.empty);
     shown = &g.empty;
     // The surfaces need not wait for the volume.
     if (g.raster && view_ && frame.budget_ms >= 0.0) {
-      const auto quick = render::Progressive::quick_layers(g.progressive.tracer(), frame_size_, frame.budget_ms);
-      g.progressive.tracer().lay_beneath(g.empty, surfaces(), quick.layer_size, quick.layers);
+      render::Tracer& tracer = g.progressive.tracer();
+      tracer.draw_layers(g.empty, surfaces(), render::Progressive::quick_layers(tracer, frame_size_, frame.budget_ms));
     }
   }
   const bool legend = shown->view() != render::View::shaded;

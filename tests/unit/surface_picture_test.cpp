@@ -359,6 +359,33 @@ TEST_P(SurfacePicture, AovsThatAreNotThereAreRefusedInALine) {
   EXPECT_NE(message(Aov::normal, 7).find("6912 floats"), std::string::npos);
 }
 
+TEST_P(SurfacePicture, SurfacesAreThereBeforeTheVolume) {
+  viewer_->set_volume(test::noise_volume({160, 160, 160}, ivec3(0), 3));
+  show(scene(), SurfaceLight::full);
+  viewer_->viewer().set_display({0.0F, render::ToneMap::clip, true});
+  auto functions = gl::load_functions(headless::Context::get_proc, context_.get());
+  viewer::Frame frame;
+  frame.target = viewer::Target::texture;
+  frame.format = GL_RGBA32F;
+  frame.encoding = render::ColourEncoding::hdr;
+  frame.size = {side, side};
+  frame.viewport = {0, 0, side, side};
+  frame.flip_y = true;
+  frame.budget_ms = 0.5;
+  const auto red = [&] {
+    const viewer::FrameResult result = viewer_->viewer().render(frame);
+    std::vector<glm::vec4> pixels(std::size_t{side} * side);
+    functions->GetTextureImage(result.texture, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels.size() * 16),
+                               pixels.data());
+    return pixels[std::size_t{side} * 12 + 2].x;
+  };
+  EXPECT_NEAR(red(), 2.0F, 0.01F);
+  // And gone with them.
+  viewer_->viewer().set_surfaces(nullptr);
+  viewer_->set_volume(viewer::VolumePtr());
+  EXPECT_EQ(red(), 0.0F);
+}
+
 // While the volume is coarse, surfaces are as fine as the frame, in front of it and behind; read back, they are there.
 TEST_P(SurfacePicture, PreviewsShowSurfacesAtFullResolution) {
   show(scene(), SurfaceLight::full);
