@@ -145,7 +145,10 @@ void Session::follow(Model& model, bool held) {
 
 void Session::follow_surfaces(Model& model) {
   SceneOptions& scene = model.scene;
-  if (!same(known_->surface, scene.surface)) check(model, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
+  if (!same(known_->surface, scene.surface)) {
+    check(model, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
+    if (known_->surface.animation != scene.surface.animation) read_surfaces(model);
+  }
   known_->surface = scene.surface;
   if (known_->surfaces == scene.surfaces) return;
   known_->surfaces = scene.surfaces;
@@ -173,8 +176,15 @@ void Session::finish_surfaces(Model& model) {
   }
   shown_surfaces_ = scene.surfaces;
   model.preferences.remember(shown_surfaces_);
+  read_surfaces(model);
+  if (scene.surface_camera >= 0)
+    check(model, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
+}
+
+void Session::read_surfaces(Model& model) {
   cumulet_surfaces* shown = nullptr;
   check(model, cumulet_get_surfaces(viewer_.get(), &shown));
+  if (shown == nullptr) return;
   cumulet_surfaces_info& info = model.status.surfaces;
   info = {};
   info.struct_size = sizeof info;
@@ -182,11 +192,9 @@ void Session::finish_surfaces(Model& model) {
   cumulet_animation_info& animation = model.status.animation;
   animation = {};
   animation.struct_size = sizeof animation;
-  if (scene.surface.animation < info.animations)
-    check(model, cumulet_surfaces_get_animation(shown, scene.surface.animation, &animation));
+  const std::uint32_t number = model.scene.surface.animation;
+  if (number < info.animations) check(model, cumulet_surfaces_get_animation(shown, number, &animation));
   cumulet_surfaces_release(shown);
-  if (scene.surface_camera >= 0)
-    check(model, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
 }
 
 void Session::set_camera(Model& model) {

@@ -73,6 +73,8 @@ class Session {
   void follow_volume(Model& model);
   void follow_surfaces(Model& model);
   void finish_surfaces(Model& model);
+  // What the library says of those it shows.
+  void read_surfaces(Model& model);
   void finish_load(Model& model);
   void set_camera(Model& model);
 

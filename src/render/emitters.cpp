@@ -62,7 +62,8 @@ std::uint32_t wrapped(float at, std::uint32_t size, Wrap wrap) {
   float turns = at;
   if (wrap == Wrap::repeat) turns = at - std::floor(at);
   if (wrap == Wrap::mirrored) turns = 1.0F - std::abs(1.0F - (at - 2.0F * std::floor(0.5F * at)));
-  const float texel = std::clamp(turns, 0.0F, 1.0F) * static_cast<float>(size);
+  if (!(turns > 0.0F)) return 0;  // nor where a transform has led nowhere
+  const float texel = std::min(turns, 1.0F) * static_cast<float>(size);
   return std::min(size - 1U, static_cast<std::uint32_t>(texel));
 }
 

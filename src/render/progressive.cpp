@@ -73,7 +73,7 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
   } else if (surfaces.raster != nullptr && !surfaces.traced) {
     settings.layered = Layered::within;
     settings.layer_size = size;
-    const double layer_bytes = 12.0 * size.x * size.y;
+    const double layer_bytes = (surfaces.raster->blends() ? 24.0 : 12.0) * size.x * size.y;
     settings.layers = static_cast<unsigned>(std::clamp(most_layer_bytes / layer_bytes, 1.0, 8.0));
   }
   settings.view = wish_.view;
@@ -105,6 +105,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
   working_ = &picture;
   working_generation_ = wish_.generation;
   traced_ = surfaces.scene != nullptr && surfaces.traced;
+  scene_ = traced_ ? surfaces.scene->scene() : nullptr;
   divisor_ = divisor;
   stale_ = false;
   answer_seconds_ = 0.0;
@@ -123,8 +124,11 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
     failed_ = false;
     if (resized || wish.generation != wish_.generation) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
+    // So do paths on another scene's triangles.
     const bool traced = surfaces.scene != nullptr && surfaces.traced;
-    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview || traced != traced_) {
+    const surface::Scene* scene = traced ? surfaces.scene->scene() : nullptr;
+    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview || traced != traced_ ||
+        scene != scene_) {
       working_ = nullptr;
     }
   } else if (working_ != nullptr && divisor_ == finest_) {

@@ -41,6 +41,10 @@ class Progressive {
   [[nodiscard]] const Picture* shown() const { return shown_; }
   /// What is to be read back: without preview the picture under way.
   [[nodiscard]] Picture* newest() { return wish_.preview || working_ == nullptr ? shown_ : working_; }
+  /// Whether that is of the data of this generation.
+  [[nodiscard]] bool newest_is_of(std::uint64_t generation) const {
+    return (wish_.preview || working_ == nullptr ? shown_generation_ : working_generation_) == generation;
+  }
   [[nodiscard]] bool converged() const;
   /// Whether advance has anything left to do.
   [[nodiscard]] bool more() const;
@@ -69,7 +73,8 @@ class Progressive {
   std::uint32_t finest_ = 1;   // finer ones do not fit the driver's memory
   PictureWish wish_;
   bool wished_ = false;
-  bool traced_ = true;      // paths of working_ meet triangles
+  bool traced_ = true;  // paths of working_ meet triangles, of this scene
+  const surface::Scene* scene_ = nullptr;
   bool stale_ = false;      // working_ is of an older wish
   bool answering_ = false;  // working_ is the first picture after a change
   bool failed_ = false;     // until the wish changes

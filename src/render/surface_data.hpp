@@ -67,6 +67,8 @@ class SurfaceData {
   /// The chance that a look for light, but for the sky's, goes to an emissive triangle: their share of the flux of
   /// lamps and sun as well, but 0.2 to 0.8 where there are others. sun: luminance of its irradiance.
   [[nodiscard]] double emitter_share(double sun) const;
+  /// What it is of, to tell one from another.
+  [[nodiscard]] const surface::Scene* scene() const { return scene_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:

@@ -72,6 +72,8 @@ class SurfaceRaster {
   void draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
             SurfaceLayers& into);
 
+  /// Whether the scene has BLEND triangles, which have layers of their own.
+  [[nodiscard]] bool blends() const { return !assets_.blended.empty(); }
   /// GL memory of the scene, without layers.
   [[nodiscard]] std::uint64_t bytes() const { return assets_.bytes; }
 

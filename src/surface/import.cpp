@@ -150,9 +150,10 @@ class Assembler {
 
 }  // namespace detail
 
-ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& name,
+ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& label,
                      const std::optional<std::filesystem::path>& folder, const Log& log, Progress* progress,
                      const GltfLimits& limits) {
+  const std::string name = cumulet::one_line(label, 4096);  // as long as paths are
   try {
     detail::Budget budget(limits);
     const detail::GltfFile file = detail::parse_gltf(std::move(bytes), folder, log, name, budget, progress);

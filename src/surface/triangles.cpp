@@ -36,6 +36,7 @@ void check_mesh(const TriangleMesh& mesh) {
   if (!std::ranges::all_of(mesh.colors, [](float c) { return c >= 0.0F && c <= 1.0F; })) {
     malformed("a color is not from 0 to 1");
   }
+  if (mesh.indices.size() > std::numeric_limits<std::uint32_t>::max()) malformed("has more than 2^32 indices");
   if (mesh.indices.empty() ? count % 3 != 0 : mesh.indices.size() % 3 != 0) {
     malformed(mesh.indices.empty() ? "without indices, its vertices are not 3 a triangle"
                                    : "indices are not 3 a triangle");

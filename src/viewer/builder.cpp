@@ -42,6 +42,14 @@ void Builder::build(VolumePtr volume, const BuildSettings& settings) {
       {});
 }
 
+void Builder::cancel() {
+  {
+    const std::scoped_lock lock(mutex_);
+    load_.reset();  // what it stops soon takes no other settings
+  }
+  worker_.cancel();
+}
+
 bool Builder::configure_load(const std::optional<BuildSettings>& settings) {
   const std::scoped_lock lock(mutex_);
   const auto load = load_.lock();

@@ -55,7 +55,7 @@ class Builder {
   void build(VolumePtr volume, const BuildSettings& settings);
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
-  void cancel() { worker_.cancel(); }
+  void cancel();
 
   /// The newest volume that was read, once.
   std::optional<VolumePtr> take_loaded();

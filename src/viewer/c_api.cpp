@@ -298,6 +298,7 @@ cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampli
     const cumulet_sampling_desc d = read_desc(desc, "cumulet_sampling_desc");
     require(number(d.view) <= CUMULET_VIEW_WIREFRAME, "cumulet_sampling_desc.view is unknown");
     require(number(d.preview) <= CUMULET_PREVIEW_OFF, "cumulet_sampling_desc.preview is unknown");
+    require(d.volume_alone == 0 || d.volume_alone == 1, "cumulet_sampling_desc.volume_alone is neither 0 nor 1");
     v.set_sampling({d.samples == 0 ? 256 : d.samples, d.seed, static_cast<render::View>(d.view),
                     d.preview == CUMULET_PREVIEW_AUTO, d.volume_alone != 0});
   });

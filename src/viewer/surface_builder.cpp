@@ -30,6 +30,14 @@ void SurfaceBuilder::read(const std::string& path, Load& load, Progress& progres
   }
 }
 
+void SurfaceBuilder::cancel() {
+  {
+    const std::scoped_lock lock(mutex_);
+    load_.reset();  // what it stops soon takes no other settings
+  }
+  worker_.cancel();
+}
+
 bool SurfaceBuilder::configure_load(SurfaceMoment moment) {
   const std::scoped_lock lock(mutex_);
   const auto load = load_.lock();

@@ -33,7 +33,7 @@ class SurfaceBuilder {
   bool configure_load(SurfaceMoment moment);
   /// Poses a scene, after the pose under way: a moment that takes long is shown before the next.
   void pose(SurfaceAssetPtr asset, SurfaceMoment moment);
-  void cancel() { worker_.cancel(); }
+  void cancel();
   /// The newest result, once.
   std::optional<PosedSurfaces> take();
   /// Whether there is work under way, or a result that nobody took.

@@ -429,9 +429,8 @@ core::CmParameters Viewer::parameters() const {
   p.from_cube_x = glm::vec4(glm::vec3(from_cube[0]), static_cast<float>(from_cube[3].x));
   p.from_cube_y = glm::vec4(glm::vec3(from_cube[1]), static_cast<float>(from_cube[3].y));
   p.from_cube_z = glm::vec4(glm::vec3(from_cube[2]), static_cast<float>(from_cube[3].z));
-  p.lights.z = surface_settings_.light == SurfaceLight::full   ? 1U
-               : surface_settings_.light == SurfaceLight::none ? 2U
-                                                               : 0U;
+  const bool traced = surfaces().traced;
+  p.lights.z = surface_settings_.light == SurfaceLight::full ? 1U : (traced ? 0U : 2U);
   p.sun_world = direction(sun);
   p.sun_cube = direction(linear * sun);
   p.sky_radiance = glm::vec4(light_.sky_radiance, 0.0F);
@@ -441,8 +440,7 @@ core::CmParameters Viewer::parameters() const {
   const double to_emitters = gl_->surfaces ? gl_->surfaces->emitter_share(sun_power) : 0.0;
   p.sun_irradiance = glm::vec4(light_.sun_irradiance, static_cast<float>(to_emitters));
   const auto sky_power = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(light_.sky_radiance));
-  const bool local = gl_->surfaces && surface_settings_.light != SurfaceLight::none &&
-                     (gl_->surfaces->lamps() || gl_->surfaces->emitters());
+  const bool local = gl_->surfaces && traced && (gl_->surfaces->lamps() || gl_->surfaces->emitters());
   const float to_sky = local && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
                        : sun_power > 0.0F           ? 0.5F * sky_power / (sky_power + sun_power)
                                                     : (sky_power > 0.0F ? 1.0F : 0.0F);
@@ -507,7 +505,7 @@ void Viewer::upload_raster(Gl& g) {
       g.raster->set_scene(surface_source_->scene);
     }
     g.raster->set_pose(surface_source_->pose);
-  } catch (const Error&) {
+  } catch (...) {
     g.raster.reset();  // rays meet the triangles then
     throw;
   }
@@ -586,7 +584,7 @@ render::Surfaces Viewer::surfaces() const {
   surfaces.scene = gl_->surfaces.get();
   surfaces.raster = gl_->raster.get();
   surfaces.traced = surface_settings_.light != SurfaceLight::none || surfaces.raster == nullptr;
-  surfaces.view = {view_->eye, view_->forward, view_->right, view_->up, view_->orthographic};
+  if (view_) surfaces.view = {view_->eye, view_->forward, view_->right, view_->up, view_->orthographic};
   surfaces.lighting = {glm::vec3(to_sun(light_)), light_.sun_irradiance, light_.sky_radiance};
   return surfaces;
 }
@@ -641,20 +639,26 @@ void Viewer::make_target_textures(Gl& g, const Frame& frame) const {
   g.failed_size = glm::uvec2(0U);
 }
 
+// The surfaces need not wait for the volume.
+void Viewer::draw_surfaces_alone(const Frame& frame) {
+  Gl& g = gl();
+  if (g.progressive.shown() != nullptr || frame.budget_ms < 0.0) return;
+  render::Tracer& tracer = g.progressive.tracer();
+  if (g.empty.sum() == 0 || g.empty.layered() != render::Layered::no) tracer.clear(g.empty);
+  if (!g.raster || !view_ || g.alone_failed == settings_revision_) return;
+  g.alone_failed = settings_revision_;  // unless it succeeds
+  tracer.draw_layers(g.empty, surfaces(), render::Progressive::quick_layers(tracer, frame_size_, frame.budget_ms));
+  g.alone_failed = 0;
+}
+
 void Viewer::draw(const Frame& frame, FrameResult& result) {
   Gl& g = gl();
   const render::Picture* shown = g.progressive.shown();
   if (shown != nullptr) result.size = shown->size();
   if (frame.target == Target::none || frame_size_.x == 0 || frame_size_.y == 0) return;
   if (shown == nullptr) {
-    const bool gone = g.empty.layered() != render::Layered::no && !g.raster;
-    if (g.empty.sum() == 0 || gone) g.progressive.tracer().clear(g.empty);
+    if (g.empty.sum() == 0) g.progressive.tracer().clear(g.empty);
     shown = &g.empty;
-    // The surfaces need not wait for the volume.
-    if (g.raster && view_ && frame.budget_ms >= 0.0) {
-      render::Tracer& tracer = g.progressive.tracer();
-      tracer.draw_layers(g.empty, surfaces(), render::Progressive::quick_layers(tracer, frame_size_, frame.budget_ms));
-    }
   }
   const bool legend = shown->view() != render::View::shaded;
   render::Display display;
@@ -719,6 +723,7 @@ FrameResult Viewer::render(const Frame& frame) {
     const render::Deadline deadline = deadline_after(frame.budget_ms);
     attempt([&] { prepare(frame, deadline); });
     if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
+    attempt([&] { draw_surfaces_alone(frame); });
     attempt([&] { draw(frame, result); });
     result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
     const auto failed = [](const Worker::Status& status) {
@@ -813,7 +818,10 @@ void Viewer::read_aov(Aov aov, float* values, std::size_t count) {
       }
       g.progressive.tracer().read_volume(picture, values);
     } else {
-      if (!g.data) throw Error(ErrorCode::invalid_argument, "there is no volume and no surface to know anything of");
+      if (!g.data || !g.progressive.newest_is_of(generation_)) {
+        throw Error(ErrorCode::invalid_argument,
+                    "the picture is of what was shown before: render until there is a newer");
+      }
       g.progressive.tracer().read_fact(picture, *g.data, surfaces(), fact, values);
     }
   });

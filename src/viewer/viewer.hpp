@@ -223,7 +223,8 @@ class Viewer {
     SurfacePtr surfaces_source;  // what surfaces is of, or what failed to be uploaded
     std::uint64_t surfaces_revision = 0;
     render::Picture empty;
-    gl::Object colour;  // the texture target
+    std::uint64_t alone_failed = 0;  // settings at which the surfaces beneath it could not be drawn
+    gl::Object colour;               // the texture target
     gl::Object depth;
     glm::uvec2 texture_size{0U};
     GLenum texture_format = 0;
@@ -247,6 +248,7 @@ class Viewer {
   [[nodiscard]] core::CmParameters parameters() const;
   void prepare(const Frame& frame, render::Deadline deadline);
   void trace(const Frame& frame, render::Deadline deadline);
+  void draw_surfaces_alone(const Frame& frame);
   void draw(const Frame& frame, FrameResult& result);
   void make_target_textures(Gl& g, const Frame& frame) const;
   void upload(Gl& g, render::Deadline deadline);

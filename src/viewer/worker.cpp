@@ -36,10 +36,10 @@ void Worker::take(Job job, bool replaces) {
   std::optional<Job> old;  // ends after the lock: what it holds may be large
   {
     const std::scoped_lock lock(mutex_);
+    if (!thread_.joinable()) thread_ = std::thread([this] { run(); });  // may throw: before anything has changed
     if (replaces && current_) current_->cancel();
     old = std::exchange(next_, std::move(job));
     failure_.reset();
-    if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
   }
   changed_.notify_all();
 }

@@ -482,6 +482,55 @@ TEST_F(Contract, Contract12FlippedAndInARectangle) {
   EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT) << "not inside the target";
 }
 
+TEST_F(Contract, AovsAreReadThroughTheAbi) {
+  show(v_, CUMULET_BACKGROUND_TRANSPARENT);
+  std::vector<float> values(std::size_t{4} * side * side);
+  EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, values.data(), values.size()), CUMULET_ERROR_INVALID_ARGUMENT)
+      << "nothing was rendered";
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 4;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  sampling.volume_alone = 2;
+  EXPECT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_ERROR_INVALID_ARGUMENT);
+  sampling.volume_alone = 1;
+  ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
+  picture_of(v_, volume_.get(), target_);
+  for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_ALBEDO; ++aov) {
+    EXPECT_EQ(cumulet_read_aov(v_, static_cast<cumulet_aov>(aov), values.data(), values.size()), CUMULET_OK) << aov;
+  }
+  EXPECT_EQ(cumulet_read_aov(v_, static_cast<cumulet_aov>(7), values.data(), values.size()),
+            CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, nullptr, values.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, values.data(), 3), CUMULET_ERROR_INVALID_ARGUMENT);
+  // Without surfaces the volume alone is the picture; what does not pass is its alpha.
+  std::vector<float> beauty(values.size());
+  std::vector<float> passes(values.size() / 4);
+  ASSERT_EQ(cumulet_read_aov(v_, CUMULET_AOV_BEAUTY, beauty.data(), beauty.size()), CUMULET_OK);
+  ASSERT_EQ(cumulet_read_aov(v_, CUMULET_AOV_VOLUME, values.data(), values.size()), CUMULET_OK);
+  EXPECT_EQ(beauty, values);
+  ASSERT_EQ(cumulet_read_aov(v_, CUMULET_AOV_TRANSMITTANCE, passes.data(), passes.size()), CUMULET_OK);
+  double difference = 0.0;
+  for (std::size_t i = 0; i < passes.size(); ++i) difference += (1.0 - passes[i] - values[4 * i + 3]) / (side * side);
+  EXPECT_NEAR(difference, 0.0, 0.02);
+  // A frame of no size forgets the view, not the picture.
+  auto frame = target_.frame();
+  frame.width = frame.height = 0;
+  ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+  EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_SURFACE_DEPTH, passes.data(), passes.size()), CUMULET_OK);
+  // A picture of another march's data is not looked at with this one's.
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.march = CUMULET_MARCH_DENSE;
+  ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK);
+  frame.budget_ms = 1e3;
+  ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);  // uploads, traces nothing
+  EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_TRANSMITTANCE, passes.data(), passes.size()),
+            CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(cumulet_last_error(v_)).find("render"), std::string::npos);
+  EXPECT_EQ(cumulet_detach(v_), CUMULET_OK);
+  EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_TRANSMITTANCE, passes.data(), passes.size()), CUMULET_ERROR_DETACHED);
+}
+
 // Conventions, multisampling and real geometry: tests/embed/reversed_z.cpp.
 TEST_F(Contract, Contract13HostDepthHidesWhatIsBehindIt) {
   show(v_, CUMULET_BACKGROUND_TRANSPARENT);

@@ -752,7 +752,7 @@ typedef enum cumulet_aov {
                              and our surfaces */
   CUMULET_AOV_VOLUME = 1, /* 4 floats: the same of paths that met the volume first. Needs volume_alone of the sampling.
                              Beauty less this is the surfaces as seen through the volume */
-  CUMULET_AOV_TRANSMITTANCE = 2, /* 1 float: of the volume, up to the nearest surface or right through; no noise */
+  CUMULET_AOV_TRANSMITTANCE = 2, /* 1 float: of the volume, up to the nearest surface or right through */
   CUMULET_AOV_SURFACE_DEPTH = 3, /* 1 float: z of the nearest surface, ours or the host's, at the pixel's centre;
                                     infinite where there is none */
   CUMULET_AOV_VOLUME_DEPTH = 4,  /* 1 float: z where the volume before that reaches half opacity, infinite where it does
@@ -764,8 +764,10 @@ typedef enum cumulet_aov {
 
 /*
  * [GL] One of these, of the picture so far: width x height (of the result) pixels, first pixel top left. count is the
- * number of floats at values. All but the first two are found when first asked for, by 16 rays a pixel; asking again
- * costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views.
+ * number of floats at values. All but the first two are found when first asked for, by 16 rays a pixel (the depths by
+ * the one through its middle), without noise but where surfaces cover or transmit a part of the light, which is a
+ * chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views, and for a picture that is
+ * still of the volume before.
  */
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
