@@ -19,9 +19,9 @@ struct GltfLimits {
   std::uint32_t image_side = 16384;                  ///< pixels
 };
 
-/// As import_gltf(path), of the bytes of a .gltf or .glb. `name` stands for the path in errors and log lines; files
+/// As import_gltf(path), of the bytes of a .gltf or .glb. `label` stands for the path in errors and log lines; files
 /// that it refers to are looked for relative to `folder`; without one they are refused.
-ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& name,
+ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& label,
                      const std::optional<std::filesystem::path>& folder, const Log& log, Progress* progress = nullptr,
                      const GltfLimits& limits = {});
 

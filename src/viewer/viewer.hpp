@@ -257,7 +257,7 @@ class Viewer {
   VolumePtr empty_volume();
   [[nodiscard]] render::Surfaces surfaces() const;
   render::Picture& readable();
-  void read_means(Gl& g, const render::Picture& picture, float* rgba);
+  static void read_means(Gl& g, const render::Picture& picture, float* rgba);
   void upload_raster(Gl& g);
 
   Log log_;
