@@ -19,6 +19,11 @@ constexpr double most_layer_bytes = 256e6;
 constexpr double answer_frames = 2.0;
 using Clock = std::chrono::steady_clock;
 
+const surface::Scene* scene_met(const Surfaces& surfaces) {
+  const SurfaceData* met = surfaces.met();
+  return met != nullptr ? met->scene() : nullptr;
+}
+
 }  // namespace
 
 bool Progressive::same(const PictureWish& wish) const {
@@ -104,8 +109,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
   }
   working_ = &picture;
   working_generation_ = wish_.generation;
-  traced_ = surfaces.scene != nullptr && surfaces.traced;
-  scene_ = traced_ ? surfaces.scene->scene() : nullptr;
+  scene_ = scene_met(surfaces);
   divisor_ = divisor;
   stale_ = false;
   answer_seconds_ = 0.0;
@@ -125,10 +129,8 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
     if (resized || wish.generation != wish_.generation) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
     // So do paths on another scene's triangles.
-    const bool traced = surfaces.scene != nullptr && surfaces.traced;
-    const surface::Scene* scene = traced ? surfaces.scene->scene() : nullptr;
-    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview || traced != traced_ ||
-        scene != scene_) {
+    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview ||
+        scene_met(surfaces) != scene_) {
       working_ = nullptr;
     }
   } else if (working_ != nullptr && divisor_ == finest_) {

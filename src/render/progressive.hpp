@@ -40,10 +40,10 @@ class Progressive {
   /// The newest whole picture; null before the first.
   [[nodiscard]] const Picture* shown() const { return shown_; }
   /// What is to be read back: without preview the picture under way.
-  [[nodiscard]] Picture* newest() { return wish_.preview || working_ == nullptr ? shown_ : working_; }
+  [[nodiscard]] Picture* newest() { return newest_is_shown() ? shown_ : working_; }
   /// Whether that is of the data of this generation.
   [[nodiscard]] bool newest_is_of(std::uint64_t generation) const {
-    return (wish_.preview || working_ == nullptr ? shown_generation_ : working_generation_) == generation;
+    return (newest_is_shown() ? shown_generation_ : working_generation_) == generation;
   }
   [[nodiscard]] bool converged() const;
   /// Whether advance has anything left to do.
@@ -56,6 +56,7 @@ class Progressive {
   [[nodiscard]] double trace_seconds() const { return trace_seconds_; }
 
  private:
+  [[nodiscard]] bool newest_is_shown() const { return wish_.preview || working_ == nullptr; }
   [[nodiscard]] bool same(const PictureWish& wish) const;
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
   [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const;
@@ -73,11 +74,10 @@ class Progressive {
   std::uint32_t finest_ = 1;   // finer ones do not fit the driver's memory
   PictureWish wish_;
   bool wished_ = false;
-  bool traced_ = true;  // paths of working_ meet triangles, of this scene
-  const surface::Scene* scene_ = nullptr;
-  bool stale_ = false;      // working_ is of an older wish
-  bool answering_ = false;  // working_ is the first picture after a change
-  bool failed_ = false;     // until the wish changes
+  const surface::Scene* scene_ = nullptr;  // whose triangles paths of working_ meet
+  bool stale_ = false;                     // working_ is of an older wish
+  bool answering_ = false;                 // working_ is the first picture after a change
+  bool failed_ = false;                    // until the wish changes
   double trace_seconds_ = 0.0;
   double answer_seconds_ = 0.0;  // that working_ took until it was complete
   double answer_rate_ = 100.0;   // pixels a millisecond, until complete

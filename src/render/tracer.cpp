@@ -202,8 +202,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   if (!picture.sum_ || size != picture.size_) allocate(picture, size);
   picture.complete_ = false;
   picture.facts_.reset();
-  const bool traced = shaded && surfaces.scene != nullptr && surfaces.traced;
-  picture.traced_ = traced ? (surfaces.scene->emitters() ? 2 : 1) : 0;
+  const SurfaceData* met = shaded ? surfaces.met() : nullptr;
+  picture.traced_ = met == nullptr ? 0 : (met->emitters() ? 2 : 1);
   picture.layered_ = Layered::no;
   if (shaded && settings.layered != Layered::no && surfaces.raster != nullptr) {
     draw_layers(picture, surfaces, settings);

@@ -35,6 +35,9 @@ struct Surfaces {
   SurfaceRaster* raster = nullptr;  // the surface pass, and what it is drawn with
   SurfaceView view;
   SurfaceLighting lighting;
+
+  /// The scene whose triangles paths meet; null: they meet none.
+  [[nodiscard]] const SurfaceData* met() const { return traced ? scene : nullptr; }
 };
 
 /// What camera rays of a picture do with the surface pass.

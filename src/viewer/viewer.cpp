@@ -639,13 +639,18 @@ void Viewer::make_target_textures(Gl& g, const Frame& frame) const {
   g.failed_size = glm::uvec2(0U);
 }
 
+bool Viewer::draws(const Frame& frame) const {
+  return frame.target != Target::none && frame_size_.x > 0 && frame_size_.y > 0;
+}
+
 // The surfaces need not wait for the volume.
 void Viewer::draw_surfaces_alone(const Frame& frame) {
   Gl& g = gl();
-  if (g.progressive.shown() != nullptr || frame.budget_ms < 0.0) return;
+  if (g.progressive.shown() != nullptr || !draws(frame)) return;
   render::Tracer& tracer = g.progressive.tracer();
-  if (g.empty.sum() == 0 || g.empty.layered() != render::Layered::no) tracer.clear(g.empty);
-  if (!g.raster || !view_ || g.alone_failed == settings_revision_) return;
+  const bool able = g.raster && view_ && g.alone_failed != settings_revision_;
+  if (g.empty.sum() == 0 || (!able && g.empty.layered() != render::Layered::no)) tracer.clear(g.empty);
+  if (!able || frame.budget_ms < 0.0) return;
   g.alone_failed = settings_revision_;  // unless it succeeds
   tracer.draw_layers(g.empty, surfaces(), render::Progressive::quick_layers(tracer, frame_size_, frame.budget_ms));
   g.alone_failed = 0;
@@ -655,11 +660,8 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
   Gl& g = gl();
   const render::Picture* shown = g.progressive.shown();
   if (shown != nullptr) result.size = shown->size();
-  if (frame.target == Target::none || frame_size_.x == 0 || frame_size_.y == 0) return;
-  if (shown == nullptr) {
-    if (g.empty.sum() == 0) g.progressive.tracer().clear(g.empty);
-    shown = &g.empty;
-  }
+  if (!draws(frame)) return;
+  if (shown == nullptr) shown = &g.empty;
   const bool legend = shown->view() != render::View::shaded;
   render::Display display;
   display.exposure_stops = display_.exposure_stops;

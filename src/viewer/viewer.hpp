@@ -248,6 +248,8 @@ class Viewer {
   [[nodiscard]] core::CmParameters parameters() const;
   void prepare(const Frame& frame, render::Deadline deadline);
   void trace(const Frame& frame, render::Deadline deadline);
+  // Whether there is a target of any size.
+  [[nodiscard]] bool draws(const Frame& frame) const;
   void draw_surfaces_alone(const Frame& frame);
   void draw(const Frame& frame, FrameResult& result);
   void make_target_textures(Gl& g, const Frame& frame) const;
