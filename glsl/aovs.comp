@@ -81,10 +81,7 @@ void main() {
         float part = min(1.0, (range.y - t) / max(span, 1e-30));
         float depth = (e_0 + 0.5 * (e_1 - e_0) * part) * part * span;
         if (i == 0 && volume_z == CM_INFINITE && used + depth >= 0.69314718) {
-          // As cm_march inverts it.
-          float left = 0.69314718 - used;
-          float root = sqrt(max(0.0, e_0 * e_0 + 2.0 * (e_1 - e_0) / span * left));
-          volume_z = (t + min(span, 2.0 * left / (e_0 + root))) / t_per_z;
+          volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
         }
         used += depth;
         t = t_1;

@@ -191,10 +191,7 @@ void main() {
       float span = t_1 - t;
       float depth = 0.5 * (e_0 + e_1) * span;
       if (view == CM_VIEW_DEPTH && used + depth >= 0.69314718) {
-        // As cm_march inverts it.
-        float left = 0.69314718 - used;
-        float root = sqrt(max(0.0, e_0 * e_0 + 2.0 * (e_1 - e_0) / span * left));
-        half_t = t + min(span, 2.0 * left / (e_0 + root));
+        half_t = t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used);
         if (half_t >= range.y) half_t = 0.0;
         break;
       }

@@ -103,6 +103,13 @@ CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3)
   return length(v);
 }
 
+// How far into a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends, this optical depth is used up:
+// e_0 s + (e_1 - e_0) s^2 / (2 span) = depth, in the form that loses nothing.
+CM_FN float cm_depth_distance(float e_0, float e_1, float span, float depth) {
+  float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * depth));
+  return min(span, 2.0f * depth / (e_0 + root));
+}
+
 // Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
 CM_FN uint cm_march(CM_INOUT(CmPath) p) {
   vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / p.d;
@@ -140,9 +147,7 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
   }
   // After the loop, not in it: software drivers run both sides of every branch, each step.
   if (event == CM_EVENT_COLLISION) {
-    // e_0 s + (e_1 - e_0) s^2 / (2 span) = depth, in the form that loses nothing.
-    float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * p.depth));
-    p.t += min(span, 2.0f * p.depth / (e_0 + root));
+    p.t += cm_depth_distance(e_0, e_1, span, p.depth);
     p.depth = -1.0f;
     if (p.t >= p.t_end) event = CM_EVENT_ESCAPE;  // behind a surface
   }

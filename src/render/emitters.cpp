@@ -10,6 +10,8 @@
 #include <limits>
 #include <numbers>
 
+#include "render/luminance.hpp"
+
 namespace cumulet::render {
 
 namespace {
@@ -27,9 +29,6 @@ using surface::Wrap;
 constexpr int looks = 16;
 constexpr float least_share = 0.05F;
 constexpr std::uint32_t certain = std::numeric_limits<std::uint32_t>::max();
-
-// Rec. 709
-float luminance(const vec3& v) { return glm::dot(v, vec3(0.2126F, 0.7152F, 0.0722F)); }
 
 using FromSrgb = std::array<float, 256>;
 

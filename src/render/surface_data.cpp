@@ -11,6 +11,7 @@
 #include <span>
 
 #include "base/error.hpp"
+#include "render/luminance.hpp"
 #include "render/punctual.hpp"
 
 namespace cumulet::render {
@@ -102,8 +103,7 @@ double flux_of(const surface::PunctualLight& light, double cross_section) {
   using Kind = surface::PunctualLight::Kind;
   const double solid_angle =
       2.0 * std::numbers::pi * (light.kind == Kind::spot ? 1.0 - std::cos(double{light.outer_cone}) : 2.0);
-  return glm::dot(glm::dvec3(light.intensity), glm::dvec3(0.2126, 0.7152, 0.0722)) *
-         (light.kind == Kind::directional ? cross_section : solid_angle);
+  return luminance(glm::dvec3(light.intensity)) * (light.kind == Kind::directional ? cross_section : solid_angle);
 }
 
 void pack_words(SurfaceSource& source) {

@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
+#include "render/luminance.hpp"
 
 namespace cumulet::render {
 
@@ -487,10 +488,9 @@ Totals Tracer::totals(const Picture& picture) const {
                        counts.data());
   gl::check(*gl_, "reading the sample counts back");
   Totals totals;
-  const glm::dvec3 weights(0.2126, 0.7152, 0.0722);
-  const double sky = glm::dot(glm::dvec3(picture.parameters_.sky_radiance), weights);
+  const double sky = luminance(glm::dvec3(picture.parameters_.sky_radiance));
   double error = 0.0;
-  double luminance = 0.0;
+  double brightness = 0.0;
   for (std::size_t i = 0; i < pixels; ++i) {
     const double n = counts[i].x;
     totals.samples += counts[i].x;
@@ -498,11 +498,11 @@ Totals Tracer::totals(const Picture& picture) const {
     if (n < 2.0) continue;
     float square = 0.0F;
     std::memcpy(&square, &counts[i].z, sizeof(square));
-    const double mean = (glm::dot(glm::dvec3(sums[i]), weights) + (n - double(sums[i].w)) * sky) / n;
+    const double mean = (luminance(glm::dvec3(sums[i])) + (n - double(sums[i].w)) * sky) / n;
     error += std::max(0.0, double(square) / n - mean * mean) / (n - 1.0);
-    luminance += mean;
+    brightness += mean;
   }
-  if (luminance > 0.0) totals.noise = std::sqrt(error / double(pixels)) / (luminance / double(pixels));
+  if (brightness > 0.0) totals.noise = std::sqrt(error / double(pixels)) / (brightness / double(pixels));
   return totals;
 }
 

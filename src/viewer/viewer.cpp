@@ -8,6 +8,7 @@
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
+#include "render/luminance.hpp"
 #include "viewer/stopwatch.hpp"
 
 namespace cumulet::viewer {
@@ -18,8 +19,6 @@ using glm::dvec3;
 using Clock = std::chrono::steady_clock;
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
-
-double luminance(const glm::vec3& c) { return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z; }
 
 dvec3 to_sun(const Light& light) {
   const double azimuth = radians(light.sun_azimuth_degrees);
@@ -436,10 +435,11 @@ core::CmParameters Viewer::parameters() const {
   p.sky_radiance = glm::vec4(light_.sky_radiance, 0.0F);
   p.albedo = glm::vec4(medium_.albedo, 1.0F);
   // Half of the sky's share of the light: its escaping paths sample it as well.
-  const auto sun_power = static_cast<float>(luminance(light_.sun_irradiance));
+  const auto sun_power = static_cast<float>(render::luminance(dvec3(light_.sun_irradiance)));
   const double to_emitters = gl_->surfaces ? gl_->surfaces->emitter_share(sun_power) : 0.0;
   p.sun_irradiance = glm::vec4(light_.sun_irradiance, static_cast<float>(to_emitters));
-  const auto sky_power = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(light_.sky_radiance));
+  const auto sky_power =
+      4.0F * std::numbers::pi_v<float> * static_cast<float>(render::luminance(dvec3(light_.sky_radiance)));
   const bool local = gl_->surfaces && traced && (gl_->surfaces->lamps() || gl_->surfaces->emitters());
   const float to_sky = local && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
                        : sun_power > 0.0F           ? 0.5F * sky_power / (sky_power + sun_power)
