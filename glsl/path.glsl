@@ -290,8 +290,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     surface = cm_surface_point(p.triangle, p.weights, p.w);
 #if CM_SURFACES > 1
     // The flight that met it, and the next-event estimate before: the balance heuristic, whatever the medium between.
-    // A loop of one turn at most, here and below: software drivers run an if's body for every lane, wanted or not.
-    for (bool weigh = met && p.bounce > 0u && !surface.unlit; weigh; weigh = false) {
+    if (met && p.bounce > 0u && !surface.unlit) {
       vec3 way = surface.position - cm_from_cube_point(p.o);
       float other = cm_emitter_met(p.triangle, way, dot(surface.geometric, p.w)) * (1.0f - q) * cm.sun_irradiance.w;
       surface.emission *= p.light.x / max(p.light.x + other, 1e-30f);
@@ -355,7 +354,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
       cm_lamp(here, u_light, sun_light, to_light, light_distance);
     }
 #if CM_SURFACES > 1
-    for (bool pick = emitter; pick; pick = false) {
+    if (emitter) {
       uvec2 words = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
       float u_a = cm_random(p.random, p.stream);
       float u_b = cm_random(p.random, p.stream);
@@ -378,7 +377,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
 #if CM_SURFACES > 1
     vec3 wi = shadow ? to_light : w;
     float direction_density = 0.0f;
-    for (bool weigh = on_surface; weigh; weigh = false) direction_density = cm_surface_pdf(surface, p.w, wi);
+    if (on_surface) direction_density = cm_surface_pdf(surface, p.w, wi);
     if (!on_surface) direction_density = cm_phase(cm.medium.y, dot(p.w, wi));
     if (emitter) light_density += direction_density;
 #endif

@@ -329,7 +329,7 @@ vec3 cm_emitter_sample(vec3 here, uvec2 pick, vec2 u, out vec3 to_light, out flo
   uint word = cm.scene.z + CM_MATERIAL_WORDS * m.corner.w;
   uint flags = cm_words(word + 5u).x;
   vec3 emission = cm_emission(m);
-  for (bool ask = (flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + 4u).y > 0.0; ask; ask = false) {
+  if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + 4u).y > 0.0) {
     emission *= cm_coverage(m);
   }
   bool front = along == (uintBitsToFloat(entry.w) < 0.0);
