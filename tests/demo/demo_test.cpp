@@ -22,6 +22,7 @@
 #include "preferences.hpp"
 #include "replay.hpp"
 #include "sun_dial.hpp"
+#include "support/folder.hpp"
 
 namespace {
 
@@ -247,7 +248,8 @@ TEST(Replay, OrdersComeInTheirFrame) {
 }
 
 TEST(Replay, WhatIsRecordedPlaysTheSame) {
-  const std::string path = ::testing::TempDir() + "demo_test.replay";
+  const cumulet::test::Folder folder;
+  const std::string path = (folder / "recorded.replay").string();
   const std::string text =
       "move 12.5 40\ndown left\nmove 13 41\nup left\nwheel -2\nkey ctrl+f12\ntext \"a \xE2\x82\xAC\\\\\"\ndrop \"/a "
       "b/c.vdb\"\n";
@@ -272,7 +274,6 @@ TEST(Replay, WhatIsRecordedPlaysTheSame) {
     EXPECT_EQ(again[i].y, played[i].y) << i;
     EXPECT_EQ(again[i].path, played[i].path) << i;
   }
-  std::filesystem::remove(path);
   EXPECT_THROW(Recorder("/nowhere/a.replay"), std::runtime_error);
 }
 
@@ -296,9 +297,8 @@ TEST(SunDial, PointsAndAnglesAgree) {
 }
 
 TEST(Preferences, AreKeptAndForgiving) {
-  const std::string folder = ::testing::TempDir() + "demo_test_config";
-  std::filesystem::remove_all(folder);
-  const std::string path = folder + "/cumulet/demo.json";
+  const cumulet::test::Folder folder;
+  const std::string path = (folder / "cumulet" / "demo.json").string();
   Preferences preferences;
   for (int i = 0; i < 20; ++i) preferences.remember("/a/" + std::to_string(i) + ".vdb");
   preferences.remember("/a/../b/15.vdb");
@@ -322,7 +322,6 @@ TEST(Preferences, AreKeptAndForgiving) {
   }
   EXPECT_TRUE(load_preferences("/nowhere/demo.json").recent.empty());
   EXPECT_THROW(save_preferences(preferences, "/proc/nowhere/demo.json"), std::runtime_error);
-  std::filesystem::remove_all(folder);
 }
 
 TEST(DemoOptions, TakeTheSceneFlagsAndAFile) {

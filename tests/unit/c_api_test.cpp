@@ -4,13 +4,13 @@
 
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
 #include "cumulet/cumulet.h"
 #include "headless.hpp"
+#include "support/folder.hpp"
 
 extern "C" const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
@@ -176,7 +176,6 @@ class CApiSurfaces : public CApi {
  protected:
   void SetUp() override {
     CApi::SetUp();
-    path_ = (std::filesystem::temp_directory_path() / ("c_api_" + std::to_string(getpid()) + ".gltf")).string();
     const float floats[] = {-1, -1, 0, 1, -1, 0, 0, 1, 0, 0, 2, 0, 0, 0, 5, 0, 0};
     std::ofstream(path_ + ".bin", std::ios::binary).write(reinterpret_cast<const char*>(floats), sizeof floats);
     std::ofstream(path_) << R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
@@ -185,19 +184,13 @@ class CApiSurfaces : public CApi {
       "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
       "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
                       "samplers": [{"input": 1, "output": 2}]}],
-      "buffers": [{"byteLength": 68, "uri": ")"
-                         << std::filesystem::path(path_).filename().string() << R"(.bin"}],
+      "buffers": [{"byteLength": 68, "uri": "triangle.gltf.bin"}],
       "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
                       {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
       "accessors": [
         {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
         {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [2]},
         {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}]})";
-  }
-  void TearDown() override {
-    CApi::TearDown();
-    std::filesystem::remove(path_);
-    std::filesystem::remove(path_ + ".bin");
   }
   /// What the viewer shows; the caller releases it.
   [[nodiscard]] cumulet_surfaces* shown() const {
@@ -258,7 +251,8 @@ class CApiSurfaces : public CApi {
     return sum / 256.0;
   }
 
-  std::string path_;
+  cumulet::test::Folder folder_;
+  std::string path_ = (folder_ / "triangle.gltf").string();
 };
 
 TEST_F(CApiSurfaces, LoadPoseLookAndRemove) {
@@ -397,7 +391,7 @@ TEST_F(CApiSurfaces, HandlesOpenFilesAndTellOfThem) {
 TEST_F(CApiSurfaces, AFileInMemoryFindsOthersInItsFolderAlone) {
   std::ifstream file(path_, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  const std::string folder = std::filesystem::path(path_).parent_path().string();
+  const std::string folder = folder_.path().string();
   char error[512] = "";
   cumulet_surfaces* surfaces = nullptr;
   ASSERT_EQ(cumulet_surfaces_from_memory(bytes.data(), bytes.size(), folder.c_str(), "mine", &surfaces, error, 512),
@@ -411,8 +405,7 @@ TEST_F(CApiSurfaces, AFileInMemoryFindsOthersInItsFolderAlone) {
             CUMULET_ERROR_FILE);
   EXPECT_EQ(surfaces, nullptr);
   EXPECT_EQ(std::string(error).rfind("mine: ", 0), 0U) << error;
-  EXPECT_NE(std::string(error).find(std::filesystem::path(path_).filename().string() + ".bin"), std::string::npos)
-      << error;
+  EXPECT_NE(std::string(error).find("triangle.gltf.bin"), std::string::npos) << error;
   EXPECT_EQ(std::string(error).find('\n'), std::string::npos);
   EXPECT_EQ(cumulet_surfaces_from_memory(bytes.data(), 100, nullptr, nullptr, &surfaces, error, 512),
             CUMULET_ERROR_FILE);

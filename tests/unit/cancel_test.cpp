@@ -8,7 +8,6 @@
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -21,6 +20,7 @@
 
 #include "base/progress.hpp"
 #include "grid/tet_grid.hpp"
+#include "support/folder.hpp"
 #include "support/volumes.hpp"
 #include "viewer/volume_asset.hpp"
 #include "volume/memory.hpp"
@@ -215,14 +215,9 @@ class CancelImport : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     openvdb::initialize();
-    folder_ = fs::temp_directory_path() / ("cumulet_cancel_" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
     grid_ = make(0.0F);
   }
-  static void TearDownTestSuite() {
-    grid_.reset();
-    fs::remove_all(folder_);
-  }
+  static void TearDownTestSuite() { grid_.reset(); }
 
   static openvdb::FloatGrid::Ptr make(float background) {
     auto grid = openvdb::FloatGrid::create(background);
@@ -236,7 +231,7 @@ class CancelImport : public ::testing::Test {
     }
     return grid;
   }
-  static fs::path write(std::uint32_t compression, const openvdb::GridCPtrVec& grids) {
+  [[nodiscard]] fs::path write(std::uint32_t compression, const openvdb::GridCPtrVec& grids) const {
     fs::path file = folder_ / "test.vdb";
     openvdb::io::File out(file.string());
     out.setCompression(compression);
@@ -247,7 +242,7 @@ class CancelImport : public ::testing::Test {
     expect_both([&](Progress& progress) { (void)volume::import_volume(file, "density", {}, &progress); });
   }
 
-  static inline fs::path folder_;
+  test::Folder folder_;
   static inline openvdb::FloatGrid::Ptr grid_;
 };
 

@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <filesystem>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -14,6 +13,7 @@
 
 #include "cumulet/cumulet.hpp"
 #include "headless.hpp"
+#include "support/folder.hpp"
 
 extern "C" const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
@@ -55,15 +55,11 @@ class BallFile {
     if (corner != 0.0F) grid->tree().setValue({0, 0, 0}, corner);
     openvdb::io::File(path()).write(openvdb::GridCPtrVec{grid});
   }
-  ~BallFile() { std::filesystem::remove(path()); }
-  BallFile(const BallFile&) = delete;
-  BallFile& operator=(const BallFile&) = delete;
 
-  [[nodiscard]] std::string path() const { return path_; }
+  [[nodiscard]] std::string path() const { return (folder_ / "ball.vdb").string(); }
 
  private:
-  std::string path_ =
-      (std::filesystem::temp_directory_path() / ("cpp_api_test_" + std::to_string(getpid()) + ".vdb")).string();
+  test::Folder folder_;
 };
 
 template <class Range, class Values>

@@ -1,7 +1,6 @@
 // The glTF importer, by small files made here, against numbers worked out by hand.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -10,6 +9,7 @@
 #include <random>
 
 #include "base/error.hpp"
+#include "support/folder.hpp"
 #include "support/gltf_check.hpp"
 #include "support/gltf_model.hpp"
 #include "support/gltf_seeds.hpp"
@@ -102,7 +102,7 @@ TEST(Gltf, OneTriangleAsGltfAndAsGlb) {
 }
 
 TEST(Gltf, ExternalFilesAreRelativeToItAndPercentDecoded) {
-  const fs::path folder = fs::temp_directory_path() / ("cumulet_gltf_test_" + std::to_string(getpid()));
+  const test::Folder folder;
   fs::create_directories(folder / "sub dir");
   const auto write = [](const fs::path& path, const Bytes& bytes) {
     std::ofstream(path, std::ios::binary)
@@ -132,7 +132,7 @@ TEST(Gltf, ExternalFilesAreRelativeToItAndPercentDecoded) {
     return "was imported";
   };
   EXPECT_TRUE(has(line((folder / "none.gltf").string()), "no such file"));
-  EXPECT_TRUE(has(line(folder.string()), "is not a file"));
+  EXPECT_TRUE(has(line(folder.path().string()), "is not a file"));
   for (const auto& [uri, cause] :
        std::vector<std::pair<std::string, std::string>>{{"other.bin", "other.bin: no such file"},
                                                         {"sub%20dir", "is not a file"},
@@ -152,7 +152,6 @@ TEST(Gltf, ExternalFilesAreRelativeToItAndPercentDecoded) {
   }
   write(folder / "sub dir" / "a+b.bin", Bytes(10));
   EXPECT_TRUE(has(line(save(whole)), "has 10 bytes, not 36"));
-  fs::remove_all(folder);
 }
 
 TEST(Gltf, NodesOfTranslationRotationScaleAndMatrix) {

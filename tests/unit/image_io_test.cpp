@@ -4,7 +4,6 @@
 #include <ImfStandardAttributes.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <csignal>
@@ -21,27 +20,21 @@
 #include "file.hpp"
 #include "image.hpp"
 #include "layers.hpp"
+#include "support/folder.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
 using namespace cumulet::image;
 
-/// A folder of its own for each test, gone afterwards.
 class ImageIo : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("cumulet-image-" + std::to_string(::getpid()) + "-" + info->name());
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
   /// Every name in the folder: temporary files that were left behind show up here.
   [[nodiscard]] std::size_t count() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()));
   }
-  fs::path folder_;
+  cumulet::test::Folder folder_;
 };
 
 Image gradient(std::uint32_t width, std::uint32_t height) {
@@ -318,7 +311,7 @@ TEST_F(ImageIo, FailedWriteLeavesTheOldFile) {
 
 TEST_F(ImageIo, CheckWritableTellsAndTouchesNothing) {
   EXPECT_NE(failure([&] { check_writable(path("absent/a.png")); }).find(path("absent/a.png")), std::string::npos);
-  EXPECT_NE(failure([&] { check_writable(folder_.string()); }), "");
+  EXPECT_NE(failure([&] { check_writable(folder_.path().string()); }), "");
   EXPECT_NE(failure([&] { check_writable(""); }), "");
   put(path("a.png"), "old");
   check_writable(path("a.png"));

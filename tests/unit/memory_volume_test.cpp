@@ -3,16 +3,15 @@
 #include <cumulet/cumulet.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
-#include <unistd.h>
 #include <cumulet/cumulet_openvdb.hpp>
 
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <random>
 #include <stdexcept>
 #include <thread>
 
+#include "support/folder.hpp"
 #include "support/volumes.hpp"
 #include "viewer/c_handles.hpp"
 
@@ -430,13 +429,7 @@ TEST(SparseVolume, FindsEveryOverlapAndNoOther) {
 
 class OpenVdbVolume : public ::testing::Test {
  protected:
-  void SetUp() override {
-    openvdb::initialize();
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("cumulet_memory_" + std::to_string(::getpid()) + "_" + info->name());
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { openvdb::initialize(); }
   std::string write(const openvdb::GridCPtrVec& grids) const {
     const std::string file = (folder_ / "test.vdb").string();
     openvdb::io::File(file).write(grids);
@@ -481,7 +474,7 @@ class OpenVdbVolume : public ::testing::Test {
     return grid;
   }
 
-  fs::path folder_;
+  cumulet::test::Folder folder_;
 };
 
 TEST_F(OpenVdbVolume, IsTheOneOfTheFile) {

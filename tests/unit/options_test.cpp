@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "support/folder.hpp"
+
 namespace {
 
 using namespace cumulet::demo;
@@ -172,14 +174,19 @@ TEST(Options, ViewNames) {
   EXPECT_EQ(parse({"--view", "density"}).scene.sampling.view, CUMULET_VIEW_DENSITY);
 }
 
-/// A scene file of this process's own: tests run beside each other.
-std::string write_scene(const std::string& text) {
-  std::string path = ::testing::TempDir() + "options_test_" + std::to_string(getpid()) + ".json";
-  std::ofstream(path) << text;
-  return path;
-}
+class SceneOption : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string write_scene(const std::string& text) const {
+    std::string path = (folder_ / "scene.json").string();
+    std::ofstream(path) << text;
+    return path;
+  }
 
-TEST(Options, FlagsOverrideTheSceneFileWhereverTheyStand) {
+ private:
+  cumulet::test::Folder folder_;
+};
+
+TEST_F(SceneOption, FlagsOverrideTheSceneFileWhereverTheyStand) {
   const std::string path = write_scene(R"({"cumulet_scene": 1, "volume": {"file": "/a/smoke.vdb", "grid": "smoke"},
     "camera": {"eye": [0, 0, 9], "target": [0, 0, 0], "orthographic_height": 4},
     "medium": {"density_scale": 7, "anisotropy": 0.25},
@@ -210,7 +217,7 @@ TEST(Options, FlagsOverrideTheSceneFileWhereverTheyStand) {
   EXPECT_EQ(mixed->scene.display.exposure_stops, 2.0f);
 }
 
-TEST(Options, ASceneFileMustNameAVolumeOrAFlag) {
+TEST_F(SceneOption, MustNameAVolumeOrAFlag) {
   const std::string path = write_scene(R"({"cumulet_scene": 1})");
   EXPECT_NE(usage_error({"--scene", path, "-o", "a.png"}).find("--volume"), std::string::npos);
   std::ostringstream out;
@@ -218,7 +225,7 @@ TEST(Options, ASceneFileMustNameAVolumeOrAFlag) {
             0.0f);
 }
 
-TEST(Options, ABadSceneFileIsNoUsageError) {
+TEST_F(SceneOption, ABadFileIsNoUsageError) {
   std::ostringstream out;
   const std::string path = write_scene("{");
   for (const std::string& name : {path, std::string("/nowhere/scene.json")}) {

@@ -14,6 +14,7 @@
 
 #include "support/c_host.hpp"
 #include "support/fake_gl.hpp"
+#include "support/folder.hpp"
 
 extern "C" const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\nleak:libgallium\nleak:swrast_dri\n"; }
@@ -614,7 +615,7 @@ class Files : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     openvdb::initialize();
-    std::filesystem::create_directories(folder());
+    folder_.emplace();
     auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(20.0F, openvdb::Vec3f(0.0F), 1.0F);
     openvdb::tools::sdfToFogVolume(*grid);
     grid->setName("density");
@@ -627,11 +628,10 @@ class Files : public testing::Test {
     std::ofstream(path("empty.vdb"), std::ios::binary) << "";
     std::ofstream(path("noise.nvdb"), std::ios::binary) << std::string(5000, 'x');
   }
-  static std::filesystem::path folder() {
-    return std::filesystem::temp_directory_path() / ("cumulet_robust_" + std::to_string(getpid()));
-  }
-  static void TearDownTestSuite() { std::filesystem::remove_all(folder()); }
-  static std::string path(const std::string& name) { return (folder() / name).string(); }
+  static void TearDownTestSuite() { folder_.reset(); }
+  static std::string path(const std::string& name) { return (*folder_ / name).string(); }
+
+  static inline std::optional<cumulet::test::Folder> folder_;
 };
 
 TEST_F(Files, BadOnesWhileOneIsShownLoseNothing) {

@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
+
+#include "support/folder.hpp"
 
 namespace {
 
@@ -209,14 +210,14 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
 }
 
 TEST(SceneFile, FilesAreWrittenAndReadWhole) {
-  const std::string path = ::testing::TempDir() + "scene_file_test.json";
+  const cumulet::test::Folder folder;
+  const std::string path = (folder / "scene.json").string();
   save_scene(full_scene(), path);
   EXPECT_TRUE(same_scene(load_scene(path), full_scene()));
   EXPECT_THROW(static_cast<void>(load_scene("/nowhere/s.json")), std::runtime_error);
   EXPECT_THROW(save_scene(full_scene(), "/nowhere/s.json"), std::runtime_error);
   std::ofstream(path) << std::string(2 << 20, ' ');
   EXPECT_THROW(static_cast<void>(load_scene(path)), std::runtime_error);
-  std::filesystem::remove(path);
 }
 
 }  // namespace

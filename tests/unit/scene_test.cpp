@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "scene.hpp"
+#include "support/folder.hpp"
 #include "support/gltf_check.hpp"
 #include "surfaces.hpp"
 
@@ -110,14 +111,14 @@ TEST(Fire, HasSmokeAndTemperature) {
 class Mountains : public testing::Test {
  protected:
   Mountains() {
-    const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "mountains.glb";
+    const test::Folder folder;
+    const std::filesystem::path file = folder / "mountains.glb";
     std::ofstream(file, std::ios::binary) << glb_;
     const auto note = [](void* lines, LogLevel level, const char* line) {
       if (level >= LogLevel::warning) static_cast<std::vector<std::string>*>(lines)->emplace_back(line);
     };
     scene_ = surface::import_gltf(file.string(), Log(note, &warnings_));
     pose_ = scene_->pose(0.0);
-    std::filesystem::remove(file);
     std::uint32_t length = 0;
     std::memcpy(&length, glb_.data() + 12, sizeof length);
     json_ = nlohmann::json::parse(glb_.substr(20, length));

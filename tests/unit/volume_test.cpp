@@ -13,7 +13,6 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/tools/LevelSetSphere.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -23,6 +22,7 @@
 #include <set>
 
 #include "base/error.hpp"
+#include "support/folder.hpp"
 
 #if defined(__SANITIZE_ADDRESS__)
 #include <sanitizer/lsan_interface.h>
@@ -150,13 +150,7 @@ void expect_same(const GridT& grid, const ScalarVolume& v, double tolerance = 0.
 
 class VolumeImport : public ::testing::Test {
  protected:
-  void SetUp() override {
-    openvdb::initialize();
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / ("cumulet_volume_" + std::to_string(::getpid()) + "_" + info->name());
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { openvdb::initialize(); }
 
   fs::path path(const std::string& name) const { return folder_ / name; }
   fs::path write(const openvdb::GridPtrVec& grids, const std::string& name = "test.vdb") const {
@@ -187,7 +181,7 @@ class VolumeImport : public ::testing::Test {
     return {};
   }
 
-  fs::path folder_;
+  cumulet::test::Folder folder_;
 };
 
 #define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
@@ -494,7 +488,7 @@ TEST_F(VolumeImport, ChoosesTheGrid) {
 
 TEST_F(VolumeImport, BadPathsAndContents) {
   EXPECT_HAS(refusal(path("none.vdb")), "no such file");
-  EXPECT_HAS(refusal(folder_), "is a directory");
+  EXPECT_HAS(refusal(folder_.path()), "is a directory");
   EXPECT_HAS(refusal(write_bytes("", "empty.vdb")), "is empty");
   EXPECT_HAS(refusal(write_bytes("abc", "short.vdb")), "too short");
   EXPECT_HAS(refusal(write_bytes("this is a text file, not a volume\n", "text.vdb")), "not a VDB");
