@@ -31,7 +31,7 @@ layout(std140, binding = 0) uniform CmParameters {
   vec4 sun_cube;
   vec4 sun_irradiance;  // w: share of the emissive triangles in next-event estimates that are not to the sky
   vec4 sky_radiance;
-  vec4 albedo;
+  vec4 albedo;          // w: least roughness of surfaces that blurred paths meet
   vec4 medium;          // x: extinction of density 1, 1 / world unit; y: anisotropy; z: probability of next-event
                         // estimation towards the sky (other lights have the rest); w: 1 if there is any light
   uvec4 image;          // width, height, seed, target samples

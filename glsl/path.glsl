@@ -24,6 +24,9 @@
 #define CM_MODE_SHADOW_SKY 3u
 #define CM_MODE_DONE 4u
 
+// A bit of CmPath::bounce: the path was scattered wider than a surface with the least roughness of albedo.w does.
+#define CM_BLURRED 0x80000000u
+
 #define CM_EVENT_NONE 0u
 #define CM_EVENT_COLLISION 1u
 #define CM_EVENT_ESCAPE 2u
@@ -50,7 +53,7 @@ struct CmPath {
   vec3 throughput;
   uint mode;
   vec3 radiance;    // of this sample so far
-  uint bounce;
+  uint bounce;      // events of the path so far, and CM_BLURRED
   vec3 light;       // what the shadow ray carries if nothing stops it; of a flight, x: density of its direction
   uint random;
   uvec3 cell;
@@ -288,6 +291,11 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
   CmSurfacePoint surface;
   if (on_surface) {
     surface = cm_surface_point(p.triangle, p.weights, p.w);
+    // Path space regularization: Kaplanyan and Dachsbacher, 2013.
+    if ((p.bounce & CM_BLURRED) != 0u) {
+      surface.material.roughness = max(surface.material.roughness, cm.albedo.w);
+      surface.material.clearcoat_roughness = max(surface.material.clearcoat_roughness, cm.albedo.w);
+    }
 #if CM_SURFACES > 1
     // The flight that met it, and the next-event estimate before: the balance heuristic, whatever the medium between.
     if (met && p.bounce > 0u && !surface.unlit) {
@@ -310,7 +318,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
     float survival = strongest < 0.5f ? max(strongest, 0.05f) : 1.0f;
     float u = cm_random(p.random, p.stream);
-    finished = !(strongest > 0.0f) || u >= survival || (cm.march.y != 0u && p.bounce > cm.march.y);
+    finished = !(strongest > 0.0f) || u >= survival || (cm.march.y != 0u && (p.bounce & ~CM_BLURRED) > cm.march.y);
     p.throughput = p.throughput / survival;
     p.o = p.o + p.t * p.d;
     p.home = uvec2(p.cell.x, p.cell.y);
@@ -374,15 +382,20 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
       float phase = cm_phase(cm.medium.y, dot(p.w, to_light));
       facing = vec3(phase, phase, phase);
     }
-#if CM_SURFACES > 1
     vec3 wi = shadow ? to_light : w;
     float direction_density = 0.0f;
     if (on_surface) direction_density = cm_surface_pdf(surface, p.w, wi);
     if (!on_surface) direction_density = cm_phase(cm.medium.y, dot(p.w, wi));
+#if CM_SURFACES > 1
     if (emitter) light_density += direction_density;
 #endif
     sky_light *= scattered;
-    if (!shadow) p.throughput *= scattered;
+    if (!shadow) {
+      p.throughput *= scattered;
+      // A quarter of the lobe's highest density with that roughness, and no matte surface is smooth.
+      float alpha = cm_alpha(cm.albedo.w);
+      if (direction_density < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha))) p.bounce |= CM_BLURRED;
+    }
 #else
     float facing = cm_phase(cm.medium.y, dot(p.w, to_light));
     float light_density = 1.0f - q;

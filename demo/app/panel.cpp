@@ -241,6 +241,10 @@ void Panel::surfaces(Model& model) {
            "Sun, sky, lamps and what glows only, and the shadows of all: faster."},
           {"None", CUMULET_SURFACE_LIGHT_NONE, "Rasterised, without shadows: the fastest."}},
          surface.light);
+  ui_.slider("Indirect roughness",
+             "Softens what mirrors and lakes throw on walls and clouds: no bright specks. What you look at keeps its "
+             "gloss. 0: as physics has it.",
+             surface.indirect_roughness, 0.0f, 1.0f, "%.2f");
   ImGui::BeginDisabled(info.animations == 0);
   ui_.slider("Time", "Seconds into the model's animation.", surface.time, 0.0,
              std::max(model.status.animation.duration, 1e-3), "%.2f s");

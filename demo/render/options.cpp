@@ -228,6 +228,14 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   add_choice(app, group, "--surface-light", surface_light_names, scene.surface.light,
              "Light between surfaces and volume (default: full), or only from sun, sky, lamps and what glows");
   add(
+      app, group, "--indirect-roughness", "R",
+      [&](const std::string& text) {
+        const double roughness = parse_number(text);
+        if (!(roughness >= 0.0 && roughness <= 1.0)) throw UsageError(in_quotes(text) + " is not from 0 to 1");
+        scene.surface.indirect_roughness = static_cast<float>(roughness);
+      },
+      "Least roughness that scattered paths find: softens what mirrors and lakes throw (default: 0, no bias)");
+  add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
       [&](const std::string& text) { scene.camera = parse_camera(text); },
       "Eye, target and vertical field of view in degrees (default: fit the scene)");

@@ -54,6 +54,7 @@ void write_scene(const path& folder) {
   cumulet::demo::SceneOptions scene;
   scene.volume = (folder / "cumulus.vdb").string();
   scene.surfaces = (folder / "mountains.glb").string();
+  scene.surface.indirect_roughness = 0.4F;  // or the sun in lake and windows makes specks
   const cumulet::scene::View view;
   for (glm::length_t i = 0; i < 3; ++i) {
     scene.camera.eye[i] = view.eye[i];

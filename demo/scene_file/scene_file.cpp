@@ -220,6 +220,7 @@ void read_scene(Section& root, SceneOptions& scene) {
     surfaces.integer("animation", scene.surface.animation, 0.0, max_u32);
     surfaces.integer("camera", scene.surface_camera, -1.0, 1e6);
     surfaces.choice("light", surface_light_names, scene.surface.light);
+    surfaces.number("indirect_roughness", scene.surface.indirect_roughness, {0.0, 1.0});
   });
   root.section("camera", [&](Section& camera) { read_camera(camera, scene.camera); });
   root.section("medium", [&](Section& medium) { read_medium(medium, scene.medium); });
@@ -289,6 +290,7 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
     shown["animation"] = scene.surface.animation;
     if (scene.surface_camera >= 0) shown["camera"] = scene.surface_camera;
     shown["light"] = name_of(surface_light_names, scene.surface.light);
+    shown["indirect_roughness"] = shortest(scene.surface.indirect_roughness);
   }
 
   Json camera = Json::object();

@@ -285,7 +285,9 @@ cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer, const cumule
     const cumulet_surface_settings_desc d = read_desc(desc, "cumulet_surface_settings_desc");
     require(std::isfinite(d.time), "cumulet_surface_settings_desc.time is not finite");
     require(number(d.light) <= CUMULET_SURFACE_LIGHT_NONE, "cumulet_surface_settings_desc.light is unknown");
-    v.set_surface_settings({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light)});
+    require(d.indirect_roughness >= 0.0F && d.indirect_roughness <= 1.0F,
+            "cumulet_surface_settings_desc.indirect_roughness is not from 0 to 1");
+    v.set_surface_settings({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light), d.indirect_roughness});
   });
 }
 

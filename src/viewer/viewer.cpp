@@ -433,7 +433,7 @@ core::CmParameters Viewer::parameters() const {
   p.sun_world = direction(sun);
   p.sun_cube = direction(linear * sun);
   p.sky_radiance = glm::vec4(light_.sky_radiance, 0.0F);
-  p.albedo = glm::vec4(medium_.albedo, 1.0F);
+  p.albedo = glm::vec4(medium_.albedo, surface_settings_.indirect_roughness);
   // Half of the sky's share of the light: its escaping paths sample it as well.
   const auto sun_power = static_cast<float>(render::luminance(dvec3(light_.sun_irradiance)));
   const double to_emitters = gl_->surfaces ? gl_->surfaces->emitter_share(sun_power) : 0.0;

@@ -48,6 +48,7 @@ enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
 struct SurfaceSettings {
   SurfaceMoment moment;
   SurfaceLight light = SurfaceLight::full;
+  float indirect_roughness = 0.0F;
 };
 
 struct Sampling {

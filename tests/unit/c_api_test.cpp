@@ -298,6 +298,12 @@ TEST_F(CApiSurfaces, LoadPoseLookAndRemove) {
   const unsigned unknown = 7;
   std::memcpy(&surfaces.light, &unknown, sizeof unknown);
   EXPECT_EQ(cumulet_set_surface_settings(viewer_, &surfaces), CUMULET_ERROR_INVALID_ARGUMENT);
+  for (const float roughness : {-0.1F, 1.1F, std::nanf("")}) {
+    surfaces = make_desc<cumulet_surface_settings_desc>();
+    surfaces.indirect_roughness = roughness;
+    EXPECT_EQ(cumulet_set_surface_settings(viewer_, &surfaces), CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(error().find("indirect_roughness"), std::string::npos);
+  }
 
   EXPECT_EQ(cumulet_load_surfaces(viewer_, ""), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_load_surfaces(viewer_, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);

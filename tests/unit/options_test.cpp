@@ -242,9 +242,10 @@ TEST_F(SceneOption, ABadFileIsNoUsageError) {
 
 TEST(Options, SurfacesMayComeAlone) {
   std::ostringstream out;
-  const auto options = parse_render_options({"--gltf", "a.glb", "--gltf-time", "1.5", "--gltf-animation", "2",
-                                             "--gltf-camera", "1", "--surface-light", "shadows", "-o", "a.png"},
-                                            out);
+  const auto options =
+      parse_render_options({"--gltf", "a.glb", "--gltf-time", "1.5", "--gltf-animation", "2", "--gltf-camera", "1",
+                            "--surface-light", "shadows", "--indirect-roughness", "0.25", "-o", "a.png"},
+                           out);
   ASSERT_TRUE(options.has_value());
   EXPECT_EQ(options->scene.surfaces, "a.glb");
   EXPECT_EQ(options->scene.volume, "");
@@ -252,7 +253,9 @@ TEST(Options, SurfacesMayComeAlone) {
   EXPECT_EQ(options->scene.surface.animation, 2U);
   EXPECT_EQ(options->scene.surface_camera, 1);
   EXPECT_EQ(options->scene.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
+  EXPECT_EQ(options->scene.surface.indirect_roughness, 0.25F);
   EXPECT_NE(usage_error(with({"--surface-light", "some"})).find("shadows"), std::string::npos);
+  for (const char* bad : {"-0.1", "1.1", "nan", "x"}) EXPECT_NE(usage_error(with({"--indirect-roughness", bad})), "");
 }
 
 TEST(Options, AovsAreListedOrAll) {

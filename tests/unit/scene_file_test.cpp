@@ -33,6 +33,7 @@ SceneOptions full_scene() {
   scene.surface.time = 1.25;
   scene.surface.animation = 3;
   scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
+  scene.surface.indirect_roughness = 0.3f;
   scene.surface_camera = 2;
   scene.width = 333;
   scene.height = 222;
@@ -80,6 +81,7 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   EXPECT_EQ(read.surface.time, scene.surface.time);
   EXPECT_EQ(read.surface.animation, scene.surface.animation);
   EXPECT_EQ(read.surface.light, scene.surface.light);
+  EXPECT_EQ(read.surface.indirect_roughness, scene.surface.indirect_roughness);
   EXPECT_EQ(read.surface_camera, scene.surface_camera);
   EXPECT_EQ(read.width, scene.width);
   EXPECT_EQ(read.height, scene.height);

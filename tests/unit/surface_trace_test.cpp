@@ -145,6 +145,74 @@ TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
   }
 }
 
+viewer::SurfaceSettings indirect_roughness(float roughness) {
+  viewer::SurfaceSettings s;
+  s.indirect_roughness = roughness;
+  return s;
+}
+
+Material metal(float roughness) {
+  Material m;
+  m.metallic = 1.0F;
+  m.roughness = roughness;
+  return m;
+}
+
+// The sun in a ball throws rare bright samples on a floor: softened, as much light, and far less noise.
+TEST_P(SurfaceTrace, IndirectRoughnessKeepsTheLightAndTakesTheSpecks) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer::Medium medium;
+  medium.density_scale = 1e-6;
+  viewer->set_medium(medium);
+  viewer->set_light(sun_at(60.0F, vec3(3.0F)));
+  auto scene = floor_scene(test::diffuse(vec3(0.5F)));
+  scene->add_sphere({32.0F, 0.0F, 32.0F}, 8.0F, scene->add(metal(0.1F)), 48);
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  viewer->set_camera(test::camera_at({60.0, 60.0, 90.0}, {32.0, -10.0, 44.0}, 8.0));
+  // The mean of two pictures, and the noise of a pixel.
+  const auto measure = [&] {
+    const test::Picture a = test::render(*viewer, {32, 32, 64, 1, render::View::shaded});
+    const test::Picture b = test::render(*viewer, {32, 32, 64, 2, render::View::shaded});
+    double square = 0.0;
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) square += std::pow(a.pixels[i].x - b.pixels[i].x, 2.0);
+    return std::pair(0.5 * (a.mean().x + b.mean().x), std::sqrt(0.5 * square / double(a.pixels.size())));
+  };
+  const auto [mean, noise] = measure();
+  viewer->viewer().set_surface_settings(indirect_roughness(0.4F));
+  const auto [soft_mean, soft_noise] = measure();
+  const double error = 4.0 * noise / std::sqrt(2.0 * 32.0 * 32.0);
+  EXPECT_NEAR(soft_mean, mean, error);
+  EXPECT_LT(error, 0.1 * mean);
+  EXPECT_LT(soft_noise, 0.25 * noise);
+}
+
+// Up a periscope, at a card whose edge is in the picture's middle.
+TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
+  const auto viewer = make();
+  Material card = test::diffuse(vec3(0.0F));
+  card.emission = vec3(1.0F);
+  auto scene = std::make_shared<StillScene>();
+  const std::uint32_t mirror = scene->add(metal(0.0F));
+  for (const float y : {100.0F, 120.0F}) {
+    const float up = y == 100.0F ? 4.0F : -4.0F;  // its normal's way
+    scene->add_quad({{{32 - up, y - 4, 36}, {32 + up, y - 4, 36}, {32 + up, y + 4, 28}, {32 - up, y + 4, 28}}}, mirror);
+  }
+  scene->add_quad({{{32, 110, 0}, {52, 110, 0}, {52, 130, 0}, {32, 130, 0}}}, scene->add(card));
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  viewer->set_camera(test::camera_at({32.0, 100.0, 80.0}, {32.0, 100.0, 32.0}, 6.0));
+  const test::Picture as_it_is = test::render(*viewer, {24, 24, 16, 1, render::View::shaded});
+  EXPECT_LT(as_it_is.pixels[12 * 24 + 4].x, 0.01F);
+  EXPECT_GT(as_it_is.pixels[12 * 24 + 20].x, 0.99F);
+  viewer->viewer().set_surface_settings(indirect_roughness(1.0F));
+  const test::Picture soft = test::render(*viewer, {24, 24, 16, 1, render::View::shaded});
+  double difference = 0.0;
+  for (std::size_t i = 0; i < soft.pixels.size(); ++i) {
+    difference += std::abs(double(soft.pixels[i].x) - double(as_it_is.pixels[i].x)) / 576.0;
+  }
+  EXPECT_LT(difference, 1e-3);
+}
+
 TEST_P(SurfaceTrace, LampsFallOffWithTheSquareOfTheDistance) {
   const auto viewer = make();
   viewer->set_volume(slab());

@@ -382,6 +382,13 @@ typedef struct cumulet_surface_settings_desc {
   double time;        /* seconds into the animation; past its end it begins anew */
   uint32_t animation; /* its number in the file; one that is not there: as the scene rests */
   cumulet_surface_light light;
+  /*
+   * 0 to 1: surfaces count as no smoother than this once a path was scattered wider than such a surface reflects, so
+   * that what mirrors and lakes throw on walls and clouds is soft, without bright specks (path space regularization:
+   * Kaplanyan, Dachsbacher 2013). What the camera sees, and what it sees in mirrors, stays as it is. 0, the default:
+   * off, without bias.
+   */
+  float indirect_roughness;
 } cumulet_surface_settings_desc;
 
 /* How this viewer shows its surfaces. Poses them on the worker if the moment changed; the last pose is shown until

@@ -633,12 +633,14 @@ struct SurfaceSettingsDesc {
   double time = 0.0;
   std::uint32_t animation = 0;
   SurfaceLight light{};
+  float indirect_roughness = 0.0F;
 
   operator cumulet_surface_settings_desc() const noexcept {
     return {.struct_size = sizeof(cumulet_surface_settings_desc),
             .time = time,
             .animation = animation,
-            .light = static_cast<cumulet_surface_light>(light)};
+            .light = static_cast<cumulet_surface_light>(light),
+            .indirect_roughness = indirect_roughness};
   }
 };
 
