@@ -162,16 +162,13 @@ CM_FN float cm_bsdf_pdf(CmSurface s, vec3 wo, vec3 wi) {
   return cm_bsdf_pdf_local(s, cm_into_frame(u, v, s.normal, wo), cm_into_frame(u, v, s.normal, wi));
 }
 
-// A direction for u in [0, 1)^3; u0 picks the lobe. weight is eval / pdf. False, and weight 0, where none carries light:
-// the path ends.
-CM_FN bool cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2, CM_OUT(vec3) wi, CM_OUT(vec3) weight) {
-  wi = s.normal;
-  weight = vec3(0.0f);
+// A direction for u in [0, 1)^3; u0 picks the lobe. May be below the surface, where eval is 0.
+CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   vec3 u;
   vec3 v;
   cm_frame(s.normal, u, v);
   vec3 o = cm_into_frame(u, v, s.normal, wo);
-  if (!(o.z > 0.0f)) return false;
+  if (!(o.z > 0.0f)) return s.normal;
   vec3 lobes = cm_lobe_weights(s, o.z);
   vec3 i;
   if (u0 < lobes.x + lobes.y) {
@@ -183,11 +180,7 @@ CM_FN bool cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2, CM
     float angle = 6.28318531f * u2;
     i = vec3(radius * cos(angle), radius * sin(angle), sqrt(1.0f - u1));
   }
-  float pdf = cm_bsdf_pdf_local(s, o, i);
-  if (!(pdf > 0.0f)) return false;
-  wi = normalize(u * i.x + v * i.y + s.normal * i.z);
-  weight = cm_bsdf_eval_local(s, o, i) * (1.0f / pdf);
-  return cm_max3(weight) > 0.0f;
+  return normalize(u * i.x + v * i.y + s.normal * i.z);
 }
 
 // A shading normal, bent towards the viewer as far as it must be for the surface to be seen from its front.

@@ -34,6 +34,8 @@ layout(std140, binding = 0) uniform CmParameters {
   vec4 albedo;          // w: least roughness of surfaces that blurred paths meet
   vec4 medium;          // x: extinction of density 1, 1 / world unit; y: anisotropy; z: probability of next-event
                         // estimation towards the sky (other lights have the rest); w: 1 if there is any light
+  vec4 emission;        // source radiance of the medium: emission coefficient over extinction; w: where it lights
+                        // surfaces, 1 / (3 times cube space's unit of volume in the world), else 0
   uvec4 image;          // width, height, seed, target samples
   uvec4 tile;           // x, y, width, height
   uvec4 march;          // x: iterations a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of cells a page,

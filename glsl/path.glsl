@@ -106,6 +106,12 @@ CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3)
   return length(v);
 }
 
+// The optical depth of the first `way` of a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends.
+CM_FN float cm_depth_of(float e_0, float e_1, float span, float way) {
+  float part = clamp(way / max(span, 1e-30f), 0.0f, 1.0f);
+  return (e_0 + 0.5f * (e_1 - e_0) * part) * part * span;
+}
+
 // How far into a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends, this optical depth is used up:
 // e_0 s + (e_1 - e_0) s^2 / (2 span) = depth, in the form that loses nothing.
 CM_FN float cm_depth_distance(float e_0, float e_1, float span, float depth) {
@@ -136,8 +142,7 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
     float used = 0.5f * (e_0 + e_1) * span;
 #if CM_SURFACES
     // To a surface or a lamp inside the cell, not beyond.
-    float part = min(1.0f, (p.t_end - p.t) / max(span, 1e-30f));
-    used = t_1 > p.t_end ? (e_0 + 0.5f * (e_1 - e_0) * part) * part * span : used;
+    used = t_1 > p.t_end ? cm_depth_of(e_0, e_1, span, p.t_end - p.t) : used;
 #endif
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
@@ -150,9 +155,15 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
   }
   // After the loop, not in it: software drivers run both sides of every branch, each step.
   if (event == CM_EVENT_COLLISION) {
-    p.t += cm_depth_distance(e_0, e_1, span, p.depth);
-    p.depth = -1.0f;
-    if (p.t >= p.t_end) event = CM_EVENT_ESCAPE;  // behind a surface
+    float left = p.t_end - p.t;
+    float way = cm_depth_distance(e_0, e_1, span, p.depth);
+    p.t += way;
+    p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e_0, e_1, span, left));
+    if (way >= left) event = CM_EVENT_ESCAPE;  // behind a surface
+#if !CM_SURFACES
+  } else if (event == CM_EVENT_ESCAPE && p.t > p.t_end) {
+    p.depth += cm_depth_of(e_1, e_0, span, p.t - p.t_end);
+#endif
   }
   return event;
 }
@@ -309,6 +320,20 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
   // Without light between surfaces: what has left one sees the sky alone, and the volume sees none.
   bool dark = cm.lights.z == 0u && p.bounce > 0u && (met || (collided && p.home.x == CM_NONE));
 #endif
+  // The medium's own light: S e^-x dx over the flight. A collision tells of S (its chance is 1 - e^-x), but seldom in a
+  // thin flame. Where the depth x that a flight came through is known, 2 S (1 - e^-x) where it collides and S (1 - e^-x)
+  // where it does not have the same mean, and next to no noise in thin flames.
+#if CM_SURFACES
+  float glow = collided && !dark ? 1.0f : 0.0f;  // a triangle may be nearer than the march has been
+#else
+  float glow = flight && event != CM_EVENT_NONE ? 1.0f - exp(max(0.0f, p.depth) - p.depth_0) : 0.0f;
+  if (collided) glow *= 2.0f;
+#endif
+  vec3 glowing = p.throughput * (glow * vec3(cm.emission));
+  p.radiance += glowing;
+#if CM_AOVS
+  if (p.bounce == 0u && !collided) p.volume += vec4(glowing, 0.0f);
+#endif
   if (collided || met) {
 #if CM_AOVS
     if (collided && p.bounce == 0u) p.in_volume = 1u;
@@ -372,20 +397,34 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
       light_density *= density;
     }
 #endif
-    vec3 scattered = vec3(1.0f, 1.0f, 1.0f);
+    // Of the direction that the ray takes: the share of its light that goes on, and the density of flights.
     vec3 facing = vec3(0.0f, 0.0f, 0.0f);
+    float lobe_density = 0.0f;
+    float direction_density = 0.0f;
     if (on_surface) {
       float u_3 = cm_random(p.random, p.stream);
-      cm_surface_scatter(surface, p.w, u_0, u_1, u_3, w, scattered);
-      facing = cm_surface_eval(surface, p.w, to_light);
+      // A glowing medium is looked for by half of the flights: towards a point of its box, each as likely.
+      float to_glow = cm.emission.w > 0.0f ? 0.5f : 0.0f;
+      bool guided = u_3 < to_glow;
+      u_3 = guided ? u_3 / to_glow : (u_3 - to_glow) / (1.0f - to_glow);
+      vec3 goal = mix(vec3(cm.box_min), vec3(cm.box_max), vec3(u_0, u_1, u_3));
+      vec3 to_goal = cm_to_world(goal - p.o);
+      w = cm_surface_sample(surface, p.w, u_0, u_1, u_3);
+      if (guided && dot(to_goal, to_goal) > 0.0f) w = normalize(to_goal);
+      vec3 wi = to_sun ? to_light : w;
+      vec2 range = cm_box_range(p.o, cm_to_cube(wi));
+      vec3 box = vec3(cm.box_max) - vec3(cm.box_min);
+      float cubes = max(0.0f, range.y - range.x) * (dot(range, range) + range.x * range.y);
+      float in_glow = cubes * cm.emission.w / max(box.x * box.y * box.z, 1e-30f);
+      facing = cm_surface_eval(surface, p.w, wi);
+      lobe_density = cm_surface_pdf(surface, p.w, wi);
+      direction_density = lobe_density + to_glow * (in_glow - lobe_density);
     } else {
-      float phase = cm_phase(cm.medium.y, dot(p.w, to_light));
-      facing = vec3(phase, phase, phase);
+      lobe_density = cm_phase(cm.medium.y, dot(p.w, to_sun ? to_light : w));
+      direction_density = lobe_density;
+      facing = vec3(lobe_density, lobe_density, lobe_density);
     }
-    vec3 wi = shadow ? to_light : w;
-    float direction_density = 0.0f;
-    if (on_surface) direction_density = cm_surface_pdf(surface, p.w, wi);
-    if (!on_surface) direction_density = cm_phase(cm.medium.y, dot(p.w, wi));
+    vec3 scattered = direction_density > 0.0f ? facing / direction_density : vec3(0.0f, 0.0f, 0.0f);
 #if CM_SURFACES > 1
     if (emitter) light_density += direction_density;
 #endif
@@ -394,7 +433,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
       p.throughput *= scattered;
       // A quarter of the lobe's highest density with that roughness, and no matte surface is smooth.
       float alpha = cm_alpha(cm.albedo.w);
-      if (direction_density < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha))) p.bounce |= CM_BLURRED;
+      if (lobe_density < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha))) p.bounce |= CM_BLURRED;
     }
 #else
     float facing = cm_phase(cm.medium.y, dot(p.w, to_light));

@@ -241,16 +241,12 @@ vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
   return dot(point.geometric, wi) > 0.0 ? cm_bsdf_eval(point.material, -w, wi) : vec3(0.0);
 }
 
-// Density of cm_surface_scatter's wi by solid angle.
+// Density of cm_surface_sample's directions by solid angle.
 float cm_surface_pdf(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_pdf(point.material, -w, wi); }
 
-// A direction to go on in, and its weight: share times cosine over density.
-void cm_surface_scatter(CmSurfacePoint point, vec3 w, float u_0, float u_1, float u_2, out vec3 wi, out vec3 weight) {
-  bool any = cm_bsdf_sample(point.material, -w, u_0, u_1, u_2, wi, weight);
-  if (!any || dot(point.geometric, wi) <= 0.0) {
-    wi = point.geometric;
-    weight = vec3(0.0);
-  }
+// A direction to go on in.
+vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1, float u_2) {
+  return cm_bsdf_sample(point.material, -w, u_0, u_1, u_2);
 }
 
 // Where a ray from o (cube space) starts in the world; on a surface: beside it, on the side of its direction d (world).

@@ -274,6 +274,9 @@ void Panel::medium(Model& model) {
       coalbedo = before > 0.0f ? std::min(coalbedo * absorption / before, 1.0f) : absorption;
   ui_.slider("Anisotropy", "Henyey-Greenstein g: below 0 light turns back, above 0 it goes on forward.",
              medium.anisotropy, -0.99f, 0.99f, "%.3f");
+  light_source("Glow colour", "The colour of the medium's own light, as it looks on the screen.", "Glow",
+               "Radiance of an opaque body of the medium, as of fire: it lights all the rest. 0: dark.",
+               medium.emission, glow_colour_, 1000.0f);
   ui_.slider("Max bounces", "Scattering events a path may have.", medium.max_bounces, 0U, 256U,
              medium.max_bounces == 0 ? "no limit" : "%u", ImGuiSliderFlags_Logarithmic);
 }

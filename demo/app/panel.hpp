@@ -53,6 +53,7 @@ class Panel {
   std::string path_of_;
   // What a light of strength 0 was before.
   float sun_colour_[3] = {1.0f, 1.0f, 1.0f};
+  float glow_colour_[3] = {1.0f, 0.35f, 0.08f};
   float sky_colour_[3] = {1.0f, 1.0f, 1.0f};
 };
 

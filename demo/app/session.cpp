@@ -33,7 +33,7 @@ bool same(const cumulet_grid_desc& a, const cumulet_grid_desc& b) {
 bool same(const cumulet_medium_desc& a, const cumulet_medium_desc& b) {
   return std::tie(a.density_scale, a.anisotropy, a.max_bounces) ==
              std::tie(b.density_scale, b.anisotropy, b.max_bounces) &&
-         same(a.coalbedo, b.coalbedo);
+         same(a.coalbedo, b.coalbedo) && same(a.emission, b.emission);
 }
 
 bool same(const cumulet_light_desc& a, const cumulet_light_desc& b) {
@@ -51,7 +51,8 @@ bool same(const cumulet_display_desc& a, const cumulet_display_desc& b) {
 }
 
 bool same(const cumulet_surface_settings_desc& a, const cumulet_surface_settings_desc& b) {
-  return std::tie(a.time, a.animation, a.light) == std::tie(b.time, b.animation, b.light);
+  return std::tie(a.time, a.animation, a.light, a.indirect_roughness) ==
+         std::tie(b.time, b.animation, b.light, b.indirect_roughness);
 }
 
 bool same(const cumulet_camera_desc& a, const cumulet_camera_desc& b) {

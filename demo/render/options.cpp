@@ -266,6 +266,9 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         scene.medium.max_bounces = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32));
       },
       "Scattering events a path may have; 0: no limit (default)");
+  add(
+      app, group, "--emission", "R,G,B", [&](const std::string& text) { parse_light(text, scene.medium.emission); },
+      "What an opaque body of the medium glows with, as fire does (default: 0,0,0)");
 
   group = "Light (default: daylight; given one of the two, the other is dark)";
   add(

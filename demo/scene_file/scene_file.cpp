@@ -180,6 +180,7 @@ void read_medium(Section& medium, cumulet_medium_desc& desc) {
   // Close enough to 1 for a float to be 1.
   if (!(desc.anisotropy > -1.0f && desc.anisotropy < 1.0f)) medium.wrong("anisotropy", "is not between -1 and 1");
   medium.integer("max_bounces", desc.max_bounces, 0.0, max_u32);
+  medium.three("emission", desc.emission, light_range);
 }
 
 void read_light(Section& light, cumulet_light_desc& desc) {
@@ -310,6 +311,7 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   medium["albedo"] = {albedo_of(coalbedo[0]), albedo_of(coalbedo[1]), albedo_of(coalbedo[2])};
   medium["anisotropy"] = shortest(scene.medium.anisotropy);
   medium["max_bounces"] = scene.medium.max_bounces;
+  medium["emission"] = three(scene.medium.emission);
   json["medium"] = medium;
 
   Json& sun = json["light"]["sun"];

@@ -237,11 +237,13 @@ cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_d
     require(in_range(d.density_scale, 0.0, 1e30), "cumulet_medium_desc.density_scale is not from 0 to 1e30");
     require(d.anisotropy > -1.0F && d.anisotropy < 1.0F, "cumulet_medium_desc.anisotropy is not between -1 and 1");
     for (const float c : d.coalbedo) require(in_range(c, 0.0, 1.0), "cumulet_medium_desc.coalbedo is not from 0 to 1");
+    require_colour(d.emission, "cumulet_medium_desc.emission is negative or not finite");
     core::Medium m;
     m.density_scale = d.density_scale > 0.0 ? d.density_scale : 1.0;
     m.albedo = 1.0F - to_vec3(d.coalbedo);
     m.anisotropy = d.anisotropy;
     m.max_bounces = d.max_bounces;
+    m.emission = to_vec3(d.emission);
     v.set_medium(m);
   });
 }

@@ -446,6 +446,9 @@ core::CmParameters Viewer::parameters() const {
                                                     : (sky_power > 0.0F ? 1.0F : 0.0F);
   p.medium = {static_cast<float>(std::min(1e30, medium_.density_scale * std::max(source.max_value, 1e-30F))),
               medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F || local ? 1.0F : 0.0F};
+  const bool glows = surface_settings_.light == SurfaceLight::full && medium_.emission != glm::vec3(0.0F);
+  const double unit = std::abs(glm::determinant(glm::dmat3(from_cube)));
+  p.emission = glm::vec4(medium_.emission, glows ? static_cast<float>(1.0 / (3.0 * unit)) : 0.0F);
   p.image = {frame_size_, sampling_.seed, std::max(1U, sampling_.samples)};
   p.march = {0U, medium_.max_bounces, 0U, 0U};
   return p;

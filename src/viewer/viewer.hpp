@@ -34,6 +34,7 @@ struct Medium {
   glm::vec3 albedo{1.0F};
   float anisotropy = 0.0F;
   std::uint32_t max_bounces = 0;
+  glm::vec3 emission{0.0F};
 };
 
 struct Light {

@@ -121,6 +121,40 @@ def test_change(s):
             assert_differ(a, b, area)
 
 
+def test_glow(s):
+    settle = ["frames 3", "wait loaded", "wait converged"]
+    s.play("replay", [*settle, *shot("dark"), 'drag "Glow" 0.02 0.5 to "Glow" 0.6 0.5', *settle, *shot("glowing"), "key ctrl+z",
+                      *settle, *shot("undone")], "--volume", s.fire, "--spp", "16")
+    dark, report, area = look(s, "dark")
+    glowing, glowing_report, _ = look(s, "glowing")
+    assert report["scene"]["medium"]["emission"] == [0, 0, 0]
+    red, green, blue = glowing_report["scene"]["medium"]["emission"]
+    assert red > green > blue > 0, "a glow begins in the colour of fire"
+    assert glowing.mean(area) > dark.mean(area) + 5
+    assert_alike(dark, look(s, "undone")[0], area)
+
+
+def test_surfaces(s):
+    settle = ["frames 3", "wait loaded", "wait converged"]
+    mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
+    s.play("replay", [*settle, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *settle,
+                      *shot("soft"), 'click "Surface light"', "frames 2", 'click "Surface light/None"', *settle, *shot("none"),
+                      'click "Remove surfaces"', *settle, *shot("removed"), "key ctrl+z", *settle, *shot("back")],
+           "--volume", s.cumulus, "--gltf", mountains, "--spp", "2")
+    first, report, area = look(s, "first")
+    assert report["scene"]["surfaces"]["indirect_roughness"] == 0
+    soft, soft_report, _ = look(s, "soft")
+    assert 0.4 < soft_report["scene"]["surfaces"]["indirect_roughness"] < 0.8, soft_report["scene"]["surfaces"]
+    assert difference(first, soft, area) != (0, 0), "the same samples find rougher surfaces"
+    none, none_report, _ = look(s, "none")
+    assert none_report["scene"]["surfaces"]["light"] == "none"
+    assert difference(soft, none, area) != (0, 0)
+    removed, removed_report, _ = look(s, "removed")
+    assert "surfaces" not in removed_report["scene"]
+    assert_differ(none, removed, area)
+    assert_alike(none, look(s, "back")[0], area)
+
+
 def test_exposure(s):
     s.play("replay", ["wait loaded", "wait converged", *shot("first"), 'drag "Exposure" to "Exposure" 0.6 0.5', "frames 3",
                       *shot("bright"), "key ctrl+z", "frames 3", *shot("undone")], "--volume", s.cumulus)

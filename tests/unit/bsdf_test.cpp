@@ -49,6 +49,14 @@ std::vector<CmSurface> all_surfaces() {
   return result;
 }
 
+/// A direction and its weight; whether it carries any light.
+bool sample(const CmSurface& s, vec3 wo, float u0, float u1, float u2, vec3& wi, vec3& weight) {
+  wi = cm_bsdf_sample(s, wo, u0, u1, u2);
+  const float pdf = cm_bsdf_pdf(s, wo, wi);
+  weight = pdf > 0.0F ? cm_bsdf_eval(s, wo, wi) / pdf : vec3(0.0F);
+  return weight.x + weight.y + weight.z > 0.0F;
+}
+
 /// Unit vector at a cosine and an angle about the surface's normal.
 vec3 direction(const CmSurface& s, double cosine, double angle) {
   vec3 u;
@@ -108,7 +116,7 @@ TEST(Bsdf, DensityIntegratesToOneLessTheFailedSamples) {
         vec3 weight;
         const float u0 = unit(random);
         const float u1 = unit(random);
-        failed += cm_bsdf_sample(s, wo, u0, u1, unit(random), wi, weight) ? 0 : 1;
+        failed += sample(s, wo, u0, u1, unit(random), wi, weight) ? 0 : 1;
       }
       EXPECT_NEAR(sum, 1.0 - double(failed) / n, 8e-3) << s.roughness << ' ' << s.metallic << ' ' << cosine;
       EXPECT_LE(sum, 1.0 + 2e-3);
@@ -143,7 +151,7 @@ TEST(Bsdf, SamplesFollowTheDensity) {
       vec3 weight;
       const float u0 = unit(random);
       const float u1 = unit(random);
-      if (cm_bsdf_sample(s, wo, u0, u1, unit(random), wi, weight)) ++counted[static_cast<std::size_t>(bin_of(wi))];
+      if (sample(s, wo, u0, u1, unit(random), wi, weight)) ++counted[static_cast<std::size_t>(bin_of(wi))];
     }
     double chi2 = 0.0;
     int bins = 0;
@@ -173,11 +181,9 @@ TEST(Bsdf, SampleWeightsAreEvalOverDensityAndTheirMeanIsTheAlbedo) {
       vec3 weight;
       const float u0 = unit(random);
       const float u1 = unit(random);
-      if (!cm_bsdf_sample(s, wo, u0, u1, unit(random), wi, weight)) continue;
+      if (!sample(s, wo, u0, u1, unit(random), wi, weight)) continue;
       ASSERT_GT(dot(wi, s.normal), 0.0F);
       ASSERT_NEAR(length(wi), 1.0F, 1e-5F);
-      const vec3 expected = cm_bsdf_eval(s, wo, wi) / cm_bsdf_pdf(s, wo, wi);
-      ASSERT_NEAR(weight.y, expected.y, 0.01F * expected.y + 1e-6F);
       mean += dvec3(weight) / double(n);
       square += dvec3(weight * weight) / double(n);
     }
@@ -235,7 +241,7 @@ TEST(Bsdf, WhiteWithoutInterfaceReflectsAll) {
     vec3 weight;
     const float u0 = unit(random);
     const float u1 = unit(random);
-    ASSERT_TRUE(cm_bsdf_sample(s, wo, u0, u1, unit(random), wi, weight));
+    ASSERT_TRUE(sample(s, wo, u0, u1, unit(random), wi, weight));
     EXPECT_NEAR(weight.x, 1.0F, 2e-6F);
     EXPECT_NEAR(cm_bsdf_eval(s, wo, wi).x, dot(wi, s.normal) / std::numbers::pi_v<float>, 1e-6F);
   }
@@ -253,7 +259,7 @@ TEST(Bsdf, SmoothWhiteMetalIsAMirror) {
     vec3 weight;
     const float u0 = unit(random);
     const float u1 = unit(random) * 0.99F;
-    ASSERT_TRUE(cm_bsdf_sample(s, wo, u0, u1, unit(random), wi, weight));
+    ASSERT_TRUE(sample(s, wo, u0, u1, unit(random), wi, weight));
     EXPECT_NEAR(weight.x, 1.0F, 1e-3F);
     EXPECT_GT(dot(wi, reflect(-wo, s.normal)), 0.9995F);
   }
@@ -268,7 +274,7 @@ TEST(Bsdf, NothingComesFromBelow) {
     EXPECT_EQ(cm_bsdf_pdf(s, above, below), 0.0F);
     vec3 wi;
     vec3 weight(1.0F);
-    EXPECT_FALSE(cm_bsdf_sample(s, below, 0.5F, 0.5F, 0.5F, wi, weight));
+    EXPECT_FALSE(sample(s, below, 0.5F, 0.5F, 0.5F, wi, weight));
     EXPECT_EQ(weight, vec3(0.0F));
   }
 }
@@ -289,7 +295,7 @@ TEST(Bsdf, ExtremesStayFinite) {
             vec3 weight;
             const float u0 = i % 3 == 0 ? 0.0F : unit(random);
             const float u1 = i % 5 == 0 ? 0.99999994F : unit(random);
-            cm_bsdf_sample(s, wo, u0, u1, unit(random), wi, weight);
+            sample(s, wo, u0, u1, unit(random), wi, weight);
             ASSERT_TRUE(std::isfinite(weight.x) && weight.x >= 0.0F && weight.x < 30.0F)
                 << roughness << ' ' << metallic << ' ' << f0 << ' ' << cosine << ' ' << weight.x;
             ASSERT_TRUE(std::isfinite(wi.x + wi.y + wi.z));

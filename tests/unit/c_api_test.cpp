@@ -120,6 +120,10 @@ TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   medium.anisotropy = 0.5F;
   medium.coalbedo[1] = 1.5F;
   EXPECT_EQ(cumulet_set_medium(viewer_, &medium), CUMULET_ERROR_INVALID_ARGUMENT);
+  medium.coalbedo[1] = 0.0F;
+  medium.emission[2] = -1.0F;
+  EXPECT_EQ(cumulet_set_medium(viewer_, &medium), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(error().find("emission"), std::string::npos);
   auto light = make_desc<cumulet_light_desc>();
   light.sky_radiance[2] = -1.0F;
   EXPECT_EQ(cumulet_set_light(viewer_, &light), CUMULET_ERROR_INVALID_ARGUMENT);

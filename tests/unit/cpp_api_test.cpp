@@ -115,13 +115,14 @@ TEST(CppDescs, BecomeTheirCounterparts) {
   EXPECT_EQ(grid.camera_adaptive, 1);
   EXPECT_EQ(grid.pixel_size, 2.5);
 
-  const cumulet_medium_desc medium =
-      MediumDesc{.density_scale = 2, .coalbedo = {0.1F, 0.2F, 0.3F}, .anisotropy = 0.5F, .max_bounces = 9};
+  const cumulet_medium_desc medium = MediumDesc{
+      .density_scale = 2, .coalbedo = {0.1F, 0.2F, 0.3F}, .anisotropy = 0.5F, .max_bounces = 9, .emission = {4, 5, 6}};
   EXPECT_EQ(medium.struct_size, sizeof medium);
   EXPECT_EQ(medium.density_scale, 2.0);
   expect_same(medium.coalbedo, Rgb{0.1F, 0.2F, 0.3F});
   EXPECT_EQ(medium.anisotropy, 0.5F);
   EXPECT_EQ(medium.max_bounces, 9U);
+  expect_same(medium.emission, std::array{4.0F, 5.0F, 6.0F});
 
   const cumulet_light_desc light = LightDesc{
       .sun_azimuth_degrees = 1, .sun_elevation_degrees = 2, .sun_irradiance = {3, 4, 5}, .sky_radiance = {6, 7, 8}};

@@ -110,6 +110,8 @@ TEST(Options, EveryFlag) {
                                        "-0.6",
                                        "--max-bounces",
                                        "3",
+                                       "--emission",
+                                       "9,3,0.5",
                                        "--sun",
                                        "-30,12.5 1,2,3",
                                        "--sky",
@@ -146,6 +148,7 @@ TEST(Options, EveryFlag) {
   expect_rgb(scene.medium.coalbedo, 0.0f, 0.25f, 1.0f);
   EXPECT_FLOAT_EQ(scene.medium.anisotropy, -0.6f);
   EXPECT_EQ(scene.medium.max_bounces, 3u);
+  expect_rgb(scene.medium.emission, 9.0f, 3.0f, 0.5f);
   EXPECT_FLOAT_EQ(scene.light.sun_azimuth_degrees, -30.0f);
   EXPECT_FLOAT_EQ(scene.light.sun_elevation_degrees, 12.5f);
   expect_rgb(scene.light.sun_irradiance, 1.0f, 2.0f, 3.0f);

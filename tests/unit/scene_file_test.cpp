@@ -50,6 +50,7 @@ SceneOptions full_scene() {
   scene.medium.coalbedo[2] = 1.0f;
   scene.medium.anisotropy = -0.85f;
   scene.medium.max_bounces = 4294967295u;
+  for (int i = 0; i < 3; ++i) scene.medium.emission[i] = 3.3f * static_cast<float>(i);
   scene.light.sun_azimuth_degrees = -123.4f;
   scene.light.sun_elevation_degrees = -5.6f;
   for (int i = 0; i < 3; ++i) scene.light.sun_irradiance[i] = 0.7f * static_cast<float>(i);
@@ -90,6 +91,7 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
     EXPECT_EQ(read.camera.target[i], scene.camera.target[i]);
     EXPECT_EQ(read.camera.up[i], scene.camera.up[i]);
     EXPECT_EQ(read.medium.coalbedo[i], scene.medium.coalbedo[i]) << i;
+    EXPECT_EQ(read.medium.emission[i], scene.medium.emission[i]) << i;
     EXPECT_EQ(read.light.sun_irradiance[i], scene.light.sun_irradiance[i]);
     EXPECT_EQ(read.light.sky_radiance[i], scene.light.sky_radiance[i]);
   }

@@ -342,6 +342,27 @@ TEST_P(SurfacePicture, AovsAreTheAnalyticOnes) {
   }
 }
 
+TEST_P(SurfacePicture, AGlowIsTheVolumesAlone) {
+  for (const SurfaceLight mode : {SurfaceLight::none, SurfaceLight::full}) {
+    show(scene(), mode);
+    viewer_->set_medium({sigma, vec3(0.0F), 0.0F, 0, vec3(2.0F)});
+    viewer_->set_image({side, side, 64, 1, render::View::shaded});
+    viewer_->viewer().set_sampling({64, 1, render::View::shaded, false, true});
+    viewer_->build();
+    while (!viewer_->render(1e9)) {
+    }
+    std::vector<float> volume(std::size_t{4} * side * side);
+    std::vector<float> transmittance(std::size_t{1} * side * side);
+    viewer_->viewer().read_aov(Aov::volume, volume.data(), volume.size());
+    viewer_->viewer().read_aov(Aov::transmittance, transmittance.data(), transmittance.size());
+    double difference = 0.0;
+    for (std::size_t i = 0; i < transmittance.size(); ++i) {
+      difference += volume[4 * i] - 2.0 * (1.0 - transmittance[i]);
+    }
+    EXPECT_NEAR(difference / (side * side), 0.0, 0.01) << int(mode);
+  }
+}
+
 TEST_P(SurfacePicture, AovsThatAreNotThereAreRefusedInALine) {
   show(scene(), SurfaceLight::full);
   (void)render(1, 4);

@@ -213,6 +213,61 @@ TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
   EXPECT_LT(difference, 1e-3);
 }
 
+// A floor below an opaque glowing slab that scatters nothing: albedo / pi times S cos^2 / r^2 over its underside.
+TEST_P(SurfaceTrace, AFireLightsTheFloor) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer->set_light({});
+  viewer->set_medium({4.0, vec3(0.0F), 0.0F, 0, {3.0F, 1.0F, 0.0F}});
+  viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.8F)))));
+  // Under the slab's edge.
+  viewer->set_camera(test::camera_at({131.5, 0.0, 31.5}, {31.5, -10.0, 31.5}, 0.05));
+  double irradiance = 0.0;
+  constexpr int n = 256;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const dvec3 p(64.0 * (i + 0.5) / n - 32.0, 9.5, 64.0 * (j + 0.5) / n - 32.0);
+      const double square = glm::dot(p, p);
+      irradiance += (64.0 / n) * (64.0 / n) * p.y * p.y / (square * square);
+    }
+  }
+  for (const March kind : {March::tet, March::brick}) {
+    viewer->set_grid(march(kind));
+    viewer->viewer().set_surface_settings({});
+    const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
+    const double expected = 3.0 * 0.8 / pi * irradiance;
+    EXPECT_NEAR(picture.mean().x / expected, 1.0, 0.01);
+    EXPECT_NEAR(picture.mean().y / expected, 1.0 / 3.0, 0.01);
+    EXPECT_EQ(picture.mean().z, 0.0);
+    viewer->viewer().set_surface_settings({{}, viewer::SurfaceLight::shadows});
+    EXPECT_EQ(test::render(*viewer, {16, 16, 16, 1, render::View::shaded}).mean().x, 0.0);
+  }
+}
+
+// A black floor in the middle of a glowing slab: S (1 - e^-tau) of what is above it, by triangles and by the surface
+// pass.
+TEST_P(SurfaceTrace, AGlowEndsAtASurface) {
+  const auto viewer = make();
+  viewer->set_volume(slab());
+  viewer->set_light({});
+  viewer->set_camera(looking_down(0.5));
+  viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.0F)), 3.7F)));
+  for (const March kind : {March::tet, March::dense}) {
+    viewer->set_grid(march(kind));
+    for (const auto light : {viewer::SurfaceLight::full, viewer::SurfaceLight::none}) {
+      viewer->viewer().set_surface_settings({{}, light});
+      for (const double sigma : {0.02, 0.5}) {
+        viewer->set_medium({sigma, vec3(0.0F), 0.0F, 0, vec3(2.0F)});
+        const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
+        const double opacity = 1.0 - std::exp(-sigma * 3.8);
+        EXPECT_NEAR(picture.mean().x, 2.0 * opacity, 8.0 * std::sqrt(opacity * (1.0 - opacity)) / 256.0)
+            << sigma << " " << int(light);
+        EXPECT_NEAR(picture.mean().w, 1.0, 1e-6);
+      }
+    }
+  }
+}
+
 TEST_P(SurfaceTrace, LampsFallOffWithTheSquareOfTheDistance) {
   const auto viewer = make();
   viewer->set_volume(slab());

@@ -102,13 +102,62 @@ TEST_P(Trace, WhiteFurnaceIsOneEverywhere) {
   }
 }
 
+// S (1 - e^-tau) of a slab that glows and does not scatter, before a sky.
+TEST_P(Trace, AGlowingSlabInEveryMarch) {
+  const auto viewer = make();
+  viewer->set_volume(box_volume({64, 64, 8}));
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.0F, 0.5F, 3.0F)});
+  viewer->set_camera(test::camera_at({31.5, 31.5, 500.0}, {31.5, 31.5, 0.0}, 0.5));
+  for (const Kind& kind : kinds) {
+    viewer->set_grid(settings_of(kind, -1.0));
+    for (const double sigma : {0.02, 0.1, 2.0}) {
+      viewer->set_medium({sigma, vec3(0.0F), 0.0F, 0, {4.0F, 2.0F, 0.0F}});
+      const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
+      const double through = std::exp(-sigma * 8.0);
+      const double error = 4.0 * std::sqrt((through + 1.0 / 3.0) * (1.0 - through) / (256.0 * 64.0));
+      EXPECT_NEAR(picture.mean().x, 4.0 * (1.0 - through), 4.0 * error);
+      EXPECT_NEAR(picture.mean().y, 2.0 * (1.0 - through) + 0.5 * through, 2.0 * error);
+      EXPECT_NEAR(picture.mean().z, 3.0 * through, 3.0 * error);
+    }
+  }
+}
+
+// As hot as what is around it: whatever it absorbs and scatters, it cannot be seen.
+TEST_P(Trace, AMediumInBalanceIsInvisible) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3));
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(2.0F, 1.0F, 0.5F)});
+  const vec3 albedo(0.2F, 0.7F, 0.99F);
+  viewer->set_medium({1.0, albedo, 0.5F, 0, (1.0F - albedo) * vec3(2.0F, 1.0F, 0.5F)});
+  for (const Kind& kind : {kinds[0], kinds[3]}) {
+    viewer->set_grid(settings_of(kind, 0.02));
+    const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
+    for (int c = 0; c < 3; ++c) {
+      const double expected = 2.0 / double(1 << c);
+      double square = 0.0;
+      for (const glm::vec4& p : picture.pixels) square += (p[c] - expected) * (p[c] - expected);
+      const double error = std::sqrt(square / 576.0 / 576.0);
+      EXPECT_NEAR(picture.mean()[c], expected, 4.0 * error + 1e-5) << c;
+      EXPECT_LT(error, 0.005 * expected) << c;
+    }
+    EXPECT_GT(picture.mean().w, 0.2);
+  }
+}
+
 // An independent path tracer: delta tracking over the voxels, no next-event estimation towards the sky, no roulette;
 // the sun by ratio of delta-tracked transmittance. Nothing shared with glsl/ but the definition of the medium.
 class Reference {
  public:
   Reference(const volume::ScalarVolume& volume, double scale, const dvec3& albedo, double g, const dvec3& sun,
-            const dvec3& irradiance, const dvec3& sky)
-      : volume_(&volume), scale_(scale), albedo_(albedo), g_(g), sun_(sun), irradiance_(irradiance), sky_(sky) {}
+            const dvec3& irradiance, const dvec3& sky, const dvec3& emission)
+      : volume_(&volume),
+        scale_(scale),
+        albedo_(albedo),
+        g_(g),
+        sun_(sun),
+        irradiance_(irradiance),
+        sky_(sky),
+        emission_(emission) {}
 
   dvec3 path(dvec3 o, dvec3 d) {
     dvec3 weight(1.0);
@@ -117,6 +166,7 @@ class Reference {
       const auto hit = collide(o, d);
       if (!hit) return radiance + weight * sky_;
       o = *hit;
+      radiance += weight * emission_;
       weight *= albedo_;
       const double cosine = glm::dot(d, sun_);
       const double phase =
@@ -165,7 +215,7 @@ class Reference {
   double scale_;
   dvec3 albedo_;
   double g_;
-  dvec3 sun_, irradiance_, sky_;
+  dvec3 sun_, irradiance_, sky_, emission_;
   std::mt19937_64 engine_{12345};
   std::uniform_real_distribution<double> uniform_{0.0, 1.0};
 };
@@ -180,7 +230,7 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
   const dvec3 sun(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
                   std::cos(azimuth) * std::cos(elevation));
   const dvec3 albedo(0.95, 0.8, 0.5);
-  Reference reference(volume, 0.6, albedo, 0.4, sun, {3.0, 2.5, 2.0}, {0.3, 0.5, 0.8});
+  Reference reference(volume, 0.6, albedo, 0.4, sun, {3.0, 2.5, 2.0}, {0.3, 0.5, 0.8}, {0.2, 0.1, 0.05});
   const dvec3 forward = glm::normalize(target - eye);
   const dvec3 right = glm::normalize(glm::cross(forward, dvec3(0, 1, 0)));
   const dvec3 up = glm::cross(right, forward);
@@ -200,7 +250,7 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
 
   const auto viewer = make();
   viewer->set_volume(volume);
-  viewer->set_medium({0.6, vec3(albedo), 0.4F, 0});
+  viewer->set_medium({0.6, vec3(albedo), 0.4F, 0, {0.2F, 0.1F, 0.05F}});
   viewer->set_light({40.0F, 25.0F, {3.0F, 2.5F, 2.0F}, {0.3F, 0.5F, 0.8F}});
   viewer->set_camera(test::camera_at(eye, target, fovy));
   for (const Kind& kind : kinds) {

@@ -463,6 +463,12 @@ typedef struct cumulet_medium_desc {
   float coalbedo[3];    /* 1 - single-scattering albedo, each in [0, 1]; 0: nothing is absorbed */
   float anisotropy;     /* Henyey-Greenstein g in (-1, 1); 0: isotropic */
   uint32_t max_bounces; /* scattering events a path may have; 0: no limit */
+  /*
+   * Source radiance: each point gives off extinction x emission per unit of length, so that a body of the medium too
+   * thick to see through glows with this if it does not scatter. It lights the rest of the medium and the surfaces
+   * (CUMULET_SURFACE_LIGHT_FULL), as fire does. 0: dark.
+   */
+  float emission[3];
 } cumulet_medium_desc;
 
 /* A distant sun (a delta direction, invisible to camera rays) and a sky of constant radiance. Restarts accumulation. */

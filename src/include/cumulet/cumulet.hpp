@@ -604,13 +604,15 @@ struct MediumDesc {
   Rgb coalbedo{};
   float anisotropy = 0.0F;
   std::uint32_t max_bounces = 0;
+  Rgb emission{};
 
   operator cumulet_medium_desc() const noexcept {
     return {.struct_size = sizeof(cumulet_medium_desc),
             .density_scale = density_scale,
             .coalbedo = {coalbedo[0], coalbedo[1], coalbedo[2]},
             .anisotropy = anisotropy,
-            .max_bounces = max_bounces};
+            .max_bounces = max_bounces,
+            .emission = {emission[0], emission[1], emission[2]}};
   }
 };
 
