@@ -189,7 +189,7 @@ void BrickSums::compute(const float* values, const BrickTree& tree) {
 }
 
 Moments BrickSums::moments(unsigned h, const ivec3& corner, const BrickTree& tree) const {
-  const double leaves = 512 >> (std::bit_width(h) - 1);
+  const double leaves = 512.0 / std::bit_floor(h);
   constexpr double leaf_volume = 1.0 / 6.0;
   Moments m;
   m.volume = leaves * leaf_volume;
