@@ -78,8 +78,7 @@ void main() {
         float e_0 = cm.medium.x * r_0;
         float e_1 = cm.medium.x * r_1;
         float span = t_1 - t;
-        float part = min(1.0, (range.y - t) / max(span, 1e-30));
-        float depth = (e_0 + 0.5 * (e_1 - e_0) * part) * part * span;
+        float depth = cm_depth_of(e_0, e_1, span, range.y - t);
         if (i == 0 && volume_z == CM_INFINITE && used + depth >= 0.69314718) {
           volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
         }

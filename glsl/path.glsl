@@ -199,6 +199,15 @@ CM_FN void cm_begin_ray(CM_INOUT(CmPath) p) {
   }
 }
 
+// The density, by solid angle, of directions w (world) from o (cube space) to points of the box, each as likely: the
+// integral of t^2 over the ray's part inside, over the box's volume.
+CM_FN float cm_glow_density(vec3 o, vec3 w) {
+  vec2 range = cm_box_range(o, cm_to_cube(w));
+  vec3 box = vec3(cm.box_max) - vec3(cm.box_min);
+  float cubes = max(0.0f, range.y - range.x) * (dot(range, range) + range.x * range.y);
+  return cubes * cm.emission.w / max(box.x * box.y * box.z, 1e-30f);
+}
+
 // Whether a triangle ends the ray before the event does: then o, once moved, is on it. Asked after the march, not before:
 // in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the medium.
 CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) {
@@ -412,13 +421,9 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
       w = cm_surface_sample(surface, p.w, u_0, u_1, u_3);
       if (guided && dot(to_goal, to_goal) > 0.0f) w = normalize(to_goal);
       vec3 wi = to_sun ? to_light : w;
-      vec2 range = cm_box_range(p.o, cm_to_cube(wi));
-      vec3 box = vec3(cm.box_max) - vec3(cm.box_min);
-      float cubes = max(0.0f, range.y - range.x) * (dot(range, range) + range.x * range.y);
-      float in_glow = cubes * cm.emission.w / max(box.x * box.y * box.z, 1e-30f);
       facing = cm_surface_eval(surface, p.w, wi);
       lobe_density = cm_surface_pdf(surface, p.w, wi);
-      direction_density = lobe_density + to_glow * (in_glow - lobe_density);
+      direction_density = lobe_density + to_glow * (cm_glow_density(p.o, wi) - lobe_density);
     } else {
       lobe_density = cm_phase(cm.medium.y, dot(p.w, to_sun ? to_light : w));
       direction_density = lobe_density;

@@ -68,6 +68,9 @@ def assert_drawn(picture, area):
     assert max(lights) - min(lights) > 25, "the picture is blank"
 
 
+SETTLE = ["frames 3", "wait loaded", "wait converged"]
+
+
 def test_orbit_undo(s):
     orbit = ["drag viewport 0.4 0.5 to viewport 0.7 0.4"]
     converge = ["wait loaded", "wait converged"]
@@ -92,13 +95,12 @@ def test_orbit_undo(s):
 
 
 def test_change(s):
-    settle = ["frames 3", "wait loaded", "wait converged"]
-    s.play("replay", [*settle, *shot("first"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.3 0.5', *settle,
-                      *shot("thin"), "key ctrl+z", *settle, *shot("thick"), "key n", *settle, *shot("wide"), "key n",
-                      'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *settle, *shot("sun"), 'click "Tone map"',
+    s.play("replay", [*SETTLE, *shot("first"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.3 0.5', *SETTLE,
+                      *shot("thin"), "key ctrl+z", *SETTLE, *shot("thick"), "key n", *SETTLE, *shot("wide"), "key n",
+                      'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *SETTLE, *shot("sun"), 'click "Tone map"',
                       "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), 'click "Threshold"',
-                      'drag "Threshold" to "Threshold" 0.75 0.5', *settle, *shot("coarse"), "key 2", *settle, *shot("cells"),
-                      "key 3", *settle, *shot("steps"), "key 5", *settle, *shot("wireframe"), "key 1"],
+                      'drag "Threshold" to "Threshold" 0.75 0.5', *SETTLE, *shot("coarse"), "key 2", *SETTLE, *shot("cells"),
+                      "key 3", *SETTLE, *shot("steps"), "key 5", *SETTLE, *shot("wireframe"), "key 1"],
            "--volume", s.cumulus)
     first, report, area = look(s, "first")
     thin, thin_report, _ = look(s, "thin")
@@ -122,9 +124,8 @@ def test_change(s):
 
 
 def test_glow(s):
-    settle = ["frames 3", "wait loaded", "wait converged"]
-    s.play("replay", [*settle, *shot("dark"), 'drag "Glow" 0.02 0.5 to "Glow" 0.6 0.5', *settle, *shot("glowing"), "key ctrl+z",
-                      *settle, *shot("undone")], "--volume", s.fire, "--spp", "16")
+    s.play("replay", [*SETTLE, *shot("dark"), 'drag "Glow" 0.02 0.5 to "Glow" 0.6 0.5', *SETTLE, *shot("glowing"), "key ctrl+z",
+                      *SETTLE, *shot("undone")], "--volume", s.fire, "--spp", "16")
     dark, report, area = look(s, "dark")
     glowing, glowing_report, _ = look(s, "glowing")
     assert report["scene"]["medium"]["emission"] == [0, 0, 0]
@@ -135,11 +136,10 @@ def test_glow(s):
 
 
 def test_surfaces(s):
-    settle = ["frames 3", "wait loaded", "wait converged"]
     mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
-    s.play("replay", [*settle, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *settle,
-                      *shot("soft"), 'click "Surface light"', "frames 2", 'click "Surface light/None"', *settle, *shot("none"),
-                      'click "Remove surfaces"', *settle, *shot("removed"), "key ctrl+z", *settle, *shot("back")],
+    s.play("replay", [*SETTLE, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,
+                      *shot("soft"), 'click "Surface light"', "frames 2", 'click "Surface light/None"', *SETTLE, *shot("none"),
+                      'click "Remove surfaces"', *SETTLE, *shot("removed"), "key ctrl+z", *SETTLE, *shot("back")],
            "--volume", s.cumulus, "--gltf", mountains, "--spp", "2")
     first, report, area = look(s, "first")
     assert report["scene"]["surfaces"]["indirect_roughness"] == 0

@@ -82,6 +82,19 @@ class SurfacePicture : public test::ViewerTest {
   [[nodiscard]] test::Picture render(std::uint32_t seed, std::uint32_t samples = 256) const {
     return test::render(*viewer_, {side, side, samples, seed, render::View::shaded});
   }
+  /// As render, and with the volume alone summed apart.
+  void trace_for_aovs(std::uint32_t samples) const {
+    viewer_->set_image({side, side, samples, 1, render::View::shaded});
+    viewer_->viewer().set_sampling({samples, 1, render::View::shaded, false, true});
+    viewer_->build();
+    while (!viewer_->render(1e9)) {
+    }
+  }
+  [[nodiscard]] std::vector<float> read(Aov aov, std::size_t channels) const {
+    std::vector<float> values(channels * side * side);
+    viewer_->viewer().read_aov(aov, values.data(), values.size());
+    return values;
+  }
   static double to_sphere_edge(std::uint32_t x, std::uint32_t y) {
     return std::abs(std::hypot(left + (x + 0.5) * scale - 23.0, 27.5 - (y + 0.5) * scale - 18.0) - 3.0) / scale;
   }
@@ -285,17 +298,7 @@ TEST_P(SurfacePicture, BlendedSurfacesAreSortedAgainstTheVolume) {
 TEST_P(SurfacePicture, AovsAreTheAnalyticOnes) {
   for (const SurfaceLight mode : {SurfaceLight::none, SurfaceLight::full}) {
     show(scene(), mode);
-    viewer_->set_image({side, side, 128, 1, render::View::shaded});
-    viewer::Sampling sampling{128, 1, render::View::shaded, false, true};
-    viewer_->viewer().set_sampling(sampling);
-    viewer_->build();
-    while (!viewer_->render(1e9)) {
-    }
-    const auto read = [&](Aov aov, std::size_t channels) {
-      std::vector<float> values(channels * side * side);
-      viewer_->viewer().read_aov(aov, values.data(), values.size());
-      return values;
-    };
+    trace_for_aovs(128);
     const auto beauty = read(Aov::beauty, 4);
     const auto volume = read(Aov::volume, 4);
     const auto transmittance = read(Aov::transmittance, 1);
@@ -346,15 +349,9 @@ TEST_P(SurfacePicture, AGlowIsTheVolumesAlone) {
   for (const SurfaceLight mode : {SurfaceLight::none, SurfaceLight::full}) {
     show(scene(), mode);
     viewer_->set_medium({sigma, vec3(0.0F), 0.0F, 0, vec3(2.0F)});
-    viewer_->set_image({side, side, 64, 1, render::View::shaded});
-    viewer_->viewer().set_sampling({64, 1, render::View::shaded, false, true});
-    viewer_->build();
-    while (!viewer_->render(1e9)) {
-    }
-    std::vector<float> volume(std::size_t{4} * side * side);
-    std::vector<float> transmittance(std::size_t{1} * side * side);
-    viewer_->viewer().read_aov(Aov::volume, volume.data(), volume.size());
-    viewer_->viewer().read_aov(Aov::transmittance, transmittance.data(), transmittance.size());
+    trace_for_aovs(64);
+    const std::vector<float> volume = read(Aov::volume, 4);
+    const std::vector<float> transmittance = read(Aov::transmittance, 1);
     double difference = 0.0;
     for (std::size_t i = 0; i < transmittance.size(); ++i) {
       difference += volume[4 * i] - 2.0 * (1.0 - transmittance[i]);
