@@ -1,17 +1,23 @@
-# `cmake --install`: the library, its header, a CMake package, a pkg-config file, the programs and the licences.
-# `cpack`: the same and every shared library it needs in one portable .tar.gz (cmake/bundle.cmake).
+# `cmake --install`: the library, its headers, a CMake package, a pkg-config file, the programs with their manual pages,
+# completions and desktop files, the documents and the licences.
+# `cpack -G TGZ`: the same and every shared library it needs in one portable .tar.gz (bundle.cmake).
+# `cpack -G DEB`: three Debian packages that need Debian's own libraries (debian.cmake): libcumulet0 is what a host's
+# package depends on, so it brings no program's needs (a window, OpenEXR); libcumulet-dev has what compiling takes;
+# cumulet the programs.
 include(CMakePackageConfigHelpers)
 
 set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc/cumulet)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Cumulet)
 
-# --- where an installed file finds its libraries ---------------------------------------------------------------
+# --- where a file finds its libraries --------------------------------------------------------------------------
 # Beside it: lib/. A portable tarball adds lib/host/N and lib/fallback, for what a GL driver loads too: bundle.cmake.
-# It is DT_RPATH (--disable-new-dtags) since that, unlike DT_RUNPATH, also serves the libraries of our libraries, so
-# that those are bundled as they are. $ORIGIN keeps a tree that was moved working.
+# What is built has room for those, an install does not name them, and nothing names a folder of the build: $ORIGIN
+# keeps a tree that was moved working. It is DT_RPATH (--disable-new-dtags) since that, unlike DT_RUNPATH, also serves
+# the libraries of our libraries, so that those are bundled as they are.
 file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
 function(cumulet_rpath target lib)
-  set_property(TARGET ${target} PROPERTY INSTALL_RPATH ${lib} ${lib}/host/1 ${lib}/host/2 ${lib}/host/3 ${lib}/fallback)
+  set_target_properties(${target} PROPERTIES INSTALL_RPATH ${lib}
+                        BUILD_RPATH "${lib};${lib}/host/1;${lib}/host/2;${lib}/host/3;${lib}/fallback")
   target_link_options(${target} PRIVATE -Wl,--disable-new-dtags)
 endfunction()
 
@@ -26,32 +32,62 @@ cumulet_rpath(cumulet $ORIGIN)
 
 # --- install ---------------------------------------------------------------------------------------------------
 install(TARGETS cumulet EXPORT Cumulet
-        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
-        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-        RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-if(programs)
-  install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-endif()
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/include/cumulet DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
+        RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT library)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/include/cumulet DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+        COMPONENT development)
 
-install(EXPORT Cumulet NAMESPACE Cumulet:: FILE CumuletTargets.cmake DESTINATION ${package_dir})
+# A program's manual page and completions, of what it says of its own flags.
+set(manual_files)
+foreach(program ${programs})
+  set(page ${PROJECT_SOURCE_DIR}/docs/man/${program}.1.in)
+  set(made ${CMAKE_BINARY_DIR}/manual/${program})
+  add_custom_command(OUTPUT ${made}.1 ${made}.bash ${made}.zsh
+                     COMMAND ${CUMULET_GLAD_PYTHON} ${CMAKE_CURRENT_LIST_DIR}/manual.py $<TARGET_FILE:${program}> ${page}
+                             ${CMAKE_BINARY_DIR}/manual ${PROJECT_VERSION}
+                     DEPENDS ${program} ${page} ${CMAKE_CURRENT_LIST_DIR}/manual.py VERBATIM)
+  list(APPEND manual_files ${made}.1)
+  install(TARGETS ${program} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+  install(FILES ${made}.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT programs)
+  install(FILES ${made}.bash RENAME ${program} DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+          COMPONENT programs)
+  install(FILES ${made}.zsh RENAME _${program} DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions
+          COMPONENT programs)
+endforeach()
+if(programs)
+  add_custom_target(cumulet_manual ALL DEPENDS ${manual_files})
+endif()
+if(TARGET cumulet-demo)
+  set(desktop ${PROJECT_SOURCE_DIR}/demo/desktop)
+  install(FILES ${desktop}/cumulet-demo.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT programs)
+  install(FILES ${desktop}/cumulet.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages COMPONENT programs)
+  install(FILES ${desktop}/cumulet.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps
+          COMPONENT programs)
+endif()
+
+install(EXPORT Cumulet NAMESPACE Cumulet:: FILE CumuletTargets.cmake DESTINATION ${package_dir}
+        COMPONENT development)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/CumuletConfig.cmake.in
                               ${CMAKE_CURRENT_BINARY_DIR}/CumuletConfig.cmake INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/CumuletConfigVersion.cmake
                                  COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/CumuletConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/CumuletConfigVersion.cmake
-        DESTINATION ${package_dir})
+        DESTINATION ${package_dir} COMPONENT development)
 
 set(pkgconfig_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 file(RELATIVE_PATH pc_to_prefix ${CMAKE_INSTALL_PREFIX}/${pkgconfig_dir} ${CMAKE_INSTALL_PREFIX})
 configure_file(${CMAKE_CURRENT_LIST_DIR}/cumulet.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc DESTINATION ${pkgconfig_dir})
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
 
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md DESTINATION ${doc_dir})
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/third_party_notes DESTINATION ${doc_dir})
+# The README's links hold there.
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md DESTINATION ${doc_dir} COMPONENT programs)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/third_party_notes DESTINATION ${doc_dir}
+        COMPONENT programs PATTERN man EXCLUDE)
 
 # --- cpack -----------------------------------------------------------------------------------------------------
 if(PROJECT_IS_TOP_LEVEL)
+  set(CUMULET_MAINTAINER "Cumulet <cumulet@localhost>" CACHE STRING "Whom a Debian package names for questions")
   string(TOLOWER ${CMAKE_SYSTEM_NAME} system)
   set(CPACK_GENERATOR TGZ)
   set(CPACK_PACKAGE_NAME cumulet)
@@ -63,10 +99,52 @@ if(PROJECT_IS_TOP_LEVEL)
   set(CPACK_STRIP_FILES ON)
   set(CPACK_VERBATIM_VARIABLES ON)
   set(CPACK_THREADS 0)
-  set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_CURRENT_LIST_DIR}/bundle.cmake)
+  set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_CURRENT_LIST_DIR}/bundle.cmake ${CMAKE_CURRENT_LIST_DIR}/debian.cmake)
   set(CPACK_CUMULET_LIBDIR ${CMAKE_INSTALL_LIBDIR})
   set(CPACK_CUMULET_BINDIR ${CMAKE_INSTALL_BINDIR})
   set(CPACK_CUMULET_DOCDIR ${doc_dir})
+  set(CPACK_CUMULET_DATADIR ${CMAKE_INSTALL_DATADIR})
+  set(CPACK_CUMULET_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
+
+  set(CPACK_COMPONENTS_ALL library development programs)
+  set(CPACK_DEB_COMPONENT_INSTALL ON)
+  set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+  set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+  set(CPACK_DEBIAN_PACKAGE_MAINTAINER ${CUMULET_MAINTAINER})
+  set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+  set(same_version "libcumulet0 (= ${PROJECT_VERSION}-1)")
+
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libcumulet0)
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+  set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")  # the ABI is not frozen before 1.0
+  set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "path-traced volumes inside an OpenGL context - library
+Cumulet path-traces OpenVDB and NanoVDB volumes, and glTF surfaces in them,
+inside an OpenGL 4.5 context that its host has made. Volumes become adaptive
+tetrahedral grids, which compute shaders trace.")
+
+  set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libcumulet-dev)
+  set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+  set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "${same_version}")
+  set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS libopenvdb-dev)
+  set(CPACK_DEBIAN_DEVELOPMENT_DESCRIPTION "path-traced volumes inside an OpenGL context - headers
+What it takes to compile against Cumulet: C and C++ headers, a CMake package
+and a pkg-config file.")
+
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_NAME cumulet)
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SECTION graphics)
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_LIBRARY_OUTPUT_DIRECTORY})
+  # Loaded by name, which dpkg-shlibdeps cannot see: EGL, a font. The driver is whatever the machine has.
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "${same_version}, libegl1, fonts-dejavu-core")
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS libgl1-mesa-dri)
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS libosmesa6)
+  set(CPACK_DEBIAN_PROGRAMS_DESCRIPTION "path-traced volumes - viewer and command line renderer
+cumulet-demo shows OpenVDB and NanoVDB volumes and glTF models in a window,
+path-traced as they are turned and changed. cumulet-render makes pictures of
+them without a display. cumulet-scene writes a sample scene.")
+  set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # or it would come before those
   include(CPack)
 endif()
 

@@ -1,6 +1,9 @@
 # Run by cpack on the staged tree before it is archived: adds every shared library that the programs and libcumulet
 # need, but for the C library's family and OpenGL's, with the licences of those libraries.
 cmake_minimum_required(VERSION 3.25)
+if(NOT CPACK_GENERATOR STREQUAL "TGZ")
+  return()
+endif()
 
 set(stage ${CPACK_TEMPORARY_INSTALL_DIRECTORY})
 set(lib_dir ${stage}/${CPACK_CUMULET_LIBDIR})
@@ -99,3 +102,15 @@ foreach(package ${packages})
   endforeach()
 endforeach()
 message(STATUS "Bundled ${count} shared libraries")
+
+# Ours look there, in this order.
+foreach(file ${programs} ${libraries})
+  if(NOT IS_SYMLINK ${file})
+    file(READ_ELF ${file} RPATH installed)
+    set(rpath ${installed})
+    foreach(folder host/1 host/2 host/3 fallback)
+      string(APPEND rpath ":${installed}/${folder}")
+    endforeach()
+    file(RPATH_CHANGE FILE ${file} OLD_RPATH ${installed} NEW_RPATH ${rpath})
+  endif()
+endforeach()

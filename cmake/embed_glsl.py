@@ -1,9 +1,17 @@
 """Resolve #include "x.glsl" in glsl/, validate each shader, and write one C++ file that holds them all.
 
-A shader declares the variants that the library compiles in comments: `// variant: CM_MARCH=1 CM_CELLS=0`.
-Each is validated with glslangValidator where there is one.
+A shader that is compiled with macros says in comments with which, for make_*_program of src/gl/objects.hpp builds no
+others:
+
+    // variants: CM_MARCH=0 CM_PAGES=1..8 or CM_MARCH=1,2
+    // variants: - or CM_LAYERS=1
+
+A line holds alternatives, one of which every variant has; "-" is none of the macros. 1,2 are values; 1..8 is a range of
+them, and what holds at both of its ends is taken to hold between. Each variant (the product of the lines; of ranges
+beyond eight numbers the ends) is validated with glslangValidator where there is one.
 """
 import argparse
+import itertools
 import pathlib
 import re
 import subprocess
@@ -11,6 +19,8 @@ import sys
 import tempfile
 
 INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
+MACRO = re.compile(r"(CM_[A-Z_]+)=(?:(\d+)\.\.(\d+)|(\w+(?:,\w+)*))")
+AT_ONCE = 64  # files a call of the validator
 
 
 def flatten(path, seen):
@@ -27,21 +37,69 @@ def flatten(path, seen):
     return lines
 
 
+def parse_macro(text, where):
+    match = MACRO.fullmatch(text)
+    if not match:
+        sys.exit(f"{where}: '{text}' is no NAME=VALUE,... or NAME=LOW..HIGH")
+    name, low, high, values = match.groups()
+    if values:
+        return name, values.split(","), False
+    return name, [str(i) for i in range(int(low), int(high) + 1)], True
+
+
+def variants_of(name, source):
+    """Each a list of macros (name, values, whether they are a range)."""
+    if re.search(r"^// variant:", source, re.M):
+        sys.exit(f"{name}: '// variant:' lines are not read any more: see cmake/embed_glsl.py for '// variants:'")
+    lines = []
+    for line in re.findall(r"^// variants:(.*)$", source, re.M):
+        alternatives = [part.split() for part in line.split(" or ")]
+        lines.append([[parse_macro(m, name) for m in part if m != "-"] for part in alternatives])
+    return [sum(choice, []) for choice in itertools.product(*lines)]
+
+
 def with_defines(source, defines):
     version, rest = source.split("\n", 1)
     lines = "".join(f"#define {d.replace('=', ' ')}\n" for d in defines)
     return f"{version}\n{lines}{rest}"
 
 
-def validate(validator, name, source):
-    variants = re.findall(r"^// variant:(.*)$", source, re.M) or [""]
-    for variant in variants:
-        with tempfile.NamedTemporaryFile("w", suffix=pathlib.Path(name).suffix) as file:
-            file.write(with_defines(source, variant.split()))
-            file.flush()
-            result = subprocess.run([validator, file.name], capture_output=True, text=True)
-        if result.returncode != 0:
-            sys.exit(f"{name} [{variant.strip()}]:\n{result.stdout}{result.stderr}")
+def validate(validator, name, source, variants):
+    texts = []
+    for macros in variants:
+        choices = [[f"{macro}={value}" for value in (values[::len(values) - 1] if is_range and len(values) > 8 else values)]
+                   for macro, values, is_range in macros]
+        texts += [with_defines(source, defines) for defines in itertools.product(*choices)]
+    with tempfile.TemporaryDirectory() as folder:
+        files = []
+        for i, text in enumerate(texts):
+            files.append(pathlib.Path(folder) / f"{i}{pathlib.Path(name).suffix}")
+            files[-1].write_text(text)
+        for i in range(0, len(files), AT_ONCE):
+            result = subprocess.run([validator, "-t", *files[i:i + AT_ONCE]], capture_output=True, text=True)
+            if result.returncode == 0:
+                continue
+            for file in files[i:i + AT_ONCE]:  # one by one: which is it?
+                result = subprocess.run([validator, file], capture_output=True, text=True)
+                if result.returncode != 0:
+                    defines = re.findall(r"^#define (.*)$", file.read_text().split("\n//", 1)[0], re.M)
+                    sys.exit(f"{name} [{', '.join(defines)}]:\n{result.stdout}{result.stderr}")
+
+
+def variant_tables(symbol, variants):
+    """C++ of the shader's variants, as gl/shader_sources.hpp declares them."""
+    rows, uses = [], []
+    for i, macros in enumerate(variants):
+        entries = []
+        for j, (macro, values, is_range) in enumerate(macros):
+            texts = ", ".join(f'"{v}"' for v in values)
+            rows.append(f"static constexpr std::string_view {symbol}_{i}_{j}[] = {{{texts}}};")
+            entries.append(f'{{"{macro}", {symbol}_{i}_{j}, {"true" if is_range else "false"}}}')
+        if entries:
+            rows.append(f"static constexpr ShaderMacro {symbol}_{i}[] = {{{', '.join(entries)}}};")
+        uses.append(f"{symbol}_{i}" if entries else "std::span<const ShaderMacro>{}")
+    rows.append(f"static constexpr std::span<const ShaderMacro> {symbol}_variants[] = {{{', '.join(uses)}}};\n")
+    return "\n".join(rows)
 
 
 def main():
@@ -53,18 +111,21 @@ def main():
 
     shaders = sorted(p for p in options.folder.iterdir() if p.suffix in (".comp", ".vert", ".frag"))
     parts = ['#include "gl/shader_sources.hpp"\n\nnamespace cumulet::gl {\n']
-    cases = []
+    entries = []
     for path in shaders:
         source = "\n".join(flatten(path, set())) + "\n"
+        variants = variants_of(path.name, source)
         if options.validator and not options.validator.endswith("NOTFOUND"):
-            validate(options.validator, path.name, source)
+            validate(options.validator, path.name, source, variants)
         symbol = path.name.replace(".", "_")
         # Compilers limit the length of one literal; adjacent ones join.
         chunks = [source[i:i + 8000] for i in range(0, len(source), 8000)]
         literal = "\n".join(f'R"glsl({chunk})glsl"' for chunk in chunks)
         parts.append(f"static constexpr char {symbol}[] =\n{literal};\n")
-        cases.append(f'  if (name == "{path.name}") return {symbol};\n')
-    parts.append("std::string_view shader_source([[maybe_unused]] std::string_view name) {\n" + "".join(cases) + "  return {};\n}\n")
+        parts.append(variant_tables(symbol, variants))
+        entries.append(f'    {{"{path.name}", {symbol}, {symbol}_variants}},')
+    parts.append("static constexpr Shader all_shaders[] = {\n" + "\n".join(entries) + "\n};\n")
+    parts.append("std::span<const Shader> shaders() { return all_shaders; }\n")
     parts.append("}  // namespace cumulet::gl\n")
     options.out.write_text("\n".join(parts))
 

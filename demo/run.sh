@@ -12,8 +12,8 @@ case ${1:-} in
 esac
 
 install_packages build
-build release || die "the build failed"
-bin=build/release/bin
+build programs || die "the build failed"
+bin=build/programs/bin
 
 # The scene is deterministic: written again only after its generator changed.
 scene=build/sample

@@ -1,30 +1,40 @@
 // What a surface reflects: the metallic-roughness material of glTF 2.0 (appendix B) with KHR_materials_ior, _specular
-// and _clearcoat. Shared by GLSL and C++.
+// and _clearcoat. Shared by GLSL and C++; the includer provides
+//   vec2 cm_ggx_albedo(float roughness, float cosine)
+//   vec2 cm_ggx_albedo_average(float roughness)
+// of src/surface/ggx_albedo.hpp's table: a GGX lobe with a Fresnel term of f0 and f90 reflects f0 x + f90 y of constant
+// radiance, towards a cosine and on average over all of them (weighed by the cosine).
 //
-// Three lobes: a GGX coat over a GGX base (Smith, height-correlated; Heitz, "Understanding the Masking-Shadowing
-// Function in Microfacet-Based BRDFs", JCGT 3(2), 2014), and a Lambertian one under the base. Fresnel is Schlick's.
-// Appendix B weighs the Lambertian lobe by 1 - F(v.h), which reflects up to 1.7 times the light that comes in at
-// grazing angles. Here it is T(n.v) T(n.l) / (1 - F_avg) with T = 1 - F (Kelemen and Szirmay-Kalos, "A Microfacet Based
-// Coupled Specular-Matte BRDF Model with Importance Sampling", Eurographics 2001): as reciprocal, and a smooth white
-// dielectric reflects exactly what comes in. The coat weighs what is under it by T(n.v) T(n.l).
+// Three lobes: a GGX coat over a GGX base, and a Lambertian one under the base. Appendix B weighs the Lambertian lobe by
+// 1 - F(v.h), which reflects up to 1.7 times the light that comes in at grazing angles. Here it is coupled to the base by
+// what that reflects, E: (1 - E(n.v)) (1 - E(n.l)) / (1 - E_avg) (Kelemen and Szirmay-Kalos, "A Microfacet Based Coupled
+// Specular-Matte BRDF Model with Importance Sampling", Eurographics 2001): as reciprocal, and a white dielectric of any
+// roughness reflects exactly what comes in. The coat weighs the Lambertian lobe in the same way, by its own E; the base's
+// own lobe, whose way in is mostly as steep as its way out, by the lesser of 1 - E(n.v) and 1 - E(n.l).
+//
+// The Lambertian lobe ends softly where light sinks below the smooth surface under a normal map: see cm_terminator.
 //
 // wo and wi are unit vectors that point away from the surface, wo towards where the light goes. Nothing is transmitted.
 #ifndef CM_BSDF_GLSL
 #define CM_BSDF_GLSL
 #include "frame.glsl"
+#include "ggx.glsl"
+
+CM_FN vec2 cm_ggx_albedo(float roughness, float cosine);
+CM_FN vec2 cm_ggx_albedo_average(float roughness);
 
 struct CmSurface {
   vec3 base_color;            // linear, 0 to 1
   float metallic;             // 0 to 1
   float roughness;            // perceptual, 0 to 1: alpha = max(roughness^2, 1e-3)
   vec3 normal;                // of shading: unit, world, on wo's side
+  vec3 smooth_normal;         // what it would be without a normal map, unit
   vec3 f0;                    // reflectance of the dielectric at normal incidence, see cm_dielectric_f0
   float specular;             // its reflectance at grazing incidence
   float clearcoat;            // weight of the coat, of ior 1.5
   float clearcoat_roughness;  // as roughness
 };
 
-const float CM_INV_PI = 0.318309886f;
 const float CM_COAT_F0 = 0.04f;
 
 // f0 of an ior (0: infinite, as KHR_materials_ior has it) and KHR_materials_specular's weight and colour.
@@ -33,57 +43,7 @@ CM_FN vec3 cm_dielectric_f0(float ior, float specular, vec3 specular_color) {
   return min(specular_color * (r * r), vec3(1.0f)) * specular;
 }
 
-CM_FN float cm_alpha(float roughness) { return max(roughness * roughness, 1e-3f); }
-
 CM_FN float cm_max3(vec3 v) { return max(v.x, max(v.y, v.z)); }
-
-// (1 - cosine)^5
-CM_FN float cm_schlick(float cosine) {
-  float c = clamp(1.0f - cosine, 0.0f, 1.0f);
-  float c2 = c * c;
-  return c2 * c2 * c;
-}
-
-// The functions below take vectors in the frame of the normal: z is the cosine.
-
-// GGX density of normals: 1 / (pi a^2 ((x^2 + y^2) / a^2 + z^2)^2), h unit.
-CM_FN float cm_ggx_density(float alpha, vec3 h) {
-  float inverse = 1.0f / (alpha * alpha);
-  float s = (h.x * h.x + h.y * h.y) * inverse + h.z * h.z;
-  return CM_INV_PI * inverse / (s * s);
-}
-
-// Smith's Lambda: (sqrt(1 + a^2 tan^2) - 1) / 2.
-CM_FN float cm_ggx_lambda(float alpha, vec3 w) {
-  float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
-  return 0.5f * sqrt(1.0f + alpha * alpha * tan2) - 0.5f;
-}
-
-// Visible normal: Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 7(4), 2018; with u in [0, 1)^2.
-CM_FN vec3 cm_ggx_visible_normal(float alpha, vec3 wo, float u0, float u1) {
-  vec3 stretched = normalize(vec3(alpha * wo.x, alpha * wo.y, wo.z));
-  float length2 = stretched.x * stretched.x + stretched.y * stretched.y;
-  vec3 t1 = length2 > 0.0f ? vec3(-stretched.y, stretched.x, 0.0f) * (1.0f / sqrt(length2)) : vec3(1.0f, 0.0f, 0.0f);
-  vec3 t2 = cross(stretched, t1);
-  float radius = sqrt(u0);
-  float angle = 6.28318531f * u1;
-  float p1 = radius * cos(angle);
-  float blend = 0.5f * (1.0f + stretched.z);
-  float p2 = (1.0f - blend) * sqrt(max(0.0f, 1.0f - p1 * p1)) + blend * radius * sin(angle);
-  vec3 h = t1 * p1 + t2 * p2 + stretched * sqrt(max(0.0f, 1.0f - p1 * p1 - p2 * p2));
-  return normalize(vec3(alpha * h.x, alpha * h.y, max(h.z, 1e-6f)));
-}
-
-// Density of wi, reflected at a visible normal: G1(wo) D(h) / (4 n.wo).
-CM_FN float cm_ggx_pdf(float alpha, vec3 wo, vec3 h) {
-  return cm_ggx_density(alpha, h) / ((1.0f + cm_ggx_lambda(alpha, wo)) * 4.0f * wo.z);
-}
-
-// D G2 / (4 n.wo): a GGX lobe without its Fresnel term, times |cos|.
-CM_FN float cm_ggx(float alpha, vec3 wo, vec3 wi, vec3 h) {
-  float g = 1.0f / (1.0f + cm_ggx_lambda(alpha, wo) + cm_ggx_lambda(alpha, wi));
-  return cm_ggx_density(alpha, h) * g / (4.0f * wo.z);
-}
 
 CM_FN float cm_coat_fresnel(CmSurface s, float cosine) {
   return s.clearcoat * (CM_COAT_F0 + (1.0f - CM_COAT_F0) * cm_schlick(cosine));
@@ -95,6 +55,15 @@ CM_FN float cm_interface_fresnel(CmSurface s, float cosine) {
   return f0 + (s.specular - f0) * cm_schlick(cosine);
 }
 
+// What is left of constant radiance below the dielectric's interface, and below the coat, towards a cosine or by the
+// average of the table.
+CM_FN float cm_below_interface(CmSurface s, vec2 albedo) {
+  return max(0.0f, 1.0f - cm_max3(s.f0) * albedo.x - s.specular * albedo.y);
+}
+CM_FN float cm_below_coat(CmSurface s, vec2 albedo) {
+  return 1.0f - s.clearcoat * (CM_COAT_F0 * albedo.x + albedo.y);
+}
+
 // Of the base lobe: dielectric and metal are both linear in f0 and f90.
 CM_FN vec3 cm_base_fresnel(CmSurface s, float cosine) {
   vec3 f0 = mix(s.f0, s.base_color, s.metallic);
@@ -104,34 +73,38 @@ CM_FN vec3 cm_base_fresnel(CmSurface s, float cosine) {
 
 // Reflected share of constant radiance by the Lambertian lobe alone, without the coat.
 CM_FN vec3 cm_matte_albedo(CmSurface s, float cosine) {
-  return s.base_color * ((1.0f - s.metallic) * (1.0f - cm_interface_fresnel(s, cosine)));
+  return s.base_color * ((1.0f - s.metallic) * cm_below_interface(s, cm_ggx_albedo(s.roughness, cosine)));
 }
 
 // Probabilities of choosing the coat (x), the base lobe (y) and the Lambertian one (z): roughly as they reflect.
 CM_FN vec3 cm_lobe_weights(CmSurface s, float cosine) {
-  float coat = cm_coat_fresnel(s, cosine);
-  vec3 w = vec3(coat, (1.0f - coat) * cm_max3(cm_base_fresnel(s, cosine)),
-                (1.0f - coat) * cm_max3(cm_matte_albedo(s, cosine)));
+  float below = s.clearcoat > 0.0f ? cm_below_coat(s, cm_ggx_albedo(s.clearcoat_roughness, cosine)) : 1.0f;
+  vec3 w = vec3(1.0f - below, below * cm_max3(cm_base_fresnel(s, cosine)), below * cm_max3(cm_matte_albedo(s, cosine)));
   float sum = w.x + w.y + w.z;
   return sum > 0.0f ? w * (1.0f / sum) : vec3(0.0f, 0.0f, 1.0f);
 }
 
-CM_FN vec3 cm_bsdf_eval_local(CmSurface s, vec3 wo, vec3 wi) {
+// The lobes' sum times |cos|; the Lambertian one weighed by `terminator`.
+CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, vec3 wo, vec3 wi) {
   if (!(wo.z > 0.0f) || !(wi.z > 0.0f)) return vec3(0.0f);
   vec3 h = normalize(wo + wi);
   float cosine = dot(wo, h);
   vec3 f = cm_base_fresnel(s, cosine) * cm_ggx(cm_alpha(s.roughness), wo, wi, h);
+  vec3 matte = vec3(0.0f);
   if (s.metallic < 1.0f) {
-    float f0 = cm_max3(s.f0);
-    float average = f0 + (s.specular - f0) * (1.0f / 21.0f);
-    float through = (1.0f - cm_interface_fresnel(s, wi.z)) / max(1.0f - average, 1e-6f);
-    f += cm_matte_albedo(s, wo.z) * (through * wi.z * CM_INV_PI);
+    float average = cm_below_interface(s, cm_ggx_albedo_average(s.roughness));
+    float through = cm_below_interface(s, cm_ggx_albedo(s.roughness, wi.z)) / max(average, 1e-6f);
+    matte = cm_matte_albedo(s, wo.z) * (terminator * through * wi.z * CM_INV_PI);
   }
   if (s.clearcoat > 0.0f) {
-    f *= (1.0f - cm_coat_fresnel(s, wo.z)) * (1.0f - cm_coat_fresnel(s, wi.z));
-    f += vec3(cm_coat_fresnel(s, cosine) * cm_ggx(cm_alpha(s.clearcoat_roughness), wo, wi, h));
+    float rough = s.clearcoat_roughness;
+    float out_of = cm_below_coat(s, cm_ggx_albedo(rough, wo.z));
+    float into = cm_below_coat(s, cm_ggx_albedo(rough, wi.z));
+    f *= min(out_of, into);
+    matte *= out_of * into / cm_below_coat(s, cm_ggx_albedo_average(rough));
+    f += vec3(cm_coat_fresnel(s, cosine) * cm_ggx(cm_alpha(rough), wo, wi, h));
   }
-  return f;
+  return f + matte;
 }
 
 CM_FN float cm_bsdf_pdf_local(CmSurface s, vec3 wo, vec3 wi) {
@@ -146,12 +119,25 @@ CM_FN float cm_bsdf_pdf_local(CmSurface s, vec3 wo, vec3 wi) {
 
 CM_FN vec3 cm_into_frame(vec3 u, vec3 v, vec3 n, vec3 w) { return vec3(dot(u, w), dot(v, w), dot(n, w)); }
 
-// f |cos wi|: 0 where either is not above the surface. f is reciprocal.
+// How much of the light from wi the Lambertian lobe gets: all of it where no map has turned the normal, none where wi is
+// below the smooth surface, and between them less and less: Chiang, Li and Burley, "Taming the Shadow Terminator",
+// SIGGRAPH Talks 2019. A mapped normal at c to the smooth one loses so, of constant radiance, 2 % (c = 0.999) to 14 %
+// (0.9), 35 % (0.5) and at most (1 - c) / 2 with c <= 0: the shade that bumps throw on each other, as Cycles has it.
+CM_FN float cm_terminator(CmSurface s, vec3 wi) {
+  float c = dot(s.normal, s.smooth_normal);
+  float above = dot(s.smooth_normal, wi);
+  if (c <= 0.0f) return above > 0.0f ? 1.0f : 0.0f;
+  float t = clamp(above / max(dot(s.normal, wi) * c, 1e-12f), 0.0f, 1.0f);
+  return t * (1.0f + t * (1.0f - t));
+}
+
+// f |cos wi|: 0 where either is not above the surface. f is reciprocal where the normal is not mapped.
 CM_FN vec3 cm_bsdf_eval(CmSurface s, vec3 wo, vec3 wi) {
   vec3 u;
   vec3 v;
   cm_frame(s.normal, u, v);
-  return cm_bsdf_eval_local(s, cm_into_frame(u, v, s.normal, wo), cm_into_frame(u, v, s.normal, wi));
+  return cm_bsdf_eval_local(s, cm_terminator(s, wi), cm_into_frame(u, v, s.normal, wo),
+                            cm_into_frame(u, v, s.normal, wi));
 }
 
 // Density of cm_bsdf_sample's wi by solid angle. Integrates to 1 less the share of samples that fail.
@@ -183,26 +169,35 @@ CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   return normalize(u * i.x + v * i.y + s.normal * i.z);
 }
 
-// A shading normal, bent towards the viewer as far as it must be for the surface to be seen from its front.
-CM_FN vec3 cm_bend_normal(vec3 normal, vec3 wo) {
-  float cosine = dot(normal, wo);
-  return cosine >= 1e-3f ? normal : normalize(normal + wo * (1e-3f - cosine));
+// A shading normal, bent as far as it must be for the viewer's mirror image to be above the surface, whose own normal is
+// `geometric`, on the viewer's side: halfway to a mirror direction that is lifted to just above it.
+CM_FN vec3 cm_bend_normal(vec3 normal, vec3 geometric, vec3 wo) {
+  vec3 mirrored = normal * (2.0f * dot(normal, wo)) - wo;
+  float height = dot(mirrored, geometric);
+  float least = min(0.01f, 0.9f * dot(wo, geometric));
+  if (height >= least) return normal;
+  vec3 along = mirrored - geometric * height;
+  float length2 = dot(along, along);
+  float scale = sqrt(max(0.0f, 1.0f - least * least) / max(length2, 1e-12f));
+  vec3 bent = wo + along * scale + geometric * least;
+  float bent2 = dot(bent, bent);
+  return bent2 > 1e-12f ? bent * (1.0f / sqrt(bent2)) : geometric;
 }
 
-// What a sky of constant radiance 1 comes back as, nothing in its way: the integral of cm_bsdf_eval over wi. base and
-// coat: the shares that the two GGX lobes reflect, f0 x + f90 y (Karis, "Real Shading in Unreal Engine 4", SIGGRAPH 2013;
-// surface/ggx_albedo.hpp has the table).
-CM_FN vec3 cm_bsdf_albedo(CmSurface s, vec3 wo, vec2 base, vec2 coat) {
+// What a sky of constant radiance 1 comes back as, nothing in its way: the integral of cm_bsdf_eval over wi.
+CM_FN vec3 cm_bsdf_albedo(CmSurface s, vec3 wo) {
   float cosine = clamp(dot(s.normal, wo), 0.0f, 1.0f);
   vec3 f0 = mix(s.f0, s.base_color, s.metallic);
   float f90 = mix(s.specular, 1.0f, s.metallic);
+  vec2 base = cm_ggx_albedo(s.roughness, cosine);
   vec3 sum = f0 * base.x + vec3(f90 * base.y);
   vec3 matte = cm_matte_albedo(s, cosine);
   if (s.clearcoat > 0.0f) {
-    float through = 1.0f - cm_coat_fresnel(s, cosine);
-    float through_all = 1.0f - s.clearcoat * (CM_COAT_F0 + (1.0f - CM_COAT_F0) * (1.0f / 21.0f));
-    sum *= through * mix(through, through_all, s.roughness);  // smooth: the way out is as steep as the way in
-    matte *= through * through_all;
+    vec2 coat = cm_ggx_albedo(s.clearcoat_roughness, cosine);
+    float through = cm_below_coat(s, coat);
+    float through_all = cm_below_coat(s, cm_ggx_albedo_average(s.clearcoat_roughness));
+    sum *= mix(through, min(through, through_all), s.roughness);  // smooth: the way out is as steep as the way in
+    matte *= through;
     sum += vec3(s.clearcoat * (CM_COAT_F0 * coat.x + coat.y));
   }
   return sum + matte;

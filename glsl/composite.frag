@@ -1,10 +1,7 @@
 #version 450
 // An accumulation as displayed colour, or its depth.
 // Variants, not uniforms, choose what a pixel does: software drivers run both sides of every branch.
-// variant: CM_DEPTH=0 CM_BILINEAR=0 CM_RESOLVED=0 CM_TONE_MAP=0u CM_ENCODE=true
-// variant: CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=1 CM_TONE_MAP=3u CM_ENCODE=false
-// variant: CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=1 CM_TONE_MAP=0u CM_ENCODE=true CM_LAYERS=1
-// variant: CM_DEPTH=1
+// variants: CM_DEPTH=1 or CM_DEPTH=0 CM_BILINEAR=0,1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false or CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false CM_LAYERS=1
 #ifndef CM_LAYERS
 #define CM_LAYERS 0
 #endif
@@ -53,9 +50,7 @@ vec4 cm_texel(ivec2 texel) {
 #if CM_RESOLVED
   vec4 mean = texelFetch(cm_sum, texel, 0);
 #else
-  uint samples = texelFetch(cm_counts, texel, 0).x;
-  if (samples == 0u) return vec4(0.0);
-  vec4 mean = texelFetch(cm_sum, texel, 0) / float(samples);
+  vec4 mean = texelFetch(cm_sum, texel, 0) / max(float(texelFetch(cm_counts, texel, 0).x), 1.0);
 #endif
 #if CM_LAYERS
   return mean;

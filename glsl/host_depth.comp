@@ -1,7 +1,6 @@
 #version 450
 // A host's depth as view depth, one layer a sample, and whether it differs from before.
-// variant: CM_MULTISAMPLE=0
-// variant: CM_MULTISAMPLE=1
+// variants: CM_MULTISAMPLE=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #if CM_MULTISAMPLE

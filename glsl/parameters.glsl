@@ -38,11 +38,11 @@ layout(std140, binding = 0) uniform CmParameters {
                         // surfaces, 1 / (3 times cube space's unit of volume in the world), else 0
   uvec4 image;          // width, height, seed, target samples
   uvec4 tile;           // x, y, width, height
-  uvec4 march;          // x: iterations a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of cells a page,
-                        // w: 1 where a pass begins
+  uvec4 march;          // x: rounds a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of
+                        // cells a page
   uvec4 cube;           // x: exponent of the root cells, y: number of cells, z: number of tree nodes, w: levels
-  uvec4 order;          // x: row of work groups y of a dispatch works on row y x (mod rows); y: 1 to pick one pixel;
-                        // z, w: first row of the tile to trace, and the row after the last
+  uvec4 order;          // inspect.comp's and aovs.comp's: y: 1 to pick one pixel; z, w: first row of the tile, and the
+                        // row after the last
   uvec4 surface;        // the host's depth: x: layers (0: none), y: width, z: height
   vec4 from_cube_x;     // columns of the linear part of cube to world space; w: of its origin
   vec4 from_cube_y;
@@ -53,6 +53,7 @@ layout(std140, binding = 0) uniform CmParameters {
   uvec4 lights;         // x: first word of the punctual lights, y: how many; z: 1 where surfaces pass light on;
                         // w: triangles
   uvec4 emitters;       // x: first word of the emissive triangles' table, y: how many
+  uvec4 ggx_albedo;     // x: first word of surface/ggx_albedo.hpp's cells, y: of its averages
 #ifdef __cplusplus
 };
 #else

@@ -63,6 +63,7 @@ struct CmPath {
                     // ray 1 where a layer's colour, in light, waits at its end
   uint samples;     // finished in this pixel
   uint steps;       // of all its samples
+  uint marches;     // calls of cm_march so far, for who counts them
   float square;     // sum over its samples of their squared luminance
 #if CM_AOVS
   uint in_volume;   // 1 once this sample has met the volume first
@@ -71,6 +72,7 @@ struct CmPath {
 #if CM_SURFACES
   uint triangle;    // that o is on, if it is on one
   vec2 weights;     // of its second and third vertex
+  uint behind;      // 1 where the path met the side from which its vertices turn clockwise
   float reach;      // the ray's own end: a lamp, the host's surface; t_end < 0: cm_begin_ray is due
 #endif
 };
@@ -122,6 +124,7 @@ CM_FN float cm_depth_distance(float e_0, float e_1, float span, float depth) {
 // Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
 CM_FN uint cm_march(CM_INOUT(CmPath) p) {
   vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / p.d;
+  p.marches += 1u;
   uint event = CM_EVENT_NONE;
   float e_0 = 0.0f;
   float e_1 = 0.0f;
@@ -215,7 +218,13 @@ CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) {
   if (event == CM_EVENT_NONE || (event == CM_EVENT_COLLISION && !flight)) return false;
   if (p.bounce == 0u && cm.layers.x != 0u) return false;
   vec3 d = cm_to_world(p.d);
-  vec3 o = cm_surface_origin(p.o, p.home.x == CM_NONE, p.triangle, p.weights, d);
+  vec3 o = cm_from_cube_point(p.o);
+  if (p.home.x == CM_NONE) {
+    vec3 shift;
+    o = cm_surface_origin(p.triangle, p.weights, p.behind != 0u, d, shift);
+    // Shadow rays end where they would from the point itself: at a lamp.
+    if (!flight) d -= shift / p.reach;
+  }
   cm_hit_seed = p.random;
   cm_hit_camera = p.bounce == 0u;
   CmHit hit;
@@ -360,6 +369,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     if (met) {
       p.o = cm_to_cube_point(surface.position);
       p.home.x = CM_NONE;
+      p.behind = surface.behind ? 1u : 0u;
       finished = finished || surface.unlit;
     }
     finished = finished || dark;
@@ -410,6 +420,9 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     vec3 facing = vec3(0.0f, 0.0f, 0.0f);
     float lobe_density = 0.0f;
     float direction_density = 0.0f;
+#if CM_SURFACES > 1
+    bool happened_on = true;  // flights along it may count what they meet of the emissive triangles
+#endif
     if (on_surface) {
       float u_3 = cm_random(p.random, p.stream);
       // A glowing medium is looked for by half of the flights: towards a point of its box, each as likely.
@@ -424,6 +437,10 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
       facing = cm_surface_eval(surface, p.w, wi);
       lobe_density = cm_surface_pdf(surface, p.w, wi);
       direction_density = lobe_density + to_glow * (cm_glow_density(p.o, wi) - lobe_density);
+#if CM_SURFACES > 1
+      // Rays that start above the triangle see a lamp at another angle than it is looked for: that alone counts then.
+      happened_on = !surface.lifted || cm_lift_share(dot(surface.geometric, wi)) <= 0.0f;
+#endif
     } else {
       lobe_density = cm_phase(cm.medium.y, dot(p.w, to_sun ? to_light : w));
       direction_density = lobe_density;
@@ -431,7 +448,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     }
     vec3 scattered = direction_density > 0.0f ? facing / direction_density : vec3(0.0f, 0.0f, 0.0f);
 #if CM_SURFACES > 1
-    if (emitter) light_density += direction_density;
+    if (emitter && happened_on) light_density += direction_density;
 #endif
     sky_light *= scattered;
     if (!shadow) {
@@ -446,7 +463,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
 #endif
     p.light = p.throughput * (to_sun ? sun_light * (facing / max(light_density, 1e-30f)) : sky_light);
 #if CM_SURFACES > 1
-    if (!shadow) p.light.x = direction_density;
+    if (!shadow) p.light.x = happened_on ? direction_density : 1e-30f;
 #endif
 #if CM_SURFACES
     p.d = cm_to_cube(to_sun ? to_light : w);

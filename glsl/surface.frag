@@ -1,9 +1,8 @@
 #version 450
 // A surface as it is lit without shadows: by the sun, the scene's lights and a constant sky. Linear, premultiplied.
-// CM_ALPHA: 0 opaque, 1 mask, 2 blend, which transmission is drawn as too.
-// variant: CM_ALPHA=0
-// variant: CM_ALPHA=1
-// variant: CM_ALPHA=2
+// CM_ALPHA: 0 opaque, 1 mask, 2 blend, which transmission is drawn as too. CM_USED: a bit a map that there is; CM_COATED:
+// 1 with a coat. What a material has not is not even compiled: not every driver skips what a uniform forbids.
+// variants: CM_ALPHA=0,1,2 CM_USED=0..1023 CM_COATED=0,1
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 #include "bsdf.glsl"
@@ -17,13 +16,13 @@ layout(location = 4) in vec4 cm_vertex_color;
 layout(location = 5) in float cm_z;
 
 layout(binding = 0) uniform sampler2D cm_maps[10];
-layout(binding = 10) uniform sampler2D cm_albedo_table;  // cosine, roughness
+layout(binding = 10) uniform sampler2D cm_albedo_table;  // surface/ggx_albedo.hpp's
 layout(std430, binding = 0) readonly buffer CmLights { CmLight cm_lights[]; };  // from the eye
 
 layout(location = 0) out vec4 cm_colour;
 layout(location = 1) out float cm_depth_z;
 
-bool cm_has(int map) { return (cm_material.flags.x >> uint(map) & 1u) != 0u; }
+bool cm_has(int map) { return (CM_USED >> map & 1) != 0; }
 
 vec2 cm_uv_of(int map) {
   vec3 uv = vec3((cm_material.flags.y >> uint(map) & 1u) != 0u ? cm_texture_uv.zw : cm_texture_uv.xy, 1.0);
@@ -32,8 +31,8 @@ vec2 cm_uv_of(int map) {
 
 #define CM_SAMPLE(map) texture(cm_maps[map], cm_uv_of(map))
 
-// Unit, on the viewer's side: the front's, which back faces turn over.
-vec3 cm_normal_here(vec3 wo) {
+// Unit, on the viewer's side: the front's, which back faces turn over. smooth_normal: without the normal map.
+vec3 cm_normal_here(vec3 wo, out vec3 smooth_normal) {
   vec3 dx = dFdx(cm_from_eye);
   vec3 dy = dFdy(cm_from_eye);
   float side = gl_FrontFacing ? 1.0 : -1.0;
@@ -45,6 +44,7 @@ vec3 cm_normal_here(vec3 wo) {
     n = dot(n, n) > 0.0 ? normalize(n) : wo;
     if (dot(n, wo) * side < 0.0) n = -n;
   }
+  smooth_normal = n * side;
   if (cm_has(CM_MAP_NORMAL)) {
     vec3 t = cm_shading_tangent.xyz;
     float turn = cm_shading_tangent.w;
@@ -67,12 +67,21 @@ vec3 cm_normal_here(vec3 wo) {
       if (dot(mapped, mapped) > 1e-12) n = normalize(mapped);
     }
   }
-  return cm_bend_normal(n * side, wo);
+  vec3 g = cross(dx, dy);
+  g = dot(g, g) > 0.0 ? normalize(g) : wo;
+  if (dot(g, wo) < 0.0) g = -g;
+  smooth_normal = cm_bend_normal(smooth_normal, g, wo);
+  return cm_bend_normal(n * side, g, wo);
 }
 
-vec2 cm_ggx_share(float roughness, float cosine) {
-  vec2 size = vec2(textureSize(cm_albedo_table, 0));
-  return textureLod(cm_albedo_table, vec2(cosine, (0.5 + roughness * (size.y - 1.0)) / size.y), 0.0).xy;
+vec2 cm_ggx_albedo(float roughness, float cosine) {
+  vec2 place = cm_ggx_albedo_place(roughness, cosine);
+  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
+}
+
+vec2 cm_ggx_albedo_average(float roughness) {
+  vec2 place = vec2(float(CM_GGX_ALBEDO_SIZE), cm_ggx_albedo_place(roughness, 0.0).y);
+  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
 }
 
 void main() {
@@ -91,18 +100,21 @@ void main() {
     if (cm_has(CM_MAP_CLEARCOAT)) coat.x *= CM_SAMPLE(CM_MAP_CLEARCOAT).r;
     if (cm_has(CM_MAP_CLEARCOAT_ROUGHNESS)) coat.y *= CM_SAMPLE(CM_MAP_CLEARCOAT_ROUGHNESS).g;
     if (cm_has(CM_MAP_TRANSMISSION)) coat.z *= CM_SAMPLE(CM_MAP_TRANSMISSION).r;
+#if CM_COATED == 0
+    coat.x = 0.0;
+#endif
 
     CmSurface s;
     s.base_color = clamp(base.rgb, 0.0, 1.0);
     s.metallic = reflection.x;
     s.roughness = reflection.y;
-    s.normal = cm_normal_here(wo);
+    s.normal = cm_normal_here(wo, s.smooth_normal);
     s.f0 = min(specular.rgb, vec3(1.0)) * specular.w;
     s.specular = specular.w;
     s.clearcoat = coat.x;
     s.clearcoat_roughness = coat.y;
-    float cosine = clamp(dot(s.normal, wo), 0.0, 1.0);
 #if CM_ALPHA == 2
+    float cosine = clamp(dot(s.normal, wo), 0.0, 1.0);
     // What is transmitted is not scattered back; thin, unrefracted, and of one colour: an approximation.
     float through = coat.z * (1.0 - s.metallic);
     alpha *= 1.0 - through * (1.0 - cm_interface_fresnel(s, cosine)) * dot(s.base_color, vec3(0.2126, 0.7152, 0.0722));
@@ -113,8 +125,7 @@ void main() {
 #endif
     float occlusion = 1.0;
     if (cm_has(CM_MAP_OCCLUSION)) occlusion += reflection.w * (CM_SAMPLE(CM_MAP_OCCLUSION).r - 1.0);
-    colour = cm_view.sky_radiance.rgb * occlusion *
-             cm_bsdf_albedo(s, wo, cm_ggx_share(s.roughness, cosine), cm_ggx_share(s.clearcoat_roughness, cosine));
+    colour = cm_view.sky_radiance.rgb * occlusion * cm_bsdf_albedo(s, wo);
     colour += cm_view.sun_irradiance.rgb * cm_bsdf_eval(s, wo, cm_view.sun_direction.xyz);
     for (uint i = 0u; i < cm_view.counts.x; ++i) {
       vec3 wi;

@@ -44,6 +44,23 @@ vec3 cm_to_cube_point(vec3 p) {
   return cm.to_cube_x.xyz * v.x + cm.to_cube_y.xyz * v.y + cm.to_cube_z.xyz * v.z;
 }
 
+vec2 cm_ggx_albedo(float roughness, float cosine) {
+  vec2 place = cm_ggx_albedo_place(roughness, cosine);
+  ivec2 cell = min(ivec2(place), CM_GGX_ALBEDO_SIZE - 2);
+  vec2 f = place - vec2(cell);
+  uvec4 corners = cm_words(cm.ggx_albedo.x + uint(cell.y * (CM_GGX_ALBEDO_SIZE - 1) + cell.x));
+  vec2 low = mix(unpackHalf2x16(corners.x), unpackHalf2x16(corners.y), f.x);
+  vec2 high = mix(unpackHalf2x16(corners.z), unpackHalf2x16(corners.w), f.x);
+  return mix(low, high, f.y);
+}
+
+vec2 cm_ggx_albedo_average(float roughness) {
+  float place = cm_ggx_albedo_place(roughness, 0.0).y;
+  int row = min(int(place), CM_GGX_ALBEDO_SIZE - 2);
+  uvec2 ends = cm_words(cm.ggx_albedo.y + uint(row)).xy;
+  return mix(unpackHalf2x16(ends.x), unpackHalf2x16(ends.y), place - float(row));
+}
+
 // Unit vector of two signed 16-bit octahedral coordinates (Cigolle et al., "A Survey of Efficient Representations for
 // Independent Unit Vectors", JCGT 3(2), 2014).
 vec3 cm_octahedral(uint word) {
@@ -163,9 +180,31 @@ struct CmSurfacePoint {
   CmSurface material;
   vec3 position;   // world
   vec3 geometric;  // unit normal of the triangle, on the side the path came from
+  bool behind;     // that side is the one from which its vertices turn clockwise
+  bool lifted;     // rays that leave it at grazing angles start above it: see cm_lift
   vec3 emission;   // to that side
   bool unlit;
 };
+
+// From a point of a triangle to the smooth surface that its vertices' normals speak of, where that bulges towards
+// `geometric`: the mean of the point's projections onto the vertices' tangent planes (Hanika, "Hacking the Shadow
+// Terminator", Ray Tracing Gems II, chapter 4, 2021). 0 where it is flat, to what normals of 16 bits can tell.
+vec3 cm_lift(vec3 p, vec3 weight, vec3 position[3], vec3 normal[3], vec3 geometric) {
+  vec3 lift = vec3(0.0);
+  for (int i = 0; i < 3; ++i) {
+    vec3 n = dot(normal[i], geometric) < 0.0 ? -normal[i] : normal[i];
+    vec3 from = p - position[i];
+    float below = -dot(from, n) - 1e-4 * (abs(from.x) + abs(from.y) + abs(from.z));
+    lift += weight[i] * max(0.0, below) * n;
+  }
+  return lift;
+}
+
+// How much of that a ray starts above the triangle, `cosine` to its normal: all of it along the triangle and below. So
+// light that the smooth normals face is not stopped by the flat triangles that stand for them, and nothing is lost at
+// their edges; whoever looks for light and whoever happens on it start alike.
+const float CM_GRAZING = 0.1;
+float cm_lift_share(float cosine) { return clamp(1.0 - cosine / CM_GRAZING, 0.0, 1.0); }
 
 // What a material emits where it is seen from its front.
 vec3 cm_emission(CmVertexMix m) {
@@ -180,6 +219,7 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   uint material = m.corner.w;
   uint word = cm.scene.z + CM_MATERIAL_WORDS * material;
   vec3 position[3];
+  vec3 normals[3];
   vec3 normal = vec3(0.0);
   vec4 tangent = vec4(0.0);
   for (int i = 0; i < 3; ++i) {
@@ -187,7 +227,8 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
     uvec4 first = cm_words(vertex);
     uvec4 last = cm_words(vertex + 2u);
     position[i] = uintBitsToFloat(first.xyz);
-    normal += m.weight[i] * cm_octahedral(first.w);
+    normals[i] = cm_octahedral(first.w);
+    normal += m.weight[i] * normals[i];
     float hand = uintBitsToFloat(last.y);
     if (hand != 0.0) tangent += m.weight[i] * vec4(cm_octahedral(last.x), hand);
   }
@@ -195,10 +236,13 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   vec3 g = cross(position[1] - position[0], position[2] - position[0]);
   // Scaled first: the cross product of a tiny triangle has no length in fp32.
   g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
-  point.geometric = dot(g, w) > 0.0 ? -g : g;
+  point.behind = dot(g, w) > 0.0;
+  point.geometric = point.behind ? -g : g;
+  point.lifted = cm_lift(point.position, m.weight, position, normals, point.geometric) != vec3(0.0);
   float normal_length = length(normal);
   normal = normal_length > 1e-6 ? normal / normal_length : g;
   bool back = dot(normal, point.geometric) < 0.0;
+  point.material.smooth_normal = cm_bend_normal(back ? -normal : normal, point.geometric, -w);
 
   vec4 base = cm_floats(word) * cm_texture(material, CM_USE_BASE_COLOR, m, true) * m.color;
   vec4 a = cm_floats(word + 2u);
@@ -219,7 +263,7 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
     }
   }
   if (back) normal = -normal;
-  normal = cm_bend_normal(normal, -w);
+  normal = cm_bend_normal(normal, point.geometric, -w);
 
   point.unlit = (flags & CM_UNLIT) != 0u;
   point.emission = cm_hit_back && (flags & CM_ONE_SIDED) != 0u ? vec3(0.0) : cm_emission(m);
@@ -236,10 +280,9 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   return point;
 }
 
-// Reflected share of light from wi (world, unit) towards where the path came from, times the cosine.
-vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
-  return dot(point.geometric, wi) > 0.0 ? cm_bsdf_eval(point.material, -w, wi) : vec3(0.0);
-}
+// Reflected share of light from wi (world, unit) towards where the path came from, times the cosine. Not 0 below the
+// triangle: what is seen there from the ray's start counts, often the surface itself.
+vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_eval(point.material, -w, wi); }
 
 // Density of cm_surface_sample's directions by solid angle.
 float cm_surface_pdf(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_pdf(point.material, -w, wi); }
@@ -249,17 +292,24 @@ vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1, float
   return cm_bsdf_sample(point.material, -w, u_0, u_1, u_2);
 }
 
-// Where a ray from o (cube space) starts in the world; on a surface: beside it, on the side of its direction d (world).
-vec3 cm_surface_origin(vec3 o, bool on_surface, uint triangle, vec2 weights, vec3 d) {
-  if (!on_surface) return cm_from_cube_point(o);
+// Where a ray along d (world, unit) starts from a point of a triangle, in the world: beside it, on the side that its
+// path came from. shift: from the point itself, but for the rounding.
+vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, out vec3 shift) {
   uvec4 corner = cm_words(cm.scene.x + triangle);
-  vec3 a = cm_floats(cm.scene.y + CM_VERTEX_WORDS * corner.x).xyz;
-  vec3 b = cm_floats(cm.scene.y + CM_VERTEX_WORDS * corner.y).xyz;
-  vec3 c = cm_floats(cm.scene.y + CM_VERTEX_WORDS * corner.z).xyz;
-  vec3 g = cross(b - a, c - a);
+  vec3 position[3];
+  vec3 normals[3];
+  for (int i = 0; i < 3; ++i) {
+    uvec4 first = cm_words(cm.scene.y + CM_VERTEX_WORDS * corner[i]);
+    position[i] = uintBitsToFloat(first.xyz);
+    normals[i] = cm_octahedral(first.w);
+  }
+  vec3 g = cross(position[1] - position[0], position[2] - position[0]);
   g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
-  vec3 p = (1.0 - weights.x - weights.y) * a + weights.x * b + weights.y * c;
-  return cm_offset_origin(p, dot(g, d) < 0.0 ? -g : g);
+  if (behind) g = -g;
+  vec3 weight = vec3(1.0 - weights.x - weights.y, weights);
+  vec3 p = weight.x * position[0] + weight.y * position[1] + weight.z * position[2];
+  shift = cm_lift_share(dot(g, d)) * cm_lift(p, weight, position, normals, g);
+  return cm_offset_origin(p + shift, g);
 }
 
 // One of the sun and the punctual lights, as likely as each other; divided by that chance. light: irradiance at right

@@ -48,7 +48,7 @@ layout(std140, binding = 1) uniform CmMaterial {
   vec4 reflection;      // metallic, roughness, normal scale, occlusion strength
   vec4 specular;        // specular colour times ((ior - 1) / (ior + 1))^2, and the weight
   vec4 coat;            // clearcoat, its roughness, transmission
-  uvec4 flags;          // bits: x: maps there are, y: those by the second uv set; z: 1 where unlit
+  uvec4 flags;          // y: bits of the maps by the second uv set; z: 1 where unlit
   vec4 uv_rows[20];     // two a map: uv' = (dot(row, (uv, 1)), dot(row, (uv, 1)))
 #ifdef __cplusplus
 };

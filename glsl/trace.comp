@@ -1,16 +1,9 @@
 #version 450
-// One lane a pixel of some rows of the tile: loads its path, runs it for a bounded number of steps, stores it.
-// variant: CM_MARCH=0 CM_LINEAR=0 CM_PAGES=1
-// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1
-// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8
-// variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1
-// variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1
-// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1 CM_SURFACES=1
-// variant: CM_MARCH=2 CM_LINEAR=0 CM_PAGES=1 CM_SURFACES=1
-// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8 CM_SURFACES=1 CM_AOVS=1
-// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=8 CM_LAYERS=1
-// variant: CM_MARCH=1 CM_LINEAR=0 CM_PAGES=1 CM_LAYERS=1 CM_AOVS=1
-// variant: CM_MARCH=0 CM_LINEAR=1 CM_PAGES=1 CM_SURFACES=2
+// One lane a pixel of some blocks of the tile, 128 by 8 pixels each: loads its path, runs it for a bounded number of
+// rounds, stores it.
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..8 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: - or CM_LAYERS=1 or CM_SURFACES=1,2
+// variants: - or CM_AOVS=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shared.glsl"
@@ -31,10 +24,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path.glsl"
 
 layout(std430, binding = 0) buffer CmPaths { uvec4 cm_paths[]; };  // 8 planes of one word-quad a lane; 9 with surfaces
-layout(std430, binding = 1) buffer CmCounter {
-  uint cm_unfinished;  // pixels without their target samples
-  uint cm_empty;       // of these, pixels without any
-  uint cm_finished;    // samples finished in this dispatch
+layout(std430, binding = 1) buffer CmBlocks {
+  uvec4 cm_total;     // x: full rounds that lanes marched
+  uvec4 cm_blocks[];  // x: which block, and CM_BEGINS; then its pixels without their target samples, those without any
+                      // and its samples finished in this dispatch
 };
 layout(rgba32f, binding = 0) uniform image2D cm_sum;
 layout(rgba32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps, sum of squared luminance (a float)
@@ -42,14 +35,17 @@ layout(rgba32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps, su
 layout(rgba32f, binding = 2) uniform image2D cm_volume_sum;  // of the samples that met the volume first
 #endif
 
+#define CM_BLOCK_WIDTH 128u
+#define CM_BEGINS 0x80000000u  // a pass
+
 uvec4 cm_pack(vec3 v, uint w) { return uvec4(floatBitsToUint(v), w); }
 
 void main() {
-  // Rows are dealt out far apart: a driver that gives each core a run of work groups then gives each its share of the
-  // costly ones.
-  uint row = gl_WorkGroupID.y * cm.order.x % gl_NumWorkGroups.y;
-  uvec2 local = uvec2(gl_GlobalInvocationID.x, cm.order.z + row * gl_WorkGroupSize.y + gl_LocalInvocationID.y);
-  if (local.x >= cm.tile.z || local.y >= cm.order.w) return;
+  uint block = cm_blocks[gl_WorkGroupID.y].x & ~CM_BEGINS;
+  uint across = (cm.tile.z + CM_BLOCK_WIDTH - 1u) / CM_BLOCK_WIDTH;
+  uvec2 corner = uvec2(block % across * CM_BLOCK_WIDTH, block / across * gl_WorkGroupSize.y);
+  uvec2 local = corner + uvec2(gl_GlobalInvocationID.x, gl_LocalInvocationID.y);
+  if (local.x >= cm.tile.z || local.y >= cm.tile.w) return;
   uint lanes = cm.tile.z * cm.tile.w;
   uint lane = local.y * cm.tile.z + local.x;
   uvec2 pixel = cm.tile.xy + local;
@@ -62,8 +58,8 @@ void main() {
   p.volume = imageLoad(cm_volume_sum, texel);
   p.in_volume = 0u;
 #endif
-  if (cm.march.w != 0u) {
-    // A pass begins: every pixel goes on from the samples it has.
+  if ((cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u) {
+    // Every pixel goes on from the samples it has.
     p.samples = counts.x;
     p.steps = counts.y;
     p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
@@ -85,13 +81,14 @@ void main() {
 #if CM_SURFACES
     p.triangle = 0u;
     p.weights = vec2(0.0);
+    p.behind = 0u;
     p.reach = 0.0;
 #endif
   } else {
     uvec4 a3 = cm_paths[3u * lanes + lane];
     p.mode = a3.w & 0xffu;
 #if CM_AOVS
-    p.in_volume = a3.w >> 8;
+    p.in_volume = a3.w >> 8 & 1u;
 #endif
     if (p.mode == CM_MODE_DONE) return;
     uvec4 a0 = cm_paths[lane];
@@ -122,19 +119,23 @@ void main() {
     uvec4 a8 = cm_paths[8u * lanes + lane];
     p.triangle = a8.x;
     p.weights = uintBitsToFloat(a8.yz);
+    p.behind = a3.w >> 9;
     p.reach = uintBitsToFloat(a8.w);
 #endif
   }
 
   uint samples = p.samples;
+  p.marches = 0u;
   vec4 sum = imageLoad(cm_sum, texel);
   cm_run(p, pixel, cm.march.x, sum);
   imageStore(cm_sum, texel, sum);
+  uint mode = p.mode;
 #if CM_AOVS
   imageStore(cm_volume_sum, texel, p.volume);
-  uint mode = p.mode | (p.in_volume << 8);
-#else
-  uint mode = p.mode;
+  mode |= p.in_volume << 8;
+#endif
+#if CM_SURFACES
+  mode |= p.behind << 9;
 #endif
   imageStore(cm_counts, texel, uvec4(p.samples, p.steps, floatBitsToUint(p.square), 0u));
 
@@ -149,7 +150,8 @@ void main() {
 #if CM_SURFACES
   cm_paths[8u * lanes + lane] = uvec4(p.triangle, floatBitsToUint(p.weights), floatBitsToUint(p.reach));
 #endif
-  if (p.mode != CM_MODE_DONE) atomicAdd(cm_unfinished, 1u);
-  if (p.samples == 0u) atomicAdd(cm_empty, 1u);
-  if (p.samples != samples) atomicAdd(cm_finished, p.samples - samples);
+  if (p.mode != CM_MODE_DONE) atomicAdd(cm_blocks[gl_WorkGroupID.y].y, 1u);
+  if (p.samples == 0u) atomicAdd(cm_blocks[gl_WorkGroupID.y].z, 1u);
+  if (p.samples != samples) atomicAdd(cm_blocks[gl_WorkGroupID.y].w, p.samples - samples);
+  if (p.marches != 0u) atomicAdd(cm_total.x, (p.marches + CM_EVENTS - 1u) / CM_EVENTS);
 }

@@ -6,6 +6,8 @@ export DEBIAN_FRONTEND=noninteractive
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
+# Folders of build/ share what ccache holds: what demo/run.sh compiled, tests/run.sh need not.
+export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
 script_started=$SECONDS
 jobs=${CUMULET_JOBS:-$(nproc)}
 # OpenVDB's headers take up to 1.5 GiB a compiler.

@@ -26,8 +26,13 @@ count() { # PASSED FAILED SKIPPED
   passed=$((passed + $1)) failed=$((failed + $2)) skipped=$((skipped + $3))
 }
 
+# What tests that were killed leave behind goes with this folder.
+TMPDIR=$(mktemp -d)
+export TMPDIR
+
 finish() {
   trap - EXIT
+  rm -rf "$TMPDIR"
   say "all done"
   if [ "$skipped" -gt 0 ]; then
     echo "$passed passed, $failed failed, $skipped skipped"
@@ -93,7 +98,7 @@ format_check() {
 
 # shellcheck disable=SC2317 # called by check
 script_check() {
-  shellcheck -x .ci/run demo/run.sh scripts/common.sh tests/run.sh tests/package/*.sh
+  shellcheck -x .ci/run demo/run.sh scripts/common.sh tests/run.sh tests/embed/*.sh tests/package/*.sh
 }
 
 # shellcheck disable=SC2317 # called by xargs

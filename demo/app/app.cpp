@@ -6,34 +6,42 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <exception>
 #include <file.hpp>
 #include <filesystem>
 #include <image.hpp>
+#include <iostream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <program.hpp>
 #include <stdexcept>
+#include <thread>
 #include <utility>
+
+#include "renderer.hpp"
 
 namespace cumulet::demo {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Milliseconds of tracing a frame. While things move, frames are what counts: the library takes as few pixels as fit.
-// At rest, samples are: the window answers ten times a second all the same.
+// Milliseconds of tracing a picture. While things move, pictures are what counts: the library takes as few pixels as
+// fit. At rest, samples are.
 constexpr double moving_budget = 16.0;
 constexpr double resting_budget = 60.0;
 
 constexpr double event_glow = 0.7;   // seconds of frames after an event: tooltips and highlights come late
 constexpr double motion_rest = 0.4;  // seconds without motion that end a step of undo
 constexpr double replay_frame = 1.0 / 60.0;
+constexpr double least_frame = 1.0 / 60.0;  // seconds from one frame to the next
 
 }  // namespace
 
 App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(preferences_path()) {
   model_.scene = options_.scene;
+  suggest_next_ = model_.scene.auto_density_scale && model_.scene.medium.density_scale == 0.0;
   spell_out_defaults(model_.scene);
   model_.preferences = load_preferences(preferences_path_);
   model_.navigation.style = model_.preferences.style;
@@ -50,7 +58,8 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
           [](void* user, const char* name) { return reinterpret_cast<GLADapiproc>(Window::get_proc(user, name)); },
           nullptr) == 0)
     throw std::runtime_error("the OpenGL functions cannot be loaded");
-  session_ = std::make_unique<Session>(Window::get_proc, nullptr, Window::wake);
+  context_ = window_->make_shared_context();
+  renderer_ = std::make_unique<Renderer>(*gl_, context_.get(), Window::wake);
   // Sizes in the scene are for pictures: here the window has its own.
   model_.scene.width = 1280;
   model_.scene.height = 720;
@@ -63,41 +72,42 @@ App::~App() = default;
 void App::run() {
   while (!quit_ && !window_->should_close()) {
     Window::wait(patience());
+    // Often enough for a hand, and no more: the rest of the time is the pictures'.
+    const double early = now_ + least_frame - glfwGetTime();
+    if (!stepped() && early > 0.0) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(early));
+      Window::wait(0.0);
+    }
     frame();
   }
   remember();
 }
 
 double App::patience() const {
-  if (player_ && order_.idle <= 0.0) return 0.0;
-  const double most = player_ ? order_.idle : std::numeric_limits<double>::infinity();
-  const Status& status = model_.status;
-  const bool flying = model_.navigation.fly != 0 && window_->input().any_key();
-  const bool turning = model_.navigation.turntable_degrees_per_second != 0.0 && status.has_volume;
-  if (window_->input().pending() || flying || turning || (status.frame.flags & CUMULET_RENDER_MORE) != 0) return 0.0;
+  if (stepped() || window_->input().pending()) return 0.0;
+  double wait = player_ ? order_.idle : std::numeric_limits<double>::infinity();
   constexpr double glow_frame = 1.0 / 30.0;
-  if (now_ - last_event_ < event_glow) return std::min(most, glow_frame);
-  constexpr double slow_frame = 0.1;
-  if (status.busy || session_->waiting()) return std::min(most, slow_frame);
+  if (now_ - last_event_ < event_glow) return std::min(wait, glow_frame);
   constexpr double blink = 0.4;
-  double wait = ImGui::GetIO().WantTextInput ? blink : most;
+  constexpr double slow_frame = 0.1;
+  if (ImGui::GetIO().WantTextInput) wait = std::min(wait, blink);
   for (const Message& message : model_.messages)
     if (!message.error) wait = std::min(wait, std::max(message.until - now_, slow_frame));
-  return std::min(wait, most);
+  return wait;
 }
 
 void App::frame() {
   now_ = glfwGetTime();
-  const double begun = now_;
   const auto scale = static_cast<float>(options_.ui_scale > 0.0 ? options_.ui_scale : window_->content_scale());
   if (scale != ui_scale_) Window::set_ui_scale(scale);
   ui_scale_ = scale;
+  take();
 
   order_ = {};
   if (player_) {
     ReplayHost host;
-    host.loading = model_.status.busy || session_->waiting();
-    host.converged = (model_.status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
+    host.loading = model_.status.busy || waiting();
+    host.converged = settled() && (model_.status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
     host.viewport = viewport_;
     host.find = [this](const std::string& label) {
       auto place = panel_.ui().find(label);
@@ -108,29 +118,31 @@ void App::frame() {
   }
   const std::vector<Event> events = window_->input().take();
   if (!events.empty()) last_event_ = now_;
-  window_->begin_frame(events, player_ && order_.idle <= 0.0 ? replay_frame : 0.0);
+  window_->begin_frame(events, stepped() ? replay_frame : 0.0);
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   viewport_ = Panel::viewport(model_, static_cast<double>(screen.x), static_cast<double>(screen.y), ui_scale_);
   handle(events);
 
   model_.can_undo = history_->can_undo(model_.scene);
   model_.can_redo = history_->can_redo();
+  last_state_ = panel_.state();
   std::vector<Command> commands;
   panel_.draw(model_, ui_scale_, now_, commands);
   execute(commands);
 
-  const bool motion = session_->camera_moved() && model_.navigation.turntable_degrees_per_second == 0.0;
-  if (motion) last_motion_ = now_;
+  if (std::exchange(camera_moved_, false) && model_.navigation.turntable_degrees_per_second == 0.0) last_motion_ = now_;
   held_ = ImGui::IsAnyItemActive() || viewport_buttons_ != 0 || now_ - last_motion_ < motion_rest;
-  session_->follow(model_, held_);
+  ask();
+  if (stepped()) {
+    renderer_->wait_for(wish_.number);
+    take();
+  }
   follow_history();
-  draw(held_ || now_ - last_event_ < motion_rest ? moving_budget : resting_budget);
-  Window::draw_ui();
+  draw();
   obey(order_);
-  if (recorder_) recorder_->frame(events, model_.status.busy || session_->waiting());
-  const double seconds = glfwGetTime() - begun;
+  if (recorder_) recorder_->frame(events, model_.status.busy || waiting());
   window_->swap();
-  take_statistics(seconds);
+  take_statistics(events);
   ++frames_;
 
   const std::string name = std::filesystem::path(model_.scene.volume).filename().string();
@@ -176,7 +188,7 @@ void App::handle_key(const Event& event) {
   const bool in_popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
   if (event.down && !in_popup) {
     const bool escape = event.code == GLFW_KEY_ESCAPE;
-    const auto command = command_of(event.code, window_->input().modifiers(), io.WantTextInput);
+    const auto command = command_of(event.code, event.modifiers, io.WantTextInput);
     if (command && !(escape && ImGui::IsAnyItemActive())) {
       execute(*command);
       return;
@@ -191,7 +203,7 @@ void App::to_viewer(const Event& event) {
   out.struct_size = sizeof out;
   out.x = window_->input().x() - viewport_.x;
   out.y = window_->input().y() - viewport_.y;
-  out.modifiers = window_->input().modifiers();
+  out.modifiers = event.modifiers;
   switch (event.type) {
     case Event::Type::move:
       out.type = CUMULET_EVENT_POINTER_MOVE;
@@ -218,36 +230,7 @@ void App::to_viewer(const Event& event) {
     case Event::Type::resize:
       return;
   }
-  if (!session_->input(out) && event.type == Event::Type::key && event.down) move_by_keys(event.code);
-}
-
-void App::move_by_keys(int key) {
-  constexpr double step = 0.1;
-  constexpr double closer = 0.9;
-  switch (key) {
-    case GLFW_KEY_LEFT:
-      session_->orbit(-step, 0.0);
-      break;
-    case GLFW_KEY_RIGHT:
-      session_->orbit(step, 0.0);
-      break;
-    case GLFW_KEY_UP:
-      session_->orbit(0.0, step);
-      break;
-    case GLFW_KEY_DOWN:
-      session_->orbit(0.0, -step);
-      break;
-    case GLFW_KEY_EQUAL:
-    case GLFW_KEY_KP_ADD:
-      session_->dolly(closer);
-      break;
-    case GLFW_KEY_MINUS:
-    case GLFW_KEY_KP_SUBTRACT:
-      session_->dolly(1.0 / closer);
-      break;
-    default:
-      break;
-  }
+  inputs_.push_back({out, event.type == Event::Type::key ? event.code : 0});
 }
 
 void App::execute(const std::vector<Command>& commands) {
@@ -289,20 +272,21 @@ void App::execute(const Command& command) {
       break;
     case Action::save_png:
     case Action::save_exr:
-      save_picture(command);
+      requests_.push_back(
+          {command.action == Action::save_exr ? Request::Type::save_exr : Request::Type::save_png, command.text});
       break;
     case Action::undo:
     case Action::redo:
       step_history(command.action == Action::undo);
       break;
     case Action::frame_all:
-      session_->frame_all(model_);
+      requests_.push_back({Request::Type::frame_all});
       break;
     case Action::cancel:
       cancel();
       break;
     case Action::cancel_load:
-      session_->cancel();
+      renderer_->cancel();
       break;
     case Action::dismiss:
       std::erase_if(model_.messages, [&](const Message& message) { return message.text == command.text; });
@@ -337,6 +321,16 @@ void App::execute(const Command& command) {
     case Action::view:
       model_.scene.sampling.view = static_cast<cumulet_view>(command.value);
       break;
+    case Action::grids_dialog:
+      panel_.picker().open(model_.scene.volume, Window::wake);
+      break;
+    case Action::choose_grid:
+      suggest_next_ = model_.scene.grid_name != command.text;
+      model_.scene.grid_name = command.text;
+      break;
+    case Action::auto_density:
+      requests_.push_back({Request::Type::suggest_density});
+      break;
     case Action::quit:
       quit_ = true;
       break;
@@ -348,8 +342,8 @@ void App::cancel() {
     model_.help = false;
   else if (!model_.messages.empty())
     model_.messages.pop_back();
-  else if (model_.status.busy)
-    session_->cancel();
+  else if (model_.status.busy || waiting())
+    renderer_->cancel();
   else
     ImGui::SetWindowFocus(nullptr);
 }
@@ -366,21 +360,23 @@ void App::open(const std::string& path) {
   if (!has_ending(path, ".json")) {
     model_.scene.volume = path;
     model_.scene.grid_name.clear();
-    session_->fit_next();
-    session_->reload();
+    fit_next_ = suggest_next_ = pick_next_ = reload_ = true;
     return;
   }
   try {
     SceneOptions scene = load_scene(path);
+    suggest_next_ = scene.auto_density_scale && scene.medium.density_scale == 0.0;
     spell_out_defaults(scene);
     scene.width = model_.scene.width;
     scene.height = model_.scene.height;
     model_.scene = std::move(scene);
     model_.scene_path = path;
-    model_.preferences.remember(path);
-    if (is_unplaced(model_.scene.camera)) session_->fit_next();
+    opening_scene_ = path;
+    reload_ = true;
+    fit_next_ = is_unplaced(model_.scene.camera);
   } catch (const std::exception& error) {
-    tell(model_, true, error.what(), now_);
+    complain(error.what());
+    model_.preferences.forget(path);
   }
 }
 
@@ -399,28 +395,113 @@ void App::save_scene(const std::string& path) {
   }
 }
 
-void App::save_picture(const Command& command) {
-  try {
-    if (command.action == Action::save_exr) {
-      session_->write_exr(model_, command.text);
-    } else {
-      image::PngOptions png;
-      png.tone_mapping = image::ToneMapping::none;
-      png.keep_alpha = model_.scene.display.background == CUMULET_BACKGROUND_TRANSPARENT;
-      image::write_png(command.text, session_->read_display(model_), png);
-    }
-    model_.preferences.folder = std::filesystem::path(command.text).parent_path().string();
-    tell(model_, false, "Saved " + command.text, now_);
-  } catch (const std::exception& error) {
-    tell(model_, true, error.what(), now_);
-  }
+bool App::waiting() const {
+  return answer_waits_ || answered_volume_ != wish_.volume_edit || answered_surfaces_ != wish_.surfaces_edit;
+}
+
+void App::complain(const std::string& cause) {
+  if (starting_) std::cerr << "cumulet-demo: " << one_line(cause) << std::endl;
+  tell(model_, true, cause, now_);
 }
 
 void App::follow_history() {
   SceneOptions scene = model_.scene;
   // A turntable's motion is no change of the user's.
   if (model_.navigation.turntable_degrees_per_second != 0.0) scene.camera = history_->current().camera;
-  history_->offer(scene, held_ || session_->waiting());
+  history_->offer(scene, held_ || waiting() || !settled());
+}
+
+void App::ask() {
+  Wish wish;
+  wish.number = wish_.number;
+  wish.scene = model_.scene;
+  wish.camera_edit = wish_.camera_edit + (same_camera(wish.scene.camera, wish_.scene.camera) ? 0 : 1);
+  const bool other_volume = wish.scene.volume != wish_.scene.volume || wish.scene.grid_name != wish_.scene.grid_name;
+  const bool load = std::exchange(reload_, false) || other_volume;
+  wish.volume_edit = wish_.volume_edit + (load ? 1 : 0);
+  wish.fit = load ? std::exchange(fit_next_, false) : wish_.fit;
+  wish.suggest = load ? std::exchange(suggest_next_, false) : wish_.suggest;
+  wish.surfaces_edit = wish_.surfaces_edit + (wish.scene.surfaces == wish_.scene.surfaces ? 0 : 1);
+  wish.navigation = model_.navigation;
+  wish.adaptive_resolution = model_.adaptive_resolution;
+  wish.held = held_;
+  wish.paused = panel_.dialog_open();
+  wish.budget_ms = held_ || now_ - last_event_ < motion_rest ? moving_budget : resting_budget;
+  wish.width = static_cast<std::uint32_t>(viewport_.width);
+  wish.height = static_cast<std::uint32_t>(viewport_.height);
+  wish.scale = static_cast<double>(ui_scale_);
+  if (!stepped() && same_wish(wish, wish_) && inputs_.empty() && requests_.empty()) return;
+  ++wish.number;
+  const bool changed = !inputs_.empty() || !same_scene(wish.scene, wish_.scene);
+  if (changed && !changed_at_) {
+    changed_at_ = now_;
+    changed_number_ = wish.number;
+  }
+  wish_ = wish;
+  renderer_->ask(std::move(wish), std::exchange(inputs_, {}), std::exchange(requests_, {}));
+}
+
+void App::take() {
+  if (const auto answer = renderer_->take()) accept(*answer);
+}
+
+void App::accept(const Answer& answer) {
+  ++pictures_;
+  answered_ = answer.wish;
+  answer_waits_ = answer.waiting;
+  answered_volume_ = answer.volume_edit;
+  answered_surfaces_ = answer.surfaces_edit;
+  camera_moved_ |= answer.camera_moved;
+  // What the user has changed since is newer.
+  if (answer.camera_edit == wish_.camera_edit) model_.scene.camera = wish_.scene.camera = answer.camera;
+  if (answer.volume_edit == wish_.volume_edit) {
+    model_.scene.volume = wish_.scene.volume = answer.volume;
+    model_.scene.grid_name = wish_.scene.grid_name = answer.grid_name;
+  }
+  if (answer.surfaces_edit == wish_.surfaces_edit) model_.scene.surfaces = wish_.scene.surfaces = answer.surfaces;
+  if (answer.status.noise > 0.0 && answer.status.noise != model_.status.noise)
+    model_.charts.noise_percent.add(static_cast<float>(100.0 * answer.status.noise));
+  if (answer.density_scale) {
+    model_.scene.medium.density_scale = *answer.density_scale;
+    // What the program begins with is no change of the user's.
+    if (starting_) history_.emplace(model_.scene);
+  }
+  model_.status = answer.status;
+  model_.grids = answer.grids;
+  for (const Answer::Notice& notice : answer.notices) {
+    if (notice.error)
+      complain(notice.text);
+    else
+      tell(model_, false, notice.text, now_);
+  }
+  remember_files(answer);
+  if (!waiting() && std::exchange(pick_next_, false)) {
+    const auto& grids = model_.grids;
+    const auto shown = std::ranges::count_if(grids, [](const GridInfo& grid) { return grid.refusal.empty(); });
+    const bool clear = std::ranges::any_of(grids, [](const GridInfo& grid) { return grid.name == "density"; });
+    if (shown > 1 && !clear) panel_.picker().open(model_.scene.volume, Window::wake);
+  }
+  if (!waiting()) starting_ = false;
+}
+
+void App::remember_files(const Answer& answer) {
+  Preferences& preferences = model_.preferences;
+  for (const Answer::File& file : answer.files) {
+    switch (file.fate) {
+      case Answer::File::Fate::opened:
+        preferences.remember(file.path);
+        break;
+      case Answer::File::Fate::failed:
+        preferences.forget(file.path);
+        preferences.forget(opening_scene_);
+        opening_scene_.clear();
+        break;
+      case Answer::File::Fate::saved:
+        preferences.folder = std::filesystem::path(file.path).parent_path().string();
+        break;
+    }
+  }
+  if (!waiting() && !opening_scene_.empty()) preferences.remember(std::exchange(opening_scene_, {}));
 }
 
 void App::step_history(bool back) {
@@ -428,58 +509,52 @@ void App::step_history(bool back) {
   if (!scene) return;
   const cumulet_camera_desc camera = model_.scene.camera;
   model_.scene = *scene;
+  fit_next_ = suggest_next_ = false;
   if (model_.navigation.turntable_degrees_per_second != 0.0) model_.scene.camera = camera;
 }
 
-void App::draw(double budget_ms) {
-  const auto [width, height] = window_->size();
+void App::draw() {
   gl_->BindFramebuffer(GL_FRAMEBUFFER, 0);
   gl_->Disable(GL_SCISSOR_TEST);
   constexpr float dark = 0.075f;
   gl_->ClearColor(dark, dark * 1.08f, dark * 1.2f, 1.0f);
   gl_->Clear(GL_COLOR_BUFFER_BIT);
-  cumulet_frame_desc frame{};
-  frame.struct_size = sizeof frame;
-  frame.budget_ms = budget_ms;
-  frame.width = static_cast<std::uint32_t>(width);
-  frame.height = static_cast<std::uint32_t>(height);
-  frame.viewport[0] = static_cast<std::int32_t>(viewport_.x);
-  frame.viewport[1] = 0;
-  frame.viewport[2] = static_cast<std::int32_t>(viewport_.width);
-  frame.viewport[3] = static_cast<std::int32_t>(viewport_.height);
-  frame.scale = static_cast<double>(ui_scale_);
-  session_->render(model_, frame);
+  const Renderer::Picture picture = renderer_->picture();
+  if (picture.texture != 0) {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): so ImGui has textures
+    auto* texture = reinterpret_cast<ImTextureID>(std::uintptr_t{picture.texture});
+    const ImVec2 low(static_cast<float>(viewport_.x), static_cast<float>(viewport_.y));
+    const ImVec2 high(low.x + static_cast<float>(viewport_.width), low.y + static_cast<float>(viewport_.height));
+    ImGui::GetBackgroundDrawList()->AddImage(texture, low, high, {0.0f, 1.0f}, {1.0f, 0.0f});
+  }
+  Window::draw_ui();
 }
 
-void App::take_statistics(double frame_seconds) {
-  Status& status = model_.status;
-  const bool more = (status.frame.flags & CUMULET_RENDER_MORE) != 0;
-  if (more) status.frame_ms.add(static_cast<float>(1000.0 * frame_seconds));
+void App::take_statistics(const std::vector<Event>& events) {
+  const Status& status = model_.status;
+  Charts& charts = model_.charts;
+  // From the first that a hand did of what this frame shows.
+  double begun = now_;
+  for (const Event& event : events)
+    if (event.time > 0.0) begun = std::min(begun, event.time);
+  charts.frame_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - begun)));
+
+  if (changed_at_ && answered_ >= changed_number_)
+    charts.picture_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - *std::exchange(changed_at_, std::nullopt))));
 
   constexpr double rate_period = 0.5;
+  const bool more = (status.frame.flags & CUMULET_RENDER_MORE) != 0;
   const double elapsed = now_ - rate_since_;
   // Fewer than before: the picture began anew.
   if (status.stats.samples < rate_samples_ || !more) {
     rate_samples_ = status.stats.samples;
     rate_since_ = now_;
   } else if (elapsed > rate_period && status.stats.samples > rate_samples_) {
-    status.samples_per_second.add(
+    charts.samples_per_second.add(
         static_cast<float>(static_cast<double>(status.stats.samples - rate_samples_) / elapsed));
     rate_samples_ = status.stats.samples;
     rate_since_ = now_;
   }
-
-  constexpr double noise_period = 1.0;
-  const bool refining = (more || (status.frame.flags & CUMULET_RENDER_CONVERGED) != 0) && !held_ &&
-                        status.frame.progress > 0.0 && (status.frame.flags & CUMULET_RENDER_PREVIEW) == 0 &&
-                        model_.scene.sampling.view == CUMULET_VIEW_SHADED;
-  // Fewer samples than when it was measured: another picture.
-  if (status.stats.samples < noise_samples_) status.noise = 0.0;
-  if (!refining || now_ - last_noise_ < noise_period) return;
-  if (status.noise > 0.0 && status.stats.samples == noise_samples_) return;
-  last_noise_ = now_;
-  noise_samples_ = status.stats.samples;
-  session_->measure_noise(model_);
 }
 
 void App::obey(const Player::Order& order) {
@@ -523,7 +598,13 @@ void App::write_report(const std::string& path) const {
   json["samples"] = status.stats.samples;
   json["noise"] = status.noise;
   json["undo_steps"] = history_->depth();
-  json["frame_ms"] = status.frame_ms.values();
+  json["frame_ms"] = model_.charts.frame_ms.values();
+  json["picture_ms"] = model_.charts.picture_ms.values();
+  json["pictures"] = pictures_;
+  json["grid"] = status.grid;
+  json["state"] = last_state_;
+  json["dialog"] = panel_.dialog_open();
+  json["recent"] = model_.preferences.recent;
   json["messages"] = Json::array();
   for (const Message& message : model_.messages)
     json["messages"].push_back({{"error", message.error}, {"text", message.text}});

@@ -19,6 +19,8 @@ struct GladGLContext;
 
 namespace cumulet::demo {
 
+class Renderer;
+
 /// cumulet-demo: the window, what it shows, and the loop that joins them.
 class App {
  public:
@@ -34,23 +36,34 @@ class App {
  private:
   void frame();
   [[nodiscard]] double patience() const;
+  /// Whether a replay is at the wheel: each frame shows what it asked for, however long that takes.
+  [[nodiscard]] bool stepped() const { return player_ && order_.idle <= 0.0; }
 
   void handle(const std::vector<Event>& events);
   void handle_key(const Event& event);
   void to_viewer(const Event& event);
-  void move_by_keys(int key);
 
   void execute(const std::vector<Command>& commands);
   void execute(const Command& command);
   void open(const std::string& path);
   void save_scene(const std::string& path);
-  void save_picture(const Command& command);
   void step_history(bool back);
   void cancel();
 
   void follow_history();
-  void draw(double budget_ms);
-  void take_statistics(double frame_seconds);
+  /// Sends what has changed to the renderer.
+  void ask();
+  /// What has come back since, if anything.
+  void take();
+  void accept(const Answer& answer);
+  void remember_files(const Answer& answer);
+  /// Whether the newest wish is answered.
+  [[nodiscard]] bool settled() const { return answered_ >= wish_.number; }
+  /// Whether a load is still to end, be it that the viewer has not heard of it yet.
+  [[nodiscard]] bool waiting() const;
+  void complain(const std::string& cause);
+  void draw();
+  void take_statistics(const std::vector<Event>& events);
   void obey(const Player::Order& order);
   void save_window(const std::string& path);
   void write_report(const std::string& path) const;
@@ -60,8 +73,9 @@ class App {
   std::string preferences_path_;
   Model model_;
   std::unique_ptr<Window> window_;
+  Window::Context context_;
   std::unique_ptr<GladGLContext> gl_;
-  std::unique_ptr<Session> session_;
+  std::unique_ptr<Renderer> renderer_;
   std::optional<History> history_;
   std::optional<Player> player_;
   std::optional<Recorder> recorder_;
@@ -75,10 +89,28 @@ class App {
   double now_ = 0.0;
   double last_event_ = 0.0;
   double last_motion_ = -1.0;
-  double last_noise_ = 0.0;
-  std::uint64_t noise_samples_ = 0;
   double rate_since_ = 0.0;
   std::uint64_t rate_samples_ = 0;
+
+  Wish wish_;  // sent last; its camera, volume and surfaces as they are known to the viewer
+  std::vector<ViewerInput> inputs_;
+  std::vector<Request> requests_;
+  bool reload_ = false;  // the volume, though it is the same
+  bool fit_next_ = false;
+  bool suggest_next_ = false;
+  bool pick_next_ = false;  // a file that was opened without a grid's name is there next
+  std::uint64_t answered_ = 0;
+  // The oldest change that no picture has followed yet.
+  std::optional<double> changed_at_;
+  std::uint64_t changed_number_ = 0;
+  bool answer_waits_ = false;
+  std::uint64_t answered_volume_ = 0;  // edits that the last answer knew of
+  std::uint64_t answered_surfaces_ = 0;
+  bool camera_moved_ = false;
+  bool starting_ = true;        // until what the command line named is there, or is not
+  std::string opening_scene_;   // a scene file whose parts are still to come
+  std::uint64_t pictures_ = 0;  // that the window has shown
+  std::string last_state_;      // the state line of the frame before this
   std::uint64_t frames_ = 0;
 };
 

@@ -108,7 +108,8 @@ void FileDialog::recent(Ui& ui, const Preferences& preferences, std::vector<Comm
   Ui::heading("Recent");
   for (const std::string& file : preferences.recent) {
     const std::string name = fs::path(file).filename().string();
-    if (ImGui::Selectable(std::string(name).append("##recent").append(file).c_str(), false,
+    const std::string shown = end_of(file, ImGui::GetContentRegionAvail().x);
+    if (ImGui::Selectable(std::string(shown).append("##recent").append(file).c_str(), false,
                           ImGuiSelectableFlags_DontClosePopups)) {
       path_ = file;
       choose(commands);
@@ -142,15 +143,18 @@ void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Comman
     choose(commands);
   ImGui::Spacing();
   recent(ui, preferences, commands);
-  Ui::heading(folder_.c_str());
+  Ui::heading(end_of(folder_, ImGui::GetContentRegionAvail().x).c_str());
   list(ui, commands);
   std::error_code error;
-  if (!trouble_.empty())
-    ImGui::TextColored({0.95f, 0.55f, 0.45f, 1.0f}, "%s", trouble_.c_str());
-  else if (saving() && fs::exists(path_, error) && !fs::is_directory(path_, error))
+  if (!trouble_.empty()) {
+    ImGui::PushStyleColor(ImGuiCol_Text, {0.95f, 0.55f, 0.45f, 1.0f});
+    ImGui::TextWrapped("%s", trouble_.c_str());
+    ImGui::PopStyleColor();
+  } else if (saving() && fs::exists(path_, error) && !fs::is_directory(path_, error)) {
     ImGui::TextColored({0.95f, 0.75f, 0.45f, 1.0f}, "This file will be replaced.");
-  else
+  } else {
     Ui::heading(endings.c_str());
+  }
   ImGui::Spacing();
   if (ui.button(saving() ? "Save file" : "Open file", "Takes the path above.", {ui.px(110.0f), 0.0f})) choose(commands);
   ImGui::SameLine();

@@ -52,6 +52,25 @@ std::string numbered(const char* word, int number) {
   return text;
 }
 
+bool is_modifier(int code) {
+  switch (code) {
+    case GLFW_KEY_LEFT_SHIFT:
+    case GLFW_KEY_RIGHT_SHIFT:
+    case GLFW_KEY_LEFT_CONTROL:
+    case GLFW_KEY_RIGHT_CONTROL:
+    case GLFW_KEY_LEFT_ALT:
+    case GLFW_KEY_RIGHT_ALT:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Whether the key types a character, and does nothing else. (Space presses buttons.)
+bool only_types(int code, unsigned modifiers) {
+  return code > GLFW_KEY_SPACE && code < GLFW_KEY_ESCAPE && (modifiers & (modifier_ctrl | modifier_alt)) == 0;
+}
+
 bool is_plain(int code) {
   return (code >= GLFW_KEY_A && code <= GLFW_KEY_Z) || (code >= GLFW_KEY_0 && code <= GLFW_KEY_9);
 }
@@ -62,6 +81,7 @@ std::vector<Event> Input::take() {
   std::vector<Event> taken;
   std::bitset<buttons> changed_buttons;
   std::bitset<keys> changed_keys;
+  bool other_changed = false;  // than Ctrl, Shift, Alt
   while (!queue_.empty()) {
     const Event& event = queue_.front();
     const auto code = static_cast<std::size_t>(event.code);
@@ -78,8 +98,13 @@ std::vector<Event> Input::take() {
         buttons_[code] = event.down;
         break;
       case Event::Type::key:
-        if (changed_keys[code]) return taken;
+        if (only_types(event.code, modifiers())) {
+          keys_[code] = event.down;
+          break;
+        }
+        if (changed_keys[code] || (other_changed && is_modifier(event.code))) return taken;
         changed_keys[code] = true;
+        other_changed |= !is_modifier(event.code);
         keys_[code] = event.down;
         break;
       case Event::Type::focus_lost:
@@ -93,6 +118,7 @@ std::vector<Event> Input::take() {
       case Event::Type::resize:
         break;
     }
+    queue_.front().modifiers = modifiers();
     taken.push_back(std::move(queue_.front()));
     queue_.pop_front();
   }

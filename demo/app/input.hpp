@@ -18,13 +18,17 @@ struct Event {
   double y = 0.0;  // likewise; wheel: steps
   int code = 0;    // button: 0 left, 1 right, 2 middle (as GLFW has them); key: GLFW's; character: Unicode
   bool down = false;
-  std::string path = {};  // drop
+  std::string path = {};   // drop
+  double time = 0.0;       // seconds, glfwGetTime's, at which it was heard of; 0: of a replay
+  unsigned modifiers = 0;  // Modifier bits held right after it; Input::take knows
 };
 
 enum Modifier : unsigned { modifier_shift = 1, modifier_ctrl = 2, modifier_alt = 4 };  // as in cumulet.h
 
-/// Events wait here until a frame takes them. A frame sees a button or a key change once only: a press and a release
-/// that came together are seen in two frames, for the user interface looks at states, not at events.
+/// Events wait here until a frame takes them. A frame sees a button or a key change once only, and no change of Ctrl,
+/// Shift or Alt after that of another key: a press and a release that came together are seen in two frames, for the
+/// user interface looks at states, not at events. Keys that only type are not looked at: any number of them comes at
+/// once.
 class Input {
  public:
   static constexpr int buttons = 3;

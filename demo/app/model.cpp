@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <program.hpp>
 #include <system_error>
 
 #include "input.hpp"
@@ -73,6 +74,15 @@ Model::Model() {
   status.frame.struct_size = sizeof status.frame;
   status.work.struct_size = sizeof status.work;
   status.stats.struct_size = sizeof status.stats;
+}
+
+void tell(Model& model, bool error, const std::string& text, double now) {
+  constexpr double seconds = 5.0;
+  constexpr std::size_t most = 3;
+  const std::string line = one_line(text);
+  std::erase_if(model.messages, [&](const Message& message) { return message.text == line; });
+  if (model.messages.size() >= most) model.messages.erase(model.messages.begin());
+  model.messages.push_back({error, line, now + seconds});
 }
 
 double default_threshold(cumulet_criterion criterion) { return criterion == CUMULET_CRITERION_RANGE_MEAN ? 1.0 : 0.02; }

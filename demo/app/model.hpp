@@ -39,6 +39,9 @@ enum class Action {
   darker,
   next_march,
   view,  // value: a cumulet_view
+  grids_dialog,
+  choose_grid,   // text
+  auto_density,  // a density scale that suits the volume
   quit
 };
 
@@ -94,8 +97,14 @@ struct Status {
   cumulet_animation_info animation{};  // that is set, of those
   bool busy = false;                   // a file is read or a grid is built
   bool has_volume = false;
+  std::string grid;    // of the file, that is shown
   double noise = 0.0;  // relative standard error, 0: not known
-  Series frame_ms;
+};
+
+/// What of it is drawn over time.
+struct Charts {
+  Series frame_ms;    // of the window's frames, whatever is traced meanwhile
+  Series picture_ms;  // from a change to the window with the picture that was drawn next
   Series samples_per_second;
   Series noise_percent;
 };
@@ -112,11 +121,15 @@ struct Model {
   std::string scene_path;  // of the scene file last opened or saved
   std::vector<GridInfo> grids;
   Status status;
+  Charts charts;
   std::vector<Message> messages;
   Preferences preferences;
 
   Model();
 };
+
+/// Adds a line to the message bar, in place of an equal one. Errors stay, others go after a while.
+void tell(Model& model, bool error, const std::string& text, double now);
 
 /// Replaces the zeros that stand for a default by what they stand for (cumulet.h), so that controls can show them.
 void spell_out_defaults(SceneOptions& scene);

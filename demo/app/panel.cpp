@@ -34,22 +34,6 @@ bool choose(Ui& ui, const char* label, const char* tip, const std::vector<Choice
   return true;
 }
 
-/// Leaves out the middle of a line that is too wide: a message begins with a file and ends with a cause.
-std::string shorten(const std::string& text, float width) {
-  if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
-  const auto split = [](unsigned char c) { return (c & 0xC0U) == 0x80U; };  // within a character
-  std::size_t head = text.size() / 2;
-  std::size_t tail = head;
-  const auto shown = [&] { return text.substr(0, head) + "..." + text.substr(tail); };
-  while (head > 0 && ImGui::CalcTextSize(shown().c_str()).x > width) {
-    do --head;
-    while (head > 0 && split(static_cast<unsigned char>(text[head])));
-    do tail = std::min(tail + 1, text.size());
-    while (tail < text.size() && split(static_cast<unsigned char>(text[tail])));
-  }
-  return shown();
-}
-
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 }  // namespace
@@ -67,11 +51,13 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   if (model.panel) side(model, commands);
   if (!model.status.has_volume && !model.status.busy) hint();
   if (model.status.busy) loading(model, commands);
+  state_.clear();
   if (model.status.has_volume) state_line(model);
   messages(model, commands);
   if (model.help) help(model);
   help_was_closed_ = !model.help;
   dialog_.draw(ui_, model.preferences, commands);
+  picker_.draw(ui_, commands);
 }
 
 void Panel::side(Model& model, std::vector<Command>& commands) {
@@ -98,7 +84,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   section("File", true, [&] { file(model, commands); });
   section("Display", true, [&] { display(model); });
   section("Light", true, [&] { light(model); });
-  section("Medium", true, [&] { medium(model); });
+  section("Medium", true, [&] { medium(model, commands); });
   section("Surfaces", true, [&] { surfaces(model); });
   section("Grid", true, [&] { grid(model); });
   section("Camera", true, [&] { camera(model, commands); });
@@ -158,15 +144,18 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
     const GridInfo& grid = model.grids[i];
     tips.push_back(grid.refusal.empty() ? grid.type : grid.type + ": " + grid.refusal);
     grids.push_back({grid.name.c_str(), static_cast<int>(i), tips.back().c_str()});
-    const bool is_default = model.scene.grid_name.empty() && now < 0 && grid.refusal.empty();
-    const bool density = model.scene.grid_name.empty() && grid.name == "density";
-    if (grid.name == model.scene.grid_name || is_default || density) now = static_cast<int>(i);
+    if (grid.name == model.status.grid) now = static_cast<int>(i);
   }
   ImGui::BeginDisabled(grids.empty());
   if (ui_.choose("Grid name", "Which of the file's grids is shown: it must be a scalar fog volume.", grids, now))
     model.scene.grid_name = model.grids[static_cast<std::size_t>(now)].name;
   ImGui::EndDisabled();
 
+  ImGui::BeginDisabled(!model.status.has_volume);
+  if (ui_.button("Look into the grids", "Each grid's type, voxels, range and histogram, and one to choose.",
+                 {-1.0f, 0.0f}))
+    commands.push_back({Action::grids_dialog});
+  ImGui::EndDisabled();
   const float spacing = ImGui::GetStyle().ItemSpacing.x;
   const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
   ImGui::BeginDisabled(!model.status.has_volume);
@@ -245,6 +234,11 @@ void Panel::surfaces(Model& model) {
              "Softens what mirrors and lakes throw on walls and clouds: no bright specks. What you look at keeps its "
              "gloss. 0: as physics has it.",
              surface.indirect_roughness, 0.0f, 1.0f, "%.2f");
+  bool double_sided = surface.double_sided != 0;
+  if (ui_.checkbox("Double sided", "Shows both sides of all surfaces, for models that are wound inside out.",
+                   double_sided)) {
+    surface.double_sided = double_sided ? 1 : 0;
+  }
   ImGui::BeginDisabled(info.animations == 0);
   ui_.slider("Time", "Seconds into the model's animation.", surface.time, 0.0,
              std::max(model.status.animation.duration, 1e-3), "%.2f s");
@@ -254,10 +248,14 @@ void Panel::surfaces(Model& model) {
   ImGui::EndDisabled();
 }
 
-void Panel::medium(Model& model) {
+void Panel::medium(Model& model, std::vector<Command>& commands) {
   cumulet_medium_desc& medium = model.scene.medium;
   ui_.slider("Density scale", "Extinction is this times the grid's value, per world unit.", medium.density_scale, 1e-4,
              1e4, "%.4g", ImGuiSliderFlags_Logarithmic);
+  ImGui::BeginDisabled(!model.status.has_volume);
+  if (ui_.button("Auto density", "A scale at which the volume is a body: a mean optical depth of 8.", {-1.0f, 0.0f}))
+    commands.push_back({Action::auto_density});
+  ImGui::EndDisabled();
   float albedo[3];
   for (std::size_t i = 0; i < 3; ++i) albedo[i] = 1.0f - medium.coalbedo[i];
   if (ui_.colour("Albedo",
@@ -382,12 +380,15 @@ void Panel::sampling(Model& model) {
 void Panel::statistics(const Model& model) {
   const Status& status = model.status;
   const cumulet_stats& stats = status.stats;
-  ui_.plot("Frame time", "Milliseconds a frame took, the newest on the right.", status.frame_ms.values(),
-           print("%.1f ms", static_cast<double>(status.frame_ms.latest())));
-  ui_.plot("Samples per second", "Camera paths finished.", status.samples_per_second.values(),
-           short_count(static_cast<double>(status.samples_per_second.latest())) + "/s");
+  const Charts& charts = model.charts;
+  ui_.plot("Frame time", "Milliseconds from an event, or a new picture, to the window that shows it.",
+           charts.frame_ms.values(), print("%.1f ms", static_cast<double>(charts.frame_ms.latest())));
+  ui_.plot("Picture latency", "Milliseconds from a change to the picture that was drawn next, on the window.",
+           charts.picture_ms.values(), print("%.0f ms", static_cast<double>(charts.picture_ms.latest())));
+  ui_.plot("Samples per second", "Camera paths finished.", charts.samples_per_second.values(),
+           short_count(static_cast<double>(charts.samples_per_second.latest())) + "/s");
   ui_.plot("Noise", "Relative standard error of the picture, measured each second while it refines.",
-           status.noise_percent.values(),
+           charts.noise_percent.values(),
            status.noise > 0.0 ? print("%.2f %%", 100.0 * status.noise) : std::string("-"));
   ImGui::Spacing();
   if (!status.has_volume) return;
@@ -449,15 +450,16 @@ void Panel::messages(Model& model, std::vector<Command>& commands) {
   for (std::size_t i = 0; i < model.messages.size(); ++i) {
     const Message& message = model.messages[i];
     ImGui::PushID(static_cast<int>(i));
-    const float line = ImGui::GetFrameHeight();
     const ImVec2 corner = ImGui::GetCursorScreenPos();
     const ImU32 mark = message.error ? IM_COL32(230, 105, 85, 255) : IM_COL32(127, 180, 230, 255);
-    ImGui::GetWindowDrawList()->AddRectFilled({corner.x, corner.y + line * 0.12f},
-                                              {corner.x + ui_.px(4.0f), corner.y + line * 0.88f}, mark, ui_.px(2.0f));
     ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ui_.px(12.0f));
     ImGui::AlignTextToFramePadding();
-    const float room = ImGui::GetContentRegionAvail().x - button - ui_.px(8.0f);
-    ImGui::TextUnformatted(shorten(message.text, room).c_str());
+    // A cause that is cut is no cause.
+    ImGui::PushTextWrapPos(ImGui::GetWindowWidth() - button - ui_.px(18.0f));
+    ImGui::TextUnformatted(message.text.c_str());
+    ImGui::PopTextWrapPos();
+    ImGui::GetWindowDrawList()->AddRectFilled({corner.x, ImGui::GetItemRectMin().y},
+                                              {corner.x + ui_.px(4.0f), ImGui::GetItemRectMax().y}, mark, ui_.px(2.0f));
     ui_.remember("Message", message.text.c_str());
     ImGui::SameLine();
     ImGui::SetCursorPosX(ImGui::GetWindowWidth() - button - ui_.px(10.0f));
@@ -483,6 +485,7 @@ void Panel::state_line(const Model& model) {
     text += print("   %ux%u", status.frame.width, status.frame.height);
   if (status.noise > 0.0) text += print("   noise %.2f %%", 100.0 * status.noise);
   if (model.navigation.fly != 0) text += "   flying";
+  state_ = text;
   ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
                           {0.0f, 1.0f});
   ImGui::SetNextWindowBgAlpha(0.55f);

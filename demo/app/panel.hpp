@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "file_dialog.hpp"
+#include "grid_picker.hpp"
 #include "model.hpp"
 #include "ui.hpp"
 
@@ -20,7 +21,12 @@ class Panel {
 
   void focus() { focus_ = true; }
   [[nodiscard]] FileDialog& dialog() { return dialog_; }
+  /// Whether one that stops all else is open.
+  [[nodiscard]] bool dialog_open() const { return dialog_.is_open() || picker_.is_open(); }
+  [[nodiscard]] GridPicker& picker() { return picker_; }
   [[nodiscard]] Ui& ui() { return ui_; }
+  /// The line of text below the picture, as drawn last; "" if there is none.
+  [[nodiscard]] const std::string& state() const { return state_; }
 
  private:
   void side(Model& model, std::vector<Command>& commands);
@@ -29,7 +35,7 @@ class Panel {
   void camera(Model& model, std::vector<Command>& commands);
   void display(Model& model);
   void light(Model& model);
-  void medium(Model& model);
+  void medium(Model& model, std::vector<Command>& commands);
   void surfaces(Model& model);
   void grid(Model& model);
   void sampling(Model& model);
@@ -45,10 +51,12 @@ class Panel {
 
   Ui ui_;
   FileDialog dialog_;
+  GridPicker picker_;
   bool focus_ = false;
   bool help_was_closed_ = true;
   double time_ = 0.0;
   Rectangle view_;
+  std::string state_;
   std::string path_;  // as typed
   std::string path_of_;
   // What a light of strength 0 was before.

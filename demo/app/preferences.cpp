@@ -24,6 +24,12 @@ constexpr int most_side = 16384;
 constexpr std::array style_names = {Name{"simple", CUMULET_NAVIGATION_SIMPLE},
                                     Name{"blender", CUMULET_NAVIGATION_BLENDER}, Name{"maya", CUMULET_NAVIGATION_MAYA}};
 
+std::string absolute(const std::string& path) {
+  std::error_code error;
+  const fs::path there = fs::absolute(fs::path(path), error);
+  return error ? "" : there.lexically_normal().string();
+}
+
 std::string environment(const char* name) {
   const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before any thread is started
   return value == nullptr ? "" : value;
@@ -32,15 +38,15 @@ std::string environment(const char* name) {
 }  // namespace
 
 void Preferences::remember(const std::string& path) {
-  std::error_code error;
-  const fs::path absolute = fs::absolute(fs::path(path), error).lexically_normal();
-  if (error) return;
-  const std::string text = absolute.string();
+  const std::string text = absolute(path);
+  if (text.empty()) return;
   std::erase(recent, text);
   recent.insert(recent.begin(), text);
   if (recent.size() > most_recent) recent.resize(most_recent);
-  folder = absolute.parent_path().string();
+  folder = fs::path(text).parent_path().string();
 }
+
+void Preferences::forget(const std::string& path) { std::erase(recent, absolute(path)); }
 
 std::string preferences_path() {
   std::string folder = environment("XDG_CONFIG_HOME");

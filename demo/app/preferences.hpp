@@ -17,6 +17,8 @@ struct Preferences {
 
   /// Puts a file at the top of the recent ones, and remembers its folder.
   void remember(const std::string& path);
+  /// Takes a file that cannot be opened from the recent ones.
+  void forget(const std::string& path);
 };
 
 /// $XDG_CONFIG_HOME/cumulet/demo.json, or below ~/.config; "" if there is neither.

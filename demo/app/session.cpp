@@ -51,8 +51,8 @@ bool same(const cumulet_display_desc& a, const cumulet_display_desc& b) {
 }
 
 bool same(const cumulet_surface_settings_desc& a, const cumulet_surface_settings_desc& b) {
-  return std::tie(a.time, a.animation, a.light, a.indirect_roughness) ==
-         std::tie(b.time, b.animation, b.light, b.indirect_roughness);
+  return std::tie(a.time, a.animation, a.light, a.indirect_roughness, a.double_sided) ==
+         std::tie(b.time, b.animation, b.light, b.indirect_roughness, b.double_sided);
 }
 
 bool same(const cumulet_camera_desc& a, const cumulet_camera_desc& b) {
@@ -68,13 +68,15 @@ bool same(const cumulet_navigation_desc& a, const cumulet_navigation_desc& b) {
 
 }  // namespace
 
-void tell(Model& model, bool error, const std::string& text, double now) {
-  constexpr double seconds = 5.0;
-  constexpr std::size_t most = 3;
-  const std::string line = one_line(text);
-  std::erase_if(model.messages, [&](const Message& message) { return message.text == line; });
-  if (model.messages.size() >= most) model.messages.erase(model.messages.begin());
-  model.messages.push_back({error, line, now + seconds});
+bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b) { return same(a, b); }
+
+bool same_wish(const Wish& a, const Wish& b) {
+  const auto rest = [](const Wish& wish) {
+    return std::tie(wish.camera_edit, wish.volume_edit, wish.surfaces_edit, wish.fit, wish.suggest,
+                    wish.adaptive_resolution, wish.held, wish.paused, wish.budget_ms, wish.width, wish.height,
+                    wish.scale);
+  };
+  return rest(a) == rest(b) && same(a.navigation, b.navigation) && same_scene(a.scene, b.scene);
 }
 
 Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake)
@@ -109,209 +111,317 @@ void Session::on_log(void* user, cumulet_log_level level, const char* message) {
 
 void Session::on_update(void* user) { static_cast<Shared*>(user)->wake(); }
 
-bool Session::check(Model& model, cumulet_status status) {
+bool Session::check(cumulet_status status) {
   if (status == CUMULET_OK) return true;
   const std::string cause = cumulet_last_error(viewer_.get());
-  tell(model, true, cause.empty() ? cumulet_status_text(status) : cause, glfwGetTime());
+  tell(true, cause.empty() ? cumulet_status_text(status) : cause);
   return false;
 }
 
-void Session::follow(Model& model, bool held) {
-  SceneOptions& scene = model.scene;
-  scene.sampling.preview = model.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
-  cumulet_viewer* viewer = viewer_.get();
+void Session::follow(const Wish& wish) {
+  const bool first = !known_;
+  Wish next = wish;
+  // What the user has not changed since is the viewer's.
+  if (!first && wish.camera_edit == wish_.camera_edit) next.scene.camera = scene_.camera;
+  const bool load = !first && wish.volume_edit != wish_.volume_edit;
+  if (!first && !load) {
+    next.scene.volume = scene_.volume;
+    next.scene.grid_name = scene_.grid_name;
+  }
+  if (!first && wish.surfaces_edit == wish_.surfaces_edit) next.scene.surfaces = scene_.surfaces;
+  wish_ = std::move(next);
+  scene_.sampling.preview = wish_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
   // What was given is known even if it was refused: the refusal is told once.
-  if (!known_) {
+  if (first) {
     known_ = SceneOptions();
     known_->sampling.samples = 0;
   }
-  if (!same(known_->medium, scene.medium)) check(model, cumulet_set_medium(viewer, &scene.medium));
-  known_->medium = scene.medium;
-  if (!same(known_->light, scene.light)) check(model, cumulet_set_light(viewer, &scene.light));
-  known_->light = scene.light;
-  if (!same(known_->sampling, scene.sampling)) check(model, cumulet_set_sampling(viewer, &scene.sampling));
-  known_->sampling = scene.sampling;
-  if (!same(known_->display, scene.display)) check(model, cumulet_set_display(viewer, &scene.display));
-  known_->display = scene.display;
-  if (!(held && model.status.busy)) {
-    if (!same(known_->grid, scene.grid)) check(model, cumulet_set_grid(viewer, &scene.grid));
-    known_->grid = scene.grid;
+  if (first || load) {
+    fit_ = wish_.fit;
+    suggest_ = wish_.suggest;
   }
-  if (!same(known_->camera, scene.camera)) set_camera(model);
-  if (!same(navigation_, model.navigation)) check(model, cumulet_set_navigation(viewer, &model.navigation));
-  navigation_ = model.navigation;
-  follow_surfaces(model);
-  follow_volume(model);
+  if (load && !scene_.volume.empty()) known_->volume.clear();
+  cumulet_viewer* viewer = viewer_.get();
+  if (!same(known_->medium, scene_.medium)) check(cumulet_set_medium(viewer, &scene_.medium));
+  known_->medium = scene_.medium;
+  if (!same(known_->light, scene_.light)) check(cumulet_set_light(viewer, &scene_.light));
+  known_->light = scene_.light;
+  if (!same(known_->sampling, scene_.sampling)) check(cumulet_set_sampling(viewer, &scene_.sampling));
+  known_->sampling = scene_.sampling;
+  if (!same(known_->display, scene_.display)) check(cumulet_set_display(viewer, &scene_.display));
+  known_->display = scene_.display;
+  if (!(wish_.held && status_.busy)) {
+    if (!same(known_->grid, scene_.grid)) check(cumulet_set_grid(viewer, &scene_.grid));
+    known_->grid = scene_.grid;
+  }
+  if (!same(known_->camera, scene_.camera)) set_camera();
+  if (!same(navigation_, wish_.navigation)) check(cumulet_set_navigation(viewer, &wish_.navigation));
+  navigation_ = wish_.navigation;
+  follow_surfaces();
+  follow_volume();
 }
 
-void Session::follow_surfaces(Model& model) {
-  SceneOptions& scene = model.scene;
-  if (!same(known_->surface, scene.surface)) {
-    check(model, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
-    if (known_->surface.animation != scene.surface.animation) read_surfaces(model);
+void Session::follow_surfaces() {
+  if (!same(known_->surface, scene_.surface)) {
+    check(cumulet_set_surface_settings(viewer_.get(), &scene_.surface));
+    if (known_->surface.animation != scene_.surface.animation) read_surfaces();
   }
-  known_->surface = scene.surface;
-  if (known_->surfaces == scene.surfaces) return;
-  known_->surfaces = scene.surfaces;
-  if (scene.surfaces.empty()) {
-    check(model, cumulet_set_surfaces(viewer_.get(), nullptr));
+  known_->surface = scene_.surface;
+  if (known_->surfaces == scene_.surfaces) return;
+  known_->surfaces = scene_.surfaces;
+  if (scene_.surfaces.empty()) {
+    check(cumulet_set_surfaces(viewer_.get(), nullptr));
     shown_surfaces_.clear();
-    model.status.surfaces = {};
-    model.status.animation = {};
+    status_.surfaces = {};
+    status_.animation = {};
     return;
   }
-  waiting_for_surfaces_ = check(model, cumulet_load_surfaces(viewer_.get(), scene.surfaces.c_str()));
-  if (!waiting_for_surfaces_) scene.surfaces = known_->surfaces = shown_surfaces_;
+  waiting_for_surfaces_ = check(cumulet_load_surfaces(viewer_.get(), scene_.surfaces.c_str()));
+  if (waiting_for_surfaces_) return;
+  files_.push_back({scene_.surfaces, Answer::File::Fate::failed});
+  scene_.surfaces = known_->surfaces = shown_surfaces_;
 }
 
-void Session::finish_surfaces(Model& model) {
+void Session::finish_surfaces() {
   waiting_for_surfaces_ = false;
-  SceneOptions& scene = model.scene;
-  const cumulet_progress& work = model.status.work;
-  const bool failed =
-      work.status != CUMULET_OK && std::string_view(static_cast<const char*>(work.message)).starts_with(scene.surfaces);
+  const cumulet_progress& work = status_.work;
+  const bool failed = work.status != CUMULET_OK &&
+                      std::string_view(static_cast<const char*>(work.message)).starts_with(scene_.surfaces);
   if (failed) {
-    tell(model, true, work.message, glfwGetTime());
-    scene.surfaces = known_->surfaces = shown_surfaces_;
+    tell(true, work.message);
+    files_.push_back({scene_.surfaces, Answer::File::Fate::failed});
+    scene_.surfaces = known_->surfaces = shown_surfaces_;
     return;
   }
-  shown_surfaces_ = scene.surfaces;
-  model.preferences.remember(shown_surfaces_);
-  read_surfaces(model);
-  if (scene.surface_camera >= 0)
-    check(model, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
+  shown_surfaces_ = scene_.surfaces;
+  files_.push_back({shown_surfaces_, Answer::File::Fate::opened});
+  read_surfaces();
+  if (scene_.surface_camera >= 0)
+    check(cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene_.surface_camera)));
 }
 
-void Session::read_surfaces(Model& model) {
+void Session::read_surfaces() {
   cumulet_surfaces* shown = nullptr;
-  check(model, cumulet_get_surfaces(viewer_.get(), &shown));
+  check(cumulet_get_surfaces(viewer_.get(), &shown));
   if (shown == nullptr) return;
-  cumulet_surfaces_info& info = model.status.surfaces;
+  cumulet_surfaces_info& info = status_.surfaces;
   info = {};
   info.struct_size = sizeof info;
-  check(model, cumulet_surfaces_get_info(shown, &info));
-  cumulet_animation_info& animation = model.status.animation;
+  check(cumulet_surfaces_get_info(shown, &info));
+  cumulet_animation_info& animation = status_.animation;
   animation = {};
   animation.struct_size = sizeof animation;
-  const std::uint32_t number = model.scene.surface.animation;
-  if (number < info.animations) check(model, cumulet_surfaces_get_animation(shown, number, &animation));
+  const std::uint32_t number = scene_.surface.animation;
+  if (number < info.animations) check(cumulet_surfaces_get_animation(shown, number, &animation));
   cumulet_surfaces_release(shown);
 }
 
-void Session::set_camera(Model& model) {
-  check(model, cumulet_camera_set(camera_.get(), &model.scene.camera));
-  known_->camera = model.scene.camera;
+void Session::set_camera() {
+  check(cumulet_camera_set(camera_.get(), &scene_.camera));
+  known_->camera = scene_.camera;
   // What the library makes of it may differ in the last digit: that is no movement.
   static_cast<void>(cumulet_camera_get(camera_.get(), &seen_));
-  if (is_unplaced(model.scene.camera) && !is_unplaced(seen_)) model.scene.camera = known_->camera = seen_;
+  if (is_unplaced(scene_.camera) && !is_unplaced(seen_)) scene_.camera = known_->camera = seen_;
 }
 
-void Session::follow_volume(Model& model) {
-  SceneOptions& scene = model.scene;
-  if (known_->volume == scene.volume && known_->grid_name == scene.grid_name) return;
-  known_->volume = scene.volume;
-  known_->grid_name = scene.grid_name;
-  if (scene.volume.empty()) {
-    check(model, cumulet_set_volume(viewer_.get(), nullptr));
+void Session::follow_volume() {
+  if (known_->volume == scene_.volume && known_->grid_name == scene_.grid_name) return;
+  known_->volume = scene_.volume;
+  known_->grid_name = scene_.grid_name;
+  if (scene_.volume.empty()) {
+    check(cumulet_set_volume(viewer_.get(), nullptr));
     shown_volume_.clear();
     shown_grid_.clear();
-    model.grids.clear();
-    model.status.has_volume = false;
+    grids_.clear();
+    status_.has_volume = false;
     waiting_ = false;
     return;
   }
-  const char* grid = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();
-  waiting_ = check(model, cumulet_load_volume(viewer_.get(), scene.volume.c_str(), grid));
+  const cumulet_volume_file_desc file = volume_file(scene_);
+  waiting_ = check(cumulet_load_volume_file(viewer_.get(), &file));
   if (waiting_) return;
+  files_.push_back({scene_.volume, Answer::File::Fate::failed});
   fit_ = false;
-  scene.volume = known_->volume = shown_volume_;
-  scene.grid_name = known_->grid_name = shown_grid_;
+  scene_.volume = known_->volume = shown_volume_;
+  scene_.grid_name = known_->grid_name = shown_grid_;
 }
 
-void Session::reload() {
-  if (known_) known_->volume.clear();
-}
-
-void Session::render(Model& model, const cumulet_frame_desc& frame) {
-  Status& status = model.status;
-  status.frame = {};
-  status.frame.struct_size = sizeof status.frame;
-  check(model, cumulet_render(viewer_.get(), &frame, &status.frame));
-  status.work = {};
-  status.work.struct_size = sizeof status.work;
-  static_cast<void>(cumulet_get_progress(viewer_.get(), &status.work));
-  status.stats.struct_size = sizeof status.stats;
-  static_cast<void>(cumulet_get_stats(viewer_.get(), &status.stats));
-  const bool was_busy = status.busy;
-  status.busy = status.work.stage != CUMULET_STAGE_IDLE || (status.frame.flags & CUMULET_RENDER_LOADING) != 0;
-  if (waiting_for_surfaces_ && !status.busy) finish_surfaces(model);
-  if (waiting_ && !status.busy)
-    finish_load(model);
-  else if (was_busy && !status.busy && status.work.status != CUMULET_OK &&
-           status.work.status != CUMULET_ERROR_CANCELLED)
-    tell(model, true, status.work.message, glfwGetTime());
-
-  cumulet_camera_desc now{};
-  now.struct_size = sizeof now;
-  camera_moved_ = cumulet_camera_get(camera_.get(), &now) == CUMULET_OK && !same(now, seen_);
-  if (camera_moved_) {
-    seen_ = now;
-    if (now.fovy_degrees == 0.0) now.fovy_degrees = model.scene.camera.fovy_degrees;
-    model.scene.camera = known_->camera = now;
+void Session::render(unsigned framebuffer) {
+  cumulet_frame_desc frame{};
+  frame.struct_size = sizeof frame;
+  frame.budget_ms = wish_.paused ? -1.0 : wish_.budget_ms;
+  frame.framebuffer = framebuffer;
+  frame.width = wish_.width;
+  frame.height = wish_.height;
+  frame.scale = wish_.scale;
+  // What moves is drawn once it is there, rather than the last picture once more on the way.
+  if (wish_.held && !wish_.paused) {
+    cumulet_frame_desc unseen = frame;
+    unseen.target = CUMULET_TARGET_NONE;
+    check(cumulet_render(viewer_.get(), &unseen, nullptr));
   }
+  status_.frame = {};
+  status_.frame.struct_size = sizeof status_.frame;
+  check(cumulet_render(viewer_.get(), &frame, &status_.frame));
+  status_.work = {};
+  status_.work.struct_size = sizeof status_.work;
+  static_cast<void>(cumulet_get_progress(viewer_.get(), &status_.work));
+  status_.stats.struct_size = sizeof status_.stats;
+  static_cast<void>(cumulet_get_stats(viewer_.get(), &status_.stats));
+  const bool was_busy = status_.busy;
+  status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
+  if (waiting_for_surfaces_ && !status_.busy) finish_surfaces();
+  if (waiting_ && !status_.busy)
+    finish_load();
+  else if (was_busy && !status_.busy && status_.work.status != CUMULET_OK &&
+           status_.work.status != CUMULET_ERROR_CANCELLED)
+    tell(true, status_.work.message);
+  see_camera();
+  measure_noise();
 
   const std::lock_guard lock(shared_->mutex);
-  for (const std::string& warning : shared_->warnings) tell(model, false, warning, glfwGetTime());
+  for (const std::string& warning : shared_->warnings) tell(false, warning);
   shared_->warnings.clear();
 }
 
-void Session::finish_load(Model& model) {
+void Session::see_camera() {
+  cumulet_camera_desc now{};
+  now.struct_size = sizeof now;
+  if (cumulet_camera_get(camera_.get(), &now) != CUMULET_OK || same(now, seen_)) return;
+  camera_moved_ = true;
+  seen_ = now;
+  if (now.fovy_degrees == 0.0) now.fovy_degrees = scene_.camera.fovy_degrees;
+  scene_.camera = known_->camera = now;
+}
+
+bool Session::more() const { return !wish_.paused && (status_.frame.flags & CUMULET_RENDER_MORE) != 0; }
+
+Answer Session::answer() {
+  Answer answer;
+  answer.wish = wish_.number;
+  answer.status = status_;
+  answer.grids = grids_;
+  answer.waiting = waiting_ || waiting_for_surfaces_;
+  answer.camera = scene_.camera;
+  answer.volume = scene_.volume;
+  answer.grid_name = scene_.grid_name;
+  answer.surfaces = scene_.surfaces;
+  answer.camera_edit = wish_.camera_edit;
+  answer.volume_edit = wish_.volume_edit;
+  answer.surfaces_edit = wish_.surfaces_edit;
+  answer.camera_moved = std::exchange(camera_moved_, false);
+  answer.density_scale = std::exchange(density_scale_, std::nullopt);
+  answer.notices = std::exchange(notices_, {});
+  answer.files = std::exchange(files_, {});
+  return answer;
+}
+
+void Session::finish_load() {
   waiting_ = false;
-  SceneOptions& scene = model.scene;
-  const cumulet_progress& work = model.status.work;
+  const cumulet_progress& work = status_.work;
   if (work.status != CUMULET_OK) {
     const bool cancelled = work.status == CUMULET_ERROR_CANCELLED;
-    tell(model, !cancelled, cancelled ? "Cancelled: " + scene.volume : work.message, glfwGetTime());
-    scene.volume = known_->volume = shown_volume_;
-    scene.grid_name = known_->grid_name = shown_grid_;
+    tell(!cancelled, cancelled ? "Cancelled: " + scene_.volume : work.message);
+    if (!cancelled) files_.push_back({scene_.volume, Answer::File::Fate::failed});
+    scene_.volume = known_->volume = shown_volume_;
+    scene_.grid_name = known_->grid_name = shown_grid_;
     fit_ = false;
     return;
   }
-  shown_volume_ = scene.volume;
-  shown_grid_ = scene.grid_name;
-  model.status.has_volume = true;
-  model.grids.clear();
+  shown_volume_ = scene_.volume;
+  shown_grid_ = scene_.grid_name;
+  status_.has_volume = true;
+  grids_.clear();
   const auto add = [](void* user, const char* name, const char* type, const char* refusal) {
     static_cast<std::vector<GridInfo>*>(user)->push_back({name, type, refusal});
   };
+  status_.grid = shown_grid_;
+  cumulet_volume* volume = nullptr;
+  cumulet_volume_info info{};
+  info.struct_size = sizeof info;
+  if (check(cumulet_get_volume(viewer_.get(), &volume)) && volume != nullptr &&
+      cumulet_volume_get_info(volume, &info) == CUMULET_OK)
+    status_.grid = info.name;
+  cumulet_volume_release(volume);
   std::array<char, 512> error{};
-  if (cumulet_list_grids(shown_volume_.c_str(), add, &model.grids, error.data(), error.size()) != CUMULET_OK)
-    tell(model, true, error.data(), glfwGetTime());
-  model.preferences.remember(shown_volume_);
+  if (cumulet_list_grids(shown_volume_.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
+    tell(true, error.data());
+  files_.push_back({shown_volume_, Answer::File::Fate::opened});
+  if (std::exchange(suggest_, false)) suggest_density();
   if (!fit_) return;
   fit_ = false;
-  const double fovy = scene.camera.fovy_degrees;
-  scene.camera = {};
-  scene.camera.struct_size = sizeof scene.camera;
-  scene.camera.fovy_degrees = fovy;
-  set_camera(model);
+  const double fovy = scene_.camera.fovy_degrees;
+  scene_.camera = {};
+  scene_.camera.struct_size = sizeof scene_.camera;
+  scene_.camera.fovy_degrees = fovy;
+  set_camera();
 }
 
-void Session::frame_all(Model& model) {
-  if (model.status.has_volume) check(model, cumulet_frame_all(viewer_.get()));
-}
-
-bool Session::input(const cumulet_event& event) {
+void Session::input(const ViewerInput& input) {
   std::int32_t handled = 0;
-  return cumulet_input(viewer_.get(), &event, &handled) == CUMULET_OK && handled != 0;
+  const bool taken = cumulet_input(viewer_.get(), &input.event, &handled) == CUMULET_OK && handled != 0;
+  if (!taken && input.event.type == CUMULET_EVENT_KEY_DOWN) move_by_keys(input.key);
 }
 
-void Session::orbit(double yaw, double pitch) { static_cast<void>(cumulet_camera_orbit(camera_.get(), yaw, pitch)); }
-void Session::dolly(double factor) { static_cast<void>(cumulet_camera_dolly(camera_.get(), factor)); }
+void Session::suggest_density() {
+  cumulet_volume* volume = nullptr;
+  if (!check(cumulet_get_volume(viewer_.get(), &volume)) || volume == nullptr) return;
+  double scale = 0.0;
+  // What shows nothing at any scale keeps the one it has.
+  if (cumulet_volume_suggest_density_scale(volume, &scale) == CUMULET_OK) density_scale_ = scale;
+  cumulet_volume_release(volume);
+}
 
-void Session::write_exr(const Model& model, const std::string& path) {
-  const std::uint32_t width = model.status.frame.width;
-  const std::uint32_t height = model.status.frame.height;
+void Session::move_by_keys(int key) {
+  constexpr double step = 0.1;
+  constexpr double closer = 0.9;
+  const auto orbit = [this](double yaw, double pitch) { check(cumulet_camera_orbit(camera_.get(), yaw, pitch)); };
+  const auto dolly = [this](double factor) { check(cumulet_camera_dolly(camera_.get(), factor)); };
+  switch (key) {
+    case GLFW_KEY_LEFT:
+      return orbit(-step, 0.0);
+    case GLFW_KEY_RIGHT:
+      return orbit(step, 0.0);
+    case GLFW_KEY_UP:
+      return orbit(0.0, step);
+    case GLFW_KEY_DOWN:
+      return orbit(0.0, -step);
+    case GLFW_KEY_EQUAL:
+    case GLFW_KEY_KP_ADD:
+      return dolly(closer);
+    case GLFW_KEY_MINUS:
+    case GLFW_KEY_KP_SUBTRACT:
+      return dolly(1.0 / closer);
+    default:
+      return;
+  }
+}
+
+void Session::execute(const Request& request) {
+  if (request.type == Request::Type::suggest_density) return suggest_density();
+  if (request.type == Request::Type::frame_all) {
+    if (status_.has_volume) check(cumulet_frame_all(viewer_.get()));
+    return;
+  }
+  try {
+    if (request.type == Request::Type::save_exr) {
+      write_exr(request.path);
+    } else {
+      image::PngOptions png;
+      png.tone_mapping = image::ToneMapping::none;
+      png.keep_alpha = scene_.display.background == CUMULET_BACKGROUND_TRANSPARENT;
+      image::write_png(request.path, read_display(), png);
+    }
+    files_.push_back({request.path, Answer::File::Fate::saved});
+    tell(false, "Saved " + request.path);
+  } catch (const std::exception& error) {
+    tell(true, error.what());
+  }
+}
+
+void Session::write_exr(const std::string& path) {
+  const std::uint32_t width = status_.frame.width;
+  const std::uint32_t height = status_.frame.height;
   if (width == 0) throw std::runtime_error("there is no picture yet");
   std::vector<float> rgba(std::size_t{4} * width * height);
   if (cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()) != CUMULET_OK)
@@ -319,12 +429,12 @@ void Session::write_exr(const Model& model, const std::string& path) {
   // All but the volume alone, which would cost every frame something.
   constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
                             CUMULET_AOV_NORMAL, CUMULET_AOV_ALBEDO};
-  const bool shaded = model.scene.sampling.view == CUMULET_VIEW_SHADED;
+  const bool shaded = scene_.sampling.view == CUMULET_VIEW_SHADED;
   demo::write_exr(viewer_.get(), path, width, height, rgba, std::span(aovs).first(shaded ? aovs.size() : 0));
 }
 
-image::Image Session::read_display(const Model& model) {
-  image::Image picture{model.status.frame.width, model.status.frame.height, {}};
+image::Image Session::read_display() {
+  image::Image picture{status_.frame.width, status_.frame.height, {}};
   if (picture.width == 0) throw std::runtime_error("there is no picture yet");
   std::vector<std::uint8_t> bytes(std::size_t{4} * picture.width * picture.height);
   if (cumulet_read_display(viewer_.get(), bytes.data(), bytes.size()) != CUMULET_OK)
@@ -337,11 +447,23 @@ image::Image Session::read_display(const Model& model) {
   return picture;
 }
 
-void Session::measure_noise(Model& model) {
+// Each second while the picture refines.
+void Session::measure_noise() {
+  constexpr double period = 1.0;
+  const cumulet_frame_result& frame = status_.frame;
+  const std::uint64_t samples = status_.stats.samples;
+  const bool refining = (frame.flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_CONVERGED)) != 0 && !wish_.held &&
+                        !wish_.paused && frame.progress > 0.0 && (frame.flags & CUMULET_RENDER_PREVIEW) == 0 &&
+                        scene_.sampling.view == CUMULET_VIEW_SHADED;
+  // Fewer samples than when it was measured: another picture.
+  if (samples < noise_samples_) status_.noise = 0.0;
+  const double now = glfwGetTime();
+  if (!refining || now - last_noise_ < period) return;
+  if (status_.noise > 0.0 && samples == noise_samples_) return;
+  last_noise_ = now;
+  noise_samples_ = samples;
   double noise = 0.0;
-  if (!check(model, cumulet_measure_noise(viewer_.get(), &noise))) return;
-  model.status.noise = std::isfinite(noise) ? noise : 0.0;
-  if (model.status.noise > 0.0) model.status.noise_percent.add(static_cast<float>(100.0 * model.status.noise));
+  if (check(cumulet_measure_noise(viewer_.get(), &noise))) status_.noise = std::isfinite(noise) ? noise : 0.0;
 }
 
 }  // namespace cumulet::demo

@@ -2,6 +2,7 @@
 
 #include <cumulet/cumulet.h>
 
+#include <cstdint>
 #include <functional>
 #include <image.hpp>
 #include <memory>
@@ -14,7 +15,73 @@
 
 namespace cumulet::demo {
 
-/// A cumulet viewer that follows a model. Needs the GL context current throughout, as all of it runs in one thread.
+/// An event of the picture, and GLFW's key for what the viewer has no use for.
+struct ViewerInput {
+  cumulet_event event{};
+  int key = 0;
+};
+
+/// What is asked for once, beside what is wished all the time.
+struct Request {
+  enum class Type { frame_all, save_png, save_exr, suggest_density };
+  Type type = Type::frame_all;
+  std::string path = {};
+};
+
+/// All that the window wants to see: a value, sent to the viewer's thread.
+struct Wish {
+  std::uint64_t number = 0;  // rises with each
+  SceneOptions scene;
+  // What the viewer changes by itself is taken from the scene only where these say that the user has changed it since.
+  std::uint64_t camera_edit = 0;
+  std::uint64_t volume_edit = 0;  // the volume or its grid; the same file may be wished anew
+  std::uint64_t surfaces_edit = 0;
+  bool fit = false;      // that volume is framed once it is there: its camera comes from no scene file
+  bool suggest = false;  // its density scale is told, too: none comes from a scene file
+  cumulet_navigation_desc navigation{};
+  bool adaptive_resolution = true;
+  bool held = false;    // a control or the camera is: the grid's settings may wait for the worker
+  bool paused = false;  // nothing is traced
+  double budget_ms = 0.0;
+  std::uint32_t width = 0;  // of the picture, pixels
+  std::uint32_t height = 0;
+  double scale = 1.0;
+};
+
+/// What the viewer makes of a wish.
+struct Answer {
+  std::uint64_t wish = 0;  // the newest that was seen
+  Status status;
+  std::vector<GridInfo> grids;
+  bool waiting = false;  // something is still to come of itself: a load, or the camera's first place
+  cumulet_camera_desc camera{};
+  std::string volume;  // shown, or being loaded
+  std::string grid_name;
+  std::string surfaces;
+  std::uint64_t camera_edit = 0;  // what these follow
+  std::uint64_t volume_edit = 0;
+  std::uint64_t surfaces_edit = 0;
+  // Since the last answer that was taken:
+  bool camera_moved = false;            // by whatever
+  std::optional<double> density_scale;  // that suits the volume
+  struct Notice {
+    bool error = false;
+    std::string text;
+  };
+  std::vector<Notice> notices;
+  struct File {
+    enum class Fate { opened, failed, saved };
+    std::string path;
+    Fate fate = Fate::opened;
+  };
+  std::vector<File> files;
+};
+
+[[nodiscard]] bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b);
+/// Whether they ask for the same, whatever their numbers.
+[[nodiscard]] bool same_wish(const Wish& a, const Wish& b);
+
+/// A cumulet viewer that follows wishes. All of it in the one thread that has its GL context.
 class Session {
  public:
   /// wake is called from any thread when there is something new to draw. Throws std::runtime_error.
@@ -23,34 +90,21 @@ class Session {
   Session& operator=(const Session&) = delete;
   ~Session() = default;
 
-  /// Hands the viewer what has changed in the model since the last time. While a control is held, the grid's settings
-  /// wait until the worker is free, so that it is not restarted with every pixel of a drag.
-  void follow(Model& model, bool held);
-  /// One frame into framebuffer 0; then the model's status is the newest, and its camera where input has moved it.
-  void render(Model& model, const cumulet_frame_desc& frame);
+  /// Hands the viewer what has changed since the last wish; for the same again, what had to wait.
+  void follow(const Wish& wish);
+  void input(const ViewerInput& input);
+  void execute(const Request& request);
+  /// One frame of the last wish into a framebuffer of the picture's size.
+  void render(unsigned framebuffer);
+  /// Whether render has anything left to do.
+  [[nodiscard]] bool more() const;
+  /// Whether a file is read or a grid is built, whose progress is worth a look now and then.
+  [[nodiscard]] bool busy() const { return status_.busy; }
+  /// What there is to tell; the notices and the files once.
+  [[nodiscard]] Answer answer();
 
-  /// A new volume will be framed once it is there: its camera does not come from a scene file.
-  void fit_next() { fit_ = true; }
-  /// The volume is loaded again, though it is the same.
-  void reload();
-  /// Whether something is still to come of itself: a load, or the camera's first place.
-  [[nodiscard]] bool waiting() const { return waiting_; }
-  /// Whether the last frame moved the camera, by whatever.
-  [[nodiscard]] bool camera_moved() const { return camera_moved_; }
-
+  /// From any thread.
   void cancel() { cumulet_cancel(viewer_.get()); }
-  void frame_all(Model& model);
-  /// Whether it meant something to the camera.
-  bool input(const cumulet_event& event);
-  void orbit(double yaw, double pitch);
-  void dolly(double factor);
-
-  /// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
-  [[nodiscard]] image::Image read_display(const Model& model);
-  /// The picture in linear radiance with its layers, as docs/aovs.md says; debug views have none.
-  void write_exr(const Model& model, const std::string& path);
-  /// Measures it for the model's status.
-  void measure_noise(Model& model);
 
  private:
   struct DestroyViewer {
@@ -68,19 +122,30 @@ class Session {
   static void on_log(void* user, cumulet_log_level level, const char* message);
   static void on_update(void* user);
 
-  /// Tells a failed call in the message bar.
-  bool check(Model& model, cumulet_status status);
-  void follow_volume(Model& model);
-  void follow_surfaces(Model& model);
-  void finish_surfaces(Model& model);
+  void tell(bool error, const std::string& text) { notices_.push_back({error, text}); }
+  /// Tells a failed call.
+  bool check(cumulet_status status);
+  void follow_volume();
+  void follow_surfaces();
+  void finish_surfaces();
   // What the library says of those it shows.
-  void read_surfaces(Model& model);
-  void finish_load(Model& model);
-  void set_camera(Model& model);
+  void read_surfaces();
+  void finish_load();
+  void set_camera();
+  void see_camera();
+  void move_by_keys(int key);
+  void measure_noise();
+  void suggest_density();
+  /// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
+  [[nodiscard]] image::Image read_display();
+  /// The picture in linear radiance with its layers, as docs/aovs.md says; debug views have none.
+  void write_exr(const std::string& path);
 
   std::unique_ptr<Shared> shared_;
   std::unique_ptr<cumulet_viewer, DestroyViewer> viewer_;
   std::unique_ptr<cumulet_camera, ReleaseCamera> camera_;
+  Wish wish_;
+  SceneOptions& scene_ = wish_.scene;  // with what the viewer has made of it
   std::optional<SceneOptions> known_;  // what the viewer was given last
   cumulet_navigation_desc navigation_{};
   cumulet_camera_desc seen_{};  // the viewer's camera
@@ -88,10 +153,15 @@ class Session {
   bool waiting_for_surfaces_ = false;
   bool waiting_ = false;
   bool fit_ = false;
+  bool suggest_ = false;
+  std::optional<double> density_scale_;
   bool camera_moved_ = false;
+  double last_noise_ = 0.0;
+  std::uint64_t noise_samples_ = 0;
+  Status status_;
+  std::vector<GridInfo> grids_;
+  std::vector<Answer::Notice> notices_;
+  std::vector<Answer::File> files_;
 };
-
-/// Adds a line to the message bar, in place of an equal one. Errors stay, others go after a while.
-void tell(Model& model, bool error, const std::string& text, double now);
 
 }  // namespace cumulet::demo

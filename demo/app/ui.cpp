@@ -38,6 +38,19 @@ std::string in_words(double value, const char* const* units, std::size_t count, 
 
 }  // namespace
 
+std::string end_of(const std::string& text, float width) {
+  if (ImGui::CalcTextSize(text.c_str()).x <= width) return text;
+  const auto within = [&](std::size_t i) { return (static_cast<unsigned char>(text[i]) & 0xC0U) == 0x80U; };
+  std::size_t first = 0;
+  std::string shown;
+  do {
+    do ++first;
+    while (first < text.size() && within(first));
+    shown = "..." + text.substr(first);
+  } while (first < text.size() && ImGui::CalcTextSize(shown.c_str()).x > width);
+  return shown;
+}
+
 std::string short_count(double count) {
   constexpr std::array units = {"", "k", "M", "G", "T"};
   return in_words(count, units.data(), units.size(), " ");
@@ -205,9 +218,20 @@ bool Ui::colour(const char* label, const char* tip, float (&rgb)[3]) {
 bool Ui::text(const char* label, const char* tip, const char* hint, std::string& value, float room_right) {
   begin_row(label);
   ImGui::SetNextItemWidth(room_right > 0.0f ? -room_right : -1.0f);
-  const bool entered =
-      ImGui::InputTextWithHint((std::string("##") + label).c_str(), hint, &value,
-                               ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
+  const std::string id = std::string("##") + label;
+  const ImVec2 padding = ImGui::GetStyle().FramePadding;
+  const float room = ImGui::CalcItemWidth() - 2.0f * padding.x;
+  // Until it is edited, its end is shown.
+  const bool idle = ImGui::GetActiveID() != ImGui::GetID(id.c_str()) && ImGui::CalcTextSize(value.c_str()).x > room;
+  if (idle) ImGui::PushStyleColor(ImGuiCol_Text, 0U);
+  const bool entered = ImGui::InputTextWithHint(
+      id.c_str(), hint, &value, ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll);
+  if (idle) {
+    ImGui::PopStyleColor();
+    const ImVec2 corner = ImGui::GetItemRectMin();
+    ImGui::GetWindowDrawList()->AddText({corner.x + padding.x, corner.y + padding.y}, colour_of(ImGuiCol_Text),
+                                        end_of(value, room).c_str());
+  }
   remember(label, tip);
   return entered;
 }

@@ -89,6 +89,9 @@ class Ui {
   bool hovered_now_ = false;
 };
 
+/// A line, or as much of its end as fits the width: of a path, what tells it from others.
+[[nodiscard]] std::string end_of(const std::string& text, float width);
+
 /// A quiet dark theme. Fonts: a system's DejaVu Sans if there is one, else ImGui's own, each at this scale.
 void apply_theme(float scale);
 void load_fonts(float scale);

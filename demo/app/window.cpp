@@ -27,6 +27,7 @@ Input& input_of(GLFWwindow* window) { return static_cast<Window*>(glfwGetWindowU
 Event make(Event::Type type) {
   Event event;
   event.type = type;
+  event.time = glfwGetTime();
   return event;
 }
 
@@ -46,6 +47,9 @@ Window::Window(int width, int height) {
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_DEPTH_BITS, 0);
   glfwWindowHint(GLFW_STENCIL_BITS, 0);
+  // As cumulet-demo.desktop has it, so that a desktop shows that file's name and icon.
+  glfwWindowHintString(GLFW_X11_CLASS_NAME, "cumulet-demo");
+  glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "cumulet-demo");
   window_.reset(glfwCreateWindow(width, height, "Cumulet", nullptr, nullptr));
   if (window_ == nullptr) throw std::runtime_error("no window with OpenGL 4.5: " + glfw_error());
   const auto [across, down] = pixels_per_unit();
@@ -214,6 +218,16 @@ void Window::draw_ui() {
 }
 
 void Window::swap() { glfwSwapBuffers(window_.get()); }
+
+Window::Context Window::make_shared_context() const {
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
+  Context context(glfwCreateWindow(1, 1, "Cumulet", nullptr, window_.get()));
+  glfwWindowHint(GLFW_VISIBLE, GLFW_TRUE);
+  if (context == nullptr) throw std::runtime_error("no OpenGL context for the pictures: " + glfw_error());
+  return context;
+}
+
+void Window::make_current(GLFWwindow* context) { glfwMakeContextCurrent(context); }
 
 void* Window::get_proc(void*, const char* name) { return reinterpret_cast<void*>(glfwGetProcAddress(name)); }
 

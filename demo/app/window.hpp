@@ -14,7 +14,13 @@ namespace cumulet::demo {
 /// The one window: GLFW, an OpenGL 4.5 context current on this thread, and Dear ImGui in it. Everything is in
 /// framebuffer pixels.
 class Window {
+  struct DestroyWindow {
+    void operator()(GLFWwindow* window) const;
+  };
+
  public:
+  using Context = std::unique_ptr<GLFWwindow, DestroyWindow>;
+
   /// width and height in framebuffer pixels. Throws std::runtime_error, one line, without a display or OpenGL 4.5.
   Window(int width, int height);
   Window(const Window&) = delete;
@@ -42,6 +48,11 @@ class Window {
   static void draw_ui();
   void swap();
 
+  /// Another context that shares objects with the window's, for another thread. Made, and let go, in this one, while
+  /// the window lives. Throws std::runtime_error, one line.
+  [[nodiscard]] Context make_shared_context() const;
+  /// Makes it current in the calling thread; null: none.
+  static void make_current(GLFWwindow* context);
   /// Of a GL function, for cumulet.h and glad.
   static void* get_proc(void* user, const char* name);
 
@@ -52,14 +63,11 @@ class Window {
     Terminate& operator=(const Terminate&) = delete;
     ~Terminate();
   };
-  struct DestroyWindow {
-    void operator()(GLFWwindow* window) const;
-  };
   void listen();
   [[nodiscard]] std::pair<double, double> pixels_per_unit() const;
 
   Terminate glfw_;
-  std::unique_ptr<GLFWwindow, DestroyWindow> window_;
+  Context window_;
   Input input_;
   std::string title_;
 };

@@ -18,6 +18,8 @@
 #include <string>
 
 #include "aovs.hpp"
+#include "info.hpp"
+#include "memory.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 
@@ -134,6 +136,24 @@ void wait(const Viewer& viewer, Progress& progress) {
   }
 }
 
+void tell(Progress& progress, const std::string& line) {
+  progress.clear();
+  std::fprintf(stderr, "%s\n", one_line(line).c_str());
+}
+
+/// The scale that suits the volume, whatever it is seen from.
+void choose_density_scale(const Viewer& viewer, cumulet_medium_desc medium, Progress& progress) {
+  cumulet_volume* volume = nullptr;
+  check(viewer, cumulet_get_volume(viewer.get(), &volume));
+  const cumulet_status status = cumulet_volume_suggest_density_scale(volume, &medium.density_scale);
+  cumulet_volume_release(volume);
+  if (status != CUMULET_OK) return;  // nothing to see at any scale
+  check(viewer, cumulet_set_medium(viewer.get(), &medium));
+  std::array<char, 32> digits{};
+  std::snprintf(digits.data(), digits.size(), "%g", medium.density_scale);
+  tell(progress, std::string("density scale ") + digits.data() + ", for a mean optical depth of 8 (--density-scale)");
+}
+
 cumulet_stats stats_of(const Viewer& viewer) {
   cumulet_stats stats{};
   stats.struct_size = sizeof stats;
@@ -150,8 +170,32 @@ cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& opt
   frame.budget_ms = budget_ms;
   cumulet_frame_result result{};
   result.struct_size = sizeof result;
-  check(viewer, cumulet_render(viewer.get(), &frame, &result));
+  const cumulet_status status = cumulet_render(viewer.get(), &frame, &result);
+  if (status == CUMULET_ERROR_OUT_OF_MEMORY) {
+    throw std::runtime_error(cumulet::demo::needs_text(options) + ": " + cumulet_last_error(viewer.get()));
+  }
+  check(viewer, status);
   return result;
+}
+
+/// The library shows a scene at rest whose animation is not there: whoever named it meant another.
+void check_animation(const Viewer& viewer, const RenderOptions& options) {
+  cumulet_surfaces* surfaces = nullptr;
+  check(viewer, cumulet_get_surfaces(viewer.get(), &surfaces));
+  cumulet_surfaces_info info{};
+  info.struct_size = sizeof info;
+  const cumulet_status status = cumulet_surfaces_get_info(surfaces, &info);
+  cumulet_surfaces_release(surfaces);
+  check(viewer, status);
+  const std::uint32_t wanted = options.scene.surface.animation;
+  if (wanted == 0 || wanted < info.animations) return;  // 0: the default, of a file without any
+  throw std::runtime_error(options.scene.surfaces + ": there is no animation " + std::to_string(wanted) +
+                           ": the file has " + std::to_string(info.animations));
+}
+
+/// Better at once than after the samples.
+void check_memory(const Viewer& viewer, const RenderOptions& options) {
+  cumulet::demo::check_memory(options, stats_of(viewer).gl_renderer, cumulet::demo::available_memory());
 }
 
 void write_picture(const Viewer& viewer, const RenderOptions& options) {
@@ -218,6 +262,7 @@ void render(const RenderOptions& options) {
   progress.stage("loading " + (options.scene.volume.empty() ? options.scene.surfaces : options.scene.volume));
   Context context = Context::create(backend_of(options.backend));
   const Viewer viewer = create_viewer(context, progress);
+  check_memory(viewer, options);
   const auto& scene = options.scene;
   cumulet_sampling_desc sampling = scene.sampling;
   sampling.preview = CUMULET_PREVIEW_OFF;
@@ -232,9 +277,17 @@ void render(const RenderOptions& options) {
     check(viewer, cumulet_set_surface_settings(viewer.get(), &scene.surface));
     check(viewer, cumulet_load_surfaces(viewer.get(), scene.surfaces.c_str()));
   }
-  const char* grid_name = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();
-  if (!scene.volume.empty()) check(viewer, cumulet_load_volume(viewer.get(), scene.volume.c_str(), grid_name));
+  if (!scene.volume.empty()) {
+    const cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
+    check(viewer, cumulet_load_volume_file(viewer.get(), &file));
+  }
   wait(viewer, progress);
+  if (!scene.volume.empty()) {
+    if (scene.up == cumulet::demo::UpAxis::y && cumulet::demo::is_z_up(scene.volume))
+      tell(progress, scene.volume + ": its metadata says Blender or Mantaflow, whose up axis is Z: try --up z");
+    if (scene.auto_density_scale) choose_density_scale(viewer, scene.medium, progress);
+  }
+  if (!scene.surfaces.empty()) check_animation(viewer, options);
   if (scene.surface_camera >= 0)
     check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));
 
@@ -271,6 +324,11 @@ void render(const RenderOptions& options) {
 int main(int argc, char** argv) {
   return cumulet::demo::run_program("cumulet-render", [&] {
     const auto options = cumulet::demo::parse_render_options({argv + std::min(argc, 1), argv + argc}, std::cout);
-    if (options) render(*options);
+    if (!options) return;
+    if (options->info) {
+      cumulet::demo::write_info(options->scene, options->json, std::cout);
+    } else {
+      render(*options);
+    }
   });
 }

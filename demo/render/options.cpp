@@ -6,17 +6,23 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <names.hpp>
 #include <ostream>
 #include <utility>
+
+#include "option_table.hpp"
 
 namespace cumulet::demo {
 namespace {
 
 constexpr std::uint64_t max_u32 = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint64_t max_u64 = std::numeric_limits<std::uint64_t>::max();
+
+constexpr std::size_t help_columns = 100;
 
 std::string in_quotes(std::string_view text) { return "'" + std::string(text) + "'"; }
 
@@ -58,7 +64,7 @@ void parse_light(std::string_view text, float (&rgb)[3]) {
   for (std::size_t i = 0; i < 3; ++i) rgb[i] = static_cast<float>(values[i]);
 }
 
-/// A flag with a value. Repeating it is an error, as is a bad value, which names the flag.
+/// A flag with a value; repeated, the last wins. A bad value is an error that names the flag.
 CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, const std::string& type,
                  std::function<void(const std::string&)> parse, const std::string& help) {
   const auto checked = [flag, parse = std::move(parse)](const std::string& text) {
@@ -69,7 +75,7 @@ CLI::Option* add(CLI::App& app, const char* group, const std::string& flag, cons
       throw CLI::ValidationError(flag.substr(flag.rfind("--")), error.what());
     }
   };
-  return app.add_option_function<std::string>(flag, checked, help)->type_name(type)->group(group);
+  return app.add_option_function<std::string>(flag, checked, help)->type_name(type)->group(group)->take_last();
 }
 
 template <class Names, class Target>
@@ -140,16 +146,61 @@ std::vector<std::string> glue_negative_fractions(std::vector<std::string> argume
   return glued;
 }
 
-OutputFormat format_of(const std::string& path) {
+/// In lower case, without the dot.
+std::string ending_of(const std::string& path) {
   const auto dot = path.find_last_of("./");
   std::string ending = dot == std::string::npos || path[dot] != '.' ? "" : path.substr(dot + 1);
   for (char& c : ending)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return ending;
+}
+
+OutputFormat format_of(const std::string& path) {
+  const std::string ending = ending_of(path);
   if (ending == "png") return OutputFormat::png;
   if (ending == "exr") return OutputFormat::exr;
   if (ending == "pfm") return OutputFormat::pfm;
   throw UsageError(in_quotes(path) + " ends in none of .png, .exr, .pfm");
 }
+
+/// Help that fits a terminal of 100 columns: descriptions are broken between words.
+class HelpFormatter final : public CLI::Formatter {
+ public:
+  HelpFormatter() { column_width(44); }
+
+  std::string make_option(const CLI::Option* option, bool positional) const override {
+    std::string text = "  " + make_option_name(option, positional) + make_option_opts(option);
+    const std::size_t indent = get_column_width();
+    // A flag that reaches into the descriptions has a line of its own.
+    const std::size_t used = text.size();
+    if (used >= indent) text += '\n';
+    text.append(used < indent ? indent - used : indent, ' ');
+    return text + wrapped(make_option_desc(option), indent) + "\n";
+  }
+
+  std::string make_description(const CLI::App* app) const override {
+    return wrapped(CLI::Formatter::make_description(app), 0) + "\n";
+  }
+
+ private:
+  static std::string wrapped(std::string_view description, std::size_t indent) {
+    std::string text;
+    std::size_t column = indent;
+    for (const std::string_view line : split(description, '\n')) {
+      for (const std::string_view word : words(line)) {
+        if (column > indent && column + 1 + word.size() > help_columns) {
+          text += '\n';
+          text.append(indent, ' ');
+          column = indent;
+        }
+        if (column > indent) text += ' ';
+        column += word.size() + (column > indent ? 1 : 0);
+        text += word;
+      }
+    }
+    return text;
+  }
+};
 
 std::string version_text(const std::string& program) {
   return program + " " + std::to_string(CUMULET_VERSION_MAJOR) + "." + std::to_string(CUMULET_VERSION_MINOR) + "." +
@@ -202,7 +253,8 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       "OpenVDB or NanoVDB file (.vdb, .nvdb)");
   add(
       app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
-      "Grid to show (default: density, else the only scalar one)");
+      "Grid to show (default: density, else the likeliest)");
+  add_choice(app, group, "--up", up_names, scene.up, "The volume's up axis (default: y; Blender's and Mantaflow's: z)");
   add(
       app, group, "--gltf", "FILE",
       [&](const std::string& text) {
@@ -235,6 +287,10 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         scene.surface.indirect_roughness = static_cast<float>(roughness);
       },
       "Least roughness that scattered paths find: softens what mirrors and lakes throw (default: 0, no bias)");
+  app.add_flag_function(
+         "--double-sided", [&](std::int64_t count) { scene.surface.double_sided = count > 0 ? 1 : 0; },
+         "Show both sides of all surfaces, for files that are wound inside out")
+      ->group(group);
   add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
       [&](const std::string& text) { scene.camera = parse_camera(text); },
@@ -242,9 +298,12 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
 
   group = "Medium";
   add(
-      app, group, "--density-scale", "K",
-      [&](const std::string& text) { scene.medium.density_scale = parse_positive(text); },
-      "Extinction is K x grid value, 1 / world unit (default: 1)");
+      app, group, "--density-scale", "K|auto",
+      [&](const std::string& text) {
+        scene.auto_density_scale = text == "auto";
+        scene.medium.density_scale = scene.auto_density_scale ? 0.0 : parse_positive(text);
+      },
+      "Extinction is K x grid value, 1 / world unit (default: auto, for a mean optical depth of 8)");
   add(
       app, group, "--albedo", "R,G,B",
       [&](const std::string& text) {
@@ -334,7 +393,58 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
              "From radiance to the screen and a .png (default: neutral, the Khronos PBR one)");
 }
 
+namespace {
+
+enum class FileKind { volume, surfaces, scene };
+
+/// By its name's ending, else by its content.
+FileKind kind_of(const std::string& path) {
+  const std::string ending = ending_of(path);
+  if (ending == "vdb" || ending == "nvdb") return FileKind::volume;
+  if (ending == "gltf" || ending == "glb") return FileKind::surfaces;
+  if (ending == "json") return FileKind::scene;
+  std::string head(4096, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  if (head.rfind("NanoVDB", 0) == 0 || head.rfind(" BDV", 0) == 0) return FileKind::volume;
+  if (head.rfind("glTF", 0) == 0) return FileKind::surfaces;
+  if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
+  if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
+  throw UsageError(in_quotes(path) + " is no volume (.vdb, .nvdb), no glTF (.gltf, .glb) and no scene (.json)");
+}
+
+/// Files without a flag: one of a kind, a scene first.
+void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
+  const auto take = [&scene, &lit](const std::vector<std::string>& files) {
+    try {
+      std::array<std::string, 3> of_kind;
+      for (const std::string& file : files) {
+        std::string& place = of_kind[static_cast<std::size_t>(kind_of(file))];
+        if (!place.empty()) throw UsageError(in_quotes(file) + " is given as well as " + in_quotes(place));
+        place = file;
+      }
+      const auto& [volume, surfaces, scene_file] = of_kind;
+      lit = !scene_file.empty();
+      if (lit) scene = load_scene(scene_file);
+      if (!volume.empty()) scene.volume = volume;
+      if (!surfaces.empty()) scene.surfaces = surfaces;
+    } catch (const UsageError& error) {
+      throw CLI::ValidationError("FILE", error.what());
+    }
+  };
+  app.add_option_function<std::vector<std::string>>(
+         "files", take, "A volume (.vdb, .nvdb), surfaces (.gltf, .glb), a scene (.json): one of each")
+      ->type_name("FILE");
+}
+
+}  // namespace
+
 void finish_scene_options(const CLI::App& app, SceneOptions& scene) {
+  for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-camera"}) {
+    if (app.count(flag) > 0 && scene.surfaces.empty())
+      throw UsageError(std::string(flag) + " needs a model: --gltf, or a --scene that names one");
+  }
   if (app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0) scene.set_daylight();
 }
 
@@ -342,7 +452,11 @@ bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ost
   const std::string version = version_text(app.get_name());
   app.set_help_flag("-h,--help", "Show this and exit");
   app.set_version_flag("--version", version, "Show the version and exit");
-  app.get_formatter()->column_width(44);
+  app.formatter(std::make_shared<HelpFormatter>());
+  if (arguments == std::vector<std::string>{"--option-table"}) {
+    out << option_table(app);
+    return false;
+  }
   try {
     std::vector<std::string> reversed = glue_negative_fractions(std::move(arguments));
     std::reverse(reversed.begin(), reversed.end());  // as CLI11 wants them
@@ -365,6 +479,9 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   app.footer(
       "Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.\n"
       "Ctrl-C writes the samples so far and exits 1; a second one stops at once.");
+  // Before the flags, which override what a scene says.
+  bool lit = false;
+  add_files(app, options.scene, lit);
   add_scene_options(app, options.scene);
 
   const char* group = "Output";
@@ -374,8 +491,9 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.format = format_of(text);
         options.output = text;
       },
-      ".png is exposed and tone-mapped; .exr and .pfm hold linear radiance")
-      ->required();
+      ".png is exposed and tone-mapped; .exr and .pfm hold linear radiance");
+  app.add_flag("--info", options.info, "Tell what is in the files, and render nothing")->group(group);
+  app.add_flag("--json", options.json, "The same as JSON")->group(group);
   add(
       app, group, "--aovs", "NAME,...|all",
       [&](const std::string& text) {
@@ -405,9 +523,12 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
              options.backend, "OpenGL without a display (default: auto: EGL, then OSMesa)");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  finish_scene_options(app, options.scene);
+  if (!lit) finish_scene_options(app, options.scene);
   if (options.scene.volume.empty() && options.scene.surfaces.empty())
-    throw UsageError("--volume or --gltf is required, or a --scene that names one");
+    throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
+  if (options.json && !options.info) throw UsageError("--json is for --info");
+  if (options.info) return options;
+  if (options.output.empty()) throw UsageError("--output is required");
   if (!options.aovs.empty() && options.format != OutputFormat::exr)
     throw UsageError("--aovs needs an .exr to write to");
   if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)

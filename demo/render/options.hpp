@@ -22,7 +22,8 @@ void add_scene_options(CLI::App& app, SceneOptions& scene);
 /// What can be said only after the parse: default daylight.
 void finish_scene_options(const CLI::App& app, SceneOptions& scene);
 
-/// Parses, with --help and --version, for which it gives false after their text went to out. Throws UsageError.
+/// Parses, with --help and --version (and --option-table: option_table.hpp), for which it gives false after their text
+/// went to out. Throws UsageError.
 [[nodiscard]] bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out);
 
 enum class OutputFormat { png, exr, pfm };
@@ -31,9 +32,11 @@ enum class BackendChoice { automatic, egl, osmesa };
 struct RenderOptions {
   SceneOptions scene;
   BackendChoice backend = BackendChoice::automatic;
-  std::string output;
+  std::string output;  // not empty, unless info
   OutputFormat format = OutputFormat::png;
   std::string stats;              // empty: none
+  bool info = false;              // tell what is in the files, render nothing
+  bool json = false;              // as JSON
   std::vector<cumulet_aov> aovs;  // layers of an .exr beside the picture
 };
 

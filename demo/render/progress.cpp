@@ -11,11 +11,12 @@ namespace cumulet::demo {
 namespace {
 
 constexpr int bar_width = 24;
+constexpr double least_seconds = 0.3;
 
 /// "12.3 M": three digits, for reading only.
 std::string format_count(double count) {
   const char* unit = "";
-  for (const char* next : {"k", "M", "G"}) {
+  for (const char* next : {"k", "M", "G", "T"}) {
     if (count < 1000.0) break;
     count /= 1000.0;
     unit = next;
@@ -48,19 +49,24 @@ void Progress::stage(const std::string& what) {
 }
 
 void Progress::render(double part, double total) {
-  if (!rendering_) start_ = Clock::now();
+  if (!rendering_) {
+    start_ = Clock::now();
+    start_part_ = part;
+  }
   rendering_ = true;
+  show(rendering_line(part, part - start_part_, std::chrono::duration<double>(Clock::now() - start_).count(), total));
+}
+
+std::string rendering_line(double part, double gained, double seconds, double total) {
   part = std::clamp(part, 0.0, 1.0);
-  const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
   const auto filled = static_cast<std::size_t>(part * bar_width);
   std::string line = "rendering [" + std::string(filled, '#') + std::string(bar_width - filled, '.') + "] ";
   line += std::to_string(static_cast<int>(part * 100.0)) + " %";
-  // The rates mean nothing yet at the very start.
-  if (part > 0.0 && seconds > 0.0) {
-    line += "  " + format_count(part * total / seconds) + "samples/s";
-    line += "  ETA " + format_duration(seconds * (1.0 - part) / part);
+  if (gained > 0.0 && seconds >= least_seconds) {
+    line += "  " + format_count(gained * total / seconds) + "samples/s";
+    line += "  ETA " + format_duration(seconds * (1.0 - part) / gained);
   }
-  show(line);
+  return line;
 }
 
 void Progress::clear() {

@@ -16,7 +16,7 @@ class Progress {
 
   /// A stage whose length is not known.
   void stage(const std::string& what);
-  /// Rendering, with part of all samples done since the first call; total is their number.
+  /// Rendering, with part of all samples done; total is their number. Rates are of what was done since the first call.
   void render(double part, double total);
   /// Wipes the line, so that something else can be printed.
   void clear();
@@ -28,8 +28,13 @@ class Progress {
   bool terminal_;
   bool shown_ = false;
   Clock::time_point start_;
+  double start_part_ = 0.0;
   bool rendering_ = false;
 };
+
+/// What Progress::render shows: `part` of `total` samples are done, `gained` of it in the last `seconds`. The rates are
+/// left out while so little was gained, or in so short a time, that they mean nothing.
+[[nodiscard]] std::string rendering_line(double part, double gained, double seconds, double total);
 
 /// "1:05", "2:01:40", "0:00".
 [[nodiscard]] std::string format_duration(double seconds);

@@ -8,8 +8,13 @@
 #include <fstream>
 #include <functional>
 #include <iostream>
-#include <scene_file.hpp>
+#include <optional>
+#include <options.hpp>
+#include <program.hpp>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "scene.hpp"
 #include "surfaces.hpp"
@@ -77,58 +82,65 @@ void write_scene(const path& folder) {
   std::printf("%s\n", file.string().c_str());
 }
 
-int run(int argc, char** argv) {
+struct Wanted {
   std::string folder;
   std::string only;
+  double voxels = 0.0;  // 0: the setting's
   bool full = false;
-  double voxels = 0.0;
   std::uint32_t seed = 1;
-  CLI::App app{
+};
+
+/// Nothing after --help or --version.
+std::optional<Wanted> parse(std::vector<std::string> arguments) {
+  Wanted wanted;
+  CLI::App app(
       "Writes Cumulet's sample scene: cumulus.vdb (density), mountains.glb (the ground, a tower) and sample.json, "
-      "which shows both; and fire.vdb (density, temperature)"};
-  app.add_option("OUT_DIR", folder, "folder to write to, made if it is missing")->required();
-  app.add_flag("--full", full, "the detailed setting: over 20 million active voxels in the cumulus");
-  app.add_option("--voxels", voxels, "about how many active voxels, in place of the setting's")
-      ->check(CLI::Range(1000.0, 1e9));
-  app.add_option("--seed", seed, "another cloud, other mountains, another fire");
-  app.add_option("--only", only, "write one of them")->check(CLI::IsMember({"cumulus", "mountains", "fire"}));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    std::cerr << "cumulet-scene: " << error.what() << "\n";
-    return 2;
+      "which shows both; and fire.vdb (density, temperature).",
+      "cumulet-scene");
+  app.footer("Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.");
+  app.add_option("OUT_DIR", wanted.folder, "Folder to write to, made if it is missing")->required()->type_name("DIR");
+  app.add_flag("--full", wanted.full, "The detailed setting: over 20 million active voxels in the cumulus");
+  app.add_option("--voxels", wanted.voxels, "About how many active voxels, in place of the setting's")
+      ->check(CLI::Range(1000.0, 1e9).description(""))
+      ->type_name("N");
+  app.add_option("--seed", wanted.seed, "Another cloud, other mountains, another fire (default: 1)")->type_name("S");
+  app.add_option("--only", wanted.only, "Write one of them")
+      ->check(CLI::IsMember({"cumulus", "mountains", "fire"}).description(""))
+      ->type_name("cumulus|mountains|fire");
+  if (!cumulet::demo::parse_arguments(app, std::move(arguments), std::cout)) return std::nullopt;
+  return wanted;
+}
+
+void write_all(const Wanted& options) {
+  const path folder = options.folder;
+  openvdb::initialize();
+  std::filesystem::create_directories(folder);
+  const auto wanted = [&](const char* part) { return options.only.empty() || options.only == part; };
+  const auto voxels = [&](double full, double usual) {
+    if (options.voxels > 0.0) return options.voxels;
+    return options.full ? full : usual;
+  };
+  if (wanted("cumulus"))
+    write_grids(folder / "cumulus.vdb", {cumulet::scene::make_cumulus({voxels(22e6, 1.2e6), options.seed})});
+  if (wanted("mountains")) write_surfaces(folder / "mountains.glb", options.seed);
+  if (options.only.empty()) write_scene(folder);
+  if (wanted("fire")) {
+    openvdb::GridPtrVec grids;
+    for (const auto& grid : cumulet::scene::make_fire({voxels(4e6, 0.4e6), options.seed})) grids.push_back(grid);
+    write_grids(folder / "fire.vdb", grids);
   }
-  try {
-    openvdb::initialize();
-    std::filesystem::create_directories(folder);
-    const auto wanted = [&](const char* part) { return only.empty() || only == part; };
-    if (wanted("cumulus")) {
-      const double count = voxels > 0.0 ? voxels : (full ? 22e6 : 1.2e6);
-      write_grids(path(folder) / "cumulus.vdb", {cumulet::scene::make_cumulus({count, seed})});
-    }
-    if (wanted("mountains")) write_surfaces(path(folder) / "mountains.glb", seed);
-    if (only.empty()) write_scene(folder);
-    if (wanted("fire")) {
-      const double count = voxels > 0.0 ? voxels : (full ? 4e6 : 0.4e6);
-      openvdb::GridPtrVec grids;
-      for (const auto& grid : cumulet::scene::make_fire({count, seed})) grids.push_back(grid);
-      write_grids(path(folder) / "fire.vdb", grids);
-    }
-  } catch (const std::exception& error) {
-    std::cerr << "cumulet-scene: " << folder << ": " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (...) {
-    return 1;
-  }
+  return cumulet::demo::run_program("cumulet-scene", [&] {
+    const auto wanted = parse({argv + std::min(argc, 1), argv + argc});
+    if (!wanted) return;
+    try {
+      write_all(*wanted);
+    } catch (const std::exception& error) {
+      throw std::runtime_error(wanted->folder + ": " + error.what());
+    }
+  });
 }

@@ -27,7 +27,7 @@ void add_box(Mesh& mesh, const vec3& centre, const vec3& x, const vec3& y, const
     return centre + static_cast<float>(i) * x + static_cast<float>(j) * y + static_cast<float>(k) * z;
   };
   for (const int s : {-1, 1}) {
-    mesh.quad(corner(s, -1, -s), corner(s, -1, s), corner(s, 1, s), corner(s, 1, -s));
+    mesh.quad(corner(s, -1, s), corner(s, -1, -s), corner(s, 1, -s), corner(s, 1, s));
     mesh.quad(corner(-s, s, -1), corner(-s, s, 1), corner(s, s, 1), corner(s, s, -1));
     mesh.quad(corner(-1, -s, s), corner(1, -s, s), corner(1, s, s), corner(-1, s, s));
   }

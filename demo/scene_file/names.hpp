@@ -3,6 +3,7 @@
 #include <cumulet/cumulet.h>
 
 #include <array>
+#include <scene_file.hpp>
 #include <string>
 
 namespace cumulet::demo {
@@ -16,6 +17,7 @@ struct Name {
 template <class Value>
 Name(const char*, Value) -> Name<Value>;
 
+inline constexpr std::array up_names = {Name{"y", UpAxis::y}, Name{"z", UpAxis::z}};
 inline constexpr std::array march_names = {Name{"tet", CUMULET_MARCH_TET}, Name{"dense", CUMULET_MARCH_DENSE},
                                            Name{"brick", CUMULET_MARCH_BRICK}};
 inline constexpr std::array cells_names = {Name{"constant", CUMULET_CELLS_CONSTANT},

@@ -73,6 +73,12 @@ class Section {
     if (out.find('\0') != std::string::npos) wrong(key, "holds a zero byte");
   }
 
+  /// Whether the key's value is this text.
+  bool is_text(const char* key, const char* text) {
+    const Json* value = find(key);
+    return value != nullptr && value->is_string() && value->get<std::string>() == text;
+  }
+
   void flag(const char* key, std::int32_t& out) {
     const Json* value = find(key);
     if (value == nullptr) return;
@@ -157,6 +163,26 @@ class Section {
   std::vector<std::string> known_;
 };
 
+/// Keys that an object has twice, of which a parser keeps one without a word.
+class Repeats {
+ public:
+  void see(Json::parse_event_t event, const Json& parsed) {
+    if (event == Json::parse_event_t::object_start) objects_.emplace_back();
+    if (event == Json::parse_event_t::object_end) objects_.pop_back();
+    if (event != Json::parse_event_t::key) return;
+    auto& keys = objects_.back();
+    keys.push_back(parsed.get<std::string>());
+    if (std::find(keys.begin(), keys.end() - 1, keys.back()) == keys.end() - 1 || !first_.empty()) return;
+    for (const auto& object : objects_) first_ += (first_.empty() ? "" : ".") + object.back();
+  }
+  /// Where the first one is, such as "picture.width"; "": there is none.
+  [[nodiscard]] const std::string& first() const { return first_; }
+
+ private:
+  std::vector<std::vector<std::string>> objects_;  // under way, each with its keys so far
+  std::string first_;
+};
+
 constexpr Range above_zero = {0.0, std::numeric_limits<double>::max(), true};
 constexpr Range light_range = {0.0, max_light};
 
@@ -171,8 +197,9 @@ void read_camera(Section& camera, cumulet_camera_desc& desc) {
   camera.number("orthographic_height", desc.orthographic_height, {0.0});
 }
 
-void read_medium(Section& medium, cumulet_medium_desc& desc) {
-  medium.number("density_scale", desc.density_scale, above_zero);
+void read_medium(Section& medium, cumulet_medium_desc& desc, bool& automatic) {
+  automatic = medium.is_text("density_scale", "auto");
+  if (!automatic) medium.number("density_scale", desc.density_scale, above_zero);
   double albedo[3];
   if (medium.three("albedo", albedo, {0.0, 1.0}))
     for (std::size_t i = 0; i < 3; ++i) desc.coalbedo[i] = static_cast<float>(1.0 - albedo[i]);
@@ -205,6 +232,8 @@ void read_grid(Section& grid, cumulet_grid_desc& desc) {
 }
 
 void read_scene(Section& root, SceneOptions& scene) {
+  // What a file of this version meant before there was another way.
+  scene.auto_density_scale = false;
   int version = 0;
   root.integer("cumulet_scene", version, 0.0, max_u32);
   if (version != format_version)
@@ -214,6 +243,7 @@ void read_scene(Section& root, SceneOptions& scene) {
   root.section("volume", [&](Section& volume) {
     volume.text("file", scene.volume);
     volume.text("grid", scene.grid_name);
+    volume.choice("up", up_names, scene.up);
   });
   root.section("surfaces", [&](Section& surfaces) {
     surfaces.text("file", scene.surfaces);
@@ -222,9 +252,10 @@ void read_scene(Section& root, SceneOptions& scene) {
     surfaces.integer("camera", scene.surface_camera, -1.0, 1e6);
     surfaces.choice("light", surface_light_names, scene.surface.light);
     surfaces.number("indirect_roughness", scene.surface.indirect_roughness, {0.0, 1.0});
+    surfaces.flag("double_sided", scene.surface.double_sided);
   });
   root.section("camera", [&](Section& camera) { read_camera(camera, scene.camera); });
-  root.section("medium", [&](Section& medium) { read_medium(medium, scene.medium); });
+  root.section("medium", [&](Section& medium) { read_medium(medium, scene.medium, scene.auto_density_scale); });
   if (root.has("light"))
     root.section("light", [&](Section& light) { read_light(light, scene.light); });
   else
@@ -283,6 +314,7 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   json["cumulet_scene"] = format_version;
   json["volume"]["file"] = volume;
   if (!scene.grid_name.empty()) json["volume"]["grid"] = scene.grid_name;
+  if (scene.up != UpAxis::y) json["volume"]["up"] = name_of(up_names, scene.up);
 
   if (!surfaces.empty()) {
     Json& shown = json["surfaces"];
@@ -292,6 +324,7 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
     if (scene.surface_camera >= 0) shown["camera"] = scene.surface_camera;
     shown["light"] = name_of(surface_light_names, scene.surface.light);
     shown["indirect_roughness"] = shortest(scene.surface.indirect_roughness);
+    shown["double_sided"] = scene.surface.double_sided != 0;
   }
 
   Json camera = Json::object();
@@ -306,7 +339,11 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   json["camera"] = camera;
 
   Json medium = Json::object();
-  if (scene.medium.density_scale > 0.0) medium["density_scale"] = scene.medium.density_scale;
+  if (scene.medium.density_scale > 0.0) {
+    medium["density_scale"] = scene.medium.density_scale;
+  } else if (scene.auto_density_scale) {
+    medium["density_scale"] = "auto";
+  }
   const auto& coalbedo = scene.medium.coalbedo;
   medium["albedo"] = {albedo_of(coalbedo[0]), albedo_of(coalbedo[1]), albedo_of(coalbedo[2])};
   medium["anisotropy"] = shortest(scene.medium.anisotropy);
@@ -373,6 +410,18 @@ SceneOptions::SceneOptions() {
   display.struct_size = sizeof display;
 }
 
+cumulet_volume_file_desc volume_file(const SceneOptions& scene) {
+  cumulet_volume_file_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.path = scene.volume.c_str();
+  desc.grid_name = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();
+  if (scene.up == UpAxis::z) {
+    constexpr std::array upright = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0};
+    std::copy(upright.begin(), upright.end(), desc.to_world);
+  }
+  return desc;
+}
+
 void SceneOptions::set_daylight() {
   light.sun_azimuth_degrees = 65.0f;
   light.sun_elevation_degrees = 38.0f;
@@ -384,8 +433,12 @@ void SceneOptions::set_daylight() {
 
 SceneOptions parse_scene(const std::string& text, const std::string& path) {
   Json json;
+  Repeats repeats;
   try {
-    json = Json::parse(text);
+    json = Json::parse(text, [&](int, Json::parse_event_t event, const Json& parsed) {
+      repeats.see(event, parsed);
+      return true;
+    });
   } catch (const Json::exception& error) {
     // "[json.exception.parse_error.101] parse error at line 1, column 2: ...; last read: ..."
     std::string cause = error.what();
@@ -395,6 +448,7 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
     if (cause.size() > 200) cause = cause.substr(0, 200) + "...";
     fail(path, "not JSON: " + cause);
   }
+  if (!repeats.first().empty()) fail(path, repeats.first() + ": is given twice");
   SceneOptions scene;
   Section root(path, "", json);
   read_scene(root, scene);

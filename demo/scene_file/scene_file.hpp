@@ -7,17 +7,22 @@
 
 namespace cumulet::demo {
 
+/// Which way is up in a volume's file. Blender's and Mantaflow's is Z; pictures' is Y.
+enum class UpAxis { y, z };
+
 /// What every demo program can show, as the library's own descriptors with struct_size set. Zero is the library's
 /// default, as there.
 struct SceneOptions {
   std::string volume;
   std::string grid_name;
+  UpAxis up = UpAxis::y;             // of the volume's file
   std::string surfaces;              // a glTF file; "": none
   std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
   cumulet_medium_desc medium{};
+  bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
   cumulet_light_desc light{};
   cumulet_camera_desc camera{};
   cumulet_surface_settings_desc surface{};
@@ -28,6 +33,9 @@ struct SceneOptions {
   /// A pleasant day: what is lit when nothing says how.
   void set_daylight();
 };
+
+/// The scene's volume as the library takes it; the scene must outlive it.
+[[nodiscard]] cumulet_volume_file_desc volume_file(const SceneOptions& scene);
 
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
 /// volume is taken from its folder. What the text does not say is as in SceneOptions(), in daylight. Throws

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "base/callback_scope.hpp"
+
 namespace cumulet {
 
 enum class LogLevel { debug = 0, info = 1, warning = 2, error = 3 };
@@ -16,7 +18,9 @@ class Log {
   Log(Function function, void* user) : function_(function), user_(user) {}
 
   void write(LogLevel level, const std::string& message) const {
-    if (function_ != nullptr) function_(user_, level, message.c_str());
+    if (function_ == nullptr) return;
+    const CallbackScope inside;
+    function_(user_, level, message.c_str());
   }
   void info(const std::string& message) const { write(LogLevel::info, message); }
   void warning(const std::string& message) const { write(LogLevel::warning, message); }

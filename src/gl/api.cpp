@@ -1,5 +1,6 @@
 #include "gl/api.hpp"
 
+#include <algorithm>
 #include <cstring>
 
 #include "base/error.hpp"
@@ -40,6 +41,9 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
   if (gl->DispatchCompute == nullptr || gl->CreateBuffers == nullptr || gl->TextureBuffer == nullptr) {
     throw Error(ErrorCode::unsupported, "the context says OpenGL 4.5 but get_proc lacks functions of it");
   }
+  GLint draw_buffers = 0;
+  gl->GetIntegerv(GL_MAX_DRAW_BUFFERS, &draw_buffers);
+  gl->draw_buffers = static_cast<GLuint>(std::clamp(draw_buffers, 1, 16));
   return gl;
 }
 

@@ -1,6 +1,7 @@
 #include "gl/objects.hpp"
 
 #include <array>
+#include <cstring>
 
 #include "base/error.hpp"
 #include "gl/shader_sources.hpp"
@@ -32,12 +33,15 @@ Object make_program(const FunctionsPtr& gl, std::span<const Stage> stages, std::
   Object program(gl, Object::Kind::program, gl->CreateProgram());
   std::vector<Object> shaders;
   for (const Stage& stage : stages) {
-    const std::string_view source = shader_source(stage.name);
-    if (source.empty()) throw Error(ErrorCode::internal, "no shader named " + stage.name);
-    const std::size_t end = source.find('\n') + 1;  // #version stays first
-    std::string text(source.substr(0, end));
-    for (const std::string& define : defines) text += "#define " + define + "\n";
-    text += source.substr(end);
+    const Shader* source = find_shader(stage.name);
+    if (source == nullptr) throw Error(ErrorCode::internal, "no shader named " + stage.name);
+    // The last stage's variants are the program's.
+    if (&stage == &stages.back() && !source->has_variant(defines)) {
+      std::string all;
+      for (const std::string& define : defines) all += (all.empty() ? "" : ", ") + define;
+      throw Error(ErrorCode::internal, stage.name + " names no variant with [" + all + "]");
+    }
+    const std::string text = source->with(defines);
     const Object& shader = shaders.emplace_back(gl, Object::Kind::shader, gl->CreateShader(stage.type));
     const char* pointer = text.c_str();
     gl->ShaderSource(shader.name(), 1, &pointer, nullptr);
@@ -95,6 +99,54 @@ Object::~Object() {
       gl_->DeleteVertexArrays(1, &name_);
       break;
   }
+}
+
+Fence::Fence(FunctionsPtr gl) : gl_(std::move(gl)), sync_(gl_->FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)) {
+  gl_->Flush();
+}
+
+Fence::~Fence() {
+  if (sync_ != nullptr && !gl_->abandoned.load(std::memory_order_relaxed)) gl_->DeleteSync(sync_);
+}
+
+// Without GL_SYNC_FLUSH_COMMANDS_BIT, which makes Mesa's zink wait: it was flushed.
+bool Fence::passed() const { return sync_ == nullptr || gl_->ClientWaitSync(sync_, 0, 0) != GL_TIMEOUT_EXPIRED; }
+
+void Fence::wait() const {
+  constexpr GLuint64 long_time = 1'000'000'000;
+  while (sync_ != nullptr && gl_->ClientWaitSync(sync_, GL_SYNC_FLUSH_COMMANDS_BIT, long_time) == GL_TIMEOUT_EXPIRED) {
+  }
+}
+
+void Fence::order() const {
+  if (sync_ != nullptr) gl_->WaitSync(sync_, 0, GL_TIMEOUT_IGNORED);
+}
+
+ReadBack::ReadBack(const FunctionsPtr& gl, std::size_t bytes, const char* what) {
+  constexpr GLbitfield access = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+  const std::vector<std::byte> zeros(bytes);
+  buffer_ = make_buffer(gl, bytes, zeros.data(), access, what);
+  data_ =
+      static_cast<const std::byte*>(gl->MapNamedBufferRange(buffer_.name(), 0, static_cast<GLsizeiptr>(bytes), access));
+  check(*gl, what);
+  if (data_ == nullptr) throw Error(ErrorCode::gl, std::string("GL maps no buffer: ") + what);
+}
+
+void find_out_dispatches(const FunctionsPtr& gl) {
+  const ReadBack seen(gl, 4, "creating a buffer to look at");
+  const Object program = make_compute_program(gl, "sign.comp", {});
+  gl->UseProgram(program.name());
+  gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, seen.name());
+  gl->DispatchCompute(1, 1, 1);
+  // Nothing was flushed: what is written now was written in the call.
+  std::uint32_t sign = 0;
+  std::memcpy(&sign, seen.data(), sizeof(sign));
+  gl->dispatches_in_call = sign != 0;
+  check(*gl, "the first dispatch");
+}
+
+void memory_barrier(const Functions& gl, GLbitfield barriers) {
+  if (!gl.dispatches_in_call.load(std::memory_order_relaxed)) gl.MemoryBarrier(barriers);
 }
 
 Object make_buffer(const FunctionsPtr& gl, std::size_t bytes, const void* data, GLbitfield flags, const char* what) {

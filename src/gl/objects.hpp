@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <span>
 #include <string>
@@ -9,6 +10,8 @@
 #include "gl/api.hpp"
 
 namespace cumulet::gl {
+
+using FunctionsPtr = std::shared_ptr<const Functions>;
 
 /// A GL name with its deleter; movable, deleted with the context current. Framebuffers and vertex arrays belong to the
 /// one context they were made in, the other kinds to its share group.
@@ -41,7 +44,52 @@ class Object {
   GLuint name_ = 0;
 };
 
-using FunctionsPtr = std::shared_ptr<const Functions>;
+/// A point in the stream of commands; deleted with the context current.
+class Fence {
+ public:
+  Fence() = default;
+  /// After all commands so far, which are sent off.
+  explicit Fence(FunctionsPtr gl);
+  Fence(Fence&& other) noexcept : gl_(std::move(other.gl_)), sync_(std::exchange(other.sync_, nullptr)) {}
+  Fence& operator=(Fence&& other) noexcept {
+    std::swap(gl_, other.gl_);
+    std::swap(sync_, other.sync_);
+    return *this;
+  }
+  Fence(const Fence&) = delete;
+  Fence& operator=(const Fence&) = delete;
+  ~Fence();
+  /// Whether the commands before it are done; true where there is none. Never waits.
+  [[nodiscard]] bool passed() const;
+  /// Until they are.
+  void wait() const;
+  /// What the context does from now on comes after, though another context of the share group made it. Never waits.
+  void order() const;
+
+ private:
+  FunctionsPtr gl_;
+  GLsync sync_ = nullptr;
+};
+
+/// A buffer that the driver writes and we read, without asking for it, once a fence after the writing has passed.
+class ReadBack {
+ public:
+  ReadBack() = default;
+  ReadBack(const FunctionsPtr& gl, std::size_t bytes, const char* what);
+  [[nodiscard]] GLuint name() const { return buffer_.name(); }
+  [[nodiscard]] const std::byte* data() const { return data_; }
+  explicit operator bool() const { return data_ != nullptr; }
+
+ private:
+  Object buffer_;
+  const std::byte* data_ = nullptr;
+};
+
+/// Finds out Functions::dispatches_in_call, by a small dispatch. Needs a StateGuard around. Throws on a GL error.
+void find_out_dispatches(const FunctionsPtr& gl);
+/// glMemoryBarrier, where it is needed: a driver whose dispatches are over when their call returns orders all that
+/// follows, but its barrier (Mesa's llvmpipe) waits for whatever the host has queued.
+void memory_barrier(const Functions& gl, GLbitfield barriers);
 
 /// An immutable buffer; data may be null. flags as for glNamedBufferStorage. Throws on a GL error.
 Object make_buffer(const FunctionsPtr& gl, std::size_t bytes, const void* data, GLbitfield flags, const char* what);
@@ -53,9 +101,11 @@ Object make_texture_2d_array(const FunctionsPtr& gl, GLenum format, int width, i
 Object make_texture_2d_multisample(const FunctionsPtr& gl, GLenum format, int samples, int width, int height,
                                    const char* what);
 Object make_texture_3d(const FunctionsPtr& gl, GLenum format, int x, int y, int z, const char* what);
-/// Compiles glsl/NAME with the given "NAME VALUE" macros. Throws Error(gl) with the driver's log.
+/// Compiles glsl/NAME with the given "NAME VALUE" macros. Throws Error(gl) with the driver's log, and Error(internal)
+/// for macros that are none of the variants that the shader's source names (cmake/embed_glsl.py): those are validated,
+/// and their cost on GPUs is known (tests/gpu_cost).
 Object make_compute_program(const FunctionsPtr& gl, const std::string& name, std::span<const std::string> defines);
-/// Likewise of a vertex and a fragment shader.
+/// Likewise of a vertex and a fragment shader; the latter names the variants.
 Object make_graphics_program(const FunctionsPtr& gl, const std::string& vertex, const std::string& fragment,
                              std::span<const std::string> defines);
 Object make_framebuffer(const FunctionsPtr& gl);

@@ -1,109 +1,153 @@
 #pragma once
 
 #include <array>
+#include <utility>
 
 #include "gl/api.hpp"
 
 namespace cumulet::gl {
 
-/// Sets the GL state that cumulet.h lists to values that every pass can start from, and puts the host's back on
-/// destruction: the .cpp's tables are the list. The values are GL's defaults, except that dither is off and only draw
-/// buffer 0 can be written. Of bindings only samplers and pixel buffers are set; all others stay until a pass sets
-/// them.
+/// Gives passes the GL state that cumulet.h lists at values that they can start from, and puts the host's back on
+/// destruction. Lazily: the functions of gl::Functions tell it what they are about to set or need, so that only what a
+/// call uses is asked for, set and put back, once, and nothing can be forgotten.
+///
+/// The values are GL's defaults, except that dither is off and only draw buffer 0 can be written. They are there for
+/// every draw, clear, blit and transfer of pixels, and a texture is read without a sampler object until one is bound.
+/// All other bindings are the host's until a pass sets its own.
 ///
 /// State that the library never sets is not saved: the values (not the enables) of blend colour, sample coverage and
 /// mask, stencil, polygon offset, logic op and restart index, and viewports, scissors and depth ranges but the first:
-/// use the indexed calls. Never glBindTextureUnit(unit, 0): it unbinds targets that are not saved.
+/// use the indexed calls.
 ///
 /// Produces no GL error. What the host has deleted while it was bound, or a program that no longer links, cannot be
 /// bound again in GL: that binding ends as 0, if the library used it.
 class StateGuard {
  public:
-  /// restore false (CUMULET_GL_STATE_HOST_RESETS): sets the known values, saves and restores nothing.
+  /// restore false (CUMULET_GL_STATE_HOST_RESETS): asks for nothing and puts nothing back. Guards that restore may
+  /// nest.
   explicit StateGuard(const Functions& gl, bool restore = true);
   ~StateGuard();
   StateGuard(const StateGuard&) = delete;
   StateGuard& operator=(const StateGuard&) = delete;
 
-  static constexpr int units = 16;
-  static constexpr int ranges = 2;  // of storage and of uniform buffers
-  static constexpr int images = 3;
-  static constexpr int blended_buffers = 2;  // whose blend functions it keeps
+  /// The first values again, for passes that come after one that changed them.
+  void set_known();
+
+  // What the library may use (cumulet.h): GL's minima for compute shaders.
+  static constexpr GLuint units = 16;
+  static constexpr GLuint ranges = 8;  // of storage and of uniform buffers
+  static constexpr GLuint images = 8;
+  static constexpr GLuint blended_buffers = 2;
 
  private:
-  static constexpr std::size_t targets = 5;
+  friend struct Functions;  // it tells what is about to be used
+
+  static constexpr std::size_t targets = 11;
   static constexpr std::size_t most_draw_buffers = 16;  // drivers have 8
   static constexpr std::size_t capabilities = 28;
-  static constexpr std::size_t pixel_parameters = 24;
+  static constexpr std::size_t pixel_parameters = 12;
 
+  /// A value that is asked for when it is first used.
+  template <class T>
+  struct Saved {
+    T value{};
+    bool used = false;
+    /// Whether this is the first use.
+    bool use() { return !std::exchange(used, true); }
+  };
   struct BufferRange {
     GLint buffer = 0;
     GLint64 offset = 0;
     GLint64 size = 0;
-    bool operator==(const BufferRange&) const = default;
   };
   struct ImageUnit {
     GLint name = 0, level = 0, layered = 0, layer = 0, access = 0, format = 0;
-    bool operator==(const ImageUnit&) const = default;
-  };
-  struct DrawBuffer {
-    std::array<GLboolean, 4> mask{};
-    GLboolean blend = GL_FALSE;
   };
   struct Blend {
     std::array<GLint, 4> function{};  // source and destination of colour, then of alpha
     std::array<GLint, 2> equation{};
   };
-  struct TextureUnit {
-    std::array<GLint, targets> textures{};
-    GLint sampler = 0;
+  struct Depth {
+    GLboolean mask = GL_FALSE;
+    GLint function = 0;
+    std::array<GLdouble, 2> range{};
   };
-  [[nodiscard]] BufferRange range(GLenum binding, GLenum start, GLenum size, GLuint index) const;
-  void restore_range(GLenum target, GLuint index, const BufferRange& saved, const BufferRange& now) const;
-  [[nodiscard]] ImageUnit image(GLuint unit) const;
+  struct Cull {
+    GLint mode = 0, front = 0;
+  };
+  struct Pixels {
+    GLint buffer = 0;
+    std::array<GLint, pixel_parameters> parameters{};
+  };
+  struct Raster {
+    std::array<bool, capabilities> enabled{};
+    std::array<std::array<GLboolean, 4>, most_draw_buffers> masks{};
+    bool scissor = false;
+    std::array<GLint, 2> polygon_mode{};  // some drivers tell front and back, core ones have only one
+    GLint clip_origin = 0, clip_depth = 0;
+  };
+
+  // About to be used, each.
+  void program();
+  void pipeline();
+  void vertex_array();
+  void draw_framebuffer();
+  void read_framebuffer();
+  void active_texture();
+  void texture(GLuint unit, std::size_t target);
+  void textures(GLuint unit, GLuint name);
+  void bound_texture(GLenum target);
+  void sampler(GLuint unit);
+  void buffer(GLenum target);
+  void range(GLenum target, GLuint index);
+  void image(GLuint unit);
+  void pixels(bool pack);
+  void raster();
+  void capability(GLenum name, bool on);
+  void blend_enable(GLuint buffer);
+  void blend(GLuint buffer);
+  void depth();
+  void cull();
+  void viewport();
+  void scissor_box();
+
+  [[nodiscard]] const GladGLContext& plain() const { return *gl_; }
   [[nodiscard]] GLint get(GLenum name) const;
   void enable(GLenum capability, bool on) const;
-  [[nodiscard]] GLuint draw_buffer_count() const;
+  void set_pixels(bool pack) const;
+  void set_raster();
+  void set_blend(GLuint buffer) const;
+  void set_depth() const;
+  void set_cull() const;
 
-  void save_objects();
-  void save_raster();
-  void set_known() const;
-  void restore_objects() const;
+  void restore_bindings() const;
+  void restore_textures() const;
+  void restore_ranges(GLenum target) const;
+  void restore_images() const;
+  void restore_pixels() const;
   void restore_raster() const;
 
   const Functions* gl_;
   bool restore_;
+  StateGuard* outer_;
 
-  GLint program_ = 0;
-  GLint pipeline_ = 0;
-  GLint vertex_array_ = 0;
-  GLint draw_framebuffer_ = 0;
-  GLint read_framebuffer_ = 0;
-  GLint active_texture_ = 0;
-  std::array<TextureUnit, units> texture_units_{};
-  std::array<BufferRange, ranges> storage_{};
-  std::array<BufferRange, ranges> uniform_{};
-  GLint storage_generic_ = 0;
-  GLint uniform_generic_ = 0;
-  std::array<ImageUnit, images> images_{};
-  GLint pack_buffer_ = 0;
-  GLint unpack_buffer_ = 0;
-  std::array<GLint, pixel_parameters> pixel_store_{};
-
-  std::array<GLboolean, capabilities> enabled_{};
-  std::array<DrawBuffer, most_draw_buffers> draw_buffers_{};
-  std::array<GLfloat, 4> viewport_{};
-  std::array<GLint, 4> scissor_box_{};
-  GLboolean scissor_test_ = GL_FALSE;
-  std::array<GLdouble, 2> depth_range_{};
-  GLboolean depth_mask_ = GL_FALSE;
-  GLint depth_function_ = 0;
-  std::array<Blend, blended_buffers> blends_{};
-  GLint cull_face_ = 0;
-  GLint front_face_ = 0;
-  std::array<GLint, 2> polygon_mode_{};  // some drivers tell front and back, core ones have only one
-  GLint clip_origin_ = 0;
-  GLint clip_depth_ = 0;
+  Saved<GLint> program_, pipeline_, vertex_array_, draw_framebuffer_, read_framebuffer_;
+  Saved<GLint> active_texture_;
+  GLuint active_unit_ = 0;  // as it is now, once it was used
+  std::array<std::array<Saved<GLint>, targets>, units> textures_{};
+  std::array<Saved<GLint>, units> samplers_{};
+  std::array<Saved<BufferRange>, ranges> storage_{}, uniform_{};
+  Saved<GLint> storage_generic_, uniform_generic_;
+  std::array<Saved<ImageUnit>, images> images_{};
+  Saved<Pixels> pack_, unpack_;
+  Saved<Raster> raster_;
+  std::array<bool, capabilities> enabled_{};  // as they are now, once raster_ was used
+  std::array<Saved<bool>, most_draw_buffers> blend_enables_{};
+  std::array<Saved<Blend>, blended_buffers> blends_{};
+  Saved<Depth> depth_;
+  Saved<Cull> cull_;
+  Saved<std::array<GLfloat, 4>> viewport_;
+  Saved<std::array<GLint, 4>> scissor_box_;
 };
 
 }  // namespace cumulet::gl

@@ -1,9 +1,10 @@
 #include "render/compositor.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string>
+#include <utility>
 
-#include "base/error.hpp"
 
 namespace cumulet::render {
 
@@ -11,29 +12,87 @@ namespace {
 
 GLint as_bool(bool value) { return value ? 1 : 0; }
 
+// More than what a host draws ahead.
+constexpr std::size_t most_means = 3;
+// Of a picture under way, between means of it, in times that they took.
+constexpr double pause = 4.0;
+
+double milliseconds(std::chrono::steady_clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
 gl::Object make_program(const gl::FunctionsPtr& gl, std::span<const std::string> defines) {
   return gl::make_graphics_program(gl, "composite.vert", "composite.frag", defines);
 }
 
 }  // namespace
 
-bool Compositor::resolve(const PictureTextures& picture) {
-  if (!resolve_) resolve_ = gl::make_compute_program(gl_, "resolve.comp", {});
-  if (!mean_ || mean_size_ != picture.size) try {
-      mean_ = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(picture.size.x), static_cast<int>(picture.size.y),
-                                  "creating the texture of means");
-      mean_size_ = picture.size;
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::out_of_memory) throw;
-      return false;  // slower and with holes, but drawn
-    }
-  gl_->UseProgram(resolve_.name());
-  gl_->BindTextureUnit(0, picture.sum);
-  gl_->BindTextureUnit(1, picture.counts);
-  gl_->BindImageTexture(0, mean_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
-  gl_->MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
-  return true;
+bool Compositor::resolves_now() const { return milliseconds(Clock::now() - resolved_) >= pause * resolve_ms_; }
+
+double Compositor::expected_ms() const { return draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0); }
+
+Compositor::Means* Compositor::free_means(glm::uvec2 size) {
+  const bool in_call = gl_->dispatches_in_call;
+  const bool all = !in_call ? !means_.empty() : means_.size() >= most_means;
+  const auto found =
+      all ? std::ranges::find_if(means_, [](const auto& means) { return means->drawn.passed(); }) : means_.end();
+  if (all && found == means_.end()) return nullptr;
+  Means& means = found != means_.end() ? **found : *means_.emplace_back(std::make_unique<Means>());
+  if (means.of.size != size) {
+    means.texture = {};
+    means.of = {};
+    means.texture = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
+                                        "creating the texture of means");
+  }
+  return &means;
+}
+
+Compositor::Means* Compositor::resolve(const PictureTextures& picture) {
+  lags_ = false;
+  const MeansOf wanted{picture.sum, picture.holes ? picture.sum_before : 0, picture.size, picture.picture,
+                       picture.revision};
+  if (newest_ != nullptr) {
+    if (wanted.revision && newest_->of == wanted) return newest_;
+    const bool older = newest_->of.picture == wanted.picture && newest_->of.size == wanted.size;
+    if (older && picture.may_lag && !resolves_now()) return newest_;
+  }
+  if (no_memory_for_ == picture.size) return nullptr;
+  Means* means = nullptr;
+  try {
+    means = free_means(picture.size);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::out_of_memory) throw;
+    means_.clear();
+    newest_ = nullptr;
+    no_memory_for_ = picture.size;
+    no_memory_ = error;
+    return nullptr;  // slower and with holes, but drawn
+  }
+  lags_ = means == nullptr;
+  if (lags_) return newest_;
+  gl::Object& program = resolve_.at(picture.holes ? 1 : 0);
+  if (!program) {
+    program = gl::make_compute_program(gl_, "resolve.comp",
+                                       std::array<std::string, 1>{picture.holes ? "CM_HOLES 1" : "CM_HOLES 0"});
+  }
+  const auto& gl = *gl_;
+  const auto begun = Clock::now();
+  const bool before = picture.sum_before != 0;
+  gl.BindTextureUnit(0, picture.sum);
+  gl.BindTextureUnit(1, picture.counts);
+  gl.BindTextureUnit(2, before ? picture.sum_before : picture.sum);
+  gl.BindTextureUnit(3, before ? picture.counts_before : picture.counts);
+  gl.BindImageTexture(0, means->texture.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  gl.UseProgram(program.name());
+  gl.DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
+  gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT);
+  means->of = wanted;
+  newest_ = means;
+  if (gl.dispatches_in_call) {
+    resolved_ = Clock::now();
+    resolve_ms_ = milliseconds(resolved_ - begun);
+  }
+  return means;
 }
 
 void Compositor::draw(const PictureTextures& picture, const Display& display, const FrameTarget& target) {
@@ -49,9 +108,13 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
                 "the target, framebuffer " + std::to_string(target.framebuffer) + ", is not complete");
   }
   const bool layered = picture.beneath != nullptr && picture.beneath->colour;
-  const bool bilinear = layered || glm::ivec2(picture.size) != glm::ivec2(viewport.z, viewport.w);
-  // Where means are read more than once, they are made once.
-  const bool resolved = (bilinear || picture.holes) && resolve(picture);
+  const gl::Object vertex_array = gl::make_vertex_array(gl_);
+  gl.BindVertexArray(vertex_array.name());
+  Means* const means = resolve(picture);
+  const auto begun = Clock::now();
+  const bool resolved = means != nullptr;
+  const glm::uvec2 size = resolved ? means->of.size : picture.size;
+  const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
   std::vector<std::string> defines{"CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
                                    resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
@@ -59,13 +122,11 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   if (layered) defines.emplace_back("CM_LAYERS 1");
   gl::Object& program = colours_[defines];
   if (!program) program = make_program(gl_, defines);
-  const gl::Object vertex_array = gl::make_vertex_array(gl_);
-  gl.BindVertexArray(vertex_array.name());
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
                       static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
-  gl.BindTextureUnit(0, resolved ? mean_.name() : picture.sum);
-  gl.BindTextureUnit(1, picture.counts);
+  gl.BindTextureUnit(0, resolved ? means->texture.name() : picture.sum);
+  if (!resolved) gl.BindTextureUnit(1, picture.counts);
 
   const GLuint colour = program.name();
   gl.ProgramUniform4i(colour, 0, viewport.x, viewport.y, viewport.z, viewport.w);
@@ -78,7 +139,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     const SurfaceLayers& layers = *picture.beneath;
     gl.BindTextureUnit(3, layers.colour.name());
     gl.BindTextureUnit(4, layers.z.name());
-    gl.BindTextureUnit(5, picture.host_z);
+    if (picture.host_z != 0) gl.BindTextureUnit(5, picture.host_z);
     gl.ProgramUniform4i(colour, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
                         picture.host_z != 0 ? static_cast<GLint>(picture.host_layers) : 0, 0);
   }
@@ -117,7 +178,10 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     gl.DepthMask(GL_FALSE);
     gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   }
+  if (resolved && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
+  draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);
   gl::check(gl, "drawing the picture");
+  if (const auto failure = std::exchange(no_memory_, std::nullopt)) throw Error(*failure);
 }
 
 }  // namespace cumulet::render

@@ -1,10 +1,16 @@
 #pragma once
 
+#include <array>
+#include <chrono>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "base/error.hpp"
 #include "gl/objects.hpp"
 #include "render/display.hpp"
 #include "render/surface_raster.hpp"
@@ -14,13 +20,19 @@ namespace cumulet::render {
 /// An accumulation as a tracer made it.
 struct PictureTextures {
   GLuint sum = 0;     // rgba32f: sums of radiance (without any background) and alpha; row 0 is the top
-  GLuint counts = 0;  // rgba32ui: .x is the number of samples summed; a pixel with none is transparent black
+  GLuint counts = 0;  // rgba32ui: .x is the number of samples summed; a pixel with none is empty
   glm::uvec2 size{0U};
-  bool holes = false;   // some pixels may have no sample yet: they take after those around them
+  bool holes = false;   // some pixels may have no sample yet: they take after those around them, else show what was
+                        // there before
   GLuint volume_z = 0;  // r32f, same size, or 0: view depth z at half opacity, 0 where the volume is not so opaque
   const SurfaceLayers* beneath = nullptr;  // surfaces to draw beneath
   GLuint host_z = 0;                       // as HostDepth's, that hides those behind it; 0: none
   unsigned host_layers = 0;
+  GLuint sum_before = 0;  // what was there before, of any size; 0: nothing
+  GLuint counts_before = 0;
+  std::optional<std::uint64_t> revision{};  // another wherever the sums may be others; without, they always may
+  std::uint64_t picture = 0;                // another with every picture that is begun
+  bool may_lag = false;  // more samples of it are on their way: those of some frames ago may be drawn
 };
 
 struct FrameTarget {
@@ -46,16 +58,47 @@ class Compositor {
   /// depth there; alpha is premultiplied after exposure, tone map and encoding. Throws Error(invalid_argument) for a
   /// name that is no framebuffer, or one that is not complete.
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
+  /// Milliseconds that the next call of draw will take, as far as is known.
+  [[nodiscard]] double expected_ms() const;
+  /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
+  /// that the device has not come to: to be drawn again.
+  [[nodiscard]] bool lags() const { return lags_; }
 
  private:
-  // Whether there is memory for it.
-  bool resolve(const PictureTextures& picture);
+  using Clock = std::chrono::steady_clock;
+  /// What the sums were when they were turned into means.
+  struct MeansOf {
+    GLuint sum = 0;
+    GLuint before = 0;
+    glm::uvec2 size{0U};
+    std::uint64_t picture = 0;
+    std::optional<std::uint64_t> revision;
+    bool operator==(const MeansOf&) const = default;
+  };
+  /// Means that are drawn. Where dispatches run within their call, one that writes what queued drawing reads, sums as
+  /// well as means, waits for all that the host has queued: so drawing reads means alone, and they are written again
+  /// once what draws them is over.
+  struct Means {
+    gl::Object texture;
+    MeansOf of;
+    gl::Fence drawn;
+  };
+  // The means to draw; null if there is no memory for them.
+  Means* resolve(const PictureTextures& picture);
+  Means* free_means(glm::uvec2 size);
+  [[nodiscard]] bool resolves_now() const;
 
   gl::FunctionsPtr gl_;
   std::map<std::vector<std::string>, gl::Object> colours_;  // by their macros: made when first needed
-  gl::Object resolve_;
-  gl::Object mean_;
-  glm::uvec2 mean_size_{0U};
+  std::array<gl::Object, 2> resolve_;                       // by CM_HOLES
+  std::vector<std::unique_ptr<Means>> means_;
+  Means* newest_ = nullptr;
+  std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
+  std::optional<Error> no_memory_;           // to be told
+  double resolve_ms_ = 0.0;                  // within the call
+  double draw_ms_ = 0.0;                     // the rest of it
+  bool lags_ = false;
+  Clock::time_point resolved_{};
   gl::Object depth_;
 };
 

@@ -153,7 +153,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
     const dvec3 b = pose.vertices[scene.indices[first + 1]].position;
     const dvec3 c = pose.vertices[scene.indices[first + 2]].position;
     const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
-    const double sides = scene.materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
+    const double sides = pose.double_sided || scene.materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
     const double emitted = area * t.luminance * sides;
     if (!(emitted > 0.0) || !std::isfinite(emitted)) continue;
     table.entries.emplace_back(t.triangle, certain, static_cast<std::uint32_t>(power.size()),

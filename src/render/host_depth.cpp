@@ -1,6 +1,7 @@
 #include "render/host_depth.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <string>
 
 #include "base/error.hpp"
@@ -167,6 +168,17 @@ HostDepth::Source HostDepth::open_framebuffer(const HostDepthInput& input) {
   return copy(framebuffer, format_of(bits), samples, {origin_in(input, size), input.viewport.z, input.viewport.w});
 }
 
+bool HostDepth::answered() {
+  bool changed = false;
+  while (!asked_.empty() && asked_.front().fence.passed()) {
+    std::uint32_t answer = 0;
+    std::memcpy(&answer, answers_.data() + asked_.front().place * sizeof(answer), sizeof(answer));
+    changed = changed || answer != 0;
+    asked_.pop_front();
+  }
+  return changed;
+}
+
 bool HostDepth::update(const HostDepthInput& input) {
   const glm::uvec2 size(std::max(input.viewport.z, 0), std::max(input.viewport.w, 0));
   if (input.source == DepthSource::none || size.x == 0 || size.y == 0) {
@@ -175,13 +187,16 @@ bool HostDepth::update(const HostDepthInput& input) {
     copy_ = {};
     size_ = glm::uvec2(0U);
     layers_ = 0;
+    asked_.clear();
     return had;
   }
+  const bool earlier = answered();
   if (input.unchanged && z_ && input.source == last_.source && input.viewport == last_.viewport &&
       input.target_size == last_.target_size && input.flip_y == last_.flip_y &&
       input.orthographic == last_.orthographic && input.depth_a == last_.depth_a && input.depth_b == last_.depth_b) {
-    return false;
+    return earlier;
   }
+  if (asked_.size() == most_asked) return earlier;  // the device is far behind: the next frame's depth will do
   const auto& gl = *gl_;
   const Source source = input.source == DepthSource::framebuffer ? open_framebuffer(input) : open_texture(input);
   const auto layers = static_cast<unsigned>(std::clamp(source.samples, 1, most_layers));
@@ -193,6 +208,7 @@ bool HostDepth::update(const HostDepthInput& input) {
   }
   if (!sampler_) sampler_ = gl::make_sampler(gl_);
   if (!changed_) changed_ = gl::make_buffer(gl_, 4, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the depth's flag");
+  if (!answers_) answers_ = gl::ReadBack(gl_, most_asked * 4, "creating the depth's flags");
   const bool fits = z_ && size == size_ && layers == layers_;
   gl::Object made;
   if (!fits) {
@@ -213,10 +229,11 @@ bool HostDepth::update(const HostDepthInput& input) {
                       static_cast<float>(input.depth_b));
   gl.UseProgram(program.name());
   gl.DispatchCompute((size.x + 7) / 8, (size.y + 7) / 8, layers);
-  gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
-                   GL_TEXTURE_UPDATE_BARRIER_BIT);
-  std::uint32_t changed = 0;
-  gl.GetNamedBufferSubData(changed_.name(), 0, 4, &changed);
+  gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
+                             GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
+  const std::size_t place = next_place_++ % most_asked;
+  gl.CopyNamedBufferSubData(changed_.name(), answers_.name(), 0, static_cast<GLintptr>(place * 4), 4);
+  asked_.push_back({place, gl.dispatches_in_call ? gl::Fence() : gl::Fence(gl_)});
   gl.BindSampler(0, 0);
   gl::check(gl, "reading the host's depth");
   if (!fits) {
@@ -225,7 +242,8 @@ bool HostDepth::update(const HostDepthInput& input) {
     layers_ = layers;
   }
   last_ = input;
-  return !fits || changed != 0;
+  const bool now = answered();
+  return !fits || earlier || now;
 }
 
 }  // namespace cumulet::render

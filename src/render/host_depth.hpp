@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <glm/glm.hpp>
 
 #include "gl/objects.hpp"
@@ -28,10 +29,14 @@ struct HostDepthInput {
 class HostDepth {
  public:
   explicit HostDepth(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
-  /// Reads the input. Returns whether z differs from before anywhere (or size or layers do). Throws
+  /// Reads the input. Returns whether it is known by now that z differs from before anywhere (or size or layers do): of
+  /// this call or an earlier one, for the device is not waited for (but Mesa's llvmpipe waits for the host's drawing of
+  /// it). Throws
   /// Error(invalid_argument) for a name that is no such texture or framebuffer, does not hold depth, or is smaller than
-  /// the viewport; z is then what it was. O(pixels), and one readback of 4 bytes.
+  /// the viewport; z is then what it was. O(pixels).
   bool update(const HostDepthInput& input);
+  /// Whether it is still to be told if z differs: a later update will.
+  [[nodiscard]] bool pending() const { return !asked_.empty(); }
   /// GL_TEXTURE_2D_ARRAY, r32f; 0 without input.
   [[nodiscard]] GLuint texture() const { return z_.name(); }
   [[nodiscard]] glm::uvec2 size() const { return size_; }
@@ -46,6 +51,8 @@ class HostDepth {
   };
   Source open_texture(const HostDepthInput& input);
   Source open_framebuffer(const HostDepthInput& input);
+  // Whether any of those answered says that z differs.
+  bool answered();
   Source copy(GLuint framebuffer, GLenum format, int samples, glm::ivec4 rectangle);
 
   gl::FunctionsPtr gl_;
@@ -60,6 +67,14 @@ class HostDepth {
   std::array<gl::Object, 2> programs_;  // single, multisampled
   gl::Object sampler_;
   gl::Object changed_;
+  static constexpr std::size_t most_asked = 8;
+  gl::ReadBack answers_;  // what changed_ was, one place each
+  struct Asked {
+    std::size_t place = 0;
+    gl::Fence fence;
+  };
+  std::deque<Asked> asked_;
+  std::size_t next_place_ = 0;
 };
 
 }  // namespace cumulet::render

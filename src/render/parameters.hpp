@@ -6,5 +6,5 @@
 
 namespace cumulet::core {
 #include "parameters.glsl"
-static_assert(sizeof(CmParameters) == 29 * 16);
+static_assert(sizeof(CmParameters) == 30 * 16);
 }  // namespace cumulet::core

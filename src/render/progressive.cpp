@@ -11,8 +11,10 @@ namespace cumulet::render {
 namespace {
 
 constexpr std::uint32_t coarsest_divisor = 16;
-// Lanes whose first path was short go on with further samples while others' are under way.
+// Of a coarse picture.
 constexpr std::uint32_t preview_samples = 16;
+// The last few of a coarse picture's samples are those of the longest paths: nobody waits for them.
+constexpr double nearly_all = 0.9;
 // For the surface pass at full resolution: eight layers at 1080p.
 constexpr double most_layer_bytes = 256e6;
 // Frames that the first answer to a change may take.
@@ -36,6 +38,24 @@ bool Progressive::same(const PictureWish& wish) const {
          wish.preview == wish_.preview && wish.volume_alone == wish_.volume_alone;
 }
 
+std::uint32_t Progressive::enough(std::uint32_t divisor) const {
+  const std::uint32_t wanted = wish_.view == View::shaded ? wish_.parameters.image.w : 1;
+  if (divisor <= finest_) return wanted;
+  // A quarter of the samples of one a pixel at full resolution.
+  const std::uint32_t affordable = divisor / finest_ * (divisor / finest_) / 4;
+  return std::clamp(std::min(affordable, preview_samples), 1U, wanted);
+}
+
+glm::uvec2 Progressive::size_of(std::uint32_t divisor) const {
+  return (glm::uvec2(wish_.parameters.image) + divisor - 1U) / divisor;
+}
+
+bool Progressive::is_enough() const {
+  const glm::u64vec2 size(working_->size());
+  const auto wanted = static_cast<double>(size.x * size.y * working_->parameters().image.w);
+  return working_->done() || (working_->complete() && static_cast<double>(working_->samples()) >= nearly_all * wanted);
+}
+
 std::uint32_t Progressive::coarsest(double budget_ms) const {
   if (!wish_.preview) return 1;
   const double pixels = double(wish_.parameters.image.x) * wish_.parameters.image.y;
@@ -46,7 +66,7 @@ std::uint32_t Progressive::coarsest(double budget_ms) const {
 }
 
 Picture& Progressive::acquire(glm::uvec2 size) {
-  const auto is_free = [this](const auto& picture) { return picture.get() != shown_; };
+  const auto is_free = [this](const auto& picture) { return picture.get() != shown_ && picture.get() != before(); };
   // working_ itself, if it is not shown: it is to be given up.
   for (const auto& picture : pictures_) {
     if (is_free(picture) && picture->size() == size) return *picture;
@@ -57,16 +77,13 @@ Picture& Progressive::acquire(glm::uvec2 size) {
   return *pictures_.emplace_back(std::make_unique<Picture>());
 }
 
-PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms) {
+PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms, bool rests) {
   PictureSettings settings;
   const double affordable = tracer.raster_rate() * budget_ms;
-  const auto pixels = [&] { return double(settings.layer_size.x) * settings.layer_size.y; };
+  const double pixels = double(size.x) * size.y;
   settings.layered = Layered::beneath;
-  settings.layer_size = size;
-  for (std::uint32_t divisor = 2; divisor <= coarsest_divisor && pixels() > affordable; divisor *= 2) {
-    settings.layer_size = (size + divisor - 1U) / divisor;
-  }
-  settings.layers = 4.0 * pixels() <= affordable ? 4 : 1;
+  settings.layer_size = rests || pixels <= affordable ? size : (size + 1U) / 2U;
+  settings.layers = 4.0 * pixels <= affordable ? 4 : 1;
   return settings;
 }
 
@@ -74,7 +91,7 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
   const glm::uvec2 size(wish_.parameters.image);
   PictureSettings settings;
   if (surfaces.raster != nullptr && divisor > finest_) {
-    settings = quick_layers(tracer_, size, budget_ms);
+    settings = quick_layers(tracer_, size, budget_ms, !answering_);
   } else if (surfaces.raster != nullptr && !surfaces.traced) {
     settings.layered = Layered::within;
     settings.layer_size = size;
@@ -82,7 +99,6 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
     settings.layers = static_cast<unsigned>(std::clamp(most_layer_bytes / layer_bytes, 1.0, 8.0));
   }
   settings.view = wish_.view;
-  settings.budget_ms = budget_ms;
   settings.hasty = wish_.preview;
   settings.volume_alone = wish_.volume_alone && divisor == finest_;
   return settings;
@@ -90,9 +106,8 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
 
 void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms) {
   core::CmParameters parameters = wish_.parameters;
-  parameters.image.x = (parameters.image.x + divisor - 1) / divisor;
-  parameters.image.y = (parameters.image.y + divisor - 1) / divisor;
-  if (divisor > finest_) parameters.image.w = std::min(parameters.image.w, preview_samples);
+  const glm::uvec2 size = size_of(divisor);
+  parameters.image = {size, parameters.image.z, enough(divisor)};
   Picture& picture = acquire(glm::uvec2(parameters.image));
   working_ = nullptr;
   try {
@@ -148,11 +163,12 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
       // The first answer to a change is finished, whatever changes meanwhile: else nothing would ever be shown.
       const bool answering = wish_.preview && answering_ && working_ != nullptr && !working_->complete();
       if (working_ == nullptr || (stale_ && !answering)) {
-        start(coarsest(budget_ms), data, surfaces, budget_ms);
         answering_ = true;
-      } else if (!stale_ && working_->complete() && divisor_ > finest_) {
-        start(divisor_ / 2, data, surfaces, budget_ms);
+        first_divisor_ = coarsest(budget_ms);
+        start(first_divisor_, data, surfaces, budget_ms);
+      } else if (!stale_ && divisor_ > finest_ && is_enough()) {
         answering_ = false;
+        start(divisor_ / 2, data, surfaces, budget_ms);
       }
       const auto begun = Clock::now();
       const bool was_complete = working_->complete();
@@ -165,6 +181,7 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
           const glm::dvec2 size(working_->size());
           answer_rate_ += 0.3 * (size.x * size.y / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
         }
+        if (shown_ != working_) before_ = shown_;
         shown_ = working_;
         shown_generation_ = working_generation_;
         if (needs_depth()) tracer_.trace_depth(*shown_, data, surfaces, deadline);
@@ -179,7 +196,7 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
 }
 
 void Progressive::reset() {
-  shown_ = working_ = nullptr;
+  shown_ = before_ = working_ = nullptr;
   pictures_.clear();
   wished_ = false;
   stale_ = failed_ = false;
@@ -194,7 +211,21 @@ bool Progressive::more() const {
 bool Progressive::converged() const { return wished_ && !failed_ && !more() && divisor_ == 1; }
 
 double Progressive::progress() const {
-  return working_ != nullptr && !stale_ && divisor_ == finest_ ? working_->progress() : 0.0;
+  if (!wished_ || working_ == nullptr || stale_) return 0.0;
+  double all = 0.0;
+  double done = 0.0;
+  for (std::uint32_t divisor = std::max(first_divisor_, divisor_); divisor >= finest_; divisor /= 2) {
+    const glm::dvec2 size(size_of(divisor));
+    const double work = size.x * size.y * enough(divisor);
+    all += work;
+    if (divisor > divisor_) done += work;
+    if (divisor == divisor_) done += work * std::min(1.0, working_->progress());
+  }
+  return all > 0.0 ? done / all : 0.0;
+}
+
+void Progressive::settle() {
+  if (working_ != nullptr) tracer_.settle(*working_);
 }
 
 std::uint64_t Progressive::bytes() const {

@@ -20,13 +20,16 @@ struct PictureWish {
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
-/// of a frame, then ones of twice the resolution, then the full one, which goes on to its target samples. As long as
+/// of a frame, then ones of twice the resolution, then the full one, which goes on to its target samples. Each coarse
+/// one is shown as soon as it is whole and goes on to a few samples a pixel, at most a quarter of what a sample a pixel
+/// of the full one takes: so it is worth looking at while the next, which takes longer, is made. As long as
 /// wishes change faster than a coarse picture takes, each is finished before the newest wish is taken up. All calls
 /// need the context current and a StateGuard around.
 class Progressive {
  public:
-  /// Layers of the surface pass, and their size, for pictures that are to be there within a frame.
-  static PictureSettings quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms);
+  /// Layers of the surface pass, and their size, for pictures that are to be there soon. At rest never coarser than the
+  /// picture, else (in motion) than half of it: most of what a coarser one would cost is the vertices.
+  static PictureSettings quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms, bool rests);
 
   explicit Progressive(gl::FunctionsPtr gl) : tracer_(std::move(gl)) {}
 
@@ -39,6 +42,10 @@ class Progressive {
 
   /// The newest whole picture; null before the first.
   [[nodiscard]] const Picture* shown() const { return shown_; }
+  /// What was shown before, where that may have pixels without a sample; else null.
+  [[nodiscard]] const Picture* before() const { return shown_ != nullptr && shown_->has_holes() ? before_ : nullptr; }
+  /// Waits for what is under way, so that what is read back is all there is.
+  void settle();
   /// What is to be read back: without preview the picture under way.
   [[nodiscard]] Picture* newest() { return newest_is_shown() ? shown_ : working_; }
   /// Whether that is of the data of this generation.
@@ -48,6 +55,7 @@ class Progressive {
   [[nodiscard]] bool converged() const;
   /// Whether advance has anything left to do.
   [[nodiscard]] bool more() const;
+  /// Part of the work on the wish that is done, 0 to 1: never less than before, as long as the wish is the same.
   [[nodiscard]] double progress() const;
   [[nodiscard]] Tracer& tracer() { return tracer_; }
   [[nodiscard]] const Tracer& tracer() const { return tracer_; }
@@ -56,6 +64,10 @@ class Progressive {
   [[nodiscard]] double trace_seconds() const { return trace_seconds_; }
 
  private:
+  // Samples a pixel of a picture with that divisor that take it to the next.
+  [[nodiscard]] std::uint32_t enough(std::uint32_t divisor) const;
+  [[nodiscard]] glm::uvec2 size_of(std::uint32_t divisor) const;
+  [[nodiscard]] bool is_enough() const;
   [[nodiscard]] bool newest_is_shown() const { return wish_.preview || working_ == nullptr; }
   [[nodiscard]] bool same(const PictureWish& wish) const;
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
@@ -68,10 +80,12 @@ class Progressive {
   std::vector<std::unique_ptr<Picture>> pictures_;
   Picture* shown_ = nullptr;
   std::uint64_t shown_generation_ = 0;
+  Picture* before_ = nullptr;
   Picture* working_ = nullptr;
   std::uint64_t working_generation_ = 0;
-  std::uint32_t divisor_ = 1;  // of working_
-  std::uint32_t finest_ = 1;   // finer ones do not fit the driver's memory
+  std::uint32_t divisor_ = 1;        // of working_
+  std::uint32_t first_divisor_ = 1;  // of the wish
+  std::uint32_t finest_ = 1;         // finer ones do not fit the driver's memory
   PictureWish wish_;
   bool wished_ = false;
   const surface::Scene* scene_ = nullptr;  // whose triangles paths of working_ meet

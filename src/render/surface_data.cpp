@@ -11,8 +11,10 @@
 #include <span>
 
 #include "base/error.hpp"
+#include "base/progress_part.hpp"
 #include "render/luminance.hpp"
 #include "render/punctual.hpp"
+#include "surface/ggx_albedo.hpp"
 
 namespace cumulet::render {
 
@@ -65,7 +67,7 @@ void add_use(std::vector<uvec4>& words, const TextureUse& use) {
   words.push_back(bits(vec4(m[1][1], m[2][0], m[2][1], 0.0F)));
 }
 
-void add_material(std::vector<uvec4>& words, const Material& m) {
+void add_material(std::vector<uvec4>& words, const Material& m, bool double_sided) {
   const float f0 = (m.ior - 1.0F) / (m.ior + 1.0F);
   words.push_back(bits(m.base_color));
   words.push_back(bits(m.emission, m.alpha_cutoff));
@@ -74,7 +76,7 @@ void add_material(std::vector<uvec4>& words, const Material& m) {
   words.push_back(bits(vec4(m.clearcoat_roughness, m.transmission, m.normal_scale, 0.0F)));
   words.emplace_back((m.alpha_mode == AlphaMode::mask ? flag_mask : 0U) |
                          (m.alpha_mode == AlphaMode::blend ? flag_blend : 0U) | (m.unlit ? flag_unlit : 0U) |
-                         (m.double_sided ? 0U : flag_one_sided),
+                         (m.double_sided || double_sided ? 0U : flag_one_sided),
                      0U, 0U, 0U);
   for (const TextureUse* use : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture,
                                 &m.emission_texture, &m.specular_texture, &m.specular_color_texture,
@@ -106,7 +108,7 @@ double flux_of(const surface::PunctualLight& light, double cross_section) {
   return luminance(glm::dvec3(light.intensity)) * (light.kind == Kind::directional ? cross_section : solid_angle);
 }
 
-void pack_words(SurfaceSource& source) {
+void pack_words(SurfaceSource& source, const Progress* progress) {
   const surface::Scene& scene = *source.scene;
   std::vector<uvec4>& words = source.words;
   const auto nodes = std::as_bytes(source.bvh.nodes());
@@ -116,6 +118,7 @@ void pack_words(SurfaceSource& source) {
   std::memcpy(words.data(), nodes.data(), nodes.size());
   if (!records.empty()) std::memcpy(words.data() + source.lights.w, records.data(), records.size());
 
+  check(progress);
   source.tables.x = size_of(words);
   words.resize(words.size() + scene.triangle_count());
   for (const surface::Draw& draw : scene.draws) {
@@ -124,9 +127,11 @@ void pack_words(SurfaceSource& source) {
           uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], draw.material);
     }
   }
+  check(progress);
   source.tables.y = size_of(words);
   words.resize(words.size() + 3 * scene.attributes.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
+    check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const surface::PosedVertex& v = source.pose.vertices[i];
       const surface::VertexAttributes& a = scene.attributes[i];
@@ -139,7 +144,7 @@ void pack_words(SurfaceSource& source) {
   });
 
   source.tables.z = size_of(words);
-  for (const Material& material : scene.materials) add_material(words, material);
+  for (const Material& material : scene.materials) add_material(words, material, source.pose.double_sided);
   source.tables.w = size_of(words);
   for (const surface::Texture& texture : scene.textures) {
     const TextureAtlas::Place& place = source.atlas.places[texture.image];
@@ -151,9 +156,17 @@ void pack_words(SurfaceSource& source) {
   source.lights.y = static_cast<std::uint32_t>(source.pose.lights.size());
   add_lights(words, source.pose.lights);
 
+  check(progress);
   const EmitterTable table = emitter_table(source.emissive, scene, source.pose);
   source.emitters = {size_of(words), size_of(table.entries), 0U, 0U};
   words.insert(words.end(), table.entries.begin(), table.entries.end());
+  const surface::GgxAlbedo& albedo = surface::GgxAlbedo::table();
+  const std::vector<uvec4> cells = albedo.cells();
+  const std::vector<uvec4> averages = albedo.average_cells();
+  source.ggx_albedo.x = size_of(words);
+  words.insert(words.end(), cells.begin(), cells.end());
+  source.ggx_albedo.y = size_of(words);
+  words.insert(words.end(), averages.begin(), averages.end());
   source.emitted_flux = table.flux;
   const double radius = 0.5 * glm::length(source.pose.high - source.pose.low);
   source.cross_section = std::numbers::pi * radius * radius;
@@ -163,7 +176,9 @@ void pack_words(SurfaceSource& source) {
 }
 
 void build(SurfaceSource& source, const Progress* progress) {
+  check(progress);
   const std::vector<std::uint32_t> flags = surface::triangle_flags(*source.scene, source.pose);
+  check(progress);
   source.bvh = surface::Bvh::build(source.pose.vertices, source.scene->indices, flags, progress);
   source.built_cost = source.bvh.cost();
 }
@@ -240,9 +255,11 @@ std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene
   source->scene = std::move(scene);
   source->pose = std::move(pose);
   build(*source, progress);
+  check(progress);
   source->emissive = emissive_triangles(*source->scene);
   source->atlas = pack_atlas(source->scene->images, largest_layer);
-  pack_words(*source);
+  check(progress);
+  pack_words(*source, progress);
   return source;
 }
 
@@ -251,16 +268,19 @@ std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& la
   auto source = std::make_shared<SurfaceSource>();
   source->scene = last.scene;
   source->pose = std::move(pose);
+  check(progress);
   source->bvh = last.bvh;
+  check(progress);
   source->built_cost = last.built_cost;
   source->bvh.refit(source->pose.vertices, source->scene->indices);
-  // A node that turned inside out has other flags; a tree whose boxes have grown apart is slow.
-  if (source->pose.flipped != last.pose.flipped || source->bvh.cost() > 1.5 * source->built_cost)
-    build(*source, progress);
-  if (progress != nullptr) progress->check();
+  // A node that turned inside out has other flags, as have other sides; a tree whose boxes have grown apart is slow.
+  const bool other_flags =
+      source->pose.flipped != last.pose.flipped || source->pose.double_sided != last.pose.double_sided;
+  if (other_flags || source->bvh.cost() > 1.5 * source->built_cost) build(*source, progress);
+  check(progress);
   source->emissive = last.emissive;
   source->atlas = last.atlas;
-  pack_words(*source);
+  pack_words(*source, progress);
   return source;
 }
 
@@ -270,6 +290,7 @@ SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, c
       tables_(source.tables),
       lights_(source.lights),
       emitters_(source.emitters),
+      ggx_albedo_(source.ggx_albedo),
       emitted_flux_(source.emitted_flux),
       lamp_flux_(source.lamp_flux),
       cross_section_(source.cross_section) {
@@ -327,6 +348,7 @@ void SurfaceData::describe(core::CmParameters& parameters) const {
   parameters.lights = lights_;
   parameters.lights.z = passes_light_on;
   parameters.emitters = emitters_;
+  parameters.ggx_albedo = ggx_albedo_;
 }
 
 double SurfaceData::emitter_share(double sun) const {

@@ -39,6 +39,7 @@ struct SurfaceSource {
   glm::uvec4 tables{0U};          // CmParameters::scene
   glm::uvec4 lights{0U};          // CmParameters::lights, but z
   glm::uvec4 emitters{0U};        // CmParameters::emitters
+  glm::uvec4 ggx_albedo{0U};      // CmParameters::ggx_albedo
   double emitted_flux = 0.0;      // luminance of all that emissive triangles emit
   double lamp_flux = 0.0;         // and lamps
   double cross_section = 0.0;     // of the scene's bounding sphere
@@ -79,6 +80,7 @@ class SurfaceData {
   glm::uvec4 tables_{0U};
   glm::uvec4 lights_{0U};
   glm::uvec4 emitters_{0U};
+  glm::uvec4 ggx_albedo_{0U};
   double emitted_flux_ = 0.0;
   double lamp_flux_ = 0.0;
   double cross_section_ = 0.0;

@@ -28,7 +28,6 @@ using core::CmMaterial;
 using core::CmSurfaceView;
 using surface::AlphaMode;
 
-constexpr int table_size = 32;
 constexpr GLuint table_unit = core::CM_MAPS;
 
 std::size_t padded(std::size_t bytes, std::size_t alignment) { return (bytes + alignment - 1) / alignment * alignment; }
@@ -137,7 +136,6 @@ CmMaterial block_of(const surface::Material& m) {
   const auto uses = uses_of(m);
   for (std::size_t map = 0; map < uses.size(); ++map) {
     const surface::TextureUse& use = *uses[map];
-    if (use.texture >= 0) block.flags.x |= 1U << map;
     if (use.uv_set == 1) block.flags.y |= 1U << map;
     for (int row = 0; row < 2; ++row) {
       block.uv_rows[2 * map + static_cast<std::size_t>(row)] =
@@ -189,6 +187,24 @@ void SurfaceRaster::upload_textures(Assets& assets) const {
   }
 }
 
+void SurfaceRaster::make_programs(Assets& assets) const {
+  for (std::size_t i = 0; i < assets.materials.size(); ++i) {
+    const surface::Material& material = assets.scene->materials[i];
+    std::uint32_t used = 0;
+    const auto uses = uses_of(material);
+    for (std::size_t map = 0; map < uses.size(); ++map) used |= uses[map]->texture >= 0 ? 1U << map : 0U;
+    const bool coated = material.clearcoat > 0.0F;
+    gl::Object& program = assets.programs[{assets.materials[i].pass, used, coated}];
+    if (!program) {
+      const std::array<std::string, 3> defines{"CM_ALPHA " + std::to_string(static_cast<int>(assets.materials[i].pass)),
+                                               "CM_USED " + std::to_string(used),
+                                               coated ? "CM_COATED 1" : "CM_COATED 0"};
+      program = gl::make_graphics_program(gl_, "surface.vert", "surface.frag", defines);
+    }
+    assets.materials[i].program = program.name();
+  }
+}
+
 void SurfaceRaster::upload_materials(Assets& assets) const {
   GLint alignment = 1;
   gl_->GetIntegerv(GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT, &alignment);
@@ -234,6 +250,7 @@ void SurfaceRaster::set_scene(surface::ScenePtr scene) {
   if (assets.scene != nullptr) {
     const surface::Scene& s = *assets.scene;
     upload_textures(assets);
+    make_programs(assets);
     upload_materials(assets);
     prepare_draws(assets);
     if (!s.attributes.empty() && !s.indices.empty()) {
@@ -249,6 +266,7 @@ void SurfaceRaster::set_scene(surface::ScenePtr scene) {
     }
   }
   assets_ = std::move(assets);
+  content_ = std::make_shared<char>();
   posed_ = false;
   flipped_.clear();
   lights_.clear();
@@ -262,6 +280,7 @@ void SurfaceRaster::set_pose(const surface::Pose& pose) {
   if (scene == nullptr || pose.vertices.size() != scene->attributes.size()) {
     throw Error(ErrorCode::internal, "a pose of another scene");
   }
+  content_ = std::make_shared<char>();
   std::vector<glm::vec3> centres;
   centres.reserve(assets_.blended.size());
   for (const Batch& triangle : assets_.blended) {
@@ -273,6 +292,7 @@ void SurfaceRaster::set_pose(const surface::Pose& pose) {
   }
   flipped_ = pose.flipped;
   flipped_.resize(scene->draws.size(), 0);
+  double_sided_ = pose.double_sided;
   lights_ = pose.lights;
   low_ = pose.low;
   high_ = pose.high;
@@ -337,17 +357,15 @@ void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers
 
 void SurfaceRaster::make_fixtures() {
   if (view_block_) return;
-  for (std::size_t i = 0; i < programs_.size(); ++i) {
-    const std::array<std::string, 1> defines{"CM_ALPHA " + std::to_string(i)};
-    programs_[i] = gl::make_graphics_program(gl_, "surface.vert", "surface.frag", defines);
-  }
   constexpr const char* what = "creating the surface pass";
   white_ = gl::make_texture_2d(gl_, GL_RGBA8, 1, 1, what);
   const std::array<std::uint8_t, 4> texel{255, 255, 255, 255};
   gl_->TextureSubImage2D(white_.name(), 0, 0, 0, 1, 1, GL_RGBA, GL_UNSIGNED_BYTE, texel.data());
-  albedo_table_ = gl::make_texture_2d(gl_, GL_RG16F, table_size, table_size, what);
-  const std::vector<glm::vec2> table = surface::make_ggx_albedo_table(table_size);
-  gl_->TextureSubImage2D(albedo_table_.name(), 0, 0, 0, table_size, table_size, GL_RG, GL_FLOAT, table.data());
+  const int width = surface::GgxAlbedo::width();
+  const int height = surface::GgxAlbedo::height();
+  albedo_table_ = gl::make_texture_2d(gl_, GL_RG16F, width, height, what);
+  gl_->TextureSubImage2D(albedo_table_.name(), 0, 0, 0, width, height, GL_RG, GL_FLOAT,
+                         surface::GgxAlbedo::table().texels().data());
   table_sampler_ = gl::make_sampler(gl_);
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
@@ -397,9 +415,8 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
   for (const Batch& batch : batches) {
     const std::uint32_t index = assets_.scene->draws[batch.draw].material;
     const Material& material = assets_.materials[index];
-    const GLuint wanted = programs_[static_cast<std::size_t>(material.pass)].name();
-    if (program != wanted) gl.UseProgram(wanted);
-    program = wanted;
+    if (program != material.program) gl.UseProgram(material.program);
+    program = material.program;
     if (bound != index) {
       for (GLuint unit = 0; unit < material.maps.size(); ++unit) {
         const Map& map = material.maps[unit];
@@ -408,7 +425,7 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
       }
       gl.BindBufferRange(GL_UNIFORM_BUFFER, 1, assets_.material_block.name(),
                          assets_.material_stride * static_cast<GLintptr>(index), sizeof(CmMaterial));
-      if (material.double_sided) {
+      if (material.double_sided || double_sided_) {
         gl.Disable(GL_CULL_FACE);
       } else {
         gl.Enable(GL_CULL_FACE);
@@ -484,7 +501,7 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     const float far = 0.0F;
     gl.ClearNamedFramebufferfv(target, GL_DEPTH, 0, &far);
     const glm::vec2 shift = (glm::vec2(0.5F) - surface_jitter(layer, layers)) * 2.0F / glm::vec2(size);
-    for (const gl::Object& program : programs_) gl.ProgramUniform2f(program.name(), 0, shift.x, shift.y);
+    for (const auto& [variant, program] : assets_.programs) gl.ProgramUniform2f(program.name(), 0, shift.x, shift.y);
     if (posed_) {
       gl.VertexArrayElementBuffer(vertex_array.name(), assets_.indices.name());
       draw_batches(assets_.solid, mirrored);

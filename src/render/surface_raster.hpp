@@ -2,8 +2,11 @@
 
 #include <array>
 #include <glm/glm.hpp>
+#include <map>
+#include <memory>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "gl/objects.hpp"
@@ -28,6 +31,7 @@ struct SurfaceLighting {
   glm::vec3 sun_direction{0.0F, 1.0F, 0.0F};  ///< unit, towards the sun
   glm::vec3 sun_irradiance{0.0F};             ///< on a plane that faces it
   glm::vec3 sky_radiance{0.0F};               ///< the same from everywhere
+  bool operator==(const SurfaceLighting&) const = default;
 };
 
 /// What the surface pass has drawn: linear colour and view depth, a layer a sub-pixel place.
@@ -72,6 +76,8 @@ class SurfaceRaster {
   void draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
             SurfaceLayers& into);
 
+  /// Another with every scene and every pose: what is drawn of one and the same looks the same.
+  [[nodiscard]] const std::shared_ptr<const void>& content() const { return content_; }
   /// Whether the scene has BLEND triangles, which have layers of their own.
   [[nodiscard]] bool blends() const { return !assets_.blended.empty(); }
   /// GL memory of the scene, without layers.
@@ -93,7 +99,10 @@ class SurfaceRaster {
     std::array<Map, 10> maps{};
     surface::AlphaMode pass = surface::AlphaMode::opaque;
     bool double_sided = false;
+    GLuint program = 0;  // of Assets::programs
   };
+  /// What the shader of a material is compiled for: how it covers, bits of its maps, whether it has a coat.
+  using Variant = std::tuple<surface::AlphaMode, std::uint32_t, bool>;
   struct Assets {
     surface::ScenePtr scene;
     gl::Object attributes;
@@ -103,6 +112,7 @@ class SurfaceRaster {
     std::vector<gl::Object> textures;
     std::vector<gl::Object> samplers;
     std::vector<Material> materials;
+    std::map<Variant, gl::Object> programs;
     std::vector<Batch> solid;    // OPAQUE, then MASK
     std::vector<Batch> blended;  // a triangle each
     gl::Object posed;            // vertices
@@ -111,6 +121,7 @@ class SurfaceRaster {
   };
 
   void upload_textures(Assets& assets) const;
+  void make_programs(Assets& assets) const;
   void upload_materials(Assets& assets) const;
   void prepare_draws(Assets& assets) const;
   void sort_blended(const SurfaceView& view);
@@ -121,7 +132,9 @@ class SurfaceRaster {
 
   gl::FunctionsPtr gl_;
   Assets assets_;
+  std::shared_ptr<const void> content_;
   bool posed_ = false;
+  bool double_sided_ = false;  // all materials of the pose
   std::vector<std::uint8_t> flipped_;
   std::vector<surface::PunctualLight> lights_;
   glm::dvec3 low_{0.0};
@@ -130,7 +143,6 @@ class SurfaceRaster {
   std::vector<Batch> sorted_;       // of blended triangles, into sorted_indices
   std::optional<SurfaceView> sorted_view_;
 
-  std::array<gl::Object, 3> programs_;  // by AlphaMode
   gl::Object white_;
   gl::Object albedo_table_;
   gl::Object table_sampler_;

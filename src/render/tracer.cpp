@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numeric>
+#include <thread>
 
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
@@ -15,28 +17,40 @@ namespace cumulet::render {
 namespace {
 
 constexpr std::uint32_t tile_edge = 512;
-constexpr double hasty_rest = 0.03;     // of a tile's pixels
-constexpr double dispatch_ms = 1000.0;  // well under any driver's watchdog, well over the cost of a dispatch
+constexpr std::uint32_t block_width = 128;  // trace.comp's
+constexpr std::uint32_t block_height = 8;
+constexpr std::uint32_t begins_pass = 0x80000000U;
+constexpr double hasty_rest = 0.03;    // of a tile's pixels
+constexpr double dispatch_ms = 500.0;  // well under any driver's watchdog, well over the cost of a dispatch
+constexpr double least_ms = 1.0;       // whatever the budget, so that there is progress
+constexpr double vector = 8.0;         // lanes that cost what one of them costs, at least
+// Loading and storing paths shall cost little beside running them.
+constexpr double worthwhile_rounds = 8.0;
+constexpr std::uint32_t first_rounds = 4;  // while nothing is known of what they cost
+constexpr std::uint32_t most_rounds = 65536;
+constexpr double part_of_rest = 0.9;  // of the time left, that a dispatch may likely take
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t view_depth = 5;  // inspect.comp's
 constexpr GLuint surface_unit = 11;
 constexpr GLuint layer_colour_unit = 8;
 constexpr GLuint layer_z_unit = 15;
-constexpr double rays_of_facts = 16.0;  // aovs.comp's, a pixel
 
 using Clock = std::chrono::steady_clock;
 
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+double milliseconds_until(Deadline deadline) {
+  return std::chrono::duration<double, std::milli>(deadline - Clock::now()).count();
 }
 
-// A step through n rows that meets each once and lands far from the last: near n times the golden section, coprime to
-// n.
-std::uint32_t row_step(std::uint32_t rows) {
-  auto step = std::max(1U, static_cast<std::uint32_t>(0.618 * rows));
-  while (std::gcd(step, rows) != 1) ++step;
+// A step through n things that meets each once and lands far from the last: near n times the golden section, coprime
+// to n.
+std::size_t far_step(std::size_t n) {
+  auto step = std::max<std::size_t>(1, static_cast<std::size_t>(0.618 * static_cast<double>(n)));
+  while (std::gcd(step, n) != 1) ++step;
   return step;
 }
+
+// While there is nothing to do but to wait for the device: no call into GL waits.
+void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 
 void describe(const Surfaces& surfaces, core::CmParameters& parameters) {
   parameters.surface = {surfaces.depth != 0 ? surfaces.layers : 0, surfaces.size, 0};
@@ -47,8 +61,9 @@ void describe(const Surfaces& surfaces, core::CmParameters& parameters) {
 
 double Picture::progress() const {
   if (done_) return 1.0;
+  if (view_ != View::shaded) return size_.y > 0 ? double(view_row_) / size_.y : 0.0;
   const double wanted = double(parameters_.image.w) * size_.x * size_.y;
-  return view_ == View::shaded && wanted > 0.0 ? static_cast<double>(samples_) / wanted : 0.0;
+  return wanted > 0.0 ? static_cast<double>(samples()) / wanted : 0.0;
 }
 
 void Picture::extend(std::uint32_t samples) {
@@ -66,43 +81,41 @@ void Picture::extend(std::uint32_t samples) {
 }
 
 void Picture::begin_tile() {
-  windows_.clear();
-  window_ = 0;
+  // What is under way tells the tile it is of, and no one asks that one.
+  blocks_ = std::make_shared<Blocks>();
+  block_ = 0;
   const glm::uvec2 extent = tile_extent();
-  for (std::uint32_t row = 0; row < extent.y; row += window_rows_) {
-    const std::uint32_t end = std::min(extent.y, row + window_rows_);
-    windows_.push_back({row, end, (end - row) * extent.x, (end - row) * extent.x, true});
+  for (std::uint32_t y = 0; y < extent.y; y += block_height) {
+    for (std::uint32_t x = 0; x < extent.x; x += block_width) {
+      const std::uint32_t lanes = std::min(block_width, extent.x - x) * std::min(block_height, extent.y - y);
+      blocks_->push_back({lanes, lanes, lanes, 0, true});
+    }
   }
 }
 
-// Whether the tile, the pass, the picture end with what the last dispatch did.
-void Picture::end_dispatch() {
+// Whether the tile, the pass, the picture end with what is known.
+void Picture::end_tile() {
+  if (done_ || view_ != View::shaded) return;
   std::uint64_t unfinished = 0;
   std::uint64_t empty = 0;
-  bool begun = true;
-  for (const Window& window : windows_) {
-    begun = begun && !window.begins;
-    unfinished += window.unfinished;
-    empty += window.empty;
+  for (const Block& block : *blocks_) {
+    unfinished += block.unfinished;
+    empty += block.empty;
   }
   const glm::uvec2 extent = tile_extent();
-  const auto rest = hasty_ && !complete_ && begun ? static_cast<std::uint64_t>(hasty_rest * extent.x * extent.y) : 0;
+  const auto rest = hasty_ && !complete_ ? static_cast<std::uint64_t>(hasty_rest * extent.x * extent.y) : 0;
   const bool one_tile = tiles_ == glm::uvec2(1U);
   if (one_tile && empty <= rest) complete_ = true;
   holes_ = one_tile ? empty > 0 : hasty_ && pass_ < 2;
   // The last few of a hasty first pass are left to the next.
   const bool first_pass = pass_target_ == 1 && parameters_.image.w > 1;
-  if (unfinished > (first_pass ? rest : 0)) {
-    do window_ = (window_ + 1) % windows_.size();
-    while (windows_[window_].unfinished == 0);
-    return;
-  }
+  if (unfinished > (first_pass ? rest : 0)) return;
   if (++tile_ == tiles_.x * tiles_.y) {
     tile_ = 0;
     complete_ = true;
     ++pass_;
     const std::uint32_t target = parameters_.image.w;
-    if (pass_target_ >= target || view_ != View::shaded) {
+    if (pass_target_ >= target) {
       done_ = true;
     } else {
       // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
@@ -116,25 +129,24 @@ void Picture::end_dispatch() {
 std::uint64_t Picture::bytes() const {
   const std::uint64_t pixel =
       (sum_ ? 32U : 0U) + (volume_z_ ? 4U : 0U) + (volume_sum_ ? 16U : 0U) + (facts_ ? 36U : 0U);
-  return std::uint64_t{size_.x} * size_.y * pixel + layers_.bytes();
+  return std::uint64_t{size_.x} * size_.y * pixel;
 }
 
-GLuint Tracer::program(const MarchData& data, const char* name, std::span<const std::string> more) {
+const Tracer::Program& Tracer::program(const MarchData& data, const char* name, std::span<const std::string> more) {
   std::vector<std::string> key = data.defines();
   key.insert(key.end(), more.begin(), more.end());
   key.emplace_back(name);
   auto found = programs_.find(key);
   if (found == programs_.end()) {
-    gl::Object made = gl::make_compute_program(gl_, name, std::span(key).first(key.size() - 1));
+    Program made{gl::make_compute_program(gl_, name, std::span(key).first(key.size() - 1))};
     // Those of one march at most: a host that tries them all shall not collect them.
     if (programs_.size() >= 8) programs_.clear();
     found = programs_.emplace(std::move(key), std::move(made)).first;
-    iterations_ = 16.0;
   }
-  return found->second.name();
+  return found->second;
 }
 
-GLuint Tracer::trace_program(const Picture& picture, const MarchData& data) {
+const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
   std::vector<std::string> more;
   if (picture.traced_ > 0) more.emplace_back(picture.traced_ > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1");
   if (picture.traced_ == 0 && picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
@@ -142,14 +154,16 @@ GLuint Tracer::trace_program(const Picture& picture, const MarchData& data) {
   return program(data, "trace.comp", more);
 }
 
-GLuint Tracer::inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name) {
+const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name) {
   const std::array<std::string, 1> more{"CM_SURFACES 1"};
   return program(data, name, std::span(more).first(surfaces.scene != nullptr ? 1 : 0));
 }
 
 void Tracer::make_shared_objects() {
-  if (!counter_)
-    counter_ = gl::make_buffer(gl_, sizeof(glm::uvec3), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counter");
+  if (!blocks_) {
+    blocks_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
+                              "creating the counters");
+  }
   if (!uniforms_)
     uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
 }
@@ -167,23 +181,56 @@ void Tracer::allocate(Picture& picture, glm::uvec2 size) const {
   picture.size_ = size;
 }
 
+void Tracer::drop_unused_layers() {
+  std::erase_if(drawn_layers_, [](const auto& drawn) { return drawn.use_count() == 1; });
+}
+
+std::uint64_t Tracer::bytes() const {
+  std::uint64_t bytes = paths_lanes_ * lane_bytes;
+  for (const auto& drawn : drawn_layers_) bytes += drawn->layers.bytes();
+  return bytes;
+}
+
 void Tracer::draw_layers(Picture& picture, const Surfaces& surfaces, const PictureSettings& settings) {
   // The surface pass leaves any state it likes; what comes after it in the frame counts on the known one.
   struct Known {
     const gl::Functions& gl;
     explicit Known(const gl::Functions& functions) : gl(functions) {}
-    ~Known() { const gl::StateGuard known(gl, false); }
+    ~Known() {
+      if (gl.guard != nullptr) gl.guard->set_known();
+    }
     Known(const Known&) = delete;
     Known& operator=(const Known&) = delete;
   };
   const Known known(*gl_);
   picture.layered_ = Layered::no;
-  const auto start = Clock::now();
+  picture.layers_.reset();
   const glm::uvec2 size = settings.layer_size;
-  surfaces.raster->draw(surfaces.view, surfaces.lighting, size, settings.layers, picture.layers_);
-  gl_->Finish();
-  const double pixels = double(size.x) * size.y * settings.layers;
-  raster_rate_ += 0.3 * (pixels / std::max(1e-3, milliseconds_since(start)) - raster_rate_);
+  const LayersOf wanted{surfaces.raster->content(), surfaces.view, surfaces.lighting, size, settings.layers};
+  const auto found = std::ranges::find_if(drawn_layers_, [&](const auto& drawn) { return drawn->of == wanted; });
+  if (found != drawn_layers_.end()) {
+    picture.layers_ = {*found, &(*found)->layers};
+    picture.layered_ = settings.layered;
+    return;
+  }
+  const auto spare = std::ranges::find_if(drawn_layers_, [](const auto& drawn) { return drawn.use_count() == 1; });
+  const auto made = spare != drawn_layers_.end() ? *spare : std::make_shared<DrawnLayers>();
+  made->of = {};
+  std::erase(drawn_layers_, made);
+  drop_unused_layers();
+  collect();
+  const bool measured = !rasters_.full();
+  if (measured) rasters_.begin(Flights::Kind::draws);
+  surfaces.raster->draw(surfaces.view, surfaces.lighting, size, settings.layers, made->layers);
+  if (measured) {
+    Dispatched what;
+    what.lanes = double(size.x) * size.y * settings.layers;
+    what.most_ms = what.lanes / raster_rate_;
+    rasters_.end(std::move(what), 0, 0);
+  }
+  made->of = wanted;
+  drawn_layers_.push_back(made);
+  picture.layers_ = {made, &made->layers};
   picture.layered_ = settings.layered;
 }
 
@@ -203,13 +250,18 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   if (!picture.sum_ || size != picture.size_) allocate(picture, size);
   picture.complete_ = false;
   picture.facts_.reset();
-  const SurfaceData* met = shaded ? surfaces.met() : nullptr;
+  // A preview's volume is lit by sun and sky alone, as its surfaces are, so that it comes at once; by what the scene
+  // has where there is no other light.
+  const glm::vec3 distant = glm::vec3(parameters.sun_irradiance) + glm::vec3(parameters.sky_radiance);
+  const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
+  const SurfaceData* met = shaded && !preview ? surfaces.met() : nullptr;
   picture.traced_ = met == nullptr ? 0 : (met->emitters() ? 2 : 1);
   picture.layered_ = Layered::no;
   if (shaded && settings.layered != Layered::no && surfaces.raster != nullptr) {
     draw_layers(picture, surfaces, settings);
   } else {
-    picture.layers_ = {};
+    picture.layers_.reset();
+    drop_unused_layers();
   }
   picture.volume_alone_ = shaded && settings.volume_alone;
   if (!picture.volume_alone_) {
@@ -227,7 +279,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   data.describe(picture.parameters_);
   describe(surfaces, picture.parameters_);
   if (picture.layered_ != Layered::no) {
-    const SurfaceLayers& layers = picture.layers_;
+    const SurfaceLayers& layers = *picture.layers_;
     picture.parameters_.layers = {layers.layers, layers.size,
                                   (layers.blended ? 1U : 0U) | (picture.layered_ == Layered::within ? 2U : 0U)};
   }
@@ -235,19 +287,17 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   if (!shaded) picture.parameters_.march.y = static_cast<std::uint32_t>(settings.view);
   picture.tile_size_ = tile;
   picture.tiles_ = (size + tile - 1U) / tile;
-  // A window's shortest dispatch should fit the budget: its lanes each run some dozens of steps.
-  const double lanes_in_budget = 0.5 * rate_ * settings.budget_ms;
-  picture.window_rows_ =
-      static_cast<std::uint32_t>(std::clamp(lanes_in_budget / tile.x, 8.0, double(tile_edge))) / 8U * 8U;
   picture.tile_ = 0;
   picture.hasty_ = settings.hasty;
   picture.pass_ = 0;
   picture.holes_ = true;
   picture.pass_target_ = picture.tiles_ == glm::uvec2(1U) ? picture.parameters_.image.w : 1U;
-  picture.samples_ = 0;
+  picture.samples_ = std::make_shared<std::uint64_t>(0);
+  picture.view_row_ = 0;
   picture.complete_ = false;
   picture.done_ = false;
   picture.begin_tile();
+  picture.begun_ = picture.revision_ = ++revision_;
   picture.depth_row_ = 0;
   picture.depth_done_ = false;
   const glm::vec4 zero(0.0F);
@@ -261,8 +311,10 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
 void Tracer::clear(Picture& picture) {
   allocate(picture, glm::uvec2(1));
   picture.layered_ = Layered::no;
-  picture.layers_ = {};
+  picture.layers_.reset();
+  drop_unused_layers();
   picture.parameters_ = {};
+  picture.begun_ = picture.revision_ = ++revision_;
   picture.view_ = View::shaded;
   picture.complete_ = picture.done_ = true;
   picture.holes_ = false;
@@ -280,90 +332,220 @@ void Tracer::bind(const MarchData& data, const Surfaces& surfaces) const {
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.name());
 }
 
+void Tracer::collect() {
+  while (const auto landed = flights_.land()) {
+    const Dispatched& what = landed->what;
+    const double ms = landed->ms.value_or(landed->at_most_ms);
+    if (landed->words.empty()) {
+      if (what.cost) what.cost->learn(what.slots, landed->ms ? ms : 0.0, ms);
+      continue;
+    }
+    // What the lanes did in full rounds, of all that they could have done: lanes that end early, or meet nothing, cost
+    // less and tell little of others.
+    const double full = landed->words[0].x;
+    const double high = full > 0.0 ? ms * what.lanes / full : std::numeric_limits<double>::infinity();
+    if (what.cost) what.cost->learn(what.slots, landed->ms ? ms / what.rounds : 0.0, high);
+    for (std::size_t i = 1; i < landed->words.size(); ++i) *what.samples += landed->words[i].w;
+    if (log_ != nullptr) {
+      const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_width * block_height;
+      log_->push_back(
+          {what.aim_ms, ms, lanes, static_cast<std::uint32_t>(what.lanes), what.rounds, what.most_ms > 0.0});
+    }
+    for (std::size_t i = 0; i < what.blocks.size(); ++i) {
+      Block& block = (*what.tile)[what.blocks[i]];
+      block.unfinished = landed->words[1 + i].y;
+      block.empty = landed->words[1 + i].z;
+      --block.under_way;
+    }
+  }
+  while (const auto landed = rasters_.land()) {
+    const double rate = landed->what.lanes / std::max(1e-3, landed->ms.value_or(landed->at_most_ms));
+    if (landed->ms || rate > raster_rate_) raster_rate_ += 0.3 * (rate - raster_rate_);
+  }
+}
+
+bool Tracer::layers_ready(Deadline deadline) {
+  if (!gl_->dispatches_in_call) return true;  // the device puts them in order
+  for (collect(); !rasters_.empty(); collect()) {
+    if (Clock::now() >= deadline) return false;
+    pass_time();
+  }
+  return true;
+}
+
+void Tracer::settle(Picture& picture) {
+  flights_.finish();
+  collect();
+  picture.end_tile();
+}
+
 bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
                    bool until_complete) {
+  collect();
+  picture.end_tile();
   if (picture.done_) return true;
-  const auto start = Clock::now();
-  const double budget_ms = std::max(0.0, std::chrono::duration<double, std::milli>(deadline - start).count());
-  const std::uint64_t samples_before = picture.samples_;
-  gl_->UseProgram(picture.view_ == View::shaded ? trace_program(picture, data)
-                                                : inspect_program(data, surfaces, "inspect.comp"));
+  if (picture.layered_ != Layered::no && !layers_ready(deadline)) return false;
+  const bool shaded = picture.view_ == View::shaded;
+  const Program& program = shaded ? trace_program(picture, data) : inspect_program(data, surfaces, "inspect.comp");
+  flights_.order();
+  gl_->UseProgram(program.object.name());
   bind(data, surfaces);
   if (picture.layered_ != Layered::no) {
-    gl_->BindTextureUnit(layer_colour_unit, picture.layers_.colour.name());
-    gl_->BindTextureUnit(layer_z_unit, picture.layers_.z.name());
+    gl_->BindTextureUnit(layer_colour_unit, picture.layers_->colour.name());
+    gl_->BindTextureUnit(layer_z_unit, picture.layers_->z.name());
   }
   if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, paths_.name());
-  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, counter_.name());
+  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, blocks_.name());
   gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
   gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
   // What is bound shall fit the format, though this view does not write it.
   gl_->BindImageTexture(2, picture.volume_sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
                         picture.volume_sum_ ? GL_RGBA32F : GL_R32F);
-  const double aim = std::clamp(0.5 * budget_ms, 1.0, dispatch_ms);
-  while (!picture.done_ && !(until_complete && picture.complete_)) {
-    dispatch(picture, surfaces, aim);
-    if (Clock::now() >= deadline) break;
+  if (!shaded) {
+    core::CmParameters parameters = picture.parameters_;
+    describe(surfaces, parameters);
+    picture.revision_ = ++revision_;
+    picture.done_ = picture.complete_ = inspect(picture, parameters, program, picture.view_row_, deadline);
+    picture.holes_ = !picture.done_;
+    *picture.samples_ = std::uint64_t{picture.size_.x} * std::min(picture.view_row_, picture.size_.y);
+    return picture.done_;
   }
-  if (picture.view_ == View::shaded) {
-    const auto samples = static_cast<double>(picture.samples_ - samples_before);
-    const double spent = milliseconds_since(start);
-    if (spent > 0.5) rate_ = std::max(1.0, rate_ + 0.1 * (samples / spent - rate_));
+  until_complete = until_complete && !picture.complete_;
+  const double aim = std::clamp(0.5 * milliseconds_until(deadline), least_ms, dispatch_ms);
+  bool sent = false;
+  while (!picture.done_ && !(until_complete && picture.complete_)) {
+    const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
+    if (!flights_.full()) {
+      const bool anyway = !sent && flights_.empty();
+      if (auto what = choose(picture, program.cost, std::clamp(left, anyway ? least_ms : 0.0, aim), anyway)) {
+        dispatch(picture, surfaces, std::move(*what));
+        sent = true;
+        collect();
+        picture.end_tile();
+        continue;
+      }
+    }
+    // What is under way lasts until the deadline, or there is no time for more.
+    if (flights_.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) break;
+    pass_time();
+    collect();
+    picture.end_tile();
   }
   return picture.done_;
 }
 
-void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, double aim_ms) {
+std::optional<Dispatched> Tracer::choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
+                                         bool anyway) {
+  Dispatched what;
+  what.cost = cost;
+  what.aim_ms = aim_ms;
+  const std::size_t count = picture.blocks_->size();
+  std::optional<double> cost_ms;
+  double all_lanes = 0.0;
+  // Those of which nothing is under way; if there are none, those of which it may be too little.
+  for (std::uint32_t under_way = 0; under_way < 2 && what.blocks.empty(); ++under_way) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t index = (picture.block_ + i) % count;
+      const Block& block = (*picture.blocks_)[index];
+      if (block.unfinished == 0 || block.under_way != under_way) continue;
+      const double lanes = what.lanes + block.unfinished;
+      const double slots = std::min(lanes, (all_lanes + block.lanes) / vector);
+      const auto ms = cost->most(slots, anyway);
+      if (!what.blocks.empty() && (!ms || *ms * worthwhile_rounds > aim_ms)) break;
+      what.blocks.push_back(static_cast<std::uint32_t>(index));
+      what.lanes = lanes;
+      what.slots = slots;
+      all_lanes += block.lanes;
+      cost_ms = ms;
+    }
+  }
+  if (what.blocks.empty() || (cost_ms.value_or(least_ms) > aim_ms && !anyway)) return std::nullopt;
+  what.rounds = first_rounds;
+  if (cost_ms) {
+    what.rounds = static_cast<std::uint32_t>(std::clamp(aim_ms / *cost_ms, 1.0, double(most_rounds)));
+    what.most_ms = *cost_ms * what.rounds;
+  }
+  return what;
+}
+
+void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, Dispatched what) {
   const glm::uvec2 extent = picture.tile_extent();
-  Picture::Window& window = picture.windows_[picture.window_];
-  const bool shaded = picture.view_ == View::shaded;
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
   parameters.tile = {picture.tile_corner(), extent};
   parameters.image.w = picture.pass_target_;
-  const std::uint32_t groups = (window.end - window.first + 7) / 8;
-  parameters.order = {row_step(groups), 0U, window.first, window.end};
-  parameters.march.x = static_cast<std::uint32_t>(iterations_);
-  parameters.march.w = window.begins ? 1 : 0;
-  glm::uvec3 counter(0U);
-  gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
-  gl_->NamedBufferSubData(counter_.name(), 0, sizeof(counter), &counter);
-  const auto dispatched = Clock::now();
-  gl_->DispatchCompute((extent.x + 7) / 8, groups, 1);
-  gl_->MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
-                     GL_TEXTURE_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
-  gl_->GetNamedBufferSubData(counter_.name(), 0, sizeof(counter), &counter);
-  gl::check(*gl_, "tracing");
-  window.begins = false;
-  window.unfinished = counter.x;
-  window.empty = counter.y;
-  picture.samples_ += shaded ? counter.z : extent.x * (window.end - window.first);
-  if (shaded) {
-    // As few lanes remain, each may run longer; never more than twice as long as the last time.
-    const double spent = std::max(0.01, milliseconds_since(dispatched));
-    iterations_ = std::clamp(iterations_ * std::clamp(aim_ms / spent, 0.25, 2.0), 4.0, 65536.0);
+  parameters.march.x = what.rounds;
+  // Blocks are dealt out far apart: a driver that gives each core a run of work groups then gives each its share of the
+  // costly ones.
+  const std::size_t count = what.blocks.size();
+  picture.block_ = (what.blocks.back() + 1) % picture.blocks_->size();
+  std::vector<std::uint32_t> dealt(count);
+  const std::size_t step = far_step(count);
+  for (std::size_t i = 0; i < count; ++i) dealt[i] = what.blocks[i * step % count];
+  what.blocks = std::move(dealt);
+  std::vector<glm::uvec4> words(1 + count, glm::uvec4(0U));
+  for (std::size_t i = 0; i < count; ++i) {
+    Block& block = (*picture.blocks_)[what.blocks[i]];
+    words[1 + i].x = what.blocks[i] | (block.begins ? begins_pass : 0U);
+    block.begins = false;
+    ++block.under_way;
   }
-  picture.end_dispatch();
+  picture.revision_ = ++revision_;
+  what.tile = picture.blocks_;
+  what.samples = picture.samples_;
+  gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
+  gl_->NamedBufferSubData(blocks_.name(), 0, static_cast<GLsizeiptr>(words.size() * sizeof(glm::uvec4)), words.data());
+  flights_.begin(Flights::Kind::dispatch);
+  const std::uint32_t across = (std::min(extent.x, block_width) + 7) / 8;
+  gl_->DispatchCompute(across, static_cast<GLuint>(count), 1);
+  flights_.end(std::move(what), blocks_.name(), words.size());
+  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
+                               GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT |
+                               GL_TEXTURE_FETCH_BARRIER_BIT);
+  gl::check(*gl_, "tracing");
 }
 
-bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameters, double rays, std::uint32_t& row,
-                     Deadline deadline) {
+// Sends rows of a dispatch that is a round for each of its pixels; what follows in GL comes after them.
+bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program,
+                     std::uint32_t& row, Deadline deadline) {
   core::CmParameters p = parameters;
-  // Rows that a camera ray a pixel takes about a millisecond for.
-  const double in_a_millisecond = rate_ / (rays * picture.size_.x);
-  const auto rows = static_cast<std::uint32_t>(std::clamp(in_a_millisecond, 8.0, 512.0)) / 8U * 8U;
+  const double aim = std::clamp(0.5 * milliseconds_until(deadline), least_ms, dispatch_ms);
+  bool sent = false;
   while (row < picture.size_.y) {
-    const std::uint32_t height = std::min(rows, picture.size_.y - row);
-    p.tile = {0U, 0U, picture.size_};
-    p.order = {0U, 0U, row, row + height};
-    gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
-    gl_->DispatchCompute((picture.size_.x + 7) / 8, (height + 7) / 8, 1);
-    gl_->MemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-    gl_->Finish();
-    gl::check(*gl_, "looking at the pixels");
-    row += height;
-    if (Clock::now() >= deadline) break;
+    const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
+    const bool anyway = !sent && flights_.empty();
+    const double most_ms = std::clamp(left, anyway ? least_ms : 0.0, aim);
+    const auto slots = [&](std::uint32_t rows) { return double(rows) * picture.size_.x / vector; };
+    const auto fits = [&](std::uint32_t rows) {
+      const auto ms = program.cost->most(slots(rows));
+      return ms && *ms <= most_ms;
+    };
+    std::uint32_t height = 8;
+    while (height < picture.size_.y && fits(2 * height)) height *= 2;
+    if (!flights_.full() && (anyway || fits(height) || !program.cost->most(1.0))) {
+      height = std::min(height, picture.size_.y - row);
+      p.tile = {0U, 0U, picture.size_};
+      p.order = {0U, 0U, row, row + height};
+      gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
+      Dispatched what;
+      what.slots = slots(height);
+      what.cost = program.cost;
+      what.most_ms = program.cost->most(what.slots).value_or(0.0);
+      flights_.begin(Flights::Kind::dispatch);
+      gl_->DispatchCompute((picture.size_.x + 7) / 8, (height + 7) / 8, 1);
+      flights_.end(std::move(what), 0, 0);
+      row += height;
+      sent = true;
+    } else if (flights_.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) {
+      break;
+    } else {
+      pass_time();
+    }
+    collect();
   }
+  gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
+                               GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+  gl::check(*gl_, "looking at the pixels");
   return row >= picture.size_.y;
 }
 
@@ -374,7 +556,8 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
                                             static_cast<int>(picture.size_.y), "creating the depth texture");
   }
   make_shared_objects();
-  gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp"));
+  const Program& program = inspect_program(data, surfaces, "inspect.comp");
+  gl_->UseProgram(program.object.name());
   bind(data, surfaces);
   gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
   gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
@@ -382,7 +565,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
   parameters.march.y = view_depth;
-  picture.depth_done_ = inspect(picture, parameters, 1.0, picture.depth_row_, deadline);
+  picture.depth_done_ = inspect(picture, parameters, program, picture.depth_row_, deadline);
   return picture.depth_done_;
 }
 
@@ -395,7 +578,8 @@ void Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces&
                        gl::make_texture_2d(gl_, GL_RGBA32UI, width, height, what),
                        gl::make_texture_2d(gl_, GL_R32F, width, height, what)};
   make_shared_objects();
-  gl_->UseProgram(inspect_program(data, surfaces, "aovs.comp"));
+  const Program& program = inspect_program(data, surfaces, "aovs.comp");
+  gl_->UseProgram(program.object.name());
   bind(data, surfaces);
   gl_->BindImageTexture(0, facts.normal.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(1, facts.albedo.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
@@ -403,7 +587,8 @@ void Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces&
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
   std::uint32_t row = 0;
-  inspect(picture, parameters, rays_of_facts, row, Deadline::max());
+  while (!inspect(picture, parameters, program, row, Clock::now() + std::chrono::seconds(1))) {
+  }
   picture.facts_ = std::move(facts);
 }
 
@@ -445,14 +630,14 @@ float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, 
   p.march.y = view_depth;
   p.tile = {pixel, 1U, 1U};
   p.order = {0U, 1U, 0U, 1U};  // into the texture's one pixel
-  gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp"));
+  gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp").object.name());
   bind(data, surfaces);
   gl_->BindImageTexture(0, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(1, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
   gl_->BindImageTexture(2, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
   gl_->DispatchCompute(1, 1, 1);
-  gl_->MemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  gl::memory_barrier(*gl_, GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   float z = 0.0F;
   gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(z), &z);
   gl::check(*gl_, "picking");

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "gl/objects.hpp"
 #include "render/march_data.hpp"
+#include "render/pace.hpp"
 #include "render/parameters.hpp"
 #include "render/surface_data.hpp"
 #include "render/surface_raster.hpp"
@@ -49,8 +51,6 @@ enum class Layered {
 
 struct PictureSettings {
   View view = View::shaded;
-  /// What Tracer::trace will be given about: chooses the size of windows.
-  double budget_ms = 10.0;
   /// The first pass leaves the last few pixels, those with the longest paths, to the second.
   bool hasty = false;
   Layered layered = Layered::no;
@@ -68,11 +68,11 @@ constexpr std::size_t channels_of(PixelFact fact) {
 
 /// One accumulation under way.
 ///
-/// A tile is what paths are stored for; a window, some rows of it, is what one dispatch covers. Samples come in passes
-/// that end in every tile before the next begins (a picture of one tile has one pass); within a dispatch a lane runs a
-/// bounded number of steps and keeps its path for the next. Each pixel belongs to one lane at a time and adds its
-/// samples in order, and a sample that is begun anew ends the same: so the image depends on parameters and sample count
-/// alone, not on tiles, windows, budgets or timing.
+/// A tile is what paths are stored for; a dispatch covers some of its blocks, those that have something to do, and in
+/// it a lane runs a bounded number of rounds and keeps its path for the next. Samples come in passes that end in every
+/// tile before the next begins (a picture of one tile has one pass). Each pixel belongs to one lane at a time and adds
+/// its samples in order, and a sample that is begun anew ends the same: so the image depends on parameters and sample
+/// count alone, not on tiles, blocks, budgets or timing, nor on when it is known what a dispatch did.
 class Picture {
  public:
   [[nodiscard]] glm::uvec2 size() const { return size_; }
@@ -85,16 +85,20 @@ class Picture {
   /// Whether pixels without a sample may be left.
   [[nodiscard]] bool has_holes() const { return holes_; }
   [[nodiscard]] double progress() const;
-  /// Camera paths finished.
-  [[nodiscard]] std::uint64_t samples() const { return samples_; }
-  /// The surface pass that camera rays ended at: no one's where layered is no.
-  [[nodiscard]] const SurfaceLayers& layers() const { return layers_; }
+  /// Camera paths that are known to be finished.
+  [[nodiscard]] std::uint64_t samples() const { return samples_ ? *samples_ : 0; }
+  /// The surface pass that camera rays ended at. Not where layered is no.
+  [[nodiscard]] const SurfaceLayers& layers() const { return *layers_; }
   [[nodiscard]] Layered layered() const { return layered_; }
   [[nodiscard]] bool volume_alone() const { return volume_alone_; }
   /// Asks for this many samples, if that is more: goes on where it was.
   void extend(std::uint32_t samples);
   [[nodiscard]] GLuint sum() const { return sum_.name(); }
   [[nodiscard]] GLuint counts() const { return counts_.name(); }
+  /// Another with every picture that is begun.
+  [[nodiscard]] std::uint64_t begun() const { return begun_; }
+  /// Another with everything that was sent off to be added to it.
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// View depth z at half opacity, once Tracer::trace_depth is done; else 0.
   [[nodiscard]] GLuint volume_z() const { return depth_done_ ? volume_z_.name() : 0; }
   [[nodiscard]] std::uint64_t bytes() const;
@@ -106,10 +110,12 @@ class Picture {
   glm::uvec2 size_{0U};
   gl::Object sum_;
   gl::Object counts_;
+  std::uint64_t begun_ = 0;
+  std::uint64_t revision_ = 0;
   gl::Object volume_z_;
   gl::Object volume_sum_;
   bool volume_alone_ = false;
-  SurfaceLayers layers_;
+  std::shared_ptr<const SurfaceLayers> layers_;  // of Tracer::drawn_layers_
   Layered layered_ = Layered::no;
   unsigned traced_ = 0;  // 1: paths meet triangles; 2: and look for those that emit
   // Per-pixel facts of what is seen (aovs.comp), once made.
@@ -119,26 +125,19 @@ class Picture {
     gl::Object volume_z;
   };
   std::optional<Facts> facts_;
-  struct Window {
-    std::uint32_t first = 0;  // row of the tile
-    std::uint32_t end = 0;
-    std::uint32_t unfinished = 0;
-    std::uint32_t empty = 0;
-    bool begins = true;
-  };
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   void begin_tile();
-  void end_dispatch();
+  void end_tile();
 
   glm::uvec2 tile_size_{1U};
   glm::uvec2 tiles_{1U};
-  std::uint32_t window_rows_ = 8;
   std::uint32_t tile_ = 0;
-  std::vector<Window> windows_;  // of the tile under way
-  std::size_t window_ = 0;
+  std::shared_ptr<Blocks> blocks_;  // of the tile and pass under way
+  std::size_t block_ = 0;           // where the next dispatch looks for some
   std::uint32_t pass_target_ = 1;
-  std::uint64_t samples_ = 0;
+  std::shared_ptr<std::uint64_t> samples_;  // dispatches count them, even for a picture begun anew meanwhile
+  std::uint32_t view_row_ = 0;              // a debug view is made by rows
   bool hasty_ = false;
   std::uint32_t pass_ = 0;  // the one under way
   bool holes_ = true;
@@ -151,14 +150,16 @@ class Picture {
 /// Traces pictures by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
 class Tracer {
  public:
-  explicit Tracer(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  explicit Tracer(gl::FunctionsPtr gl) : gl_(gl), flights_(gl), rasters_(std::move(gl)) {}
 
   /// Starts a picture anew. parameters: camera, medium, lights, image; box and march fields are filled from data.
   /// Throws with the picture as it was, or not complete.
   void begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces,
              const PictureSettings& settings);
-  /// Traces until about the deadline. The last picture begun or traced goes on; another loses the paths under way.
-  /// until_complete: no further than every pixel's first sample. Returns whether every pixel has its target samples.
+  /// Traces until about the deadline, and returns with dispatches under way: no call but those that read waits for
+  /// them. No dispatch is sent that would likely end after the deadline, but for the first. The last picture begun or
+  /// traced goes on; another loses the paths under way. until_complete: no further than every pixel's first sample, if
+  /// that was not there before. Returns whether every pixel has its target samples.
   bool trace(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
              bool until_complete = false);
   /// Finds the depth at half opacity until about the deadline; returns whether it is there.
@@ -167,7 +168,8 @@ class Tracer {
   float pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
   /// A picture of one transparent pixel: what there is before the first.
   void clear(Picture& picture);
-  /// Draws the surface pass for a picture; begin does, and who shows one of clear's with the surfaces beneath.
+  /// Draws the surface pass for a picture, unless another picture has the same; begin does, and who shows one of
+  /// clear's with the surfaces beneath.
   void draw_layers(Picture& picture, const Surfaces& surfaces, const PictureSettings& settings);
 
   /// width * height * 4 floats: mean radiance without background, and alpha; (0,0) top left.
@@ -177,20 +179,47 @@ class Tracer {
   /// A fact a pixel (PixelFact), each channels_of(fact) floats. Finds them first, if need be.
   void read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
-  /// Camera paths a millisecond that this driver traced lately.
-  [[nodiscard]] double rate() const { return rate_; }
+  /// Waits for what is under way, so that all that is known of the picture is exact.
+  void settle(Picture& picture);
+  /// Every dispatch that ends is told; for tests.
+  void set_log(std::vector<DispatchRecord>* log) { log_ = log; }
   /// Pixels a millisecond that the surface pass drew lately.
   [[nodiscard]] double raster_rate() const { return raster_rate_; }
-  [[nodiscard]] std::uint64_t bytes() const { return paths_lanes_ * lane_bytes; }
+  [[nodiscard]] std::uint64_t bytes() const;
 
  private:
   static constexpr std::size_t lane_bytes = std::size_t{9} * 16;  // the last of it with surfaces only
-  void dispatch(Picture& picture, const Surfaces& surfaces, double aim_ms);
-  GLuint program(const MarchData& data, const char* name, std::span<const std::string> more);
-  GLuint trace_program(const Picture& picture, const MarchData& data);
-  GLuint inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name);
+  /// What a surface pass was drawn of and for: the same of the same.
+  struct LayersOf {
+    std::shared_ptr<const void> content;
+    SurfaceView view;
+    SurfaceLighting lighting;
+    glm::uvec2 size{0U};
+    unsigned layers = 0;
+    bool operator==(const LayersOf&) const = default;
+  };
+  struct DrawnLayers {
+    LayersOf of;
+    SurfaceLayers layers;
+  };
+  void drop_unused_layers();
+  struct Program {
+    gl::Object object;
+    std::shared_ptr<RoundCost> cost = std::make_shared<RoundCost>();
+  };
+  // What to dispatch: nothing if it is likely to take longer than the aim. anyway: the least, then.
+  static std::optional<Dispatched> choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
+                                          bool anyway);
+  void dispatch(Picture& picture, const Surfaces& surfaces, Dispatched what);
+  // Takes up what has ended.
+  void collect();
+  // Whether the surface pass is done, where a dispatch that reads it would wait for it.
+  bool layers_ready(Deadline deadline);
+  const Program& program(const MarchData& data, const char* name, std::span<const std::string> more);
+  const Program& trace_program(const Picture& picture, const MarchData& data);
+  const Program& inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name);
   // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
-  bool inspect(const Picture& picture, const core::CmParameters& parameters, double rays, std::uint32_t& row,
+  bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);
   void make_shared_objects();
   void allocate(Picture& picture, glm::uvec2 size) const;
@@ -199,14 +228,17 @@ class Tracer {
   void find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces);
 
   gl::FunctionsPtr gl_;
-  std::map<std::vector<std::string>, gl::Object> programs_;
+  std::uint64_t revision_ = 0;  // the newest of its pictures'
+  std::map<std::vector<std::string>, Program> programs_;
+  std::vector<std::shared_ptr<DrawnLayers>> drawn_layers_;  // pictures share them
   gl::Object paths_;
   std::size_t paths_lanes_ = 0;
-  gl::Object counter_;
+  gl::Object blocks_;  // what a dispatch covers, and what it did
   gl::Object uniforms_;
   gl::Object pick_;
-  double iterations_ = 16.0;
-  double rate_ = 1500.0;
+  Flights flights_;
+  Flights rasters_;
+  std::vector<DispatchRecord>* log_ = nullptr;
   double raster_rate_ = 2e4;
 };
 

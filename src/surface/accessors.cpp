@@ -81,10 +81,7 @@ std::size_t Accessors::count(int accessor, const std::string& what) const {
 
 std::span<const std::uint8_t> Accessors::view(int index, std::uint64_t offset, std::uint64_t size,
                                               const std::string& what) const {
-  if (index < 0 || static_cast<std::size_t>(index) >= file_.views.size()) {
-    malformed(what + ": there is no buffer view " + std::to_string(index));
-  }
-  const auto bytes = file_.views[static_cast<std::size_t>(index)];
+  const auto bytes = naming(what, [&] { return file_.view(index); });
   if (offset > bytes.size() || size > bytes.size() - offset) {
     malformed(what + " reaches beyond the " + std::to_string(bytes.size()) + " bytes of buffer view " +
               std::to_string(index));
@@ -98,6 +95,7 @@ Accessors::Layout Accessors::layout(const tinygltf::Accessor& accessor, const st
   if (reader(accessor.componentType) == nullptr || component_size == 0) {
     malformed(what + ": component type " + std::to_string(accessor.componentType) + " is none of glTF's");
   }
+  if (accessor.type < 0) malformed(what + " has a type of element that is none of glTF's");
   layout.components =
       static_cast<std::size_t>(tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type)));
   layout.size = layout.components * component_size;
@@ -148,6 +146,7 @@ void Accessors::each(const tinygltf::Accessor& accessor, const std::vector<std::
   }
   const std::size_t count = which != nullptr ? which->size() : accessor.count;
   for (std::size_t n = 0; n < count; ++n) {
+    budget_.check(n);
     const std::size_t i = which != nullptr ? (*which)[n] : n;
     const std::uint8_t* bytes = from.data == nullptr ? nullptr : from.data + i * from.stride;
     if (!replaced.empty()) {

@@ -656,7 +656,7 @@ std::vector<std::uint32_t> triangle_flags(const Scene& scene, const Pose& pose) 
     const Material& material = scene.materials[draw.material];
     std::uint32_t word = static_cast<std::uint32_t>(i) & TriangleFlags::user;
     if (material.alpha_mode != AlphaMode::opaque || material.transmission > 0.0F) word |= TriangleFlags::ask;
-    if (!material.double_sided) word |= TriangleFlags::one_sided;
+    if (!material.double_sided && !pose.double_sided) word |= TriangleFlags::one_sided;
     if (i < pose.flipped.size() && pose.flipped[i] != 0) word |= TriangleFlags::clockwise;
     const std::size_t first = draw.first_index / 3;
     for (std::size_t t = first; t < first + draw.index_count / 3; ++t) flags[t] = word;

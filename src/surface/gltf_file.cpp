@@ -55,15 +55,21 @@ void check_extensions(const json& root, const Log& log, const std::string& name)
   log.warning(name + ": drawn without " + one_line(list));
 }
 
-void check_version(const json& root) {
+/// glTF 2.x: a minor version adds what an older reader may leave out.
+bool of_version_2(const std::string& version) {
+  return version.size() > 2 && version.starts_with("2.") &&
+         std::all_of(version.begin() + 2, version.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+void check_version(const json& root, const Log& log, const std::string& name) {
   const auto asset = root.find("asset");
   if (asset == root.end() || !asset->contains("version")) malformed("asset.version is missing");
   const auto version = asset->at("version").get<std::string>();
   const auto oldest = asset->value("minVersion", std::string("2.0"));
-  if (!version.starts_with("2.") || oldest != "2.0") {
-    throw Error(ErrorCode::unsupported,
-                "is glTF " + one_line(version.starts_with("2.") ? oldest : version) + ", not 2.0");
+  for (const std::string& one : {version, oldest}) {
+    if (!of_version_2(one)) throw Error(ErrorCode::unsupported, "is glTF " + one_line(one) + ", not 2.0");
   }
+  if (oldest != "2.0") log.warning(name + ": is written for glTF " + one_line(oldest) + " and read as 2.0");
 }
 
 struct Container {
@@ -168,8 +174,8 @@ std::string decode_percent(std::string_view uri) {
 }
 
 /// Takes what tinygltf must not see out of the JSON, whose types are checked: bytes, which are loaded here with checks,
-/// and what it takes for errors: channels that name no node, indices in no buffer view, skins without matrices.
-/// What it is to have back is returned.
+/// and what it takes for errors: channels that name no node, indices in no buffer view, skins without matrices,
+/// accessors of types that are none of glTF's. What it is to have back is returned.
 struct SetAside {
   struct Indices {
     std::size_t mesh;
@@ -179,6 +185,7 @@ struct SetAside {
   json buffers = json::array();
   json images = json::array();
   std::vector<Indices> indices;
+  std::vector<std::size_t> untyped;  ///< accessors of a type that is none of glTF's
   std::size_t channels = 0;
 };
 
@@ -213,6 +220,15 @@ SetAside set_aside(json& root) {
         }
       }
       ++m;
+    }
+  }
+  if (accessors != root.end()) {
+    constexpr std::array types = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"};
+    for (std::size_t a = 0; a < accessors->size(); ++a) {
+      const auto type = accessors->at(a).find("type");
+      if (type == accessors->at(a).end() || std::ranges::find(types, type->get<std::string>()) != types.end()) continue;
+      aside.untyped.push_back(a);
+      *type = types[0];
     }
   }
   // Optional in glTF, not in tinygltf.
@@ -266,7 +282,8 @@ tinygltf::Model parse_model(const json& root) {
 
 class Loader {
  public:
-  Loader(GltfFile& file, Budget& budget, Progress* progress) : file_(file), budget_(budget), progress_(progress) {}
+  Loader(GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress)
+      : file_(file), log_(log), name_(name), budget_(budget), progress_(progress) {}
 
   void load_buffers(const json& buffers, std::optional<std::span<const std::uint8_t>> binary) {
     for (std::size_t i = 0; i < buffers.size(); ++i) {
@@ -276,24 +293,26 @@ class Loader {
       const auto length = buffer["byteLength"].get<std::uint64_t>();
       std::span<const std::uint8_t> bytes;
       if (buffer.contains("uri")) {
-        const auto uri = buffer["uri"].get<std::string>();
         try {
-          bytes = file_.storage.emplace_back(resolve_uri(uri, file_.folder, budget_));
+          bytes = file_.storage.emplace_back(resolve_uri(buffer["uri"].get<std::string>(), file_.folder, budget_));
         } catch (const Error& error) {
-          throw Error(error.code(), numbered("buffer", i) + ": " + error.what());
+          // An end of it for who reads it, if anybody does.
+          const std::string cause = numbered("buffer", i) + ": " + error.what();
+          log_.warning(name_ + ": " + cause);
+          buffers_.push_back({Missing{cause}, length});
+          continue;
         }
       } else if (i == 0 && binary) {
         bytes = *binary;
       } else {
-        // A place-holder of EXT_meshopt_compression; a view of it that is not compressed reaches beyond its end.
-        buffers_.emplace_back();
+        buffers_.push_back({NoData{}, length});  // as EXT_meshopt_compression's place-holders
         continue;
       }
       if (bytes.size() < length) {
         malformed(numbered("buffer", i) + " has " + std::to_string(bytes.size()) + " bytes, not " +
                   std::to_string(length));
       }
-      buffers_.push_back(bytes.first(length));
+      buffers_.push_back({bytes.first(length), length});
     }
   }
 
@@ -313,36 +332,68 @@ class Loader {
         return extension.Has(key) ? extension.Get(key).GetNumberAsDouble() : 0.0;
       };
       if (!extension.Has("buffer")) malformed(what + ": EXT_meshopt_compression names no buffer");
-      const auto from = part(static_cast<int>(number("buffer")), static_cast<std::uint64_t>(number("byteOffset")),
-                             static_cast<std::uint64_t>(number("byteLength")), what);
-      file_.views.emplace_back(file_.storage.emplace_back(decode_meshopt(extension, from, what, budget_)));
+      Data from = part(static_cast<int>(number("buffer")), static_cast<std::uint64_t>(number("byteOffset")),
+                       static_cast<std::uint64_t>(number("byteLength")), what);
+      if (const auto* bytes = std::get_if<Bytes>(&from)) {
+        from = file_.storage.emplace_back(decode_meshopt(extension, *bytes, what, budget_));
+      }
+      file_.views.push_back(std::move(from));
     }
   }
 
  private:
-  std::span<const std::uint8_t> part(int buffer, std::uint64_t offset, std::uint64_t length, const std::string& what) {
+  struct Buffer {
+    Data data;
+    std::uint64_t size = 0;  ///< as the file says
+  };
+
+  Data part(int buffer, std::uint64_t offset, std::uint64_t length, const std::string& what) {
     if (buffer < 0 || static_cast<std::size_t>(buffer) >= buffers_.size()) {
       malformed(what + ": there is no buffer " + std::to_string(buffer));
     }
-    const auto bytes = buffers_[static_cast<std::size_t>(buffer)];
-    if (offset > bytes.size() || length > bytes.size() - offset) {
-      malformed(what + " reaches beyond the " + std::to_string(bytes.size()) + " bytes of buffer " +
-                std::to_string(buffer));
+    const auto& [data, size] = buffers_[static_cast<std::size_t>(buffer)];
+    if (offset > size || length > size - offset) {
+      malformed(what + " reaches beyond the " + std::to_string(size) + " bytes of buffer " + std::to_string(buffer));
     }
-    return bytes.subspan(offset, length);
+    const auto* bytes = std::get_if<Bytes>(&data);
+    return bytes != nullptr ? Data(bytes->subspan(offset, length)) : data;
   }
 
   GltfFile& file_;
+  const Log& log_;
+  const std::string& name_;
   Budget& budget_;
   Progress* progress_;
-  std::vector<std::span<const std::uint8_t>> buffers_;
+  std::vector<Buffer> buffers_;
 };
 
 }  // namespace
 
 void malformed(const std::string& cause) { throw Error(ErrorCode::file, cause); }
 
+Bytes GltfFile::view(std::int64_t index) const {
+  if (index < 0 || static_cast<std::size_t>(index) >= views.size()) {
+    malformed("there is no buffer view " + std::to_string(index));
+  }
+  const Data& found = views[static_cast<std::size_t>(index)];
+  if (const auto* missing = std::get_if<Missing>(&found)) malformed(missing->cause);
+  if (std::holds_alternative<NoData>(found)) malformed("buffer view " + std::to_string(index) + " has no data");
+  return std::get<Bytes>(found);
+}
+
+bool GltfFile::without_data(int accessor) const {
+  if (accessor < 0 || static_cast<std::size_t>(accessor) >= model.accessors.size()) return false;
+  const tinygltf::Accessor& of = model.accessors[static_cast<std::size_t>(accessor)];
+  const auto empty = [this](int view) {
+    const auto at = static_cast<std::size_t>(view);
+    return view >= 0 && at < views.size() && std::holds_alternative<NoData>(views[at]);
+  };
+  const bool sparse = of.sparse.isSparse && (empty(of.sparse.indices.bufferView) || empty(of.sparse.values.bufferView));
+  return empty(of.bufferView) || sparse;
+}
+
 void Budget::take(std::uint64_t count, std::uint64_t size, std::string_view what) {
+  cumulet::check(progress_);
   if (size != 0 && count > left_ / size) {
     malformed(std::string(what) + " would need more than the " + std::to_string(limits_.memory >> 20U) +
               " MiB that a glTF file may take");
@@ -373,9 +424,11 @@ std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optiona
     const std::size_t comma = uri.find(',');
     if (comma == std::string::npos) malformed("a data URI has no data");
     const std::string_view head = std::string_view(uri).substr(0, comma);
-    if (!head.ends_with(";base64")) malformed("a data URI is not base64");
-    budget.take(uri.size() - comma, 1, "a data URI");
-    return decode_base64(std::string_view(uri).substr(comma + 1));
+    const std::string_view data = std::string_view(uri).substr(comma + 1);
+    budget.take(data.size(), 1, "a data URI");
+    if (head.ends_with(";base64")) return decode_base64(data);
+    const std::string plain = decode_percent(data);
+    return {plain.begin(), plain.end()};
   }
   const std::string text = decode_percent(uri);
   if (text.empty()) malformed("its URI is empty");
@@ -448,7 +501,7 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
   const Container container = unpack(file.storage.emplace_back(std::move(bytes)));
   json root = parse_json(container.json);
   check_schema(root);
-  check_version(root);
+  check_version(root, log, name);
   check_extensions(root, log, name);
   SetAside aside = set_aside(root);
   if (aside.channels > 0) {
@@ -464,7 +517,9 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
     file.model.meshes[mesh].primitives[primitive].indices = accessor;
   }
 
-  Loader loader(file, budget, progress);
+  for (const std::size_t accessor : aside.untyped) file.model.accessors.at(accessor).type = -1;
+
+  Loader loader(file, log, name, budget, progress);
   loader.load_buffers(aside.buffers, container.binary);
   loader.load_views();
   for (const json& image : aside.images) {

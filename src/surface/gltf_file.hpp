@@ -11,12 +11,13 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "base/one_line.hpp"
-#include "base/progress.hpp"
+#include "base/progress_part.hpp"
 #include "surface/gltf_import.hpp"
 
 namespace cumulet::surface::detail {
@@ -25,6 +26,15 @@ namespace cumulet::surface::detail {
 [[noreturn]] void malformed(const std::string& cause);
 /// A text of the file's or a library's as a part of one line, not too long.
 inline std::string one_line(std::string_view text) { return cumulet::one_line(text, 200); }
+/// What `body` gives; an Error of its gets "what: " in front.
+template <class Body>
+auto naming(const std::string& what, const Body& body) {
+  try {
+    return body();
+  } catch (const Error& error) {
+    throw Error(error.code(), what + ": " + error.what());
+  }
+}
 /// "node 3" and the like.
 inline std::string numbered(std::string_view what, std::size_t number) {
   return std::string(what) + " " + std::to_string(number);
@@ -33,16 +43,22 @@ inline std::string numbered(std::string_view what, std::size_t number) {
 /// What an import may still allocate. Counts in a file are checked against it before memory is asked for.
 class Budget {
  public:
-  explicit Budget(const GltfLimits& limits) : limits_(limits), left_(limits.memory) {}
+  Budget(const GltfLimits& limits, const Progress* progress)
+      : limits_(limits), left_(limits.memory), progress_(progress) {}
 
-  /// Throws if count * size bytes are too many.
+  /// Throws if count * size bytes are too many, and Error(cancelled): what takes memory takes time.
   void take(std::uint64_t count, std::uint64_t size, std::string_view what);
   [[nodiscard]] std::uint64_t left() const { return left_; }
   [[nodiscard]] const GltfLimits& limits() const { return limits_; }
+  /// For long loops: throws Error(cancelled) now and then.
+  void check(std::size_t turn) const {
+    if (turn % 16384 == 0) cumulet::check(progress_);
+  }
 
  private:
   GltfLimits limits_;
   std::uint64_t left_;
+  const Progress* progress_;
 };
 
 /// Where an image's bytes are: in a buffer view, in a data URI or in a file beside the glTF file.
@@ -52,14 +68,29 @@ struct ImageSource {
   std::int64_t view = -1;
 };
 
+using Bytes = std::span<const std::uint8_t>;
+/// Of a buffer that names no data, which is legal (glTF 2.0, 3.6.1): it is for others to fill.
+struct NoData {};
+/// Why data that a file names cannot be had.
+struct Missing {
+  std::string cause;
+};
+/// A buffer, or a buffer view, decompressed. What is not there matters to who reads it.
+using Data = std::variant<Bytes, NoData, Missing>;
+
 struct GltfFile {
   /// All but buffers and images, which stay empty. An index in it is -1 or at least 0, but not checked further.
   tinygltf::Model model;
-  std::vector<std::span<const std::uint8_t>> views;  ///< a buffer view each, decompressed
+  std::vector<Data> views;  ///< a buffer view each
   std::vector<ImageSource> images;
   std::optional<std::filesystem::path> folder;  ///< where files that it refers to are; none: nowhere
 
   std::deque<std::vector<std::uint8_t>> storage;  ///< what views point into
+
+  /// The bytes of a buffer view. Throws Error(file) if there is no such one, or if its buffer has no data.
+  [[nodiscard]] Bytes view(std::int64_t index) const;
+  /// Whether an accessor, if there is such a one, lies in a buffer that names no data.
+  [[nodiscard]] bool without_data(int accessor) const;
 };
 
 /// Bytes of a data URI, or of a file named by a URI relative to `folder`. Throws Error(file).

@@ -9,12 +9,16 @@
 #include "surface/gltf_import.hpp"
 #include "surface/materials.hpp"
 #include "surface/posable_scene.hpp"
+#include "surface/winding.hpp"
 
 namespace cumulet::surface {
 
 namespace detail {
 
 namespace {
+
+/// Of the area of closed shapes. No modeller means any: what lies within another is not counted.
+constexpr double most_inward = 0.25;
 
 /// Meshes, nodes and all else, put together.
 class Assembler {
@@ -27,6 +31,7 @@ class Assembler {
     scene_->rig = import_rig(file_, log_, name_, budget_, progress_, *scene_);
     plan();
     meshes();
+    look_at_winding();
     place();
     lights_and_cameras();
     remark();
@@ -38,12 +43,17 @@ class Assembler {
   /// Which meshes the displayed nodes show.
   void plan() {
     used_.resize(file_.model.meshes.size(), false);
+    std::vector<bool> displayed(scene_->rig.nodes.size(), false);
+    for (const std::uint32_t node : scene_->rig.displayed) displayed[node] = true;
     for (const std::uint32_t node : scene_->rig.displayed) {
       const tinygltf::Node& from = file_.model.nodes[node];
       if (from.mesh >= 0) used_[static_cast<std::size_t>(from.mesh)] = true;
       if (from.skin >= 0 && static_cast<std::size_t>(from.skin) >= scene_->rig.skins.size()) {
         malformed(numbered("node", node) + ": there is no skin " + std::to_string(from.skin));
       }
+      if (from.skin < 0) continue;
+      const auto& joints = scene_->rig.skins[static_cast<std::size_t>(from.skin)].joints;
+      if (std::ranges::any_of(joints, [&](std::uint32_t joint) { return !displayed[joint]; })) ++absent_joints_;
     }
   }
 
@@ -74,7 +84,11 @@ class Assembler {
     scene_->indices.reserve(indices);
     for_each_instance([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
       check(progress_);
-      const int skin = part.influences > 0 ? file_.model.nodes[node].skin : -1;
+      int skin = file_.model.nodes[node].skin;
+      if (skin >= 0 && part.influences == 0) {
+        ++remarks_.unbound;
+        skin = -1;
+      }
       if (skin >= 0) {
         const std::size_t joints = scene_->rig.skins[static_cast<std::size_t>(skin)].joints.size();
         if (part.joint_count > joints) {
@@ -120,6 +134,34 @@ class Assembler {
     }
   }
 
+  /// Whether closed shapes are seen from outside.
+  void look_at_winding() {
+    std::string some;
+    std::size_t count = 0;
+    for (std::size_t m = 0; m < parts_of_.size(); ++m) {
+      std::vector<glm::vec3> positions;
+      std::vector<std::uint32_t> indices;
+      for (const std::size_t place : parts_of_[m]) {
+        const MeshPart& part = scene_->parts[place];
+        if (scene_->materials[part.material].double_sided) continue;
+        budget_.take(part.indices.size(), 120, "the tables of a mesh");
+        const auto first = static_cast<std::uint32_t>(positions.size());
+        positions.insert(positions.end(), part.positions.begin(), part.positions.end());
+        for (const std::uint32_t index : part.indices) indices.push_back(first + index);
+      }
+      check(progress_);
+      const Winding winding = winding_of(positions, indices);
+      if (!(winding.inward > most_inward * winding.area)) continue;
+      if (++count > 3) continue;
+      const std::string called = one_line(file_.model.meshes[m].name);
+      some += (some.empty() ? "" : ", ") + numbered("mesh", m) + (called.empty() ? "" : " (" + called + ")");
+    }
+    if (count == 0) return;
+    if (count > 3) some += " and " + std::to_string(count - 3) + " more";
+    log_.warning(name_ + ": much of " + some + " faces into its closed shape, and is not seen from outside: " +
+                 "double_sided of the surface settings shows it");
+  }
+
   void remark() const {
     if (remarks_.not_triangles > 0) {
       log_.info(name_ + ": " + std::to_string(remarks_.not_triangles) +
@@ -131,6 +173,17 @@ class Assembler {
     if (remarks_.not_finite > 0) {
       log_.warning(name_ + ": " + std::to_string(remarks_.not_finite) +
                    " primitives have numbers that are not finite, taken as 0");
+    }
+    if (remarks_.without_data > 0) {
+      log_.warning(name_ + ": " + std::to_string(remarks_.without_data) +
+                   " primitives are not drawn: their buffer has no data");
+    }
+    if (remarks_.unbound > 0) {
+      log_.warning(name_ + ": " + std::to_string(remarks_.unbound) +
+                   " primitives have a skin and no joints, and stand still");
+    }
+    if (absent_joints_ > 0) {
+      log_.warning(name_ + ": " + std::to_string(absent_joints_) + " nodes have a skin whose joints are in no scene");
     }
     if (scene_->indices.empty()) log_.warning(name_ + ": has no triangles");
   }
@@ -144,6 +197,7 @@ class Assembler {
   std::vector<bool> used_;
   std::vector<std::vector<std::size_t>> parts_of_;
   MeshRemarks remarks_;
+  std::size_t absent_joints_ = 0;
 };
 
 }  // namespace
@@ -155,7 +209,7 @@ ScenePtr import_gltf(std::vector<std::uint8_t> bytes, const std::string& label,
                      const GltfLimits& limits) {
   const std::string name = cumulet::one_line(label, 4096);  // as long as paths are
   try {
-    detail::Budget budget(limits);
+    detail::Budget budget(limits, progress);
     const detail::GltfFile file = detail::parse_gltf(std::move(bytes), folder, log, name, budget, progress);
     return detail::Assembler(file, log, name, budget, progress).assemble();
   } catch (const Error& error) {
@@ -172,7 +226,7 @@ ScenePtr import_gltf(const std::string& path, const Log& log, Progress* progress
   std::vector<std::uint8_t> bytes;
   try {
     GltfLimits limits;
-    detail::Budget budget(limits);
+    detail::Budget budget(limits, progress);
     bytes = detail::read_file(path, budget);
   } catch (const Error& error) {
     throw Error(error.code(), path + ": " + error.what());

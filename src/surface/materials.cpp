@@ -237,12 +237,7 @@ class Materials {
   }
 
   Image load(const ImageSource& image) {
-    if (image.view >= 0) {
-      if (static_cast<std::size_t>(image.view) >= file_.views.size()) {
-        malformed("there is no buffer view " + std::to_string(image.view));
-      }
-      return decode_image(file_.views[static_cast<std::size_t>(image.view)], budget_);
-    }
+    if (image.view >= 0) return decode_image(file_.view(image.view), budget_);
     if (image.uri.empty()) malformed("it has neither a URI nor a buffer view");
     const std::vector<std::uint8_t> bytes = resolve_uri(image.uri, file_.folder, budget_);
     try {

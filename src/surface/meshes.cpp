@@ -81,6 +81,10 @@ class Primitive {
       ++remarks_.not_triangles;
       return std::nullopt;
     }
+    if (without_data()) {
+      ++remarks_.without_data;
+      return std::nullopt;
+    }
     decompress();
     part_.material = static_cast<std::uint32_t>(materials_.size() - 1);
     if (from_.material >= 0) {
@@ -102,6 +106,12 @@ class Primitive {
   }
 
  private:
+  [[nodiscard]] bool without_data() const {
+    const auto any = [this](const auto& attributes) {
+      return std::ranges::any_of(attributes, [this](const auto& a) { return file_.without_data(a.second); });
+    };
+    return file_.without_data(from_.indices) || any(from_.attributes) || std::ranges::any_of(from_.targets, any);
+  }
   [[nodiscard]] bool has(const std::string& attribute) const { return from_.attributes.contains(attribute); }
   [[nodiscard]] std::string label(const std::string& attribute) const { return what_ + ", " + attribute; }
 
@@ -112,9 +122,8 @@ class Primitive {
     if (!extension.Has("bufferView") || !extension.Has("attributes")) {
       malformed(what_ + ": KHR_draco_mesh_compression is malformed");
     }
-    const auto view = static_cast<std::size_t>(extension.Get("bufferView").GetNumberAsInt());
-    if (view >= file_.views.size()) malformed(what_ + ": there is no buffer view " + std::to_string(view));
-    draco_ = std::make_unique<DracoMesh>(file_.views[view], what_, budget_);
+    const auto compressed = naming(what_, [&] { return file_.view(extension.Get("bufferView").GetNumberAsInt()); });
+    draco_ = std::make_unique<DracoMesh>(compressed, what_, budget_);
     for (const auto& [name, id] : extension.Get("attributes").Get<tinygltf::Value::Object>()) {
       draco_ids_[name] = static_cast<std::uint32_t>(id.GetNumberAsInt());
     }
@@ -216,8 +225,8 @@ class Primitive {
     for (glm::vec2& uv : uvs) uv = map.transform * glm::vec3(uv, 1.0F);
     std::vector<std::uint32_t> origins;
     budget_.take(part_.indices.size(), 96, what_);  // of its tables
-    part_.tangents =
-        make_tangents(part_.indices, part_.positions, part_.flat ? flat_normals() : part_.normals, uvs, origins);
+    part_.tangents = make_tangents(part_.indices, part_.positions, part_.flat ? flat_normals() : part_.normals, uvs,
+                                   origins, [this](std::size_t turn) { budget_.check(turn); });
     for (const std::uint32_t origin : origins) {
       which_.push_back(which_[origin]);
       part_.positions.push_back(part_.positions[origin]);

@@ -2,6 +2,7 @@
 
 // Private to surface/: primitives as triangles, before they are posed.
 
+#include <functional>
 #include <glm/glm.hpp>
 
 #include "surface/accessors.hpp"
@@ -37,6 +38,8 @@ struct MeshRemarks {
   std::size_t not_triangles = 0;  ///< primitives of points and lines
   std::size_t incomplete = 0;     ///< primitives with indices left over
   std::size_t not_finite = 0;     ///< primitives with normals, tangents, coordinates or colours that are not
+  std::size_t without_data = 0;   ///< primitives in buffers that name no data
+  std::size_t unbound = 0;        ///< primitives under a node with a skin that no joint holds
 };
 
 /// All primitives of a mesh that draw triangles. Throws Error(file).
@@ -58,10 +61,11 @@ void make_unit(MeshPart& part);
 /// growing v, up in the image (glTF 2.0, 3.9.3). Vertices that agree in position, normal and coordinates count as one.
 /// One whose triangles are not all of the same side is split: indices of one side go to a copy, `origins` says of which
 /// vertex each copy is, and the tangents returned are those of all vertices, then of the copies. (As M. Mikkelsen's
-/// tangent space, which also tells apart triangles around a vertex that share no edge.)
-std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const std::vector<glm::vec3>& positions,
-                                     const std::vector<glm::vec3>& normals, const std::vector<glm::vec2>& uvs,
-                                     std::vector<std::uint32_t>& origins);
+/// tangent space, which also tells apart triangles around a vertex that share no edge.) check may throw.
+std::vector<glm::vec4> make_tangents(
+    std::vector<std::uint32_t>& indices, const std::vector<glm::vec3>& positions, const std::vector<glm::vec3>& normals,
+    const std::vector<glm::vec2>& uvs, std::vector<std::uint32_t>& origins,
+    const std::function<void(std::size_t turn)>& check = [](std::size_t) {});
 
 /// Unit, perpendicular to a unit vector.
 glm::vec3 any_perpendicular(const glm::vec3& normal);

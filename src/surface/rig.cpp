@@ -37,6 +37,13 @@ class Importer {
     display();
     for (std::size_t i = 0; i < model_.skins.size(); ++i) rig_.skins.push_back(skin(i));
     for (std::size_t i = 0; i < model_.animations.size(); ++i) animation(i);
+    if (unmatched_ > 0) {
+      log_.warning(name_ + ": " + std::to_string(unmatched_) + " nodes have not a weight a morph target");
+    }
+    if (without_data_ > 0) {
+      log_.warning(name_ + ": " + std::to_string(without_data_) +
+                   " skins and animation channels are as at rest: their buffer has no data");
+    }
     if (frozen_ > 0) {
       log_.warning(name_ + ": " + std::to_string(frozen_) +
                    " animation channels of nodes that have a matrix, or no morph targets, are ignored");
@@ -72,6 +79,7 @@ class Importer {
       for (const auto& primitive : mesh.primitives) targets = std::max(targets, primitive.targets.size());
       if (from.weights.empty()) weights = &mesh.weights;
     }
+    if (!weights->empty() && weights->size() != targets) ++unmatched_;
     budget_.take(targets, sizeof(float), what);
     to.weights.resize(targets, 0.0F);
     for (std::size_t t = 0; t < std::min(targets, weights->size()); ++t) to.weights[t] = narrow((*weights)[t]);
@@ -145,7 +153,9 @@ class Importer {
       }
       to.joints.push_back(static_cast<std::uint32_t>(joint));
     }
-    if (from.inverseBindMatrices >= 0) {
+    if (file_.without_data(from.inverseBindMatrices)) {
+      ++without_data_;
+    } else if (from.inverseBindMatrices >= 0) {
       to.inverse_bind = accessors_.matrices(from.inverseBindMatrices, what + ", inverseBindMatrices");
       if (to.inverse_bind.size() < to.joints.size()) {
         malformed(what + " has " + std::to_string(to.inverse_bind.size()) + " matrices for " +
@@ -212,6 +222,10 @@ class Importer {
     } else if (sampler.interpolation != "LINEAR") {
       malformed(what + ": interpolation \"" + one_line(sampler.interpolation) + "\" is none of glTF's");
     }
+    if (file_.without_data(sampler.input) || file_.without_data(sampler.output)) {
+      ++without_data_;
+      return std::nullopt;
+    }
     to.times = accessors_.scalars(sampler.input, what + ", input");
     for (std::size_t k = 0; k < to.times.size(); ++k) {
       if (!std::isfinite(to.times[k]) || to.times[k] < 0.0F || (k > 0 && to.times[k] < to.times[k - 1])) {
@@ -256,6 +270,8 @@ class Importer {
   Scene& scene_;
   Accessors accessors_;
   Rig rig_;
+  std::size_t unmatched_ = 0;
+  std::size_t without_data_ = 0;
   std::size_t frozen_ = 0;
 };
 

@@ -132,6 +132,7 @@ struct Pose {
   double time = 0.0;
   std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
   std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
+  bool double_sided = false;          ///< all materials count as double sided, whatever they say
   std::vector<PunctualLight> lights;
   std::vector<SceneCamera> cameras;
   glm::dvec3 low{0.0};  ///< bounds of all triangles

@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <unordered_map>
 
 #include "surface/meshes.hpp"
@@ -21,19 +23,56 @@ struct Corner {
   }
 };
 
-struct CornerHash {
-  std::size_t operator()(const Corner& corner) const {
-    std::uint64_t hash = 0xCBF29CE484222325U;
-    for (const float value : {corner.position.x, corner.position.y, corner.position.z, corner.normal.x, corner.normal.y,
-                              corner.normal.z, corner.uv.x, corner.uv.y, corner.side}) {
-      std::uint32_t bits = 0;
-      const float plain = value + 0.0F;  // -0 is 0
-      std::memcpy(&bits, &plain, sizeof bits);
-      hash = (hash ^ bits) * 0x100000001B3U;
-      hash ^= hash >> 29U;
-    }
-    return hash;
+std::size_t hash_of(const Corner& corner) {
+  std::uint64_t hash = 0xCBF29CE484222325U;
+  for (const float value : {corner.position.x, corner.position.y, corner.position.z, corner.normal.x, corner.normal.y,
+                            corner.normal.z, corner.uv.x, corner.uv.y, corner.side}) {
+    std::uint32_t bits = 0;
+    const float plain = value + 0.0F;  // -0 is 0
+    std::memcpy(&bits, &plain, sizeof bits);
+    hash = (hash ^ bits) * 0x100000001B3U;
+    hash ^= hash >> 29U;
   }
+  return hash;
+}
+
+/// Vectors by corner. Its tables are as large from the beginning as they can become, and freed at once: a map of a node
+/// a corner takes a second to grow and to free, in which nobody can cancel.
+class Sums {
+ public:
+  /// For at most so many corners.
+  explicit Sums(std::size_t corners) : slots_(std::bit_ceil(2 * corners + 1), none) {}
+
+  glm::vec3& operator[](const Corner& corner) {
+    std::uint32_t& slot = slots_[place(corner)];
+    if (slot == none) {
+      slot = static_cast<std::uint32_t>(entries_.size());
+      entries_.push_back({corner, glm::vec3(0.0F)});
+    }
+    return entries_[slot].sum;
+  }
+  /// Null if there is none.
+  [[nodiscard]] const glm::vec3* find(const Corner& corner) const {
+    const std::uint32_t slot = slots_[place(corner)];
+    return slot == none ? nullptr : &entries_[slot].sum;
+  }
+
+ private:
+  struct Entry {
+    Corner corner;
+    glm::vec3 sum;
+  };
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  [[nodiscard]] std::size_t place(const Corner& corner) const {
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t at = hash_of(corner) & mask;
+    while (slots_[at] != none && !(entries_[slots_[at]].corner == corner)) at = (at + 1) & mask;
+    return at;
+  }
+
+  std::vector<std::uint32_t> slots_;
+  std::vector<Entry> entries_;
 };
 
 float angle_between(const glm::vec3& a, const glm::vec3& b) {
@@ -50,13 +89,15 @@ glm::vec3 any_perpendicular(const glm::vec3& normal) {
 
 std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const std::vector<glm::vec3>& positions,
                                      const std::vector<glm::vec3>& normals, const std::vector<glm::vec2>& uvs,
-                                     std::vector<std::uint32_t>& origins) {
+                                     std::vector<std::uint32_t>& origins,
+                                     const std::function<void(std::size_t turn)>& check) {
   struct Face {
     glm::vec3 direction{0.0F};
     float side = 0.0F;  ///< 0: no area in texture space
   };
   std::vector<Face> faces(indices.size() / 3);
   for (std::size_t f = 0; f < faces.size(); ++f) {
+    check(f);
     const std::uint32_t* v = &indices[3 * f];
     const glm::vec3 p1 = positions[v[1]] - positions[v[0]];
     const glm::vec3 p2 = positions[v[2]] - positions[v[0]];
@@ -70,11 +111,12 @@ std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const 
   }
 
   // Sums of what counts as one vertex, by side.
-  std::unordered_map<Corner, glm::vec3, CornerHash> sums;
+  Sums sums(std::min(2 * positions.size(), indices.size()));
   const auto corner = [&](std::uint32_t vertex, float side) {
     return Corner{positions[vertex], normals[vertex], uvs[vertex], side};
   };
   for (std::size_t f = 0; f < faces.size(); ++f) {
+    check(f);
     if (faces[f].side == 0.0F) continue;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t v = indices[3 * f + k];
@@ -99,6 +141,7 @@ std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const 
     }
   }
   for (std::size_t f = 0; f < faces.size(); ++f) {
+    check(f);
     for (std::size_t k = 0; k < 3; ++k) {
       std::uint32_t& v = indices[3 * f + k];
       if (faces[f].side == 0.0F || sides[v] == faces[f].side) continue;
@@ -110,13 +153,14 @@ std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const 
 
   std::vector<glm::vec4> tangents(count + origins.size());
   for (std::size_t v = 0; v < tangents.size(); ++v) {
+    check(v);
     const bool copy = v >= count;
     const std::uint32_t original = copy ? origins[v - count] : static_cast<std::uint32_t>(v);
     const float first = sides[original] == 0.0F ? 1.0F : sides[original];
     const float side = copy ? -first : first;
-    const auto found = sums.find(corner(original, side));
-    const float length = found == sums.end() ? 0.0F : glm::length(found->second);
-    const glm::vec3 direction = length > 0.0F ? found->second / length : any_perpendicular(normals[original]);
+    const glm::vec3* found = sums.find(corner(original, side));
+    const float length = found == nullptr ? 0.0F : glm::length(*found);
+    const glm::vec3 direction = length > 0.0F ? *found / length : any_perpendicular(normals[original]);
     // glTF's v grows downwards in the image, its bitangent cross(n, t) * w upwards.
     tangents[v] = glm::vec4(direction, -side);
   }

@@ -7,39 +7,45 @@
 
 namespace cumulet::viewer {
 
-void Builder::replace(Worker::Job job, std::weak_ptr<Load> load) {
-  const std::scoped_lock lock(mutex_);
-  load_ = std::move(load);
-  // A result that nobody took is of an older wish.
-  built_.reset();
-  worker_.replace(std::move(job));
+VolumePtr VolumeFile::read(const Log& log, Progress* progress) const {
+  volume::ScalarVolume volume = volume::import_volume(path, grid_name, log, progress);
+  volume.index_to_world = to_world * volume.index_to_world;
+  try {
+    return std::make_shared<const VolumeAsset>(std::move(volume), progress);
+  } catch (const Error& e) {
+    if (e.code() == ErrorCode::cancelled) throw;
+    throw Error(e.code(), path + ": " + e.what());
+  }
 }
 
-void Builder::load(const std::string& path, std::string grid_name, std::optional<BuildSettings> settings) {
+void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings) {
   const auto load = std::make_shared<Load>(Load{settings});
-  replace({path, Progress::Stage::loading,
-           [this, path, grid_name = std::move(grid_name), load](Progress& progress) {
-             Stopwatch watch;
-             const auto volume =
-                 std::make_shared<const VolumeAsset>(volume::import_volume(path, grid_name, log_, &progress));
-             const double seconds = watch.lap();
-             {
-               const std::scoped_lock lock(mutex_);
-               progress.check();
-               loaded_ = volume;
-               load->open = false;
-             }
-             // Closed: nobody else changes it now.
-             if (load->settings) build_of(volume, *load->settings, seconds, progress);
-           }},
-          load);
+  const std::scoped_lock lock(mutex_);
+  load_ = load;
+  worker_.replace({file.path, Progress::Stage::loading,
+                   [this, file, load](Progress& progress) {
+                     Stopwatch watch;
+                     const VolumePtr volume = file.read(log_, &progress);
+                     const double seconds = watch.lap();
+                     {
+                       const std::scoped_lock handing(mutex_);
+                       progress.check();
+                       loaded_ = volume;
+                       load->open = false;
+                     }
+                     // Closed: nobody else changes it now.
+                     if (load->settings) build_of(volume, *load->settings, seconds, progress);
+                   },
+                   true});
 }
 
 void Builder::build(VolumePtr volume, const BuildSettings& settings) {
-  replace(
-      {"building the grid", Progress::Stage::refining,
-       [this, volume = std::move(volume), settings](Progress& progress) { build_of(volume, settings, 0.0, progress); }},
-      {});
+  const std::scoped_lock lock(mutex_);
+  load_.reset();  // in place of a load that waits
+  worker_.post({"building the grid", Progress::Stage::refining,
+                [this, volume = std::move(volume), settings](Progress& progress) {
+                  build_of(volume, settings, 0.0, progress);
+                }});
 }
 
 void Builder::cancel() {
@@ -48,6 +54,14 @@ void Builder::cancel() {
     load_.reset();  // what it stops soon takes no other settings
   }
   worker_.cancel();
+}
+
+void Builder::cancel_loads() {
+  {
+    const std::scoped_lock lock(mutex_);
+    load_.reset();
+  }
+  worker_.cancel_loads();
 }
 
 bool Builder::configure_load(const std::optional<BuildSettings>& settings) {

@@ -18,6 +18,16 @@
 
 namespace cumulet::viewer {
 
+/// One grid of a file, and where it stands.
+struct VolumeFile {
+  std::string path;
+  std::string grid_name;
+  glm::dmat4 to_world{1.0};  ///< affine, from the file's own world space
+
+  /// Throws what import_volume and VolumeAsset throw.
+  [[nodiscard]] VolumePtr read(const Log& log, Progress* progress) const;
+};
+
 /// What a march is made with.
 struct BuildSettings {
   render::March march = render::March::tet;
@@ -42,20 +52,25 @@ struct Built {
   BuildSeconds seconds;
 };
 
-/// Loads volumes and builds what marches need on a thread of its own, one job at a time; the newest wish wins. All
-/// calls are safe from any thread.
+/// Loads volumes and builds what marches need on a thread of its own, one job at a time. The newest wish wins, and none
+/// starves: a build under way is finished first, and of loads under way at least every second, so that volumes and
+/// settings that change faster than they build are seen as often as they can be. What it holds is bounded: one job
+/// under way, one that waits, one result. All calls are safe from any thread.
 class Builder {
  public:
   /// notify: called on the worker after a job ended.
   Builder(Log log, std::function<void()> notify) : log_(log), worker_(std::move(notify)) {}
 
-  /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way.
-  void load(const std::string& path, std::string grid_name, std::optional<BuildSettings> settings);
-  /// Builds of this volume. Replaces what is under way.
+  /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way, as Worker::replace()
+  /// does: another file is another subject, and files may take minutes.
+  void load(const VolumeFile& file, std::optional<BuildSettings> settings);
+  /// Builds of this volume, after what is under way.
   void build(VolumePtr volume, const BuildSettings& settings);
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
   void cancel();
+  /// Loads alone: another volume is there.
+  void cancel_loads();
 
   /// The newest volume that was read, once.
   std::optional<VolumePtr> take_loaded();
@@ -74,7 +89,6 @@ class Builder {
     std::optional<BuildSettings> settings;
     bool open = true;
   };
-  void replace(Worker::Job job, std::weak_ptr<Load> load);
   void build_of(const VolumePtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress);
   Built make(const VolumePtr& volume, const BuildSettings& settings, Progress& progress) const;
 

@@ -19,8 +19,8 @@ namespace render = cumulet::render;
 
 template <class Call>
 cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
-  // Not even the message may be touched from inside the callback: another thread may be in a call.
-  if (viewer == nullptr || viewer->viewer->in_update_callback()) return CUMULET_ERROR_INVALID_ARGUMENT;
+  // Not even the message may be touched from inside a callback: another thread may be in a call.
+  if (viewer == nullptr || cumulet::CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
   return cumulet::c_abi::guarded(viewer->last_error, [&] { call(*viewer->viewer); });
 }
 
@@ -111,9 +111,9 @@ uint32_t cumulet_version(void) {
 }
 
 cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** out, char* error, size_t error_size) {
+  if (out != nullptr) *out = nullptr;
   return cumulet::c_abi::guarded(error, error_size, [&] {
     if (out == nullptr) refuse("out is NULL");
-    *out = nullptr;
     const cumulet_create_desc d = read_desc(desc, "cumulet_create_desc");
     require(number(d.gl_state) <= CUMULET_GL_STATE_HOST_RESETS, "cumulet_create_desc.gl_state is unknown");
     // The two level enums have the same values; the callback is wrapped by its type alone.
@@ -129,11 +129,12 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
 }
 
 void cumulet_destroy(cumulet_viewer* viewer) {
-  if (viewer == nullptr || viewer->viewer->in_update_callback()) return;
+  if (cumulet::CallbackScope::inside()) return;
   delete viewer;
 }
 
 const char* cumulet_last_error(const cumulet_viewer* viewer) {
+  if (cumulet::CallbackScope::inside()) return inside_callback;
   return viewer == nullptr ? "viewer is NULL" : viewer->last_error.c_str();
 }
 
@@ -157,8 +158,12 @@ cumulet_status cumulet_context_lost(cumulet_viewer* viewer) {
 cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
-    v.load_volume(path, grid_name == nullptr ? "" : grid_name);
+    v.load_volume({path, grid_name == nullptr ? "" : grid_name});
   });
+}
+
+cumulet_status cumulet_load_volume_file(cumulet_viewer* viewer, const cumulet_volume_file_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) { v.load_volume(to_volume_file(desc)); });
 }
 
 cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume) {
@@ -289,7 +294,9 @@ cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer, const cumule
     require(number(d.light) <= CUMULET_SURFACE_LIGHT_NONE, "cumulet_surface_settings_desc.light is unknown");
     require(d.indirect_roughness >= 0.0F && d.indirect_roughness <= 1.0F,
             "cumulet_surface_settings_desc.indirect_roughness is not from 0 to 1");
-    v.set_surface_settings({{d.time, d.animation}, static_cast<core::SurfaceLight>(d.light), d.indirect_roughness});
+    require(d.double_sided == 0 || d.double_sided == 1, "cumulet_surface_settings_desc.double_sided is not 0 or 1");
+    v.set_surface_settings(
+        {{d.time, d.animation, d.double_sided == 1}, static_cast<core::SurfaceLight>(d.light), d.indirect_roughness});
   });
 }
 

@@ -67,7 +67,8 @@ template <class Handle, class Call>
 cumulet_status on(Handle* camera, Call&& call) noexcept {
   return guarded(nullptr, 0, [&] {
     require(camera != nullptr, "the camera is NULL");
-    call(*camera->camera);
+    const auto kept = camera->camera;  // the callbacks of this call may release the handle
+    call(*kept);
   });
 }
 

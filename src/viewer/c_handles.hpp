@@ -5,6 +5,7 @@
 #include <atomic>
 #include <memory>
 
+#include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
@@ -29,6 +30,9 @@ struct cumulet_camera {
 
 namespace cumulet::c_abi {
 
+/// A host's descriptor, checked.
+viewer::VolumeFile to_volume_file(const cumulet_volume_file_desc* desc);
+
 // Counted handles, of an asset each.
 
 template <class Handle>
@@ -45,9 +49,9 @@ void release(Handle* handle) {
 /// Hands the caller what make gives, or null and why not.
 template <class Handle, class Make>
 cumulet_status make_handle(Handle** out, char* error, size_t error_size, Make&& make) noexcept {
+  if (out != nullptr) *out = nullptr;
   return guarded(error, error_size, [&] {
     require(out != nullptr, "out is NULL");
-    *out = nullptr;
     auto handle = std::make_unique<Handle>();
     handle->asset = make();
     *out = handle.release();

@@ -10,10 +10,13 @@
 #include <new>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
+#include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "cumulet/cumulet.h"
+#include "viewer/c_fields.hpp"
 
 namespace cumulet::c_abi {
 
@@ -70,16 +73,22 @@ cumulet_status guarded(std::string& message, Call&& call) noexcept {
 }
 
 /// Copies text into a fixed buffer, cut to fit and zero-terminated.
-inline void copy_text(const std::string& text, char* to, size_t size) {
+inline void copy_text(std::string_view text, char* to, size_t size) {
   if (to == nullptr || size == 0) return;
   const size_t length = std::min(text.size(), size - 1);
   std::memcpy(to, text.data(), length);
   to[length] = '\0';
 }
 
+inline constexpr const char* inside_callback = "called from inside a callback";
+
 /// The same for calls that tell their cause in the caller's buffer.
 template <class Call>
 cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
+  if (CallbackScope::inside()) {
+    copy_text(inside_callback, error, error_size);
+    return CUMULET_ERROR_INVALID_ARGUMENT;
+  }
   std::string message;
   const cumulet_status status = guarded(message, std::forward<Call>(call));
   copy_text(message, error, error_size);
@@ -92,15 +101,17 @@ inline void require(bool condition, const char* what) {
   if (!condition) refuse(what);
 }
 
-/// A host built against an older header passes a shorter struct: what it lacks is zero.
+/// A host built against an older header passes a shorter struct: what it lacks is zero. A longer one is refused: nobody
+/// here knows whether what it asks for besides may be left undone.
 template <class Desc>
 Desc read_desc(const Desc* desc, const char* name) {
   if (desc == nullptr) refuse(std::string(name) + " is NULL");
-  if (desc->struct_size < sizeof(size_t) || desc->struct_size > sizeof(Desc)) {
+  const size_t bytes = bytes_of_fields<Desc>(desc->struct_size);
+  if (bytes == 0) {
     refuse(std::string(name) + ".struct_size is " + std::to_string(desc->struct_size) + ", not sizeof(" + name + ")");
   }
   Desc copy{};
-  std::memcpy(&copy, desc, desc->struct_size);
+  std::memcpy(&copy, desc, bytes);
   return copy;
 }
 
@@ -109,7 +120,7 @@ template <class Desc>
 void write_desc(Desc* out, Desc value, const char* name) {
   read_desc(out, name);
   value.struct_size = out->struct_size;
-  std::memcpy(out, &value, value.struct_size);
+  std::memcpy(out, &value, bytes_of_fields<Desc>(out->struct_size));
 }
 
 /// The number in an enum that a C host filled: reading it as the enum would be undefined where it is not one of its

@@ -1,11 +1,20 @@
 // Volumes of the C ABI.
 
+#include <algorithm>
+#include <optional>
+
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
+#include "volume/inspection.hpp"
 #include "volume/memory.hpp"
 
 using namespace cumulet;
 using namespace cumulet::c_abi;
+
+struct cumulet_inspection {
+  explicit cumulet_inspection(const char* path) : file(path) {}
+  volume::Inspection file;
+};
 
 namespace {
 
@@ -19,12 +28,27 @@ viewer::VolumePtr asset_of(const std::string& name, volume::ScalarVolume volume)
 
 }  // namespace
 
+viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
+  const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
+  require(d.path != nullptr && *d.path != '\0', "path is NULL or empty");
+  require(all_finite(d.to_world), "to_world is not finite");
+  const glm::dmat4 m = matrix_or_identity(d.to_world);
+  require(m[0].w == 0.0 && m[1].w == 0.0 && m[2].w == 0.0 && m[3].w == 1.0, "to_world is not affine");
+  return {d.path, d.grid_name == nullptr ? "" : d.grid_name, m};
+}
+
 cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out, char* error,
                                    size_t error_size) {
-  return make_handle(out, error, error_size, [&] {
-    require(path != nullptr, "path is NULL");
-    return asset_of(path, volume::import_volume(path, grid_name == nullptr ? "" : grid_name, {}));
-  });
+  cumulet_volume_file_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.path = path;
+  desc.grid_name = grid_name;
+  return cumulet_volume_open_file(&desc, out, error, error_size);
+}
+
+cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out, char* error,
+                                        size_t error_size) {
+  return make_handle(out, error, error_size, [&] { return to_volume_file(desc).read({}, nullptr); });
 }
 
 cumulet_status cumulet_volume_from_dense(const cumulet_dense_desc* desc, cumulet_volume** out, char* error,
@@ -79,7 +103,19 @@ cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_vol
       out.bounds_max[axis] = asset.bounds().max[axis];
     }
     out.max_value = asset.volume().max_value;
+    out.negative_voxels = asset.volume().negative_voxels;
+    out.non_finite_voxels = asset.volume().non_finite_voxels;
     write_desc(info, out, "cumulet_volume_info");
+  });
+}
+
+cumulet_status cumulet_volume_suggest_density_scale(const cumulet_volume* volume, double* scale) {
+  return guarded(nullptr, 0, [&] {
+    require(volume != nullptr, "volume is NULL");
+    require(scale != nullptr, "scale is NULL");
+    const std::optional<double> suggested = volume->asset->coarse().suggest_density_scale();
+    require(suggested.has_value(), "the volume shows nothing");
+    *scale = *suggested;
   });
 }
 
@@ -90,5 +126,90 @@ cumulet_status cumulet_list_grids(const char* path, cumulet_grid_fn fn, void* us
     for (const volume::GridInfo& grid : volume::list_grids(path)) {
       fn(user, grid.unique_name.c_str(), grid.type.c_str(), grid.refusal.c_str());
     }
+  });
+}
+
+// ---- inspection ----
+
+cumulet_status cumulet_inspect_volume_file(const char* path, cumulet_inspection** out, char* error, size_t error_size) {
+  return guarded(error, error_size, [&] {
+    require(out != nullptr, "out is NULL");
+    *out = nullptr;
+    require(path != nullptr, "path is NULL");
+    *out = new cumulet_inspection(path);
+  });
+}
+
+void cumulet_inspection_release(cumulet_inspection* inspection) { delete inspection; }
+
+cumulet_status cumulet_inspection_get_file(const cumulet_inspection* inspection, cumulet_volume_file_info* info) {
+  return guarded(nullptr, 0, [&] {
+    require(inspection != nullptr, "inspection is NULL");
+    const volume::Inspection& file = inspection->file;
+    cumulet_volume_file_info out{};
+    out.format = file.format().c_str();
+    out.bytes = file.bytes();
+    out.grid_count = static_cast<uint32_t>(file.grids().size());
+    out.metadata_count = static_cast<uint32_t>(file.metadata().size());
+    out.default_grid = file.chosen() ? static_cast<int32_t>(*file.chosen()) : -1;
+    write_desc(info, out, "cumulet_volume_file_info");
+  });
+}
+
+cumulet_status cumulet_inspection_get_grid(cumulet_inspection* inspection, uint32_t grid, cumulet_grid_info* info) {
+  return guarded(nullptr, 0, [&] {
+    require(inspection != nullptr, "inspection is NULL");
+    volume::Inspection& file = inspection->file;
+    require(grid < file.grids().size(), "there is no such grid");
+    read_desc(info, "cumulet_grid_info");
+    const volume::GridInfo& entry = file.grids()[grid];
+    const volume::GridFacts& facts = file.facts(grid);
+    cumulet_grid_info out{};
+    out.name = entry.unique_name.c_str();
+    out.type = entry.type.c_str();
+    out.grid_class = entry.grid_class.c_str();
+    out.refusal = facts.refusal.c_str();
+    out.metadata_count = static_cast<uint32_t>(entry.metadata.size());
+    if (facts.values) {
+      const volume::GridValues& values = *facts.values;
+      out.values = entry.values == volume::Values::scalars ? CUMULET_GRID_VALUES_SCALARS : CUMULET_GRID_VALUES_LENGTHS;
+      for (int i = 0; i < 16; ++i) out.index_to_world[i] = values.index_to_world[i / 4][i % 4];
+      out.active_voxels = values.active_voxels;
+      const viewer::Bounds box = values.active_voxels > 0
+                                     ? viewer::world_bounds(values.bounds_min, values.bounds_max, values.index_to_world)
+                                     : viewer::Bounds{};
+      for (int axis = 0; axis < 3; ++axis) {
+        out.voxel_min[axis] = values.bounds_min[axis];
+        out.voxel_max[axis] = values.bounds_max[axis];
+        out.bounds_min[axis] = box.min[axis];
+        out.bounds_max[axis] = box.max[axis];
+      }
+      out.min_value = values.min;
+      out.max_value = values.max;
+      out.mean_value = values.mean;
+      out.negative_voxels = values.negative_voxels;
+      out.non_finite_voxels = values.non_finite_voxels;
+      out.memory_bytes = values.memory_bytes;
+      static_assert(volume::histogram_bins == CUMULET_HISTOGRAM_BINS);
+      std::copy(values.histogram.begin(), values.histogram.end(), out.histogram);
+    }
+    write_desc(info, out, "cumulet_grid_info");
+  });
+}
+
+cumulet_status cumulet_inspection_get_metadata(const cumulet_inspection* inspection, int32_t grid, uint32_t index,
+                                               cumulet_metadata* out) {
+  return guarded(nullptr, 0, [&] {
+    require(inspection != nullptr, "inspection is NULL");
+    const volume::Inspection& file = inspection->file;
+    require(grid >= -1 && grid < static_cast<int64_t>(file.grids().size()), "there is no such grid");
+    const auto& entries = grid < 0 ? file.metadata() : file.grids()[static_cast<size_t>(grid)].metadata;
+    require(index < entries.size(), "there is no such entry");
+    const volume::Metadata& entry = entries[index];
+    cumulet_metadata found{};
+    found.name = entry.name.c_str();
+    found.type = entry.type.c_str();
+    found.value = entry.value.c_str();
+    write_desc(out, found, "cumulet_metadata");
   });
 }

@@ -16,16 +16,17 @@ SurfaceAsset::Rest SurfaceAsset::rest() const {
   return *rest_;
 }
 
-SurfacePtr SurfaceAsset::posed(SurfaceMoment moment, Progress& progress) const {
+SurfacePtr SurfaceAsset::posed(SurfaceChoice choice, Progress& progress) const {
   const auto lock = patient_lock(mutex_, progress);
   SurfacePtr last = newest_.lock();
-  if (last && newest_moment_ == moment) return last;
+  if (last && newest_choice_ == choice) return last;
   progress.check();
-  surface::Pose pose = scene_->pose(moment.time, moment.animation);
+  surface::Pose pose = scene_->pose(choice.time, choice.animation);
+  pose.double_sided = choice.double_sided;
   SurfacePtr made = last ? render::make_surface_source(*last, std::move(pose), &progress)
                          : render::make_surface_source(scene_, std::move(pose), &progress);
   newest_ = made;
-  newest_moment_ = moment;
+  newest_choice_ = choice;
   return made;
 }
 

@@ -15,11 +15,12 @@ namespace cumulet::viewer {
 
 using SurfacePtr = std::shared_ptr<const render::SurfaceSource>;
 
-/// Which moment of which animation.
-struct SurfaceMoment {
+/// What of an asset a viewer shows.
+struct SurfaceChoice {
   double time = 0.0;  // seconds
   std::uint32_t animation = 0;
-  bool operator==(const SurfaceMoment&) const = default;
+  bool double_sided = false;  // all of its materials
+  bool operator==(const SurfaceChoice&) const = default;
 };
 
 /// A scene and what is made of it once, however many viewers show it. Immutable to its users; any thread.
@@ -38,9 +39,9 @@ class SurfaceAsset {
   };
   /// Poses the scene when it is first asked.
   [[nodiscard]] Rest rest() const;
-  /// The scene at a moment. If a viewer holds it at that moment already, the same; if at another, a refit of that.
+  /// The scene as chosen. If a viewer holds just that already, the same; if another choice, a refit of it.
   /// Throws Error(cancelled).
-  [[nodiscard]] SurfacePtr posed(SurfaceMoment moment, Progress& progress) const;
+  [[nodiscard]] SurfacePtr posed(SurfaceChoice choice, Progress& progress) const;
 
  private:
   surface::ScenePtr scene_;
@@ -49,7 +50,7 @@ class SurfaceAsset {
   mutable std::optional<Rest> rest_;
   mutable std::mutex mutex_;
   mutable std::weak_ptr<const render::SurfaceSource> newest_;  // as long as somebody shows it
-  mutable SurfaceMoment newest_moment_;
+  mutable SurfaceChoice newest_choice_;
 };
 
 using SurfaceAssetPtr = std::shared_ptr<const SurfaceAsset>;

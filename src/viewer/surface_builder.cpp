@@ -2,31 +2,30 @@
 
 namespace cumulet::viewer {
 
-void SurfaceBuilder::load(const std::string& path, SurfaceMoment moment) {
-  const auto load = std::make_shared<Load>(Load{moment});
+void SurfaceBuilder::load(const std::string& path, SurfaceChoice choice) {
+  const auto load = std::make_shared<Load>(Load{choice});
   const std::scoped_lock lock(mutex_);
   load_ = load;
-  result_.reset();
   worker_.replace(
-      {path, Progress::Stage::loading, [this, path, load](Progress& progress) { read(path, *load, progress); }});
+      {path, Progress::Stage::loading, [this, path, load](Progress& progress) { read(path, *load, progress); }, true});
 }
 
 void SurfaceBuilder::read(const std::string& path, Load& load, Progress& progress) {
   const auto asset = std::make_shared<const SurfaceAsset>(surface::import_gltf(path, log_, &progress), path);
   SurfacePtr made;
-  SurfaceMoment moment;
+  SurfaceChoice choice;
   for (;;) {
     {
       const std::scoped_lock lock(mutex_);
       progress.check();
-      if (made && moment == load.moment) {
+      if (made && choice == load.choice) {
         load.open = false;
         result_ = {asset, std::move(made)};
         return;
       }
-      moment = load.moment;
+      choice = load.choice;
     }
-    made = asset->posed(moment, progress);
+    made = asset->posed(choice, progress);
   }
 }
 
@@ -38,20 +37,30 @@ void SurfaceBuilder::cancel() {
   worker_.cancel();
 }
 
-bool SurfaceBuilder::configure_load(SurfaceMoment moment) {
+void SurfaceBuilder::cancel_loads() {
+  {
+    const std::scoped_lock lock(mutex_);
+    load_.reset();
+  }
+  worker_.cancel_loads();
+}
+
+bool SurfaceBuilder::configure_load(SurfaceChoice choice) {
   const std::scoped_lock lock(mutex_);
   const auto load = load_.lock();
   if (!load || !load->open) return false;
-  load->moment = moment;
+  load->choice = choice;
   return true;
 }
 
-void SurfaceBuilder::pose(SurfaceAssetPtr asset, SurfaceMoment moment) {
+void SurfaceBuilder::pose(SurfaceAssetPtr asset, SurfaceChoice choice) {
   worker_.post(
-      {"posing the surfaces", Progress::Stage::loading, [this, asset = std::move(asset), moment](Progress& progress) {
-         PosedSurfaces made{asset, asset->posed(moment, progress)};
+      {"posing the surfaces", Progress::Stage::loading, [this, asset = std::move(asset), choice](Progress& progress) {
+         PosedSurfaces made{nullptr, asset->posed(choice, progress)};
          const std::scoped_lock lock(mutex_);
          progress.check();
+         // What a load read, and nobody has taken yet, stays what was read.
+         if (result_) made.asset = std::move(result_->asset);
          result_ = std::move(made);
        }});
 }

@@ -15,25 +15,28 @@
 
 namespace cumulet::viewer {
 
-/// A scene, and what is shown of it.
+/// What there is to show.
 struct PosedSurfaces {
-  SurfaceAssetPtr asset;
+  SurfaceAssetPtr asset;  ///< if it was read from a file, which
   SurfacePtr source;
 };
 
-/// Reads glTF scenes and poses them on a thread of its own; the newest wish wins. All calls are safe from any thread.
+/// Reads glTF scenes and poses them on a thread of its own. The newest wish wins, and none starves, as Builder has it.
+/// All calls are safe from any thread.
 class SurfaceBuilder {
  public:
   /// notify: called on the worker after a job ended.
   SurfaceBuilder(Log log, std::function<void()> notify) : log_(log), worker_(std::move(notify)) {}
 
-  /// Reads a file, then poses it. Replaces what is under way.
-  void load(const std::string& path, SurfaceMoment moment);
-  /// Another moment for a load under way. Returns false if there is none: then take what it made, and call pose.
-  bool configure_load(SurfaceMoment moment);
-  /// Poses a scene, after the pose under way: a moment that takes long is shown before the next.
-  void pose(SurfaceAssetPtr asset, SurfaceMoment moment);
+  /// Reads a file, then poses it. Replaces what is under way, as Worker::replace() does.
+  void load(const std::string& path, SurfaceChoice choice);
+  /// Another choice for a load under way. Returns false if there is none: then take what it made, and call pose.
+  bool configure_load(SurfaceChoice choice);
+  /// Poses a scene, after the pose under way: a pose that takes long is shown before the next.
+  void pose(SurfaceAssetPtr asset, SurfaceChoice choice);
   void cancel();
+  /// Loads alone: other surfaces are there.
+  void cancel_loads();
   /// The newest result, once.
   std::optional<PosedSurfaces> take();
   /// Whether there is work under way, or a result that nobody took.
@@ -45,7 +48,7 @@ class SurfaceBuilder {
  private:
   // What a load will be posed at: open until it is.
   struct Load {
-    SurfaceMoment moment;
+    SurfaceChoice choice;
     bool open = true;
   };
   void read(const std::string& path, Load& load, Progress& progress);

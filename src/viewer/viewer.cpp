@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
@@ -17,6 +18,9 @@ namespace {
 
 using glm::dvec3;
 using Clock = std::chrono::steady_clock;
+
+// Of a frame's budget.
+constexpr double most_of_drawing = 0.5;
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
@@ -31,9 +35,20 @@ render::Deadline deadline_after(double milliseconds) {
                             std::chrono::duration<double, std::milli>(std::clamp(milliseconds, 0.0, 1e9)));
 }
 
-render::PictureTextures textures_of(const render::Picture& picture, const render::HostDepth& host) {
-  render::PictureTextures textures{picture.sum(), picture.counts(), picture.size(), picture.has_holes(),
-                                   picture.volume_z()};
+render::PictureTextures textures_of(const render::Picture& picture, const render::Picture* before,
+                                    const render::HostDepth& host) {
+  render::PictureTextures textures;
+  textures.sum = picture.sum();
+  textures.counts = picture.counts();
+  textures.size = picture.size();
+  textures.holes = picture.has_holes();
+  textures.volume_z = picture.volume_z();
+  textures.picture = picture.begun();
+  textures.revision = picture.revision();
+  if (before != nullptr) {
+    textures.sum_before = before->sum();
+    textures.counts_before = before->counts();
+  }
   if (picture.layered() == render::Layered::beneath) {
     textures.beneath = &picture.layers();
     textures.host_z = host.texture();
@@ -65,6 +80,7 @@ class TransientFramebuffer {
 
 Viewer::Gl::Gl(gl::FunctionsPtr gl)
     : functions(std::move(gl)),
+      group(functions),
       limits(gl::query_limits(*functions)),
       progressive(functions),
       compositor(functions),
@@ -83,7 +99,10 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state)
   set_camera(std::make_shared<Camera>());
 }
 
-Viewer::~Viewer() = default;
+Viewer::~Viewer() {
+  // Without a context nothing can be deleted, and in a stranger's the names are of other objects.
+  if (gl_ && !gl_->group.is_current()) context_lost();
+}
 
 // ---- context ----
 
@@ -104,6 +123,11 @@ void Viewer::attach(GetProc get_proc, void* user) {
 void Viewer::detach() {
   if (!gl_) return;
   const gl::FunctionsPtr functions = gl_->functions;
+  if (gl::was_reset(*functions)) {
+    context_lost();
+    return;
+  }
+  gl_->group.require();
   gl_.reset();
   gl::clear_errors(*functions);
 }
@@ -120,7 +144,12 @@ void Viewer::with_gl(Body&& body) {
   try {
     gl::clear_errors(*functions);
     gl::check_reset(*functions);
+    g.group.require();  // before anything is begun that could not be undone
     const gl::StateGuard guard(*functions, restore_state_);
+    if (!g.knows_dispatches) {
+      gl::find_out_dispatches(functions);
+      g.knows_dispatches = true;
+    }
     body(g);
   } catch (const Error& error) {
     // Whatever failed: in a lost context everything does.
@@ -136,19 +165,8 @@ void Viewer::with_gl(Body&& body) {
 
 void Viewer::notify() {
   if (!update_ || update_pending_.exchange(true)) return;
-  const auto self = std::this_thread::get_id();
-  {
-    const std::scoped_lock lock(callback_mutex_);
-    callback_threads_.push_back(self);
-  }
+  const CallbackScope inside;
   update_();
-  const std::scoped_lock lock(callback_mutex_);
-  callback_threads_.erase(std::ranges::find(callback_threads_, self));
-}
-
-bool Viewer::in_update_callback() const {
-  const std::scoped_lock lock(callback_mutex_);
-  return std::ranges::find(callback_threads_, std::this_thread::get_id()) != callback_threads_.end();
 }
 
 void Viewer::touch() {
@@ -172,7 +190,7 @@ void Viewer::sync() {
     built_ = std::move(*built);
   }
   if (auto surfaces = surface_builder_.take()) {
-    surface_asset_ = std::move(surfaces->asset);
+    if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
     surface_source_ = std::move(surfaces->source);
   }
 }
@@ -194,14 +212,18 @@ void Viewer::request_build() {
   if (volume_ && settings) builder_.build(volume_, *settings);
 }
 
-void Viewer::load_volume(const std::string& path, const std::string& grid_name) {
+void Viewer::load_volume(const VolumeFile& file) {
   sync();
-  builder_.load(path, grid_name, grid_.camera_adaptive ? std::nullopt : build_settings());
+  builder_.load(file, grid_.camera_adaptive ? std::nullopt : build_settings());
   touch();
 }
 
 void Viewer::set_volume(VolumePtr volume) {
-  builder_.cancel();
+  if (volume) {
+    builder_.cancel_loads();  // builds go on: a host may set volumes faster than they build
+  } else {
+    builder_.cancel();
+  }
   sync();
   volume_ = std::move(volume);
   built_view_.reset();
@@ -230,7 +252,7 @@ void Viewer::cancel() {
 
 void Viewer::load_surfaces(const std::string& path) {
   sync();
-  surface_builder_.load(path, surface_settings_.moment);
+  surface_builder_.load(path, surface_settings_.choice);
   touch();
 }
 
@@ -243,11 +265,15 @@ void Viewer::show_surfaces(SurfacePtr surfaces) {
 }
 
 void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
-  surface_builder_.cancel();
+  if (surfaces) {
+    surface_builder_.cancel_loads();  // poses go on: a host may set surfaces faster than they are posed
+  } else {
+    surface_builder_.cancel();
+  }
   sync();
   surface_asset_ = std::move(surfaces);
   if (surface_asset_) {
-    surface_builder_.pose(surface_asset_, surface_settings_.moment);
+    surface_builder_.pose(surface_asset_, surface_settings_.choice);
   } else {
     surface_source_ = nullptr;
   }
@@ -260,9 +286,9 @@ SurfaceAssetPtr Viewer::surfaces_asset() {
 }
 
 void Viewer::set_surface_settings(const SurfaceSettings& settings) {
-  if (settings.moment != surface_settings_.moment && !surface_builder_.configure_load(settings.moment)) {
+  if (settings.choice != surface_settings_.choice && !surface_builder_.configure_load(settings.choice)) {
     sync();
-    if (surface_asset_) surface_builder_.pose(surface_asset_, settings.moment);
+    if (surface_asset_) surface_builder_.pose(surface_asset_, settings.choice);
   }
   surface_settings_ = settings;
   touch();
@@ -281,9 +307,12 @@ void Viewer::use_surface_camera(std::size_t index) {
   CameraPose pose = camera_->pose();
   pose.eye = eye;
   // What it looks at, to orbit about: as far as the middle of the scene.
-  const Bounds all = bounds();
-  const double distance = glm::dot(0.5 * (all.min + all.max) - eye, forward);
-  pose.target = eye + forward * std::max(distance, 1e-3 * glm::length(all.max - all.min) + 1e-12);
+  double distance = 1.0;
+  if (const auto all = box()) {
+    distance =
+        std::max(glm::dot(0.5 * (all->min + all->max) - eye, forward), 1e-3 * glm::length(all->max - all->min) + 1e-12);
+  }
+  pose.target = eye + forward * distance;
   pose.up = glm::normalize(dvec3(seen.to_world[1]));
   pose.orthographic_height = seen.orthographic ? seen.height : 0.0;
   if (!seen.orthographic) pose.fovy_degrees = glm::degrees(seen.vertical_fov);
@@ -369,7 +398,7 @@ void Viewer::frame_all() { camera_->frame(bounds(), frame_size_.y > 0 ? double(f
 
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
-  if (volume_) box = volume_->bounds();
+  if (volume_ && !volume_->volume().empty()) box = volume_->bounds();
   if (surface_source_ && surface_source_->scene->triangle_count() > 0) {
     const surface::Pose& pose = surface_source_->pose;
     box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};
@@ -463,16 +492,18 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   const auto box = this->box();
   navigation_.advance(std::min(since, 0.25), *camera_, box);
 
-  // Where nothing is left to see, the last picture goes as well.
-  if (!box) built_ = {};
+  // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
+  const bool scene = volume_ || surface_source_;
+  if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume.
-  if (!volume_ && box && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
+  if (!volume_ && scene && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   last_view_ = view_;
   view_.reset();
-  // Without anything to see the camera may wait for its bounds.
-  if (frame_size_.x > 0 && frame_size_.y > 0 && box) view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
+  // Without a scene the camera may wait for its bounds.
+  if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
+    view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
 
   if (grid_.camera_adaptive && view_ && volume_ && (view_ != built_view_ || frame_size_ != built_size_)) {
     const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
@@ -528,6 +559,12 @@ void Viewer::upload_surfaces(Gl& g) {
   g.surfaces = std::make_unique<render::SurfaceData>(g.functions, g.limits, *surface_source_, last.get());
 }
 
+bool Viewer::wants_upload() const {
+  const Gl& g = gl();
+  const bool failed = g.upload_source == built_.source && g.upload_revision == settings_revision_;
+  return g.data_source != built_.source && !failed;
+}
+
 void Viewer::upload(Gl& g, render::Deadline deadline) {
   if (!built_.source) {
     if (g.data) {
@@ -538,28 +575,30 @@ void Viewer::upload(Gl& g, render::Deadline deadline) {
     g.data_source.reset();
     g.upload_source.reset();
     g.upload.reset();
-  } else if (g.data_source != built_.source) {
-    Stopwatch watch;
-    try {
-      const bool failed = g.upload_source == built_.source && !g.upload;
-      if (g.upload_source != built_.source || (failed && g.upload_revision != settings_revision_)) {
-        g.upload.reset();
-        g.upload_source = built_.source;
-        g.upload_revision = settings_revision_;
-        g.upload = std::make_unique<render::MarchUpload>(g.functions, g.limits, built_.source, page_texels_);
-        built_.seconds.upload = 0.0;
-      }
-      if (g.upload && g.upload->advance(deadline)) {
+  } else {
+    // What is under way goes on to its end, though there may be something newer by now: that is next. Begun anew with
+    // each, an upload that takes longer than a build would never end.
+    while (g.upload || wants_upload()) {
+      Stopwatch watch;
+      try {
+        if (!g.upload) {
+          g.upload_source = built_.source;
+          g.upload_revision = settings_revision_;
+          built_.seconds.upload = 0.0;
+          g.upload = std::make_unique<render::MarchUpload>(g.functions, g.limits, built_.source, page_texels_);
+        }
+        const bool done = g.upload->advance(deadline);
+        if (g.upload_source == built_.source) built_.seconds.upload += watch.lap();
+        if (!done) break;
         g.data = g.upload->take();
-        g.data_source = built_.source;
+        g.data_source = g.upload_source;
         g.upload.reset();
         ++generation_;
+      } catch (const Error&) {
+        g.upload.reset();  // upload_source stays: tried again when there is another, or a setting changes
+        throw;
       }
-    } catch (const Error&) {
-      g.upload.reset();  // upload_source stays: tried again when there is another, or a setting changes
-      throw;
     }
-    built_.seconds.upload += watch.lap();
   }
   upload_progress_ = g.upload ? g.upload->progress() : 1.0;
 }
@@ -655,7 +694,8 @@ void Viewer::draw_surfaces_alone(const Frame& frame) {
   if (g.empty.sum() == 0 || (!able && g.empty.layered() != render::Layered::no)) tracer.clear(g.empty);
   if (!able || frame.budget_ms < 0.0) return;
   g.alone_failed = settings_revision_;  // unless it succeeds
-  tracer.draw_layers(g.empty, surfaces(), render::Progressive::quick_layers(tracer, frame_size_, frame.budget_ms));
+  tracer.draw_layers(g.empty, surfaces(),
+                     render::Progressive::quick_layers(tracer, frame_size_, frame.budget_ms, view_ == last_view_));
   g.alone_failed = 0;
 }
 
@@ -685,7 +725,9 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
     target.depth_b = view_->depth_b;
     target.reversed = view_->orthographic ? view_->depth_b < 0.0 : view_->depth_b > 0.0;
   }
-  const render::PictureTextures picture = textures_of(*shown, g.host_depth);
+  render::PictureTextures picture =
+      textures_of(*shown, shown == &g.empty ? nullptr : g.progressive.before(), g.host_depth);
+  picture.may_lag = !shown->done();
   if (frame.target == Target::framebuffer) {
     g.compositor.draw(picture, display, target);
     return;
@@ -725,7 +767,9 @@ FrameResult Viewer::render(const Frame& frame) {
         gl::clear_errors(*g.functions);
       }
     };
-    const render::Deadline deadline = deadline_after(frame.budget_ms);
+    // What drawing will take is the budget's, too.
+    const render::Deadline deadline =
+        deadline_after(frame.budget_ms - std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms));
     attempt([&] { prepare(frame, deadline); });
     if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
     attempt([&] { draw_surfaces_alone(frame); });
@@ -735,10 +779,11 @@ FrameResult Viewer::render(const Frame& frame) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;
     };
     result.failed = failed(builder_.status()) || failed(surface_builder_.status());
-    result.converged = !result.loading && g.data && view_ && g.progressive.converged();
+    const bool pending = g.host_depth.pending() || (draws(frame) && g.compositor.lags());
+    result.converged = !result.loading && g.data && view_ && !pending && g.progressive.converged();
     const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
-    result.more =
-        navigation_.moving() || g.upload != nullptr || waits_to_build || (g.data && view_ && g.progressive.more());
+    result.more = navigation_.moving() || g.upload != nullptr || waits_to_build ||
+                  (g.data && view_ && (pending || g.progressive.more()));
     result.progress = g.progressive.progress();
     result.preview = result.size != glm::uvec2(0U) && result.size != frame_size_;
   });
@@ -764,6 +809,7 @@ Pick Viewer::pick(double x, double y) {
 }
 
 render::Picture& Viewer::readable() {
+  gl().progressive.settle();
   render::Picture* picture = gl().progressive.newest();
   if (picture == nullptr) throw Error(ErrorCode::invalid_argument, "nothing has been rendered yet");
   return *picture;
@@ -786,7 +832,7 @@ void Viewer::read_means(Gl& g, const render::Picture& picture, float* rgba) {
   target.viewport = {0, 0, size};
   target.flip_y = true;  // the first row is the top
   target.blend_over = false;
-  g.compositor.draw(textures_of(picture, g.host_depth), display, target);
+  g.compositor.draw(textures_of(picture, nullptr, g.host_depth), display, target);
   g.functions->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
   gl::check(*g.functions, "reading the picture back");
 }

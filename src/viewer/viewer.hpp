@@ -6,14 +6,12 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
-#include <vector>
 
 #include "base/log.hpp"
 #include "gl/objects.hpp"
+#include "gl/share_group.hpp"
 #include "render/compositor.hpp"
 #include "render/host_depth.hpp"
 #include "render/progressive.hpp"
@@ -47,7 +45,7 @@ struct Light {
 enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
 
 struct SurfaceSettings {
-  SurfaceMoment moment;
+  SurfaceChoice choice;
   SurfaceLight light = SurfaceLight::full;
   float indirect_roughness = 0.0F;
 };
@@ -151,7 +149,7 @@ class Viewer {
   void context_lost();
   [[nodiscard]] bool attached() const { return gl_ != nullptr; }
 
-  void load_volume(const std::string& path, const std::string& grid_name);
+  void load_volume(const VolumeFile& file);
   void set_volume(VolumePtr volume);
   /// The newest volume; null if there is none.
   VolumePtr volume();
@@ -196,11 +194,11 @@ class Viewer {
 
   /// Tells the host that there is something new. Coalesced; any thread.
   void notify();
-  /// Whether the calling thread is inside the update callback.
-  [[nodiscard]] bool in_update_callback() const;
 
   /// What the shaders were told of the picture under way; for tests.
   const core::CmParameters& trace_parameters();
+  /// Where every dispatch of paths that ends is told, or null; for tests.
+  void set_dispatch_log(std::vector<render::DispatchRecord>* log) { gl().progressive.tracer().set_log(log); }
   /// Pages of cell records end after so many texels; 0: at the driver's limit; for tests.
   void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
 
@@ -209,8 +207,10 @@ class Viewer {
   struct Gl {
     explicit Gl(gl::FunctionsPtr gl);
     gl::FunctionsPtr functions;
+    gl::ShareGroup group;
     gl::Limits limits;
     GlStrings strings;
+    bool knows_dispatches = false;
     render::Progressive progressive;
     render::Compositor compositor;
     render::HostDepth host_depth;
@@ -256,6 +256,8 @@ class Viewer {
   void draw(const Frame& frame, FrameResult& result);
   void make_target_textures(Gl& g, const Frame& frame) const;
   void upload(Gl& g, render::Deadline deadline);
+  // Of the newest, which is not in GL and did not fail to get there.
+  [[nodiscard]] bool wants_upload() const;
   void upload_surfaces(Gl& g);
   [[nodiscard]] std::optional<Bounds> box() const;
   VolumePtr empty_volume();
@@ -267,8 +269,6 @@ class Viewer {
   Log log_;
   std::function<void()> update_;
   std::atomic<bool> update_pending_ = false;
-  mutable std::mutex callback_mutex_;
-  std::vector<std::thread::id> callback_threads_;
   std::atomic<double> upload_progress_ = 1.0;
   bool restore_state_;
   std::int64_t page_texels_ = 0;

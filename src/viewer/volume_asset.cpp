@@ -7,17 +7,10 @@
 
 namespace cumulet::viewer {
 
-VolumeAsset::VolumeAsset(volume::ScalarVolume volume) : volume_(std::move(volume)) {
+VolumeAsset::VolumeAsset(volume::ScalarVolume volume, const Progress* progress)
+    : volume_(std::move(volume)), coarse_(volume_, progress) {
   grid::fit_cube(volume_);
-  for (int corner = 0; corner < 8; ++corner) {
-    glm::dvec3 p(volume_.bounds_min);
-    for (int axis = 0; axis < 3; ++axis) {
-      p[axis] = ((corner >> axis) & 1) != 0 ? volume_.bounds_max[axis] + 0.5 : volume_.bounds_min[axis] - 0.5;
-    }
-    const glm::dvec3 world(volume_.index_to_world * glm::dvec4(p, 1.0));
-    bounds_.min = corner == 0 ? world : glm::min(bounds_.min, world);
-    bounds_.max = corner == 0 ? world : glm::max(bounds_.max, world);
-  }
+  bounds_ = world_bounds(volume_.bounds_min, volume_.bounds_max, volume_.index_to_world);
 }
 
 std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progress, double& seconds) const {

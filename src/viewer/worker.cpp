@@ -26,7 +26,7 @@ Worker::~Worker() {
   {
     const std::scoped_lock lock(mutex_);
     stopping_ = true;
-    if (current_) current_->cancel();
+    if (current_) current_->progress->cancel();
   }
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
@@ -37,27 +37,32 @@ void Worker::take(Job job, bool replaces) {
   {
     const std::scoped_lock lock(mutex_);
     if (!thread_.joinable()) thread_ = std::thread([this] { run(); });  // may throw: before anything has changed
-    if (replaces && current_) current_->cancel();
+    if (replaces && current_ && !current_->spared) {
+      current_->replaced = true;
+      current_->progress->cancel();
+    }
     old = std::exchange(next_, std::move(job));
     failure_.reset();
   }
   changed_.notify_all();
 }
 
-void Worker::cancel() {
+void Worker::end_jobs(bool loads_only) {
   std::optional<Job> old;
   {
     const std::scoped_lock lock(mutex_);
-    if (next_) failure_ = Error(ErrorCode::cancelled, "cancelled");
-    old = std::exchange(next_, std::nullopt);
-    if (current_) current_->cancel();
+    if (next_ && (next_->load || !loads_only)) {
+      failure_ = Error(ErrorCode::cancelled, "cancelled");
+      old = std::exchange(next_, std::nullopt);
+    }
+    if (current_ && (current_->load || !loads_only)) current_->progress->cancel();
   }
   changed_.notify_all();
 }
 
 bool Worker::busy() const {
   const std::scoped_lock lock(mutex_);
-  return next_ || current_;
+  return next_ || current_.has_value();
 }
 
 Worker::Status Worker::status() const {
@@ -67,8 +72,8 @@ Worker::Status Worker::status() const {
   if (next_) {
     status.stage = next_->stage;
   } else if (current_) {
-    status.stage = current_->stage();
-    status.fraction = current_->fraction();
+    status.stage = current_->progress->stage();
+    status.fraction = current_->progress->fraction();
   }
   return status;
 }
@@ -89,11 +94,12 @@ void Worker::run() {
     std::optional<Job> job = std::exchange(next_, std::nullopt);
     const auto progress = std::make_shared<Progress>();
     progress->begin(job->stage);
-    current_ = progress;
+    current_ = Current{progress, job->load, last_was_replaced_, false};
     lock.unlock();
     std::optional<Error> failure = failure_of(*job, *progress);
     job.reset();
     lock.lock();
+    last_was_replaced_ = current_->replaced;
     current_.reset();
     // A newer wish makes how this one ended old news.
     if (!next_) failure_ = std::move(failure);

@@ -24,6 +24,7 @@ class Worker {
     /// Throws if it fails. Nobody sees how a job ended that a newer one replaced: what it hands over it should hand
     /// over after a last progress.check(), under the lock that its owner holds around replace().
     std::function<void(Progress&)> work;
+    bool load = false;  ///< reads a file: see cancel_loads()
   };
 
   struct Status {
@@ -39,12 +40,17 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// In place of a job that waits; the one under way goes on to its end.
+  /// In place of a job that waits; the one under way goes on to its end. For jobs that each make a picture of their
+  /// own: however fast wishes come, what is under way is shown, and then the newest. None starves, and at most one
+  /// job's time is spent on what nobody wants any more.
   void post(Job job) { take(std::move(job), false); }
-  /// In place of a job that waits and of the one under way, which is cancelled.
+  /// In place of a job that waits and of the one under way, which is cancelled, unless the job before it was so as
+  /// well: whoever chose wrongly need not wait, but of a stream of wishes at least every second is finished.
   void replace(Job job) { take(std::move(job), true); }
   /// Ends both, soon, with ErrorCode::cancelled.
-  void cancel();
+  void cancel() { end_jobs(false); }
+  /// The same of those that read a file.
+  void cancel_loads() { end_jobs(true); }
 
   /// Whether a job waits or is under way.
   [[nodiscard]] bool busy() const;
@@ -53,14 +59,23 @@ class Worker {
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
 
  private:
+  // A job under way, and why it ends.
+  struct Current {
+    std::shared_ptr<Progress> progress;
+    bool load = false;
+    bool spared = false;  // by replace(): the one before was cancelled for it
+    bool replaced = false;
+  };
   void take(Job job, bool replaces);
+  void end_jobs(bool loads_only);
   void run();
 
   std::function<void()> notify_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Job> next_;
-  std::shared_ptr<Progress> current_;  // of the job under way
+  std::optional<Current> current_;
+  bool last_was_replaced_ = false;
   std::optional<Error> failure_;
   bool stopping_ = false;
   std::thread thread_;  // last: it uses all of the above

@@ -40,7 +40,9 @@ namespace {
 constexpr int max_extent = 1 << 20;
 constexpr int max_coordinate = 1 << 30;
 
-std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress) {
+}  // namespace
+
+std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress* progress) {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
@@ -64,6 +66,8 @@ std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progre
   fail("is not a VDB or NanoVDB file");
 }
 
+namespace {
+
 std::string describe(const GridInfo& entry) {
   return "\"" + entry.unique_name + "\" (" + entry.type + ", " + entry.grid_class + ")";
 }
@@ -74,7 +78,31 @@ std::string describe(const std::vector<GridInfo>& grids, const std::vector<std::
   return out;
 }
 
-std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name) {
+// What is shown of a file without a grid called density, the first of these first, in whatever case.
+constexpr std::array likely_names = {"density", "smoke", "soot", "flames", "flame", "fire", "temperature", "heat"};
+
+std::string lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+/// What a message says of a choice that nobody made; empty where it needs no word.
+std::string remark_on_choice(const std::vector<GridInfo>& grids, const std::string& name, std::size_t chosen) {
+  std::vector<std::size_t> others;
+  bool one_density = lower_case(grids[chosen].name) == "density";
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (i == chosen || !grids[i].refusal.empty()) continue;
+    others.push_back(i);
+    one_density = one_density && grids[i].name != grids[chosen].name;
+  }
+  if (!name.empty() || others.empty() || one_density) return {};
+  return "shows its grid " + describe(grids[chosen]) + "; there is also " + describe(grids, others);
+}
+
+}  // namespace
+
+std::size_t detail::choose_grid(const std::vector<GridInfo>& grids, const std::string& name) {
   if (grids.empty()) fail("holds no grids");
   std::vector<std::size_t> all(grids.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
@@ -104,36 +132,19 @@ std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& n
     if (found.empty()) fail("has no grid \"" + name + "\"; it has " + describe(grids, all));
     return only_usable(found);
   }
-  if (const auto density = named("density"); !density.empty()) return only_usable(density);
 
   const auto usable = where([](const GridInfo& e) { return e.refusal.empty(); });
-  if (usable.size() == 1) return usable[0];
-  if (usable.size() > 1)
-    fail("several scalar grids and none called density, choose one by name: " + describe(grids, usable));
+  for (const char* likely : likely_names) {
+    for (const std::size_t i : usable) {
+      if (lower_case(grids[i].name) == likely) return i;
+    }
+  }
+  if (!usable.empty()) return usable[0];
   if (grids.size() == 1) fail("grid \"" + grids[0].unique_name + "\" " + grids[0].refusal);
   fail("no scalar fog volume among its grids: " + describe(grids, all));
 }
 
-struct Box {
-  glm::ivec3 min{std::numeric_limits<int>::max()};
-  glm::ivec3 max{std::numeric_limits<int>::min()};
-
-  [[nodiscard]] bool empty() const { return glm::any(glm::greaterThan(min, max)); }
-  void expand(const Box& b) {
-    min = glm::min(min, b.min);
-    max = glm::max(max, b.max);
-  }
-  [[nodiscard]] Box clipped(const Box& b) const { return {glm::max(min, b.min), glm::min(max, b.max)}; }
-  [[nodiscard]] bool contains(const Box& b) const {
-    return glm::all(glm::lessThanEqual(min, b.min)) && glm::all(glm::greaterThanEqual(max, b.max));
-  }
-  /// Only where neither side is longer than max_extent.
-  [[nodiscard]] std::uint64_t voxels() const {
-    if (empty()) return 0;
-    const glm::u64vec3 size(max - min + 1);
-    return size.x * size.y * size.z;
-  }
-};
+namespace {
 
 Box box_of_active(const ActiveMask& mask, glm::ivec3 origin) {
   int x0 = brick_size;
@@ -155,12 +166,9 @@ Box box_of_active(const ActiveMask& mask, glm::ivec3 origin) {
   return {origin + min, origin + max};
 }
 
-struct ActiveRegion {
-  Box box;
-  std::uint64_t voxels = 0;
-};
+}  // namespace
 
-ActiveRegion active_leaf_region(const LeafSource& leaves, ProgressPart& part) {
+ActiveRegion detail::active_leaf_region(const LeafSource& leaves, ProgressPart& part) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, leaves.count(), 256), ActiveRegion{},
       [&](const tbb::blocked_range<std::size_t>& range, ActiveRegion sum) {
@@ -179,6 +187,8 @@ ActiveRegion active_leaf_region(const LeafSource& leaves, ProgressPart& part) {
       });
 }
 
+namespace {
+
 bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
@@ -187,19 +197,21 @@ bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
 struct CleanBrick {
   std::array<float, brick_voxels> values;
   std::uint64_t negative = 0;
+  std::uint64_t non_finite = 0;
   float max = 0.0F;
   bool constant = true;  ///< all voxels within bounds alike
   float first = 0.0F;    ///< the first of them
-  int bad = -1;          ///< first voxel that is not finite
-  float bad_value = 0.0F;
 };
+
+/// A voxel's value as the volume keeps it.
+float counted(float value) { return std::isfinite(value) && value > 0.0F ? value : 0.0F; }  // turns -0 into 0 too
 
 void clean(const LeafSource& leaves, std::size_t leaf, const Box& bounds, CleanBrick& brick) {
   leaves.values(leaf, brick.values.data());
   brick.negative = 0;
   brick.max = 0.0F;
   brick.constant = true;
-  brick.bad = -1;
+  brick.non_finite = 0;
   bool started = false;
   const glm::ivec3 origin = leaves.origin(leaf);
   const bool inside = bounds.contains({origin, origin + (brick_size - 1)});
@@ -213,14 +225,11 @@ void clean(const LeafSource& leaves, std::size_t leaf, const Box& bounds, CleanB
       }
     }
     if (!std::isfinite(value)) {
-      if (brick.bad < 0) {
-        brick.bad = i;
-        brick.bad_value = value;
-      }
-      continue;
+      ++brick.non_finite;
+    } else if (value < 0.0F) {
+      ++brick.negative;
     }
-    if (value < 0.0F) ++brick.negative;
-    value = value > 0.0F ? value : 0.0F;  // turns -0 into 0 too
+    value = counted(value);
     brick.max = std::max(brick.max, value);
     if (!started) {
       brick.first = value;
@@ -232,27 +241,17 @@ void clean(const LeafSource& leaves, std::size_t leaf, const Box& bounds, CleanB
 
 struct BrickTotals {
   std::uint64_t negative = 0;
+  std::uint64_t non_finite = 0;
   std::uint64_t covered = 0;
   float max = 0.0F;
-  std::size_t bad_brick = std::numeric_limits<std::size_t>::max();
-  int bad_voxel = 0;
-  float bad_value = 0.0F;
 
   void add(const BrickTotals& b) {
     negative += b.negative;
+    non_finite += b.non_finite;
     covered += b.covered;
     max = std::max(max, b.max);
-    if (b.bad_brick < bad_brick) {
-      bad_brick = b.bad_brick;
-      bad_voxel = b.bad_voxel;
-      bad_value = b.bad_value;
-    }
   }
 };
-
-std::string name_of_non_finite(float value) {
-  return std::isnan(value) ? "nan" : value > 0.0F ? "infinity" : "-infinity";
-}
 
 /// Leaf indices by origin; every origin a brick's, none twice.
 std::vector<std::size_t> sorted_leaves(const LeafSource& leaves, const Progress* progress) {
@@ -292,11 +291,9 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
                               double from) {
   const auto at = [&](double part) { return from + part * (1.0 - from); };
   check_transform(source.index_to_world);
-  if (!std::isfinite(source.background)) fail("its background value is " + name_of_non_finite(source.background));
 
   ScalarVolume out;
   out.index_to_world = source.index_to_world;
-  out.background = std::max(source.background, 0.0F) + 0.0F;
 
   ProgressPart looking(progress, at(0.0), at(0.2), source.leaves->count());
   ActiveRegion region = active_leaf_region(*source.leaves, looking);
@@ -304,7 +301,12 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
     if (tile.active) region.box.expand({tile.box.min, tile.box.max});
   }
   const Box bounds = region.box;
-  if (bounds.empty()) fail("is empty: it has no active voxels");
+  if (bounds.empty()) {
+    log.warning(log_prefix + "is empty: it has no active voxels");
+    out.bounds_max = out.bounds_min;
+    return out;
+  }
+  out.background = counted(source.background);
   const glm::i64vec3 extent = glm::i64vec3(bounds.max) - glm::i64vec3(bounds.min) + std::int64_t{1};
   if (glm::any(glm::greaterThan(extent, glm::i64vec3(max_extent)))) {
     fail("its active voxels span " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
@@ -342,12 +344,8 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
           BrickTotals one;
           one.negative = brick.negative;
           one.covered = leaf_box(order[i]).voxels();
+          one.non_finite = brick.non_finite;
           one.max = brick.max;
-          if (brick.bad >= 0) {
-            one.bad_brick = i;
-            one.bad_voxel = brick.bad;
-            one.bad_value = brick.bad_value;
-          }
           sum.add(one);
           constant[i] = brick.constant ? 1 : 0;
           constant_value[i] = brick.first;
@@ -359,25 +357,24 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
         a.add(b);
         return a;
       });
-  if (bricks.bad_brick < order.size()) {
-    const int i = bricks.bad_voxel;
-    fail("voxel " + to_string(leaves.origin(order[bricks.bad_brick]) + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7)) +
-         " is " + name_of_non_finite(bricks.bad_value));
-  }
-
-  std::uint64_t negative = bricks.negative;
+  out.negative_voxels = bricks.negative;
+  out.non_finite_voxels = bricks.non_finite;
+  const auto count_uncounted = [&out](float value, std::uint64_t voxels) {
+    if (!std::isfinite(value)) {
+      out.non_finite_voxels += voxels;
+    } else if (value < 0.0F) {
+      out.negative_voxels += voxels;
+    }
+  };
   std::uint64_t covered = bricks.covered;
   out.max_value = bricks.max;
   for (const SourceTile& tile : source.tiles) {
     const Box box = bounds.clipped({tile.box.min, tile.box.max});
     if (box.empty()) continue;
-    if (!std::isfinite(tile.box.value)) {
-      fail("the tile at voxel " + to_string(tile.box.min) + " is " + name_of_non_finite(tile.box.value));
-    }
     if (tile.active) out.active_voxels += box.voxels();
     covered += box.voxels();
-    if (tile.box.value < 0.0F) negative += box.voxels();
-    const float value = tile.box.value > 0.0F ? tile.box.value : 0.0F;
+    count_uncounted(tile.box.value, box.voxels());
+    const float value = counted(tile.box.value);
     out.max_value = std::max(out.max_value, value);
     if (value != out.background) out.tiles.push_back({box.min, box.max, value});
   }
@@ -385,7 +382,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   const std::uint64_t uncovered = bounds.voxels() - std::min(covered, bounds.voxels());
   if (uncovered > 0) {
     out.max_value = std::max(out.max_value, out.background);
-    if (source.background < 0.0F) negative += uncovered;
+    count_uncounted(source.background, uncovered);
   }
 
   // A brick of one value says no more than a tile, in a seventieth of the memory.
@@ -414,10 +411,12 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
                     });
   tbb::parallel_sort(out.tiles.begin(), out.tiles.end(),
                      [](const Tile& a, const Tile& b) { return lexicographic(a.min, b.min); });
-  if (negative > 0) {
-    log.warning(log_prefix + std::to_string(negative) + (negative == 1 ? " negative voxel" : " negative voxels") +
-                " clamped to 0");
-  }
+  const auto warn = [&](std::uint64_t voxels, const char* what, const char* how) {
+    if (voxels > 0)
+      log.warning(log_prefix + std::to_string(voxels) + what + (voxels == 1 ? " voxel" : " voxels") + how);
+  };
+  warn(out.negative_voxels, " negative", " clamped to 0");
+  warn(out.non_finite_voxels, " non-finite", " counted as 0");
   return out;
 }
 
@@ -431,6 +430,8 @@ ScalarVolume import_volume(const std::filesystem::path& file, const std::string&
     std::unique_ptr<Reader> reader = open(file, progress);
     const std::size_t chosen = choose_grid(reader->grids(), grid_name);
     const GridInfo entry = reader->grids()[chosen];
+    const std::string remark = remark_on_choice(reader->grids(), grid_name, chosen);
+    if (!remark.empty()) log.warning(one_line(file.string() + ": " + remark));
     const std::string name = one_line(file.string() + ": grid \"" + entry.unique_name + "\"");
     return naming(name, [&] {
       SourceGrid source = reader->read(chosen, log, name + ": ");

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <glm/glm.hpp>
 #include <ios>
+#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -16,7 +17,7 @@
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "base/one_line.hpp"
-#include "base/progress.hpp"
+#include "base/progress_part.hpp"
 #include "volume/memory.hpp"
 
 namespace cumulet::volume::detail {
@@ -57,12 +58,21 @@ class Reader {
   virtual ~Reader() = default;
 
   [[nodiscard]] virtual const std::vector<GridInfo>& grids() const = 0;
-  /// Reads the tree of the grid at this place of grids(). log_prefix begins every warning.
+  /// Of the file as a whole.
+  [[nodiscard]] virtual const std::vector<Metadata>& metadata() const = 0;
+  /// "OpenVDB 224", "NanoVDB 32.3".
+  [[nodiscard]] virtual const std::string& format() const = 0;
+  /// Reads the tree of the grid at this place of grids(), whose values are not none. log_prefix begins every warning.
   virtual SourceGrid read(std::size_t grid, const Log& log, const std::string& log_prefix) = 0;
 };
 
 /// Reading is this part of loading; the shared half does the rest.
 inline constexpr double read_part = 0.7;
+
+/// By content, not by name.
+std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress);
+/// Where import_volume looks for this name, or without one. Throws as import_volume does.
+std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name);
 
 std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* progress);
 std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file, Progress* progress);
@@ -72,6 +82,36 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
                       double from);
 
 std::string to_string(glm::ivec3 v);
+
+/// A box of voxels, both ends inclusive.
+struct Box {
+  glm::ivec3 min{std::numeric_limits<int>::max()};
+  glm::ivec3 max{std::numeric_limits<int>::min()};
+
+  [[nodiscard]] bool empty() const { return glm::any(glm::greaterThan(min, max)); }
+  void expand(const Box& b) {
+    min = glm::min(min, b.min);
+    max = glm::max(max, b.max);
+  }
+  [[nodiscard]] Box clipped(const Box& b) const { return {glm::max(min, b.min), glm::min(max, b.max)}; }
+  [[nodiscard]] bool contains(const Box& b) const {
+    return glm::all(glm::lessThanEqual(min, b.min)) && glm::all(glm::greaterThanEqual(max, b.max));
+  }
+  /// Only where no side is longer than 2^20.
+  [[nodiscard]] std::uint64_t voxels() const {
+    if (empty()) return 0;
+    const glm::u64vec3 size(glm::i64vec3(max) - glm::i64vec3(min) + std::int64_t{1});
+    return size.x * size.y * size.z;
+  }
+};
+
+struct ActiveRegion {
+  Box box;
+  std::uint64_t voxels = 0;
+};
+
+/// Of the leaves alone.
+ActiveRegion active_leaf_region(const LeafSource& leaves, ProgressPart& part);
 
 /// An error found by a reader itself; the caller puts the file's name in front.
 [[noreturn]] inline void fail(const std::string& cause) { throw std::runtime_error(cause); }

@@ -251,6 +251,8 @@ class NanoReader final : public Reader {
   }
 
   [[nodiscard]] const std::vector<GridInfo>& grids() const override { return entries_; }
+  [[nodiscard]] const std::vector<Metadata>& metadata() const override { return metadata_; }
+  [[nodiscard]] const std::string& format() const override { return format_; }
 
   SourceGrid read(std::size_t index, const Log& log, const std::string& log_prefix) override {
     Handle handle = load(places_[index]);
@@ -303,6 +305,7 @@ class NanoReader final : public Reader {
            std::to_string(NANOVDB_MAJOR_VERSION_NUMBER));
     }
     if (header.codec >= Codec::END) fail("the file is damaged: unknown compression");
+    format_ = "NanoVDB " + std::to_string(header.version.getMajor()) + "." + std::to_string(header.version.getMinor());
     position += sizeof header;
     const std::size_t first = places_.size();
     for (int i = 0; i < header.gridCount; ++i) {
@@ -321,6 +324,7 @@ class NanoReader final : public Reader {
       entry.type = type_name(meta.gridType);
       entry.grid_class = class_name(meta.gridClass);
       entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_scalar(meta.gridType));
+      entry.values = is_scalar(meta.gridType) ? Values::scalars : Values::none;
       entries_.push_back(std::move(entry));
     }
     for (std::size_t i = first; i < places_.size(); ++i) {
@@ -439,6 +443,8 @@ class NanoReader final : public Reader {
   Progress* progress_;
   SourceFile stream_;
   std::uint64_t size_;
+  std::vector<Metadata> metadata_;  // the format has none
+  std::string format_;
   std::vector<Place> places_;
   std::vector<GridInfo> entries_;
 };

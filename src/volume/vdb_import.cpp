@@ -33,6 +33,15 @@ std::string class_name(openvdb::GridClass grid_class) {
 
 glm::ivec3 to_glm(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
 
+template <typename Value>
+float to_float(const Value& value) {
+  if constexpr (std::is_arithmetic_v<Value>) {
+    return static_cast<float>(value);
+  } else {
+    return static_cast<float>(openvdb::Vec3d(value).length());
+  }
+}
+
 template <typename TreeT>
 class VdbLeaves final : public LeafSource {
  public:
@@ -52,7 +61,7 @@ class VdbLeaves final : public LeafSource {
   }
   void values(std::size_t leaf, float* out) const override {
     const auto* data = leaves_[leaf]->buffer().data();
-    for (int i = 0; i < brick_voxels; ++i) out[i] = static_cast<float>(data[i]);
+    for (int i = 0; i < brick_voxels; ++i) out[i] = to_float(data[i]);
   }
 
  private:
@@ -66,7 +75,7 @@ void collect_tiles(const NodeT& node, float background, std::vector<SourceTile>&
   using ChildT = typename NodeT::ChildNodeType;
   constexpr auto size = static_cast<int>(ChildT::DIM);
   for (auto it = node.cbeginValueAll(); it; ++it) {
-    const auto value = static_cast<float>(*it);
+    const float value = to_float(*it);
     if (!it.isValueOn() && value == background) continue;
     const glm::ivec3 min = to_glm(it.getCoord());
     tiles.push_back({{min, min + (size - 1), value}, it.isValueOn()});
@@ -81,7 +90,7 @@ void take_tree(const openvdb::GridBase& grid, SourceGrid& out) {
   using TreeT = typename GridT::TreeType;
   const auto tree = static_cast<const GridT&>(grid).treePtr();
   const auto& root = tree->root();
-  out.background = static_cast<float>(root.background());
+  out.background = to_float(root.background());
   collect_tiles(root, out.background, out.tiles);
   out.leaves = std::make_unique<VdbLeaves<TreeT>>(tree);
 }
@@ -143,6 +152,27 @@ class OwningTree final : public TreeT {
   }
 };
 
+/// Calls f<GridT>() for the grid's type, if its voxels can be read.
+template <typename Call>
+void with_type(const openvdb::GridBase& grid, Call&& f) {
+  const auto try_types = [&]<typename... GridT>() {
+    (void)((grid.isType<GridT>() && (f.template operator()<GridT>(), true)) || ...);
+  };
+  try_types.template operator()<openvdb::FloatGrid, openvdb::DoubleGrid, openvdb::Int32Grid, openvdb::Int64Grid,
+                                openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::Vec3IGrid>();
+}
+
+std::vector<Metadata> metadata_of(const openvdb::MetaMap& map) {
+  std::vector<Metadata> entries;
+  for (auto it = map.beginMeta(); it != map.endMeta(); ++it) {
+    // OpenVDB's own index into the file: bytes, and large.
+    if (it->second->typeName() == "__delayedload") continue;
+    constexpr std::size_t longest = 4096;
+    entries.push_back({it->first, it->second->typeName(), it->second->str().substr(0, longest)});
+  }
+  return entries;
+}
+
 /// A .vdb file read through openvdb's archive.
 ///
 /// Not through openvdb::io::File: that one may copy the file, loads leaves lazily from a mapping
@@ -155,6 +185,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     read_directory();
   }
   [[nodiscard]] const std::vector<GridInfo>& grids() const override { return entries_; }
+  [[nodiscard]] const std::vector<Metadata>& metadata() const override { return file_metadata_; }
+  [[nodiscard]] const std::string& format() const override { return format_; }
 
   SourceGrid read(std::size_t index, const Log& /*log*/, const std::string& /*log_prefix*/) override {
     SourceGrid out;
@@ -171,11 +203,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     for (int column = 0; column < 4; ++column) {
       for (int row = 0; row < 4; ++row) out.index_to_world[column][row] = matrix(column, row);
     }
-    if (grid->isType<openvdb::FloatGrid>()) {
-      take_tree<openvdb::FloatGrid>(*grid, out);
-    } else {
-      take_tree<openvdb::DoubleGrid>(*grid, out);
-    }
+    with_type(*grid, [&]<typename GridT>() { take_tree<GridT>(*grid, out); });
+    if (!out.leaves) fail("is of a type that cannot be read");
     return out;
   }
 
@@ -225,6 +254,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     if (version > openvdb::OPENVDB_FILE_VERSION || version < openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) {
       fail("VDB file format " + std::to_string(version) + " is not supported");
     }
+    format_ = "OpenVDB " + std::to_string(version);
     stream_.seekg(0);
     readHeader(stream_);
     metadata_ = std::make_shared<openvdb::io::StreamMetadata>();
@@ -234,7 +264,9 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     setLibraryVersion(stream_);
     setDataCompression(stream_);
     check_lengths([this] { skip_metadata(); });
-    openvdb::MetaMap().readMeta(stream_);
+    openvdb::MetaMap metadata;
+    metadata.readMeta(stream_);
+    file_metadata_ = metadata_of(metadata);
     const std::int32_t count = readGridCount(stream_);
     if (!inputHasGridOffsets()) stream_.begin(0.0, 0.5 * read_part, static_cast<std::uint64_t>(size_));
     if (count < 0) fail("the file is damaged: negative grid count");
@@ -305,21 +337,25 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     entry.type = is_float && descriptor.saveFloatAsHalf() ? "half" : points ? "points" : grid.valueType();
     entry.grid_class = class_name(grid.getGridClass());
     entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_float || grid.isType<openvdb::DoubleGrid>());
-    if (entry.refusal.empty() && !grid.transform().isLinear()) {
-      entry.refusal = "has a frustum transform, which is not affine";
+    entry.metadata = metadata_of(grid);
+    if (!grid.transform().isLinear()) {
+      if (entry.refusal.empty()) entry.refusal = "has a frustum transform, which is not affine";
+      return;
     }
+    if (points) return;
+    with_type(grid, [&]<typename GridT>() {
+      entry.values = std::is_arithmetic_v<typename GridT::ValueType> ? Values::scalars : Values::lengths;
+    });
   }
 
   /// Whether the grid is of a type that can be read here at all, and so cancelled.
   static bool own_tree(openvdb::GridBase& grid) {
-    if (grid.isType<openvdb::FloatGrid>()) {
-      grid.setTree(std::make_shared<OwningTree<openvdb::FloatTree>>());
-    } else if (grid.isType<openvdb::DoubleGrid>()) {
-      grid.setTree(std::make_shared<OwningTree<openvdb::DoubleTree>>());
-    } else {
-      return false;
-    }
-    return true;
+    bool own = false;
+    with_type(grid, [&]<typename GridT>() {
+      grid.setTree(std::make_shared<OwningTree<typename GridT::TreeType>>());
+      own = true;
+    });
+    return own;
   }
 
   openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor) {
@@ -340,6 +376,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   }
 
   openvdb::io::StreamMetadata::Ptr metadata_;  // the stream points to it
+  std::vector<Metadata> file_metadata_;
+  std::string format_;
   SourceFile stream_;
   std::int64_t size_;
   std::vector<openvdb::io::GridDescriptor> descriptors_;

@@ -43,7 +43,23 @@ struct ScalarVolume {
   /// Disjoint, not overlapping any brick, clipped to bounds; only tiles whose value differs from
   /// the background.
   std::vector<Tile> tiles;
+  // What the source had within bounds, and counts as 0.
+  std::uint64_t negative_voxels = 0;
+  std::uint64_t non_finite_voxels = 0;
+
+  /// No active voxel: bounds are then the one voxel (0, 0, 0), which is 0.
+  [[nodiscard]] bool empty() const { return active_voxels == 0; }
 };
+
+/// An entry of a file's metadata, as text.
+struct Metadata {
+  std::string name;
+  std::string type;
+  std::string value;
+};
+
+/// What can be read of a grid's voxels: nothing, numbers, or the lengths of vectors.
+enum class Values { none, scalars, lengths };
 
 /// One grid of a file, for listings and messages.
 struct GridInfo {
@@ -52,6 +68,8 @@ struct GridInfo {
   std::string grid_class;   ///< "fog volume", "level set", "unknown", ...
   std::string unique_name;  ///< "name[n]" where a file repeats a name
   std::string refusal;      ///< why it is no scalar fog volume; empty: it is one
+  Values values = Values::none;
+  std::vector<Metadata> metadata;
 };
 
 /// The grids of a .vdb or .nvdb file, without their voxels. Throws Error(file).
@@ -59,11 +77,12 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file);
 
 /// Reads one scalar grid of a .vdb or .nvdb file.
 ///
-/// grid_name empty: "density" if there is one, else the only scalar fog grid; several: an error that
-/// lists them. Level sets, vector grids, points, empty grids, non-finite voxels and unreadable files
-/// throw Error(file) with one line that names file and cause. Negative voxels are clamped to zero
-/// with one warning that counts them. Any affine transform is accepted; a frustum transform is not.
-/// O(active nodes) time and memory. progress receives the fraction done; cancelled, Error(cancelled) is thrown.
+/// grid_name empty: the scalar fog grid called "density"; else the first of those called "smoke", "soot", "flames",
+/// "flame", "fire", "temperature", "heat", in whatever case; else the first of the file. A warning names the others,
+/// unless it is the only one called "density". Level sets, vector grids, points and unreadable files throw Error(file)
+/// with one line that names file and cause. An empty grid is an empty volume, with a warning; negative and non-finite
+/// voxels are zero, with one warning each that counts them. Any affine transform is accepted; a frustum transform is
+/// not. O(active nodes) time and memory. progress receives the fraction done; cancelled, Error(cancelled) is thrown.
 ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
                            Progress* progress = nullptr);
 

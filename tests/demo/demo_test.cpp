@@ -108,6 +108,71 @@ TEST(Input, AFrameSeesAButtonChangeOnce) {
   EXPECT_FALSE(input.pending());
 }
 
+Event key_change(int code, bool down) {
+  Event event;
+  event.type = Event::Type::key;
+  event.code = code;
+  event.down = down;
+  return event;
+}
+
+// However the two keys are let go, and whatever part of it a frame finds in the queue.
+TEST(Input, AChordThatIsOverInAFrameIsStillAChord) {
+  const std::vector<std::vector<Event>> chords = {
+      {key_change(GLFW_KEY_LEFT_CONTROL, true), key_change(GLFW_KEY_O, true), key_change(GLFW_KEY_O, false),
+       key_change(GLFW_KEY_LEFT_CONTROL, false)},
+      {key_change(GLFW_KEY_LEFT_CONTROL, true), key_change(GLFW_KEY_O, true), key_change(GLFW_KEY_LEFT_CONTROL, false),
+       key_change(GLFW_KEY_O, false)}};
+  for (const auto& chord : chords) {
+    for (std::size_t early = 0; early <= chord.size(); ++early) {
+      Input input;
+      int opened = 0;
+      const auto frames = [&] {
+        do {
+          for (const Event& event : input.take()) {
+            const auto command = event.type == Event::Type::key && event.down
+                                     ? command_of(event.code, event.modifiers, false)
+                                     : std::nullopt;
+            if (command && command->action == Action::open_dialog) ++opened;
+            // Dear ImGui looks at the state: the frame that brings O still holds Ctrl.
+            if (event.code == GLFW_KEY_O && event.down) {
+              EXPECT_EQ(input.modifiers(), modifier_ctrl);
+            }
+          }
+        } while (input.pending());
+      };
+      for (std::size_t i = 0; i < chord.size(); ++i) {
+        if (i == early) frames();
+        input.push(chord[i]);
+      }
+      frames();
+      EXPECT_EQ(opened, 1) << early;
+      EXPECT_EQ(input.modifiers(), 0u);
+    }
+  }
+}
+
+TEST(Input, TypingTakesNoFrames) {
+  Input input;
+  for (int i = 0; i < 57; ++i) {
+    input.push(key_change(GLFW_KEY_A + i % 26, true));
+    Event character;
+    character.type = Event::Type::character;
+    character.code = 'a' + i % 26;
+    input.push(character);
+    input.push(key_change(GLFW_KEY_A + i % 26, false));
+  }
+  EXPECT_EQ(input.take().size(), 3u * 57u);
+}
+
+TEST(Preferences, WhatCannotBeOpenedIsNotRecent) {
+  Preferences preferences;
+  preferences.remember("/a/cloud.vdb");
+  preferences.remember("/a/b/../fire.vdb");
+  preferences.forget("/a/fire.vdb");
+  EXPECT_EQ(preferences.recent, std::vector<std::string>{"/a/cloud.vdb"});
+}
+
 TEST(Input, ModifiersFollowTheKeysUntilTheFocusIsLost) {
   Input input;
   input.push(key(GLFW_KEY_RIGHT_CONTROL, true));
@@ -439,6 +504,21 @@ TEST_P(PanelTest, LabelsFitBesideTheirControls) {
     EXPECT_LT(ImGui::GetFont()->CalcTextSizeA(ImGui::GetFontSize(), 1e9f, 0.0f, label).x, panel_.ui().px(126.0f))
         << label;
   }
+}
+
+TEST_P(PanelTest, PathsShowTheirEnds) {
+  const std::string path = "/a/folder/of a very long name/\xc3\xa9t\xc3\xa9/another/cloud_0042.vdb";
+  ImGui::NewFrame();
+  const float whole = ImGui::CalcTextSize(path.c_str()).x;
+  EXPECT_EQ(end_of(path, whole + 1.0f), path);
+  for (float width = 0.9f * whole; width > 0.5f * whole; width -= 0.01f * whole) {
+    const std::string shown = end_of(path, width);
+    EXPECT_TRUE(shown.starts_with("...") && path.ends_with(shown.substr(3))) << shown;
+    EXPECT_TRUE(shown.ends_with("cloud_0042.vdb"));
+    EXPECT_LE(ImGui::CalcTextSize(shown.c_str()).x, width);
+    EXPECT_NE(static_cast<unsigned char>(shown[3]) & 0xC0U, 0x80U) << "within a character";
+  }
+  ImGui::EndFrame();
 }
 
 TEST_P(PanelTest, DrawingChangesNothing) {

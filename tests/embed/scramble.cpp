@@ -1,6 +1,8 @@
 // A host that sets every state to something unusual before every [GL] call of the ABI, and compares all of it after.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <functional>
 #include <string>
 #include <utility>
@@ -8,6 +10,7 @@
 
 #include "support/c_host.hpp"
 #include "support/gl_state.hpp"
+#include "support/gltf_seeds.hpp"
 
 namespace {
 
@@ -140,6 +143,97 @@ TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
   expect_kept(host, ++seed, "detach", [&] { return cumulet_detach(v); });
   expect_kept(host, ++seed, "attach", [&] { return cumulet_attach(v, Context::get_proc, context_.get()); });
   render("anew", target.frame());
+  expect_kept(host, ++seed, "destroy", [&] {
+    viewer.reset();
+    return CUMULET_OK;
+  });
+  gl_->DeleteTextures(1, &multisampled);
+}
+
+// With surfaces, in everything that a viewer can do with them: textures, blended ones, lamps and emitters; each light,
+// rays and raster, previews, the host's depth of each kind, targets, read-backs and AOVs.
+TEST_P(Scramble, EveryCallWithSurfacesToo) {
+  ScramblingHost host(gl_);
+  const HostTarget target(*gl_, side, side);
+  const auto volume = cumulet::test::make_ball(12);
+  const auto file = cumulet::test::seed_materials().glb();
+  cumulet_surfaces* out = nullptr;
+  std::array<char, 256> error{};
+  ASSERT_EQ(cumulet_surfaces_from_memory(file.data(), file.size(), nullptr, nullptr, &out, error.data(), error.size()),
+            CUMULET_OK)
+      << error.data();
+  const cumulet::test::SurfacesRef surfaces(out);
+  ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
+  cumulet_viewer* v = viewer.get();
+  std::uint32_t seed = 300;
+  const auto render = [&](const std::string& what, cumulet_frame_desc frame) {
+    frame.budget_ms = 1.0;
+    expect_kept(host, ++seed, "render " + what, [&] { return cumulet_render(v, &frame, nullptr); });
+  };
+  GLuint multisampled = 0;
+  gl_->CreateTextures(GL_TEXTURE_2D_MULTISAMPLE, 1, &multisampled);
+  gl_->TextureStorage2DMultisample(multisampled, 4, GL_DEPTH_COMPONENT32F, side, side, GL_TRUE);
+
+  // Alone, before there is a volume; then with one.
+  ASSERT_EQ(cumulet_set_surfaces(v, surfaces.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
+  render("surfaces alone", target.frame());
+  ASSERT_EQ(cumulet_set_volume(v, volume.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
+  std::vector<float> rgba(std::size_t{side} * side * 4);
+  std::vector<std::uint8_t> bytes(rgba.size());
+  auto pick = make_desc<cumulet_pick>();
+  double noise = 0.0;
+  for (const cumulet_surface_light light :
+       {CUMULET_SURFACE_LIGHT_NONE, CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_SHADOWS}) {
+    const std::string name = "light " + std::to_string(light);
+    auto settings = make_desc<cumulet_surface_settings_desc>();
+    settings.light = light;
+    ASSERT_EQ(cumulet_set_surface_settings(v, &settings), CUMULET_OK);
+    for (const cumulet_preview preview : {CUMULET_PREVIEW_AUTO, CUMULET_PREVIEW_OFF}) {
+      auto sampling = make_desc<cumulet_sampling_desc>();
+      sampling.samples = 1;
+      sampling.preview = preview;
+      sampling.volume_alone = 1;
+      ASSERT_EQ(cumulet_set_sampling(v, &sampling), CUMULET_OK);
+      cumulet_frame_desc frame = target.frame();
+      frame.write_depth = 1;
+      render(name + " with depth out", frame);
+      frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE;
+      frame.depth_name = target.depth_texture();
+      render(name + " and a depth texture", frame);
+      frame.depth_source = CUMULET_DEPTH_SOURCE_FRAMEBUFFER;
+      frame.depth_name = target.framebuffer();
+      render(name + " and a framebuffer's depth", frame);
+      frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE_MULTISAMPLE;
+      frame.depth_name = multisampled;
+      render(name + " and multisampled depth", frame);
+      frame = target.frame();
+      frame.target = CUMULET_TARGET_TEXTURE;
+      render(name + " into its own texture", frame);
+      render(name, target.frame());
+    }
+    for (const cumulet_view view : {CUMULET_VIEW_CELLS, CUMULET_VIEW_SHADED}) {
+      auto sampling = make_desc<cumulet_sampling_desc>();
+      sampling.samples = 1;
+      sampling.preview = CUMULET_PREVIEW_OFF;
+      sampling.view = view;
+      sampling.volume_alone = 1;
+      ASSERT_EQ(cumulet_set_sampling(v, &sampling), CUMULET_OK);
+      render(name + " view " + std::to_string(view), target.frame());
+    }
+    converge(v, target.frame());
+    for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_ALBEDO; ++aov) {
+      expect_kept(host, ++seed, name + " aov " + std::to_string(aov),
+                  [&] { return cumulet_read_aov(v, static_cast<cumulet_aov>(aov), rgba.data(), rgba.size()); });
+    }
+    expect_kept(host, ++seed, "pick_at", [&] { return cumulet_pick_at(v, side / 2.0, side / 2.0, &pick); });
+    expect_kept(host, ++seed, "read_linear", [&] { return cumulet_read_linear(v, rgba.data(), rgba.size()); });
+    expect_kept(host, ++seed, "read_display", [&] { return cumulet_read_display(v, bytes.data(), bytes.size()); });
+    expect_kept(host, ++seed, "measure_noise", [&] { return cumulet_measure_noise(v, &noise); });
+  }
+  ASSERT_EQ(cumulet_set_surfaces(v, nullptr), CUMULET_OK);
+  render("without them", target.frame());
   expect_kept(host, ++seed, "destroy", [&] {
     viewer.reset();
     return CUMULET_OK;

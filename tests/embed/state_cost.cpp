@@ -1,5 +1,5 @@
 // What saving and restoring the GL state costs a frame: CUMULET_GL_STATE_RESTORE against HOST_RESETS, frames that only
-// draw, interleaved. By hand:
+// draw, interleaved; and how many questions to GL (glGet*, glIs*) a frame that draws and one that traces ask. By hand:
 //
 //     cumulet-state-cost [FRAMES]
 #include <algorithm>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "support/c_host.hpp"
+#include "support/fake_gl.hpp"
 
 namespace {
 
@@ -57,10 +58,34 @@ void measure(int frames, int side) {
               side, side, a, b, a / b, median(difference), frames);
 }
 
+void count() {
+  Context context = Context::create(cumulet::headless::Backend::automatic);
+  cumulet::test::FakeGl fake(Context::get_proc, &context);
+  const cumulet::test::HostTarget target(fake.real(), 64, 64);
+  const auto volume = cumulet::test::make_ball(16);
+  const auto viewer = cumulet::test::make_viewer({.get_proc = cumulet::test::FakeGl::get_proc, .user = &fake});
+  const auto asked = [&](const cumulet_frame_desc& frame) {
+    const std::uint64_t before = fake.questions();
+    if (cumulet_render(viewer.get(), &frame, nullptr) != CUMULET_OK)
+      throw std::runtime_error(cumulet_last_error(viewer.get()));
+    return static_cast<unsigned long long>(fake.questions() - before);
+  };
+  if (cumulet_set_volume(viewer.get(), volume.get()) != CUMULET_OK || cumulet_wait(viewer.get(), -1.0) != CUMULET_OK)
+    throw std::runtime_error(cumulet_last_error(viewer.get()));
+  cumulet_frame_desc frame = target.frame();
+  frame.budget_ms = 0.1;
+  asked(frame);  // uploads
+  asked(frame);
+  const auto traced = asked(frame);
+  frame.budget_ms = -1.0;
+  std::printf("questions a frame: %llu traced and drawn, %llu drawn\n", traced, asked(frame));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
+    count();
     for (const int side : {1, 64, 512}) measure(argc > 1 ? std::max(std::atoi(argv[1]), 1) : 2000, side);
     return 0;
   } catch (const std::exception& error) {

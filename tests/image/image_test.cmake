@@ -2,6 +2,7 @@
 #   RENDER, COMPARE  programs     NAME  of the test     OUT  folder for pictures     FLAGS_A, FLAGS_B  `|`-separated
 #   GOLDEN  picture in the source tree (BLESS in the environment: writes it)     EXACT  the pictures must be equal
 #   NEEDS  a file without which the test is skipped     LIMITS  flags of compare
+#   DRIVER  how the name of A's OpenGL renderer must begin; such a picture blesses no golden
 foreach(list FLAGS_A FLAGS_B LIMITS)
   string(REPLACE "|" ";" ${list} "${${list}}")
 endforeach()
@@ -18,9 +19,19 @@ function(render picture)
 endfunction()
 
 file(MAKE_DIRECTORY ${OUT})
+if(DRIVER)
+  list(APPEND FLAGS_A --stats ${OUT}/${NAME}.json)
+endif()
 render(${OUT}/${NAME}.exr ${FLAGS_A})
+if(DRIVER)
+  file(READ ${OUT}/${NAME}.json stats)
+  string(JSON renderer GET "${stats}" gl renderer)
+  if(NOT renderer MATCHES "^${DRIVER}")
+    message(FATAL_ERROR "${renderer} made ${OUT}/${NAME}.exr, not ${DRIVER}")
+  endif()
+endif()
 if(GOLDEN)
-  if(DEFINED ENV{CUMULET_BLESS})
+  if(DEFINED ENV{CUMULET_BLESS} AND NOT DRIVER)
     file(COPY_FILE ${OUT}/${NAME}.exr ${GOLDEN})
   endif()
   if(NOT EXISTS ${GOLDEN})

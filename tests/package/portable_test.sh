@@ -1,24 +1,10 @@
 #!/bin/bash
 # The portable tarball runs where none of our libraries is: in a root folder with the C library alone, then in one
 # with Mesa added. Usage: portable_test.sh BUILD_DIR
-set -euo pipefail
-build=$1
+# shellcheck source=tests/package/root.sh
+. "$(dirname "$0")/root.sh"
 
-PATH=$PATH:/usr/sbin:/sbin
-if [ "$(id -u)" = 0 ]; then
-  enter=("$(command -v chroot)")
-elif unshare --map-root-user true 2>/dev/null; then
-  enter=("$(command -v unshare)" --map-root-user "$(command -v chroot)")
-else
-  echo "portable_test: skipped: chroot needs root, or user namespaces"
-  exit 77
-fi
-
-fail() { echo "portable_test: $*" >&2; exit 1; }
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-
-(cd "$build" && cpack -G TGZ -B "$work/pack") >"$work/cpack.log" 2>&1 || { cat "$work/cpack.log"; fail "cpack failed"; }
+pack "$1" TGZ
 tarball=$(find "$work/pack" -maxdepth 1 -name 'cumulet-*.tar.gz')
 [ -n "$tarball" ] || fail "cpack wrote no tarball"
 echo "$(basename "$tarball"): $(($(stat -c %s "$tarball") / 1048576)) MiB"
@@ -29,7 +15,8 @@ if grep -E '/lib(c|m|pthread|dl|rt|GL|GLX|EGL|OSMesa|X11|xcb|gbm|drm)(-[0-9.]+)?
   fail "the tarball holds libraries that must be the system's"
 fi
 for wanted in lib/libcumulet.so.0 lib/fallback/libstdc++.so.6 share/doc/cumulet/LICENSE include/cumulet/cumulet.h \
-  include/cumulet/cumulet.hpp include/cumulet/cumulet_openvdb.hpp; do
+  include/cumulet/cumulet.hpp include/cumulet/cumulet_openvdb.hpp share/doc/cumulet/docs/scene_file.md \
+  share/man/man1/cumulet-render.1 share/applications/cumulet-demo.desktop; do
   grep -q "/$wanted\$" "$work/list" || fail "the tarball lacks $wanted"
 done
 
@@ -67,15 +54,21 @@ copy_closure() { # ROOT FILE...: files and the libraries that they need
   done
 }
 
-in_root() { # ROOT PROGRAM ARGS...: with a bare environment; the loader asks /proc/self/exe what $ORIGIN is
-  ln -sfn "$2" "$1/proc/self/exe"
-  env -i "${enter[@]}" "$@"
-}
-
 # 1. Only the C library: what needs no OpenGL runs, on the bundled C++ runtime.
 bare=$work/bare
 new_root "$bare"
-in_root "$bare" /opt/bin/cumulet-scene /tmp/scene || fail "cumulet-scene did not run in a root with the C library alone"
+
+# Ours look in folders of the tree alone, and in none that is not there.
+while IFS=$'\t' read -r file path; do
+  for folder in ${path//:/ }; do
+    # shellcheck disable=SC2016 # $ORIGIN is the loader's
+    if [[ $folder != '$ORIGIN'* ]] || [ ! -d "$(dirname "$file")/${folder#'$ORIGIN'}" ]; then
+      fail "$(basename "$file") looks for libraries in $folder"
+    fi
+  done
+done < <(rpaths "$bare/opt")
+
+in_root "$bare" /opt/bin/cumulet-scene --voxels 20000 /tmp/scene || fail "cumulet-scene did not run in a root with the C library alone"
 volume=$(find "$bare/tmp/scene" -name '*.vdb' | sort | head -n1)
 [ -s "$volume" ] || fail "cumulet-scene wrote no .vdb"
 in_root "$bare" /opt/bin/cumulet-render --help >"$work/help" || fail "cumulet-render --help did not run there"

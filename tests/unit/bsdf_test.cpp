@@ -13,6 +13,10 @@
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
+inline vec2 cm_ggx_albedo(float roughness, float cosine) {
+  return surface::GgxAlbedo::table().towards(roughness, cosine);
+}
+inline vec2 cm_ggx_albedo_average(float roughness) { return surface::GgxAlbedo::table().average(roughness); }
 #include "bsdf.glsl"
 }  // namespace cumulet::core
 
@@ -26,6 +30,7 @@ CmSurface make_surface(vec3 base, float metallic, float roughness) {
   s.metallic = metallic;
   s.roughness = roughness;
   s.normal = vec3(0.0F, 0.0F, 1.0F);
+  s.smooth_normal = s.normal;
   s.f0 = cm_dielectric_f0(1.5F, 1.0F, vec3(1.0F));
   s.specular = 1.0F;
   return s;
@@ -43,6 +48,7 @@ std::vector<CmSurface> all_surfaces() {
       s.f0 = cm_dielectric_f0(2.4F, 0.7F, vec3(1.0F, 0.6F, 0.2F));
       s.specular = 0.7F;
       s.normal = normalize(vec3(0.4F, -0.7F, -0.3F));
+      s.smooth_normal = s.normal;
       result.push_back(s);
     }
   }
@@ -78,6 +84,23 @@ void integrate(const CmSurface& s, int cosines, int angles, F&& f) {
       f(direction(s, std::cos(theta), angle), area);
     }
   }
+}
+
+/// The share of constant radiance that comes back, by samples: at grazing angles smooth lobes are too narrow for a
+/// quadrature. Its error is below 0.002 where most samples weigh about 1.
+double reflected_share(const CmSurface& s, vec3 wo) {
+  constexpr int strata = 100;
+  std::mt19937 random(17);
+  std::uniform_real_distribution<float> unit(0.0F, 1.0F);
+  double sum = 0.0;
+  for (int i = 0; i < strata * strata; ++i) {
+    const float u0 = (static_cast<float>(i % strata) + unit(random)) / strata;
+    const float u1 = (static_cast<float>(i / strata) + unit(random)) / strata;
+    vec3 wi;
+    vec3 weight;
+    if (sample(s, wo, u0, u1, unit(random), wi, weight)) sum += weight.x;
+  }
+  return sum / (strata * strata);
 }
 
 TEST(Frame, IsOrthonormalAndRightHanded) {
@@ -219,13 +242,206 @@ TEST(Bsdf, NeverReflectsMoreThanComesIn) {
           s.clearcoat_roughness = 0.3F;
           for (const double cosine : {1.0, 0.8, 0.5, 0.3, 0.15, 0.05}) {
             const vec3 wo = direction(s, cosine, 0.3);
-            double sum = 0.0;
-            integrate(s, 500, 500, [&](vec3 wi, double area) { sum += cm_bsdf_eval(s, wo, wi).x * area; });
-            EXPECT_LE(sum, 1.003) << metallic << ' ' << clearcoat << ' ' << ior << ' ' << roughness << ' ' << cosine;
+            EXPECT_LE(reflected_share(s, wo), clearcoat > 0.0F ? 1.01 : 1.005)
+                << metallic << ' ' << clearcoat << ' ' << ior << ' ' << roughness << ' ' << cosine;
           }
         }
       }
     }
+  }
+}
+
+/// What light from wi comes back to wo, by glTF 2.0's appendix B in double precision, from its formulas and from
+/// nothing of glsl/: D and V of GGX with alpha = roughness^2, Schlick's Fresnel term; but the diffuse lobe coupled as
+/// bsdf.glsl says, by directional albedos that are integrated here.
+struct Reference {
+  double roughness;
+  double metallic;
+  double f0;
+  dvec3 base;
+
+  static double schlick(double f0, double cosine) { return f0 + (1.0 - f0) * std::pow(1.0 - cosine, 5.0); }
+  [[nodiscard]] double lobe(dvec3 o, dvec3 i) const {
+    const double a2 = std::pow(roughness, 4.0);
+    const dvec3 h = normalize(o + i);
+    const double d = a2 / (std::numbers::pi * std::pow(h.z * h.z * (a2 - 1.0) + 1.0, 2.0));
+    const double v =
+        0.5 / (i.z * std::sqrt(o.z * o.z * (1.0 - a2) + a2) + o.z * std::sqrt(i.z * i.z * (1.0 - a2) + a2));
+    return d * v;
+  }
+  /// By microfacets: over their normals, as they are distributed.
+  [[nodiscard]] double interface_albedo(double cosine) const {
+    constexpr int n = 200;
+    const double a2 = std::pow(roughness, 4.0);
+    const dvec3 o(std::sqrt(1.0 - cosine * cosine), 0.0, cosine);
+    double sum = 0.0;
+    for (int j = 0; j < n; ++j) {
+      for (int k = 0; k < n; ++k) {
+        const double u = (j + 0.5) / n;
+        const double z = std::sqrt((1.0 - u) / (1.0 + (a2 - 1.0) * u));
+        const double r = std::sqrt(1.0 - z * z);
+        const double angle = std::numbers::pi * (k + 0.5) / n;  // both halves are alike
+        const dvec3 h(r * std::cos(angle), r * std::sin(angle), z);
+        const double oh = dot(o, h);
+        const dvec3 i = 2.0 * oh * h - o;
+        if (oh <= 0.0 || i.z <= 0.0) continue;
+        const double a4 = std::pow(roughness, 4.0);
+        const double d = a4 / (std::numbers::pi * std::pow(h.z * h.z * (a4 - 1.0) + 1.0, 2.0));
+        sum += lobe(o, i) * schlick(f0, oh) * i.z * 4.0 * oh / (d * h.z);
+      }
+    }
+    return sum / (n * n);
+  }
+  [[nodiscard]] dvec3 operator()(dvec3 o, dvec3 i, double e_o, double e_i, double e_average) const {
+    const double vh = dot(o, normalize(o + i));
+    const dvec3 diffuse = base / std::numbers::pi * ((1.0 - e_o) * (1.0 - e_i) / (1.0 - e_average));
+    const dvec3 dielectric = diffuse + lobe(o, i) * schlick(f0, vh);
+    const dvec3 metal = lobe(o, i) * (base + (1.0 - base) * std::pow(1.0 - vh, 5.0));
+    return (dielectric + (metal - dielectric) * metallic) * i.z;
+  }
+};
+
+TEST(Bsdf, IsAppendixBInDoublePrecision) {
+  for (const double roughness : {0.25, 0.5, 0.8, 1.0}) {
+    for (const double ior : {1.5, 2.0}) {
+      Reference reference{roughness, 0.0, std::pow((ior - 1.0) / (ior + 1.0), 2.0), {0.9, 0.5, 0.1}};
+      double average = 0.0;
+      constexpr int n = 24;
+      for (int i = 0; i < n; ++i) {
+        const double cosine = (i + 0.5) / n;
+        average += reference.interface_albedo(cosine) * 2.0 * cosine / n;
+      }
+      for (const double c_o : {0.95, 0.6, 0.25, 0.08}) {
+        const double e_o = reference.interface_albedo(c_o);
+        for (const double c_i : {0.9, 0.5, 0.2, 0.05}) {
+          const double e_i = reference.interface_albedo(c_i);
+          for (const double angle : {0.1, 1.2, 2.4, 3.1}) {
+            const dvec3 o(std::sqrt(1.0 - c_o * c_o), 0.0, c_o);
+            const double sine = std::sqrt(1.0 - c_i * c_i);
+            const dvec3 i(sine * std::cos(angle), sine * std::sin(angle), c_i);
+            for (const double metallic : {0.0, 0.4, 1.0}) {
+              CmSurface s =
+                  make_surface({0.9F, 0.5F, 0.1F}, static_cast<float>(metallic), static_cast<float>(roughness));
+              s.f0 = cm_dielectric_f0(static_cast<float>(ior), 1.0F, vec3(1.0F));
+              reference.metallic = metallic;
+              const dvec3 expected = reference(o, i, e_o, e_i, average);
+              const vec3 got = cm_bsdf_eval_local(s, 1.0F, vec3(o), vec3(i));
+              for (int c = 0; c < 3; ++c) {
+                EXPECT_NEAR(got[c], expected[c], 0.01 * expected[c] + 1e-5)
+                    << roughness << ' ' << ior << ' ' << c_o << ' ' << c_i << ' ' << angle << ' ' << metallic;
+              }
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+// The furnace: a white dielectric, of any roughness and index, bare or under a coat, is as bright as what is around it.
+TEST(Bsdf, WhiteVanishesInAFurnaceFromEveryAngle) {
+  for (const float clearcoat : {0.0F, 1.0F}) {
+    for (const float ior : {1.0F, 1.5F, 2.5F}) {
+      for (const float roughness : {0.15F, 0.3F, 0.5F, 0.75F, 1.0F}) {
+        CmSurface s = make_surface(vec3(1.0F), 0.0F, roughness);
+        s.f0 = cm_dielectric_f0(ior, 1.0F, vec3(1.0F));
+        s.clearcoat = clearcoat;
+        s.clearcoat_roughness = 0.3F;
+        for (const double cosine : {1.0, 0.8, 0.5, 0.3, 0.15, 0.05, 0.02}) {
+          const vec3 wo = direction(s, cosine, 0.3);
+          // Under a coat, what the lobes share out is not exact.
+          EXPECT_NEAR(reflected_share(s, wo), 1.0, clearcoat > 0.0F ? 0.02 : 0.005)
+              << clearcoat << ' ' << ior << ' ' << roughness << ' ' << cosine;
+        }
+      }
+    }
+  }
+}
+
+std::vector<std::pair<vec3, vec3>> normals_and_viewers(vec3 geometric) {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
+  std::vector<std::pair<vec3, vec3>> result;
+  while (result.size() < 20000) {
+    const vec3 n(unit(random), unit(random), unit(random));
+    vec3 wo(unit(random), unit(random), unit(random));
+    if (result.size() % 3 == 0) wo -= geometric * (dot(wo, geometric) - 1e-3F * std::abs(unit(random)));
+    if (dot(n, n) < 0.01F || dot(wo, wo) < 0.01F) continue;
+    if (dot(normalize(wo), geometric) > 0.0F && dot(n, geometric) > 0.0F)
+      result.emplace_back(normalize(n), normalize(wo));
+  }
+  return result;
+}
+
+TEST(Bsdf, BentNormalsMirrorAboveTheSurface) {
+  const vec3 g = normalize(vec3(0.3F, -0.2F, 0.9F));
+  int bent_ones = 0;
+  for (const auto& [n, wo] : normals_and_viewers(g)) {
+    const vec3 bent = cm_bend_normal(n, g, wo);
+    EXPECT_NEAR(length(bent), 1.0F, 1e-5F);
+    EXPECT_GT(dot(bent, wo), 0.0F);
+    EXPECT_GT(dot(bent, g), 0.0F);
+    EXPECT_GE(dot(reflect(-wo, bent), g), std::min(0.01F, 0.9F * dot(wo, g)) - 1e-4F);
+    // No further than needed: a valid one stays.
+    if (dot(reflect(-wo, n), g) > 0.01F) {
+      EXPECT_EQ(bent, n);
+    } else {
+      ++bent_ones;
+      const vec3 near = cm_bend_normal(normalize(n + vec3(1e-4F)), g, wo);
+      EXPECT_LT(length(near - bent), 0.1F);  // continuous
+    }
+  }
+  EXPECT_GT(bent_ones, 3000);
+}
+
+TEST(Bsdf, BentNormalsLoseNoLight) {
+  const vec3 g(0.0F, 0.0F, 1.0F);
+  const auto all = normals_and_viewers(g);
+  for (std::size_t i = 0; i < all.size(); i += 400) {
+    for (const float roughness : {0.1F, 0.6F}) {
+      CmSurface s = make_surface(vec3(1.0F), 0.0F, roughness);
+      s.normal = cm_bend_normal(all[i].first, g, all[i].second);
+      s.smooth_normal = s.normal;
+      EXPECT_NEAR(reflected_share(s, all[i].second), 1.0, 0.005) << dot(s.normal, all[i].second);
+    }
+  }
+}
+
+TEST(Bsdf, TheTerminatorOfMappedNormalsIsSoft) {
+  CmSurface s = make_surface(vec3(0.7F), 0.0F, 0.5F);
+  s.f0 = vec3(0.0F);
+  s.specular = 0.0F;
+  const vec3 wo = s.smooth_normal;
+  for (const double tilt : {0.0, 0.05, 0.45, 1.0, 1.5, 2.0}) {
+    s.normal = vec3(static_cast<float>(std::sin(tilt)), 0.0F, static_cast<float>(std::cos(tilt)));
+    double last = 0.0;
+    double lost = 0.0;
+    double all = 0.0;
+    CmSurface flat = s;
+    flat.smooth_normal = s.normal;
+    const vec3 from = tilt < 1.5 ? wo : s.normal;
+    // Light that rises over the smooth surface, on the side to which the normal leans.
+    for (int i = -50; i < 300; ++i) {
+      const double angle = i * 0.005;
+      const vec3 wi(static_cast<float>(std::cos(angle)), 0.0F, static_cast<float>(std::sin(angle)));
+      const double lit = cm_bsdf_eval(s, from, wi).x;
+      EXPECT_LE(lit, cm_bsdf_eval(flat, from, wi).x + 1e-6);
+      if (tilt < 1.5) {
+        EXPECT_LT(std::abs(lit - last), 0.05) << tilt << ' ' << angle;
+      }
+      if (angle <= 0.0) {
+        EXPECT_EQ(lit, 0.0);
+      }
+      last = lit;
+    }
+    integrate(flat, 300, 300, [&](vec3 wi, double area) {
+      all += cm_bsdf_eval(flat, from, wi).x * area;
+      lost += (cm_bsdf_eval(flat, from, wi).x - cm_bsdf_eval(s, from, wi).x) * area;
+    });
+    const double c = std::cos(tilt);
+    const double bound =
+        tilt == 0.0 ? 0.0 : (tilt == 0.05 ? 0.02 : (tilt == 0.45 ? 0.145 : 0.5 - 0.5 * std::min(c, 0.0)));
+    EXPECT_LE(lost, bound * all + 1e-4) << tilt;
   }
 }
 
@@ -245,12 +461,13 @@ TEST(Bsdf, WhiteWithoutInterfaceReflectsAll) {
     EXPECT_NEAR(weight.x, 1.0F, 2e-6F);
     EXPECT_NEAR(cm_bsdf_eval(s, wo, wi).x, dot(wi, s.normal) / std::numbers::pi_v<float>, 1e-6F);
   }
-  EXPECT_EQ(cm_bsdf_albedo(s, s.normal, vec2(0.9F, 0.1F), vec2(0.0F)), vec3(1.0F));
+  EXPECT_EQ(cm_bsdf_albedo(s, s.normal), vec3(1.0F));
 }
 
 TEST(Bsdf, SmoothWhiteMetalIsAMirror) {
   CmSurface s = make_surface(vec3(1.0F), 1.0F, 0.0F);
   s.normal = normalize(vec3(-0.2F, 0.9F, 0.4F));
+  s.smooth_normal = s.normal;
   std::mt19937 random(5);
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
   for (int i = 0; i < 1000; ++i) {
@@ -307,26 +524,26 @@ TEST(Bsdf, ExtremesStayFinite) {
 }
 
 TEST(Bsdf, AlbedoByTheTableIsTheIntegral) {
-  constexpr int size = 32;
-  const std::vector<vec2> table = cumulet::surface::make_ggx_albedo_table(size);
-  for (const std::size_t row : {8U, 14U, 22U, 31U}) {
+  for (const float roughness : {0.25F, 0.46F, 0.72F, 1.0F}) {
     for (const float metallic : {0.0F, 1.0F}) {
-      CmSurface s = make_surface({0.9F, 0.5F, 0.1F}, metallic, static_cast<float>(row) / (size - 1));
+      CmSurface s = make_surface({0.9F, 0.5F, 0.1F}, metallic, roughness);
       s.clearcoat = 0.5F;
       s.clearcoat_roughness = s.roughness;
-      for (const std::size_t column : {30U, 18U, 9U, 4U}) {
-        const vec3 wo = direction(s, (static_cast<double>(column) + 0.5) / size, 0.0);
+      for (const double cosine : {0.95, 0.58, 0.3, 0.14}) {
+        const vec3 wo = direction(s, cosine, 0.0);
         dvec3 sum(0.0);
         integrate(s, 600, 900, [&](vec3 wi, double area) { sum += dvec3(cm_bsdf_eval(s, wo, wi)) * area; });
-        const vec2 lobe = table[row * size + column];
-        const vec3 albedo = cm_bsdf_albedo(s, wo, lobe, lobe);
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(albedo[c], sum[c], 0.05) << row << ' ' << metallic << ' ' << column;
+        const vec3 albedo = cm_bsdf_albedo(s, wo);
+        for (int c = 0; c < 3; ++c) {
+          EXPECT_NEAR(albedo[c], sum[c], 0.05) << roughness << ' ' << metallic << ' ' << cosine;
+        }
         s.clearcoat = 0.0F;
         dvec3 bare(0.0);
         integrate(s, 600, 900, [&](vec3 wi, double area) { bare += dvec3(cm_bsdf_eval(s, wo, wi)) * area; });
-        const vec3 bare_albedo = cm_bsdf_albedo(s, wo, lobe, lobe);
-        for (int c = 0; c < 3; ++c)
-          EXPECT_NEAR(bare_albedo[c], bare[c], 0.015) << row << ' ' << metallic << ' ' << column;
+        const vec3 bare_albedo = cm_bsdf_albedo(s, wo);
+        for (int c = 0; c < 3; ++c) {
+          EXPECT_NEAR(bare_albedo[c], bare[c], 0.008) << roughness << ' ' << metallic << ' ' << cosine;
+        }
         s.clearcoat = 0.5F;
       }
     }

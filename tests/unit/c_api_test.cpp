@@ -4,8 +4,12 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "cumulet/cumulet.h"
@@ -314,6 +318,70 @@ TEST_F(CApiSurfaces, LoadPoseLookAndRemove) {
   ASSERT_EQ(cumulet_set_surfaces(viewer_, nullptr), CUMULET_OK);
   EXPECT_EQ(shown(), nullptr);
   EXPECT_EQ(cumulet_get_bounds(viewer_, low, high), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+// Khronos' glTF-Validator's models: each one that it finds no error in ends in a picture.
+TEST_F(CApiSurfaces, EveryValidModelOfTheValidatorConverges) {
+  const std::filesystem::path suite = std::filesystem::path(CUMULET_SHARED_DATA) / "gltf" / "khronos_validator";
+  if (!std::filesystem::exists(suite)) GTEST_SKIP() << "no shared data";
+  look(viewer_);
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 1;
+  ASSERT_EQ(cumulet_set_sampling(viewer_, &sampling), CUMULET_OK);
+  std::size_t pictures = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(suite)) {
+    constexpr std::string_view ending = ".report.json";
+    const std::string path = entry.path().string();
+    if (!path.ends_with(ending)) continue;
+    std::ifstream file(path);
+    const std::string report(std::istreambuf_iterator<char>(file), {});
+    if (report.find("\"numErrors\": 0,") == std::string::npos) continue;
+    const std::string model = path.substr(0, path.size() - ending.size());
+    SCOPED_TRACE(model);
+    ASSERT_EQ(cumulet_load_surfaces(viewer_, model.c_str()), CUMULET_OK);
+    ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
+    picture(viewer_);
+    ++pictures;
+    if (HasFailure()) break;
+  }
+  EXPECT_GE(pictures, 129U);
+}
+
+// Materials of one side, seen from behind: not there, unless the viewer shows both sides. Traced and drawn.
+TEST_F(CApiSurfaces, DoubleSidedShowsBacksThatGlow) {
+  std::ifstream file(path_);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  const auto replace = [&text](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace(R"("attributes": {"POSITION": 0})", R"("attributes": {"POSITION": 0}, "material": 0)");
+  replace(R"("scene": 0,)", R"("scene": 0, "materials": [{"emissiveFactor": [0.5, 0.5, 0.5]}],)");
+  std::ofstream(path_) << text;
+  ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
+  const auto middle = [&] {
+    const std::vector<float> rgba = picture(viewer_);
+    return std::pair(rgba[4 * (8 * 16 + 8)], rgba[4 * (8 * 16 + 8) + 3]);
+  };
+  for (const cumulet_surface_light light : {CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_NONE}) {
+    SCOPED_TRACE(light);
+    auto settings = make_desc<cumulet_surface_settings_desc>();
+    settings.light = light;
+    for (const int32_t both : {0, 1, 0}) {
+      settings.double_sided = both;
+      ASSERT_EQ(cumulet_set_surface_settings(viewer_, &settings), CUMULET_OK);
+      ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
+      look(viewer_, -10.0);
+      EXPECT_NEAR(middle().first, both == 1 ? 0.5F : 0.0F, 1e-3F);
+      EXPECT_EQ(middle().second, both == 1 ? 1.0F : 0.0F);
+      look(viewer_, 10.0);
+      EXPECT_NEAR(middle().first, 0.5F, 1e-3F);
+    }
+  }
+  auto settings = make_desc<cumulet_surface_settings_desc>();
+  settings.double_sided = 2;
+  EXPECT_EQ(cumulet_set_surface_settings(viewer_, &settings), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(error().find("double_sided is not 0 or 1"), std::string::npos);
 }
 
 TEST_F(CApiSurfaces, ABadFileLosesNothing) {
@@ -635,6 +703,41 @@ TEST_F(CApiSurfaces, BadTrianglesAreRefusedInOneLine) {
   cumulet_surfaces_release(surfaces);
   ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
   look(viewer_);
+  EXPECT_EQ(coverage(viewer_), 0.0);
+}
+
+// A scene without triangles is an empty picture, not one that a host waits for.
+TEST_F(CApiSurfaces, WithoutTrianglesThePictureConvergesAndIsEmpty) {
+  const auto without_mesh = folder_ / "camera.gltf";
+  std::ofstream(without_mesh) << R"({"asset": {"version": "2.0"},
+    "nodes": [{"camera": 0, "translation": [0, 0, 10]}],
+    "cameras": [{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 0.1}}]})";
+  ASSERT_EQ(cumulet_load_surfaces(viewer_, without_mesh.c_str()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
+  double low[3];
+  double high[3];
+  EXPECT_EQ(cumulet_get_bounds(viewer_, low, high), CUMULET_ERROR_INVALID_ARGUMENT);
+  auto light = make_desc<cumulet_light_desc>();
+  light.sky_radiance[0] = 0.25F;
+  ASSERT_EQ(cumulet_set_light(viewer_, &light), CUMULET_OK);
+  for (const cumulet_surface_light surface_light : {CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_NONE}) {
+    auto settings = make_desc<cumulet_surface_settings_desc>();
+    settings.light = surface_light;
+    ASSERT_EQ(cumulet_set_surface_settings(viewer_, &settings), CUMULET_OK);
+    const std::vector<float> rgba = picture(viewer_);
+    for (std::size_t i = 0; i < rgba.size(); ++i) EXPECT_EQ(rgba[i], i % 4 == 0 ? 0.25F : 0.0F) << i;
+  }
+  // Its camera needs nothing to look at.
+  EXPECT_EQ(cumulet_use_surface_camera(viewer_, 0), CUMULET_OK) << error();
+  EXPECT_EQ(coverage(viewer_), 0.0);
+  std::vector<float> depth(256);
+  EXPECT_EQ(cumulet_read_aov(viewer_, CUMULET_AOV_SURFACE_DEPTH, depth.data(), depth.size()), CUMULET_OK) << error();
+  EXPECT_TRUE(std::isinf(depth[0]));
+  // Then something to see, and nothing again.
+  ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
+  EXPECT_GT(coverage(viewer_), 0.01);
+  ASSERT_EQ(cumulet_set_surfaces(viewer_, nullptr), CUMULET_OK);
   EXPECT_TRUE(shows_nothing(viewer_));
 }
 

@@ -16,12 +16,16 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <thread>
 
 #include "base/progress.hpp"
 #include "grid/tet_grid.hpp"
+#include "render/surface_data.hpp"
 #include "support/folder.hpp"
+#include "support/gltf_seeds.hpp"
 #include "support/volumes.hpp"
+#include "surface/gltf_import.hpp"
 #include "viewer/volume_asset.hpp"
 #include "volume/memory.hpp"
 
@@ -277,6 +281,47 @@ TEST_F(CancelImport, NanoVdbOfEveryCodec) {
     nanovdb::io::writeGrid(file.string(), nano, codec);
     expect_import(file);
   }
+}
+
+/// One mesh of 200,000 triangles, without tangents under a normal map: the longest that a mesh is worked upon.
+std::vector<std::uint8_t> large_model() {
+  constexpr std::uint32_t n = 320;
+  std::vector<float> positions, normals, uvs;
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t y = 0; y <= n; ++y) {
+    for (std::uint32_t x = 0; x <= n; ++x) {
+      const float u = float(x) / n;
+      const float v = float(y) / n;
+      positions.insert(positions.end(), {u, 0.02F * std::sin(40.0F * u) * std::cos(50.0F * v), v});
+      normals.insert(normals.end(), {0.0F, 1.0F, 0.0F});
+      uvs.insert(uvs.end(), {u, v});
+      const std::uint32_t a = y * (n + 1) + x;
+      if (x < n && y < n) indices.insert(indices.end(), {a, a + n + 1, a + 1, a + 1, a + n + 1, a + n + 2});
+    }
+  }
+  test::GltfModel model;
+  model.add("images", {{"bufferView", model.view(test::png(1, 1, 8, 2, {128, 128, 255}))}, {"mimeType", "image/png"}});
+  model.add("textures", {{"source", 0}});
+  model.add("materials", {{"normalTexture", {{"index", 0}}}});
+  const int node = model.show(
+      {{"attributes",
+        {{"POSITION", model.vec3(positions)}, {"NORMAL", model.vec3(normals)}, {"TEXCOORD_0", model.vec2(uvs)}}},
+       {"indices", model.accessor("SCALAR", 1, indices)},
+       {"material", 0}});
+  model.root["scene"] = model.add("scenes", {{"nodes", {node}}});
+  return model.glb();
+}
+
+TEST(Cancel, Surfaces) {
+  const std::vector<std::uint8_t> file = large_model();
+  expect_cancels([&](Progress& progress) {
+    progress.begin(Progress::Stage::loading);
+    const auto scene = surface::import_gltf(file, "large", {}, {}, &progress);
+    progress.at(0.99);
+    const auto source =
+        render::make_surface_source(scene, scene->pose(0.0, std::numeric_limits<std::size_t>::max()), &progress);
+    progress.at(1.0);
+  });
 }
 
 TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {

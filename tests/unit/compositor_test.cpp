@@ -161,11 +161,14 @@ struct Picture {
     }
     return n > 0.0 ? total / n : total;
   }
-  [[nodiscard]] glm::dvec4 texel(glm::ivec2 p, const Display& display, bool filled) const {
+  [[nodiscard]] glm::dvec4 texel(glm::ivec2 p, const Display& display) const {
     const std::size_t i = index(p);
-    if (counts[i].x == 0 && !filled) return glm::dvec4(0.0);
-    glm::dvec4 mean =
-        counts[i].x == 0 ? around(glm::clamp(p, glm::ivec2(0), size - 1)) : glm::dvec4(sum[i]) / double(counts[i].x);
+    glm::dvec4 mean(0.0);
+    if (counts[i].x > 0) {
+      mean = glm::dvec4(sum[i]) / double(counts[i].x);
+    } else if (holes) {
+      mean = around(glm::clamp(p, glm::ivec2(0), size - 1));
+    }
     if (display.transparent) return mean;
     if (!display.legend) mean += glm::dvec4(glm::dvec3(display.background) * (1.0 - mean.a), 0.0);
     return {glm::dvec3(mean), 1.0};
@@ -176,16 +179,15 @@ struct Picture {
 glm::dvec4 evaluate(const Picture& picture, const Display& display, glm::ivec2 pixel, glm::ivec2 viewport) {
   glm::dvec4 value;
   if (picture.size == viewport) {
-    value = picture.texel(pixel, display, picture.holes);
+    value = picture.texel(pixel, display);
   } else {
     const glm::dvec2 at = (glm::dvec2(pixel) + 0.5) * glm::dvec2(picture.size) / glm::dvec2(viewport) - 0.5;
     const glm::ivec2 low(glm::floor(at));
     const glm::dvec2 weight = at - glm::dvec2(low);
-    value = glm::mix(
-        glm::mix(picture.texel(low, display, true), picture.texel(low + glm::ivec2(1, 0), display, true), weight.x),
-        glm::mix(picture.texel(low + glm::ivec2(0, 1), display, true),
-                 picture.texel(low + glm::ivec2(1, 1), display, true), weight.x),
-        weight.y);
+    value = glm::mix(glm::mix(picture.texel(low, display), picture.texel(low + glm::ivec2(1, 0), display), weight.x),
+                     glm::mix(picture.texel(low + glm::ivec2(0, 1), display),
+                              picture.texel(low + glm::ivec2(1, 1), display), weight.x),
+                     weight.y);
   }
   if (value.a <= 0.0) return glm::dvec4(0.0);
   glm::dvec3 c = glm::dvec3(value) / value.a;
@@ -505,6 +507,49 @@ TEST_P(Compositing, DepthOutsideItsRangeIsClamped) {
     for (int x = 0; x < 8; ++x) {
       const bool surface = picture.z[picture.index({x, 7 - y})] > 0.0F;
       ASSERT_EQ(depths[static_cast<std::size_t>(y * size.x + x)], surface ? 0.0F : 1.0F);
+    }
+  }
+}
+
+// Rows whose first paths are still under way, more than neighbours can fill.
+TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
+  const auto flat = [&](int side, const glm::vec4& colour, int empty_rows) {
+    Picture picture(gl_, side, side, false);
+    picture.holes = true;
+    for (int i = 0; i < side * side; ++i) {
+      const unsigned samples = i / side < empty_rows ? 0U : 2U;
+      picture.sum[static_cast<std::size_t>(i)] = static_cast<float>(samples) * colour;
+      picture.counts[static_cast<std::size_t>(i)] = {samples, 0U, 0U, 0U};
+    }
+    gl_->TextureSubImage2D(picture.sum_texture.name(), 0, 0, 0, side, side, GL_RGBA, GL_FLOAT, picture.sum.data());
+    gl_->TextureSubImage2D(picture.counts_texture.name(), 0, 0, 0, side, side, GL_RGBA_INTEGER, GL_UNSIGNED_INT,
+                           picture.counts.data());
+    return picture;
+  };
+  const Picture earlier = flat(4, {0.0F, 1.0F, 0.0F, 1.0F}, 0);
+  const Picture now = flat(16, {1.0F, 0.0F, 0.0F, 1.0F}, 8);
+  const Target made = make_target(GL_RGBA32F, 0);
+  FrameTarget target;
+  target.framebuffer = made.framebuffer.name();
+  target.viewport = {0, 0, 16, 16};
+  target.blend_over = false;
+  Display display;
+  display.encoding = ColourEncoding::hdr;
+  for (const bool has_before : {true, false}) {
+    PictureTextures textures = now.textures();
+    if (has_before) {
+      textures.sum_before = earlier.sum_texture.name();
+      textures.counts_before = earlier.counts_texture.name();
+    }
+    {
+      const StateGuard guard(*gl_);
+      compositor_->draw(textures, display, target);
+    }
+    const std::vector<glm::vec4> got = read(made, GL_RGBA32F, 0);
+    for (int row = 0; row < 16; ++row) {
+      const glm::vec4 value = got[static_cast<std::size_t>((15 - row) * size.x + 5)];
+      EXPECT_EQ(value.x > 0.0F, row >= 7) << row;  // one row takes after its neighbours
+      EXPECT_EQ(value.y > 0.0F, row < 7 && has_before) << row;
     }
   }
 }

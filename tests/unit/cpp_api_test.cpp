@@ -635,9 +635,11 @@ TEST(CppSurfaces, AreFilesAndBytes) {
   const auto nowhere = Surfaces::from_memory(bytes, nullptr, "json");
   EXPECT_EQ(nowhere.error().status, StatusCode::file);
   EXPECT_STREQ(nowhere.error().message.c_str(),
-               "json: buffer 0: \"corners.bin\" is a file of its own, and there is no folder to look in");
+               "json: mesh 0, primitive 0, POSITION: buffer 0: \"corners.bin\" is a file of its own, and there is no "
+               "folder to look in");
   const auto missing = Surfaces::from_memory(bytes, "/nowhere");
-  EXPECT_STREQ(missing.error().message.c_str(), "memory: buffer 0: corners.bin: no such file");
+  EXPECT_STREQ(missing.error().message.c_str(),
+               "memory: mesh 0, primitive 0, POSITION: buffer 0: corners.bin: no such file");
   EXPECT_EQ(Surfaces::open("no such model.glb").error().status, StatusCode::file);
   EXPECT_EQ(Surfaces().info().error().status, StatusCode::invalid_argument);
 }

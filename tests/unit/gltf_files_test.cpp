@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
+#include <string_view>
 
 #include "base/error.hpp"
 #include "support/gltf_check.hpp"
@@ -14,6 +17,7 @@ namespace cumulet::surface {
 namespace {
 
 const std::filesystem::path models = std::filesystem::path(CUMULET_SHARED_DATA) / "gltf";
+constexpr const char* validator = "khronos_validator";
 
 /// Those that must be refused, and what the line must say.
 const std::map<std::string, std::string> refused = {
@@ -69,6 +73,7 @@ TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".gltf" && extension != ".glb") continue;
     const std::string name = entry.path().lexically_relative(models).string();
+    if (name.starts_with(validator)) continue;  // below
     SCOPED_TRACE(name);
     seen.insert(name);
     const auto expected = refused.find(name);
@@ -97,6 +102,44 @@ TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
   }
   for (const auto& [name, cause] : refused) EXPECT_TRUE(seen.contains(name)) << name << " is not there";
   EXPECT_GT(seen.size(), 70U);
+}
+
+// Khronos' glTF-Validator: its own test models, with its report of each.
+TEST(GltfFiles, WhatTheValidatorCallsValidLoadsAndTheRestIsTold) {
+  const auto suite = models / validator;
+  if (!std::filesystem::exists(suite)) GTEST_SKIP() << "no shared data";
+  std::size_t valid = 0;
+  std::size_t invalid = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(suite)) {
+    constexpr std::string_view ending = ".report.json";
+    const std::string report = entry.path().string();
+    if (!report.ends_with(ending)) continue;
+    const std::string file = report.substr(0, report.size() - ending.size());
+    SCOPED_TRACE(file);
+    const auto issues = nlohmann::json::parse(std::ifstream(report))["issues"];
+    const bool good = issues["numErrors"] == 0;
+    ++(good ? valid : invalid);
+    std::string causes;
+    for (const auto& message : issues["messages"]) {
+      if (message["severity"] != 0) continue;
+      causes.append(" ").append(message.value("code", "")).append("@").append(message.value("pointer", ""));
+    }
+    Lines lines;
+    try {
+      const ScenePtr scene = import_gltf(file, Log(note, &lines));
+      EXPECT_EQ(test::broken(*scene), "");
+      EXPECT_EQ(test::broken(*scene, scene->pose(0.5)), "");
+      // Most show nothing at all, and are told of for that.
+      EXPECT_TRUE(good || !lines.warnings.empty()) << "told of none:" << causes;
+    } catch (const Error& error) {
+      EXPECT_FALSE(good) << error.what();
+      EXPECT_TRUE(one_line(error.what())) << error.what();
+      EXPECT_NE(std::string(error.what()).find(file), std::string::npos) << error.what();
+    }
+    for (const std::string& line : lines.all) EXPECT_TRUE(one_line(line)) << line;
+  }
+  EXPECT_GE(valid, 129U);
+  EXPECT_GE(invalid, 243U);
 }
 
 TEST(GltfFiles, DracoIsTheSameEngine) {

@@ -241,11 +241,6 @@ TEST(DenseVolume, RefusesWhatIsWrong) {
                      d.desc.value_count = 0;
                    }),
              "0 values");
-  EXPECT_HAS(wrong(content, [](Dense& d) { std::fill(d.values.begin(), d.values.end(), 0.0F); }), "is empty");
-  EXPECT_HAS(wrong(content, [](Dense& d) { d.at(3, 4, 5) = std::numeric_limits<float>::quiet_NaN(); }),
-             "voxel (3, 4, 5) is nan");
-  EXPECT_HAS(wrong(content, [](Dense& d) { d.at(8, 4, 5) = std::numeric_limits<float>::infinity(); }),
-             "voxel (8, 4, 5) is infinity");
   const auto matrix = [&](int element, double value) {
     return wrong(content, [=](Dense& d) {
       for (int i = 0; i < 4; ++i) d.desc.index_to_world[5 * i] = 1.0;
@@ -273,8 +268,37 @@ TEST(DenseVolume, TakesDefaults) {
   EXPECT_EQ(value_at(inside(volume), {1, 1, 1}), 0.0F);
   EXPECT_EQ(inside(volume).active_voxels, 2U);
   dense.desc.name = "a\nb";
+  dense.desc.index_to_world[0] = INFINITY;
+  EXPECT_HAS(refused(CUMULET_ERROR_FILE, dense.call()), "a b: ");
+}
+
+TEST(DenseVolume, CountsWhatCountsAsZero) {
+  Dense dense(3, 3, 3);
   dense.at(0, 0, 0) = INFINITY;
-  EXPECT_HAS(refused(CUMULET_ERROR_FILE, dense.call()), "a b: voxel (0, 0, 0) is infinity");
+  dense.at(1, 0, 0) = NAN;
+  dense.at(2, 0, 0) = -1.0F;
+  dense.at(2, 2, 2) = 2.0F;
+  const Volume volume = made(dense.call());
+  cumulet_volume_info info{};
+  info.struct_size = sizeof info;
+  ASSERT_EQ(cumulet_volume_get_info(volume.get(), &info), CUMULET_OK);
+  EXPECT_EQ(info.active_voxels, 4U);
+  EXPECT_EQ(info.non_finite_voxels, 2U);
+  EXPECT_EQ(info.negative_voxels, 1U);
+  EXPECT_EQ(info.max_value, 2.0F);
+  EXPECT_EQ(value_at(inside(volume), {0, 0, 0}), 0.0F);
+
+  // Nothing at all is a volume, too.
+  const Volume nothing = made(Dense(2, 2, 2).call());
+  ASSERT_EQ(cumulet_volume_get_info(nothing.get(), &info), CUMULET_OK);
+  EXPECT_EQ(info.active_voxels, 0U);
+  double scale = 5.0;
+  EXPECT_EQ(cumulet_volume_suggest_density_scale(nothing.get(), &scale), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(scale, 5.0);
+  ASSERT_EQ(cumulet_volume_suggest_density_scale(volume.get(), &scale), CUMULET_OK);
+  EXPECT_GT(scale, 1.0);
+  EXPECT_EQ(cumulet_volume_suggest_density_scale(volume.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_volume_suggest_density_scale(nullptr, &scale), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
 TEST(SparseVolume, HoldsBricksTilesAndBackground) {
@@ -338,17 +362,7 @@ TEST(SparseVolume, RefusesWhatIsWrong) {
   EXPECT_HAS(wrong(content, [](Sparse& s) { s.tile({23, 7, 7}, {30, 9, 9}); }), "overlap");
   EXPECT_HAS(wrong(content, [](Sparse& s) { s.tile({30, 0, 0}, {29, 9, 9}); }), "ends before it begins");
   EXPECT_HAS(wrong(argument, [](Sparse& s) { s.tile({30, 0, 0}, {30, 9, 9}, 1.0F, 2); }), "active is 2");
-  EXPECT_HAS(wrong(content, [](Sparse& s) { s.tiles[0].value = NAN; }), "tile at voxel (16, 0, 0) is nan");
-  EXPECT_HAS(wrong(content, [](Sparse& s) { s.values[512 + 3 * 64 + 2 * 8 + 1] = INFINITY; }),
-             "voxel (11, 2, 1) is infinity");
-  EXPECT_HAS(wrong(content, [](Sparse& s) { s.desc.background = NAN; }), "background value is nan");
   EXPECT_HAS(wrong(content, [](Sparse& s) { s.desc.index_to_world[0] = 1.0; }), "not affine");
-  EXPECT_HAS(wrong(content,
-                   [](Sparse& s) {
-                     s.active.assign(16, 0);
-                     s.tiles[0].active = 0;
-                   }),
-             "is empty");
   EXPECT_HAS(wrong(content, [](Sparse& s) { s.brick(1 << 21, 0, 0); }), "span 2097160 x 8 x 8 voxels");
   // The ends of the integers.
   EXPECT_HAS(wrong(content,
@@ -525,11 +539,97 @@ TEST_F(OpenVdbVolume, RefusesWhatFilesRefuse) {
   frustum->setTransform(openvdb::math::Transform::createFrustumTransform(
       openvdb::BBoxd(openvdb::Vec3d(0), openvdb::Vec3d(10)), 0.5, 2.0));
   EXPECT_HAS(refusal(frustum), "frustum");
-  EXPECT_HAS(refusal(openvdb::FloatGrid::create()), "openvdb: is empty");
+  EXPECT_TRUE(inside(copy(openvdb::FloatGrid::create())).empty());
   const auto bad = openvdb::FloatGrid::create();
   bad->tree().setValue(Coord(1, 2, 3), NAN);
-  EXPECT_HAS(refusal(bad), "voxel (1, 2, 3) is nan");
+  EXPECT_EQ(inside(copy(bad)).non_finite_voxels, 1U);
   EXPECT_EQ(cumulet::volume_from_openvdb(rich(0.0F), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(OpenVdbVolume, FilesStandWhereTheHostWants) {
+  const auto grid = rich(0.0F);
+  const std::string file = write({grid});
+  cumulet_volume_file_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.path = file.c_str();
+  const auto call = [&](cumulet_volume** out, char* error, size_t size) {
+    return cumulet_volume_open_file(&desc, out, error, size);
+  };
+  expect_identical(inside(made(call)), inside(open(file)));
+  // Z up to Y up: (x, y, z) to (x, z, -y).
+  const double upright[16] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
+  std::ranges::copy(upright, desc.to_world);
+  const Volume turned = made(call);
+  const glm::dmat4 before = inside(open(file)).index_to_world;
+  const glm::dmat4& after = inside(turned).index_to_world;
+  for (int column = 0; column < 4; ++column)
+    EXPECT_EQ(after[column], glm::dvec4(before[column].x, before[column].z, -before[column].y, before[column].w));
+  desc.to_world[3] = 0.5;
+  EXPECT_HAS(refused(CUMULET_ERROR_INVALID_ARGUMENT, call), "not affine");
+  desc.to_world[3] = NAN;
+  EXPECT_HAS(refused(CUMULET_ERROR_INVALID_ARGUMENT, call), "not finite");
+  std::fill_n(desc.to_world, 15, 0.0);
+  desc.to_world[15] = 1.0;
+  EXPECT_HAS(refused(CUMULET_ERROR_FILE, call), "flattens space");
+}
+
+TEST_F(OpenVdbVolume, AreInspected) {
+  const auto grid = rich(0.0F);
+  grid->insertMeta("author", openvdb::StringMetadata("me"));
+  const auto sphere = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(5.0F, openvdb::Vec3f(0), 1.0F);
+  sphere->setName("surface");
+  const std::string file = write({sphere, grid});
+  cumulet_inspection* inspection = nullptr;
+  char error[256] = "x";
+  ASSERT_EQ(cumulet_inspect_volume_file(file.c_str(), &inspection, error, sizeof error), CUMULET_OK) << error;
+  cumulet_volume_file_info info{};
+  info.struct_size = sizeof info;
+  ASSERT_EQ(cumulet_inspection_get_file(inspection, &info), CUMULET_OK);
+  EXPECT_EQ(info.grid_count, 2U);
+  EXPECT_EQ(info.default_grid, 1);
+  EXPECT_STREQ(info.format, "OpenVDB 224");
+  cumulet_grid_info found{};
+  found.struct_size = sizeof found;
+  ASSERT_EQ(cumulet_inspection_get_grid(inspection, 1, &found), CUMULET_OK);
+  EXPECT_STREQ(found.name, "density");
+  EXPECT_STREQ(found.type, "float");
+  EXPECT_STREQ(found.refusal, "");
+  EXPECT_EQ(found.values, CUMULET_GRID_VALUES_SCALARS);
+  const Volume volume = open(file);
+  EXPECT_EQ(found.active_voxels, inside(volume).active_voxels);
+  EXPECT_EQ(found.max_value, inside(volume).max_value);
+  std::uint64_t counted = 0;
+  for (const std::uint64_t bin : found.histogram) counted += bin;
+  EXPECT_EQ(counted, found.active_voxels);
+  cumulet_volume_info shown{};
+  shown.struct_size = sizeof shown;
+  ASSERT_EQ(cumulet_volume_get_info(volume.get(), &shown), CUMULET_OK);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(found.bounds_min[axis], shown.bounds_min[axis]);
+    EXPECT_EQ(found.bounds_max[axis], shown.bounds_max[axis]);
+  }
+  bool author = false;
+  cumulet_metadata entry{};
+  entry.struct_size = sizeof entry;
+  for (std::uint32_t i = 0; i < found.metadata_count; ++i) {
+    ASSERT_EQ(cumulet_inspection_get_metadata(inspection, 1, i, &entry), CUMULET_OK);
+    author = author || (std::string(entry.name) == "author" && std::string(entry.value) == "me");
+  }
+  EXPECT_TRUE(author);
+  ASSERT_EQ(cumulet_inspection_get_grid(inspection, 0, &found), CUMULET_OK);
+  EXPECT_STREQ(found.refusal, "is a level set, not a fog volume");
+  EXPECT_EQ(cumulet_inspection_get_grid(inspection, 2, &found), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_inspection_get_grid(inspection, 0, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_inspection_get_metadata(inspection, 1, 1000, &entry), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_inspection_get_metadata(inspection, 2, 0, &entry), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_inspection_get_metadata(inspection, -2, 0, &entry), CUMULET_ERROR_INVALID_ARGUMENT);
+  cumulet_inspection_release(inspection);
+  cumulet_inspection_release(nullptr);
+  EXPECT_EQ(cumulet_inspect_volume_file("/nowhere/x.vdb", &inspection, error, sizeof error), CUMULET_ERROR_FILE);
+  EXPECT_EQ(inspection, nullptr);
+  EXPECT_STREQ(error, "/nowhere/x.vdb: no such file");
+  EXPECT_EQ(cumulet_inspect_volume_file(nullptr, &inspection, error, sizeof error), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_inspection_get_file(nullptr, &info), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(OpenVdbVolume, FilesOpenAndFail) {
@@ -542,7 +642,7 @@ TEST_F(OpenVdbVolume, FilesOpenAndFail) {
   const auto opening = [](const char* path, const char* name) {
     return [=](auto... arguments) { return cumulet_volume_open(path, name, arguments...); };
   };
-  const std::string several = refused(CUMULET_ERROR_FILE, opening(file.c_str(), ""));
+  const std::string several = refused(CUMULET_ERROR_FILE, opening(file.c_str(), "density"));
   EXPECT_EQ(several.rfind(file + ": ", 0), 0U) << several;
   EXPECT_HAS(refused(CUMULET_ERROR_FILE, opening(file.c_str(), "dust")), "has no grid \"dust\"");
   EXPECT_HAS(refused(CUMULET_ERROR_FILE, opening("/nowhere/x.vdb", nullptr)), "/nowhere/x.vdb: no such file");

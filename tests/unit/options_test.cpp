@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "memory.hpp"
+#include "progress.hpp"
 #include "support/folder.hpp"
 
 namespace {
@@ -257,8 +259,70 @@ TEST(Options, SurfacesMayComeAlone) {
   EXPECT_EQ(options->scene.surface_camera, 1);
   EXPECT_EQ(options->scene.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
   EXPECT_EQ(options->scene.surface.indirect_roughness, 0.25F);
+  EXPECT_EQ(options->scene.surface.double_sided, 0);
+  EXPECT_EQ(parse({"--gltf", "a.glb", "--double-sided"}).scene.surface.double_sided, 1);
+  EXPECT_EQ(parse({"--gltf", "a.glb", "--double-sided=off"}).scene.surface.double_sided, 0);
   EXPECT_NE(usage_error(with({"--surface-light", "some"})).find("shadows"), std::string::npos);
   for (const char* bad : {"-0.1", "1.1", "nan", "x"}) EXPECT_NE(usage_error(with({"--indirect-roughness", bad})), "");
+}
+
+TEST(Options, WhatIsOfAModelNeedsOne) {
+  for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-camera"}) {
+    EXPECT_EQ(usage_error(with({flag, "1"})),
+              std::string(flag) + " needs a model: --gltf, or a --scene that names one");
+    EXPECT_EQ(usage_error(with({flag, "1", "--gltf", "a.glb"})), "");
+  }
+}
+
+TEST(Options, HelpFitsAHundredColumns) {
+  std::ostringstream out;
+  EXPECT_FALSE(parse_render_options({"--help"}, out).has_value());
+  std::istringstream lines(out.str());
+  std::size_t count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    EXPECT_LE(line.size(), 100U) << line;
+    EXPECT_TRUE(line.empty() || line.back() != ' ') << line;
+  }
+  EXPECT_GT(count, 60U);
+  EXPECT_NE(out.str().find("OpenVDB or NanoVDB file (.vdb, .nvdb)"), std::string::npos) << out.str();
+}
+
+TEST(Progress, RatesAreShownOnceTheyMeanSomething) {
+  // What was done before the first line took no time that anybody measured.
+  EXPECT_EQ(rendering_line(0.5, 0.0, 0.0, 1e9), "rendering [############............] 50 %");
+  EXPECT_EQ(rendering_line(0.5, 0.01, 1e-9, 1e9), "rendering [############............] 50 %");
+  EXPECT_EQ(rendering_line(0.0, 0.0, 10.0, 1e9), "rendering [........................] 0 %");
+  EXPECT_EQ(rendering_line(0.5, 0.25, 10.0, 4e6),
+            "rendering [############............] 50 %  100 ksamples/s  ETA 0:20");
+  EXPECT_NE(rendering_line(1.0, 1.0, 10.0, 5e13).find("5 Tsamples/s"), std::string::npos);
+}
+
+TEST(PictureMemory, IsToldBeforeItIsMissed) {
+  RenderOptions options = parse({"--size", "16384x16384"});
+  constexpr std::uint64_t gib = std::uint64_t{1} << 30U;
+  const auto told = [&](std::string_view renderer, std::optional<std::uint64_t> available) -> std::string {
+    try {
+      check_memory(options, renderer, available);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  // What a software driver takes is main memory as well.
+  EXPECT_EQ(told("llvmpipe (LLVM 15.0.6, 256 bits)", 15 * gib),
+            "a picture of 16384x16384 needs 8.0 GiB of OpenGL's memory and 11.0 GiB of main memory: 15.0 GiB of main "
+            "memory are free, and this driver has no other");
+  EXPECT_EQ(told("NVIDIA H100", 15 * gib), "");
+  EXPECT_NE(told("NVIDIA H100", 10 * gib), "");
+  EXPECT_EQ(told("llvmpipe", 64 * gib), "");
+  EXPECT_EQ(told("llvmpipe", std::nullopt), "");
+  options.format = OutputFormat::exr;
+  options.aovs = {CUMULET_AOV_NORMAL};
+  EXPECT_GT(picture_memory(options).main, 20 * gib);
+  options = parse({});
+  EXPECT_LT(picture_memory(options).main + picture_memory(options).gl, gib / 8);
+  EXPECT_EQ(told("llvmpipe", gib), "");
+  EXPECT_GT(available_memory().value_or(gib), 0U);
 }
 
 TEST(Options, AovsAreListedOrAll) {
@@ -356,8 +420,58 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
   EXPECT_NE(usage_error({"--volume", "a.vdb"}).find("--output"), std::string::npos);
   EXPECT_NE(usage_error(with({"--bogus"})).find("--bogus"), std::string::npos);
   EXPECT_NE(usage_error(with({"stray"})).find("stray"), std::string::npos);
-  EXPECT_NE(usage_error(with({"--spp", "1", "--spp", "2"})).find("--spp"), std::string::npos);
+  EXPECT_NE(usage_error(with({"--json"})).find("--info"), std::string::npos);
   EXPECT_NE(usage_error(with({"--stats", "out.png"})), "");
+}
+
+TEST(Options, TheLastOfAFlagWins) {
+  EXPECT_EQ(parse({"--spp", "1", "--spp", "2"}).scene.sampling.samples, 2u);
+  EXPECT_EQ(parse({"--volume", "b.vdb"}).scene.volume, "b.vdb");
+  EXPECT_EQ(parse({"--march", "dense", "--march", "tet"}).scene.grid.march, CUMULET_MARCH_TET);
+}
+
+TEST(Options, TheDensityScaleIsAutoUnlessSaid) {
+  EXPECT_TRUE(parse({}).scene.auto_density_scale);
+  EXPECT_FALSE(parse({"--density-scale", "3"}).scene.auto_density_scale);
+  const SceneOptions again = parse({"--density-scale", "3", "--density-scale", "auto"}).scene;
+  EXPECT_TRUE(again.auto_density_scale);
+  EXPECT_EQ(again.medium.density_scale, 0.0);
+}
+
+TEST(Options, TheUpAxisTurnsTheVolume) {
+  const SceneOptions upright = parse({}).scene;
+  EXPECT_EQ(volume_file(upright).to_world[0], 0.0) << "zero: as it is";
+  const SceneOptions turned = parse({"--up", "z", "--grid-name", "smoke"}).scene;
+  const cumulet_volume_file_desc file = volume_file(turned);
+  EXPECT_STREQ(file.path, "cloud.vdb");
+  EXPECT_STREQ(file.grid_name, "smoke");
+  // Column 2 is where Z goes: up. Column 1, Y: away from the camera.
+  EXPECT_EQ(file.to_world[9], 1.0);
+  EXPECT_EQ(file.to_world[6], -1.0);
+  EXPECT_NE(usage_error(with({"--up", "x"})).find("--up"), std::string::npos);
+}
+
+TEST(Options, FilesNeedNoFlag) {
+  std::ostringstream out;
+  const auto both = parse_render_options({"cloud.VDB", "model.glb", "-o", "a.png"}, out);
+  EXPECT_EQ(both->scene.volume, "cloud.VDB");
+  EXPECT_EQ(both->scene.surfaces, "model.glb");
+  EXPECT_GT(both->scene.light.sun_irradiance[0], 0.0f) << "daylight";
+  const auto info = parse_render_options({"--info", "--json", "cloud.vdb"}, out);
+  EXPECT_TRUE(info->info && info->json);
+  EXPECT_NE(usage_error({"a.vdb", "b.nvdb", "-o", "a.png"}).find("b.nvdb"), std::string::npos);
+  EXPECT_NE(usage_error({"a.txt", "-o", "a.png"}).find("a.txt"), std::string::npos);
+  // By content, and a scene's settings below the flags.
+  const cumulet::test::Folder folder;
+  const std::string scene = (folder.path() / "scene").string();
+  std::ofstream(scene) << R"({"cumulet_scene": 1, "volume": {"file": "/v.vdb", "up": "z"}, "light": {},
+                              "picture": {"samples": 3}})";
+  const auto read = parse_render_options({"-o", "a.png", "--spp", "5", scene}, out);
+  EXPECT_EQ(read->scene.volume, "/v.vdb");
+  EXPECT_EQ(read->scene.up, UpAxis::z);
+  EXPECT_EQ(read->scene.sampling.samples, 5u);
+  EXPECT_EQ(read->scene.light.sun_irradiance[0], 0.0f) << "the scene's own light";
+  EXPECT_FALSE(read->scene.auto_density_scale) << "a scene without a scale means 1, as it always did";
 }
 
 TEST(Options, HelpAndVersionNeedNothingElse) {

@@ -34,6 +34,7 @@ SceneOptions full_scene() {
   scene.surface.animation = 3;
   scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
   scene.surface.indirect_roughness = 0.3f;
+  scene.surface.double_sided = 1;
   scene.surface_camera = 2;
   scene.width = 333;
   scene.height = 222;
@@ -83,6 +84,7 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   EXPECT_EQ(read.surface.animation, scene.surface.animation);
   EXPECT_EQ(read.surface.light, scene.surface.light);
   EXPECT_EQ(read.surface.indirect_roughness, scene.surface.indirect_roughness);
+  EXPECT_EQ(read.surface.double_sided, scene.surface.double_sided);
   EXPECT_EQ(read.surface_camera, scene.surface_camera);
   EXPECT_EQ(read.width, scene.width);
   EXPECT_EQ(read.height, scene.height);
@@ -140,19 +142,51 @@ TEST(SceneFile, EveryDifferenceCounts) {
   EXPECT_TRUE(differs([](SceneOptions& s) { s.grid.threshold = 0.5; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.sampling.seed = 1; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.display.exposure_stops = 0.0f; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.surface.double_sided = 0; }));
   EXPECT_FALSE(differs([](SceneOptions&) {}));
+}
+
+TEST(SceneFile, AKeyIsGivenOnce) {
+  const auto told = [](const std::string& text) -> std::string {
+    try {
+      static_cast<void>(parse_scene(text, "s.json"));
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(told(R"({"cumulet_scene": 1, "cumulet_scene": 1})"), "s.json: cumulet_scene: is given twice");
+  EXPECT_EQ(told(R"({"cumulet_scene": 1, "picture": {"width": 8, "height": 8, "width": 9}})"),
+            "s.json: picture.width: is given twice");
+  EXPECT_EQ(told(R"({"cumulet_scene": 1, "light": {"sun": {"irradiance": [1, 1, 1], "irradiance": [2, 2, 2]}}})"),
+            "s.json: light.sun.irradiance: is given twice");
+  // The same key in two objects is no repeat.
+  EXPECT_EQ(told(R"({"cumulet_scene": 1, "volume": {"file": "a.vdb"}, "surfaces": {"file": "a.glb"}})"), "");
 }
 
 TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
   const SceneOptions read = parse_scene(R"({"cumulet_scene": 1})", "s.json");
   SceneOptions day;
   day.set_daylight();
+  day.auto_density_scale = false;  // a file of version 1 means 1, for ever
   EXPECT_TRUE(same_scene(read, day));
   EXPECT_EQ(read.grid.threshold, 0.0);
   EXPECT_EQ(read.grid.max_cells, 0u);
   EXPECT_EQ(read.camera.fovy_degrees, 0.0);
   const SceneOptions dark = parse_scene(with(R"("light": {})"), "s.json");
   EXPECT_EQ(dark.light.sky_radiance[2], 0.0f);
+}
+
+TEST(SceneFile, TheDensityScaleIsSavedAsItWasFound) {
+  SceneOptions scene;
+  const auto again = [&] { return parse_scene(scene_text(scene, "s.json"), "s.json"); };
+  EXPECT_TRUE(again().auto_density_scale) << "nothing loaded yet";
+  scene.medium.density_scale = 12.5;
+  EXPECT_FALSE(again().auto_density_scale);
+  EXPECT_EQ(again().medium.density_scale, 12.5);
+  scene.up = UpAxis::z;
+  EXPECT_EQ(again().up, UpAxis::z);
+  EXPECT_FALSE(same_scene(scene, SceneOptions()));
 }
 
 TEST(SceneFile, AVolumeIsFoundFromTheFilesFolder) {
@@ -174,6 +208,7 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
                         Case{R"("colour": {})", "colour"},
                         Case{R"("medium": [])", "medium"},
                         Case{R"("medium": {"density_scale": 0})", "medium.density_scale"},
+                        Case{R"("volume": {"up": "x"})", "volume.up"},
                         Case{R"("medium": {"density_scale": "1"})", "medium.density_scale"},
                         Case{R"("medium": {"density_scale": null})", "medium.density_scale"},
                         Case{R"("medium": {"albedo": [1, 1]})", "medium.albedo"},

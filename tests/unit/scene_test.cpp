@@ -2,6 +2,7 @@
 #include <openvdb/tools/Count.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -12,9 +13,12 @@
 #include <string>
 #include <vector>
 
+#include "mesh.hpp"
 #include "scene.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_check.hpp"
+#include "surface/bvh_rays.hpp"
+#include "surface/winding.hpp"
 #include "surfaces.hpp"
 
 namespace {
@@ -156,6 +160,64 @@ TEST_F(Mountains, AreTheSameEachTime) {
   EXPECT_TRUE(glb_ == scene::make_surfaces(1));
   EXPECT_FALSE(glb_ == scene::make_surfaces(2));
   EXPECT_LT(glb_.size(), 20000000U);
+}
+
+TEST(Mesh, PartsAreWoundOutwards) {
+  scene::Mesh mesh;
+  mesh.box({1, 2, 3}, {1, 2, 3}, 0.3F);
+  const auto area = [&] { return surface::detail::winding_of(mesh.position, mesh.index).area; };
+  EXPECT_NEAR(area(), 88.0, 1e-3);
+  mesh.bar({9, 0, 0}, {9, 5, 0}, 0.5F);
+  mesh.bar({9, 9, 0}, {12, 7, 4}, 0.5F);
+  mesh.turned({-9, 0, 0}, {{0.0F, 0.0F}, {2.0F, 1.0F}, {0.0F, 3.0F}}, 12);
+  EXPECT_GT(area(), 88.0 + 12.0 + 12.0 + 10.0);
+  EXPECT_EQ(surface::detail::winding_of(mesh.position, mesh.index).inward, 0.0);
+  // And the normals agree with it.
+  for (std::size_t i = 0; i + 2 < mesh.index.size(); i += 3) {
+    const auto at = [&](std::size_t k) { return mesh.position[mesh.index[i + k]]; };
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_GT(glm::dot(glm::cross(at(1) - at(0), at(2) - at(0)), mesh.normal[mesh.index[i + k]]), 0.0F);
+    }
+  }
+}
+
+// Whatever is seen first from around the tower is seen from its front. From above: the roofs are sheets that jut out.
+TEST_F(Mountains, ShowTheirFronts) {
+  std::vector<std::uint32_t> flags(scene_->triangle_count(), 0);  // rays meet backs as well
+  const surface::Bvh bvh = surface::Bvh::build(pose_.vertices, scene_->indices, flags);
+  core::BvhRays rays{&bvh};
+  const auto corner = [&](std::size_t triangle, std::size_t k) {
+    return pose_.vertices[scene_->indices[3 * triangle + k]].position;
+  };
+  EXPECT_EQ(pose_.flipped, std::vector<std::uint8_t>(scene_->draws.size(), 0));
+  std::vector<bool> building(scene_->triangle_count(), false);
+  std::vector<surface::Draw> draws;
+  for (const surface::Draw& draw : scene_->draws) {
+    if (draw.node != node("Tower") && draw.node != node("Station") && draw.node != node("Lantern")) continue;
+    std::fill_n(building.begin() + draw.first_index / 3, draw.index_count / 3, true);
+    draws.push_back(draw);
+  }
+  std::size_t seen = 0;
+  std::size_t backs = 0;
+  for (const surface::Draw& draw : draws) {
+    for (std::size_t t = draw.first_index / 3; t < (draw.first_index + draw.index_count) / 3; ++t) {
+      const glm::vec3 target = (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3.0F;
+      for (int way = 0; way < 5; ++way) {
+        const float angle = 1.2566371F * static_cast<float>(way) + 0.1F * static_cast<float>(t);
+        const glm::vec3 back = glm::normalize(glm::vec3(std::cos(angle), 1.2F, std::sin(angle)));
+        core::BvhRays::CmHit hit{};
+        if (!rays.cm_bvh_closest(target + 120.0F * back, -back, 0.0F, 121.0F, hit)) continue;
+        if (!building[hit.triangle]) continue;  // the ground may hide it, seen from within
+        ++seen;
+        const glm::vec3 normal = glm::cross(corner(hit.triangle, 1) - corner(hit.triangle, 0),
+                                            corner(hit.triangle, 2) - corner(hit.triangle, 0));
+        backs += glm::dot(normal, back) < 0.0F ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(seen, 10000U);
+  // But for windows, flat before a wall that leans: some are seen edge-on, from behind. Of bars it would be a half.
+  EXPECT_LT(200 * backs, seen);
 }
 
 TEST_F(Mountains, AreImportedWithoutAWarning) {

@@ -20,9 +20,15 @@
 #include "base/shared_code.hpp"
 #include "gl/state_guard.hpp"
 #include "image.hpp"
+#include "render/progressive.hpp"
 #include "support/gl_state.hpp"
+#include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
+inline vec2 cm_ggx_albedo(float roughness, float cosine) {
+  return surface::GgxAlbedo::table().towards(roughness, cosine);
+}
+inline vec2 cm_ggx_albedo_average(float roughness) { return surface::GgxAlbedo::table().average(roughness); }
 #include "bsdf.glsl"
 }  // namespace cumulet::core
 
@@ -631,6 +637,7 @@ TEST_P(SurfaceRasters, MapsOfEveryKindAreReadFromTheirChannels) {
   s.metallic = 0.5F * 0.8F;
   s.roughness = 0.9F * 0.4F;
   s.normal = {0.0F, 0.0F, 1.0F};
+  s.smooth_normal = s.normal;
   s.f0 = core::cm_dielectric_f0(1.8F, 0.9F * 0.6F, colour);
   s.specular = 0.9F * 0.6F;
   s.clearcoat = 0.8F * 0.2F;
@@ -656,8 +663,8 @@ TEST_P(SurfaceRasters, MapsOfEveryKindAreReadFromTheirChannels) {
 }
 
 TEST_P(SurfaceRasters, NormalMapsWithAndWithoutTangents) {
-  // The map leans by 0.6 to its right and 0.48 up; the sun shines from each side in turn.
-  const glm::vec3 m(0.6F, 0.48F, 0.64F);
+  // The map leans by 0.48 to its right and 0.36 up, so little that the mirror image of the eye is above the wall.
+  const glm::vec3 m(0.48F, 0.36F, 0.8F);
   const auto byte = [](float value) { return static_cast<std::uint8_t>(std::lround((value + 1.0F) * 127.5F)); };
   const std::vector<std::uint8_t> texel{byte(m.x), byte(m.y), byte(m.z), 255};
   for (const bool mirrored_u : {false, true}) {
@@ -686,12 +693,19 @@ TEST_P(SurfaceRasters, NormalMapsWithAndWithoutTangents) {
           view.forward.z = 1.0;
           view.right = -view.right;
         }
-        for (const glm::vec3 sun : {glm::vec3(1, 0, 0), glm::vec3(-1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, -1, 0),
-                                    glm::vec3(0, 0, 1), glm::vec3(0, 0, -1)}) {
+        const glm::vec3 smooth(0.0F, 0.0F, from_behind ? -1.0F : 1.0F);
+        for (const glm::vec3 sun :
+             {glm::vec3(0.8F, 0, 0.6F), glm::vec3(-0.8F, 0, 0.6F), glm::vec3(0, 0.96F, 0.28F),
+              glm::vec3(0, -0.6F, 0.8F), glm::vec3(0.8F, 0, -0.6F), glm::vec3(-0.8F, 0, -0.6F),
+              glm::vec3(0, 0.96F, -0.28F), glm::vec3(0, 0, 1), glm::vec3(0, 0, -1), glm::vec3(1, 0, 0)}) {
           SurfaceLighting lighting;
           lighting.sun_direction = sun;
           lighting.sun_irradiance = glm::vec3(pi);
-          const float expected = std::max(0.0F, glm::dot(normal, sun));
+          // With the soft terminator of mapped normals.
+          const float cosine = std::max(0.0F, glm::dot(normal, sun));
+          const float above = glm::dot(smooth, sun) / (std::max(cosine, 1e-6F) * glm::dot(normal, smooth));
+          const float t = glm::clamp(above, 0.0F, 1.0F);
+          const float expected = cosine * (t + t * t - t * t * t);
           EXPECT_NEAR(draw(view, lighting, {8U, 8U}).centre().x, expected, 0.01F) << sun.x << sun.y << sun.z;
         }
       }
@@ -768,6 +782,7 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
         s.metallic = material.metallic;
         s.roughness = material.roughness;
         s.normal = glm::vec3(d, std::sqrt(1.0F - glm::dot(d, d)));
+        s.smooth_normal = s.normal;
         s.f0 = glm::vec3(0.04F);
         s.specular = 1.0F;
         if (s.roughness < 0.3F &&
@@ -800,6 +815,46 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
     const char* backend = GetParam() == cumulet::headless::Backend::egl ? "egl" : "osmesa";
     cumulet::image::write_png(std::string(folder) + "/spheres_" + backend + ".png", out);
   }
+}
+
+// Whatever the driver's pace, and whatever the pass's vertices cost it: a drag shows half of the pixels or more, rest
+// all of them; and pictures of one view are drawn over one pass.
+TEST_P(SurfaceRasters, PreviewsAreSharp) {
+  using namespace cumulet::render;
+  Tracer tracer(gl_);
+  const glm::uvec2 size(1068U, 901U);
+  for (const double budget : {1e-9, 0.1, 16.0, 1e9}) {
+    const glm::uvec2 dragged = Progressive::quick_layers(tracer, size, budget, false).layer_size;
+    EXPECT_GE(dragged.x, size.x / 2) << budget;
+    EXPECT_GE(dragged.y, size.y / 2) << budget;
+    EXPECT_EQ(Progressive::quick_layers(tracer, size, budget, true).layer_size, size) << budget;
+  }
+  const auto scene = std::make_shared<HandScene>();
+  scene->add_matte(glm::vec3(0.5F));
+  scene->add_wall(-2.0F, 3.0F, 0);
+  set(scene);
+  const StateGuard guard(*gl_);
+  Surfaces surfaces;
+  surfaces.raster = raster_.get();
+  surfaces.view = straight({0, 0, 0}, 0.5);
+  PictureSettings settings;
+  settings.layered = Layered::beneath;
+  settings.layer_size = {32U, 16U};
+  cumulet::render::Picture coarse;
+  cumulet::render::Picture fine;
+  tracer.draw_layers(coarse, surfaces, settings);
+  tracer.draw_layers(fine, surfaces, settings);
+  EXPECT_EQ(&coarse.layers(), &fine.layers());
+  const std::uint64_t bytes = tracer.bytes();
+  surfaces.view.eye.x = 0.5;
+  tracer.draw_layers(fine, surfaces, settings);
+  EXPECT_NE(&coarse.layers(), &fine.layers()) << "another view";
+  tracer.draw_layers(coarse, surfaces, settings);
+  EXPECT_EQ(&coarse.layers(), &fine.layers());
+  raster_->set_pose(scene->pose(0.0, 0));
+  tracer.draw_layers(fine, surfaces, settings);
+  EXPECT_NE(&coarse.layers(), &fine.layers()) << "another pose";
+  EXPECT_LE(tracer.bytes(), 2 * bytes) << "what no picture shows is used again";
 }
 
 TEST_P(SurfaceRasters, LeavesAndReadsNoState) {

@@ -145,6 +145,40 @@ TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
   }
 }
 
+// A sphere of few triangles is lit as the smooth one that its normals speak of, down to the terminator: no facet's own
+// edge stops light, and none is lost in a furnace.
+TEST_P(SurfaceTrace, ACoarseSphereHasASmoothTerminator) {
+  const auto viewer = make();
+  auto scene = std::make_shared<StillScene>();
+  scene->add_sphere({0.0F, 0.0F, 0.0F}, 10.0F, scene->add(test::diffuse(vec3(1.0F))), 6);
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  viewer::CameraPose camera = test::camera_at({0.0, 0.0, 100.0}, {0.0, 0.0, 0.0}, 40.0);
+  camera.orthographic_height = 18.0;
+  viewer->set_camera(camera);
+  constexpr int side = 32;
+  for (const bool raster : {false, true}) {
+    viewer->viewer().set_surface_settings({{}, raster ? viewer::SurfaceLight::none : viewer::SurfaceLight::full});
+    viewer->set_light(sun_at(90.0F, vec3(static_cast<float>(pi))));
+    const test::Picture lit = test::render(*viewer, {side, side, 16, 1, render::View::shaded});
+    int counted = 0;
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        const double px = (x + 0.5 - 0.5 * side) * 18.0 / side / 10.0;
+        const double py = (0.5 * side - y - 0.5) * 18.0 / side / 10.0;
+        if (px * px + py * py > 0.5 || std::abs(py) > 0.6) continue;
+        const double got = lit.pixels[static_cast<std::size_t>(y * side + x)].x;
+        EXPECT_NEAR(got, std::max(0.0, py), 0.08) << raster << ' ' << x << ',' << y;
+        ++counted;
+      }
+    }
+    EXPECT_GT(counted, 400);
+  }
+  viewer->viewer().set_surface_settings({});
+  viewer->set_light(sun_at(0.0F, vec3(0.0F), vec3(1.0F)));
+  const test::Picture furnace = test::render(*viewer, {side, side, 64, 1, render::View::shaded});
+  EXPECT_NEAR(furnace.mean().x, 1.0, 2e-3);
+}
+
 viewer::SurfaceSettings indirect_roughness(float roughness) {
   viewer::SurfaceSettings s;
   s.indirect_roughness = roughness;

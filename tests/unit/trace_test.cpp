@@ -542,7 +542,7 @@ TEST_P(Trace, RefusesWhatItCannotDoAndKeepsWhatItHad) {
   const test::Image image{8, 8, 2, 1, render::View::shaded};
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   const test::Picture before = test::render(*viewer, image);
-  viewer->viewer().load_volume("no such file.vdb", "");
+  viewer->viewer().load_volume({"no such file.vdb", ""});
   EXPECT_THROW(viewer->build(), Error);
   auto flat = test::noise_volume({16, 16, 16}, ivec3(0), 1);
   flat.index_to_world[2] = flat.index_to_world[1];

@@ -63,6 +63,55 @@ TEST_F(WorkerTest, ReplacingCancelsWhatIsUnderWayAndTellsNobody) {
   EXPECT_FALSE(worker_.status().failure);
 }
 
+// However fast wishes come, every second job is finished.
+TEST_F(WorkerTest, NoTwoInARowAreReplaced) {
+  begin("first");
+  started_ = false;
+  worker_.replace(job("second"));  // "first" is cancelled for it
+  started_.wait(false);
+  worker_.replace(job("third"));
+  worker_.replace(job("fourth"));
+  EXPECT_EQ(done(), (std::vector<std::string>{"second", "fourth"}));
+  EXPECT_FALSE(worker_.status().failure);
+  // Answered: the next may be replaced again.
+  let_go_ = false;
+  started_ = false;
+  done_.clear();
+  begin("fifth");
+  worker_.replace(job("sixth"));
+  EXPECT_EQ(done(), (std::vector<std::string>{"sixth"}));
+  // What was cancelled for no other counts for nothing.
+  let_go_ = false;
+  started_ = false;
+  done_.clear();
+  begin("seventh");
+  worker_.cancel();
+  EXPECT_TRUE(worker_.wait(std::nullopt));
+  started_ = false;
+  begin("eighth");
+  worker_.replace(job("ninth"));
+  EXPECT_EQ(done(), (std::vector<std::string>{"ninth"}));
+}
+
+TEST_F(WorkerTest, LoadsAloneAreCancelled) {
+  begin("first");
+  Worker::Job load = job("second");
+  load.load = true;
+  worker_.post(load);
+  worker_.cancel_loads();
+  ASSERT_TRUE(worker_.status().failure);
+  EXPECT_EQ(worker_.status().failure->code(), ErrorCode::cancelled);
+  EXPECT_EQ(done(), (std::vector<std::string>{"first"}));
+  let_go_ = false;
+  started_ = false;
+  done_.clear();
+  worker_.post(load);
+  started_.wait(false);
+  worker_.cancel_loads();
+  EXPECT_TRUE(worker_.wait(std::nullopt));
+  EXPECT_TRUE(done_.empty());
+}
+
 TEST_F(WorkerTest, CancelEndsBoth) {
   begin("first");
   worker_.post(job("second"));

@@ -21,26 +21,28 @@
  *     goes away (a widget moved between windows), call cumulet_detach while it is still current, or
  *     cumulet_context_lost when it is gone, and cumulet_attach in the new one: volume, grid, surfaces, settings and
  *     camera are kept, GL objects are made anew within the next frames. cumulet_destroy needs the context current if
- *     the viewer is attached, and none if it is not.
+ *     the viewer is attached, and none if it is not; without it, GL objects stay behind until the context goes.
  *
  * Threads
  *     Calls for one viewer must not overlap, from whatever thread they come, with two exceptions that are safe at any
  *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
- *     objects with it, current on the calling thread; no other call touches GL. Camera, volume and surfaces handles may
- *     be used from any thread at any time. Files are read, grids are built and surfaces are posed on worker threads of
- *     the viewer's own; cumulet_render uploads what they made, within its time budget, and shows the last good picture
- *     until then. The update callback comes from any thread, a worker's included. Neither it nor the log callback may
- *     call the library (but for the two exceptions): a call from the update callback is refused with
- *     CUMULET_ERROR_INVALID_ARGUMENT.
+ *     objects with it, current on the calling thread: without, they are CUMULET_ERROR_GL each time and change nothing,
+ *     and the next call with it goes on. No other call touches GL. Camera, volume and surfaces handles may be used from
+ *     any thread at any time. Files are read, grids are built and surfaces are posed on worker threads of the viewer's
+ *     own; cumulet_render uploads what they made, within its time budget, and shows the last good picture until then.
+ *     The newest wish wins and none starves: what changes faster than it is read, built, posed or uploaded is shown as
+ *     often as it can be, and the newest last. The update callback comes from any thread, a worker's included. Neither
+ *     it nor the log callback may call the library, but for the two exceptions and to retain and release handles: any
+ *     other call from inside one, for whatever viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT
+ *     (cumulet_destroy does nothing).
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
- *     reads no state but: pixel buffers and parameters, bindings and capabilities are set to what it needs first. It
- *     uses, and so saves and restores:
+ *     reads no state but: pixel buffers and parameters, bindings and capabilities are set to what it needs first. What
+ *     a call does not use it neither asks for nor sets; what it does it asks for once, and puts back. It may use:
  *       - the current program and program pipeline, the vertex array binding, the draw and read framebuffer bindings
- *       - active texture; on units 0-15 the 2D, 2D array, 2D multisample, 3D and buffer texture bindings and the
- *         sampler
- *       - storage buffer bindings 0-1, uniform buffer bindings 0-1 and their generic points, image units 0-2
+ *       - active texture; on units 0-15 the texture bindings of every target and the sampler
+ *       - storage buffer bindings 0-7, uniform buffer bindings 0-7 and their generic points, image units 0-7
  *       - pixel pack and unpack buffers and all pixel store parameters
  *       - viewport 0, scissor test and box 0, colour mask (of every draw buffer), depth mask, function, test and range,
  *         depth clamp, stencil test
@@ -69,7 +71,8 @@
  *
  * Descriptors
  *     Set struct_size to sizeof the struct and zero the rest: zero means the default. Unknown enum values are errors.
- *     A struct from an older header is shorter, and what it lacks is zero.
+ *     A struct from an older header is shorter, and what it lacks is zero. Any other size, one that cuts a field or
+ *     that a newer header has among them, is CUMULET_ERROR_INVALID_ARGUMENT.
  *
  * Units and conventions
  *     World space is the VDB's own (metres, +Y up, right-handed). Extinction is density_scale x grid value in
@@ -114,7 +117,7 @@ typedef enum cumulet_status {
   CUMULET_ERROR_UNSUPPORTED = -2,      /* the context lacks a version, a function or a limit */
   CUMULET_ERROR_FILE = -3,             /* unreadable, malformed or unsuitable file (or voxels in memory) */
   CUMULET_ERROR_OUT_OF_MEMORY = -4,    /* host or GL memory */
-  CUMULET_ERROR_GL = -5,               /* any other GL error */
+  CUMULET_ERROR_GL = -5,               /* any other GL error, a [GL] call without the attached context among them */
   CUMULET_ERROR_INTERNAL = -6,         /* a bug in Cumulet: please report it */
   CUMULET_ERROR_CANCELLED = -7,        /* by cumulet_cancel */
   CUMULET_ERROR_CONTEXT_LOST = -8,     /* the driver reset the context: the viewer is detached now */
@@ -186,16 +189,35 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
 /*
  * A scalar fog volume in main memory: immutable, counted, free of GL, to be shown by any number of viewers. These
  * calls are synchronous, for any thread; error as in cumulet_create. cumulet_load_volume is the asynchronous way.
- * The medium is zero outside the bounds of the active voxels. Negative voxels count as zero (cumulet_load_volume logs a
- * warning).
+ * The medium is zero outside the bounds of the active voxels. Negative and non-finite voxels count as zero, and a grid
+ * without active voxels is an empty volume, which shows nothing: cumulet_volume_info tells, cumulet_load_volume logs
+ * warnings.
  */
 
 /*
- * Reads one scalar grid of a .vdb or .nvdb file. grid_name NULL or "": "density", else the only scalar fog grid;
- * "name[1]" is the second of that name.
+ * Reads one scalar grid of a .vdb or .nvdb file. grid_name NULL or "": the one called "density"; else the first of
+ * those called "smoke", "soot", "flames", "flame", "fire", "temperature", "heat", in whatever case; else the first
+ * scalar fog grid of the file (cumulet_load_volume logs a warning that names the others). "name[1]" is the second of
+ * that name.
  */
 CUMULET_API cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out,
                                                char* error, size_t error_size);
+
+/* One grid of a file, and where it stands. */
+typedef struct cumulet_volume_file_desc {
+  size_t struct_size;
+  const char* path;
+  const char* grid_name; /* as above */
+  /*
+   * Affine: from the world space of the file to that of the picture, in which +Y is up; zero: identity. For a file
+   * whose up axis is Z, as Blender's and Mantaflow's, (x, y, z) to (x, z, -y): columns 1,0,0,0, 0,0,-1,0, 0,1,0,0,
+   * 0,0,0,1.
+   */
+  double to_world[16];
+} cumulet_volume_file_desc;
+
+CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
+                                                    char* error, size_t error_size);
 
 /* Voxels in a box. Active are those that are not zero. */
 typedef struct cumulet_dense_desc {
@@ -245,15 +267,96 @@ typedef struct cumulet_volume_info {
   double bounds_min[3]; /* world space */
   double bounds_max[3];
   float max_value;
+  uint64_t negative_voxels; /* that count as 0 */
+  uint64_t non_finite_voxels;
 } cumulet_volume_info;
 
 CUMULET_API cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_volume_info* info);
+
+/*
+ * A density scale (of cumulet_medium_desc) with which the volume looks like a body rather than a ghost or a block: a
+ * mean optical depth of 8, taken over rays from all directions through what is visibly occupied: haze and a few extreme
+ * voxels count for little. It depends on the volume alone, not on the camera; for a sequence, ask once, of a frame that
+ * is not empty. Some milliseconds. CUMULET_ERROR_INVALID_ARGUMENT, *scale unchanged, for a volume that shows nothing.
+ */
+CUMULET_API cumulet_status cumulet_volume_suggest_density_scale(const cumulet_volume* volume, double* scale);
 
 /* One grid of a file: refusal is "" if it can be shown, else why not. */
 typedef void (*cumulet_grid_fn)(void* user, const char* name, const char* type, const char* refusal);
 /* Calls fn for each grid of a .vdb or .nvdb file, reading no voxels. */
 CUMULET_API cumulet_status cumulet_list_grids(const char* path, cumulet_grid_fn fn, void* user, char* error,
                                               size_t error_size);
+
+/*
+ * What is in a file, for a dialog that lets a person choose: immutable, for any thread. Texts live until it is
+ * released.
+ */
+typedef struct cumulet_inspection cumulet_inspection; /* cumulet_inspection_release */
+
+/* Reads the directory of a .vdb or .nvdb file; error as in cumulet_create. */
+CUMULET_API cumulet_status cumulet_inspect_volume_file(const char* path, cumulet_inspection** out, char* error,
+                                                       size_t error_size);
+CUMULET_API void cumulet_inspection_release(cumulet_inspection* inspection); /* NULL is allowed */
+
+typedef struct cumulet_volume_file_info {
+  size_t struct_size;
+  const char* format; /* "OpenVDB 224", "NanoVDB 32.3" */
+  uint64_t bytes;     /* of the file */
+  uint32_t grid_count;
+  uint32_t metadata_count; /* entries of the file as a whole */
+  int32_t default_grid;    /* the one that is read if none is named; -1: none can be shown */
+} cumulet_volume_file_info;
+
+CUMULET_API cumulet_status cumulet_inspection_get_file(const cumulet_inspection* inspection,
+                                                       cumulet_volume_file_info* info);
+
+enum { CUMULET_HISTOGRAM_BINS = 64 };
+
+typedef enum cumulet_grid_values {
+  CUMULET_GRID_VALUES_NONE = 0,    /* voxels of a type that is not read, or damaged: what follows values is 0 */
+  CUMULET_GRID_VALUES_SCALARS = 1, /* numbers */
+  CUMULET_GRID_VALUES_LENGTHS = 2  /* of vectors */
+} cumulet_grid_values;
+
+typedef struct cumulet_grid_info {
+  size_t struct_size;
+  const char* name;       /* "name[1]" where the file repeats one */
+  const char* type;       /* as the file says: "float", "half", "vec3s", ... */
+  const char* grid_class; /* "fog volume", "level set", "unknown", ... */
+  const char* refusal;    /* "" if it can be shown, else why not */
+  uint32_t metadata_count;
+  cumulet_grid_values values;
+  double index_to_world[16]; /* in the file's own world space */
+  uint64_t active_voxels;
+  int32_t voxel_min[3]; /* the box of the active voxels, inclusive */
+  int32_t voxel_max[3];
+  double bounds_min[3]; /* of the same, world space */
+  double bounds_max[3];
+  float min_value; /* of the finite active voxels */
+  float max_value;
+  double mean_value;
+  uint64_t negative_voxels;
+  uint64_t non_finite_voxels;
+  uint64_t memory_bytes; /* what a volume of it holds in main memory, at most */
+  /* Counts of the finite active voxels in equal steps from min_value to max_value. */
+  uint64_t histogram[CUMULET_HISTOGRAM_BINS];
+} cumulet_grid_info;
+
+/* One grid of the file, from 0. The first call for a grid reads its voxels: seconds, for a large one. */
+CUMULET_API cumulet_status cumulet_inspection_get_grid(cumulet_inspection* inspection, uint32_t grid,
+                                                       cumulet_grid_info* info);
+
+/* An entry of metadata, as text of at most 4096 bytes, in whatever encoding the file has. */
+typedef struct cumulet_metadata {
+  size_t struct_size;
+  const char* name;
+  const char* type; /* "string", "bool", "vec3i", ... */
+  const char* value;
+} cumulet_metadata;
+
+/* grid -1: of the file as a whole. CUMULET_ERROR_INVALID_ARGUMENT for a grid or an entry that is not there. */
+CUMULET_API cumulet_status cumulet_inspection_get_metadata(const cumulet_inspection* inspection, int32_t grid,
+                                                           uint32_t index, cumulet_metadata* out);
 
 /* ---- Surfaces -------------------------------------------------------------------------------------------------- */
 
@@ -342,10 +445,14 @@ CUMULET_API cumulet_status cumulet_surfaces_get_animation(const cumulet_surfaces
 
 /*
  * Begins to read a file as cumulet_volume_open does, on the viewer's worker, and then to build its grid; replaces a
- * load under way. Returns at once; the volume shown before stays until the new one is ready, for good if that fails.
+ * load or build under way, though never two in a row, so that of a stream of files at least every second is shown.
+ * Returns at once; the volume shown before stays until the new one is ready, for good if that fails.
  */
 CUMULET_API cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name);
-/* Begins to build this volume's grid, likewise. NULL: shows nothing, at once. Cancels a load under way. */
+/* The same of cumulet_volume_open_file. */
+CUMULET_API cumulet_status cumulet_load_volume_file(cumulet_viewer* viewer, const cumulet_volume_file_desc* desc);
+/* Begins to build this volume's grid, after the build under way, which is shown first. NULL: shows nothing, at once.
+ * Cancels a load under way. */
 CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume);
 /* The volume last loaded or set, retained for the caller, who releases it; NULL if there is none. */
 CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out);
@@ -353,13 +460,14 @@ CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_vo
 CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
 
 /*
- * Begins to read a file as cumulet_surfaces_open does, on a worker, and then to pose it; replaces a load under way. The
- * surfaces shown before stay until it is ready, for good if that fails. Surfaces and volume share one world space and
- * one picture: rays end at triangles, and light goes both ways. cumulet_wait, cumulet_get_progress and cumulet_cancel
- * are about this work, too.
+ * Begins to read a file as cumulet_surfaces_open does, on a worker, and then to pose it; replaces a load under way, as
+ * cumulet_load_volume does. The surfaces shown before stay until it is ready, for good if that fails. Surfaces and
+ * volume share one world space and one picture: rays end at triangles, and light goes both ways. cumulet_wait,
+ * cumulet_get_progress and cumulet_cancel are about this work, too.
  */
 CUMULET_API cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path);
-/* Begins to pose these surfaces, likewise. NULL: shows none, at once. Cancels a load under way. */
+/* Begins to pose these surfaces, after the pose under way, which is shown first. NULL: shows none, at once. Cancels a
+ * load under way. */
 CUMULET_API cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, cumulet_surfaces* surfaces);
 /* The surfaces last loaded or set, retained for the caller, who releases them; NULL if there are none. */
 CUMULET_API cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** out);
@@ -370,9 +478,9 @@ typedef enum cumulet_surface_light {
                                         volume's shadow */
   /*
    * No light between surfaces and volume: surfaces are rasterised, lit by sun, sky and lamps without shadows, and hide
-   * what is behind them; the volume is lit by sun and sky alone. The fastest, and what previews show of surfaces in
-   * every mode. Surfaces of alphaMode BLEND are sorted among each other; in front of the volume, in it and behind it
-   * they count as one, at the nearest of a pixel.
+   * what is behind them; the volume is lit by sun and sky alone. The fastest, and what previews show in every mode
+   * where there is sun or sky. Surfaces of alphaMode BLEND are sorted among each other; in front of the volume, in it
+   * and behind it they count as one, at the nearest of a pixel.
    */
   CUMULET_SURFACE_LIGHT_NONE = 2
 } cumulet_surface_light;
@@ -389,10 +497,12 @@ typedef struct cumulet_surface_settings_desc {
    * off, without bias.
    */
   float indirect_roughness;
+  int32_t double_sided; /* 1: all materials show, and emit from, both of their sides, whatever the file says: for files
+                           that are wound inside out (a warning tells of those). 0: as the file says */
 } cumulet_surface_settings_desc;
 
-/* How this viewer shows its surfaces. Poses them on the worker if the moment changed; the last pose is shown until
- * then. */
+/* How this viewer shows its surfaces. Poses them on the worker if the moment or double_sided changed; the last pose is
+ * shown until then. */
 CUMULET_API cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer,
                                                         const cumulet_surface_settings_desc* desc);
 /* Moves the viewer's camera to one of the surfaces' own, as posed last: see cumulet_wait. */
@@ -688,7 +798,7 @@ typedef enum cumulet_depth_source {
 
 typedef struct cumulet_frame_desc {
   size_t struct_size;
-  double budget_ms; /* for uploads and tracing; 0: 10; negative: draw what there is, trace nothing */
+  double budget_ms; /* for uploads, tracing and drawing; 0: 10; negative: draw what there is, trace nothing */
 
   cumulet_target target;
   uint32_t framebuffer; /* GL name; 0 is the context's default framebuffer, if the host says so */
@@ -723,7 +833,7 @@ enum {
 typedef struct cumulet_frame_result {
   size_t struct_size;
   uint32_t flags;         /* CUMULET_RENDER_* */
-  double progress;        /* part of all samples done, 0 to 1 */
+  double progress;        /* part of the work on the newest settings that is done, coarse pictures too, 0 to 1 */
   uint32_t width;         /* of the picture that is shown: less than the frame's in a preview, 0 if there is none */
   uint32_t height;        /* likewise */
   uint32_t texture;       /* CUMULET_TARGET_TEXTURE: GL name, valid until the next render or detach */
@@ -734,6 +844,13 @@ typedef struct cumulet_frame_result {
  * [GL] One frame: takes up what the worker has made, uploads and traces for about budget_ms in bounded dispatches, and
  * draws the newest picture. result may be NULL. Fails, once, when something cannot be made (GL memory, a limit), still
  * having drawn what there was before; later frames go on with that until a setting changes.
+ *
+ * It waits for no result of the device: what a dispatch did is learnt later, at most three of them are under way when
+ * the call returns, and what the host has queued neither counts as the tracer's time nor is waited for. A dispatch is
+ * sent if it will likely end by the end of the budget, by what dispatches of its kind took at worst; the least that a
+ * frame sends (some rounds of 1024 pixels) takes a few milliseconds on software drivers, and the first of a kind waits
+ * for the driver to compile. Mesa's llvmpipe runs dispatches within the call, on the cores that the host's drawing is
+ * on, and waits for what the host draws into a depth texture that it gives. Calls that read wait for what is under way.
  */
 CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_frame_desc* frame,
                                           cumulet_frame_result* result);
@@ -747,7 +864,7 @@ typedef struct cumulet_pick {
 
 /* [GL] What is at the position x, y of the picture last rendered, in pixels of its frame. */
 CUMULET_API cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick);
-/* World bounds of the viewer's volume and surfaces. CUMULET_ERROR_INVALID_ARGUMENT if it has neither. */
+/* World bounds of the viewer's volume and triangles. CUMULET_ERROR_INVALID_ARGUMENT if it has neither. */
 CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], double box_max[3]);
 
 /*

@@ -365,6 +365,20 @@ struct VolumeInfo {
   std::uint64_t active_voxels = 0;
   Bounds bounds;
   float max_value = 0.0F;
+  std::uint64_t negative_voxels = 0;
+  std::uint64_t non_finite_voxels = 0;
+};
+
+struct VolumeFileDesc {
+  const char* path = nullptr;
+  const char* grid_name = nullptr;
+  Matrix to_world{};
+
+  operator cumulet_volume_file_desc() const noexcept {
+    cumulet_volume_file_desc c{.struct_size = sizeof c, .path = path, .grid_name = grid_name, .to_world = {}};
+    std::ranges::copy(to_world, c.to_world);
+    return c;
+  }
 };
 
 /// A share in an immutable volume: a copy is one more.
@@ -382,6 +396,12 @@ class Volume {
   [[nodiscard]] static Result<Volume> open(const std::string& path, const std::string& grid_name = {}) noexcept {
     return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
       return cumulet_volume_open(path.c_str(), detail::or_null(grid_name), out, error, size);
+    });
+  }
+  [[nodiscard]] static Result<Volume> open(const VolumeFileDesc& desc) noexcept {
+    const cumulet_volume_file_desc c = desc;
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_open_file(&c, out, error, size);
     });
   }
   [[nodiscard]] static Result<Volume> from_dense(const DenseDesc& desc) noexcept {
@@ -406,11 +426,18 @@ class Volume {
   [[nodiscard]] Result<VolumeInfo> info() const noexcept {
     auto c = detail::sized<cumulet_volume_info>();
     if (auto done = detail::result(cumulet_volume_get_info(handle_, &c)); !done) return done.error();
-    const auto& [struct_size, name, active_voxels, bounds_min, bounds_max, max_value] = c;
+    const auto& [struct_size, name, active_voxels, bounds_min, bounds_max, max_value, negative, non_finite] = c;
     return VolumeInfo{.name = Text<128>(name),
                       .active_voxels = active_voxels,
                       .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)},
-                      .max_value = max_value};
+                      .max_value = max_value,
+                      .negative_voxels = negative,
+                      .non_finite_voxels = non_finite};
+  }
+  [[nodiscard]] Result<double> suggest_density_scale() const noexcept {
+    double scale = 0.0;
+    if (auto done = detail::result(cumulet_volume_suggest_density_scale(handle_, &scale)); !done) return done.error();
+    return scale;
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
@@ -440,6 +467,123 @@ template <class Visit>
   const cumulet_status status = cumulet_list_grids(path.c_str(), call, user, cause.data(), cause.size());
   return detail::result(status, cause.data());
 }
+
+enum class GridValues {
+  none = CUMULET_GRID_VALUES_NONE,
+  scalars = CUMULET_GRID_VALUES_SCALARS,
+  lengths = CUMULET_GRID_VALUES_LENGTHS
+};
+
+/// Texts live as long as the Inspection.
+struct VolumeFileInfo {
+  std::string_view format;
+  std::uint64_t bytes = 0;
+  std::uint32_t grid_count = 0;
+  std::uint32_t metadata_count = 0;
+  std::int32_t default_grid = -1;
+};
+
+/// Likewise.
+struct GridInfo {
+  std::string_view name;
+  std::string_view type;
+  std::string_view grid_class;
+  std::string_view refusal;
+  std::uint32_t metadata_count = 0;
+  GridValues values = GridValues::none;
+  Matrix index_to_world{};
+  std::uint64_t active_voxels = 0;
+  std::array<std::int32_t, 3> voxel_min{};
+  std::array<std::int32_t, 3> voxel_max{};
+  Bounds bounds;
+  float min_value = 0.0F;
+  float max_value = 0.0F;
+  double mean_value = 0.0;
+  std::uint64_t negative_voxels = 0;
+  std::uint64_t non_finite_voxels = 0;
+  std::uint64_t memory_bytes = 0;
+  std::array<std::uint64_t, CUMULET_HISTOGRAM_BINS> histogram{};
+};
+
+/// Likewise.
+struct Metadata {
+  std::string_view name;
+  std::string_view type;
+  std::string_view value;
+};
+
+/// What is in a volume's file.
+class Inspection {
+ public:
+  Inspection() noexcept = default;
+  Inspection(const Inspection&) = delete;
+  Inspection(Inspection&& other) noexcept : handle_(std::exchange(other.handle_, nullptr)) {}
+  Inspection& operator=(Inspection other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Inspection() { cumulet_inspection_release(handle_); }
+
+  [[nodiscard]] static Result<Inspection> of(const std::string& path) noexcept {
+    return detail::made<Inspection>([&](cumulet_inspection** out, char* error, std::size_t size) {
+      return cumulet_inspect_volume_file(path.c_str(), out, error, size);
+    });
+  }
+
+  [[nodiscard]] Result<VolumeFileInfo> file() const noexcept {
+    auto c = detail::sized<cumulet_volume_file_info>();
+    if (auto done = detail::result(cumulet_inspection_get_file(handle_, &c)); !done) return done.error();
+    return VolumeFileInfo{.format = c.format,
+                          .bytes = c.bytes,
+                          .grid_count = c.grid_count,
+                          .metadata_count = c.metadata_count,
+                          .default_grid = c.default_grid};
+  }
+  [[nodiscard]] Result<GridInfo> grid(std::uint32_t index) const noexcept {
+    auto c = detail::sized<cumulet_grid_info>();
+    if (auto done = detail::result(cumulet_inspection_get_grid(handle_, index, &c)); !done) return done.error();
+    return GridInfo{.name = c.name,
+                    .type = c.type,
+                    .grid_class = c.grid_class,
+                    .refusal = c.refusal,
+                    .metadata_count = c.metadata_count,
+                    .values = static_cast<GridValues>(c.values),
+                    .index_to_world = std::to_array(c.index_to_world),
+                    .active_voxels = c.active_voxels,
+                    .voxel_min = std::to_array(c.voxel_min),
+                    .voxel_max = std::to_array(c.voxel_max),
+                    .bounds = {std::to_array(c.bounds_min), std::to_array(c.bounds_max)},
+                    .min_value = c.min_value,
+                    .max_value = c.max_value,
+                    .mean_value = c.mean_value,
+                    .negative_voxels = c.negative_voxels,
+                    .non_finite_voxels = c.non_finite_voxels,
+                    .memory_bytes = c.memory_bytes,
+                    .histogram = std::to_array(c.histogram)};
+  }
+  /// grid -1: of the file as a whole.
+  [[nodiscard]] Result<Metadata> metadata(std::int32_t grid, std::uint32_t index) const noexcept {
+    auto c = detail::sized<cumulet_metadata>();
+    if (auto done = detail::result(cumulet_inspection_get_metadata(handle_, grid, index, &c)); !done)
+      return done.error();
+    return Metadata{.name = c.name, .type = c.type, .value = c.value};
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_inspection* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_inspection* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's.
+  [[nodiscard]] static Inspection adopt(cumulet_inspection* handle) noexcept {
+    Inspection inspection;
+    inspection.handle_ = handle;
+    return inspection;
+  }
+
+ private:
+  cumulet_inspection* handle_ = nullptr;
+};
 
 // ---- Surfaces -------------------------------------------------------------------------------------------------------
 
@@ -636,13 +780,15 @@ struct SurfaceSettingsDesc {
   std::uint32_t animation = 0;
   SurfaceLight light{};
   float indirect_roughness = 0.0F;
+  bool double_sided = false;
 
   operator cumulet_surface_settings_desc() const noexcept {
     return {.struct_size = sizeof(cumulet_surface_settings_desc),
             .time = time,
             .animation = animation,
             .light = static_cast<cumulet_surface_light>(light),
-            .indirect_roughness = indirect_roughness};
+            .indirect_roughness = indirect_roughness,
+            .double_sided = double_sided ? 1 : 0};
   }
 };
 
@@ -994,6 +1140,10 @@ class Viewer {
 
   [[nodiscard]] Result<> load_volume(const std::string& path, const std::string& grid_name = {}) noexcept {
     return result(cumulet_load_volume(handle(), path.c_str(), detail::or_null(grid_name)));
+  }
+  [[nodiscard]] Result<> load_volume(const VolumeFileDesc& desc) noexcept {
+    const cumulet_volume_file_desc c = desc;
+    return result(cumulet_load_volume_file(handle(), &c));
   }
   /// An empty volume: shows nothing.
   [[nodiscard]] Result<> set_volume(const Volume& volume) noexcept {

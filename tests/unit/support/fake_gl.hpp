@@ -60,6 +60,17 @@ class FakeGl {
     const auto found = std::find(fn_names.begin(), fn_names.end(), name);
     return found == fn_names.end() ? 0 : calls_of_[static_cast<std::size_t>(found - fn_names.begin())];
   }
+  /// Calls that ask for state: glGet* and glIs*, but for errors and the reset status, which are not state.
+  [[nodiscard]] std::uint64_t questions() const {
+    std::uint64_t count = 0;
+    for (std::size_t i = 0; i < fn_names.size(); ++i) {
+      const std::string_view name = fn_names[i];
+      const bool asks = starts(name, "Is") || starts(name, "GetInteger") || starts(name, "GetBoolean") ||
+                        starts(name, "GetFloat") || starts(name, "GetDouble") || starts(name, "GetTextureParameter");
+      if (asks && name != "IsSync") count += calls_of_[i];
+    }
+    return count;
+  }
   [[nodiscard]] std::uint64_t allocations() const { return allocations_; }
   /// The allocation that was refused last, "" if none was.
   [[nodiscard]] const std::string& refused() const { return refused_; }

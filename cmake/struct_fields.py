@@ -1,0 +1,34 @@
+"""Writes where the fields of cumulet.h's structs end, as C++: the sizes that a host's struct_size may have.
+
+Only names are read here; the compiler fills in the numbers, and c_support.hpp asserts that no byte is left out.
+"""
+import argparse
+import re
+
+
+def structs(header):
+    text = re.sub(r"/\*.*?\*/", "", header, flags=re.S)
+    for name, body in re.findall(r"typedef struct (\w+) \{(.*?)\} \1;", text, flags=re.S):
+        fields = [re.search(r"(\w+)\s*(\[[^\]]*\]\s*)*$", d.strip()).group(1) for d in body.split(";") if d.strip()]
+        if fields[0] == "struct_size":
+            yield name, fields
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--out", required=True)
+    parser.add_argument("header")
+    arguments = parser.parse_args()
+    with open(arguments.header, encoding="utf-8") as file:
+        found = list(structs(file.read()))
+    lines = ["// Made by cmake/struct_fields.py."]
+    for name, fields in found:
+        lines.append(f"template <>\ninline constexpr auto fields_of<{name}> = std::to_array<Field>({{")
+        lines += [f"    {{offsetof({name}, {f}), sizeof({name}::{f}), alignof(decltype({name}::{f}))}}," for f in fields]
+        lines.append(f"}});\nstatic_assert(covers<{name}>());")
+    with open(arguments.out, "w", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

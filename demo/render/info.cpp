@@ -1,0 +1,183 @@
+#include "info.hpp"
+
+#include <cumulet/cumulet.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <program.hpp>
+#include <stdexcept>
+
+namespace cumulet::demo {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Release {
+  void operator()(cumulet_inspection* inspection) const { cumulet_inspection_release(inspection); }
+  void operator()(cumulet_surfaces* surfaces) const { cumulet_surfaces_release(surfaces); }
+};
+using Inspection = std::unique_ptr<cumulet_inspection, Release>;
+using Surfaces = std::unique_ptr<cumulet_surfaces, Release>;
+
+void check(cumulet_status status) {
+  if (status != CUMULET_OK) throw std::runtime_error(cumulet_status_text(status));
+}
+
+Inspection inspect(const std::string& path) {
+  std::array<char, 1024> error{};
+  cumulet_inspection* inspection = nullptr;
+  if (cumulet_inspect_volume_file(path.c_str(), &inspection, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return Inspection(inspection);
+}
+
+/// grid -1: of the file as a whole.
+Json metadata_of(const Inspection& inspection, std::int32_t grid, std::uint32_t count) {
+  Json list = Json::array();
+  cumulet_metadata entry{};
+  entry.struct_size = sizeof entry;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    check(cumulet_inspection_get_metadata(inspection.get(), grid, i, &entry));
+    list.push_back({{"name", entry.name}, {"type", entry.type}, {"value", entry.value}});
+  }
+  return list;
+}
+
+Json volume_info(const std::string& path) {
+  const Inspection inspection = inspect(path);
+  cumulet_volume_file_info file{};
+  file.struct_size = sizeof file;
+  check(cumulet_inspection_get_file(inspection.get(), &file));
+  Json json;
+  json["file"] = path;
+  json["format"] = file.format;
+  json["bytes"] = file.bytes;
+  json["metadata"] = metadata_of(inspection, -1, file.metadata_count);
+  json["grids"] = Json::array();
+  for (std::uint32_t i = 0; i < file.grid_count; ++i) {
+    cumulet_grid_info grid{};
+    grid.struct_size = sizeof grid;
+    check(cumulet_inspection_get_grid(inspection.get(), i, &grid));
+    Json entry;
+    entry["name"] = grid.name;
+    entry["type"] = grid.type;
+    entry["class"] = grid.grid_class;
+    entry["shown_by_default"] = file.default_grid == static_cast<std::int32_t>(i);
+    if (*grid.refusal != '\0') entry["refusal"] = grid.refusal;
+    if (grid.values != CUMULET_GRID_VALUES_NONE) {
+      entry["values"] = grid.values == CUMULET_GRID_VALUES_SCALARS ? "scalars" : "lengths";
+      entry["active_voxels"] = grid.active_voxels;
+      entry["voxel_min"] = grid.voxel_min;
+      entry["voxel_max"] = grid.voxel_max;
+      entry["range"] = {grid.min_value, grid.max_value};
+      entry["mean"] = grid.mean_value;
+      entry["negative_voxels"] = grid.negative_voxels;
+      entry["non_finite_voxels"] = grid.non_finite_voxels;
+      entry["index_to_world"] = grid.index_to_world;
+      entry["bounds_min"] = grid.bounds_min;
+      entry["bounds_max"] = grid.bounds_max;
+      entry["memory_bytes"] = grid.memory_bytes;
+      entry["histogram"] = grid.histogram;
+    }
+    entry["metadata"] = metadata_of(inspection, static_cast<std::int32_t>(i), grid.metadata_count);
+    json["grids"].push_back(entry);
+  }
+  return json;
+}
+
+Json surfaces_info(const std::string& path) {
+  std::array<char, 1024> error{};
+  cumulet_surfaces* opened = nullptr;
+  if (cumulet_surfaces_open(path.c_str(), &opened, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  const Surfaces surfaces(opened);
+  cumulet_surfaces_info info{};
+  info.struct_size = sizeof info;
+  check(cumulet_surfaces_get_info(surfaces.get(), &info));
+  Json json;
+  json["file"] = path;
+  json["triangles"] = info.triangles;
+  json["materials"] = info.materials;
+  json["lights"] = info.lights;
+  json["cameras"] = info.cameras;
+  json["bounds_min"] = info.bounds_min;
+  json["bounds_max"] = info.bounds_max;
+  json["animations"] = Json::array();
+  for (std::uint32_t i = 0; i < info.animations; ++i) {
+    cumulet_animation_info animation{};
+    animation.struct_size = sizeof animation;
+    check(cumulet_surfaces_get_animation(surfaces.get(), i, &animation));
+    json["animations"].push_back({{"name", animation.name}, {"duration", animation.duration}});
+  }
+  return json;
+}
+
+std::string text(const Json& value) {
+  return one_line(value.is_string() ? value.get<std::string>()
+                                    : value.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+/// A line a fact, those of what is inside indented; long lists of numbers are for JSON alone.
+void write_lines(const Json& json, const std::string& indent, std::ostream& out) {
+  for (const auto& [key, value] : json.items()) {
+    if (key == "histogram") continue;
+    if (!value.is_array() || value.empty() || !value.front().is_object()) {
+      if (!value.is_array() || !value.empty()) out << indent << key << ": " << text(value) << '\n';
+      continue;
+    }
+    out << indent << key << ":\n";
+    for (const Json& entry : value) {
+      if (key == "metadata") {
+        out << indent << "  " << text(entry["name"]) << " (" << text(entry["type"]) << "): " << text(entry["value"])
+            << '\n';
+        continue;
+      }
+      out << indent << "- " << text(entry["name"]) << '\n';
+      Json rest = entry;
+      rest.erase("name");
+      write_lines(rest, indent + "    ", out);
+    }
+  }
+}
+
+}  // namespace
+
+void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
+  Json json;
+  if (!scene.volume.empty()) json["volume"] = volume_info(scene.volume);
+  if (!scene.surfaces.empty()) json["surfaces"] = surfaces_info(scene.surfaces);
+  if (as_json) {
+    // Names may be in any encoding: what is not UTF-8 is replaced. What is not finite is null.
+    out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+    return;
+  }
+  for (const auto& [what, facts] : json.items()) write_lines(facts, "", out);
+}
+
+bool is_z_up(const std::string& volume_file) {
+  const Inspection inspection = inspect(volume_file);
+  cumulet_volume_file_info file{};
+  file.struct_size = sizeof file;
+  check(cumulet_inspection_get_file(inspection.get(), &file));
+  for (const Json& entry : metadata_of(inspection, -1, file.metadata_count)) {
+    if (entry["name"] == "creator" && entry["value"].get<std::string>().find("Blender") != std::string::npos)
+      return true;
+  }
+  // Mantaflow signs with its own entry in every grid. An entry past the last one is none.
+  for (std::uint32_t grid = 0; grid < file.grid_count; ++grid) {
+    cumulet_metadata entry{};
+    entry.struct_size = sizeof entry;
+    for (std::uint32_t i = 0;
+         cumulet_inspection_get_metadata(inspection.get(), static_cast<std::int32_t>(grid), i, &entry) == CUMULET_OK;
+         ++i) {
+      if (std::string(entry.name) == "file_base_resolution") return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,68 @@
+#include "memory.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+namespace cumulet::demo {
+
+namespace {
+
+std::string gib(std::uint64_t bytes) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1f GiB", static_cast<double>(bytes) / static_cast<double>(1U << 30U));
+  return text.data();
+}
+
+}  // namespace
+
+PictureMemory picture_memory(const RenderOptions& options) {
+  const std::uint64_t pixels = std::uint64_t{options.scene.width} * options.scene.height;
+  // A sum of four floats and four counts a pixel. Surfaces without light between are layers beside it.
+  std::uint64_t gl = 32;
+  if (!options.scene.surfaces.empty() && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE) gl += 24;
+  // Both of these are read back, to measure the noise as well.
+  std::uint64_t main = 32;
+  if (options.format == OutputFormat::png) main += 4 + 8;  // as displayed; filtered and packed
+  if (options.format == OutputFormat::pfm) main += 12;
+  if (options.format == OutputFormat::exr) main += 16;  // the file
+  main += options.aovs.size() * 2 * 4 * sizeof(float);  // read, and in the file
+  if (!options.aovs.empty()) {
+    gl += 16 + 36;
+    main += 16;
+  }
+  return {gl * pixels, main * pixels};
+}
+
+std::optional<std::uint64_t> available_memory() {
+  std::ifstream file("/proc/meminfo");
+  for (std::string key; file >> key;) {
+    std::uint64_t kib = 0;
+    if (key == "MemAvailable:" && file >> kib) return kib * 1024;
+    std::string rest;
+    std::getline(file, rest);
+  }
+  return std::nullopt;
+}
+
+void check_memory(const RenderOptions& options, std::string_view renderer, std::optional<std::uint64_t> available) {
+  const PictureMemory memory = picture_memory(options);
+  const bool software = std::ranges::any_of(std::array{"llvmpipe", "softpipe", "Software"}, [&](const char* name) {
+    return renderer.find(name) != std::string_view::npos;
+  });
+  const std::uint64_t needed = memory.main + (software ? memory.gl : 0);
+  if (!available || needed <= *available) return;
+  throw std::runtime_error(needs_text(options) + ": " + gib(*available) + " of main memory are free" +
+                           (software ? ", and this driver has no other" : ""));
+}
+
+std::string needs_text(const RenderOptions& options) {
+  const PictureMemory memory = picture_memory(options);
+  return "a picture of " + std::to_string(options.scene.width) + "x" + std::to_string(options.scene.height) +
+         " needs " + gib(memory.gl) + " of OpenGL's memory and " + gib(memory.main) + " of main memory";
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,67 @@
+// GGX microfacets with Smith's height-correlated masking (Heitz, "Understanding the Masking-Shadowing Function in
+// Microfacet-Based BRDFs", JCGT 3(2), 2014), and Schlick's Fresnel term. Shared by GLSL and C++.
+#ifndef CM_GGX_GLSL
+#define CM_GGX_GLSL
+
+const float CM_INV_PI = 0.318309886f;
+
+// Entries a side of the table of directional albedos that src/surface/ggx_albedo.hpp makes.
+const int CM_GGX_ALBEDO_SIZE = 32;
+
+CM_FN float cm_alpha(float roughness) { return max(roughness * roughness, 1e-3f); }
+
+// (1 - cosine)^5
+CM_FN float cm_schlick(float cosine) {
+  float c = clamp(1.0f - cosine, 0.0f, 1.0f);
+  float c2 = c * c;
+  return c2 * c2 * c;
+}
+
+// The functions below take vectors in the frame of the normal: z is the cosine.
+
+// GGX density of normals: 1 / (pi a^2 ((x^2 + y^2) / a^2 + z^2)^2), h unit.
+CM_FN float cm_ggx_density(float alpha, vec3 h) {
+  float inverse = 1.0f / (alpha * alpha);
+  float s = (h.x * h.x + h.y * h.y) * inverse + h.z * h.z;
+  return CM_INV_PI * inverse / (s * s);
+}
+
+// Smith's Lambda: (sqrt(1 + a^2 tan^2) - 1) / 2.
+CM_FN float cm_ggx_lambda(float alpha, vec3 w) {
+  float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
+  return 0.5f * sqrt(1.0f + alpha * alpha * tan2) - 0.5f;
+}
+
+// Visible normal: Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 7(4), 2018; with u in [0, 1)^2.
+CM_FN vec3 cm_ggx_visible_normal(float alpha, vec3 wo, float u0, float u1) {
+  vec3 stretched = normalize(vec3(alpha * wo.x, alpha * wo.y, wo.z));
+  float length2 = stretched.x * stretched.x + stretched.y * stretched.y;
+  vec3 t1 = length2 > 0.0f ? vec3(-stretched.y, stretched.x, 0.0f) * (1.0f / sqrt(length2)) : vec3(1.0f, 0.0f, 0.0f);
+  vec3 t2 = cross(stretched, t1);
+  float radius = sqrt(u0);
+  float angle = 6.28318531f * u1;
+  float p1 = radius * cos(angle);
+  float blend = 0.5f * (1.0f + stretched.z);
+  float p2 = (1.0f - blend) * sqrt(max(0.0f, 1.0f - p1 * p1)) + blend * radius * sin(angle);
+  vec3 h = t1 * p1 + t2 * p2 + stretched * sqrt(max(0.0f, 1.0f - p1 * p1 - p2 * p2));
+  return normalize(vec3(alpha * h.x, alpha * h.y, max(h.z, 1e-6f)));
+}
+
+// Density of wi, reflected at a visible normal: G1(wo) D(h) / (4 n.wo).
+CM_FN float cm_ggx_pdf(float alpha, vec3 wo, vec3 h) {
+  return cm_ggx_density(alpha, h) / ((1.0f + cm_ggx_lambda(alpha, wo)) * 4.0f * wo.z);
+}
+
+// D G2 / (4 n.wo): a GGX lobe without its Fresnel term, times |cos|.
+CM_FN float cm_ggx(float alpha, vec3 wo, vec3 wi, vec3 h) {
+  float g = 1.0f / (1.0f + cm_ggx_lambda(alpha, wo) + cm_ggx_lambda(alpha, wi));
+  return cm_ggx_density(alpha, h) * g / (4.0f * wo.z);
+}
+
+// Where an albedo is in the table: the cosine's place and the roughness's, from 0 to CM_GGX_ALBEDO_SIZE - 1. Grazing
+// angles, where it is steep, have the most room.
+CM_FN vec2 cm_ggx_albedo_place(float roughness, float cosine) {
+  return clamp(vec2(sqrt(max(cosine, 0.0f)), roughness), 0.0f, 1.0f) * float(CM_GGX_ALBEDO_SIZE - 1);
+}
+
+#endif

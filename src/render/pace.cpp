@@ -1,0 +1,161 @@
+#include "render/pace.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+namespace cumulet::render {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Seen to begin and end as closely as this, the clock tells what a dispatch took.
+constexpr double close_ms = 0.3;
+// More than this no two dispatches tell.
+constexpr double most_growth = 4.0;
+// The dearest rounds take about three times as long as the cheapest in which all lanes march; more is others' doing.
+constexpr double spread = 4.0;
+constexpr double free_spread = 1.5;
+constexpr double forgetting = 1.005;  // the scene may have become dearer
+
+double milliseconds(Clock::duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
+
+}  // namespace
+
+std::optional<double> RoundCost::most(double slots, bool free) const {
+  std::optional<double> most;
+  for (const Known& known : known_) {
+    if (known.slots <= 0.0) continue;
+    const double ms =
+        std::min(known.ms, (free ? free_spread : spread) * known.best) * std::max(1.0, slots / known.slots);
+    if (!most || ms < *most) most = ms;
+  }
+  return most;
+}
+
+void RoundCost::learn(double slots, double low_ms, double high_ms) {
+  slots = std::max(1.0, slots);
+  if (!warm_) {
+    warm_ = true;
+    return;
+  }
+  const auto before = most(slots);
+  Known& own = known_.at(std::min<std::size_t>(known_.size() - 1, static_cast<std::size_t>(std::log2(slots))));
+  if (std::isfinite(high_ms) && high_ms > 0.0) {
+    if (own.slots > 0.0) {
+      const double scale = std::max(1.0, slots / own.slots);
+      const double was = own.ms * scale;
+      own.best = std::min(own.best * scale * forgetting, high_ms);
+      own.ms = high_ms < was ? 0.5 * (was + high_ms) : was;
+      own.slots = slots;
+    } else {
+      own = {slots, high_ms, high_ms};
+    }
+  }
+  // Whatever was thought of others: these took as long as they did, unless the machine was interrupted. Twice in a row
+  // it was not.
+  const double ratio = before ? low_ms / *before : 0.0;
+  const double sure = std::min(ratio, std::exchange(last_ratio_, ratio));
+  if (!(sure > 1.0)) return;
+  low_ms = std::min(sure, most_growth) * *before;
+  for (Known& known : known_) {
+    if (known.slots > 0.0) known.ms = std::max(known.ms, low_ms * std::min(1.0, known.slots / slots));
+  }
+}
+
+void Flights::begin(Kind kind) {
+  if (!ring_) ring_ = gl::ReadBack(gl_, (most + 1) * place_bytes, "creating the counters' ring");
+  next_ = {};
+  next_.in_call = kind == Kind::dispatch && gl_->dispatches_in_call;
+  if (!next_.in_call) {
+    if (flying_.empty()) next_.before = gl::Fence(gl_);
+    if (timers_ && !gl_->dispatches_in_call) {
+      // For this dispatch alone: contexts do not share queries.
+      gl_->CreateQueries(GL_TIMESTAMP, 2, queries_.data());
+      if (queries_[0] != 0) gl_->QueryCounter(queries_[0], GL_TIMESTAMP);
+    }
+  }
+  next_.sent = next_.looked = Clock::now();
+}
+
+void Flights::end(Dispatched what, GLuint buffer, std::size_t words) {
+  if (next_.in_call) next_.in_call_ms = milliseconds(Clock::now() - next_.sent);
+  next_.what = std::move(what);
+  next_.words = words;
+  next_.place = next_place_;
+  next_place_ = (next_place_ + 1) % (most + 1);
+  if (queries_[0] != 0) {
+    gl_->QueryCounter(queries_[1], GL_TIMESTAMP);
+    for (std::size_t i = 0; i < 2; ++i) {
+      gl_->GetQueryBufferObjectui64v(queries_.at(i), ring_.name(), GL_QUERY_RESULT,
+                                     static_cast<GLintptr>(times_at(next_) + 8 * i));
+    }
+    gl_->DeleteQueries(2, queries_.data());
+    queries_ = {};
+    next_.timed = true;
+  }
+  if (words > 0) {
+    gl::memory_barrier(*gl_, GL_BUFFER_UPDATE_BARRIER_BIT);
+    gl_->CopyNamedBufferSubData(buffer, ring_.name(), 0, static_cast<GLintptr>(next_.place * place_bytes),
+                                static_cast<GLsizeiptr>(words * 16));
+  }
+  if (!next_.in_call) next_.after = gl::Fence(gl_);
+  flying_.push_back(std::move(next_));
+}
+
+std::optional<Flights::Landed> Flights::land() {
+  if (flying_.empty()) return std::nullopt;
+  Flight& first = flying_.front();
+  const auto now = Clock::now();
+  const bool close = milliseconds(now - first.looked) < close_ms;
+  if (!first.in_call && first.waits && first.before.passed()) {
+    first.waits = false;
+    if (close) first.began = now;
+  }
+  if (!first.in_call && !first.after.passed()) {
+    first.looked = now;
+    return std::nullopt;
+  }
+  Landed landed;
+  landed.ms = first.in_call_ms;
+  landed.at_most_ms = milliseconds(now - first.sent);
+  if (first.timed) {
+    std::array<std::uint64_t, 2> times{};
+    std::memcpy(times.data(), ring_.data() + times_at(first), sizeof(times));
+    timers_ = times[1] > times[0];
+    if (timers_) landed.ms = 1e-6 * static_cast<double>(times[1] - times[0]);
+  }
+  if (!landed.ms && first.began && close) landed.ms = milliseconds(now - *first.began);
+  landed.words.resize(first.words);
+  if (first.words > 0) std::memcpy(landed.words.data(), ring_.data() + first.place * place_bytes, first.words * 16);
+  landed.what = std::move(first.what);
+  if (landed.ms && landed.what.most_ms > 0.0) {
+    likely_ += 0.1 * (std::clamp(*landed.ms / landed.what.most_ms, 0.05, 1.0) - likely_);
+  }
+  flying_.pop_front();
+  if (!flying_.empty()) {
+    Flight& next = flying_.front();
+    next.waits = false;
+    next.looked = now;
+    if (close) next.began = now;
+  }
+  return landed;
+}
+
+void Flights::finish() const {
+  if (!flying_.empty()) flying_.back().after.wait();
+}
+
+void Flights::order() const {
+  if (!flying_.empty()) flying_.back().after.order();
+}
+
+double Flights::expected_ms() const {
+  double sum = 0.0;
+  for (const Flight& flight : flying_) sum += flight.what.most_ms;
+  return likely_ * sum;
+}
+
+}  // namespace cumulet::render

@@ -1,0 +1,134 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "gl/objects.hpp"
+
+namespace cumulet::render {
+
+/// What a round costs, by how much is under way in it: an upper estimate that errs on the safe side where it has to
+/// guess. More at once take longer, but no longer than in proportion.
+class RoundCost {
+ public:
+  /// What one round of that many slots takes at most, in ms; nothing while nothing is known. free: on a machine that
+  /// does nothing else: for the least that a frame does, which shall not shrink because others are busy.
+  [[nodiscard]] std::optional<double> most(double slots, bool free = false) const;
+  /// A round of that many took between low and high; the first is not believed: drivers compile in it.
+  void learn(double slots, double low_ms, double high_ms);
+
+ private:
+  struct Known {
+    double slots = 0.0;
+    double ms = 0.0;
+    double best = 0.0;  // lately
+  };
+  std::array<Known, 32> known_;  // by the logarithm of slots
+  bool warm_ = false;
+  double last_ratio_ = 0.0;  // of the last dispatch, what it took at least to what was thought to be most
+};
+
+/// Some pixels of a tile in one pass.
+struct Block {
+  std::uint32_t lanes = 0;
+  std::uint32_t unfinished = 0;  // as far as is known: no fewer are
+  std::uint32_t empty = 0;
+  std::uint32_t under_way = 0;  // dispatches
+  bool begins = true;
+};
+using Blocks = std::vector<Block>;
+
+/// What was dispatched, and what it was thought to take.
+struct Dispatched {
+  std::shared_ptr<Blocks> tile;            // that it is of
+  std::shared_ptr<std::uint64_t> samples;  // of the picture
+  std::vector<std::uint32_t> blocks;
+  std::uint32_t rounds = 1;
+  double lanes = 0.0;  // that had something to do
+  double slots = 0.0;  // vectors of them
+  std::shared_ptr<RoundCost> cost;
+  double aim_ms = 0.0;
+  double most_ms = 0.0;
+};
+
+/// A dispatch that is over, for tests and tuning.
+struct DispatchRecord {
+  double aim_ms = 0.0;
+  double ms = 0.0;  // on the device, whatever else was queued
+  std::uint32_t lanes = 0;
+  std::uint32_t alive = 0;  // of these, as far as was known
+  std::uint32_t rounds = 0;
+  bool known = false;  // not the first of its kind
+};
+
+/// The dispatches under way: what each has to tell, and how long it took on the device, whatever else the host has
+/// queued there. Nothing waits but finish(). A driver that runs dispatches within the call has none under way.
+class Flights {
+ public:
+  static constexpr std::size_t most = 3;
+  static constexpr std::size_t most_words = 257;  // uvec4, that a dispatch tells
+
+  explicit Flights(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+
+  enum class Kind { dispatch, draws };
+  struct Landed {
+    Dispatched what;
+    std::vector<glm::uvec4> words;
+    /// On the device. Without: no more than at_most_ms, with all that the host had queued.
+    std::optional<double> ms;
+    double at_most_ms = 0.0;
+  };
+
+  /// Around a dispatch; at most `most` of them may be under way. words of the buffer are kept as they are then.
+  void begin(Kind kind);
+  void end(Dispatched what, GLuint buffer, std::size_t words);
+  /// The oldest, if it is over. Never waits.
+  std::optional<Landed> land();
+  /// Waits until all are over; land() gives them.
+  void finish() const;
+  /// What this context does from now on comes after them, whichever made them.
+  void order() const;
+
+  [[nodiscard]] bool empty() const { return flying_.empty(); }
+  [[nodiscard]] bool full() const { return flying_.size() >= most; }
+  /// Milliseconds that those under way will likely take.
+  [[nodiscard]] double expected_ms() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Flight {
+    Dispatched what;
+    std::size_t words = 0;
+    std::size_t place = 0;
+    gl::Fence before;
+    gl::Fence after;
+    Clock::time_point sent;
+    Clock::time_point looked;                // last seen under way
+    std::optional<Clock::time_point> began;  // when those before it were seen to be over, if that is known closely
+    bool waits = true;                       // for those before it, as far as is known
+    bool timed = false;
+    bool in_call = false;  // over when its call returns
+    std::optional<double> in_call_ms;
+  };
+  static constexpr std::size_t place_bytes = most_words * 16 + 64;
+  [[nodiscard]] static std::size_t times_at(const Flight& flight) {
+    return flight.place * place_bytes + most_words * 16;
+  }
+
+  gl::FunctionsPtr gl_;
+  gl::ReadBack ring_;
+  std::size_t next_place_ = 0;
+  std::deque<Flight> flying_;
+  std::array<GLuint, 2> queries_{};
+  Flight next_;
+  bool timers_ = true;   // tell the truth
+  double likely_ = 0.5;  // of what a dispatch takes at most
+};
+
+}  // namespace cumulet::render

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "volume/volume.hpp"
+
+namespace cumulet::volume {
+
+inline constexpr std::size_t histogram_bins = 64;
+
+/// What a grid's active voxels hold; of vectors, their lengths.
+struct GridValues {
+  glm::dmat4 index_to_world{1.0};
+  std::uint64_t active_voxels = 0;
+  glm::ivec3 bounds_min{0};  ///< inclusive; zero, as bounds_max, without active voxels
+  glm::ivec3 bounds_max{0};
+  // Of those that are finite; zero if none is.
+  float min = 0.0F;
+  float max = 0.0F;
+  double mean = 0.0;
+  std::uint64_t negative_voxels = 0;
+  std::uint64_t non_finite_voxels = 0;
+  std::uint64_t memory_bytes = 0;  ///< what a ScalarVolume of it holds at most
+  /// Counts of the finite ones in equal steps from min to max; where those are equal, all are in the first.
+  std::array<std::uint64_t, histogram_bins> histogram{};
+};
+
+struct GridFacts {
+  std::optional<GridValues> values;  ///< none if they cannot be read
+  std::string refusal;               ///< GridInfo's, or what is wrong with the voxels
+};
+
+/// What is in a .vdb or .nvdb file. Any thread.
+class Inspection {
+ public:
+  /// Reads the directory. Throws Error(file).
+  explicit Inspection(const std::filesystem::path& file);
+
+  [[nodiscard]] const std::string& format() const { return format_; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] const std::vector<Metadata>& metadata() const { return metadata_; }
+  [[nodiscard]] const std::vector<GridInfo>& grids() const { return grids_; }
+  /// The grid that import_volume reads if it is given no name.
+  [[nodiscard]] std::optional<std::size_t> chosen() const { return chosen_; }
+  /// Reads a grid's voxels, the first time. Throws Error(out_of_memory).
+  [[nodiscard]] const GridFacts& facts(std::size_t grid);
+
+ private:
+  std::filesystem::path file_;
+  std::uint64_t bytes_ = 0;
+  std::string format_;
+  std::vector<Metadata> metadata_;
+  std::vector<GridInfo> grids_;
+  std::optional<std::size_t> chosen_;
+  std::mutex mutex_;
+  std::vector<std::optional<GridFacts>> facts_;
+};
+
+}  // namespace cumulet::volume

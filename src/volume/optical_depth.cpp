@@ -1,0 +1,308 @@
+#include "volume/optical_depth.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <limits>
+#include <numbers>
+
+#include "base/progress_part.hpp"
+
+namespace cumulet::volume {
+
+namespace {
+
+constexpr int most_cells = 96;
+constexpr double wanted_depth = 8.0;
+constexpr double visible_share = 0.05;
+constexpr double extreme_share = 0.005;
+constexpr double visible_depth = 0.05129;  // an opacity of 5 %
+constexpr int directions = 24;
+constexpr int rays_a_side = 64;
+constexpr int hull_directions = 96;
+
+/// Directions spread evenly over the sphere; the first half of them over a half of it.
+glm::dvec3 direction_of(int i, int count) {
+  const double z = 1.0 - (2.0 * i + 1.0) / count;
+  const double angle = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
+  const double r = std::sqrt(1.0 - z * z);
+  return {r * std::cos(angle), r * std::sin(angle), z};
+}
+
+/// Voxels that two inclusive ranges share.
+int shared(int a0, int a1, int b0, int b1) { return std::max(0, std::min(a1, b1) - std::max(a0, b0) + 1); }
+
+}  // namespace
+
+CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress) {
+  if (volume.empty()) return;
+  const glm::ivec3 low = volume.bounds_min;
+  const glm::ivec3 extent = volume.bounds_max - low + 1;
+  const int block = (std::max({extent.x, extent.y, extent.z}) - 1) / most_cells + 1;
+  size_ = (extent - 1) / block + 1;
+  means_.resize(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
+                static_cast<std::size_t>(size_.z));
+  to_world_ = volume.index_to_world * glm::translate(glm::dmat4(1.0), glm::dvec3(low) - 0.5) *
+              glm::scale(glm::dmat4(1.0), glm::dvec3(block));
+
+  // A slab of cells by one thread: the order of every sum is the volume's own.
+  const auto& origins = volume.brick_origins;
+  const double whole = double(block) * block * block;
+  const std::size_t in_slab = static_cast<std::size_t>(size_.y) * static_cast<std::size_t>(size_.z);
+  tbb::parallel_for(0, size_.x, [&](int slab) {
+    check(progress);
+    const int x0 = low.x + slab * block;
+    const int x1 = std::min(x0 + block - 1, volume.bounds_max.x);
+    std::vector<double> sums(in_slab);
+    std::vector<double> covered(in_slab);
+    const auto at = [&](int y, int z) {
+      return static_cast<std::size_t>((z - low.z) / block) * static_cast<std::size_t>(size_.y) +
+             static_cast<std::size_t>((y - low.y) / block);
+    };
+    auto first = std::lower_bound(origins.begin(), origins.end(), x0 - (brick_size - 1),
+                                  [](const glm::ivec3& origin, int x) { return origin.x < x; });
+    for (; first != origins.end() && first->x <= x1; ++first) {
+      const glm::ivec3 origin = *first;
+      const float* values = &volume.brick_values[static_cast<std::size_t>(first - origins.begin()) * brick_voxels];
+      const glm::ivec3 from = glm::max(origin, glm::ivec3(x0, low.y, low.z));
+      const glm::ivec3 to =
+          glm::min(origin + (brick_size - 1), glm::ivec3(x1, volume.bounds_max.y, volume.bounds_max.z));
+      for (int x = from.x; x <= to.x; ++x) {
+        for (int y = from.y; y <= to.y; ++y) {
+          for (int z = from.z; z <= to.z; ++z) {
+            const std::size_t cell = at(y, z);
+            sums[cell] += values[((x & 7) * brick_size + (y & 7)) * brick_size + (z & 7)];
+            covered[cell] += 1.0;
+          }
+        }
+      }
+    }
+    const auto for_cells = [&](const glm::ivec3& min, const glm::ivec3& max, auto&& f) {
+      const int wide = shared(min.x, max.x, x0, x1);
+      if (wide == 0) return;
+      for (int j = (min.y - low.y) / block; j <= (max.y - low.y) / block; ++j) {
+        const int y0 = low.y + j * block;
+        const double area = double(wide) * shared(min.y, max.y, y0, y0 + block - 1);
+        for (int k = (min.z - low.z) / block; k <= (max.z - low.z) / block; ++k) {
+          const int z0 = low.z + k * block;
+          f(static_cast<std::size_t>(k) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(j),
+            area * shared(min.z, max.z, z0, z0 + block - 1));
+        }
+      }
+    };
+    for (const Tile& tile : volume.tiles) {
+      for_cells(tile.min, tile.max, [&](std::size_t cell, double voxels) {
+        sums[cell] += voxels * tile.value;
+        covered[cell] += voxels;
+      });
+    }
+    if (volume.background > 0.0F) {
+      for_cells(volume.bounds_min, volume.bounds_max, [&](std::size_t cell, double voxels) {
+        sums[cell] += std::max(0.0, voxels - covered[cell]) * volume.background;
+      });
+    }
+    for (int k = 0; k < size_.z; ++k) {
+      for (int j = 0; j < size_.y; ++j) {
+        const std::size_t cell =
+            static_cast<std::size_t>(k) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(j);
+        means_[index({slab, j, k})] = static_cast<float>(sums[cell] / whole);
+      }
+    }
+  });
+}
+
+double CoarseVolume::depth_along(const glm::dvec3& origin, const glm::dvec3& direction) const {
+  // Into the box of cells, then from wall to wall; t is world length.
+  double t = std::numeric_limits<double>::lowest();
+  double end = std::numeric_limits<double>::max();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0.0) {
+      if (origin[axis] < 0.0 || origin[axis] >= size_[axis]) return 0.0;
+      continue;
+    }
+    const double a = -origin[axis] / direction[axis];
+    const double b = (size_[axis] - origin[axis]) / direction[axis];
+    t = std::max(t, std::min(a, b));
+    end = std::min(end, std::max(a, b));
+  }
+  if (!(t < end)) return 0.0;
+  glm::ivec3 cell;
+  glm::ivec3 step;
+  glm::dvec3 next(std::numeric_limits<double>::max());
+  glm::dvec3 stride(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    cell[axis] = std::clamp(static_cast<int>(std::floor(origin[axis] + t * direction[axis])), 0, size_[axis] - 1);
+    step[axis] = direction[axis] < 0.0 ? -1 : 1;
+    if (direction[axis] == 0.0) continue;
+    next[axis] = (cell[axis] + (step[axis] > 0 ? 1 : 0) - origin[axis]) / direction[axis];
+    stride[axis] = 1.0 / std::abs(direction[axis]);
+  }
+  double depth = 0.0;
+  for (;;) {
+    const int axis = next.x < next.y ? (next.x < next.z ? 0 : 2) : (next.y < next.z ? 1 : 2);
+    const double to = std::min(next[axis], end);
+    depth += std::max(0.0, to - t) * means_[index(cell)];
+    if (next[axis] >= end) return depth;
+    t = std::max(t, to);
+    cell[axis] += step[axis];
+    if (cell[axis] < 0 || cell[axis] >= size_[axis]) return depth;
+    next[axis] += stride[axis];
+  }
+}
+
+std::vector<CoarseVolume::Ray> CoarseVolume::rays() const {
+  glm::ivec3 low = size_;
+  glm::ivec3 high(-1);
+  for (glm::ivec3 c(0); c.z < size_.z; ++c.z) {
+    for (c.y = 0; c.y < size_.y; ++c.y) {
+      for (c.x = 0; c.x < size_.x; ++c.x) {
+        if (!(means_[index(c)] > 0.0F)) continue;
+        low = glm::min(low, c);
+        high = glm::max(high, c);
+      }
+    }
+  }
+  if (high.x < 0) return {};
+  const glm::dmat4 from_world = glm::inverse(to_world_);
+  std::vector<Ray> all(std::size_t{directions} * rays_a_side * rays_a_side);
+  tbb::parallel_for(0, directions, [&](int d) {
+    // One half of the sphere: a ray has no sense.
+    const glm::dvec3 direction = direction_of(d, 2 * directions);
+    const glm::dvec3 u = glm::normalize(
+        glm::cross(direction, std::abs(direction.y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0)));
+    const glm::dvec3 v = glm::cross(direction, u);
+    glm::dvec2 least(std::numeric_limits<double>::max());
+    glm::dvec2 most(std::numeric_limits<double>::lowest());
+    for (int corner = 0; corner < 8; ++corner) {
+      glm::dvec3 p;
+      for (int axis = 0; axis < 3; ++axis) p[axis] = ((corner >> axis) & 1) != 0 ? high[axis] + 1 : low[axis];
+      const glm::dvec3 world(to_world_ * glm::dvec4(p, 1.0));
+      least = glm::min(least, glm::dvec2(glm::dot(world, u), glm::dot(world, v)));
+      most = glm::max(most, glm::dvec2(glm::dot(world, u), glm::dot(world, v)));
+    }
+    const glm::dvec2 pixel = (most - least) / double(rays_a_side);
+    const glm::dvec3 along(from_world * glm::dvec4(direction, 0.0));
+    for (int i = 0; i < rays_a_side * rays_a_side; ++i) {
+      const glm::ivec2 ray(i % rays_a_side, i / rays_a_side);
+      const glm::dvec2 at = least + pixel * (glm::dvec2(ray) + 0.5);
+      const glm::dvec3 origin(from_world * glm::dvec4(u * at.x + v * at.y, 1.0));
+      all[static_cast<std::size_t>(d) * rays_a_side * rays_a_side + static_cast<std::size_t>(i)] = {
+          depth_along(origin, along), pixel.x * pixel.y};
+    }
+  });
+  std::erase_if(all, [](const Ray& ray) { return !(ray.depth > 0.0); });
+  return all;
+}
+
+std::optional<double> CoarseVolume::suggest_density_scale() const {
+  std::vector<Ray> all = rays();
+  if (all.empty()) return std::nullopt;
+  std::stable_sort(all.begin(), all.end(), [](const Ray& a, const Ray& b) { return a.depth > b.depth; });
+  double area = 0.0;
+  for (const Ray& ray : all) area += ray.area;
+  double most = all.front().depth;
+  double extreme = 0.0;
+  for (const Ray& ray : all) {
+    most = ray.depth;
+    extreme += ray.area;
+    if (extreme >= extreme_share * area) break;
+  }
+  double mass = 0.0;
+  double seen = 0.0;
+  for (const Ray& ray : all) {
+    const double depth = std::min(ray.depth, most);
+    mass += ray.area * depth;
+    seen += ray.area * depth * depth;
+  }
+  double visible_area = 0.0;
+  double visible_mass = 0.0;
+  for (const Ray& ray : all) {
+    const double depth = std::min(ray.depth, most);
+    if (depth < visible_share * seen / mass) break;
+    visible_area += ray.area;
+    visible_mass += ray.area * depth;
+  }
+  const double scale = wanted_depth * visible_area / visible_mass;
+  // What a person reads, and types again.
+  std::array<char, 32> digits{};
+  const char* end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), scale, std::chars_format::scientific, 2).ptr;
+  double rounded = scale;
+  std::from_chars(digits.data(), end, rounded);
+  return std::clamp(rounded, 1e-30, 1e30);
+}
+
+std::vector<glm::dvec3> CoarseVolume::visible_hull(double density_scale) const {
+  // Columns of cells along each axis: their depth.
+  std::array<std::vector<double>, 3> columns;
+  const auto column = [&](int axis, const glm::ivec3& c) {
+    const int a = axis == 0 ? 1 : 0;
+    const int b = axis == 2 ? 1 : 2;
+    return static_cast<std::size_t>(c[b]) * static_cast<std::size_t>(size_[a]) + static_cast<std::size_t>(c[a]);
+  };
+  glm::dvec3 edge;
+  for (int axis = 0; axis < 3; ++axis) {
+    edge[axis] = glm::length(glm::dvec3(to_world_[axis]));
+    const std::size_t cells = means_.size();
+    columns[static_cast<std::size_t>(axis)].resize(cells == 0 ? 0 : cells / static_cast<std::size_t>(size_[axis]));
+  }
+  const auto for_cells = [&](auto&& f) {
+    for (glm::ivec3 c(0); c.z < size_.z; ++c.z) {
+      for (c.y = 0; c.y < size_.y; ++c.y) {
+        for (c.x = 0; c.x < size_.x; ++c.x) {
+          if (const float mean = means_[index(c)]; mean > 0.0F) f(c, mean);
+        }
+      }
+    }
+  };
+  for_cells([&](const glm::ivec3& c, float mean) {
+    for (int axis = 0; axis < 3; ++axis)
+      columns[static_cast<std::size_t>(axis)][column(axis, c)] += density_scale * mean * edge[axis];
+  });
+  // The ends of every row of visible cells: the hull needs no more.
+  std::vector<glm::dvec3> corners;
+  for (const double least : {visible_depth, 0.0}) {
+    std::vector<std::array<int, 2>> ends(columns[0].size(), {std::numeric_limits<int>::max(), -1});
+    for_cells([&](const glm::ivec3& c, float) {
+      int opaque = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        opaque += columns[static_cast<std::size_t>(axis)][column(axis, c)] >= least ? 1 : 0;
+      if (opaque < 2) return;
+      auto& [first, last] = ends[column(0, c)];
+      first = std::min(first, c.x);
+      last = std::max(last, c.x);
+    });
+    for (int z = 0; z < size_.z; ++z) {
+      for (int y = 0; y < size_.y; ++y) {
+        const auto [first, last] = ends[column(0, {0, y, z})];
+        if (last < 0) continue;
+        for (int corner = 0; corner < 8; ++corner) {
+          const glm::dvec3 p((corner & 1) != 0 ? last + 1 : first, y + ((corner >> 1) & 1), z + (corner >> 2));
+          corners.emplace_back(to_world_ * glm::dvec4(p, 1.0));
+        }
+      }
+    }
+    if (!corners.empty()) break;
+  }
+  if (corners.empty()) return {};
+  std::vector<glm::dvec3> hull;
+  for (int d = 0; d < hull_directions + 6; ++d) {
+    glm::dvec3 direction(0.0);
+    if (d < hull_directions) {
+      direction = direction_of(d, hull_directions);
+    } else {  // the bounds, exactly
+      direction[(d - hull_directions) / 2] = (d & 1) != 0 ? 1.0 : -1.0;
+    }
+    const glm::dvec3 furthest = *std::max_element(
+        corners.begin(), corners.end(),
+        [&](const glm::dvec3& a, const glm::dvec3& b) { return glm::dot(a, direction) < glm::dot(b, direction); });
+    if (std::find(hull.begin(), hull.end(), furthest) == hull.end()) hull.push_back(furthest);
+  }
+  return hull;
+}
+
+}  // namespace cumulet::volume

@@ -1,0 +1,140 @@
+// How well cumulet_render keeps its budget: what a call takes over 5, 10 and 16 ms, at rest and while the sun is
+// dragged, alone and beside a host that queues GPU work of its own; and the loop of README's host, until it converges.
+// By hand:
+//
+//     cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK]
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <vector>
+
+#include "support/busy_host.hpp"
+#include "support/c_host.hpp"
+
+namespace {
+
+using cumulet::headless::Context;
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+void must(cumulet_viewer* viewer, cumulet_status status) {
+  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+}
+
+struct Scenario {
+  const char* name;
+  cumulet_preview preview;
+  bool drags;
+  bool busy;
+};
+
+class Bench {
+ public:
+  Bench(const char* volume, int frames, double host_ms)
+      : context_(Context::create(cumulet::headless::Backend::automatic)),
+        gl_(cumulet::test::load_gl(Context::get_proc, &context_)),
+        target_(gl_, 1280, 720),
+        host_(gl_, host_ms),
+        volume_(volume),
+        frames_(frames) {
+    std::printf("%s; host's own work %.0f ms\n", reinterpret_cast<const char*>(gl_.GetString(GL_RENDERER)), host_ms);
+  }
+
+  cumulet::test::ViewerPtr open(std::uint32_t samples, cumulet_preview preview) {
+    auto viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = samples});
+    auto sampling = cumulet::test::make_desc<cumulet_sampling_desc>();
+    sampling.samples = samples;
+    sampling.preview = preview;
+    must(viewer.get(), cumulet_set_sampling(viewer.get(), &sampling));
+    must(viewer.get(), cumulet_load_volume(viewer.get(), volume_, nullptr));
+    must(viewer.get(), cumulet_wait(viewer.get(), -1.0));
+    must(viewer.get(), cumulet_frame_all(viewer.get()));
+    return viewer;
+  }
+  cumulet_frame_result frame(cumulet_viewer* viewer, double budget_ms) {
+    cumulet_frame_desc desc = target_.frame();
+    desc.budget_ms = budget_ms;
+    auto result = cumulet::test::make_desc<cumulet_frame_result>();
+    must(viewer, cumulet_render(viewer, &desc, &result));
+    return result;
+  }
+
+  void pace(const Scenario& scenario, double budget_ms) {
+    const auto viewer = open(4096, scenario.preview);
+    auto light = cumulet::test::make_desc<cumulet_light_desc>();
+    for (float& value : light.sun_irradiance) value = 2.5F;
+    for (float& value : light.sky_radiance) value = 0.3F;
+    light.sun_elevation_degrees = 40.0F;
+    std::vector<double> taken;
+    for (int i = -frames_ / 4; i < frames_; ++i) {
+      if (scenario.drags) {
+        light.sun_azimuth_degrees = static_cast<float>(i);
+        must(viewer.get(), cumulet_set_light(viewer.get(), &light));
+      }
+      if (scenario.busy) host_.queue();
+      const auto start = Clock::now();
+      frame(viewer.get(), budget_ms);
+      if (i >= 0) taken.push_back(ms_since(start));
+      gl_.Finish();  // as a swap of buffers might
+    }
+    auto stats = cumulet::test::make_desc<cumulet_stats>();
+    must(viewer.get(), cumulet_get_stats(viewer.get(), &stats));
+    std::ranges::sort(taken);
+    const auto at = [&](double part) { return taken[static_cast<std::size_t>(part * double(taken.size() - 1))]; };
+    std::printf("| %-22s | %4.0f | %6.2f | %6.2f | %7.2f | %9llu |\n", scenario.name, budget_ms, at(0.5), at(0.95),
+                taken.back(), static_cast<unsigned long long>(stats.samples));
+    std::fflush(stdout);
+  }
+
+  void readme_loop() {
+    const auto viewer = open(1, CUMULET_PREVIEW_OFF);
+    const auto start = Clock::now();
+    cumulet_frame_result result{};
+    int frames = 0;
+    do {
+      result = frame(viewer.get(), 10.0);
+      ++frames;
+    } while ((result.flags & CUMULET_RENDER_MORE) != 0 && frames < 3000 && ms_since(start) < 30e3);
+    std::printf("README's loop, 1280x720, 1 sample, 10 ms: %s after %d frames, %.1f s, progress %.3f\n",
+                (result.flags & CUMULET_RENDER_CONVERGED) != 0 ? "converged" : "NOT converged", frames,
+                1e-3 * ms_since(start), result.progress);
+  }
+
+ private:
+  Context context_;
+  GladGLContext gl_;
+  cumulet::test::HostTarget target_;
+  cumulet::test::BusyHost host_;
+  const char* volume_;
+  int frames_;
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK]\n");
+    return 2;
+  }
+  try {
+    Bench bench(argv[1], argc > 2 ? std::max(std::atoi(argv[2]), 8) : 100, argc > 3 ? std::atof(argv[3]) : 120.0);
+    std::printf("| %-22s | ms   | p50    | p95    | max     | samples   |\n|---|--:|--:|--:|--:|--:|\n", "scenario");
+    for (const Scenario& scenario : {Scenario{"rest, preview off", CUMULET_PREVIEW_OFF, false, false},
+                                     Scenario{"rest, preview", CUMULET_PREVIEW_AUTO, false, false},
+                                     Scenario{"drag, preview", CUMULET_PREVIEW_AUTO, true, false},
+                                     Scenario{"rest off, busy host", CUMULET_PREVIEW_OFF, false, true},
+                                     Scenario{"drag, busy host", CUMULET_PREVIEW_AUTO, true, true}}) {
+      for (const double budget_ms : {5.0, 10.0, 16.0}) bench.pace(scenario, budget_ms);
+    }
+    bench.readme_loop();
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "cumulet-bench-pace: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,531 @@
+// Hosts that ask too much: volumes and surfaces faster than they are built, frames without a context, calls from inside
+// callbacks.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <future>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+#include "support/c_host.hpp"
+#include "support/egl_context.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+using cumulet::test::CameraRef;
+using cumulet::test::converge;
+using cumulet::test::EglContext;
+using cumulet::test::HostTarget;
+using cumulet::test::make_ball;
+using cumulet::test::make_desc;
+using cumulet::test::make_viewer;
+using cumulet::test::picture_of;
+using cumulet::test::SurfacesRef;
+using cumulet::test::ViewerPtr;
+using cumulet::test::VolumeRef;
+using Clock = std::chrono::steady_clock;
+
+constexpr int side = 16;
+
+/// What a stream waits for at most: on any machine of ours many times what it takes.
+constexpr auto patience = 60s;
+
+class Trial : public testing::Test {
+ protected:
+  Trial() : gl_((context_.make_current(), cumulet::test::load_gl(EglContext::get_proc, nullptr))) {}
+
+  [[nodiscard]] cumulet_stats stats() const {
+    auto stats = make_desc<cumulet_stats>();
+    EXPECT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK) << cumulet_last_error(v_);
+    return stats;
+  }
+  void render(double budget_ms = 10.0) const {
+    auto frame = target_.frame();
+    frame.budget_ms = budget_ms;
+    ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << cumulet_last_error(v_);
+  }
+  /// Wishes every few milliseconds until so many different answers were seen. Returns how many were.
+  template <class Wish, class Answer>
+  std::size_t stream(std::chrono::milliseconds pause, std::size_t enough, Wish&& wish, Answer&& answer) const {
+    std::set<double> seen;
+    const auto until = Clock::now() + patience;
+    for (int i = 0; seen.size() < enough && Clock::now() < until; ++i) {
+      wish(i);
+      render();
+      if (const double value = answer(); value != 0.0) seen.insert(value);
+      std::this_thread::sleep_for(pause);
+    }
+    return seen.size();
+  }
+
+  EglContext context_;
+  GladGLContext gl_;
+  HostTarget target_{gl_, side, side};
+  ViewerPtr viewer_ = make_viewer({.get_proc = EglContext::get_proc, .samples = 1});
+  cumulet_viewer* v_ = viewer_.get();
+};
+
+/// To the voxel: takes many times as long as a wish comes after the other.
+cumulet_grid_desc slow_grid() {
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.threshold = -1.0;
+  return grid;
+}
+
+// ---- streams ----
+
+TEST_F(Trial, VolumesThatChangeFasterThanTheyBuildAreSeen) {
+  const cumulet_grid_desc grid = slow_grid();
+  ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
+  std::vector<VolumeRef> volumes;
+  for (int i = 0; i < 8; ++i) volumes.push_back(make_ball(32 + 2 * i));
+  // What is in GL tells which of them it is.
+  EXPECT_GE(stream(
+                10ms, 3,
+                [&](int i) {
+                  ASSERT_EQ(cumulet_set_volume(v_, volumes[static_cast<std::size_t>(i) % volumes.size()].get()),
+                            CUMULET_OK);
+                },
+                [&] { return static_cast<double>(stats().cell_bytes); }),
+            3U);
+  // The newest is what remains.
+  ASSERT_EQ(cumulet_set_volume(v_, volumes[1].get()), CUMULET_OK);
+  converge(v_, target_.frame());
+  const std::uint64_t last = stats().cell_bytes;
+  picture_of(v_, volumes[1].get(), target_);
+  EXPECT_EQ(stats().cell_bytes, last);
+}
+
+TEST_F(Trial, AThresholdThatChangesFasterThanItBuildsIsSeen) {
+  const VolumeRef volume = make_ball(40);
+  ASSERT_EQ(cumulet_set_volume(v_, volume.get()), CUMULET_OK);
+  EXPECT_GE(stream(
+                10ms, 3,
+                [&](int i) {
+                  cumulet_grid_desc grid = slow_grid();
+                  grid.max_cells = 50000 + 4000 * static_cast<std::uint64_t>(i % 16);
+                  ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
+                },
+                [&] { return static_cast<double>(stats().cell_bytes); }),
+            3U);
+}
+
+// A grid that is built in one frame's time, and takes many to upload.
+TEST_F(Trial, VolumesThatChangeFasterThanTheyUploadAreSeen) {
+  const cumulet_grid_desc grid = slow_grid();
+  ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
+  const std::vector<VolumeRef> volumes = [] {
+    std::vector<VolumeRef> made;
+    for (int i = 0; i < 2; ++i) made.push_back(make_ball(56 + 2 * i));
+    return made;
+  }();
+  std::uint64_t frames = 0;
+  for (; frames < 60 && stats().cell_bytes == 0; ++frames) {
+    ASSERT_EQ(cumulet_set_volume(v_, volumes[frames % 2].get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK);
+    render(0.0001);
+  }
+  EXPECT_GT(frames, 3U) << "an upload of one frame proves nothing";
+  EXPECT_GT(stats().cell_bytes, 0U);
+}
+
+/// A cloth of n x n squares, as wide as a number says.
+SurfacesRef make_cloth(int n, float width) {
+  std::vector<float> positions;
+  std::vector<std::uint32_t> indices;
+  const auto at = [n](int x, int y) { return static_cast<std::uint32_t>(y * (n + 1) + x); };
+  for (int y = 0; y <= n; ++y) {
+    for (int x = 0; x <= n; ++x) {
+      const float u = static_cast<float>(x) / static_cast<float>(n);
+      const float v = static_cast<float>(y) / static_cast<float>(n);
+      positions.insert(positions.end(), {width * u, 0.1F * std::sin(40.0F * u * v), v});
+      if (x < n && y < n) {
+        for (const auto corner : {at(x, y), at(x, y + 1), at(x + 1, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)}) {
+          indices.push_back(corner);
+        }
+      }
+    }
+  }
+  auto mesh = make_desc<cumulet_mesh_desc>();
+  mesh.positions = positions.data();
+  mesh.vertex_count = positions.size() / 3;
+  mesh.indices = indices.data();
+  mesh.index_count = indices.size();
+  auto triangles = make_desc<cumulet_triangles_desc>();
+  triangles.meshes = &mesh;
+  triangles.mesh_count = 1;
+  cumulet_surfaces* out = nullptr;
+  EXPECT_EQ(cumulet_surfaces_from_triangles(&triangles, &out, nullptr, 0), CUMULET_OK);
+  return SurfacesRef(out);
+}
+
+TEST_F(Trial, SurfacesThatChangeFasterThanTheyArePosedAreSeen) {
+  std::vector<SurfacesRef> cloths;
+  for (int i = 0; i < 8; ++i) cloths.push_back(make_cloth(120, 1.0F + static_cast<float>(i)));
+  const auto width = [&] {
+    std::array<double, 3> low{}, high{};
+    return cumulet_get_bounds(v_, low.data(), high.data()) == CUMULET_OK ? std::round(high[0] - low[0]) : 0.0;
+  };
+  EXPECT_GE(stream(
+                2ms, 3,
+                [&](int i) {
+                  cumulet_surfaces* cloth = cloths[static_cast<std::size_t>(i) % cloths.size()].get();
+                  ASSERT_EQ(cumulet_set_surfaces(v_, cloth), CUMULET_OK);
+                  // What was set last, though another may be shown yet.
+                  cumulet_surfaces* out = nullptr;
+                  ASSERT_EQ(cumulet_get_surfaces(v_, &out), CUMULET_OK);
+                  EXPECT_EQ(out, cloth);
+                  cumulet_surfaces_release(out);
+                },
+                width),
+            3U);
+}
+
+// ---- without a context ----
+
+class NoContext : public Trial {
+ protected:
+  NoContext() { first_ = picture_of(v_, volume_.get(), target_); }
+
+  /// Every [GL] call, each time.
+  void expect_refused() {
+    auto frame = target_.frame();
+    frame.target = CUMULET_TARGET_NONE;
+    auto pick = make_desc<cumulet_pick>();
+    std::vector<float> rgba(std::size_t{side} * side * 4);
+    std::vector<std::uint8_t> bytes(rgba.size());
+    double noise = 0.0;
+    for (int round = 0; round < 2; ++round) {
+      for (const auto& call : std::vector<std::function<cumulet_status()>>{
+               [&] { return cumulet_render(v_, &frame, nullptr); },
+               [&] { return cumulet_pick_at(v_, 1.0, 1.0, &pick); },
+               [&] { return cumulet_read_linear(v_, rgba.data(), rgba.size()); },
+               [&] { return cumulet_read_display(v_, bytes.data(), bytes.size()); },
+               [&] { return cumulet_read_aov(v_, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
+               [&] { return cumulet_measure_noise(v_, &noise); }, [&] { return cumulet_detach(v_); }}) {
+        EXPECT_EQ(call(), CUMULET_ERROR_GL);
+        const std::string line = cumulet_last_error(v_);
+        EXPECT_NE(line.find("no OpenGL context is current"), std::string::npos) << line;
+      }
+    }
+  }
+  void expect_healed() {
+    target_.clear({});
+    converge(v_, target_.frame());
+    EXPECT_EQ(cumulet::test::difference(target_.pixels(), first_), "");
+    EXPECT_EQ(cumulet::test::difference(picture_of(v_, volume_.get(), target_), first_), "");
+    EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
+  }
+
+  VolumeRef volume_ = make_ball(16);
+  std::vector<std::uint8_t> first_;
+};
+
+TEST_F(NoContext, EachCallIsAnErrorAndTheNextOneWithItGoesOn) {
+  for (int i = 0; i < 2; ++i) {
+    context_.release();
+    expect_refused();
+    context_.make_current();
+    expect_healed();
+  }
+}
+
+TEST_F(NoContext, TheFirstFrameOfAllMayLackIt) {
+  const ViewerPtr viewer = make_viewer({.get_proc = EglContext::get_proc});
+  ASSERT_EQ(cumulet_set_volume(viewer.get(), volume_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  const auto frame = target_.frame();
+  context_.release();
+  EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_ERROR_GL);
+  context_.make_current();
+  target_.clear({});
+  converge(viewer.get(), frame);
+  EXPECT_GT(std::ranges::max(target_.pixels()), 100);
+}
+
+TEST_F(NoContext, AStrangersContextIsNone) {
+  const EglContext stranger;
+  stranger.make_current();
+  // Objects of the stranger's own, whose names are like the viewer's.
+  std::vector<GLuint> textures(64), buffers(64);
+  gl_.CreateTextures(GL_TEXTURE_2D, 64, textures.data());
+  gl_.CreateBuffers(64, buffers.data());
+  expect_refused();
+  for (const GLuint texture : textures) EXPECT_EQ(gl_.IsTexture(texture), GL_TRUE) << texture;
+  for (const GLuint buffer : buffers) EXPECT_EQ(gl_.IsBuffer(buffer), GL_TRUE) << buffer;
+  context_.make_current();
+  expect_healed();
+  // Destroyed in the wrong place, it deletes nothing there.
+  stranger.make_current();
+  viewer_.reset();
+  for (const GLuint texture : textures) EXPECT_EQ(gl_.IsTexture(texture), GL_TRUE) << texture;
+  for (const GLuint buffer : buffers) EXPECT_EQ(gl_.IsBuffer(buffer), GL_TRUE) << buffer;
+  EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
+  context_.make_current();
+}
+
+// ---- callbacks ----
+
+/// Calls every function of the ABI from inside a callback, and keeps what they answered.
+struct Caller {
+  cumulet_viewer* viewer = nullptr;
+  cumulet_viewer* other = nullptr;
+  cumulet_camera* camera = nullptr;
+  cumulet_volume* volume = nullptr;
+  cumulet_surfaces* surfaces = nullptr;
+  std::atomic<int> rounds = 0;
+  std::atomic<bool> armed = false;
+  std::set<std::string> names;
+  std::vector<std::string> wrong;
+
+  void answer(const std::string& name, cumulet_status status,
+              cumulet_status expected = CUMULET_ERROR_INVALID_ARGUMENT) {
+    names.insert(name);
+    if (status != expected) wrong.push_back(name + ": " + std::to_string(status));
+  }
+  void call_all();
+  static void on_update(void* user) { static_cast<Caller*>(user)->once(); }
+  static void on_log(void* user, cumulet_log_level, const char*) { static_cast<Caller*>(user)->once(); }
+
+ private:
+  void once() {
+    if (!armed.exchange(false)) return;
+    call_all();
+    ++rounds;
+  }
+};
+
+#define CALL(function, ...) answer(#function, function(__VA_ARGS__))
+
+void Caller::call_all() {
+  std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  std::array<double, 3> low{}, high{1.0, 1.0, 1.0};
+  std::array<float, 4> one{};
+  std::array<std::uint8_t, 4> bytes{};
+  double number = 0.0;
+  std::int32_t handled = 0;
+  const auto create = make_desc<cumulet_create_desc>();
+  const auto dense = make_desc<cumulet_dense_desc>();
+  const auto sparse = make_desc<cumulet_sparse_desc>();
+  const auto triangles = make_desc<cumulet_triangles_desc>();
+  const auto medium = make_desc<cumulet_medium_desc>();
+  const auto light = make_desc<cumulet_light_desc>();
+  const auto grid = make_desc<cumulet_grid_desc>();
+  const auto sampling = make_desc<cumulet_sampling_desc>();
+  const auto display = make_desc<cumulet_display_desc>();
+  const auto navigation = make_desc<cumulet_navigation_desc>();
+  const auto event = make_desc<cumulet_event>();
+  const auto frame = make_desc<cumulet_frame_desc>();
+  const auto settings = make_desc<cumulet_surface_settings_desc>();
+  auto pose = make_desc<cumulet_camera_desc>();
+  auto pick = make_desc<cumulet_pick>();
+  auto stats = make_desc<cumulet_stats>();
+  auto progress = make_desc<cumulet_progress>();
+  auto volume_info = make_desc<cumulet_volume_info>();
+  auto surfaces_info = make_desc<cumulet_surfaces_info>();
+  auto animation = make_desc<cumulet_animation_info>();
+  const auto volume_file = make_desc<cumulet_volume_file_desc>();
+  auto file_info = make_desc<cumulet_volume_file_info>();
+  auto grid_info = make_desc<cumulet_grid_info>();
+  auto metadata = make_desc<cumulet_metadata>();
+  cumulet_inspection* new_inspection = nullptr;
+  cumulet_viewer* new_viewer = nullptr;
+  cumulet_camera* new_camera = nullptr;
+  cumulet_volume* new_volume = nullptr;
+  cumulet_surfaces* new_surfaces = nullptr;
+
+  // The exceptions.
+  for (cumulet_viewer* v : {viewer, other}) {
+    answer("cumulet_get_progress", cumulet_get_progress(v, &progress), CUMULET_OK);
+    cumulet_cancel(v);
+  }
+  names.insert({"cumulet_cancel", "cumulet_status_text", "cumulet_version", "cumulet_volume_retain",
+                "cumulet_volume_release", "cumulet_surfaces_retain", "cumulet_surfaces_release",
+                "cumulet_camera_release", "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
+  cumulet_volume_release(cumulet_volume_retain(volume));
+  cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
+  cumulet_camera_release(nullptr);
+  cumulet_inspection_release(nullptr);
+  if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
+  // Refused without a status.
+  cumulet_destroy(viewer);
+  cumulet_destroy(other);
+  if (std::string(cumulet_last_error(viewer)).empty()) wrong.push_back("cumulet_last_error");
+
+  CALL(cumulet_create, &create, &new_viewer, nullptr, 0);
+  CALL(cumulet_volume_open, "none.vdb", nullptr, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_from_dense, &dense, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_from_sparse, &sparse, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_open_file, &volume_file, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_suggest_density_scale, volume, &number);
+  CALL(cumulet_inspect_volume_file, "none.vdb", &new_inspection, nullptr, 0);
+  CALL(cumulet_inspection_get_file, new_inspection, &file_info);
+  CALL(cumulet_inspection_get_grid, new_inspection, 0, &grid_info);
+  CALL(cumulet_inspection_get_metadata, new_inspection, 0, 0, &metadata);
+  CALL(cumulet_volume_get_info, volume, &volume_info);
+  CALL(
+      cumulet_list_grids, "none.vdb", [](void*, const char*, const char*, const char*) {}, nullptr, nullptr, 0);
+  CALL(cumulet_surfaces_open, "none.glb", &new_surfaces, nullptr, 0);
+  CALL(cumulet_surfaces_from_memory, bytes.data(), bytes.size(), nullptr, nullptr, &new_surfaces, nullptr, 0);
+  CALL(cumulet_surfaces_from_triangles, &triangles, &new_surfaces, nullptr, 0);
+  CALL(cumulet_surfaces_get_info, surfaces, &surfaces_info);
+  CALL(cumulet_surfaces_get_animation, surfaces, 0, &animation);
+  CALL(cumulet_camera_create, &pose, &new_camera);
+  CALL(cumulet_camera_set, camera, &pose);
+  CALL(cumulet_camera_get, camera, &pose);
+  CALL(cumulet_camera_set_matrices, camera, m.data(), m.data(), CUMULET_CLIP_NEGATIVE_ONE_TO_ONE);
+  CALL(cumulet_camera_get_matrices, camera, 1.0, CUMULET_CLIP_NEGATIVE_ONE_TO_ONE, m.data(), m.data());
+  CALL(cumulet_camera_orbit, camera, 0.1, 0.1);
+  CALL(cumulet_camera_look, camera, 0.1, 0.1);
+  CALL(cumulet_camera_roll, camera, 0.1);
+  CALL(cumulet_camera_pan, camera, 0.1, 0.1);
+  CALL(cumulet_camera_dolly, camera, 1.1);
+  CALL(cumulet_camera_fly, camera, 0.1, 0.1, 0.1);
+  CALL(cumulet_camera_frame, camera, low.data(), high.data(), 1.0);
+  for (cumulet_viewer* v : {viewer, other}) {
+    CALL(cumulet_attach, v, EglContext::get_proc, nullptr);
+    CALL(cumulet_detach, v);
+    CALL(cumulet_context_lost, v);
+    CALL(cumulet_load_volume, v, "none.vdb", nullptr);
+    CALL(cumulet_load_volume_file, v, &volume_file);
+    CALL(cumulet_set_volume, v, nullptr);
+    CALL(cumulet_get_volume, v, &new_volume);
+    CALL(cumulet_load_surfaces, v, "none.glb");
+    CALL(cumulet_set_surfaces, v, nullptr);
+    CALL(cumulet_get_surfaces, v, &new_surfaces);
+    CALL(cumulet_set_surface_settings, v, &settings);
+    CALL(cumulet_use_surface_camera, v, 0);
+    CALL(cumulet_wait, v, 0.0);
+    CALL(cumulet_rebuild, v);
+    CALL(cumulet_set_grid, v, &grid);
+    CALL(cumulet_set_medium, v, &medium);
+    CALL(cumulet_set_light, v, &light);
+    CALL(cumulet_set_sampling, v, &sampling);
+    CALL(cumulet_set_display, v, &display);
+    CALL(cumulet_set_camera, v, camera);
+    CALL(cumulet_get_camera, v, &new_camera);
+    CALL(cumulet_frame_all, v);
+    CALL(cumulet_set_navigation, v, &navigation);
+    CALL(cumulet_input, v, &event, &handled);
+    CALL(cumulet_render, v, &frame, nullptr);
+    CALL(cumulet_pick_at, v, 0.0, 0.0, &pick);
+    CALL(cumulet_get_bounds, v, low.data(), high.data());
+    CALL(cumulet_read_linear, v, one.data(), one.size());
+    CALL(cumulet_read_display, v, bytes.data(), bytes.size());
+    CALL(cumulet_read_aov, v, CUMULET_AOV_BEAUTY, one.data(), one.size());
+    CALL(cumulet_measure_noise, v, &number);
+    CALL(cumulet_get_stats, v, &stats);
+  }
+  if (new_viewer != nullptr || new_camera != nullptr || new_volume != nullptr || new_surfaces != nullptr ||
+      new_inspection != nullptr) {
+    wrong.push_back("a refused call gave a handle");
+  }
+}
+
+/// Runs it on a thread of its own, and ends the program if it never comes back.
+void expect_returns(const std::string& what, const std::function<void()>& call) {
+  auto done = std::async(std::launch::async, call);
+  if (done.wait_for(patience) == std::future_status::ready) return;
+  std::fprintf(stderr, "%s: deadlock\n", what.c_str());
+  std::_Exit(1);
+}
+
+TEST(Callbacks, EveryFunctionIsRefusedFromInsideAndNoneDeadlocks) {
+  Caller caller;
+  const ViewerPtr viewer = make_viewer(
+      {.update = Caller::on_update, .update_user = &caller, .log = Caller::on_log, .log_user = &caller, .samples = 1});
+  const ViewerPtr other = make_viewer({});
+  const VolumeRef volume = make_ball(16);
+  const SurfacesRef surfaces = make_cloth(2, 1.0F);
+  cumulet_camera* out = nullptr;
+  ASSERT_EQ(cumulet_get_camera(viewer.get(), &out), CUMULET_OK);
+  const CameraRef camera(out);
+  ASSERT_EQ(cumulet_set_camera(other.get(), camera.get()), CUMULET_OK);
+  caller.viewer = viewer.get();
+  caller.other = other.get();
+  caller.camera = camera.get();
+  caller.volume = volume.get();
+  caller.surfaces = surfaces.get();
+
+  // Updates are told once a frame: each trigger has a viewer of its own that has told none yet.
+  int rounds = 0;
+  const auto trigger = [&](const std::string& what, const std::function<void()>& call) {
+    caller.armed = true;
+    expect_returns(what, call);
+    const auto until = Clock::now() + patience;
+    while (caller.rounds == rounds && Clock::now() < until) std::this_thread::sleep_for(1ms);
+    EXPECT_EQ(caller.rounds, ++rounds) << what << ": no callback came";
+  };
+  const auto fresh = [&] {
+    ViewerPtr made = make_viewer({.log = Caller::on_log, .log_user = &caller, .samples = 1});
+    return made;
+  };
+  // By a camera's change, on the thread that makes it. (make_viewer has told an update; a frame makes way for the
+  // next.)
+  const EglContext context;
+  expect_returns("a frame", [&] {
+    context.make_current();
+    EXPECT_EQ(cumulet_attach(viewer.get(), EglContext::get_proc, nullptr), CUMULET_OK);
+    auto frame = make_desc<cumulet_frame_desc>();
+    frame.target = CUMULET_TARGET_NONE;
+    EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+    context.release();
+  });
+  trigger("camera", [&] { EXPECT_EQ(cumulet_camera_orbit(camera.get(), 0.2, 0.1), CUMULET_OK); });
+  // By a setting, and by a job that ends on the worker.
+  const auto make_way = [&] {
+    context.make_current();
+    auto frame = make_desc<cumulet_frame_desc>();
+    frame.target = CUMULET_TARGET_NONE;
+    EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+    context.release();
+  };
+  expect_returns("a frame", make_way);
+  trigger("setting", [&] {
+    const auto light = make_desc<cumulet_light_desc>();
+    EXPECT_EQ(cumulet_set_light(viewer.get(), &light), CUMULET_OK);
+  });
+  expect_returns("a job", [&] {
+    EXPECT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  });
+  // A log line comes from the worker, too: the grid is ended by max_cells.
+  const ViewerPtr logging = fresh();
+  caller.viewer = logging.get();
+  trigger("log", [&] {
+    auto grid = slow_grid();
+    grid.max_cells = 100;
+    EXPECT_EQ(cumulet_set_grid(logging.get(), &grid), CUMULET_OK);
+    EXPECT_EQ(cumulet_set_volume(logging.get(), volume.get()), CUMULET_OK);
+    (void)cumulet_wait(logging.get(), -1.0);  // the callback cancelled
+  });
+  EXPECT_EQ(caller.wrong, std::vector<std::string>{});
+
+  // None was forgotten.
+  std::ifstream file(CUMULET_HEADER);
+  std::stringstream header;
+  header << file.rdbuf();
+  const std::string text = header.str();
+  const std::regex declaration("CUMULET_API [^(;]*?(cumulet_\\w+)\\(");
+  std::set<std::string> all;
+  for (std::sregex_iterator i(text.begin(), text.end(), declaration), end; i != end; ++i) all.insert((*i)[1]);
+  EXPECT_GT(all.size(), 50U);
+  EXPECT_EQ(caller.names, all);
+
+  // Outside, all is as before.
+  EXPECT_EQ(cumulet_camera_orbit(camera.get(), 0.1, 0.0), CUMULET_OK);
+  expect_returns("detach", [&] {
+    context.make_current();
+    EXPECT_EQ(cumulet_detach(viewer.get()), CUMULET_OK);
+    context.release();
+  });
+}
+
+}  // namespace

@@ -1,0 +1,116 @@
+#!/bin/bash
+# An installed tree is whole and knows nothing of the folders it was built in: no file names them, programs look for
+# libraries beside themselves alone. Manual pages and completions have every flag that --help has, and no other; the
+# desktop files are valid, and files are known by them. Usage: install_test.sh BUILD_DIR SOURCE_DIR
+set -euo pipefail
+build=$1 source=$2
+here=$(cd "$(dirname "$0")" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() { echo "install_test: $*" >&2; exit 1; }
+for tool in groff zsh desktop-file-validate update-mime-database gio; do
+  command -v "$tool" >/dev/null || { echo "install_test: skipped: it needs $tool (scripts/packages.txt)"; exit 77; }
+done
+
+cmake --install "$build" --prefix "$work/tree" --strip >"$work/log" || { cat "$work/log"; fail "cmake --install failed"; }
+tree=$work/tree share=$work/tree/share
+
+# --- nothing of the build ---------------------------------------------------------------------------------------------
+if found=$(grep -rlF -e "$(realpath "$build")" -e "$(realpath "$source")" "$tree"); then
+  fail "folders of the build are named in $found"
+fi
+while read -r file; do
+  path=$(readelf -d "$file" | sed -n 's/.*R\(UN\)*PATH).*\[\(.*\)\]/\2/p')
+  # shellcheck disable=SC2016 # $ORIGIN is the loader's
+  case $path in
+    '$ORIGIN' | '$ORIGIN/../lib' | '$ORIGIN/../lib/'*-linux-gnu) ;;
+    *) fail "$(basename "$file") looks for libraries in '$path'" ;;
+  esac
+done < <(find "$tree" -type f \( -path '*/bin/*' -o -name '*.so*' \))
+
+# --- documents: the README's links lead to something --------------------------------------------------------------------
+while read -r link; do
+  [ -e "$share/doc/cumulet/$link" ] || fail "the README's $link is not installed"
+done < <(grep -oE '\bdocs/[a-z_]+\.[a-z]+' "$source/README.md" | sort -u)
+
+# --- manual pages and completions ---------------------------------------------------------------------------------------
+complete_bash() { # PROGRAM WORD...: what its completion offers for the last word
+  (
+    cd "$work/files"
+    # shellcheck disable=SC1090
+    . "$share/bash-completion/completions/$1"
+    COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
+    "_${1//-/_}"
+    printf '%s\n' "${COMPREPLY[@]}" | LC_ALL=C sort | tr '\n' ' '
+  )
+}
+complete_zsh() { # PROGRAM TEXT: what is on a terminal's line after its completion
+  (cd "$work/files" && zsh -f "$here/complete.zsh" "$share/zsh/site-functions" "$@")
+}
+expect() { # WANTED SAID WHAT
+  [ "$1" = "$2" ] || fail "$3: '$2', not '$1'"
+}
+
+mkdir -p "$work/files/folder"
+touch "$work"/files/{cloud.vdb,smoke.nvdb,notes.txt,model.glb,scene.json}
+for program in "$tree"/bin/*; do
+  program=$(basename "$program")
+  # From what people read: the first column.
+  flags=$("$tree/bin/$program" --help | grep -oE '^  (-[a-z],)?--[a-z-]+|^  -[a-z]\b' | tr -d ' ' | tr ',' '\n' | LC_ALL=C sort)
+  [ -n "$flags" ] || fail "$program --help names no flag"
+
+  page=$share/man/man1/$program.1
+  said=$(groff -man -Tutf8 -ww -z "$page" 2>&1)
+  [ -z "$said" ] || fail "groff on $program.1: $said"
+  in_page=$(groff -man -Tascii -P-cbou "$page" | grep -oE '^ {7}(-[a-z], )?--?[a-z-]+' | tr -d ' ' | tr ',' '\n' | LC_ALL=C sort)
+  expect "$flags" "$in_page" "flags in the manual page of $program"
+  if grep -qE '@[a-z_]+@' "$page"; then fail "$program.1 has a gap"; fi
+  # Examples, too: of the page, and of the README.
+  { groff -man -Tascii -P-cbou "$page" && cat "$source/README.md"; } |
+    awk -v program="$program" 'more || $1 == program { print; more = /\\$/ }' |
+    { grep -oE -- '--[a-z][a-z-]*' || true; } | LC_ALL=C sort -u | LC_ALL=C comm -23 - <(echo "$flags") >"$work/unknown"
+  [ ! -s "$work/unknown" ] || fail "examples of $program have $(tr '\n' ' ' <"$work/unknown")"
+
+  expect "$(tr '\n' ' ' <<<"$flags")" "$(complete_bash "$program" -)" "bash: $program -"
+  zsh -n "$share/zsh/site-functions/_$program"
+  for flag in $flags; do
+    grep -qE -- "['{,]${flag}[]=[},]" "$share/zsh/site-functions/_$program" || fail "zsh: _$program lacks $flag"
+  done
+done
+expect "brick dense tet " "$(complete_bash cumulet-render --march "")" "bash: --march"
+expect "dense " "$(complete_bash cumulet-render --march = d)" "bash: --march=d"
+expect "cloud.vdb folder smoke.nvdb " "$(complete_bash cumulet-render --volume "")" "bash: --volume"
+expect "scene.json " "$(complete_bash cumulet-demo --scene s)" "bash: --scene s"
+expect "cloud.vdb folder model.glb scene.json smoke.nvdb " "$(complete_bash cumulet-demo "")" "bash: cumulet-demo"
+expect "folder " "$(complete_bash cumulet-scene f)" "bash: cumulet-scene f"
+expect " " "$(complete_bash cumulet-render --spp "")" "bash: --spp"
+expect "cumulet-render --march dense" "$(complete_zsh "cumulet-render --march d")" "zsh: --march d"
+expect "cumulet-render --volume cloud.vdb" "$(complete_zsh "cumulet-render --volume c")" "zsh: --volume c"
+expect "cumulet-demo --replay=" "$(complete_zsh "cumulet-demo --rep")" "zsh: --rep"
+expect "cumulet-scene folder/" "$(complete_zsh "cumulet-scene f")" "zsh: cumulet-scene f"
+
+# --- the desktop ----------------------------------------------------------------------------------------------------------
+desktop-file-validate "$share/applications/cumulet-demo.desktop"
+icon=$(sed -n 's/^Icon=//p' "$share/applications/cumulet-demo.desktop")
+[ -s "$share/icons/hicolor/scalable/apps/$icon.svg" ] || fail "no icon '$icon'"
+run=$(sed -n 's/^Exec=\([^ ]*\).*/\1/p' "$share/applications/cumulet-demo.desktop")
+[ -x "$tree/bin/$run" ] || fail "no program '$run'"
+# The system's types stay known beside ours.
+mkdir -p "$share/mime/packages"
+cp /usr/share/mime/packages/freedesktop.org.xml "$share/mime/packages"
+export XDG_DATA_HOME=$work/none XDG_DATA_DIRS=$share
+update-mime-database "$share/mime" 2>&1 | tee "$work/mime.log"
+[ ! -s "$work/mime.log" ] || fail "update-mime-database has something to say"
+type_of() { # FILE
+  gio info -a standard::content-type "$1" | sed -n 's/.*standard::content-type: //p'
+}
+printf ' BDV\0\0\0\0' >"$work/files/unnamed_openvdb"
+printf 'NanoVDB0' >"$work/files/unnamed_nanovdb"
+printf '\1\2\3' | tee "$work/files/cloud.vdb" >"$work/files/smoke.nvdb" # known by their names
+expect application/x-openvdb "$(type_of "$work/files/cloud.vdb")" "type of cloud.vdb"
+expect application/x-openvdb "$(type_of "$work/files/unnamed_openvdb")" "type of an OpenVDB file without a name"
+expect application/x-nanovdb "$(type_of "$work/files/smoke.nvdb")" "type of smoke.nvdb"
+expect application/x-nanovdb "$(type_of "$work/files/unnamed_nanovdb")" "type of a NanoVDB file without a name"
+for type in $(sed -n 's/^MimeType=//p' "$share/applications/cumulet-demo.desktop" | tr ';' ' '); do
+  [ -s "$share/mime/$type.xml" ] || fail "cumulet-demo.desktop takes '$type', which nobody defines"
+done

@@ -1,0 +1,253 @@
+// Pace: what a frame may do in its budget, how dispatches are bounded, and what is shown meanwhile.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "render/pace.hpp"
+#include "support/busy_host.hpp"
+#include "support/c_host.hpp"
+#include "support/fake_gl.hpp"
+#include "support/gl_viewer.hpp"
+#include "support/volumes.hpp"
+
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+using namespace cumulet;
+using glm::ivec3;
+using glm::vec3;
+
+constexpr double no_bound = std::numeric_limits<double>::infinity();
+
+TEST(RoundCost, KnowsNothingFromNothing) {
+  render::RoundCost cost;
+  EXPECT_FALSE(cost.most(1.0));
+  cost.learn(100.0, 500.0, 500.0);  // the driver compiled in it
+  EXPECT_FALSE(cost.most(1.0));
+  cost.learn(100.0, 0.001, no_bound);  // sky: nothing marched
+  EXPECT_FALSE(cost.most(1.0));
+}
+
+TEST(RoundCost, GuessesOnTheSafeSide) {
+  render::RoundCost cost;
+  cost.learn(128.0, 1.0, 1.0);
+  cost.learn(128.0, 1.0, 1.0);
+  EXPECT_DOUBLE_EQ(*cost.most(128.0), 1.0);
+  EXPECT_DOUBLE_EQ(*cost.most(1024.0), 8.0);  // as if there were no more lanes than those
+  EXPECT_DOUBLE_EQ(*cost.most(2.0), 1.0);     // as if one lane took as long
+}
+
+TEST(RoundCost, CheapWindowsTeachNothingOfDearOnes) {
+  render::RoundCost cost;
+  for (int i = 0; i < 2; ++i) cost.learn(128.0, 1.0, 1.0);
+  for (int i = 0; i < 1000; ++i) cost.learn(128.0, 1e-4, no_bound);  // sky
+  EXPECT_DOUBLE_EQ(*cost.most(128.0), 1.0);
+  // Half of the lanes marched, some of the rounds: it is known to lie between.
+  cost.learn(128.0, 0.3, 3.0);
+  EXPECT_DOUBLE_EQ(*cost.most(128.0), 1.0);
+}
+
+TEST(RoundCost, AnInterruptedDispatchIsForgiven) {
+  render::RoundCost cost;
+  for (int i = 0; i < 2; ++i) cost.learn(128.0, 1.0, 1.0);
+  cost.learn(128.0, 50.0, 50.0);
+  EXPECT_NEAR(*cost.most(128.0), 1.0, 0.01);
+  cost.learn(128.0, 3.0, 3.0);  // twice in a row it is believed
+  EXPECT_NEAR(*cost.most(128.0), 3.0, 0.1);
+  // However busy the machine is: no more than some times what it can do, so that work goes on.
+  for (int i = 0; i < 20; ++i) cost.learn(128.0, 1000.0, 1000.0);
+  EXPECT_LT(*cost.most(128.0), 5.0);
+  EXPECT_LT(*cost.most(128.0, true), 2.0);
+}
+
+class Pace : public test::ViewerTest {
+ protected:
+  void SetUp() override {
+    ViewerTest::SetUp();
+    if (IsSkipped()) return;
+    still_ = make();
+    still_->set_volume(test::noise_volume({40, 40, 40}, ivec3(0), 2));
+    still_->set_medium({1.0, vec3(1.0F), 0.3F, 0});
+    still_->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+    // A cloud in the lower half, sky in the upper.
+    still_->set_camera(test::camera_at({20.0, 40.0, 120.0}, {20.0, 40.0, 0.0}, 36.0));
+  }
+  [[nodiscard]] viewer::Viewer& viewer() const { return still_->viewer(); }
+  static viewer::Frame frame(std::uint32_t width, std::uint32_t height, double budget_ms) {
+    viewer::Frame f;
+    f.target = viewer::Target::none;
+    f.size = {width, height};
+    f.viewport = {0, 0, width, height};
+    f.budget_ms = budget_ms;
+    return f;
+  }
+  std::unique_ptr<test::Still> still_;
+};
+
+TEST_P(Pace, DispatchesOnACloudAreBoundedThoughSkyIsCheap) {
+  std::vector<render::DispatchRecord> log;
+  viewer().wait(-1.0);
+  // Sky tiles and passes first: their lanes end at once, and thousands of rounds take no time.
+  viewer().set_sampling({8, 1, render::View::shaded, false});
+  viewer().set_dispatch_log(&log);
+  viewer::FrameResult result;
+  for (int i = 0; i < 4000 && !result.converged; ++i) result = viewer().render(frame(600, 96, 40.0));
+  ASSERT_TRUE(result.converged);
+  std::vector<double> over;
+  for (const render::DispatchRecord& dispatch : log) {
+    if (dispatch.known) over.push_back(dispatch.ms / std::max(dispatch.aim_ms, 1.0));
+  }
+  ASSERT_GT(over.size(), 20U);
+  std::ranges::sort(over);
+  // The machine may interrupt a few for others.
+  EXPECT_LT(over[over.size() * 95 / 100], 4.0);
+  EXPECT_LT(over.back(), 40.0);
+}
+
+TEST_P(Pace, SmallBudgetsConvergeToTheSamePicture) {
+  viewer().wait(-1.0);
+  std::vector<std::vector<float>> pictures;
+  for (const double budget_ms : {1e6, 3.0}) {
+    viewer().set_sampling({2, 3, render::View::shaded, false});
+    viewer().render(frame(16, 16, 1.0));  // another picture between
+    viewer().set_sampling({1, 3, render::View::shaded, false});
+    viewer::FrameResult result;
+    double last = 0.0;
+    for (int i = 0; i < 20000 && !result.converged; ++i) {
+      result = viewer().render(frame(320, 180, budget_ms));
+      EXPECT_GE(result.progress, last);
+      last = result.progress;
+    }
+    ASSERT_TRUE(result.converged) << budget_ms << " ms: " << last;
+    EXPECT_EQ(viewer().stats().samples, 320U * 180U);
+    pictures.emplace_back(std::size_t{320} * 180 * 4);
+    viewer().read_linear(pictures.back().data(), pictures.back().size());
+  }
+  EXPECT_EQ(pictures[0], pictures[1]);
+}
+
+TEST_P(Pace, CoarsePicturesAreWorthShowingAndProgressIsOfTheWish) {
+  viewer().wait(-1.0);
+  viewer().set_sampling({4, 3, render::View::shaded, true});
+  const viewer::Frame f = frame(512, 256, 2.0);
+  viewer::FrameResult result;
+  // A drag, then rest.
+  for (int i = 0; i < 12; ++i) {
+    viewer().set_light({static_cast<float>(i), 30.0F, vec3(3.0F), vec3(0.3F)});
+    result = viewer().render(f);
+  }
+  double last = 0.0;
+  bool told_early = false;
+  glm::uvec2 size = result.size;
+  std::uint64_t samples = 0;
+  bool settled = false;
+  int changes = 0;
+  int checked = 0;
+  for (int i = 0; i < 20000 && !result.converged; ++i) {
+    result = viewer().render(f);
+    // The drag's last answer may be finished first: its progress is none of the wish's.
+    settled = settled || result.progress > 0.0;
+    if (settled) {
+      EXPECT_GE(result.progress, last);
+      last = result.progress;
+    }
+    told_early = told_early || (result.preview && result.progress > 0.0);
+    // The first that is seen may be the drag's.
+    if (settled && result.size != size && ++changes > 1 && size.x > 0) {
+      ++checked;
+      // The one before, as it was left: as many samples as a quarter of the full picture's pixels, nearly.
+      const double divisor = 512.0 / size.x;
+      const double each = std::clamp(divisor * divisor / 4.0, 1.0, 4.0);
+      EXPECT_GE(double(samples), 0.85 * each * size.x * size.y) << size.x;
+    }
+    if (result.size != size) samples = 0;
+    size = result.size;
+    if (result.preview) samples = std::max(samples, viewer().stats().samples);
+  }
+  ASSERT_TRUE(result.converged);
+  EXPECT_TRUE(told_early);
+  EXPECT_GT(checked, 0);
+  EXPECT_EQ(result.progress, 1.0);
+}
+
+CUMULET_ON_BACKENDS(Pace);
+
+// What waits for the device, by the functions' names.
+std::uint64_t waits(const test::FakeGl& gl) {
+  std::uint64_t sum = 0;
+  for (const char* name :
+       {"Finish", "GetNamedBufferSubData", "GetBufferSubData", "ReadPixels", "ReadnPixels", "GetTextureImage",
+        "GetTexImage", "GetnTexImage", "GetTextureSubImage", "MapBuffer", "MapNamedBuffer", "GetQueryObjectiv",
+        "GetQueryObjectuiv", "GetQueryObjecti64v", "GetQueryObjectui64v"})
+    sum += gl.calls(name);
+  return sum;
+}
+
+TEST(PaceOfFrames, NoFrameWaitsForTheDevice) {
+  headless::Context context = headless::Context::create(headless::Backend::automatic);
+  test::FakeGl fake(headless::Context::get_proc, &context);
+  const test::HostTarget target(fake.real(), 200, 120);
+  const auto volume = test::make_ball(16);
+  for (const bool preview : {false, true}) {
+    const auto viewer = test::make_viewer({.get_proc = test::FakeGl::get_proc, .user = &fake, .samples = 4});
+    auto sampling = test::make_desc<cumulet_sampling_desc>();
+    sampling.samples = 4;
+    sampling.preview = preview ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
+    ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
+    cumulet_frame_desc frame = target.frame();
+    frame.budget_ms = 4.0;
+    frame.depth_source = CUMULET_DEPTH_SOURCE_TEXTURE;
+    frame.depth_name = target.depth_texture();
+    const std::uint64_t before = waits(fake);
+    const std::uint64_t dispatches = fake.calls("DispatchCompute");
+    const cumulet_frame_result result = test::converge(viewer.get(), frame);
+    EXPECT_EQ(waits(fake), before) << preview;
+    EXPECT_EQ(result.progress, 1.0);
+    EXPECT_GT(fake.calls("DispatchCompute"), dispatches + 2);
+    std::vector<float> rgba(std::size_t{200} * 120 * 4);
+    EXPECT_EQ(cumulet_read_linear(viewer.get(), rgba.data(), rgba.size()), CUMULET_OK);
+    EXPECT_GT(waits(fake), before);  // which the test would see
+  }
+}
+
+// A host that draws a lot of its own before each frame, and never waits: nor does the viewer.
+TEST(PaceOfFrames, NoCallWaitsForWhatTheHostHasQueued) {
+  headless::Context context = headless::Context::create(headless::Backend::automatic);
+  const GladGLContext gl = test::load_gl(headless::Context::get_proc, &context);
+  const test::HostTarget target(gl, 320, 180);
+  const auto volume = test::make_ball(32);
+  for (const cumulet_preview preview : {CUMULET_PREVIEW_OFF, CUMULET_PREVIEW_AUTO}) {
+    const auto viewer = test::make_viewer({.get_proc = headless::Context::get_proc, .user = &context, .samples = 64});
+    auto sampling = test::make_desc<cumulet_sampling_desc>();
+    sampling.samples = 4096;
+    sampling.preview = preview;
+    ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
+    ASSERT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+    cumulet_frame_desc frame = target.frame();
+    frame.budget_ms = 5.0;
+    auto result = test::make_desc<cumulet_frame_result>();
+    // What is compiled is compiled, of every size that is drawn.
+    for (int i = 0; i < 60; ++i) ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
+    gl.Finish();
+    const test::BusyHost host(gl, 1000.0);
+    const double before = result.progress;
+    host.queue();
+    const GLsync queued = gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.Flush();
+    for (int i = 0; i < 8; ++i) ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
+    EXPECT_EQ(gl.ClientWaitSync(queued, 0, 0), GLenum{GL_TIMEOUT_EXPIRED}) << "preview " << preview;
+    EXPECT_GT(result.progress, before) << "preview " << preview;
+    gl.DeleteSync(queued);
+    gl.Finish();
+    EXPECT_TRUE((result.flags & CUMULET_RENDER_MORE) != 0);
+  }
+}
+
+}  // namespace
