@@ -220,11 +220,16 @@ inline std::string difference(const std::vector<std::uint8_t>& a, const std::vec
   return std::to_string(bytes) + " of " + std::to_string(a.size()) + " bytes, by at most " + std::to_string(largest);
 }
 
-/// Sets the volume and renders all of the picture. The bytes of the target.
+/// Sets the volume and renders all of the picture. The bytes of the target, into which it is drawn once: frames that are
+/// drawn while it comes would show through where it is transparent, and their number is a matter of timing.
 inline std::vector<std::uint8_t> picture_of(cumulet_viewer* viewer, cumulet_volume* volume, const HostTarget& target) {
   if (cumulet_set_volume(viewer, volume) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+  auto frame = target.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  converge(viewer, frame);
+  frame.target = CUMULET_TARGET_FRAMEBUFFER;
   target.clear({0.0F, 0.0F, 0.0F, 0.0F});
-  converge(viewer, target.frame());
+  if (cumulet_render(viewer, &frame, nullptr) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
   return target.pixels();
 }
 
