@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "base/milliseconds.hpp"
 
 namespace cumulet::render {
 
@@ -16,10 +17,6 @@ GLint as_bool(bool value) { return value ? 1 : 0; }
 constexpr std::size_t most_means = 3;
 // Of a picture under way, between means of it, in times that they took.
 constexpr double pause = 4.0;
-
-double milliseconds(std::chrono::steady_clock::duration duration) {
-  return std::chrono::duration<double, std::milli>(duration).count();
-}
 
 gl::Object make_program(const gl::FunctionsPtr& gl, std::span<const std::string> defines) {
   return gl::make_graphics_program(gl, "composite.vert", "composite.frag", defines);

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/milliseconds.hpp"
+
 namespace cumulet::render {
 
 namespace {
@@ -19,8 +21,6 @@ constexpr double most_growth = 4.0;
 constexpr double spread = 4.0;
 constexpr double free_spread = 1.5;
 constexpr double forgetting = 1.005;  // the scene may have become dearer
-
-double milliseconds(Clock::duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
 
 }  // namespace
 

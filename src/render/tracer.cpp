@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "base/error.hpp"
+#include "base/milliseconds.hpp"
 #include "gl/state_guard.hpp"
 #include "render/luminance.hpp"
 
@@ -36,10 +37,6 @@ constexpr GLuint layer_colour_unit = 8;
 constexpr GLuint layer_z_unit = 15;
 
 using Clock = std::chrono::steady_clock;
-
-double milliseconds_until(Deadline deadline) {
-  return std::chrono::duration<double, std::milli>(deadline - Clock::now()).count();
-}
 
 // A step through n things that meets each once and lands far from the last: near n times the golden section, coprime
 // to n.
