@@ -11,8 +11,20 @@
 
 namespace cumulet::test {
 
+/// A scene whose images are made by hand too.
+class TexturedScene : public surface::Scene {
+ public:
+  /// The texture's number.
+  std::int32_t add_texture(std::uint32_t width, std::uint32_t height, std::vector<std::uint8_t> rgba,
+                           surface::Sampler sampler = {}) {
+    images.push_back({"by hand", width, height, std::move(rgba)});
+    textures.push_back({static_cast<std::uint32_t>(images.size() - 1), sampler});
+    return static_cast<std::int32_t>(textures.size() - 1);
+  }
+};
+
 /// Triangles that do not move.
-class StillScene : public surface::Scene {
+class StillScene : public TexturedScene {
  public:
   surface::Pose rest;
   [[nodiscard]] surface::Pose pose(double time, std::size_t /*animation*/) const override {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/shared_code.hpp"
+#include "support/appendix_b.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
@@ -251,85 +252,50 @@ TEST(Bsdf, NeverReflectsMoreThanComesIn) {
   }
 }
 
-/// What light from wi comes back to wo, by glTF 2.0's appendix B in double precision, from its formulas and from
-/// nothing of glsl/: D and V of GGX with alpha = roughness^2, Schlick's Fresnel term; but the diffuse lobe coupled as
-/// bsdf.glsl says, by directional albedos that are integrated here.
-struct Reference {
-  double roughness;
-  double metallic;
-  double f0;
-  dvec3 base;
-
-  static double schlick(double f0, double cosine) { return f0 + (1.0 - f0) * std::pow(1.0 - cosine, 5.0); }
-  [[nodiscard]] double lobe(dvec3 o, dvec3 i) const {
-    const double a2 = std::pow(roughness, 4.0);
-    const dvec3 h = normalize(o + i);
-    const double d = a2 / (std::numbers::pi * std::pow(h.z * h.z * (a2 - 1.0) + 1.0, 2.0));
-    const double v =
-        0.5 / (i.z * std::sqrt(o.z * o.z * (1.0 - a2) + a2) + o.z * std::sqrt(i.z * i.z * (1.0 - a2) + a2));
-    return d * v;
-  }
-  /// By microfacets: over their normals, as they are distributed.
-  [[nodiscard]] double interface_albedo(double cosine) const {
-    constexpr int n = 200;
-    const double a2 = std::pow(roughness, 4.0);
-    const dvec3 o(std::sqrt(1.0 - cosine * cosine), 0.0, cosine);
-    double sum = 0.0;
-    for (int j = 0; j < n; ++j) {
-      for (int k = 0; k < n; ++k) {
-        const double u = (j + 0.5) / n;
-        const double z = std::sqrt((1.0 - u) / (1.0 + (a2 - 1.0) * u));
-        const double r = std::sqrt(1.0 - z * z);
-        const double angle = std::numbers::pi * (k + 0.5) / n;  // both halves are alike
-        const dvec3 h(r * std::cos(angle), r * std::sin(angle), z);
-        const double oh = dot(o, h);
-        const dvec3 i = 2.0 * oh * h - o;
-        if (oh <= 0.0 || i.z <= 0.0) continue;
-        const double a4 = std::pow(roughness, 4.0);
-        const double d = a4 / (std::numbers::pi * std::pow(h.z * h.z * (a4 - 1.0) + 1.0, 2.0));
-        sum += lobe(o, i) * schlick(f0, oh) * i.z * 4.0 * oh / (d * h.z);
-      }
-    }
-    return sum / (n * n);
-  }
-  [[nodiscard]] dvec3 operator()(dvec3 o, dvec3 i, double e_o, double e_i, double e_average) const {
-    const double vh = dot(o, normalize(o + i));
-    const dvec3 diffuse = base / std::numbers::pi * ((1.0 - e_o) * (1.0 - e_i) / (1.0 - e_average));
-    const dvec3 dielectric = diffuse + lobe(o, i) * schlick(f0, vh);
-    const dvec3 metal = lobe(o, i) * (base + (1.0 - base) * std::pow(1.0 - vh, 5.0));
-    return (dielectric + (metal - dielectric) * metallic) * i.z;
-  }
-};
-
 TEST(Bsdf, IsAppendixBInDoublePrecision) {
-  for (const double roughness : {0.25, 0.5, 0.8, 1.0}) {
-    for (const double ior : {1.5, 2.0}) {
-      Reference reference{roughness, 0.0, std::pow((ior - 1.0) / (ior + 1.0), 2.0), {0.9, 0.5, 0.1}};
-      double average = 0.0;
-      constexpr int n = 24;
-      for (int i = 0; i < n; ++i) {
-        const double cosine = (i + 0.5) / n;
-        average += reference.interface_albedo(cosine) * 2.0 * cosine / n;
-      }
-      for (const double c_o : {0.95, 0.6, 0.25, 0.08}) {
-        const double e_o = reference.interface_albedo(c_o);
-        for (const double c_i : {0.9, 0.5, 0.2, 0.05}) {
-          const double e_i = reference.interface_albedo(c_i);
-          for (const double angle : {0.1, 1.2, 2.4, 3.1}) {
+  using cumulet::test::AppendixB;
+  using cumulet::test::Below;
+  constexpr std::array<double, 4> out{0.95, 0.6, 0.25, 0.08};
+  constexpr std::array<double, 4> in{0.9, 0.5, 0.2, 0.05};
+  // Below an interface, by the places in `out` and `in`.
+  const auto all_below = [&](const cumulet::test::RoughInterface& interface, double weight) {
+    std::array<std::array<Below, 4>, 4> result{};
+    const double average = average_below(interface, weight);
+    for (std::size_t o = 0; o < 4; ++o) {
+      const double out_of = 1.0 - weight * interface.albedo(out[o]);
+      for (std::size_t i = 0; i < 4; ++i) result[o][i] = {out_of, 1.0 - weight * interface.albedo(in[i]), average};
+    }
+    return result;
+  };
+  AppendixB reference;
+  reference.base = {0.9, 0.5, 0.1};
+  for (const auto& [clearcoat, clearcoat_roughness] : {std::pair{0.0, 1.0}, {0.6, 0.3}, {1.0, 0.7}}) {
+    reference.clearcoat = clearcoat;
+    reference.coat.roughness = clearcoat_roughness;
+    const auto below_coat = all_below(reference.coat, clearcoat);
+    for (const double roughness : {0.25, 0.5, 0.8, 1.0}) {
+      for (const double ior : {1.5, 2.0}) {
+        reference.dielectric = {roughness, std::pow((ior - 1.0) / (ior + 1.0), 2.0)};
+        const auto below = all_below(reference.dielectric, 1.0);
+        for (const double metallic : {0.0, 0.4, 1.0}) {
+          reference.metallic = metallic;
+          CmSurface s = make_surface({0.9F, 0.5F, 0.1F}, static_cast<float>(metallic), static_cast<float>(roughness));
+          s.f0 = cm_dielectric_f0(static_cast<float>(ior), 1.0F, vec3(1.0F));
+          s.clearcoat = static_cast<float>(clearcoat);
+          s.clearcoat_roughness = static_cast<float>(clearcoat_roughness);
+          for (std::size_t k = 0; k < 64; ++k) {
+            const double c_o = out[k / 4 % 4];
+            const double c_i = in[k % 4];
+            const double angle = std::array{0.1, 1.2, 2.4, 3.1}[k / 16];
             const dvec3 o(std::sqrt(1.0 - c_o * c_o), 0.0, c_o);
             const double sine = std::sqrt(1.0 - c_i * c_i);
             const dvec3 i(sine * std::cos(angle), sine * std::sin(angle), c_i);
-            for (const double metallic : {0.0, 0.4, 1.0}) {
-              CmSurface s =
-                  make_surface({0.9F, 0.5F, 0.1F}, static_cast<float>(metallic), static_cast<float>(roughness));
-              s.f0 = cm_dielectric_f0(static_cast<float>(ior), 1.0F, vec3(1.0F));
-              reference.metallic = metallic;
-              const dvec3 expected = reference(o, i, e_o, e_i, average);
-              const vec3 got = cm_bsdf_eval_local(s, 1.0F, vec3(o), vec3(i));
-              for (int c = 0; c < 3; ++c) {
-                EXPECT_NEAR(got[c], expected[c], 0.01 * expected[c] + 1e-5)
-                    << roughness << ' ' << ior << ' ' << c_o << ' ' << c_i << ' ' << angle << ' ' << metallic;
-              }
+            const dvec3 expected = reference(o, i, below[k / 4 % 4][k % 4], below_coat[k / 4 % 4][k % 4]);
+            const vec3 got = cm_bsdf_eval_local(s, 1.0F, vec3(o), vec3(i));
+            for (int c = 0; c < 3; ++c) {
+              EXPECT_NEAR(got[c], expected[c], 0.01 * expected[c] + 1e-5)
+                  << roughness << ' ' << ior << ' ' << c_o << ' ' << c_i << ' ' << angle << ' ' << metallic << " coat "
+                  << clearcoat << ' ' << clearcoat_roughness;
             }
           }
         }

@@ -22,6 +22,7 @@
 #include "image.hpp"
 #include "render/progressive.hpp"
 #include "support/gl_state.hpp"
+#include "support/surfaces.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
@@ -49,7 +50,7 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr float pi = std::numbers::pi_v<float>;
 
 /// A scene and its one pose.
-class HandScene : public surface::Scene {
+class HandScene : public cumulet::test::TexturedScene {
  public:
   [[nodiscard]] surface::Pose pose(double /*time*/, std::size_t /*animation*/) const override {
     surface::Pose result = posed;
@@ -94,12 +95,6 @@ class HandScene : public surface::Scene {
     material.metallic = 0.0F;
     material.specular = 0.0F;
     return material;
-  }
-  std::int32_t add_texture(std::uint32_t width, std::uint32_t height, std::vector<std::uint8_t> rgba,
-                           surface::Sampler sampler = {}) {
-    images.push_back({"by hand", width, height, std::move(rgba)});
-    textures.push_back({static_cast<std::uint32_t>(images.size() - 1), sampler});
-    return static_cast<std::int32_t>(textures.size() - 1);
   }
 
   surface::Pose posed;

@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
+#include "support/appendix_b.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
@@ -177,6 +179,70 @@ TEST_P(SurfaceTrace, ACoarseSphereHasASmoothTerminator) {
   viewer->set_light(sun_at(0.0F, vec3(0.0F), vec3(1.0F)));
   const test::Picture furnace = test::render(*viewer, {side, side, 64, 1, render::View::shaded});
   EXPECT_NEAR(furnace.mean().x, 1.0, 2e-3);
+}
+
+// A tile of every texel: base colour, metal, roughness and coat from textures, under the sun alone.
+TEST_P(SurfaceTrace, TexturedGlossIsAppendixBInDoublePrecision) {
+  constexpr std::uint32_t tiles = 4;
+  constexpr int side = 64;
+  const auto viewer = make();
+  auto scene = std::make_shared<StillScene>();
+  std::mt19937 random(11);
+  std::uniform_int_distribution<int> byte(70, 255);
+  std::array<std::vector<std::uint8_t>, 3> texels;
+  for (auto& t : texels) {
+    for (std::uint32_t i = 0; i < 4 * tiles * tiles; ++i) t.push_back(static_cast<std::uint8_t>(byte(random)));
+  }
+  const surface::Sampler nearest{surface::Wrap::clamp, surface::Wrap::clamp, surface::Filter::nearest,
+                                 surface::Filter::nearest, false};
+  Material material;
+  material.base_color_texture.texture = scene->add_texture(tiles, tiles, texels[0], nearest);
+  material.metallic_roughness_texture.texture = scene->add_texture(tiles, tiles, texels[1], nearest);
+  material.clearcoat = 1.0F;
+  material.clearcoat_texture.texture = scene->add_texture(tiles, tiles, texels[2], nearest);
+  material.clearcoat_roughness = 0.8F;
+  material.clearcoat_roughness_texture = material.clearcoat_texture;
+  const float half = 10.0F;
+  scene->add_quad({{{-half, -half, 0}, {half, -half, 0}, {half, half, 0}, {-half, half, 0}}}, scene->add(material));
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  viewer::Light light = sun_at(40.0F, vec3(static_cast<float>(pi)));
+  light.sun_azimuth_degrees = -35.0F;
+  viewer->set_light(light);
+  const double elevation = 40.0 * pi / 180.0;
+  const double azimuth = -35.0 * pi / 180.0;
+  const dvec3 i(std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation));
+  const auto part = [](std::uint8_t value) { return value / 255.0; };
+  for (const double turn : {0.3, 1.0}) {
+    const dvec3 o(std::sin(turn), 0.0, std::cos(turn));
+    viewer::CameraPose camera = test::camera_at(50.0 * o, {0.0, 0.0, 0.0}, 40.0);
+    camera.orthographic_height = 24.0;
+    viewer->set_camera(camera);
+    const test::Picture picture = test::render(*viewer, {side, side, 4, 1, render::View::shaded});
+    for (std::uint32_t k = 0; k < tiles * tiles; ++k) {
+      const std::uint8_t* colour = &texels[0][4 * std::size_t{k}];
+      const std::uint8_t* rough = &texels[1][4 * std::size_t{k}];
+      const std::uint8_t* coat = &texels[2][4 * std::size_t{k}];
+      test::AppendixB reference;
+      for (int c = 0; c < 3; ++c) reference.base[c] = std::pow((part(colour[c]) + 0.055) / 1.055, 2.4);
+      reference.dielectric.roughness = part(rough[1]);
+      reference.metallic = part(rough[2]);
+      reference.clearcoat = part(coat[0]);
+      reference.coat.roughness = double{0.8F} * part(coat[1]);
+      const auto below = [&](const test::RoughInterface& interface, double weight) {
+        return test::Below{1.0 - weight * interface.albedo(o.z), 1.0 - weight * interface.albedo(i.z),
+                           average_below(interface, weight)};
+      };
+      const dvec3 expected =
+          pi * reference(o, i, below(reference.dielectric, 1.0), below(reference.coat, reference.clearcoat));
+      // The middle of the tile, whose texture's first row is at the quad's bottom.
+      const double x = (2.0 * (k % tiles + 0.5) / tiles - 1.0) * double{half} * o.z;
+      const double y = (2.0 * (k / tiles + 0.5) / tiles - 1.0) * double{half};
+      const auto column = static_cast<int>((x / 24.0 + 0.5) * side);
+      const auto row = static_cast<int>((0.5 - y / 24.0) * side);
+      const glm::vec4 got = picture.pixels[static_cast<std::size_t>(row * side + column)];
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], expected[c], 0.01 * expected[c]) << turn << ' ' << k << ' ' << c;
+    }
+  }
 }
 
 viewer::SurfaceSettings indirect_roughness(float roughness) {
