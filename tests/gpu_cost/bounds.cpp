@@ -33,7 +33,9 @@ Bounds Bounds::read(const std::string& path) {
     numbers >> family >> cost.registers >> cost.spilled >> cost.spilled_scalars >> cost.scratch_bytes >>
         cost.shared_bytes >> cost.waves >> cost.code_bytes >> std::ws;
     std::string kernel;
-    if (!numbers || !std::getline(numbers, kernel)) throw std::runtime_error(path + ": cannot read '" + line + "'");
+    if (!numbers || !std::getline(numbers, kernel)) {
+      throw std::runtime_error(std::string(path).append(": cannot read '").append(line).append("'"));
+    }
     bounds.bounds_[{family, kernel}] = cost;
   }
   return bounds;
@@ -91,7 +93,7 @@ std::string Bounds::complaint(const std::string& family, const std::string& kern
 std::vector<std::string> Bounds::stale(const std::string& family, const std::vector<Kernel>& kernels) const {
   std::vector<std::string> names;
   for (const auto& [key, cost] : bounds_) {
-    const bool known = std::ranges::any_of(kernels, [&](const Kernel& kernel) { return kernel.name == key.second; });
+    const bool known = std::ranges::find(kernels, key.second, &Kernel::name) != kernels.end();
     if (key.first == family && !known) names.push_back(key.second);
   }
   return names;
