@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/progress_part.hpp"
 #include "render/luminance.hpp"
 
 namespace cumulet::render {
@@ -45,11 +46,12 @@ vec3 texel(const FromSrgb& linear, const Image& image, std::size_t i) {
   return {linear[image.rgba[4 * i]], linear[image.rgba[4 * i + 1]], linear[image.rgba[4 * i + 2]]};
 }
 
-dvec3 mean_colour(const FromSrgb& linear, const Image& image) {
+dvec3 mean_colour(const FromSrgb& linear, const Image& image, const Progress* progress) {
   const std::size_t texels = std::size_t{image.width} * image.height;
   const dvec3 sum = tbb::parallel_deterministic_reduce(
       tbb::blocked_range<std::size_t>(0, texels, 1U << 16U), dvec3(0.0),
       [&](const auto& range, dvec3 part) {
+        check(progress);
         for (std::size_t i = range.begin(); i != range.end(); ++i) part += dvec3(texel(linear, image, i));
         return part;
       },
@@ -69,7 +71,7 @@ std::uint32_t wrapped(float at, std::uint32_t size, Wrap wrap) {
 // What a material emits, by place.
 class Emission {
  public:
-  Emission(const FromSrgb& linear, const Scene& scene, const Material& material)
+  Emission(const FromSrgb& linear, const Scene& scene, const Material& material, const Progress* progress)
       : linear_(&linear), scene_(&scene), material_(&material) {
     const surface::TextureUse& use = material.emission_texture;
     if (material.unlit || !(luminance(material.emission) > 0.0F)) return;
@@ -77,7 +79,7 @@ class Emission {
     if (use.texture >= 0) {
       texture_ = &scene.textures[static_cast<std::size_t>(use.texture)];
       image_ = &scene.images[texture_->image];
-      mean = vec3(mean_colour(linear, *image_));
+      mean = vec3(mean_colour(linear, *image_, progress));
     }
     mean_ = luminance(material.emission * mean);
   }
@@ -117,11 +119,11 @@ class Emission {
 
 }  // namespace
 
-std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene) {
+std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene, const Progress* progress) {
   const FromSrgb linear = from_srgb();
   std::vector<Emission> emissions;
   emissions.reserve(scene.materials.size());
-  for (const Material& material : scene.materials) emissions.emplace_back(linear, scene, material);
+  for (const Material& material : scene.materials) emissions.emplace_back(linear, scene, material, progress);
   std::vector<EmissiveTriangle> triangles;
   for (std::size_t i = 0; i < scene.draws.size(); ++i) {
     const surface::Draw& draw = scene.draws[i];
@@ -133,6 +135,7 @@ std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene) {
   }
   std::ranges::sort(triangles, {}, &EmissiveTriangle::triangle);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, triangles.size(), 1024), [&](const auto& range) {
+    check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       EmissiveTriangle& t = triangles[i];
       t.luminance = emissions[scene.draws[t.draw].material].over(t.triangle);
@@ -142,12 +145,13 @@ std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene) {
 }
 
 EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const Scene& scene,
-                           const surface::Pose& pose) {
+                           const surface::Pose& pose, const Progress* progress) {
   EmitterTable table;
   std::vector<double> areas;
   std::vector<double> power;
   double sum = 0.0;
   for (const EmissiveTriangle& t : triangles) {
+    if (areas.size() % 4096 == 0) check(progress);
     const std::size_t first = 3 * std::size_t{t.triangle};
     const dvec3 a = pose.vertices[scene.indices[first]].position;
     const dvec3 b = pose.vertices[scene.indices[first + 1]].position;
@@ -163,6 +167,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
     sum += emitted;
   }
   table.flux = std::numbers::pi * sum;
+  check(progress);
 
   const std::size_t n = power.size();
   std::vector<std::uint32_t> small;
@@ -184,6 +189,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
       small.push_back(high);
     }
   }
+  check(progress);
   // Chances as the table's words give them, not as they were meant.
   std::vector<double> chance(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {

@@ -19,8 +19,8 @@ struct EmissiveTriangle {
 };
 
 /// The scene's emissive triangles, in ascending order; those of unlit materials are not among them. O(n), and over the
-/// texels of emissive images, on TBB's threads.
-std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene);
+/// texels of emissive images, on TBB's threads. Throws Error(cancelled).
+std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene, const Progress* progress = nullptr);
 
 /// Picks triangles in proportion to their power (Walker's alias method: Vose, "A Linear Algorithm for Generating Random
 /// Numbers with a Given Distribution", IEEE Transactions on Software Engineering 17(9), 1991).
@@ -32,8 +32,8 @@ struct EmitterTable {
   double flux = 0.0;  ///< luminance of all that they emit: pi x radiance x area x sides
 };
 
-/// The table of a pose. O(n).
+/// The table of a pose. O(n). Throws Error(cancelled).
 EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const surface::Scene& scene,
-                           const surface::Pose& pose);
+                           const surface::Pose& pose, const Progress* progress = nullptr);
 
 }  // namespace cumulet::render

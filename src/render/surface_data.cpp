@@ -10,6 +10,7 @@
 #include <numeric>
 #include <span>
 
+#include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
 #include "render/luminance.hpp"
@@ -157,7 +158,7 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   add_lights(words, source.pose.lights);
 
   check(progress);
-  const EmitterTable table = emitter_table(source.emissive, scene, source.pose);
+  const EmitterTable table = emitter_table(source.emissive, scene, source.pose, progress);
   source.emitters = {size_of(words), size_of(table.entries), 0U, 0U};
   words.insert(words.end(), table.entries.begin(), table.entries.end());
   const surface::GgxAlbedo& albedo = surface::GgxAlbedo::table();
@@ -251,12 +252,12 @@ TextureAtlas pack_atlas(const std::vector<surface::Image>& images, std::uint32_t
 
 std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene, surface::Pose pose,
                                                          Progress* progress) {
-  auto source = std::make_shared<SurfaceSource>();
+  auto source = make_left<SurfaceSource>();
   source->scene = std::move(scene);
   source->pose = std::move(pose);
   build(*source, progress);
   check(progress);
-  source->emissive = emissive_triangles(*source->scene);
+  source->emissive = emissive_triangles(*source->scene, progress);
   source->atlas = pack_atlas(source->scene->images, largest_layer);
   check(progress);
   pack_words(*source, progress);
@@ -265,14 +266,14 @@ std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene
 
 std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& last, surface::Pose pose,
                                                          Progress* progress) {
-  auto source = std::make_shared<SurfaceSource>();
+  auto source = make_left<SurfaceSource>();
   source->scene = last.scene;
   source->pose = std::move(pose);
   check(progress);
   source->bvh = last.bvh;
   check(progress);
   source->built_cost = last.built_cost;
-  source->bvh.refit(source->pose.vertices, source->scene->indices);
+  source->bvh.refit(source->pose.vertices, source->scene->indices, progress);
   // A node that turned inside out has other flags, as have other sides; a tree whose boxes have grown apart is slow.
   const bool other_flags =
       source->pose.flipped != last.pose.flipped || source->pose.double_sided != last.pose.double_sided;

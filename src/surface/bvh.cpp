@@ -113,6 +113,7 @@ class Bvh::Builder {
     root = Piece();
     out.records_.resize(ids_.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, ids_.size(), grain), [&](const auto& range) {
+      check(progress_);
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
         Record& record = out.records_[i];
         record.triangle = ids_[i];
@@ -322,6 +323,7 @@ class Bvh::Builder {
     const Bins bins = tbb::parallel_reduce(
         ids, Bins(),
         [&](const auto& range, Bins sum) {
+          check(progress_);
           for (std::size_t i = range.begin(); i != range.end(); ++i) sum.add(grid, boxes_[ids_[i]]);
           return sum;
         },
@@ -346,6 +348,7 @@ class Bvh::Builder {
     const auto in_first = [&](std::uint32_t id) { return grid.bin(boxes_[id].centre(), split.axis) < split.bin; };
     const auto each_chunk = [&](const auto& visit) {
       tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
+        check(progress_);
         visit(c, p.begin + c * grain, std::min(p.end, p.begin + (c + 1) * grain));
       });
     };
@@ -595,17 +598,20 @@ void Bvh::fit(std::uint32_t node) {
   for (Node::Child& child : nodes_[node].child) child = Builder::child_of(bounds_of(child.link), child.link);
 }
 
-void Bvh::refit(std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices) {
+void Bvh::refit(std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices,
+                const Progress* progress) {
   if (indices.size() != 3 * triangles_) {
     throw Error(ErrorCode::invalid_argument, "triangles: " + std::to_string(indices.size() / 3) +
                                                  ", but the tree is over " + std::to_string(triangles_));
   }
   Builder::check_indices(vertices, indices);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, records_.size(), grain), [&](const auto& range) {
+    check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) Builder::place(records_[i], vertices, indices);
   });
   // From the leaves up: children come after their parents.
   tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t p) {
+    check(progress);
     for (std::uint32_t node = parts_[p].end; node > parts_[p].begin; --node) fit(node - 1);
   });
   auto node = static_cast<std::uint32_t>(nodes_.size());

@@ -77,9 +77,10 @@ class Bvh {
 
   /// The same tree over moved vertices: boxes grow and shrink with their triangles, so hits are right, if slower where
   /// triangles have moved apart (see cost()). The indices and flags are those of build(). Throws
-  /// Error(invalid_argument) for another number of indices or one out of range; the tree is then as it was. O(n), on
-  /// TBB's threads.
-  void refit(std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices);
+  /// Error(invalid_argument) for another number of indices or one out of range; the tree is then as it was. Throws
+  /// Error(cancelled), and the tree is then of no use. O(n), on TBB's threads.
+  void refit(std::span<const PosedVertex> vertices, std::span<const std::uint32_t> indices,
+             const Progress* progress = nullptr);
 
   /// The surface area heuristic's estimate for a ray that meets the root's box: nodes visited plus triangles tested,
   ///   1 + sum over child boxes c of A(c) / A(root) * (1 for a node, its triangles for a leaf).

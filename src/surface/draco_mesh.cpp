@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/apart.hpp"
+
 namespace cumulet::surface::detail {
 
 struct DracoMesh::State {
@@ -60,8 +62,8 @@ double largest(draco::DataType type) {
 
 }  // namespace
 
-DracoMesh::DracoMesh(std::span<const std::uint8_t> bytes, const std::string& what, Budget& budget)
-    : state_(std::make_unique<State>()) {
+DracoMesh::DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, Budget& budget)
+    : state_(std::make_unique<State>()), budget_(budget) {
   const std::uint64_t faces = face_count(bytes, what);
   // Far more than regular meshes compress to.
   if (faces > bytes.size() * 1024) {
@@ -70,15 +72,17 @@ DracoMesh::DracoMesh(std::span<const std::uint8_t> bytes, const std::string& wha
   }
   constexpr std::uint64_t bytes_per_face = 256;  // of the decoder's tables
   budget.take(faces, bytes_per_face, what);
-  draco::DecoderBuffer buffer;
-  buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  draco::Decoder decoder;
-  auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-  if (!decoded.ok()) {
-    malformed(what +
-              " cannot be decompressed (KHR_draco_mesh_compression): " + one_line(decoded.status().error_msg_string()));
-  }
-  state_->mesh = std::move(decoded).value();
+  state_->mesh = apart(budget.progress_for(faces * bytes_per_face), [bytes, owner, what] {
+    draco::DecoderBuffer buffer;
+    buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    draco::Decoder decoder;
+    auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
+    if (!decoded.ok()) {
+      malformed(what + " cannot be decompressed (KHR_draco_mesh_compression): " +
+                one_line(decoded.status().error_msg_string()));
+    }
+    return std::move(decoded).value();
+  });
 }
 
 DracoMesh::~DracoMesh() = default;
@@ -89,6 +93,7 @@ std::vector<std::uint32_t> DracoMesh::indices() const {
   std::vector<std::uint32_t> result;
   result.reserve(std::size_t{state_->mesh->num_faces()} * 3);
   for (std::uint32_t f = 0; f < state_->mesh->num_faces(); ++f) {
+    budget_.check(f);
     for (const draco::PointIndex& point : state_->mesh->face(draco::FaceIndex(f))) result.push_back(point.value());
   }
   return result;
@@ -109,6 +114,7 @@ void DracoMesh::read(std::uint32_t id, std::size_t components, bool normalized, 
   const double divisor = normalized ? largest(attribute->data_type()) : 1.0;
   std::vector<float> element(attribute->num_components());
   for (std::size_t n = 0; n < which.size(); ++n) {
+    budget_.check(n);
     const draco::AttributeValueIndex index = attribute->mapped_index(draco::PointIndex(which[n]));
     if (index.value() >= attribute->size() ||
         !attribute->ConvertValue(index, static_cast<std::int8_t>(element.size()), element.data())) {

@@ -14,8 +14,8 @@ namespace cumulet::surface::detail {
 
 class DracoMesh {
  public:
-  /// Throws Error(file) if the bytes are no mesh of Draco 2.2, or one too large for them.
-  DracoMesh(std::span<const std::uint8_t> bytes, const std::string& what, Budget& budget);
+  /// Of bytes that `owner` keeps. Throws Error(file) if they are no mesh of Draco 2.2, or one too large for them.
+  DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, Budget& budget);
   ~DracoMesh();
   DracoMesh(const DracoMesh&) = delete;
   DracoMesh& operator=(const DracoMesh&) = delete;
@@ -30,6 +30,7 @@ class DracoMesh {
  private:
   struct State;
   std::unique_ptr<State> state_;
+  const Budget& budget_;
 };
 
 }  // namespace cumulet::surface::detail

@@ -121,7 +121,7 @@ Container unpack(std::span<const std::uint8_t> bytes) {
   return container;
 }
 
-std::vector<std::uint8_t> decode_base64(std::string_view text) {
+std::vector<std::uint8_t> decode_base64(std::string_view text, const Budget& budget) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(text.size() / 4 * 3 + 3);
   std::uint32_t bits = 0;
@@ -129,7 +129,9 @@ std::vector<std::uint8_t> decode_base64(std::string_view text) {
   while (!text.empty() && (text.back() == '=' || std::isspace(static_cast<unsigned char>(text.back())) != 0)) {
     text.remove_suffix(1);
   }
-  for (const char c : text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    budget.check(i);
+    const char c = text[i];
     std::uint32_t value = 0;
     if (c >= 'A' && c <= 'Z') {
       value = static_cast<std::uint32_t>(c - 'A');
@@ -294,7 +296,7 @@ class Loader {
       std::span<const std::uint8_t> bytes;
       if (buffer.contains("uri")) {
         try {
-          bytes = file_.storage.emplace_back(resolve_uri(buffer["uri"].get<std::string>(), file_.folder, budget_));
+          bytes = file_.storage->emplace_back(resolve_uri(buffer["uri"].get<std::string>(), file_.folder, budget_));
         } catch (const Error& error) {
           // An end of it for who reads it, if anybody does.
           const std::string cause = numbered("buffer", i) + ": " + error.what();
@@ -335,7 +337,7 @@ class Loader {
       Data from = part(static_cast<int>(number("buffer")), static_cast<std::uint64_t>(number("byteOffset")),
                        static_cast<std::uint64_t>(number("byteLength")), what);
       if (const auto* bytes = std::get_if<Bytes>(&from)) {
-        from = file_.storage.emplace_back(decode_meshopt(extension, *bytes, what, budget_));
+        from = file_.storage->emplace_back(decode_meshopt(extension, *bytes, file_.storage, what, budget_));
       }
       file_.views.push_back(std::move(from));
     }
@@ -412,9 +414,16 @@ std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& b
   std::ifstream file(path, std::ios::binary);
   if (!file) malformed("cannot be opened");
   budget.take(size, 1, "the file");
-  std::vector<std::uint8_t> bytes(size);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (static_cast<std::uint64_t>(file.gcount()) != size) malformed("cannot be read");
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(size);
+  constexpr std::uint64_t piece = std::uint64_t{4} << 20U;
+  while (bytes.size() < size) {
+    budget.check(0);
+    const std::size_t done = bytes.size();
+    bytes.resize(std::min(size, done + piece));
+    file.read(reinterpret_cast<char*>(&bytes[done]), static_cast<std::streamsize>(bytes.size() - done));
+    if (static_cast<std::size_t>(file.gcount()) != bytes.size() - done) malformed("cannot be read");
+  }
   return bytes;
 }
 
@@ -426,7 +435,7 @@ std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optiona
     const std::string_view head = std::string_view(uri).substr(0, comma);
     const std::string_view data = std::string_view(uri).substr(comma + 1);
     budget.take(data.size(), 1, "a data URI");
-    if (head.ends_with(";base64")) return decode_base64(data);
+    if (head.ends_with(";base64")) return decode_base64(data, budget);
     const std::string plain = decode_percent(data);
     return {plain.begin(), plain.end()};
   }
@@ -448,7 +457,7 @@ std::vector<std::uint8_t> resolve_uri(const std::string& uri, const std::optiona
 }
 
 std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::span<const std::uint8_t> from,
-                                         const std::string& what, Budget& budget) {
+                                         const Owner& owner, const std::string& what, Budget& budget) {
   const auto number = [&extension](const char* key) {
     return extension.Has(key) ? static_cast<std::size_t>(extension.Get(key).GetNumberAsDouble()) : std::size_t{0};
   };
@@ -478,29 +487,36 @@ std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::
     malformed(what + ": " + std::to_string(from.size()) + " bytes cannot hold " + std::to_string(count) + " elements");
   }
   budget.take(count, stride, what);
-  std::vector<std::uint8_t> bytes(count * stride);
-  int status = 0;
-  if (count != 0) {
-    if (attributes) status = meshopt_decodeVertexBuffer(bytes.data(), count, stride, from.data(), from.size());
-    if (triangles) status = meshopt_decodeIndexBuffer(bytes.data(), count, stride, from.data(), from.size());
-    if (mode == "INDICES") {
-      status = meshopt_decodeIndexSequence(bytes.data(), count, stride, from.data(), from.size());
+  return apart(budget.progress_for(count * stride), [=] {
+    std::vector<std::uint8_t> bytes(count * stride);
+    int status = 0;
+    if (count != 0) {
+      if (attributes) status = meshopt_decodeVertexBuffer(bytes.data(), count, stride, from.data(), from.size());
+      if (triangles) status = meshopt_decodeIndexBuffer(bytes.data(), count, stride, from.data(), from.size());
+      if (mode == "INDICES") {
+        status = meshopt_decodeIndexSequence(bytes.data(), count, stride, from.data(), from.size());
+      }
     }
-  }
-  if (status != 0) malformed(what + " cannot be decompressed (EXT_meshopt_compression)");
-  if (filter == "OCTAHEDRAL") meshopt_decodeFilterOct(bytes.data(), count, stride);
-  if (filter == "QUATERNION") meshopt_decodeFilterQuat(bytes.data(), count, stride);
-  if (filter == "EXPONENTIAL") meshopt_decodeFilterExp(bytes.data(), count, stride);
-  return bytes;
+    if (status != 0) malformed(what + " cannot be decompressed (EXT_meshopt_compression)");
+    if (filter == "OCTAHEDRAL") meshopt_decodeFilterOct(bytes.data(), count, stride);
+    if (filter == "QUATERNION") meshopt_decodeFilterQuat(bytes.data(), count, stride);
+    if (filter == "EXPONENTIAL") meshopt_decodeFilterExp(bytes.data(), count, stride);
+    static_cast<void>(owner);
+    return bytes;
+  });
 }
 
 GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::filesystem::path>& folder, const Log& log,
                     const std::string& name, Budget& budget, Progress* progress) {
   GltfFile file;
   file.folder = folder;
-  const Container container = unpack(file.storage.emplace_back(std::move(bytes)));
-  json root = parse_json(container.json);
-  check_schema(root);
+  const Container container = unpack(file.storage->emplace_back(std::move(bytes)));
+  const std::size_t length = container.json.size();
+  json root = apart(budget.progress_for(length), [text = container.json, owner = file.storage] {
+    json parsed = parse_json(text);
+    check_schema(parsed);
+    return parsed;
+  });
   check_version(root, log, name);
   check_extensions(root, log, name);
   SetAside aside = set_aside(root);
@@ -508,8 +524,7 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
     log.warning(name + ": " + std::to_string(aside.channels) + " animation channels that move no node are ignored");
   }
 
-  file.model = parse_model(root);
-  root = json();
+  file.model = apart(budget.progress_for(length), [root = std::move(root)] { return parse_model(root); });
   for (const auto& [mesh, primitive, accessor] : aside.indices) {
     if (mesh >= file.model.meshes.size() || primitive >= file.model.meshes[mesh].primitives.size()) {
       malformed(numbered("mesh", mesh) + " is malformed");

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "base/one_line.hpp"
@@ -54,6 +56,11 @@ class Budget {
   void check(std::size_t turn) const {
     if (turn % 16384 == 0) cumulet::check(progress_);
   }
+  /// For a call of apart() that works on so many bytes: few are not worth a thread.
+  [[nodiscard]] const Progress* progress_for(std::uint64_t bytes) const {
+    constexpr std::uint64_t few = 65536;
+    return bytes < few ? nullptr : progress_;
+  }
 
  private:
   GltfLimits limits_;
@@ -69,6 +76,8 @@ struct ImageSource {
 };
 
 using Bytes = std::span<const std::uint8_t>;
+/// Keeps bytes for whoever is left to work on them.
+using Owner = std::shared_ptr<const void>;
 /// Of a buffer that names no data, which is legal (glTF 2.0, 3.6.1): it is for others to fill.
 struct NoData {};
 /// Why data that a file names cannot be had.
@@ -85,7 +94,8 @@ struct GltfFile {
   std::vector<ImageSource> images;
   std::optional<std::filesystem::path> folder;  ///< where files that it refers to are; none: nowhere
 
-  std::deque<std::vector<std::uint8_t>> storage;  ///< what views point into
+  using Storage = std::deque<std::vector<std::uint8_t>>;
+  std::shared_ptr<Storage> storage = make_left<Storage>();  ///< what views point into
 
   /// The bytes of a buffer view. Throws Error(file) if there is no such one, or if its buffer has no data.
   [[nodiscard]] Bytes view(std::int64_t index) const;
@@ -105,8 +115,8 @@ std::vector<std::uint8_t> read_file(const std::filesystem::path& path, Budget& b
 GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::filesystem::path>& folder, const Log& log,
                     const std::string& name, Budget& budget, Progress* progress);
 
-/// EXT_meshopt_compression, of one buffer view: its bytes in `from`. Throws Error(file).
+/// EXT_meshopt_compression, of one buffer view: its bytes in `from`, which `owner` keeps. Throws Error(file).
 std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::span<const std::uint8_t> from,
-                                         const std::string& what, Budget& budget);
+                                         const Owner& owner, const std::string& what, Budget& budget);
 
 }  // namespace cumulet::surface::detail

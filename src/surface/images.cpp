@@ -3,6 +3,7 @@
 #include <cstring>
 #include <limits>
 
+#include "base/apart.hpp"
 #include "surface/materials.hpp"
 
 namespace cumulet::surface::detail {
@@ -71,22 +72,8 @@ Header read_header(std::span<const std::uint8_t> bytes) {
   malformed("is neither PNG nor JPEG");
 }
 
-}  // namespace
-
-Image decode_image(std::span<const std::uint8_t> bytes, Budget& budget) {
-  // The library reads more formats, and trusts sizes; this lets pass what glTF knows and memory holds.
-  const Header header = read_header(bytes);
-  const std::string size = std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels";
-  const std::uint32_t side = budget.limits().image_side;
-  if (header.width == 0 || header.height == 0) malformed("has no pixels");
-  if (header.width > side || header.height > side || header.width * header.height * 8 > std::uint64_t{INT32_MAX} ||
-      bytes.size() > std::uint64_t{INT32_MAX}) {
-    malformed(size + " are too many");
-  }
-  if (header.least_bytes > bytes.size())
-    malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");
-  budget.take(header.width * header.height, 4, "an image of " + size);
-
+/// What is known to fit.
+Image decode(Bytes bytes) {
   tinygltf::Image image;
   std::string error;
   std::string warning;
@@ -110,6 +97,25 @@ Image decode_image(std::span<const std::uint8_t> bytes, Budget& budget) {
     malformed("cannot be decoded");
   }
   return result;
+}
+
+}  // namespace
+
+Image decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
+  // The library reads more formats, and trusts sizes; this lets pass what glTF knows and memory holds.
+  const Header header = read_header(bytes);
+  const std::string size = std::to_string(header.width) + " x " + std::to_string(header.height) + " pixels";
+  const std::uint32_t side = budget.limits().image_side;
+  if (header.width == 0 || header.height == 0) malformed("has no pixels");
+  if (header.width > side || header.height > side || header.width * header.height * 8 > std::uint64_t{INT32_MAX} ||
+      bytes.size() > std::uint64_t{INT32_MAX}) {
+    malformed(size + " are too many");
+  }
+  if (header.least_bytes > bytes.size())
+    malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");
+  const std::uint64_t pixels = header.width * header.height;
+  budget.take(pixels, 4, "an image of " + size);
+  return apart(budget.progress_for(4 * pixels), [bytes, owner] { return decode(bytes); });
 }
 
 }  // namespace cumulet::surface::detail

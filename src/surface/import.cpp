@@ -4,6 +4,7 @@
 #include <limits>
 #include <new>
 
+#include "base/apart.hpp"
 #include "base/progress_part.hpp"
 #include "surface/gltf_file.hpp"
 #include "surface/gltf_import.hpp"
@@ -149,8 +150,10 @@ class Assembler {
         positions.insert(positions.end(), part.positions.begin(), part.positions.end());
         for (const std::uint32_t index : part.indices) indices.push_back(first + index);
       }
-      check(progress_);
-      const Winding winding = winding_of(positions, indices);
+      const Progress* const progress = budget_.progress_for(sizeof(std::uint32_t) * indices.size());
+      const Winding winding = apart(progress, [positions = std::move(positions), indices = std::move(indices)] {
+        return winding_of(positions, indices);
+      });
       if (!(winding.inward > most_inward * winding.area)) continue;
       if (++count > 3) continue;
       const std::string called = one_line(file_.model.meshes[m].name);
@@ -193,7 +196,7 @@ class Assembler {
   const std::string& name_;
   Budget& budget_;
   Progress* progress_;
-  std::shared_ptr<PosableScene> scene_ = std::make_shared<PosableScene>();
+  std::shared_ptr<PosableScene> scene_ = make_left<PosableScene>();
   std::vector<bool> used_;
   std::vector<std::vector<std::size_t>> parts_of_;
   MeshRemarks remarks_;

@@ -237,11 +237,11 @@ class Materials {
   }
 
   Image load(const ImageSource& image) {
-    if (image.view >= 0) return decode_image(file_.view(image.view), budget_);
+    if (image.view >= 0) return decode_image(file_.view(image.view), file_.storage, budget_);
     if (image.uri.empty()) malformed("it has neither a URI nor a buffer view");
-    const std::vector<std::uint8_t> bytes = resolve_uri(image.uri, file_.folder, budget_);
+    const auto bytes = std::make_shared<const std::vector<std::uint8_t>>(resolve_uri(image.uri, file_.folder, budget_));
     try {
-      return decode_image(bytes, budget_);
+      return decode_image(*bytes, bytes, budget_);
     } catch (const Error& error) {
       if (image.uri.starts_with("data:")) throw;
       throw Error(error.code(), one_line(image.uri) + " " + error.what());

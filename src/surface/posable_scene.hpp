@@ -32,11 +32,11 @@ class PosableScene final : public Scene {
   /// large to be multiplied.
   void finish();
 
-  [[nodiscard]] Pose pose(double time, std::size_t animation) const override;
+  [[nodiscard]] Pose pose(double time, std::size_t animation, const Progress* progress) const override;
 
  private:
   /// True if the instance mirrors.
-  bool place(const Instance& instance, const Stance& now, Pose& pose) const;
+  bool place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const;
 };
 
 }  // namespace cumulet::surface::detail

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/progress_part.hpp"
 #include "surface/posable_scene.hpp"
 
 namespace cumulet::surface::detail {
@@ -88,7 +89,7 @@ void PosableScene::finish() {
   }
 }
 
-bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose) const {
+bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const {
   const MeshPart& part = parts[instance.part];
   const std::vector<float>& weights = now.weights[instance.node];
   std::vector<glm::mat4> joints;
@@ -130,9 +131,11 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
     to.tangent = glm::vec4(glm::mat3(matrix) * glm::vec3(shape.tangent), side * shape.tangent.w);
   };
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.positions.size(), 4096), [&](const auto& range) {
+    check(progress);
     for (std::size_t v = range.begin(); v != range.end(); ++v) at(v);
   });
 
+  check(progress);
   if (part.flat) {
     for (std::size_t i = 0; i + 3 <= part.indices.size(); i += 3) {
       const std::uint32_t* v = &part.indices[i];
@@ -142,6 +145,7 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
       for (int k = 0; k < 3; ++k) vertices[v[k]].normal = normal;
     }
   }
+  check(progress);
   if (!part.tangents.empty()) {
     for (std::size_t v = 0; v < part.positions.size(); ++v) {
       const glm::vec3 normal = vertices[v].normal;
@@ -154,7 +158,7 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
   return flipped;
 }
 
-Pose PosableScene::pose(double time, std::size_t animation) const {
+Pose PosableScene::pose(double time, std::size_t animation, const Progress* progress) const {
   const Track* track = animation < rig.tracks.size() ? &rig.tracks[animation] : nullptr;
   if (track != nullptr && !std::isfinite(time)) time = 0.0;
   if (track != nullptr && (time < 0.0 || time > track->duration)) {
@@ -166,8 +170,10 @@ Pose PosableScene::pose(double time, std::size_t animation) const {
   result.time = time;
   result.vertices.resize(attributes.size());
   for (const Instance& instance : instances) {
-    result.flipped.push_back(place(instance, now, result) ? 1 : 0);
+    check(progress);
+    result.flipped.push_back(place(instance, now, result, progress) ? 1 : 0);
   }
+  check(progress);
   if (!result.vertices.empty()) {
     glm::vec3 low(std::numeric_limits<float>::max());
     glm::vec3 high(std::numeric_limits<float>::lowest());

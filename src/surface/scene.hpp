@@ -161,7 +161,8 @@ class Scene {
 
   /// The scene `time` seconds into animation `animation` (looped past its end); as it rests, if there is no such one.
   /// Linear, step and cubic spline interpolation, skins and morph targets (glTF 2.0, 3.7.3, 3.7.2.2, 3.11).
-  [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0) const = 0;
+  /// Cancelled, throws Error(cancelled).
+  [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0, const Progress* progress = nullptr) const = 0;
 };
 
 using ScenePtr = std::shared_ptr<const Scene>;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "base/apart.hpp"
 #include "grid/tet_grid.hpp"
 #include "viewer/stopwatch.hpp"
 
@@ -111,13 +112,13 @@ Built Builder::make(const VolumePtr& volume, const BuildSettings& settings, Prog
     built.seconds.records = watch.lap();
     return built;
   }
-  const auto diamonds = std::make_unique<const grid::DiamondSet>(*statistics, settings.refine, &progress);
-  auto builder = std::make_unique<grid::GridBuilder>(*statistics, *diamonds);
+  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, settings.refine, &progress);
+  auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
   built.seconds.refine = watch.lap();
   progress.begin(Progress::Stage::records);
   const float max_value = volume->volume().max_value;
-  auto grid = std::make_shared<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, &progress));
+  auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, &progress));
   builder.reset();
   built.seconds.records = watch.lap();
   built.cells = grid->cells.size();

@@ -21,7 +21,7 @@ SurfacePtr SurfaceAsset::posed(SurfaceChoice choice, Progress& progress) const {
   SurfacePtr last = newest_.lock();
   if (last && newest_choice_ == choice) return last;
   progress.check();
-  surface::Pose pose = scene_->pose(choice.time, choice.animation);
+  surface::Pose pose = scene_->pose(choice.time, choice.animation, &progress);
   pose.double_sided = choice.double_sided;
   SurfacePtr made = last ? render::make_surface_source(*last, std::move(pose), &progress)
                          : render::make_surface_source(scene_, std::move(pose), &progress);

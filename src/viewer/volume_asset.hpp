@@ -17,7 +17,7 @@ class VolumeAsset {
   /// Throws Error(unsupported) for what no control cube holds.
   explicit VolumeAsset(volume::ScalarVolume volume, const Progress* progress = nullptr);
 
-  [[nodiscard]] const volume::ScalarVolume& volume() const { return volume_; }
+  [[nodiscard]] const volume::ScalarVolume& volume() const { return *volume_; }
   /// World bounds of the active voxels.
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return coarse_; }
@@ -26,7 +26,7 @@ class VolumeAsset {
   [[nodiscard]] std::shared_ptr<const grid::Statistics> statistics(Progress& progress, double& seconds) const;
 
  private:
-  volume::ScalarVolume volume_;
+  std::shared_ptr<const volume::ScalarVolume> volume_;
   volume::CoarseVolume coarse_;
   Bounds bounds_;
   mutable std::mutex mutex_;

@@ -14,6 +14,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "base/apart.hpp"
 #include "base/progress_part.hpp"
 #include "volume/import_detail.hpp"
 
@@ -292,7 +293,8 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   const auto at = [&](double part) { return from + part * (1.0 - from); };
   check_transform(source.index_to_world);
 
-  ScalarVolume out;
+  const auto made = make_left<ScalarVolume>();
+  ScalarVolume& out = *made;
   out.index_to_world = source.index_to_world;
 
   ProgressPart looking(progress, at(0.0), at(0.2), source.leaves->count());
@@ -304,7 +306,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   if (bounds.empty()) {
     log.warning(log_prefix + "is empty: it has no active voxels");
     out.bounds_max = out.bounds_min;
-    return out;
+    return std::move(out);
   }
   out.background = counted(source.background);
   const glm::i64vec3 extent = glm::i64vec3(bounds.max) - glm::i64vec3(bounds.min) + std::int64_t{1};
@@ -417,7 +419,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   };
   warn(out.negative_voxels, " negative", " clamped to 0");
   warn(out.non_finite_voxels, " non-finite", " counted as 0");
-  return out;
+  return std::move(out);
 }
 
 std::vector<GridInfo> list_grids(const std::filesystem::path& file) {

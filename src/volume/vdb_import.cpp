@@ -7,6 +7,7 @@
 #include <bit>
 #include <mutex>
 
+#include "base/apart.hpp"
 #include "volume/import_detail.hpp"
 #include "volume/source_file.hpp"
 
@@ -352,7 +353,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   static bool own_tree(openvdb::GridBase& grid) {
     bool own = false;
     with_type(grid, [&]<typename GridT>() {
-      grid.setTree(std::make_shared<OwningTree<typename GridT::TreeType>>());
+      grid.setTree(make_left<OwningTree<typename GridT::TreeType>>());
       own = true;
     });
     return own;

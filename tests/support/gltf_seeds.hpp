@@ -7,6 +7,7 @@
 #include <meshoptimizer.h>
 #include <zlib.h>
 
+#include <cmath>
 #include <memory>
 
 #include "support/gltf_model.hpp"
@@ -245,6 +246,46 @@ struct Grid {
     }
   }
 };
+
+/// One mesh of 2 n^2 triangles, without tangents under a normal map: the longest that a mesh is worked upon.
+inline GltfModel seed_tangents(std::uint32_t n) {
+  const Grid grid(n);
+  std::vector<float> positions, normals, uvs;
+  for (std::size_t i = 0; i < grid.positions.size(); i += 3) {
+    const float u = grid.positions[i];
+    const float v = grid.positions[i + 1];
+    positions.insert(positions.end(), {u, v, 0.02F * std::sin(40.0F * u) * std::cos(50.0F * v)});
+    normals.insert(normals.end(), {0.0F, 0.0F, 1.0F});
+    uvs.insert(uvs.end(), {u, v});
+  }
+  GltfModel model;
+  model.add("images", {{"bufferView", model.view(png(1, 1, 8, 2, {128, 128, 255}))}, {"mimeType", "image/png"}});
+  model.add("textures", {{"source", 0}});
+  model.add("materials", {{"normalTexture", {{"index", 0}}}});
+  model.show({{"attributes",
+               {{"POSITION", model.vec3(positions)}, {"NORMAL", model.vec3(normals)}, {"TEXCOORD_0", model.vec2(uvs)}}},
+              {"indices", model.accessor("SCALAR", 1, grid.indices)},
+              {"material", 0}});
+  return model;
+}
+
+/// A square picture of so many pixels a side, on one triangle that glows with it.
+inline GltfModel seed_picture(std::uint32_t side) {
+  Bytes rows(std::size_t{side} * side * 3);
+  std::uint32_t noise = 1;
+  for (std::uint8_t& byte : rows) {
+    noise = noise * 1664525U + 1013904223U;
+    byte = static_cast<std::uint8_t>(noise >> 27U);
+  }
+  GltfModel model;
+  model.add("images", {{"bufferView", model.view(png(side, side, 8, 2, rows))}, {"mimeType", "image/png"}});
+  model.add("textures", {{"source", 0}});
+  model.add("materials", {{"emissiveTexture", {{"index", 0}}}, {"emissiveFactor", {1, 1, 1}}});
+  model.show({{"attributes",
+               {{"POSITION", model.vec3({0, 0, 0, 1, 0, 0, 0, 1, 0})}, {"TEXCOORD_0", model.vec2({0, 0, 1, 0, 0, 1})}}},
+              {"material", 0}});
+  return model;
+}
 
 /// The grid's triangles through Draco, positions of 14 bits.
 inline GltfModel seed_draco(std::uint32_t n = 4, int speed = 3) {

@@ -27,7 +27,8 @@ class TexturedScene : public surface::Scene {
 class StillScene : public TexturedScene {
  public:
   surface::Pose rest;
-  [[nodiscard]] surface::Pose pose(double time, std::size_t /*animation*/) const override {
+  [[nodiscard]] surface::Pose pose(double time, std::size_t /*animation*/,
+                                   const cumulet::Progress* /*progress*/ = nullptr) const override {
     surface::Pose posed = rest;
     posed.time = time;
     return posed;

@@ -482,7 +482,10 @@ TEST(Bvh, FlagsSayWhatIsHit) {
 
 TEST(Bvh, SceneTellsTheFlags) {
   struct Still : surface::Scene {
-    [[nodiscard]] surface::Pose pose(double /*time*/, std::size_t /*animation*/) const override { return {}; }
+    [[nodiscard]] surface::Pose pose(double /*time*/, std::size_t /*animation*/,
+                                     const cumulet::Progress* /*progress*/ = nullptr) const override {
+      return {};
+    }
   } scene;
   scene.materials.resize(3);
   scene.materials[0].double_sided = true;

@@ -104,6 +104,42 @@ void expect_cancels(const Work& work) {
 #endif
 }
 
+/// The same at many moments, spread evenly over the time that the work takes: where fractions tell little.
+void expect_stops(const Work& work) {
+  constexpr int moments = 20;
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  Progress uncancelled;
+  work(uncancelled);
+  const auto whole = Clock::now() - start;
+  std::vector<double> delays;
+  for (int i = 0; i < moments; ++i) {
+    Progress progress;
+    std::atomic<double> asked = 0.0;
+    std::thread canceller([&] {
+      std::this_thread::sleep_for(whole * i / moments);
+      asked = processor_milliseconds();
+      progress.cancel();
+    });
+    try {
+      work(progress);
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::cancelled) << e.what();
+      delays.push_back(processor_milliseconds() - asked);
+    }
+    canceller.join();
+  }
+  ASSERT_GE(delays.size(), moments / 4U);
+  std::sort(delays.begin(), delays.end());
+  std::string list;
+  for (const double delay : delays) list += std::to_string(delay).substr(0, 5) + " ";
+  testing::Test::RecordProperty("milliseconds_to_stop", list);
+#if !defined(__SANITIZE_ADDRESS__)
+  EXPECT_LT(delays[delays.size() / 2], 30.0) << list;
+  EXPECT_LT(delays.back(), 100.0) << list;
+#endif
+}
+
 void expect_both(const Work& work) {
   expect_steady_progress(work);
   expect_cancels(work);
@@ -283,37 +319,8 @@ TEST_F(CancelImport, NanoVdbOfEveryCodec) {
   }
 }
 
-/// One mesh of 200,000 triangles, without tangents under a normal map: the longest that a mesh is worked upon.
-std::vector<std::uint8_t> large_model() {
-  constexpr std::uint32_t n = 320;
-  std::vector<float> positions, normals, uvs;
-  std::vector<std::uint32_t> indices;
-  for (std::uint32_t y = 0; y <= n; ++y) {
-    for (std::uint32_t x = 0; x <= n; ++x) {
-      const float u = float(x) / n;
-      const float v = float(y) / n;
-      positions.insert(positions.end(), {u, 0.02F * std::sin(40.0F * u) * std::cos(50.0F * v), v});
-      normals.insert(normals.end(), {0.0F, 1.0F, 0.0F});
-      uvs.insert(uvs.end(), {u, v});
-      const std::uint32_t a = y * (n + 1) + x;
-      if (x < n && y < n) indices.insert(indices.end(), {a, a + n + 1, a + 1, a + 1, a + n + 1, a + n + 2});
-    }
-  }
-  test::GltfModel model;
-  model.add("images", {{"bufferView", model.view(test::png(1, 1, 8, 2, {128, 128, 255}))}, {"mimeType", "image/png"}});
-  model.add("textures", {{"source", 0}});
-  model.add("materials", {{"normalTexture", {{"index", 0}}}});
-  const int node = model.show(
-      {{"attributes",
-        {{"POSITION", model.vec3(positions)}, {"NORMAL", model.vec3(normals)}, {"TEXCOORD_0", model.vec2(uvs)}}},
-       {"indices", model.accessor("SCALAR", 1, indices)},
-       {"material", 0}});
-  model.root["scene"] = model.add("scenes", {{"nodes", {node}}});
-  return model.glb();
-}
-
 TEST(Cancel, Surfaces) {
-  const std::vector<std::uint8_t> file = large_model();
+  const std::vector<std::uint8_t> file = test::seed_tangents(320).glb();
   expect_cancels([&](Progress& progress) {
     progress.begin(Progress::Stage::loading);
     const auto scene = surface::import_gltf(file, "large", {}, {}, &progress);
@@ -322,6 +329,27 @@ TEST(Cancel, Surfaces) {
         render::make_surface_source(scene, scene->pose(0.0, std::numeric_limits<std::size_t>::max()), &progress);
     progress.at(1.0);
   });
+}
+
+TEST(Cancel, Pictures) {
+  const std::vector<std::uint8_t> file = test::seed_picture(2400).glb();
+  expect_stops([&](Progress& progress) {
+    const auto scene = surface::import_gltf(file, "picture", {}, {}, &progress);
+    (void)render::make_surface_source(scene, scene->pose(0.0, 0, &progress), &progress);
+  });
+}
+
+TEST(Cancel, DracoMeshes) {
+  const std::vector<std::uint8_t> file = test::seed_draco(320).glb();
+  expect_stops([&](Progress& progress) { (void)surface::import_gltf(file, "draco", {}, {}, &progress); });
+}
+
+TEST(Cancel, Poses) {
+  const auto scene = surface::import_gltf(test::seed_tangents(100).glb(), "large", {}, {});
+  Progress progress;
+  EXPECT_EQ(scene->pose(0.0, 0, &progress).vertices.size(), scene->attributes.size());
+  progress.cancel();
+  EXPECT_THROW((void)scene->pose(0.0, 0, &progress), Error);
 }
 
 TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {

@@ -21,7 +21,8 @@ class CountedScene final : public test::StillScene {
     rest.cameras.emplace_back();
     rest.lights.resize(2);
   }
-  [[nodiscard]] surface::Pose pose(double time, std::size_t animation) const override {
+  [[nodiscard]] surface::Pose pose(double time, std::size_t animation,
+                                   const cumulet::Progress* /*progress*/ = nullptr) const override {
     ++poses;
     surface::Pose posed = StillScene::pose(time, animation);
     if (animation != 0) return posed;

@@ -52,7 +52,8 @@ constexpr float pi = std::numbers::pi_v<float>;
 /// A scene and its one pose.
 class HandScene : public cumulet::test::TexturedScene {
  public:
-  [[nodiscard]] surface::Pose pose(double /*time*/, std::size_t /*animation*/) const override {
+  [[nodiscard]] surface::Pose pose(double /*time*/, std::size_t /*animation*/,
+                                   const cumulet::Progress* /*progress*/ = nullptr) const override {
     surface::Pose result = posed;
     result.low = glm::dvec3(infinite);
     result.high = glm::dvec3(-infinite);

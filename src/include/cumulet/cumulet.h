@@ -31,10 +31,10 @@
  *     any thread at any time. Files are read, grids are built and surfaces are posed on worker threads of the viewer's
  *     own; cumulet_render uploads what they made, within its time budget, and shows the last good picture until then.
  *     The newest wish wins and none starves: what changes faster than it is read, built, posed or uploaded is shown as
- *     often as it can be, and the newest last. The update callback comes from any thread, a worker's included. Neither
- *     it nor the log callback may call the library, but for the two exceptions and to retain and release handles: any
- *     other call from inside one, for whatever viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT
- *     (cumulet_destroy does nothing).
+ *     often as it can be, and the newest last. The update callback comes from any thread, a worker's included, and not
+ *     after cumulet_destroy. Neither it nor the log callback may call the library, but for the two exceptions and to
+ *     retain and release handles: any other call from inside one, for whatever viewer or handle, is refused with
+ *     CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing).
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -172,7 +172,15 @@ typedef struct cumulet_create_desc {
  */
 CUMULET_API cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** out, char* error,
                                           size_t error_size);
-/* [GL] if attached. Cancels and waits for the worker, frees everything. NULL is allowed. */
+/*
+ * [GL] if attached. Cancels and waits for the worker, frees everything. NULL is allowed.
+ *
+ * The worker looks every few milliseconds whether it is cancelled, in all that it does: some 20 ms on an idle machine.
+ * It does not wait for what cannot be interrupted, a library's decoder under way (an image, a compressed mesh, JSON) or
+ * gigabytes on their way back to the system. Those end on threads of the library that may outlive the viewer by a
+ * second or so. They call back nothing, know no GL and no handle, and use no file; unloading the library and exit()
+ * wait for them.
+ */
 CUMULET_API void cumulet_destroy(cumulet_viewer* viewer);
 /* The last failed call of this viewer in one line, "" if the last call succeeded; lives until the next call. */
 CUMULET_API const char* cumulet_last_error(const cumulet_viewer* viewer);
@@ -456,7 +464,8 @@ CUMULET_API cumulet_status cumulet_load_volume_file(cumulet_viewer* viewer, cons
 CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume);
 /* The volume last loaded or set, retained for the caller, who releases it; NULL if there is none. */
 CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out);
-/* Stops loading and building, soon; what was shown stays, with the settings it was built with. Any thread, any time. */
+/* Stops loading and building, within some 20 ms (see cumulet_destroy); what was shown stays, with the settings it was
+ * built with. Any thread, any time. */
 CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
 
 /*
