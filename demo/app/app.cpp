@@ -328,6 +328,11 @@ void App::execute(const Command& command) {
       suggest_next_ = model_.scene.grid_name != command.text;
       model_.scene.grid_name = command.text;
       break;
+    case Action::choose_up:
+      // It stands elsewhere now.
+      fit_next_ = model_.scene.up != static_cast<UpAxis>(command.value);
+      model_.scene.up = static_cast<UpAxis>(command.value);
+      break;
     case Action::auto_density:
       requests_.push_back({Request::Type::suggest_density});
       break;
@@ -358,8 +363,7 @@ void App::open(const std::string& path) {
     return;
   }
   if (!has_ending(path, ".json")) {
-    model_.scene.volume = path;
-    model_.scene.grid_name.clear();
+    set_volume(model_.scene, {path});
     fit_next_ = suggest_next_ = pick_next_ = reload_ = true;
     return;
   }
@@ -416,8 +420,7 @@ void App::ask() {
   wish.number = wish_.number;
   wish.scene = model_.scene;
   wish.camera_edit = wish_.camera_edit + (same_camera(wish.scene.camera, wish_.scene.camera) ? 0 : 1);
-  const bool other_volume = wish.scene.volume != wish_.scene.volume || wish.scene.grid_name != wish_.scene.grid_name;
-  const bool load = std::exchange(reload_, false) || other_volume;
+  const bool load = std::exchange(reload_, false) || volume_of(wish.scene) != volume_of(wish_.scene);
   wish.volume_edit = wish_.volume_edit + (load ? 1 : 0);
   wish.fit = load ? std::exchange(fit_next_, false) : wish_.fit;
   wish.suggest = load ? std::exchange(suggest_next_, false) : wish_.suggest;
@@ -455,8 +458,8 @@ void App::accept(const Answer& answer) {
   // What the user has changed since is newer.
   if (answer.camera_edit == wish_.camera_edit) model_.scene.camera = wish_.scene.camera = answer.camera;
   if (answer.volume_edit == wish_.volume_edit) {
-    model_.scene.volume = wish_.scene.volume = answer.volume;
-    model_.scene.grid_name = wish_.scene.grid_name = answer.grid_name;
+    set_volume(model_.scene, answer.volume);
+    set_volume(wish_.scene, answer.volume);
   }
   if (answer.surfaces_edit == wish_.surfaces_edit) model_.scene.surfaces = wish_.scene.surfaces = answer.surfaces;
   if (answer.status.noise > 0.0 && answer.status.noise != model_.status.noise)

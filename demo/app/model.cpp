@@ -76,6 +76,14 @@ Model::Model() {
   status.stats.struct_size = sizeof status.stats;
 }
 
+VolumeChoice volume_of(const SceneOptions& scene) { return {scene.volume, scene.grid_name, scene.up}; }
+
+void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
+  scene.volume = volume.file;
+  scene.grid_name = volume.grid_name;
+  scene.up = volume.up;
+}
+
 void tell(Model& model, bool error, const std::string& text, double now) {
   constexpr double seconds = 5.0;
   constexpr std::size_t most = 3;

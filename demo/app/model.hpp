@@ -41,6 +41,7 @@ enum class Action {
   view,  // value: a cumulet_view
   grids_dialog,
   choose_grid,   // text
+  choose_up,     // value: an UpAxis
   auto_density,  // a density scale that suits the volume
   quit
 };
@@ -68,6 +69,17 @@ struct GridInfo {
   std::string type;
   std::string refusal;  // "": can be shown
 };
+
+/// Which volume a scene shows, and how it lies: one load.
+struct VolumeChoice {
+  std::string file;
+  std::string grid_name = {};
+  UpAxis up = UpAxis::y;
+
+  bool operator==(const VolumeChoice&) const = default;
+};
+[[nodiscard]] VolumeChoice volume_of(const SceneOptions& scene);
+void set_volume(SceneOptions& scene, const VolumeChoice& volume);
 
 struct Message {
   bool error = false;

@@ -152,6 +152,12 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
   ImGui::EndDisabled();
 
   ImGui::BeginDisabled(!model.status.has_volume);
+  UpAxis up = model.scene.up;
+  if (choose(ui_, "Up axis", "The volume's up axis. The file is read again, and framed.",
+             {{"Y", static_cast<int>(UpAxis::y), "As pictures have it."},
+              {"Z", static_cast<int>(UpAxis::z), "As Blender and Mantaflow write it: turned to Y."}},
+             up))
+    commands.push_back({Action::choose_up, {}, static_cast<int>(up)});
   if (ui_.button("Look into the grids", "Each grid's type, voxels, range and histogram, and one to choose.",
                  {-1.0f, 0.0f}))
     commands.push_back({Action::grids_dialog});

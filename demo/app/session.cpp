@@ -124,10 +124,7 @@ void Session::follow(const Wish& wish) {
   // What the user has not changed since is the viewer's.
   if (!first && wish.camera_edit == wish_.camera_edit) next.scene.camera = scene_.camera;
   const bool load = !first && wish.volume_edit != wish_.volume_edit;
-  if (!first && !load) {
-    next.scene.volume = scene_.volume;
-    next.scene.grid_name = scene_.grid_name;
-  }
+  if (!first && !load) set_volume(next.scene, volume_of(scene_));
   if (!first && wish.surfaces_edit == wish_.surfaces_edit) next.scene.surfaces = scene_.surfaces;
   wish_ = std::move(next);
   scene_.sampling.preview = wish_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
@@ -170,16 +167,22 @@ void Session::follow_surfaces() {
   if (known_->surfaces == scene_.surfaces) return;
   known_->surfaces = scene_.surfaces;
   if (scene_.surfaces.empty()) {
-    check(cumulet_set_surfaces(viewer_.get(), nullptr));
-    shown_surfaces_.clear();
-    status_.surfaces = {};
-    status_.animation = {};
+    remove_surfaces();
     return;
   }
   waiting_for_surfaces_ = check(cumulet_load_surfaces(viewer_.get(), scene_.surfaces.c_str()));
   if (waiting_for_surfaces_) return;
   files_.push_back({scene_.surfaces, Answer::File::Fate::failed});
   scene_.surfaces = known_->surfaces = shown_surfaces_;
+}
+
+void Session::remove_surfaces() {
+  check(cumulet_set_surfaces(viewer_.get(), nullptr));
+  scene_.surfaces.clear();
+  known_->surfaces.clear();
+  shown_surfaces_.clear();
+  status_.surfaces = {};
+  status_.animation = {};
 }
 
 void Session::finish_surfaces() {
@@ -193,9 +196,16 @@ void Session::finish_surfaces() {
     scene_.surfaces = known_->surfaces = shown_surfaces_;
     return;
   }
+  read_surfaces();
+  const std::string refusal = animation_refusal(scene_, status_.surfaces.animations);
+  if (!refusal.empty()) {
+    tell(true, refusal);
+    files_.push_back({scene_.surfaces, Answer::File::Fate::failed});
+    remove_surfaces();
+    return;
+  }
   shown_surfaces_ = scene_.surfaces;
   files_.push_back({shown_surfaces_, Answer::File::Fate::opened});
-  read_surfaces();
   if (scene_.surface_camera >= 0)
     check(cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene_.surface_camera)));
 }
@@ -225,13 +235,11 @@ void Session::set_camera() {
 }
 
 void Session::follow_volume() {
-  if (known_->volume == scene_.volume && known_->grid_name == scene_.grid_name) return;
-  known_->volume = scene_.volume;
-  known_->grid_name = scene_.grid_name;
+  if (volume_of(*known_) == volume_of(scene_)) return;
+  set_volume(*known_, volume_of(scene_));
   if (scene_.volume.empty()) {
     check(cumulet_set_volume(viewer_.get(), nullptr));
-    shown_volume_.clear();
-    shown_grid_.clear();
+    shown_volume_ = {};
     grids_.clear();
     status_.has_volume = false;
     waiting_ = false;
@@ -242,8 +250,8 @@ void Session::follow_volume() {
   if (waiting_) return;
   files_.push_back({scene_.volume, Answer::File::Fate::failed});
   fit_ = false;
-  scene_.volume = known_->volume = shown_volume_;
-  scene_.grid_name = known_->grid_name = shown_grid_;
+  set_volume(scene_, shown_volume_);
+  set_volume(*known_, shown_volume_);
 }
 
 void Session::render(unsigned framebuffer) {
@@ -303,8 +311,7 @@ Answer Session::answer() {
   answer.grids = grids_;
   answer.waiting = waiting_ || waiting_for_surfaces_;
   answer.camera = scene_.camera;
-  answer.volume = scene_.volume;
-  answer.grid_name = scene_.grid_name;
+  answer.volume = volume_of(scene_);
   answer.surfaces = scene_.surfaces;
   answer.camera_edit = wish_.camera_edit;
   answer.volume_edit = wish_.volume_edit;
@@ -323,19 +330,18 @@ void Session::finish_load() {
     const bool cancelled = work.status == CUMULET_ERROR_CANCELLED;
     tell(!cancelled, cancelled ? "Cancelled: " + scene_.volume : work.message);
     if (!cancelled) files_.push_back({scene_.volume, Answer::File::Fate::failed});
-    scene_.volume = known_->volume = shown_volume_;
-    scene_.grid_name = known_->grid_name = shown_grid_;
+    set_volume(scene_, shown_volume_);
+    set_volume(*known_, shown_volume_);
     fit_ = false;
     return;
   }
-  shown_volume_ = scene_.volume;
-  shown_grid_ = scene_.grid_name;
+  shown_volume_ = volume_of(scene_);
   status_.has_volume = true;
   grids_.clear();
   const auto add = [](void* user, const char* name, const char* type, const char* refusal) {
     static_cast<std::vector<GridInfo>*>(user)->push_back({name, type, refusal});
   };
-  status_.grid = shown_grid_;
+  status_.grid = shown_volume_.grid_name;
   cumulet_volume* volume = nullptr;
   cumulet_volume_info info{};
   info.struct_size = sizeof info;
@@ -344,9 +350,9 @@ void Session::finish_load() {
     status_.grid = info.name;
   cumulet_volume_release(volume);
   std::array<char, 512> error{};
-  if (cumulet_list_grids(shown_volume_.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
+  if (cumulet_list_grids(shown_volume_.file.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
     tell(true, error.data());
-  files_.push_back({shown_volume_, Answer::File::Fate::opened});
+  files_.push_back({shown_volume_.file, Answer::File::Fate::opened});
   if (std::exchange(suggest_, false)) suggest_density();
   if (!fit_) return;
   fit_ = false;

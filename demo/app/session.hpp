@@ -34,7 +34,7 @@ struct Wish {
   SceneOptions scene;
   // What the viewer changes by itself is taken from the scene only where these say that the user has changed it since.
   std::uint64_t camera_edit = 0;
-  std::uint64_t volume_edit = 0;  // the volume or its grid; the same file may be wished anew
+  std::uint64_t volume_edit = 0;  // the volume, its grid or its up axis; the same file may be wished anew
   std::uint64_t surfaces_edit = 0;
   bool fit = false;      // that volume is framed once it is there: its camera comes from no scene file
   bool suggest = false;  // its density scale is told, too: none comes from a scene file
@@ -55,8 +55,7 @@ struct Answer {
   std::vector<GridInfo> grids;
   bool waiting = false;  // something is still to come of itself: a load, or the camera's first place
   cumulet_camera_desc camera{};
-  std::string volume;  // shown, or being loaded
-  std::string grid_name;
+  VolumeChoice volume;  // shown, or being loaded
   std::string surfaces;
   std::uint64_t camera_edit = 0;  // what these follow
   std::uint64_t volume_edit = 0;
@@ -127,6 +126,7 @@ class Session {
   bool check(cumulet_status status);
   void follow_volume();
   void follow_surfaces();
+  void remove_surfaces();
   void finish_surfaces();
   // What the library says of those it shows.
   void read_surfaces();
@@ -149,7 +149,8 @@ class Session {
   std::optional<SceneOptions> known_;  // what the viewer was given last
   cumulet_navigation_desc navigation_{};
   cumulet_camera_desc seen_{};  // the viewer's camera
-  std::string shown_volume_, shown_grid_, shown_surfaces_;
+  VolumeChoice shown_volume_;
+  std::string shown_surfaces_;
   bool waiting_for_surfaces_ = false;
   bool waiting_ = false;
   bool fit_ = false;

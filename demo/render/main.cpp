@@ -178,7 +178,6 @@ cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& opt
   return result;
 }
 
-/// The library shows a scene at rest whose animation is not there: whoever named it meant another.
 void check_animation(const Viewer& viewer, const RenderOptions& options) {
   cumulet_surfaces* surfaces = nullptr;
   check(viewer, cumulet_get_surfaces(viewer.get(), &surfaces));
@@ -187,10 +186,8 @@ void check_animation(const Viewer& viewer, const RenderOptions& options) {
   const cumulet_status status = cumulet_surfaces_get_info(surfaces, &info);
   cumulet_surfaces_release(surfaces);
   check(viewer, status);
-  const std::uint32_t wanted = options.scene.surface.animation;
-  if (wanted == 0 || wanted < info.animations) return;  // 0: the default, of a file without any
-  throw std::runtime_error(options.scene.surfaces + ": there is no animation " + std::to_string(wanted) +
-                           ": the file has " + std::to_string(info.animations));
+  const std::string refusal = cumulet::demo::animation_refusal(options.scene, info.animations);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 
 /// Better at once than after the samples.

@@ -422,6 +422,13 @@ cumulet_volume_file_desc volume_file(const SceneOptions& scene) {
   return desc;
 }
 
+std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations) {
+  const std::uint32_t wanted = scene.surface.animation;
+  if (wanted == 0 || wanted < animations) return {};  // 0: the default, of a file without any
+  return scene.surfaces + ": there is no animation " + std::to_string(wanted) + ": the file has " +
+         std::to_string(animations);
+}
+
 void SceneOptions::set_daylight() {
   light.sun_azimuth_degrees = 65.0f;
   light.sun_elevation_degrees = 38.0f;

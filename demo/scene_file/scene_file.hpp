@@ -37,6 +37,10 @@ struct SceneOptions {
 /// The scene's volume as the library takes it; the scene must outlive it.
 [[nodiscard]] cumulet_volume_file_desc volume_file(const SceneOptions& scene);
 
+/// Why surfaces with so many animations cannot be shown as the scene has it; empty if they can. The library shows a
+/// scene at rest whose animation is not there: whoever named it meant another.
+[[nodiscard]] std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations);
+
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
 /// volume is taken from its folder. What the text does not say is as in SceneOptions(), in daylight. Throws
 /// std::runtime_error, one line with the path, the key and the cause.

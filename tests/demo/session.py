@@ -419,6 +419,13 @@ def test_failures(s):
         report = s.report("report")
         assert [m["text"] for m in report["messages"] if m["error"] and name in m["text"]], report["messages"]
         assert report["recent"] == [], report["recent"]
+    mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
+    (s.out / "replay.replay").write_text('frames 3\nwait loaded\nframes 3\nreport "report.json"\n')
+    done = s.start([*SIZE, "--gltf", str(mountains), "--gltf-animation", "99", "--replay", "replay.replay"])
+    assert "mountains.glb: there is no animation 99: the file has " in done.stderr, done
+    report = s.report("report")
+    assert [m for m in report["messages"] if m["error"] and "animation 99" in m["text"]], report["messages"]
+    assert "surfaces" not in report["scene"] and report["recent"] == [], report
     s.play("later", ["wait loaded", f'drop "{s.out}/cut.vdb"', "frames 3", "wait loaded", *shot("later")], "--volume",
            s.cumulus)
     assert s.report("later")["recent"] == [s.cumulus], s.report("later")["recent"]
@@ -442,6 +449,24 @@ def test_grids(s):
     assert scale("dense") > 2 * scale("temperature")
     assert scale("auto") == scale("temperature") and scale("undone") == scale("dense")
     assert scale("back") == scale("opened") and grid("back") == "", "undo takes grid and scale back together"
+
+
+def test_up_axis(s):
+    """Chosen, seen, saved, undone; as cumulet-render shows it."""
+    s.play("replay", ["wait loaded", "wait converged", *shot("y"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', "frames 3",
+                      "wait loaded", "wait converged", *shot("z"), "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"',
+                      "key enter", "frames 3", "key escape", "frames 2", "key ctrl+z", "frames 3", "wait loaded",
+                      "wait converged", *shot("back")],
+           "--volume", s.fire)
+    up = lambda name: s.report(name)["scene"]["volume"].get("up", "y")
+    assert [up(name) for name in ("y", "z", "back")] == ["y", "z", "y"]
+    assert json.loads((s.out / "scene.json").read_text())["volume"]["up"] == "z"
+    standing, report, area = look(s, "y")
+    lying = look(s, "z")[0]
+    assert_differ(standing, lying, area)
+    assert_alike(standing, look(s, "back")[0], area)
+    subprocess.run([s.renderer, "--scene", "scene.json", "-o", "rendered.png"], cwd=s.out, check=True)
+    assert_alike(lying, s.picture("rendered"), area)
 
 
 def test_settings(s):
