@@ -158,12 +158,7 @@ SurfacesRef make_cloth(int n, float width) {
   mesh.vertex_count = positions.size() / 3;
   mesh.indices = indices.data();
   mesh.index_count = indices.size();
-  auto triangles = make_desc<cumulet_triangles_desc>();
-  triangles.meshes = &mesh;
-  triangles.mesh_count = 1;
-  cumulet_surfaces* out = nullptr;
-  EXPECT_EQ(cumulet_surfaces_from_triangles(&triangles, &out, nullptr, 0), CUMULET_OK);
-  return SurfacesRef(out);
+  return cumulet::test::make_surfaces({&mesh, 1});
 }
 
 TEST_F(Trial, SurfacesThatChangeFasterThanTheyArePosedAreSeen) {

@@ -65,28 +65,16 @@ TEST(RoundCost, AnInterruptedDispatchIsForgiven) {
   EXPECT_LT(*cost.most(128.0, true), 2.0);
 }
 
-class Pace : public test::ViewerTest {
+class Pace : public test::StillTest {
  protected:
   void SetUp() override {
-    ViewerTest::SetUp();
+    StillTest::SetUp();
     if (IsSkipped()) return;
-    still_ = make();
     still_->set_volume(test::noise_volume({40, 40, 40}, ivec3(0), 2));
     still_->set_medium({1.0, vec3(1.0F), 0.3F, 0});
-    still_->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
     // A cloud in the lower half, sky in the upper.
     still_->set_camera(test::camera_at({20.0, 40.0, 120.0}, {20.0, 40.0, 0.0}, 36.0));
   }
-  [[nodiscard]] viewer::Viewer& viewer() const { return still_->viewer(); }
-  static viewer::Frame frame(std::uint32_t width, std::uint32_t height, double budget_ms) {
-    viewer::Frame f;
-    f.target = viewer::Target::none;
-    f.size = {width, height};
-    f.viewport = {0, 0, width, height};
-    f.budget_ms = budget_ms;
-    return f;
-  }
-  std::unique_ptr<test::Still> still_;
 };
 
 TEST_P(Pace, DispatchesOnACloudAreBoundedThoughSkyIsCheap) {

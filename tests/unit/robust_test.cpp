@@ -84,12 +84,7 @@ SurfacesRef make_panes() {
   }
   const std::array<float, 4> half{0.9F, 0.2F, 0.1F, 0.5F};
   std::copy(half.begin(), half.end(), meshes[1].base_color);
-  auto desc = make_desc<cumulet_triangles_desc>();
-  desc.meshes = meshes.data();
-  desc.mesh_count = meshes.size();
-  cumulet_surfaces* out = nullptr;
-  if (cumulet_surfaces_from_triangles(&desc, &out, nullptr, 0) != CUMULET_OK) throw std::runtime_error("no surfaces");
-  return SurfacesRef(out);
+  return cumulet::test::make_surfaces(meshes);
 }
 
 void light_surfaces(cumulet_viewer* viewer, cumulet_surface_light light) {
@@ -601,10 +596,7 @@ TEST(Sizes, AnyFromNothingTo16384EachFrame) {
   frame.width = 16385;
   EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   converge(viewer.get(), host.target.frame());
-  auto sampling = make_desc<cumulet_sampling_desc>();
-  sampling.samples = 1;
-  sampling.preview = CUMULET_PREVIEW_OFF;
-  ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
+  preview(viewer.get(), CUMULET_PREVIEW_OFF);
   converge(viewer.get(), host.target.frame());
   EXPECT_EQ(difference(host.target.pixels(), picture), "");
 }

@@ -19,27 +19,15 @@ using glm::dvec3;
 using glm::ivec3;
 using glm::vec3;
 
-class ViewerFrames : public test::ViewerTest {
+class ViewerFrames : public test::StillTest {
  protected:
   void SetUp() override {
-    ViewerTest::SetUp();
-    if (IsSkipped()) return;
-    still_ = make();
-    still_->set_medium({0.4, vec3(1.0F), 0.3F, 0});
-    still_->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+    StillTest::SetUp();
+    if (!IsSkipped()) still_->set_medium({0.4, vec3(1.0F), 0.3F, 0});
   }
-  [[nodiscard]] viewer::Viewer& viewer() const { return still_->viewer(); }
   void show_noise() const {
     still_->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
     still_->build();
-  }
-  static viewer::Frame frame(std::uint32_t width, std::uint32_t height, double budget_ms = 20.0) {
-    viewer::Frame f;
-    f.target = viewer::Target::none;
-    f.size = {width, height};
-    f.viewport = {0, 0, width, height};
-    f.budget_ms = budget_ms;
-    return f;
   }
   viewer::FrameResult converge(const viewer::Frame& f) const {
     viewer::FrameResult result;
@@ -60,7 +48,6 @@ class ViewerFrames : public test::ViewerTest {
     for (std::size_t i = 3; i < rgba.size(); i += 4) sum += rgba[i];
     return 4.0 * sum / static_cast<double>(rgba.size());
   }
-  std::unique_ptr<test::Still> still_;
 };
 
 TEST_P(ViewerFrames, PreviewsEndInThePictureThatThereIsWithoutThem) {

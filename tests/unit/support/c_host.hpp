@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -70,6 +71,18 @@ inline VolumeRef make_ball(int size, float density = 0.4F) {
   if (cumulet_volume_from_dense(&desc, &out, error.data(), error.size()) != CUMULET_OK)
     throw std::runtime_error(error.data());
   return VolumeRef(out);
+}
+
+/// Throws std::runtime_error.
+inline SurfacesRef make_surfaces(std::span<const cumulet_mesh_desc> meshes) {
+  auto desc = make_desc<cumulet_triangles_desc>();
+  desc.meshes = meshes.data();
+  desc.mesh_count = meshes.size();
+  cumulet_surfaces* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_surfaces_from_triangles(&desc, &out, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return SurfacesRef(out);
 }
 
 inline GladGLContext load_gl(cumulet_get_proc_fn get_proc, void* user) {
@@ -220,8 +233,8 @@ inline std::string difference(const std::vector<std::uint8_t>& a, const std::vec
   return std::to_string(bytes) + " of " + std::to_string(a.size()) + " bytes, by at most " + std::to_string(largest);
 }
 
-/// Sets the volume and renders all of the picture. The bytes of the target, into which it is drawn once: frames that are
-/// drawn while it comes would show through where it is transparent, and their number is a matter of timing.
+/// Sets the volume and renders all of the picture. The bytes of the target, into which it is drawn once: frames that
+/// are drawn while it comes would show through where it is transparent, and their number is a matter of timing.
 inline std::vector<std::uint8_t> picture_of(cumulet_viewer* viewer, cumulet_volume* volume, const HostTarget& target) {
   if (cumulet_set_volume(viewer, volume) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
   auto frame = target.frame();

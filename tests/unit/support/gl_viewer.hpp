@@ -27,6 +27,29 @@ class ViewerTest : public testing::TestWithParam<headless::Backend> {
   std::unique_ptr<headless::Context> context_;
 };
 
+/// A viewer in daylight, in a context of its own, on each backend.
+class StillTest : public ViewerTest {
+ protected:
+  void SetUp() override {
+    ViewerTest::SetUp();
+    if (IsSkipped()) return;
+    still_ = make();
+    still_->set_light({30.0F, 30.0F, glm::vec3(3.0F), glm::vec3(0.3F)});
+  }
+  [[nodiscard]] viewer::Viewer& viewer() const { return still_->viewer(); }
+  /// Drawn nowhere.
+  static viewer::Frame frame(std::uint32_t width, std::uint32_t height, double budget_ms = 20.0) {
+    viewer::Frame f;
+    f.target = viewer::Target::none;
+    f.size = {width, height};
+    f.viewport = {0, 0, width, height};
+    f.budget_ms = budget_ms;
+    return f;
+  }
+
+  std::unique_ptr<Still> still_;
+};
+
 inline viewer::CameraPose camera_at(const glm::dvec3& eye, const glm::dvec3& target, double fovy = 30.0) {
   viewer::CameraPose c;
   c.eye = eye;
