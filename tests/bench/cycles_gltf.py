@@ -15,18 +15,24 @@ import math
 import os
 import pathlib
 import re
+import shutil
 import struct
 import subprocess
 import sys
 import urllib.parse
 import zlib
 
-import numpy
+try:
+    import numpy
+except ImportError:
+    numpy = None
 
 SUN = {"azimuth_degrees": 35, "elevation_degrees": 40, "irradiance": [2.5, 2.5, 2.5]}
 SKY = {"radiance": [0.5, 0.5, 0.5]}
 FOVY = 40
 BLOCK = 8
+# Debian's Blender runs the first python3 in PATH, which must be Debian's too.
+PEER_PATH = "/usr/bin:" + os.environ["PATH"]
 
 
 class Unusable(Exception):
@@ -238,8 +244,7 @@ def render(model_file, options, out):
     # Cycles counts light's ways between surfaces, we count surfaces.
     description["medium"]["max_bounces"] -= 1
     peer_scene.write_text(json.dumps(description))
-    # Debian's Blender runs the first python3 in PATH, which must be Debian's too.
-    environment = dict(os.environ, LAMBERT="1", PATH="/usr/bin:" + os.environ["PATH"])
+    environment = dict(os.environ, LAMBERT="1", PATH=PEER_PATH)
     alpha = pathlib.Path(__file__).with_name("cycles_alpha.py")
     for seed, file in enumerate(theirs, 1):
         file.unlink(missing_ok=True)
@@ -272,8 +277,16 @@ def main():
     parser.add_argument("--bounces", type=int, default=8, help="at least 2")
     parser.add_argument("--nearest", action="store_true",
                         help="no filter of textures: Cycles' mixes texels before it decodes sRGB, ours after, as glTF has it")
+    parser.add_argument("--within", type=float, nargs=2, metavar=("MEAN", "BLOCKS"),
+                        help="fail where a model differs by more, in %%, beyond the noise")
     options = parser.parse_args()
+    for missing, what in ((numpy is None, "numpy"), (not shutil.which("blender", path=PEER_PATH), "Blender"),
+                          (not (options.peer / "cycles.py").exists(), f"{options.peer}/cycles.py")):
+        if missing:
+            print(f"skipped: there is no {what}")
+            sys.exit(77)
     options.out.mkdir(parents=True, exist_ok=True)
+    failed = False
     print("| Model | Triangles | Mean, % | Blocks, % (their noise) | Worst block, % (its noise), at | Taken out | Seconds, ours and Cycles' |")
     print("|---|--:|--:|--:|--:|---|--:|", flush=True)
     for file, name in models_of(options.models):
@@ -282,7 +295,8 @@ def main():
             ours, theirs, changes, triangles, seconds = render(file, options, out)
             found = compare(ours, theirs)
         except Unusable as error:
-            print(f"| {name} | - | - | - | - | - | {str(error)[:160]} |", flush=True)
+            print(f"| {name} | - | - | - | - | - | {error} |", flush=True)
+            failed = True
             continue
         a, b = (sum(images) / 2 for images in (ours, theirs))
         write_png(out.with_suffix(".png"), numpy.concatenate([a, b, 0.5 + 8 * (b - a) / 2], axis=1))
@@ -291,6 +305,10 @@ def main():
               f"| {100 * found['blocks']:.2f} ({100 * found['blocks_noise']:.2f}) "
               f"| {100 * found['worst']:+.1f} ({100 * found['worst_noise']:.1f}), {x} {y} | {changes or '-'} "
               f"| {seconds[0]:.0f}, {seconds[1]:.0f} |", flush=True)
+        if options.within:
+            mean, blocks = options.within
+            failed |= 100 * (abs(found["mean"]) - 2 * found["mean_noise"]) > mean or 100 * found["blocks"] > blocks
+    sys.exit(1 if options.within and failed else 0)
 
 
 main()
