@@ -15,6 +15,17 @@ inline void check(const Progress* progress) {
   if (progress != nullptr) progress->check();
 }
 
+/// vector.resize(size), looking at the cancel flag while gigabytes are filled.
+template <class T>
+void resize(std::vector<T>& vector, std::size_t size, const Progress* progress, const T& value = T()) {
+  constexpr std::size_t piece = std::max<std::size_t>((std::size_t{4} << 20U) / sizeof(T), 1);
+  vector.reserve(size);
+  while (vector.size() < size) {
+    check(progress);
+    vector.resize(std::min(size, vector.size() + piece), value);
+  }
+}
+
 /// One step of a stage: maps a count of things done, by any number of threads, to a span of the stage's fraction.
 /// Without a Progress it does nothing. Methods throw Error(cancelled) when that is asked for.
 class ProgressPart {
@@ -37,15 +48,10 @@ class ProgressPart {
     telling_.clear(std::memory_order_release);
   }
 
-  /// vector.resize(size), looking at the cancel flag while gigabytes are filled.
+  /// As cumulet::resize().
   template <class T>
   void resize(std::vector<T>& vector, std::size_t size, const T& value = T()) const {
-    constexpr std::size_t piece = std::max<std::size_t>((std::size_t{4} << 20U) / sizeof(T), 1);
-    vector.reserve(size);
-    while (vector.size() < size) {
-      check();
-      vector.resize(std::min(size, vector.size() + piece), value);
-    }
+    cumulet::resize(vector, size, progress_, value);
   }
 
  private:

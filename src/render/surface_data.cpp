@@ -115,14 +115,15 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   const auto nodes = std::as_bytes(source.bvh.nodes());
   const auto records = std::as_bytes(source.bvh.records());
   source.lights.w = static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
-  words.resize((nodes.size() + records.size()) / sizeof(uvec4));
+  resize(words, (nodes.size() + records.size()) / sizeof(uvec4), progress);
   std::memcpy(words.data(), nodes.data(), nodes.size());
   if (!records.empty()) std::memcpy(words.data() + source.lights.w, records.data(), records.size());
 
   check(progress);
   source.tables.x = size_of(words);
-  words.resize(words.size() + scene.triangle_count());
+  resize(words, words.size() + scene.triangle_count(), progress);
   for (const surface::Draw& draw : scene.draws) {
+    check(progress);
     for (std::uint32_t i = draw.first_index; i + 2 < draw.first_index + draw.index_count; i += 3) {
       words[source.tables.x + i / 3] =
           uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], draw.material);
@@ -130,7 +131,7 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   }
   check(progress);
   source.tables.y = size_of(words);
-  words.resize(words.size() + 3 * scene.attributes.size());
+  resize(words, words.size() + 3 * scene.attributes.size(), progress);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
     check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {

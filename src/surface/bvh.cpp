@@ -223,7 +223,7 @@ class Bvh::Builder {
 
   void gather() {
     const std::size_t triangles = indices_.size() / 3;
-    boxes_.resize(triangles);
+    resize(boxes_, triangles, progress_);
     ids_.reserve(triangles);
     for (std::size_t i = 0; i < triangles; ++i) {
       if (flags_.empty() || (flags_[i] & TriangleFlags::left_out) == 0) ids_.push_back(static_cast<std::uint32_t>(i));

@@ -97,7 +97,7 @@ class Assembler {
                     " of " + std::to_string(joints) + " in " + numbered("skin", static_cast<std::size_t>(skin)));
         }
       }
-      scene_->add_instance(place, node, skin);
+      scene_->add_instance(place, node, skin, progress_);
     });
   }
 

@@ -26,8 +26,9 @@ class PosableScene final : public Scene {
   std::vector<std::pair<std::uint32_t, PunctualLight>> lights;  ///< with their nodes
   std::vector<std::pair<std::uint32_t, SceneCamera>> cameras;
 
-  /// A draw of a part under a node, moved by a skin if that is not below 0. Throws Error(file) for too many vertices.
-  void add_instance(std::size_t part, std::uint32_t node, std::int32_t skin);
+  /// A draw of a part under a node, moved by a skin if that is not below 0. Throws Error(file) for too many vertices,
+  /// Error(cancelled).
+  void add_instance(std::size_t part, std::uint32_t node, std::int32_t skin, const Progress* progress = nullptr);
   /// After the last instance: drops what only they needed. Throws Error(file) where transforms or positions are too
   /// large to be multiplied.
   void finish();

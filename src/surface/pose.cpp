@@ -56,7 +56,7 @@ Shape morph(const MeshPart& part, const std::vector<float>& weights, std::size_t
 
 }  // namespace
 
-void PosableScene::add_instance(std::size_t part, std::uint32_t node, std::int32_t skin) {
+void PosableScene::add_instance(std::size_t part, std::uint32_t node, std::int32_t skin, const Progress* progress) {
   const MeshPart& from = parts[part];
   constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
   if (attributes.size() + from.positions.size() > most || indices.size() + from.indices.size() > most) {
@@ -66,8 +66,15 @@ void PosableScene::add_instance(std::size_t part, std::uint32_t node, std::int32
   instances.push_back({part, node, first_vertex, skin});
   draws.push_back({static_cast<std::uint32_t>(indices.size()), static_cast<std::uint32_t>(from.indices.size()),
                    from.material, node});
-  attributes.insert(attributes.end(), from.attributes.begin(), from.attributes.end());
-  for (const std::uint32_t index : from.indices) indices.push_back(first_vertex + index);
+  constexpr std::size_t piece = 65536;
+  for (std::size_t i = 0; i < from.attributes.size(); ++i) {
+    if (i % piece == 0) check(progress);
+    attributes.push_back(from.attributes[i]);
+  }
+  for (std::size_t i = 0; i < from.indices.size(); ++i) {
+    if (i % piece == 0) check(progress);
+    indices.push_back(first_vertex + from.indices[i]);
+  }
 }
 
 void PosableScene::finish() {
@@ -168,7 +175,7 @@ Pose PosableScene::pose(double time, std::size_t animation, const Progress* prog
   const Stance now = stance(rig, track, time);
   Pose result;
   result.time = time;
-  result.vertices.resize(attributes.size());
+  resize(result.vertices, attributes.size(), progress);
   for (const Instance& instance : instances) {
     check(progress);
     result.flipped.push_back(place(instance, now, result, progress) ? 1 : 0);
