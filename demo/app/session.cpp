@@ -134,7 +134,15 @@ void Session::follow(const Wish& wish) {
     known_->sampling.samples = 0;
   }
   if (first || load) {
-    fit_ = wish_.fit;
+    fit_.reset();
+    if (is_unplaced(scene_.camera)) {
+      // Again when the density scale is known, which says what can be seen.
+      if (scene_.surface_camera < 0) fit_ = scene_.camera;
+    } else if (wish_.fit) {
+      fit_.emplace();
+      fit_->struct_size = sizeof *fit_;
+      fit_->fovy_degrees = scene_.camera.fovy_degrees;
+    }
     suggest_ = wish_.suggest;
   }
   if (load && !scene_.volume.empty()) known_->volume.clear();
@@ -249,7 +257,7 @@ void Session::follow_volume() {
   waiting_ = check(cumulet_load_volume_file(viewer_.get(), &file));
   if (waiting_) return;
   files_.push_back({scene_.volume, Answer::File::Fate::failed});
-  fit_ = false;
+  fit_.reset();
   set_volume(scene_, shown_volume_);
   set_volume(*known_, shown_volume_);
 }
@@ -332,7 +340,7 @@ void Session::finish_load() {
     if (!cancelled) files_.push_back({scene_.volume, Answer::File::Fate::failed});
     set_volume(scene_, shown_volume_);
     set_volume(*known_, shown_volume_);
-    fit_ = false;
+    fit_.reset();
     return;
   }
   shown_volume_ = volume_of(scene_);
@@ -355,12 +363,9 @@ void Session::finish_load() {
   files_.push_back({shown_volume_.file, Answer::File::Fate::opened});
   if (std::exchange(suggest_, false)) suggest_density();
   if (!fit_) return;
-  fit_ = false;
-  const double fovy = scene_.camera.fovy_degrees;
-  scene_.camera = {};
-  scene_.camera.struct_size = sizeof scene_.camera;
-  scene_.camera.fovy_degrees = fovy;
+  scene_.camera = *std::exchange(fit_, std::nullopt);
   set_camera();
+  static_cast<void>(cumulet_frame_all(viewer_.get()));  // waits on where there is nothing to fit
 }
 
 void Session::input(const ViewerInput& input) {
@@ -374,7 +379,12 @@ void Session::suggest_density() {
   if (!check(cumulet_get_volume(viewer_.get(), &volume)) || volume == nullptr) return;
   double scale = 0.0;
   // What shows nothing at any scale keeps the one it has.
-  if (cumulet_volume_suggest_density_scale(volume, &scale) == CUMULET_OK) density_scale_ = scale;
+  if (cumulet_volume_suggest_density_scale(volume, &scale) == CUMULET_OK) {
+    density_scale_ = scale;
+    // At once: what is fitted next depends on it.
+    known_->medium.density_scale = scale;
+    check(cumulet_set_medium(viewer_.get(), &known_->medium));
+  }
   cumulet_volume_release(volume);
 }
 
@@ -406,7 +416,7 @@ void Session::move_by_keys(int key) {
 void Session::execute(const Request& request) {
   if (request.type == Request::Type::suggest_density) return suggest_density();
   if (request.type == Request::Type::frame_all) {
-    if (status_.has_volume) check(cumulet_frame_all(viewer_.get()));
+    if (status_.has_volume || !shown_surfaces_.empty()) check(cumulet_frame_all(viewer_.get()));
     return;
   }
   try {

@@ -153,7 +153,7 @@ class Session {
   std::string shown_surfaces_;
   bool waiting_for_surfaces_ = false;
   bool waiting_ = false;
-  bool fit_ = false;
+  std::optional<cumulet_camera_desc> fit_;  // the camera to place when the volume is there
   bool suggest_ = false;
   std::optional<double> density_scale_;
   bool camera_moved_ = false;

@@ -1,12 +1,15 @@
 #include "viewer/camera.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/gtc/matrix_access.hpp>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/error.hpp"
 
@@ -16,11 +19,14 @@ namespace {
 
 using glm::dmat3;
 using glm::dmat4;
+using glm::dvec2;
 using glm::dvec3;
 using glm::dvec4;
 
 constexpr double pole_margin = 1e-4;  // radians: invisible, and far above what doubles round the direction by
 constexpr double farthest = 1e30;
+constexpr double fit_margin = 0.06;      // of the picture's shorter side
+constexpr double nearest_to_eye = 0.02;  // of the subject's depth
 
 struct Axes {
   dvec3 forward, right, up;
@@ -69,40 +75,62 @@ double orthographic_distance(const CameraPose& pose, const Bounds& box) {
   return 1.01 * reach + std::max(0.0, pose.near_plane);
 }
 
-/// As near as keeps all eight corners of the box in the picture, seen from back (unit).
-CameraPose fitted(const CameraPose& from, const dvec3& back, const Bounds& box, double aspect) {
+/// The reach of a box along normals.
+std::vector<double> reach_of(const Bounds& box, std::span<const dvec3> normals) {
+  const dvec3 centre = 0.5 * (box.min + box.max);
+  const dvec3 half = 0.5 * (box.max - box.min);
+  std::vector<double> reach;
+  for (const dvec3& n : normals) reach.push_back(glm::dot(centre, n) + glm::dot(half, glm::abs(n)));
+  return reach;
+}
+
+/// As near as keeps all of the subject in the picture, seen from back (unit), margin (of the picture's shorter side)
+/// away from its edges.
+CameraPose fitted(const CameraPose& from, const dvec3& back, const Subject& subject, double aspect, double margin) {
   CameraPose pose = from;
-  pose.target = 0.5 * (box.min + box.max);
-  pose.eye = pose.target + back;
+  pose.target = dvec3(0.0);
+  pose.eye = back;
   const Axes axes = axes_of(pose);
+  const bool orthographic = pose.orthographic_height > 0.0;
+  // The slopes of the planes that hold it: how far aside a point may be for each unit in front of the eye.
   const double tan_y = tan_half(pose);
-  const double tan_x = tan_y * aspect;
-  double distance = 1e-30;
-  double half_height = 1e-30;
-  for (int corner = 0; corner < 8; ++corner) {
-    const dvec3 p((corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
-                  (corner & 4) != 0 ? box.max.z : box.min.z);
-    const dvec3 q = p - pose.target;
-    const double right = std::abs(glm::dot(q, axes.right));
-    const double up = std::abs(glm::dot(q, axes.up));
-    distance = std::max(distance, glm::dot(q, back) + std::max(right / tan_x, up / tan_y));
-    half_height = std::max({half_height, up, right / aspect});
+  const double inset = 2.0 * margin * std::min(aspect, 1.0);
+  const dvec2 tangent = tan_y * (dvec2(aspect, 1.0) - inset);
+  const dvec2 slope = orthographic ? dvec2(0.0) : tangent;
+  const std::array<dvec3, 6> normals = {axes.right + slope.x * back,
+                                        -axes.right + slope.x * back,
+                                        axes.up + slope.y * back,
+                                        -axes.up + slope.y * back,
+                                        back,
+                                        -back};
+  std::vector<double> reach;
+  if (subject.reach) reach = subject.reach(back, normals);
+  if (reach.empty()) reach = reach_of(subject.bounds, normals);
+  const dvec2 middle = 0.5 * dvec2(reach[0] - reach[1], reach[2] - reach[3]);
+  const dvec2 width(reach[0] + reach[1], reach[2] + reach[3]);
+  const double depth = 0.5 * (reach[4] - reach[5]);
+  pose.target = axes.right * middle.x + axes.up * middle.y + back * depth;
+  const dvec2 size = 0.5 * width / tangent;
+  double distance = std::max(size.x, size.y);
+  if (!orthographic) {
+    // Wide angles hold a corner that points at the eye from where it is: not so near.
+    distance = std::max(distance, reach[4] + nearest_to_eye * (reach[4] + reach[5])) - depth;
   }
   const double nearest = nearest_distance(pose.target);
-  if (distance < nearest) {  // a point: as near as before
+  if (!(distance > nearest)) {  // a point: as near as before
     distance = from.eye == from.target ? 1.0 : std::max(nearest, distance_of(from));
-  } else if (pose.orthographic_height > 0.0) {
-    pose.orthographic_height = 2.0 * half_height;
-    distance = std::max(half_height / tan_y, orthographic_distance(pose, box));
+  } else if (orthographic) {
+    pose.orthographic_height = 2.0 * tan_y * distance;
+    distance = std::max(distance, orthographic_distance(pose, subject.bounds));
   }
   pose.eye = pose.target + back * distance;
   return pose;
 }
 
 /// Where a camera without bounds to fit looks from.
-CameraPose placed(const CameraPose& from, const std::optional<Bounds>& bounds, double aspect) {
+CameraPose placed(const CameraPose& from, const std::optional<Subject>& subject, double aspect, double margin) {
   if (from.eye != from.target) return from;
-  if (bounds) return fitted(from, glm::normalize(dvec3(0.0, 0.2, 1.0)), *bounds, aspect);
+  if (subject) return fitted(from, glm::normalize(dvec3(0.0, 0.2, 1.0)), *subject, aspect, margin);
   CameraPose pose = from;
   pose.target = dvec3(0.0);
   pose.eye = dvec3(0.0, 0.0, 5.0);
@@ -313,7 +341,7 @@ void Camera::matrices(double aspect, ClipDepth clip, dmat4& view, dmat4& project
     }
     return;
   }
-  const CameraPose pose = placed(pose_, std::nullopt, aspect);
+  const CameraPose pose = placed(pose_, std::nullopt, aspect, 0.0);
   const ViewFrame frame = frame_of(pose, aspect);
   const Axes axes = axes_of(pose);
   const dmat3 rotation = glm::transpose(dmat3(axes.right, axes.up, -axes.forward));
@@ -425,9 +453,19 @@ void Camera::fly(double right, double up, double forward) {
   change(pose);
 }
 
+void Camera::frame(const Subject& subject, double aspect, double margin) {
+  change(waits_for_bounds() ? placed(pose_, subject, aspect, margin)
+                            : fitted(pose_, -axes_of(pose_).forward, subject, aspect, margin));
+}
+
 void Camera::frame(const Bounds& box, double aspect) {
   const Edit edit(*this);
-  change(waits_for_bounds() ? placed(pose_, box, aspect) : fitted(pose_, -axes_of(pose_).forward, box, aspect));
+  frame(box, aspect, 0.0);
+}
+
+void Camera::fit(const Subject& subject, double aspect) {
+  const Edit edit(*this);
+  frame(subject, aspect, fit_margin);
 }
 
 void Camera::look_from(AxisView side) {
@@ -486,11 +524,11 @@ void Camera::toggle_orthographic(const std::optional<Bounds>& bounds) {
   change(pose);
 }
 
-ViewFrame Camera::view(double aspect, const std::optional<Bounds>& bounds) {
+ViewFrame Camera::view(double aspect, const std::optional<Subject>& subject) {
   const Edit edit(*this);
   if (matrices_) {
-    if (own_.eye == own_.target && bounds) {  // matrices came first: the bounds tell what they look at
-      const double distance = glm::length(0.5 * (bounds->min + bounds->max) - pose_.eye);
+    if (own_.eye == own_.target && subject) {  // matrices came first: the bounds tell what they look at
+      const double distance = glm::length(0.5 * (subject->bounds.min + subject->bounds.max) - pose_.eye);
       if (distance > nearest_distance(pose_.eye)) {
         pose_.target = pose_.eye + axes_of(pose_).forward * distance;
         own_ = pose_;
@@ -498,9 +536,10 @@ ViewFrame Camera::view(double aspect, const std::optional<Bounds>& bounds) {
     }
     return matrices_frame_;
   }
-  if (!(aspect > 0.0 && std::isfinite(aspect))) return frame_of(placed(pose_, std::nullopt, 1.0), 1.0);  // no picture
-  const CameraPose pose = placed(pose_, bounds, aspect);
-  if (bounds && pose != pose_) {
+  if (!(aspect > 0.0 && std::isfinite(aspect)))
+    return frame_of(placed(pose_, std::nullopt, 1.0, 0.0), 1.0);  // no picture
+  const CameraPose pose = placed(pose_, subject, aspect, fit_margin);
+  if (subject && pose != pose_) {
     pose_ = pose;
     ++revision_;
   }

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <optional>
 
-#include "viewer/bounds.hpp"
+#include "viewer/subject.hpp"
 
 namespace cumulet::viewer {
 
@@ -19,7 +19,7 @@ enum class AxisView { front, back, right, left, top, bottom };
 /// cumulet_camera_desc, defaults filled in.
 struct CameraPose {
   glm::dvec3 eye{0.0};
-  glm::dvec3 target{0.0};  // eye == target: fit the bounds
+  glm::dvec3 target{0.0};  // eye == target: fit the subject
   glm::dvec3 up{0.0, 1.0, 0.0};
   double fovy_degrees = 40.0;
   double orthographic_height = 0.0;  // 0: perspective
@@ -48,7 +48,7 @@ struct ViewFrame {
 /// A camera that viewers may share: every call locks. Operations as in cumulet.h; arguments are finite. An operation
 /// goes on from the host's matrices as from the nearest pose, and throws Error(invalid_argument), changing nothing,
 /// where it would lead out of what doubles tell apart. A camera that still waits for bounds to fit has nothing to turn
-/// about: operations but frame and toggle_orthographic leave it waiting.
+/// about: operations but frame, fit and toggle_orthographic leave it waiting.
 class Camera {
  public:
   explicit Camera(const CameraPose& pose = {}) : pose_(pose) {}
@@ -74,7 +74,10 @@ class Camera {
   /// As dolly, but an orthographic eye stays where it is: its near plane would come to cut the scene.
   void zoom(double factor);
   void fly(double right, double up, double forward);
+  /// Moves until the box just fills the picture; the direction is kept, or is the one of a camera that waited.
   void frame(const Bounds& box, double aspect);
+  /// Likewise, of what is seen of the subject, with a margin of 6 % of the picture's shorter side.
+  void fit(const Subject& subject, double aspect);
   /// Looks at the target from one side, the distance kept; the axis nearest to up becomes up. Where that is +Y, front
   /// is +Z and right +X; where +Z, front is -Y.
   void look_from(AxisView side);
@@ -82,9 +85,9 @@ class Camera {
   /// bounds are in front of it from wherever it may orbit to.
   void toggle_orthographic(const std::optional<Bounds>& bounds);
 
-  /// The frame for a picture of this aspect ratio. A pose that fits the bounds (eye == target) is placed first, for
-  /// good, where bounds are known; without any it looks at the origin from +Z.
-  [[nodiscard]] ViewFrame view(double aspect, const std::optional<Bounds>& bounds);
+  /// The frame for a picture of this aspect ratio. A pose that fits the subject (eye == target) is placed first, for
+  /// good, where there is one; without any it looks at the origin from +Z.
+  [[nodiscard]] ViewFrame view(double aspect, const std::optional<Subject>& subject);
   /// Counts changes; setting what is set already is none.
   [[nodiscard]] std::uint64_t revision() const;
   /// Calls changed after every change, on the thread that made it, until the token is gone; then no call is under way
@@ -119,6 +122,7 @@ class Camera {
   [[nodiscard]] bool waits_for_bounds() const { return pose_.eye == pose_.target; }
   void change(const CameraPose& pose);
   void scale(double factor, bool keep_orthographic_eye);
+  void frame(const Subject& subject, double aspect, double margin);
 
   mutable std::mutex mutex_;
   CameraPose pose_;                   // with matrices_: the nearest to them

@@ -36,7 +36,7 @@ std::uint32_t fly_key(int key) {
 void zoom(Camera& camera, double base, double steps) { camera.zoom(std::pow(base, -std::clamp(steps, -400.0, 400.0))); }
 
 /// Blender's; opposite: with ctrl.
-bool keypad_view(int digit, bool opposite, Camera& camera, const std::optional<Bounds>& bounds) {
+bool keypad_view(int digit, bool opposite, Camera& camera, const std::optional<Subject>& subject) {
   switch (digit) {
     case 1:
       camera.look_from(opposite ? AxisView::back : AxisView::front);
@@ -59,7 +59,7 @@ bool keypad_view(int digit, bool opposite, Camera& camera, const std::optional<B
       camera.orbit(-key_orbit, 0.0);
       return true;
     case 5:
-      camera.toggle_orthographic(bounds);
+      camera.toggle_orthographic(subject ? std::optional(subject->bounds) : std::nullopt);
       return true;
     case 6:
       camera.orbit(key_orbit, 0.0);
@@ -134,7 +134,7 @@ void Navigation::drag_by(double dx, double dy, Camera& camera) const {
 }
 
 bool Navigation::input(const InputEvent& event, Camera& camera, double width, double height,
-                       const std::optional<Bounds>& bounds) {
+                       const std::optional<Subject>& subject) {
   fast_ = (event.modifiers & shift) != 0;
   const bool sized = width > 0.0 && height > 0.0;
   switch (event.type) {
@@ -164,7 +164,7 @@ bool Navigation::input(const InputEvent& event, Camera& camera, double width, do
       zoom(camera, wheel_step, event.wheel * settings_.speed);
       return true;
     case InputEvent::Type::key_down:
-      return key_down(event, camera, sized ? width / height : 1.0, bounds);
+      return key_down(event, camera, sized ? width / height : 1.0, subject);
     case InputEvent::Type::key_up: {
       const std::uint32_t bit = keys_ & fly_key(event.key);
       keys_ &= ~bit;
@@ -179,10 +179,11 @@ bool Navigation::input(const InputEvent& event, Camera& camera, double width, do
   return false;
 }
 
-bool Navigation::key_down(const InputEvent& event, Camera& camera, double aspect, const std::optional<Bounds>& bounds) {
+bool Navigation::key_down(const InputEvent& event, Camera& camera, double aspect,
+                          const std::optional<Subject>& subject) {
   const bool keypad = event.key >= CUMULET_KEY_KEYPAD_0 && event.key <= CUMULET_KEY_KEYPAD_0 + 9;
   if (keypad && settings_.style == NavigationStyle::blender && (event.modifiers & (shift | alt)) == 0) {
-    return keypad_view(event.key - CUMULET_KEY_KEYPAD_0, (event.modifiers & ctrl) != 0, camera, bounds);
+    return keypad_view(event.key - CUMULET_KEY_KEYPAD_0, (event.modifiers & ctrl) != 0, camera, subject);
   }
   if ((event.modifiers & (ctrl | alt)) != 0) return false;
   if (settings_.fly) {
@@ -202,8 +203,8 @@ bool Navigation::key_down(const InputEvent& event, Camera& camera, double aspect
     case 'F':
     case CUMULET_KEY_HOME:
     case CUMULET_KEY_KEYPAD_PERIOD:
-      if (bounds) camera.frame(*bounds, aspect);
-      return bounds.has_value();
+      if (subject) camera.fit(*subject, aspect);
+      return subject.has_value();
     case CUMULET_KEY_LEFT:
       return arrow(-1, 0);
     case CUMULET_KEY_RIGHT:

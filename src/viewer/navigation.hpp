@@ -34,7 +34,7 @@ struct InputEvent {
 /// 1 a drag over the picture's height orbits by half a turn, looks by a quarter, pans by the height at the target, or
 /// dollies by a factor of 10; a wheel step dollies by 1.15.
 ///
-/// Keys, in every style: F, Home, keypad '.': frame the bounds; arrows: orbit by 15 degrees, with shift: pan by a
+/// Keys, in every style: F, Home, keypad '.': fit the subject; arrows: orbit by 15 degrees, with shift: pan by a
 /// twentieth; + (or =) and -: dolly as the wheel does. Blender's keypad besides: 1, 3, 7 (ctrl: the opposite), 5, and
 /// 2, 4, 6, 8 as arrows.
 class Navigation {
@@ -43,7 +43,8 @@ class Navigation {
   void set(const NavigationSettings& settings);
   [[nodiscard]] const NavigationSettings& settings() const { return settings_; }
   /// width, height: of the picture, in pixels (0: not known yet). Returns whether the event meant something.
-  bool input(const InputEvent& event, Camera& camera, double width, double height, const std::optional<Bounds>& bounds);
+  bool input(const InputEvent& event, Camera& camera, double width, double height,
+             const std::optional<Subject>& subject);
   /// Flies and turns for seconds that have gone by. Returns whether the camera moved.
   bool advance(double seconds, Camera& camera, const std::optional<Bounds>& bounds);
   /// Whether advance has anything to do: frames are needed though nothing else changes.
@@ -54,7 +55,7 @@ class Navigation {
 
   [[nodiscard]] Drag drag_of(int button, std::uint32_t modifiers) const;
   void drag_by(double dx, double dy, Camera& camera) const;
-  bool key_down(const InputEvent& event, Camera& camera, double aspect, const std::optional<Bounds>& bounds);
+  bool key_down(const InputEvent& event, Camera& camera, double aspect, const std::optional<Subject>& subject);
   [[nodiscard]] glm::dvec3 flight() const;
   void release();
 

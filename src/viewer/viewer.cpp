@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -388,13 +389,15 @@ void Viewer::set_navigation(const NavigationSettings& settings) {
 
 bool Viewer::input(const InputEvent& event) {
   sync();
-  const auto box = this->box();
-  const bool handled = navigation_.input(event, *camera_, frame_size_.x, frame_size_.y, box);
+  const bool handled = navigation_.input(event, *camera_, frame_size_.x, frame_size_.y, subject());
   if (navigation_.moving()) notify();
   return handled;
 }
 
-void Viewer::frame_all() { camera_->frame(bounds(), frame_size_.y > 0 ? double(frame_size_.x) / frame_size_.y : 1.0); }
+void Viewer::frame_all() {
+  static_cast<void>(bounds());  // there is something to fit
+  camera_->fit(*subject(), frame_size_.y > 0 ? double(frame_size_.x) / frame_size_.y : 1.0);
+}
 
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
@@ -404,6 +407,31 @@ std::optional<Bounds> Viewer::box() const {
     box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};
   }
   return box;
+}
+
+std::optional<Subject> Viewer::subject() const {
+  const auto all = box();
+  if (!all) return std::nullopt;
+  Subject subject(*all);
+  subject.reach = [this](const dvec3& direction, std::span<const dvec3> normals) {
+    return seen_reach(direction, normals);
+  };
+  return subject;
+}
+
+std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const dvec3> normals) const {
+  std::vector<double> reach;
+  const auto add = [&](const dvec3& p) {
+    reach.resize(normals.size(), std::numeric_limits<double>::lowest());
+    for (std::size_t i = 0; i < normals.size(); ++i) reach[i] = std::max(reach[i], glm::dot(p, normals[i]));
+  };
+  if (volume_) {
+    for (const dvec3& p : volume_->coarse().visible(direction, medium_.density_scale)) add(p);
+  }
+  if (surface_source_) {
+    for (const surface::PosedVertex& vertex : surface_source_->pose.vertices) add(vertex.position);
+  }
+  return reach;
 }
 
 Bounds Viewer::bounds() {
@@ -503,7 +531,7 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   view_.reset();
   // Without a scene the camera may wait for its bounds.
   if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
-    view_ = camera_->view(double(frame_size_.x) / frame_size_.y, box);
+    view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
 
   if (grid_.camera_adaptive && view_ && volume_ && (view_ != built_view_ || frame_size_ != built_size_)) {
     const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;

@@ -7,7 +7,9 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "base/log.hpp"
 #include "gl/objects.hpp"
@@ -260,6 +262,9 @@ class Viewer {
   [[nodiscard]] bool wants_upload() const;
   void upload_surfaces(Gl& g);
   [[nodiscard]] std::optional<Bounds> box() const;
+  /// What cameras fit; good for as long as nothing changes.
+  [[nodiscard]] std::optional<Subject> subject() const;
+  [[nodiscard]] std::vector<double> seen_reach(const glm::dvec3& direction, std::span<const glm::dvec3> normals) const;
   VolumePtr empty_volume();
   [[nodiscard]] render::Surfaces surfaces() const;
   render::Picture& readable();

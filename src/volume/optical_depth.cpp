@@ -23,11 +23,11 @@ constexpr double extreme_share = 0.005;
 constexpr double visible_depth = 0.05129;  // an opacity of 5 %
 constexpr int directions = 24;
 constexpr int rays_a_side = 64;
-constexpr int hull_directions = 96;
+constexpr int rays_a_side_of_view = 128;
 
-/// Directions spread evenly over the sphere; the first half of them over a half of it.
-glm::dvec3 direction_of(int i, int count) {
-  const double z = 1.0 - (2.0 * i + 1.0) / count;
+/// Directions spread evenly over a half of the sphere: a ray has no sense.
+glm::dvec3 direction_of(int i) {
+  const double z = 1.0 - (i + 0.5) / directions;
   const double angle = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
   const double r = std::sqrt(1.0 - z * z);
   return {r * std::cos(angle), r * std::sin(angle), z};
@@ -115,13 +115,14 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
   });
 }
 
-double CoarseVolume::depth_along(const glm::dvec3& origin, const glm::dvec3& direction) const {
+template <class Visit>
+void CoarseVolume::walk(const glm::dvec3& origin, const glm::dvec3& direction, Visit&& visit) const {
   // Into the box of cells, then from wall to wall; t is world length.
   double t = std::numeric_limits<double>::lowest();
   double end = std::numeric_limits<double>::max();
   for (int axis = 0; axis < 3; ++axis) {
     if (direction[axis] == 0.0) {
-      if (origin[axis] < 0.0 || origin[axis] >= size_[axis]) return 0.0;
+      if (origin[axis] < 0.0 || origin[axis] >= size_[axis]) return;
       continue;
     }
     const double a = -origin[axis] / direction[axis];
@@ -129,7 +130,7 @@ double CoarseVolume::depth_along(const glm::dvec3& origin, const glm::dvec3& dir
     t = std::max(t, std::min(a, b));
     end = std::min(end, std::max(a, b));
   }
-  if (!(t < end)) return 0.0;
+  if (!(t < end)) return;
   glm::ivec3 cell;
   glm::ivec3 step;
   glm::dvec3 next(std::numeric_limits<double>::max());
@@ -141,57 +142,71 @@ double CoarseVolume::depth_along(const glm::dvec3& origin, const glm::dvec3& dir
     next[axis] = (cell[axis] + (step[axis] > 0 ? 1 : 0) - origin[axis]) / direction[axis];
     stride[axis] = 1.0 / std::abs(direction[axis]);
   }
-  double depth = 0.0;
   for (;;) {
     const int axis = next.x < next.y ? (next.x < next.z ? 0 : 2) : (next.y < next.z ? 1 : 2);
     const double to = std::min(next[axis], end);
-    depth += std::max(0.0, to - t) * means_[index(cell)];
-    if (next[axis] >= end) return depth;
+    visit(t, std::max(t, to), double(means_[index(cell)]));
+    if (next[axis] >= end) return;
     t = std::max(t, to);
     cell[axis] += step[axis];
-    if (cell[axis] < 0 || cell[axis] >= size_[axis]) return depth;
+    if (cell[axis] < 0 || cell[axis] >= size_[axis]) return;
     next[axis] += stride[axis];
   }
 }
 
-std::vector<CoarseVolume::Ray> CoarseVolume::rays() const {
-  glm::ivec3 low = size_;
-  glm::ivec3 high(-1);
+double CoarseVolume::depth_along(const glm::dvec3& origin, const glm::dvec3& direction) const {
+  double depth = 0.0;
+  walk(origin, direction, [&](double from, double to, double mean) { depth += (to - from) * mean; });
+  return depth;
+}
+
+std::optional<CoarseVolume::Box> CoarseVolume::occupied() const {
+  Box box{size_, glm::ivec3(-1)};
   for (glm::ivec3 c(0); c.z < size_.z; ++c.z) {
     for (c.y = 0; c.y < size_.y; ++c.y) {
       for (c.x = 0; c.x < size_.x; ++c.x) {
         if (!(means_[index(c)] > 0.0F)) continue;
-        low = glm::min(low, c);
-        high = glm::max(high, c);
+        box.low = glm::min(box.low, c);
+        box.high = glm::max(box.high, c);
       }
     }
   }
-  if (high.x < 0) return {};
+  if (box.high.x < 0) return std::nullopt;
+  return box;
+}
+
+CoarseVolume::Sheet CoarseVolume::sheet(const Box& box, const glm::dvec3& direction, int rays) const {
+  Sheet sheet;
+  sheet.u = glm::normalize(
+      glm::cross(direction, std::abs(direction.y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0)));
+  sheet.v = glm::cross(direction, sheet.u);
+  sheet.least = glm::dvec2(std::numeric_limits<double>::max());
+  glm::dvec2 most(std::numeric_limits<double>::lowest());
+  for (int corner = 0; corner < 8; ++corner) {
+    glm::dvec3 p;
+    for (int axis = 0; axis < 3; ++axis) p[axis] = ((corner >> axis) & 1) != 0 ? box.high[axis] + 1 : box.low[axis];
+    const glm::dvec3 world(to_world_ * glm::dvec4(p, 1.0));
+    const glm::dvec2 at(glm::dot(world, sheet.u), glm::dot(world, sheet.v));
+    sheet.least = glm::min(sheet.least, at);
+    most = glm::max(most, at);
+  }
+  sheet.pixel = (most - sheet.least) / double(rays);
+  return sheet;
+}
+
+std::vector<CoarseVolume::Ray> CoarseVolume::rays() const {
+  const std::optional<Box> box = occupied();
+  if (!box) return {};
   const glm::dmat4 from_world = glm::inverse(to_world_);
   std::vector<Ray> all(std::size_t{directions} * rays_a_side * rays_a_side);
   tbb::parallel_for(0, directions, [&](int d) {
-    // One half of the sphere: a ray has no sense.
-    const glm::dvec3 direction = direction_of(d, 2 * directions);
-    const glm::dvec3 u = glm::normalize(
-        glm::cross(direction, std::abs(direction.y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0)));
-    const glm::dvec3 v = glm::cross(direction, u);
-    glm::dvec2 least(std::numeric_limits<double>::max());
-    glm::dvec2 most(std::numeric_limits<double>::lowest());
-    for (int corner = 0; corner < 8; ++corner) {
-      glm::dvec3 p;
-      for (int axis = 0; axis < 3; ++axis) p[axis] = ((corner >> axis) & 1) != 0 ? high[axis] + 1 : low[axis];
-      const glm::dvec3 world(to_world_ * glm::dvec4(p, 1.0));
-      least = glm::min(least, glm::dvec2(glm::dot(world, u), glm::dot(world, v)));
-      most = glm::max(most, glm::dvec2(glm::dot(world, u), glm::dot(world, v)));
-    }
-    const glm::dvec2 pixel = (most - least) / double(rays_a_side);
+    const glm::dvec3 direction = direction_of(d);
+    const Sheet from = sheet(*box, direction, rays_a_side);
     const glm::dvec3 along(from_world * glm::dvec4(direction, 0.0));
     for (int i = 0; i < rays_a_side * rays_a_side; ++i) {
-      const glm::ivec2 ray(i % rays_a_side, i / rays_a_side);
-      const glm::dvec2 at = least + pixel * (glm::dvec2(ray) + 0.5);
-      const glm::dvec3 origin(from_world * glm::dvec4(u * at.x + v * at.y, 1.0));
+      const glm::dvec3 origin(from_world * glm::dvec4(from.centre(i % rays_a_side, i / rays_a_side), 1.0));
       all[static_cast<std::size_t>(d) * rays_a_side * rays_a_side + static_cast<std::size_t>(i)] = {
-          depth_along(origin, along), pixel.x * pixel.y};
+          depth_along(origin, along), from.pixel.x * from.pixel.y};
     }
   });
   std::erase_if(all, [](const Ray& ray) { return !(ray.depth > 0.0); });
@@ -236,73 +251,43 @@ std::optional<double> CoarseVolume::suggest_density_scale() const {
   return std::clamp(rounded, 1e-30, 1e30);
 }
 
-std::vector<glm::dvec3> CoarseVolume::visible_hull(double density_scale) const {
-  // Columns of cells along each axis: their depth.
-  std::array<std::vector<double>, 3> columns;
-  const auto column = [&](int axis, const glm::ivec3& c) {
-    const int a = axis == 0 ? 1 : 0;
-    const int b = axis == 2 ? 1 : 2;
-    return static_cast<std::size_t>(c[b]) * static_cast<std::size_t>(size_[a]) + static_cast<std::size_t>(c[a]);
-  };
-  glm::dvec3 edge;
-  for (int axis = 0; axis < 3; ++axis) {
-    edge[axis] = glm::length(glm::dvec3(to_world_[axis]));
-    const std::size_t cells = means_.size();
-    columns[static_cast<std::size_t>(axis)].resize(cells == 0 ? 0 : cells / static_cast<std::size_t>(size_[axis]));
-  }
-  const auto for_cells = [&](auto&& f) {
-    for (glm::ivec3 c(0); c.z < size_.z; ++c.z) {
-      for (c.y = 0; c.y < size_.y; ++c.y) {
-        for (c.x = 0; c.x < size_.x; ++c.x) {
-          if (const float mean = means_[index(c)]; mean > 0.0F) f(c, mean);
+std::vector<glm::dvec3> CoarseVolume::visible(const glm::dvec3& direction, double density_scale) const {
+  const std::optional<Box> box = occupied();
+  if (!box || !(density_scale > 0.0)) return {};
+  const glm::dmat4 from_world = glm::inverse(to_world_);
+  const glm::dvec3 along(from_world * glm::dvec4(direction, 0.0));
+  const Sheet from = sheet(*box, direction, rays_a_side_of_view);
+  const double least = visible_depth / density_scale;
+  const glm::dvec3 u = 0.5 * from.pixel.x * from.u;
+  const glm::dvec3 v = 0.5 * from.pixel.y * from.v;
+  std::array<std::vector<glm::dvec3>, rays_a_side_of_view> rows;
+  tbb::parallel_for(0, rays_a_side_of_view, [&](int y) {
+    for (int x = 0; x < rays_a_side_of_view; ++x) {
+      const glm::dvec3 centre = from.centre(x, y);
+      const glm::dvec3 origin(from_world * glm::dvec4(centre, 1.0));
+      const double depth = depth_along(origin, along);
+      if (!(depth >= least)) continue;
+      // Half of what is least from either end: what lies further out is too thin.
+      std::array<double, 2> ends{};
+      double sum = 0.0;
+      walk(origin, along, [&](double t0, double t1, double mean) {
+        const double next = sum + (t1 - t0) * mean;
+        for (int end = 0; end < 2; ++end) {
+          const double wanted = end == 0 ? 0.5 * least : depth - 0.5 * least;
+          if (sum < wanted && next >= wanted) ends.at(static_cast<std::size_t>(end)) = t0 + (wanted - sum) / mean;
         }
+        sum = next;
+      });
+      for (const double t : ends) {
+        const glm::dvec3 p = centre + t * direction;
+        rows.at(static_cast<std::size_t>(y))
+            .insert(rows.at(static_cast<std::size_t>(y)).end(), {p - u - v, p + u - v, p - u + v, p + u + v});
       }
     }
-  };
-  for_cells([&](const glm::ivec3& c, float mean) {
-    for (int axis = 0; axis < 3; ++axis)
-      columns[static_cast<std::size_t>(axis)][column(axis, c)] += density_scale * mean * edge[axis];
   });
-  // The ends of every row of visible cells: the hull needs no more.
-  std::vector<glm::dvec3> corners;
-  for (const double least : {visible_depth, 0.0}) {
-    std::vector<std::array<int, 2>> ends(columns[0].size(), {std::numeric_limits<int>::max(), -1});
-    for_cells([&](const glm::ivec3& c, float) {
-      int opaque = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        opaque += columns[static_cast<std::size_t>(axis)][column(axis, c)] >= least ? 1 : 0;
-      if (opaque < 2) return;
-      auto& [first, last] = ends[column(0, c)];
-      first = std::min(first, c.x);
-      last = std::max(last, c.x);
-    });
-    for (int z = 0; z < size_.z; ++z) {
-      for (int y = 0; y < size_.y; ++y) {
-        const auto [first, last] = ends[column(0, {0, y, z})];
-        if (last < 0) continue;
-        for (int corner = 0; corner < 8; ++corner) {
-          const glm::dvec3 p((corner & 1) != 0 ? last + 1 : first, y + ((corner >> 1) & 1), z + (corner >> 2));
-          corners.emplace_back(to_world_ * glm::dvec4(p, 1.0));
-        }
-      }
-    }
-    if (!corners.empty()) break;
-  }
-  if (corners.empty()) return {};
-  std::vector<glm::dvec3> hull;
-  for (int d = 0; d < hull_directions + 6; ++d) {
-    glm::dvec3 direction(0.0);
-    if (d < hull_directions) {
-      direction = direction_of(d, hull_directions);
-    } else {  // the bounds, exactly
-      direction[(d - hull_directions) / 2] = (d & 1) != 0 ? 1.0 : -1.0;
-    }
-    const glm::dvec3 furthest = *std::max_element(
-        corners.begin(), corners.end(),
-        [&](const glm::dvec3& a, const glm::dvec3& b) { return glm::dot(a, direction) < glm::dot(b, direction); });
-    if (std::find(hull.begin(), hull.end(), furthest) == hull.end()) hull.push_back(furthest);
-  }
-  return hull;
+  std::vector<glm::dvec3> points;
+  for (const auto& row : rows) points.insert(points.end(), row.begin(), row.end());
+  return points;
 }
 
 }  // namespace cumulet::volume

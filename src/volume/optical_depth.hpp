@@ -24,15 +24,30 @@ class CoarseVolume {
   /// must. Nothing for a volume without extinction.
   [[nodiscard]] std::optional<double> suggest_density_scale() const;
 
-  /// World space points whose convex hull is about that of what can be seen at this density scale: of the cells that
-  /// lie, along two axes of the grid or more, in columns of an opacity of at least 5 %; if there are none, of all that
-  /// is not zero. Empty if all is.
-  [[nodiscard]] std::vector<glm::dvec3> visible_hull(double density_scale) const;
+  /// World-space points about what is seen of it along this direction (unit) at this density scale: of every ray whose
+  /// opacity is at least 5 %, what lies between the half of that from one end and from the other. The same against the
+  /// direction. Empty if there is no such ray.
+  [[nodiscard]] std::vector<glm::dvec3> visible(const glm::dvec3& direction, double density_scale) const;
 
  private:
   struct Ray {
     double depth;
     double area;
+  };
+  /// Cells, both inclusive.
+  struct Box {
+    glm::ivec3 low;
+    glm::ivec3 high;
+  };
+  /// Parallel rays, one through the middle of each pixel of a plane through the origin.
+  struct Sheet {
+    glm::dvec3 u;  ///< unit, as v; both at right angles to the rays
+    glm::dvec3 v;
+    glm::dvec2 least;  ///< the first pixel's corner, along u and v
+    glm::dvec2 pixel;
+    [[nodiscard]] glm::dvec3 centre(int x, int y) const {
+      return u * (least.x + (x + 0.5) * pixel.x) + v * (least.y + (y + 0.5) * pixel.y);
+    }
   };
 
   [[nodiscard]] std::size_t index(glm::ivec3 cell) const {
@@ -40,7 +55,15 @@ class CoarseVolume {
                static_cast<std::size_t>(size_.x) +
            static_cast<std::size_t>(cell.x);
   }
+  /// visit(from, to, mean) for each cell that the ray meets, near ones first; from and to are in the direction's
+  /// lengths.
+  template <class Visit>
+  void walk(const glm::dvec3& origin, const glm::dvec3& direction, Visit&& visit) const;
   [[nodiscard]] double depth_along(const glm::dvec3& origin, const glm::dvec3& direction) const;
+  /// Of all that is not zero.
+  [[nodiscard]] std::optional<Box> occupied() const;
+  /// So many rays a side, over all of the box.
+  [[nodiscard]] Sheet sheet(const Box& box, const glm::dvec3& direction, int rays) const;
   [[nodiscard]] std::vector<Ray> rays() const;
 
   glm::ivec3 size_{0};

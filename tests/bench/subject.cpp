@@ -40,6 +40,7 @@ viewer::Light bench_light() {
 Subject::Subject(headless::Context& context, viewer::VolumePtr volume, Kind kind, const Options& options,
                  double density_scale)
     : kind_(kind), size_(options.size), albedo_(options.albedo), density_scale_(density_scale), still_(context) {
+  still_.viewer().camera()->frame(volume->bounds(), 1.0);
   still_.set_volume(std::move(volume));
   still_.set_light(bench_light());
   viewer::GridSettings settings;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <glm/ext/matrix_clip_space.hpp>
@@ -14,6 +15,7 @@
 #include <numbers>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -35,6 +37,7 @@ using cumulet::viewer::InputEvent;
 using cumulet::viewer::Navigation;
 using cumulet::viewer::NavigationSettings;
 using cumulet::viewer::NavigationStyle;
+using cumulet::viewer::Subject;
 using cumulet::viewer::ViewFrame;
 using glm::dmat4;
 using glm::dvec2;
@@ -401,27 +404,6 @@ TEST(CameraMatrices, RefuseWhatIsNoViewOrNoProjection) {
 
 // ---- Fitting
 
-/// What version 0.1 did, word for word.
-dvec3 placed_by_0_1(const Bounds& box, double fovy_degrees, unsigned width, unsigned height) {
-  const dvec3 target = 0.5 * (box.min + box.max);
-  const dvec3 back = glm::normalize(dvec3(0.0, 0.2, 1.0));
-  const dvec3 eye = target + back;
-  const dvec3 ahead = glm::normalize(target - eye);
-  const dvec3 right = glm::normalize(glm::cross(ahead, dvec3(0.0, 1.0, 0.0)));
-  const dvec3 up = glm::cross(right, ahead);
-  const double tan_y = std::tan(0.5 * (fovy_degrees * std::numbers::pi / 180.0));
-  const double tan_x = tan_y * width / height;
-  double far = 1e-30;
-  for (int corner = 0; corner < 8; ++corner) {
-    const dvec3 p((corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
-                  (corner & 4) != 0 ? box.max.z : box.min.z);
-    const dvec3 q = p - target;
-    const double wide = std::max(std::abs(glm::dot(q, right)) / tan_x, std::abs(glm::dot(q, up)) / tan_y);
-    far = std::max(far, glm::dot(q, back) + wide);
-  }
-  return target + back * far;
-}
-
 double widest(const Camera& camera, const Bounds& box, double aspect) {
   double wide = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
@@ -435,30 +417,83 @@ double widest(const Camera& camera, const Bounds& box, double aspect) {
   return wide;
 }
 
-TEST(CameraFit, IsThatOfVersion01ToTheBit) {
+/// How far inside the picture's edges the box is, as fractions of the picture's shorter side: left, right, below,
+/// above.
+std::array<double, 4> margins(const Camera& camera, const Bounds& box, double aspect) {
+  dvec2 least(infinity);
+  dvec2 most(-infinity);
+  for (int corner = 0; corner < 8; ++corner) {
+    const dvec3 p((corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
+                  (corner & 4) != 0 ? box.max.z : box.min.z);
+    const dvec2 at(project(camera, p, aspect));
+    least = glm::min(least, at);
+    most = glm::max(most, at);
+  }
+  const dvec2 side = 0.5 * dvec2(aspect, 1.0) / std::min(aspect, 1.0);
+  return {(least.x + 1.0) * side.x, (1.0 - most.x) * side.x, (least.y + 1.0) * side.y, (1.0 - most.y) * side.y};
+}
+
+TEST(CameraFit, LeavesTheSameMarginOnBothOfTheTighterSides) {
   Random random;
   for (int i = 0; i < 200; ++i) {
     const dvec3 corner = random.vector(100.0);
-    const Bounds box{corner, corner + glm::abs(random.vector(50.0))};
-    CameraPose pose;
-    pose.fovy_degrees = i % 2 == 0 ? 40.0 : random(5.0, 120.0);
+    const Bounds box{corner, corner + 1.0 + glm::abs(random.vector(50.0))};
+    CameraPose pose = i % 4 < 2 ? CameraPose() : random_pose(random);
+    pose.fovy_degrees = i % 2 == 0 ? 40.0 : random(5.0, 80.0);
+    if (i % 3 == 0) pose.orthographic_height = 1.0;
+    const double aspect = random(0.2, 5.0);
     Camera camera(pose);
-    const unsigned width = 100 + 37 * static_cast<unsigned>(i);
-    const unsigned height = 128U << (i % 4);  // a power of two: no rounding in the aspect ratio
-    const ViewFrame frame = camera.view(static_cast<double>(width) / height, box);
-    EXPECT_EQ(frame.eye, placed_by_0_1(box, pose.fovy_degrees, width, height));
-    EXPECT_EQ(camera.pose().eye, frame.eye);
-    EXPECT_EQ(camera.pose().target, 0.5 * (box.min + box.max));
+    if (i % 4 < 2) {
+      static_cast<void>(camera.view(aspect, box));
+      EXPECT_LT(angle(forward(camera.pose()), dvec3(0.0, -0.2, -1.0)), 1e-9);
+    } else {
+      camera.fit(box, aspect);
+      EXPECT_LT(angle(forward(camera.pose()), forward(pose)), 1e-7);
+    }
+    EXPECT_EQ(camera.pose().orthographic_height > 0.0, i % 3 == 0);
+    const auto [left, right, below, above] = margins(camera, box, aspect);
+    const bool by_width = left < below;
+    EXPECT_NEAR(by_width ? left : below, 0.06, 1e-9);
+    EXPECT_NEAR(by_width ? right : above, 0.06, 1e-9);
+    EXPECT_GT(by_width ? below : left, 0.06 - 1e-9);
+    EXPECT_GT(by_width ? above : right, 0.06 - 1e-9);
   }
 }
 
-TEST(CameraFit, AnyPictureShapeToWithinRounding) {
-  const Bounds box{dvec3(-3, 1, 2), dvec3(5, 4, 7)};
-  for (const auto& [width, height] : {std::pair{96U, 72U}, {1280U, 720U}, {333U, 777U}, {1U, 16384U}}) {
-    Camera camera;
-    const ViewFrame frame = camera.view(static_cast<double>(width) / height, box);
-    const dvec3 expected = placed_by_0_1(box, 40.0, width, height);
-    expect_near(frame.eye, expected, 1e-14 * glm::length(expected));
+TEST(CameraFit, IsOfWhatIsSeen) {
+  // A ball in a box: its reach is its own.
+  const dvec3 centre(3, -2, 5);
+  const double radius = 2.0;
+  Subject subject(Bounds{dvec3(-20), dvec3(20)});
+  dvec3 asked(0.0);
+  subject.reach = [&](const dvec3& direction, std::span<const dvec3> normals) {
+    asked = direction;
+    std::vector<double> reach;
+    for (const dvec3& n : normals) reach.push_back(glm::dot(centre, n) + radius * glm::length(n));
+    return reach;
+  };
+  Random random;
+  for (int i = 0; i < 50; ++i) {
+    CameraPose pose = random_pose(random);
+    if (i % 2 == 1) pose.orthographic_height = 1.0;
+    const double aspect = random(0.3, 3.0);
+    Camera camera(pose);
+    camera.fit(subject, aspect);
+    const CameraPose fitted = camera.pose();
+    EXPECT_LT(std::abs(glm::dot(asked, forward(fitted))), 1.0 + 1e-12);
+    EXPECT_GT(std::abs(glm::dot(asked, forward(fitted))), 1.0 - 1e-12);
+    expect_near(fitted.target, centre, 1e-9);
+    const double half = std::tan(0.5 * fitted.fovy_degrees * pi / 180.0);
+    const double reach = i % 2 == 1 ? radius / (0.5 * fitted.orthographic_height)
+                                    : std::tan(std::asin(radius / distance(fitted))) / half;
+    EXPECT_NEAR(reach, 0.88 * std::min(aspect, 1.0), 1e-9);
+    // Of nothing seen: the bounds.
+    Subject unseen(subject.bounds);
+    unseen.reach = [](const dvec3&, std::span<const dvec3>) { return std::vector<double>(); };
+    camera.fit(unseen, aspect);
+    Camera plain(pose);
+    plain.fit(subject.bounds, aspect);
+    expect_near(camera.pose().eye, plain.pose().eye, 1e-6);
   }
 }
 
@@ -476,7 +511,7 @@ TEST(CameraFit, IsForGoodAndCountsAsAChange) {
   EXPECT_EQ(camera.revision(), 2U);
   EXPECT_EQ(camera.view(1.0, Bounds{dvec3(-9), dvec3(9)}), frame);
   EXPECT_EQ(camera.revision(), 2U);
-  EXPECT_NEAR(widest(camera, box, 1.0), 1.0, 1e-9);
+  EXPECT_NEAR(widest(camera, box, 1.0), 0.88, 1e-9);
 }
 
 TEST(CameraFit, WaitingCamerasStayUntilThereIsSomethingToTurnAbout) {
@@ -494,10 +529,11 @@ TEST(CameraFit, WaitingCamerasStayUntilThereIsSomethingToTurnAbout) {
   camera.toggle_orthographic(std::nullopt);
   const Bounds box{dvec3(-1, -2, -1), dvec3(2, 5, 1)};
   EXPECT_TRUE(camera.view(1.0, box).orthographic);
-  EXPECT_NEAR(widest(camera, box, 1.0), 1.0, 1e-9);
+  EXPECT_NEAR(widest(camera, box, 1.0), 0.88, 1e-9);
   Camera framed;
   framed.frame(box, 1.0);
-  EXPECT_EQ(framed.pose().eye, placed_by_0_1(box, 40.0, 512, 512));
+  EXPECT_LT(angle(forward(framed.pose()), dvec3(0.0, -0.2, -1.0)), 1e-9);
+  EXPECT_NEAR(widest(framed, box, 1.0), 1.0, 1e-9);
 }
 
 TEST(CameraFrame, FillsThePictureFromTheDirectionItHad) {
@@ -512,18 +548,26 @@ TEST(CameraFrame, FillsThePictureFromTheDirectionItHad) {
     Camera camera(pose);
     camera.frame(box, aspect);
     EXPECT_LT(angle(forward(camera.pose()), forward(pose)), 1e-9);
-    EXPECT_EQ(camera.pose().target, 0.5 * (box.min + box.max));
+    // As deep in the picture as the box's middle.
+    EXPECT_NEAR(glm::dot(camera.pose().target - 0.5 * (box.min + box.max), forward(pose)), 0.0, 1e-9);
     EXPECT_EQ(camera.pose().orthographic_height > 0.0, i % 2 == 1);
     double wide = 0.0;
+    double nearest = infinity;
+    double farthest = 0.0;
     for (int c = 0; c < 8; ++c) {
       const dvec3 p((c & 1) != 0 ? box.max.x : box.min.x, (c & 2) != 0 ? box.max.y : box.min.y,
                     (c & 4) != 0 ? box.max.z : box.min.z);
       const dvec3 at = project(camera, p, aspect);
       wide = std::max({wide, std::abs(at.x), std::abs(at.y)});
-      EXPECT_GT(glm::dot(p - camera.pose().eye, forward(pose)), 0.0);
+      nearest = std::min(nearest, glm::dot(p - camera.pose().eye, forward(pose)));
+      farthest = std::max(farthest, glm::dot(p - camera.pose().eye, forward(pose)));
       EXPECT_TRUE(i % 2 == 0 || at.z >= 0.0);
     }
-    EXPECT_NEAR(wide, 1.0, 1e-9);
+    EXPECT_LT(wide, 1.0 + 1e-9);
+    // But for wide angles on a corner: not nearer than a fiftieth of its depth.
+    const double least = 0.02 * (farthest - nearest);
+    EXPECT_TRUE(i % 2 == 1 || nearest > (1.0 - 1e-9) * least);
+    EXPECT_TRUE(nearest <= (1.0 + 1e-9) * least || std::abs(wide - 1.0) < 1e-9) << wide;
   }
   // A point: as near as before, and never upon it.
   for (const double height : {0.0, 3.0}) {
@@ -1273,7 +1317,7 @@ TEST(Navigation, WithoutAPictureDragsMoveNothing) {
   EXPECT_EQ(session.camera.revision(), 1U);
   EXPECT_TRUE(session.press('F'));
   session.navigation.input({InputEvent::Type::key_down, 0, 0, 0, 0, 'F', 0}, session.camera, 0.0, 0.0, session.bounds);
-  EXPECT_NEAR(widest(session.camera, *session.bounds, 1.0), 1.0, 1e-9);
+  EXPECT_NEAR(widest(session.camera, *session.bounds, 1.0), 0.88, 1e-9);
 }
 
 TEST(Navigation, KeysFrameAll) {
@@ -1285,7 +1329,7 @@ TEST(Navigation, KeysFrameAll) {
         session.camera.set(pose_at({30, 40, 100}, {30, 0, 0}));
         const dvec3 ahead = forward(session.camera.pose());
         EXPECT_TRUE(session.press(key));
-        EXPECT_NEAR(widest(session.camera, *session.bounds, width / height), 1.0, 1e-9);
+        EXPECT_NEAR(widest(session.camera, *session.bounds, width / height), 0.88, 1e-9);
         EXPECT_LT(angle(forward(session.camera.pose()), ahead), 1e-9);
         session.lift(key);
         EXPECT_FALSE(session.press(key, ctrl));  // a host's own shortcut

@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "base/error.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/surfaces.hpp"
 #include "support/volumes.hpp"
 
 extern "C" const char* __lsan_default_suppressions();
@@ -16,6 +18,7 @@ namespace {
 
 using namespace cumulet;
 using glm::dvec3;
+using glm::ivec2;
 using glm::ivec3;
 using glm::vec3;
 
@@ -147,6 +150,74 @@ TEST_P(ViewerFrames, NoVolumeShowsNothingAgain) {
 }
 
 // A slab of 16 voxels, from z = -0.5 to 15.5.
+/// The box of the pixels that are opaque; high is exclusive.
+struct Silhouette {
+  ivec2 low{1 << 20};
+  ivec2 high{0};
+};
+
+TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
+  // A ball of radius 10, away from the middle of a box that is all but empty.
+  const auto ball = [](const ivec3& p) { return glm::distance(vec3(p), vec3(50, 24, 30)) < 10.0F ? 1.0F : 1e-5F; };
+  still_->set_volume(test::make_volume({80, 60, 70}, ivec3(0), ball));
+  viewer().set_medium({3.0, vec3(1.0F), 0.0F, 1});
+  viewer().set_light({0.0F, 90.0F, vec3(1.0F), vec3(0.0F)});
+  viewer::DisplaySettings display;
+  display.transparent = true;
+  viewer().set_display(display);
+  viewer().set_sampling({16, 1, render::View::shaded, false});
+  still_->build();
+  const auto expect_fitted = [&](glm::uvec2 size) {
+    converge(frame(size.x, size.y));
+    const std::vector<float> rgba = read(size);
+    Silhouette seen;
+    for (int y = 0; y < static_cast<int>(size.y); ++y) {
+      for (int x = 0; x < static_cast<int>(size.x); ++x) {
+        if (rgba[4 * static_cast<std::size_t>(y * static_cast<int>(size.x) + x) + 3] < 0.25F) continue;
+        seen.low = glm::min(seen.low, ivec2(x, y));
+        seen.high = glm::max(seen.high, ivec2(x, y) + 1);
+      }
+    }
+    const ivec2 wide = seen.high - seen.low;
+    const double share = double(std::min(wide.x, wide.y)) / std::min(size.x, size.y);
+    EXPECT_GT(share, 0.84);
+    EXPECT_LT(share, 0.95);
+    const ivec2 off = glm::abs(seen.low + seen.high - ivec2(size));
+    EXPECT_LE(std::max(off.x, off.y), 4) << "not in the middle";
+  };
+  expect_fitted({120, 90});  // a camera that waited
+  for (const dvec3& back : {dvec3(1, 0, 0), dvec3(-1, 2, 0.5), dvec3(0.3, -1, -1)}) {
+    for (const double height : {0.0, 7.0}) {
+      viewer::CameraPose pose;
+      pose.eye = 100.0 * back;
+      pose.orthographic_height = height;
+      viewer().camera()->set(pose);
+      converge(frame(90, 100));  // tells the size
+      viewer().frame_all();
+      expect_fitted({90, 100});
+    }
+  }
+
+  // Nothing that is seen: the bounds.
+  viewer().set_medium({1e-6, vec3(1.0F), 0.0F, 1});
+  viewer().frame_all();
+  viewer::Camera plain(viewer().camera()->pose());
+  plain.fit(viewer().bounds(), 0.9);
+  EXPECT_LT(glm::distance(viewer().camera()->pose().eye, plain.pose().eye), 1e-6);
+
+  // Surfaces, with the ball and without it.
+  auto scene = std::make_shared<test::StillScene>();
+  scene->add_sphere(vec3(20, 24, 30), 10.0F, scene->add(test::diffuse(vec3(0.5F))));
+  viewer().show_surfaces(test::source_of(scene));
+  converge(frame(90, 100));
+  viewer().camera()->set(test::camera_at({50, 24, 400}, {50, 24, 0}));
+  viewer().frame_all();
+  EXPECT_NEAR(viewer().camera()->pose().target.x, 20.0, 0.5);
+  viewer().set_medium({3.0, vec3(1.0F), 0.0F, 1});
+  viewer().frame_all();
+  EXPECT_NEAR(viewer().camera()->pose().target.x, 35.0, 0.5);
+}
+
 class ViewerSlab : public ViewerFrames {
  protected:
   void SetUp() override {

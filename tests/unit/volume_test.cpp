@@ -866,25 +866,53 @@ TEST(DensityScale, HeedsNeitherHazeNorSpecks) {
   EXPECT_NEAR(suggested(made_of(64, specks)), plain, 0.05 * plain);
 }
 
-TEST(VisibleHull, LeavesOutWhatIsTooThinToSee) {
-  const auto bounds = [](const ScalarVolume& volume, double scale) {
-    const auto hull = cumulet::volume::CoarseVolume(volume).visible_hull(scale);
-    std::array<glm::dvec3, 2> box{glm::dvec3(1e30), glm::dvec3(-1e30)};
-    for (const auto& p : hull) box = {glm::min(box[0], p), glm::max(box[1], p)};
-    return box;
-  };
+/// How far what is seen along direction reaches along each axis of the world.
+std::array<glm::dvec3, 2> seen(const ScalarVolume& volume, const glm::dvec3& direction, double scale) {
+  std::array<glm::dvec3, 2> box{glm::dvec3(1e30), glm::dvec3(-1e30)};
+  for (const auto& p : cumulet::volume::CoarseVolume(volume).visible(direction, scale))
+    box = {glm::min(box[0], p), glm::max(box[1], p)};
+  return box;
+}
+
+TEST(Visible, IsWhatIsOpaqueAndNoHazeBesideBeforeOrBehindIt) {
   const auto haze = [](glm::vec3 p) { return glm::length(p - glm::vec3(0.3F, 0, 0)) < 0.5F ? 1.0F : 1e-5F; };
+  const auto turn = glm::rotate(glm::dmat4(1.0), 0.7, glm::normalize(glm::dvec3(1, 2, 3)));
+  for (const glm::dmat4& to_world : {glm::dmat4(1.0), turn, glm::scale(turn, glm::dvec3(0.5))}) {
+    const auto volume = made_of(64, haze, to_world);
+    // Voxel i is centred on i: the ball is from 25.1 to 57.1 in x, from 15.5 to 47.5 in y and z.
+    const glm::dvec3 centre(to_world * glm::dvec4(41.1, 31.5, 31.5, 1.0));
+    const double voxel = glm::length(glm::dvec3(to_world[0]));
+    for (const glm::dvec3& direction : {glm::dvec3(0, 0, 1), glm::dvec3(-1, 0, 0), glm::normalize(glm::dvec3(1, 1, 1)),
+                                        glm::normalize(glm::dvec3(-0.3, 0.8, 0.1))}) {
+      const auto points = cumulet::volume::CoarseVolume(volume).visible(direction, 1.0 / voxel);
+      ASSERT_FALSE(points.empty());
+      // Aside and along: as far as the ball, to a voxel.
+      const glm::dvec3 u = glm::normalize(glm::cross(direction, glm::dvec3(0.1, 0.2, 0.7)));
+      for (const glm::dvec3& n : {u, -u, glm::cross(u, direction), direction, -direction}) {
+        double reach = -1e30;
+        for (const auto& p : points) reach = std::max(reach, glm::dot(p - centre, n));
+        EXPECT_NEAR(reach, 16.0 * voxel, 1.3 * voxel);
+      }
+    }
+  }
+}
+
+TEST(Visible, ChangesWithTheDensityScaleAndWithTheSide) {
+  const auto haze = [](glm::vec3 p) { return glm::length(p) < 0.5F ? 1.0F : 1e-5F; };
   const auto volume = made_of(64, haze);
-  // Voxel i is centred on i: the ball is from 25.1 to 57.1 in x, from 15.5 to 47.5 in y and z.
-  const auto [low, high] = bounds(volume, 1.0);
-  EXPECT_NEAR(low.x, 25.1, 1.0);
-  EXPECT_NEAR(high.x, 57.1, 1.0);
-  EXPECT_NEAR(low.z, 15.5, 1.0);
-  EXPECT_NEAR(high.z, 47.5, 1.0);
-  // So dense that the haze is opaque, or so thin that nothing is: all of it.
-  EXPECT_EQ(bounds(volume, 1e4)[0], glm::dvec3(-0.5));
-  EXPECT_EQ(bounds(volume, 1e-9)[1], glm::dvec3(63.5));
-  EXPECT_TRUE(cumulet::volume::CoarseVolume(made_of(8, [](glm::vec3) { return 0.0F; })).visible_hull(1.0).empty());
+  // So dense that the haze is opaque: all of it. So thin that nothing is: nothing.
+  const auto [low, high] = seen(volume, {0, 0, 1}, 1e4);
+  EXPECT_NEAR(low.x, -0.5, 1e-6);
+  EXPECT_NEAR(high.y, 63.5, 1e-6);
+  EXPECT_NEAR(low.z, -0.5, 1.0);
+  const auto nothing = cumulet::volume::CoarseVolume(volume).visible({0, 0, 1}, 1e-9);
+  EXPECT_TRUE(nothing.empty());
+  EXPECT_TRUE(cumulet::volume::CoarseVolume(made_of(8, [](glm::vec3) { return 0.0F; })).visible({1, 0, 0}, 1).empty());
+  // A thin sheet across x, with a ball at its middle: it is seen from its edge alone.
+  const auto sheet = [](glm::vec3 p) { return glm::length(p) < 0.3F ? 1.0F : (std::abs(p.x) < 0.05F ? 0.01F : 0.0F); };
+  const auto flat = made_of(64, sheet);
+  EXPECT_NEAR(seen(flat, {1, 0, 0}, 1.0)[1].y, 31.5 + 0.3 * 32, 1.5);
+  EXPECT_NEAR(seen(flat, {0, 0, 1}, 1.0)[1].y, 63.5, 1.0);
 }
 
 TEST(CoarseVolume, KeepsTheMassOfBricksTilesAndBackground) {

@@ -660,9 +660,11 @@ typedef enum cumulet_clip {
 } cumulet_clip;
 
 /*
- * A pinhole or orthographic camera. eye == target: fits the volume's bounds, from +Z and a little above, as soon as
- * they are known. Near and far plane do not clip the volume: they say what depth buffers mean (d = f (z - n) / (z (f -
- * n)), reversed: 1 - d), and where an orthographic ray begins (at the near plane).
+ * A pinhole or orthographic camera. eye == target: placed once, by the first viewer that renders through it with
+ * something to show, so that it fits what is seen from +Z and a little above. Seen are triangles, and the volume where
+ * its opacity, at the density scale of that moment, is 5 % or more; where nothing is, the bounds. 6 % of the picture's
+ * shorter side, or more, stay free on each side. Near and far plane do not clip the volume: they say what depth buffers
+ * mean (d = f (z - n) / (z (f - n)), reversed: 1 - d), and where an orthographic ray begins (at the near plane).
  */
 typedef struct cumulet_camera_desc {
   size_t struct_size;
@@ -685,7 +687,7 @@ CUMULET_API cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_ca
 CUMULET_API cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_camera** out);
 
 CUMULET_API cumulet_status cumulet_camera_set(cumulet_camera* camera, const cumulet_camera_desc* desc);
-/* A camera that fits the bounds is told as where it came to stand, if a viewer has placed it. */
+/* A camera that fits the scene is told as where it came to stand, if a viewer has placed it. */
 CUMULET_API cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_desc* desc);
 /*
  * The host's own matrices: view is world to eye space (a rotation and a translation), projection any perspective, off
@@ -710,7 +712,8 @@ CUMULET_API cumulet_status cumulet_camera_fly(cumulet_camera* camera, double rig
 /* Keeps the direction and moves so that the box just fills the picture. */
 CUMULET_API cumulet_status cumulet_camera_frame(cumulet_camera* camera, const double box_min[3],
                                                 const double box_max[3], double aspect);
-/* Frames the viewer's volume. */
+/* Keeps the direction and fits what is seen of the viewer's volume and triangles, with the margin of a camera that is
+ * placed (see cumulet_camera_desc). Some milliseconds. */
 CUMULET_API cumulet_status cumulet_frame_all(cumulet_viewer* viewer);
 
 /* Whose habits the mouse follows. In all of them: wheel, + and -: dolly; arrows: orbit by 15 degrees (shift: pan);
