@@ -350,13 +350,10 @@ void Session::finish_load() {
     static_cast<std::vector<GridInfo>*>(user)->push_back({name, type, refusal});
   };
   status_.grid = shown_volume_.grid_name;
-  cumulet_volume* volume = nullptr;
   cumulet_volume_info info{};
   info.struct_size = sizeof info;
-  if (check(cumulet_get_volume(viewer_.get(), &volume)) && volume != nullptr &&
-      cumulet_volume_get_info(volume, &info) == CUMULET_OK)
+  if (const VolumePtr volume = shown(); volume && cumulet_volume_get_info(volume.get(), &info) == CUMULET_OK)
     status_.grid = info.name;
-  cumulet_volume_release(volume);
   std::array<char, 512> error{};
   if (cumulet_list_grids(shown_volume_.file.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
     tell(true, error.data());
@@ -374,18 +371,21 @@ void Session::input(const ViewerInput& input) {
   if (!taken && input.event.type == CUMULET_EVENT_KEY_DOWN) move_by_keys(input.key);
 }
 
-void Session::suggest_density() {
+Session::VolumePtr Session::shown() {
   cumulet_volume* volume = nullptr;
-  if (!check(cumulet_get_volume(viewer_.get(), &volume)) || volume == nullptr) return;
+  check(cumulet_get_volume(viewer_.get(), &volume));
+  return VolumePtr(volume);
+}
+
+void Session::suggest_density() {
+  const VolumePtr volume = shown();
   double scale = 0.0;
   // What shows nothing at any scale keeps the one it has.
-  if (cumulet_volume_suggest_density_scale(volume, &scale) == CUMULET_OK) {
-    density_scale_ = scale;
-    // At once: what is fitted next depends on it.
-    known_->medium.density_scale = scale;
-    check(cumulet_set_medium(viewer_.get(), &known_->medium));
-  }
-  cumulet_volume_release(volume);
+  if (!volume || cumulet_volume_suggest_density_scale(volume.get(), &scale) != CUMULET_OK) return;
+  density_scale_ = scale;
+  // At once: what is fitted next depends on it.
+  known_->medium.density_scale = scale;
+  check(cumulet_set_medium(viewer_.get(), &known_->medium));
 }
 
 void Session::move_by_keys(int key) {

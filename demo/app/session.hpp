@@ -112,6 +112,10 @@ class Session {
   struct ReleaseCamera {
     void operator()(cumulet_camera* camera) const { cumulet_camera_release(camera); }
   };
+  struct ReleaseVolume {
+    void operator()(cumulet_volume* volume) const { cumulet_volume_release(volume); }
+  };
+  using VolumePtr = std::unique_ptr<cumulet_volume, ReleaseVolume>;
   struct Shared {  // with the callbacks, from any thread
     std::function<void()> wake;
     std::mutex mutex;
@@ -135,6 +139,8 @@ class Session {
   void see_camera();
   void move_by_keys(int key);
   void measure_noise();
+  /// The viewer's volume, or none.
+  VolumePtr shown();
   void suggest_density();
   /// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
   [[nodiscard]] image::Image read_display();

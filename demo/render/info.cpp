@@ -20,38 +20,45 @@ struct Release {
   void operator()(cumulet_inspection* inspection) const { cumulet_inspection_release(inspection); }
   void operator()(cumulet_surfaces* surfaces) const { cumulet_surfaces_release(surfaces); }
 };
-using Inspection = std::unique_ptr<cumulet_inspection, Release>;
-using Surfaces = std::unique_ptr<cumulet_surfaces, Release>;
+template <class Handle>
+using Owner = std::unique_ptr<Handle, Release>;
 
 void check(cumulet_status status) {
   if (status != CUMULET_OK) throw std::runtime_error(cumulet_status_text(status));
 }
 
-Inspection inspect(const std::string& path) {
+/// What one of the library's openers makes of a file.
+template <class Handle>
+Owner<Handle> open(cumulet_status (*opener)(const char*, Handle**, char*, std::size_t), const std::string& path) {
   std::array<char, 1024> error{};
-  cumulet_inspection* inspection = nullptr;
-  if (cumulet_inspect_volume_file(path.c_str(), &inspection, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  return Inspection(inspection);
+  Handle* handle = nullptr;
+  if (opener(path.c_str(), &handle, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
+  return Owner<Handle>(handle);
+}
+
+/// What the library tells in a descriptor: of which thing, and which one of it.
+template <class Desc, class Get, class... Which>
+Desc told(Get get, Which... which) {
+  Desc desc{};
+  desc.struct_size = sizeof desc;
+  check(get(which..., &desc));
+  return desc;
 }
 
 /// grid -1: of the file as a whole.
-Json metadata_of(const Inspection& inspection, std::int32_t grid, std::uint32_t count) {
+Json metadata_of(const cumulet_inspection* inspection, std::int32_t grid, std::uint32_t count) {
   Json list = Json::array();
-  cumulet_metadata entry{};
-  entry.struct_size = sizeof entry;
   for (std::uint32_t i = 0; i < count; ++i) {
-    check(cumulet_inspection_get_metadata(inspection.get(), grid, i, &entry));
+    const auto entry = told<cumulet_metadata>(cumulet_inspection_get_metadata, inspection, grid, i);
     list.push_back({{"name", entry.name}, {"type", entry.type}, {"value", entry.value}});
   }
   return list;
 }
 
 Json volume_info(const std::string& path) {
-  const Inspection inspection = inspect(path);
-  cumulet_volume_file_info file{};
-  file.struct_size = sizeof file;
-  check(cumulet_inspection_get_file(inspection.get(), &file));
+  const auto owner = open<cumulet_inspection>(cumulet_inspect_volume_file, path);
+  cumulet_inspection* inspection = owner.get();
+  const auto file = told<cumulet_volume_file_info>(cumulet_inspection_get_file, inspection);
   Json json;
   json["file"] = path;
   json["format"] = file.format;
@@ -59,9 +66,7 @@ Json volume_info(const std::string& path) {
   json["metadata"] = metadata_of(inspection, -1, file.metadata_count);
   json["grids"] = Json::array();
   for (std::uint32_t i = 0; i < file.grid_count; ++i) {
-    cumulet_grid_info grid{};
-    grid.struct_size = sizeof grid;
-    check(cumulet_inspection_get_grid(inspection.get(), i, &grid));
+    const auto grid = told<cumulet_grid_info>(cumulet_inspection_get_grid, inspection, i);
     Json entry;
     entry["name"] = grid.name;
     entry["type"] = grid.type;
@@ -90,27 +95,22 @@ Json volume_info(const std::string& path) {
 }
 
 Json surfaces_info(const std::string& path) {
-  std::array<char, 1024> error{};
-  cumulet_surfaces* opened = nullptr;
-  if (cumulet_surfaces_open(path.c_str(), &opened, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  const Surfaces surfaces(opened);
-  cumulet_surfaces_info info{};
-  info.struct_size = sizeof info;
-  check(cumulet_surfaces_get_info(surfaces.get(), &info));
+  const auto surfaces = open<cumulet_surfaces>(cumulet_surfaces_open, path);
+  const auto info = told<cumulet_surfaces_info>(cumulet_surfaces_get_info, surfaces.get());
   Json json;
   json["file"] = path;
+  json["meshes"] = info.meshes;
+  json["primitives"] = info.primitives;
   json["triangles"] = info.triangles;
   json["materials"] = info.materials;
+  json["textures"] = info.textures;
   json["lights"] = info.lights;
   json["cameras"] = info.cameras;
   json["bounds_min"] = info.bounds_min;
   json["bounds_max"] = info.bounds_max;
   json["animations"] = Json::array();
   for (std::uint32_t i = 0; i < info.animations; ++i) {
-    cumulet_animation_info animation{};
-    animation.struct_size = sizeof animation;
-    check(cumulet_surfaces_get_animation(surfaces.get(), i, &animation));
+    const auto animation = told<cumulet_animation_info>(cumulet_surfaces_get_animation, surfaces.get(), i);
     json["animations"].push_back({{"name", animation.name}, {"duration", animation.duration}});
   }
   return json;
@@ -144,26 +144,10 @@ void write_lines(const Json& json, const std::string& indent, std::ostream& out)
   }
 }
 
-}  // namespace
-
-void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
-  Json json;
-  if (!scene.volume.empty()) json["volume"] = volume_info(scene.volume);
-  if (!scene.surfaces.empty()) json["surfaces"] = surfaces_info(scene.surfaces);
-  if (as_json) {
-    // Names may be in any encoding: what is not UTF-8 is replaced. What is not finite is null.
-    out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-    return;
-  }
-  for (const auto& [what, facts] : json.items()) write_lines(facts, "", out);
-}
-
 bool is_z_up(const std::string& volume_file) {
-  const Inspection inspection = inspect(volume_file);
-  cumulet_volume_file_info file{};
-  file.struct_size = sizeof file;
-  check(cumulet_inspection_get_file(inspection.get(), &file));
-  for (const Json& entry : metadata_of(inspection, -1, file.metadata_count)) {
+  const auto inspection = open<cumulet_inspection>(cumulet_inspect_volume_file, volume_file);
+  const auto file = told<cumulet_volume_file_info>(cumulet_inspection_get_file, inspection.get());
+  for (const Json& entry : metadata_of(inspection.get(), -1, file.metadata_count)) {
     if (entry["name"] == "creator" && entry["value"].get<std::string>().find("Blender") != std::string::npos)
       return true;
   }
@@ -178,6 +162,25 @@ bool is_z_up(const std::string& volume_file) {
     }
   }
   return false;
+}
+
+}  // namespace
+
+void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
+  Json json;
+  if (!scene.volume.empty()) json["volume"] = volume_info(scene.volume);
+  if (!scene.surfaces.empty()) json["surfaces"] = surfaces_info(scene.surfaces);
+  if (as_json) {
+    // Names may be in any encoding: what is not UTF-8 is replaced. What is not finite is null.
+    out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+    return;
+  }
+  for (const auto& [what, facts] : json.items()) write_lines(facts, "", out);
+}
+
+std::optional<std::string> up_hint(const SceneOptions& scene) {
+  if (scene.volume.empty() || scene.up != UpAxis::y || !is_z_up(scene.volume)) return std::nullopt;
+  return scene.volume + ": its metadata says Blender or Mantaflow, whose up axis is Z: try --up z";
 }
 
 }  // namespace cumulet::demo

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <iosfwd>
+#include <optional>
 #include <scene_file.hpp>
 #include <string>
 
@@ -9,7 +10,7 @@ namespace cumulet::demo {
 /// What is in the scene's files, as lines or as JSON. Throws std::runtime_error, one line that names the file.
 void write_info(const SceneOptions& scene, bool as_json, std::ostream& out);
 
-/// Whether a volume's metadata says that it comes from Blender or Mantaflow, whose up axis is Z.
-[[nodiscard]] bool is_z_up(const std::string& volume_file);
+/// A line for who shows with Y up what its metadata says is Blender's or Mantaflow's, whose up axis is Z.
+[[nodiscard]] std::optional<std::string> up_hint(const SceneOptions& scene);
 
 }  // namespace cumulet::demo

@@ -279,11 +279,8 @@ void render(const RenderOptions& options) {
     check(viewer, cumulet_load_volume_file(viewer.get(), &file));
   }
   wait(viewer, progress);
-  if (!scene.volume.empty()) {
-    if (scene.up == cumulet::demo::UpAxis::y && cumulet::demo::is_z_up(scene.volume))
-      tell(progress, scene.volume + ": its metadata says Blender or Mantaflow, whose up axis is Z: try --up z");
-    if (scene.auto_density_scale) choose_density_scale(viewer, scene.medium, progress);
-  }
+  if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress, *hint);
+  if (!scene.volume.empty() && scene.auto_density_scale) choose_density_scale(viewer, scene.medium, progress);
   if (!scene.surfaces.empty()) check_animation(viewer, options);
   if (scene.surface_camera >= 0)
     check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));

@@ -35,6 +35,7 @@ class Assembler {
     look_at_winding();
     place();
     lights_and_cameras();
+    count();
     remark();
     scene_->finish();
     return scene_;
@@ -163,6 +164,15 @@ class Assembler {
     if (count > 3) some += " and " + std::to_string(count - 3) + " more";
     log_.warning(name_ + ": much of " + some + " faces into its closed shape, and is not seen from outside: " +
                  "double_sided of the surface settings shows it");
+  }
+
+  void count() {
+    const tinygltf::Model& model = file_.model;
+    std::size_t primitives = 0;
+    for (const tinygltf::Mesh& mesh : model.meshes) primitives += mesh.primitives.size();
+    scene_->counts = {static_cast<std::uint32_t>(model.meshes.size()), static_cast<std::uint32_t>(primitives),
+                      static_cast<std::uint32_t>(model.materials.size()),
+                      static_cast<std::uint32_t>(model.textures.size())};
   }
 
   void remark() const {

@@ -157,6 +157,15 @@ class Scene {
   std::vector<VertexAttributes> attributes;
   std::vector<Animation> animations;
 
+  /// What the file has, shown or not.
+  struct Counts {
+    std::uint32_t meshes = 0;
+    std::uint32_t primitives = 0;
+    std::uint32_t materials = 0;
+    std::uint32_t textures = 0;
+  };
+  Counts counts;
+
   [[nodiscard]] std::size_t triangle_count() const { return indices.size() / 3; }
 
   /// The scene `time` seconds into animation `animation` (looped past its end); as it rests, if there is no such one.

@@ -95,6 +95,8 @@ ScenePtr import_triangles(std::span<const TriangleMesh> meshes, const std::strin
       scene->add_instance(i, node, -1);
     }
     what = name;
+    const auto count = static_cast<std::uint32_t>(meshes.size());
+    scene->counts = {count, count, count, 0};
     if (scene->materials.empty()) scene->materials.emplace_back();
     scene->finish();
     return scene;

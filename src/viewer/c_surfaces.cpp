@@ -112,7 +112,8 @@ cumulet_status cumulet_surfaces_get_info(const cumulet_surfaces* surfaces, cumul
     cumulet_surfaces_info out{};
     copy_text(asset.name(), out.name, sizeof out.name);
     out.triangles = asset.scene().triangle_count();
-    out.materials = static_cast<uint32_t>(asset.scene().materials.size());
+    const surface::Scene::Counts& counts = asset.scene().counts;
+    out.materials = counts.materials;
     out.lights = static_cast<uint32_t>(rest.lights);
     out.cameras = static_cast<uint32_t>(rest.cameras);
     out.animations = static_cast<uint32_t>(asset.scene().animations.size());
@@ -120,6 +121,9 @@ cumulet_status cumulet_surfaces_get_info(const cumulet_surfaces* surfaces, cumul
       out.bounds_min[axis] = rest.bounds.min[axis];
       out.bounds_max[axis] = rest.bounds.max[axis];
     }
+    out.meshes = counts.meshes;
+    out.primitives = counts.primitives;
+    out.textures = counts.textures;
     write_desc(info, out, "cumulet_surfaces_info");
   });
 }

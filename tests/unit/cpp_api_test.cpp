@@ -612,6 +612,9 @@ TEST(CppSurfaces, AreAHostsTriangles) {
   EXPECT_EQ(info.name.view(), "made");
   EXPECT_EQ(info.triangles, 3U);
   EXPECT_EQ(info.materials, 2U);
+  EXPECT_EQ(info.meshes, 2U);
+  EXPECT_EQ(info.primitives, 2U);
+  EXPECT_EQ(info.textures, 0U);
   EXPECT_EQ(info.lights + info.cameras + info.animations, 0U);
   EXPECT_EQ(info.bounds.max, (Vector{4, 2, 5}));
   EXPECT_EQ(surfaces.animation(0).error().status, StatusCode::invalid_argument);

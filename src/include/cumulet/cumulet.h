@@ -427,13 +427,16 @@ CUMULET_API void cumulet_surfaces_release(cumulet_surfaces* surfaces);          
 typedef struct cumulet_surfaces_info {
   size_t struct_size;
   char name[128]; /* the path, or what the host named it */
-  uint64_t triangles;
-  uint32_t materials;
-  uint32_t lights;
+  uint64_t triangles; /* that are shown: those of a mesh that two nodes place count twice */
+  uint32_t materials; /* of the file, used or not, as meshes, primitives and textures */
+  uint32_t lights;    /* that are shown, as cameras */
   uint32_t cameras;
   uint32_t animations;
   double bounds_min[3]; /* world space, as it rests; zero without triangles */
   double bounds_max[3];
+  uint32_t meshes;
+  uint32_t primitives; /* parts of meshes, each of one material */
+  uint32_t textures;
 } cumulet_surfaces_info;
 
 /* The first call takes as long as a pose. */

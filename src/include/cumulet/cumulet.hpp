@@ -633,6 +633,9 @@ struct SurfacesInfo {
   std::uint32_t cameras = 0;
   std::uint32_t animations = 0;
   Bounds bounds;
+  std::uint32_t meshes = 0;
+  std::uint32_t primitives = 0;
+  std::uint32_t textures = 0;
 };
 
 struct AnimationInfo {
@@ -688,14 +691,18 @@ class Surfaces {
   [[nodiscard]] Result<SurfacesInfo> info() const noexcept {
     auto c = detail::sized<cumulet_surfaces_info>();
     if (auto done = detail::result(cumulet_surfaces_get_info(handle_, &c)); !done) return done.error();
-    const auto& [struct_size, name, triangles, materials, lights, cameras, animations, bounds_min, bounds_max] = c;
+    const auto& [struct_size, name, triangles, materials, lights, cameras, animations, bounds_min, bounds_max, meshes,
+                 primitives, textures] = c;
     return SurfacesInfo{.name = Text<128>(name),
                         .triangles = triangles,
                         .materials = materials,
                         .lights = lights,
                         .cameras = cameras,
                         .animations = animations,
-                        .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)}};
+                        .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)},
+                        .meshes = meshes,
+                        .primitives = primitives,
+                        .textures = textures};
   }
   [[nodiscard]] Result<AnimationInfo> animation(std::uint32_t index) const noexcept {
     auto c = detail::sized<cumulet_animation_info>();

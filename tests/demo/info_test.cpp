@@ -1,0 +1,201 @@
+// cumulet-render --info, as lines and as JSON, and the hint of which axis is up.
+
+#include "info.hpp"
+
+#include <gtest/gtest.h>
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
+#include <openvdb/openvdb.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+
+#include "support/folder.hpp"
+
+namespace {
+
+using cumulet::demo::SceneOptions;
+using nlohmann::json;
+
+openvdb::FloatGrid::Ptr box(const std::string& name) {
+  auto grid = openvdb::FloatGrid::create(0.0F);
+  grid->fill({{0, 0, 0}, {3, 1, 0}}, 0.5F);
+  grid->tree().setValue({1, 1, 0}, 2.0F);
+  grid->setName(name);
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.25));
+  return grid;
+}
+
+class Info : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { openvdb::initialize(); }
+
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  [[nodiscard]] SceneOptions volume(const std::string& name) const {
+    SceneOptions scene;
+    scene.volume = path(name);
+    return scene;
+  }
+  void write_vdb(const std::string& name, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& meta = {}) const {
+    openvdb::io::File(path(name)).write(grids, meta);
+  }
+  static std::string lines(const SceneOptions& scene) {
+    std::ostringstream out;
+    cumulet::demo::write_info(scene, false, out);
+    return out.str();
+  }
+  static json told(const SceneOptions& scene) {
+    std::ostringstream out;
+    cumulet::demo::write_info(scene, true, out);
+    return json::parse(out.str());
+  }
+
+ private:
+  cumulet::test::Folder folder_;
+};
+
+void expect_line(const std::string& text, const std::string& line) {
+  EXPECT_NE(("\n" + text).find("\n" + line + "\n"), std::string::npos) << line << "\nis not a line of\n" << text;
+}
+
+TEST_F(Info, OfAVdb) {
+  auto velocity = openvdb::Vec3SGrid::create(openvdb::Vec3s(0));
+  velocity->tree().setValue({0, 0, 0}, openvdb::Vec3s(3, 4, 0));
+  velocity->setName("vel");
+  openvdb::MetaMap meta;
+  meta.insertMeta("artist", openvdb::StringMetadata("a\nb"));
+  write_vdb("two.vdb", {velocity, box("density")}, meta);
+
+  const json all = told(volume("two.vdb"));
+  EXPECT_FALSE(all.contains("surfaces"));
+  const json& file = all["volume"];
+  EXPECT_EQ(file["file"], path("two.vdb"));
+  EXPECT_NE(file["format"].get<std::string>().find("OpenVDB"), std::string::npos);
+  EXPECT_GT(file["bytes"], 100);
+  const json artist = {{"name", "artist"}, {"type", "string"}, {"value", "a\nb"}};
+  EXPECT_NE(std::find(file["metadata"].begin(), file["metadata"].end(), artist), file["metadata"].end());
+  ASSERT_EQ(file["grids"].size(), 2U);
+  const json& lengths = file["grids"][0];
+  EXPECT_EQ(lengths["name"], "vel");
+  EXPECT_EQ(lengths["values"], "lengths");
+  EXPECT_EQ(lengths["range"], json({5.0, 5.0}));
+  EXPECT_FALSE(lengths["shown_by_default"].get<bool>());
+  const json& density = file["grids"][1];
+  EXPECT_EQ(density["name"], "density");
+  EXPECT_TRUE(density["shown_by_default"].get<bool>());
+  EXPECT_EQ(density["values"], "scalars");
+  EXPECT_EQ(density["active_voxels"], 8);
+  EXPECT_EQ(density["voxel_min"], json({0, 0, 0}));
+  EXPECT_EQ(density["voxel_max"], json({3, 1, 0}));
+  EXPECT_EQ(density["range"], json({0.5, 2.0}));
+  EXPECT_NEAR(density["mean"], (7 * 0.5 + 2.0) / 8, 1e-6);
+  EXPECT_EQ(density["negative_voxels"], 0);
+  EXPECT_EQ(density["non_finite_voxels"], 0);
+  EXPECT_EQ(density["index_to_world"][0], 0.25);
+  EXPECT_EQ(density["bounds_max"], json({0.875, 0.375, 0.125}));
+  EXPECT_GT(density["memory_bytes"], 0);
+  std::uint64_t counted = 0;
+  for (const json& bin : density["histogram"]) counted += bin.get<std::uint64_t>();
+  EXPECT_EQ(counted, 8U);
+
+  const std::string text = lines(volume("two.vdb"));
+  expect_line(text, "file: " + path("two.vdb"));
+  expect_line(text, "  artist (string): a b");
+  expect_line(text, "- density");
+  expect_line(text, "    active_voxels: 8");
+  expect_line(text, "    range: [0.5,2.0]");
+  EXPECT_EQ(text.find("histogram"), std::string::npos);
+}
+
+TEST_F(Info, OfANanoVdb) {
+  const auto handle = nanovdb::openToNanoVDB(*box("smoke"));
+  nanovdb::io::writeGrid(path("one.nvdb"), handle);
+  const json all = told(volume("one.nvdb"));
+  EXPECT_NE(all["volume"]["format"].get<std::string>().find("NanoVDB"), std::string::npos);
+  ASSERT_EQ(all["volume"]["grids"].size(), 1U);
+  const json& grid = all["volume"]["grids"][0];
+  EXPECT_EQ(grid["name"], "smoke");
+  EXPECT_EQ(grid["active_voxels"], 8);
+  EXPECT_EQ(grid["range"], json({0.5, 2.0}));
+  expect_line(lines(volume("one.nvdb")), "- smoke");
+}
+
+TEST_F(Info, OfAModel) {
+  // Two meshes, one of two primitives; the first is placed twice, the other one not at all.
+  std::ofstream(path("model.gltf")) << R"({
+    "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+    "nodes": [{"mesh": 0}, {"mesh": 0, "translation": [5, 0, 0]}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 1},
+                               {"attributes": {"POSITION": 0}, "mode": 0}]},
+               {"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "materials": [{"name": "a"}, {"name": "b"}, {"name": "c"}],
+    "images": [{"uri": "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="}],
+    "textures": [{"source": 0}, {"source": 0}],
+    "animations": [{"name": "slide", "samplers": [{"input": 1, "output": 2}],
+                    "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}],
+    "accessors": [
+      {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+      {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [2]},
+      {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
+                    {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+    "buffers": [{"uri": "data.bin", "byteLength": 68}]})";
+  const std::array<float, 17> numbers = {-1, -1, 0, 1, -1, 0, 0, 1, 0, 0, 2, 0, 0, 0, 5, 0, 0};
+  std::ofstream(path("data.bin"), std::ios::binary)
+      .write(reinterpret_cast<const char*>(numbers.data()), sizeof numbers);
+  SceneOptions scene;
+  scene.surfaces = path("model.gltf");
+  const json all = told(scene);
+  EXPECT_FALSE(all.contains("volume"));
+  const json& model = all["surfaces"];
+  EXPECT_EQ(model["file"], path("model.gltf"));
+  EXPECT_EQ(model["meshes"], 2);
+  EXPECT_EQ(model["primitives"], 3);
+  EXPECT_EQ(model["triangles"], 2) << "those that are shown";
+  EXPECT_EQ(model["materials"], 3);
+  EXPECT_EQ(model["textures"], 2);
+  EXPECT_EQ(model["lights"], 0);
+  EXPECT_EQ(model["cameras"], 0);
+  EXPECT_EQ(model["bounds_max"], json({6.0, 1.0, 0.0}));
+  EXPECT_EQ(model["animations"], json::array({{{"name", "slide"}, {"duration", 2.0}}}));
+  const std::string text = lines(scene);
+  expect_line(text, "meshes: 2");
+  expect_line(text, "textures: 2");
+  expect_line(text, "- slide");
+  expect_line(text, "    duration: 2.0");
+  // Both at once.
+  write_vdb("box.vdb", {box("density")});
+  scene.volume = path("box.vdb");
+  const json both = told(scene);
+  EXPECT_TRUE(both.contains("volume") && both.contains("surfaces"));
+  scene.surfaces = path("none.glb");
+  EXPECT_THROW(told(scene), std::runtime_error);
+}
+
+TEST_F(Info, HintsAtTheUpAxisOfBlenderAndMantaflow) {
+  openvdb::MetaMap blender;
+  blender.insertMeta("creator", openvdb::StringMetadata("Blender/Smoke"));
+  write_vdb("blender.vdb", {box("density")}, blender);
+  openvdb::MetaMap other;
+  other.insertMeta("creator", openvdb::StringMetadata("Houdini"));
+  write_vdb("other.vdb", {box("density")}, other);
+  const auto signed_by_mantaflow = box("density");
+  signed_by_mantaflow->insertMeta("file_base_resolution", openvdb::Vec3IMetadata(openvdb::Vec3i(64)));
+  write_vdb("mantaflow.vdb", {box("shadow"), signed_by_mantaflow});
+  for (const char* name : {"blender.vdb", "mantaflow.vdb"}) {
+    SceneOptions scene = volume(name);
+    const auto hint = cumulet::demo::up_hint(scene);
+    ASSERT_TRUE(hint) << name;
+    EXPECT_EQ(hint->find(path(name) + ": "), 0U);
+    EXPECT_NE(hint->find("--up z"), std::string::npos);
+    scene.up = cumulet::demo::UpAxis::z;
+    EXPECT_FALSE(cumulet::demo::up_hint(scene));
+  }
+  EXPECT_FALSE(cumulet::demo::up_hint(volume("other.vdb")));
+  EXPECT_FALSE(cumulet::demo::up_hint(SceneOptions()));
+}
+
+}  // namespace
