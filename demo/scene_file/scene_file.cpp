@@ -431,9 +431,9 @@ std::string animation_refusal(const SceneOptions& scene, std::uint32_t animation
 
 void SceneOptions::set_daylight() {
   light.sun_azimuth_degrees = 65.0f;
-  light.sun_elevation_degrees = 38.0f;
-  constexpr std::array<float, 3> sun = {3.6f, 3.3f, 2.9f};
-  constexpr std::array<float, 3> sky = {0.10f, 0.18f, 0.34f};
+  light.sun_elevation_degrees = 40.0f;
+  constexpr std::array<float, 3> sun = {4.4f, 4.05f, 3.55f};
+  constexpr std::array<float, 3> sky = {0.06f, 0.11f, 0.21f};
   std::copy(sun.begin(), sun.end(), light.sun_irradiance);
   std::copy(sky.begin(), sky.end(), light.sky_radiance);
 }

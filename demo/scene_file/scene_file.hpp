@@ -30,7 +30,7 @@ struct SceneOptions {
   cumulet_display_desc display{};
 
   SceneOptions();
-  /// A pleasant day: what is lit when nothing says how.
+  /// A pleasant day, what is lit when nothing says how: a sun from the right of a default camera, above and before it.
   void set_daylight();
 };
 

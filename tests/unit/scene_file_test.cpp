@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -175,6 +177,22 @@ TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
   EXPECT_EQ(read.camera.fovy_degrees, 0.0);
   const SceneOptions dark = parse_scene(with(R"("light": {})"), "s.json");
   EXPECT_EQ(dark.light.sky_radiance[2], 0.0f);
+}
+
+TEST(SceneFile, DaylightModelsWhatADefaultCameraSees) {
+  SceneOptions day;
+  day.set_daylight();
+  // From in front and from a side, above: the default camera looks from +Z and a little above.
+  EXPECT_GE(std::abs(day.light.sun_azimuth_degrees), 40.0f);
+  EXPECT_LE(std::abs(day.light.sun_azimuth_degrees), 70.0f);
+  EXPECT_GE(day.light.sun_elevation_degrees, 30.0f);
+  EXPECT_LE(day.light.sun_elevation_degrees, 50.0f);
+  // A matte white that faces the sun is about as bright as the screen, one in the shade a tenth of that.
+  const auto luminance = [](const float(&rgb)[3]) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; };
+  const double lit = luminance(day.light.sun_irradiance) / std::numbers::pi;
+  const double shade = luminance(day.light.sky_radiance);
+  EXPECT_NEAR(lit + shade, 1.4, 0.2);
+  EXPECT_GT(lit, 10.0 * shade);
 }
 
 TEST(SceneFile, TheDensityScaleIsSavedAsItWasFound) {
