@@ -29,13 +29,17 @@ bool Compositor::resolves_now() const { return milliseconds(Clock::now() - resol
 double Compositor::expected_ms() const { return draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0); }
 
 Compositor::Means* Compositor::free_means(glm::uvec2 size) {
-  const bool in_call = gl_->dispatches_in_call;
-  const bool all = !in_call ? !means_.empty() : means_.size() >= most_means;
-  const auto found =
-      all ? std::ranges::find_if(means_, [](const auto& means) { return means->drawn.passed(); }) : means_.end();
-  if (all && found == means_.end()) return nullptr;
-  Means& means = found != means_.end() ? **found : *means_.emplace_back(std::make_unique<Means>());
-  if (means.of.size != size) {
+  const bool waits = gl_->dispatches_in_call && !gl::Fence(gl_).passed();
+  if (waits) {
+    std::erase_if(means_, [this](const auto& means) { return means.get() != newest_ && means->drawn.passed(); });
+    if (means_.size() >= most_means) return nullptr;
+  } else {
+    newest_ = nullptr;
+    means_.resize(std::min<std::size_t>(means_.size(), 1));
+  }
+  if (waits || means_.empty()) means_.push_back(std::make_unique<Means>());
+  Means& means = *means_.back();
+  if (!means.texture || means.of.size != size) {
     means.texture = {};
     means.of = {};
     means.texture = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
@@ -46,14 +50,21 @@ Compositor::Means* Compositor::free_means(glm::uvec2 size) {
 
 Compositor::Means* Compositor::resolve(const PictureTextures& picture) {
   lags_ = false;
-  const MeansOf wanted{picture.sum, picture.holes ? picture.sum_before : 0, picture.size, picture.picture,
-                       picture.revision};
+  const MeansOf wanted{picture.sum,     picture.holes ? picture.sum_before : 0,
+                       picture.holes,   picture.size,
+                       picture.picture, picture.revision};
   if (newest_ != nullptr) {
     if (wanted.revision && newest_->of == wanted) return newest_;
     const bool older = newest_->of.picture == wanted.picture && newest_->of.size == wanted.size;
     if (older && picture.may_lag && !resolves_now()) return newest_;
   }
   if (no_memory_for_ == picture.size) return nullptr;
+  gl::Object& program = resolve_.at(picture.holes ? 1 : 0);
+  if (!program) {
+    program = gl::make_compute_program(gl_, "resolve.comp",
+                                       std::array<std::string, 1>{picture.holes ? "CM_HOLES 1" : "CM_HOLES 0"});
+  }
+  const auto begun = Clock::now();
   Means* means = nullptr;
   try {
     means = free_means(picture.size);
@@ -67,13 +78,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture) {
   }
   lags_ = means == nullptr;
   if (lags_) return newest_;
-  gl::Object& program = resolve_.at(picture.holes ? 1 : 0);
-  if (!program) {
-    program = gl::make_compute_program(gl_, "resolve.comp",
-                                       std::array<std::string, 1>{picture.holes ? "CM_HOLES 1" : "CM_HOLES 0"});
-  }
   const auto& gl = *gl_;
-  const auto begun = Clock::now();
   const bool before = picture.sum_before != 0;
   gl.BindTextureUnit(0, picture.sum);
   gl.BindTextureUnit(1, picture.counts);
@@ -145,7 +150,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   } else {
     gl.Disable(GL_FRAMEBUFFER_SRGB);
   }
-  if (target.blend_over) {
+  if (target.blend_over && display.transparent) {  // else it is opaque
     gl.Enablei(GL_BLEND, 0);
     gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
     gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);

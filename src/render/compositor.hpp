@@ -60,6 +60,8 @@ class Compositor {
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
   /// Milliseconds that the next call of draw will take, as far as is known.
   [[nodiscard]] double expected_ms() const;
+  /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
+  [[nodiscard]] bool drawn() const { return newest_ == nullptr || newest_->drawn.passed(); }
   /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
   /// that the device has not come to: to be drawn again.
   [[nodiscard]] bool lags() const { return lags_; }
@@ -70,14 +72,15 @@ class Compositor {
   struct MeansOf {
     GLuint sum = 0;
     GLuint before = 0;
+    bool holes = false;
     glm::uvec2 size{0U};
     std::uint64_t picture = 0;
     std::optional<std::uint64_t> revision;
     bool operator==(const MeansOf&) const = default;
   };
   /// Means that are drawn. Where dispatches run within their call, one that writes what queued drawing reads, sums as
-  /// well as means, waits for all that the host has queued: so drawing reads means alone, and they are written again
-  /// once what draws them is over.
+  /// well as means, waits for all that the host has queued: so drawing reads means alone, and while anything is queued
+  /// none are written a second time, for llvmpipe takes some that were drawn long ago for being read still.
   struct Means {
     gl::Object texture;
     MeansOf of;
@@ -85,6 +88,7 @@ class Compositor {
   };
   // The means to draw; null if there is no memory for them.
   Means* resolve(const PictureTextures& picture);
+  // To be written; null if as many as there may be wait to be drawn. Else newest_ may be gone.
   Means* free_means(glm::uvec2 size);
   [[nodiscard]] bool resolves_now() const;
 

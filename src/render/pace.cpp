@@ -15,6 +15,8 @@ using Clock = std::chrono::steady_clock;
 
 // Seen to begin and end as closely as this, the clock tells what a dispatch took.
 constexpr double close_ms = 0.3;
+// Should a driver show its marks no earlier than a fence tells.
+constexpr double patience_ms = 200.0;
 // More than this no two dispatches tell.
 constexpr double most_growth = 4.0;
 // The dearest rounds take about three times as long as the cheapest in which all lanes march; more is others' doing.
@@ -65,27 +67,59 @@ void RoundCost::learn(double slots, double low_ms, double high_ms) {
   }
 }
 
+void Reserve::learn(double budget_ms, double taken_ms) {
+  constexpr double late_at = 1.15;
+  constexpr double may_be_late = 0.05;
+  constexpr double step = 0.2;
+  constexpr double most_part = 0.5;
+  const bool late = taken_ms > late_at * budget_ms;
+  part_ = std::clamp(part_ + step * ((late ? 1.0 : 0.0) - may_be_late), 0.0, most_part);
+}
+
+void Flights::leave(Mark mark) {
+  gl_->ClearNamedBufferSubData(ring_.name(), GL_R32UI, static_cast<GLintptr>(mark_at(next_, mark)), 4, GL_RED_INTEGER,
+                               GL_UNSIGNED_INT, &next_.serial);
+}
+
+bool Flights::left(const Flight& flight, Mark mark) const {
+  // The device may write it at any time.
+  const auto* word = reinterpret_cast<const volatile std::uint32_t*>(ring_.data() + mark_at(flight, mark));
+  return *word == flight.serial;
+}
+
+bool Flights::has_begun(const Flight& flight) const {
+  return gl_->dispatches_in_call ? flight.before.passed() : left(flight, Mark::begun);
+}
+
+bool Flights::is_over(Flight& flight, Clock::time_point now) const {
+  if (!left(flight, Mark::over) && milliseconds(now - flight.asked) < patience_ms) return false;
+  flight.asked = now;
+  return flight.after.passed();
+}
+
 void Flights::begin(Kind kind) {
   if (!ring_) ring_ = gl::ReadBack(gl_, (most + 1) * place_bytes, "creating the counters' ring");
   next_ = {};
+  next_.place = next_place_;
+  next_place_ = (next_place_ + 1) % (most + 1);
+  next_.serial = ++serial_;
   next_.in_call = kind == Kind::dispatch && gl_->dispatches_in_call;
   if (!next_.in_call) {
-    if (flying_.empty()) next_.before = gl::Fence(gl_);
+    if (gl_->dispatches_in_call && flying_.empty()) next_.before = gl::Fence(gl_);
+    leave(Mark::begun);
     if (timers_ && !gl_->dispatches_in_call) {
       // For this dispatch alone: contexts do not share queries.
       gl_->CreateQueries(GL_TIMESTAMP, 2, queries_.data());
       if (queries_[0] != 0) gl_->QueryCounter(queries_[0], GL_TIMESTAMP);
     }
   }
-  next_.sent = next_.looked = Clock::now();
+  next_.sent = next_.asked = next_.looked = Clock::now();
 }
 
 void Flights::end(Dispatched what, GLuint buffer, std::size_t words) {
   if (next_.in_call) next_.in_call_ms = milliseconds(Clock::now() - next_.sent);
   next_.what = std::move(what);
   next_.words = words;
-  next_.place = next_place_;
-  next_place_ = (next_place_ + 1) % (most + 1);
   if (queries_[0] != 0) {
     gl_->QueryCounter(queries_[1], GL_TIMESTAMP);
     for (std::size_t i = 0; i < 2; ++i) {
@@ -101,7 +135,10 @@ void Flights::end(Dispatched what, GLuint buffer, std::size_t words) {
     gl_->CopyNamedBufferSubData(buffer, ring_.name(), 0, static_cast<GLintptr>(next_.place * place_bytes),
                                 static_cast<GLsizeiptr>(words * 16));
   }
-  if (!next_.in_call) next_.after = gl::Fence(gl_);
+  if (!next_.in_call) {
+    leave(Mark::over);
+    next_.after = gl::Fence(gl_);
+  }
   flying_.push_back(std::move(next_));
 }
 
@@ -110,11 +147,11 @@ std::optional<Flights::Landed> Flights::land() {
   Flight& first = flying_.front();
   const auto now = Clock::now();
   const bool close = milliseconds(now - first.looked) < close_ms;
-  if (!first.in_call && first.waits && first.before.passed()) {
+  if (!first.in_call && first.waits && has_begun(first)) {
     first.waits = false;
     if (close) first.began = now;
   }
-  if (!first.in_call && !first.after.passed()) {
+  if (!first.in_call && !is_over(first, now)) {
     first.looked = now;
     return std::nullopt;
   }

@@ -408,13 +408,14 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surf
     return picture.done_;
   }
   until_complete = until_complete && !picture.complete_;
-  const double aim = std::clamp(0.5 * milliseconds_until(deadline), least_ms, dispatch_ms);
+  const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
   bool sent = false;
   while (!picture.done_ && !(until_complete && picture.complete_)) {
     const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
     if (!flights_.full()) {
-      const bool anyway = !sent && flights_.empty();
-      if (auto what = choose(picture, program.cost, std::clamp(left, anyway ? least_ms : 0.0, aim), anyway)) {
+      auto what = choose(picture, program.cost, std::clamp(left, 0.0, aim), false);
+      if (!what && !sent && flights_.empty()) what = choose(picture, program.cost, least_ms, true);
+      if (what) {
         dispatch(picture, surfaces, std::move(*what));
         sent = true;
         collect();
@@ -506,7 +507,7 @@ void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, Dispatched wha
 bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program,
                      std::uint32_t& row, Deadline deadline) {
   core::CmParameters p = parameters;
-  const double aim = std::clamp(0.5 * milliseconds_until(deadline), least_ms, dispatch_ms);
+  const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
   bool sent = false;
   while (row < picture.size_.y) {
     const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();

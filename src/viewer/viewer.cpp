@@ -8,6 +8,7 @@
 
 #include "base/callback_scope.hpp"
 #include "base/error.hpp"
+#include "base/milliseconds.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
 #include "render/luminance.hpp"
@@ -796,12 +797,16 @@ FrameResult Viewer::render(const Frame& frame) {
       }
     };
     // What drawing will take is the budget's, too.
-    const render::Deadline deadline =
-        deadline_after(frame.budget_ms - std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms));
+    const auto begun = Clock::now();
+    const bool shares = g.functions->dispatches_in_call && g.compositor.drawn() && !gl::Fence(g.functions).passed();
+    const double keep = shares ? g.reserve.of(frame.budget_ms) : 0.0;
+    const double drawing = std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms);
+    const render::Deadline deadline = deadline_after(frame.budget_ms - keep - drawing);
     attempt([&] { prepare(frame, deadline); });
     if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
     attempt([&] { draw_surfaces_alone(frame); });
     attempt([&] { draw(frame, result); });
+    if (shares && frame.budget_ms > 0.0) g.reserve.learn(frame.budget_ms, milliseconds(Clock::now() - begun));
     result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
     const auto failed = [](const Worker::Status& status) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;

@@ -215,6 +215,7 @@ class Viewer {
     bool knows_dispatches = false;
     render::Progressive progressive;
     render::Compositor compositor;
+    render::Reserve reserve;
     render::HostDepth host_depth;
     std::optional<render::MarchData> data;
     std::shared_ptr<const render::MarchSource> data_source;    // what data is of

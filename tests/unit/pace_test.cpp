@@ -65,6 +65,25 @@ TEST(RoundCost, AnInterruptedDispatchIsForgiven) {
   EXPECT_LT(*cost.most(128.0, true), 2.0);
 }
 
+TEST(Reserve, OneOfTwentyCallsMayBeLate) {
+  render::Reserve reserve;
+  EXPECT_EQ(reserve.of(10.0), 0.0);
+  // A machine that takes from 0 to 4 ms of a call of 10, each as often.
+  int late = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const double others = double((i * 7) % 41) * 0.1;
+    const double taken = 10.0 - reserve.of(10.0) + others;
+    late += i >= 1000 && taken > 11.5 ? 1 : 0;
+    reserve.learn(10.0, taken);
+  }
+  EXPECT_NEAR(late, 50, 10);
+  // Whatever happens, there is something left; and once it is over, all.
+  for (int i = 0; i < 100; ++i) reserve.learn(10.0, 1000.0);
+  EXPECT_GE(10.0 - reserve.of(10.0), 5.0);
+  for (int i = 0; i < 100; ++i) reserve.learn(10.0, 1.0);
+  EXPECT_EQ(reserve.of(10.0), 0.0);
+}
+
 class Pace : public test::StillTest {
  protected:
   void SetUp() override {
@@ -235,6 +254,47 @@ TEST(PaceOfFrames, NoCallWaitsForWhatTheHostHasQueued) {
     gl.DeleteSync(queued);
     gl.Finish();
     EXPECT_TRUE((result.flags & CUMULET_RENDER_MORE) != 0);
+  }
+}
+
+// The same in a drag, frame after frame: what was drawn long ago must not be waited for, either, though llvmpipe may
+// take it for being drawn still.
+TEST(PaceOfFrames, NoFrameOfADragWaitsForWhatTheHostHasQueued) {
+  headless::Context context = headless::Context::create(headless::Backend::automatic);
+  const GladGLContext gl = test::load_gl(headless::Context::get_proc, &context);
+  const test::HostTarget target(gl, 1280, 720);
+  const auto volume = test::make_ball(32);
+  const auto viewer = test::make_viewer({.get_proc = headless::Context::get_proc, .user = &context, .samples = 4096});
+  auto sampling = test::make_desc<cumulet_sampling_desc>();
+  sampling.samples = 4096;
+  sampling.preview = CUMULET_PREVIEW_AUTO;
+  ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  cumulet_frame_desc frame = target.frame();
+  auto light = test::make_desc<cumulet_light_desc>();
+  light.sun_irradiance[0] = 3.0F;
+  light.sun_elevation_degrees = 30.0F;
+  const auto render = [&](bool drags) {
+    light.sun_azimuth_degrees += drags ? 1.0F : 0.0F;
+    ASSERT_EQ(cumulet_set_light(viewer.get(), &light), CUMULET_OK);
+    ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+  };
+  for (const double budget_ms : {1.0, 4.0, 16.0, 64.0, 256.0}) {  // whatever is compiled is
+    frame.budget_ms = budget_ms;
+    for (int i = 0; i < 8; ++i) render(true);
+  }
+  const test::BusyHost host(gl, 250.0);
+  frame.budget_ms = 16.0;
+  for (int i = 0; i < 24; ++i) {
+    gl.Finish();
+    host.queue();
+    const GLsync queued = gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.Flush();
+    const bool rests = i < 6;
+    for (int frames = 0; frames < (rests ? 5 : 1); ++frames) render(!rests);
+    EXPECT_EQ(gl.ClientWaitSync(queued, 0, 0), GLenum{GL_TIMEOUT_EXPIRED}) << "frame " << i;
+    gl.DeleteSync(queued);
   }
 }
 

@@ -460,8 +460,9 @@ class ContextLossAt : public testing::Test {
       const cumulet_status attached = host.attach(viewer_.get());
       if (attached == CUMULET_OK) {
         auto failures = render_all(viewer_.get(), host.target.frame());
-        // Lost in the very last calls of a frame: the next one tells.
-        if (failures.empty()) failures = render_all(viewer_.get(), host.target.frame());
+        // Lost in the very last calls of a frame: the next one tells. How many calls a picture takes is a matter of
+        // timing, too: then a later one loses it.
+        for (int i = 0; i < 20 && failures.empty(); ++i) failures = render_all(viewer_.get(), host.target.frame());
         EXPECT_EQ(failures, std::vector<cumulet_status>{CUMULET_ERROR_CONTEXT_LOST});
         ASSERT_FALSE(failures.empty());
         ASSERT_EQ(failures.back(), CUMULET_ERROR_CONTEXT_LOST);
