@@ -12,7 +12,8 @@
 // roughness reflects exactly what comes in. The coat weighs the Lambertian lobe in the same way, by its own E; the base's
 // own lobe, whose way in is mostly as steep as its way out, by the lesser of 1 - E(n.v) and 1 - E(n.l).
 //
-// The Lambertian lobe ends softly where light sinks below the smooth surface under a normal map: see cm_terminator.
+// The Lambertian lobe keeps the normal that is not bent: it mirrors nothing, and loses light at rims by a bent one. It
+// ends softly where light sinks below the smooth surface under a normal map: see cm_terminator.
 //
 // wo and wi are unit vectors that point away from the surface, wo towards where the light goes. Nothing is transmitted.
 #ifndef CM_BSDF_GLSL
@@ -28,7 +29,8 @@ struct CmSurface {
   float metallic;             // 0 to 1
   float roughness;            // perceptual, 0 to 1: alpha = max(roughness^2, 1e-3)
   vec3 normal;                // of shading: unit, world, on wo's side
-  vec3 smooth_normal;         // what it would be without a normal map, unit
+  vec3 matte_normal;          // what it would be if it were not bent, unit: the Lambertian lobe's
+  vec3 smooth_normal;         // matte_normal without a normal map, unit
   vec3 f0;                    // reflectance of the dielectric at normal incidence, see cm_dielectric_f0
   float specular;             // its reflectance at grazing incidence
   float clearcoat;            // weight of the coat, of ior 1.5
@@ -84,34 +86,44 @@ CM_FN vec3 cm_lobe_weights(CmSurface s, float cosine) {
   return sum > 0.0f ? w * (1.0f / sum) : vec3(0.0f, 0.0f, 1.0f);
 }
 
-// The lobes' sum times |cos|; the Lambertian one weighed by `terminator`.
-CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, vec3 wo, vec3 wi) {
-  if (!(wo.z > 0.0f) || !(wi.z > 0.0f)) return vec3(0.0f);
-  vec3 h = normalize(wo + wi);
-  float cosine = dot(wo, h);
-  vec3 f = cm_base_fresnel(s, cosine) * cm_ggx(cm_alpha(s.roughness), wo, wi, h);
+// The lobes' sum times |cos|; the Lambertian one, which sees wi at matte_cosine, weighed by `terminator`.
+CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine, vec3 wo, vec3 wi) {
+  if (!(wo.z > 0.0f)) return vec3(0.0f);
+  float cosine = 1.0f;
+  vec3 h = vec3(0.0f);
+  vec3 f = vec3(0.0f);
+  bool above = wi.z > 0.0f;
+  if (above) {
+    h = normalize(wo + wi);
+    cosine = dot(wo, h);
+    f = cm_base_fresnel(s, cosine) * cm_ggx(cm_alpha(s.roughness), wo, wi, h);
+  }
   vec3 matte = vec3(0.0f);
-  if (s.metallic < 1.0f) {
+  if (s.metallic < 1.0f && matte_cosine > 0.0f) {
     float average = cm_below_interface(s, cm_ggx_albedo_average(s.roughness));
-    float through = cm_below_interface(s, cm_ggx_albedo(s.roughness, wi.z)) / max(average, 1e-6f);
-    matte = cm_matte_albedo(s, wo.z) * (terminator * through * wi.z * CM_INV_PI);
+    float through = cm_below_interface(s, cm_ggx_albedo(s.roughness, matte_cosine)) / max(average, 1e-6f);
+    matte = cm_matte_albedo(s, wo.z) * (terminator * through * matte_cosine * CM_INV_PI);
   }
   if (s.clearcoat > 0.0f) {
     float rough = s.clearcoat_roughness;
     float out_of = cm_below_coat(s, cm_ggx_albedo(rough, wo.z));
-    float into = cm_below_coat(s, cm_ggx_albedo(rough, wi.z));
-    f *= min(out_of, into);
+    float into = cm_below_coat(s, cm_ggx_albedo(rough, max(matte_cosine, 0.0f)));
     matte *= out_of * into / cm_below_coat(s, cm_ggx_albedo_average(rough));
-    f += vec3(cm_coat_fresnel(s, cosine) * cm_ggx(cm_alpha(rough), wo, wi, h));
+    if (above) {
+      f *= min(out_of, cm_below_coat(s, cm_ggx_albedo(rough, wi.z)));
+      f += vec3(cm_coat_fresnel(s, cosine) * cm_ggx(cm_alpha(rough), wo, wi, h));
+    }
   }
   return f + matte;
 }
 
-CM_FN float cm_bsdf_pdf_local(CmSurface s, vec3 wo, vec3 wi) {
-  if (!(wo.z > 0.0f) || !(wi.z > 0.0f)) return 0.0f;
-  vec3 h = normalize(wo + wi);
+CM_FN float cm_bsdf_pdf_local(CmSurface s, float matte_cosine, vec3 wo, vec3 wi) {
+  if (!(wo.z > 0.0f)) return 0.0f;
   vec3 lobes = cm_lobe_weights(s, wo.z);
-  float pdf = lobes.z * wi.z * CM_INV_PI;
+  float pdf = lobes.z * max(matte_cosine, 0.0f) * CM_INV_PI;
+  // Lobes that mirror throw some of their samples below the surface, where the Lambertian one may still see them.
+  vec3 h = normalize(wo + wi);
+  if (!(h.z > 0.0f)) return pdf;
   if (lobes.y > 0.0f) pdf += lobes.y * cm_ggx_pdf(cm_alpha(s.roughness), wo, h);
   if (lobes.x > 0.0f) pdf += lobes.x * cm_ggx_pdf(cm_alpha(s.clearcoat_roughness), wo, h);
   return pdf;
@@ -124,10 +136,10 @@ CM_FN vec3 cm_into_frame(vec3 u, vec3 v, vec3 n, vec3 w) { return vec3(dot(u, w)
 // SIGGRAPH Talks 2019. A mapped normal at c to the smooth one loses so, of constant radiance, 2 % (c = 0.999) to 14 %
 // (0.9), 35 % (0.5) and at most (1 - c) / 2 with c <= 0: the shade that bumps throw on each other, as Cycles has it.
 CM_FN float cm_terminator(CmSurface s, vec3 wi) {
-  float c = dot(s.normal, s.smooth_normal);
+  float c = dot(s.matte_normal, s.smooth_normal);
   float above = dot(s.smooth_normal, wi);
   if (c <= 0.0f) return above > 0.0f ? 1.0f : 0.0f;
-  float t = clamp(above / max(dot(s.normal, wi) * c, 1e-12f), 0.0f, 1.0f);
+  float t = clamp(above / max(dot(s.matte_normal, wi) * c, 1e-12f), 0.0f, 1.0f);
   return t * (1.0f + t * (1.0f - t));
 }
 
@@ -136,19 +148,20 @@ CM_FN vec3 cm_bsdf_eval(CmSurface s, vec3 wo, vec3 wi) {
   vec3 u;
   vec3 v;
   cm_frame(s.normal, u, v);
-  return cm_bsdf_eval_local(s, cm_terminator(s, wi), cm_into_frame(u, v, s.normal, wo),
+  return cm_bsdf_eval_local(s, cm_terminator(s, wi), dot(s.matte_normal, wi), cm_into_frame(u, v, s.normal, wo),
                             cm_into_frame(u, v, s.normal, wi));
 }
 
-// Density of cm_bsdf_sample's wi by solid angle. Integrates to 1 less the share of samples that fail.
+// Density of cm_bsdf_sample's wi by solid angle.
 CM_FN float cm_bsdf_pdf(CmSurface s, vec3 wo, vec3 wi) {
   vec3 u;
   vec3 v;
   cm_frame(s.normal, u, v);
-  return cm_bsdf_pdf_local(s, cm_into_frame(u, v, s.normal, wo), cm_into_frame(u, v, s.normal, wi));
+  return cm_bsdf_pdf_local(s, dot(s.matte_normal, wi), cm_into_frame(u, v, s.normal, wo),
+                           cm_into_frame(u, v, s.normal, wi));
 }
 
-// A direction for u in [0, 1)^3; u0 picks the lobe. May be below the surface, where eval is 0.
+// A direction for u in [0, 1)^3; u0 picks the lobe. May be below the surface: eval is 0 where it is for every lobe.
 CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   vec3 u;
   vec3 v;
@@ -157,19 +170,22 @@ CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   if (!(o.z > 0.0f)) return s.normal;
   vec3 lobes = cm_lobe_weights(s, o.z);
   vec3 i;
+  vec3 n = s.normal;
   if (u0 < lobes.x + lobes.y) {
     float alpha = cm_alpha(u0 < lobes.x ? s.clearcoat_roughness : s.roughness);
     vec3 h = cm_ggx_visible_normal(alpha, o, u1, u2);
     i = h * (2.0f * dot(o, h)) - o;
   } else {
+    n = s.matte_normal;
+    cm_frame(n, u, v);
     float radius = sqrt(u1);
     float angle = 6.28318531f * u2;
     i = vec3(radius * cos(angle), radius * sin(angle), sqrt(1.0f - u1));
   }
-  return normalize(u * i.x + v * i.y + s.normal * i.z);
+  return normalize(u * i.x + v * i.y + n * i.z);
 }
 
-// A shading normal, bent as far as it must be for the viewer's mirror image to be above the surface, whose own normal is
+// A shading normal for the lobes that mirror, bent as far as it must be for the viewer's mirror image to be above the surface, whose own normal is
 // `geometric`, on the viewer's side: halfway to a mirror direction that is lifted to just above it.
 CM_FN vec3 cm_bend_normal(vec3 normal, vec3 geometric, vec3 wo) {
   vec3 mirrored = normal * (2.0f * dot(normal, wo)) - wo;

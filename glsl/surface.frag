@@ -31,8 +31,8 @@ vec2 cm_uv_of(int map) {
 
 #define CM_SAMPLE(map) texture(cm_maps[map], cm_uv_of(map))
 
-// Unit, on the viewer's side: the front's, which back faces turn over. smooth_normal: without the normal map.
-vec3 cm_normal_here(vec3 wo, out vec3 smooth_normal) {
+// Unit, on the viewer's side: the front's, which back faces turn over. matte_normal: not bent; smooth_normal: nor mapped.
+vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
   vec3 dx = dFdx(cm_from_eye);
   vec3 dy = dFdy(cm_from_eye);
   float side = gl_FrontFacing ? 1.0 : -1.0;
@@ -70,8 +70,8 @@ vec3 cm_normal_here(vec3 wo, out vec3 smooth_normal) {
   vec3 g = cross(dx, dy);
   g = dot(g, g) > 0.0 ? normalize(g) : wo;
   if (dot(g, wo) < 0.0) g = -g;
-  smooth_normal = cm_bend_normal(smooth_normal, g, wo);
-  return cm_bend_normal(n * side, g, wo);
+  matte_normal = n * side;
+  return cm_bend_normal(matte_normal, g, wo);
 }
 
 vec2 cm_ggx_albedo(float roughness, float cosine) {
@@ -108,7 +108,7 @@ void main() {
     s.base_color = clamp(base.rgb, 0.0, 1.0);
     s.metallic = reflection.x;
     s.roughness = reflection.y;
-    s.normal = cm_normal_here(wo, s.smooth_normal);
+    s.normal = cm_normal_here(wo, s.matte_normal, s.smooth_normal);
     s.f0 = min(specular.rgb, vec3(1.0)) * specular.w;
     s.specular = specular.w;
     s.clearcoat = coat.x;

@@ -242,7 +242,7 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   float normal_length = length(normal);
   normal = normal_length > 1e-6 ? normal / normal_length : g;
   bool back = dot(normal, point.geometric) < 0.0;
-  point.material.smooth_normal = cm_bend_normal(back ? -normal : normal, point.geometric, -w);
+  point.material.smooth_normal = back ? -normal : normal;
 
   vec4 base = cm_floats(word) * cm_texture(material, CM_USE_BASE_COLOR, m, true) * m.color;
   vec4 a = cm_floats(word + 2u);
@@ -263,6 +263,7 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
     }
   }
   if (back) normal = -normal;
+  point.material.matte_normal = normal;
   normal = cm_bend_normal(normal, point.geometric, -w);
 
   point.unlit = (flags & CM_UNLIT) != 0u;

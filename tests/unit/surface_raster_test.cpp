@@ -633,7 +633,7 @@ TEST_P(SurfaceRasters, MapsOfEveryKindAreReadFromTheirChannels) {
   s.metallic = 0.5F * 0.8F;
   s.roughness = 0.9F * 0.4F;
   s.normal = {0.0F, 0.0F, 1.0F};
-  s.smooth_normal = s.normal;
+  s.matte_normal = s.smooth_normal = s.normal;
   s.f0 = core::cm_dielectric_f0(1.8F, 0.9F * 0.6F, colour);
   s.specular = 0.9F * 0.6F;
   s.clearcoat = 0.8F * 0.2F;
@@ -778,7 +778,7 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
         s.metallic = material.metallic;
         s.roughness = material.roughness;
         s.normal = glm::vec3(d, std::sqrt(1.0F - glm::dot(d, d)));
-        s.smooth_normal = s.normal;
+        s.matte_normal = s.smooth_normal = s.normal;
         s.f0 = glm::vec3(0.04F);
         s.specular = 1.0F;
         if (s.roughness < 0.3F &&
