@@ -426,7 +426,7 @@ CUMULET_API void cumulet_surfaces_release(cumulet_surfaces* surfaces);          
 
 typedef struct cumulet_surfaces_info {
   size_t struct_size;
-  char name[128]; /* the path, or what the host named it */
+  char name[128];     /* the path, or what the host named it */
   uint64_t triangles; /* that are shown: those of a mesh that two nodes place count twice */
   uint32_t materials; /* of the file, used or not, as meshes, primitives and textures */
   uint32_t lights;    /* that are shown, as cameras */
