@@ -512,11 +512,13 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
   file.folder = folder;
   const Container container = unpack(file.storage->emplace_back(std::move(bytes)));
   const std::size_t length = container.json.size();
-  json root = apart(budget.progress_for(length), [text = container.json, owner = file.storage] {
+  auto checked = apart(budget.progress_for(length), [text = container.json, owner = file.storage] {
     json parsed = parse_json(text);
-    check_schema(parsed);
-    return parsed;
+    std::string out_of_range = check_schema(parsed);
+    return std::pair(std::move(parsed), std::move(out_of_range));
   });
+  json& root = checked.first;
+  if (!checked.second.empty()) log.warning(name + ": " + checked.second);
   check_version(root, log, name);
   check_extensions(root, log, name);
   SetAside aside = set_aside(root);

@@ -1,6 +1,8 @@
 #include "surface/gltf_schema.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -39,9 +41,21 @@ const char* name_of(Kind kind) {
   return "something else";
 }
 
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+/// Of numbers that glTF bounds.
+struct Range {
+  double least = -infinite;
+  double most = infinite;
+};
+constexpr Range unit{0.0, 1.0};
+constexpr Range positive{0.0, infinite};
+constexpr Range cone{0.0, 1.5707963267948966 + 1e-6};  // float's half pi is more
+
 struct Leaf {
   const char* path;  ///< "[]": any element of an array; "*": any member of an object
   Kind kind;
+  Range range{};
 };
 
 // Containers are known from their leaves. "{}" at the end: an object whose members are not looked at.
@@ -53,11 +67,11 @@ constexpr Leaf leaves[] = {
     {"extensionsRequired[]", Kind::string},
     {"extensions.KHR_lights_punctual.lights[].name", Kind::string},
     {"extensions.KHR_lights_punctual.lights[].type", Kind::string},
-    {"extensions.KHR_lights_punctual.lights[].color[]", Kind::number},
-    {"extensions.KHR_lights_punctual.lights[].intensity", Kind::number},
-    {"extensions.KHR_lights_punctual.lights[].range", Kind::number},
-    {"extensions.KHR_lights_punctual.lights[].spot.innerConeAngle", Kind::number},
-    {"extensions.KHR_lights_punctual.lights[].spot.outerConeAngle", Kind::number},
+    {"extensions.KHR_lights_punctual.lights[].color[]", Kind::number, unit},
+    {"extensions.KHR_lights_punctual.lights[].intensity", Kind::number, positive},
+    {"extensions.KHR_lights_punctual.lights[].range", Kind::number, positive},
+    {"extensions.KHR_lights_punctual.lights[].spot.innerConeAngle", Kind::number, cone},
+    {"extensions.KHR_lights_punctual.lights[].spot.outerConeAngle", Kind::number, cone},
     {"scenes[].name", Kind::string},
     {"scenes[].nodes[]", Kind::index},
     {"nodes[].name", Kind::string},
@@ -135,26 +149,26 @@ constexpr Leaf leaves[] = {
     {"animations[].channels[].target.node", Kind::index},
     {"animations[].channels[].target.path", Kind::string},
     {"materials[].name", Kind::string},
-    {"materials[].emissiveFactor[]", Kind::number},
+    {"materials[].emissiveFactor[]", Kind::number, unit},
     {"materials[].alphaMode", Kind::string},
-    {"materials[].alphaCutoff", Kind::number},
+    {"materials[].alphaCutoff", Kind::number, positive},
     {"materials[].doubleSided", Kind::boolean},
     {"materials[].normalTexture.scale", Kind::number},
-    {"materials[].occlusionTexture.strength", Kind::number},
-    {"materials[].pbrMetallicRoughness.baseColorFactor[]", Kind::number},
-    {"materials[].pbrMetallicRoughness.metallicFactor", Kind::number},
-    {"materials[].pbrMetallicRoughness.roughnessFactor", Kind::number},
-    {"materials[].extensions.KHR_materials_emissive_strength.emissiveStrength", Kind::number},
+    {"materials[].occlusionTexture.strength", Kind::number, unit},
+    {"materials[].pbrMetallicRoughness.baseColorFactor[]", Kind::number, unit},
+    {"materials[].pbrMetallicRoughness.metallicFactor", Kind::number, unit},
+    {"materials[].pbrMetallicRoughness.roughnessFactor", Kind::number, unit},
+    {"materials[].extensions.KHR_materials_emissive_strength.emissiveStrength", Kind::number, positive},
     {"materials[].extensions.KHR_materials_ior.ior", Kind::number},
-    {"materials[].extensions.KHR_materials_specular.specularFactor", Kind::number},
-    {"materials[].extensions.KHR_materials_specular.specularColorFactor[]", Kind::number},
-    {"materials[].extensions.KHR_materials_clearcoat.clearcoatFactor", Kind::number},
-    {"materials[].extensions.KHR_materials_clearcoat.clearcoatRoughnessFactor", Kind::number},
-    {"materials[].extensions.KHR_materials_transmission.transmissionFactor", Kind::number},
+    {"materials[].extensions.KHR_materials_specular.specularFactor", Kind::number, unit},
+    {"materials[].extensions.KHR_materials_specular.specularColorFactor[]", Kind::number, positive},
+    {"materials[].extensions.KHR_materials_clearcoat.clearcoatFactor", Kind::number, unit},
+    {"materials[].extensions.KHR_materials_clearcoat.clearcoatRoughnessFactor", Kind::number, unit},
+    {"materials[].extensions.KHR_materials_transmission.transmissionFactor", Kind::number, unit},
     {"materials[].extensions.KHR_materials_unlit{}", Kind::object},
-    {"materials[].extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor[]", Kind::number},
-    {"materials[].extensions.KHR_materials_pbrSpecularGlossiness.specularFactor[]", Kind::number},
-    {"materials[].extensions.KHR_materials_pbrSpecularGlossiness.glossinessFactor", Kind::number},
+    {"materials[].extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor[]", Kind::number, unit},
+    {"materials[].extensions.KHR_materials_pbrSpecularGlossiness.specularFactor[]", Kind::number, unit},
+    {"materials[].extensions.KHR_materials_pbrSpecularGlossiness.glossinessFactor", Kind::number, unit},
 };
 
 constexpr const char* texture_uses[] = {
@@ -183,13 +197,20 @@ constexpr Leaf texture_use_leaves[] = {
 class Schema {
  public:
   Schema() {
-    for (const Leaf& leaf : leaves) add(leaf.path, leaf.kind);
+    for (const Leaf& leaf : leaves) {
+      add(leaf.path, leaf.kind);
+      ranges_[leaf.path] = leaf.range;
+    }
     for (const char* use : texture_uses) {
       for (const Leaf& leaf : texture_use_leaves) add(std::string(use) + leaf.path, leaf.kind);
     }
   }
 
-  void check(json& root) { visit(root, {}, "the file"); }
+  std::string check(json& root) {
+    visit(root, {}, "the file");
+    if (outside_ > 1) remark_ += ", and " + std::to_string(outside_ - 1) + " more such numbers";
+    return remark_;
+  }
 
  private:
   /// The leaf, and every container on the way to it.
@@ -207,6 +228,9 @@ class Schema {
     const auto found = kinds_.find(type);
     if (found != kinds_.end()) {
       check_kind(value, found->second, where);
+      const auto range = ranges_.find(type);
+      if (found->second == Kind::number && range != ranges_.end())
+        check_range(value.get<double>(), range->second, where);
     } else if (value.is_number_integer()) {
       soften(value);
     }
@@ -259,6 +283,15 @@ class Schema {
     if (!good) malformed(where + " is not " + name_of(kind));
   }
 
+  void check_range(double number, const Range& range, const std::string& where) {
+    if (number >= range.least && number <= range.most) return;
+    const bool below = number < range.least;
+    std::array<char, 64> told{};
+    std::snprintf(told.data(), told.size(), " is %g, %s than glTF's %g", number, below ? "less" : "more",
+                  below ? range.least : range.most);
+    if (outside_++ == 0) remark_ = where + told.data();
+  }
+
   /// tinygltf keeps integers of extensions in an int.
   static void soften(json& value) {
     if (!value.is_number_integer()) return;
@@ -267,6 +300,9 @@ class Schema {
   }
 
   std::unordered_map<std::string, Kind> kinds_;
+  std::unordered_map<std::string, Range> ranges_;
+  std::string remark_;
+  std::size_t outside_ = 0;
 };
 
 }  // namespace
@@ -292,9 +328,9 @@ void check_nesting(std::string_view text) {
   }
 }
 
-void check_schema(json& root) {
+std::string check_schema(json& root) {
   if (!root.is_object()) malformed("JSON is not an object");
-  Schema().check(root);
+  return Schema().check(root);
 }
 
 }  // namespace cumulet::surface::detail

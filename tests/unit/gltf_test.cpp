@@ -264,6 +264,30 @@ TEST(Gltf, PlainDataUrisHoldBytesAsTheyAre) {
   near(corners(*scene, scene->pose(0.0))[1], {1, 0, 0});
 }
 
+TEST(Gltf, NumbersOutOfRangeAreTold) {
+  GltfModel model = triangle_model();
+  model.root["materials"] = nlohmann::json::array({{{"emissiveFactor", {0.0, 1.0, 0.5}}, {"alphaCutoff", 7.0}}});
+  {
+    Lines good;
+    imported(model, good.log);
+    EXPECT_TRUE(good.warnings.empty());
+  }
+  model.root["materials"][0]["emissiveFactor"] = {0.0, 3.5, 0.5};
+  {
+    Lines lines;
+    imported(model, lines.log);
+    ASSERT_EQ(lines.warnings.size(), 1U);
+    EXPECT_TRUE(has(lines.warnings[0], "materials[0].emissiveFactor[1] is 3.5, more than glTF's 1"));
+  }
+  model.root["materials"][0]["pbrMetallicRoughness"] = {{"roughnessFactor", -2}, {"metallicFactor", 1.01}};
+  {
+    Lines lines;
+    imported(model, lines.log);
+    ASSERT_EQ(lines.warnings.size(), 1U);
+    EXPECT_TRUE(has(lines.warnings[0], ", and 2 more such numbers"));
+  }
+}
+
 TEST(Gltf, SkinsAndWeightsThatDoNothingAreTold) {
   const auto warnings = [](const GltfModel& model) {
     Lines lines;
