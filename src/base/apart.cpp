@@ -17,7 +17,14 @@ class Threads {
   explicit Threads(std::atomic<bool>& gone) : gone_(gone) {}
   ~Threads() {
     gone_ = true;
-    for (One& one : all_) one.thread.join();
+    std::list<One> rest;
+    {
+      // What ends meanwhile may leave something in its turn: that is done on the spot.
+      const std::scoped_lock lock(mutex_);
+      closed_ = true;
+      rest.swap(all_);
+    }
+    for (One& one : rest) one.thread.join();
   }
   Threads(const Threads&) = delete;
   Threads& operator=(const Threads&) = delete;
@@ -25,6 +32,7 @@ class Threads {
   /// False if there is none to be had.
   bool run(const std::function<void()>& work) {
     const std::scoped_lock lock(mutex_);
+    if (closed_) return false;
     all_.remove_if([](One& one) {
       if (!one.ended) return false;
       one.thread.join();
@@ -55,6 +63,7 @@ class Threads {
 
   std::atomic<bool>& gone_;
   std::mutex mutex_;
+  bool closed_ = false;
   std::list<One> all_;
 };
 

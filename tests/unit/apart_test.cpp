@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <cstdlib>
 #include <latch>
 #include <memory>
 #include <thread>
@@ -105,6 +107,21 @@ TEST(Apart, OfVeryManySomeAreDoneAtOnce) {
   EXPECT_GT(left, 2);
   open.count_down();
   while (done < left) std::this_thread::yield();
+}
+
+// What was left leaves something in its turn, while the process ends.
+TEST(ApartDeathTest, ExitWaitsForWhatWasLeftByWhatWasLeft) {
+  testing::GTEST_FLAG(death_test_style) = "threadsafe";
+  const auto left_and_exit = [] {
+    for (int i = 0; i < 12; ++i) {
+      leave([i] {
+        std::this_thread::sleep_for(std::chrono::microseconds(100 * i));
+        for (int k = 0; k < 20; ++k) leave([] { std::this_thread::sleep_for(std::chrono::microseconds(50)); });
+      });
+    }
+    std::exit(0);
+  };
+  for (int i = 0; i < 5; ++i) EXPECT_EXIT(left_and_exit(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace
