@@ -59,6 +59,22 @@ void expect_steady_progress(const Work& work) {
 
 double processor_milliseconds() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
+/// Half of the delays from asking to stopping, in milliseconds, are short, and none is longer than most.
+void expect_soon(std::vector<double> delays, double most) {
+  ASSERT_FALSE(delays.empty());
+  std::sort(delays.begin(), delays.end());
+  std::string list;
+  for (const double delay : delays) list += std::to_string(delay).substr(0, 5) + " ";
+  testing::Test::RecordProperty("milliseconds_to_stop", list);
+#if !defined(__SANITIZE_ADDRESS__)
+  // In processor time of all threads, which a busy machine does not change much.
+  EXPECT_LT(delays[delays.size() / 2], 30.0) << list;
+  EXPECT_LT(delays.back(), most) << list;
+#else
+  static_cast<void>(most);
+#endif
+}
+
 /// Cancels at many fractions, and between them: the work stops soon, by Error(cancelled) and nothing else.
 void expect_cancels(const Work& work) {
   constexpr int moments = 16;
@@ -92,16 +108,7 @@ void expect_cancels(const Work& work) {
     delays.push_back(stopped - asked);
   }
   EXPECT_GE(cancelled, moments / 3);
-  ASSERT_FALSE(delays.empty());
-  std::sort(delays.begin(), delays.end());
-  std::string list;
-  for (const double delay : delays) list += std::to_string(delay).substr(0, 5) + " ";
-  testing::Test::RecordProperty("milliseconds_to_stop", list);
-#if !defined(__SANITIZE_ADDRESS__)
-  // In processor time of all threads, which a busy machine does not change much.
-  EXPECT_LT(delays[delays.size() / 2], 30.0) << list;
-  EXPECT_LT(delays.back(), 250.0) << list;
-#endif
+  expect_soon(delays, 250.0);
 }
 
 /// The same at many moments, spread evenly over the time that the work takes: where fractions tell little.
@@ -130,14 +137,7 @@ void expect_stops(const Work& work) {
     canceller.join();
   }
   ASSERT_GE(delays.size(), moments / 4U);
-  std::sort(delays.begin(), delays.end());
-  std::string list;
-  for (const double delay : delays) list += std::to_string(delay).substr(0, 5) + " ";
-  testing::Test::RecordProperty("milliseconds_to_stop", list);
-#if !defined(__SANITIZE_ADDRESS__)
-  EXPECT_LT(delays[delays.size() / 2], 30.0) << list;
-  EXPECT_LT(delays.back(), 100.0) << list;
-#endif
+  expect_soon(delays, 100.0);
 }
 
 void expect_both(const Work& work) {
