@@ -10,7 +10,7 @@
 //
 // v0 v1 is always the longest edge, which bisection cuts in half. All three lie in 0 <= z <= y <= x and differ
 // only in the fourth face, the cap: x + y <= 2 (A), x <= 1 (B), x + z <= 2 (C). 3 classes x 48 frames are the 144
-// shapes of design.md section 2. Faces are numbered 0: z >= 0, 1: x >= y, 2: y >= z, 3: the cap.
+// shapes of docs/architecture.md. Faces are numbered 0: z >= 0, 1: x >= y, 2: y >= z, 3: the cap.
 //
 // Shape word, 16 bits: 0-2 sign of frame axes x, y, z; 3-4, 5-6, 7-8 cube axis behind frame axis x, y, z;
 // 9-10 class; 11-15 exponent.

@@ -213,7 +213,7 @@ void write_picture(const Viewer& viewer, const RenderOptions& options) {
   }
 }
 
-/// The names and units are scripted against: design.md, section 6. What does not apply is left out.
+/// The names and units are scripted against: keys are added, never renamed. What does not apply is left out.
 void write_stats(const RenderOptions& options, const cumulet_stats& stats, const char* backend) {
   const bool tet = options.scene.grid.march == CUMULET_MARCH_TET;
   Json json;

@@ -24,9 +24,9 @@ struct Tile {
 
 /// A scalar field on a sparse voxel lattice, free of any file format.
 ///
-/// Voxel (i,j,k) is the unit cube centred on (i,j,k) in index space, of constant value (design.md
-/// section 3). The field is zero outside bounds; inside, a voxel is in a brick, else in a tile,
-/// else it has the background value. Values are finite and not negative.
+/// Voxel (i,j,k) is the unit cube centred on (i,j,k) in index space, of constant value. The field is zero outside
+/// bounds; inside, a voxel is in a brick, else in a tile, else it has the background value. Values are finite and not
+/// negative.
 struct ScalarVolume {
   std::string name;                ///< grid name, for messages
   glm::dmat4 index_to_world{1.0};  ///< affine: world = index_to_world * (i,j,k,1)

@@ -1,4 +1,4 @@
-// The embedding contract, design.md section 5: one test a point, by cumulet.h and cumulet.hpp alone. What needs more
+// The embedding contract of docs/architecture.md: one test a point, by cumulet.h and cumulet.hpp alone. What needs more
 // than a test (every state, every allocation, threads, windows) is in robust_test.cpp and tests/embed.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
