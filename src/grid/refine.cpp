@@ -236,6 +236,29 @@ class DiamondSet::Evaluation {
     if (squared > floor) visit(midpoint(v0, shape), squared);
   }
 
+  // Likewise for a Kuhn cell (B) of a node above bricks, its two halves (C) and four quarters (A).
+  template <class Visit>
+  void kuhn_cell(const Statistics::Node& node, std::uint32_t permutation, double shortest, float floor,
+                 Visit visit) const {
+    const int size = node.log2_size;
+    vec3 v0(node.corner);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (((node.corner[axis] >> size) & 1) != 0) v0[axis] += static_cast<float>(1 << size);
+    }
+    const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
+    const std::uint32_t shape = frame | (1U << 9U) | (static_cast<std::uint32_t>(size) << 11U);
+    cell(v0, shape, shortest, floor, visit);
+    for (unsigned a = 0; a < 2; ++a) {
+      const std::uint32_t child = core::cm_child_shape(shape, a);
+      const vec3 child_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
+      cell(child_v0, child, shortest, floor, visit);
+      for (unsigned b = 0; b < 2; ++b) {
+        cell(b == 0 ? child_v0 : core::cm_cell_vertex(child_v0, child, 1), core::cm_child_shape(child, b), shortest,
+             floor, visit);
+      }
+    }
+  }
+
   [[nodiscard]] double shortest_edge(const Statistics::Node& node) const {
     const double size = 1 << node.log2_size;
     const dvec3 centre = dvec3(node.corner) + 0.5 * size;
@@ -326,7 +349,7 @@ void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared, Pr
     part.add(range.size());
   });
 
-  // Above bricks: a Kuhn cell (B), its two halves (C) and four quarters (A); then the 24 roots.
+  // Above bricks; then the 24 roots.
   for (int size = 4; size < log2_size_; ++size) {
     const auto& level = statistics.nodes_of_size(size);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, level.size(), 16), [&](const auto& range) {
@@ -336,22 +359,7 @@ void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared, Pr
         const Statistics::Node& node = statistics.nodes()[level[i]];
         const double shortest = evaluation.shortest_edge(node);
         for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
-          const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
-          vec3 v0(node.corner);
-          for (int axis = 0; axis < 3; ++axis) {
-            if (((node.corner[axis] >> size) & 1) != 0) v0[axis] += static_cast<float>(1 << size);
-          }
-          const std::uint32_t shape = frame | (1U << 9U) | (static_cast<std::uint32_t>(size) << 11U);
-          evaluation.cell(v0, shape, shortest, floor, visit);
-          for (unsigned a = 0; a < 2; ++a) {
-            const std::uint32_t child = core::cm_child_shape(shape, a);
-            const vec3 child_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
-            evaluation.cell(child_v0, child, shortest, floor, visit);
-            for (unsigned b = 0; b < 2; ++b) {
-              evaluation.cell(b == 0 ? child_v0 : core::cm_cell_vertex(child_v0, child, 1),
-                              core::cm_child_shape(child, b), shortest, floor, visit);
-            }
-          }
+          evaluation.kuhn_cell(node, permutation, shortest, floor, visit);
         }
       }
       part.add(range.size());
@@ -394,53 +402,57 @@ void DiamondSet::close(Progress* progress, double from, double to) {
 
 void DiamondSet::close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks,
                               const Progress* progress) {
-  const int size = 1 << log2_size_;
-  const int h = 1 << octave;
-  const int step = 1 << (octave % 3);
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
     check(progress);
-    const Block& block = *blocks[b];
-    Raiser raise(*this);
-    const auto raise_inside = [&](const ivec3& v, std::uint16_t priority) {
-      if (glm::all(glm::greaterThanEqual(v, ivec3(0))) && glm::all(glm::lessThanEqual(v, ivec3(size)))) {
-        raise(v, priority);
-      }
-    };
-    for (int x = 0; x < 8; x += step) {
-      for (int y = 0; y < 8; y += step) {
-        for (int z = 0; z < 8; z += step) {
-          const ivec3 local(x, y, z);
-          const ivec3 odd = (local / step) & 1;
-          if (odd.x + odd.y + odd.z != odd_coordinates) continue;
-          const std::uint16_t priority =
-              block.priority[static_cast<unsigned>(x * 64 + y * 8 + z)].load(std::memory_order_relaxed);
-          if (priority == 0) continue;
-          const ivec3 v = (block.corner * 8 + local) << (3 * block.scale);
-          if (odd_coordinates == 3) {
-            // Cube middle: of its corners, low is a multiple of 4 h and high is the opposite one.
-            ivec3 low;
-            ivec3 high;
-            for (int axis = 0; axis < 3; ++axis) {
-              const bool even = ((v[axis] - h) & (4 * h - 1)) == 0;
-              low[axis] = even ? v[axis] - h : v[axis] + h;
-              high[axis] = even ? v[axis] + h : v[axis] - h;
-            }
-            raise({high.x, low.y, low.z}, priority);
-            raise({low.x, high.y, low.z}, priority);
-            raise({low.x, low.y, high.z}, priority);
-          } else {
-            for (int axis = 0; axis < 3; ++axis) {
-              if (odd[axis] != 0) continue;
-              ivec3 offset(0);
-              offset[axis] = h;
-              raise_inside(v + offset, priority);
-              raise_inside(v - offset, priority);
-            }
-          }
-        }
+    close_block(*blocks[b], octave, odd_coordinates);
+  });
+}
+
+void DiamondSet::close_block(const Block& block, int octave, int odd_coordinates) {
+  const int step = 1 << (octave % 3);
+  Raiser raise(*this);
+  for (int x = 0; x < 8; x += step) {
+    for (int y = 0; y < 8; y += step) {
+      for (int z = 0; z < 8; z += step) {
+        const ivec3 local(x, y, z);
+        const ivec3 odd = (local / step) & 1;
+        if (odd.x + odd.y + odd.z != odd_coordinates) continue;
+        const std::uint16_t priority =
+            block.priority[static_cast<unsigned>(x * 64 + y * 8 + z)].load(std::memory_order_relaxed);
+        if (priority == 0) continue;
+        const ivec3 v = (block.corner * 8 + local) << (3 * block.scale);
+        raise_parents(raise, v, odd, octave, priority);
       }
     }
-  });
+  }
+}
+
+void DiamondSet::raise_parents(Raiser& raise, const ivec3& v, const ivec3& odd, int octave,
+                               std::uint16_t priority) const {
+  const int h = 1 << octave;
+  if (odd == ivec3(1)) {
+    // Cube middle: of its corners, low is a multiple of 4 h and high is the opposite one.
+    ivec3 low;
+    ivec3 high;
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool even = ((v[axis] - h) & (4 * h - 1)) == 0;
+      low[axis] = even ? v[axis] - h : v[axis] + h;
+      high[axis] = even ? v[axis] + h : v[axis] - h;
+    }
+    raise({high.x, low.y, low.z}, priority);
+    raise({low.x, high.y, low.z}, priority);
+    raise({low.x, low.y, high.z}, priority);
+    return;
+  }
+  const int size = 1 << log2_size_;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (odd[axis] != 0) continue;
+    for (const int offset : {h, -h}) {
+      ivec3 parent = v;
+      parent[axis] += offset;
+      if (parent[axis] >= 0 && parent[axis] <= size) raise(parent, priority);
+    }
+  }
 }
 
 unsigned DiamondSet::cells_around(const ivec3& vertex, int octave) const {

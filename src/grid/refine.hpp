@@ -99,6 +99,10 @@ class DiamondSet {
   void evaluate(const Evaluation& evaluation, double floor_squared, Progress* progress, double from, double to);
   void close(Progress* progress, double from, double to);
   void close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks, const Progress* progress);
+  void close_block(const Block& block, int octave, int odd_coordinates);
+  // Of the vertex v, whose odd coordinates are odd multiples of 2^octave.
+  void raise_parents(Raiser& raise, const glm::ivec3& v, const glm::ivec3& odd, int octave,
+                     std::uint16_t priority) const;
   void choose_cut(std::uint64_t max_cells, const Progress* progress);
   [[nodiscard]] unsigned cells_around(const glm::ivec3& vertex, int octave) const;
   [[nodiscard]] std::vector<Block*> blocks_of(int scale, const Progress* progress) const;

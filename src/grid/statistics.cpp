@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 
@@ -228,11 +229,70 @@ const float* Statistics::values(const Node& node) const {
                              : extra_values_.data() + std::size_t(node.values - count) * volume::brick_voxels;
 }
 
+namespace {
+
+// Inclusive of high.
+struct VoxelBox {
+  ivec3 low;
+  ivec3 high;
+  [[nodiscard]] bool holds(const VoxelBox& box) const {
+    return glm::all(glm::greaterThanEqual(box.low, low)) && glm::all(glm::lessThanEqual(box.high, high));
+  }
+  [[nodiscard]] bool meets(const VoxelBox& box) const {
+    return glm::all(glm::lessThanEqual(low, box.high)) && glm::all(glm::greaterThanEqual(high, box.low));
+  }
+};
+
+VoxelBox box_of(const volume::Tile& tile) { return {tile.min, tile.max}; }
+
+// The value of all of a box without bricks that these tiles meet, if it is one.
+std::optional<float> one_value(const volume::ScalarVolume& volume, const VoxelBox& box,
+                               const std::vector<std::uint32_t>& tiles) {
+  const VoxelBox bounds{volume.bounds_min, volume.bounds_max};
+  if (tiles.empty() && (volume.background == 0.0F || bounds.holds(box))) return volume.background;
+  if (tiles.size() == 1 && box_of(volume.tiles[tiles[0]]).holds(box)) return volume.tiles[tiles[0]].value;
+  return std::nullopt;
+}
+
+// Adds the values of a brick where a tile or the background ends.
+void append_brick(const volume::ScalarVolume& volume, const ivec3& low, const std::vector<std::uint32_t>& tiles,
+                  std::vector<float>& values) {
+  const VoxelBox bounds{volume.bounds_min, volume.bounds_max};
+  for (int v = 0; v < volume::brick_voxels; ++v) {
+    const ivec3 p = low + ivec3(v / 64, (v / 8) % 8, v % 8);
+    float value = volume.background;
+    for (const std::uint32_t t : tiles) {
+      if (box_of(volume.tiles[t]).holds({p, p})) value = volume.tiles[t].value;
+    }
+    values.push_back(bounds.holds({p, p}) ? value : 0.0F);
+  }
+}
+
+// Sorts bricks [first, last) by octant about the middle; octant i (x fastest) is then [ends[i], ends[i + 1]).
+std::array<std::uint32_t, 9> sort_by_octant(const volume::ScalarVolume& volume, std::vector<std::uint32_t>& bricks,
+                                            std::uint32_t first, std::uint32_t last, const ivec3& middle) {
+  const auto split = [&](std::uint32_t from, std::uint32_t to, int axis) {
+    return static_cast<std::uint32_t>(
+        std::partition(bricks.begin() + from, bricks.begin() + to,
+                       [&](std::uint32_t b) { return volume.brick_origins[b][axis] < middle[axis]; }) -
+        bricks.begin());
+  };
+  std::array<std::uint32_t, 9> ends{};
+  ends[0] = first;
+  ends[8] = last;
+  ends[4] = split(ends[0], ends[8], 2);
+  for (unsigned i : {0U, 4U}) ends[i + 2] = split(ends[i], ends[i + 4], 1);
+  for (unsigned i : {0U, 2U, 4U, 6U}) ends[i + 1] = split(ends[i], ends[i + 2], 0);
+  return ends;
+}
+
+}  // namespace
+
 void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* progress) {
   ProgressPart part(progress, 0.0, 0.1, volume.brick_origins.size());
   struct Work {
     std::uint32_t node;
-    std::uint32_t first, last;         // range of bricks_
+    std::uint32_t first, last;         // range of bricks
     std::vector<std::uint32_t> tiles;  // that meet the node
   };
   std::vector<std::uint32_t> bricks(volume.brick_origins.size());
@@ -254,68 +314,30 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
     const ivec3 corner = nodes_[work.node].corner;
     const int log2_size = nodes_[work.node].log2_size;
     const ivec3 low = corner + cube_.origin;
-    const ivec3 high = low + ((1 << log2_size) - 1);
-    const bool outside =
-        glm::any(glm::greaterThan(low, volume.bounds_max)) || glm::any(glm::lessThan(high, volume.bounds_min));
-    const bool inside = glm::all(glm::greaterThanEqual(low, volume.bounds_min)) &&
-                        glm::all(glm::lessThanEqual(high, volume.bounds_max));
-    std::erase_if(work.tiles, [&](std::uint32_t t) {
-      return glm::any(glm::greaterThan(low, volume.tiles[t].max)) || glm::any(glm::lessThan(high, volume.tiles[t].min));
-    });
+    const VoxelBox box{low, low + ((1 << log2_size) - 1)};
+    if (!box.meets({volume.bounds_min, volume.bounds_max})) continue;  // uniform zero
+    std::erase_if(work.tiles, [&](std::uint32_t t) { return !box.meets(box_of(volume.tiles[t])); });
     const bool no_bricks = work.first == work.last;
     Node& node = nodes_[work.node];
-    if (outside) continue;  // uniform zero
-    if (no_bricks && work.tiles.empty() && (volume.background == 0.0F || inside)) {
-      node.uniform = volume.background;
+    if (const auto value = no_bricks ? one_value(volume, box, work.tiles) : std::nullopt) {
+      node.uniform = *value;
       continue;
     }
-    if (no_bricks && work.tiles.size() == 1) {
-      const volume::Tile& tile = volume.tiles[work.tiles[0]];
-      if (glm::all(glm::greaterThanEqual(low, tile.min)) && glm::all(glm::lessThanEqual(high, tile.max))) {
-        node.uniform = tile.value;
-        continue;
-      }
-    }
     by_size_[static_cast<std::size_t>(log2_size)].push_back(work.node);
+    if (log2_size == 3 && !no_bricks) {
+      node.values = static_cast<std::int32_t>(bricks[work.first]);
+      ++placed;
+      continue;
+    }
     if (log2_size == 3) {
-      if (!no_bricks) {
-        node.values = static_cast<std::int32_t>(bricks[work.first]);
-        ++placed;
-      } else {
-        node.values = file_bricks + static_cast<std::int32_t>(extra_values_.size() / volume::brick_voxels);
-        for (int v = 0; v < volume::brick_voxels; ++v) {
-          const ivec3 p = low + ivec3(v / 64, (v / 8) % 8, v % 8);
-          float value = volume.background;
-          for (const std::uint32_t t : work.tiles) {
-            const volume::Tile& tile = volume.tiles[t];
-            if (glm::all(glm::greaterThanEqual(p, tile.min)) && glm::all(glm::lessThanEqual(p, tile.max))) {
-              value = tile.value;
-            }
-          }
-          const bool in_bounds = glm::all(glm::greaterThanEqual(p, volume.bounds_min)) &&
-                                 glm::all(glm::lessThanEqual(p, volume.bounds_max));
-          extra_values_.push_back(in_bounds ? value : 0.0F);
-        }
-      }
+      node.values = file_bricks + static_cast<std::int32_t>(extra_values_.size() / volume::brick_voxels);
+      append_brick(volume, low, work.tiles, extra_values_);
       continue;
     }
     const auto child = static_cast<std::uint32_t>(nodes_.size());
     node.child = child;
     const int half = 1 << (log2_size - 1);
-    const ivec3 middle = low + half;
-    // Sort the node's bricks by octant: three partitions.
-    const auto split = [&](std::uint32_t first, std::uint32_t last, int axis) {
-      return static_cast<std::uint32_t>(
-          std::partition(bricks.begin() + first, bricks.begin() + last,
-                         [&](std::uint32_t b) { return volume.brick_origins[b][axis] < middle[axis]; }) -
-          bricks.begin());
-    };
-    std::array<std::uint32_t, 9> ends{};
-    ends[0] = work.first;
-    ends[8] = work.last;
-    ends[4] = split(ends[0], ends[8], 2);
-    for (unsigned i : {0U, 4U}) ends[i + 2] = split(ends[i], ends[i + 4], 1);
-    for (unsigned i : {0U, 2U, 4U, 6U}) ends[i + 1] = split(ends[i], ends[i + 2], 0);
+    const auto ends = sort_by_octant(volume, bricks, work.first, work.last, low + half);
     for (unsigned i = 0; i < 8; ++i) {
       nodes_.push_back(
           {.corner = corner + half * ivec3(i & 1U, (i >> 1U) & 1U, (i >> 2U) & 1U), .log2_size = log2_size - 1});

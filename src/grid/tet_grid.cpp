@@ -93,30 +93,69 @@ void GridBuilder::bisect(Progress* progress) {
   order(progress);
 }
 
+std::uint32_t GridBuilder::mark_splits(std::uint32_t first, std::uint32_t last) {
+  DiamondCursor cursor(*diamonds_);
+  std::uint32_t splits = 0;
+  for (std::uint32_t i = first; i < last; ++i) {
+    Node& node = nodes_[i];
+    const std::uint32_t cell_class = core::cm_shape_class(node.shape);
+    node.child = 0;
+    if (cell_class == 1 && core::cm_shape_exponent(node.shape) == 0) continue;  // a sixth of a voxel
+    const vec3 middle =
+        v0_of(node.v0) +
+        core::cm_from_frame(core::cm_frame_midpoint(cell_class) * core::cm_shape_unit(node.shape), node.shape);
+    if (cursor.is_split(ivec3(middle))) {
+      node.child = 1;
+      ++splits;
+    }
+  }
+  return splits;
+}
+
+void GridBuilder::make_child(std::uint32_t parent, unsigned side) {
+  const Node node = nodes_[parent];
+  const std::uint32_t cell_class = core::cm_shape_class(node.shape);
+  Node& child = nodes_[node.child + side];
+  const std::uint32_t shape = core::cm_child_shape(node.shape, side);
+  child.child = 0;
+  child.shape = static_cast<std::uint16_t>(shape);
+  child.v0 = side == 0 ? node.v0 : pack_v0(core::cm_cell_vertex(v0_of(node.v0), node.shape, 1));
+  child.heap = static_cast<std::uint16_t>(node.heap == 0 ? 0 : 2 * node.heap + side);
+  child.permutation = node.permutation;
+  if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 3) {
+    child.heap = 1;
+    child.permutation = static_cast<std::uint16_t>(permutation_of(shape));
+  }
+  child.links[3] = node.child + 1 - side;
+  for (const auto& [face, parent_face] : half_face[cell_class][side]) {
+    const std::uint32_t other = node.links[parent_face];
+    if (other == CM_NONE) {
+      child.links[face] = CM_NONE;
+      continue;
+    }
+    // The neighbour is of the same diamond and splits too: its child at the same end of the edge.
+    const Node& neighbour = nodes_[other];
+    child.links[face] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
+  }
+  const auto [face, parent_face] = whole_face[cell_class][side];
+  std::uint32_t whole = node.links[parent_face];
+  if (whole != CM_NONE && nodes_[whole].child != 0) {
+    // It splits in this round too, elsewhere: its cap (face 3) goes to child 1, its other whole face to child 0.
+    whole = nodes_[whole].child + (nodes_[whole].links[3] == parent ? 1 : 0);
+  }
+  child.links[face] = whole;
+}
+
 void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressPart& part) {
   constexpr std::uint32_t chunk = 4096;
   const std::uint32_t chunks = (last - first + chunk - 1) / chunk;
+  const auto begin_of = [&](std::uint32_t c) { return first + c * chunk; };
+  const auto end_of = [&](std::uint32_t c) { return std::min(last, begin_of(c + 1)); };
   std::vector<std::uint32_t> splits(chunks);
   // Mark what splits; then children get consecutive places in the order of their parents.
   tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
     part.check();
-    DiamondCursor cursor(*diamonds_);
-    const std::uint32_t end = std::min(last, first + (c + 1) * chunk);
-    std::uint32_t n = 0;
-    for (std::uint32_t i = first + c * chunk; i < end; ++i) {
-      Node& node = nodes_[i];
-      const std::uint32_t cell_class = core::cm_shape_class(node.shape);
-      node.child = 0;
-      if (cell_class == 1 && core::cm_shape_exponent(node.shape) == 0) continue;  // a sixth of a voxel
-      const vec3 middle =
-          v0_of(node.v0) +
-          core::cm_from_frame(core::cm_frame_midpoint(cell_class) * core::cm_shape_unit(node.shape), node.shape);
-      if (cursor.is_split(ivec3(middle))) {
-        node.child = 1;
-        ++n;
-      }
-    }
-    splits[c] = n;
+    splits[c] = mark_splits(begin_of(c), end_of(c));
   });
   std::uint32_t next = last;
   for (std::uint32_t& n : splits) {
@@ -126,53 +165,20 @@ void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressP
   }
   if (next > nodes_.size()) throw Error(ErrorCode::internal, "bisection overran its count: the set is not closed");
   tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
-    const std::uint32_t end = std::min(last, first + (c + 1) * chunk);
     std::uint32_t child = splits[c];
-    for (std::uint32_t i = first + c * chunk; i < end; ++i) {
+    for (std::uint32_t i = begin_of(c); i < end_of(c); ++i) {
       if (nodes_[i].child == 0) continue;
       nodes_[i].child = child;
       child += 2;
     }
   });
   tbb::parallel_for(0U, chunks, [&](std::uint32_t c) {
-    const std::uint32_t end = std::min(last, first + (c + 1) * chunk);
-    for (std::uint32_t i = first + c * chunk; i < end; ++i) {
-      const Node node = nodes_[i];
-      if (node.child == 0) continue;
-      const std::uint32_t cell_class = core::cm_shape_class(node.shape);
-      for (unsigned side = 0; side < 2; ++side) {
-        Node& child = nodes_[node.child + side];
-        const std::uint32_t shape = core::cm_child_shape(node.shape, side);
-        child.child = 0;
-        child.shape = static_cast<std::uint16_t>(shape);
-        child.v0 = side == 0 ? node.v0 : pack_v0(core::cm_cell_vertex(v0_of(node.v0), node.shape, 1));
-        child.heap = static_cast<std::uint16_t>(node.heap == 0 ? 0 : 2 * node.heap + side);
-        child.permutation = node.permutation;
-        if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 3) {
-          child.heap = 1;
-          child.permutation = static_cast<std::uint16_t>(permutation_of(shape));
-        }
-        child.links[3] = node.child + 1 - side;
-        for (const auto& [face, parent_face] : half_face[cell_class][side]) {
-          const std::uint32_t other = node.links[parent_face];
-          if (other == CM_NONE) {
-            child.links[face] = CM_NONE;
-            continue;
-          }
-          // The neighbour is of the same diamond and splits too: its child at the same end of the edge.
-          const Node& neighbour = nodes_[other];
-          child.links[face] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
-        }
-        const auto [face, parent_face] = whole_face[cell_class][side];
-        std::uint32_t whole = node.links[parent_face];
-        if (whole != CM_NONE && nodes_[whole].child != 0) {
-          // It splits in this round too, elsewhere: its cap (face 3) goes to child 1, its other whole face to child 0.
-          whole = nodes_[whole].child + (nodes_[whole].links[3] == i ? 1 : 0);
-        }
-        child.links[face] = whole;
-      }
+    for (std::uint32_t i = begin_of(c); i < end_of(c); ++i) {
+      if (nodes_[i].child == 0) continue;
+      make_child(i, 0);
+      make_child(i, 1);
     }
-    part.add(end - (first + c * chunk));
+    part.add(end_of(c) - begin_of(c));
   });
   level_first_.push_back(next);
 }
@@ -228,17 +234,9 @@ void GridBuilder::order(Progress* progress) {
   }
 }
 
-TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress) {
-  TetGrid grid;
-  grid.cube = statistics_->cube();
-  grid.limited = diamonds_->limited();
-  grid.levels = static_cast<std::uint32_t>(level_first_.size() - 2);
-  grid.density_unit = max_value > 0.0F ? max_value : 1.0F;
+void GridBuilder::number_nodes(TetGrid& grid, ProgressPart& part) const {
   const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
-  ProgressPart places(progress, 0.0, 0.1, nodes_.size());
-  places.resize(grid.cells, count);
-  places.resize(grid.tree, count - 24);
-
+  part.resize(grid.tree, count - 24);
   // Depth-first number of an internal node: leaves before it minus roots before it, plus its internal ancestors...
   // which a walk per level hands down: child 0 comes next, child 1 after all of child 0.
   for (unsigned root = 0; root < 24; ++root) {
@@ -246,7 +244,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress
   }
   grid.roots[24] = {count, count - 24};
   std::vector<std::uint32_t> place;
-  places.resize(place, nodes_.size());
+  part.resize(place, nodes_.size());
   for (unsigned root = 0; root < 24; ++root) place[root] = grid.roots[root].first_internal;
   for (std::size_t level = 0; level + 1 < level_first_.size(); ++level) {
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(level_first_[level], level_first_[level + 1], 4096),
@@ -258,10 +256,61 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress
                           place[child] = place[i] + 1;
                           place[child + 1] = place[i] + leaves_below_[child];
                         }
-                        places.add(range.size());
+                        part.add(range.size());
                       });
   }
-  place = {};
+}
+
+// Moments of leaves, one after another: those in one brick's tree share its sums.
+class GridBuilder::LeafMoments {
+ public:
+  explicit LeafMoments(const Statistics& statistics) : statistics_(&statistics) {}
+  Moments operator()(const Node& node, const vec3& centroid) {
+    const vec3 v0 = v0_of(node.v0);
+    if (node.heap == 0) return statistics_->moments(v0, node.shape);
+    const Statistics::Node& holder = statistics_->node_at(ivec3(centroid));
+    if (holder.is_uniform()) return uniform_moments(v0, node.shape, holder.uniform);
+    if (&holder != brick_ || node.permutation != permutation_) {
+      brick_ = &holder;
+      permutation_ = node.permutation;
+      tree_ = &brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation));
+      sums_->compute(statistics_->values(holder), *tree_);
+    }
+    return sums_->moments(node.heap, holder.corner, *tree_);
+  }
+
+ private:
+  const Statistics* statistics_;
+  std::unique_ptr<BrickSums> sums_ = std::make_unique<BrickSums>();
+  const Statistics::Node* brick_ = nullptr;  // what the sums are of
+  unsigned permutation_ = 0;
+  const BrickTree* tree_ = nullptr;
+};
+
+CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& gradient) const {
+  const Node& node = nodes_[index];
+  CellRecord record{};
+  for (unsigned face = 0; face < 4; ++face) {
+    const std::uint32_t other = resolve(index, face);
+    record.links[static_cast<int>(face)] = other == CM_NONE ? CM_NONE : first_leaf_[other];
+  }
+  record.data.x = node.v0[0] | (std::uint32_t{node.v0[1]} << 16U);
+  record.data.y = node.v0[2] | (std::uint32_t{node.shape} << 16U);
+  record.data.z = glm::packHalf2x16({mean, gradient.x});
+  record.data.w = glm::packHalf2x16({gradient.y, gradient.z});
+  return record;
+}
+
+TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress) {
+  TetGrid grid;
+  grid.cube = statistics_->cube();
+  grid.limited = diamonds_->limited();
+  grid.levels = static_cast<std::uint32_t>(level_first_.size() - 2);
+  grid.density_unit = max_value > 0.0F ? max_value : 1.0F;
+  const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
+  ProgressPart places(progress, 0.0, 0.1, nodes_.size());
+  places.resize(grid.cells, count);
+  number_nodes(grid, places);
 
   struct Box {
     vec3 low{3.0e38F};
@@ -271,37 +320,16 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress
   const double to_relative = 1.0 / grid.density_unit;
   ProgressPart part(progress, 0.1, 1.0, count);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
-    const auto sums = std::make_unique<BrickSums>();
-    const Statistics::Node* brick = nullptr;
-    unsigned brick_permutation = 6;
-    const BrickTree* tree = nullptr;
+    LeafMoments moments(*statistics_);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
-      const std::uint32_t index = leaf_nodes_[rank];
-      const Node& node = nodes_[index];
+      const Node& node = nodes_[leaf_nodes_[rank]];
       const vec3 v0 = v0_of(node.v0);
       const std::uint32_t shape = node.shape;
       const std::uint32_t cell_class = core::cm_shape_class(shape);
       const float unit = core::cm_shape_unit(shape);
       const vec3 centroid = v0 + core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape);
-
-      Moments m;
-      if (node.heap == 0) {
-        m = statistics_->moments(v0, shape);
-      } else {
-        const Statistics::Node& holder = statistics_->node_at(ivec3(centroid));
-        if (holder.is_uniform()) {
-          m = uniform_moments(v0, shape, holder.uniform);
-        } else {
-          if (&holder != brick || node.permutation != brick_permutation) {
-            brick = &holder;
-            brick_permutation = node.permutation;
-            tree = &brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation));
-            sums->compute(statistics_->values(holder), *tree);
-          }
-          m = sums->moments(node.heap, holder.corner, *tree);
-        }
-      }
+      const Moments m = moments(node, centroid);
       const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
       vec3 gradient(0.0F);
       if (cells == CellKind::linear && m.min < m.max) {
@@ -317,15 +345,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress
           box.high = glm::max(box.high, vertex);
         }
       }
-      CellRecord& record = grid.cells[rank];
-      for (unsigned face = 0; face < 4; ++face) {
-        const std::uint32_t other = resolve(index, face);
-        record.links[static_cast<int>(face)] = other == CM_NONE ? CM_NONE : first_leaf_[other];
-      }
-      record.data.x = node.v0[0] | (std::uint32_t{node.v0[1]} << 16U);
-      record.data.y = node.v0[2] | (shape << 16U);
-      record.data.z = glm::packHalf2x16({static_cast<float>(mean * to_relative), gradient.x});
-      record.data.w = glm::packHalf2x16({gradient.y, gradient.z});
+      grid.cells[rank] = record(leaf_nodes_[rank], static_cast<float>(mean * to_relative), gradient);
     }
     part.add(range.size());
   });

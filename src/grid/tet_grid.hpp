@@ -65,8 +65,16 @@ class GridBuilder {
 
   void make_roots();
   void split_level(std::uint32_t first, std::uint32_t last, ProgressPart& part);
+  // Of these nodes; returns how many split.
+  std::uint32_t mark_splits(std::uint32_t first, std::uint32_t last);
+  void make_child(std::uint32_t parent, unsigned side);
   [[nodiscard]] std::uint32_t resolve(std::uint32_t from, unsigned face) const;
   void order(Progress* progress);
+  // The roots and the tree of point location.
+  void number_nodes(TetGrid& grid, ProgressPart& part) const;
+  class LeafMoments;
+  // mean and gradient: in units of the grid's density_unit.
+  [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient) const;
 
   const Statistics* statistics_;
   const DiamondSet* diamonds_;

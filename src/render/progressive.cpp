@@ -135,8 +135,7 @@ bool Progressive::needs_depth() const {
   return wish_.depth && shown_ != nullptr && shown_->volume_z() == 0 && shown_generation_ == wish_.generation;
 }
 
-void Progressive::advance(const PictureWish& wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
-                          double budget_ms) {
+void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
   const bool resized = glm::uvec2(wish.parameters.image) != glm::uvec2(wish_.parameters.image);
   if (!same(wish)) {
     stale_ = true;
@@ -157,6 +156,11 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
   }
   wish_ = wish;
   wished_ = true;
+}
+
+void Progressive::advance(const PictureWish& wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+                          double budget_ms) {
+  take(wish, surfaces);
   if (failed_) return;
   try {
     do {

@@ -75,6 +75,8 @@ class Progressive {
   Picture& acquire(glm::uvec2 size);
   void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms);
   [[nodiscard]] bool needs_depth() const;
+  // What of the work under way is still of use for this wish.
+  void take(const PictureWish& wish, const Surfaces& surfaces);
 
   Tracer tracer_;
   std::vector<std::unique_ptr<Picture>> pictures_;

@@ -191,71 +191,92 @@ struct SetAside {
   std::size_t channels = 0;
 };
 
+json take_member(json& root, const char* name) {
+  const auto found = root.find(name);
+  if (found == root.end()) return json::array();
+  json value = std::move(*found);
+  root.erase(found);
+  return value;
+}
+
+/// Indices whose accessor has no buffer view.
+std::vector<SetAside::Indices> take_indices(json& root) {
+  std::vector<SetAside::Indices> taken;
+  if (!root.contains("meshes")) return taken;
+  const auto accessors = root.find("accessors");
+  const auto take = [&](json& primitive, std::size_t m, std::size_t p) {
+    const auto indices = primitive.find("indices");
+    if (indices == primitive.end()) return;
+    const auto accessor = indices->get<std::size_t>();
+    if (accessors == root.end() || accessor >= accessors->size()) {
+      malformed("mesh " + std::to_string(m) + ", primitive " + std::to_string(p) + ": there is no accessor " +
+                std::to_string(accessor));
+    }
+    if (accessors->at(accessor).contains("bufferView")) return;
+    taken.push_back({m, p, static_cast<int>(accessor)});
+    primitive.erase(indices);
+  };
+  json& meshes = root["meshes"];
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    const auto primitives = meshes[m].find("primitives");
+    if (primitives == meshes[m].end()) continue;
+    for (std::size_t p = 0; p < primitives->size(); ++p) take(primitives->at(p), m, p);
+  }
+  return taken;
+}
+
+/// Gives accessors of unknown types a known one, and tells which.
+std::vector<std::size_t> take_types(json& root) {
+  constexpr std::array types = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"};
+  std::vector<std::size_t> untyped;
+  const auto accessors = root.find("accessors");
+  if (accessors == root.end()) return untyped;
+  for (std::size_t a = 0; a < accessors->size(); ++a) {
+    const auto type = accessors->at(a).find("type");
+    if (type == accessors->at(a).end() || std::ranges::find(types, type->get<std::string>()) != types.end()) continue;
+    untyped.push_back(a);
+    *type = types[0];
+  }
+  return untyped;
+}
+
+/// Inverse bind matrices are optional in glTF, not in tinygltf.
+void complete_skins(json& root) {
+  if (!root.contains("skins")) return;
+  json& skins = root["skins"];
+  for (std::size_t s = 0; s < skins.size(); ++s) {
+    if (!skins[s].contains("joints")) malformed(numbered("skin", s) + " has no joints");
+    if (!skins[s].contains("inverseBindMatrices")) skins[s]["inverseBindMatrices"] = -1;
+  }
+}
+
+/// Drops channels that name no node, and counts them.
+std::size_t take_channels(json& root) {
+  std::size_t count = 0;
+  if (!root.contains("animations")) return count;
+  for (json& animation : root["animations"]) {
+    if (!animation.contains("channels")) continue;
+    json kept = json::array();
+    for (json& channel : animation["channels"]) {
+      if (channel.contains("target") && !channel["target"].contains("node")) {
+        ++count;
+      } else {
+        kept.push_back(std::move(channel));
+      }
+    }
+    animation["channels"] = std::move(kept);
+  }
+  return count;
+}
+
 SetAside set_aside(json& root) {
   SetAside aside;
-  for (const char* name : {"buffers", "images"}) {
-    const auto found = root.find(name);
-    if (found == root.end()) continue;
-    (name == std::string_view("buffers") ? aside.buffers : aside.images) = std::move(*found);
-    root.erase(found);
-  }
-  const auto accessors = root.find("accessors");
-  if (root.contains("meshes")) {
-    std::size_t m = 0;
-    for (json& mesh : root["meshes"]) {
-      std::size_t p = 0;
-      if (mesh.contains("primitives")) {
-        for (json& primitive : mesh["primitives"]) {
-          const auto indices = primitive.find("indices");
-          if (indices != primitive.end()) {
-            const auto accessor = indices->get<std::size_t>();
-            if (accessors == root.end() || accessor >= accessors->size()) {
-              malformed("mesh " + std::to_string(m) + ", primitive " + std::to_string(p) + ": there is no accessor " +
-                        std::to_string(accessor));
-            }
-            if (!accessors->at(accessor).contains("bufferView")) {
-              aside.indices.push_back({m, p, static_cast<int>(accessor)});
-              primitive.erase(indices);
-            }
-          }
-          ++p;
-        }
-      }
-      ++m;
-    }
-  }
-  if (accessors != root.end()) {
-    constexpr std::array types = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"};
-    for (std::size_t a = 0; a < accessors->size(); ++a) {
-      const auto type = accessors->at(a).find("type");
-      if (type == accessors->at(a).end() || std::ranges::find(types, type->get<std::string>()) != types.end()) continue;
-      aside.untyped.push_back(a);
-      *type = types[0];
-    }
-  }
-  // Optional in glTF, not in tinygltf.
-  if (root.contains("skins")) {
-    std::size_t s = 0;
-    for (json& skin : root["skins"]) {
-      if (!skin.contains("joints")) malformed(numbered("skin", s) + " has no joints");
-      if (!skin.contains("inverseBindMatrices")) skin["inverseBindMatrices"] = -1;
-      ++s;
-    }
-  }
-  if (root.contains("animations")) {
-    for (json& animation : root["animations"]) {
-      if (!animation.contains("channels")) continue;
-      json kept = json::array();
-      for (json& channel : animation["channels"]) {
-        if (channel.contains("target") && !channel["target"].contains("node")) {
-          ++aside.channels;
-        } else {
-          kept.push_back(std::move(channel));
-        }
-      }
-      animation["channels"] = std::move(kept);
-    }
-  }
+  aside.buffers = take_member(root, "buffers");
+  aside.images = take_member(root, "images");
+  aside.indices = take_indices(root);
+  aside.untyped = take_types(root);
+  complete_skins(root);
+  aside.channels = take_channels(root);
   return aside;
 }
 

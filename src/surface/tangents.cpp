@@ -80,21 +80,14 @@ float angle_between(const glm::vec3& a, const glm::vec3& b) {
   return lengths > 0.0F ? std::acos(std::clamp(glm::dot(a, b) / lengths, -1.0F, 1.0F)) : 0.0F;
 }
 
-}  // namespace
+/// Where a triangle's texture goes to.
+struct Face {
+  glm::vec3 direction{0.0F};  ///< of growing u, times its area there
+  float side = 0.0F;          ///< -1: mirrored; 0: no area in texture space
+};
 
-glm::vec3 any_perpendicular(const glm::vec3& normal) {
-  const glm::vec3 axis = std::abs(normal.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-  return glm::normalize(glm::cross(normal, axis));
-}
-
-std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const std::vector<glm::vec3>& positions,
-                                     const std::vector<glm::vec3>& normals, const std::vector<glm::vec2>& uvs,
-                                     std::vector<std::uint32_t>& origins,
-                                     const std::function<void(std::size_t turn)>& check) {
-  struct Face {
-    glm::vec3 direction{0.0F};
-    float side = 0.0F;  ///< 0: no area in texture space
-  };
+std::vector<Face> texture_faces(const std::vector<std::uint32_t>& indices, const std::vector<glm::vec3>& positions,
+                                const std::vector<glm::vec2>& uvs, const std::function<void(std::size_t turn)>& check) {
   std::vector<Face> faces(indices.size() / 3);
   for (std::size_t f = 0; f < faces.size(); ++f) {
     check(f);
@@ -109,7 +102,48 @@ std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const 
     faces[f].side = area > 0.0F ? 1.0F : -1.0F;
     faces[f].direction = (t2.y * p1 - t1.y * p2) * faces[f].side;
   }
+  return faces;
+}
 
+/// Gives vertices between triangles of both sides a copy for the second side: origins has what the copies are of.
+/// Returns each vertex' (first) side, 0 where its triangles have none.
+std::vector<float> part_sides(std::vector<std::uint32_t>& indices, const std::vector<Face>& faces, std::uint32_t count,
+                              std::vector<std::uint32_t>& origins, const std::function<void(std::size_t turn)>& check) {
+  std::vector<float> sides(count, 0.0F);
+  std::unordered_map<std::uint32_t, std::uint32_t> copies;
+  origins.clear();
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    if (faces[f].side == 0.0F) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      float& side = sides[indices[3 * f + k]];
+      if (side == 0.0F) side = faces[f].side;
+    }
+  }
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    check(f);
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::uint32_t& v = indices[3 * f + k];
+      if (faces[f].side == 0.0F || sides[v] == faces[f].side) continue;
+      const auto [found, added] = copies.try_emplace(v, count + static_cast<std::uint32_t>(origins.size()));
+      if (added) origins.push_back(v);
+      v = found->second;
+    }
+  }
+  return sides;
+}
+
+}  // namespace
+
+glm::vec3 any_perpendicular(const glm::vec3& normal) {
+  const glm::vec3 axis = std::abs(normal.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  return glm::normalize(glm::cross(normal, axis));
+}
+
+std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const std::vector<glm::vec3>& positions,
+                                     const std::vector<glm::vec3>& normals, const std::vector<glm::vec2>& uvs,
+                                     std::vector<std::uint32_t>& origins,
+                                     const std::function<void(std::size_t turn)>& check) {
+  const std::vector<Face> faces = texture_faces(indices, positions, uvs, check);
   // Sums of what counts as one vertex, by side.
   Sums sums(std::min(2 * positions.size(), indices.size()));
   const auto corner = [&](std::uint32_t vertex, float side) {
@@ -130,27 +164,7 @@ std::vector<glm::vec4> make_tangents(std::vector<std::uint32_t>& indices, const 
   }
 
   const auto count = static_cast<std::uint32_t>(positions.size());
-  std::vector<float> sides(count, 0.0F);
-  std::unordered_map<std::uint32_t, std::uint32_t> mirrored;  // the copy for triangles of side -1
-  origins.clear();
-  for (std::size_t f = 0; f < faces.size(); ++f) {
-    if (faces[f].side == 0.0F) continue;
-    for (std::size_t k = 0; k < 3; ++k) {
-      float& side = sides[indices[3 * f + k]];
-      if (side == 0.0F) side = faces[f].side;
-    }
-  }
-  for (std::size_t f = 0; f < faces.size(); ++f) {
-    check(f);
-    for (std::size_t k = 0; k < 3; ++k) {
-      std::uint32_t& v = indices[3 * f + k];
-      if (faces[f].side == 0.0F || sides[v] == faces[f].side) continue;
-      const auto [found, added] = mirrored.try_emplace(v, count + static_cast<std::uint32_t>(origins.size()));
-      if (added) origins.push_back(v);
-      v = found->second;
-    }
-  }
-
+  const std::vector<float> sides = part_sides(indices, faces, count, origins, check);
   std::vector<glm::vec4> tangents(count + origins.size());
   for (std::size_t v = 0; v < tangents.size(); ++v) {
     check(v);
