@@ -24,7 +24,7 @@ def main():
     lines = ["// Made by cmake/struct_fields.py."]
     for name, fields in found:
         lines.append(f"template <>\ninline constexpr auto fields_of<{name}> = std::to_array<Field>({{")
-        lines += [f"    {{offsetof({name}, {f}), sizeof({name}::{f}), alignof(decltype({name}::{f}))}}," for f in fields]
+        lines += [f"    {{\"{f}\", offsetof({name}, {f}), sizeof({name}::{f}), alignof(decltype({name}::{f}))}}," for f in fields]
         lines.append(f"}});\nstatic_assert(covers<{name}>());")
     with open(arguments.out, "w", encoding="utf-8") as file:
         file.write("\n".join(lines) + "\n")

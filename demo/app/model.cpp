@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <program.hpp>
+#include <settings.hpp>
 #include <system_error>
 
 #include "input.hpp"
@@ -93,15 +94,15 @@ void tell(Model& model, bool error, const std::string& text, double now) {
   model.messages.push_back({error, line, now + seconds});
 }
 
-double default_threshold(cumulet_criterion criterion) { return criterion == CUMULET_CRITERION_RANGE_MEAN ? 1.0 : 0.02; }
-
 void spell_out_defaults(SceneOptions& scene) {
-  if (scene.grid.threshold == 0.0) scene.grid.threshold = default_threshold(scene.grid.criterion);
-  if (scene.grid.max_cells == 0) scene.grid.max_cells = 5'400'000;
-  if (scene.grid.pixel_size == 0.0) scene.grid.pixel_size = 1.0;
-  if (scene.medium.density_scale == 0.0) scene.medium.density_scale = 1.0;
-  if (scene.camera.fovy_degrees == 0.0) scene.camera.fovy_degrees = 40.0;
-  if (scene.sampling.samples == 0) scene.sampling.samples = 256;
+  settings::spell_out_zeros(scene.grid);
+  if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
+  settings::spell_out_zeros(scene.medium);
+  settings::spell_out_zeros(scene.light);
+  settings::spell_out_zeros(scene.camera);
+  settings::spell_out_zeros(scene.surface);
+  settings::spell_out_zeros(scene.sampling);
+  settings::spell_out_zeros(scene.display);
 }
 
 const char* stage_text(cumulet_stage stage) {

@@ -145,8 +145,6 @@ void tell(Model& model, bool error, const std::string& text, double now);
 
 /// Replaces the zeros that stand for a default by what they stand for (cumulet.h), so that controls can show them.
 void spell_out_defaults(SceneOptions& scene);
-/// The threshold that 0 stands for.
-[[nodiscard]] double default_threshold(cumulet_criterion criterion);
 
 /// "Reading the file", "Refining the grid", ...
 [[nodiscard]] const char* stage_text(cumulet_stage stage);

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <names.hpp>
 #include <numbers>
+#include <settings.hpp>
 
 namespace cumulet::demo {
 namespace {
@@ -23,15 +23,6 @@ std::string print(const char* format, Values... values) {
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(), format, values...);  // NOLINT(cppcoreguidelines-pro-type-vararg)
   return text.data();
-}
-
-/// A choice that is an enum of the C interface.
-template <class Enum>
-bool choose(Ui& ui, const char* label, const char* tip, const std::vector<Choice>& choices, Enum& value) {
-  int number = static_cast<int>(value);
-  if (!ui.choose(label, tip, choices, number)) return false;
-  value = static_cast<Enum>(number);
-  return true;
 }
 
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
@@ -152,12 +143,12 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
   ImGui::EndDisabled();
 
   ImGui::BeginDisabled(!model.status.has_volume);
-  UpAxis up = model.scene.up;
-  if (choose(ui_, "Up axis", "The volume's up axis. The file is read again, and framed.",
-             {{"Y", static_cast<int>(UpAxis::y), "As pictures have it."},
-              {"Z", static_cast<int>(UpAxis::z), "As Blender and Mantaflow write it: turned to Y."}},
-             up))
-    commands.push_back({Action::choose_up, {}, static_cast<int>(up)});
+  int up = static_cast<int>(model.scene.up);
+  if (ui_.choose("Up axis", "The volume's up axis. The file is read again, and framed.",
+                 {{"Y", static_cast<int>(UpAxis::y), "As pictures have it."},
+                  {"Z", static_cast<int>(UpAxis::z), "As Blender and Mantaflow write it: turned to Y."}},
+                 up))
+    commands.push_back({Action::choose_up, {}, up});
   if (ui_.button("Look into the grids", "Each grid's type, voxels, range and histogram, and one to choose.",
                  {-1.0f, 0.0f}))
     commands.push_back({Action::grids_dialog});
@@ -174,37 +165,8 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
 }
 
 void Panel::display(Model& model) {
-  cumulet_display_desc& display = model.scene.display;
-  choose(ui_, "View", "The picture, or a look at the grid that makes it (keys 1 to 5).",
-         {{"Shaded", CUMULET_VIEW_SHADED, "The path-traced picture."},
-          {"Cells", CUMULET_VIEW_CELLS, "The cells on a cut through the middle, coloured by level."},
-          {"Steps", CUMULET_VIEW_STEPS, "How many cells a camera ray passes, as a heat map."},
-          {"Density", CUMULET_VIEW_DENSITY, "The opacity along each camera ray."},
-          {"Wireframe", CUMULET_VIEW_WIREFRAME, "The edges of the cells that hold density."}},
-         model.scene.sampling.view);
-  ui_.slider("Exposure", "Brightness in stops: each doubles the light. Restarts nothing (keys [ and ]).",
-             display.exposure_stops, -10.0f, 10.0f, "%.2f stops");
-  choose(ui_, "Tone map", "How radiance becomes what the screen can show.",
-         {{"Neutral", CUMULET_TONE_MAP_NEUTRAL, "Khronos PBR Neutral: keeps colours, rolls off highlights."},
-          {"Filmic", CUMULET_TONE_MAP_FILMIC, "A fit of the ACES curve: more contrast."},
-          {"Clip", CUMULET_TONE_MAP_CLIP, "What is above 1 is white."}},
-         display.tone_map);
-  choose(ui_, "Background", "What is behind the volume.",
-         {{"Sky", CUMULET_BACKGROUND_SKY, "The sky's radiance."},
-          {"Transparent", CUMULET_BACKGROUND_TRANSPARENT, "Nothing: saved pictures have an alpha channel."}},
-         display.background);
-}
-
-/// Colour and strength of three numbers whose largest is the strength.
-void Panel::light_source(const char* colour, const char* colour_tip, const char* strength, const char* strength_tip,
-                         float (&rgb)[3], float (&remembered)[3], float most) {
-  float power = std::max({rgb[0], rgb[1], rgb[2]});
-  if (power > 0.0f)
-    for (std::size_t i = 0; i < 3; ++i) remembered[i] = rgb[i] / power;
-  bool changed = ui_.colour(colour, colour_tip, remembered);
-  changed |= ui_.slider(strength, strength_tip, power, 0.0f, most, "%.3f", ImGuiSliderFlags_Logarithmic);
-  if (!changed) return;
-  for (std::size_t i = 0; i < 3; ++i) rgb[i] = remembered[i] * power;
+  settings::with(&cumulet_sampling_desc::view, [&](const auto& view) { rows_.draw(view, model.scene.sampling.view); });
+  rows(model.scene.display);
 }
 
 void Panel::light(Model& model) {
@@ -216,38 +178,24 @@ void Panel::light(Model& model) {
                "Drag the sun: the direction is its azimuth, the rim the horizon, the centre overhead. By keyboard: "
                "Space, then the arrows, then Space. The triangle is the camera.",
                light.sun_azimuth_degrees, light.sun_elevation_degrees, static_cast<float>(azimuth));
-  ui_.slider("Sun azimuth", "From +Z towards +X.", light.sun_azimuth_degrees, -180.0f, 180.0f, "%.1f°");
-  ui_.slider("Sun elevation", "Above the horizon.", light.sun_elevation_degrees, -90.0f, 90.0f, "%.1f°");
-  light_source("Sun colour", "The sun's colour, as it looks on the screen.", "Sun strength",
-               "Irradiance on a surface that faces the sun; 0: no sun.", light.sun_irradiance, sun_colour_, 1000.0f);
-  light_source("Sky colour", "The sky's colour, as it looks on the screen.", "Sky strength",
-               "Radiance from everywhere; 0: black.", light.sky_radiance, sky_colour_, 100.0f);
+  rows(light);
 }
 
 void Panel::surfaces(Model& model) {
-  cumulet_surface_settings_desc& surface = model.scene.surface;
+  using Desc = cumulet_surface_settings_desc;
+  Desc& surface = model.scene.surface;
   const cumulet_surfaces_info& info = model.status.surfaces;
   const bool any = !model.scene.surfaces.empty();
   ui_.fact("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb here");
   ImGui::BeginDisabled(!any);
-  choose(ui_, "Surface light", "What light the surfaces pass on.",
-         {{"Full", CUMULET_SURFACE_LIGHT_FULL, "To each other and to the volume, and back."},
-          {"Shadows", CUMULET_SURFACE_LIGHT_SHADOWS,
-           "Sun, sky, lamps and what glows only, and the shadows of all: faster."},
-          {"None", CUMULET_SURFACE_LIGHT_NONE, "Rasterised, without shadows: the fastest."}},
-         surface.light);
-  ui_.slider("Indirect roughness",
-             "Softens what mirrors and lakes throw on walls and clouds: no bright specks. What you look at keeps its "
-             "gloss. 0: as physics has it.",
-             surface.indirect_roughness, 0.0f, 1.0f, "%.2f");
-  bool double_sided = surface.double_sided != 0;
-  if (ui_.checkbox("Double sided", "Shows both sides of all surfaces, for models that are wound inside out.",
-                   double_sided)) {
-    surface.double_sided = double_sided ? 1 : 0;
-  }
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (!setting.is(&Desc::time)) rows_.draw(setting, surface.*setting.field);
+  });
   ImGui::BeginDisabled(info.animations == 0);
-  ui_.slider("Time", "Seconds into the model's animation.", surface.time, 0.0,
-             std::max(model.status.animation.duration, 1e-3), "%.2f s");
+  settings::with(&Desc::time, [&](auto time) {
+    time.row.most = std::max(model.status.animation.duration, 1e-3);
+    rows_.draw(time, surface.time);
+  });
   ImGui::EndDisabled();
   if (any) ui_.fact("Triangles", short_count(double(info.triangles)));
   if (ui_.button("Remove surfaces", "Shows the volume alone.")) model.scene.surfaces.clear();
@@ -255,79 +203,48 @@ void Panel::surfaces(Model& model) {
 }
 
 void Panel::medium(Model& model, std::vector<Command>& commands) {
-  cumulet_medium_desc& medium = model.scene.medium;
-  ui_.slider("Density scale", "Extinction is this times the grid's value, per world unit.", medium.density_scale, 1e-4,
-             1e4, "%.4g", ImGuiSliderFlags_Logarithmic);
-  ImGui::BeginDisabled(!model.status.has_volume);
-  if (ui_.button("Auto density", "A scale at which the volume is a body: a mean optical depth of 8.", {-1.0f, 0.0f}))
-    commands.push_back({Action::auto_density});
-  ImGui::EndDisabled();
-  float albedo[3];
-  for (std::size_t i = 0; i < 3; ++i) albedo[i] = 1.0f - medium.coalbedo[i];
-  if (ui_.colour("Albedo",
-                 "Single-scattering albedo: the part of light that goes on after a collision. White: "
-                 "nothing is absorbed.",
-                 albedo))
-    for (std::size_t i = 0; i < 3; ++i) medium.coalbedo[i] = std::clamp(1.0f - albedo[i], 0.0f, 1.0f);
-  // Absorption of a cloud is far below what a colour field can say.
-  float absorption = (medium.coalbedo[0] + medium.coalbedo[1] + medium.coalbedo[2]) / 3.0f;
-  const float before = absorption;
-  if (ui_.slider("Absorption", "The mean part of light that is lost at a collision: 1 - albedo.", absorption, 0.0f,
-                 1.0f, "%.4g", ImGuiSliderFlags_Logarithmic))
-    for (float& coalbedo : medium.coalbedo)
-      coalbedo = before > 0.0f ? std::min(coalbedo * absorption / before, 1.0f) : absorption;
-  ui_.slider("Anisotropy", "Henyey-Greenstein g: below 0 light turns back, above 0 it goes on forward.",
-             medium.anisotropy, -0.99f, 0.99f, "%.3f");
-  light_source("Glow colour", "The colour of the medium's own light, as it looks on the screen.", "Glow",
-               "Radiance of an opaque body of the medium, as of fire: it lights all the rest. 0: dark.",
-               medium.emission, glow_colour_, 1000.0f);
-  ui_.slider("Max bounces", "Scattering events a path may have.", medium.max_bounces, 0U, 256U,
-             medium.max_bounces == 0 ? "no limit" : "%u", ImGuiSliderFlags_Logarithmic);
+  using Desc = cumulet_medium_desc;
+  Desc& medium = model.scene.medium;
+  settings::for_each<Desc>([&](const auto& setting) {
+    rows_.draw(setting, medium.*setting.field);
+    if (setting.is(&Desc::density_scale)) {
+      ImGui::BeginDisabled(!model.status.has_volume);
+      if (ui_.button("Auto density", "A scale at which the volume is a body: a mean optical depth of 8.",
+                     {-1.0f, 0.0f}))
+        commands.push_back({Action::auto_density});
+      ImGui::EndDisabled();
+    }
+    if (setting.is(&Desc::coalbedo)) absorption(medium.coalbedo);
+  });
+}
+
+/// Absorption of a cloud is far below what a colour field can say.
+void Panel::absorption(float (&coalbedo)[3]) {
+  float mean = (coalbedo[0] + coalbedo[1] + coalbedo[2]) / 3.0f;
+  const float before = mean;
+  if (!ui_.slider("Absorption", "The mean part of light that is lost at a collision: 1 - albedo.", mean, 0.0f, 1.0f,
+                  "%.4g", ImGuiSliderFlags_Logarithmic))
+    return;
+  for (float& one : coalbedo) one = before > 0.0f ? std::min(one * mean / before, 1.0f) : mean;
 }
 
 void Panel::grid(Model& model) {
-  cumulet_grid_desc& grid = model.scene.grid;
-  choose(ui_, "March", "What rays step through (key M).",
-         {{"Tetrahedra", CUMULET_MARCH_TET, "The adaptive grid."},
-          {"Dense voxels", CUMULET_MARCH_DENSE, "Every voxel: the reference."},
-          {"Bricks", CUMULET_MARCH_BRICK, "Voxels, with empty 8x8x8 bricks skipped."}},
-         grid.march);
-  const bool tet = grid.march == CUMULET_MARCH_TET;
-  ImGui::BeginDisabled(!tet);
-  choose(ui_, "Cells", "The density inside a tetrahedron.",
-         {{"Linear", CUMULET_CELLS_LINEAR, "A least-squares fit: fewer cells for the same error."},
-          {"Constant", CUMULET_CELLS_CONSTANT, "The mean."}},
-         grid.cells);
-  if (choose(ui_, "Criterion", "What is compared with the threshold, to decide whether a cell is split.",
-             {{"Deviation", CUMULET_CRITERION_DEVIATION, "Standard deviation x edge length, against the mean depth."},
-              {"Range / mean", CUMULET_CRITERION_RANGE_MEAN, "(max - min) / mean, as in the paper."}},
-             grid.criterion))
-    grid.threshold = default_threshold(grid.criterion);
-  bool to_voxel = grid.threshold < 0.0;
-  if (ui_.checkbox("To the voxel", "Splits wherever the density varies at all, until the cells tile the voxels.",
-                   to_voxel))
-    grid.threshold = to_voxel ? -1.0 : default_threshold(grid.criterion);
-  ImGui::BeginDisabled(to_voxel);
-  double threshold = to_voxel ? 0.0 : grid.threshold;
-  const bool deviation = grid.criterion == CUMULET_CRITERION_DEVIATION;
-  if (ui_.slider("Threshold", "Cells above it are split: smaller is finer.", threshold, deviation ? 1e-4 : 1e-2,
-                 deviation ? 1.0 : 100.0, "%.4g", ImGuiSliderFlags_Logarithmic))
-    grid.threshold = threshold;
-  ImGui::EndDisabled();
-  ui_.slider("Cell budget", "The most cells: spent where the criterion is largest.", grid.max_cells,
-             std::uint64_t{1000}, std::uint64_t{50'000'000}, "%llu", ImGuiSliderFlags_Logarithmic);
-  bool adaptive = grid.camera_adaptive != 0;
-  if (ui_.checkbox("Camera adaptive", "Keeps cells coarse that are out of sight or smaller than a few pixels.",
-                   adaptive))
-    grid.camera_adaptive = adaptive ? 1 : 0;
-  ImGui::BeginDisabled(!adaptive);
-  ui_.slider("Pixel size", "Pixels that a cell's longest edge must cover to be split.", grid.pixel_size, 0.25, 32.0,
-             "%.2f", ImGuiSliderFlags_Logarithmic);
-  ImGui::EndDisabled();
-  ImGui::EndDisabled();
+  using Desc = cumulet_grid_desc;
+  Desc& grid = model.scene.grid;
+  settings::for_each<Desc>([&](const auto& setting) {
+    const bool of_cells = !setting.is(&Desc::march);
+    ImGui::BeginDisabled((of_cells && grid.march != CUMULET_MARCH_TET) ||
+                         (setting.is(&Desc::pixel_size) && grid.camera_adaptive == 0));
+    if (setting.is(&Desc::threshold)) {
+      threshold(setting, grid);
+    } else if (rows_.draw(setting, grid.*setting.field) && setting.is(&Desc::criterion)) {
+      grid.threshold = settings::default_threshold(grid.criterion);
+    }
+    ImGui::EndDisabled();
+  });
 
   const cumulet_stats& stats = model.status.stats;
-  if (tet) {
+  if (grid.march == CUMULET_MARCH_TET) {
     const std::string limited = stats.limited != 0 ? " (at the budget)" : "";
     ui_.fact("Live cells", model.status.has_volume ? short_count(static_cast<double>(stats.cells)) + limited : "-");
     ui_.fact("Levels", model.status.has_volume ? std::to_string(stats.levels) : "-");
@@ -335,30 +252,43 @@ void Panel::grid(Model& model) {
   ui_.fact("March data", model.status.has_volume ? short_bytes(static_cast<double>(stats.cell_bytes)) : "-");
 }
 
-void Panel::camera(Model& model, std::vector<Command>& commands) {
-  cumulet_navigation_desc& navigation = model.navigation;
-  if (choose(ui_, "Navigation", "Whose habits the mouse follows; Help (F1) lists them.",
-             {{"Simple", CUMULET_NAVIGATION_SIMPLE, "Left: orbit; middle or Shift+left: pan; right: dolly."},
-              {"Blender", CUMULET_NAVIGATION_BLENDER, "Middle: orbit; Shift: pan; Ctrl: dolly; keypad views."},
-              {"Maya", CUMULET_NAVIGATION_MAYA, "Alt + left: orbit; Alt + middle: pan; Alt + right: dolly."}},
-             navigation.style))
-    model.preferences.style = navigation.style;
-  bool fly = navigation.fly != 0;
-  if (ui_.checkbox("Fly", "Any button looks around; W A S D move, E and Q rise and sink, Shift is faster (G).", fly))
-    commands.push_back({Action::toggle_fly});
-  ui_.slider("Speed", "Of all camera motion.", navigation.speed, 0.05, 20.0, "%.2f", ImGuiSliderFlags_Logarithmic);
-  bool turntable = navigation.turntable_degrees_per_second != 0.0;
-  if (ui_.checkbox("Turntable", "The camera circles the target (T).", turntable))
-    commands.push_back({Action::toggle_turntable});
-  ImGui::BeginDisabled(!turntable);
-  double speed = turntable ? navigation.turntable_degrees_per_second : 0.0;
-  if (ui_.slider("Turn speed", "Degrees a second; negative: the other way.", speed, -90.0, 90.0, "%.1f°/s") &&
-      turntable)
-    navigation.turntable_degrees_per_second = speed == 0.0 ? 0.1 : speed;
+void Panel::threshold(settings::Facts facts, cumulet_grid_desc& grid) {
+  bool to_voxel = grid.threshold < 0.0;
+  if (ui_.checkbox("To the voxel", "Splits wherever the density varies at all, until the cells tile the voxels.",
+                   to_voxel))
+    grid.threshold = to_voxel ? -1.0 : settings::default_threshold(grid.criterion);
+  const bool deviation = grid.criterion == CUMULET_CRITERION_DEVIATION;
+  facts.row.least = deviation ? 1e-4 : 1e-2;
+  facts.row.most = deviation ? 1.0 : 100.0;
+  double shown = to_voxel ? 0.0 : grid.threshold;
+  ImGui::BeginDisabled(to_voxel);
+  if (rows_.draw(facts, shown)) grid.threshold = shown;
   ImGui::EndDisabled();
+}
+
+void Panel::camera(Model& model, std::vector<Command>& commands) {
+  using Desc = cumulet_navigation_desc;
+  Desc& navigation = model.navigation;
+  const auto turn = [&](const settings::Facts& facts) {
+    bool on = navigation.turntable_degrees_per_second != 0.0;
+    if (ui_.checkbox("Turntable", "The camera circles the target (T).", on))
+      commands.push_back({Action::toggle_turntable});
+    ImGui::BeginDisabled(!on);
+    double speed = navigation.turntable_degrees_per_second;
+    if (rows_.draw(facts, speed) && on) navigation.turntable_degrees_per_second = speed == 0.0 ? 0.1 : speed;
+    ImGui::EndDisabled();
+  };
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (setting.is(&Desc::turntable_degrees_per_second)) return turn(setting);
+    auto value = navigation.*setting.field;
+    if (!rows_.draw(setting, value)) return;
+    if (setting.is(&Desc::fly)) return commands.push_back({Action::toggle_fly});
+    navigation.*setting.field = value;
+    if (setting.is(&Desc::style)) model.preferences.style = navigation.style;
+  });
 
   cumulet_camera_desc& view = model.scene.camera;
-  ui_.slider("Field of view", "From bottom to top of the picture.", view.fovy_degrees, 2.0, 150.0, "%.1f°");
+  settings::with(&cumulet_camera_desc::fovy_degrees, [&](const auto& fovy) { rows_.draw(fovy, view.fovy_degrees); });
   bool orthographic = view.orthographic_height > 0.0;
   if (ui_.checkbox("Orthographic", "Parallel rays.", orthographic)) {
     const double distance =
@@ -375,10 +305,10 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
 }
 
 void Panel::sampling(Model& model) {
-  cumulet_sampling_desc& sampling = model.scene.sampling;
-  ui_.slider("Samples", "A pixel; more go on from where it is.", sampling.samples, 1U, 65536U, "%u",
-             ImGuiSliderFlags_Logarithmic);
-  ui_.integer("Seed", "The same seed and settings give the same picture.", sampling.seed);
+  using Desc = cumulet_sampling_desc;
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (!setting.is(&Desc::view)) rows_.draw(setting, model.scene.sampling.*setting.field);
+  });
   ui_.checkbox("Fast preview", "Coarser pictures while things change, then finer and finer. Off: always full size.",
                model.adaptive_resolution);
 }
@@ -483,8 +413,9 @@ void Panel::state_line(const Model& model) {
   std::string text =
       print("%.0f of %u samples", std::floor(part * model.scene.sampling.samples), model.scene.sampling.samples);
   if ((status.frame.flags & CUMULET_RENDER_CONVERGED) != 0) text = print("%u samples", model.scene.sampling.samples);
-  for (const auto& view : view_names)
-    if (view.value == model.scene.sampling.view && view.value != CUMULET_VIEW_SHADED) text = view.text;
+  const cumulet_view shown = model.scene.sampling.view;
+  for (const auto& view : settings::view_choices)
+    if (view.value == shown && shown != CUMULET_VIEW_SHADED) text = view.name;
   if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0)
     text += print("   preview %ux%u", status.frame.width, status.frame.height);
   else

@@ -6,6 +6,7 @@
 #include "file_dialog.hpp"
 #include "grid_picker.hpp"
 #include "model.hpp"
+#include "rows.hpp"
 #include "ui.hpp"
 
 namespace cumulet::demo {
@@ -40,8 +41,12 @@ class Panel {
   void grid(Model& model);
   void sampling(Model& model);
   void statistics(const Model& model);
-  void light_source(const char* colour, const char* colour_tip, const char* strength, const char* strength_tip,
-                    float (&rgb)[3], float (&remembered)[3], float most);
+  template <class Desc>
+  void rows(Desc& desc) {
+    settings::for_each<Desc>([&](const auto& setting) { rows_.draw(setting, desc.*setting.field); });
+  }
+  void absorption(float (&coalbedo)[3]);
+  void threshold(settings::Facts facts, cumulet_grid_desc& grid);
 
   void hint() const;
   void loading(const Model& model, std::vector<Command>& commands);
@@ -50,6 +55,7 @@ class Panel {
   void help(Model& model);
 
   Ui ui_;
+  Rows rows_{ui_};
   FileDialog dialog_;
   GridPicker picker_;
   bool focus_ = false;
@@ -59,10 +65,6 @@ class Panel {
   std::string state_;
   std::string path_;  // as typed
   std::string path_of_;
-  // What a light of strength 0 was before.
-  float sun_colour_[3] = {1.0f, 1.0f, 1.0f};
-  float glow_colour_[3] = {1.0f, 0.35f, 0.08f};
-  float sky_colour_[3] = {1.0f, 1.0f, 1.0f};
 };
 
 }  // namespace cumulet::demo

@@ -6,8 +6,8 @@
 #include <exception>
 #include <file.hpp>
 #include <filesystem>
-#include <names.hpp>
 #include <nlohmann/json.hpp>
+#include <settings.hpp>
 #include <stdexcept>
 #include <system_error>
 
@@ -20,9 +20,6 @@ namespace fs = std::filesystem;
 constexpr std::size_t most_recent = 10;
 constexpr int least_side = 320;
 constexpr int most_side = 16384;
-
-constexpr std::array style_names = {Name{"simple", CUMULET_NAVIGATION_SIMPLE},
-                                    Name{"blender", CUMULET_NAVIGATION_BLENDER}, Name{"maya", CUMULET_NAVIGATION_MAYA}};
 
 std::string absolute(const std::string& path) {
   std::error_code error;
@@ -63,8 +60,8 @@ Preferences load_preferences(const std::string& path) {
         if (file.is_string() && preferences.recent.size() < most_recent) preferences.recent.push_back(file);
     preferences.folder = json.value("folder", preferences.folder);
     const std::string style = json.value("navigation", std::string());
-    for (const auto& name : style_names)
-      if (style == name.text) preferences.style = name.value;
+    for (const auto& choice : settings::navigation_choices)
+      if (style == choice.name) preferences.style = static_cast<cumulet_navigation_style>(choice.value);
     preferences.width = std::clamp(json.value("width", preferences.width), least_side, most_side);
     preferences.height = std::clamp(json.value("height", preferences.height), least_side, most_side);
   } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch): a first run, or nothing worth a complaint
@@ -77,8 +74,8 @@ void save_preferences(const Preferences& preferences, const std::string& path) {
   Json json;
   json["recent"] = preferences.recent;
   json["folder"] = preferences.folder;
-  for (const auto& name : style_names)
-    if (name.value == preferences.style) json["navigation"] = name.text;
+  for (const auto& choice : settings::navigation_choices)
+    if (choice.value == preferences.style) json["navigation"] = choice.name;
   json["width"] = preferences.width;
   json["height"] = preferences.height;
   std::error_code error;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <program.hpp>
+#include <settings.hpp>
 #include <span>
 #include <stdexcept>
 #include <tuple>
@@ -18,53 +19,7 @@
 namespace cumulet::demo {
 namespace {
 
-template <class Number, std::size_t count>
-bool same(const Number (&a)[count], const Number (&b)[count]) {
-  return std::equal(a, a + count, b);
-}
-
-bool same(const cumulet_grid_desc& a, const cumulet_grid_desc& b) {
-  const auto all = [](const cumulet_grid_desc& d) {
-    return std::tie(d.march, d.cells, d.criterion, d.threshold, d.max_cells, d.camera_adaptive, d.pixel_size);
-  };
-  return all(a) == all(b);
-}
-
-bool same(const cumulet_medium_desc& a, const cumulet_medium_desc& b) {
-  return std::tie(a.density_scale, a.anisotropy, a.max_bounces) ==
-             std::tie(b.density_scale, b.anisotropy, b.max_bounces) &&
-         same(a.coalbedo, b.coalbedo) && same(a.emission, b.emission);
-}
-
-bool same(const cumulet_light_desc& a, const cumulet_light_desc& b) {
-  return std::tie(a.sun_azimuth_degrees, a.sun_elevation_degrees) ==
-             std::tie(b.sun_azimuth_degrees, b.sun_elevation_degrees) &&
-         same(a.sun_irradiance, b.sun_irradiance) && same(a.sky_radiance, b.sky_radiance);
-}
-
-bool same(const cumulet_sampling_desc& a, const cumulet_sampling_desc& b) {
-  return std::tie(a.samples, a.seed, a.view, a.preview) == std::tie(b.samples, b.seed, b.view, b.preview);
-}
-
-bool same(const cumulet_display_desc& a, const cumulet_display_desc& b) {
-  return std::tie(a.exposure_stops, a.tone_map, a.background) == std::tie(b.exposure_stops, b.tone_map, b.background);
-}
-
-bool same(const cumulet_surface_settings_desc& a, const cumulet_surface_settings_desc& b) {
-  return std::tie(a.time, a.animation, a.light, a.indirect_roughness, a.double_sided) ==
-         std::tie(b.time, b.animation, b.light, b.indirect_roughness, b.double_sided);
-}
-
-bool same(const cumulet_camera_desc& a, const cumulet_camera_desc& b) {
-  return same(a.eye, b.eye) && same(a.target, b.target) && same(a.up, b.up) &&
-         std::tie(a.fovy_degrees, a.orthographic_height, a.near_plane, a.far_plane) ==
-             std::tie(b.fovy_degrees, b.orthographic_height, b.near_plane, b.far_plane);
-}
-
-bool same(const cumulet_navigation_desc& a, const cumulet_navigation_desc& b) {
-  return std::tie(a.style, a.fly, a.speed, a.turntable_degrees_per_second) ==
-         std::tie(b.style, b.fly, b.speed, b.turntable_degrees_per_second);
-}
+using settings::same;
 
 }  // namespace
 

@@ -12,15 +12,13 @@
 #include <memory>
 #include <names.hpp>
 #include <ostream>
+#include <settings.hpp>
 #include <utility>
 
 #include "option_table.hpp"
 
 namespace cumulet::demo {
 namespace {
-
-constexpr std::uint64_t max_u32 = std::numeric_limits<std::uint32_t>::max();
-constexpr std::uint64_t max_u64 = std::numeric_limits<std::uint64_t>::max();
 
 constexpr std::size_t help_columns = 100;
 
@@ -41,12 +39,6 @@ std::vector<std::string_view> words(std::string_view text) {
   std::vector<std::string_view> parts = split(text, ' ');
   std::erase(parts, std::string_view{});
   return parts;
-}
-
-double parse_positive(std::string_view text) {
-  const double value = parse_number(text);
-  if (!(value > 0.0)) throw UsageError(in_quotes(text) + " is not above 0");
-  return value;
 }
 
 /// Three numbers that are not negative and that a float can hold.
@@ -85,14 +77,71 @@ CLI::Option* add_choice(CLI::App& app, const char* group, const std::string& fla
       app, group, flag, list_names(names, "|"),
       [names, &target](const std::string& text) {
         for (const auto& name : names) {
-          if (text == name.text) {
-            target = name.value;
+          if (text == name.name) {
+            target = static_cast<Target>(name.value);
             return;
           }
         }
         throw UsageError(in_quotes(text) + " is none of " + list_names(names, ", "));
       },
       help);
+}
+
+/// Whether a flag's text is a word that is dealt with and no value to parse.
+using TakeWord = std::function<bool(std::string_view flag, const std::string& text)>;
+
+/// A number that the field can hold and that people may give.
+template <class Desc, class Value>
+Value parse_real(const settings::Setting<Desc, Value>& setting, const std::string& text) {
+  const double number = parse_number(text);
+  const auto value = static_cast<Value>(number);
+  const settings::Range range = setting.given_range();
+  if (!range.holds(number) || !range.holds(value)) throw UsageError(in_quotes(text) + " " + range.refusal());
+  const bool negative = setting.spelling == settings::Spelling::zero_is_negative && value == Value{};
+  return negative ? Value{-1} : value;
+}
+
+template <class Desc, class Value>
+void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc, Value>& setting, Value& value,
+                 const TakeWord& take_word) {
+  const auto add_parsed = [&](auto parse) {
+    const auto parse_or_take = [flag = setting.flag, parse, take_word](const std::string& text) {
+      if (!take_word || !take_word(flag, text)) parse(text);
+    };
+    add(app, group, setting.flag, setting.type, parse_or_take, setting.help);
+  };
+  if constexpr (settings::Enumerated<Value>) {
+    add_choice(app, group, setting.flag, setting.choices, value, setting.help);
+  } else if constexpr (settings::Switch<Value>) {
+    if (*setting.type != '\0') {
+      add_choice(app, group, setting.flag, std::array{Name{"on", 1}, Name{"off", 0}}, value, setting.help);
+    } else {
+      app.add_flag_function(
+             setting.flag, [&value](std::int64_t count) { value = count > 0 ? 1 : 0; }, setting.help)
+          ->group(group);
+    }
+  } else if constexpr (settings::Count<Value>) {
+    const auto least = static_cast<std::uint64_t>(std::max(setting.given_range().least, 0.0));
+    add_parsed([&value, least](const std::string& text) {
+      value = static_cast<Value>(parse_integer(text, least, std::numeric_limits<Value>::max()));
+    });
+  } else if constexpr (settings::Real<Value>) {
+    add_parsed([&value, setting](const std::string& text) { value = parse_real(setting, text); });
+  } else {
+    add_parsed([&value, setting](const std::string& text) {
+      const std::array<double, 3> rgb = parse_rgb(text, setting.range.most);
+      const bool complement = setting.spelling == settings::Spelling::complement;
+      for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(complement ? 1.0 - rgb[i] : rgb[i]);
+    });
+  }
+}
+
+/// The flags of a descriptor's settings.
+template <class Desc>
+void add_settings(CLI::App& app, const char* group, Desc& desc, const TakeWord& take_word = {}) {
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (*setting.flag != '\0') add_setting(app, group, setting, desc.*setting.field, take_word);
+  });
 }
 
 void parse_size(std::string_view text, SceneOptions& scene) {
@@ -263,134 +312,39 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       },
       "glTF 2.0 scene (.gltf, .glb) around and in the volume");
   add(
-      app, group, "--gltf-time", "SECONDS", [&](const std::string& text) { scene.surface.time = parse_number(text); },
-      "Moment of its animation (default: 0)");
-  add(
-      app, group, "--gltf-animation", "N",
-      [&](const std::string& text) {
-        scene.surface.animation = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32));
-      },
-      "Which animation of the file, from 0 (default: 0)");
-  add(
       app, group, "--gltf-camera", "N",
       [&](const std::string& text) {
         scene.surface_camera = static_cast<std::int32_t>(parse_integer(text, 0, 1000000));
       },
       "Look through this camera of the file, from 0");
-  add_choice(app, group, "--surface-light", surface_light_names, scene.surface.light,
-             "Light between surfaces and volume (default: full), or only from sun, sky, lamps and what glows");
-  add(
-      app, group, "--indirect-roughness", "R",
-      [&](const std::string& text) {
-        const double roughness = parse_number(text);
-        if (!(roughness >= 0.0 && roughness <= 1.0)) throw UsageError(in_quotes(text) + " is not from 0 to 1");
-        scene.surface.indirect_roughness = static_cast<float>(roughness);
-      },
-      "Least roughness that scattered paths find: softens what mirrors and lakes throw (default: 0, no bias)");
-  app.add_flag_function(
-         "--double-sided", [&](std::int64_t count) { scene.surface.double_sided = count > 0 ? 1 : 0; },
-         "Show both sides of all surfaces, for files that are wound inside out")
-      ->group(group);
+  add_settings(app, group, scene.surface);
   add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
       [&](const std::string& text) { scene.camera = parse_camera(text); },
       "Eye, target and vertical field of view in degrees (default: fit the scene)");
 
-  group = "Medium";
-  add(
-      app, group, "--density-scale", "K|auto",
-      [&](const std::string& text) {
-        scene.auto_density_scale = text == "auto";
-        scene.medium.density_scale = scene.auto_density_scale ? 0.0 : parse_positive(text);
-      },
-      "Extinction is K x grid value, 1 / world unit (default: auto, for a mean optical depth of 8)");
-  add(
-      app, group, "--albedo", "R,G,B",
-      [&](const std::string& text) {
-        const std::array<double, 3> albedo = parse_rgb(text, 1.0);
-        for (std::size_t i = 0; i < 3; ++i) scene.medium.coalbedo[i] = static_cast<float>(1.0 - albedo[i]);
-      },
-      "Single-scattering albedo, each from 0 to 1 (default: 1,1,1)");
-  add(
-      app, group, "--anisotropy", "G",
-      [&](const std::string& text) {
-        const auto g = static_cast<float>(parse_number(text));
-        if (!(g > -1.0f && g < 1.0f)) throw UsageError(in_quotes(text) + " is not between -1 and 1");
-        scene.medium.anisotropy = g;
-      },
-      "Henyey-Greenstein g, between -1 and 1 (default: 0, isotropic)");
-  add(
-      app, group, "--max-bounces", "N",
-      [&](const std::string& text) {
-        scene.medium.max_bounces = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32));
-      },
-      "Scattering events a path may have; 0: no limit (default)");
-  add(
-      app, group, "--emission", "R,G,B", [&](const std::string& text) { parse_light(text, scene.medium.emission); },
-      "What an opaque body of the medium glows with, as fire does (default: 0,0,0)");
+  const auto take_auto = [&scene](std::string_view flag, const std::string& text) {
+    if (flag != "--density-scale") return false;
+    scene.auto_density_scale = text == "auto";
+    if (scene.auto_density_scale) scene.medium.density_scale = 0.0;
+    return scene.auto_density_scale;
+  };
+  add_settings(app, "Medium", scene.medium, take_auto);
 
   group = "Light (default: daylight; given one of the two, the other is dark)";
   add(
       app, group, "--sun", "\"azimuth,elevation r,g,b\"",
       [&](const std::string& text) { parse_sun(text, scene.light); },
       "Degrees from +Z towards +X and above the horizon; irradiance");
-  add(
-      app, group, "--sky", "R,G,B", [&](const std::string& text) { parse_light(text, scene.light.sky_radiance); },
-      "Radiance, the same from everywhere");
-
-  group = "Grid";
-  add_choice(app, group, "--march", march_names, scene.grid.march,
-             "Adaptive tetrahedra (default), every voxel, or voxels that skip empty 8^3 bricks");
-  add_choice(app, group, "--cells", cells_names, scene.grid.cells, "Density inside a tetrahedron (default: linear)");
-  add_choice(app, group, "--criterion", criterion_names, scene.grid.criterion,
-             "What is compared with the threshold (default: deviation)");
-  add(
-      app, group, "--threshold", "T",
-      [&](const std::string& text) {
-        const double threshold = parse_number(text);
-        if (threshold < 0.0) throw UsageError(in_quotes(text) + " is negative");
-        // Zero means the default in the API and "always split" to whoever types it.
-        scene.grid.threshold = threshold == 0.0 ? -1.0 : threshold;
-      },
-      "Split cells above it; 0: down to the voxel (default: 0.02, for range-mean 1)");
-  add(
-      app, group, "--max-cells", "N",
-      [&](const std::string& text) { scene.grid.max_cells = parse_integer(text, 1, max_u64); },
-      "Stop splitting there (default: 5400000)");
-  add_choice(app, group, "--camera-adaptive", std::array{Name{"on", 1}, Name{"off", 0}}, scene.grid.camera_adaptive,
-             "Keep cells coarse that are out of sight or under a pixel (default: off)");
-  add(
-      app, group, "--pixel-size", "P", [&](const std::string& text) { scene.grid.pixel_size = parse_positive(text); },
-      "Pixels that a split cell's longest edge must cover (default: 1)");
+  add_settings(app, group, scene.light);
+  add_settings(app, "Grid", scene.grid);
 
   group = "Picture";
   add(
       app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene); },
       "Pixels (default: 1280x720)");
-  add(
-      app, group, "--spp", "N",
-      [&](const std::string& text) {
-        scene.sampling.samples = static_cast<std::uint32_t>(parse_integer(text, 1, max_u32));
-      },
-      "Samples a pixel (default: 64)");
-  add(
-      app, group, "--seed", "S",
-      [&](const std::string& text) {
-        scene.sampling.seed = static_cast<std::uint32_t>(parse_integer(text, 0, max_u32));
-      },
-      "Same seed, same driver: same picture (default: 0)");
-  add_choice(app, group, "--view", view_names, scene.sampling.view,
-             "The picture (default), or a look at the grid that made it");
-  add(
-      app, group, "--exposure", "STOPS",
-      [&](const std::string& text) {
-        const double stops = parse_number(text);
-        if (std::abs(stops) > 64.0) throw UsageError(in_quotes(text) + " is not from -64 to 64");
-        scene.display.exposure_stops = static_cast<float>(stops);
-      },
-      "Brightens what is shown, and a .png, by 2^STOPS (default: 0)");
-  add_choice(app, group, "--tone-map", tone_map_names, scene.display.tone_map,
-             "From radiance to the screen and a .png (default: neutral, the Khronos PBR one)");
+  add_settings(app, group, scene.sampling);
+  add_settings(app, group, scene.display);
 }
 
 namespace {
@@ -504,7 +458,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
             const bool meant = part == "all" || part == name;
             if (meant && std::ranges::find(options.aovs, aov) == options.aovs.end()) options.aovs.push_back(aov);
           }
-          const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.text; });
+          const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.name; });
           if (options.aovs.size() == before && !known && part != "all")
             throw UsageError(in_quotes(part) + " is none of all, " + list_names(aov_names, ", "));
         }

@@ -11,6 +11,9 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <settings.hpp>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
@@ -24,9 +27,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
+using settings::number_text;
+using settings::Range;
+using settings::Spelling;
 
 constexpr int format_version = 1;
-constexpr double max_light = 1e30;
 constexpr double max_u32 = 4294967295.0;
 // JSON's numbers are exact integers up to here.
 constexpr double max_integer = 9007199254740992.0;
@@ -35,132 +40,132 @@ constexpr double max_integer = 9007199254740992.0;
   throw std::runtime_error(file + ": " + cause);
 }
 
-std::string number_text(double value) {
-  std::array<char, 64> text{};
-  const auto* end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  const char* begin = text.data();
-  return {begin, end};
-}
-
-struct Range {
-  double least = -std::numeric_limits<double>::max();
-  double most = std::numeric_limits<double>::max();
-  bool open = false;  // the ends themselves are out
-};
-
-/// One JSON object: reads its keys, and refuses what it was not asked for, since a misspelt key would go unnoticed.
-class Section {
+/// A file's keys, each named by its path, such as "light.sun.irradiance", and taken out of it when it is read: what is
+/// left over is refused, since a misspelt key would go unnoticed.
+class Reader {
  public:
-  Section(std::string file, std::string where, const Json& json)
-      : file_(std::move(file)), where_(std::move(where)), json_(json) {
-    if (!json_.is_object()) fail(file_, (where_.empty() ? "the file" : where_) + " is not an object");
+  Reader(std::string file, Json json) : file_(std::move(file)), json_(std::move(json)) {
+    if (!json_.is_object()) fail(file_, "the file is not an object");
   }
 
-  template <class Read>
-  void section(const char* key, Read read) {
-    if (const Json* value = find(key)) {
-      Section inner(file_, name(key), *value);
-      read(inner);
-      inner.finish();
-    }
-  }
-
-  void text(const char* key, std::string& out) {
-    const Json* value = find(key);
-    if (value == nullptr) return;
+  void text(const std::string& key, std::string& out) {
+    const std::optional<Json> value = take(key);
+    if (!value) return;
     if (!value->is_string()) wrong(key, "is not a text");
     out = value->get<std::string>();
     if (out.find('\0') != std::string::npos) wrong(key, "holds a zero byte");
   }
 
-  /// Whether the key's value is this text.
-  bool is_text(const char* key, const char* text) {
+  /// Whether the key's value is this word; takes nothing else.
+  bool word(const std::string& key, const char* word) {
     const Json* value = find(key);
-    return value != nullptr && value->is_string() && value->get<std::string>() == text;
+    if (value == nullptr || !value->is_string() || value->get<std::string>() != word) return false;
+    take(key);
+    return true;
   }
 
-  void flag(const char* key, std::int32_t& out) {
-    const Json* value = find(key);
-    if (value == nullptr) return;
+  void flag(const std::string& key, std::int32_t& out) {
+    const std::optional<Json> value = take(key);
+    if (!value) return;
     if (!value->is_boolean()) wrong(key, "is neither true nor false");
     out = value->get<bool>() ? 1 : 0;
   }
 
   template <class Names, class Value>
-  void choice(const char* key, const Names& names, Value& out) {
+  void choice(const std::string& key, const Names& names, Value& out) {
+    if (find(key) == nullptr) return;
     std::string chosen;
     text(key, chosen);
-    if (json_.find(key) == json_.end()) return;
     for (const auto& name : names) {
-      if (chosen == name.text) {
-        out = name.value;
+      if (chosen == name.name) {
+        out = static_cast<Value>(name.value);
         return;
       }
     }
     wrong(key, "'" + chosen + "' is none of " + list_names(names, ", "));
   }
 
+  /// Whether there is one. It holds for the number that is kept, too: a float may be less exact.
   template <class Number>
-  void number(const char* key, Number& out, const Range& range = {}) {
-    if (const Json* value = find(key)) out = static_cast<Number>(checked(key, *value, range));
+  bool number(const std::string& key, Number& out, const Range& range) {
+    const std::optional<Json> value = take(key);
+    if (!value) return false;
+    out = static_cast<Number>(checked(key, *value, range));
+    if (!range.holds(out)) wrong(key, range.refusal());
+    return true;
   }
 
   template <class Number>
-  void integer(const char* key, Number& out, double least, double most) {
-    const Json* value = find(key);
-    if (value == nullptr) return;
+  void integer(const std::string& key, Number& out, double least, double most) {
+    const std::optional<Json> value = take(key);
+    if (!value) return;
     const double number = checked(key, *value, {least, most});
     if (number != std::floor(number)) wrong(key, number_text(number) + " is not a whole number");
     out = static_cast<Number>(number);
   }
 
   template <class Number>
-  bool three(const char* key, Number (&out)[3], const Range& range = {}) {
-    const Json* value = find(key);
-    if (value == nullptr) return false;
+  bool three(const std::string& key, Number (&out)[3], const Range& range = {}) {
+    const std::optional<Json> value = take(key);
+    if (!value) return false;
     if (!value->is_array() || value->size() != 3) wrong(key, "is not three numbers");
     for (std::size_t i = 0; i < 3; ++i) out[i] = static_cast<Number>(checked(key, (*value)[i], range));
     return true;
   }
 
-  [[nodiscard]] bool has(const char* key) const { return json_.contains(key); }
+  [[nodiscard]] bool has(const std::string& key) { return find(key) != nullptr; }
 
-  [[noreturn]] void wrong(const char* key, const std::string& cause) const { fail(file_, name(key) + ": " + cause); }
+  [[noreturn]] void wrong(const std::string& key, const std::string& cause) const { fail(file_, key + ": " + cause); }
 
-  void finish() const {
-    for (const auto& item : json_.items())
-      if (std::find(known_.begin(), known_.end(), item.key()) == known_.end())
-        fail(file_, name(item.key()) + ": there is no such setting");
-  }
+  void finish() const { refuse_rest(json_, ""); }
 
  private:
-  [[nodiscard]] std::string name(const std::string& key) const { return where_.empty() ? key : where_ + "." + key; }
-
-  const Json* find(const char* key) {
-    known_.emplace_back(key);
-    const auto found = json_.find(key);
-    return found == json_.end() ? nullptr : &*found;
+  /// Remembers the objects on the way, which may be there, be it empty.
+  Json* find(const std::string& key) {
+    Json* at = &json_;
+    for (std::size_t begin = 0;;) {
+      const std::size_t end = key.find('.', begin);
+      const auto found = at->find(key.substr(begin, end - begin));
+      if (found == at->end()) {
+        return nullptr;
+      }
+      at = &*found;
+      if (end == std::string::npos) return at;
+      const std::string section = key.substr(0, end);
+      if (!at->is_object()) fail(file_, section + " is not an object");
+      sections_.insert(section);
+      begin = end + 1;
+    }
   }
 
-  [[nodiscard]] double checked(const char* key, const Json& value, const Range& range) const {
+  std::optional<Json> take(const std::string& key) {
+    Json* value = find(key);
+    if (value == nullptr) return std::nullopt;
+    Json taken = std::move(*value);
+    const std::size_t dot = key.rfind('.');
+    Json& parent = dot == std::string::npos ? json_ : *find(key.substr(0, dot));
+    parent.erase(key.substr(dot + 1));
+    return taken;
+  }
+
+  void refuse_rest(const Json& object, const std::string& where) const {
+    for (const auto& item : object.items()) {
+      const std::string key = where + item.key();
+      if (!sections_.contains(key)) wrong(key, "there is no such setting");
+      refuse_rest(item.value(), key + ".");
+    }
+  }
+
+  [[nodiscard]] double checked(const std::string& key, const Json& value, const Range& range) const {
     if (!value.is_number()) wrong(key, "is not a number");
     const double number = value.get<double>();
-    const bool inside =
-        range.open ? number > range.least && number < range.most : number >= range.least && number <= range.most;
-    if (!inside) {
-      const std::string given = number_text(number);
-      if (range.most == std::numeric_limits<double>::max())
-        wrong(key, given + (range.open ? " is not above " : " is less than ") + number_text(range.least));
-      wrong(key, given + (range.open ? " is not between " : " is not from ") + number_text(range.least) +
-                     (range.open ? " and " : " to ") + number_text(range.most));
-    }
+    if (!range.holds(number)) wrong(key, number_text(number) + " " + range.refusal());
     return number;
   }
 
   std::string file_;
-  std::string where_;
-  const Json& json_;
-  std::vector<std::string> known_;
+  Json json_;
+  std::set<std::string> sections_;
 };
 
 /// Keys that an object has twice, of which a parser keeps one without a word.
@@ -183,97 +188,71 @@ class Repeats {
   std::string first_;
 };
 
-constexpr Range above_zero = {0.0, std::numeric_limits<double>::max(), true};
-constexpr Range light_range = {0.0, max_light};
-
-void read_camera(Section& camera, cumulet_camera_desc& desc) {
-  const bool eye = camera.three("eye", desc.eye);
-  const bool target = camera.three("target", desc.target);
-  if (eye != target) camera.wrong(eye ? "target" : "eye", "is missing");
-  if (eye && std::equal(desc.eye, desc.eye + 3, desc.target)) camera.wrong("target", "is the same point as the eye");
-  if (camera.three("up", desc.up) && std::equal(desc.up, desc.up + 3, std::array{0.0, 0.0, 0.0}.begin()))
-    camera.wrong("up", "has no direction");
-  camera.number("fovy_degrees", desc.fovy_degrees, {0.0, 180.0, true});
-  camera.number("orthographic_height", desc.orthographic_height, {0.0});
+void read_camera(Reader& reader, cumulet_camera_desc& desc) {
+  const bool eye = reader.three("camera.eye", desc.eye);
+  const bool target = reader.three("camera.target", desc.target);
+  if (eye != target) reader.wrong(eye ? "camera.target" : "camera.eye", "is missing");
+  if (eye && std::equal(desc.eye, desc.eye + 3, desc.target))
+    reader.wrong("camera.target", "is the same point as the eye");
+  if (reader.three("camera.up", desc.up) && std::equal(desc.up, desc.up + 3, std::array{0.0, 0.0, 0.0}.begin()))
+    reader.wrong("camera.up", "has no direction");
+  reader.number("camera.fovy_degrees", desc.fovy_degrees, {0.0, 180.0, true});
+  reader.number("camera.orthographic_height", desc.orthographic_height, settings::not_negative);
 }
 
-void read_medium(Section& medium, cumulet_medium_desc& desc, bool& automatic) {
-  automatic = medium.is_text("density_scale", "auto");
-  if (!automatic) medium.number("density_scale", desc.density_scale, above_zero);
-  double albedo[3];
-  if (medium.three("albedo", albedo, {0.0, 1.0}))
-    for (std::size_t i = 0; i < 3; ++i) desc.coalbedo[i] = static_cast<float>(1.0 - albedo[i]);
-  medium.number("anisotropy", desc.anisotropy, {-1.0, 1.0, true});
-  // Close enough to 1 for a float to be 1.
-  if (!(desc.anisotropy > -1.0f && desc.anisotropy < 1.0f)) medium.wrong("anisotropy", "is not between -1 and 1");
-  medium.integer("max_bounces", desc.max_bounces, 0.0, max_u32);
-  medium.three("emission", desc.emission, light_range);
+template <class Desc, class Value>
+void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting, Value& value) {
+  const Range range = setting.given_range();
+  if constexpr (settings::Enumerated<Value>) {
+    reader.choice(setting.key, setting.choices, value);
+  } else if constexpr (settings::Switch<Value>) {
+    reader.flag(setting.key, value);
+  } else if constexpr (settings::Count<Value>) {
+    const double most = std::min(static_cast<double>(std::numeric_limits<Value>::max()), max_integer);
+    reader.integer(setting.key, value, std::max(range.least, 0.0), most);
+  } else if constexpr (settings::Real<Value>) {
+    const bool given = reader.number(setting.key, value, range);
+    if (given && setting.spelling == Spelling::zero_is_negative && value == 0.0) value = -1.0;
+  } else if (setting.spelling == Spelling::complement) {
+    double complement[3];
+    if (!reader.three(setting.key, complement, range)) return;
+    for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(1.0 - complement[i]);
+  } else {
+    reader.three(setting.key, value, range);
+  }
 }
 
-void read_light(Section& light, cumulet_light_desc& desc) {
-  light.section("sun", [&](Section& sun) {
-    sun.number("azimuth_degrees", desc.sun_azimuth_degrees, {-360.0, 360.0});
-    sun.number("elevation_degrees", desc.sun_elevation_degrees, {-90.0, 90.0});
-    sun.three("irradiance", desc.sun_irradiance, light_range);
+template <class Desc>
+void read_settings(Reader& reader, Desc& desc) {
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (*setting.key != '\0') read_setting(reader, setting, desc.*setting.field);
   });
-  light.section("sky", [&](Section& sky) { sky.three("radiance", desc.sky_radiance, light_range); });
 }
 
-void read_grid(Section& grid, cumulet_grid_desc& desc) {
-  grid.choice("march", march_names, desc.march);
-  grid.choice("cells", cells_names, desc.cells);
-  grid.choice("criterion", criterion_names, desc.criterion);
-  grid.number("threshold", desc.threshold, {0.0});
-  // Zero means the default in the API and "always split" to whoever writes it.
-  if (grid.has("threshold") && desc.threshold == 0.0) desc.threshold = -1.0;
-  grid.integer("max_cells", desc.max_cells, 1.0, max_integer);
-  grid.flag("camera_adaptive", desc.camera_adaptive);
-  grid.number("pixel_size", desc.pixel_size, above_zero);
-}
-
-void read_scene(Section& root, SceneOptions& scene) {
-  // What a file of this version meant before there was another way.
-  scene.auto_density_scale = false;
+void read_scene(Reader& reader, SceneOptions& scene) {
   int version = 0;
-  root.integer("cumulet_scene", version, 0.0, max_u32);
+  if (!reader.has("cumulet_scene")) reader.wrong("cumulet_scene", "is missing: not a Cumulet scene");
+  reader.integer("cumulet_scene", version, 0.0, max_u32);
   if (version != format_version)
-    root.wrong("cumulet_scene", root.has("cumulet_scene")
-                                    ? "version " + std::to_string(version) + " is not known: this program reads 1"
-                                    : "is missing: not a Cumulet scene");
-  root.section("volume", [&](Section& volume) {
-    volume.text("file", scene.volume);
-    volume.text("grid", scene.grid_name);
-    volume.choice("up", up_names, scene.up);
-  });
-  root.section("surfaces", [&](Section& surfaces) {
-    surfaces.text("file", scene.surfaces);
-    surfaces.number("time", scene.surface.time);
-    surfaces.integer("animation", scene.surface.animation, 0.0, max_u32);
-    surfaces.integer("camera", scene.surface_camera, -1.0, 1e6);
-    surfaces.choice("light", surface_light_names, scene.surface.light);
-    surfaces.number("indirect_roughness", scene.surface.indirect_roughness, {0.0, 1.0});
-    surfaces.flag("double_sided", scene.surface.double_sided);
-  });
-  root.section("camera", [&](Section& camera) { read_camera(camera, scene.camera); });
-  root.section("medium", [&](Section& medium) { read_medium(medium, scene.medium, scene.auto_density_scale); });
-  if (root.has("light"))
-    root.section("light", [&](Section& light) { read_light(light, scene.light); });
-  else
-    scene.set_daylight();
-  root.section("grid", [&](Section& grid) { read_grid(grid, scene.grid); });
-  root.section("picture", [&](Section& picture) {
-    picture.integer("width", scene.width, 1.0, 16384.0);
-    picture.integer("height", scene.height, 1.0, 16384.0);
-    picture.integer("samples", scene.sampling.samples, 1.0, max_u32);
-    picture.integer("seed", scene.sampling.seed, 0.0, max_u32);
-    picture.choice("view", view_names, scene.sampling.view);
-  });
-  root.section("display", [&](Section& display) {
-    display.number("exposure_stops", scene.display.exposure_stops, {-64.0, 64.0});
-    display.choice("tone_map", tone_map_names, scene.display.tone_map);
-    display.choice("background", background_names, scene.display.background);
-  });
-  root.finish();
+    reader.wrong("cumulet_scene", "version " + std::to_string(version) + " is not known: this program reads 1");
+  reader.text("volume.file", scene.volume);
+  reader.text("volume.grid", scene.grid_name);
+  reader.choice("volume.up", up_names, scene.up);
+  reader.text("surfaces.file", scene.surfaces);
+  reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
+  read_settings(reader, scene.surface);
+  read_camera(reader, scene.camera);
+  // Without a word, a file of this version means 1: there was no other way.
+  scene.auto_density_scale = reader.word("medium.density_scale", "auto");
+  read_settings(reader, scene.medium);
+  if (!reader.has("light")) scene.set_daylight();
+  read_settings(reader, scene.light);
+  read_settings(reader, scene.grid);
+  reader.integer("picture.width", scene.width, 1.0, 16384.0);
+  reader.integer("picture.height", scene.height, 1.0, 16384.0);
+  read_settings(reader, scene.sampling);
+  read_settings(reader, scene.display);
+  reader.finish();
 }
 
 /// The decimal number with the fewest digits that says the float: 0.1, not 0.10000000149011612.
@@ -299,14 +278,47 @@ double albedo_of(float coalbedo) {
   return 1.0 - static_cast<double>(coalbedo);
 }
 
-Json three(const float (&rgb)[3]) { return {shortest(rgb[0]), shortest(rgb[1]), shortest(rgb[2])}; }
 Json three(const double (&xyz)[3]) { return {xyz[0], xyz[1], xyz[2]}; }
 
 template <class Names, class Value>
 const char* name_of(const Names& names, Value value) {
   for (const auto& name : names)
-    if (name.value == value) return name.text;
+    if (static_cast<Value>(name.value) == value) return name.name;
   throw std::logic_error("a setting has no name");
+}
+
+/// Nothing for what is left to the library.
+template <class Desc, class Value>
+std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const Value& value) {
+  if constexpr (settings::Enumerated<Value>) {
+    return name_of(setting.choices, value);
+  } else if constexpr (settings::Switch<Value>) {
+    return value != 0;
+  } else if constexpr (settings::Triple<Value>) {
+    const auto one = setting.spelling == Spelling::complement ? albedo_of : shortest;
+    return Json{one(value[0]), one(value[1]), one(value[2])};
+  } else {
+    const bool negative = setting.spelling == Spelling::zero_is_negative;
+    if (value == Value{} && (setting.zero != 0.0 || negative)) return std::nullopt;
+    if constexpr (settings::Count<Value>) {
+      return value;
+    } else {
+      const Value spelled = negative ? std::max(value, Value{}) : value;
+      if constexpr (std::is_same_v<Value, float>) return shortest(spelled);
+      return spelled;
+    }
+  }
+}
+
+template <class Desc>
+void write_settings(Json& json, const Desc& desc) {
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (*setting.key == '\0') return;
+    const std::optional<Json> value = json_of(setting, desc.*setting.field);
+    std::string path = "/" + std::string(setting.key);
+    std::ranges::replace(path, '.', '/');
+    if (value) json[Json::json_pointer(path)] = *value;
+  });
 }
 
 Json to_json(const SceneOptions& scene, const std::string& volume, const std::string& surfaces) {
@@ -319,12 +331,8 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   if (!surfaces.empty()) {
     Json& shown = json["surfaces"];
     shown["file"] = surfaces;
-    shown["time"] = scene.surface.time;
-    shown["animation"] = scene.surface.animation;
     if (scene.surface_camera >= 0) shown["camera"] = scene.surface_camera;
-    shown["light"] = name_of(surface_light_names, scene.surface.light);
-    shown["indirect_roughness"] = shortest(scene.surface.indirect_roughness);
-    shown["double_sided"] = scene.surface.double_sided != 0;
+    write_settings(json, scene.surface);
   }
 
   Json camera = Json::object();
@@ -338,45 +346,14 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   if (view.orthographic_height > 0.0) camera["orthographic_height"] = view.orthographic_height;
   json["camera"] = camera;
 
-  Json medium = Json::object();
-  if (scene.medium.density_scale > 0.0) {
-    medium["density_scale"] = scene.medium.density_scale;
-  } else if (scene.auto_density_scale) {
-    medium["density_scale"] = "auto";
-  }
-  const auto& coalbedo = scene.medium.coalbedo;
-  medium["albedo"] = {albedo_of(coalbedo[0]), albedo_of(coalbedo[1]), albedo_of(coalbedo[2])};
-  medium["anisotropy"] = shortest(scene.medium.anisotropy);
-  medium["max_bounces"] = scene.medium.max_bounces;
-  medium["emission"] = three(scene.medium.emission);
-  json["medium"] = medium;
-
-  Json& sun = json["light"]["sun"];
-  sun["azimuth_degrees"] = shortest(scene.light.sun_azimuth_degrees);
-  sun["elevation_degrees"] = shortest(scene.light.sun_elevation_degrees);
-  sun["irradiance"] = three(scene.light.sun_irradiance);
-  json["light"]["sky"]["radiance"] = three(scene.light.sky_radiance);
-
-  Json& grid = json["grid"];
-  grid["march"] = name_of(march_names, scene.grid.march);
-  grid["cells"] = name_of(cells_names, scene.grid.cells);
-  grid["criterion"] = name_of(criterion_names, scene.grid.criterion);
-  if (scene.grid.threshold != 0.0) grid["threshold"] = std::max(scene.grid.threshold, 0.0);
-  if (scene.grid.max_cells != 0) grid["max_cells"] = scene.grid.max_cells;
-  grid["camera_adaptive"] = scene.grid.camera_adaptive != 0;
-  if (scene.grid.pixel_size > 0.0) grid["pixel_size"] = scene.grid.pixel_size;
-
-  Json& picture = json["picture"];
-  picture["width"] = scene.width;
-  picture["height"] = scene.height;
-  if (scene.sampling.samples != 0) picture["samples"] = scene.sampling.samples;
-  picture["seed"] = scene.sampling.seed;
-  picture["view"] = name_of(view_names, scene.sampling.view);
-
-  Json& display = json["display"];
-  display["exposure_stops"] = shortest(scene.display.exposure_stops);
-  display["tone_map"] = name_of(tone_map_names, scene.display.tone_map);
-  display["background"] = name_of(background_names, scene.display.background);
+  if (scene.auto_density_scale && scene.medium.density_scale == 0.0) json["medium"]["density_scale"] = "auto";
+  write_settings(json, scene.medium);
+  write_settings(json, scene.light);
+  write_settings(json, scene.grid);
+  json["picture"]["width"] = scene.width;
+  json["picture"]["height"] = scene.height;
+  write_settings(json, scene.sampling);
+  write_settings(json, scene.display);
   return json;
 }
 
@@ -457,8 +434,8 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
   }
   if (!repeats.first().empty()) fail(path, repeats.first() + ": is given twice");
   SceneOptions scene;
-  Section root(path, "", json);
-  read_scene(root, scene);
+  Reader reader(path, std::move(json));
+  read_scene(reader, scene);
   const fs::path folder = fs::path(path).parent_path();
   for (std::string* file : {&scene.volume, &scene.surfaces})
     if (!file->empty() && fs::path(*file).is_relative()) *file = (folder / *file).string();

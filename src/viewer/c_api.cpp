@@ -1,6 +1,7 @@
 // The C ABI's viewer: checks arguments, translates descriptors, keeps exceptions in.
 
 #include "viewer/c_handles.hpp"
+#include "viewer/c_settings.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/viewer.hpp"
 
@@ -22,10 +23,6 @@ cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
   // Not even the message may be touched from inside a callback: another thread may be in a call.
   if (viewer == nullptr || cumulet::CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
   return cumulet::c_abi::guarded(viewer->last_error, [&] { call(*viewer->viewer); });
-}
-
-void require_colour(std::span<const float, 3> values, const char* what) {
-  for (const float value : values) require(in_range(value, 0.0, 1e30), what);
 }
 
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
@@ -214,13 +211,7 @@ cumulet_status cumulet_rebuild(cumulet_viewer* viewer) {
 
 cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_grid_desc d = read_desc(desc, "cumulet_grid_desc");
-    require(number(d.march) <= CUMULET_MARCH_BRICK, "cumulet_grid_desc.march is unknown");
-    require(number(d.cells) <= CUMULET_CELLS_CONSTANT, "cumulet_grid_desc.cells is unknown");
-    require(number(d.criterion) <= CUMULET_CRITERION_RANGE_MEAN, "cumulet_grid_desc.criterion is unknown");
-    require(std::isfinite(d.threshold), "cumulet_grid_desc.threshold is not finite");
-    require_bool(d.camera_adaptive, "cumulet_grid_desc.camera_adaptive is not 0 or 1");
-    require(in_range(d.pixel_size, 0.0, 1e6), "cumulet_grid_desc.pixel_size is not from 0 to 1e6");
+    const cumulet_grid_desc d = read_settings(desc);
     core::GridSettings s;
     s.build.march = static_cast<render::March>(d.march);
     cumulet::grid::RefineSettings& refine = s.build.refine;
@@ -228,39 +219,24 @@ cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc*
         d.cells == CUMULET_CELLS_LINEAR ? cumulet::grid::CellKind::linear : cumulet::grid::CellKind::constant;
     const bool deviation = d.criterion == CUMULET_CRITERION_DEVIATION;
     refine.criterion = deviation ? cumulet::grid::Criterion::deviation : cumulet::grid::Criterion::range_mean;
-    refine.threshold = d.threshold != 0.0 ? d.threshold : (deviation ? 0.02 : 1.0);
-    if (d.max_cells != 0) refine.max_cells = d.max_cells;
+    refine.threshold = d.threshold != 0.0 ? d.threshold : cumulet::settings::default_threshold(d.criterion);
+    refine.max_cells = d.max_cells;
+    refine.pixel_size = d.pixel_size;
     s.camera_adaptive = d.camera_adaptive == 1;
-    refine.pixel_size = d.pixel_size > 0.0 ? d.pixel_size : 1.0;
     v.set_grid(s);
   });
 }
 
 cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_medium_desc d = read_desc(desc, "cumulet_medium_desc");
-    require(in_range(d.density_scale, 0.0, 1e30), "cumulet_medium_desc.density_scale is not from 0 to 1e30");
-    require(d.anisotropy > -1.0F && d.anisotropy < 1.0F, "cumulet_medium_desc.anisotropy is not between -1 and 1");
-    for (const float c : d.coalbedo) require(in_range(c, 0.0, 1.0), "cumulet_medium_desc.coalbedo is not from 0 to 1");
-    require_colour(d.emission, "cumulet_medium_desc.emission is negative or not finite");
-    core::Medium m;
-    m.density_scale = d.density_scale > 0.0 ? d.density_scale : 1.0;
-    m.albedo = 1.0F - to_vec3(d.coalbedo);
-    m.anisotropy = d.anisotropy;
-    m.max_bounces = d.max_bounces;
-    m.emission = to_vec3(d.emission);
-    v.set_medium(m);
+    const cumulet_medium_desc d = read_settings(desc);
+    v.set_medium({d.density_scale, 1.0F - to_vec3(d.coalbedo), d.anisotropy, d.max_bounces, to_vec3(d.emission)});
   });
 }
 
 cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_light_desc d = read_desc(desc, "cumulet_light_desc");
-    require(std::isfinite(d.sun_azimuth_degrees), "cumulet_light_desc.sun_azimuth_degrees is not finite");
-    require(in_range(d.sun_elevation_degrees, -90.0, 90.0),
-            "cumulet_light_desc.sun_elevation_degrees is not from -90 to 90");
-    require_colour(d.sun_irradiance, "cumulet_light_desc.sun_irradiance is negative or not finite");
-    require_colour(d.sky_radiance, "cumulet_light_desc.sky_radiance is negative or not finite");
+    const cumulet_light_desc d = read_settings(desc);
     v.set_light({d.sun_azimuth_degrees, d.sun_elevation_degrees, to_vec3(d.sun_irradiance), to_vec3(d.sky_radiance)});
   });
 }
@@ -289,12 +265,7 @@ cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** o
 
 cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer, const cumulet_surface_settings_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_surface_settings_desc d = read_desc(desc, "cumulet_surface_settings_desc");
-    require(std::isfinite(d.time), "cumulet_surface_settings_desc.time is not finite");
-    require(number(d.light) <= CUMULET_SURFACE_LIGHT_NONE, "cumulet_surface_settings_desc.light is unknown");
-    require(d.indirect_roughness >= 0.0F && d.indirect_roughness <= 1.0F,
-            "cumulet_surface_settings_desc.indirect_roughness is not from 0 to 1");
-    require(d.double_sided == 0 || d.double_sided == 1, "cumulet_surface_settings_desc.double_sided is not 0 or 1");
+    const cumulet_surface_settings_desc d = read_settings(desc);
     v.set_surface_settings(
         {{d.time, d.animation, d.double_sided == 1}, static_cast<core::SurfaceLight>(d.light), d.indirect_roughness});
   });
@@ -306,21 +277,15 @@ cumulet_status cumulet_use_surface_camera(cumulet_viewer* viewer, uint32_t index
 
 cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_sampling_desc d = read_desc(desc, "cumulet_sampling_desc");
-    require(number(d.view) <= CUMULET_VIEW_WIREFRAME, "cumulet_sampling_desc.view is unknown");
-    require(number(d.preview) <= CUMULET_PREVIEW_OFF, "cumulet_sampling_desc.preview is unknown");
-    require(d.volume_alone == 0 || d.volume_alone == 1, "cumulet_sampling_desc.volume_alone is neither 0 nor 1");
-    v.set_sampling({d.samples == 0 ? 256 : d.samples, d.seed, static_cast<render::View>(d.view),
-                    d.preview == CUMULET_PREVIEW_AUTO, d.volume_alone != 0});
+    const cumulet_sampling_desc d = read_settings(desc);
+    v.set_sampling(
+        {d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO, d.volume_alone == 1});
   });
 }
 
 cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_display_desc d = read_desc(desc, "cumulet_display_desc");
-    require(in_range(d.exposure_stops, -64.0, 64.0), "cumulet_display_desc.exposure_stops is not from -64 to 64");
-    require(number(d.tone_map) <= CUMULET_TONE_MAP_CLIP, "cumulet_display_desc.tone_map is unknown");
-    require(number(d.background) <= CUMULET_BACKGROUND_TRANSPARENT, "cumulet_display_desc.background is unknown");
+    const cumulet_display_desc d = read_settings(desc);
     v.set_display(
         {d.exposure_stops, static_cast<render::ToneMap>(d.tone_map), d.background == CUMULET_BACKGROUND_TRANSPARENT});
   });
@@ -349,14 +314,9 @@ cumulet_status cumulet_frame_all(cumulet_viewer* viewer) {
 
 cumulet_status cumulet_set_navigation(cumulet_viewer* viewer, const cumulet_navigation_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_navigation_desc d = read_desc(desc, "cumulet_navigation_desc");
-    require(number(d.style) <= CUMULET_NAVIGATION_MAYA, "cumulet_navigation_desc.style is unknown");
-    require_bool(d.fly, "cumulet_navigation_desc.fly is not 0 or 1");
-    require(in_range(d.speed, 0.0, 1e6), "cumulet_navigation_desc.speed is not from 0 to 1e6");
-    require(in_range(d.turntable_degrees_per_second, -3600.0, 3600.0),
-            "cumulet_navigation_desc.turntable_degrees_per_second is not from -3600 to 3600");
-    v.set_navigation({static_cast<core::NavigationStyle>(d.style), d.fly == 1, d.speed > 0.0 ? d.speed : 1.0,
-                      d.turntable_degrees_per_second});
+    const cumulet_navigation_desc d = read_settings(desc);
+    v.set_navigation(
+        {static_cast<core::NavigationStyle>(d.style), d.fly == 1, d.speed, d.turntable_degrees_per_second});
   });
 }
 

@@ -11,6 +11,7 @@ namespace cumulet::c_abi {
 
 /// A field of a struct of the ABI.
 struct Field {
+  const char* name;
   size_t offset, size, alignment;
   [[nodiscard]] constexpr size_t end() const { return offset + size; }
 };

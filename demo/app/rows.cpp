@@ -1,0 +1,85 @@
+#include "rows.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace cumulet::demo {
+namespace {
+
+bool shown(const settings::Row& row) { return *row.label != '\0'; }
+
+ImGuiSliderFlags flags_of(const settings::Row& row) {
+  return row.logarithmic ? ImGuiSliderFlags_Logarithmic : ImGuiSliderFlags_None;
+}
+
+/// least and most as the value's own type.
+template <class Number>
+bool slide(Ui& ui, const settings::Row& row, Number& value, const char* format) {
+  const bool zero = value == Number{} && *row.zero != '\0';
+  return ui.slider(row.label, row.tip, value, static_cast<Number>(row.least), static_cast<Number>(row.most),
+                   zero ? row.zero : format, flags_of(row));
+}
+
+}  // namespace
+
+bool Rows::draw(const settings::Facts& facts, std::int32_t& value) {
+  if (!shown(facts.row)) return false;
+  bool on = value != 0;
+  if (!ui_.checkbox(facts.row.label, facts.row.tip, on)) return false;
+  value = on ? 1 : 0;
+  return true;
+}
+
+bool Rows::draw(const settings::Facts& facts, std::uint32_t& value) {
+  if (!shown(facts.row)) return false;
+  if (facts.row.most == 0.0) return ui_.integer(facts.row.label, facts.row.tip, value);
+  return slide(ui_, facts.row, value, "%u");
+}
+
+bool Rows::draw(const settings::Facts& facts, std::uint64_t& value) {
+  return shown(facts.row) && slide(ui_, facts.row, value, "%llu");
+}
+
+bool Rows::draw(const settings::Facts& facts, float& value) {
+  return shown(facts.row) && slide(ui_, facts.row, value, facts.row.format);
+}
+
+bool Rows::draw(const settings::Facts& facts, double& value) {
+  return shown(facts.row) && slide(ui_, facts.row, value, facts.row.format);
+}
+
+bool Rows::draw(const settings::Facts& facts, float (&value)[3]) {
+  const settings::Row& row = facts.row;
+  if (!shown(row)) return false;
+  if (facts.spelling == settings::Spelling::complement) {
+    float spelled[3] = {1.0f - value[0], 1.0f - value[1], 1.0f - value[2]};
+    if (!ui_.colour(row.label, row.tip, spelled)) return false;
+    for (std::size_t i = 0; i < 3; ++i) value[i] = std::clamp(1.0f - spelled[i], 0.0f, 1.0f);
+    return true;
+  }
+  std::array<float, 3>& kept = hues_.try_emplace(row.label, row.hue).first->second;
+  float strength = std::max({value[0], value[1], value[2]});
+  if (strength > 0.0f)
+    for (std::size_t i = 0; i < 3; ++i) kept[i] = value[i] / strength;
+  float hue[3] = {kept[0], kept[1], kept[2]};
+  bool changed = ui_.colour(row.colour, row.colour_tip, hue);
+  changed |= ui_.slider(row.label, row.tip, strength, static_cast<float>(row.least), static_cast<float>(row.most),
+                        row.format, ImGuiSliderFlags_Logarithmic);
+  if (!changed) return false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    kept[i] = hue[i];
+    value[i] = hue[i] * strength;
+  }
+  return true;
+}
+
+bool Rows::choose(const settings::Facts& facts, int& value) {
+  if (!shown(facts.row)) return false;
+  std::vector<Choice> choices;
+  for (const settings::Choice& choice : facts.choices) choices.push_back({choice.label, choice.value, choice.tip});
+  std::ranges::sort(choices, {}, &Choice::value);  // the default first
+  return ui_.choose(facts.row.label, facts.row.tip, choices, value);
+}
+
+}  // namespace cumulet::demo

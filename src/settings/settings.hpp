@@ -1,0 +1,301 @@
+#pragma once
+
+// The table of settings: one row says all there is to say of a setting but what it means to the picture, which is in
+// cumulet.h. From here come the checks and defaults of the C API, keys of scene files, flags with their help, whether
+// two descriptors are the same, and the rows of the demo's panel.
+
+#include <cumulet/cumulet.h>
+
+#include <array>
+#include <tuple>
+
+#include "setting.hpp"
+
+namespace cumulet::settings {
+
+inline constexpr std::array march_choices = {
+    Choice{"tet", CUMULET_MARCH_TET, "Tetrahedra", "The adaptive grid."},
+    Choice{"dense", CUMULET_MARCH_DENSE, "Dense voxels", "Every voxel: the reference."},
+    Choice{"brick", CUMULET_MARCH_BRICK, "Bricks", "Voxels, with empty 8x8x8 bricks skipped."}};
+inline constexpr std::array cells_choices = {
+    Choice{"constant", CUMULET_CELLS_CONSTANT, "Constant", "The mean."},
+    Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."}};
+inline constexpr std::array criterion_choices = {
+    Choice{"range-mean", CUMULET_CRITERION_RANGE_MEAN, "Range / mean", "(max - min) / mean, as in the paper."},
+    Choice{"deviation", CUMULET_CRITERION_DEVIATION, "Deviation",
+           "Standard deviation x edge length, against the mean depth."}};
+inline constexpr std::array surface_light_choices = {
+    Choice{"full", CUMULET_SURFACE_LIGHT_FULL, "Full", "To each other and to the volume, and back."},
+    Choice{"shadows", CUMULET_SURFACE_LIGHT_SHADOWS, "Shadows",
+           "Sun, sky, lamps and what glows only, and the shadows of all: faster."},
+    Choice{"none", CUMULET_SURFACE_LIGHT_NONE, "None", "Rasterised, without shadows: the fastest."}};
+inline constexpr std::array view_choices = {
+    Choice{"shaded", CUMULET_VIEW_SHADED, "Shaded", "The path-traced picture."},
+    Choice{"cells", CUMULET_VIEW_CELLS, "Cells", "The cells on a cut through the middle, coloured by level."},
+    Choice{"steps", CUMULET_VIEW_STEPS, "Steps", "How many cells a camera ray passes, as a heat map."},
+    Choice{"density", CUMULET_VIEW_DENSITY, "Density", "The opacity along each camera ray."},
+    Choice{"wireframe", CUMULET_VIEW_WIREFRAME, "Wireframe", "The edges of the cells that hold density."}};
+inline constexpr std::array preview_choices = {Choice{"auto", CUMULET_PREVIEW_AUTO, "", ""},
+                                               Choice{"off", CUMULET_PREVIEW_OFF, "", ""}};
+inline constexpr std::array tone_map_choices = {
+    Choice{"neutral", CUMULET_TONE_MAP_NEUTRAL, "Neutral", "Khronos PBR Neutral: keeps colours, rolls off highlights."},
+    Choice{"filmic", CUMULET_TONE_MAP_FILMIC, "Filmic", "A fit of the ACES curve: more contrast."},
+    Choice{"clip", CUMULET_TONE_MAP_CLIP, "Clip", "What is above 1 is white."}};
+inline constexpr std::array background_choices = {Choice{"sky", CUMULET_BACKGROUND_SKY, "Sky", "The sky's radiance."},
+                                                  Choice{"transparent", CUMULET_BACKGROUND_TRANSPARENT, "Transparent",
+                                                         "Nothing: saved pictures have an alpha channel."}};
+inline constexpr std::array navigation_choices = {
+    Choice{"simple", CUMULET_NAVIGATION_SIMPLE, "Simple", "Left: orbit; middle or Shift+left: pan; right: dolly."},
+    Choice{"blender", CUMULET_NAVIGATION_BLENDER, "Blender", "Middle: orbit; Shift: pan; Ctrl: dolly; keypad views."},
+    Choice{"maya", CUMULET_NAVIGATION_MAYA, "Maya", "Alt + left: orbit; Alt + middle: pan; Alt + right: dolly."}};
+inline constexpr std::array depth_choices = {Choice{"standard", CUMULET_DEPTH_STANDARD, "", ""},
+                                             Choice{"reversed", CUMULET_DEPTH_REVERSED, "", ""}};
+
+// One setting, one row.
+// clang-format off
+
+template <>
+struct Table<cumulet_medium_desc> {
+  using Desc = cumulet_medium_desc;
+  static constexpr const char* name = "cumulet_medium_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::density_scale, {.name = "density_scale", .range = {0.0, 1e30}, .given = above_zero, .zero = 1.0,
+        .key = "medium.density_scale", .flag = "--density-scale", .type = "K|auto",
+        .help = "Extinction is K x grid value, 1 / world unit (default: auto, for a mean optical depth of 8)",
+        .row = {.label = "Density scale",
+                .tip = "Extinction is this times the grid's value, per world unit.",
+                .least = 1e-4, .most = 1e4, .format = "%.4g", .logarithmic = true}}),
+      Setting(&Desc::coalbedo, {.name = "coalbedo", .range = {0.0, 1.0}, .spelling = Spelling::complement,
+        .key = "medium.albedo", .flag = "--albedo", .type = "R,G,B",
+        .help = "Single-scattering albedo, each from 0 to 1 (default: 1,1,1)",
+        .row = {.label = "Albedo",
+                .tip = "Single-scattering albedo: the part of light that goes on after a collision. White: nothing "
+                       "is absorbed."}}),
+      Setting(&Desc::anisotropy, {.name = "anisotropy", .range = {-1.0, 1.0, true},
+        .key = "medium.anisotropy", .flag = "--anisotropy", .type = "G",
+        .help = "Henyey-Greenstein g, between -1 and 1 (default: 0, isotropic)",
+        .row = {.label = "Anisotropy",
+                .tip = "Henyey-Greenstein g: below 0 light turns back, above 0 it goes on forward.",
+                .least = -0.99, .most = 0.99}}),
+      Setting(&Desc::max_bounces, {.name = "max_bounces",
+        .key = "medium.max_bounces", .flag = "--max-bounces", .type = "N",
+        .help = "Scattering events a path may have; 0: no limit (default)",
+        .row = {.label = "Max bounces",
+                .tip = "Scattering events a path may have.",
+                .most = 256.0, .logarithmic = true, .zero = "no limit"}}),
+      Setting(&Desc::emission, {.name = "emission", .range = light_range,
+        .key = "medium.emission", .flag = "--emission", .type = "R,G,B",
+        .help = "What an opaque body of the medium glows with, as fire does (default: 0,0,0)",
+        .row = {.label = "Glow",
+                .tip = "Radiance of an opaque body of the medium, as of fire: it lights all the rest. 0: dark.",
+                .most = 1000.0,
+                .colour = "Glow colour",
+                .colour_tip = "The colour of the medium's own light, as it looks on the screen.",
+                .hue = {1.0F, 0.35F, 0.08F}}})};
+};
+
+template <>
+struct Table<cumulet_light_desc> {
+  using Desc = cumulet_light_desc;
+  static constexpr const char* name = "cumulet_light_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::sun_azimuth_degrees, {.name = "sun_azimuth_degrees", .given = Range{-360.0, 360.0},
+        .key = "light.sun.azimuth_degrees",
+        .row = {.label = "Sun azimuth",
+                .tip = "From +Z towards +X.",
+                .least = -180.0, .most = 180.0, .format = "%.1f°"}}),
+      Setting(&Desc::sun_elevation_degrees, {.name = "sun_elevation_degrees", .range = {-90.0, 90.0},
+        .key = "light.sun.elevation_degrees",
+        .row = {.label = "Sun elevation",
+                .tip = "Above the horizon.",
+                .least = -90.0, .most = 90.0, .format = "%.1f°"}}),
+      Setting(&Desc::sun_irradiance, {.name = "sun_irradiance", .range = light_range,
+        .key = "light.sun.irradiance",
+        .row = {.label = "Sun strength",
+                .tip = "Irradiance on a surface that faces the sun; 0: no sun.",
+                .most = 1000.0,
+                .colour = "Sun colour",
+                .colour_tip = "The sun's colour, as it looks on the screen."}}),
+      Setting(&Desc::sky_radiance, {.name = "sky_radiance", .range = light_range,
+        .key = "light.sky.radiance", .flag = "--sky", .type = "R,G,B",
+        .help = "Radiance, the same from everywhere",
+        .row = {.label = "Sky strength",
+                .tip = "Radiance from everywhere; 0: black.",
+                .most = 100.0,
+                .colour = "Sky colour",
+                .colour_tip = "The sky's colour, as it looks on the screen."}})};
+};
+
+template <>
+struct Table<cumulet_surface_settings_desc> {
+  using Desc = cumulet_surface_settings_desc;
+  static constexpr const char* name = "cumulet_surface_settings_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::time, {.name = "time",
+        .key = "surfaces.time", .flag = "--gltf-time", .type = "SECONDS",
+        .help = "Moment of its animation (default: 0)",
+        .row = {.label = "Time",
+                .tip = "Seconds into the model's animation.",
+                .format = "%.2f s"}}),
+      Setting(&Desc::animation, {.name = "animation",
+        .key = "surfaces.animation", .flag = "--gltf-animation", .type = "N",
+        .help = "Which animation of the file, from 0 (default: 0)"}),
+      Setting(&Desc::light, {.name = "light", .choices = surface_light_choices,
+        .key = "surfaces.light", .flag = "--surface-light",
+        .help = "Light between surfaces and volume (default: full), or only from sun, sky, lamps and what glows",
+        .row = {.label = "Surface light",
+                .tip = "What light the surfaces pass on."}}),
+      Setting(&Desc::indirect_roughness, {.name = "indirect_roughness", .range = {0.0, 1.0},
+        .key = "surfaces.indirect_roughness", .flag = "--indirect-roughness", .type = "R",
+        .help = "Least roughness that scattered paths find: softens what mirrors and lakes throw (default: 0, no "
+                "bias)",
+        .row = {.label = "Indirect roughness",
+                .tip = "Softens what mirrors and lakes throw on walls and clouds: no bright specks. What you look at "
+                       "keeps its gloss. 0: as physics has it.",
+                .most = 1.0, .format = "%.2f"}}),
+      Setting(&Desc::double_sided, {.name = "double_sided",
+        .key = "surfaces.double_sided", .flag = "--double-sided",
+        .help = "Show both sides of all surfaces, for files that are wound inside out",
+        .row = {.label = "Double sided",
+                .tip = "Shows both sides of all surfaces, for models that are wound inside out."}})};
+};
+
+template <>
+struct Table<cumulet_grid_desc> {
+  using Desc = cumulet_grid_desc;
+  static constexpr const char* name = "cumulet_grid_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::march, {.name = "march", .choices = march_choices,
+        .key = "grid.march", .flag = "--march",
+        .help = "Adaptive tetrahedra (default), every voxel, or voxels that skip empty 8^3 bricks",
+        .row = {.label = "March",
+                .tip = "What rays step through (key M)."}}),
+      Setting(&Desc::cells, {.name = "cells", .choices = cells_choices,
+        .key = "grid.cells", .flag = "--cells",
+        .help = "Density inside a tetrahedron (default: linear)",
+        .row = {.label = "Cells",
+                .tip = "The density inside a tetrahedron."}}),
+      Setting(&Desc::criterion, {.name = "criterion", .choices = criterion_choices,
+        .key = "grid.criterion", .flag = "--criterion",
+        .help = "What is compared with the threshold (default: deviation)",
+        .row = {.label = "Criterion",
+                .tip = "What is compared with the threshold, to decide whether a cell is split."}}),
+      Setting(&Desc::threshold, {.name = "threshold", .given = not_negative, .spelling = Spelling::zero_is_negative,
+        .key = "grid.threshold", .flag = "--threshold", .type = "T",
+        .help = "Split cells above it; 0: down to the voxel (default: 0.02, for range-mean 1)",
+        .row = {.label = "Threshold",
+                .tip = "Cells above it are split: smaller is finer.",
+                .format = "%.4g", .logarithmic = true}}),
+      Setting(&Desc::max_cells, {.name = "max_cells", .given = Range{1.0}, .zero = 5.4e6,
+        .key = "grid.max_cells", .flag = "--max-cells", .type = "N",
+        .help = "Stop splitting there (default: 5400000)",
+        .row = {.label = "Cell budget",
+                .tip = "The most cells: spent where the criterion is largest.",
+                .least = 1e3, .most = 5e7, .logarithmic = true}}),
+      Setting(&Desc::camera_adaptive, {.name = "camera_adaptive",
+        .key = "grid.camera_adaptive", .flag = "--camera-adaptive", .type = "on|off",
+        .help = "Keep cells coarse that are out of sight or under a pixel (default: off)",
+        .row = {.label = "Camera adaptive",
+                .tip = "Keeps cells coarse that are out of sight or smaller than a few pixels."}}),
+      Setting(&Desc::pixel_size, {.name = "pixel_size", .range = {0.0, 1e6}, .given = above_zero, .zero = 1.0,
+        .key = "grid.pixel_size", .flag = "--pixel-size", .type = "P",
+        .help = "Pixels that a split cell's longest edge must cover (default: 1)",
+        .row = {.label = "Pixel size",
+                .tip = "Pixels that a cell's longest edge must cover to be split.",
+                .least = 0.25, .most = 32.0, .format = "%.2f", .logarithmic = true}})};
+};
+
+template <>
+struct Table<cumulet_sampling_desc> {
+  using Desc = cumulet_sampling_desc;
+  static constexpr const char* name = "cumulet_sampling_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::samples, {.name = "samples", .given = Range{1.0}, .zero = 256.0,
+        .key = "picture.samples", .flag = "--spp", .type = "N",
+        .help = "Samples a pixel (default: 64)",
+        .row = {.label = "Samples",
+                .tip = "A pixel; more go on from where it is.",
+                .least = 1.0, .most = 65536.0, .logarithmic = true}}),
+      Setting(&Desc::seed, {.name = "seed",
+        .key = "picture.seed", .flag = "--seed", .type = "S",
+        .help = "Same seed, same driver: same picture (default: 0)",
+        .row = {.label = "Seed",
+                .tip = "The same seed and settings give the same picture."}}),
+      Setting(&Desc::view, {.name = "view", .choices = view_choices,
+        .key = "picture.view", .flag = "--view",
+        .help = "The picture (default), or a look at the grid that made it",
+        .row = {.label = "View",
+                .tip = "The picture, or a look at the grid that makes it (keys 1 to 5)."}}),
+      Setting(&Desc::preview, {.name = "preview", .choices = preview_choices}),
+      Setting(&Desc::volume_alone, {.name = "volume_alone"})};
+};
+
+template <>
+struct Table<cumulet_display_desc> {
+  using Desc = cumulet_display_desc;
+  static constexpr const char* name = "cumulet_display_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::exposure_stops, {.name = "exposure_stops", .range = {-64.0, 64.0},
+        .key = "display.exposure_stops", .flag = "--exposure", .type = "STOPS",
+        .help = "Brightens what is shown, and a .png, by 2^STOPS (default: 0)",
+        .row = {.label = "Exposure",
+                .tip = "Brightness in stops: each doubles the light. Restarts nothing (keys [ and ]).",
+                .least = -10.0, .most = 10.0, .format = "%.2f stops"}}),
+      Setting(&Desc::tone_map, {.name = "tone_map", .choices = tone_map_choices,
+        .key = "display.tone_map", .flag = "--tone-map",
+        .help = "From radiance to the screen and a .png (default: neutral, the Khronos PBR one)",
+        .row = {.label = "Tone map",
+                .tip = "How radiance becomes what the screen can show."}}),
+      Setting(&Desc::background, {.name = "background", .choices = background_choices,
+        .key = "display.background",
+        .row = {.label = "Background",
+                .tip = "What is behind the volume."}})};
+};
+
+template <>
+struct Table<cumulet_camera_desc> {
+  using Desc = cumulet_camera_desc;
+  static constexpr const char* name = "cumulet_camera_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::eye, {.name = "eye"}),
+      Setting(&Desc::target, {.name = "target"}),
+      Setting(&Desc::up, {.name = "up"}),
+      Setting(&Desc::fovy_degrees, {.name = "fovy_degrees", .zero = 40.0,
+        .row = {.label = "Field of view",
+                .tip = "From bottom to top of the picture.",
+                .least = 2.0, .most = 150.0, .format = "%.1f°"}}),
+      Setting(&Desc::orthographic_height, {.name = "orthographic_height"}),
+      Setting(&Desc::near_plane, {.name = "near_plane"}),
+      Setting(&Desc::far_plane, {.name = "far_plane"}),
+      Setting(&Desc::depth, {.name = "depth", .choices = depth_choices})};
+};
+
+template <>
+struct Table<cumulet_navigation_desc> {
+  using Desc = cumulet_navigation_desc;
+  static constexpr const char* name = "cumulet_navigation_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::style, {.name = "style", .choices = navigation_choices,
+        .row = {.label = "Navigation",
+                .tip = "Whose habits the mouse follows; Help (F1) lists them."}}),
+      Setting(&Desc::fly, {.name = "fly",
+        .row = {.label = "Fly",
+                .tip = "Any button looks around; W A S D move, E and Q rise and sink, Shift is faster (G)."}}),
+      Setting(&Desc::speed, {.name = "speed", .range = {0.0, 1e6}, .zero = 1.0,
+        .row = {.label = "Speed",
+                .tip = "Of all camera motion.",
+                .least = 0.05, .most = 20.0, .format = "%.2f", .logarithmic = true}}),
+      Setting(&Desc::turntable_degrees_per_second, {.name = "turntable_degrees_per_second", .range = {-3600.0, 3600.0},
+        .row = {.label = "Turn speed",
+                .tip = "Degrees a second; negative: the other way.",
+                .least = -90.0, .most = 90.0, .format = "%.1f°/s"}})};
+};
+
+// clang-format on
+
+/// The threshold that 0 stands for.
+[[nodiscard]] constexpr double default_threshold(cumulet_criterion criterion) {
+  return criterion == CUMULET_CRITERION_RANGE_MEAN ? 1.0 : 0.02;
+}
+
+}  // namespace cumulet::settings

@@ -1,0 +1,47 @@
+#pragma once
+
+// Descriptors of settings, checked by the table.
+
+#include <algorithm>
+#include <string>
+
+#include "settings/settings.hpp"
+#include "viewer/c_support.hpp"
+
+namespace cumulet::c_abi {
+
+/// Why a field cannot be set as the descriptor has it; "" if it can.
+template <class Desc, class Value>
+std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& desc) {
+  const auto& value = desc.*setting.field;
+  if constexpr (settings::Enumerated<Value>) {
+    const auto is = [&](const settings::Choice& c) { return number(value) == static_cast<unsigned>(c.value); };
+    return std::ranges::any_of(setting.choices, is) ? "" : "is unknown";
+  } else if constexpr (settings::Switch<Value>) {
+    return value == 0 || value == 1 ? "" : "is not 0 or 1";
+  } else if constexpr (settings::Triple<Value>) {
+    const bool holds = std::ranges::all_of(value, [&](auto v) { return setting.range.holds(v); });
+    const bool light = setting.range.most == settings::light_range.most;
+    return holds ? "" : (light ? "is negative or not finite" : setting.range.refusal());
+  } else if constexpr (settings::Real<Value>) {
+    return setting.range.holds(value) ? "" : setting.range.refusal();
+  } else {
+    static_assert(settings::Count<Value>);
+    return "";
+  }
+}
+
+/// A host's descriptor with zeros as what they stand for. Throws Error(invalid_argument) that names the field.
+template <class Desc>
+Desc read_settings(const Desc* desc) {
+  using Table = settings::Table<Desc>;
+  Desc checked = read_desc(desc, Table::name);
+  settings::for_each<Desc>([&](const auto& setting) {
+    const std::string why = refusal(setting, checked);
+    if (!why.empty()) refuse(std::string(Table::name) + "." + setting.name + " " + why);
+  });
+  settings::spell_out_zeros(checked);
+  return checked;
+}
+
+}  // namespace cumulet::c_abi

@@ -1,0 +1,214 @@
+// The table of settings against all that is made of it: the C API, scene files, flags, and their page.
+
+#include "settings/settings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "options.hpp"
+#include "viewer/c_fields.hpp"
+
+namespace {
+
+using namespace cumulet;
+using demo::SceneOptions;
+using settings::Setting;
+
+/// Calls visit with each descriptor of a scene and what gives it to a viewer.
+template <class Visit>
+void for_each_descriptor(Visit&& visit) {
+  visit(&SceneOptions::medium, cumulet_set_medium);
+  visit(&SceneOptions::light, cumulet_set_light);
+  visit(&SceneOptions::grid, cumulet_set_grid);
+  visit(&SceneOptions::surface, cumulet_set_surface_settings);
+  visit(&SceneOptions::sampling, cumulet_set_sampling);
+  visit(&SceneOptions::display, cumulet_set_display);
+}
+
+/// A value that is not the default, and that people may give.
+template <class Desc, class Value>
+void set_sample(const Setting<Desc, Value>& setting, Value& value) {
+  if constexpr (settings::Enumerated<Value>) {
+    for (const settings::Choice& choice : setting.choices)
+      if (choice.value != 0) value = static_cast<Value>(choice.value);
+  } else if constexpr (settings::Triple<Value>) {
+    value[0] = 0.25f;
+    value[1] = 0.5f;
+    value[2] = 0.125f;
+  } else if constexpr (settings::Switch<Value>) {
+    value = 1;
+  } else if constexpr (settings::Count<Value>) {
+    value = 7;
+  } else {
+    value = Value{0.25};
+  }
+}
+
+/// The same on the command line.
+template <class Desc, class Value>
+std::string sample_text(const Setting<Desc, Value>& setting, const Value& value) {
+  if constexpr (settings::Enumerated<Value>) {
+    for (const settings::Choice& choice : setting.choices)
+      if (choice.value == value) return choice.name;
+    return "";
+  } else if constexpr (settings::Triple<Value>) {
+    return setting.spelling == settings::Spelling::complement ? "0.75,0.5,0.875" : "0.25,0.5,0.125";
+  } else if constexpr (settings::Switch<Value>) {
+    return "on";
+  } else if constexpr (settings::Count<Value>) {
+    return "7";
+  } else {
+    return "0.25";
+  }
+}
+
+/// A value that the C API refuses; false if there is none.
+template <class Desc, class Value>
+bool set_bad(const Setting<Desc, Value>&, Value& value) {
+  if constexpr (settings::Enumerated<Value> || settings::Switch<Value>) {
+    const int bad = 99;
+    std::memcpy(&value, &bad, sizeof value);
+  } else if constexpr (settings::Triple<Value>) {
+    value[1] = std::numeric_limits<float>::quiet_NaN();
+  } else if constexpr (settings::Count<Value>) {
+    return false;
+  } else {
+    value = std::numeric_limits<Value>::quiet_NaN();
+  }
+  return true;
+}
+
+template <class Value>
+bool equal(const Value& a, const Value& b) {
+  if constexpr (settings::Triple<Value>)
+    return std::equal(std::begin(a), std::end(a), std::begin(b));
+  else
+    return a == b;
+}
+
+template <class Desc>
+void expect_all_fields() {
+  SCOPED_TRACE(settings::Table<Desc>::name);
+  std::vector<std::string> names = {"struct_size"};
+  const Desc desc{};
+  settings::for_each<Desc>([&](const auto& setting) {
+    const auto offset = static_cast<std::size_t>(reinterpret_cast<const char*>(&(desc.*setting.field)) -
+                                                 reinterpret_cast<const char*>(&desc));
+    for (const c_abi::Field& field : c_abi::fields_of<Desc>) {
+      if (field.offset == offset) {
+        EXPECT_STREQ(field.name, setting.name);
+      }
+    }
+    names.emplace_back(setting.name);
+  });
+  std::set<std::string> fields;
+  for (const c_abi::Field& field : c_abi::fields_of<Desc>) fields.insert(field.name);
+  EXPECT_EQ(std::set<std::string>(names.begin(), names.end()), fields);
+  EXPECT_EQ(names.size(), fields.size());
+}
+
+TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
+  expect_all_fields<cumulet_medium_desc>();
+  expect_all_fields<cumulet_light_desc>();
+  expect_all_fields<cumulet_grid_desc>();
+  expect_all_fields<cumulet_surface_settings_desc>();
+  expect_all_fields<cumulet_sampling_desc>();
+  expect_all_fields<cumulet_display_desc>();
+  expect_all_fields<cumulet_camera_desc>();
+  expect_all_fields<cumulet_navigation_desc>();
+}
+
+TEST(Settings, SceneFilesKeepEach) {
+  std::set<std::string> keys;
+  std::set<std::string> without;
+  for_each_descriptor([&](auto part, auto) {
+    settings::for_each<std::decay_t<decltype(SceneOptions().*part)>>([&](const auto& setting) {
+      if (*setting.key == '\0') {
+        without.insert(setting.name);
+        return;
+      }
+      EXPECT_TRUE(keys.insert(setting.key).second) << setting.key;
+      SceneOptions scene;
+      scene.surfaces = "/a.glb";
+      const SceneOptions before = scene;
+      set_sample(setting, scene.*part.*setting.field);
+      EXPECT_FALSE(same_scene(scene, before)) << setting.key;
+      EXPECT_FALSE(settings::same(scene.*part, before.*part)) << setting.key;
+      const SceneOptions read = demo::parse_scene(demo::scene_text(scene, "/s.json"), "/s.json");
+      EXPECT_TRUE(equal(read.*part.*setting.field, scene.*part.*setting.field)) << setting.key;
+      EXPECT_TRUE(settings::same(read.*part, scene.*part)) << setting.key;
+    });
+  });
+  // What a picture's file has no say in.
+  EXPECT_EQ(without, (std::set<std::string>{"preview", "volume_alone"}));
+}
+
+TEST(Settings, AFlagSetsEach) {
+  std::set<std::string> flags;
+  std::set<std::string> without;
+  for_each_descriptor([&](auto part, auto) {
+    settings::for_each<std::decay_t<decltype(SceneOptions().*part)>>([&](const auto& setting) {
+      if (*setting.flag == '\0') {
+        without.insert(setting.name);
+        return;
+      }
+      EXPECT_TRUE(flags.insert(setting.flag).second) << setting.flag;
+      EXPECT_STRNE(setting.help, "") << setting.flag;
+      SceneOptions scene;
+      set_sample(setting, scene.*part.*setting.field);
+      const std::string text = sample_text(setting, scene.*part.*setting.field);
+      std::ostringstream out;
+      const auto options = demo::parse_render_options(
+          {"--volume", "a.vdb", "--gltf", "a.glb", "-o", "a.png", std::string(setting.flag) + "=" + text}, out);
+      ASSERT_TRUE(options.has_value());
+      EXPECT_TRUE(equal(options->scene.*part.*setting.field, scene.*part.*setting.field)) << setting.flag;
+    });
+  });
+  // --sun sets three at once.
+  EXPECT_EQ(without, (std::set<std::string>{"background", "preview", "sun_azimuth_degrees", "sun_elevation_degrees",
+                                            "sun_irradiance", "volume_alone"}));
+}
+
+TEST(Settings, TheLibraryTakesEachAndNamesWhatItRefuses) {
+  cumulet_create_desc create{};
+  create.struct_size = sizeof create;
+  cumulet_viewer* made = nullptr;
+  ASSERT_EQ(cumulet_create(&create, &made, nullptr, 0), CUMULET_OK);
+  const std::unique_ptr<cumulet_viewer, decltype(&cumulet_destroy)> viewer(made, cumulet_destroy);
+  for_each_descriptor([&](auto part, auto set) {
+    using Desc = std::decay_t<decltype(SceneOptions().*part)>;
+    settings::for_each<Desc>([&](const auto& setting) {
+      Desc desc = SceneOptions().*part;
+      set_sample(setting, desc.*setting.field);
+      EXPECT_EQ(set(made, &desc), CUMULET_OK) << setting.name << ": " << cumulet_last_error(made);
+      if (!set_bad(setting, desc.*setting.field)) return;
+      EXPECT_EQ(set(made, &desc), CUMULET_ERROR_INVALID_ARGUMENT) << setting.name;
+      const std::string named = std::string(settings::Table<Desc>::name) + "." + setting.name + " is ";
+      EXPECT_EQ(std::string(cumulet_last_error(made)).rfind(named, 0), 0U) << cumulet_last_error(made);
+    });
+  });
+}
+
+TEST(Settings, RangesAreTold) {
+  using settings::Range;
+  EXPECT_EQ(Range{}.refusal(), "is not finite");
+  EXPECT_EQ((Range{0.0}).refusal(), "is negative");
+  EXPECT_EQ((Range{1.0}).refusal(), "is less than 1");
+  EXPECT_EQ(settings::above_zero.refusal(), "is not above 0");
+  EXPECT_EQ((Range{-1.0, 1.0, true}).refusal(), "is not between -1 and 1");
+  EXPECT_EQ((Range{0.0, 1e30}).refusal(), "is not from 0 to 1e30");
+  EXPECT_FALSE(Range{}.holds(std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_FALSE(Range{}.holds(std::numeric_limits<double>::infinity()));
+  EXPECT_FALSE(settings::above_zero.holds(0.0));
+  EXPECT_TRUE((Range{0.0, 1.0}).holds(1.0));
+}
+
+}  // namespace
