@@ -35,7 +35,8 @@ install(TARGETS cumulet EXPORT Cumulet
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
         RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT library)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/include/cumulet DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/include/cumulet ${PROJECT_BINARY_DIR}/src/include/cumulet
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
         COMPONENT development)
 
 # A program's manual page and completions, of what it says of its own flags.

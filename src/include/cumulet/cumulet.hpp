@@ -9,6 +9,8 @@
  *
  *         viewer.set_medium({.density_scale = 4, .anisotropy = 0.7F}).value();
  *
+ *     Enums and descriptors that are cumulet.h's field for field are in cumulet_descriptors.hpp, which the build makes.
+ *
  * Errors
  *     Nothing here throws, so that it also serves where exceptions are off. What can fail returns a Result, which the
  *     compiler wants looked at; value() of a failed one calls std::terminate. A handle that is empty (default
@@ -36,6 +38,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <cumulet/cumulet_descriptors.hpp>
+
 #include "cumulet.h"
 
 namespace cumulet {
@@ -59,69 +63,6 @@ enum class StatusCode {
   detached = CUMULET_ERROR_DETACHED,
   timeout = CUMULET_ERROR_TIMEOUT
 };
-enum class LogLevel {
-  debug = CUMULET_LOG_DEBUG,
-  info = CUMULET_LOG_INFO,
-  warning = CUMULET_LOG_WARNING,
-  error = CUMULET_LOG_ERROR
-};
-enum class GlState { restore = CUMULET_GL_STATE_RESTORE, host_resets = CUMULET_GL_STATE_HOST_RESETS };
-enum class Stage {
-  idle = CUMULET_STAGE_IDLE,
-  loading = CUMULET_STAGE_LOADING,
-  statistics = CUMULET_STAGE_STATISTICS,
-  refining = CUMULET_STAGE_REFINING,
-  records = CUMULET_STAGE_RECORDS,
-  uploading = CUMULET_STAGE_UPLOADING
-};
-enum class March { tet = CUMULET_MARCH_TET, dense = CUMULET_MARCH_DENSE, brick = CUMULET_MARCH_BRICK };
-enum class Cells { linear = CUMULET_CELLS_LINEAR, constant = CUMULET_CELLS_CONSTANT };
-enum class Criterion { deviation = CUMULET_CRITERION_DEVIATION, range_mean = CUMULET_CRITERION_RANGE_MEAN };
-enum class View {
-  shaded = CUMULET_VIEW_SHADED,
-  cells = CUMULET_VIEW_CELLS,
-  steps = CUMULET_VIEW_STEPS,
-  density = CUMULET_VIEW_DENSITY,
-  wireframe = CUMULET_VIEW_WIREFRAME
-};
-enum class SurfaceLight {
-  full = CUMULET_SURFACE_LIGHT_FULL,
-  shadows = CUMULET_SURFACE_LIGHT_SHADOWS,
-  none = CUMULET_SURFACE_LIGHT_NONE
-};
-enum class Aov {
-  beauty = CUMULET_AOV_BEAUTY,
-  volume = CUMULET_AOV_VOLUME,
-  transmittance = CUMULET_AOV_TRANSMITTANCE,
-  surface_depth = CUMULET_AOV_SURFACE_DEPTH,
-  volume_depth = CUMULET_AOV_VOLUME_DEPTH,
-  normal = CUMULET_AOV_NORMAL,
-  albedo = CUMULET_AOV_ALBEDO
-};
-enum class Preview { automatic = CUMULET_PREVIEW_AUTO, off = CUMULET_PREVIEW_OFF };
-enum class ToneMap {
-  neutral = CUMULET_TONE_MAP_NEUTRAL,
-  filmic = CUMULET_TONE_MAP_FILMIC,
-  clip = CUMULET_TONE_MAP_CLIP
-};
-enum class Background { sky = CUMULET_BACKGROUND_SKY, transparent = CUMULET_BACKGROUND_TRANSPARENT };
-enum class Depth { standard = CUMULET_DEPTH_STANDARD, reversed = CUMULET_DEPTH_REVERSED };
-enum class Clip { negative_one_to_one = CUMULET_CLIP_NEGATIVE_ONE_TO_ONE, zero_to_one = CUMULET_CLIP_ZERO_TO_ONE };
-enum class NavigationStyle {
-  simple = CUMULET_NAVIGATION_SIMPLE,
-  blender = CUMULET_NAVIGATION_BLENDER,
-  maya = CUMULET_NAVIGATION_MAYA
-};
-enum class EventType {
-  pointer_move = CUMULET_EVENT_POINTER_MOVE,
-  button_down = CUMULET_EVENT_BUTTON_DOWN,
-  button_up = CUMULET_EVENT_BUTTON_UP,
-  wheel = CUMULET_EVENT_WHEEL,
-  key_down = CUMULET_EVENT_KEY_DOWN,
-  key_up = CUMULET_EVENT_KEY_UP,
-  focus_lost = CUMULET_EVENT_FOCUS_LOST
-};
-enum class Button { left = CUMULET_BUTTON_LEFT, middle = CUMULET_BUTTON_MIDDLE, right = CUMULET_BUTTON_RIGHT };
 /// Letters and digits are their upper-case ASCII codes: Key{'A'}.
 enum class Key : std::int32_t {
   none = CUMULET_KEY_NONE,
@@ -148,24 +89,6 @@ enum class Modifiers : std::uint32_t {
   shift = CUMULET_MODIFIER_SHIFT,
   ctrl = CUMULET_MODIFIER_CTRL,
   alt = CUMULET_MODIFIER_ALT
-};
-enum class Target {
-  framebuffer = CUMULET_TARGET_FRAMEBUFFER,
-  texture = CUMULET_TARGET_TEXTURE,
-  none = CUMULET_TARGET_NONE
-};
-enum class Colour {
-  srgb = CUMULET_COLOUR_SRGB,
-  srgb_framebuffer = CUMULET_COLOUR_SRGB_FRAMEBUFFER,
-  linear = CUMULET_COLOUR_LINEAR,
-  hdr = CUMULET_COLOUR_HDR
-};
-enum class Blend { over = CUMULET_BLEND_OVER, replace = CUMULET_BLEND_REPLACE };
-enum class DepthSource {
-  none = CUMULET_DEPTH_SOURCE_NONE,
-  texture = CUMULET_DEPTH_SOURCE_TEXTURE,
-  texture_multisample = CUMULET_DEPTH_SOURCE_TEXTURE_MULTISAMPLE,
-  framebuffer = CUMULET_DEPTH_SOURCE_FRAMEBUFFER
 };
 /// Combined with |.
 enum class RenderFlags : std::uint32_t {
@@ -304,8 +227,6 @@ template <class Desc>
 
 // ---- Volumes --------------------------------------------------------------------------------------------------------
 
-using Vector = std::array<double, 3>;
-using Rgb = std::array<float, 3>;
 /// Column-major.
 using Matrix = std::array<double, 16>;
 
@@ -467,12 +388,6 @@ template <class Visit>
   const cumulet_status status = cumulet_list_grids(path.c_str(), call, user, cause.data(), cause.size());
   return detail::result(status, cause.data());
 }
-
-enum class GridValues {
-  none = CUMULET_GRID_VALUES_NONE,
-  scalars = CUMULET_GRID_VALUES_SCALARS,
-  lengths = CUMULET_GRID_VALUES_LENGTHS
-};
 
 /// Texts live as long as the Inspection.
 struct VolumeFileInfo {
@@ -727,132 +642,7 @@ class Surfaces {
   cumulet_surfaces* handle_ = nullptr;
 };
 
-// ---- Settings -------------------------------------------------------------------------------------------------------
-
-struct GridDesc {
-  March march{};
-  Cells cells{};
-  Criterion criterion{};
-  double threshold = 0.0;
-  std::uint64_t max_cells = 0;
-  bool camera_adaptive = false;
-  double pixel_size = 0.0;
-
-  operator cumulet_grid_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_grid_desc),
-            .march = static_cast<cumulet_march>(march),
-            .cells = static_cast<cumulet_cells>(cells),
-            .criterion = static_cast<cumulet_criterion>(criterion),
-            .threshold = threshold,
-            .max_cells = max_cells,
-            .camera_adaptive = camera_adaptive,
-            .pixel_size = pixel_size};
-  }
-};
-
-struct MediumDesc {
-  double density_scale = 0.0;
-  Rgb coalbedo{};
-  float anisotropy = 0.0F;
-  std::uint32_t max_bounces = 0;
-  Rgb emission{};
-
-  operator cumulet_medium_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_medium_desc),
-            .density_scale = density_scale,
-            .coalbedo = {coalbedo[0], coalbedo[1], coalbedo[2]},
-            .anisotropy = anisotropy,
-            .max_bounces = max_bounces,
-            .emission = {emission[0], emission[1], emission[2]}};
-  }
-};
-
-struct LightDesc {
-  float sun_azimuth_degrees = 0.0F;
-  float sun_elevation_degrees = 0.0F;
-  Rgb sun_irradiance{};
-  Rgb sky_radiance{};
-
-  operator cumulet_light_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_light_desc),
-            .sun_azimuth_degrees = sun_azimuth_degrees,
-            .sun_elevation_degrees = sun_elevation_degrees,
-            .sun_irradiance = {sun_irradiance[0], sun_irradiance[1], sun_irradiance[2]},
-            .sky_radiance = {sky_radiance[0], sky_radiance[1], sky_radiance[2]}};
-  }
-};
-
-struct SurfaceSettingsDesc {
-  double time = 0.0;
-  std::uint32_t animation = 0;
-  SurfaceLight light{};
-  float indirect_roughness = 0.0F;
-  bool double_sided = false;
-
-  operator cumulet_surface_settings_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_surface_settings_desc),
-            .time = time,
-            .animation = animation,
-            .light = static_cast<cumulet_surface_light>(light),
-            .indirect_roughness = indirect_roughness,
-            .double_sided = double_sided ? 1 : 0};
-  }
-};
-
-struct SamplingDesc {
-  std::uint32_t samples = 0;
-  std::uint32_t seed = 0;
-  View view{};
-  Preview preview{};
-  bool volume_alone = false;
-
-  operator cumulet_sampling_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_sampling_desc),
-            .samples = samples,
-            .seed = seed,
-            .view = static_cast<cumulet_view>(view),
-            .preview = static_cast<cumulet_preview>(preview),
-            .volume_alone = volume_alone ? 1 : 0};
-  }
-};
-
-struct DisplayDesc {
-  float exposure_stops = 0.0F;
-  ToneMap tone_map{};
-  Background background{};
-
-  operator cumulet_display_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_display_desc),
-            .exposure_stops = exposure_stops,
-            .tone_map = static_cast<cumulet_tone_map>(tone_map),
-            .background = static_cast<cumulet_background>(background)};
-  }
-};
-
 // ---- Camera and input -----------------------------------------------------------------------------------------------
-
-struct CameraDesc {
-  Vector eye{};
-  Vector target{};
-  Vector up{};
-  double fovy_degrees = 0.0;
-  double orthographic_height = 0.0;
-  double near_plane = 0.0;
-  double far_plane = 0.0;
-  Depth depth{};
-
-  operator cumulet_camera_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_camera_desc),
-            .eye = {eye[0], eye[1], eye[2]},
-            .target = {target[0], target[1], target[2]},
-            .up = {up[0], up[1], up[2]},
-            .fovy_degrees = fovy_degrees,
-            .orthographic_height = orthographic_height,
-            .near_plane = near_plane,
-            .far_plane = far_plane,
-            .depth = static_cast<cumulet_depth>(depth)};
-  }
-};
 
 struct CameraMatrices {
   Matrix view{};
@@ -879,15 +669,7 @@ class Camera {
   [[nodiscard]] Result<CameraDesc> get() const noexcept {
     auto c = detail::sized<cumulet_camera_desc>();
     if (auto done = detail::result(cumulet_camera_get(handle(), &c)); !done) return done.error();
-    const auto& [struct_size, eye, target, up, fovy_degrees, orthographic_height, near_plane, far_plane, depth] = c;
-    return CameraDesc{.eye = std::to_array(eye),
-                      .target = std::to_array(target),
-                      .up = std::to_array(up),
-                      .fovy_degrees = fovy_degrees,
-                      .orthographic_height = orthographic_height,
-                      .near_plane = near_plane,
-                      .far_plane = far_plane,
-                      .depth = static_cast<Depth>(depth)};
+    return CameraDesc::of(c);
   }
   [[nodiscard]] Result<> set_matrices(const CameraMatrices& matrices, Clip clip) noexcept {
     return detail::result(cumulet_camera_set_matrices(handle(), matrices.view.data(), matrices.projection.data(),
@@ -943,21 +725,6 @@ class Camera {
   std::unique_ptr<cumulet_camera, Release> handle_;
 };
 
-struct NavigationDesc {
-  NavigationStyle style{};
-  bool fly = false;
-  double speed = 0.0;
-  double turntable_degrees_per_second = 0.0;
-
-  operator cumulet_navigation_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_navigation_desc),
-            .style = static_cast<cumulet_navigation_style>(style),
-            .fly = fly,
-            .speed = speed,
-            .turntable_degrees_per_second = turntable_degrees_per_second};
-  }
-};
-
 struct Event {
   EventType type{};
   double x = 0.0;
@@ -980,45 +747,6 @@ struct Event {
 };
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------
-
-struct FrameDesc {
-  double budget_ms = 0.0;
-  Target target{};
-  std::uint32_t framebuffer = 0;
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
-  std::array<std::int32_t, 4> viewport{};
-  bool flip_y = false;
-  double scale = 0.0;
-  std::uint32_t format = 0;
-  Colour colour{};
-  Blend blend{};
-  bool write_depth = false;
-  DepthSource depth_source{};
-  std::uint32_t depth_name = 0;
-  bool depth_flip_y = false;
-  bool depth_unchanged = false;
-
-  operator cumulet_frame_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_frame_desc),
-            .budget_ms = budget_ms,
-            .target = static_cast<cumulet_target>(target),
-            .framebuffer = framebuffer,
-            .width = width,
-            .height = height,
-            .viewport = {viewport[0], viewport[1], viewport[2], viewport[3]},
-            .flip_y = flip_y,
-            .scale = scale,
-            .format = format,
-            .colour = static_cast<cumulet_colour>(colour),
-            .blend = static_cast<cumulet_blend>(blend),
-            .write_depth = write_depth,
-            .depth_source = static_cast<cumulet_depth_source>(depth_source),
-            .depth_name = depth_name,
-            .depth_flip_y = depth_flip_y,
-            .depth_unchanged = depth_unchanged};
-  }
-};
 
 struct FrameResult {
   RenderFlags flags{};

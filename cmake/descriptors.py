@@ -1,0 +1,95 @@
+"""Writes what of cumulet.hpp follows from cumulet.h: enum classes, and descriptors that convert to C's.
+
+A descriptor here is a struct of settings or of a frame: numbers, enums, and arrays of numbers. Its int32_t are switches.
+Names, order and meaning are the header's.
+"""
+import argparse
+import re
+
+DESCRIPTORS = ["grid", "medium", "light", "surface_settings", "sampling", "display", "camera", "navigation", "frame"]
+# What C functions fill.
+FILLED = {"camera"}
+ENUMS_BY_HAND = {"cumulet_status", "cumulet_key"}
+RENAMED = {"auto": "automatic"}  # a keyword
+
+NUMBERS = {"double": ("double", "0.0"), "float": ("float", "0.0F"), "uint32_t": ("std::uint32_t", "0"),
+           "uint64_t": ("std::uint64_t", "0")}
+ARRAYS = {("float", 3): "Rgb", ("double", 3): "Vector"}
+
+
+def camel(name):
+    return "".join(part.capitalize() for part in name.removeprefix("cumulet_").split("_"))
+
+
+def enum_class(name, body):
+    constants = re.findall(r"(CUMULET_\w+)\s*=", body)
+    prefix = constants[0]
+    while not all(c.startswith(prefix) for c in constants) or not prefix.endswith("_"):
+        prefix = prefix[:-1]
+    values = []
+    for constant in constants:
+        value = constant.removeprefix(prefix).lower()
+        values.append(f"  {RENAMED.get(value, value)} = {constant}")
+    return f"enum class {camel(name)} {{\n" + ",\n".join(values) + "\n};\n"
+
+
+def fields(body):
+    """Type, name and number of elements (0: no array) of each."""
+    for declaration in body.split(";"):
+        match = re.fullmatch(r"\s*(\w+)\s+(\w+)(?:\[(\d+)\])?\s*", declaration)
+        if match and match[2] != "struct_size":
+            yield match[1], match[2], int(match[3] or 0)
+
+
+def member(c_type, name, count):
+    """The member, how it becomes C's, and how it is made of C's."""
+    if count:
+        cpp = ARRAYS.get((c_type, count), f"std::array<std::{c_type}, {count}>")
+        elements = ", ".join(f"{name}[{i}]" for i in range(count))
+        return f"{cpp} {name}{{}};", f"{{{elements}}}", f"std::to_array(c.{name})"
+    if c_type in NUMBERS:
+        cpp, zero = NUMBERS[c_type]
+        return f"{cpp} {name} = {zero};", name, f"c.{name}"
+    if c_type == "int32_t":
+        return f"bool {name} = false;", f"{name} ? 1 : 0", f"c.{name} != 0"
+    return f"{camel(c_type)} {name}{{}};", f"static_cast<{c_type}>({name})", f"static_cast<{camel(c_type)}>(c.{name})"
+
+
+def descriptor(name, body, filled):
+    members = [(field, *member(c_type, field, count)) for c_type, field, count in fields(body)]
+    lines = [f"struct {camel(name)} {{"]
+    lines += [f"  {declaration}" for _, declaration, _, _ in members]
+    lines += ["", f"  operator {name}() const noexcept {{", f"    return {{.struct_size = sizeof({name}),"]
+    lines += [f"            .{field} = {to}," for field, _, to, _ in members]
+    lines[-1] = lines[-1][:-1] + "};"
+    lines += ["  }"]
+    if filled:
+        values = ",\n            ".join(f".{field} = {of}" for field, _, _, of in members)
+        lines += [f"  [[nodiscard]] static {camel(name)} of(const {name}& c) noexcept {{", f"    return {{{values}}};", "  }"]
+    return "\n".join(lines + ["};"]) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--out", required=True)
+    parser.add_argument("header")
+    arguments = parser.parse_args()
+    with open(arguments.header, encoding="utf-8") as file:
+        text = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
+    version = [re.search(rf"CUMULET_VERSION_{part} (\d+)", text)[1] for part in ("MAJOR", "MINOR")]
+    enums = re.findall(r"typedef enum (\w+) \{(.*?)\} \1;", text, flags=re.S)
+    structs = dict(re.findall(r"typedef struct (\w+) \{(.*?)\} \1;", text, flags=re.S))
+    parts = ["/*\n * The part of cumulet.hpp that follows from cumulet.h: include that. Made by cmake/descriptors.py.\n */",
+             "#ifndef CUMULET_CUMULET_DESCRIPTORS_HPP\n#define CUMULET_CUMULET_DESCRIPTORS_HPP\n",
+             "#include <cumulet/cumulet.h>\n\n#include <array>\n#include <cstdint>\n",
+             f"namespace cumulet {{\ninline namespace v{version[0]}_{version[1]} {{\n",
+             "using Vector = std::array<double, 3>;\nusing Rgb = std::array<float, 3>;\n"]
+    parts += [enum_class(name, body) for name, body in enums if name not in ENUMS_BY_HAND]
+    parts += [descriptor(f"cumulet_{name}_desc", structs[f"cumulet_{name}_desc"], name in FILLED) for name in DESCRIPTORS]
+    parts += ["}\n}\n\n#endif"]
+    with open(arguments.out, "w", encoding="utf-8") as file:
+        file.write("\n".join(parts) + "\n")
+
+
+if __name__ == "__main__":
+    main()
