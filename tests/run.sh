@@ -1,26 +1,30 @@
 #!/bin/bash
 # Every test: installs the Debian packages that are missing, builds, and runs the tests, the unit tests again under
 # AddressSanitizer and UndefinedBehaviorSanitizer, and the checks of format, scripts and (clang-tidy) code.
-# The last line is "N passed, N failed" (", N skipped"); the exit status is 0 if none failed. --quick: the release
-# build's tests only.
+# The last line is "N passed, N failed" (", N skipped"); the exit status is 0 if none failed.
+# --quick: the release build's tests alone, without those labelled slow. --long: everything, then the tests of threads
+# under ThreadSanitizer and a minute of each fuzzer (an hour more).
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
 
-quick=
+tier=all
 for argument in "$@"; do
   case $argument in
-    --quick) quick=yes ;;
+    --quick) tier=quick ;;
+    --long) tier=long ;;
     -h | --help)
-      echo "usage: tests/run.sh [--quick]    (--quick: the release build's tests only)"
+      echo "usage: tests/run.sh [--quick | --long]"
+      echo "  --quick: the release build's tests, but for slow ones; --long: ThreadSanitizer and fuzzers, too"
       exit 0
       ;;
     *)
-      echo "tests/run.sh: unknown argument '$argument'; there is only --quick" >&2
+      echo "tests/run.sh: unknown argument '$argument'; there are --quick and --long" >&2
       exit 2
       ;;
   esac
 done
 
+launcher=() # of ctest
 passed=0 failed=0 skipped=0
 count() { # PASSED FAILED SKIPPED
   passed=$((passed + $1)) failed=$((failed + $2)) skipped=$((skipped + $3))
@@ -59,13 +63,14 @@ check() { # NAME COMMAND...: one check that counts as one test
   fi
 }
 
-run_ctest() { # NAME FOLDER: its tests, each counted
+run_ctest() { # NAME FOLDER CTEST_OPTION...: its tests, each counted
   local name=$1 folder=$2 since=$SECONDS report total bad skips
+  shift 2
   report=$root/build/$name.junit.xml
   rm -f "$report"
   say "$name: running"
-  ctest --test-dir "$folder" --output-on-failure --progress --no-tests=error --parallel "$jobs" \
-    --output-junit "$report" || true
+  "${launcher[@]}" ctest --test-dir "$folder" --output-on-failure --progress --no-tests=error --parallel "$jobs" \
+    --output-junit "$report" "$@" || true
   total=$(junit tests "$report") bad=$(junit failures "$report")
   skips=$(($(junit skipped "$report") + $(junit disabled "$report")))
   if [ "${total:-0}" -eq 0 ]; then
@@ -150,25 +155,39 @@ unset DISPLAY WAYLAND_DISPLAY XDG_RUNTIME_DIR
 export CTEST_OUTPUT_ON_FAILURE=1
 install_packages test
 
-if build release; then
-  run_ctest release build/release
-else
-  count 0 1 0
-fi
-
-if [ -z "$quick" ]; then
-  check "clang-format" format_check
-  check "shellcheck" script_check
-  tidy
-  # Leaks inside the software GL driver and TBB are theirs. GCC 12 takes what lies before a block of dynamic TLS for a
-  # header of glibc 2.19 and now and then crashes at exit on what it reads there: such blocks are found from the heap too.
-  export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_get_addr=0
-  export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
-  export UBSAN_OPTIONS=print_stacktrace=1
-  if build sanitize tests/unit/all; then
-    run_ctest sanitize build/sanitize/tests/unit
+# build_and_test PRESET TARGETS FOLDER CTEST_OPTION...
+build_and_test() {
+  local preset=$1 targets=$2 folder=build/$1/$3
+  shift 3
+  # shellcheck disable=SC2086 # words
+  if build "$preset" $targets; then
+    run_ctest "$preset" "$folder" "$@"
   else
     count 0 1 0
   fi
+}
+
+if [ "$tier" = quick ]; then
+  build_and_test release "" . --label-exclude 'slow|long'
+  finish
+fi
+build_and_test release "" . --label-exclude long
+check "clang-format" format_check
+check "shellcheck" script_check
+tidy
+# Leaks inside the software GL driver and TBB are theirs. GCC 12 takes what lies before a block of dynamic TLS for a
+# header of glibc 2.19 and now and then crashes at exit on what it reads there: such blocks are found from the heap too.
+export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_get_addr=0
+export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
+export UBSAN_OPTIONS=print_stacktrace=1
+build_and_test sanitize tests/unit/all tests/unit
+if [ "$tier" = long ]; then
+  # What TSan cannot see into is left out. TBB has one thread (of one core), or its own ways of waiting would count as
+  # races; the library's threads stay many.
+  export TSAN_OPTIONS=ignore_noninstrumented_modules=1:history_size=7 LP_NUM_THREADS=0
+  launcher=(taskset --cpu-list "$(taskset --cpu-list --pid $$ | sed 's/.*: \([0-9]*\).*/\1/')")
+  build_and_test tsan cumulet_threads_tests . --label-regex threads
+  launcher=()
+  build_and_test fuzz cumulet_fuzzers tests/fuzz
 fi
 finish

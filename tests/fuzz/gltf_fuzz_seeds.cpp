@@ -1,21 +1,12 @@
 // Writes the seeds of gltf_fuzz into a folder.
 
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-
+#include "fuzz/seed_folder.hpp"
 #include "support/gltf_seeds.hpp"
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fputs("usage: gltf_fuzz_seeds FOLDER\n", stderr);
-    return 2;
-  }
-  const std::filesystem::path folder = argv[1];
-  std::filesystem::create_directories(folder);
+  const cumulet::test::SeedFolder folder(argc, argv);
   const auto write = [&](const std::string& name, const cumulet::test::Bytes& bytes) {
-    std::ofstream(folder / name, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    folder.write(name, std::string(bytes.begin(), bytes.end()));
   };
   const std::pair<const char*, cumulet::test::GltfModel> models[] = {
       {"materials", cumulet::test::seed_materials()},   {"animated", cumulet::test::seed_animated()},

@@ -1,0 +1,416 @@
+// libFuzzer over cumulet.h: a program of calls with descriptors of whatever numbers. No call may crash, hang, leak or
+// fail without one line that says why. Pointers and counts are right: C cannot check those. See README.md.
+
+#include <fuzzer/FuzzedDataProvider.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cumulet/cumulet.h"
+#include "headless.hpp"
+#include "unit/support/c_host.hpp"
+
+namespace {
+
+using cumulet::headless::Context;
+using cumulet::test::CameraRef;
+using cumulet::test::SurfacesRef;
+using cumulet::test::ViewerPtr;
+using cumulet::test::VolumeRef;
+
+[[noreturn]] void fail(const std::string& why) {
+  std::fprintf(stderr, "api_fuzz: %s\n", why.c_str());
+  std::abort();
+}
+
+void check_line(const char* line) {
+  if (line == nullptr || *line == '\0') fail("an error without a cause");
+  if (std::strpbrk(line, "\n\r") != nullptr) fail(std::string("not one line: ") + line);
+  if (std::string(line).starts_with("internal error")) fail(line);
+}
+
+/// One context for all inputs; viewers come and go in it.
+Context& context() {
+  static Context made = Context::create(cumulet::headless::Backend::osmesa);
+  return made;
+}
+
+class Program {
+ public:
+  Program(const std::uint8_t* data, std::size_t size) : data_(data, size) {}
+
+  void run() {
+    auto desc = described<cumulet_create_desc>();
+    desc.struct_size = sizeof desc;
+    const bool draws = data_.ConsumeIntegralInRange(0, 7) == 7;
+    desc.get_proc = draws ? Context::get_proc : nullptr;
+    desc.get_proc_user = draws ? &context() : nullptr;
+    desc.log = [](void*, cumulet_log_level, const char* message) { check_line(message); };
+    desc.log_user = nullptr;
+    desc.update = nullptr;
+    std::array<char, 256> error{};
+    cumulet_viewer* viewer = nullptr;
+    if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK) {
+      check_line(error.data());
+      return;
+    }
+    viewer_.reset(viewer);
+    for (int calls = 0; calls < 40 && data_.remaining_bytes() > 0; ++calls) call();
+  }
+
+ private:
+  /// Numbers of all kinds at each place of 8 bytes, most of them harmless: else all would be refused at once.
+  template <class Desc>
+  Desc described() {
+    Desc desc{};
+    std::array<std::uint64_t, sizeof(Desc) / 8> words{};
+    for (std::uint64_t& word : words) word = number();
+    std::memcpy(static_cast<void*>(&desc), words.data(), sizeof words);
+    desc.struct_size = data_.ConsumeIntegralInRange(0, 15) == 0 ? data_.ConsumeIntegral<std::uint16_t>() : sizeof desc;
+    // No more than there is: what the library writes must have room.
+    if (desc.struct_size > sizeof desc) desc.struct_size = sizeof desc + 8;
+    return desc;
+  }
+
+  std::uint64_t number() {
+    const auto one_float = [this] {
+      constexpr std::array numbers = {0.0F,
+                                      1.0F,
+                                      0.5F,
+                                      -1.0F,
+                                      1e-30F,
+                                      1e30F,
+                                      std::numeric_limits<float>::infinity(),
+                                      std::numeric_limits<float>::quiet_NaN(),
+                                      3.0F};
+      return bits<std::uint32_t>(data_.PickValueInArray(numbers));
+    };
+    switch (data_.ConsumeIntegralInRange(0, 11)) {
+      case 0:
+        return data_.ConsumeIntegral<std::uint64_t>();
+      case 1:
+      case 2:
+        return bits<std::uint64_t>(data_.PickValueInArray({1.0, -1.0, 0.5, 10.0, 45.0, 1e-300, 1e300, 1e9,
+                                                           std::numeric_limits<double>::infinity(),
+                                                           std::numeric_limits<double>::quiet_NaN()}));
+      case 3:
+      case 4:
+        return one_float() | std::uint64_t{one_float()} << 32U;
+      case 5:
+      case 6:
+        return data_.ConsumeIntegralInRange<std::uint32_t>(0, 4) |
+               std::uint64_t{data_.ConsumeIntegralInRange<std::uint32_t>(0, 4)} << 32U;
+      default:
+        return 0;
+    }
+  }
+
+  template <class To, class From>
+  static To bits(From value) {
+    static_assert(sizeof(To) == sizeof(From));
+    To out;
+    std::memcpy(&out, &value, sizeof out);
+    return out;
+  }
+
+  /// A viewer's call.
+  void told(cumulet_status status) {
+    const char* line = cumulet_last_error(viewer_.get());
+    if (status != CUMULET_OK) check_line(line);
+    if (status == CUMULET_OK && *line != '\0') fail("a success with an error");
+  }
+  /// A call with an error buffer.
+  template <class Make>
+  void made(Make make) {
+    std::array<char, 256> error{};
+    if (make(error.data(), error.size()) != CUMULET_OK) check_line(error.data());
+  }
+
+  void make_dense() {
+    auto desc = described<cumulet_dense_desc>();
+    const std::size_t count = data_.ConsumeIntegralInRange<std::size_t>(0, 600);
+    std::vector<float> values(count);
+    for (float& value : values) value = bits<float>(static_cast<std::uint32_t>(number()));
+    if (data_.ConsumeBool()) {
+      desc.size[0] = data_.ConsumeIntegralInRange(1, 9);
+      desc.size[1] = data_.ConsumeIntegralInRange(1, 9);
+      desc.size[2] = static_cast<int>(count) / (desc.size[0] * desc.size[1]);
+      values.resize(static_cast<std::size_t>(desc.size[0] * desc.size[1] * desc.size[2]));
+    }
+    desc.values = values.data();
+    desc.value_count = values.size();
+    desc.name = data_.ConsumeBool() ? "dense\nthing" : nullptr;
+    cumulet_volume* volume = nullptr;
+    made([&](char* error, std::size_t size) { return cumulet_volume_from_dense(&desc, &volume, error, size); });
+    if (volume != nullptr) volume_.reset(volume);
+  }
+
+  void make_sparse() {
+    auto desc = described<cumulet_sparse_desc>();
+    const std::size_t bricks = data_.ConsumeIntegralInRange<std::size_t>(0, 3);
+    std::vector<std::int32_t> origins;
+    for (std::size_t i = 0; i < 3 * bricks; ++i) {
+      origins.push_back(data_.ConsumeBool() ? 8 * data_.ConsumeIntegralInRange(-4, 4)
+                                            : data_.ConsumeIntegral<std::int32_t>());
+    }
+    std::vector<float> values(512 * bricks, 0.5F);
+    for (std::size_t i = 0; i < values.size(); i += 61) values[i] = bits<float>(static_cast<std::uint32_t>(number()));
+    std::vector<std::uint64_t> active(8 * bricks);
+    for (std::uint64_t& word : active) word = number();
+    std::vector<cumulet_tile> tiles(data_.ConsumeIntegralInRange<std::size_t>(0, 3));
+    for (cumulet_tile& tile : tiles) {
+      for (int axis = 0; axis < 3; ++axis) {
+        tile.min[axis] =
+            data_.ConsumeBool() ? 8 * data_.ConsumeIntegralInRange(-4, 4) : data_.ConsumeIntegral<std::int32_t>();
+        tile.max[axis] = data_.ConsumeBool() ? tile.min[axis] / 2 + data_.ConsumeIntegralInRange(0, 64)
+                                             : data_.ConsumeIntegral<std::int32_t>();
+      }
+      tile.value = bits<float>(static_cast<std::uint32_t>(number()));
+      tile.active = data_.ConsumeIntegralInRange(0, 2);
+    }
+    desc.brick_origins = origins.data();
+    desc.brick_values = values.data();
+    desc.brick_active = data_.ConsumeBool() ? active.data() : nullptr;
+    desc.brick_count = bricks;
+    desc.tiles = tiles.data();
+    desc.tile_count = tiles.size();
+    desc.name = nullptr;
+    cumulet_volume* volume = nullptr;
+    made([&](char* error, std::size_t size) { return cumulet_volume_from_sparse(&desc, &volume, error, size); });
+    if (volume != nullptr) volume_.reset(volume);
+  }
+
+  void make_triangles() {
+    auto mesh = described<cumulet_mesh_desc>();
+    mesh.struct_size = sizeof mesh;
+    const std::size_t vertices = data_.ConsumeIntegralInRange<std::size_t>(0, 12);
+    const auto floats = [&](std::size_t count) {
+      std::vector<float> values(count);
+      for (float& value : values) value = bits<float>(static_cast<std::uint32_t>(number()));
+      return values;
+    };
+    const std::vector<float> positions = floats(3 * vertices);
+    const std::vector<float> normals = floats(3 * vertices);
+    const std::vector<float> colors = floats(4 * vertices);
+    std::vector<std::uint32_t> indices(data_.ConsumeIntegralInRange<std::size_t>(0, 12));
+    for (std::uint32_t& index : indices) index = data_.ConsumeIntegralInRange<std::uint32_t>(0, 13);
+    mesh.positions = positions.data();
+    mesh.normals = data_.ConsumeBool() ? normals.data() : nullptr;
+    mesh.colors = data_.ConsumeBool() ? colors.data() : nullptr;
+    mesh.vertex_count = vertices;
+    mesh.indices = indices.data();
+    mesh.index_count = indices.size();
+    auto desc = described<cumulet_triangles_desc>();
+    desc.meshes = &mesh;
+    desc.mesh_count = data_.ConsumeBool() ? 1 : 0;
+    desc.name = nullptr;
+    cumulet_surfaces* surfaces = nullptr;
+    made([&](char* error, std::size_t size) { return cumulet_surfaces_from_triangles(&desc, &surfaces, error, size); });
+    if (surfaces != nullptr) surfaces_.reset(surfaces);
+  }
+
+  template <class Desc, class Set>
+  void set(Set function) {
+    const auto desc = described<Desc>();
+    told(function(viewer_.get(), &desc));
+  }
+  template <class Out, class Get>
+  void get(Get function) {
+    std::array<Out, 2> out{};  // struct_size may be a bit more than there is
+    out[0] = described<Out>();
+    told(function(viewer_.get(), out.data()));
+  }
+
+  void render() {
+    auto frame = described<cumulet_frame_desc>();
+    frame.budget_ms = data_.PickValueInArray({-1.0, 0.0, 2.0});
+    frame.width = data_.ConsumeIntegralInRange<std::uint32_t>(0, 33);
+    frame.height = data_.ConsumeIntegralInRange<std::uint32_t>(0, 33);
+    if (data_.ConsumeBool()) std::memset(frame.viewport, 0, sizeof frame.viewport);
+    std::array<cumulet_frame_result, 2> result{};
+    result[0] = described<cumulet_frame_result>();
+    told(cumulet_render(viewer_.get(), &frame, result.data()));
+  }
+
+  void look() {
+    std::vector<float> values(4096);
+    std::vector<std::uint8_t> bytes(4096);
+    double noise = 0.0;
+    std::array<cumulet_pick, 2> pick{};
+    pick[0] = described<cumulet_pick>();
+    switch (data_.ConsumeIntegralInRange(0, 4)) {
+      case 0:
+        return told(cumulet_read_linear(viewer_.get(), values.data(), values.size()));
+      case 1:
+        return told(cumulet_read_display(viewer_.get(), bytes.data(), bytes.size()));
+      case 2:
+        return told(cumulet_read_aov(viewer_.get(), static_cast<cumulet_aov>(data_.ConsumeIntegralInRange(0, 6)),
+                                     values.data(), values.size()));
+      case 3:
+        return told(cumulet_measure_noise(viewer_.get(), &noise));
+      default:
+        return told(cumulet_pick_at(viewer_.get(), bits<double>(number()), bits<double>(number()), pick.data()));
+    }
+  }
+
+  void steer() {
+    cumulet_camera* raw = nullptr;
+    told(cumulet_get_camera(viewer_.get(), &raw));
+    const CameraRef camera(raw);
+    const double a = bits<double>(number());
+    const double b = bits<double>(number());
+    const double c = bits<double>(number());
+    std::array<double, 16> view{};
+    std::array<double, 16> projection{};
+    for (double& value : view) value = bits<double>(number());
+    for (double& value : projection) value = bits<double>(number());
+    const auto desc = described<cumulet_camera_desc>();
+    const auto clip = static_cast<cumulet_clip>(data_.ConsumeIntegralInRange(0, 1));
+    switch (data_.ConsumeIntegralInRange(0, 9)) {
+      case 0:
+        cumulet_camera_orbit(camera.get(), a, b);
+        break;
+      case 1:
+        cumulet_camera_look(camera.get(), a, b);
+        break;
+      case 2:
+        cumulet_camera_roll(camera.get(), a);
+        break;
+      case 3:
+        cumulet_camera_pan(camera.get(), a, b);
+        break;
+      case 4:
+        cumulet_camera_dolly(camera.get(), a);
+        break;
+      case 5:
+        cumulet_camera_fly(camera.get(), a, b, c);
+        break;
+      case 6:
+        cumulet_camera_set(camera.get(), &desc);
+        break;
+      case 7:
+        cumulet_camera_set_matrices(camera.get(), view.data(), projection.data(), clip);
+        break;
+      case 8:
+        cumulet_camera_get_matrices(camera.get(), a, clip, view.data(), projection.data());
+        break;
+      default:
+        cumulet_camera_frame(camera.get(), view.data(), projection.data(), a);
+        break;
+    }
+    // Whatever became of it, it can be told and set again.
+    auto told_desc = cumulet::test::make_desc<cumulet_camera_desc>();
+    if (cumulet_camera_get(camera.get(), &told_desc) != CUMULET_OK) fail("a camera that cannot be told");
+    for (const double value : told_desc.eye) {
+      if (value != value) fail("a camera at NaN");
+    }
+  }
+
+  /// Safe at any time, so it leaves the last error alone.
+  void look_at_progress() {
+    std::array<cumulet_progress, 2> progress{};
+    progress[0] = described<cumulet_progress>();
+    if (cumulet_get_progress(viewer_.get(), progress.data()) != CUMULET_OK) return;
+    const std::string message = progress[0].message;
+    if (!message.empty()) check_line(message.c_str());
+  }
+
+  void ask() {
+    double low[3];
+    double high[3];
+    switch (data_.ConsumeIntegralInRange(0, 5)) {
+      case 0:
+        return get<cumulet_stats>(cumulet_get_stats);
+      case 1:
+        return look_at_progress();
+      case 2:
+        return told(cumulet_get_bounds(viewer_.get(), low, high));
+      case 3: {
+        std::array<cumulet_volume_info, 2> info{};
+        info[0] = described<cumulet_volume_info>();
+        cumulet_volume_get_info(volume_.get(), info.data());
+        double scale = 0.0;
+        cumulet_volume_suggest_density_scale(volume_.get(), &scale);
+        return;
+      }
+      case 4: {
+        std::array<cumulet_surfaces_info, 2> info{};
+        info[0] = described<cumulet_surfaces_info>();
+        cumulet_surfaces_get_info(surfaces_.get(), info.data());
+        return;
+      }
+      default:
+        return told(cumulet_frame_all(viewer_.get()));
+    }
+  }
+
+  void call() {
+    cumulet_viewer* viewer = viewer_.get();
+    switch (data_.ConsumeIntegralInRange(0, 21)) {
+      case 0:
+        return make_dense();
+      case 1:
+        return make_sparse();
+      case 2:
+        return make_triangles();
+      case 3:
+        return told(cumulet_set_volume(viewer, volume_.get()));
+      case 4:
+        return told(cumulet_set_surfaces(viewer, surfaces_.get()));
+      case 5:
+        return set<cumulet_grid_desc>(cumulet_set_grid);
+      case 6:
+        return set<cumulet_medium_desc>(cumulet_set_medium);
+      case 7:
+        return set<cumulet_light_desc>(cumulet_set_light);
+      case 8:
+        return set<cumulet_sampling_desc>(cumulet_set_sampling);
+      case 9:
+        return set<cumulet_display_desc>(cumulet_set_display);
+      case 10:
+        return set<cumulet_surface_settings_desc>(cumulet_set_surface_settings);
+      case 11:
+        return set<cumulet_navigation_desc>(cumulet_set_navigation);
+      case 12: {
+        auto event = described<cumulet_event>();
+        std::int32_t handled = 0;
+        return told(cumulet_input(viewer, &event, &handled));
+      }
+      case 13:
+      case 14:
+        return render();
+      case 15:
+        return look();
+      case 16:
+        return steer();
+      case 17:
+        return ask();
+      case 18:
+        return told(cumulet_wait(viewer, data_.ConsumeIntegralInRange(0, 20)));
+      case 19:
+        return cumulet_cancel(viewer);
+      case 20:
+        return told(cumulet_rebuild(viewer));
+      default:
+        return told(data_.ConsumeBool() ? cumulet_use_surface_camera(viewer, data_.ConsumeIntegralInRange(0U, 2U))
+                                        : cumulet_detach(viewer));
+    }
+  }
+
+  FuzzedDataProvider data_;
+  VolumeRef volume_;
+  SurfacesRef surfaces_;
+  ViewerPtr viewer_;
+};
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  Program(data, size).run();
+  return 0;
+}

@@ -1,0 +1,26 @@
+// Writes the seeds of nanovdb_fuzz into a folder.
+
+#define NANOVDB_USE_BLOSC
+#define NANOVDB_USE_ZIP
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
+#include <openvdb/openvdb.h>
+
+#include "fuzz/seed_folder.hpp"
+#include "fuzz/seed_grid.hpp"
+
+int main(int argc, char** argv) {
+  const cumulet::test::SeedFolder folder(argc, argv);
+  const auto write = [&](const std::string& name, const auto& handle, nanovdb::io::Codec codec) {
+    nanovdb::io::writeGrid((folder.path() / name).string(), handle, codec);
+  };
+  auto grid = cumulet::test::seed_grid(0.0F);
+  write("plain.nvdb", nanovdb::openToNanoVDB(*grid), nanovdb::io::Codec::NONE);
+  write("zip.nvdb", nanovdb::openToNanoVDB(*grid), nanovdb::io::Codec::ZIP);
+  write("blosc.nvdb", nanovdb::openToNanoVDB(*grid), nanovdb::io::Codec::BLOSC);
+  write("fpn.nvdb", nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::FpN>(*grid),
+        nanovdb::io::Codec::ZIP);
+  write("fp8.nvdb", nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::Fp8>(*grid),
+        nanovdb::io::Codec::ZIP);
+  return 0;
+}

@@ -1,0 +1,35 @@
+// libFuzzer over scene files: whatever the text, a scene that is the same once written and read again, or one line. See
+// README.md.
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+#include "scene_file.hpp"
+
+namespace {
+
+[[noreturn]] void fail(const std::string& why) {
+  std::fprintf(stderr, "scene_fuzz: %s\n", why.c_str());
+  std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string path = "/nowhere/fuzzed.json";
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  std::string again;
+  try {
+    const cumulet::demo::SceneOptions scene = cumulet::demo::parse_scene(text, path);
+    again = cumulet::demo::scene_text(scene, path);
+    if (!cumulet::demo::same_scene(scene, cumulet::demo::parse_scene(again, path))) fail("another scene:\n" + again);
+  } catch (const std::runtime_error& error) {
+    const std::string line = error.what();
+    if (!again.empty()) fail("what was written is refused: " + line);
+    if (!line.starts_with(path) || line.find_first_of("\n\r") != std::string::npos) fail("not one line: " + line);
+  }
+  return 0;
+}

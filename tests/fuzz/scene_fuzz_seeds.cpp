@@ -1,0 +1,23 @@
+// Writes the seeds of scene_fuzz into a folder.
+
+#include "fuzz/seed_folder.hpp"
+#include "scene_file.hpp"
+
+int main(int argc, char** argv) {
+  const cumulet::test::SeedFolder folder(argc, argv);
+  cumulet::demo::SceneOptions scene;
+  folder.write("empty.json", R"({"cumulet_scene": 1})");
+  folder.write("plain.json", cumulet::demo::scene_text(scene, "/nowhere/plain.json"));
+  scene.set_daylight();
+  scene.volume = "/nowhere/clouds/cloud.vdb";
+  scene.grid_name = "density[1]";
+  scene.up = cumulet::demo::UpAxis::z;
+  scene.surfaces = "/elsewhere/tower.glb";
+  scene.surface_camera = 1;
+  scene.auto_density_scale = false;
+  scene.medium.density_scale = 4.0;
+  scene.camera.eye[2] = 90.0;
+  scene.camera.up[1] = 1.0;
+  folder.write("full.json", cumulet::demo::scene_text(scene, "/nowhere/full.json"));
+  return 0;
+}

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+namespace cumulet::test {
+
+/// Small, with all that a tree can hold: leaves, tiles, voxels that are off.
+inline openvdb::FloatGrid::Ptr seed_grid(float background) {
+  openvdb::initialize();
+  auto grid = openvdb::FloatGrid::create(background);
+  grid->setName("density");
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  grid->insertMeta("author", openvdb::StringMetadata("nobody"));
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.25));
+  auto access = grid->getAccessor();
+  for (int i = 0; i < 12; ++i) access.setValue(openvdb::Coord(i, i / 2, 3 * i % 7), 0.1F * static_cast<float>(i));
+  access.setValueOff(openvdb::Coord(2, 2, 2), 0.5F);
+  grid->tree().addTile(1, openvdb::Coord(64, 0, 0), 0.75F, true);
+  return grid;
+}
+
+}  // namespace cumulet::test

@@ -1,0 +1,82 @@
+// libFuzzer over the importers, vdb_fuzz and nanovdb_fuzz by their seeds: whatever the bytes, a volume that keeps its
+// promises or one line. See README.md.
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+#include <string>
+
+#include "base/error.hpp"
+#include "volume/inspection.hpp"
+#include "volume/volume.hpp"
+
+namespace {
+
+[[noreturn]] void fail(const std::string& why) {
+  std::fprintf(stderr, "volume_fuzz: %s\n", why.c_str());
+  std::abort();
+}
+
+/// Bytes in memory that have a file's name.
+class MemoryFile {
+ public:
+  MemoryFile(const std::uint8_t* data, std::size_t size) : descriptor_(memfd_create("fuzzed", 0)) {
+    if (descriptor_ < 0 || write(descriptor_, data, size) != static_cast<ssize_t>(size)) fail("no memory for a file");
+  }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  ~MemoryFile() { close(descriptor_); }
+  [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
+void check_line(const std::string& line, const std::string& path) {
+  if (!line.starts_with(path) || line.find_first_of("\n\r") != std::string::npos) fail("not one line: " + line);
+}
+
+void check_volume(const cumulet::volume::ScalarVolume& volume) {
+  if (volume.brick_values.size() != volume.brick_origins.size() * cumulet::volume::brick_voxels) fail("bricks");
+  for (const float value : volume.brick_values) {
+    if (!(value >= 0.0F) || !std::isfinite(value) || value > volume.max_value) fail("a value out of its range");
+  }
+}
+
+}  // namespace
+
+// OpenVDB allocates what a damaged length says. Under AddressSanitizer that ends the process, elsewhere it is the
+// exception of a machine that has less.
+void* operator new(std::size_t size) {
+  constexpr std::size_t most = std::size_t{1} << 30U;
+  void* memory = size <= most ? std::malloc(size) : nullptr;
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+void* operator new[](std::size_t size) { return operator new(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const MemoryFile file(data, size);
+  const std::string path = file.path();
+  try {
+    check_volume(cumulet::volume::import_volume(path, "", {}));
+  } catch (const cumulet::Error& error) {
+    check_line(error.what(), path);
+  } catch (const std::bad_alloc&) {  // told by the caller
+  }
+  try {
+    cumulet::volume::Inspection inspection(path);
+    for (std::size_t grid = 0; grid < inspection.grids().size(); ++grid) static_cast<void>(inspection.facts(grid));
+  } catch (const cumulet::Error& error) {
+    check_line(error.what(), path);
+  }
+  return 0;
+}
