@@ -35,8 +35,8 @@ layout(r32f, binding = 2) uniform writeonly image2D cm_volume_z;
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 
 void main() {
-  uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, cm.order.z);
-  if (pixel.x >= cm.tile.z || pixel.y >= cm.order.w) return;
+  uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
+  if (pixel.x >= cm.dispatch.tile_size.x || pixel.y >= cm.dispatch.rows.y) return;
   vec4 normal = vec4(0.0);
   vec3 albedo = vec3(0.0);
   float surface_z = CM_INFINITE;
@@ -51,7 +51,7 @@ void main() {
     float surface_t = t_per_z * cm_surface_z(pixel, within, uint(i));
 #if CM_SURFACES
     CmHit hit;
-    cm_hit_seed = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, uint(i), cm.image.z)).x;
+    cm_hit_seed = cm_hash3(uvec3(pixel.y * cm.view.size.x + pixel.x, uint(i), cm.integrator.seed)).x;
     cm_hit_camera = true;
     if (cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, hit)) {
       surface_t = hit.t;
@@ -66,15 +66,15 @@ void main() {
     float used = 0.0;
     if (range.x < range.y) {
       float t = range.x;
-      uvec3 cell = cm_march_enter(clamp(o + t * d, cm.box_min.xyz, cm.box_max.xyz));
+      uvec3 cell = cm_march_enter(clamp(o + t * d, cm.grid.box_min, cm.grid.box_max));
       vec3 inv_d = 1.0 / d;
       // Beyond e^-40 nothing is left to know.
       for (int j = 0; j < 100000 && cell.x != CM_NONE && t < range.y && used < 40.0; ++j) {
         float t_1, r_0, r_1;
         uvec3 next;
         cm_march_step(cell, o, d, inv_d, t, t_1, r_0, r_1, next);
-        float e_0 = cm.medium.x * r_0;
-        float e_1 = cm.medium.x * r_1;
+        float e_0 = cm.medium.extinction * r_0;
+        float e_1 = cm.medium.extinction * r_1;
         float span = t_1 - t;
         float depth = cm_depth_of(e_0, e_1, span, range.y - t);
         if (i == 0 && volume_z == CM_INFINITE && used + depth >= 0.69314718) {

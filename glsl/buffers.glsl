@@ -2,10 +2,10 @@
 layout(binding = 11) uniform sampler2DArray cm_surface;
 
 float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
-  if (cm.surface.x == 0u) return 3.0e38;
-  vec2 at = (vec2(pixel) + within) * vec2(cm.surface.yz) / vec2(cm.image.xy);
-  ivec2 texel = min(ivec2(at), ivec2(cm.surface.yz) - 1);
-  return texelFetch(cm_surface, ivec3(texel, int(layer % cm.surface.x)), 0).x;
+  if (cm.host_depth.layers == 0u) return 3.0e38;
+  vec2 at = (vec2(pixel) + within) * vec2(cm.host_depth.size) / vec2(cm.view.size.xy);
+  ivec2 texel = min(ivec2(at), ivec2(cm.host_depth.size) - 1);
+  return texelFetch(cm_surface, ivec3(texel, int(layer % cm.host_depth.layers)), 0).x;
 }
 
 #if CM_SURFACES || CM_LAYERS
@@ -15,12 +15,12 @@ layout(binding = 15) uniform sampler2DArray cm_layer_z;
 // What a camera ray ends at: a layer's opaque surface, or, by the chance of its coverage, the blended ones before it,
 // which count as one at the nearest. z: where; colour: radiance, and 1 in alpha; 0 where there is none.
 float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour) {
-  vec2 at = (vec2(pixel) + within) * vec2(cm.layers.yz) / vec2(cm.image.xy);
-  ivec3 texel = ivec3(min(ivec2(at), ivec2(cm.layers.yz) - 1), int(sample_number % cm.layers.x));
+  vec2 at = (vec2(pixel) + within) * vec2(cm.layers.size) / vec2(cm.view.size.xy);
+  ivec3 texel = ivec3(min(ivec2(at), ivec2(cm.layers.size) - 1), int(sample_number % cm.layers.count));
   colour = texelFetch(cm_layer_colour, texel, 0);
   float z = texelFetch(cm_layer_z, texel, 0).x;
-  if ((cm.layers.w & 1u) != 0u) {
-    texel.z += int(cm.layers.x);
+  if (cm.layers.blended != 0u) {
+    texel.z += int(cm.layers.count);
     vec4 blended = texelFetch(cm_layer_colour, texel, 0);
     if (u < blended.a) {
       colour = vec4(blended.rgb / blended.a, 1.0);
@@ -41,8 +41,8 @@ uvec4 cm_record(uint cell, uint part) {
 #if CM_PAGES == 1
   return texelFetch(cm_cells[0], int(cell * 2u + part));
 #else
-  uint page = cell >> cm.march.z;
-  int texel = int((cell & ((1u << cm.march.z) - 1u)) * 2u + part);
+  uint page = cell >> cm.grid.page_shift;
+  int texel = int((cell & ((1u << cm.grid.page_shift) - 1u)) * 2u + part);
   // Samplers may only be indexed by constants here: lanes differ in their page.
   if (page == 0u) return texelFetch(cm_cells[0], texel);
 #if CM_PAGES > 2
@@ -76,12 +76,12 @@ uint cm_root_leaf(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].x 
 uint cm_root_node(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].y : cm_roots[root >> 1].w; }
 #elif CM_MARCH == 1
 layout(binding = 13) uniform sampler3D cm_voxels;
-float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(cm.box_min.xyz), 0).x; }
+float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(cm.grid.box_min), 0).x; }
 #else
 layout(binding = 13) uniform samplerBuffer cm_brick_values;
 layout(binding = 14) uniform usampler3D cm_brick_slots;
 uint cm_brick_slot(ivec3 brick) {
-  return texelFetch(cm_brick_slots, brick - (ivec3(cm.box_min.xyz) >> 3), 0).x;
+  return texelFetch(cm_brick_slots, brick - (ivec3(cm.grid.box_min) >> 3), 0).x;
 }
 float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * 512u + index)).x; }
 #endif

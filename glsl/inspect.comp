@@ -76,9 +76,9 @@ CmFaces cm_faces(uvec3 cell, vec3 p) {
     faces.c[i] = (i == 3 ? (cell_class == 1u ? unit : 2.0 * unit) : 0.0) + dot(faces.normal[i], v0);
   }
   faces.count = 4;
-  float depth = 3.0 * float(cm.cube.x - cm_shape_exponent(shape)) +
+  float depth = 3.0 * float(cm.grid.root_exponent - cm_shape_exponent(shape)) +
                 (cell_class == 0u ? 0.0 : (cell_class == 1u ? 1.0 : -1.0));
-  faces.level = depth / max(1.0, float(cm.cube.w));
+  faces.level = depth / max(1.0, float(cm.grid.levels));
   faces.size = unit;
 #else
   // The four nearest of a voxel's six faces: those that matter.
@@ -139,10 +139,10 @@ float cm_face_edge(CmFaces faces, vec3 p) {
 }
 
 void main() {
-  uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.order.z);
-  if (local.x >= cm.tile.z || local.y >= cm.order.w) return;
-  uvec2 pixel = cm.tile.xy + local;
-  uint view = cm.march.y;
+  uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
+  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
+  uvec2 pixel = cm.dispatch.tile_corner + local;
+  uint view = cm.dispatch.view;
   CmPath p;
   vec3 w;
   float t_per_z = cm_camera_ray(pixel, vec2(0.5), p.o, w);
@@ -162,20 +162,20 @@ void main() {
   range.y = min(range.y, surface_t);
   bool hit = range.x < range.y;
   // Width of a pixel in cube space, over t where perspective.
-  float footprint = length(p.d) * 2.0 * length(cm.up.xyz) / float(cm.image.y);
+  float footprint = length(p.d) * 2.0 * length(cm.view.up) / float(cm.view.size.y);
   if (view == CM_VIEW_CELLS) {
-    vec3 f = abs(cm_to_cube(cm.forward.xyz));
+    vec3 f = abs(cm_to_cube(cm.view.forward));
     uint axis = f.x >= f.y && f.x >= f.z ? 0u : (f.y >= f.z ? 1u : 2u);
-    float middle = cm_pick(0.5 * (cm.box_min.xyz + cm.box_max.xyz), axis) + 0.217;  // off the lattice
+    float middle = cm_pick(0.5 * (cm.grid.box_min + cm.grid.box_max), axis) + 0.217;  // off the lattice
     float t = (middle - cm_pick(p.o, axis)) / cm_pick(p.d, axis);
     if (hit && t > range.x && t < range.y) {
-      colour = cm_show_cell(p.o + t * p.d, axis, footprint * (cm.forward.w > 0.5 ? 1.0 : t));
+      colour = cm_show_cell(p.o + t * p.d, axis, footprint * (cm.view.orthographic != 0u ? 1.0 : t));
       alpha = 1.0;
     }
   } else if (hit) {
     float used = 0.0;
     float t = range.x;
-    uvec3 cell = cm_march_enter(clamp(p.o + t * p.d, cm.box_min.xyz, cm.box_max.xyz));
+    uvec3 cell = cm_march_enter(clamp(p.o + t * p.d, cm.grid.box_min, cm.grid.box_max));
     vec3 inv_d = 1.0 / p.d;
     vec3 lines = vec3(0.0);
     float clear = 1.0;
@@ -183,8 +183,8 @@ void main() {
       float t_1, r_0, r_1;
       uvec3 next;
       cm_march_step(cell, p.o, p.d, inv_d, t, t_1, r_0, r_1, next);
-      float e_0 = cm.medium.x * r_0;
-      float e_1 = cm.medium.x * r_1;
+      float e_0 = cm.medium.extinction * r_0;
+      float e_1 = cm.medium.extinction * r_1;
       float span = t_1 - t;
       float depth = 0.5 * (e_0 + e_1) * span;
       if (view == CM_VIEW_DEPTH && used + depth >= 0.69314718) {
@@ -195,7 +195,7 @@ void main() {
       if (view == CM_VIEW_WIREFRAME && (r_0 > 0.0 || r_1 > 0.0)) {
         vec3 at = p.o + t * p.d;
         CmFaces faces = cm_faces(cell, at);
-        float size = max(footprint * (cm.forward.w > 0.5 ? 1.0 : t), 1e-20);
+        float size = max(footprint * (cm.view.orthographic != 0u ? 1.0 : t), 1e-20);
         // Edges of cells that are a few pixels wide would cover all.
         float line = clamp(1.2 - cm_face_edge(faces, at) / size, 0.0, 1.0) * smoothstep(0.0, 12.0, faces.size / size);
         lines += clear * 0.8 * line * cm_ramp(faces.level);
@@ -215,7 +215,7 @@ void main() {
 #if CM_SURFACES
     if (solid && half_t == 0.0) half_t = triangle.t;
 #endif
-    imageStore(cm_volume_z, ivec2(cm.order.y != 0u ? local : pixel), vec4(half_t / t_per_z));
+    imageStore(cm_volume_z, ivec2(cm.dispatch.picks != 0u ? local : pixel), vec4(half_t / t_per_z));
     return;
   }
   imageStore(cm_sum, ivec2(pixel), vec4(colour, alpha));

@@ -1,4 +1,5 @@
-// Everything a trace needs beside the buffers: a std140 block, and the same struct in C++ (all members are 16 bytes).
+// What every kernel of a picture is told: one std140 block, and the same structs in C++ (tests/unit/parameters_test.cpp
+// asks the driver where it has each field). Each struct has one writer, named with it.
 #ifndef CM_PARAMETERS_GLSL
 #define CM_PARAMETERS_GLSL
 
@@ -14,47 +15,135 @@
 #endif
 
 #ifdef __cplusplus
-struct CmParameters {
+#define CM_ALIGN(bytes) alignas(bytes)
+#define CM_BLOCK(T) struct alignas(16) T
+#define CM_EQUALITY(T) bool operator==(const T&) const = default;
+#else
+#define CM_ALIGN(bytes)
+#define CM_BLOCK(T) struct T
+#define CM_EQUALITY(T)
+#endif
+
+// The camera: Viewer.
+CM_BLOCK(CmView) {
+  CM_ALIGN(16) vec3 eye;      // cube space
+  uint orthographic;          // 1: rays are parallel, from points about the eye
+  CM_ALIGN(16) vec3 forward;  // world, unit; with right and up it spans the image plane at distance 1
+  CM_ALIGN(16) vec3 right;    // world, half the width of that plane
+  CM_ALIGN(16) vec3 up;       // likewise, height
+  CM_ALIGN(8) uvec2 size;     // pixels
+  CM_EQUALITY(CmView)
+};
+
+// Cube space (glsl/cell.glsl) and what of it holds data: render::MarchData.
+CM_BLOCK(CmGrid) {
+  CM_ALIGN(16) vec3 to_cube_x;  // columns of the linear part of world to cube space
+  CM_ALIGN(16) vec3 to_cube_y;
+  CM_ALIGN(16) vec3 to_cube_z;
+  CM_ALIGN(16) vec3 from_cube_x;  // and of cube to world space
+  CM_ALIGN(16) vec3 from_cube_y;
+  CM_ALIGN(16) vec3 from_cube_z;
+  CM_ALIGN(16) vec3 cube_origin;  // world
+  float unit_volume;              // of a unit of cube space, in the world
+  CM_ALIGN(16) vec3 box_min;      // cube space: no density outside
+  uint root_exponent;             // the root cells' cube has edges of 2 to this power
+  CM_ALIGN(16) vec3 box_max;
+  uint levels;      // of bisection
+  uint page_shift;  // log2 of cells a page
+  CM_EQUALITY(CmGrid)
+};
+
+// The participating medium: Viewer.
+CM_BLOCK(CmMedium) {
+  CM_ALIGN(16) vec3 albedo;  // of single scattering
+  float extinction;          // of stored density 1, 1 / world unit
+  CM_ALIGN(16) vec3 source;  // radiance: emission coefficient over extinction
+  float anisotropy;          // Henyey-Greenstein's g
+  CM_EQUALITY(CmMedium)
+};
+
+// Lights that are far away, and how next-event estimation chooses: Viewer.
+CM_BLOCK(CmLights) {
+  CM_ALIGN(16) vec3 sun_direction;  // world, unit, towards the sun
+  uint any;                         // 1: there is light to look for
+  CM_ALIGN(16) vec3 sun_in_cube;    // the same in cube space, per unit of world distance
+  float sky_probability;            // that an estimate is to the sky; all other lights have the rest
+  CM_ALIGN(16) vec3 sun_irradiance;
+  float emitter_probability;  // of estimates that are not to the sky: to emissive triangles
+  CM_ALIGN(16) vec3 sky_radiance;
+  float glow_probability;  // that a flight from a surface is aimed at the medium's own light
+  CM_EQUALITY(CmLights)
+};
+
+// First words of the tables of glsl/surface.glsl, and their sizes: render::SurfaceData.
+CM_BLOCK(CmSurfaceTables) {
+  uint records;  // of the triangle tree
+  uint triangles;
+  uint vertices;
+  uint materials;
+  uint textures;
+  uint lamps;
+  uint lamp_count;
+  uint emitters;
+  uint emitter_count;
+  uint ggx_albedo;  // src/surface/ggx_albedo.hpp's cells
+  uint ggx_albedo_averages;
+  CM_EQUALITY(CmSurfaceTables)
+};
+
+// The surface pass that camera rays end at: Tracer::begin.
+CM_BLOCK(CmLayers) {
+  uint count;              // 0: none
+  uint blended;            // 1: blended surfaces have layers of their own after the others
+  CM_ALIGN(8) uvec2 size;  // pixels
+  uint coloured;           // 1: paths that end at it take up its colour
+  CM_EQUALITY(CmLayers)
+};
+
+// The host's own depth: render::HostDepth, through Tracer.
+CM_BLOCK(CmHostDepth) {
+  CM_ALIGN(8) uvec2 size;  // pixels
+  uint layers;             // 0: none
+  CM_EQUALITY(CmHostDepth)
+};
+
+// How paths are continued: Viewer.
+CM_BLOCK(CmIntegrator) {
+  uint seed;
+  uint max_bounces;         // 0: no limit
+  float blurred_roughness;  // least roughness of surfaces that blurred paths meet
+  uint light_among_surfaces;  // 1: surfaces pass light on to each other and to the volume
+  CM_EQUALITY(CmIntegrator)
+};
+
+// What one dispatch does: Tracer.
+CM_BLOCK(CmDispatch) {
+  CM_ALIGN(8) uvec2 tile_corner;  // pixels
+  CM_ALIGN(8) uvec2 tile_size;
+  uint rounds;   // that a lane runs at most
+  uint samples;  // that a pixel shall have
+  uint view;     // of inspect.comp
+  uint picks;    // 1: inspect.comp looks at one pixel, the tile's, and tells of it at (0, 0)
+  CM_ALIGN(8) uvec2 rows;  // of the tile, for kernels that run by rows: the first, and the one after the last
+  CM_EQUALITY(CmDispatch)
+};
+
+#ifdef __cplusplus
+CM_BLOCK(CmParameters) {
 #else
 layout(std140, binding = 0) uniform CmParameters {
 #endif
-  vec4 eye;             // cube space
-  vec4 forward;         // world space; with right and up spans the image plane at distance 1; w: 1 where orthographic
-  vec4 right;           // scaled by half the width of that plane
-  vec4 up;              // likewise, height
-  vec4 to_cube_x;       // columns of the linear part of world to cube space
-  vec4 to_cube_y;
-  vec4 to_cube_z;
-  vec4 box_min;         // cube space: no density outside
-  vec4 box_max;
-  vec4 sun_world;       // unit vector towards the sun
-  vec4 sun_cube;
-  vec4 sun_irradiance;  // w: share of the emissive triangles in next-event estimates that are not to the sky
-  vec4 sky_radiance;
-  vec4 albedo;          // w: least roughness of surfaces that blurred paths meet
-  vec4 medium;          // x: extinction of density 1, 1 / world unit; y: anisotropy; z: probability of next-event
-                        // estimation towards the sky (other lights have the rest); w: 1 if there is any light
-  vec4 emission;        // source radiance of the medium: emission coefficient over extinction; w: where it lights
-                        // surfaces, 1 / (3 times cube space's unit of volume in the world), else 0
-  uvec4 image;          // width, height, seed, target samples
-  uvec4 tile;           // x, y, width, height
-  uvec4 march;          // x: rounds a dispatch, y: max bounces (0: no limit), or the view in inspect.comp, z: log2 of
-                        // cells a page
-  uvec4 cube;           // x: exponent of the root cells, y: number of cells, z: number of tree nodes, w: levels
-  uvec4 order;          // inspect.comp's and aovs.comp's: y: 1 to pick one pixel; z, w: first row of the tile, and the
-                        // row after the last
-  uvec4 surface;        // the host's depth: x: layers (0: none), y: width, z: height
-  vec4 from_cube_x;     // columns of the linear part of cube to world space; w: of its origin
-  vec4 from_cube_y;
-  vec4 from_cube_z;
-  uvec4 scene;          // first words of the surfaces' tables: x: triangles, y: vertices, z: materials, w: textures
-  uvec4 layers;         // the surface pass: x: layers (0: none), y: width, z: height; w: 1: blended surfaces have layers
-                        // of their own after the others, 2: paths that end at it take up its colour
-  uvec4 lights;         // x: first word of the punctual lights, y: how many; z: 1 where surfaces pass light on;
-                        // w: triangles
-  uvec4 emitters;       // x: first word of the emissive triangles' table, y: how many
-  uvec4 ggx_albedo;     // x: first word of surface/ggx_albedo.hpp's cells, y: of its averages
+  CmView view;
+  CmGrid grid;
+  CmMedium medium;
+  CmLights lights;
+  CmSurfaceTables surfaces;
+  CmLayers layers;
+  CmHostDepth host_depth;
+  CmIntegrator integrator;
+  CmDispatch dispatch;
 #ifdef __cplusplus
+  CM_EQUALITY(CmParameters)
 };
 #else
 } cm;

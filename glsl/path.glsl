@@ -77,7 +77,7 @@ struct CmPath {
 #endif
 };
 
-CM_FN vec3 cm_to_cube(vec3 v) { return vec3(cm.to_cube_x) * v.x + vec3(cm.to_cube_y) * v.y + vec3(cm.to_cube_z) * v.z; }
+CM_FN vec3 cm_to_cube(vec3 v) { return cm.grid.to_cube_x * v.x + cm.grid.to_cube_y * v.y + cm.grid.to_cube_z * v.z; }
 
 // Where a ray is inside the box: t.x to t.y, empty if t.x > t.y.
 CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
@@ -85,11 +85,11 @@ CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
   float t_out = 3.0e38f;
   for (int axis = 0; axis < 3; ++axis) {
     if (d[axis] != 0.0f) {
-      float a = (cm.box_min[axis] - o[axis]) / d[axis];
-      float b = (cm.box_max[axis] - o[axis]) / d[axis];
+      float a = (cm.grid.box_min[axis] - o[axis]) / d[axis];
+      float b = (cm.grid.box_max[axis] - o[axis]) / d[axis];
       t_in = max(t_in, min(a, b));
       t_out = min(t_out, max(a, b));
-    } else if (o[axis] < cm.box_min[axis] || o[axis] > cm.box_max[axis]) {
+    } else if (o[axis] < cm.grid.box_min[axis] || o[axis] > cm.grid.box_max[axis]) {
       t_out = -1.0f;
     }
   }
@@ -99,11 +99,11 @@ CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
 // The ray through a point of a pixel: o in cube space, w a unit vector in world space. Returns the distance along it per
 // unit of view depth.
 CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3) w) {
-  float x = 2.0f * (float(pixel.x) + within.x) / float(cm.image.x) - 1.0f;
-  float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(cm.image.y);
-  vec3 aside = x * vec3(cm.right) + y * vec3(cm.up);
-  vec3 v = vec3(cm.forward) + (1.0f - cm.forward.w) * aside;
-  o = vec3(cm.eye) + cm.forward.w * cm_to_cube(aside);
+  float x = 2.0f * (float(pixel.x) + within.x) / float(cm.view.size.x) - 1.0f;
+  float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(cm.view.size.y);
+  vec3 aside = x * cm.view.right + y * cm.view.up;
+  vec3 v = cm.view.forward + (1.0f - float(cm.view.orthographic)) * aside;
+  o = cm.view.eye + float(cm.view.orthographic) * cm_to_cube(aside);
   w = normalize(v);
   return length(v);
 }
@@ -139,8 +139,8 @@ CM_FN uint cm_march(CM_INOUT(CmPath) p) {
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
     cm_march_step(p.cell, p.o, p.d, inv_d, p.t, t_1, r_0, r_1, next);
     p.steps += 1u;
-    e_0 = cm.medium.x * r_0;
-    e_1 = cm.medium.x * r_1;
+    e_0 = cm.medium.extinction * r_0;
+    e_1 = cm.medium.extinction * r_1;
     span = t_1 - p.t;
     float used = 0.5f * (e_0 + e_1) * span;
 #if CM_SURFACES
@@ -182,10 +182,10 @@ CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(vec4) sum) {
   if (p.in_volume != 0u) p.volume += vec4(p.radiance, 1.0f);
 #endif
   sum += vec4(p.radiance, alpha);
-  float luminance = dot(p.radiance + (1.0f - alpha) * vec3(cm.sky_radiance), vec3(0.2126f, 0.7152f, 0.0722f));
+  float luminance = dot(p.radiance + (1.0f - alpha) * cm.lights.sky_radiance, vec3(0.2126f, 0.7152f, 0.0722f));
   p.square += luminance * luminance;
   p.samples += 1u;
-  p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
+  p.mode = p.samples >= cm.dispatch.samples ? CM_MODE_DONE : CM_MODE_START;
 }
 
 #if CM_SURFACES
@@ -198,7 +198,7 @@ CM_FN void cm_begin_ray(CM_INOUT(CmPath) p) {
   p.cell = uvec3(CM_NONE, 0u, CM_NONE);
   if (range.x < p.t_end) {
     p.cell = uvec3(p.home.x, p.home.y, CM_NONE);
-    if (!inside) p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
+    if (!inside) p.cell = cm_march_enter(clamp(p.o + range.x * p.d, cm.grid.box_min, cm.grid.box_max));
   }
 }
 
@@ -206,9 +206,9 @@ CM_FN void cm_begin_ray(CM_INOUT(CmPath) p) {
 // integral of t^2 over the ray's part inside, over the box's volume.
 CM_FN float cm_glow_density(vec3 o, vec3 w) {
   vec2 range = cm_box_range(o, cm_to_cube(w));
-  vec3 box = vec3(cm.box_max) - vec3(cm.box_min);
+  vec3 box = cm.grid.box_max - cm.grid.box_min;
   float cubes = max(0.0f, range.y - range.x) * (dot(range, range) + range.x * range.y);
-  return cubes * cm.emission.w / max(box.x * box.y * box.z, 1e-30f);
+  return cubes / max(3.0f * cm.grid.unit_volume * box.x * box.y * box.z, 1e-30f);
 }
 
 // Whether a triangle ends the ray before the event does: then o, once moved, is on it. Asked after the march, not before:
@@ -216,7 +216,7 @@ CM_FN float cm_glow_density(vec3 o, vec3 w) {
 CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) {
   bool flight = p.mode == CM_MODE_FLIGHT;
   if (event == CM_EVENT_NONE || (event == CM_EVENT_COLLISION && !flight)) return false;
-  if (p.bounce == 0u && cm.layers.x != 0u) return false;
+  if (p.bounce == 0u && cm.layers.count != 0u) return false;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_from_cube_point(p.o);
   if (p.home.x == CM_NONE) {
@@ -241,12 +241,12 @@ CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) {
 
 // A camera ray for the next sample; finishes at once if it meets nothing of the box.
 CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
-  uvec3 h = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, p.samples, cm.image.z));
+  uvec3 h = cm_hash3(uvec3(pixel.y * cm.view.size.x + pixel.x, p.samples, cm.integrator.seed));
   p.random = h.x;
   p.stream = h.y | 1u;
   // A pixel's samples spread evenly over its area and over the first free path: the three-dimensional Kronecker sequence
   // of Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018, shifted by a random offset a pixel.
-  uvec3 shift = cm_hash3(uvec3(pixel.y * cm.image.x + pixel.x, 0x5bd1e995u, cm.image.z));
+  uvec3 shift = cm_hash3(uvec3(pixel.y * cm.view.size.x + pixel.x, 0x5bd1e995u, cm.integrator.seed));
   uvec3 even = shift + p.samples * uvec3(3518319155u, 2882110345u, 2360945575u);
   vec2 within = vec2(cm_unit_float(even.x), cm_unit_float(even.y));
   float t_per_z = cm_camera_ray(pixel, within, p.o, p.w);
@@ -265,12 +265,12 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   p.in_volume = 0u;
 #endif
 #if CM_LAYERS
-  if (cm.layers.x != 0u) {
+  if (cm.layers.count != 0u) {
     vec4 colour = vec4(0.0f, 0.0f, 0.0f, 0.0f);
     float layer_t = t_per_z * cm_layer_surface(pixel, within, layer, cm_unit_float(h.z), colour);
     bool nearest = layer_t <= surface_t;
     surface_t = min(surface_t, layer_t);
-    if (nearest && colour.a > 0.0f && (cm.layers.w & 2u) != 0u) {
+    if (nearest && colour.a > 0.0f && cm.layers.coloured != 0u) {
       p.home.x = 1u;
       p.light = vec3(colour);
     }
@@ -283,7 +283,7 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
   vec2 range = cm_box_range(p.o, p.d);
   p.t = range.x;
   p.t_end = min(range.y, surface_t);
-  p.cell = cm_march_enter(clamp(p.o + range.x * p.d, vec3(cm.box_min), vec3(cm.box_max)));
+  p.cell = cm_march_enter(clamp(p.o + range.x * p.d, cm.grid.box_min, cm.grid.box_max));
   if (!(range.x < p.t_end)) {
 #if CM_LAYERS
     if (p.home.x == 1u) p.radiance = p.light;
@@ -297,7 +297,7 @@ CM_FN void cm_start(CM_INOUT(CmPath) p, uvec2 pixel, CM_INOUT(vec4) sum) {
 // on_surface, a constant where it is called: the path is on a triangle, or has just met one (met: a flight ends there,
 // whatever event says).
 CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, CM_INOUT(vec4) sum) {
-  float q = cm.medium.z;
+  float q = cm.lights.sky_probability;
   bool flight = p.mode == CM_MODE_FLIGHT;
   bool finished = false;
   if (event == CM_EVENT_ESCAPE && !met) {
@@ -308,7 +308,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     float balanced = transmittance / max(q + transmittance, 1e-30f);
     float survival = flight ? 1.0f : min(1.0f, exp(CM_SHADOW_DEPTH - depth));
     float weight = p.mode == CM_MODE_SHADOW_SUN ? transmittance : (p.bounce == 0u ? 0.0f : balanced);
-    vec3 light = flight ? p.throughput * vec3(cm.sky_radiance) : p.light;
+    vec3 light = flight ? p.throughput * cm.lights.sky_radiance : p.light;
     p.radiance += light * (weight / survival);
 #if CM_LAYERS
     if (p.bounce == 0u && p.home.x == 1u) p.radiance += p.light;
@@ -322,21 +322,22 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     surface = cm_surface_point(p.triangle, p.weights, p.w);
     // Path space regularization: Kaplanyan and Dachsbacher, 2013.
     if ((p.bounce & CM_BLURRED) != 0u) {
-      surface.material.roughness = max(surface.material.roughness, cm.albedo.w);
-      surface.material.clearcoat_roughness = max(surface.material.clearcoat_roughness, cm.albedo.w);
+      surface.material.roughness = max(surface.material.roughness, cm.integrator.blurred_roughness);
+      surface.material.clearcoat_roughness = max(surface.material.clearcoat_roughness, cm.integrator.blurred_roughness);
     }
 #if CM_SURFACES > 1
     // The flight that met it, and the next-event estimate before: the balance heuristic, whatever the medium between.
     if (met && p.bounce > 0u && !surface.unlit) {
       vec3 way = surface.position - cm_from_cube_point(p.o);
-      float other = cm_emitter_met(p.triangle, way, dot(surface.geometric, p.w)) * (1.0f - q) * cm.sun_irradiance.w;
+      float other = cm_emitter_met(p.triangle, way, dot(surface.geometric, p.w));
+      other *= (1.0f - q) * cm.lights.emitter_probability;
       surface.emission *= p.light.x / max(p.light.x + other, 1e-30f);
     }
 #endif
     if (met) p.radiance += p.throughput * surface.emission;
   }
   // Without light between surfaces: what has left one sees the sky alone, and the volume sees none.
-  bool dark = cm.lights.z == 0u && p.bounce > 0u && (met || (collided && p.home.x == CM_NONE));
+  bool dark = cm.integrator.light_among_surfaces == 0u && p.bounce > 0u && (met || (collided && p.home.x == CM_NONE));
 #endif
   // The medium's own light: S e^-x dx over the flight. A collision tells of S (its chance is 1 - e^-x), but seldom in a
   // thin flame. Where the depth x that a flight came through is known, 2 S (1 - e^-x) where it collides and S (1 - e^-x)
@@ -347,7 +348,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
   float glow = flight && event != CM_EVENT_NONE ? 1.0f - exp(max(0.0f, p.depth) - p.depth_0) : 0.0f;
   if (collided) glow *= 2.0f;
 #endif
-  vec3 glowing = p.throughput * (glow * vec3(cm.emission));
+  vec3 glowing = p.throughput * (glow * cm.medium.source);
   p.radiance += glowing;
 #if CM_AOVS
   if (p.bounce == 0u && !collided) p.volume += vec4(glowing, 0.0f);
@@ -357,11 +358,12 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     if (collided && p.bounce == 0u) p.in_volume = 1u;
 #endif
     p.bounce += 1u;
-    if (collided) p.throughput *= vec3(cm.albedo);
+    if (collided) p.throughput *= cm.medium.albedo;
     float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
     float survival = strongest < 0.5f ? max(strongest, 0.05f) : 1.0f;
     float u = cm_random(p.random, p.stream);
-    finished = !(strongest > 0.0f) || u >= survival || (cm.march.y != 0u && (p.bounce & ~CM_BLURRED) > cm.march.y);
+    bool last = cm.integrator.max_bounces != 0u && (p.bounce & ~CM_BLURRED) > cm.integrator.max_bounces;
+    finished = !(strongest > 0.0f) || u >= survival || last;
     p.throughput = p.throughput / survival;
     p.o = p.o + p.t * p.d;
     p.home = uvec2(p.cell.x, p.cell.y);
@@ -382,12 +384,12 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     float u_0 = cm_random(p.random, p.stream);
     float u_1 = cm_random(p.random, p.stream);
     float u_2 = cm_random(p.random, p.stream);
-    vec3 w = cm_around(p.w, cm_phase_cosine(cm.medium.y, u_0), 6.28318531f * u_1);
-    bool shadow = (collided || met) && cm.medium.w > 0.0f;
+    vec3 w = cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531f * u_1);
+    bool shadow = (collided || met) && cm.lights.any != 0u;
     bool to_sun = shadow && u_2 >= q;
-    vec3 sky_light = vec3(cm.sky_radiance);
-    vec3 sun_light = vec3(cm.sun_irradiance);
-    vec3 to_light = vec3(cm.sun_world);
+    vec3 sky_light = cm.lights.sky_radiance;
+    vec3 sun_light = cm.lights.sun_irradiance;
+    vec3 to_light = cm.lights.sun_direction;
 #if CM_SURFACES
     float light_distance = 3.0e38f;
     float light_density = 1.0f - q;
@@ -395,10 +397,10 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
 #if CM_SURFACES > 1
     bool emitter = false;
 #endif
-    if (to_sun && (cm.lights.y > 0u || CM_SURFACES > 1)) {
+    if (to_sun && (cm.surfaces.lamp_count > 0u || CM_SURFACES > 1)) {
       float u_light = cm_random(p.random, p.stream);
 #if CM_SURFACES > 1
-      float share = cm.sun_irradiance.w;
+      float share = cm.lights.emitter_probability;
       emitter = u_light < share;
       light_density *= emitter ? share : 1.0f - share;
       u_light = max(0.0f, u_light - share) / max(1.0f - share, 1e-6f);
@@ -426,10 +428,10 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     if (on_surface) {
       float u_3 = cm_random(p.random, p.stream);
       // A glowing medium is looked for by half of the flights: towards a point of its box, each as likely.
-      float to_glow = cm.emission.w > 0.0f ? 0.5f : 0.0f;
+      float to_glow = cm.lights.glow_probability;
       bool guided = u_3 < to_glow;
       u_3 = guided ? u_3 / to_glow : (u_3 - to_glow) / (1.0f - to_glow);
-      vec3 goal = mix(vec3(cm.box_min), vec3(cm.box_max), vec3(u_0, u_1, u_3));
+      vec3 goal = mix(cm.grid.box_min, cm.grid.box_max, vec3(u_0, u_1, u_3));
       vec3 to_goal = cm_to_world(goal - p.o);
       w = cm_surface_sample(surface, p.w, u_0, u_1, u_3);
       if (guided && dot(to_goal, to_goal) > 0.0f) w = normalize(to_goal);
@@ -442,7 +444,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
       happened_on = !surface.lifted || cm_lift_share(dot(surface.geometric, wi)) <= 0.0f;
 #endif
     } else {
-      lobe_density = cm_phase(cm.medium.y, dot(p.w, to_sun ? to_light : w));
+      lobe_density = cm_phase(cm.medium.anisotropy, dot(p.w, to_sun ? to_light : w));
       direction_density = lobe_density;
       facing = vec3(lobe_density, lobe_density, lobe_density);
     }
@@ -454,11 +456,11 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
     if (!shadow) {
       p.throughput *= scattered;
       // A quarter of the lobe's highest density with that roughness, and no matte surface is smooth.
-      float alpha = cm_alpha(cm.albedo.w);
+      float alpha = cm_alpha(cm.integrator.blurred_roughness);
       if (lobe_density < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha))) p.bounce |= CM_BLURRED;
     }
 #else
-    float facing = cm_phase(cm.medium.y, dot(p.w, to_light));
+    float facing = cm_phase(cm.medium.anisotropy, dot(p.w, to_light));
     float light_density = 1.0f - q;
 #endif
     p.light = p.throughput * (to_sun ? sun_light * (facing / max(light_density, 1e-30f)) : sky_light);
@@ -468,7 +470,7 @@ CM_FN void cm_handle(CM_INOUT(CmPath) p, uint event, bool on_surface, bool met, 
 #if CM_SURFACES
     p.d = cm_to_cube(to_sun ? to_light : w);
 #else
-    p.d = to_sun ? vec3(cm.sun_cube) : cm_to_cube(w);
+    p.d = to_sun ? cm.lights.sun_in_cube : cm_to_cube(w);
 #endif
     if (!shadow) p.w = w;
     p.mode = to_sun ? CM_MODE_SHADOW_SUN : (shadow ? CM_MODE_SHADOW_SKY : CM_MODE_FLIGHT);

@@ -29,26 +29,26 @@ uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(word)); }
 vec4 cm_floats(uint word) { return uintBitsToFloat(texelFetch(cm_scene_words, int(word))); }
 
 uvec4 cm_bvh_node(uint texel) { return cm_words(texel); }
-uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.lights.w + texel); }
+uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.surfaces.records + texel); }
 
 // What the ray under way is, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
 bool cm_hit_back = false;  // what it met last
 
-vec3 cm_to_world(vec3 v) { return cm.from_cube_x.xyz * v.x + cm.from_cube_y.xyz * v.y + cm.from_cube_z.xyz * v.z; }
-vec3 cm_world_origin() { return vec3(cm.from_cube_x.w, cm.from_cube_y.w, cm.from_cube_z.w); }
+vec3 cm_to_world(vec3 v) { return cm.grid.from_cube_x * v.x + cm.grid.from_cube_y * v.y + cm.grid.from_cube_z * v.z; }
+vec3 cm_world_origin() { return cm.grid.cube_origin; }
 vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm_world_origin(); }
 vec3 cm_to_cube_point(vec3 p) {
   vec3 v = p - cm_world_origin();
-  return cm.to_cube_x.xyz * v.x + cm.to_cube_y.xyz * v.y + cm.to_cube_z.xyz * v.z;
+  return cm.grid.to_cube_x * v.x + cm.grid.to_cube_y * v.y + cm.grid.to_cube_z * v.z;
 }
 
 vec2 cm_ggx_albedo(float roughness, float cosine) {
   vec2 place = cm_ggx_albedo_place(roughness, cosine);
   ivec2 cell = min(ivec2(place), CM_GGX_ALBEDO_SIZE - 2);
   vec2 f = place - vec2(cell);
-  uvec4 corners = cm_words(cm.ggx_albedo.x + uint(cell.y * (CM_GGX_ALBEDO_SIZE - 1) + cell.x));
+  uvec4 corners = cm_words(cm.surfaces.ggx_albedo + uint(cell.y * (CM_GGX_ALBEDO_SIZE - 1) + cell.x));
   vec2 low = mix(unpackHalf2x16(corners.x), unpackHalf2x16(corners.y), f.x);
   vec2 high = mix(unpackHalf2x16(corners.z), unpackHalf2x16(corners.w), f.x);
   return mix(low, high, f.y);
@@ -57,7 +57,7 @@ vec2 cm_ggx_albedo(float roughness, float cosine) {
 vec2 cm_ggx_albedo_average(float roughness) {
   float place = cm_ggx_albedo_place(roughness, 0.0).y;
   int row = min(int(place), CM_GGX_ALBEDO_SIZE - 2);
-  uvec2 ends = cm_words(cm.ggx_albedo.y + uint(row)).xy;
+  uvec2 ends = cm_words(cm.surfaces.ggx_albedo_averages + uint(row)).xy;
   return mix(unpackHalf2x16(ends.x), unpackHalf2x16(ends.y), place - float(row));
 }
 
@@ -80,12 +80,12 @@ struct CmVertexMix {
 
 CmVertexMix cm_vertex_mix(uint triangle, vec2 weights) {
   CmVertexMix m;
-  m.corner = cm_words(cm.scene.x + triangle);
+  m.corner = cm_words(cm.surfaces.triangles + triangle);
   m.weight = vec3(1.0 - weights.x - weights.y, weights);
   vec4 uv = vec4(0.0);
   m.color = vec4(0.0);
   for (int i = 0; i < 3; ++i) {
-    uint vertex = cm.scene.y + CM_VERTEX_WORDS * m.corner[i];
+    uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
     uv += m.weight[i] * cm_floats(vertex + 1u);
     uvec4 last = cm_words(vertex + 2u);
     m.color += m.weight[i] * vec4(unpackUnorm2x16(last.z), unpackUnorm2x16(last.w));
@@ -117,14 +117,14 @@ vec3 cm_from_srgb(vec3 v) {
 // A material's texture at a point, filtered bilinearly (samples are spread over the pixel: that is the minification
 // filter); white where there is none.
 vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
-  uint word = cm.scene.z + CM_MATERIAL_WORDS * material + use;
+  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * material + use;
   uvec4 head = cm_words(word);
   if (head.x == 0u) return vec4(1.0);
   vec4 tail = cm_floats(word + 1u);
   vec3 rest = uintBitsToFloat(head.yzw);
   vec2 uv = (head.x & 0x80000000u) != 0u ? m.uv_1 : m.uv_0;
   uv = vec2(rest.x * uv.x + rest.z * uv.y, rest.y * uv.x + tail.x * uv.y) + tail.yz;
-  uvec4 t = cm_words(cm.scene.w + (head.x & 0x7fffffffu) - 1u);
+  uvec4 t = cm_words(cm.surfaces.textures + (head.x & 0x7fffffffu) - 1u);
   vec2 size = vec2(t.y & 0xffffu, t.y >> 16);
   // Far outside, whole turns would lose the fraction's precision: each wrap mode repeats after two.
   vec2 at = (uv - 2.0 * floor(0.5 * uv) * vec2((t.w & 3u) == 2u ? 0.0 : 1.0, ((t.w >> 2) & 3u) == 2u ? 0.0 : 1.0));
@@ -146,12 +146,12 @@ vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
   return sum;
 }
 
-uint cm_material_flags(uint material) { return cm_words(cm.scene.z + CM_MATERIAL_WORDS * material + 5u).x; }
+uint cm_material_flags(uint material) { return cm_words(cm.surfaces.materials + CM_MATERIAL_WORDS * material + 5u).x; }
 
 // The share of rays that end at a point of a triangle. Coverage (BLEND) and transmission are chances, so that no order of
 // surfaces and volume has to be found.
 float cm_coverage(CmVertexMix m) {
-  uint word = cm.scene.z + CM_MATERIAL_WORDS * m.corner.w;
+  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
   uint flags = cm_words(word + 5u).x;
   float transmission = cm_floats(word + 4u).y;
   vec4 base = cm_floats(word) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
@@ -208,7 +208,7 @@ float cm_lift_share(float cosine) { return clamp(1.0 - cosine / CM_GRAZING, 0.0,
 
 // What a material emits where it is seen from its front.
 vec3 cm_emission(CmVertexMix m) {
-  vec3 emission = cm_floats(cm.scene.z + CM_MATERIAL_WORDS * m.corner.w + 1u).rgb;
+  vec3 emission = cm_floats(cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w + 1u).rgb;
   return emission * cm_texture(m.corner.w, CM_USE_EMISSION, m, true).rgb;
 }
 
@@ -217,13 +217,13 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   CmSurfacePoint point;
   CmVertexMix m = cm_vertex_mix(triangle, weights);
   uint material = m.corner.w;
-  uint word = cm.scene.z + CM_MATERIAL_WORDS * material;
+  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * material;
   vec3 position[3];
   vec3 normals[3];
   vec3 normal = vec3(0.0);
   vec4 tangent = vec4(0.0);
   for (int i = 0; i < 3; ++i) {
-    uint vertex = cm.scene.y + CM_VERTEX_WORDS * m.corner[i];
+    uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
     uvec4 first = cm_words(vertex);
     uvec4 last = cm_words(vertex + 2u);
     position[i] = uintBitsToFloat(first.xyz);
@@ -296,11 +296,11 @@ vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1, float
 // Where a ray along d (world, unit) starts from a point of a triangle, in the world: beside it, on the side that its
 // path came from. shift: from the point itself, but for the rounding.
 vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, out vec3 shift) {
-  uvec4 corner = cm_words(cm.scene.x + triangle);
+  uvec4 corner = cm_words(cm.surfaces.triangles + triangle);
   vec3 position[3];
   vec3 normals[3];
   for (int i = 0; i < 3; ++i) {
-    uvec4 first = cm_words(cm.scene.y + CM_VERTEX_WORDS * corner[i]);
+    uvec4 first = cm_words(cm.surfaces.vertices + CM_VERTEX_WORDS * corner[i]);
     position[i] = uintBitsToFloat(first.xyz);
     normals[i] = cm_octahedral(first.w);
   }
@@ -317,19 +317,19 @@ vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, out vec
 // angles to to_light (KHR_lights_punctual).
 void cm_lamp(vec3 here, float u, inout vec3 light, inout vec3 to_light, inout float distance) {
   bool sun = max(light.x, max(light.y, light.z)) > 0.0;
-  uint count = cm.lights.y + (sun ? 1u : 0u);
+  uint count = cm.surfaces.lamp_count + (sun ? 1u : 0u);
   uint choice = min(uint(u * float(count)), count - 1u);
-  if (choice == cm.lights.y) {
+  if (choice == cm.surfaces.lamp_count) {
     light *= float(count);
     return;
   }
-  uint word = cm.lights.x + 4u * choice;
+  uint word = cm.surfaces.lamps + 4u * choice;
   CmLight lamp = CmLight(cm_floats(word), cm_floats(word + 1u), cm_floats(word + 2u), cm_floats(word + 3u));
   light = cm_punctual_irradiance(lamp, here, to_light, distance) * float(count);
 }
 
 // The emissive triangles' table, see src/render/emitters.hpp.
-uvec4 cm_emitter(uint i) { return cm_words(cm.emitters.x + i); }
+uvec4 cm_emitter(uint i) { return cm_words(cm.surfaces.emitters + i); }
 
 // Density by solid angle of a point on an emissive triangle, picked by power and then by area: `way` from where it is
 // looked at, under `cosine` to its normal.
@@ -340,7 +340,7 @@ float cm_emitter_density(uvec4 entry, vec3 way, float cosine) {
 // The same of a triangle that a ray has met; 0 where it is not in the table. O(log n).
 float cm_emitter_met(uint triangle, vec3 way, float cosine) {
   uint low = 0u;
-  uint high = cm.emitters.y;
+  uint high = cm.surfaces.emitter_count;
   while (low + 1u < high) {
     uint middle = (low + high) >> 1u;
     bool below = cm_emitter(middle).x <= triangle;
@@ -356,14 +356,14 @@ float cm_emitter_met(uint triangle, vec3 way, float cosine) {
 vec3 cm_emitter_sample(vec3 here, uvec2 pick, vec2 u, out vec3 to_light, out float distance, out float density) {
   uint i;
   uint unused;
-  umulExtended(pick.x, cm.emitters.y, i, unused);
+  umulExtended(pick.x, cm.surfaces.emitter_count, i, unused);
   uvec4 entry = cm_emitter(i);
   if (pick.y > entry.y) entry = cm_emitter(entry.z);
   float root = sqrt(u.x);
   CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0 - u.y), root * u.y));
-  vec3 a = cm_floats(cm.scene.y + CM_VERTEX_WORDS * m.corner.x).xyz;
-  vec3 b = cm_floats(cm.scene.y + CM_VERTEX_WORDS * m.corner.y).xyz;
-  vec3 c = cm_floats(cm.scene.y + CM_VERTEX_WORDS * m.corner.z).xyz;
+  vec3 a = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.x).xyz;
+  vec3 b = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.y).xyz;
+  vec3 c = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.z).xyz;
   vec3 g = cross(b - a, c - a);
   g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
   vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
@@ -373,7 +373,7 @@ vec3 cm_emitter_sample(vec3 here, uvec2 pick, vec2 u, out vec3 to_light, out flo
   to_light = way * inversesqrt(length_2);
   distance = sqrt(length_2) * 0.99999;
   density = cm_emitter_density(entry, way, dot(g, to_light));
-  uint word = cm.scene.z + CM_MATERIAL_WORDS * m.corner.w;
+  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
   uint flags = cm_words(word + 5u).x;
   vec3 emission = cm_emission(m);
   if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + 4u).y > 0.0) {

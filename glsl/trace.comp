@@ -42,13 +42,13 @@ uvec4 cm_pack(vec3 v, uint w) { return uvec4(floatBitsToUint(v), w); }
 
 void main() {
   uint block = cm_blocks[gl_WorkGroupID.y].x & ~CM_BEGINS;
-  uint across = (cm.tile.z + CM_BLOCK_WIDTH - 1u) / CM_BLOCK_WIDTH;
+  uint across = (cm.dispatch.tile_size.x + CM_BLOCK_WIDTH - 1u) / CM_BLOCK_WIDTH;
   uvec2 corner = uvec2(block % across * CM_BLOCK_WIDTH, block / across * gl_WorkGroupSize.y);
   uvec2 local = corner + uvec2(gl_GlobalInvocationID.x, gl_LocalInvocationID.y);
-  if (local.x >= cm.tile.z || local.y >= cm.tile.w) return;
-  uint lanes = cm.tile.z * cm.tile.w;
-  uint lane = local.y * cm.tile.z + local.x;
-  uvec2 pixel = cm.tile.xy + local;
+  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.tile_size.y) return;
+  uint lanes = cm.dispatch.tile_size.x * cm.dispatch.tile_size.y;
+  uint lane = local.y * cm.dispatch.tile_size.x + local.x;
+  uvec2 pixel = cm.dispatch.tile_corner + local;
   ivec2 texel = ivec2(pixel);
 
   CmPath p;
@@ -62,7 +62,7 @@ void main() {
     // Every pixel goes on from the samples it has.
     p.samples = counts.x;
     p.steps = counts.y;
-    p.mode = p.samples >= cm.image.w ? CM_MODE_DONE : CM_MODE_START;
+    p.mode = p.samples >= cm.dispatch.samples ? CM_MODE_DONE : CM_MODE_START;
     p.o = vec3(0.0);
     p.t = 0.0;
     p.d = vec3(0.0);
@@ -127,7 +127,7 @@ void main() {
   uint samples = p.samples;
   p.marches = 0u;
   vec4 sum = imageLoad(cm_sum, texel);
-  cm_run(p, pixel, cm.march.x, sum);
+  cm_run(p, pixel, cm.dispatch.rounds, sum);
   imageStore(cm_sum, texel, sum);
   uint mode = p.mode;
 #if CM_AOVS

@@ -118,6 +118,24 @@ MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarV
   return source;
 }
 
+core::CmGrid grid_parameters(const grid::Cube& cube, const vec3& low, const vec3& high) {
+  const glm::dmat3 from_cube(cube.to_world);
+  const glm::dmat3 to_cube(glm::inverse(cube.to_world));
+  core::CmGrid grid{};
+  grid.to_cube_x = vec3(to_cube[0]);
+  grid.to_cube_y = vec3(to_cube[1]);
+  grid.to_cube_z = vec3(to_cube[2]);
+  grid.from_cube_x = vec3(from_cube[0]);
+  grid.from_cube_y = vec3(from_cube[1]);
+  grid.from_cube_z = vec3(from_cube[2]);
+  grid.cube_origin = vec3(cube.to_world[3]);
+  grid.unit_volume = static_cast<float>(std::abs(glm::determinant(from_cube)));
+  grid.box_min = low;
+  grid.box_max = high;
+  grid.root_exponent = static_cast<std::uint32_t>(cube.log2_size - 1);
+  return grid;
+}
+
 MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, std::shared_ptr<const MarchSource> source,
                          std::int64_t page_texels)
     : gl_(std::move(gl)), limits_(limits), source_(std::move(source)) {
@@ -125,8 +143,7 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, std::sha
   if (source_->march == March::tet) {
     plan_tet(page_texels);
   } else {
-    data_.box_min_ = vec3(source_->box_low);
-    data_.box_max_ = vec3(source_->box_low + source_->box_size);
+    data_.grid_ = grid_parameters(source_->cube, vec3(source_->box_low), vec3(source_->box_low + source_->box_size));
     source_->march == March::dense ? plan_dense() : plan_brick();
   }
 }
@@ -161,16 +178,14 @@ void MarchUpload::plan_texture_buffer(const void* bytes, std::size_t size, std::
 void MarchUpload::plan_tet(std::int64_t page_texels) {
   const grid::TetGrid& grid = *source_->grid;
   data_.linear_ = source_->linear;
-  data_.box_min_ = grid.content_min;
-  data_.box_max_ = grid.content_max;
+  data_.grid_ = grid_parameters(grid.cube, grid.content_min, grid.content_max);
+  data_.grid_.levels = grid.levels;
   const auto cells = static_cast<std::int64_t>(grid.cells.size());
-  data_.cube_ = {static_cast<unsigned>(grid.cube.log2_size - 1), static_cast<unsigned>(cells),
-                 static_cast<unsigned>(grid.tree.size()), grid.levels};
   const std::int64_t texels = page_texels > 0 ? page_texels : limits_.texture_buffer_texels;
   std::int64_t page_cells = texels / 2;
   if (page_cells < cells)
     page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
-  data_.log2_page_cells_ = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
+  data_.grid_.page_shift = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
   const std::int64_t tree_texels = std::max<std::int64_t>((static_cast<std::int64_t>(grid.tree.size()) + 3) / 4, 1);
   if (cells > page_cells * max_pages || tree_texels > limits_.texture_buffer_texels) {
     throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " + std::to_string(max_pages) +
@@ -252,12 +267,4 @@ void MarchData::bind(const gl::Functions& gl) const {
   }
   if (roots_) gl.BindBufferBase(GL_UNIFORM_BUFFER, 1, roots_.name());
 }
-
-void MarchData::describe(core::CmParameters& parameters) const {
-  parameters.box_min = glm::vec4(box_min_, 0.0F);
-  parameters.box_max = glm::vec4(box_max_, 0.0F);
-  parameters.cube = cube_;
-  parameters.march.z = static_cast<unsigned>(log2_page_cells_);
-}
-
 }  // namespace cumulet::render

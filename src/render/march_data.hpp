@@ -43,6 +43,9 @@ MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool line
 MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
                               std::shared_ptr<const grid::Statistics> statistics);
 
+/// Of a volume in this cube, whose data are inside low to high (cube space).
+core::CmGrid grid_parameters(const grid::Cube& cube, const glm::vec3& low, const glm::vec3& high);
+
 /// What one march reads on the GPU, and the box that holds all density.
 class MarchData {
  public:
@@ -51,21 +54,17 @@ class MarchData {
   /// The macros that select this march in a shader.
   [[nodiscard]] std::vector<std::string> defines() const;
   void bind(const gl::Functions& gl) const;
-  /// Fills the box and the cube.
-  void describe(core::CmParameters& parameters) const;
+  [[nodiscard]] const core::CmGrid& grid() const { return grid_; }
 
  private:
   friend class MarchUpload;
   March march_ = March::tet;
   bool linear_ = false;
-  int log2_page_cells_ = 0;
   std::vector<gl::Object> buffers_;
   std::vector<gl::Object> pages_;
   std::array<gl::Object, 3> textures_;  // units 12, 13, 14
   gl::Object roots_;
-  glm::vec3 box_min_{0.0F};
-  glm::vec3 box_max_{0.0F};
-  glm::uvec4 cube_{0U};
+  core::CmGrid grid_{};
   std::uint64_t bytes_ = 0;
 };
 

@@ -28,18 +28,8 @@ const surface::Scene* scene_met(const Surfaces& surfaces) {
 
 }  // namespace
 
-bool Progressive::same(const PictureWish& wish) const {
-  using Words = std::array<std::uint32_t, sizeof(core::CmParameters) / sizeof(std::uint32_t)>;
-  core::CmParameters a = wish.parameters;
-  core::CmParameters b = wish_.parameters;
-  a.image.w = b.image.w = 0;  // more samples go on
-  return wished_ && std::bit_cast<Words>(a) == std::bit_cast<Words>(b) && wish.view == wish_.view &&
-         wish.generation == wish_.generation && wish.surface_generation == wish_.surface_generation &&
-         wish.preview == wish_.preview && wish.volume_alone == wish_.volume_alone;
-}
-
 std::uint32_t Progressive::enough(std::uint32_t divisor) const {
-  const std::uint32_t wanted = wish_.view == View::shaded ? wish_.parameters.image.w : 1;
+  const std::uint32_t wanted = wish_.content.view == View::shaded ? wish_.samples : 1;
   if (divisor <= finest_) return wanted;
   // A quarter of the samples of one a pixel at full resolution.
   const std::uint32_t affordable = divisor / finest_ * (divisor / finest_) / 4;
@@ -47,18 +37,18 @@ std::uint32_t Progressive::enough(std::uint32_t divisor) const {
 }
 
 glm::uvec2 Progressive::size_of(std::uint32_t divisor) const {
-  return (glm::uvec2(wish_.parameters.image) + divisor - 1U) / divisor;
+  return (wish_.content.parameters.view.size + divisor - 1U) / divisor;
 }
 
 bool Progressive::is_enough() const {
   const glm::u64vec2 size(working_->size());
-  const auto wanted = static_cast<double>(size.x * size.y * working_->parameters().image.w);
+  const auto wanted = static_cast<double>(size.x * size.y * working_->target_samples());
   return working_->done() || (working_->complete() && static_cast<double>(working_->samples()) >= nearly_all * wanted);
 }
 
 std::uint32_t Progressive::coarsest(double budget_ms) const {
-  if (!wish_.preview) return 1;
-  const double pixels = double(wish_.parameters.image.x) * wish_.parameters.image.y;
+  if (!wish_.content.preview) return 1;
+  const double pixels = double(wish_.content.parameters.view.size.x) * wish_.content.parameters.view.size.y;
   std::uint32_t divisor = finest_;
   while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > answer_frames * answer_rate_ * budget_ms)
     divisor *= 2;
@@ -88,7 +78,7 @@ PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size,
 }
 
 PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const {
-  const glm::uvec2 size(wish_.parameters.image);
+  const glm::uvec2 size = wish_.content.parameters.view.size;
   PictureSettings settings;
   if (surfaces.raster != nullptr && divisor > finest_) {
     settings = quick_layers(tracer_, size, budget_ms, !answering_);
@@ -98,22 +88,21 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
     const double layer_bytes = (surfaces.raster->blends() ? 24.0 : 12.0) * size.x * size.y;
     settings.layers = static_cast<unsigned>(std::clamp(most_layer_bytes / layer_bytes, 1.0, 8.0));
   }
-  settings.view = wish_.view;
-  settings.hasty = wish_.preview;
-  settings.volume_alone = wish_.volume_alone && divisor == finest_;
+  settings.view = wish_.content.view;
+  settings.hasty = wish_.content.preview;
+  settings.volume_alone = wish_.content.volume_alone && divisor == finest_;
   return settings;
 }
 
 void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms) {
-  core::CmParameters parameters = wish_.parameters;
-  const glm::uvec2 size = size_of(divisor);
-  parameters.image = {size, parameters.image.z, enough(divisor)};
-  Picture& picture = acquire(glm::uvec2(parameters.image));
+  PictureParameters parameters = wish_.content.parameters;
+  parameters.view.size = size_of(divisor);
+  Picture& picture = acquire(parameters.view.size);
   working_ = nullptr;
   try {
-    tracer_.begin(picture, data, parameters, surfaces, settings(divisor, surfaces, budget_ms));
+    tracer_.begin(picture, data, parameters, enough(divisor), surfaces, settings(divisor, surfaces, budget_ms));
   } catch (const Error& error) {
-    const bool memory = error.code() == ErrorCode::out_of_memory && wish_.preview && divisor < coarsest_divisor;
+    const bool memory = error.code() == ErrorCode::out_of_memory && wish_.content.preview && divisor < coarsest_divisor;
     if (memory) {
       finest_ = divisor * 2;
       stale_ = true;
@@ -123,7 +112,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
     throw;
   }
   working_ = &picture;
-  working_generation_ = wish_.generation;
+  working_generation_ = wish_.content.generation;
   scene_ = scene_met(surfaces);
   divisor_ = divisor;
   stale_ = false;
@@ -132,26 +121,26 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
 }
 
 bool Progressive::needs_depth() const {
-  return wish_.depth && shown_ != nullptr && shown_->volume_z() == 0 && shown_generation_ == wish_.generation;
+  return wish_.depth && shown_ != nullptr && shown_->volume_z() == 0 && shown_generation_ == wish_.content.generation;
 }
 
 void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
-  const bool resized = glm::uvec2(wish.parameters.image) != glm::uvec2(wish_.parameters.image);
-  if (!same(wish)) {
+  const bool resized = wish.content.parameters.view.size != wish_.content.parameters.view.size;
+  if (!wished_ || wish.content != wish_.content) {
     stale_ = true;
     failed_ = false;
-    if (resized || wish.generation != wish_.generation) finest_ = 1;
+    if (resized || wish.content.generation != wish_.content.generation) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
     // So do paths on another scene's triangles.
-    if (wish.generation != wish_.generation || resized || wish.preview != wish_.preview ||
-        scene_met(surfaces) != scene_) {
+    if (wish.content.generation != wish_.content.generation || resized ||
+        wish.content.preview != wish_.content.preview || scene_met(surfaces) != scene_) {
       working_ = nullptr;
     }
   } else if (working_ != nullptr && divisor_ == finest_) {
-    if (!wish.preview && wish.parameters.image.w < working_->parameters().image.w) {
+    if (!wish.content.preview && wish.samples < working_->target_samples()) {
       stale_ = true;
     } else {
-      working_->extend(wish.parameters.image.w);
+      working_->extend(wish.samples);
     }
   }
   wish_ = wish;
@@ -165,7 +154,7 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
   try {
     do {
       // The first answer to a change is finished, whatever changes meanwhile: else nothing would ever be shown.
-      const bool answering = wish_.preview && answering_ && working_ != nullptr && !working_->complete();
+      const bool answering = wish_.content.preview && answering_ && working_ != nullptr && !working_->complete();
       if (working_ == nullptr || (stale_ && !answering)) {
         answering_ = true;
         first_divisor_ = coarsest(budget_ms);
@@ -181,7 +170,7 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
       trace_seconds_ += seconds;
       if (!was_complete) answer_seconds_ += seconds;
       if (working_->complete()) {
-        if (!was_complete && wish_.view == View::shaded) {
+        if (!was_complete && wish_.content.view == View::shaded) {
           const glm::dvec2 size(working_->size());
           answer_rate_ += 0.3 * (size.x * size.y / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
         }

@@ -10,13 +10,20 @@ namespace cumulet::render {
 
 /// What a picture shall show.
 struct PictureWish {
-  core::CmParameters parameters{};  // at full resolution; image.w: target samples
-  View view = View::shaded;
-  std::uint64_t generation = 0;          // of the data
-  std::uint64_t surface_generation = 0;  // of the host's depth
-  bool preview = true;                   // coarse first; else at full resolution only
-  bool depth = false;                    // find the volume's depth at half opacity as well
-  bool volume_alone = false;             // at full resolution, sum what met the volume first apart as well
+  /// What samples depend on: where it changes, a picture is begun anew.
+  struct Content {
+    PictureParameters parameters;  // at full resolution
+    View view = View::shaded;
+    std::uint64_t generation = 0;          // of the data
+    std::uint64_t surface_generation = 0;  // of the host's depth
+    bool surfaces_traced = true;           // paths meet triangles
+    bool preview = true;                   // coarse first; else at full resolution only
+    bool volume_alone = false;             // at full resolution, sum what met the volume first apart as well
+    bool operator==(const Content&) const = default;
+  };
+  Content content;
+  std::uint32_t samples = 1;  // a pixel
+  bool depth = false;         // find the volume's depth at half opacity as well
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
@@ -68,8 +75,7 @@ class Progressive {
   [[nodiscard]] std::uint32_t enough(std::uint32_t divisor) const;
   [[nodiscard]] glm::uvec2 size_of(std::uint32_t divisor) const;
   [[nodiscard]] bool is_enough() const;
-  [[nodiscard]] bool newest_is_shown() const { return wish_.preview || working_ == nullptr; }
-  [[nodiscard]] bool same(const PictureWish& wish) const;
+  [[nodiscard]] bool newest_is_shown() const { return wish_.content.preview || working_ == nullptr; }
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
   [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const;
   Picture& acquire(glm::uvec2 size);

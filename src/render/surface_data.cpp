@@ -114,30 +114,30 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   std::vector<uvec4>& words = source.words;
   const auto nodes = std::as_bytes(source.bvh.nodes());
   const auto records = std::as_bytes(source.bvh.records());
-  source.lights.w = static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
+  source.tables.records = static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
   resize(words, (nodes.size() + records.size()) / sizeof(uvec4), progress);
   std::memcpy(words.data(), nodes.data(), nodes.size());
-  if (!records.empty()) std::memcpy(words.data() + source.lights.w, records.data(), records.size());
+  if (!records.empty()) std::memcpy(words.data() + source.tables.records, records.data(), records.size());
 
   check(progress);
-  source.tables.x = size_of(words);
+  source.tables.triangles = size_of(words);
   resize(words, words.size() + scene.triangle_count(), progress);
   for (const surface::Draw& draw : scene.draws) {
     check(progress);
     for (std::uint32_t i = draw.first_index; i + 2 < draw.first_index + draw.index_count; i += 3) {
-      words[source.tables.x + i / 3] =
+      words[source.tables.triangles + i / 3] =
           uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], draw.material);
     }
   }
   check(progress);
-  source.tables.y = size_of(words);
+  source.tables.vertices = size_of(words);
   resize(words, words.size() + 3 * scene.attributes.size(), progress);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
     check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const surface::PosedVertex& v = source.pose.vertices[i];
       const surface::VertexAttributes& a = scene.attributes[i];
-      uvec4* to = &words[source.tables.y + 3 * i];
+      uvec4* to = &words[source.tables.vertices + 3 * i];
       to[0] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
       to[1] = bits(vec4(a.uv[0], a.uv[1]));
       to[2] = uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),
@@ -145,29 +145,30 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
     }
   });
 
-  source.tables.z = size_of(words);
+  source.tables.materials = size_of(words);
   for (const Material& material : scene.materials) add_material(words, material, source.pose.double_sided);
-  source.tables.w = size_of(words);
+  source.tables.textures = size_of(words);
   for (const surface::Texture& texture : scene.textures) {
     const TextureAtlas::Place& place = source.atlas.places[texture.image];
     words.emplace_back(place.corner.x | place.corner.y << 16U, place.size.x | place.size.y << 16U, place.layer,
                        wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << 2U |
                            (texture.sampler.magnify == surface::Filter::nearest ? 16U : 0U));
   }
-  source.lights.x = size_of(words);
-  source.lights.y = static_cast<std::uint32_t>(source.pose.lights.size());
+  source.tables.lamps = size_of(words);
+  source.tables.lamp_count = static_cast<std::uint32_t>(source.pose.lights.size());
   add_lights(words, source.pose.lights);
 
   check(progress);
   const EmitterTable table = emitter_table(source.emissive, scene, source.pose, progress);
-  source.emitters = {size_of(words), size_of(table.entries), 0U, 0U};
+  source.tables.emitters = size_of(words);
+  source.tables.emitter_count = size_of(table.entries);
   words.insert(words.end(), table.entries.begin(), table.entries.end());
   const surface::GgxAlbedo& albedo = surface::GgxAlbedo::table();
   const std::vector<uvec4> cells = albedo.cells();
   const std::vector<uvec4> averages = albedo.average_cells();
-  source.ggx_albedo.x = size_of(words);
+  source.tables.ggx_albedo = size_of(words);
   words.insert(words.end(), cells.begin(), cells.end());
-  source.ggx_albedo.y = size_of(words);
+  source.tables.ggx_albedo_averages = size_of(words);
   words.insert(words.end(), averages.begin(), averages.end());
   source.emitted_flux = table.flux;
   const double radius = 0.5 * glm::length(source.pose.high - source.pose.low);
@@ -290,9 +291,6 @@ SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, c
                          SurfaceData* last)
     : scene_(source.scene.get()),
       tables_(source.tables),
-      lights_(source.lights),
-      emitters_(source.emitters),
-      ggx_albedo_(source.ggx_albedo),
       emitted_flux_(source.emitted_flux),
       lamp_flux_(source.lamp_flux),
       cross_section_(source.cross_section) {
@@ -342,15 +340,6 @@ SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, c
 void SurfaceData::bind(const gl::Functions& gl) const {
   gl.BindTextureUnit(words_unit, words_.name());
   gl.BindTextureUnit(atlas_unit, atlas_->name());
-}
-
-void SurfaceData::describe(core::CmParameters& parameters) const {
-  parameters.scene = tables_;
-  const std::uint32_t passes_light_on = parameters.lights.z;
-  parameters.lights = lights_;
-  parameters.lights.z = passes_light_on;
-  parameters.emitters = emitters_;
-  parameters.ggx_albedo = ggx_albedo_;
 }
 
 double SurfaceData::emitter_share(double sun) const {

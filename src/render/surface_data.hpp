@@ -35,14 +35,11 @@ struct SurfaceSource {
   surface::Bvh bvh;
   double built_cost = 0.0;  // of the tree before it was refitted
   std::vector<EmissiveTriangle> emissive;
-  std::vector<glm::uvec4> words;  // the tables of glsl/surface.glsl
-  glm::uvec4 tables{0U};          // CmParameters::scene
-  glm::uvec4 lights{0U};          // CmParameters::lights, but z
-  glm::uvec4 emitters{0U};        // CmParameters::emitters
-  glm::uvec4 ggx_albedo{0U};      // CmParameters::ggx_albedo
-  double emitted_flux = 0.0;      // luminance of all that emissive triangles emit
-  double lamp_flux = 0.0;         // and lamps
-  double cross_section = 0.0;     // of the scene's bounding sphere
+  std::vector<glm::uvec4> words;   // the tables of glsl/surface.glsl
+  core::CmSurfaceTables tables{};  // where each begins
+  double emitted_flux = 0.0;       // luminance of all that emissive triangles emit
+  double lamp_flux = 0.0;          // and lamps
+  double cross_section = 0.0;      // of the scene's bounding sphere
   TextureAtlas atlas;
 };
 
@@ -60,11 +57,10 @@ class SurfaceData {
   /// out_of_memory, unsupported).
   SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, const SurfaceSource& source, SurfaceData* last);
   void bind(const gl::Functions& gl) const;
-  /// Fills the tables' places.
-  void describe(core::CmParameters& parameters) const;
+  [[nodiscard]] const core::CmSurfaceTables& tables() const { return tables_; }
   /// Whether there are punctual lights, and emissive triangles.
-  [[nodiscard]] bool lamps() const { return lights_.y > 0; }
-  [[nodiscard]] bool emitters() const { return emitters_.y > 0; }
+  [[nodiscard]] bool lamps() const { return tables_.lamp_count > 0; }
+  [[nodiscard]] bool emitters() const { return tables_.emitter_count > 0; }
   /// The chance that a look for light, but for the sky's, goes to an emissive triangle: their share of the flux of
   /// lamps and sun as well, but 0.2 to 0.8 where there are others. sun: luminance of its irradiance.
   [[nodiscard]] double emitter_share(double sun) const;
@@ -77,10 +73,7 @@ class SurfaceData {
   gl::Object words_;
   std::shared_ptr<gl::Object> atlas_;
   const surface::Scene* scene_ = nullptr;
-  glm::uvec4 tables_{0U};
-  glm::uvec4 lights_{0U};
-  glm::uvec4 emitters_{0U};
-  glm::uvec4 ggx_albedo_{0U};
+  core::CmSurfaceTables tables_{};
   double emitted_flux_ = 0.0;
   double lamp_flux_ = 0.0;
   double cross_section_ = 0.0;

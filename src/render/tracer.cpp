@@ -49,9 +49,21 @@ std::size_t far_step(std::size_t n) {
 // While there is nothing to do but to wait for the device: no call into GL waits.
 void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 
+// Surfaces may be others than when a picture was begun: poses and the host's depth change.
 void describe(const Surfaces& surfaces, core::CmParameters& parameters) {
-  parameters.surface = {surfaces.depth != 0 ? surfaces.layers : 0, surfaces.size, 0};
-  if (surfaces.scene != nullptr) surfaces.scene->describe(parameters);
+  parameters.host_depth = {surfaces.size, surfaces.depth != 0 ? surfaces.layers : 0};
+  if (surfaces.scene != nullptr) parameters.surfaces = surfaces.scene->tables();
+}
+
+core::CmParameters assemble(const PictureParameters& picture, const MarchData& data, const Surfaces& surfaces) {
+  core::CmParameters parameters{};
+  parameters.view = picture.view;
+  parameters.grid = data.grid();
+  parameters.medium = picture.medium;
+  parameters.lights = picture.lights;
+  parameters.integrator = picture.integrator;
+  describe(surfaces, parameters);
+  return parameters;
 }
 
 }  // namespace
@@ -59,21 +71,21 @@ void describe(const Surfaces& surfaces, core::CmParameters& parameters) {
 double Picture::progress() const {
   if (done_) return 1.0;
   if (view_ != View::shaded) return size_.y > 0 ? double(view_row_) / size_.y : 0.0;
-  const double wanted = double(parameters_.image.w) * size_.x * size_.y;
+  const double wanted = double(target_samples_) * size_.x * size_.y;
   return wanted > 0.0 ? static_cast<double>(samples()) / wanted : 0.0;
 }
 
 void Picture::extend(std::uint32_t samples) {
-  if (samples <= parameters_.image.w || view_ != View::shaded) return;
+  if (samples <= target_samples_ || view_ != View::shaded) return;
   // Lanes that are done for good begin again; so do the others' present samples, with the same result.
   if (done_ || tiles_ == glm::uvec2(1U)) {
     tile_ = 0;
     pass_target_ = tiles_ == glm::uvec2(1U)
                        ? samples
-                       : std::min(samples, parameters_.image.w + std::clamp(parameters_.image.w, 1U, longest_pass));
+                       : std::min(samples, target_samples_ + std::clamp(target_samples_, 1U, longest_pass));
     begin_tile();
   }
-  parameters_.image.w = samples;
+  target_samples_ = samples;
   done_ = false;
 }
 
@@ -105,13 +117,13 @@ void Picture::end_tile() {
   if (one_tile && empty <= rest) complete_ = true;
   holes_ = one_tile ? empty > 0 : hasty_ && pass_ < 2;
   // The last few of a hasty first pass are left to the next.
-  const bool first_pass = pass_target_ == 1 && parameters_.image.w > 1;
+  const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
   if (++tile_ == tiles_.x * tiles_.y) {
     tile_ = 0;
     complete_ = true;
     ++pass_;
-    const std::uint32_t target = parameters_.image.w;
+    const std::uint32_t target = target_samples_;
     if (pass_target_ >= target) {
       done_ = true;
     } else {
@@ -231,9 +243,9 @@ void Tracer::draw_layers(Picture& picture, const Surfaces& surfaces, const Pictu
   picture.layered_ = settings.layered;
 }
 
-void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters,
+void Tracer::begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
                    const Surfaces& surfaces, const PictureSettings& settings) {
-  const glm::uvec2 size(parameters.image);
+  const glm::uvec2 size = parameters.view.size;
   const bool shaded = settings.view == View::shaded;
   make_shared_objects();
   const glm::uvec2 tile = glm::min(size, glm::uvec2(tile_edge));
@@ -249,7 +261,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   picture.facts_.reset();
   // A preview's volume is lit by sun and sky alone, as its surfaces are, so that it comes at once; by what the scene
   // has where there is no other light.
-  const glm::vec3 distant = glm::vec3(parameters.sun_irradiance) + glm::vec3(parameters.sky_radiance);
+  const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
   const SurfaceData* met = shaded && !preview ? surfaces.met() : nullptr;
   picture.traced_ = met == nullptr ? 0 : (met->emitters() ? 2 : 1);
@@ -272,23 +284,22 @@ void Tracer::begin(Picture& picture, const MarchData& data, const core::CmParame
   } else {
     inspect_program(data, surfaces, "inspect.comp");
   }
-  picture.parameters_ = parameters;
-  data.describe(picture.parameters_);
-  describe(surfaces, picture.parameters_);
+  picture.parameters_ = assemble(parameters, data, surfaces);
+  picture.target_samples_ = samples;
   if (picture.layered_ != Layered::no) {
     const SurfaceLayers& layers = *picture.layers_;
-    picture.parameters_.layers = {layers.layers, layers.size,
-                                  (layers.blended ? 1U : 0U) | (picture.layered_ == Layered::within ? 2U : 0U)};
+    picture.parameters_.layers = {layers.layers, layers.blended ? 1U : 0U, layers.size,
+                                  picture.layered_ == Layered::within ? 1U : 0U};
   }
   picture.view_ = settings.view;
-  if (!shaded) picture.parameters_.march.y = static_cast<std::uint32_t>(settings.view);
+  if (!shaded) picture.parameters_.dispatch.view = static_cast<std::uint32_t>(settings.view);
   picture.tile_size_ = tile;
   picture.tiles_ = (size + tile - 1U) / tile;
   picture.tile_ = 0;
   picture.hasty_ = settings.hasty;
   picture.pass_ = 0;
   picture.holes_ = true;
-  picture.pass_target_ = picture.tiles_ == glm::uvec2(1U) ? picture.parameters_.image.w : 1U;
+  picture.pass_target_ = picture.tiles_ == glm::uvec2(1U) ? picture.target_samples_ : 1U;
   picture.samples_ = std::make_shared<std::uint64_t>(0);
   picture.view_row_ = 0;
   picture.complete_ = false;
@@ -470,9 +481,10 @@ void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, Dispatched wha
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
-  parameters.tile = {picture.tile_corner(), extent};
-  parameters.image.w = picture.pass_target_;
-  parameters.march.x = what.rounds;
+  parameters.dispatch.tile_corner = picture.tile_corner();
+  parameters.dispatch.tile_size = extent;
+  parameters.dispatch.rounds = what.rounds;
+  parameters.dispatch.samples = picture.pass_target_;
   // Blocks are dealt out far apart: a driver that gives each core a run of work groups then gives each its share of the
   // costly ones.
   const std::size_t count = what.blocks.size();
@@ -522,8 +534,8 @@ bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameter
     while (height < picture.size_.y && fits(2 * height)) height *= 2;
     if (!flights_.full() && (anyway || fits(height) || !program.cost->most(1.0))) {
       height = std::min(height, picture.size_.y - row);
-      p.tile = {0U, 0U, picture.size_};
-      p.order = {0U, 0U, row, row + height};
+      p.dispatch.tile_size = picture.size_;
+      p.dispatch.rows = {row, row + height};
       gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
       Dispatched what;
       what.slots = slots(height);
@@ -562,7 +574,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
   gl_->BindImageTexture(2, picture.volume_z_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
-  parameters.march.y = view_depth;
+  parameters.dispatch.view = view_depth;
   picture.depth_done_ = inspect(picture, parameters, program, picture.depth_row_, deadline);
   return picture.depth_done_;
 }
@@ -618,16 +630,16 @@ void Tracer::read_fact(Picture& picture, const MarchData& data, const Surfaces& 
   }
 }
 
-float Tracer::pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces,
+float Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,
                    glm::uvec2 pixel) {
   make_shared_objects();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
-  core::CmParameters p = parameters;
-  data.describe(p);
-  describe(surfaces, p);
-  p.march.y = view_depth;
-  p.tile = {pixel, 1U, 1U};
-  p.order = {0U, 1U, 0U, 1U};  // into the texture's one pixel
+  core::CmParameters p = assemble(parameters, data, surfaces);
+  p.dispatch.tile_corner = pixel;
+  p.dispatch.tile_size = glm::uvec2(1U);
+  p.dispatch.view = view_depth;
+  p.dispatch.picks = 1;
+  p.dispatch.rows = {0U, 1U};
   gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp").object.name());
   bind(data, surfaces);
   gl_->BindImageTexture(0, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
@@ -671,7 +683,7 @@ Totals Tracer::totals(const Picture& picture) const {
                        counts.data());
   gl::check(*gl_, "reading the sample counts back");
   Totals totals;
-  const double sky = luminance(glm::dvec3(picture.parameters_.sky_radiance));
+  const double sky = luminance(glm::dvec3(picture.parameters_.lights.sky_radiance));
   double error = 0.0;
   double brightness = 0.0;
   for (std::size_t i = 0; i < pixels; ++i) {

@@ -77,6 +77,8 @@ class Picture {
  public:
   [[nodiscard]] glm::uvec2 size() const { return size_; }
   [[nodiscard]] const core::CmParameters& parameters() const { return parameters_; }
+  /// That each pixel shall have.
+  [[nodiscard]] std::uint32_t target_samples() const { return target_samples_; }
   [[nodiscard]] View view() const { return view_; }
   /// Whether every pixel (nearly every one, of a hasty picture) has a sample.
   [[nodiscard]] bool complete() const { return complete_; }
@@ -106,6 +108,7 @@ class Picture {
  private:
   friend class Tracer;
   core::CmParameters parameters_{};
+  std::uint32_t target_samples_ = 1;
   View view_ = View::shaded;
   glm::uvec2 size_{0U};
   gl::Object sum_;
@@ -152,10 +155,9 @@ class Tracer {
  public:
   explicit Tracer(gl::FunctionsPtr gl) : gl_(gl), flights_(gl), rasters_(std::move(gl)) {}
 
-  /// Starts a picture anew. parameters: camera, medium, lights, image; box and march fields are filled from data.
-  /// Throws with the picture as it was, or not complete.
-  void begin(Picture& picture, const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces,
-             const PictureSettings& settings);
+  /// Starts a picture anew, of so many samples a pixel. Throws with the picture as it was, or not complete.
+  void begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
+             const Surfaces& surfaces, const PictureSettings& settings);
   /// Traces until about the deadline, and returns with dispatches under way: no call but those that read waits for
   /// them. No dispatch is sent that would likely end after the deadline, but for the first. The last picture begun or
   /// traced goes on; another loses the paths under way. until_complete: no further than every pixel's first sample, if
@@ -165,7 +167,7 @@ class Tracer {
   /// Finds the depth at half opacity until about the deadline; returns whether it is there.
   bool trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline);
   /// View depth z at half opacity of one pixel of a picture with these parameters; 0: not so opaque.
-  float pick(const MarchData& data, const core::CmParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
+  float pick(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
   /// A picture of one transparent pixel: what there is before the first.
   void clear(Picture& picture);
   /// Draws the surface pass for a picture, unless another picture has the same; begin does, and who shows one of

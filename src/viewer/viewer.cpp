@@ -11,7 +11,7 @@
 #include "base/milliseconds.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
-#include "render/luminance.hpp"
+#include "render/light_choice.hpp"
 #include "viewer/stopwatch.hpp"
 
 namespace cumulet::viewer {
@@ -466,49 +466,27 @@ grid::RefineCamera Viewer::refine_camera() const {
   return refine;
 }
 
-core::CmParameters Viewer::parameters() const {
+render::PictureParameters Viewer::parameters() const {
   const ViewFrame& view = *view_;
   const render::MarchSource& source = *gl_->data_source;
-  const glm::dmat4 to_cube = glm::inverse(source.cube.to_world);
-  const glm::dmat3 linear(to_cube);
-  const auto direction = [](const dvec3& v) { return glm::vec4(glm::vec3(v), 0.0F); };
-  core::CmParameters p{};
-  p.eye = glm::vec4(glm::vec3(to_cube * glm::dvec4(view.eye, 1.0)), 1.0F);
-  p.forward = direction(view.forward);
-  p.forward.w = view.orthographic ? 1.0F : 0.0F;
-  p.right = direction(view.right);
-  p.up = direction(view.up);
-  p.to_cube_x = direction(linear[0]);
-  p.to_cube_y = direction(linear[1]);
-  p.to_cube_z = direction(linear[2]);
-  const dvec3 sun = to_sun(light_);
-  const glm::dmat4& from_cube = source.cube.to_world;
-  p.from_cube_x = glm::vec4(glm::vec3(from_cube[0]), static_cast<float>(from_cube[3].x));
-  p.from_cube_y = glm::vec4(glm::vec3(from_cube[1]), static_cast<float>(from_cube[3].y));
-  p.from_cube_z = glm::vec4(glm::vec3(from_cube[2]), static_cast<float>(from_cube[3].z));
-  const bool traced = surfaces().traced;
-  p.lights.z = surface_settings_.light == SurfaceLight::full ? 1U : (traced ? 0U : 2U);
-  p.sun_world = direction(sun);
-  p.sun_cube = direction(linear * sun);
-  p.sky_radiance = glm::vec4(light_.sky_radiance, 0.0F);
-  p.albedo = glm::vec4(medium_.albedo, surface_settings_.indirect_roughness);
-  // Half of the sky's share of the light: its escaping paths sample it as well.
-  const auto sun_power = static_cast<float>(render::luminance(dvec3(light_.sun_irradiance)));
-  const double to_emitters = gl_->surfaces ? gl_->surfaces->emitter_share(sun_power) : 0.0;
-  p.sun_irradiance = glm::vec4(light_.sun_irradiance, static_cast<float>(to_emitters));
-  const auto sky_power =
-      4.0F * std::numbers::pi_v<float> * static_cast<float>(render::luminance(dvec3(light_.sky_radiance)));
-  const bool local = gl_->surfaces && traced && (gl_->surfaces->lamps() || gl_->surfaces->emitters());
-  const float to_sky = local && !(sun_power > 0.0F) ? (sky_power > 0.0F ? 0.25F : 0.0F)
-                       : sun_power > 0.0F           ? 0.5F * sky_power / (sky_power + sun_power)
-                                                    : (sky_power > 0.0F ? 1.0F : 0.0F);
-  p.medium = {static_cast<float>(std::min(1e30, medium_.density_scale * std::max(source.max_value, 1e-30F))),
-              medium_.anisotropy, to_sky, sun_power + sky_power > 0.0F || local ? 1.0F : 0.0F};
-  const bool glows = surface_settings_.light == SurfaceLight::full && medium_.emission != glm::vec3(0.0F);
-  const double unit = std::abs(glm::determinant(glm::dmat3(from_cube)));
-  p.emission = glm::vec4(medium_.emission, glows ? static_cast<float>(1.0 / (3.0 * unit)) : 0.0F);
-  p.image = {frame_size_, sampling_.seed, std::max(1U, sampling_.samples)};
-  p.march = {0U, medium_.max_bounces, 0U, 0U};
+  const bool full = surface_settings_.light == SurfaceLight::full;
+  render::PictureParameters p;
+  p.view.eye = glm::vec3(glm::inverse(source.cube.to_world) * glm::dvec4(view.eye, 1.0));
+  p.view.orthographic = view.orthographic ? 1U : 0U;
+  p.view.forward = glm::vec3(view.forward);
+  p.view.right = glm::vec3(view.right);
+  p.view.up = glm::vec3(view.up);
+  p.view.size = frame_size_;
+  p.medium.albedo = medium_.albedo;
+  p.medium.extinction = static_cast<float>(std::min(1e30, medium_.density_scale * std::max(source.max_value, 1e-30F)));
+  p.medium.source = medium_.emission;
+  p.medium.anisotropy = medium_.anisotropy;
+  p.lights = render::light_parameters({to_sun(light_), light_.sun_irradiance, light_.sky_radiance}, surfaces().met(),
+                                      gl_->data->grid(), full && medium_.emission != glm::vec3(0.0F));
+  p.integrator.seed = sampling_.seed;
+  p.integrator.max_bounces = medium_.max_bounces;
+  p.integrator.blurred_roughness = surface_settings_.indirect_roughness;
+  p.integrator.light_among_surfaces = full ? 1U : 0U;
   return p;
 }
 
@@ -676,14 +654,17 @@ void Viewer::trace(const Frame& frame, render::Deadline deadline) {
   if (g.host_depth.update(input)) ++surface_generation_;
   if (!g.data) return;
   render::PictureWish wish;
-  wish.parameters = parameters();
-  wish.view = sampling_.view;
-  wish.generation = generation_;
-  wish.surface_generation = surface_generation_;
-  wish.preview = sampling_.preview;
+  const render::Surfaces met = surfaces();
+  wish.content.parameters = parameters();
+  wish.content.view = sampling_.view;
+  wish.content.generation = generation_;
+  wish.content.surface_generation = surface_generation_;
+  wish.content.surfaces_traced = met.traced;
+  wish.content.preview = sampling_.preview;
+  wish.content.volume_alone = sampling_.volume_alone;
+  wish.samples = std::max(1U, sampling_.samples);
   wish.depth = frame.write_depth;
-  wish.volume_alone = sampling_.volume_alone;
-  g.progressive.advance(wish, *g.data, surfaces(), deadline, frame.budget_ms);
+  g.progressive.advance(wish, *g.data, met, deadline, frame.budget_ms);
 }
 
 void Viewer::make_target_textures(Gl& g, const Frame& frame) const {
@@ -740,7 +721,7 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
   display.tone_map = display_.tone_map;
   display.legend = legend;
   display.transparent = display_.transparent;
-  display.background = shown == &g.empty ? light_.sky_radiance : glm::vec3(shown->parameters().sky_radiance);
+  display.background = shown == &g.empty ? light_.sky_radiance : shown->parameters().lights.sky_radiance;
   display.encoding = frame.encoding;
   render::FrameTarget target;
   target.framebuffer = frame.framebuffer;
@@ -920,7 +901,7 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
     read_means(g, picture, rgba);
     totals_ = g.progressive.tracer().totals(picture);
     if (display_.transparent || picture.view() != render::View::shaded) return;
-    const glm::vec3 sky(picture.parameters().sky_radiance);
+    const glm::vec3 sky = picture.parameters().lights.sky_radiance;
     for (std::size_t i = 0; i < pixels; ++i) {
       for (int c = 0; c < 3; ++c) rgba[4 * i + static_cast<std::size_t>(c)] += (1.0F - rgba[4 * i + 3]) * sky[c];
     }

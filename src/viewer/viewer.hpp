@@ -212,12 +212,10 @@ class Viewer {
     gl::ShareGroup group;
     gl::Limits limits;
     GlStrings strings;
-    bool knows_dispatches = false;
     render::Progressive progressive;
     render::Compositor compositor;
     render::Reserve reserve;
     render::HostDepth host_depth;
-    std::optional<render::MarchData> data;
     std::shared_ptr<const render::MarchSource> data_source;    // what data is of
     std::shared_ptr<const render::MarchSource> upload_source;  // what upload is of, or what failed to be uploaded
     std::unique_ptr<render::MarchUpload> upload;
@@ -228,11 +226,13 @@ class Viewer {
     SurfacePtr surfaces_source;  // what surfaces is of, or what failed to be uploaded
     std::uint64_t surfaces_revision = 0;
     render::Picture empty;
+    std::optional<render::MarchData> data;
     std::uint64_t alone_failed = 0;  // settings at which the surfaces beneath it could not be drawn
     gl::Object colour;               // the texture target
     gl::Object depth;
     glm::uvec2 texture_size{0U};
     GLenum texture_format = 0;
+    bool knows_dispatches = false;
     // What could not be made, and at which settings.
     std::uint64_t upload_revision = 0;
     glm::uvec2 failed_size{0U};
@@ -250,7 +250,7 @@ class Viewer {
   void request_build();
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
-  [[nodiscard]] core::CmParameters parameters() const;
+  [[nodiscard]] render::PictureParameters parameters() const;
   void prepare(const Frame& frame, render::Deadline deadline);
   void trace(const Frame& frame, render::Deadline deadline);
   // Whether there is a target of any size.

@@ -1,15 +1,13 @@
 #pragma once
 
 #include <array>
-#include <fstream>
 #include <span>
-#include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "gl/objects.hpp"
 #include "headless.hpp"
+#include "support/gl_compute.hpp"
 #include "surface/bvh.hpp"
 
 namespace cumulet::test {
@@ -37,7 +35,7 @@ class GlRays {
   /// accept: the body of cm_hit_accept, "" for none. The context is current.
   GlRays(headless::Context& context, const std::string& accept)
       : gl_(gl::load_functions(headless::Context::get_proc, &context)) {
-    std::string text = "#version 450\nlayout(local_size_x = 64) in;\n" + file("shared.glsl") + R"(
+    std::string text = "#version 450\nlayout(local_size_x = 64) in;\n" + glsl_file("shared.glsl") + R"(
 layout(binding = 0) uniform usamplerBuffer nodes;
 layout(binding = 1) uniform usamplerBuffer triangles;
 struct Ray { vec4 from; vec4 along; };
@@ -50,7 +48,7 @@ uvec4 cm_bvh_triangle(uint texel) { return texelFetch(triangles, int(texel)); }
     if (!accept.empty()) {
       text += "#define CM_HIT_ACCEPT\nbool cm_hit_accept(uint triangle, vec2 barycentrics) { " + accept + " }\n";
     }
-    text += file("bvh.glsl") + R"(
+    text += glsl_file("bvh.glsl") + R"(
 void main() {
   uint i = gl_GlobalInvocationID.x;
   if (i >= rays.length()) return;
@@ -71,20 +69,7 @@ void main() {
   hits[8u * i + 6u] = uint(hit.front);
 }
 )";
-    const gl::Object shader(gl_, gl::Object::Kind::shader, gl_->CreateShader(GL_COMPUTE_SHADER));
-    program_ = gl::Object(gl_, gl::Object::Kind::program, gl_->CreateProgram());
-    const char* pointer = text.c_str();
-    gl_->ShaderSource(shader.name(), 1, &pointer, nullptr);
-    gl_->CompileShader(shader.name());
-    gl_->AttachShader(program_.name(), shader.name());
-    gl_->LinkProgram(program_.name());
-    GLint linked = 0;
-    gl_->GetProgramiv(program_.name(), GL_LINK_STATUS, &linked);
-    if (linked == 0) {
-      std::array<char, 2048> log{};
-      gl_->GetShaderInfoLog(shader.name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
-      throw std::runtime_error(log.data());
-    }
+    program_ = compute_program(gl_, text);
   }
 
   /// What run() works on.
@@ -134,13 +119,6 @@ void main() {
   [[nodiscard]] std::string renderer() const { return gl::string_of(*gl_, GL_RENDERER); }
 
  private:
-  static std::string file(const std::string& name) {
-    std::ifstream in(std::string(CUMULET_GLSL_DIR) + "/" + name);
-    std::ostringstream text;
-    text << in.rdbuf();
-    return text.str();
-  }
-
   gl::FunctionsPtr gl_;
   gl::Object program_;
 };
