@@ -210,35 +210,15 @@ cumulet_status cumulet_rebuild(cumulet_viewer* viewer) {
 // ---- settings ----
 
 cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_grid_desc d = read_settings(desc);
-    core::GridSettings s;
-    s.build.march = static_cast<render::March>(d.march);
-    cumulet::grid::RefineSettings& refine = s.build.refine;
-    refine.cells =
-        d.cells == CUMULET_CELLS_LINEAR ? cumulet::grid::CellKind::linear : cumulet::grid::CellKind::constant;
-    const bool deviation = d.criterion == CUMULET_CRITERION_DEVIATION;
-    refine.criterion = deviation ? cumulet::grid::Criterion::deviation : cumulet::grid::Criterion::range_mean;
-    refine.threshold = d.threshold != 0.0 ? d.threshold : cumulet::settings::default_threshold(d.criterion);
-    refine.max_cells = d.max_cells;
-    refine.pixel_size = d.pixel_size;
-    s.camera_adaptive = d.camera_adaptive == 1;
-    v.set_grid(s);
-  });
+  return guarded(viewer, [&](core::Viewer& v) { v.set_grid(core::GridSettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_medium_desc d = read_settings(desc);
-    v.set_medium({d.density_scale, 1.0F - to_vec3(d.coalbedo), d.anisotropy, d.max_bounces, to_vec3(d.emission)});
-  });
+  return guarded(viewer, [&](core::Viewer& v) { v.set_medium(core::Medium::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_light_desc d = read_settings(desc);
-    v.set_light({d.sun_azimuth_degrees, d.sun_elevation_degrees, to_vec3(d.sun_irradiance), to_vec3(d.sky_radiance)});
-  });
+  return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path) {
@@ -264,11 +244,8 @@ cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** o
 }
 
 cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer, const cumulet_surface_settings_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_surface_settings_desc d = read_settings(desc);
-    v.set_surface_settings(
-        {{d.time, d.animation, d.double_sided == 1}, static_cast<core::SurfaceLight>(d.light), d.indirect_roughness});
-  });
+  return guarded(viewer,
+                 [&](core::Viewer& v) { v.set_surface_settings(core::SurfaceSettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_use_surface_camera(cumulet_viewer* viewer, uint32_t index) {
@@ -276,19 +253,11 @@ cumulet_status cumulet_use_surface_camera(cumulet_viewer* viewer, uint32_t index
 }
 
 cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_sampling_desc d = read_settings(desc);
-    v.set_sampling(
-        {d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO, d.volume_alone == 1});
-  });
+  return guarded(viewer, [&](core::Viewer& v) { v.set_sampling(core::Sampling::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
-    const cumulet_display_desc d = read_settings(desc);
-    v.set_display(
-        {d.exposure_stops, static_cast<render::ToneMap>(d.tone_map), d.background == CUMULET_BACKGROUND_TRANSPARENT});
-  });
+  return guarded(viewer, [&](core::Viewer& v) { v.set_display(core::DisplaySettings::of(read_settings(desc))); });
 }
 
 // ---- camera and input ----

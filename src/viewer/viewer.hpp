@@ -20,45 +20,10 @@
 #include "viewer/builder.hpp"
 #include "viewer/camera.hpp"
 #include "viewer/navigation.hpp"
+#include "viewer/settings.hpp"
 #include "viewer/surface_builder.hpp"
 
 namespace cumulet::viewer {
-
-struct GridSettings {
-  BuildSettings build;  // refine.camera is filled from the viewer's
-  bool camera_adaptive = false;
-};
-
-struct Medium {
-  double density_scale = 1.0;
-  glm::vec3 albedo{1.0F};
-  float anisotropy = 0.0F;
-  std::uint32_t max_bounces = 0;
-  glm::vec3 emission{0.0F};
-};
-
-struct Light {
-  float sun_azimuth_degrees = 0.0F;
-  float sun_elevation_degrees = 0.0F;
-  glm::vec3 sun_irradiance{0.0F};
-  glm::vec3 sky_radiance{0.0F};
-};
-
-enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
-
-struct SurfaceSettings {
-  SurfaceChoice choice;
-  SurfaceLight light = SurfaceLight::full;
-  float indirect_roughness = 0.0F;
-};
-
-struct Sampling {
-  std::uint32_t samples = 256;
-  std::uint32_t seed = 0;
-  render::View view = render::View::shaded;
-  bool preview = true;
-  bool volume_alone = false;
-};
 
 /// cumulet_aov.
 enum class Aov {
@@ -69,12 +34,6 @@ enum class Aov {
   volume_depth = 4,
   normal = 5,
   albedo = 6
-};
-
-struct DisplaySettings {
-  float exposure_stops = 0.0F;
-  render::ToneMap tone_map = render::ToneMap::neutral;
-  bool transparent = false;
 };
 
 enum class Target { framebuffer = 0, texture = 1, none = 2 };

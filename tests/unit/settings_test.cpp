@@ -151,6 +151,28 @@ TEST(Settings, SceneFilesKeepEach) {
   EXPECT_EQ(without, (std::set<std::string>{"preview", "volume_alone"}));
 }
 
+TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
+  std::ifstream file(CUMULET_DOCS "/scene_file.md");
+  ASSERT_TRUE(file.is_open());
+  std::set<std::string> told;
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("| `", 0) != 0) continue;
+    std::istringstream parts(line.substr(2, line.find('|', 2) - 2));
+    for (std::string key; std::getline(parts, key, '`');)
+      if (key.find('.') != std::string::npos) told.insert(key);
+  }
+  std::set<std::string> keys = {
+      "volume.file",   "volume.grid",   "volume.up", "surfaces.file",       "surfaces.camera",
+      "camera.eye",    "camera.target", "camera.up", "camera.fovy_degrees", "camera.orthographic_height",
+      "picture.width", "picture.height"};
+  for_each_descriptor([&](auto part, auto) {
+    settings::for_each<std::decay_t<decltype(SceneOptions().*part)>>([&](const auto& setting) {
+      if (*setting.key != '\0') keys.insert(setting.key);
+    });
+  });
+  EXPECT_EQ(told, keys);
+}
+
 TEST(Settings, AFlagSetsEach) {
   std::set<std::string> flags;
   std::set<std::string> without;

@@ -1,0 +1,98 @@
+#pragma once
+
+// Settings as the viewer uses them, of descriptors that were checked (viewer/c_settings.hpp).
+
+#include <cumulet/cumulet.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <glm/gtc/type_ptr.hpp>
+
+#include "render/display.hpp"
+#include "render/tracer.hpp"
+#include "settings/settings.hpp"
+#include "viewer/builder.hpp"
+#include "viewer/surface_builder.hpp"
+
+namespace cumulet::viewer {
+
+struct GridSettings {
+  BuildSettings build;  // refine.camera is filled from the viewer's
+  bool camera_adaptive = false;
+
+  static GridSettings of(const cumulet_grid_desc& d) {
+    GridSettings s;
+    s.build.march = static_cast<render::March>(d.march);
+    grid::RefineSettings& refine = s.build.refine;
+    refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
+    const bool deviation = d.criterion == CUMULET_CRITERION_DEVIATION;
+    refine.criterion = deviation ? grid::Criterion::deviation : grid::Criterion::range_mean;
+    refine.threshold = d.threshold != 0.0 ? d.threshold : settings::default_threshold(d.criterion);
+    refine.max_cells = d.max_cells;
+    refine.pixel_size = d.pixel_size;
+    s.camera_adaptive = d.camera_adaptive == 1;
+    return s;
+  }
+};
+
+struct Medium {
+  double density_scale = 1.0;
+  glm::vec3 albedo{1.0F};
+  float anisotropy = 0.0F;
+  std::uint32_t max_bounces = 0;
+  glm::vec3 emission{0.0F};
+
+  static Medium of(const cumulet_medium_desc& d) {
+    return {d.density_scale, 1.0F - glm::make_vec3(d.coalbedo), d.anisotropy, d.max_bounces,
+            glm::make_vec3(d.emission)};
+  }
+};
+
+struct Light {
+  float sun_azimuth_degrees = 0.0F;
+  float sun_elevation_degrees = 0.0F;
+  glm::vec3 sun_irradiance{0.0F};
+  glm::vec3 sky_radiance{0.0F};
+
+  static Light of(const cumulet_light_desc& d) {
+    return {d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
+            glm::make_vec3(d.sky_radiance)};
+  }
+};
+
+enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
+
+struct SurfaceSettings {
+  SurfaceChoice choice;
+  SurfaceLight light = SurfaceLight::full;
+  float indirect_roughness = 0.0F;
+
+  static SurfaceSettings of(const cumulet_surface_settings_desc& d) {
+    return {{d.time, d.animation, d.double_sided == 1}, static_cast<SurfaceLight>(d.light), d.indirect_roughness};
+  }
+};
+
+struct Sampling {
+  std::uint32_t samples = 256;
+  std::uint32_t seed = 0;
+  render::View view = render::View::shaded;
+  bool preview = true;
+  bool volume_alone = false;
+
+  static Sampling of(const cumulet_sampling_desc& d) {
+    return {d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
+            d.volume_alone == 1};
+  }
+};
+
+struct DisplaySettings {
+  float exposure_stops = 0.0F;
+  render::ToneMap tone_map = render::ToneMap::neutral;
+  bool transparent = false;
+
+  static DisplaySettings of(const cumulet_display_desc& d) {
+    return {d.exposure_stops, static_cast<render::ToneMap>(d.tone_map), d.background == CUMULET_BACKGROUND_TRANSPARENT};
+  }
+};
+
+}  // namespace cumulet::viewer
