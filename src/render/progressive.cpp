@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "base/error.hpp"
+#include "base/milliseconds.hpp"
 
 namespace cumulet::render {
 
@@ -19,6 +20,9 @@ constexpr double nearly_all = 0.9;
 constexpr double most_layer_bytes = 256e6;
 // Frames that the first answer to a change may take.
 constexpr double answer_frames = 2.0;
+// What has not changed for so long rests; what a hand holds may be held still.
+constexpr double rest_ms = 100.0;
+constexpr double held_rest_ms = 300.0;
 using Clock = std::chrono::steady_clock;
 
 const surface::Scene* scene_met(const Surfaces& surfaces) {
@@ -81,7 +85,7 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
   const glm::uvec2 size = wish_.content.parameters.view.size;
   PictureSettings settings;
   if (surfaces.raster != nullptr && divisor > finest_) {
-    settings = quick_layers(tracer_, size, budget_ms, !answering_);
+    settings = quick_layers(tracer_, size, budget_ms, !answering_ || rests());
   } else if (surfaces.raster != nullptr && !surfaces.traced) {
     settings.layered = Layered::within;
     settings.layer_size = size;
@@ -92,6 +96,14 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
   settings.hasty = wish_.content.preview;
   settings.volume_alone = wish_.content.volume_alone && divisor == finest_;
   return settings;
+}
+
+bool Progressive::rests() const {
+  return let_go_ || milliseconds(Clock::now() - changed_) >= (wish_.held ? held_rest_ms : rest_ms);
+}
+
+bool Progressive::blurs() const {
+  return working_->layered() == Layered::beneath && working_->layers().size != wish_.content.parameters.view.size;
 }
 
 void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms) {
@@ -126,7 +138,10 @@ bool Progressive::needs_depth() const {
 
 void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
   const bool resized = wish.content.parameters.view.size != wish_.content.parameters.view.size;
-  if (!wished_ || wish.content != wish_.content) {
+  const bool changed = !wished_ || wish.content != wish_.content;
+  let_go_ = !wish.held && (wish_.held || (let_go_ && !changed));
+  if (changed) {
+    changed_ = Clock::now();
     stale_ = true;
     failed_ = false;
     if (resized || wish.content.generation != wish_.content.generation) finest_ = 1;
@@ -155,7 +170,7 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
     do {
       // The first answer to a change is finished, whatever changes meanwhile: else nothing would ever be shown.
       const bool answering = wish_.content.preview && answering_ && working_ != nullptr && !working_->complete();
-      if (working_ == nullptr || (stale_ && !answering)) {
+      if (working_ == nullptr || (stale_ && !answering) || (blurs() && rests())) {
         answering_ = true;
         first_divisor_ = coarsest(budget_ms);
         start(first_divisor_, data, surfaces, budget_ms);

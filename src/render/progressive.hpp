@@ -24,14 +24,16 @@ struct PictureWish {
   Content content;
   std::uint32_t samples = 1;  // a pixel
   bool depth = false;         // find the volume's depth at half opacity as well
+  bool held = false;          // a hand is at what changes it: another change is likely
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
 /// of a frame, then ones of twice the resolution, then the full one, which goes on to its target samples. Each coarse
 /// one is shown as soon as it is whole and goes on to a few samples a pixel, at most a quarter of what a sample a pixel
 /// of the full one takes: so it is worth looking at while the next, which takes longer, is made. As long as
-/// wishes change faster than a coarse picture takes, each is finished before the newest wish is taken up. All calls
-/// need the context current and a StateGuard around.
+/// wishes change faster than a coarse picture takes, each is finished before the newest wish is taken up. Once they
+/// rest, one over a coarse surface pass is given up for one over a pass of full size, which those after it share. All
+/// calls need the context current and a StateGuard around.
 class Progressive {
  public:
   /// Layers of the surface pass, and their size, for pictures that are to be there soon. At rest never coarser than the
@@ -78,6 +80,10 @@ class Progressive {
   [[nodiscard]] bool newest_is_shown() const { return wish_.content.preview || working_ == nullptr; }
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
   [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const;
+  // Whether no change of the wish is likely to come.
+  [[nodiscard]] bool rests() const;
+  // Whether working_ is over a coarser surface pass than what rests shall be.
+  [[nodiscard]] bool blurs() const;
   Picture& acquire(glm::uvec2 size);
   void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms);
   [[nodiscard]] bool needs_depth() const;
@@ -96,10 +102,12 @@ class Progressive {
   std::uint32_t finest_ = 1;         // finer ones do not fit the driver's memory
   PictureWish wish_;
   bool wished_ = false;
-  const surface::Scene* scene_ = nullptr;  // whose triangles paths of working_ meet
-  bool stale_ = false;                     // working_ is of an older wish
-  bool answering_ = false;                 // working_ is the first picture after a change
-  bool failed_ = false;                    // until the wish changes
+  std::chrono::steady_clock::time_point changed_;  // when the wish did, last
+  bool let_go_ = false;                            // by the hand that made the last change
+  const surface::Scene* scene_ = nullptr;          // whose triangles paths of working_ meet
+  bool stale_ = false;                             // working_ is of an older wish
+  bool answering_ = false;                         // working_ is the first picture after a change
+  bool failed_ = false;                            // until the wish changes
   double trace_seconds_ = 0.0;
   double answer_seconds_ = 0.0;  // that working_ took until it was complete
   double answer_rate_ = 100.0;   // pixels a millisecond, until complete

@@ -49,6 +49,8 @@ class Navigation {
   bool advance(double seconds, Camera& camera, const std::optional<Bounds>& bounds);
   /// Whether advance has anything to do: frames are needed though nothing else changes.
   [[nodiscard]] bool moving() const;
+  /// Whether a button is down that moves the camera with the pointer.
+  [[nodiscard]] bool dragging() const { return drag_ != Drag::none; }
 
  private:
   enum class Drag { none, orbit, pan, dolly, look };

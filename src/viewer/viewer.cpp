@@ -664,6 +664,7 @@ void Viewer::trace(const Frame& frame, render::Deadline deadline) {
   wish.content.volume_alone = sampling_.volume_alone;
   wish.samples = std::max(1U, sampling_.samples);
   wish.depth = frame.write_depth;
+  wish.held = navigation_.dragging();
   g.progressive.advance(wish, *g.data, met, deadline, frame.budget_ms);
 }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <glm/gtc/matrix_transform.hpp>
@@ -851,6 +852,52 @@ TEST_P(SurfaceRasters, PreviewsAreSharp) {
   tracer.draw_layers(fine, surfaces, settings);
   EXPECT_NE(&coarse.layers(), &fine.layers()) << "another pose";
   EXPECT_LE(tracer.bytes(), 2 * bytes) << "what no picture shows is used again";
+}
+
+// Whatever a drag leaves under way: once the hand lets go, nothing more is finished over a coarse pass, and all coarse
+// pictures share one of full size.
+TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
+  using namespace cumulet::render;
+  const auto scene = std::make_shared<HandScene>();
+  scene->add_matte(glm::vec3(0.5F));
+  scene->add_wall(-2.0F, 3.0F, 0);
+  set(scene);
+  const StateGuard guard(*gl_);
+  const glm::uvec2 size(1068U, 901U);
+  Surfaces surfaces;
+  surfaces.raster = raster_.get();
+  surfaces.view = straight({0, 0, 0}, 0.5);
+  PictureWish wish;
+  wish.content.parameters.view.size = size;
+  wish.samples = 4;
+  wish.held = true;
+  Progressive progressive(gl_);
+  const MarchData nothing;
+  const auto step = [&](bool moves) {
+    if (moves) {
+      surfaces.view.eye.x += 0.01;
+      wish.content.parameters.view.eye.x += 0.01F;
+    }
+    progressive.advance(wish, nothing, surfaces, std::chrono::steady_clock::now(), 0.1);
+  };
+  for (int i = 0; i < 200; ++i) step(i % 2 == 0);  // two calls a frame, as hosts may
+  ASSERT_NE(progressive.shown(), nullptr);
+  EXPECT_EQ(progressive.shown()->layers().size, (size + 1U) / 2U);
+  wish.held = false;
+  const SurfaceLayers* sharp = nullptr;
+  const auto* last = progressive.shown();
+  int shown = 0;
+  for (int i = 0; i < 5000 && shown < 3; ++i) {
+    step(false);
+    if (progressive.shown() == last) continue;
+    last = progressive.shown();
+    ++shown;
+    ASSERT_EQ(last->layered(), Layered::beneath);
+    EXPECT_EQ(last->layers().size, size) << "the " << shown << ". picture";
+    if (sharp == nullptr) sharp = &last->layers();
+    EXPECT_EQ(&last->layers(), sharp);
+  }
+  EXPECT_EQ(shown, 3);
 }
 
 TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
