@@ -449,7 +449,10 @@ void App::take() {
 }
 
 void App::accept(const Answer& answer) {
-  ++pictures_;
+  if (answer.drawn) {
+    ++pictures_;
+    drawn_ = answer.wish;
+  }
   answered_ = answer.wish;
   answer_waits_ = answer.waiting;
   answered_volume_ = answer.volume_edit;
@@ -542,7 +545,7 @@ void App::take_statistics(const std::vector<Event>& events) {
     if (event.time > 0.0) begun = std::min(begun, event.time);
   charts.frame_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - begun)));
 
-  if (changed_at_ && answered_ >= changed_number_)
+  if (changed_at_ && drawn_ >= changed_number_)
     charts.picture_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - *std::exchange(changed_at_, std::nullopt))));
 
   constexpr double rate_period = 0.5;

@@ -100,6 +100,7 @@ class App {
   bool suggest_next_ = false;
   bool pick_next_ = false;  // a file that was opened without a grid's name is there next
   std::uint64_t answered_ = 0;
+  std::uint64_t drawn_ = 0;  // the newest that a picture was drawn for
   // The oldest change that no picture has followed yet.
   std::optional<double> changed_at_;
   std::uint64_t changed_number_ = 0;

@@ -161,12 +161,11 @@ void Renderer::turn() {
     while (free == shown_ || free == ready_) ++free;
     poked_ = false;  // whatever it was about, this frame sees it
   }
-  const bool visible = wish_.width > 0 && wish_.height > 0;
-  if (visible)
-    draw(slots_[free], wish_.width, wish_.height);
-  else
-    session_->render(0);
-  publish(free, visible);
+  session_->work();
+  // What is under way is drawn once it is there, rather than the last picture once more.
+  const bool draws = wish_.width > 0 && wish_.height > 0 && session_->has_news();
+  if (draws) draw(slots_[free], wish_.width, wish_.height);
+  publish(free, draws);
 }
 
 // The slot is this thread's alone here.
@@ -193,7 +192,7 @@ void Renderer::draw(Slot& slot, std::uint32_t width, std::uint32_t height) {
   constexpr float dark = 0.075f;
   constexpr std::array<float, 4> nothing = {dark, dark * 1.08f, dark * 1.2f, 1.0f};
   gl.ClearNamedFramebufferfv(slot.framebuffer, GL_COLOR, 0, nothing.data());
-  session_->render(slot.framebuffer);
+  session_->draw(slot.framebuffer);
   GLsync done = gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.ClientWaitSync(done, GL_SYNC_FLUSH_COMMANDS_BIT, patience);
   gl.DeleteSync(done);
@@ -201,11 +200,13 @@ void Renderer::draw(Slot& slot, std::uint32_t width, std::uint32_t height) {
 
 void Renderer::publish(std::size_t slot, bool drawn) {
   Answer answer = session_->answer();
+  answer.drawn = drawn;
   {
     const std::lock_guard lock(mutex_);
     if (drawn) ready_ = slot;
     if (answer_) {  // not taken yet
       answer.camera_moved |= answer_->camera_moved;
+      answer.drawn |= answer_->drawn;
       if (!answer.density_scale) answer.density_scale = answer_->density_scale;
       answer_->notices.insert(answer_->notices.end(), answer.notices.begin(), answer.notices.end());
       answer.notices = std::move(answer_->notices);

@@ -217,20 +217,37 @@ void Session::follow_volume() {
   set_volume(*known_, shown_volume_);
 }
 
-void Session::render(unsigned framebuffer) {
+cumulet_frame_desc Session::frame() const {
   cumulet_frame_desc frame{};
   frame.struct_size = sizeof frame;
-  frame.budget_ms = wish_.paused ? -1.0 : wish_.budget_ms;
-  frame.framebuffer = framebuffer;
   frame.width = wish_.width;
   frame.height = wish_.height;
   frame.scale = wish_.scale;
-  // What moves is drawn once it is there, rather than the last picture once more on the way.
-  if (wish_.held && !wish_.paused) {
-    cumulet_frame_desc unseen = frame;
-    unseen.target = CUMULET_TARGET_NONE;
-    check(cumulet_render(viewer_.get(), &unseen, nullptr));
-  }
+  return frame;
+}
+
+bool Session::has_news() const {
+  const cumulet_frame_result& frame = status_.frame;
+  return frame.width == 0 || (frame.flags & CUMULET_RENDER_UNDRAWN) != 0 || drawn_width_ != wish_.width ||
+         drawn_height_ != wish_.height || !same(drawn_display_, scene_.display);
+}
+
+void Session::draw(unsigned framebuffer) {
+  cumulet_frame_desc frame = this->frame();
+  frame.budget_ms = -1.0;
+  frame.framebuffer = framebuffer;
+  status_.frame = {};
+  status_.frame.struct_size = sizeof status_.frame;
+  check(cumulet_render(viewer_.get(), &frame, &status_.frame));
+  drawn_width_ = wish_.width;
+  drawn_height_ = wish_.height;
+  drawn_display_ = scene_.display;
+}
+
+void Session::work() {
+  cumulet_frame_desc frame = this->frame();
+  frame.budget_ms = wish_.paused ? -1.0 : wish_.budget_ms;
+  frame.target = CUMULET_TARGET_NONE;
   status_.frame = {};
   status_.frame.struct_size = sizeof status_.frame;
   check(cumulet_render(viewer_.get(), &frame, &status_.frame));

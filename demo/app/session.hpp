@@ -61,6 +61,7 @@ struct Answer {
   std::uint64_t volume_edit = 0;
   std::uint64_t surfaces_edit = 0;
   // Since the last answer that was taken:
+  bool drawn = false;                   // there is another picture
   bool camera_moved = false;            // by whatever
   std::optional<double> density_scale;  // that suits the volume
   struct Notice {
@@ -93,9 +94,13 @@ class Session {
   void follow(const Wish& wish);
   void input(const ViewerInput& input);
   void execute(const Request& request);
-  /// One frame of the last wish into a framebuffer of the picture's size.
-  void render(unsigned framebuffer);
-  /// Whether render has anything left to do.
+  /// Works on the last wish for its budget.
+  void work();
+  /// Whether draw would draw anything but what it drew last.
+  [[nodiscard]] bool has_news() const;
+  /// Draws what there is into a framebuffer of the picture's size.
+  void draw(unsigned framebuffer);
+  /// Whether work has anything left to do.
   [[nodiscard]] bool more() const;
   /// Whether a file is read or a grid is built, whose progress is worth a look now and then.
   [[nodiscard]] bool busy() const { return status_.busy; }
@@ -132,6 +137,7 @@ class Session {
   void follow_surfaces();
   void remove_surfaces();
   void finish_surfaces();
+  [[nodiscard]] cumulet_frame_desc frame() const;
   // What the library says of those it shows.
   void read_surfaces();
   void finish_load();
@@ -155,6 +161,9 @@ class Session {
   std::optional<SceneOptions> known_;  // what the viewer was given last
   cumulet_navigation_desc navigation_{};
   cumulet_camera_desc seen_{};  // the viewer's camera
+  std::uint32_t drawn_width_ = 0;
+  std::uint32_t drawn_height_ = 0;
+  cumulet_display_desc drawn_display_{};
   VolumeChoice shown_volume_;
   std::string shown_surfaces_;
   bool waiting_for_surfaces_ = false;

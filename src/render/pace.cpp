@@ -72,6 +72,7 @@ void Reserve::learn(double budget_ms, double taken_ms) {
   constexpr double may_be_late = 0.05;
   constexpr double step = 0.2;
   constexpr double most_part = 0.5;
+  if (taken_ms > (1.0 + most_part) * budget_ms) return;
   const bool late = taken_ms > late_at * budget_ms;
   part_ = std::clamp(part_ + step * ((late ? 1.0 : 0.0) - may_be_late), 0.0, most_part);
 }

@@ -506,12 +506,13 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
   if (!volume_ && scene && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
-  last_view_ = view_;
   view_.reset();
   // Without a scene the camera may wait for its bounds.
   if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
     view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
+  if (frame.budget_ms < 0.0) return;
 
+  last_view_ = std::exchange(traced_view_, view_);
   if (grid_.camera_adaptive && view_ && volume_ && (view_ != built_view_ || frame_size_ != built_size_)) {
     const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
     if (rests) {
@@ -520,7 +521,6 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
       built_size_ = frame_size_;
     }
   }
-  if (frame.budget_ms < 0.0) return;
   upload_surfaces(g);
   upload(g, deadline);
   upload_raster(g);
@@ -780,15 +780,20 @@ FrameResult Viewer::render(const Frame& frame) {
     };
     // What drawing will take is the budget's, too.
     const auto begun = Clock::now();
-    const bool shares = g.functions->dispatches_in_call && g.compositor.drawn() && !gl::Fence(g.functions).passed();
-    const double keep = shares ? g.reserve.of(frame.budget_ms) : 0.0;
-    const double drawing = std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms);
+    const double keep = g.reserve.of(frame.budget_ms);
+    const double drawing =
+        frame.target == Target::none ? 0.0 : std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms);
     const render::Deadline deadline = deadline_after(frame.budget_ms - keep - drawing);
     attempt([&] { prepare(frame, deadline); });
     if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
     attempt([&] { draw_surfaces_alone(frame); });
     attempt([&] { draw(frame, result); });
-    if (shares && frame.budget_ms > 0.0) g.reserve.learn(frame.budget_ms, milliseconds(Clock::now() - begun));
+    if (const render::Picture* shown = g.progressive.shown()) {
+      const DrawnAs now{shown->revision(), shown->done(), shown->has_holes(), shown->volume_z()};
+      if (draws(frame)) g.drawn = g.compositor.lags() ? std::nullopt : std::optional(now);
+      result.undrawn = !draws(frame) && g.drawn != now;
+    }
+    if (frame.budget_ms > 0.0) g.reserve.learn(frame.budget_ms, milliseconds(Clock::now() - begun));
     result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
     const auto failed = [](const Worker::Status& status) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;

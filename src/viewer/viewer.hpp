@@ -62,6 +62,7 @@ struct FrameResult {
   bool loading = false;
   bool failed = false;
   bool preview = false;
+  bool undrawn = false;
   double progress = 0.0;
   glm::uvec2 size{0U};
   GLuint texture = 0;
@@ -164,6 +165,14 @@ class Viewer {
   void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
 
  private:
+  // All that drawing shows of a picture.
+  struct DrawnAs {
+    std::uint64_t revision = 0;
+    bool done = false;
+    bool holes = false;
+    GLuint volume_z = 0;
+    bool operator==(const DrawnAs&) const = default;
+  };
   // All that lives in one context.
   struct Gl {
     explicit Gl(gl::FunctionsPtr gl);
@@ -184,6 +193,7 @@ class Viewer {
     std::uint64_t raster_revision = 0;
     SurfacePtr surfaces_source;  // what surfaces is of, or what failed to be uploaded
     std::uint64_t surfaces_revision = 0;
+    std::optional<DrawnAs> drawn;  // last; nothing where that was older than what there was
     render::Picture empty;
     std::optional<render::MarchData> data;
     std::uint64_t alone_failed = 0;  // settings at which the surfaces beneath it could not be drawn
@@ -259,7 +269,8 @@ class Viewer {
   std::uint64_t surface_generation_ = 1;  // of the host's depth and the surfaces
   glm::uvec2 frame_size_{0U};             // of the last frame's picture
   std::optional<ViewFrame> view_;         // of the last frame
-  std::optional<ViewFrame> last_view_;    // of the frame before
+  std::optional<ViewFrame> traced_view_;  // of the last frame that traced
+  std::optional<ViewFrame> last_view_;    // of the one before it
   std::optional<ViewFrame> built_view_;   // camera-adaptive: what the grid was last asked for
   glm::uvec2 built_size_{0U};
   render::Totals totals_;

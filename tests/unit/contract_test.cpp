@@ -788,6 +788,22 @@ TEST_F(Contract, Contract19FlagsTellWhatIsToCome) {
   EXPECT_EQ(result.flags, unsigned{CUMULET_RENDER_CONVERGED});
   EXPECT_EQ(result.progress, 1.0);
   EXPECT_EQ(result.width, unsigned{side});
+  // What is made unseen is there to be drawn until it is.
+  auto unseen = frame;
+  unseen.target = CUMULET_TARGET_NONE;
+  ASSERT_EQ(cumulet_render(v_, &unseen, &result), CUMULET_OK);
+  EXPECT_EQ(result.flags, unsigned{CUMULET_RENDER_CONVERGED}) << "drawn already";
+  auto light = make_desc<cumulet_light_desc>();
+  light.sun_irradiance[0] = 3.0F;
+  light.sun_elevation_degrees = 30.0F;
+  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
+  EXPECT_EQ(converge(v_, unseen).flags, unsigned{CUMULET_RENDER_CONVERGED | CUMULET_RENDER_UNDRAWN});
+  auto drawing = frame;
+  drawing.budget_ms = -1.0;
+  ASSERT_EQ(cumulet_render(v_, &drawing, &result), CUMULET_OK);
+  EXPECT_EQ(result.flags, unsigned{CUMULET_RENDER_CONVERGED});
+  ASSERT_EQ(cumulet_render(v_, &unseen, &result), CUMULET_OK);
+  EXPECT_EQ(result.flags, unsigned{CUMULET_RENDER_CONVERGED});
   ASSERT_EQ(cumulet_load_volume(v_, "no such file.vdb", nullptr), CUMULET_OK);
   EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_FILE);
   ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);

@@ -842,7 +842,9 @@ enum {
   CUMULET_RENDER_CONVERGED = 2, /* every pixel has its samples, at full resolution, of the newest settings */
   CUMULET_RENDER_LOADING = 4,   /* the worker is busy: see cumulet_get_progress */
   CUMULET_RENDER_FAILED = 8,    /* the last load or build failed: see cumulet_get_progress */
-  CUMULET_RENDER_PREVIEW = 16   /* what is shown is coarser than the frame */
+  CUMULET_RENDER_PREVIEW = 16,  /* what is shown is coarser than the frame */
+  CUMULET_RENDER_UNDRAWN = 32 /* after a frame that draws nothing (CUMULET_TARGET_NONE): the newest picture is not what
+                                 was last drawn: without, drawing again is in vain unless the display changes */
 };
 
 typedef struct cumulet_frame_result {

@@ -97,7 +97,8 @@ enum class RenderFlags : std::uint32_t {
   converged = CUMULET_RENDER_CONVERGED,
   loading = CUMULET_RENDER_LOADING,
   failed = CUMULET_RENDER_FAILED,
-  preview = CUMULET_RENDER_PREVIEW
+  preview = CUMULET_RENDER_PREVIEW,
+  undrawn = CUMULET_RENDER_UNDRAWN
 };
 
 [[nodiscard]] constexpr Modifiers operator|(Modifiers a, Modifiers b) noexcept {
