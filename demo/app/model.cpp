@@ -95,14 +95,9 @@ void tell(Model& model, bool error, const std::string& text, double now) {
 }
 
 void spell_out_defaults(SceneOptions& scene) {
-  settings::spell_out_zeros(scene.grid);
-  if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
-  settings::spell_out_zeros(scene.medium);
-  settings::spell_out_zeros(scene.light);
+  for_each_group(scene, [](auto& group) { settings::spell_out_zeros(group); });
   settings::spell_out_zeros(scene.camera);
-  settings::spell_out_zeros(scene.surface);
-  settings::spell_out_zeros(scene.sampling);
-  settings::spell_out_zeros(scene.display);
+  if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
 }
 
 const char* stage_text(cumulet_stage stage) {

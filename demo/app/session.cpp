@@ -101,21 +101,17 @@ void Session::follow(const Wish& wish) {
     suggest_ = wish_.suggest;
   }
   if (load && !scene_.volume.empty()) known_->volume.clear();
-  cumulet_viewer* viewer = viewer_.get();
-  if (!same(known_->medium, scene_.medium)) check(cumulet_set_medium(viewer, &scene_.medium));
-  known_->medium = scene_.medium;
-  if (!same(known_->light, scene_.light)) check(cumulet_set_light(viewer, &scene_.light));
-  known_->light = scene_.light;
-  if (!same(known_->sampling, scene_.sampling)) check(cumulet_set_sampling(viewer, &scene_.sampling));
-  known_->sampling = scene_.sampling;
-  if (!same(known_->display, scene_.display)) check(cumulet_set_display(viewer, &scene_.display));
-  known_->display = scene_.display;
-  if (!(wish_.held && status_.busy)) {
-    if (!same(known_->grid, scene_.grid)) check(cumulet_set_grid(viewer, &scene_.grid));
-    known_->grid = scene_.grid;
-  }
+  const auto give = [this](auto group, auto set) {
+    if (!same((*known_).*group, scene_.*group)) check(set(viewer_.get(), &(scene_.*group)));
+    (*known_).*group = scene_.*group;
+  };
+  give(&SceneOptions::medium, cumulet_set_medium);
+  give(&SceneOptions::light, cumulet_set_light);
+  give(&SceneOptions::sampling, cumulet_set_sampling);
+  give(&SceneOptions::display, cumulet_set_display);
+  if (!(wish_.held && status_.busy)) give(&SceneOptions::grid, cumulet_set_grid);
   if (!same(known_->camera, scene_.camera)) set_camera();
-  if (!same(navigation_, wish_.navigation)) check(cumulet_set_navigation(viewer, &wish_.navigation));
+  if (!same(navigation_, wish_.navigation)) check(cumulet_set_navigation(viewer_.get(), &wish_.navigation));
   navigation_ = wish_.navigation;
   follow_surfaces();
   follow_volume();

@@ -240,18 +240,13 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   reader.choice("volume.up", up_names, scene.up);
   reader.text("surfaces.file", scene.surfaces);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
-  read_settings(reader, scene.surface);
   read_camera(reader, scene.camera);
   // Without a word, a file of this version means 1: there was no other way.
   scene.auto_density_scale = reader.word("medium.density_scale", "auto");
-  read_settings(reader, scene.medium);
   if (!reader.has("light")) scene.set_daylight();
-  read_settings(reader, scene.light);
-  read_settings(reader, scene.grid);
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
-  read_settings(reader, scene.sampling);
-  read_settings(reader, scene.display);
+  for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
   reader.finish();
 }
 
@@ -377,14 +372,9 @@ std::string portable_file(const std::string& file, const std::string& path) {
 }  // namespace
 
 SceneOptions::SceneOptions() {
-  grid.struct_size = sizeof grid;
-  medium.struct_size = sizeof medium;
-  light.struct_size = sizeof light;
+  for_each_group(*this, [](auto& group) { group.struct_size = sizeof group; });
   camera.struct_size = sizeof camera;
-  surface.struct_size = sizeof surface;
-  sampling.struct_size = sizeof sampling;
   sampling.samples = 64;
-  display.struct_size = sizeof display;
 }
 
 cumulet_volume_file_desc volume_file(const SceneOptions& scene) {

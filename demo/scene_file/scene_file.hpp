@@ -34,6 +34,17 @@ struct SceneOptions {
   void set_daylight();
 };
 
+/// Calls visit with each of a scene's groups of settings.
+template <class Scene, class Visit>
+void for_each_group(Scene& scene, Visit&& visit) {
+  visit(scene.surface);
+  visit(scene.medium);
+  visit(scene.light);
+  visit(scene.grid);
+  visit(scene.sampling);
+  visit(scene.display);
+}
+
 /// The scene's volume as the library takes it; the scene must outlive it.
 [[nodiscard]] cumulet_volume_file_desc volume_file(const SceneOptions& scene);
 
