@@ -47,6 +47,7 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
   model_.navigation.style = model_.preferences.style;
   if (!options_.replay.empty())
     player_.emplace(parse_replay(image::read_file(options_.replay), options_.replay), options_.replay);
+  if (!options_.trace.empty()) image::check_writable(options_.trace);
   if (!options_.record.empty()) recorder_.emplace(options_.record);
 
   const int width = options_.sized ? static_cast<int>(options_.scene.width) : model_.preferences.width;
@@ -59,7 +60,8 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
           nullptr) == 0)
     throw std::runtime_error("the OpenGL functions cannot be loaded");
   context_ = window_->make_shared_context();
-  renderer_ = std::make_unique<Renderer>(*gl_, context_.get(), Window::wake);
+  renderer_ =
+      std::make_unique<Renderer>(*gl_, context_.get(), Window::wake, options_.trace.empty() ? nullptr : &timeline_);
   // Sizes in the scene are for pictures: here the window has its own.
   model_.scene.width = 1280;
   model_.scene.height = 720;
@@ -81,6 +83,7 @@ void App::run() {
     frame();
   }
   remember();
+  if (!options_.trace.empty()) image::replace_file(options_.trace, timeline_.json());
 }
 
 double App::patience() const {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <timeline.hpp>
 #include <vector>
 
 #include "demo_options.hpp"
@@ -75,6 +76,7 @@ class App {
   std::unique_ptr<Window> window_;
   Window::Context context_;
   std::unique_ptr<GladGLContext> gl_;
+  Timeline timeline_;  // with --trace
   std::unique_ptr<Renderer> renderer_;
   std::optional<History> history_;
   std::optional<Player> player_;

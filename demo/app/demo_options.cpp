@@ -38,6 +38,10 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
       ->type_name("FILE")
       ->group(group);
   app.add_option("--record", options.record, "Record what is done, for --replay")->type_name("FILE")->group(group);
+  app.add_option("--trace", options.trace,
+                 "Write when frames, their passes and jobs ran, for chrome://tracing and Perfetto")
+      ->type_name("FILE.json")
+      ->group(group);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene);

@@ -14,8 +14,8 @@ constexpr GLuint64 patience = 10'000'000'000;            // nanoseconds for whic
 
 }  // namespace
 
-Renderer::Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake)
-    : window_gl_(&gl), context_(context), wake_(std::move(wake)) {
+Renderer::Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline)
+    : window_gl_(&gl), context_(context), wake_(std::move(wake)), timeline_(timeline) {
   std::promise<void> ready;
   auto started = ready.get_future();
   thread_ = std::thread([this, &ready] { work(ready); });
@@ -85,13 +85,16 @@ void Renderer::work(std::promise<void>& ready) {
             [](void* user, const char* name) { return reinterpret_cast<GLADapiproc>(Window::get_proc(user, name)); },
             nullptr) == 0)
       throw std::runtime_error("the OpenGL functions cannot be loaded");
-    auto session = std::make_unique<Session>(Window::get_proc, nullptr, [this] {
-      {
-        const std::lock_guard lock(mutex_);
-        poked_ = true;
-      }
-      changed_.notify_one();
-    });
+    auto session = std::make_unique<Session>(
+        Window::get_proc, nullptr,
+        [this] {
+          {
+            const std::lock_guard lock(mutex_);
+            poked_ = true;
+          }
+          changed_.notify_one();
+        },
+        timeline_);
     {
       const std::lock_guard lock(mutex_);
       session_ = std::move(session);

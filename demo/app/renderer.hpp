@@ -31,8 +31,9 @@ namespace cumulet::demo {
 class Renderer {
  public:
   /// gl: the window's. context shares objects with it, is current in no thread, and outlives the renderer. wake is
-  /// called from any thread when there is an answer to take. Throws std::runtime_error.
-  Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake);
+  /// called from any thread when there is an answer to take. timeline, or null: is told of the viewer's work. Throws
+  /// std::runtime_error.
+  Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
   /// Stops what is under way, soon.
@@ -70,6 +71,7 @@ class Renderer {
   const GladGLContext* window_gl_;
   GLFWwindow* context_;
   std::function<void()> wake_;
+  Timeline* timeline_;
 
   // The thread's own.
   std::unique_ptr<GladGLContext> gl_;

@@ -34,7 +34,7 @@ bool same_wish(const Wish& a, const Wish& b) {
   return rest(a) == rest(b) && same(a.navigation, b.navigation) && same_scene(a.scene, b.scene);
 }
 
-Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake)
+Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline)
     : shared_(std::make_unique<Shared>()) {
   shared_->wake = std::move(wake);
   cumulet_create_desc desc{};
@@ -45,6 +45,10 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
   desc.log_user = shared_.get();
   desc.update = on_update;
   desc.update_user = shared_.get();
+  if (timeline != nullptr) {
+    desc.trace = Timeline::add;
+    desc.trace_user = timeline;
+  }
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <timeline.hpp>
 #include <vector>
 
 #include "model.hpp"
@@ -85,7 +86,7 @@ struct Answer {
 class Session {
  public:
   /// wake is called from any thread when there is something new to draw. Throws std::runtime_error.
-  Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake);
+  Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session() = default;

@@ -16,6 +16,7 @@
 #include <program.hpp>
 #include <stdexcept>
 #include <string>
+#include <timeline.hpp>
 
 #include "aovs.hpp"
 #include "info.hpp"
@@ -29,6 +30,7 @@ using cumulet::demo::one_line;
 using cumulet::demo::OutputFormat;
 using cumulet::demo::Progress;
 using cumulet::demo::RenderOptions;
+using cumulet::demo::Timeline;
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
 using Json = nlohmann::ordered_json;
@@ -64,13 +66,17 @@ struct DestroyViewer {
 };
 using Viewer = std::unique_ptr<cumulet_viewer, DestroyViewer>;
 
-Viewer create_viewer(Context& context, Progress& progress) {
+Viewer create_viewer(Context& context, Progress& progress, Timeline* timeline) {
   cumulet_create_desc desc{};
   desc.struct_size = sizeof desc;
   desc.get_proc = Context::get_proc;
   desc.get_proc_user = &context;
   desc.log = print_log;
   desc.log_user = &progress;
+  if (timeline != nullptr) {
+    desc.trace = Timeline::add;
+    desc.trace_user = timeline;
+  }
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK)
@@ -253,12 +259,14 @@ void render(const RenderOptions& options) {
   // Hours of samples should not end at a folder that is not there.
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
+  if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
   catch_signals();
 
   Progress progress;
   progress.stage("loading " + (options.scene.volume.empty() ? options.scene.surfaces : options.scene.volume));
   Context context = Context::create(backend_of(options.backend));
-  const Viewer viewer = create_viewer(context, progress);
+  Timeline timeline;
+  const Viewer viewer = create_viewer(context, progress, options.trace.empty() ? nullptr : &timeline);
   check_memory(viewer, options);
   const auto& scene = options.scene;
   cumulet_sampling_desc sampling = scene.sampling;
@@ -305,6 +313,7 @@ void render(const RenderOptions& options) {
   write_picture(viewer, options);
   const cumulet_stats stats = stats_of(viewer);
   if (!options.stats.empty()) write_stats(options, stats, context.name());
+  if (!options.trace.empty()) cumulet::image::replace_file(options.trace, timeline.json());
   if (!complete) {
     std::array<char, 128> text{};
     std::snprintf(text.data(), text.size(), "%llu of %.0f samples", static_cast<unsigned long long>(stats.samples),

@@ -471,6 +471,13 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.stats = text;
       },
       "What was built and how long it took, in SI units");
+  add(
+      app, group, "--trace", "FILE.json",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        options.trace = text;
+      },
+      "When frames, their passes and the workers' jobs ran, for chrome://tracing and Perfetto");
   add_choice(app, group, "--backend",
              std::array{Name{"auto", BackendChoice::automatic}, Name{"egl", BackendChoice::egl},
                         Name{"osmesa", BackendChoice::osmesa}},
@@ -488,6 +495,9 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--aovs needs the shaded view");
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
+  if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
+  if (!options.trace.empty() && options.trace == options.stats)
+    throw UsageError("--trace and --stats are the same file");
   return options;
 }
 

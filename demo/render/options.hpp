@@ -35,6 +35,7 @@ struct RenderOptions {
   std::string output;  // not empty, unless info
   OutputFormat format = OutputFormat::png;
   std::string stats;              // empty: none
+  std::string trace;              // likewise
   bool info = false;              // tell what is in the files, render nothing
   bool json = false;              // as JSON
   std::vector<cumulet_aov> aovs;  // layers of an .exr beside the picture

@@ -22,6 +22,7 @@ Object make_texture(const FunctionsPtr& gl, GLenum target) {
 }
 
 Object finish_texture(const FunctionsPtr& gl, Object texture, const char* what) {
+  label(*gl, Object::Kind::texture, texture.name(), what);
   // No mipmaps and no filter: complete for texelFetch on every driver, in integer formats too.
   gl->TextureParameteri(texture.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   gl->TextureParameteri(texture.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
@@ -53,6 +54,9 @@ Object make_program(const FunctionsPtr& gl, std::span<const Stage> stages, std::
   gl->GetProgramiv(program.name(), GL_LINK_STATUS, &linked);
   check(*gl, "building a shader program");
   if (linked != 0) {
+    std::string all = stages.back().name;
+    for (const std::string& define : defines) all += ", " + define;
+    label(*gl, Object::Kind::program, program.name(), all);
     for (const Object& shader : shaders) gl->DetachShader(program.name(), shader.name());
     return program;
   }
@@ -99,6 +103,17 @@ Object::~Object() {
       gl_->DeleteVertexArrays(1, &name_);
       break;
   }
+}
+
+void label(const Functions& gl, Object::Kind kind, GLuint name, std::string_view what) {
+  constexpr std::array<GLenum, 7> identifiers{GL_BUFFER,  GL_TEXTURE,     GL_SAMPLER,     GL_SHADER,
+                                              GL_PROGRAM, GL_FRAMEBUFFER, GL_VERTEX_ARRAY};
+  constexpr std::size_t longest = 255;  // that every driver takes
+  for (const std::string_view prefix : {"creating ", "the ", "a "}) {
+    if (what.starts_with(prefix)) what.remove_prefix(prefix.size());
+  }
+  const std::string text = ("cumulet: " + std::string(what)).substr(0, longest);
+  gl.ObjectLabel(identifiers.at(static_cast<std::size_t>(kind)), name, static_cast<GLsizei>(text.size()), text.c_str());
 }
 
 Fence::Fence(FunctionsPtr gl) : gl_(std::move(gl)), sync_(gl_->FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)) {
@@ -154,6 +169,7 @@ Object make_buffer(const FunctionsPtr& gl, std::size_t bytes, const void* data, 
   gl->CreateBuffers(1, &name);
   Object buffer(gl, Object::Kind::buffer, name);
   gl->NamedBufferStorage(name, static_cast<GLsizeiptr>(bytes), data, flags);
+  label(*gl, Object::Kind::buffer, name, what);
   check(*gl, what);
   return buffer;
 }
@@ -163,6 +179,7 @@ Object make_texture_buffer(const FunctionsPtr& gl, GLenum format, const Object& 
   gl->CreateTextures(GL_TEXTURE_BUFFER, 1, &name);
   Object texture(gl, Object::Kind::texture, name);
   gl->TextureBuffer(name, format, buffer.name());
+  label(*gl, Object::Kind::texture, name, what);
   check(*gl, what);
   return texture;
 }
@@ -184,6 +201,7 @@ Object make_texture_2d_multisample(const FunctionsPtr& gl, GLenum format, int sa
                                    const char* what) {
   Object texture = make_texture(gl, GL_TEXTURE_2D_MULTISAMPLE);
   gl->TextureStorage2DMultisample(texture.name(), samples, format, width, height, GL_TRUE);
+  label(*gl, Object::Kind::texture, texture.name(), what);
   check(*gl, what);
   return texture;
 }
@@ -209,6 +227,7 @@ Object make_framebuffer(const FunctionsPtr& gl) {
   GLuint name = 0;
   gl->CreateFramebuffers(1, &name);
   Object framebuffer(gl, Object::Kind::framebuffer, name);
+  label(*gl, Object::Kind::framebuffer, name, "framebuffer");
   check(*gl, "creating a framebuffer");
   return framebuffer;
 }
@@ -217,6 +236,7 @@ Object make_vertex_array(const FunctionsPtr& gl) {
   GLuint name = 0;
   gl->CreateVertexArrays(1, &name);
   Object vertex_array(gl, Object::Kind::vertex_array, name);
+  label(*gl, Object::Kind::vertex_array, name, "vertex array");
   check(*gl, "creating a vertex array");
   return vertex_array;
 }
@@ -227,6 +247,7 @@ Object make_sampler(const FunctionsPtr& gl) {
   Object sampler(gl, Object::Kind::sampler, name);
   gl->SamplerParameteri(name, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   gl->SamplerParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  label(*gl, Object::Kind::sampler, name, "sampler");
   check(*gl, "creating a sampler");
   return sampler;
 }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -42,6 +43,26 @@ class Object {
   std::shared_ptr<const Functions> gl_;
   Kind kind_ = Kind::buffer;
   GLuint name_ = 0;
+};
+
+/// Names an object for debuggers and drivers' output (KHR_debug, core since 4.3): after the step that makes it
+/// ("creating the sums": "cumulet: sums").
+void label(const Functions& gl, Object::Kind kind, GLuint name, std::string_view what);
+
+/// A pass, for the same: the commands between its beginning and its end are its. name: "cumulet: ..." by convention.
+class DebugGroup {
+ public:
+  DebugGroup(const Functions& gl, std::string_view name) : gl_(gl) {
+    gl_.PushDebugGroup(GL_DEBUG_SOURCE_THIRD_PARTY, 0, static_cast<GLsizei>(name.size()), name.data());
+  }
+  DebugGroup(const DebugGroup&) = delete;
+  DebugGroup& operator=(const DebugGroup&) = delete;
+  ~DebugGroup() {
+    if (!gl_.abandoned.load(std::memory_order_relaxed)) gl_.PopDebugGroup();
+  }
+
+ private:
+  const Functions& gl_;
 };
 
 /// A point in the stream of commands; deleted with the context current.

@@ -64,6 +64,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture) {
     program = gl::make_compute_program(gl_, "resolve.comp",
                                        std::array<std::string, 1>{picture.holes ? "CM_HOLES 1" : "CM_HOLES 0"});
   }
+  const gl::DebugGroup group(*gl_, "cumulet: resolve");
   const auto begun = Clock::now();
   Means* means = nullptr;
   try {

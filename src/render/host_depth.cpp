@@ -190,6 +190,7 @@ bool HostDepth::update(const HostDepthInput& input) {
     asked_.clear();
     return had;
   }
+  const gl::DebugGroup group(*gl_, "cumulet: host depth");
   const bool earlier = answered();
   if (input.unchanged && z_ && input.source == last_.source && input.viewport == last_.viewport &&
       input.target_size == last_.target_size && input.flip_y == last_.flip_y &&

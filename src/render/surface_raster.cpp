@@ -444,6 +444,7 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
 void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
                          SurfaceLayers& into) {
   const auto& gl = *gl_;
+  const gl::DebugGroup group(gl, "cumulet: surfaces");
   layers = std::clamp(layers, 1U, 8U);
   make_fixtures();
   make_targets(size, layers, into);

@@ -118,8 +118,9 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     std::function<void()> update;
     if (d.update != nullptr) update = [call = d.update, user = d.update_user] { call(user); };
     auto viewer = std::make_unique<cumulet_viewer>();
-    viewer->viewer = std::make_unique<core::Viewer>(cumulet::Log(log, d.log_user), std::move(update),
-                                                    d.gl_state == CUMULET_GL_STATE_RESTORE);
+    viewer->viewer =
+        std::make_unique<core::Viewer>(cumulet::Log(log, d.log_user), std::move(update),
+                                       d.gl_state == CUMULET_GL_STATE_RESTORE, cumulet::Trace(d.trace, d.trace_user));
     if (d.get_proc != nullptr) viewer->viewer->attach(d.get_proc, d.get_proc_user);
     *out = viewer.release();
   });

@@ -64,6 +64,7 @@ class TransientFramebuffer {
  public:
   TransientFramebuffer(const gl::Functions& gl, GLuint colour, GLuint depth) : gl_(&gl) {
     gl_->CreateFramebuffers(1, &name_);
+    gl::label(gl, gl::Object::Kind::framebuffer, name_, "framebuffer of the target");
     gl_->NamedFramebufferTexture(name_, GL_COLOR_ATTACHMENT0, colour, 0);
     if (depth != 0) gl_->NamedFramebufferTexture(name_, GL_DEPTH_ATTACHMENT, depth, 0);
     gl::check(gl, "making the target's framebuffer");
@@ -92,12 +93,15 @@ Viewer::Gl::Gl(gl::FunctionsPtr gl)
   gl::check(*functions, "reading the context's limits");
 }
 
-Viewer::Viewer(Log log, std::function<void()> update, bool restore_state)
+Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace)
     : log_(log),
+      trace_(trace),
       update_(std::move(update)),
       restore_state_(restore_state),
-      builder_(log, [this] { notify(); }),
-      surface_builder_(log, [this] { notify(); }) {
+      builder_(
+          log, [this] { notify(); }, trace),
+      surface_builder_(
+          log, [this] { notify(); }, trace) {
   set_camera(std::make_shared<Camera>());
 }
 
@@ -762,13 +766,16 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
 }
 
 FrameResult Viewer::render(const Frame& frame) {
+  const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
   std::optional<Error> failure;
   // Before anything new is seen, so that what comes later is told again.
   update_pending_ = false;
   with_gl([&](Gl& g) {
     // Each part does what it can: a failure is told once, after what there was has been drawn.
-    const auto attempt = [&](auto&& part) {
+    const auto attempt = [&](const char* name, auto&& part) {
+      const gl::DebugGroup group(*g.functions, name);
+      const Trace::Span span(trace_, name);
       try {
         part();
       } catch (const Error& error) {
@@ -784,10 +791,10 @@ FrameResult Viewer::render(const Frame& frame) {
     const double drawing =
         frame.target == Target::none ? 0.0 : std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms);
     const render::Deadline deadline = deadline_after(frame.budget_ms - keep - drawing);
-    attempt([&] { prepare(frame, deadline); });
-    if (frame.budget_ms >= 0.0) attempt([&] { trace(frame, deadline); });
-    attempt([&] { draw_surfaces_alone(frame); });
-    attempt([&] { draw(frame, result); });
+    attempt("cumulet: upload", [&] { prepare(frame, deadline); });
+    if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { trace(frame, deadline); });
+    attempt("cumulet: surfaces alone", [&] { draw_surfaces_alone(frame); });
+    attempt("cumulet: draw", [&] { draw(frame, result); });
     if (const render::Picture* shown = g.progressive.shown()) {
       const DrawnAs now{shown->revision(), shown->done(), shown->has_holes(), shown->volume_z()};
       if (draws(frame)) g.drawn = g.compositor.lags() ? std::nullopt : std::optional(now);

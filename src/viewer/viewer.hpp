@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/log.hpp"
+#include "base/trace.hpp"
 #include "gl/objects.hpp"
 #include "gl/share_group.hpp"
 #include "render/compositor.hpp"
@@ -101,7 +102,7 @@ class Viewer {
  public:
   using GetProc = void* (*)(void* user, const char* name);
   /// restore_state: [GL] calls leave the GL state as they found it.
-  Viewer(Log log, std::function<void()> update, bool restore_state);
+  Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace = {});
   ~Viewer();
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
@@ -242,6 +243,7 @@ class Viewer {
   void upload_raster(Gl& g);
 
   Log log_;
+  Trace trace_;
   std::function<void()> update_;
   std::atomic<bool> update_pending_ = false;
   std::atomic<double> upload_progress_ = 1.0;

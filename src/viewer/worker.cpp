@@ -96,7 +96,11 @@ void Worker::run() {
     progress->begin(job->stage);
     current_ = Current{progress, job->load, last_was_replaced_, false};
     lock.unlock();
-    std::optional<Error> failure = failure_of(*job, *progress);
+    std::optional<Error> failure;
+    {
+      const Trace::Span span(trace_, job->what);
+      failure = failure_of(*job, *progress);
+    }
     job.reset();
     lock.lock();
     last_was_replaced_ = current_->replaced;

@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/progress.hpp"
+#include "base/trace.hpp"
 
 namespace cumulet::viewer {
 
@@ -34,7 +35,7 @@ class Worker {
   };
 
   /// notify: called on the thread after a job ended.
-  explicit Worker(std::function<void()> notify) : notify_(std::move(notify)) {}
+  explicit Worker(std::function<void()> notify, Trace trace = {}) : notify_(std::move(notify)), trace_(trace) {}
   /// Cancels and waits.
   ~Worker();
   Worker(const Worker&) = delete;
@@ -71,6 +72,7 @@ class Worker {
   void run();
 
   std::function<void()> notify_;
+  Trace trace_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Job> next_;

@@ -8,6 +8,9 @@ here=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$fuzzer.corpus" "$fuzzer.found"
 "$seeds" "$fuzzer.seeds"
 export LSAN_OPTIONS=suppressions=$here/../leaks.supp:print_suppressions=0
-export ASAN_OPTIONS=detect_odr_violation=0:alloc_dealloc_mismatch=0:allocator_may_return_null=1
+# libFuzzer's option is about single inputs; what is lost would be told at the end again.
+leaks=1
+[[ " $* " != *" -detect_leaks=0 "* ]] || leaks=0
+export ASAN_OPTIONS=detect_leaks=$leaks:detect_odr_violation=0:alloc_dealloc_mismatch=0:allocator_may_return_null=1
 exec "$fuzzer" -max_total_time="${CUMULET_FUZZ_SECONDS:-60}" -timeout=20 -rss_limit_mb=4096 -print_final_stats=1 \
   -artifact_prefix="$fuzzer.found/" ${dictionary:+-dict="$dictionary"} "$@" "$fuzzer.corpus" "$fuzzer.seeds"

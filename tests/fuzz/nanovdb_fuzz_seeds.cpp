@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   const auto write = [&](const std::string& name, const auto& handle, nanovdb::io::Codec codec) {
     nanovdb::io::writeGrid((folder.path() / name).string(), handle, codec);
   };
-  auto grid = cumulet::test::seed_grid(0.0F);
+  auto grid = cumulet::test::seed_grid();
   write("plain.nvdb", nanovdb::openToNanoVDB(*grid), nanovdb::io::Codec::NONE);
   write("zip.nvdb", nanovdb::openToNanoVDB(*grid), nanovdb::io::Codec::ZIP);
   write("blosc.nvdb", nanovdb::openToNanoVDB(*grid), nanovdb::io::Codec::BLOSC);

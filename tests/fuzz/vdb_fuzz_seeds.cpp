@@ -12,15 +12,14 @@ int main(int argc, char** argv) {
     file.setCompression(compression);
     file.write(grids);
   };
-  const auto grid = cumulet::test::seed_grid(0.0F);
-  const auto fog = cumulet::test::seed_grid(0.125F);
-  auto half = cumulet::test::seed_grid(0.0F);
+  const auto grid = cumulet::test::seed_grid();
+  auto half = cumulet::test::seed_grid();
   half->setSaveFloatAsHalf(true);
   auto vectors = openvdb::Vec3SGrid::create();
   vectors->setName("velocity");
   vectors->fill(openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(5)), openvdb::Vec3f(1, 2, 3));
   write("plain.vdb", openvdb::io::COMPRESS_NONE, {grid});
-  write("mask.vdb", openvdb::io::COMPRESS_ACTIVE_MASK, {fog});
+  write("mask.vdb", openvdb::io::COMPRESS_ACTIVE_MASK, {grid});
   write("zip.vdb", openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK, {grid, vectors});
   write("blosc.vdb", openvdb::io::COMPRESS_BLOSC, {half});
   write("shared.vdb", openvdb::io::COMPRESS_NONE, {grid, grid->copyGrid()});

@@ -12,7 +12,12 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "cumulet/cumulet.hpp"
 #include "support/c_host.hpp"
@@ -437,6 +442,65 @@ TEST_F(Contract, Contract08ErrorsAreCleanAndTheDebugCallbackIsTheHosts) {
   EXPECT_EQ(function, reinterpret_cast<void*>(callback));
   EXPECT_EQ(fake_.calls("DebugMessageCallback") + fake_.calls("DebugMessageControl"), 0U);
   gl_.DebugMessageCallback(nullptr, nullptr);
+}
+
+TEST_F(Contract, ObjectsAndPassesHaveNames) {
+  const auto named = [&](GLenum kind, GLuint name) {
+    std::array<char, 300> text{};
+    gl_.GetObjectLabel(kind, name, static_cast<GLsizei>(text.size()), nullptr, text.data());
+    return std::string(text.data());
+  };
+  constexpr GLuint most = 300;
+  // The host's own have no names.
+  const auto unnamed = [&] {
+    std::array<int, 3> counts{};
+    for (GLuint name = 1; name < most; ++name) {
+      if (gl_.IsBuffer(name) != 0 && named(GL_BUFFER, name).empty()) ++counts[0];
+      if (gl_.IsTexture(name) != 0 && named(GL_TEXTURE, name).empty()) ++counts[1];
+      if (gl_.IsProgram(name) != 0 && named(GL_PROGRAM, name).empty()) ++counts[2];
+    }
+    return counts;
+  };
+  const auto before = unnamed();
+  picture_of(v_, volume_.get(), target_);
+  EXPECT_EQ(unnamed(), before);
+  std::set<std::string> names;
+  for (GLuint name = 1; name < most; ++name) {
+    if (gl_.IsProgram(name) != 0) names.insert(named(GL_PROGRAM, name));
+  }
+  EXPECT_TRUE(
+      std::ranges::any_of(names, [](const std::string& n) { return n.starts_with("cumulet: trace.comp, CM_"); }));
+  EXPECT_GT(fake_.calls("PushDebugGroup"), 0U);
+  EXPECT_EQ(fake_.calls("PushDebugGroup"), fake_.calls("PopDebugGroup"));
+}
+
+TEST_F(Contract, FramesPassesAndJobsAreToldAsTheyEnd) {
+  struct Told {
+    std::mutex mutex;
+    std::map<std::string, std::vector<std::pair<double, double>>> pieces;
+  } told;
+  auto desc = make_desc<cumulet_create_desc>();
+  desc.get_proc = FakeGl::get_proc;
+  desc.get_proc_user = &fake_;
+  desc.trace = [](void* user, const char* name, double begin, double end) {
+    auto& t = *static_cast<Told*>(user);
+    const std::scoped_lock lock(t.mutex);
+    t.pieces[name].emplace_back(begin, end);
+    EXPECT_EQ(cumulet_rebuild(nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  };
+  desc.trace_user = &told;
+  cumulet_viewer* raw = nullptr;
+  ASSERT_EQ(cumulet_create(&desc, &raw, nullptr, 0), CUMULET_OK);
+  ViewerPtr viewer(raw);
+  picture_of(viewer.get(), volume_.get(), target_);
+  viewer.reset();
+  for (const char* name : {"frame", "cumulet: upload", "cumulet: trace", "cumulet: draw", "building the grid"})
+    EXPECT_FALSE(told.pieces[name].empty()) << name;
+  // Passes lie in their frame.
+  const auto [begin, end] = told.pieces["cumulet: draw"].back();
+  EXPECT_LE(begin, end);
+  EXPECT_TRUE(
+      std::ranges::any_of(told.pieces["frame"], [&](const auto& f) { return f.first <= begin && end <= f.second; }));
 }
 
 TEST_F(Contract, Contract09TheTargetIsGivenWithEveryFrame) {

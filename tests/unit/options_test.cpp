@@ -5,9 +5,11 @@
 #include <clocale>
 #include <cstdint>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <timeline.hpp>
 #include <vector>
 
 #include "memory.hpp"
@@ -77,6 +79,7 @@ TEST(Options, DefaultsAreTheLibrarysOwn) {
   EXPECT_EQ(scene.display.exposure_stops, 0.0f);
   EXPECT_EQ(scene.display.tone_map, CUMULET_TONE_MAP_NEUTRAL);
   EXPECT_EQ(options.stats, "");
+  EXPECT_EQ(options.trace, "");
 }
 
 TEST(Options, EveryFlag) {
@@ -408,6 +411,7 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--exposure", "65"},
                                         {"--tone-map", "aces"},
                                         {"--stats", ""},
+                                        {"--trace", ""},
                                         {"--spp"},
                                         {"--volume", ""}};
   for (const Arguments& arguments : wrong) {
@@ -422,6 +426,8 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
   EXPECT_NE(usage_error(with({"stray"})).find("stray"), std::string::npos);
   EXPECT_NE(usage_error(with({"--json"})).find("--info"), std::string::npos);
   EXPECT_NE(usage_error(with({"--stats", "out.png"})), "");
+  EXPECT_NE(usage_error(with({"--trace", "out.png"})), "");
+  EXPECT_NE(usage_error(with({"--trace", "s.json", "--stats", "s.json"})), "");
 }
 
 TEST(Options, TheLastOfAFlagWins) {
@@ -493,6 +499,20 @@ TEST(Options, NumbersAreTheSameInEveryLocale) {
   EXPECT_EQ(parse_number("+2"), 2.0);
   for (const char* text : {"", "+", "+-2", " 1", "1 ", "0x10", "nan", "1e400", "--1", "1.5.2"})
     EXPECT_THROW(static_cast<void>(parse_number(text)), UsageError) << text;
+}
+
+TEST(Timeline, IsJsonThatChromeReads) {
+  cumulet::demo::Timeline timeline;
+  EXPECT_EQ(nlohmann::json::parse(timeline.json())["traceEvents"].size(), 0U);
+  cumulet::demo::Timeline::add(&timeline, "a \"name\"\xff", 2.0, 2.5);
+  cumulet::demo::Timeline::add(&timeline, "frame", 1.0, 3.0);
+  const auto events = nlohmann::json::parse(timeline.json())["traceEvents"];
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0]["ph"], "X");
+  EXPECT_EQ(events[0]["ts"], 2e6);
+  EXPECT_EQ(events[0]["dur"], 5e5);
+  EXPECT_EQ(events[1]["name"], "frame");
+  EXPECT_EQ(events[0]["tid"], events[1]["tid"]);
 }
 
 }  // namespace

@@ -55,8 +55,9 @@
  *     and the contents of the frame's own target. It never touches: queries, transform feedback, sync objects of the
  *     host, the debug callback and its filters, or any other object. Do not call it inside transform feedback,
  *     conditional rendering or a query of the host's. With CUMULET_GL_STATE_HOST_RESETS nothing is saved or restored:
- *     afterwards the state listed above is undefined. glGetError is clean after every call; errors that were pending
- *     before are dropped.
+ *     afterwards the state listed above is undefined. Objects get labels and passes are debug groups (KHR_debug), up to
+ *     two on top of the host's own. glGetError is clean after every call; errors that were pending before
+ *     are dropped.
  *
  * Ownership
  *     Handles belong to the caller that got them and end with the function named beside the type; what a handle refers
@@ -150,6 +151,15 @@ typedef void (*cumulet_log_fn)(void* user, cumulet_log_level level, const char* 
  */
 typedef void (*cumulet_update_fn)(void* user);
 
+/*
+ * A piece of work has ended, for a timeline: "frame" (cumulet_render), its passes ("cumulet: trace"), or a job of a
+ * worker
+ * ("building the grid", a file). From the thread that did it; begin and end are seconds of its steady clock
+ * (CLOCK_MONOTONIC); pieces of one thread lie in each other or apart. name lives until return. As for the update
+ * callback: do not call the library.
+ */
+typedef void (*cumulet_trace_fn)(void* user, const char* name, double begin, double end);
+
 typedef enum cumulet_gl_state {
   CUMULET_GL_STATE_RESTORE = 0,    /* [GL] calls leave the state as they found it */
   CUMULET_GL_STATE_HOST_RESETS = 1 /* they do not: the host sets all it needs afterwards (Qt's and GTK's do) */
@@ -164,6 +174,8 @@ typedef struct cumulet_create_desc {
   cumulet_update_fn update; /* NULL: none */
   void* update_user;
   cumulet_gl_state gl_state;
+  cumulet_trace_fn trace; /* NULL: none */
+  void* trace_user;
 } cumulet_create_desc;
 
 /*

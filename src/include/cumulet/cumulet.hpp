@@ -834,6 +834,8 @@ struct CreateDesc {
   std::function<void(LogLevel, std::string_view)> log{};
   std::function<void()> update{};
   GlState gl_state{};
+  /// name, begin and end in seconds: cumulet_trace_fn.
+  std::function<void(std::string_view, double, double)> trace{};
 };
 
 /// Move-only.
@@ -852,7 +854,8 @@ class Viewer {
   ~Viewer() = default;
 
   [[nodiscard]] static Result<Viewer> create(CreateDesc desc = {}) noexcept {
-    std::unique_ptr<Callbacks> callbacks(new (std::nothrow) Callbacks{std::move(desc.log), std::move(desc.update)});
+    std::unique_ptr<Callbacks> callbacks(
+        new (std::nothrow) Callbacks{std::move(desc.log), std::move(desc.update), std::move(desc.trace)});
     if (!callbacks) return detail::result(CUMULET_ERROR_OUT_OF_MEMORY).error();
     const cumulet_create_desc c{.struct_size = sizeof c,
                                 .get_proc = desc.get_proc.function(),
@@ -861,7 +864,9 @@ class Viewer {
                                 .log_user = callbacks.get(),
                                 .update = callbacks->update ? Callbacks::call_update : nullptr,
                                 .update_user = callbacks.get(),
-                                .gl_state = static_cast<cumulet_gl_state>(desc.gl_state)};
+                                .gl_state = static_cast<cumulet_gl_state>(desc.gl_state),
+                                .trace = callbacks->trace ? Callbacks::call_trace : nullptr,
+                                .trace_user = callbacks.get()};
     auto viewer = detail::made<Viewer>(
         [&](cumulet_viewer** out, char* error, std::size_t size) { return cumulet_create(&c, out, error, size); });
     if (viewer) viewer->callbacks_ = std::move(callbacks);
@@ -1030,11 +1035,15 @@ class Viewer {
   struct Callbacks {
     std::function<void(LogLevel, std::string_view)> log;
     std::function<void()> update;
+    std::function<void(std::string_view, double, double)> trace;
 
     static void call_log(void* user, cumulet_log_level level, const char* message) noexcept {
       static_cast<const Callbacks*>(user)->log(static_cast<LogLevel>(level), message);
     }
     static void call_update(void* user) noexcept { static_cast<const Callbacks*>(user)->update(); }
+    static void call_trace(void* user, const char* name, double begin, double end) noexcept {
+      static_cast<const Callbacks*>(user)->trace(name, begin, end);
+    }
   };
   struct Destroy {
     void operator()(cumulet_viewer* handle) const noexcept { cumulet_destroy(handle); }
