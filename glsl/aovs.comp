@@ -22,10 +22,11 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "march_voxel.glsl"
 #endif
 #if CM_SURFACES
+#define CM_BVH_SHARED_STACK 64u
 #include "bsdf.glsl"
 #include "surface.glsl"
 #endif
-#include "path.glsl"
+#include "ray.glsl"
 
 layout(rgba32f, binding = 0) uniform writeonly image2D cm_normal;     // and transmittance
 layout(rgba32ui, binding = 1) uniform writeonly uimage2D cm_albedo;   // and surface z: floats

@@ -3,7 +3,8 @@
 //   uvec4 cm_bvh_triangle(uint texel)   3 texels a triangle, in the order of the leaves
 // and, if it defines CM_HIT_ACCEPT before it includes this (alpha masks), for triangles flagged CM_TRIANGLE_ASK,
 //   bool cm_hit_accept(uint triangle, vec2 barycentrics)   false: the ray goes on as if nothing were there
-// Without CM_HIT_ACCEPT they are hit like any other.
+// Without CM_HIT_ACCEPT they are hit like any other. Nodes to come back to are kept in an array of each lane, or, where
+// the includer defines CM_BVH_SHARED_STACK as the size of its work groups, in shared memory: GPUs have few registers.
 //
 // d need not be unit: t counts in its lengths, and hits have t_min < t < t_max. Components of d may be 0. Nothing is hit
 // by a ray that starts beyond 1e12, or whose largest direction component is not in [1e-12, 1e12], or that is NaN.
@@ -46,6 +47,13 @@ CM_FN vec3 cm_bvh_turn(vec3 v, uint axis) {
   return axis == 2u ? v : (axis == 1u ? vec3(v.z, v.x, v.y) : vec3(v.y, v.z, v.x));
 }
 
+#ifdef CM_BVH_SHARED_STACK
+shared uint cm_bvh_stack[CM_BVH_STACK * CM_BVH_SHARED_STACK];
+#define CM_BVH_KEPT(i) cm_bvh_stack[uint(i) * CM_BVH_SHARED_STACK + gl_LocalInvocationIndex]
+#else
+#define CM_BVH_KEPT(i) stack[i]
+#endif
+
 // Where a ray is in a box, [near, far], on the safe side: Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013, with more
 // room, for the triangle's test rounds too. Without NaNs: a direction of 0 counts as 1e-37, its slab widened by slack.
 CM_FN vec2 cm_bvh_slabs(vec3 low, vec3 high, vec3 o, vec3 inverse, vec3 slack) {
@@ -80,7 +88,9 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
   float shear_x = turned.x * inverse_z;
   float shear_y = turned.y * inverse_z;
 
+#ifndef CM_BVH_SHARED_STACK
   uint stack[CM_BVH_STACK];
+#endif
   int top = 0;
   uint link = sound ? 0u : CM_BVH_NONE;
   while (link != CM_BVH_NONE) {
@@ -95,12 +105,12 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
       bool first = hit_0 && (!hit_1 || slabs_0.x <= slabs_1.x);
       link = first ? low_0.w : low_1.w;
       if (hit_0 && hit_1) {
-        stack[top] = first ? low_1.w : low_0.w;
+        CM_BVH_KEPT(top) = first ? low_1.w : low_0.w;
         ++top;
       }
       if (!hit_0 && !hit_1) {
         --top;
-        link = top >= 0 ? stack[max(top, 0)] : CM_BVH_NONE;
+        link = top >= 0 ? CM_BVH_KEPT(max(top, 0)) : CM_BVH_NONE;
       }
     }
     uint record = link & 0x1fffffffu;
@@ -147,7 +157,7 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
       }
     }
     --top;
-    link = top >= 0 && !(any && hit.triangle != CM_BVH_NONE) ? stack[max(top, 0)] : CM_BVH_NONE;
+    link = top >= 0 && !(any && hit.triangle != CM_BVH_NONE) ? CM_BVH_KEPT(max(top, 0)) : CM_BVH_NONE;
   }
   return hit.triangle != CM_BVH_NONE;
 }

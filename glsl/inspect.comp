@@ -17,10 +17,11 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "march_voxel.glsl"
 #endif
 #if CM_SURFACES
+#define CM_BVH_SHARED_STACK 64u
 #include "bsdf.glsl"
 #include "surface.glsl"
 #endif
-#include "path.glsl"
+#include "ray.glsl"
 
 layout(rgba32f, binding = 0) uniform writeonly image2D cm_sum;
 layout(rgba32ui, binding = 1) uniform writeonly uimage2D cm_counts;
@@ -143,46 +144,46 @@ void main() {
   if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
   uvec2 pixel = cm.dispatch.tile_corner + local;
   uint view = cm.dispatch.view;
-  CmPath p;
+  vec3 o;
   vec3 w;
-  float t_per_z = cm_camera_ray(pixel, vec2(0.5), p.o, w);
-  p.d = cm_to_cube(w);
-  p.steps = 0u;
+  float t_per_z = cm_camera_ray(pixel, vec2(0.5), o, w);
+  vec3 d = cm_to_cube(w);
+  uint steps = 0u;
   vec3 colour = vec3(0.02);
   float alpha = 0.0;
   float half_t = 0.0;
-  vec2 range = cm_box_range(p.o, p.d);
+  vec2 range = cm_box_range(o, d);
   float surface_t = t_per_z * cm_surface_z(pixel, vec2(0.5), 0u);
 #if CM_SURFACES
   CmHit triangle;
   cm_hit_camera = true;
-  bool solid = cm_bvh_closest(cm_from_cube_point(p.o), w, 0.0, surface_t, triangle);
+  bool solid = cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, triangle);
   if (solid) surface_t = triangle.t;
 #endif
   range.y = min(range.y, surface_t);
   bool hit = range.x < range.y;
   // Width of a pixel in cube space, over t where perspective.
-  float footprint = length(p.d) * 2.0 * length(cm.view.up) / float(cm.view.size.y);
+  float footprint = length(d) * 2.0 * length(cm.view.up) / float(cm.view.size.y);
   if (view == CM_VIEW_CELLS) {
     vec3 f = abs(cm_to_cube(cm.view.forward));
     uint axis = f.x >= f.y && f.x >= f.z ? 0u : (f.y >= f.z ? 1u : 2u);
     float middle = cm_pick(0.5 * (cm.grid.box_min + cm.grid.box_max), axis) + 0.217;  // off the lattice
-    float t = (middle - cm_pick(p.o, axis)) / cm_pick(p.d, axis);
+    float t = (middle - cm_pick(o, axis)) / cm_pick(d, axis);
     if (hit && t > range.x && t < range.y) {
-      colour = cm_show_cell(p.o + t * p.d, axis, footprint * (cm.view.orthographic != 0u ? 1.0 : t));
+      colour = cm_show_cell(o + t * d, axis, footprint * (cm.view.orthographic != 0u ? 1.0 : t));
       alpha = 1.0;
     }
   } else if (hit) {
     float used = 0.0;
     float t = range.x;
-    uvec3 cell = cm_march_enter(clamp(p.o + t * p.d, cm.grid.box_min, cm.grid.box_max));
-    vec3 inv_d = 1.0 / p.d;
+    uvec3 cell = cm_march_enter(clamp(o + t * d, cm.grid.box_min, cm.grid.box_max));
+    vec3 inv_d = 1.0 / d;
     vec3 lines = vec3(0.0);
     float clear = 1.0;
     for (int i = 0; i < 100000 && cell.x != CM_NONE && t < range.y && clear > 0.02; ++i) {
       float t_1, r_0, r_1;
       uvec3 next;
-      cm_march_step(cell, p.o, p.d, inv_d, t, t_1, r_0, r_1, next);
+      cm_march_step(cell, o, d, inv_d, t, t_1, r_0, r_1, next);
       float e_0 = cm.medium.extinction * r_0;
       float e_1 = cm.medium.extinction * r_1;
       float span = t_1 - t;
@@ -193,7 +194,7 @@ void main() {
         break;
       }
       if (view == CM_VIEW_WIREFRAME && (r_0 > 0.0 || r_1 > 0.0)) {
-        vec3 at = p.o + t * p.d;
+        vec3 at = o + t * d;
         CmFaces faces = cm_faces(cell, at);
         float size = max(footprint * (cm.view.orthographic != 0u ? 1.0 : t), 1e-20);
         // Edges of cells that are a few pixels wide would cover all.
@@ -204,11 +205,11 @@ void main() {
       used += depth;
       t = t_1;
       cell = next;
-      p.steps += 1u;
+      steps += 1u;
     }
     alpha = 1.0 - exp(-used);
     // Steps: each doubling is a tenth of the ramp, 1024 its end.
-    colour = view == CM_VIEW_STEPS ? cm_ramp(log2(1.0 + float(p.steps)) * 0.1) : vec3(alpha);
+    colour = view == CM_VIEW_STEPS ? cm_ramp(log2(1.0 + float(steps)) * 0.1) : vec3(alpha);
     if (view == CM_VIEW_WIREFRAME) colour = lines + clear * vec3(0.02) + 0.04 * alpha;
   }
   if (view == CM_VIEW_DEPTH) {
@@ -219,5 +220,5 @@ void main() {
     return;
   }
   imageStore(cm_sum, ivec2(pixel), vec4(colour, alpha));
-  imageStore(cm_counts, ivec2(pixel), uvec4(1u, p.steps, 0u, 0u));
+  imageStore(cm_counts, ivec2(pixel), uvec4(1u, steps, 0u, 0u));
 }

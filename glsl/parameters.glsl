@@ -66,12 +66,11 @@ CM_BLOCK(CmMedium) {
 CM_BLOCK(CmLights) {
   CM_ALIGN(16) vec3 sun_direction;  // world, unit, towards the sun
   uint any;                         // 1: there is light to look for
-  CM_ALIGN(16) vec3 sun_in_cube;    // the same in cube space, per unit of world distance
-  float sky_probability;            // that an estimate is to the sky; all other lights have the rest
   CM_ALIGN(16) vec3 sun_irradiance;
-  float emitter_probability;  // of estimates that are not to the sky: to emissive triangles
+  float sky_probability;  // that an estimate is to the sky; all other lights have the rest
   CM_ALIGN(16) vec3 sky_radiance;
-  float glow_probability;  // that a flight from a surface is aimed at the medium's own light
+  float emitter_probability;  // of estimates that are not to the sky: to emissive triangles
+  float glow_probability;     // that a flight from a surface is aimed at the medium's own light
   CM_EQUALITY(CmLights)
 };
 

@@ -17,16 +17,13 @@ float sky_probability(float sun, float sky, bool local) {
 
 }  // namespace
 
-core::CmLights light_parameters(const DistantLights& lights, const SurfaceData* surfaces, const core::CmGrid& grid,
-                                bool glow) {
+core::CmLights light_parameters(const DistantLights& lights, const SurfaceData* surfaces, bool glow) {
   const auto sun = static_cast<float>(luminance(glm::dvec3(lights.sun_irradiance)));
   const float sky = 4.0F * std::numbers::pi_v<float> * static_cast<float>(luminance(glm::dvec3(lights.sky_radiance)));
   const bool local = surfaces != nullptr && (surfaces->lamps() || surfaces->emitters());
-  const glm::dmat3 to_cube(grid.to_cube_x, grid.to_cube_y, grid.to_cube_z);
   core::CmLights p{};
   p.sun_direction = glm::vec3(lights.to_sun);
   p.any = sun + sky > 0.0F || local ? 1U : 0U;
-  p.sun_in_cube = glm::vec3(to_cube * lights.to_sun);
   p.sky_probability = sky_probability(sun, sky, local);
   p.sun_irradiance = lights.sun_irradiance;
   p.emitter_probability = surfaces != nullptr ? static_cast<float>(surfaces->emitter_share(sun)) : 0.0F;

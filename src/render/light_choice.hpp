@@ -15,8 +15,7 @@ struct DistantLights {
 };
 
 /// These, and with which probabilities next-event estimation looks for each kind of light there is. surfaces: those
-/// that paths meet, or null; grid: of the volume. glow: whether the medium's own light falls on surfaces.
-core::CmLights light_parameters(const DistantLights& lights, const SurfaceData* surfaces, const core::CmGrid& grid,
-                                bool glow);
+/// that paths meet, or null. glow: whether the medium's own light falls on surfaces.
+core::CmLights light_parameters(const DistantLights& lights, const SurfaceData* surfaces, bool glow);
 
 }  // namespace cumulet::render

@@ -190,7 +190,6 @@ class Tracer {
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  static constexpr std::size_t lane_bytes = std::size_t{9} * 16;  // the last of it with surfaces only
   /// What a surface pass was drawn of and for: the same of the same.
   struct LayersOf {
     std::shared_ptr<const void> content;

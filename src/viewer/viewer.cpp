@@ -486,7 +486,7 @@ render::PictureParameters Viewer::parameters() const {
   p.medium.source = medium_.emission;
   p.medium.anisotropy = medium_.anisotropy;
   p.lights = render::light_parameters({to_sun(light_), light_.sun_irradiance, light_.sky_radiance}, surfaces().met(),
-                                      gl_->data->grid(), full && medium_.emission != glm::vec3(0.0F));
+                                      full && medium_.emission != glm::vec3(0.0F));
   p.integrator.seed = sampling_.seed;
   p.integrator.max_bounces = medium_.max_bounces;
   p.integrator.blurred_roughness = surface_settings_.indirect_roughness;

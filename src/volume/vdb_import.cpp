@@ -1,5 +1,3 @@
-#include "volume/vdb_compression.hpp"
-
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>

@@ -265,7 +265,7 @@ TEST(Emitters, AnotherPoseHasAnotherTable) {
   const auto second = render::make_surface_source(*first, pose, nullptr);
   EXPECT_NEAR(first->emitted_flux, pi * 400.0 * 2.0, 1e-2);
   EXPECT_NEAR(second->emitted_flux, pi * 1200.0 * 2.0, 1e-2);
-  const float density = glm::uintBitsToFloat(second->words.at(second->emitters.x).w);
+  const float density = glm::uintBitsToFloat(second->words.at(second->tables.emitters).w);
   EXPECT_NEAR(density * 1200.0, 1.0, 1e-5);
 }
 

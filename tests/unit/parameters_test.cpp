@@ -52,7 +52,6 @@ const std::array fields{
     CM_FIELD(medium, anisotropy),
     CM_FIELD(lights, sun_direction),
     CM_FIELD(lights, any),
-    CM_FIELD(lights, sun_in_cube),
     CM_FIELD(lights, sky_probability),
     CM_FIELD(lights, sun_irradiance),
     CM_FIELD(lights, emitter_probability),

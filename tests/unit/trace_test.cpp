@@ -371,9 +371,9 @@ void expect_cpu_agrees(Tracer& cpu, const test::Picture& gpu, std::uint32_t samp
   for (std::uint32_t i = 0; i < gpu.pixels.size(); ++i) {
     typename Tracer::CmPath path{};
     cpu.cm.dispatch.samples = samples;
-    glm::vec4 sum(0.0F);
-    cpu.cm_run(path, {i % gpu.width, i / gpu.width}, 1000000, sum);
-    sum /= static_cast<float>(samples);
+    typename Tracer::CmPixel pixel{};
+    cpu.cm_run(path, pixel, {i % gpu.width, i / gpu.width}, 1000000);
+    glm::vec4 sum = pixel.sum / static_cast<float>(samples);
     sum += glm::vec4((1.0F - sum.w) * cpu.cm.lights.sky_radiance, 0.0F);
     same += glm::distance(sum, gpu.pixels[i]) < 2e-3F ? 1 : 0;
   }

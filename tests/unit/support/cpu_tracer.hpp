@@ -34,6 +34,9 @@ struct CpuTetLinear {
 #undef CM_PHASE_GLSL
 #undef CM_FRAME_GLSL
 #undef CM_MARCH_TET_GLSL
+#undef CM_RAY_GLSL
+#undef CM_PATH_STATE_GLSL
+#undef CM_PATH_VERTEX_GLSL
 #undef CM_PATH_GLSL
 
 struct CpuDense {

@@ -1,0 +1,51 @@
+// Camera rays, the box that holds all density, and optical depths within a cell. Shared by GLSL and C++; the includer
+// has
+//   cm   the parameters (glsl/parameters.glsl)
+#ifndef CM_RAY_GLSL
+#define CM_RAY_GLSL
+
+CM_FN vec3 cm_to_cube(vec3 v) { return cm.grid.to_cube_x * v.x + cm.grid.to_cube_y * v.y + cm.grid.to_cube_z * v.z; }
+
+// Where a ray is inside the box: t.x to t.y, empty if t.x > t.y.
+CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
+  float t_in = 0.0f;
+  float t_out = 3.0e38f;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (d[axis] != 0.0f) {
+      float a = (cm.grid.box_min[axis] - o[axis]) / d[axis];
+      float b = (cm.grid.box_max[axis] - o[axis]) / d[axis];
+      t_in = max(t_in, min(a, b));
+      t_out = min(t_out, max(a, b));
+    } else if (o[axis] < cm.grid.box_min[axis] || o[axis] > cm.grid.box_max[axis]) {
+      t_out = -1.0f;
+    }
+  }
+  return vec2(t_in, t_out);
+}
+
+// The ray through a point of a pixel: o in cube space, w a unit vector in world space. Returns the distance along it per
+// unit of view depth.
+CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3) w) {
+  float x = 2.0f * (float(pixel.x) + within.x) / float(cm.view.size.x) - 1.0f;
+  float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(cm.view.size.y);
+  vec3 aside = x * cm.view.right + y * cm.view.up;
+  vec3 v = cm.view.forward + (1.0f - float(cm.view.orthographic)) * aside;
+  o = cm.view.eye + float(cm.view.orthographic) * cm_to_cube(aside);
+  w = normalize(v);
+  return length(v);
+}
+
+// The optical depth of the first `way` of a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends.
+CM_FN float cm_depth_of(float e_0, float e_1, float span, float way) {
+  float part = clamp(way / max(span, 1e-30f), 0.0f, 1.0f);
+  return (e_0 + 0.5f * (e_1 - e_0) * part) * part * span;
+}
+
+// How far into a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends, this optical depth is used up:
+// e_0 s + (e_1 - e_0) s^2 / (2 span) = depth, in the form that loses nothing.
+CM_FN float cm_depth_distance(float e_0, float e_1, float span, float depth) {
+  float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * depth));
+  return min(span, 2.0f * depth / (e_0 + root));
+}
+
+#endif
