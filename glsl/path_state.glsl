@@ -18,8 +18,8 @@
 #define CM_IN_MEDIUM 1u
 #define CM_ON_TRIANGLE 2u
 
-// The one list of a path's fields: the struct, how it is loaded and stored (glsl/trace.comp) and its size
-// (src/render/tracer.cpp) are made of it.
+// The one list of a path's fields: the struct, how it is loaded and stored (glsl/trace.comp), by words, and
+// so its size.
 //   o               the ray's start, cube space
 //   d               its direction, cube space, per unit of world distance
 //   w               world direction of flight, kept during shadow rays

@@ -21,13 +21,9 @@ namespace cumulet::render {
 
 namespace {
 
-// The words of a path, by its list of fields.
-#define CM_COUNT_1(name) +1
-#define CM_COUNT_2(name) +2
-#define CM_COUNT_3(name) +3
-constexpr std::size_t lane_bytes =
-    4 * (0 CM_PATH_FIELDS(CM_COUNT_3, CM_COUNT_2, CM_COUNT_2, CM_COUNT_1, CM_COUNT_1)
-             CM_PATH_TRIANGLE_FIELDS(CM_COUNT_3, CM_COUNT_2, CM_COUNT_2, CM_COUNT_1, CM_COUNT_1));
+// All of its fields are words, and are stored as such.
+constexpr std::size_t lane_bytes = sizeof(core::CmPath);
+static_assert(alignof(core::CmPath) == 4);
 
 constexpr std::uint32_t tile_edge = 512;
 constexpr std::uint32_t block_width = 128;  // trace.comp's

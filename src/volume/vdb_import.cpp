@@ -1,3 +1,5 @@
+#include "volume/vdb_compression.hpp"
+
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>

@@ -1,0 +1,42 @@
+#pragma once
+
+// Before any other header of OpenVDB's: its trees read their values by what is specialised here.
+
+#include <openvdb/io/Compression.h>
+#include <openvdb/math/Vec3.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <istream>
+
+namespace cumulet::volume::detail {
+
+/// Reads bytes that OpenVDB compressed, or skips them if data is null. What the file says of their length is checked
+/// before it is believed: OpenVDB writes past its buffer where a damaged length is negative, and allocates whatever a
+/// positive one says. Throws std::runtime_error.
+void read_compressed(std::istream& in, char* data, std::size_t bytes, std::uint32_t compression);
+
+}  // namespace cumulet::volume::detail
+
+namespace openvdb {
+OPENVDB_USE_VERSION_NAMESPACE
+namespace OPENVDB_VERSION_NAME::io {
+
+// Defined once, in vdb_compression.cpp: linkers then prefer these to what other code makes of OpenVDB's template.
+#define CUMULET_READ_DATA(T)                                                                                  \
+  template <>                                                                                                 \
+  void readData<T>(std::istream & in, T * data, Index count, std::uint32_t compression, DelayedLoadMetadata*, \
+                   std::size_t);
+CUMULET_READ_DATA(math::half)
+CUMULET_READ_DATA(float)
+CUMULET_READ_DATA(double)
+CUMULET_READ_DATA(std::int32_t)
+CUMULET_READ_DATA(std::int64_t)
+CUMULET_READ_DATA(math::Vec3<math::half>)
+CUMULET_READ_DATA(math::Vec3<float>)
+CUMULET_READ_DATA(math::Vec3<double>)
+CUMULET_READ_DATA(math::Vec3<std::int32_t>)
+#undef CUMULET_READ_DATA
+
+}  // namespace OPENVDB_VERSION_NAME::io
+}  // namespace openvdb
