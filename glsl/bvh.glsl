@@ -5,6 +5,7 @@
 //   bool cm_hit_accept(uint triangle, vec2 barycentrics)   false: the ray goes on as if nothing were there
 // Without CM_HIT_ACCEPT they are hit like any other. Nodes to come back to are kept in an array of each lane, or, where
 // the includer defines CM_BVH_SHARED_STACK as the size of its work groups, in shared memory: GPUs have few registers.
+// Where it defines CM_BVH_LOW and CM_BVH_HIGH, a box around all triangles, rays that miss it never touch the tree.
 //
 // d need not be unit: t counts in its lengths, and hits have t_min < t < t_max. Components of d may be 0. Nothing is hit
 // by a ray that starts beyond 1e12, or whose largest direction component is not in [1e-12, 1e12], or that is NaN.
@@ -93,6 +94,10 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
 #endif
   int top = 0;
   uint link = sound ? 0u : CM_BVH_NONE;
+#ifdef CM_BVH_LOW
+  vec2 bounds = cm_bvh_slabs(CM_BVH_LOW, CM_BVH_HIGH, o, inverse, slack);
+  if (!(max(bounds.x, t_first) <= min(bounds.y, hit.t))) link = CM_BVH_NONE;
+#endif
   while (link != CM_BVH_NONE) {
     while (link < CM_BVH_LEAF) {
       uint texel = link * 4u;

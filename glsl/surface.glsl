@@ -174,6 +174,8 @@ bool cm_hit_accept(uint triangle, vec2 weights) {
 // Cameras see through the backs of single-sided materials; light does not.
 #define CM_HIT_ACCEPT
 #define CM_BVH_CULLS cm_hit_camera
+#define CM_BVH_LOW cm.surfaces.low
+#define CM_BVH_HIGH cm.surfaces.high
 #include "bvh.glsl"
 
 struct CmSurfacePoint {

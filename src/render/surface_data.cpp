@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <glm/ext/vector_ulp.hpp>
 #include <numbers>
 #include <numeric>
 #include <span>
@@ -171,6 +172,8 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   source.tables.ggx_albedo_averages = size_of(words);
   words.insert(words.end(), averages.begin(), averages.end());
   source.emitted_flux = table.flux;
+  source.tables.low = glm::prevFloat(vec3(source.pose.low));
+  source.tables.high = glm::nextFloat(vec3(source.pose.high));
   const double radius = 0.5 * glm::length(source.pose.high - source.pose.low);
   source.cross_section = std::numbers::pi * radius * radius;
   for (const surface::PunctualLight& light : source.pose.lights) {

@@ -57,6 +57,8 @@ const std::array fields{
     CM_FIELD(lights, emitter_probability),
     CM_FIELD(lights, sky_radiance),
     CM_FIELD(lights, glow_probability),
+    CM_FIELD(surfaces, low),
+    CM_FIELD(surfaces, high),
     CM_FIELD(surfaces, records),
     CM_FIELD(surfaces, triangles),
     CM_FIELD(surfaces, vertices),
