@@ -58,7 +58,7 @@ class Reader {
 
   /// Whether the key's value is this word; takes nothing else.
   bool word(const std::string& key, const char* word) {
-    const Json* value = find(key);
+    const Json* value = find(key).value;
     if (value == nullptr || !value->is_string() || value->get<std::string>() != word) return false;
     take(key);
     return true;
@@ -73,7 +73,7 @@ class Reader {
 
   template <class Names, class Value>
   void choice(const std::string& key, const Names& names, Value& out) {
-    if (find(key) == nullptr) return;
+    if (!has(key)) return;
     std::string chosen;
     text(key, chosen);
     for (const auto& name : names) {
@@ -113,24 +113,28 @@ class Reader {
     return true;
   }
 
-  [[nodiscard]] bool has(const std::string& key) { return find(key) != nullptr; }
+  [[nodiscard]] bool has(const std::string& key) { return find(key).value != nullptr; }
 
   [[noreturn]] void wrong(const std::string& key, const std::string& cause) const { fail(file_, key + ": " + cause); }
 
   void finish() const { refuse_rest(json_, ""); }
 
  private:
+  /// A value and the object that it is in; null where there is none.
+  struct Place {
+    Json* value = nullptr;
+    Json* object = nullptr;
+  };
+
   /// Remembers the objects on the way, which may be there, be it empty.
-  Json* find(const std::string& key) {
+  Place find(const std::string& key) {
     Json* at = &json_;
     for (std::size_t begin = 0;;) {
       const std::size_t end = key.find('.', begin);
       const auto found = at->find(key.substr(begin, end - begin));
-      if (found == at->end()) {
-        return nullptr;
-      }
+      if (found == at->end()) return {};
+      if (end == std::string::npos) return {&*found, at};
       at = &*found;
-      if (end == std::string::npos) return at;
       const std::string section = key.substr(0, end);
       if (!at->is_object()) fail(file_, section + " is not an object");
       sections_.insert(section);
@@ -139,12 +143,10 @@ class Reader {
   }
 
   std::optional<Json> take(const std::string& key) {
-    Json* value = find(key);
-    if (value == nullptr) return std::nullopt;
-    Json taken = std::move(*value);
-    const std::size_t dot = key.rfind('.');
-    Json& parent = dot == std::string::npos ? json_ : *find(key.substr(0, dot));
-    parent.erase(key.substr(dot + 1));
+    const Place place = find(key);
+    if (place.value == nullptr) return std::nullopt;
+    Json taken = std::move(*place.value);
+    place.object->erase(key.substr(key.rfind('.') + 1));
     return taken;
   }
 
