@@ -60,6 +60,8 @@ class Compositor {
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
   /// Milliseconds that the next call of draw will take, as far as is known.
   [[nodiscard]] double expected_ms() const;
+  /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
+  [[nodiscard]] bool drawn() const { return newest_ == nullptr || newest_->drawn.passed(); }
   /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
   /// that the device has not come to: to be drawn again.
   [[nodiscard]] bool lags() const { return lags_; }

@@ -34,8 +34,9 @@ class RoundCost {
   double last_ratio_ = 0.0;  // of the last dispatch, what it took at least to what was thought to be most
 };
 
-/// The part of a budget that is kept back, so that nineteen of twenty calls end within it, nearly: what the system
-/// gives to others is not known before. Follows that quantile by stochastic approximation (Robbins and Monro 1951).
+/// The part of a budget that is kept back while the host's own work shares the cores with ours, so that nineteen of
+/// twenty calls end within it, nearly: what the system gives to which is not known before. Follows that quantile by
+/// stochastic approximation (Robbins and Monro 1951).
 /// Calls that are later than any reserve could make good teach nothing.
 class Reserve {
  public:

@@ -787,7 +787,8 @@ FrameResult Viewer::render(const Frame& frame) {
     };
     // What drawing will take is the budget's, too.
     const auto begun = Clock::now();
-    const double keep = g.reserve.of(frame.budget_ms);
+    const bool shares = g.functions->dispatches_in_call && g.compositor.drawn() && !gl::Fence(g.functions).passed();
+    const double keep = shares ? g.reserve.of(frame.budget_ms) : 0.0;
     const double drawing =
         frame.target == Target::none ? 0.0 : std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms);
     const render::Deadline deadline = deadline_after(frame.budget_ms - keep - drawing);
@@ -800,7 +801,7 @@ FrameResult Viewer::render(const Frame& frame) {
       if (draws(frame)) g.drawn = g.compositor.lags() ? std::nullopt : std::optional(now);
       result.undrawn = !draws(frame) && g.drawn != now;
     }
-    if (frame.budget_ms > 0.0) g.reserve.learn(frame.budget_ms, milliseconds(Clock::now() - begun));
+    if (shares && frame.budget_ms > 0.0) g.reserve.learn(frame.budget_ms, milliseconds(Clock::now() - begun));
     result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
     const auto failed = [](const Worker::Status& status) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;
