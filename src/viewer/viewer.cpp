@@ -765,6 +765,17 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
   result.texture = g.colour.name();
 }
 
+bool Viewer::shares_cores(const Gl& g) {
+  return g.functions->dispatches_in_call && g.compositor.drawn() && !gl::Fence(g.functions).passed();
+}
+
+render::Deadline Viewer::deadline_of(const Gl& g, const Frame& frame, bool shares) {
+  const double keep = shares ? g.reserve.of(frame.budget_ms) : 0.0;
+  const double drawing =
+      frame.target == Target::none ? 0.0 : std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms);
+  return deadline_after(frame.budget_ms - keep - drawing);
+}
+
 FrameResult Viewer::render(const Frame& frame) {
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
@@ -785,13 +796,9 @@ FrameResult Viewer::render(const Frame& frame) {
         gl::clear_errors(*g.functions);
       }
     };
-    // What drawing will take is the budget's, too.
     const auto begun = Clock::now();
-    const bool shares = g.functions->dispatches_in_call && g.compositor.drawn() && !gl::Fence(g.functions).passed();
-    const double keep = shares ? g.reserve.of(frame.budget_ms) : 0.0;
-    const double drawing =
-        frame.target == Target::none ? 0.0 : std::min(g.compositor.expected_ms(), most_of_drawing * frame.budget_ms);
-    const render::Deadline deadline = deadline_after(frame.budget_ms - keep - drawing);
+    const bool shares = shares_cores(g);
+    const render::Deadline deadline = deadline_of(g, frame, shares);
     attempt("cumulet: upload", [&] { prepare(frame, deadline); });
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { trace(frame, deadline); });
     attempt("cumulet: surfaces alone", [&] { draw_surfaces_alone(frame); });

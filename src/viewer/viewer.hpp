@@ -221,6 +221,10 @@ class Viewer {
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   [[nodiscard]] render::PictureParameters parameters() const;
+  // Whether the host's own work takes of the cores that ours runs on.
+  static bool shares_cores(const Gl& g);
+  // When tracing ends: what drawing will take is the budget's, too.
+  static render::Deadline deadline_of(const Gl& g, const Frame& frame, bool shares);
   void prepare(const Frame& frame, render::Deadline deadline);
   void trace(const Frame& frame, render::Deadline deadline);
   // Whether there is a target of any size.
