@@ -6,6 +6,8 @@ Names, order and meaning are the header's.
 import argparse
 import re
 
+import c_header
+
 DESCRIPTORS = ["grid", "medium", "light", "surface_settings", "sampling", "display", "camera", "navigation", "frame"]
 # What C functions fill.
 FILLED = {"camera"}
@@ -74,11 +76,10 @@ def main():
     parser.add_argument("--out", required=True)
     parser.add_argument("header")
     arguments = parser.parse_args()
-    with open(arguments.header, encoding="utf-8") as file:
-        text = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
+    text = c_header.read(arguments.header)
     version = [re.search(rf"CUMULET_VERSION_{part} (\d+)", text)[1] for part in ("MAJOR", "MINOR")]
-    enums = re.findall(r"typedef enum (\w+) \{(.*?)\} \1;", text, flags=re.S)
-    structs = dict(re.findall(r"typedef struct (\w+) \{(.*?)\} \1;", text, flags=re.S))
+    enums = c_header.types("enum", text)
+    structs = dict(c_header.types("struct", text))
     parts = ["/*\n * The part of cumulet.hpp that follows from cumulet.h: include that. Made by cmake/descriptors.py.\n */",
              "#ifndef CUMULET_CUMULET_DESCRIPTORS_HPP\n#define CUMULET_CUMULET_DESCRIPTORS_HPP\n",
              "#include <cumulet/cumulet.h>\n\n#include <array>\n#include <cstdint>\n",

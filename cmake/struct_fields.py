@@ -5,10 +5,11 @@ Only names are read here; the compiler fills in the numbers, and c_support.hpp a
 import argparse
 import re
 
+import c_header
+
 
 def structs(header):
-    text = re.sub(r"/\*.*?\*/", "", header, flags=re.S)
-    for name, body in re.findall(r"typedef struct (\w+) \{(.*?)\} \1;", text, flags=re.S):
+    for name, body in c_header.types("struct", header):
         fields = [re.search(r"(\w+)\s*(\[[^\]]*\]\s*)*$", d.strip()).group(1) for d in body.split(";") if d.strip()]
         if fields[0] == "struct_size":
             yield name, fields
@@ -19,8 +20,7 @@ def main():
     parser.add_argument("--out", required=True)
     parser.add_argument("header")
     arguments = parser.parse_args()
-    with open(arguments.header, encoding="utf-8") as file:
-        found = list(structs(file.read()))
+    found = list(structs(c_header.read(arguments.header)))
     lines = ["// Made by cmake/struct_fields.py."]
     for name, fields in found:
         lines.append(f"template <>\ninline constexpr auto fields_of<{name}> = std::to_array<Field>({{")

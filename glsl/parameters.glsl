@@ -77,7 +77,7 @@ CM_BLOCK(CmLights) {
 // The box of all triangles, and first words of the tables of glsl/surface.glsl and their sizes: render::SurfaceData.
 CM_BLOCK(CmSurfaceTables) {
   CM_ALIGN(16) vec3 low;   // world
-  CM_ALIGN(16) vec3 high;  // nowhere under low, unless there are none
+  CM_ALIGN(16) vec3 high;
   uint records;  // of the triangle tree
   uint triangles;
   uint vertices;

@@ -72,15 +72,7 @@ namespace OPENVDB_VERSION_NAME::io {
     cumulet::volume::detail::read_compressed(in, reinterpret_cast<char*>(data), sizeof(T) * std::size_t{count}, \
                                              compression);                                                      \
   }
-CUMULET_READ_DATA(math::half)
-CUMULET_READ_DATA(float)
-CUMULET_READ_DATA(double)
-CUMULET_READ_DATA(std::int32_t)
-CUMULET_READ_DATA(std::int64_t)
-CUMULET_READ_DATA(math::Vec3<math::half>)
-CUMULET_READ_DATA(math::Vec3<float>)
-CUMULET_READ_DATA(math::Vec3<double>)
-CUMULET_READ_DATA(math::Vec3<std::int32_t>)
+CUMULET_VDB_VALUES(CUMULET_READ_DATA)
 #undef CUMULET_READ_DATA
 
 }  // namespace OPENVDB_VERSION_NAME::io

@@ -22,20 +22,21 @@ namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME::io {
 
+// What values may be.
+#define CUMULET_VDB_VALUES(OF) \
+  OF(math::half)               \
+  OF(float)                    \
+  OF(double)                   \
+  OF(std::int32_t)             \
+  OF(std::int64_t)             \
+  OF(math::Vec3<math::half>) OF(math::Vec3<float>) OF(math::Vec3<double>) OF(math::Vec3<std::int32_t>)
+
 // Defined once, in vdb_compression.cpp: linkers then prefer these to what other code makes of OpenVDB's template.
 #define CUMULET_READ_DATA(T)                                                                                  \
   template <>                                                                                                 \
   void readData<T>(std::istream & in, T * data, Index count, std::uint32_t compression, DelayedLoadMetadata*, \
                    std::size_t);
-CUMULET_READ_DATA(math::half)
-CUMULET_READ_DATA(float)
-CUMULET_READ_DATA(double)
-CUMULET_READ_DATA(std::int32_t)
-CUMULET_READ_DATA(std::int64_t)
-CUMULET_READ_DATA(math::Vec3<math::half>)
-CUMULET_READ_DATA(math::Vec3<float>)
-CUMULET_READ_DATA(math::Vec3<double>)
-CUMULET_READ_DATA(math::Vec3<std::int32_t>)
+CUMULET_VDB_VALUES(CUMULET_READ_DATA)
 #undef CUMULET_READ_DATA
 
 }  // namespace OPENVDB_VERSION_NAME::io
