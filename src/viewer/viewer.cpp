@@ -472,7 +472,7 @@ grid::RefineCamera Viewer::refine_camera() const {
 
 render::PictureParameters Viewer::parameters() const {
   const ViewFrame& view = *view_;
-  const render::MarchSource& source = *gl_->data_source;
+  const render::MarchSource& source = *gl_->data.of();
   const bool full = surface_settings_.light == SurfaceLight::full;
   render::PictureParameters p;
   p.view.eye = glm::vec3(glm::inverse(source.cube.to_world) * glm::dvec4(view.eye, 1.0));
@@ -533,85 +533,71 @@ void Viewer::prepare(const Frame& frame, render::Deadline deadline) {
 void Viewer::upload_raster(Gl& g) {
   const bool wanted = sampling_.preview || surface_settings_.light == SurfaceLight::none;
   if (!wanted || !surface_source_) {
-    g.raster.reset();
-    g.raster_source.reset();
+    g.raster.clear();
     return;
   }
-  const bool failed = !g.raster && g.raster_source;
-  if (g.raster_source == surface_source_ && !(failed && g.raster_revision != settings_revision_)) return;
-  g.raster_revision = settings_revision_;
+  if (!g.raster.wants(surface_source_, settings_revision_)) return;
   // Paths that met triangles for want of it end at it from now on.
   if (!g.raster) ++surface_generation_;
-  const bool same_scene = g.raster && g.raster_source->scene == surface_source_->scene;
-  g.raster_source = surface_source_;
-  try {
-    if (!same_scene) {
-      g.raster = std::make_unique<render::SurfaceRaster>(g.functions);
-      g.raster->set_scene(surface_source_->scene);
-    }
-    g.raster->set_pose(surface_source_->pose);
-  } catch (...) {
-    g.raster.reset();  // rays meet the triangles then
-    throw;
-  }
+  const bool same_scene = g.raster && g.raster.of()->scene == surface_source_->scene;
+  std::optional<render::SurfaceRaster> last = g.raster.take();  // where this fails rays meet the triangles
+  if (!same_scene) last.reset();
+  g.raster.make(surface_source_, settings_revision_, [&] {
+    render::SurfaceRaster raster = last ? *std::move(last) : render::SurfaceRaster(g.functions);
+    if (!same_scene) raster.set_scene(surface_source_->scene);
+    raster.set_pose(surface_source_->pose);
+    return raster;
+  });
 }
 
 void Viewer::upload_surfaces(Gl& g) {
-  const bool failed = !g.surfaces && g.surfaces_source;
-  if (g.surfaces_source == surface_source_ && !(failed && g.surfaces_revision != settings_revision_)) return;
-  g.surfaces_source = surface_source_;
-  g.surfaces_revision = settings_revision_;
-  ++surface_generation_;
   if (!surface_source_) {
-    g.surfaces.reset();
+    if (!g.surfaces.empty()) ++surface_generation_;
+    g.surfaces.clear();
     return;
   }
-  const std::unique_ptr<render::SurfaceData> last = std::move(g.surfaces);
-  g.surfaces = std::make_unique<render::SurfaceData>(g.functions, g.limits, *surface_source_, last.get());
-}
-
-bool Viewer::wants_upload() const {
-  const Gl& g = gl();
-  const bool failed = g.upload_source == built_.source && g.upload_revision == settings_revision_;
-  return g.data_source != built_.source && !failed;
+  if (!g.surfaces.wants(surface_source_, settings_revision_)) return;
+  ++surface_generation_;
+  std::optional<render::SurfaceData> last = g.surfaces.take();
+  g.surfaces.make(surface_source_, settings_revision_, [&] {
+    return render::SurfaceData(g.functions, g.limits, *surface_source_, last ? &*last : nullptr);
+  });
 }
 
 void Viewer::upload(Gl& g, render::Deadline deadline) {
   if (!built_.source) {
     if (g.data) {
-      g.data.reset();
       g.progressive.reset();
       ++generation_;
     }
-    g.data_source.reset();
-    g.upload_source.reset();
+    g.data.clear();
     g.upload.reset();
-  } else {
-    // What is under way goes on to its end, though there may be something newer by now: that is next. Begun anew with
-    // each, an upload that takes longer than a build would never end.
-    while (g.upload || wants_upload()) {
-      Stopwatch watch;
-      try {
-        if (!g.upload) {
-          g.upload_source = built_.source;
-          g.upload_revision = settings_revision_;
-          built_.seconds.upload = 0.0;
-          g.upload = std::make_unique<render::MarchUpload>(g.functions, g.limits, built_.source, page_texels_);
-        }
-        const bool done = g.upload->advance(deadline);
-        if (g.upload_source == built_.source) built_.seconds.upload += watch.lap();
-        if (!done) break;
-        g.data = g.upload->take();
-        g.data_source = g.upload_source;
-        g.upload.reset();
-        ++generation_;
-      } catch (const Error&) {
-        g.upload.reset();  // upload_source stays: tried again when there is another, or a setting changes
-        throw;
-      }
+  }
+  // What is under way goes on to its end, though there may be something newer by now: that is next. Begun anew with
+  // each, an upload that takes longer than a build would never end.
+  while (g.upload || (built_.source && g.data.wants(built_.source, settings_revision_))) {
+    Stopwatch watch;
+    if (!g.upload) {
+      g.upload = Upload{built_.source, settings_revision_, nullptr};
+      built_.seconds.upload = 0.0;
+    }
+    const MarchSourcePtr of = g.upload->of;
+    try {
+      if (!g.upload->work)
+        g.upload->work = std::make_unique<render::MarchUpload>(g.functions, g.limits, of, page_texels_);
+      const bool done = g.upload->work->advance(deadline);
+      if (of == built_.source) built_.seconds.upload += watch.lap();
+      if (!done) break;
+      g.data.put(of, g.upload->work->take());
+      g.upload.reset();
+      ++generation_;
+    } catch (const Error&) {
+      g.data.fail(of, g.upload->settings);
+      g.upload.reset();
+      throw;
     }
   }
-  upload_progress_ = g.upload ? g.upload->progress() : 1.0;
+  upload_progress_ = g.upload ? g.upload->work->progress() : 1.0;
 }
 
 VolumePtr Viewer::empty_volume() {
@@ -672,28 +658,27 @@ void Viewer::trace(const Frame& frame, render::Deadline deadline) {
   g.progressive.advance(wish, *g.data, met, deadline, frame.budget_ms);
 }
 
+std::uint64_t Viewer::TargetKind::bytes() const {
+  const std::uint64_t colour = format == GL_RGBA32F ? 16 : (format == GL_RGBA16F ? 8 : 4);
+  return std::uint64_t{size.x} * size.y * (colour + (depth ? 4 : 0));
+}
+
 void Viewer::make_target_textures(Gl& g, const Frame& frame) const {
-  const bool fits =
-      g.colour && g.texture_size == frame.size && g.texture_format == frame.format && (g.depth || !frame.write_depth);
-  // What failed once is tried again when something changes: until then the old ones serve.
-  const bool failed =
-      g.failed_size == frame.size && g.failed_format == frame.format && g.failed_revision == settings_revision_;
-  if (fits || failed) return;
-  g.failed_size = frame.size;
-  g.failed_format = frame.format;
-  g.failed_revision = settings_revision_;
-  const int width = static_cast<int>(frame.size.x);
-  const int height = static_cast<int>(frame.size.y);
-  gl::Object colour = gl::make_texture_2d(g.functions, frame.format, width, height, "creating the target texture");
-  gl::Object depth;
-  if (frame.write_depth) {
-    depth = gl::make_texture_2d(g.functions, GL_DEPTH_COMPONENT32F, width, height, "creating the target's depth");
-  }
-  g.colour = std::move(colour);
-  g.depth = std::move(depth);
-  g.texture_size = frame.size;
-  g.texture_format = frame.format;
-  g.failed_size = glm::uvec2(0U);
+  const TargetKind kind{frame.size, frame.format, frame.write_depth};
+  TargetKind with_depth = kind;  // serves those without as well
+  with_depth.depth = true;
+  if (!g.target.wants(kind, settings_revision_) || (g.target && g.target.of() == with_depth)) return;
+  g.target.make(kind, settings_revision_, [&] {
+    const int width = static_cast<int>(kind.size.x);
+    const int height = static_cast<int>(kind.size.y);
+    TargetTextures made;
+    made.colour = gl::make_texture_2d(g.functions, kind.format, width, height, "creating the target texture");
+    if (kind.depth) {
+      made.depth =
+          gl::make_texture_2d(g.functions, GL_DEPTH_COMPONENT32F, width, height, "creating the target's depth");
+    }
+    return made;
+  });
 }
 
 bool Viewer::draws(const Frame& frame) const {
@@ -711,7 +696,7 @@ void Viewer::draw_surfaces_alone(const Frame& frame) {
   g.alone_failed = settings_revision_;  // unless it succeeds
   tracer.draw_layers(g.empty, surfaces(),
                      render::Progressive::quick_layers(tracer, frame_size_, frame.budget_ms, view_ == last_view_));
-  g.alone_failed = 0;
+  g.alone_failed.reset();
 }
 
 void Viewer::draw(const Frame& frame, FrameResult& result) {
@@ -748,21 +733,22 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
     return;
   }
   make_target_textures(g, frame);
-  if (!g.colour) return;
-  target.viewport = g.texture_size == frame.size ? frame.viewport : glm::ivec4(0, 0, g.texture_size);
-  const bool depth = frame.write_depth && g.depth;
-  const TransientFramebuffer framebuffer(*g.functions, g.colour.name(), depth ? g.depth.name() : 0);
+  if (!g.target) return;
+  const glm::uvec2 size = g.target.of().size;
+  target.viewport = size == frame.size ? frame.viewport : glm::ivec4(0, 0, size);
+  const bool depth = frame.write_depth && g.target->depth;
+  const TransientFramebuffer framebuffer(*g.functions, g.target->colour.name(), depth ? g.target->depth.name() : 0);
   constexpr std::array<float, 4> nothing{};
   g.functions->ClearNamedFramebufferfv(framebuffer.name(), GL_COLOR, 0, nothing.data());
   if (depth) {
     const float far = target.reversed ? 0.0F : 1.0F;
     g.functions->ClearNamedFramebufferfv(framebuffer.name(), GL_DEPTH, 0, &far);
-    result.depth_texture = g.depth.name();
+    result.depth_texture = g.target->depth.name();
   }
   target.framebuffer = framebuffer.name();
   target.blend_over = false;
   g.compositor.draw(picture, display, target);
-  result.texture = g.colour.name();
+  result.texture = g.target->colour.name();
 }
 
 bool Viewer::shares_cores(const Gl& g) {
@@ -809,7 +795,7 @@ FrameResult Viewer::render(const Frame& frame) {
       result.undrawn = !draws(frame) && g.drawn != now;
     }
     if (shares && frame.budget_ms > 0.0) g.reserve.learn(frame.budget_ms, milliseconds(Clock::now() - begun));
-    result.loading = builder_.busy() || surface_builder_.busy() || g.upload != nullptr;
+    result.loading = builder_.busy() || surface_builder_.busy() || g.upload;
     const auto failed = [](const Worker::Status& status) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;
     };
@@ -817,8 +803,8 @@ FrameResult Viewer::render(const Frame& frame) {
     const bool pending = g.host_depth.pending() || (draws(frame) && g.compositor.lags());
     result.converged = !result.loading && g.data && view_ && !pending && g.progressive.converged();
     const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
-    result.more = navigation_.moving() || g.upload != nullptr || waits_to_build ||
-                  (g.data && view_ && (pending || g.progressive.more()));
+    result.more =
+        navigation_.moving() || g.upload || waits_to_build || (g.data && view_ && (pending || g.progressive.more()));
     result.progress = g.progressive.progress();
     result.preview = result.size != glm::uvec2(0U) && result.size != frame_size_;
   });
@@ -965,11 +951,8 @@ Stats Viewer::stats() {
   s.steps = totals_.steps;
   if (gl_) {
     s.cell_bytes = gl_->data ? gl_->data->bytes() : 0;
-    const std::uint64_t target_pixels = std::uint64_t{gl_->texture_size.x} * gl_->texture_size.y;
-    const std::uint64_t colour_bytes =
-        gl_->texture_format == GL_RGBA32F ? 16 : (gl_->texture_format == GL_RGBA16F ? 8 : 4);
     const glm::u64vec2 depth_size = gl_->host_depth.size();
-    s.gl_bytes = s.cell_bytes + gl_->progressive.bytes() + target_pixels * (colour_bytes + (gl_->depth ? 4 : 0)) +
+    s.gl_bytes = s.cell_bytes + gl_->progressive.bytes() + (gl_->target ? gl_->target.of().bytes() : 0) +
                  depth_size.x * depth_size.y * gl_->host_depth.layers() * 4 + gl_->empty.bytes() +
                  (gl_->surfaces ? gl_->surfaces->bytes() : 0) + (gl_->raster ? gl_->raster->bytes() : 0);
     s.strings = gl_->strings;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/log.hpp"
+#include "base/slot.hpp"
 #include "base/trace.hpp"
 #include "gl/objects.hpp"
 #include "gl/share_group.hpp"
@@ -174,6 +175,24 @@ class Viewer {
     GLuint volume_z = 0;
     bool operator==(const DrawnAs&) const = default;
   };
+  using MarchSourcePtr = std::shared_ptr<const render::MarchSource>;
+  // Under way, and with which settings it was begun.
+  struct Upload {
+    MarchSourcePtr of;
+    std::uint64_t settings = 0;
+    std::unique_ptr<render::MarchUpload> work;
+  };
+  struct TargetKind {
+    glm::uvec2 size{0U};
+    GLenum format = 0;
+    bool depth = false;
+    bool operator==(const TargetKind&) const = default;
+    [[nodiscard]] std::uint64_t bytes() const;
+  };
+  struct TargetTextures {
+    gl::Object colour;
+    gl::Object depth;
+  };
   // All that lives in one context.
   struct Gl {
     explicit Gl(gl::FunctionsPtr gl);
@@ -185,29 +204,15 @@ class Viewer {
     render::Compositor compositor;
     render::Reserve reserve;
     render::HostDepth host_depth;
-    std::shared_ptr<const render::MarchSource> data_source;    // what data is of
-    std::shared_ptr<const render::MarchSource> upload_source;  // what upload is of, or what failed to be uploaded
-    std::unique_ptr<render::MarchUpload> upload;
-    std::unique_ptr<render::SurfaceData> surfaces;
-    std::unique_ptr<render::SurfaceRaster> raster;  // of surfaces_source, where it is of use and could be made
-    SurfacePtr raster_source;                       // what raster is of, or what failed
-    std::uint64_t raster_revision = 0;
-    SurfacePtr surfaces_source;  // what surfaces is of, or what failed to be uploaded
-    std::uint64_t surfaces_revision = 0;
-    std::optional<DrawnAs> drawn;  // last; nothing where that was older than what there was
+    Slot<render::MarchData, MarchSourcePtr> data;
+    std::optional<Upload> upload;  // of what data will be
+    Slot<render::SurfaceData, SurfacePtr> surfaces;
+    Slot<render::SurfaceRaster, SurfacePtr> raster;  // where it is of use
+    std::optional<DrawnAs> drawn;                    // last; nothing where that was older than what there was
     render::Picture empty;
-    std::optional<render::MarchData> data;
-    std::uint64_t alone_failed = 0;  // settings at which the surfaces beneath it could not be drawn
-    gl::Object colour;               // the texture target
-    gl::Object depth;
-    glm::uvec2 texture_size{0U};
-    GLenum texture_format = 0;
+    std::optional<std::uint64_t> alone_failed;  // settings at which the surfaces beneath it could not be drawn
+    Slot<TargetTextures, TargetKind> target;
     bool knows_dispatches = false;
-    // What could not be made, and at which settings.
-    std::uint64_t upload_revision = 0;
-    glm::uvec2 failed_size{0U};
-    GLenum failed_format = 0;
-    std::uint64_t failed_revision = 0;
   };
 
   [[nodiscard]] Gl& gl() const;
@@ -233,8 +238,6 @@ class Viewer {
   void draw(const Frame& frame, FrameResult& result);
   void make_target_textures(Gl& g, const Frame& frame) const;
   void upload(Gl& g, render::Deadline deadline);
-  // Of the newest, which is not in GL and did not fail to get there.
-  [[nodiscard]] bool wants_upload() const;
   void upload_surfaces(Gl& g);
   [[nodiscard]] std::optional<Bounds> box() const;
   /// What cameras fit; good for as long as nothing changes.
