@@ -114,6 +114,8 @@ def main():
     entries = []
     for path in shaders:
         source = "\n".join(flatten(path, set())) + "\n"
+        if number := re.search(r"binding\s*=\s*\d.*", source):
+            sys.exit(f"{path.name}: '{number.group()}' is no name of glsl/bindings.glsl")
         variants = variants_of(path.name, source)
         if options.validator and not options.validator.endswith("NOTFOUND"):
             validate(options.validator, path.name, source, variants)

@@ -10,6 +10,7 @@
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
+#include "bindings.glsl"
 #include "shared.glsl"
 #include "parameters.glsl"
 #include "cell.glsl"
@@ -28,9 +29,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #endif
 #include "ray.glsl"
 
-layout(rgba32f, binding = 0) uniform writeonly image2D cm_normal;     // and transmittance
-layout(rgba32ui, binding = 1) uniform writeonly uimage2D cm_albedo;   // and surface z: floats
-layout(r32f, binding = 2) uniform writeonly image2D cm_volume_z;
+layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform writeonly image2D cm_normal;     // and transmittance
+layout(rgba32ui, binding = CM_IMAGE_ALBEDO) uniform writeonly uimage2D cm_albedo;   // and surface z: floats
+layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 
 #define CM_RAYS 16
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)

@@ -1,5 +1,5 @@
 // Bindings of the marches' data, and of the host's depth.
-layout(binding = 11) uniform sampler2DArray cm_surface;
+layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_surface;
 
 float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
   if (cm.host_depth.layers == 0u) return 3.0e38;
@@ -9,8 +9,8 @@ float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
 }
 
 #if CM_SURFACES || CM_LAYERS
-layout(binding = 8) uniform sampler2DArray cm_layer_colour;
-layout(binding = 15) uniform sampler2DArray cm_layer_z;
+layout(binding = CM_UNIT_LAYER_COLOUR) uniform sampler2DArray cm_layer_colour;
+layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
 
 // What a camera ray ends at: a layer's opaque surface, or, by the chance of its coverage, the blended ones before it,
 // which count as one at the nearest. z: where; colour: radiance, and 1 in alpha; 0 where there is none.
@@ -33,9 +33,9 @@ float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, ou
 
 #if CM_MARCH == 0
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
-layout(binding = 0) uniform usamplerBuffer cm_cells[CM_PAGES];
-layout(binding = 12) uniform usamplerBuffer cm_tree_words;
-layout(std140, binding = 1) uniform CmRoots { uvec4 cm_roots[13]; };  // 25 pairs: first leaf, first tree node
+layout(binding = CM_UNIT_CELLS) uniform usamplerBuffer cm_cells[CM_PAGES];
+layout(binding = CM_UNIT_TREE) uniform usamplerBuffer cm_tree_words;
+layout(std140, binding = CM_UNIFORM_ROOTS) uniform CmRoots { uvec4 cm_roots[13]; };  // 25 pairs: first leaf, first tree node
 
 uvec4 cm_record(uint cell, uint part) {
 #if CM_PAGES == 1
@@ -75,11 +75,11 @@ uint cm_tree(uint node) {
 uint cm_root_leaf(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].x : cm_roots[root >> 1].z; }
 uint cm_root_node(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].y : cm_roots[root >> 1].w; }
 #elif CM_MARCH == 1
-layout(binding = 13) uniform sampler3D cm_voxels;
+layout(binding = CM_UNIT_VOXELS) uniform sampler3D cm_voxels;
 float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(cm.grid.box_min), 0).x; }
 #else
-layout(binding = 13) uniform samplerBuffer cm_brick_values;
-layout(binding = 14) uniform usampler3D cm_brick_slots;
+layout(binding = CM_UNIT_VOXELS) uniform samplerBuffer cm_brick_values;
+layout(binding = CM_UNIT_BRICK_SLOTS) uniform usampler3D cm_brick_slots;
 uint cm_brick_slot(ivec3 brick) {
   return texelFetch(cm_brick_slots, brick - (ivec3(cm.grid.box_min) >> 3), 0).x;
 }

@@ -5,12 +5,13 @@
 #ifndef CM_LAYERS
 #define CM_LAYERS 0
 #endif
+#include "bindings.glsl"
 #include "shared.glsl"
 #include "display.glsl"
 
-layout(binding = 0) uniform sampler2D cm_sum;  // row 0 is the picture's top; CM_RESOLVED: already the mean
-layout(binding = 1) uniform usampler2D cm_counts;
-layout(binding = 2) uniform sampler2D cm_volume_z;
+layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;  // row 0 is the picture's top; CM_RESOLVED: already the mean
+layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
+layout(binding = CM_UNIT_VOLUME_Z) uniform sampler2D cm_volume_z;
 layout(location = 0) uniform ivec4 cm_viewport;
 layout(location = 1) uniform bool cm_flip_y;
 #if CM_DEPTH == 0
@@ -19,9 +20,9 @@ layout(location = 3) uniform bool cm_transparent;
 layout(location = 4) uniform vec3 cm_background;
 layout(location = 0) out vec4 cm_colour;
 #if CM_LAYERS
-layout(binding = 3) uniform sampler2DArray cm_layer_colour;
-layout(binding = 4) uniform sampler2DArray cm_layer_z;
-layout(binding = 5) uniform sampler2DArray cm_host_z;
+layout(binding = CM_UNIT_LAYER_COLOUR) uniform sampler2DArray cm_layer_colour;
+layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
+layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_host_z;
 layout(location = 5) uniform ivec4 cm_layers;  // how many, whether blended ones follow, how many the host has
 
 // The surface pass's mean at a texel, without what is behind the host's.

@@ -2,14 +2,15 @@
 // A host's depth as view depth, one layer a sample, and whether it differs from before.
 // variants: CM_MULTISAMPLE=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
+#include "bindings.glsl"
 
 #if CM_MULTISAMPLE
-layout(binding = 0) uniform sampler2DMS cm_source;
+layout(binding = CM_UNIT_DEPTH_SOURCE) uniform sampler2DMS cm_source;
 #else
-layout(binding = 0) uniform sampler2D cm_source;
+layout(binding = CM_UNIT_DEPTH_SOURCE) uniform sampler2D cm_source;
 #endif
-layout(r32f, binding = 0) uniform image2DArray cm_z;
-layout(std430, binding = 0) buffer CmChanged { uint cm_changed; };
+layout(r32f, binding = CM_IMAGE_HOST_DEPTH) uniform image2DArray cm_z;
+layout(std430, binding = CM_STORAGE_DEPTH_CHANGED) buffer CmChanged { uint cm_changed; };
 layout(location = 0) uniform ivec2 cm_origin;
 layout(location = 1) uniform bool cm_flip_y;
 layout(location = 2) uniform bool cm_orthographic;

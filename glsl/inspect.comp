@@ -5,6 +5,7 @@
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
+#include "bindings.glsl"
 #include "shared.glsl"
 #include "parameters.glsl"
 #include "cell.glsl"
@@ -23,9 +24,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #endif
 #include "ray.glsl"
 
-layout(rgba32f, binding = 0) uniform writeonly image2D cm_sum;
-layout(rgba32ui, binding = 1) uniform writeonly uimage2D cm_counts;
-layout(r32f, binding = 2) uniform writeonly image2D cm_volume_z;
+layout(rgba32f, binding = CM_IMAGE_SUM) uniform writeonly image2D cm_sum;
+layout(rgba32ui, binding = CM_IMAGE_COUNTS) uniform writeonly uimage2D cm_counts;
+layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 
 #define CM_VIEW_CELLS 1u
 #define CM_VIEW_STEPS 2u

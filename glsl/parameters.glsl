@@ -132,7 +132,7 @@ CM_BLOCK(CmDispatch) {
 #ifdef __cplusplus
 CM_BLOCK(CmParameters) {
 #else
-layout(std140, binding = 0) uniform CmParameters {
+layout(std140, binding = CM_UNIFORM_PARAMETERS) uniform CmParameters {
 #endif
   CmView view;
   CmGrid grid;

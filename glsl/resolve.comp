@@ -3,11 +3,12 @@
 // where none of these has a sample either it shows what was there before.
 // variants: CM_HOLES=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(binding = 0) uniform sampler2D cm_sum;
-layout(binding = 1) uniform usampler2D cm_counts;
-layout(binding = 2) uniform sampler2D cm_sum_before;  // of any size
-layout(binding = 3) uniform usampler2D cm_counts_before;
-layout(rgba32f, binding = 0) uniform writeonly image2D cm_means;
+#include "bindings.glsl"
+layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;
+layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
+layout(binding = CM_UNIT_SUM_BEFORE) uniform sampler2D cm_sum_before;  // of any size
+layout(binding = CM_UNIT_COUNTS_BEFORE) uniform usampler2D cm_counts_before;
+layout(rgba32f, binding = CM_IMAGE_MEANS) uniform writeonly image2D cm_means;
 
 vec4 cm_mean_of(sampler2D sums, usampler2D counts, ivec2 texel) {
   return texelFetch(sums, texel, 0) / max(float(texelFetch(counts, texel, 0).x), 1.0);

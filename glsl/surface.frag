@@ -3,6 +3,7 @@
 // CM_ALPHA: 0 opaque, 1 mask, 2 blend, which transmission is drawn as too. CM_USED: a bit a map that there is; CM_COATED:
 // 1 with a coat. What a material has not is not even compiled: not every driver skips what a uniform forbids.
 // variants: CM_ALPHA=0,1,2 CM_USED=0..1023 CM_COATED=0,1
+#include "bindings.glsl"
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 #include "bsdf.glsl"
@@ -15,9 +16,9 @@ layout(location = 3) in vec4 cm_texture_uv;
 layout(location = 4) in vec4 cm_vertex_color;
 layout(location = 5) in float cm_z;
 
-layout(binding = 0) uniform sampler2D cm_maps[10];
-layout(binding = 10) uniform sampler2D cm_albedo_table;  // surface/ggx_albedo.hpp's
-layout(std430, binding = 0) readonly buffer CmLights { CmLight cm_lights[]; };  // from the eye
+layout(binding = CM_UNIT_MAPS) uniform sampler2D cm_maps[CM_MAPS];
+layout(binding = CM_UNIT_GGX_ALBEDO) uniform sampler2D cm_albedo_table;  // surface/ggx_albedo.hpp's
+layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLights { CmLight cm_lights[]; };  // from the eye
 
 layout(location = 0) out vec4 cm_colour;
 layout(location = 1) out float cm_depth_z;

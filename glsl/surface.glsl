@@ -4,8 +4,8 @@
 #define CM_SURFACE_GLSL
 #include "punctual.glsl"
 
-layout(binding = 9) uniform usamplerBuffer cm_scene_words;
-layout(binding = 10) uniform sampler2DArray cm_atlas;
+layout(binding = CM_UNIT_SCENE_WORDS) uniform usamplerBuffer cm_scene_words;
+layout(binding = CM_UNIT_ATLAS) uniform sampler2DArray cm_atlas;
 
 #define CM_MATERIAL_WORDS 24u
 #define CM_VERTEX_WORDS 3u

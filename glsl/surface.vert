@@ -1,5 +1,6 @@
 #version 450
 // A vertex of the scene, seen from the eye; row 0 of the target is the picture's top.
+#include "bindings.glsl"
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 

@@ -19,7 +19,7 @@ const int CM_MAPS = 10;
 #ifdef __cplusplus
 struct CmSurfaceView {
 #else
-layout(std140, binding = 0) uniform CmSurfaceView {
+layout(std140, binding = CM_UNIFORM_SURFACE_VIEW) uniform CmSurfaceView {
 #endif
   vec4 eye_high;        // world; with eye_low a sum of more digits than a float has
   vec4 eye_low;
@@ -41,7 +41,7 @@ layout(std140, binding = 0) uniform CmSurfaceView {
 #ifdef __cplusplus
 struct CmMaterial {
 #else
-layout(std140, binding = 1) uniform CmMaterial {
+layout(std140, binding = CM_UNIFORM_MATERIAL) uniform CmMaterial {
 #endif
   vec4 base_color;
   vec4 emission;        // w: alpha cutoff

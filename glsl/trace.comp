@@ -6,6 +6,7 @@
 // variants: - or CM_AOVS=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
+#include "bindings.glsl"
 #include "shared.glsl"
 #include "parameters.glsl"
 #include "cell.glsl"
@@ -24,16 +25,16 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #endif
 #include "path.glsl"
 
-layout(std430, binding = 0) buffer CmPaths { uint cm_paths[]; };  // a plane of lanes for each word of a path
-layout(std430, binding = 1) buffer CmBlocks {
+layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uint cm_paths[]; };  // a plane of lanes for each word of a path
+layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_total;     // x: full rounds that lanes marched
   uvec4 cm_blocks[];  // x: which block, and CM_BEGINS; then its pixels without their target samples, those without any
                       // and its samples finished in this dispatch
 };
-layout(rgba32f, binding = 0) uniform image2D cm_sum;
-layout(rgba32ui, binding = 1) uniform uimage2D cm_counts;  // samples, steps, sum of squared luminance (a float)
+layout(rgba32f, binding = CM_IMAGE_SUM) uniform image2D cm_sum;
+layout(rgba32ui, binding = CM_IMAGE_COUNTS) uniform uimage2D cm_counts;  // samples, steps, sum of squared luminance (a float)
 #if CM_AOVS
-layout(rgba32f, binding = 2) uniform image2D cm_volume_sum;  // of the samples that met the volume first
+layout(rgba32f, binding = CM_IMAGE_VOLUME_SUM) uniform image2D cm_volume_sum;  // of the samples that met the volume first
 #endif
 
 #define CM_BLOCK_WIDTH 128u

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "base/error.hpp"
+#include "gl/bindings.hpp"
 #include "gl/shader_sources.hpp"
 
 namespace cumulet::gl {
@@ -151,7 +152,7 @@ void find_out_dispatches(const FunctionsPtr& gl) {
   const ReadBack seen(gl, 4, "creating a buffer to look at");
   const Object program = make_compute_program(gl, "sign.comp", {});
   gl->UseProgram(program.name());
-  gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, seen.name());
+  gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_SIGN, seen.name());
   gl->DispatchCompute(1, 1, 1);
   // Nothing was flushed: what is written now was written in the call.
   std::uint32_t sign = 0;

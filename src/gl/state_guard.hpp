@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "gl/api.hpp"
+#include "gl/bindings.hpp"
 
 namespace cumulet::gl {
 
@@ -33,10 +34,10 @@ class StateGuard {
   /// The first values again, for passes that come after one that changed them.
   void set_known();
 
-  // What the library may use (cumulet.h): GL's minima for compute shaders.
-  static constexpr GLuint units = 16;
-  static constexpr GLuint ranges = 8;  // of storage and of uniform buffers
-  static constexpr GLuint images = 8;
+  // What the library may use.
+  static constexpr GLuint units = core::CM_UNITS;
+  static constexpr GLuint ranges = core::CM_BUFFERS;
+  static constexpr GLuint images = core::CM_IMAGES;
   static constexpr GLuint blended_buffers = 2;
 
  private:

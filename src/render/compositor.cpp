@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/milliseconds.hpp"
+#include "gl/bindings.hpp"
 
 namespace cumulet::render {
 
@@ -81,11 +82,11 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture) {
   if (lags_) return newest_;
   const auto& gl = *gl_;
   const bool before = picture.sum_before != 0;
-  gl.BindTextureUnit(0, picture.sum);
-  gl.BindTextureUnit(1, picture.counts);
-  gl.BindTextureUnit(2, before ? picture.sum_before : picture.sum);
-  gl.BindTextureUnit(3, before ? picture.counts_before : picture.counts);
-  gl.BindImageTexture(0, means->texture.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  gl.BindTextureUnit(core::CM_UNIT_SUM, picture.sum);
+  gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
+  gl.BindTextureUnit(core::CM_UNIT_SUM_BEFORE, before ? picture.sum_before : picture.sum);
+  gl.BindTextureUnit(core::CM_UNIT_COUNTS_BEFORE, before ? picture.counts_before : picture.counts);
+  gl.BindImageTexture(core::CM_IMAGE_MEANS, means->texture.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl.UseProgram(program.name());
   gl.DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT);
@@ -128,8 +129,8 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
                       static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
-  gl.BindTextureUnit(0, resolved ? means->texture.name() : picture.sum);
-  if (!resolved) gl.BindTextureUnit(1, picture.counts);
+  gl.BindTextureUnit(core::CM_UNIT_SUM, resolved ? means->texture.name() : picture.sum);
+  if (!resolved) gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
 
   const GLuint colour = program.name();
   gl.ProgramUniform4i(colour, 0, viewport.x, viewport.y, viewport.z, viewport.w);
@@ -140,9 +141,9 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   gl.ProgramUniform3f(colour, 4, background.x, background.y, background.z);
   if (layered) {
     const SurfaceLayers& layers = *picture.beneath;
-    gl.BindTextureUnit(3, layers.colour.name());
-    gl.BindTextureUnit(4, layers.z.name());
-    if (picture.host_z != 0) gl.BindTextureUnit(5, picture.host_z);
+    gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, layers.colour.name());
+    gl.BindTextureUnit(core::CM_UNIT_LAYER_Z, layers.z.name());
+    if (picture.host_z != 0) gl.BindTextureUnit(core::CM_UNIT_HOST_DEPTH, picture.host_z);
     gl.ProgramUniform4i(colour, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
                         picture.host_z != 0 ? static_cast<GLint>(picture.host_layers) : 0, 0);
   }
@@ -166,7 +167,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   if (target.write_depth && picture.volume_z != 0) {
     if (!depth_) depth_ = make_program(gl_, std::array<std::string, 1>{"CM_DEPTH 1"});
     const GLuint depth = depth_.name();
-    gl.BindTextureUnit(2, picture.volume_z);
+    gl.BindTextureUnit(core::CM_UNIT_VOLUME_Z, picture.volume_z);
     gl.ProgramUniform4i(depth, 0, viewport.x, viewport.y, viewport.z, viewport.w);
     gl.ProgramUniform1i(depth, 1, as_bool(target.flip_y));
     gl.ProgramUniform2f(depth, 2, static_cast<GLfloat>(target.depth_a), static_cast<GLfloat>(target.depth_b));

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "gl/bindings.hpp"
 
 namespace cumulet::render {
 
@@ -107,9 +108,9 @@ HostDepth::Source HostDepth::open_texture(const HostDepthInput& input) {
   // The target by way of a binding: asking for GL_TEXTURE_TARGET is an error in Mesa's compatibility contexts.
   GLint bound = 0;
   if (gl.IsTexture(input.name) != GL_FALSE) {
-    gl.ActiveTexture(GL_TEXTURE0);
+    gl.ActiveTexture(GL_TEXTURE0 + core::CM_UNIT_DEPTH_SOURCE);
     gl.BindTexture(multisample ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D, 0);
-    gl.BindTextureUnit(0, input.name);
+    gl.BindTextureUnit(core::CM_UNIT_DEPTH_SOURCE, input.name);
     gl.GetIntegerv(multisample ? GL_TEXTURE_BINDING_2D_MULTISAMPLE : GL_TEXTURE_BINDING_2D, &bound);
   }
   if (bound == 0) refuse(input, multisample ? "is no GL_TEXTURE_2D_MULTISAMPLE" : "is no GL_TEXTURE_2D");
@@ -219,10 +220,10 @@ bool HostDepth::update(const HostDepthInput& input) {
   const std::uint32_t zero = 0;
   const auto a = static_cast<float>(input.depth_a);
   gl.NamedBufferSubData(changed_.name(), 0, 4, &zero);
-  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, changed_.name());
-  gl.BindTextureUnit(0, source.texture);
-  gl.BindSampler(0, sampler_.name());
-  gl.BindImageTexture(0, fits ? z_.name() : made.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32F);
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_DEPTH_CHANGED, changed_.name());
+  gl.BindTextureUnit(core::CM_UNIT_DEPTH_SOURCE, source.texture);
+  gl.BindSampler(core::CM_UNIT_DEPTH_SOURCE, sampler_.name());
+  gl.BindImageTexture(core::CM_IMAGE_HOST_DEPTH, fits ? z_.name() : made.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_R32F);
   gl.ProgramUniform2i(program.name(), 0, source.origin.x, source.origin.y);
   gl.ProgramUniform1i(program.name(), 1, input.flip_y ? 1 : 0);
   gl.ProgramUniform1i(program.name(), 2, input.orthographic ? 1 : 0);
@@ -235,7 +236,7 @@ bool HostDepth::update(const HostDepthInput& input) {
   const std::size_t place = next_place_++ % most_asked;
   gl.CopyNamedBufferSubData(changed_.name(), answers_.name(), 0, static_cast<GLintptr>(place * 4), 4);
   asked_.push_back({place, gl.dispatches_in_call ? gl::Fence() : gl::Fence(gl_)});
-  gl.BindSampler(0, 0);
+  gl.BindSampler(core::CM_UNIT_DEPTH_SOURCE, 0);
   gl::check(gl, "reading the host's depth");
   if (!fits) {
     z_ = std::move(made);

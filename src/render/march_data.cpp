@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "base/error.hpp"
+#include "gl/bindings.hpp"
 
 namespace cumulet::render {
 
@@ -17,7 +18,6 @@ using glm::ivec3;
 using glm::vec3;
 
 constexpr std::int64_t max_pages = 8;
-constexpr GLuint tree_unit = 12;
 constexpr std::size_t piece_bytes = std::size_t{2} << 20U;  // about a millisecond
 
 void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
@@ -261,10 +261,12 @@ std::vector<std::string> MarchData::defines() const {
 }
 
 void MarchData::bind(const gl::Functions& gl) const {
-  for (std::size_t i = 0; i < pages_.size(); ++i) gl.BindTextureUnit(static_cast<GLuint>(i), pages_[i].name());
+  for (std::size_t i = 0; i < pages_.size(); ++i)
+    gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), pages_[i].name());
+  constexpr std::array<GLuint, 3> units{core::CM_UNIT_TREE, core::CM_UNIT_VOXELS, core::CM_UNIT_BRICK_SLOTS};
   for (std::size_t i = 0; i < textures_.size(); ++i) {
-    if (textures_[i]) gl.BindTextureUnit(tree_unit + static_cast<GLuint>(i), textures_[i].name());
+    if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
-  if (roots_) gl.BindBufferBase(GL_UNIFORM_BUFFER, 1, roots_.name());
+  if (roots_) gl.BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_ROOTS, roots_.name());
 }
 }  // namespace cumulet::render

@@ -62,7 +62,7 @@ class MarchData {
   bool linear_ = false;
   std::vector<gl::Object> buffers_;
   std::vector<gl::Object> pages_;
-  std::array<gl::Object, 3> textures_;  // units 12, 13, 14
+  std::array<gl::Object, 3> textures_;  // the tree; voxels, or values of bricks; slots of bricks
   gl::Object roots_;
   core::CmGrid grid_{};
   std::uint64_t bytes_ = 0;

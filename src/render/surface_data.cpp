@@ -14,6 +14,7 @@
 #include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
+#include "gl/bindings.hpp"
 #include "render/luminance.hpp"
 #include "render/punctual.hpp"
 #include "surface/ggx_albedo.hpp"
@@ -33,8 +34,6 @@ using surface::TextureUse;
 
 constexpr std::uint32_t usual_edge = 2048;
 constexpr std::uint32_t largest_layer = 16384;  // what any driver of GL 4.5 takes
-constexpr GLuint words_unit = 9;
-constexpr GLuint atlas_unit = 10;
 // As glsl/surface.glsl.
 constexpr std::uint32_t flag_mask = 1;
 constexpr std::uint32_t flag_blend = 2;
@@ -341,8 +340,8 @@ SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, c
 }
 
 void SurfaceData::bind(const gl::Functions& gl) const {
-  gl.BindTextureUnit(words_unit, words_.name());
-  gl.BindTextureUnit(atlas_unit, atlas_->name());
+  gl.BindTextureUnit(core::CM_UNIT_SCENE_WORDS, words_.name());
+  gl.BindTextureUnit(core::CM_UNIT_ATLAS, atlas_->name());
 }
 
 double SurfaceData::emitter_share(double sun) const {

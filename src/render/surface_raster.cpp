@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/shared_code.hpp"
+#include "gl/bindings.hpp"
 #include "render/punctual.hpp"
 #include "surface/ggx_albedo.hpp"
 
@@ -27,8 +28,6 @@ using core::CmLight;
 using core::CmMaterial;
 using core::CmSurfaceView;
 using surface::AlphaMode;
-
-constexpr GLuint table_unit = core::CM_MAPS;
 
 std::size_t padded(std::size_t bytes, std::size_t alignment) { return (bytes + alignment - 1) / alignment * alignment; }
 
@@ -404,8 +403,8 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
     gl_->NamedBufferSubData(light_buffer_.name(), 0, static_cast<GLsizeiptr>(lights.size() * sizeof(CmLight)),
                             lights.data());
   }
-  gl_->BindBufferBase(GL_UNIFORM_BUFFER, 0, view_block_.name());
-  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, light_buffer_.name());
+  gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_SURFACE_VIEW, view_block_.name());
+  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_LAMPS, light_buffer_.name());
 }
 
 void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) const {
@@ -418,12 +417,13 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
     if (program != material.program) gl.UseProgram(material.program);
     program = material.program;
     if (bound != index) {
-      for (GLuint unit = 0; unit < material.maps.size(); ++unit) {
-        const Map& map = material.maps[unit];
+      for (GLuint i = 0; i < material.maps.size(); ++i) {
+        const Map& map = material.maps[i];
+        const GLuint unit = core::CM_UNIT_MAPS + i;
         gl.BindTextureUnit(unit, map.texture != 0 ? map.texture : white_.name());
         gl.BindSampler(unit, map.sampler);
       }
-      gl.BindBufferRange(GL_UNIFORM_BUFFER, 1, assets_.material_block.name(),
+      gl.BindBufferRange(GL_UNIFORM_BUFFER, core::CM_UNIFORM_MATERIAL, assets_.material_block.name(),
                          assets_.material_stride * static_cast<GLintptr>(index), sizeof(CmMaterial));
       if (material.double_sided || double_sided_) {
         gl.Disable(GL_CULL_FACE);
@@ -473,8 +473,8 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     attribute(3, 4, offsetof(surface::VertexAttributes, uv), 1);
     attribute(4, 4, offsetof(surface::VertexAttributes, color), 1);
     gl.BindVertexArray(array);
-    gl.BindTextureUnit(table_unit, albedo_table_.name());
-    gl.BindSampler(table_unit, table_sampler_.name());
+    gl.BindTextureUnit(core::CM_UNIT_GGX_ALBEDO, albedo_table_.name());
+    gl.BindSampler(core::CM_UNIT_GGX_ALBEDO, table_sampler_.name());
   }
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target);
   gl.ViewportIndexedf(0, 0.0F, 0.0F, static_cast<GLfloat>(size.x), static_cast<GLfloat>(size.y));

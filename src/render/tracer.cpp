@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
+#include "gl/bindings.hpp"
 #include "gl/state_guard.hpp"
 #include "render/luminance.hpp"
 
@@ -40,9 +41,6 @@ constexpr std::uint32_t most_rounds = 65536;
 constexpr double part_of_rest = 0.9;  // of the time left, that a dispatch may likely take
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t view_depth = 5;  // inspect.comp's
-constexpr GLuint surface_unit = 11;
-constexpr GLuint layer_colour_unit = 8;
-constexpr GLuint layer_z_unit = 15;
 
 using Clock = std::chrono::steady_clock;
 
@@ -343,9 +341,9 @@ void Tracer::clear(Picture& picture) {
 
 void Tracer::bind(const MarchData& data, const Surfaces& surfaces) const {
   data.bind(*gl_);
-  if (surfaces.depth != 0) gl_->BindTextureUnit(surface_unit, surfaces.depth);
+  if (surfaces.depth != 0) gl_->BindTextureUnit(core::CM_UNIT_HOST_DEPTH, surfaces.depth);
   if (surfaces.scene != nullptr) surfaces.scene->bind(*gl_);
-  gl_->BindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.name());
+  gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
 }
 
 void Tracer::collect() {
@@ -407,15 +405,15 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surf
   gl_->UseProgram(program.object.name());
   bind(data, surfaces);
   if (picture.layered_ != Layered::no) {
-    gl_->BindTextureUnit(layer_colour_unit, picture.layers_->colour.name());
-    gl_->BindTextureUnit(layer_z_unit, picture.layers_->z.name());
+    gl_->BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, picture.layers_->colour.name());
+    gl_->BindTextureUnit(core::CM_UNIT_LAYER_Z, picture.layers_->z.name());
   }
-  if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, paths_.name());
-  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, blocks_.name());
-  gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+  if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PATHS, paths_.name());
+  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BLOCKS, blocks_.name());
+  gl_->BindImageTexture(core::CM_IMAGE_SUM, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
   // What is bound shall fit the format, though this view does not write it.
-  gl_->BindImageTexture(2, picture.volume_sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
+  gl_->BindImageTexture(core::CM_IMAGE_VOLUME_SUM, picture.volume_sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
                         picture.volume_sum_ ? GL_RGBA32F : GL_R32F);
   if (!shaded) {
     core::CmParameters parameters = picture.parameters_;
@@ -577,9 +575,9 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
   const Program& program = inspect_program(data, surfaces, "inspect.comp");
   gl_->UseProgram(program.object.name());
   bind(data, surfaces);
-  gl_->BindImageTexture(0, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  gl_->BindImageTexture(1, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
-  gl_->BindImageTexture(2, picture.volume_z_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  gl_->BindImageTexture(core::CM_IMAGE_SUM, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, picture.volume_z_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
   parameters.dispatch.view = view_depth;
@@ -599,9 +597,9 @@ void Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces&
   const Program& program = inspect_program(data, surfaces, "aovs.comp");
   gl_->UseProgram(program.object.name());
   bind(data, surfaces);
-  gl_->BindImageTexture(0, facts.normal.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->BindImageTexture(1, facts.albedo.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
-  gl_->BindImageTexture(2, facts.volume_z.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  gl_->BindImageTexture(core::CM_IMAGE_NORMAL, facts.normal.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  gl_->BindImageTexture(core::CM_IMAGE_ALBEDO, facts.albedo.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, facts.volume_z.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
   std::uint32_t row = 0;
@@ -650,9 +648,9 @@ float Tracer::pick(const MarchData& data, const PictureParameters& parameters, c
   p.dispatch.rows = {0U, 1U};
   gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp").object.name());
   bind(data, surfaces);
-  gl_->BindImageTexture(0, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->BindImageTexture(1, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
-  gl_->BindImageTexture(2, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
   gl_->DispatchCompute(1, 1, 1);
   gl::memory_barrier(*gl_, GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "gl/bindings.hpp"
 #include "support/gl_compute.hpp"
 #include "support/gl_state.hpp"
 
@@ -101,8 +102,14 @@ std::string word_of(const Field& field, std::size_t i) {
   return text.str();
 }
 
+// Of a shader, up to the block.
+std::string head() {
+  return "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("bindings.glsl") +
+         test::glsl_file("parameters.glsl");
+}
+
 TEST_P(Parameters, EveryFieldIsReadBackFromWhereCppWritesIt) {
-  std::string text = "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("parameters.glsl") + R"(
+  std::string text = head() + R"(
 layout(std430, binding = 0) buffer Words { uint words[]; };
 uint word(uint value) { return value; }
 uint word(float value) { return floatBitsToUint(value); }
@@ -122,7 +129,7 @@ void main() {
   const std::vector<std::uint32_t> zeros(expected.size());
   const gl::Object out = gl::make_buffer(gl_, 4 * zeros.size(), zeros.data(), 0, "words");
   gl_->UseProgram(program.name());
-  gl_->BindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms.name());
+  gl_->BindBufferBase(GL_UNIFORM_BUFFER, cumulet::core::CM_UNIFORM_PARAMETERS, uniforms.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, out.name());
   gl_->DispatchCompute(1, 1, 1);
   gl_->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
@@ -133,7 +140,7 @@ void main() {
 
 TEST_P(Parameters, TheDriverKnowsNoOtherFields) {
   const gl::Object program =
-      test::compute_program(gl_, "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("parameters.glsl") +
+      test::compute_program(gl_, head() +
                                      "layout(std430, binding = 0) buffer Words { uint words[]; };\n"
                                      "void main() { words[0] = cm.dispatch.rounds; }\n");
   const GLuint index = gl_->GetProgramResourceIndex(program.name(), GL_UNIFORM_BLOCK, "CmParameters");

@@ -1,0 +1,56 @@
+// Where shaders find what the library binds; C++ has the same (gl/bindings.hpp). Programs that are told of the same
+// thing have it at the same place; numbers that stand twice are of things that no program has both of.
+#ifndef CM_BINDINGS_GLSL
+#define CM_BINDINGS_GLSL
+
+// What cumulet.h promises the host not to go beyond, and what StateGuard can save: GL's minima for compute shaders.
+const int CM_UNITS = 16;
+const int CM_BUFFERS = 8;  // of storage buffers, and of uniform buffers
+const int CM_IMAGES = 8;
+
+// Texture units. Kernels of paths and views:
+const int CM_UNIT_CELLS = 0;  // to 7: pages of cell records
+const int CM_UNIT_LAYER_COLOUR = 8;
+const int CM_UNIT_SCENE_WORDS = 9;
+const int CM_UNIT_ATLAS = 10;
+const int CM_UNIT_HOST_DEPTH = 11;
+const int CM_UNIT_TREE = 12;
+const int CM_UNIT_VOXELS = 13;  // or values of bricks
+const int CM_UNIT_BRICK_SLOTS = 14;
+const int CM_UNIT_LAYER_Z = 15;
+// resolve.comp and composite.frag:
+const int CM_UNIT_SUM = 0;
+const int CM_UNIT_COUNTS = 1;
+const int CM_UNIT_VOLUME_Z = 2;
+const int CM_UNIT_SUM_BEFORE = 3;
+const int CM_UNIT_COUNTS_BEFORE = 4;
+// host_depth.comp:
+const int CM_UNIT_DEPTH_SOURCE = 0;
+// surface.frag:
+const int CM_UNIT_MAPS = 0;  // to 9, in the order of surface_parameters.glsl
+const int CM_UNIT_GGX_ALBEDO = 10;
+
+// Uniform buffers.
+const int CM_UNIFORM_PARAMETERS = 0;
+const int CM_UNIFORM_ROOTS = 1;
+const int CM_UNIFORM_SURFACE_VIEW = 0;
+const int CM_UNIFORM_MATERIAL = 1;
+
+// Storage buffers.
+const int CM_STORAGE_PATHS = 0;
+const int CM_STORAGE_BLOCKS = 1;
+const int CM_STORAGE_LAMPS = 0;          // surface.frag
+const int CM_STORAGE_DEPTH_CHANGED = 0;  // host_depth.comp
+const int CM_STORAGE_SIGN = 0;           // sign.comp
+
+// Images.
+const int CM_IMAGE_SUM = 0;
+const int CM_IMAGE_COUNTS = 1;
+const int CM_IMAGE_VOLUME_SUM = 2;
+const int CM_IMAGE_VOLUME_Z = 2;  // inspect.comp, aovs.comp
+const int CM_IMAGE_NORMAL = 0;    // aovs.comp
+const int CM_IMAGE_ALBEDO = 1;
+const int CM_IMAGE_MEANS = 0;       // resolve.comp
+const int CM_IMAGE_HOST_DEPTH = 0;  // host_depth.comp
+
+#endif
