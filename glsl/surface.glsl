@@ -1,29 +1,12 @@
-// Triangles and materials as the path tracer meets them: what the tables of one buffer of words say of a point. The
-// order of the tables is that of src/render/surface_data.cpp. Includes bvh.glsl; needs bsdf.glsl before it.
+// Triangles and materials as the path tracer meets them: what the tables of one buffer of words say of a point
+// (surface_tables.glsl). Includes bvh.glsl; needs bsdf.glsl before it.
 #ifndef CM_SURFACE_GLSL
 #define CM_SURFACE_GLSL
 #include "punctual.glsl"
+#include "surface_tables.glsl"
 
 layout(binding = CM_UNIT_SCENE_WORDS) uniform usamplerBuffer cm_scene_words;
 layout(binding = CM_UNIT_ATLAS) uniform sampler2DArray cm_atlas;
-
-#define CM_MATERIAL_WORDS 24u
-#define CM_VERTEX_WORDS 3u
-
-#define CM_ALPHA_MASK 1u
-#define CM_ALPHA_BLEND 2u
-#define CM_UNLIT 4u
-#define CM_ONE_SIDED 8u
-
-#define CM_USE_BASE_COLOR 6u
-#define CM_USE_METALLIC_ROUGHNESS 8u
-#define CM_USE_NORMAL 10u
-#define CM_USE_EMISSION 12u
-#define CM_USE_SPECULAR 14u
-#define CM_USE_SPECULAR_COLOR 16u
-#define CM_USE_CLEARCOAT 18u
-#define CM_USE_CLEARCOAT_ROUGHNESS 20u
-#define CM_USE_TRANSMISSION 22u
 
 uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(word)); }
 vec4 cm_floats(uint word) { return uintBitsToFloat(texelFetch(cm_scene_words, int(word))); }
@@ -86,8 +69,8 @@ CmVertexMix cm_vertex_mix(uint triangle, vec2 weights) {
   m.color = vec4(0.0);
   for (int i = 0; i < 3; ++i) {
     uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
-    uv += m.weight[i] * cm_floats(vertex + 1u);
-    uvec4 last = cm_words(vertex + 2u);
+    uv += m.weight[i] * cm_floats(vertex + CM_VERTEX_UV);
+    uvec4 last = cm_words(vertex + CM_VERTEX_REST);
     m.color += m.weight[i] * vec4(unpackUnorm2x16(last.z), unpackUnorm2x16(last.w));
   }
   m.uv_0 = uv.xy;
@@ -96,8 +79,8 @@ CmVertexMix cm_vertex_mix(uint triangle, vec2 weights) {
 }
 
 int cm_wrap(int i, int size, uint mode) {
-  if (mode == 2u) return clamp(i, 0, size - 1);
-  int period = mode == 1u ? 2 * size : size;
+  if (mode == CM_WRAP_CLAMP) return clamp(i, 0, size - 1);
+  int period = mode == CM_WRAP_MIRRORED ? 2 * size : size;
   i = i % period;
   if (i < 0) i += period;
   return i < size ? i : period - 1 - i;
@@ -106,7 +89,8 @@ int cm_wrap(int i, int size, uint mode) {
 vec4 cm_atlas_texel(uvec4 texture_words, ivec2 at) {
   ivec2 size = ivec2(texture_words.y & 0xffffu, texture_words.y >> 16);
   ivec2 corner = ivec2(texture_words.x & 0xffffu, texture_words.x >> 16);
-  at = ivec2(cm_wrap(at.x, size.x, texture_words.w & 3u), cm_wrap(at.y, size.y, (texture_words.w >> 2) & 3u));
+  at = ivec2(cm_wrap(at.x, size.x, texture_words.w & CM_WRAP_MASK),
+             cm_wrap(at.y, size.y, (texture_words.w >> CM_WRAP_T_SHIFT) & CM_WRAP_MASK));
   return texelFetch(cm_atlas, ivec3(corner + at, int(texture_words.z)), 0);
 }
 
@@ -122,15 +106,16 @@ vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
   if (head.x == 0u) return vec4(1.0);
   vec4 tail = cm_floats(word + 1u);
   vec3 rest = uintBitsToFloat(head.yzw);
-  vec2 uv = (head.x & 0x80000000u) != 0u ? m.uv_1 : m.uv_0;
+  vec2 uv = (head.x & CM_USE_SECOND_UV) != 0u ? m.uv_1 : m.uv_0;
   uv = vec2(rest.x * uv.x + rest.z * uv.y, rest.y * uv.x + tail.x * uv.y) + tail.yz;
-  uvec4 t = cm_words(cm.surfaces.textures + (head.x & 0x7fffffffu) - 1u);
+  uvec4 t = cm_words(cm.surfaces.textures + (head.x & ~CM_USE_SECOND_UV) - 1u);
   vec2 size = vec2(t.y & 0xffffu, t.y >> 16);
   // Far outside, whole turns would lose the fraction's precision: each wrap mode repeats after two.
-  vec2 at = (uv - 2.0 * floor(0.5 * uv) * vec2((t.w & 3u) == 2u ? 0.0 : 1.0, ((t.w >> 2) & 3u) == 2u ? 0.0 : 1.0));
+  bvec2 clamped = bvec2((t.w & CM_WRAP_MASK) == CM_WRAP_CLAMP, ((t.w >> CM_WRAP_T_SHIFT) & CM_WRAP_MASK) == CM_WRAP_CLAMP);
+  vec2 at = uv - 2.0 * floor(0.5 * uv) * vec2(clamped.x ? 0.0 : 1.0, clamped.y ? 0.0 : 1.0);
   at = clamp(at, vec2(-4.0), vec2(4.0)) * size;
   vec4 value;
-  if ((t.w & 16u) != 0u) {
+  if ((t.w & CM_TEXTURE_NEAREST) != 0u) {
     value = cm_atlas_texel(t, ivec2(floor(at)));
     return srgb ? vec4(cm_from_srgb(value.rgb), value.a) : value;
   }
@@ -146,16 +131,16 @@ vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
   return sum;
 }
 
-uint cm_material_flags(uint material) { return cm_words(cm.surfaces.materials + CM_MATERIAL_WORDS * material + 5u).x; }
+uint cm_material_flags(uint material) { return cm_words(cm.surfaces.materials + CM_MATERIAL_WORDS * material + CM_MATERIAL_FLAGS).x; }
 
 // The share of rays that end at a point of a triangle. Coverage (BLEND) and transmission are chances, so that no order of
 // surfaces and volume has to be found.
 float cm_coverage(CmVertexMix m) {
   uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
-  uint flags = cm_words(word + 5u).x;
-  float transmission = cm_floats(word + 4u).y;
-  vec4 base = cm_floats(word) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
-  if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + 1u).w) return 0.0;
+  uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
+  float transmission = cm_floats(word + CM_MATERIAL_COAT).y;
+  vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
+  if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + CM_MATERIAL_EMISSION).w) return 0.0;
   float solid = (flags & CM_ALPHA_BLEND) != 0u ? clamp(base.a, 0.0, 1.0) : 1.0;
   if (transmission > 0.0) {
     // Thin and clear: what passes goes straight on, in the share of the base colour's luminance.
@@ -210,7 +195,7 @@ float cm_lift_share(float cosine) { return clamp(1.0 - cosine / CM_GRAZING, 0.0,
 
 // What a material emits where it is seen from its front.
 vec3 cm_emission(CmVertexMix m) {
-  vec3 emission = cm_floats(cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w + 1u).rgb;
+  vec3 emission = cm_floats(cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w + CM_MATERIAL_EMISSION).rgb;
   return emission * cm_texture(m.corner.w, CM_USE_EMISSION, m, true).rgb;
 }
 
@@ -226,8 +211,8 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   vec4 tangent = vec4(0.0);
   for (int i = 0; i < 3; ++i) {
     uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
-    uvec4 first = cm_words(vertex);
-    uvec4 last = cm_words(vertex + 2u);
+    uvec4 first = cm_words(vertex + CM_VERTEX_PLACE);
+    uvec4 last = cm_words(vertex + CM_VERTEX_REST);
     position[i] = uintBitsToFloat(first.xyz);
     normals[i] = cm_octahedral(first.w);
     normal += m.weight[i] * normals[i];
@@ -246,11 +231,11 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   bool back = dot(normal, point.geometric) < 0.0;
   point.material.smooth_normal = back ? -normal : normal;
 
-  vec4 base = cm_floats(word) * cm_texture(material, CM_USE_BASE_COLOR, m, true) * m.color;
-  vec4 a = cm_floats(word + 2u);
-  vec4 b = cm_floats(word + 3u);
-  vec4 c = cm_floats(word + 4u);
-  uint flags = cm_words(word + 5u).x;
+  vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * cm_texture(material, CM_USE_BASE_COLOR, m, true) * m.color;
+  vec4 a = cm_floats(word + CM_MATERIAL_REFLECTION);
+  vec4 b = cm_floats(word + CM_MATERIAL_SPECULAR_COLOR);
+  vec4 c = cm_floats(word + CM_MATERIAL_COAT);
+  uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
   vec4 rough = cm_texture(material, CM_USE_METALLIC_ROUGHNESS, m, false);
 
   if (cm_words(word + CM_USE_NORMAL).x != 0u) {
@@ -302,7 +287,7 @@ vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, out vec
   vec3 position[3];
   vec3 normals[3];
   for (int i = 0; i < 3; ++i) {
-    uvec4 first = cm_words(cm.surfaces.vertices + CM_VERTEX_WORDS * corner[i]);
+    uvec4 first = cm_words(cm.surfaces.vertices + CM_VERTEX_WORDS * corner[i] + CM_VERTEX_PLACE);
     position[i] = uintBitsToFloat(first.xyz);
     normals[i] = cm_octahedral(first.w);
   }
@@ -325,7 +310,7 @@ void cm_lamp(vec3 here, float u, inout vec3 light, inout vec3 to_light, inout fl
     light *= float(count);
     return;
   }
-  uint word = cm.surfaces.lamps + 4u * choice;
+  uint word = cm.surfaces.lamps + CM_LAMP_WORDS * choice;
   CmLight lamp = CmLight(cm_floats(word), cm_floats(word + 1u), cm_floats(word + 2u), cm_floats(word + 3u));
   light = cm_punctual_irradiance(lamp, here, to_light, distance) * float(count);
 }
@@ -363,9 +348,9 @@ vec3 cm_emitter_sample(vec3 here, uvec2 pick, vec2 u, out vec3 to_light, out flo
   if (pick.y > entry.y) entry = cm_emitter(entry.z);
   float root = sqrt(u.x);
   CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0 - u.y), root * u.y));
-  vec3 a = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.x).xyz;
-  vec3 b = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.y).xyz;
-  vec3 c = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.z).xyz;
+  vec3 a = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.x + CM_VERTEX_PLACE).xyz;
+  vec3 b = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.y + CM_VERTEX_PLACE).xyz;
+  vec3 c = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.z + CM_VERTEX_PLACE).xyz;
   vec3 g = cross(b - a, c - a);
   g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
   vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
@@ -376,9 +361,9 @@ vec3 cm_emitter_sample(vec3 here, uvec2 pick, vec2 u, out vec3 to_light, out flo
   distance = sqrt(length_2) * 0.99999;
   density = cm_emitter_density(entry, way, dot(g, to_light));
   uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
-  uint flags = cm_words(word + 5u).x;
+  uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
   vec3 emission = cm_emission(m);
-  if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + 4u).y > 0.0) {
+  if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + CM_MATERIAL_COAT).y > 0.0) {
     emission *= cm_coverage(m);
   }
   bool front = along == (uintBitsToFloat(entry.w) < 0.0);

@@ -19,6 +19,10 @@
 #include "render/punctual.hpp"
 #include "surface/ggx_albedo.hpp"
 
+namespace cumulet::core {
+#include "surface_tables.glsl"
+}  // namespace cumulet::core
+
 namespace cumulet::render {
 
 namespace {
@@ -34,12 +38,6 @@ using surface::TextureUse;
 
 constexpr std::uint32_t usual_edge = 2048;
 constexpr std::uint32_t largest_layer = 16384;  // what any driver of GL 4.5 takes
-// As glsl/surface.glsl.
-constexpr std::uint32_t flag_mask = 1;
-constexpr std::uint32_t flag_blend = 2;
-constexpr std::uint32_t flag_unlit = 4;
-constexpr std::uint32_t flag_one_sided = 8;
-constexpr std::uint32_t use_second_uv = 0x80000000U;
 
 uvec4 bits(const vec4& v) { return glm::floatBitsToUint(v); }
 uvec4 bits(const vec3& v, float w) { return glm::floatBitsToUint(vec4(v, w)); }
@@ -60,34 +58,46 @@ std::uint32_t octahedral(const vec3& v) {
 
 std::uint32_t unorm16(float v) { return static_cast<std::uint32_t>(std::lround(std::clamp(v, 0.0F, 1.0F) * 65535.0F)); }
 
-void add_use(std::vector<uvec4>& words, const TextureUse& use) {
+void write_use(uvec4* to, const TextureUse& use) {
   const glm::mat3x2& m = use.transform;
   const std::uint32_t head =
-      use.texture < 0 ? 0U : static_cast<std::uint32_t>(use.texture + 1) | (use.uv_set == 1 ? use_second_uv : 0U);
-  words.emplace_back(head, glm::floatBitsToUint(m[0][0]), glm::floatBitsToUint(m[0][1]), glm::floatBitsToUint(m[1][0]));
-  words.push_back(bits(vec4(m[1][1], m[2][0], m[2][1], 0.0F)));
+      use.texture < 0 ? 0U
+                      : static_cast<std::uint32_t>(use.texture + 1) | (use.uv_set == 1 ? core::CM_USE_SECOND_UV : 0U);
+  to[0] = uvec4(head, glm::floatBitsToUint(m[0][0]), glm::floatBitsToUint(m[0][1]), glm::floatBitsToUint(m[1][0]));
+  to[1] = bits(vec4(m[1][1], m[2][0], m[2][1], 0.0F));
 }
 
-void add_material(std::vector<uvec4>& words, const Material& m, bool double_sided) {
+void write_material(uvec4* to, const Material& m, bool double_sided) {
   const float f0 = (m.ior - 1.0F) / (m.ior + 1.0F);
-  words.push_back(bits(m.base_color));
-  words.push_back(bits(m.emission, m.alpha_cutoff));
-  words.push_back(bits(vec4(m.metallic, m.roughness, f0 * f0, m.specular)));
-  words.push_back(bits(m.specular_color, m.clearcoat));
-  words.push_back(bits(vec4(m.clearcoat_roughness, m.transmission, m.normal_scale, 0.0F)));
-  words.emplace_back((m.alpha_mode == AlphaMode::mask ? flag_mask : 0U) |
-                         (m.alpha_mode == AlphaMode::blend ? flag_blend : 0U) | (m.unlit ? flag_unlit : 0U) |
-                         (m.double_sided || double_sided ? 0U : flag_one_sided),
-                     0U, 0U, 0U);
-  for (const TextureUse* use : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture,
-                                &m.emission_texture, &m.specular_texture, &m.specular_color_texture,
-                                &m.clearcoat_texture, &m.clearcoat_roughness_texture, &m.transmission_texture}) {
-    add_use(words, *use);
-  }
+  to[core::CM_MATERIAL_BASE_COLOR] = bits(m.base_color);
+  to[core::CM_MATERIAL_EMISSION] = bits(m.emission, m.alpha_cutoff);
+  to[core::CM_MATERIAL_REFLECTION] = bits(vec4(m.metallic, m.roughness, f0 * f0, m.specular));
+  to[core::CM_MATERIAL_SPECULAR_COLOR] = bits(m.specular_color, m.clearcoat);
+  to[core::CM_MATERIAL_COAT] = bits(vec4(m.clearcoat_roughness, m.transmission, m.normal_scale, 0.0F));
+  to[core::CM_MATERIAL_FLAGS].x = (m.alpha_mode == AlphaMode::mask ? core::CM_ALPHA_MASK : 0U) |
+                                  (m.alpha_mode == AlphaMode::blend ? core::CM_ALPHA_BLEND : 0U) |
+                                  (m.unlit ? core::CM_UNLIT : 0U) |
+                                  (m.double_sided || double_sided ? 0U : core::CM_ONE_SIDED);
+  write_use(to + core::CM_USE_BASE_COLOR, m.base_color_texture);
+  write_use(to + core::CM_USE_METALLIC_ROUGHNESS, m.metallic_roughness_texture);
+  write_use(to + core::CM_USE_NORMAL, m.normal_texture);
+  write_use(to + core::CM_USE_EMISSION, m.emission_texture);
+  write_use(to + core::CM_USE_SPECULAR, m.specular_texture);
+  write_use(to + core::CM_USE_SPECULAR_COLOR, m.specular_color_texture);
+  write_use(to + core::CM_USE_CLEARCOAT, m.clearcoat_texture);
+  write_use(to + core::CM_USE_CLEARCOAT_ROUGHNESS, m.clearcoat_roughness_texture);
+  write_use(to + core::CM_USE_TRANSMISSION, m.transmission_texture);
 }
 
 std::uint32_t wrap_bits(surface::Wrap wrap) {
-  return wrap == surface::Wrap::repeat ? 0U : (wrap == surface::Wrap::mirrored ? 1U : 2U);
+  switch (wrap) {
+    case surface::Wrap::mirrored:
+      return core::CM_WRAP_MIRRORED;
+    case surface::Wrap::clamp:
+      return core::CM_WRAP_CLAMP;
+    default:
+      return core::CM_WRAP_REPEAT;
+  }
 }
 
 std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
@@ -131,28 +141,32 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   }
   check(progress);
   source.tables.vertices = size_of(words);
-  resize(words, words.size() + 3 * scene.attributes.size(), progress);
+  resize(words, words.size() + core::CM_VERTEX_WORDS * scene.attributes.size(), progress);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
     check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const surface::PosedVertex& v = source.pose.vertices[i];
       const surface::VertexAttributes& a = scene.attributes[i];
-      uvec4* to = &words[source.tables.vertices + 3 * i];
-      to[0] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
-      to[1] = bits(vec4(a.uv[0], a.uv[1]));
-      to[2] = uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),
-                    unorm16(a.color.x) | unorm16(a.color.y) << 16U, unorm16(a.color.z) | unorm16(a.color.w) << 16U);
+      uvec4* to = &words[source.tables.vertices + core::CM_VERTEX_WORDS * i];
+      to[core::CM_VERTEX_PLACE] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
+      to[core::CM_VERTEX_UV] = bits(vec4(a.uv[0], a.uv[1]));
+      to[core::CM_VERTEX_REST] =
+          uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),
+                unorm16(a.color.x) | unorm16(a.color.y) << 16U, unorm16(a.color.z) | unorm16(a.color.w) << 16U);
     }
   });
 
   source.tables.materials = size_of(words);
-  for (const Material& material : scene.materials) add_material(words, material, source.pose.double_sided);
+  for (const Material& material : scene.materials) {
+    words.resize(words.size() + core::CM_MATERIAL_WORDS);
+    write_material(&words[words.size() - core::CM_MATERIAL_WORDS], material, source.pose.double_sided);
+  }
   source.tables.textures = size_of(words);
   for (const surface::Texture& texture : scene.textures) {
     const TextureAtlas::Place& place = source.atlas.places[texture.image];
     words.emplace_back(place.corner.x | place.corner.y << 16U, place.size.x | place.size.y << 16U, place.layer,
-                       wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << 2U |
-                           (texture.sampler.magnify == surface::Filter::nearest ? 16U : 0U));
+                       wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << core::CM_WRAP_T_SHIFT |
+                           (texture.sampler.magnify == surface::Filter::nearest ? core::CM_TEXTURE_NEAREST : 0U));
   }
   source.tables.lamps = size_of(words);
   source.tables.lamp_count = static_cast<std::uint32_t>(source.pose.lights.size());

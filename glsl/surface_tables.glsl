@@ -1,0 +1,50 @@
+// The tables of words that the path tracer knows a scene's triangles by: surface.glsl reads them, and
+// render/surface_data.cpp writes them. A word is a uvec4. Where each table begins: CmSurfaceTables (parameters.glsl).
+#ifndef CM_SURFACE_TABLES_GLSL
+#define CM_SURFACE_TABLES_GLSL
+
+// A vertex: position and normal; both sets of texture coordinates; tangent, its hand and colour.
+const uint CM_VERTEX_WORDS = 3u;
+const uint CM_VERTEX_PLACE = 0u;
+const uint CM_VERTEX_UV = 1u;
+const uint CM_VERTEX_REST = 2u;
+
+// A material; then two words for each of its textures.
+const uint CM_MATERIAL_WORDS = 24u;
+const uint CM_MATERIAL_BASE_COLOR = 0u;
+const uint CM_MATERIAL_EMISSION = 1u;        // w: alpha cutoff
+const uint CM_MATERIAL_REFLECTION = 2u;      // metallic, roughness, ((ior - 1) / (ior + 1))^2, specular
+const uint CM_MATERIAL_SPECULAR_COLOR = 3u;  // w: clearcoat
+const uint CM_MATERIAL_COAT = 4u;            // its roughness, transmission, normal scale
+const uint CM_MATERIAL_FLAGS = 5u;           // x
+const uint CM_USE_BASE_COLOR = 6u;
+const uint CM_USE_METALLIC_ROUGHNESS = 8u;
+const uint CM_USE_NORMAL = 10u;
+const uint CM_USE_EMISSION = 12u;
+const uint CM_USE_SPECULAR = 14u;
+const uint CM_USE_SPECULAR_COLOR = 16u;
+const uint CM_USE_CLEARCOAT = 18u;
+const uint CM_USE_CLEARCOAT_ROUGHNESS = 20u;
+const uint CM_USE_TRANSMISSION = 22u;
+
+// A material's flags.
+const uint CM_ALPHA_MASK = 1u;
+const uint CM_ALPHA_BLEND = 2u;
+const uint CM_UNLIT = 4u;
+const uint CM_ONE_SIDED = 8u;
+
+// Beside the number of the texture, plus one, that a material uses; 0 is none.
+const uint CM_USE_SECOND_UV = 0x80000000u;
+
+// A texture's last word: how its coordinates wrap, s and then t, and how it is filtered.
+const uint CM_WRAP_REPEAT = 0u;
+const uint CM_WRAP_MIRRORED = 1u;
+const uint CM_WRAP_CLAMP = 2u;
+const uint CM_WRAP_MASK = 3u;
+const uint CM_WRAP_T_SHIFT = 2u;
+const uint CM_TEXTURE_NEAREST = 16u;
+
+// A lamp: a CmLight (punctual.glsl).
+const uint CM_LAMP_WORDS = 4u;
+
+#endif
