@@ -20,9 +20,7 @@ constexpr double nearly_all = 0.9;
 constexpr double most_layer_bytes = 256e6;
 // Frames that the first answer to a change may take.
 constexpr double answer_frames = 2.0;
-// What has not changed for so long rests; what a hand holds may be held still.
-constexpr double rest_ms = 100.0;
-constexpr double held_rest_ms = 300.0;
+using State = Schedule::State;
 using Clock = std::chrono::steady_clock;
 
 const surface::Scene* scene_met(const Surfaces& surfaces) {
@@ -45,9 +43,10 @@ glm::uvec2 Progressive::size_of(std::uint32_t divisor) const {
 }
 
 bool Progressive::is_enough() const {
-  const glm::u64vec2 size(working_->size());
-  const auto wanted = static_cast<double>(size.x * size.y * working_->target_samples());
-  return working_->done() || (working_->complete() && static_cast<double>(working_->samples()) >= nearly_all * wanted);
+  const Picture& picture = *working_->picture;
+  const glm::u64vec2 size(picture.size());
+  const auto wanted = static_cast<double>(size.x * size.y * picture.target_samples());
+  return picture.done() || (picture.complete() && static_cast<double>(picture.samples()) >= nearly_all * wanted);
 }
 
 std::uint32_t Progressive::coarsest(double budget_ms) const {
@@ -60,8 +59,8 @@ std::uint32_t Progressive::coarsest(double budget_ms) const {
 }
 
 Picture& Progressive::acquire(glm::uvec2 size) {
-  const auto is_free = [this](const auto& picture) { return picture.get() != shown_ && picture.get() != before(); };
-  // working_ itself, if it is not shown: it is to be given up.
+  const auto is_free = [this](const auto& picture) { return picture.get() != shown() && picture.get() != before(); };
+  // The one under way, if it is not shown: it is to be given up.
   for (const auto& picture : pictures_) {
     if (is_free(picture) && picture->size() == size) return *picture;
   }
@@ -81,11 +80,12 @@ PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size,
   return settings;
 }
 
-PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const {
+PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms,
+                                      bool still) const {
   const glm::uvec2 size = wish_.content.parameters.view.size;
   PictureSettings settings;
   if (surfaces.raster != nullptr && divisor > finest_) {
-    settings = quick_layers(tracer_, size, budget_ms, !answering_ || rests());
+    settings = quick_layers(tracer_, size, budget_ms, still);
   } else if (surfaces.raster != nullptr && !surfaces.traced) {
     settings.layered = Layered::within;
     settings.layer_size = size;
@@ -98,142 +98,157 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
   return settings;
 }
 
-bool Progressive::rests() const {
-  return let_go_ || milliseconds(Clock::now() - changed_) >= (wish_.held ? held_rest_ms : rest_ms);
-}
-
 bool Progressive::blurs() const {
-  return working_->layered() == Layered::beneath && working_->layers().size != wish_.content.parameters.view.size;
+  return working_ && working_->picture->layered() == Layered::beneath &&
+         working_->picture->layers().size != wish_.content.parameters.view.size;
 }
 
-void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms) {
+void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces,
+                        const PictureSettings& settings) {
   PictureParameters parameters = wish_.content.parameters;
   parameters.view.size = size_of(divisor);
   Picture& picture = acquire(parameters.view.size);
-  working_ = nullptr;
+  working_.reset();
   try {
-    tracer_.begin(picture, data, parameters, enough(divisor), surfaces, settings(divisor, surfaces, budget_ms));
+    tracer_.begin(picture, data, parameters, enough(divisor), surfaces, settings);
   } catch (const Error& error) {
     const bool memory = error.code() == ErrorCode::out_of_memory && wish_.content.preview && divisor < coarsest_divisor;
     if (memory) {
       finest_ = divisor * 2;
-      stale_ = true;
     } else {
-      failed_ = true;
+      schedule_.fail();
     }
     throw;
   }
-  working_ = &picture;
-  working_generation_ = wish_.content.generation;
-  scene_ = scene_met(surfaces);
-  divisor_ = divisor;
-  stale_ = false;
+  working_ = Work{&picture, wish_.content.generation, divisor, scene_met(surfaces)};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
 
 bool Progressive::needs_depth() const {
-  return wish_.depth && shown_ != nullptr && shown_->volume_z() == 0 && shown_generation_ == wish_.content.generation;
+  return wish_.depth && shown_ && shown_->picture->volume_z() == 0 && shown_->generation == wish_.content.generation;
 }
 
 void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
-  const bool resized = wish.content.parameters.view.size != wish_.content.parameters.view.size;
-  const bool changed = !wished_ || wish.content != wish_.content;
-  let_go_ = !wish.held && (wish_.held || (let_go_ && !changed));
+  const PictureWish::Content& last = wish_.content;
+  const bool resized = wish.content.parameters.view.size != last.parameters.view.size;
+  const bool changed = state() == State::idle || wish.content != last;
+  stillness_.see(changed, wish.held, Clock::now());
   if (changed) {
-    changed_ = Clock::now();
-    stale_ = true;
-    failed_ = false;
-    if (resized || wish.content.generation != wish_.content.generation) finest_ = 1;
+    const bool other_data = resized || wish.content.generation != last.generation;
+    if (other_data) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
     // So do paths on another scene's triangles.
-    if (wish.content.generation != wish_.content.generation || resized ||
-        wish.content.preview != wish_.content.preview || scene_met(surfaces) != scene_) {
-      working_ = nullptr;
+    if (other_data || wish.content.preview != last.preview || (working_ && scene_met(surfaces) != working_->scene)) {
+      working_.reset();
     }
-  } else if (working_ != nullptr && divisor_ == finest_) {
-    if (!wish.content.preview && wish.samples < working_->target_samples()) {
-      stale_ = true;
+    schedule_.change(working_ && wish.content.preview);
+  } else if (working_ && working_->divisor == finest_) {
+    if (!wish.content.preview && wish.samples < working_->picture->target_samples()) {
+      schedule_.drop();
     } else {
-      working_->extend(wish.samples);
+      working_->picture->extend(wish.samples);
+      if (!working_->picture->done()) schedule_.extend();
     }
   }
   wish_ = wish;
-  wished_ = true;
 }
 
 void Progressive::advance(const PictureWish& wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
                           double budget_ms) {
   take(wish, surfaces);
-  if (failed_) return;
+  if (state() == State::failed) return;
   try {
     do {
-      // The first answer to a change is finished, whatever changes meanwhile: else nothing would ever be shown.
-      const bool answering = wish_.content.preview && answering_ && working_ != nullptr && !working_->complete();
-      if (working_ == nullptr || (stale_ && !answering) || (blurs() && rests())) {
-        answering_ = true;
+      const bool rests = stillness_.rests(Clock::now());
+      if (blurs() && rests) schedule_.drop();
+      if (state() == State::due) {
         first_divisor_ = coarsest(budget_ms);
-        start(first_divisor_, data, surfaces, budget_ms);
-      } else if (!stale_ && divisor_ > finest_ && is_enough()) {
-        answering_ = false;
-        start(divisor_ / 2, data, surfaces, budget_ms);
+        start(first_divisor_, data, surfaces, settings(first_divisor_, surfaces, budget_ms, rests));
+        schedule_.begin();
+      } else if (state() == State::refining && working_->divisor > finest_ && is_enough()) {
+        const std::uint32_t divisor = working_->divisor / 2;
+        start(divisor, data, surfaces, settings(divisor, surfaces, budget_ms, true));
       }
-      const auto begun = Clock::now();
-      const bool was_complete = working_->complete();
-      const bool done = tracer_.trace(*working_, data, surfaces, deadline, divisor_ > finest_);
-      const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
-      trace_seconds_ += seconds;
-      if (!was_complete) answer_seconds_ += seconds;
-      if (working_->complete()) {
-        if (!was_complete && wish_.content.view == View::shaded) {
-          const glm::dvec2 size(working_->size());
-          answer_rate_ += 0.3 * (size.x * size.y / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
-        }
-        if (shown_ != working_) before_ = shown_;
-        shown_ = working_;
-        shown_generation_ = working_generation_;
-        if (needs_depth()) tracer_.trace_depth(*shown_, data, surfaces, deadline);
-      }
-      if (done && !stale_ && divisor_ == finest_) break;
-    } while (Clock::now() < deadline);
+      work(data, surfaces, deadline);
+    } while (state() != State::done && Clock::now() < deadline);
   } catch (const Error& error) {
-    working_ = nullptr;
-    if (finest_ == 1 || error.code() != ErrorCode::out_of_memory) failed_ = true;
+    working_.reset();
+    if (finest_ == 1 || error.code() != ErrorCode::out_of_memory) {
+      schedule_.fail();
+    } else {
+      schedule_.drop();
+    }
     throw;
   }
 }
 
+void Progressive::work(const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
+  Picture& picture = *working_->picture;
+  const auto begun = Clock::now();
+  const bool was_complete = picture.complete();
+  tracer_.trace(picture, data, surfaces, deadline, working_->divisor > finest_);
+  const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
+  trace_seconds_ += seconds;
+  if (!was_complete) answer_seconds_ += seconds;
+  if (picture.complete()) {
+    if (!was_complete && wish_.content.view == View::shaded) {
+      const glm::dvec2 size(picture.size());
+      answer_rate_ += 0.3 * (size.x * size.y / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
+    }
+    if (shown() != &picture) before_ = shown_ ? shown_->picture : nullptr;
+    shown_ = working_;
+    if (needs_depth()) tracer_.trace_depth(picture, data, surfaces, deadline);
+  }
+  follow();
+}
+
+void Progressive::follow() {
+  if (!working_) return;
+  if (working_->picture->complete()) schedule_.complete();
+  if (working_->picture->done() && working_->divisor == finest_) schedule_.finish();
+}
+
 void Progressive::reset() {
-  shown_ = before_ = working_ = nullptr;
+  shown_.reset();
+  working_.reset();
+  before_ = nullptr;
   pictures_.clear();
-  wished_ = false;
-  stale_ = failed_ = false;
+  schedule_.reset();
   finest_ = 1;
 }
 
 bool Progressive::more() const {
-  if (!wished_ || failed_) return false;
-  return working_ == nullptr || stale_ || !working_->done() || divisor_ > finest_ || needs_depth();
+  switch (state()) {
+    case State::idle:
+    case State::failed:
+      return false;
+    case State::done:
+      return needs_depth();
+    default:
+      return true;
+  }
 }
 
-bool Progressive::converged() const { return wished_ && !failed_ && !more() && divisor_ == 1; }
+bool Progressive::converged() const { return state() == State::done && !needs_depth() && working_->divisor == 1; }
 
 double Progressive::progress() const {
-  if (!wished_ || working_ == nullptr || stale_) return 0.0;
+  if (state() != State::answering && state() != State::refining && state() != State::done) return 0.0;
   double all = 0.0;
   double done = 0.0;
-  for (std::uint32_t divisor = std::max(first_divisor_, divisor_); divisor >= finest_; divisor /= 2) {
+  for (std::uint32_t divisor = std::max(first_divisor_, working_->divisor); divisor >= finest_; divisor /= 2) {
     const glm::dvec2 size(size_of(divisor));
     const double work = size.x * size.y * enough(divisor);
     all += work;
-    if (divisor > divisor_) done += work;
-    if (divisor == divisor_) done += work * std::min(1.0, working_->progress());
+    if (divisor > working_->divisor) done += work;
+    if (divisor == working_->divisor) done += work * std::min(1.0, working_->picture->progress());
   }
   return all > 0.0 ? done / all : 0.0;
 }
 
 void Progressive::settle() {
-  if (working_ != nullptr) tracer_.settle(*working_);
+  if (working_) tracer_.settle(*working_->picture);
+  follow();
 }
 
 std::uint64_t Progressive::bytes() const {

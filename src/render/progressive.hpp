@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "render/schedule.hpp"
 #include "render/tracer.hpp"
 
 namespace cumulet::render {
@@ -50,17 +52,18 @@ class Progressive {
   void reset();
 
   /// The newest whole picture; null before the first.
-  [[nodiscard]] const Picture* shown() const { return shown_; }
+  [[nodiscard]] const Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
   /// What was shown before, where that may have pixels without a sample; else null.
-  [[nodiscard]] const Picture* before() const { return shown_ != nullptr && shown_->has_holes() ? before_ : nullptr; }
+  [[nodiscard]] const Picture* before() const { return shown_ && shown_->picture->has_holes() ? before_ : nullptr; }
   /// Waits for what is under way, so that what is read back is all there is.
   void settle();
   /// What is to be read back: without preview the picture under way.
-  [[nodiscard]] Picture* newest() { return newest_is_shown() ? shown_ : working_; }
+  [[nodiscard]] Picture* newest() { return newest_work() ? newest_work()->picture : nullptr; }
   /// Whether that is of the data of this generation.
   [[nodiscard]] bool newest_is_of(std::uint64_t generation) const {
-    return (newest_is_shown() ? shown_generation_ : working_generation_) == generation;
+    return newest_work() && newest_work()->generation == generation;
   }
+  [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
   [[nodiscard]] bool converged() const;
   /// Whether advance has anything left to do.
   [[nodiscard]] bool more() const;
@@ -77,39 +80,43 @@ class Progressive {
   [[nodiscard]] std::uint32_t enough(std::uint32_t divisor) const;
   [[nodiscard]] glm::uvec2 size_of(std::uint32_t divisor) const;
   [[nodiscard]] bool is_enough() const;
-  [[nodiscard]] bool newest_is_shown() const { return wish_.content.preview || working_ == nullptr; }
+  // A picture, and what it is of.
+  struct Work {
+    Picture* picture = nullptr;
+    std::uint64_t generation = 0;           // of the data
+    std::uint32_t divisor = 1;              // of the resolution
+    const surface::Scene* scene = nullptr;  // whose triangles its paths meet
+  };
+  [[nodiscard]] const std::optional<Work>& newest_work() const {
+    return wish_.content.preview || !working_ ? shown_ : working_;
+  }
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
-  [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms) const;
-  // Whether no change of the wish is likely to come.
-  [[nodiscard]] bool rests() const;
-  // Whether working_ is over a coarser surface pass than what rests shall be.
+  [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms,
+                                         bool still) const;
+  // Whether what is under way is over a coarser surface pass than what rests shall be.
   [[nodiscard]] bool blurs() const;
   Picture& acquire(glm::uvec2 size);
-  void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, double budget_ms);
+  void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, const PictureSettings& settings);
   [[nodiscard]] bool needs_depth() const;
   // What of the work under way is still of use for this wish.
   void take(const PictureWish& wish, const Surfaces& surfaces);
+  // Goes on with what is under way, and shows it once it is whole.
+  void work(const MarchData& data, const Surfaces& surfaces, Deadline deadline);
+  // Tells the schedule how far what is under way has come.
+  void follow();
 
   Tracer tracer_;
   std::vector<std::unique_ptr<Picture>> pictures_;
-  Picture* shown_ = nullptr;
-  std::uint64_t shown_generation_ = 0;
+  PictureWish wish_;
+  Schedule schedule_;
+  Stillness stillness_;
+  std::optional<Work> working_;
+  std::optional<Work> shown_;
   Picture* before_ = nullptr;
-  Picture* working_ = nullptr;
-  std::uint64_t working_generation_ = 0;
-  std::uint32_t divisor_ = 1;        // of working_
   std::uint32_t first_divisor_ = 1;  // of the wish
   std::uint32_t finest_ = 1;         // finer ones do not fit the driver's memory
-  PictureWish wish_;
-  bool wished_ = false;
-  std::chrono::steady_clock::time_point changed_;  // when the wish did, last
-  bool let_go_ = false;                            // by the hand that made the last change
-  const surface::Scene* scene_ = nullptr;          // whose triangles paths of working_ meet
-  bool stale_ = false;                             // working_ is of an older wish
-  bool answering_ = false;                         // working_ is the first picture after a change
-  bool failed_ = false;                            // until the wish changes
   double trace_seconds_ = 0.0;
-  double answer_seconds_ = 0.0;  // that working_ took until it was complete
+  double answer_seconds_ = 0.0;  // that the picture under way took until it was complete
   double answer_rate_ = 100.0;   // pixels a millisecond, until complete
 };
 
