@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <glm/gtc/packing.hpp>
-#include <unordered_map>
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
@@ -29,51 +28,15 @@ void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   }
 }
 
-float relative_scale(float max_value) { return max_value > 0.0F ? 1.0F / max_value : 1.0F; }
-
-void pack_bricks(MarchSource& source) {
-  const grid::Statistics& statistics = *source.statistics;
-  const ivec3 first = source.box_low >> 3;
-  source.brick_count = ((source.box_low + source.box_size + 7) >> 3) - first;
-  constexpr std::uint32_t empty = 0xfffffffeU;
-  std::unordered_map<float, std::uint32_t> uniform_slots;
-  const float scale = relative_scale(source.max_value);
-  std::uint32_t count = 0;
-  for (int z = 0; z < source.brick_count.z; ++z) {
-    for (int y = 0; y < source.brick_count.y; ++y) {
-      for (int x = 0; x < source.brick_count.x; ++x) {
-        const grid::Statistics::Node& node = statistics.node_at((first + ivec3(x, y, z)) * 8);
-        if (node.is_uniform() && node.uniform == 0.0F) {
-          source.brick_slots.push_back(empty);
-          continue;
-        }
-        if (node.is_uniform()) {
-          const auto [found, added] = uniform_slots.emplace(node.uniform, count);
-          source.brick_slots.push_back(found->second);
-          if (!added) continue;
-        } else {
-          source.brick_slots.push_back(count);
-        }
-        ++count;
-        const float* values = node.is_uniform() ? nullptr : statistics.values(node);
-        for (int i = 0; i < volume::brick_voxels; ++i) {
-          source.brick_values.push_back(glm::packHalf1x16((values == nullptr ? node.uniform : values[i]) * scale));
-        }
-      }
-    }
-  }
-  if (source.brick_values.empty()) source.brick_values.resize(volume::brick_voxels);
-}
-
 // Slices first to last (not included) of a dense volume, as half floats.
-void fill_slab(const MarchSource& source, int first, int last, std::vector<std::uint16_t>& slab) {
+void fill_slab(const scene::MarchSource& source, int first, int last, std::vector<std::uint16_t>& slab) {
   const grid::Statistics& statistics = *source.statistics;
   const ivec3 low = source.box_low;
   const ivec3 high = low + source.box_size;
   const auto row = static_cast<std::size_t>(source.box_size.x);
   const std::size_t slice = row * static_cast<std::size_t>(source.box_size.y);
   slab.resize(slice * static_cast<std::size_t>(last - first));
-  const float scale = relative_scale(source.max_value);
+  const float scale = source.density_a_value();
   tbb::parallel_for(low.y >> 3, (high.y + 7) >> 3, [&](int by) {
     for (int x = low.x & ~7; x < high.x; x += volume::brick_size) {
       const grid::Statistics::Node& node = statistics.node_at({x, by * 8, first & ~7});
@@ -95,29 +58,6 @@ void fill_slab(const MarchSource& source, int first, int last, std::vector<std::
 
 }  // namespace
 
-MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value) {
-  MarchSource source;
-  source.cube = grid->cube;
-  source.max_value = max_value;
-  source.grid = std::move(grid);
-  source.linear = linear;
-  return source;
-}
-
-MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
-                              std::shared_ptr<const grid::Statistics> statistics) {
-  MarchSource source;
-  source.march = march;
-  source.cube = statistics->cube();
-  source.max_value = volume->max_value;
-  source.box_low = volume->bounds_min - source.cube.origin;
-  source.box_size = volume->bounds_max - volume->bounds_min + 1;
-  source.volume = std::move(volume);
-  source.statistics = std::move(statistics);
-  if (march == March::brick) pack_bricks(source);
-  return source;
-}
-
 core::CmGrid grid_parameters(const grid::Cube& cube, const vec3& low, const vec3& high) {
   const glm::dmat3 from_cube(cube.to_world);
   const glm::dmat3 to_cube(glm::inverse(cube.to_world));
@@ -136,7 +76,7 @@ core::CmGrid grid_parameters(const grid::Cube& cube, const vec3& low, const vec3
   return grid;
 }
 
-MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, std::shared_ptr<const MarchSource> source,
+MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, scene::MarchSourcePtr source,
                          std::int64_t page_texels)
     : gl_(std::move(gl)), limits_(limits), source_(std::move(source)) {
   data_.march_ = source_->march;

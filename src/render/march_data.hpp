@@ -9,39 +9,14 @@
 #include <vector>
 
 #include "gl/objects.hpp"
-#include "grid/statistics.hpp"
-#include "grid/tet_grid.hpp"
 #include "render/parameters.hpp"
+#include "scene/march_source.hpp"
 
 namespace cumulet::render {
 
-enum class March { tet = 0, dense = 1, brick = 2 };
+using scene::March;
 
 using Deadline = std::chrono::steady_clock::time_point;
-
-/// What one march needs of the volume, in main memory: all that a new context needs too. No GL.
-struct MarchSource {
-  March march = March::tet;
-  grid::Cube cube;
-  float max_value = 0.0F;  // grid value of density 1
-
-  // tet
-  std::shared_ptr<const grid::TetGrid> grid;
-  bool linear = false;
-  // dense: read from these; brick: as packed by make_brick_source
-  std::shared_ptr<const volume::ScalarVolume> volume;
-  std::shared_ptr<const grid::Statistics> statistics;
-  glm::ivec3 box_low{0};  // voxels, cube space
-  glm::ivec3 box_size{0};
-  std::vector<std::uint16_t> brick_values;  // half floats, 512 a slot
-  std::vector<std::uint32_t> brick_slots;
-  glm::ivec3 brick_count{0};
-};
-
-MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value);
-/// dense and brick. O(voxels of the bounds) only when uploaded; brick: O(bricks) memory.
-MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
-                              std::shared_ptr<const grid::Statistics> statistics);
 
 /// Of a volume in this cube, whose data are inside low to high (cube space).
 core::CmGrid grid_parameters(const grid::Cube& cube, const glm::vec3& low, const glm::vec3& high);
@@ -73,7 +48,7 @@ class MarchUpload {
  public:
   /// page_texels: where a page of records ends; 0: where the driver's limit is. Throws Error(unsupported) that names
   /// the limit that does not suffice; allocates nothing yet.
-  MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, std::shared_ptr<const MarchSource> source,
+  MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, scene::MarchSourcePtr source,
               std::int64_t page_texels = 0);
   /// Works until the deadline, one piece at least. Returns whether all is there. Throws Error(out_of_memory, gl).
   bool advance(Deadline deadline);
@@ -91,7 +66,7 @@ class MarchUpload {
 
   gl::FunctionsPtr gl_;
   gl::Limits limits_;
-  std::shared_ptr<const MarchSource> source_;
+  scene::MarchSourcePtr source_;
   MarchData data_;
   std::vector<std::function<void()>> steps_;
   std::size_t next_ = 0;

@@ -105,10 +105,10 @@ Built Builder::make(const VolumePtr& volume, const BuildSettings& settings, Prog
   const auto statistics = volume->statistics(progress, built.seconds.statistics);
   Stopwatch watch;
   progress.begin(Progress::Stage::refining);
-  if (settings.march != render::March::tet) {
+  if (settings.march != scene::March::tet) {
     const std::shared_ptr<const volume::ScalarVolume> voxels(volume, &volume->volume());
     built.source =
-        std::make_shared<const render::MarchSource>(render::make_voxel_source(settings.march, voxels, statistics));
+        std::make_shared<const scene::MarchSource>(scene::make_voxel_source(settings.march, voxels, statistics));
     built.seconds.records = watch.lap();
     return built;
   }
@@ -128,8 +128,8 @@ Built Builder::make(const VolumePtr& volume, const BuildSettings& settings, Prog
     log_.info("max_cells (" + std::to_string(settings.refine.max_cells) +
               ") ended the refinement before the threshold");
   }
-  built.source = std::make_shared<const render::MarchSource>(
-      render::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value));
+  built.source = std::make_shared<const scene::MarchSource>(
+      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value));
   return built;
 }
 

@@ -12,7 +12,7 @@
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "grid/refine.hpp"
-#include "render/march_data.hpp"
+#include "scene/march_source.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"
 
@@ -30,7 +30,7 @@ struct VolumeFile {
 
 /// What a march is made with.
 struct BuildSettings {
-  render::March march = render::March::tet;
+  scene::March march = scene::March::tet;
   grid::RefineSettings refine;
 };
 
@@ -45,7 +45,7 @@ struct BuildSeconds {
 /// A march's data in main memory, ready for any context.
 struct Built {
   VolumePtr volume;
-  std::shared_ptr<const render::MarchSource> source;
+  scene::MarchSourcePtr source;
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
   bool limited = false;

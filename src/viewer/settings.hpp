@@ -22,7 +22,7 @@ struct GridSettings {
 
   static GridSettings of(const cumulet_grid_desc& d) {
     GridSettings s;
-    s.build.march = static_cast<render::March>(d.march);
+    s.build.march = static_cast<scene::March>(d.march);
     grid::RefineSettings& refine = s.build.refine;
     refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
     const bool deviation = d.criterion == CUMULET_CRITERION_DEVIATION;

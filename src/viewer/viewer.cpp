@@ -472,7 +472,7 @@ grid::RefineCamera Viewer::refine_camera() const {
 
 render::PictureParameters Viewer::parameters() const {
   const ViewFrame& view = *view_;
-  const render::MarchSource& source = *gl_->data.of();
+  const scene::MarchSource& source = *gl_->data.of();
   const bool full = surface_settings_.light == SurfaceLight::full;
   render::PictureParameters p;
   p.view.eye = glm::vec3(glm::inverse(source.cube.to_world) * glm::dvec4(view.eye, 1.0));

@@ -175,7 +175,7 @@ class Viewer {
     GLuint volume_z = 0;
     bool operator==(const DrawnAs&) const = default;
   };
-  using MarchSourcePtr = std::shared_ptr<const render::MarchSource>;
+  using MarchSourcePtr = scene::MarchSourcePtr;
   // Under way, and with which settings it was begun.
   struct Upload {
     MarchSourcePtr of;

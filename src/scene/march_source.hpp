@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <vector>
+
+#include "grid/statistics.hpp"
+#include "grid/tet_grid.hpp"
+
+namespace cumulet::scene {
+
+enum class March { tet = 0, dense = 1, brick = 2 };
+
+/// What one march needs of the volume, in main memory: all that a new context needs too.
+struct MarchSource {
+  March march = March::tet;
+  grid::Cube cube;
+  float max_value = 0.0F;  // grid value of density 1
+
+  // tet
+  std::shared_ptr<const grid::TetGrid> grid;
+  bool linear = false;
+  // dense: read from these; brick: as packed by make_voxel_source
+  std::shared_ptr<const volume::ScalarVolume> volume;
+  std::shared_ptr<const grid::Statistics> statistics;
+  glm::ivec3 box_low{0};  // voxels, cube space
+  glm::ivec3 box_size{0};
+  std::vector<std::uint16_t> brick_values;  // half floats, 512 a slot
+  std::vector<std::uint32_t> brick_slots;
+  glm::ivec3 brick_count{0};
+
+  /// From grid values to density 0 to 1.
+  [[nodiscard]] float density_a_value() const { return max_value > 0.0F ? 1.0F / max_value : 1.0F; }
+};
+using MarchSourcePtr = std::shared_ptr<const MarchSource>;
+
+MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value);
+/// dense and brick. O(voxels of the bounds) only when uploaded; brick: O(bricks) memory.
+MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
+                              std::shared_ptr<const grid::Statistics> statistics);
+
+}  // namespace cumulet::scene
