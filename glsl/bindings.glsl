@@ -24,6 +24,8 @@ const int CM_UNIT_COUNTS = 1;
 const int CM_UNIT_VOLUME_Z = 2;
 const int CM_UNIT_SUM_BEFORE = 3;
 const int CM_UNIT_COUNTS_BEFORE = 4;
+const int CM_UNIT_BACKGROUND = 5;
+const int CM_UNIT_BACKGROUND_BEFORE = 6;
 // host_depth.comp:
 const int CM_UNIT_DEPTH_SOURCE = 0;
 // surface.frag:
@@ -47,10 +49,12 @@ const int CM_STORAGE_SIGN = 0;           // sign.comp
 const int CM_IMAGE_SUM = 0;
 const int CM_IMAGE_COUNTS = 1;
 const int CM_IMAGE_VOLUME_SUM = 2;
+const int CM_IMAGE_BACKGROUND = 3;
 const int CM_IMAGE_VOLUME_Z = 2;  // inspect.comp, aovs.comp
 const int CM_IMAGE_NORMAL = 0;    // aovs.comp
 const int CM_IMAGE_ALBEDO = 1;
 const int CM_IMAGE_MEANS = 0;       // resolve.comp
+const int CM_IMAGE_BACKGROUND_MEANS = 1;
 const int CM_IMAGE_HOST_DEPTH = 0;  // host_depth.comp
 
 #endif

@@ -1,6 +1,7 @@
 #version 450
 // An accumulation as displayed colour, or its depth.
 // Variants, not uniforms, choose what a pixel does: software drivers run both sides of every branch.
+// CM_LAYERS 1: surfaces beneath, in front of the background.
 // variants: CM_DEPTH=1 or CM_DEPTH=0 CM_BILINEAR=0,1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false or CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false CM_LAYERS=1
 #ifndef CM_LAYERS
 #define CM_LAYERS 0
@@ -9,7 +10,7 @@
 #include "shared.glsl"
 #include "display.glsl"
 
-layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;  // row 0 is the picture's top; CM_RESOLVED: already the mean
+layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;  // row 0 is the picture's top; CM_RESOLVED: already what is shown
 layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
 layout(binding = CM_UNIT_VOLUME_Z) uniform sampler2D cm_volume_z;
 layout(location = 0) uniform ivec4 cm_viewport;
@@ -17,7 +18,9 @@ layout(location = 1) uniform bool cm_flip_y;
 #if CM_DEPTH == 0
 layout(location = 2) uniform float cm_exposure;
 layout(location = 3) uniform bool cm_transparent;
-layout(location = 4) uniform vec3 cm_background;
+#if CM_LAYERS || !CM_RESOLVED
+layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // mean radiance
+#endif
 layout(location = 0) out vec4 cm_colour;
 #if CM_LAYERS
 layout(binding = CM_UNIT_LAYER_COLOUR) uniform sampler2DArray cm_layer_colour;
@@ -56,7 +59,10 @@ vec4 cm_texel(ivec2 texel) {
 #if CM_LAYERS
   return mean;
 #else
-  return cm_transparent ? mean : vec4(mean.rgb + cm_background * (1.0 - mean.a), 1.0);
+#if !CM_RESOLVED
+  if (!cm_transparent) mean.rgb += texelFetch(cm_background, texel, 0).rgb;
+#endif
+  return cm_transparent ? mean : vec4(mean.rgb, 1.0);
 #endif
 }
 #else
@@ -81,6 +87,7 @@ void main() {
   // Of the coarse pixels around, those count whose middle sees as far: no seam of the volume along silhouettes.
   float here = 1.0 / texelFetch(cm_layer_z, ivec3(share * vec2(layer_size), 0), 0).x;
   vec4 value = vec4(0.0);
+  vec3 background = vec3(0.0);
   float sum = 0.0;
   for (int i = 0; i < 4; ++i) {
     ivec2 offset = ivec2(i & 1, i >> 1);
@@ -89,9 +96,11 @@ void main() {
     vec2 part = mix(1.0 - weight, weight, vec2(offset));
     float alike = part.x * part.y / (0.01 + abs(here - there) / max(max(here, there), 1e-30));
     value += alike * cm_texel(tap);
+    background += alike * texelFetch(cm_background, tap, 0).rgb;
     sum += alike;
   }
   value /= sum;
+  background /= sum;
   vec4 behind = vec4(0.0);
   if (layer_size == cm_viewport.zw) {
     behind = cm_surfaces(pixel);
@@ -106,7 +115,7 @@ void main() {
     }
   }
   value += (1.0 - value.a) * behind;
-  if (!cm_transparent) value = vec4(value.rgb + cm_background * (1.0 - value.a), 1.0);
+  if (!cm_transparent) value = vec4(value.rgb + background * (1.0 - behind.a), 1.0);
 #else
   ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
   ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);

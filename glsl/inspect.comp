@@ -25,7 +25,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "ray.glsl"
 
 layout(rgba32f, binding = CM_IMAGE_SUM) uniform writeonly image2D cm_sum;
-layout(rgba32ui, binding = CM_IMAGE_COUNTS) uniform writeonly uimage2D cm_counts;
+layout(rg32ui, binding = CM_IMAGE_COUNTS) uniform writeonly uimage2D cm_counts;
 layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 
 #define CM_VIEW_CELLS 1u

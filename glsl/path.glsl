@@ -22,6 +22,7 @@
 #define CM_PATH_GLSL
 
 #include "ray.glsl"
+#include "light.glsl"
 #include "path_state.glsl"
 #include "path_vertex.glsl"
 
@@ -71,14 +72,19 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
   return event;
 }
 
-// A sample is done. What lies behind the volume is added to the finished picture, not here.
+// A sample is done: what is in front of the background, and the background itself, apart, for pictures over what a host
+// has drawn.
 CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
-  float alpha = p.bounces > 0u || p.at_layer != 0u ? 1.0f : 0.0f;
+  bool covers = p.bounces > 0u || p.at_layer != 0u;
+  vec3 background = covers ? vec3(0.0f, 0.0f, 0.0f) : p.light;
   if (p.in_volume != 0u) pixel.volume += vec4(p.radiance, 1.0f);
-  pixel.sum += vec4(p.radiance, alpha);
-  float luminance = dot(p.radiance + (1.0f - alpha) * cm.lights.sky_radiance, vec3(0.2126f, 0.7152f, 0.0722f));
-  pixel.square += luminance * luminance;
+  if (p.bounces == 0u && p.at_layer != 0u) p.radiance += p.light;
+  pixel.sum += vec4(p.radiance, covers ? 1.0f : 0.0f);
   pixel.samples += 1u;
+  float share = 1.0f / float(pixel.samples);
+  pixel.background += share * (background - pixel.background);
+  float luminance = dot(p.radiance + background, vec3(0.2126f, 0.7152f, 0.0722f));
+  pixel.square += share * (luminance * luminance - pixel.square);
   p.stage = pixel.samples >= cm.dispatch.samples ? CM_STAGE_DONE : CM_STAGE_CAMERA;
 }
 
@@ -137,6 +143,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel, uvec2 at) {
   p.blurred = 0u;
   p.in_volume = 0u;
   p.at_layer = 0u;
+  p.light = cm_sky_radiance(p.w);
   p.depth_0 = -log(1.0f - cm_unit_float(even.z));
   p.depth = p.depth_0;
   p.ray = CM_RAY_FLIGHT;
@@ -147,10 +154,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel, uvec2 at) {
   p.stage = CM_STAGE_AIM;
   if (CM_SURFACES == 0) {
     cm_aim(p);
-    if (p.cell.x == CM_NONE) {
-      if (p.at_layer != 0u) p.radiance = p.light;
-      cm_finish(p, pixel);
-    }
+    if (p.cell.x == CM_NONE) cm_finish(p, pixel);
   }
 }
 
@@ -164,9 +168,8 @@ CM_FN void cm_escape(CM_INOUT(CmPath) p) {
   float balanced = transmittance / max(cm.lights.sky_probability + transmittance, 1e-30f);
   float survival = flight ? 1.0f : min(1.0f, exp(CM_SHADOW_DEPTH - depth));
   float weight = p.ray == CM_RAY_TO_LAMP ? transmittance : (p.bounces == 0u ? 0.0f : balanced);
-  vec3 light = flight ? p.throughput * cm.lights.sky_radiance : p.light;
+  vec3 light = flight ? p.throughput * cm_sky_radiance(p.w) : p.light;
   p.radiance += light * (weight / survival);
-  if (p.bounces == 0u && p.at_layer != 0u) p.radiance += p.light;
 }
 
 // The medium's own light: S e^-x dx over the flight. A collision tells of S (its chance is 1 - e^-x), but seldom in a
@@ -218,7 +221,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
     if (cm_blurs(next)) p.blurred = 1u;
   }
   p.light = p.throughput * (to_lamp ? lamp.radiance * (next.share / max(lamp.density, 1e-30f))
-                                    : cm.lights.sky_radiance * next.weight);
+                                    : cm_sky_radiance(next.w) * next.weight);
   p.density = next.may_meet ? next.density : 0.0f;
   p.d = cm_to_cube(to_lamp ? lamp.direction : next.w);
   p.ray = to_lamp ? CM_RAY_TO_LAMP : (shadow ? CM_RAY_TO_SKY : CM_RAY_FLIGHT);

@@ -24,8 +24,9 @@
 //   d               its direction, cube space, per unit of world distance
 //   w               world direction of flight, kept during shadow rays
 //   throughput      of the path
-//   radiance        of this sample so far
-//   light           what the ray brings if nothing stops it: a shadow ray; a camera ray that ends at a layer
+//   radiance        of this sample so far, without what is behind all
+//   light           what the ray brings if nothing stops it: a shadow ray; a camera ray, of a layer's colour or of what
+//                   is behind all
 //   t, t_end        world distance from o, and where the ray leaves the box, or ends
 //   depth, depth_0  optical depth left before the collision (or the end of the shadow ray), and at the ray's start
 //   cell, cache     that the ray is in, and what the march keeps of it; start_cell: it was in at o, in the medium
@@ -33,7 +34,7 @@
 //   bounces         events of the path so far
 //   blurred         1: it was scattered wider than a surface of the least roughness does
 //   in_volume       1: this sample met the volume first
-//   at_layer        1: the surface pass's colour, in light, waits at the camera ray's end
+//   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
 //   random, stream  of its random numbers
 // and among triangles
 //   triangle, weights     that o is on, of its second and third vertex
@@ -60,12 +61,13 @@ struct CmPath {
 
 // A pixel's samples so far.
 struct CmPixel {
-  vec4 sum;       // of radiance without the sky behind all, and of alpha
-  vec4 volume;    // the same of those that met the volume first
-  uint samples;   // finished
-  uint steps;     // cells marched, of all of them
-  float square;   // sum of their squared luminance
-  uint marches;   // calls of cm_fly in this dispatch
+  vec4 sum;         // of radiance in front of the background, and of alpha
+  vec4 volume;      // the same of those that met the volume first
+  vec3 background;  // mean of radiance that camera rays met behind all: exact where that is the same in each
+  float square;     // mean of squared luminance, of both together
+  uint samples;     // finished
+  uint steps;       // cells marched, of all of them
+  uint marches;     // calls of cm_fly in this dispatch
 };
 
 #endif

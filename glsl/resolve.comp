@@ -1,48 +1,66 @@
 #version 450
 // An accumulation's means. CM_HOLES 1: a pixel whose first path is still under way takes after those around it, and
-// where none of these has a sample either it shows what was there before.
-// variants: CM_HOLES=0,1
+// where none of these has a sample either it shows what was there before. CM_BACKGROUND 0: what is in front of the
+// background, premultiplied; 1: all radiance, with the same alpha; 2: as 0, and the background's radiance apart.
+// variants: CM_HOLES=0,1 CM_BACKGROUND=0,1,2
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;
 layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
+layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // already means
 layout(binding = CM_UNIT_SUM_BEFORE) uniform sampler2D cm_sum_before;  // of any size
 layout(binding = CM_UNIT_COUNTS_BEFORE) uniform usampler2D cm_counts_before;
+layout(binding = CM_UNIT_BACKGROUND_BEFORE) uniform sampler2D cm_background_before;
 layout(rgba32f, binding = CM_IMAGE_MEANS) uniform writeonly image2D cm_means;
+#if CM_BACKGROUND == 2
+layout(rgba32f, binding = CM_IMAGE_BACKGROUND_MEANS) uniform writeonly image2D cm_background_means;
+#endif
 
-vec4 cm_mean_of(sampler2D sums, usampler2D counts, ivec2 texel) {
-  return texelFetch(sums, texel, 0) / max(float(texelFetch(counts, texel, 0).x), 1.0);
+struct CmMean {
+  vec4 front;
+  vec3 background;
+};
+
+CmMean cm_mean_of(sampler2D sums, usampler2D counts, sampler2D backgrounds, ivec2 texel) {
+  return CmMean(texelFetch(sums, texel, 0) / max(float(texelFetch(counts, texel, 0).x), 1.0),
+                texelFetch(backgrounds, texel, 0).rgb);
 }
 
 #if CM_HOLES
-// The mean of those texels around that have samples.
-vec4 cm_around(sampler2D sums, usampler2D counts, ivec2 texel, out float has) {
+// The mean of those texels around that have samples; its own, of none, where there are none.
+CmMean cm_around(sampler2D sums, usampler2D counts, sampler2D backgrounds, ivec2 texel, out bool has) {
   ivec2 last = textureSize(sums, 0) - 1;
-  vec4 around = vec4(0.0);
-  has = 0.0;
+  CmMean sum = CmMean(vec4(0.0), vec3(0.0));
+  float n = 0.0;
   for (int y = -1; y <= 1; ++y) {
     for (int x = -1; x <= 1; ++x) {
       ivec2 near = clamp(texel + ivec2(x, y), ivec2(0), last);
       float one = min(float(texelFetch(counts, near, 0).x), 1.0);
-      around += one * cm_mean_of(sums, counts, near);
-      has += one;
+      CmMean mean = cm_mean_of(sums, counts, backgrounds, near);
+      sum.front += one * mean.front;
+      sum.background += one * mean.background;
+      n += one;
     }
   }
-  return around / max(has, 1.0);
+  has = n > 0.0;
+  if (!has) return cm_mean_of(sums, counts, backgrounds, clamp(texel, ivec2(0), last));
+  return CmMean(sum.front / n, sum.background / n);
 }
 #endif
 
-vec4 cm_mean(ivec2 texel) {
-  vec4 mean = cm_mean_of(cm_sum, cm_counts, texel);
+CmMean cm_mean(ivec2 texel) {
+  CmMean mean = cm_mean_of(cm_sum, cm_counts, cm_background, texel);
 #if CM_HOLES
   if (texelFetch(cm_counts, texel, 0).x > 0u) return mean;
-  float has = 0.0;
-  mean = cm_around(cm_sum, cm_counts, texel, has);
-  if (has > 0.0) return mean;
+  bool has = false;
+  mean = cm_around(cm_sum, cm_counts, cm_background, texel, has);
+  if (has) return mean;
   vec2 share = (vec2(texel) + 0.5) / vec2(textureSize(cm_sum, 0));
   ivec2 before = ivec2(share * vec2(textureSize(cm_sum_before, 0)));
-  mean = cm_mean_of(cm_sum_before, cm_counts_before, before);
-  if (texelFetch(cm_counts_before, before, 0).x == 0u) mean = cm_around(cm_sum_before, cm_counts_before, before, has);
+  CmMean last = cm_mean_of(cm_sum_before, cm_counts_before, cm_background_before, before);
+  has = texelFetch(cm_counts_before, before, 0).x > 0u;
+  if (!has) last = cm_around(cm_sum_before, cm_counts_before, cm_background_before, before, has);
+  if (has) return last;
 #endif
   return mean;
 }
@@ -50,5 +68,11 @@ vec4 cm_mean(ivec2 texel) {
 void main() {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(texel, textureSize(cm_sum, 0)))) return;
-  imageStore(cm_means, texel, cm_mean(texel));
+  CmMean mean = cm_mean(texel);
+#if CM_BACKGROUND == 1
+  mean.front.rgb += mean.background;
+#elif CM_BACKGROUND == 2
+  imageStore(cm_background_means, texel, vec4(mean.background, 0.0));
+#endif
+  imageStore(cm_means, texel, mean.front);
 }

@@ -32,7 +32,8 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
                       // and its samples finished in this dispatch
 };
 layout(rgba32f, binding = CM_IMAGE_SUM) uniform image2D cm_sum;
-layout(rgba32ui, binding = CM_IMAGE_COUNTS) uniform uimage2D cm_counts;  // samples, steps, sum of squared luminance (a float)
+layout(rg32ui, binding = CM_IMAGE_COUNTS) uniform uimage2D cm_counts;          // samples, steps
+layout(rgba32f, binding = CM_IMAGE_BACKGROUND) uniform image2D cm_background;  // and the mean of squared luminance
 #if CM_AOVS
 layout(rgba32f, binding = CM_IMAGE_VOLUME_SUM) uniform image2D cm_volume_sum;  // of the samples that met the volume first
 #endif
@@ -85,15 +86,17 @@ void cm_store_path(CmPath p, uint at, uint lanes) {
 
 CmPixel cm_load_pixel(ivec2 texel) {
   uvec4 counts = imageLoad(cm_counts, texel);
+  vec4 means = imageLoad(cm_background, texel);
   CmPixel pixel;
   pixel.sum = imageLoad(cm_sum, texel);
   pixel.volume = vec4(0.0);
 #if CM_AOVS
   pixel.volume = imageLoad(cm_volume_sum, texel);
 #endif
+  pixel.background = means.rgb;
+  pixel.square = means.w;
   pixel.samples = counts.x;
   pixel.steps = counts.y;
-  pixel.square = uintBitsToFloat(counts.z);
   pixel.marches = 0u;
   return pixel;
 }
@@ -103,7 +106,8 @@ void cm_store_pixel(CmPixel pixel, ivec2 texel) {
 #if CM_AOVS
   imageStore(cm_volume_sum, texel, pixel.volume);
 #endif
-  imageStore(cm_counts, texel, uvec4(pixel.samples, pixel.steps, floatBitsToUint(pixel.square), 0u));
+  imageStore(cm_background, texel, vec4(pixel.background, pixel.square));
+  imageStore(cm_counts, texel, uvec4(pixel.samples, pixel.steps, 0u, 0u));
 }
 
 void main() {

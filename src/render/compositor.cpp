@@ -29,7 +29,7 @@ bool Compositor::resolves_now() const { return milliseconds(Clock::now() - resol
 
 double Compositor::expected_ms() const { return draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0); }
 
-Compositor::Means* Compositor::free_means(glm::uvec2 size) {
+Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart) {
   const bool waits = gl_->dispatches_in_call && !gl::Fence(gl_).passed();
   if (waits) {
     std::erase_if(means_, [this](const auto& means) { return means.get() != newest_ && means->drawn.passed(); });
@@ -40,36 +40,45 @@ Compositor::Means* Compositor::free_means(glm::uvec2 size) {
   }
   if (waits || means_.empty()) means_.push_back(std::make_unique<Means>());
   Means& means = *means_.back();
+  const auto make = [&] {
+    return gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
+                               "creating the texture of means");
+  };
   if (!means.texture || means.of.size != size) {
     means.texture = {};
+    means.background = {};
     means.of = {};
-    means.texture = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
-                                        "creating the texture of means");
+    means.texture = make();
   }
+  if (!apart) means.background = {};
+  if (apart && !means.background) means.background = make();
   return &means;
 }
 
-Compositor::Means* Compositor::resolve(const PictureTextures& picture) {
+Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background) {
   lags_ = false;
-  const MeansOf wanted{picture.sum,     picture.holes ? picture.sum_before : 0,
-                       picture.holes,   picture.size,
-                       picture.picture, picture.revision};
-  if (newest_ != nullptr) {
+  const MeansOf wanted{
+      picture.sum,     picture.holes ? picture.sum_before : 0, picture.holes, background, picture.size, picture.picture,
+      picture.revision};
+  const bool alike = newest_ != nullptr && newest_->of.background == background;
+  if (alike) {
     if (wanted.revision && newest_->of == wanted) return newest_;
     const bool older = newest_->of.picture == wanted.picture && newest_->of.size == wanted.size;
     if (older && picture.may_lag && !resolves_now()) return newest_;
   }
   if (no_memory_for_ == picture.size) return nullptr;
-  gl::Object& program = resolve_.at(picture.holes ? 1 : 0);
+  gl::Object& program = resolve_[{picture.holes, background}];
   if (!program) {
-    program = gl::make_compute_program(gl_, "resolve.comp",
-                                       std::array<std::string, 1>{picture.holes ? "CM_HOLES 1" : "CM_HOLES 0"});
+    program = gl::make_compute_program(
+        gl_, "resolve.comp",
+        std::array<std::string, 2>{picture.holes ? "CM_HOLES 1" : "CM_HOLES 0",
+                                   "CM_BACKGROUND " + std::to_string(static_cast<int>(background))});
   }
   const gl::DebugGroup group(*gl_, "cumulet: resolve");
   const auto begun = Clock::now();
   Means* means = nullptr;
   try {
-    means = free_means(picture.size);
+    means = free_means(picture.size, background == Background::apart);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::out_of_memory) throw;
     means_.clear();
@@ -78,15 +87,21 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture) {
     no_memory_ = error;
     return nullptr;  // slower and with holes, but drawn
   }
-  lags_ = means == nullptr;
-  if (lags_) return newest_;
+  lags_ = means == nullptr && alike;
+  if (means == nullptr) return alike ? newest_ : nullptr;
   const auto& gl = *gl_;
   const bool before = picture.sum_before != 0;
   gl.BindTextureUnit(core::CM_UNIT_SUM, picture.sum);
   gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
+  gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, picture.background);
   gl.BindTextureUnit(core::CM_UNIT_SUM_BEFORE, before ? picture.sum_before : picture.sum);
   gl.BindTextureUnit(core::CM_UNIT_COUNTS_BEFORE, before ? picture.counts_before : picture.counts);
+  gl.BindTextureUnit(core::CM_UNIT_BACKGROUND_BEFORE, before ? picture.background_before : picture.background);
   gl.BindImageTexture(core::CM_IMAGE_MEANS, means->texture.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+  if (means->background) {
+    gl.BindImageTexture(core::CM_IMAGE_BACKGROUND_MEANS, means->background.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY,
+                        GL_RGBA32F);
+  }
   gl.UseProgram(program.name());
   gl.DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT);
@@ -114,7 +129,8 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool layered = picture.beneath != nullptr && picture.beneath->colour;
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
-  Means* const means = resolve(picture);
+  const Background without = display.transparent ? Background::left_out : Background::added;
+  Means* const means = resolve(picture, layered ? Background::apart : without);
   const auto begun = Clock::now();
   const bool resolved = means != nullptr;
   const glm::uvec2 size = resolved ? means->of.size : picture.size;
@@ -131,14 +147,15 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
                       static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
   gl.BindTextureUnit(core::CM_UNIT_SUM, resolved ? means->texture.name() : picture.sum);
   if (!resolved) gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
+  if (layered || !resolved) {
+    gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, resolved ? means->background.name() : picture.background);
+  }
 
   const GLuint colour = program.name();
   gl.ProgramUniform4i(colour, 0, viewport.x, viewport.y, viewport.z, viewport.w);
   gl.ProgramUniform1i(colour, 1, as_bool(target.flip_y));
   gl.ProgramUniform1f(colour, 2, exposure_of(display));
   gl.ProgramUniform1i(colour, 3, as_bool(display.transparent));
-  const glm::vec3 background = display.legend ? glm::vec3(0.0F) : display.background;
-  gl.ProgramUniform3f(colour, 4, background.x, background.y, background.z);
   if (layered) {
     const SurfaceLayers& layers = *picture.beneath;
     gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, layers.colour.name());

@@ -19,8 +19,10 @@ namespace cumulet::render {
 
 /// An accumulation as a tracer made it.
 struct PictureTextures {
-  GLuint sum = 0;     // rgba32f: sums of radiance (without any background) and alpha; row 0 is the top
-  GLuint counts = 0;  // rgba32ui: .x is the number of samples summed; a pixel with none is empty
+  GLuint sum = 0;         // rgba32f: sums of radiance in front of the background, and of alpha; row 0 is the top
+  GLuint background = 0;  // rgb32f: means of the background's radiance, which alpha is already taken off; what there
+                          // is to show where there are no samples
+  GLuint counts = 0;      // .x is the number of samples summed
   glm::uvec2 size{0U};
   bool holes = false;   // some pixels may have no sample yet: they take after those around them, else show what was
                         // there before
@@ -29,6 +31,7 @@ struct PictureTextures {
   GLuint host_z = 0;                       // as HostDepth's, that hides those behind it; 0: none
   unsigned host_layers = 0;
   GLuint sum_before = 0;  // what was there before, of any size; 0: nothing
+  GLuint background_before = 0;
   GLuint counts_before = 0;
   std::optional<std::uint64_t> revision{};  // another wherever the sums may be others; without, they always may
   std::uint64_t picture = 0;                // another with every picture that is begun
@@ -68,11 +71,14 @@ class Compositor {
 
  private:
   using Clock = std::chrono::steady_clock;
+  /// What of the radiance means hold, by CM_BACKGROUND of resolve.comp.
+  enum class Background : std::uint8_t { left_out = 0, added = 1, apart = 2 };
   /// What the sums were when they were turned into means.
   struct MeansOf {
     GLuint sum = 0;
     GLuint before = 0;
     bool holes = false;
+    Background background = Background::added;
     glm::uvec2 size{0U};
     std::uint64_t picture = 0;
     std::optional<std::uint64_t> revision;
@@ -83,18 +89,19 @@ class Compositor {
   /// none are written a second time, for llvmpipe takes some that were drawn long ago for being read still.
   struct Means {
     gl::Object texture;
+    gl::Object background;  // where that is apart
     MeansOf of;
     gl::Fence drawn;
   };
   // The means to draw; null if there is no memory for them.
-  Means* resolve(const PictureTextures& picture);
+  Means* resolve(const PictureTextures& picture, Background background);
   // To be written; null if as many as there may be wait to be drawn. Else newest_ may be gone.
-  Means* free_means(glm::uvec2 size);
+  Means* free_means(glm::uvec2 size, bool apart);
   [[nodiscard]] bool resolves_now() const;
 
   gl::FunctionsPtr gl_;
-  std::map<std::vector<std::string>, gl::Object> colours_;  // by their macros: made when first needed
-  std::array<gl::Object, 2> resolve_;                       // by CM_HOLES
+  std::map<std::vector<std::string>, gl::Object> colours_;     // by their macros: made when first needed
+  std::map<std::pair<bool, Background>, gl::Object> resolve_;  // by whether there are holes
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
   std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another

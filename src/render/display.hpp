@@ -23,9 +23,8 @@ enum class ColourEncoding { srgb = 0, srgb_framebuffer = 1, linear = 2, hdr = 3 
 struct Display {
   float exposure_stops = 0.0F;
   ToneMap tone_map = ToneMap::neutral;
-  bool legend = false;         // a debug view: neither exposed nor tone-mapped, nothing behind it
-  bool transparent = false;    // premultiplied, nothing behind the volume
-  glm::vec3 background{0.0F};  // else this radiance, weighted by 1 - alpha
+  bool legend = false;       // a debug view: neither exposed nor tone-mapped
+  bool transparent = false;  // premultiplied, without the background
   ColourEncoding encoding = ColourEncoding::srgb;
 };
 
@@ -39,7 +38,7 @@ inline std::uint32_t curve_of(const Display& display) {
 }
 
 /// Linear RGBA as cumulet_read_linear gives it to sRGB bytes as cumulet_read_display does: straight alpha, opaque
-/// unless display.transparent. Background and encoding of display do not count. bytes is as long as linear.
+/// unless display.transparent. The encoding of display does not count. bytes is as long as linear.
 inline void to_display(std::span<const float> linear, const Display& display, std::span<std::uint8_t> bytes) {
   const auto to_byte = [](float unit) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(unit, 0.0F, 1.0F) * 255.0F));

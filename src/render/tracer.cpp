@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numeric>
 #include <thread>
@@ -143,7 +142,7 @@ void Picture::end_tile() {
 
 std::uint64_t Picture::bytes() const {
   const std::uint64_t pixel =
-      (sum_ ? 32U : 0U) + (volume_z_ ? 4U : 0U) + (volume_sum_ ? 16U : 0U) + (facts_ ? 36U : 0U);
+      (sum_ ? 40U : 0U) + (volume_z_ ? 4U : 0U) + (volume_sum_ ? 16U : 0U) + (facts_ ? 36U : 0U);
   return std::uint64_t{size_.x} * size_.y * pixel;
 }
 
@@ -187,8 +186,10 @@ void Tracer::allocate(Picture& picture, glm::uvec2 size) const {
   const int width = static_cast<int>(size.x);
   const int height = static_cast<int>(size.y);
   gl::Object sum = gl::make_texture_2d(gl_, GL_RGBA32F, width, height, "creating the accumulation texture");
-  gl::Object counts = gl::make_texture_2d(gl_, GL_RGBA32UI, width, height, "creating the sample counts");
+  gl::Object background = gl::make_texture_2d(gl_, GL_RGBA32F, width, height, "creating the background's texture");
+  gl::Object counts = gl::make_texture_2d(gl_, GL_RG32UI, width, height, "creating the sample counts");
   picture.sum_ = std::move(sum);
+  picture.background_ = std::move(background);
   picture.counts_ = std::move(counts);
   picture.volume_z_ = {};
   picture.volume_sum_ = {};
@@ -315,9 +316,11 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.depth_row_ = 0;
   picture.depth_done_ = false;
   const glm::vec4 zero(0.0F);
-  const glm::uvec4 none(0U);
+  const glm::uvec2 none(0U);
+  const glm::vec4 background(shaded ? parameters.lights.sky_radiance : glm::vec3(0.0F), 0.0F);
   gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
-  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, &none);
+  gl_->ClearTexImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, &background);
+  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &none);
   if (picture.volume_sum_) gl_->ClearTexImage(picture.volume_sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
   gl::check(*gl_, "clearing the accumulation");
 }
@@ -333,10 +336,20 @@ void Tracer::clear(Picture& picture) {
   picture.complete_ = picture.done_ = true;
   picture.holes_ = false;
   const glm::vec4 zero(0.0F);
-  const glm::uvec4 one(1U, 0U, 0U, 0U);
+  const glm::uvec2 one(1U, 0U);
   gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
-  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, &one);
+  gl_->ClearTexImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
+  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &one);
   gl::check(*gl_, "making the empty picture");
+}
+
+void Tracer::set_background(Picture& picture, const glm::vec3& radiance) {
+  if (picture.parameters_.lights.sky_radiance == radiance) return;
+  const glm::vec4 texel(radiance, 0.0F);
+  gl_->ClearTexImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, &texel);
+  gl::check(*gl_, "making the empty picture");
+  picture.parameters_.lights.sky_radiance = radiance;
+  picture.revision_ = ++revision_;
 }
 
 void Tracer::bind(const MarchData& data, const Surfaces& surfaces) const {
@@ -411,7 +424,9 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surf
   if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PATHS, paths_.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BLOCKS, blocks_.name());
   gl_->BindImageTexture(core::CM_IMAGE_SUM, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_BACKGROUND, picture.background_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
+                        GL_RGBA32F);
   // What is bound shall fit the format, though this view does not write it.
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_SUM, picture.volume_sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
                         picture.volume_sum_ ? GL_RGBA32F : GL_R32F);
@@ -576,7 +591,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
   gl_->UseProgram(program.object.name());
   bind(data, surfaces);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, picture.volume_z_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
@@ -649,7 +664,7 @@ float Tracer::pick(const MarchData& data, const PictureParameters& parameters, c
   gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp").object.name());
   bind(data, surfaces);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
   gl_->DispatchCompute(1, 1, 1);
@@ -660,16 +675,36 @@ float Tracer::pick(const MarchData& data, const PictureParameters& parameters, c
   return z;
 }
 
-void Tracer::read(const Picture& picture, float* rgba) const { read_means(picture, picture.sum_.name(), rgba); }
+void Tracer::read(const Picture& picture, bool with_background, float* rgba) const {
+  read_means(picture, picture.sum_.name(), rgba);
+  if (!with_background) return;
+  const std::vector<glm::vec4> background = read_background(picture);
+  for (std::size_t i = 0; i < background.size(); ++i) {
+    for (int c = 0; c < 3; ++c) rgba[4 * i + static_cast<std::size_t>(c)] += background[i][c];
+  }
+}
+
+std::vector<glm::vec4> Tracer::read_background(const Picture& picture) const {
+  std::vector<glm::vec4> background(std::size_t{picture.size_.x} * picture.size_.y);
+  gl_->GetTextureImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(background.size() * 16),
+                       background.data());
+  gl::check(*gl_, "reading the background back");
+  return background;
+}
+
+std::vector<glm::uvec2> Tracer::read_counts(const Picture& picture) const {
+  std::vector<glm::uvec2> counts(std::size_t{picture.size_.x} * picture.size_.y);
+  gl_->GetTextureImage(picture.counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT,
+                       static_cast<GLsizei>(counts.size() * 8), counts.data());
+  gl::check(*gl_, "reading the sample counts back");
+  return counts;
+}
 
 void Tracer::read_means(const Picture& picture, GLuint sum, float* rgba) const {
-  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
-  std::vector<glm::uvec4> counts(pixels);
-  gl_->GetTextureImage(sum, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels * 16), rgba);
-  gl_->GetTextureImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, static_cast<GLsizei>(pixels * 16),
-                       counts.data());
+  const std::vector<glm::uvec2> counts = read_counts(picture);
+  gl_->GetTextureImage(sum, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(counts.size() * 16), rgba);
   gl::check(*gl_, "reading the picture back");
-  for (std::size_t i = 0; i < pixels; ++i) {
+  for (std::size_t i = 0; i < counts.size(); ++i) {
     const float scale = counts[i].x > 0 ? 1.0F / static_cast<float>(counts[i].x) : 0.0F;
     for (std::size_t c = 0; c < 4; ++c) rgba[4 * i + c] *= scale;
   }
@@ -681,29 +716,24 @@ void Tracer::read_volume(const Picture& picture, float* rgba) const {
 
 Totals Tracer::totals(const Picture& picture) const {
   if (!picture.counts_) return {};
-  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
-  std::vector<glm::uvec4> counts(pixels);
-  std::vector<glm::vec4> sums(pixels);
-  gl_->GetTextureImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels * 16), sums.data());
-  gl_->GetTextureImage(picture.counts_.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, static_cast<GLsizei>(pixels * 16),
-                       counts.data());
-  gl::check(*gl_, "reading the sample counts back");
+  const std::vector<glm::uvec2> counts = read_counts(picture);
+  const std::vector<glm::vec4> background = read_background(picture);
+  std::vector<glm::vec4> sums(counts.size());
+  gl_->GetTextureImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(sums.size() * 16), sums.data());
+  gl::check(*gl_, "reading the picture back");
   Totals totals;
-  const double sky = luminance(glm::dvec3(picture.parameters_.lights.sky_radiance));
   double error = 0.0;
   double brightness = 0.0;
-  for (std::size_t i = 0; i < pixels; ++i) {
+  for (std::size_t i = 0; i < counts.size(); ++i) {
     const double n = counts[i].x;
     totals.samples += counts[i].x;
     totals.steps += counts[i].y;
     if (n < 2.0) continue;
-    float square = 0.0F;
-    std::memcpy(&square, &counts[i].z, sizeof(square));
-    const double mean = (luminance(glm::dvec3(sums[i])) + (n - double(sums[i].w)) * sky) / n;
-    error += std::max(0.0, double(square) / n - mean * mean) / (n - 1.0);
+    const double mean = luminance(glm::dvec3(sums[i]) / n + glm::dvec3(background[i]));
+    error += std::max(0.0, double(background[i].w) - mean * mean) / (n - 1.0);
     brightness += mean;
   }
-  if (brightness > 0.0) totals.noise = std::sqrt(error / double(pixels)) / (brightness / double(pixels));
+  if (brightness > 0.0) totals.noise = std::sqrt(error * double(counts.size())) / brightness;
   return totals;
 }
 

@@ -97,6 +97,7 @@ class Picture {
   void extend(std::uint32_t samples);
   [[nodiscard]] GLuint sum() const { return sum_.name(); }
   [[nodiscard]] GLuint counts() const { return counts_.name(); }
+  [[nodiscard]] GLuint background() const { return background_.name(); }
   /// Another with every picture that is begun.
   [[nodiscard]] std::uint64_t begun() const { return begun_; }
   /// Another with everything that was sent off to be added to it.
@@ -111,8 +112,9 @@ class Picture {
   std::uint32_t target_samples_ = 1;
   View view_ = View::shaded;
   glm::uvec2 size_{0U};
-  gl::Object sum_;
-  gl::Object counts_;
+  gl::Object sum_;         // rgba32f: of radiance in front of the background, and of alpha
+  gl::Object background_;  // rgba32f: mean of its radiance, and of the squared luminance of all
+  gl::Object counts_;      // rg32ui: samples, and cells marched
   std::uint64_t begun_ = 0;
   std::uint64_t revision_ = 0;
   gl::Object volume_z_;
@@ -168,15 +170,17 @@ class Tracer {
   bool trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline);
   /// View depth z at half opacity of one pixel of a picture with these parameters; 0: not so opaque.
   float pick(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
-  /// A picture of one transparent pixel: what there is before the first.
+  /// A picture of one transparent pixel, before a black background: what there is before the first.
   void clear(Picture& picture);
+  /// Of clear's picture.
+  void set_background(Picture& picture, const glm::vec3& radiance);
   /// Draws the surface pass for a picture, unless another picture has the same; begin does, and who shows one of
   /// clear's with the surfaces beneath.
   void draw_layers(Picture& picture, const Surfaces& surfaces, const PictureSettings& settings);
 
-  /// width * height * 4 floats: mean radiance without background, and alpha; (0,0) top left.
-  void read(const Picture& picture, float* rgba) const;
-  /// The same of samples that met the volume before any surface; alpha is their share.
+  /// width * height * 4 floats: mean radiance, with the background's or without, and alpha; (0,0) top left.
+  void read(const Picture& picture, bool with_background, float* rgba) const;
+  /// The same without background of samples that met the volume before any surface; alpha is their share.
   void read_volume(const Picture& picture, float* rgba) const;
   /// A fact a pixel (PixelFact), each channels_of(fact) floats. Finds them first, if need be.
   void read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact, float* values);
@@ -226,6 +230,8 @@ class Tracer {
   void allocate(Picture& picture, glm::uvec2 size) const;
   void bind(const MarchData& data, const Surfaces& surfaces) const;
   void read_means(const Picture& picture, GLuint sum, float* rgba) const;
+  [[nodiscard]] std::vector<glm::vec4> read_background(const Picture& picture) const;
+  [[nodiscard]] std::vector<glm::uvec2> read_counts(const Picture& picture) const;
   void find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces);
 
   gl::FunctionsPtr gl_;

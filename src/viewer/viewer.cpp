@@ -41,6 +41,7 @@ render::PictureTextures textures_of(const render::Picture& picture, const render
                                     const render::HostDepth& host) {
   render::PictureTextures textures;
   textures.sum = picture.sum();
+  textures.background = picture.background();
   textures.counts = picture.counts();
   textures.size = picture.size();
   textures.holes = picture.has_holes();
@@ -49,6 +50,7 @@ render::PictureTextures textures_of(const render::Picture& picture, const render
   textures.revision = picture.revision();
   if (before != nullptr) {
     textures.sum_before = before->sum();
+    textures.background_before = before->background();
     textures.counts_before = before->counts();
   }
   if (picture.layered() == render::Layered::beneath) {
@@ -692,6 +694,7 @@ void Viewer::draw_surfaces_alone(const Frame& frame) {
   render::Tracer& tracer = g.progressive.tracer();
   const bool able = g.raster && view_ && g.alone_failed != settings_revision_;
   if (g.empty.sum() == 0 || (!able && g.empty.layered() != render::Layered::no)) tracer.clear(g.empty);
+  tracer.set_background(g.empty, light_.sky_radiance);
   if (!able || frame.budget_ms < 0.0) return;
   g.alone_failed = settings_revision_;  // unless it succeeds
   tracer.draw_layers(g.empty, surfaces(),
@@ -711,7 +714,6 @@ void Viewer::draw(const Frame& frame, FrameResult& result) {
   display.tone_map = display_.tone_map;
   display.legend = legend;
   display.transparent = display_.transparent;
-  display.background = shown == &g.empty ? light_.sky_radiance : shown->parameters().lights.sky_radiance;
   display.encoding = frame.encoding;
   render::FrameTarget target;
   target.framebuffer = frame.framebuffer;
@@ -836,17 +838,29 @@ render::Picture& Viewer::readable() {
   return *picture;
 }
 
-// Mean radiance and alpha, with the surfaces that lie beneath a preview.
-void Viewer::read_means(Gl& g, const render::Picture& picture, float* rgba) {
+// Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
+void Viewer::read_means(Gl& g, const render::Picture& picture, bool with_background, float* rgba) {
   if (picture.layered() != render::Layered::beneath) {
-    g.progressive.tracer().read(picture, rgba);
+    g.progressive.tracer().read(picture, with_background, rgba);
     return;
   }
+  std::vector<float> opaque;
+  if (with_background) {
+    opaque.resize(std::size_t{picture.size().x} * picture.size().y * 4);
+    read_composite(g, picture, false, opaque.data());
+  }
+  read_composite(g, picture, true, rgba);
+  for (std::size_t i = 0; i < opaque.size(); ++i) {
+    if (i % 4 != 3) rgba[i] = opaque[i];
+  }
+}
+
+void Viewer::read_composite(Gl& g, const render::Picture& picture, bool transparent, float* rgba) {
   const glm::ivec2 size(picture.size());
   const gl::Object flat = gl::make_texture_2d(g.functions, GL_RGBA32F, size.x, size.y, "creating the texture to read");
   const TransientFramebuffer framebuffer(*g.functions, flat.name(), 0);
   render::Display display;
-  display.transparent = true;
+  display.transparent = transparent;
   display.encoding = render::ColourEncoding::hdr;
   render::FrameTarget target;
   target.framebuffer = framebuffer.name();
@@ -880,7 +894,7 @@ void Viewer::read_aov(Aov aov, float* values, std::size_t count) {
       throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
     }
     if (aov == Aov::beauty) {
-      read_means(g, picture, values);
+      read_means(g, picture, false, values);
     } else if (aov == Aov::volume) {
       if (!picture.volume_alone()) {
         throw Error(
@@ -905,13 +919,8 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
     const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
     if (rgba == nullptr || count < pixels * 4)
       throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " floats");
-    read_means(g, picture, rgba);
+    read_means(g, picture, !display_.transparent, rgba);
     totals_ = g.progressive.tracer().totals(picture);
-    if (display_.transparent || picture.view() != render::View::shaded) return;
-    const glm::vec3 sky = picture.parameters().lights.sky_radiance;
-    for (std::size_t i = 0; i < pixels; ++i) {
-      for (int c = 0; c < 3; ++c) rgba[4 * i + static_cast<std::size_t>(c)] += (1.0F - rgba[4 * i + 3]) * sky[c];
-    }
   });
 }
 

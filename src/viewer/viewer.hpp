@@ -246,7 +246,9 @@ class Viewer {
   VolumePtr empty_volume();
   [[nodiscard]] render::Surfaces surfaces() const;
   render::Picture& readable();
-  static void read_means(Gl& g, const render::Picture& picture, float* rgba);
+  static void read_means(Gl& g, const render::Picture& picture, bool with_background, float* rgba);
+  // What the compositor draws of it, as linear radiance.
+  static void read_composite(Gl& g, const render::Picture& picture, bool transparent, float* rgba);
   void upload_raster(Gl& g);
 
   Log log_;

@@ -119,9 +119,10 @@ struct Picture {
   glm::ivec2 size{0};
   bool holes = false;
   std::vector<glm::vec4> sum;
-  std::vector<glm::uvec4> counts;
+  std::vector<glm::vec4> background;
+  std::vector<glm::uvec2> counts;
   std::vector<float> z;
-  Object sum_texture, counts_texture, z_texture;
+  Object sum_texture, background_texture, counts_texture, z_texture;
 
   Picture(const gl::FunctionsPtr& gl, int width, int height, bool legend) : size(width, height) {
     std::mt19937 random(static_cast<unsigned>(width * 131 + height));
@@ -132,46 +133,57 @@ struct Picture {
       const float bright = legend ? 1.0F : (i % 3 == 0 ? 6.0F : 0.8F);
       const glm::vec3 radiance = alpha * bright * glm::vec3(unit(random), unit(random), unit(random));
       sum.push_back(static_cast<float>(samples) * glm::vec4(radiance, alpha));
-      counts.emplace_back(samples, 9U, 9U, 9U);
+      background.emplace_back((1.0F - alpha) * (legend ? 0.0F : 1.0F) * glm::vec3(0.3F, 0.6F, unit(random)), 9.0F);
+      counts.emplace_back(samples, 9U);
       z.push_back(i % 3 == 0 ? 0.0F : 0.5F + 20.0F * unit(random));
     }
     sum_texture = gl::make_texture_2d(gl, GL_RGBA32F, width, height, "sum");
-    counts_texture = gl::make_texture_2d(gl, GL_RGBA32UI, width, height, "counts");
+    background_texture = gl::make_texture_2d(gl, GL_RGBA32F, width, height, "background");
+    counts_texture = gl::make_texture_2d(gl, GL_RG32UI, width, height, "counts");
     z_texture = gl::make_texture_2d(gl, GL_R32F, width, height, "z");
     gl->TextureSubImage2D(sum_texture.name(), 0, 0, 0, width, height, GL_RGBA, GL_FLOAT, sum.data());
-    gl->TextureSubImage2D(counts_texture.name(), 0, 0, 0, width, height, GL_RGBA_INTEGER, GL_UNSIGNED_INT,
-                          counts.data());
+    gl->TextureSubImage2D(background_texture.name(), 0, 0, 0, width, height, GL_RGBA, GL_FLOAT, background.data());
+    gl->TextureSubImage2D(counts_texture.name(), 0, 0, 0, width, height, GL_RG_INTEGER, GL_UNSIGNED_INT, counts.data());
     gl->TextureSubImage2D(z_texture.name(), 0, 0, 0, width, height, GL_RED, GL_FLOAT, z.data());
   }
   [[nodiscard]] PictureTextures textures() const {
-    return {sum_texture.name(), counts_texture.name(), glm::uvec2(size), holes, z_texture.name()};
+    PictureTextures textures;
+    textures.sum = sum_texture.name();
+    textures.background = background_texture.name();
+    textures.counts = counts_texture.name();
+    textures.size = glm::uvec2(size);
+    textures.holes = holes;
+    textures.volume_z = z_texture.name();
+    return textures;
   }
   [[nodiscard]] std::size_t index(glm::ivec2 p) const {
     p = glm::clamp(p, glm::ivec2(0), size - 1);
     return static_cast<std::size_t>(p.y * size.x + p.x);
   }
-  [[nodiscard]] glm::dvec4 around(glm::ivec2 p) const {
+  /// Of a pixel with samples, or without any around: in front of the background, and all of it.
+  [[nodiscard]] glm::dvec4 mean(glm::ivec2 p, bool with_background) const {
+    const std::size_t i = index(p);
+    glm::dvec4 mean(0.0);
+    if (counts[i].x > 0) mean = glm::dvec4(sum[i]) / double(counts[i].x);
+    if (with_background) mean += glm::dvec4(glm::dvec3(background[i]), 0.0);
+    return mean;
+  }
+  [[nodiscard]] glm::dvec4 around(glm::ivec2 p, bool with_background) const {
     glm::dvec4 total(0.0);
     double n = 0.0;
     for (int k = 0; k < 9; ++k) {
-      const std::size_t i = index(p + glm::ivec2(k % 3 - 1, k / 3 - 1));
-      if (counts[i].x == 0) continue;
-      total += glm::dvec4(sum[i]) / double(counts[i].x);
+      const glm::ivec2 near = p + glm::ivec2(k % 3 - 1, k / 3 - 1);
+      if (counts[index(near)].x == 0) continue;
+      total += mean(near, with_background);
       n += 1.0;
     }
-    return n > 0.0 ? total / n : total;
+    return n > 0.0 ? total / n : mean(p, with_background);
   }
   [[nodiscard]] glm::dvec4 texel(glm::ivec2 p, const Display& display) const {
-    const std::size_t i = index(p);
-    glm::dvec4 mean(0.0);
-    if (counts[i].x > 0) {
-      mean = glm::dvec4(sum[i]) / double(counts[i].x);
-    } else if (holes) {
-      mean = around(glm::clamp(p, glm::ivec2(0), size - 1));
-    }
-    if (display.transparent) return mean;
-    if (!display.legend) mean += glm::dvec4(glm::dvec3(display.background) * (1.0 - mean.a), 0.0);
-    return {glm::dvec3(mean), 1.0};
+    const bool hole = holes && counts[index(p)].x == 0;
+    const bool all = !display.transparent;
+    const glm::dvec4 value = hole ? around(glm::clamp(p, glm::ivec2(0), size - 1), all) : mean(p, all);
+    return all ? glm::dvec4(glm::dvec3(value), 1.0) : value;
   }
 };
 
@@ -331,7 +343,6 @@ TEST_P(Compositing, EveryEncodingCurveAndBackground) {
           display.encoding = encoding;
           display.tone_map = curve;
           display.transparent = transparent;
-          display.background = {0.3F, 0.6F, 1.4F};
           display.exposure_stops = -0.5F;
           target.blend_over = over;
           if (encoding == ColourEncoding::srgb_framebuffer) {
@@ -384,7 +395,6 @@ TEST_P(Compositing, HolesTakeAfterTheirNeighbours) {
     for (const bool transparent : {false, true}) {
       Display display;
       display.transparent = transparent;
-      display.background = {0.2F, 0.4F, 0.9F};
       check(picture, display, target, GL_RGBA32F, 0);
     }
   }
@@ -399,7 +409,6 @@ TEST_P(Compositing, LegendsAreShownAsTheyAre) {
     display.legend = true;
     display.transparent = transparent;
     display.exposure_stops = 3.0F;
-    display.background = glm::vec3(0.7F);
     check(picture, display, target, GL_RGBA8, 0);
     display.encoding = ColourEncoding::linear;
     check(picture, display, target, GL_RGBA32F, 0);
@@ -519,10 +528,13 @@ TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
     for (int i = 0; i < side * side; ++i) {
       const unsigned samples = i / side < empty_rows ? 0U : 2U;
       picture.sum[static_cast<std::size_t>(i)] = static_cast<float>(samples) * colour;
-      picture.counts[static_cast<std::size_t>(i)] = {samples, 0U, 0U, 0U};
+      picture.background[static_cast<std::size_t>(i)] = glm::vec4(0.0F, 0.0F, samples == 0 ? 1.0F : 0.0F, 0.0F);
+      picture.counts[static_cast<std::size_t>(i)] = {samples, 0U};
     }
     gl_->TextureSubImage2D(picture.sum_texture.name(), 0, 0, 0, side, side, GL_RGBA, GL_FLOAT, picture.sum.data());
-    gl_->TextureSubImage2D(picture.counts_texture.name(), 0, 0, 0, side, side, GL_RGBA_INTEGER, GL_UNSIGNED_INT,
+    gl_->TextureSubImage2D(picture.background_texture.name(), 0, 0, 0, side, side, GL_RGBA, GL_FLOAT,
+                           picture.background.data());
+    gl_->TextureSubImage2D(picture.counts_texture.name(), 0, 0, 0, side, side, GL_RG_INTEGER, GL_UNSIGNED_INT,
                            picture.counts.data());
     return picture;
   };
@@ -539,6 +551,7 @@ TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
     PictureTextures textures = now.textures();
     if (has_before) {
       textures.sum_before = earlier.sum_texture.name();
+      textures.background_before = earlier.background_texture.name();
       textures.counts_before = earlier.counts_texture.name();
     }
     {
@@ -550,6 +563,7 @@ TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
       const glm::vec4 value = got[static_cast<std::size_t>((15 - row) * size.x + 5)];
       EXPECT_EQ(value.x > 0.0F, row >= 7) << row;  // one row takes after its neighbours
       EXPECT_EQ(value.y > 0.0F, row < 7 && has_before) << row;
+      EXPECT_EQ(value.z > 0.0F, row < 7 && !has_before) << row;  // the background alone
     }
   }
 }

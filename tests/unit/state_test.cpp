@@ -122,7 +122,7 @@ class Scribbler {
 struct Frame {
   explicit Frame(const gl::FunctionsPtr& functions) : gl_(functions), compositor(functions), depth(functions) {
     sum = gl::make_texture_2d(gl_, GL_RGBA32F, 8, 8, "sum");
-    counts = gl::make_texture_2d(gl_, GL_RGBA32UI, 8, 8, "counts");
+    counts = gl::make_texture_2d(gl_, GL_RG32UI, 8, 8, "counts");
     z = gl::make_texture_2d(gl_, GL_R32F, 8, 8, "z");
     colour = gl::make_texture_2d(gl_, GL_RGBA32F, 8, 8, "colour");
     depth_texture = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, 8, 8, "depth");
@@ -130,10 +130,10 @@ struct Frame {
     gl_->NamedFramebufferTexture(target.name(), GL_COLOR_ATTACHMENT0, colour.name(), 0);
     gl_->NamedFramebufferTexture(target.name(), GL_DEPTH_ATTACHMENT, depth_texture.name(), 0);
     const glm::vec4 radiance(0.5F, 0.25F, 0.125F, 0.5F);
-    const glm::uvec4 samples(2U);
+    const glm::uvec2 samples(2U);
     const float half = 4.0F;
     gl_->ClearTexImage(sum.name(), 0, GL_RGBA, GL_FLOAT, &radiance);
-    gl_->ClearTexImage(counts.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, &samples);
+    gl_->ClearTexImage(counts.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &samples);
     gl_->ClearTexImage(z.name(), 0, GL_RED, GL_FLOAT, &half);
   }
   void draw() {
@@ -158,7 +158,13 @@ struct Frame {
     to.depth_b = -1.0;
     render::Display display;
     display.transparent = true;
-    compositor.draw({sum.name(), counts.name(), {8U, 8U}, false, z.name()}, display, to);
+    render::PictureTextures picture;
+    picture.sum = sum.name();
+    picture.background = sum.name();
+    picture.counts = counts.name();
+    picture.size = {8U, 8U};
+    picture.volume_z = z.name();
+    compositor.draw(picture, display, to);
   }
   /// Colours, then depths.
   [[nodiscard]] std::vector<float> read() const {

@@ -35,6 +35,7 @@ struct CpuTetLinear {
 #undef CM_FRAME_GLSL
 #undef CM_MARCH_TET_GLSL
 #undef CM_RAY_GLSL
+#undef CM_LIGHT_GLSL
 #undef CM_PATH_STATE_GLSL
 #undef CM_PATH_VERTEX_GLSL
 #undef CM_PATH_GLSL
