@@ -85,6 +85,16 @@ void clear_errors(const Functions& gl) {
   }
 }
 
+bool has_extension(const Functions& gl, const char* name) {
+  GLint count = 0;
+  gl.GetIntegerv(GL_NUM_EXTENSIONS, &count);
+  for (GLint i = 0; i < count; ++i) {
+    const GLubyte* text = gl.GetStringi(GL_EXTENSIONS, static_cast<GLuint>(i));
+    if (text != nullptr && std::strcmp(reinterpret_cast<const char*>(text), name) == 0) return true;
+  }
+  return false;
+}
+
 std::string string_of(const Functions& gl, GLenum name) {
   const GLubyte* text = gl.GetString(name);
   return text == nullptr ? std::string() : reinterpret_cast<const char*>(text);

@@ -103,6 +103,9 @@ void check_reset(const Functions& gl);
 /// Drops errors that were pending before we came.
 void clear_errors(const Functions& gl);
 
+/// Whether the current context has it.
+bool has_extension(const Functions& gl, const char* name);
+
 /// The GL name of a context string, "" if the driver gives none.
 std::string string_of(const Functions& gl, GLenum name);
 

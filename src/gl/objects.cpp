@@ -4,17 +4,10 @@
 #include <cstring>
 
 #include "base/error.hpp"
-#include "gl/bindings.hpp"
-#include "gl/shader_sources.hpp"
 
 namespace cumulet::gl {
 
 namespace {
-
-struct Stage {
-  GLenum type;
-  const std::string& name;
-};
 
 Object make_texture(const FunctionsPtr& gl, GLenum target) {
   GLuint name = 0;
@@ -29,52 +22,6 @@ Object finish_texture(const FunctionsPtr& gl, Object texture, const char* what) 
   gl->TextureParameteri(texture.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   check(*gl, what);
   return texture;
-}
-
-Object make_program(const FunctionsPtr& gl, std::span<const Stage> stages, std::span<const std::string> defines) {
-  Object program(gl, Object::Kind::program, gl->CreateProgram());
-  std::vector<Object> shaders;
-  for (const Stage& stage : stages) {
-    const Shader* source = find_shader(stage.name);
-    if (source == nullptr) throw Error(ErrorCode::internal, "no shader named " + stage.name);
-    // The last stage's variants are the program's.
-    if (&stage == &stages.back() && !source->has_variant(defines)) {
-      std::string all;
-      for (const std::string& define : defines) all += (all.empty() ? "" : ", ") + define;
-      throw Error(ErrorCode::internal, stage.name + " names no variant with [" + all + "]");
-    }
-    const std::string text = source->with(defines);
-    const Object& shader = shaders.emplace_back(gl, Object::Kind::shader, gl->CreateShader(stage.type));
-    const char* pointer = text.c_str();
-    gl->ShaderSource(shader.name(), 1, &pointer, nullptr);
-    gl->CompileShader(shader.name());
-    gl->AttachShader(program.name(), shader.name());
-  }
-  gl->LinkProgram(program.name());
-  GLint linked = 0;
-  gl->GetProgramiv(program.name(), GL_LINK_STATUS, &linked);
-  check(*gl, "building a shader program");
-  if (linked != 0) {
-    std::string all = stages.back().name;
-    for (const std::string& define : defines) all += ", " + define;
-    label(*gl, Object::Kind::program, program.name(), all);
-    for (const Object& shader : shaders) gl->DetachShader(program.name(), shader.name());
-    return program;
-  }
-  // The first shader that has something to say, else the linker.
-  std::array<char, 2048> log{};
-  std::size_t culprit = 0;
-  for (std::size_t i = 0; i < shaders.size() && log[0] == '\0'; ++i) {
-    GLint compiled = 0;
-    gl->GetShaderiv(shaders[i].name(), GL_COMPILE_STATUS, &compiled);
-    if (compiled != 0) continue;
-    culprit = i;
-    gl->GetShaderInfoLog(shaders[i].name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
-  }
-  if (log[0] == '\0') gl->GetProgramInfoLog(program.name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
-  std::string line(log.data());
-  for (char& c : line) c = c == '\n' ? ' ' : c;
-  throw Error(ErrorCode::gl, "shader " + stages[culprit].name + " does not build on this driver: " + line);
 }
 
 }  // namespace
@@ -148,19 +95,6 @@ ReadBack::ReadBack(const FunctionsPtr& gl, std::size_t bytes, const char* what) 
   if (data_ == nullptr) throw Error(ErrorCode::gl, std::string("GL maps no buffer: ") + what);
 }
 
-void find_out_dispatches(const FunctionsPtr& gl) {
-  const ReadBack seen(gl, 4, "creating a buffer to look at");
-  const Object program = make_compute_program(gl, "sign.comp", {});
-  gl->UseProgram(program.name());
-  gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_SIGN, seen.name());
-  gl->DispatchCompute(1, 1, 1);
-  // Nothing was flushed: what is written now was written in the call.
-  std::uint32_t sign = 0;
-  std::memcpy(&sign, seen.data(), sizeof(sign));
-  gl->dispatches_in_call = sign != 0;
-  check(*gl, "the first dispatch");
-}
-
 void memory_barrier(const Functions& gl, GLbitfield barriers) {
   if (!gl.dispatches_in_call.load(std::memory_order_relaxed)) gl.MemoryBarrier(barriers);
 }
@@ -211,17 +145,6 @@ Object make_texture_3d(const FunctionsPtr& gl, GLenum format, int x, int y, int 
   Object texture = make_texture(gl, GL_TEXTURE_3D);
   gl->TextureStorage3D(texture.name(), 1, format, x, y, z);
   return finish_texture(gl, std::move(texture), what);
-}
-
-Object make_compute_program(const FunctionsPtr& gl, const std::string& name, std::span<const std::string> defines) {
-  const std::array<Stage, 1> stages{Stage{GL_COMPUTE_SHADER, name}};
-  return make_program(gl, stages, defines);
-}
-
-Object make_graphics_program(const FunctionsPtr& gl, const std::string& vertex, const std::string& fragment,
-                             std::span<const std::string> defines) {
-  const std::array<Stage, 2> stages{Stage{GL_VERTEX_SHADER, vertex}, Stage{GL_FRAGMENT_SHADER, fragment}};
-  return make_program(gl, stages, defines);
 }
 
 Object make_framebuffer(const FunctionsPtr& gl) {

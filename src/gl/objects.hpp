@@ -106,8 +106,6 @@ class ReadBack {
   const std::byte* data_ = nullptr;
 };
 
-/// Finds out Functions::dispatches_in_call, by a small dispatch. Needs a StateGuard around. Throws on a GL error.
-void find_out_dispatches(const FunctionsPtr& gl);
 /// glMemoryBarrier, where it is needed: a driver whose dispatches are over when their call returns orders all that
 /// follows, but its barrier (Mesa's llvmpipe) waits for whatever the host has queued.
 void memory_barrier(const Functions& gl, GLbitfield barriers);
@@ -122,13 +120,6 @@ Object make_texture_2d_array(const FunctionsPtr& gl, GLenum format, int width, i
 Object make_texture_2d_multisample(const FunctionsPtr& gl, GLenum format, int samples, int width, int height,
                                    const char* what);
 Object make_texture_3d(const FunctionsPtr& gl, GLenum format, int x, int y, int z, const char* what);
-/// Compiles glsl/NAME with the given "NAME VALUE" macros. Throws Error(gl) with the driver's log, and Error(internal)
-/// for macros that are none of the variants that the shader's source names (cmake/embed_glsl.py): those are validated,
-/// and their cost on GPUs is known (tests/gpu_cost).
-Object make_compute_program(const FunctionsPtr& gl, const std::string& name, std::span<const std::string> defines);
-/// Likewise of a vertex and a fragment shader; the latter names the variants.
-Object make_graphics_program(const FunctionsPtr& gl, const std::string& vertex, const std::string& fragment,
-                             std::span<const std::string> defines);
 Object make_framebuffer(const FunctionsPtr& gl);
 Object make_vertex_array(const FunctionsPtr& gl);
 /// Nearest, no comparison: reads any complete texture as it is.

@@ -1,7 +1,6 @@
 #include "render/compositor.hpp"
 
 #include <algorithm>
-#include <array>
 #include <string>
 #include <utility>
 
@@ -19,8 +18,8 @@ constexpr std::size_t most_means = 3;
 // Of a picture under way, between means of it, in times that they took.
 constexpr double pause = 4.0;
 
-gl::Object make_program(const gl::FunctionsPtr& gl, std::span<const std::string> defines) {
-  return gl::make_graphics_program(gl, "composite.vert", "composite.frag", defines);
+gl::ProgramKey key_of(std::vector<std::string> defines) {
+  return {"composite.frag", std::move(defines), "composite.vert"};
 }
 
 }  // namespace
@@ -67,13 +66,9 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
     if (older && picture.may_lag && !resolves_now()) return newest_;
   }
   if (no_memory_for_ == picture.size) return nullptr;
-  gl::Object& program = resolve_[{picture.holes, background}];
-  if (!program) {
-    program = gl::make_compute_program(
-        gl_, "resolve.comp",
-        std::array<std::string, 2>{picture.holes ? "CM_HOLES 1" : "CM_HOLES 0",
-                                   "CM_BACKGROUND " + std::to_string(static_cast<int>(background))});
-  }
+  const gl::Program& program = programs_->get(
+      {"resolve.comp",
+       {picture.holes ? "CM_HOLES 1" : "CM_HOLES 0", "CM_BACKGROUND " + std::to_string(static_cast<int>(background))}});
   const gl::DebugGroup group(*gl_, "cumulet: resolve");
   const auto begun = Clock::now();
   Means* means = nullptr;
@@ -102,7 +97,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
     gl.BindImageTexture(core::CM_IMAGE_BACKGROUND_MEANS, means->background.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY,
                         GL_RGBA32F);
   }
-  gl.UseProgram(program.name());
+  program.use(gl);
   gl.DispatchCompute((picture.size.x + 7) / 8, (picture.size.y + 7) / 8, 1);
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT);
   means->of = wanted;
@@ -140,8 +135,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
                                    display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
   if (layered) defines.emplace_back("CM_LAYERS 1");
-  gl::Object& program = colours_[defines];
-  if (!program) program = make_program(gl_, defines);
+  const gl::Program& program = programs_->get(key_of(std::move(defines)));
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
                       static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
@@ -178,12 +172,12 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   }
   gl.Disable(GL_DEPTH_TEST);
   gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  gl.UseProgram(colour);
+  program.use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
 
   if (target.write_depth && picture.volume_z != 0) {
-    if (!depth_) depth_ = make_program(gl_, std::array<std::string, 1>{"CM_DEPTH 1"});
-    const GLuint depth = depth_.name();
+    const gl::Program& depth_program = programs_->get(key_of({"CM_DEPTH 1"}));
+    const GLuint depth = depth_program.name();
     gl.BindTextureUnit(core::CM_UNIT_VOLUME_Z, picture.volume_z);
     gl.ProgramUniform4i(depth, 0, viewport.x, viewport.y, viewport.z, viewport.w);
     gl.ProgramUniform1i(depth, 1, as_bool(target.flip_y));
@@ -193,7 +187,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     gl.Enable(GL_DEPTH_TEST);
     gl.DepthFunc(target.reversed ? GL_GEQUAL : GL_LEQUAL);
     gl.DepthMask(GL_TRUE);
-    gl.UseProgram(depth);
+    depth_program.use(gl);
     gl.DrawArrays(GL_TRIANGLES, 0, 3);
     gl.Disable(GL_DEPTH_TEST);
     gl.DepthMask(GL_FALSE);

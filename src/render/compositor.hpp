@@ -1,17 +1,14 @@
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <map>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "base/error.hpp"
-#include "gl/objects.hpp"
+#include "gl/programs.hpp"
 #include "render/display.hpp"
 #include "render/surface_raster.hpp"
 
@@ -56,7 +53,7 @@ struct FrameTarget {
 /// Vertex arrays and framebuffers belong to one context of a share group: those it needs live for one call.
 class Compositor {
  public:
-  explicit Compositor(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
   /// Draws nothing without a picture or into a rectangle of size 0. Writes colour to draw buffer 0 alone, whatever the
   /// depth there; alpha is premultiplied after exposure, tone map and encoding. Throws Error(invalid_argument) for a
   /// name that is no framebuffer, or one that is not complete.
@@ -100,8 +97,7 @@ class Compositor {
   [[nodiscard]] bool resolves_now() const;
 
   gl::FunctionsPtr gl_;
-  std::map<std::vector<std::string>, gl::Object> colours_;     // by their macros: made when first needed
-  std::map<std::pair<bool, Background>, gl::Object> resolve_;  // by whether there are holes
+  gl::ProgramsPtr programs_;
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
   std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
@@ -110,7 +106,6 @@ class Compositor {
   double draw_ms_ = 0.0;                     // the rest of it
   bool lags_ = false;
   Clock::time_point resolved_{};
-  gl::Object depth_;
 };
 
 }  // namespace cumulet::render

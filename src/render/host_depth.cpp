@@ -203,11 +203,8 @@ bool HostDepth::update(const HostDepthInput& input) {
   const Source source = input.source == DepthSource::framebuffer ? open_framebuffer(input) : open_texture(input);
   const auto layers = static_cast<unsigned>(std::clamp(source.samples, 1, most_layers));
   const bool multisample = source.samples > 0;
-  gl::Object& program = programs_[multisample ? 1 : 0];
-  if (!program) {
-    const std::array<std::string, 1> defines{multisample ? "CM_MULTISAMPLE 1" : "CM_MULTISAMPLE 0"};
-    program = gl::make_compute_program(gl_, "host_depth.comp", defines);
-  }
+  const gl::Program& program =
+      programs_->get({"host_depth.comp", {multisample ? "CM_MULTISAMPLE 1" : "CM_MULTISAMPLE 0"}});
   if (!sampler_) sampler_ = gl::make_sampler(gl_);
   if (!changed_) changed_ = gl::make_buffer(gl_, 4, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the depth's flag");
   if (!answers_) answers_ = gl::ReadBack(gl_, most_asked * 4, "creating the depth's flags");
@@ -229,7 +226,7 @@ bool HostDepth::update(const HostDepthInput& input) {
   gl.ProgramUniform1i(program.name(), 2, input.orthographic ? 1 : 0);
   gl.ProgramUniform3f(program.name(), 3, a, static_cast<float>(input.depth_a - static_cast<double>(a)),
                       static_cast<float>(input.depth_b));
-  gl.UseProgram(program.name());
+  program.use(gl);
   gl.DispatchCompute((size.x + 7) / 8, (size.y + 7) / 8, layers);
   gl::memory_barrier(gl, GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT |
                              GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);

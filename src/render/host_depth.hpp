@@ -4,7 +4,7 @@
 #include <deque>
 #include <glm/glm.hpp>
 
-#include "gl/objects.hpp"
+#include "gl/programs.hpp"
 
 namespace cumulet::render {
 
@@ -28,7 +28,7 @@ struct HostDepthInput {
 /// likes.
 class HostDepth {
  public:
-  explicit HostDepth(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  HostDepth(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
   /// Reads the input. Returns whether it is known by now that z differs from before anywhere (or size or layers do): of
   /// this call or an earlier one, for the device is not waited for (but Mesa's llvmpipe waits for the host's drawing of
   /// it). Throws
@@ -56,6 +56,7 @@ class HostDepth {
   Source copy(GLuint framebuffer, GLenum format, int samples, glm::ivec4 rectangle);
 
   gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
   HostDepthInput last_;
   gl::Object z_;
   glm::uvec2 size_{0U};
@@ -64,7 +65,6 @@ class HostDepth {
   glm::ivec2 copy_size_{0};
   GLenum copy_format_ = 0;
   int copy_samples_ = 0;
-  std::array<gl::Object, 2> programs_;  // single, multisampled
   gl::Object sampler_;
   gl::Object changed_;
   static constexpr std::size_t most_asked = 8;

@@ -42,7 +42,7 @@ class Progressive {
   /// picture, else (in motion) than half of it: most of what a coarser one would cost is the vertices.
   static PictureSettings quick_layers(const Tracer& tracer, glm::uvec2 size, double budget_ms, bool rests);
 
-  explicit Progressive(gl::FunctionsPtr gl) : tracer_(std::move(gl)) {}
+  Progressive(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : tracer_(std::move(gl), std::move(programs)) {}
 
   /// Works on the wish until about the deadline. Throws once where a picture cannot be made, and goes on with what
   /// there is, or coarser, later.

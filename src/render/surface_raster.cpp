@@ -193,14 +193,13 @@ void SurfaceRaster::make_programs(Assets& assets) const {
     const auto uses = uses_of(material);
     for (std::size_t map = 0; map < uses.size(); ++map) used |= uses[map]->texture >= 0 ? 1U << map : 0U;
     const bool coated = material.clearcoat > 0.0F;
-    gl::Object& program = assets.programs[{assets.materials[i].pass, used, coated}];
-    if (!program) {
-      const std::array<std::string, 3> defines{"CM_ALPHA " + std::to_string(static_cast<int>(assets.materials[i].pass)),
-                                               "CM_USED " + std::to_string(used),
-                                               coated ? "CM_COATED 1" : "CM_COATED 0"};
-      program = gl::make_graphics_program(gl_, "surface.vert", "surface.frag", defines);
-    }
-    assets.materials[i].program = program.name();
+    const gl::Program& program =
+        programs_->get({"surface.frag",
+                        {"CM_ALPHA " + std::to_string(static_cast<int>(assets.materials[i].pass)),
+                         "CM_USED " + std::to_string(used), coated ? "CM_COATED 1" : "CM_COATED 0"},
+                        "surface.vert"});
+    assets.materials[i].program = &program;
+    if (std::ranges::find(assets.programs, &program) == assets.programs.end()) assets.programs.push_back(&program);
   }
 }
 
@@ -409,12 +408,12 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
 
 void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) const {
   const auto& gl = *gl_;
-  GLuint program = 0;
+  const gl::Program* program = nullptr;
   std::optional<std::uint32_t> bound;
   for (const Batch& batch : batches) {
     const std::uint32_t index = assets_.scene->draws[batch.draw].material;
     const Material& material = assets_.materials[index];
-    if (program != material.program) gl.UseProgram(material.program);
+    if (program != material.program) material.program->use(gl);
     program = material.program;
     if (bound != index) {
       for (GLuint i = 0; i < material.maps.size(); ++i) {
@@ -502,7 +501,7 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     const float far = 0.0F;
     gl.ClearNamedFramebufferfv(target, GL_DEPTH, 0, &far);
     const glm::vec2 shift = (glm::vec2(0.5F) - surface_jitter(layer, layers)) * 2.0F / glm::vec2(size);
-    for (const auto& [variant, program] : assets_.programs) gl.ProgramUniform2f(program.name(), 0, shift.x, shift.y);
+    for (const gl::Program* program : assets_.programs) gl.ProgramUniform2f(program->name(), 0, shift.x, shift.y);
     if (posed_) {
       gl.VertexArrayElementBuffer(vertex_array.name(), assets_.indices.name());
       draw_batches(assets_.solid, mirrored);

@@ -2,14 +2,12 @@
 
 #include <array>
 #include <glm/glm.hpp>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
-#include <tuple>
 #include <vector>
 
-#include "gl/objects.hpp"
+#include "gl/programs.hpp"
 #include "surface/scene.hpp"
 
 namespace cumulet::render {
@@ -63,7 +61,7 @@ glm::vec2 surface_jitter(unsigned layer, unsigned layers);
 /// Needs the context current and a StateGuard around; leaves any state that the guard puts back. GL 4.5 core.
 class SurfaceRaster {
  public:
-  explicit SurfaceRaster(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+  SurfaceRaster(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
 
   /// Uploads what does not move; null: no surfaces. The pose is gone then. Throws Error(out_of_memory), or
   /// Error(unsupported) for an image that is larger than the driver's textures, and keeps what was.
@@ -99,10 +97,8 @@ class SurfaceRaster {
     std::array<Map, 10> maps{};
     surface::AlphaMode pass = surface::AlphaMode::opaque;
     bool double_sided = false;
-    GLuint program = 0;  // of Assets::programs
+    const gl::Program* program = nullptr;
   };
-  /// What the shader of a material is compiled for: how it covers, bits of its maps, whether it has a coat.
-  using Variant = std::tuple<surface::AlphaMode, std::uint32_t, bool>;
   struct Assets {
     surface::ScenePtr scene;
     gl::Object attributes;
@@ -112,11 +108,11 @@ class SurfaceRaster {
     std::vector<gl::Object> textures;
     std::vector<gl::Object> samplers;
     std::vector<Material> materials;
-    std::map<Variant, gl::Object> programs;
-    std::vector<Batch> solid;    // OPAQUE, then MASK
-    std::vector<Batch> blended;  // a triangle each
-    gl::Object posed;            // vertices
-    gl::Object sorted_indices;   // of blended triangles
+    std::vector<const gl::Program*> programs;  // of the materials, each once
+    std::vector<Batch> solid;                  // OPAQUE, then MASK
+    std::vector<Batch> blended;                // a triangle each
+    gl::Object posed;                          // vertices
+    gl::Object sorted_indices;                 // of blended triangles
     std::uint64_t bytes = 0;
   };
 
@@ -131,6 +127,7 @@ class SurfaceRaster {
   void draw_batches(std::span<const Batch> batches, bool mirrored) const;
 
   gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
   Assets assets_;
   std::shared_ptr<const void> content_;
   bool posed_ = false;

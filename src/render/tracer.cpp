@@ -147,17 +147,12 @@ std::uint64_t Picture::bytes() const {
 }
 
 const Tracer::Program& Tracer::program(const MarchData& data, const char* name, std::span<const std::string> more) {
-  std::vector<std::string> key = data.defines();
-  key.insert(key.end(), more.begin(), more.end());
-  key.emplace_back(name);
-  auto found = programs_.find(key);
-  if (found == programs_.end()) {
-    Program made{gl::make_compute_program(gl_, name, std::span(key).first(key.size() - 1))};
-    // Those of one march at most: a host that tries them all shall not collect them.
-    if (programs_.size() >= 8) programs_.clear();
-    found = programs_.emplace(std::move(key), std::move(made)).first;
-  }
-  return found->second;
+  gl::ProgramKey key{name, data.defines()};
+  key.defines.insert(key.defines.end(), more.begin(), more.end());
+  const gl::Program& made = programs_->get(key);
+  Program& program = used_[std::move(key)];
+  program.object = &made;
+  return program;
 }
 
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
@@ -415,7 +410,7 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surf
   const bool shaded = picture.view_ == View::shaded;
   const Program& program = shaded ? trace_program(picture, data) : inspect_program(data, surfaces, "inspect.comp");
   flights_.order();
-  gl_->UseProgram(program.object.name());
+  program.object->use(*gl_);
   bind(data, surfaces);
   if (picture.layered_ != Layered::no) {
     gl_->BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, picture.layers_->colour.name());
@@ -588,7 +583,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces
   }
   make_shared_objects();
   const Program& program = inspect_program(data, surfaces, "inspect.comp");
-  gl_->UseProgram(program.object.name());
+  program.object->use(*gl_);
   bind(data, surfaces);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
   gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
@@ -610,7 +605,7 @@ void Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces&
                        gl::make_texture_2d(gl_, GL_R32F, width, height, what)};
   make_shared_objects();
   const Program& program = inspect_program(data, surfaces, "aovs.comp");
-  gl_->UseProgram(program.object.name());
+  program.object->use(*gl_);
   bind(data, surfaces);
   gl_->BindImageTexture(core::CM_IMAGE_NORMAL, facts.normal.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(core::CM_IMAGE_ALBEDO, facts.albedo.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
@@ -661,7 +656,7 @@ float Tracer::pick(const MarchData& data, const PictureParameters& parameters, c
   p.dispatch.view = view_depth;
   p.dispatch.picks = 1;
   p.dispatch.rows = {0U, 1U};
-  gl_->UseProgram(inspect_program(data, surfaces, "inspect.comp").object.name());
+  inspect_program(data, surfaces, "inspect.comp").object->use(*gl_);
   bind(data, surfaces);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(core::CM_IMAGE_COUNTS, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "gl/objects.hpp"
+#include "gl/programs.hpp"
 #include "render/march_data.hpp"
 #include "render/pace.hpp"
 #include "render/parameters.hpp"
@@ -155,7 +155,8 @@ class Picture {
 /// Traces pictures by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
 class Tracer {
  public:
-  explicit Tracer(gl::FunctionsPtr gl) : gl_(gl), flights_(gl), rasters_(std::move(gl)) {}
+  Tracer(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
+      : gl_(gl), programs_(std::move(programs)), flights_(gl), rasters_(std::move(gl)) {}
 
   /// Starts a picture anew, of so many samples a pixel. Throws with the picture as it was, or not complete.
   void begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
@@ -209,7 +210,7 @@ class Tracer {
   };
   void drop_unused_layers();
   struct Program {
-    gl::Object object;
+    const gl::Program* object = nullptr;
     std::shared_ptr<RoundCost> cost = std::make_shared<RoundCost>();
   };
   // What to dispatch: nothing if it is likely to take longer than the aim. anyway: the least, then.
@@ -235,8 +236,9 @@ class Tracer {
   void find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces);
 
   gl::FunctionsPtr gl_;
-  std::uint64_t revision_ = 0;  // the newest of its pictures'
-  std::map<std::vector<std::string>, Program> programs_;
+  gl::ProgramsPtr programs_;
+  std::uint64_t revision_ = 0;                              // the newest of its pictures'
+  std::map<gl::ProgramKey, Program> used_;                  // those that this one used, and what they cost
   std::vector<std::shared_ptr<DrawnLayers>> drawn_layers_;  // pictures share them
   gl::Object paths_;
   std::size_t paths_lanes_ = 0;

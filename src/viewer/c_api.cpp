@@ -118,13 +118,27 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     std::function<void()> update;
     if (d.update != nullptr) update = [call = d.update, user = d.update_user] { call(user); };
     auto viewer = std::make_unique<cumulet_viewer>();
-    viewer->viewer =
-        std::make_unique<core::Viewer>(cumulet::Log(log, d.log_user), std::move(update),
-                                       d.gl_state == CUMULET_GL_STATE_RESTORE, cumulet::Trace(d.trace, d.trace_user));
+    viewer->viewer = std::make_unique<core::Viewer>(
+        cumulet::Log(log, d.log_user), std::move(update), d.gl_state == CUMULET_GL_STATE_RESTORE,
+        cumulet::Trace(d.trace, d.trace_user), d.programs == nullptr ? nullptr : d.programs->asset);
     if (d.get_proc != nullptr) viewer->viewer->attach(d.get_proc, d.get_proc_user);
     *out = viewer.release();
   });
 }
+
+cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumulet_programs** out, char* error,
+                                       size_t error_size) {
+  return cumulet::c_abi::make_handle(out, error, error_size, [&] {
+    const cumulet_programs_desc d = read_desc(desc, "cumulet_programs_desc");
+    const bool kept = d.folder != nullptr && *d.folder != '\0';
+    return std::make_shared<cumulet::gl::ProgramPool>(kept ? std::make_shared<cumulet::gl::ProgramFiles>(d.folder)
+                                                           : nullptr);
+  });
+}
+
+cumulet_programs* cumulet_programs_retain(cumulet_programs* programs) { return cumulet::c_abi::retain(programs); }
+
+void cumulet_programs_release(cumulet_programs* programs) { cumulet::c_abi::release(programs); }
 
 void cumulet_destroy(cumulet_viewer* viewer) {
   if (cumulet::CallbackScope::inside()) return;

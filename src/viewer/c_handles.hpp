@@ -5,6 +5,7 @@
 #include <atomic>
 #include <memory>
 
+#include "gl/programs.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/surface_asset.hpp"
@@ -17,6 +18,11 @@ struct cumulet_volume {
 
 struct cumulet_surfaces {
   cumulet::viewer::SurfaceAssetPtr asset;
+  std::atomic<int> references = 1;
+};
+
+struct cumulet_programs {
+  std::shared_ptr<cumulet::gl::ProgramPool> asset;
   std::atomic<int> references = 1;
 };
 

@@ -83,23 +83,26 @@ class TransientFramebuffer {
 
 }  // namespace
 
-Viewer::Gl::Gl(gl::FunctionsPtr gl)
+Viewer::Gl::Gl(gl::FunctionsPtr gl, gl::ProgramPool& pool)
     : functions(std::move(gl)),
       group(functions),
+      programs(pool.of_current(*functions)),
       limits(gl::query_limits(*functions)),
-      progressive(functions),
-      compositor(functions),
-      host_depth(functions) {
+      progressive(functions, programs),
+      compositor(functions, programs),
+      host_depth(functions, programs) {
   strings = {gl::string_of(*functions, GL_VENDOR), gl::string_of(*functions, GL_RENDERER),
              gl::string_of(*functions, GL_VERSION)};
   gl::check(*functions, "reading the context's limits");
 }
 
-Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace)
+Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace,
+               std::shared_ptr<gl::ProgramPool> programs)
     : log_(log),
       trace_(trace),
       update_(std::move(update)),
       restore_state_(restore_state),
+      programs_(programs ? std::move(programs) : std::make_shared<gl::ProgramPool>()),
       builder_(
           log, [this] { notify(); }, trace),
       surface_builder_(
@@ -123,7 +126,7 @@ void Viewer::attach(GetProc get_proc, void* user) {
   if (gl_) throw Error(ErrorCode::invalid_argument, "the viewer is attached to a GL context already");
   auto functions = gl::load_functions(get_proc, user);
   gl::clear_errors(*functions);
-  gl_ = std::make_unique<Gl>(std::move(functions));
+  gl_ = std::make_unique<Gl>(std::move(functions), *programs_);
   ++generation_;
   notify();
 }
@@ -141,8 +144,12 @@ void Viewer::detach() {
 }
 
 void Viewer::context_lost() {
-  if (gl_) gl_->functions->abandoned = true;
+  if (!gl_) return;
+  gl_->functions->abandoned = true;
+  const gl::ProgramsPtr programs = gl_->programs;
   gl_.reset();
+  // Others may be attached to another context of the group.
+  if (programs.use_count() == 1) programs->abandon();
 }
 
 template <class Body>
@@ -153,9 +160,10 @@ void Viewer::with_gl(Body&& body) {
     gl::clear_errors(*functions);
     gl::check_reset(*functions);
     g.group.require();  // before anything is begun that could not be undone
+    const gl::Programs::Turn turn(g.programs, log_);
     const gl::StateGuard guard(*functions, restore_state_);
     if (!g.knows_dispatches) {
-      gl::find_out_dispatches(functions);
+      gl::find_out_dispatches(functions, *g.programs);
       g.knows_dispatches = true;
     }
     body(g);
@@ -545,7 +553,7 @@ void Viewer::upload_raster(Gl& g) {
   std::optional<render::SurfaceRaster> last = g.raster.take();  // where this fails rays meet the triangles
   if (!same_scene) last.reset();
   g.raster.make(surface_source_, settings_revision_, [&] {
-    render::SurfaceRaster raster = last ? *std::move(last) : render::SurfaceRaster(g.functions);
+    render::SurfaceRaster raster = last ? *std::move(last) : render::SurfaceRaster(g.functions, g.programs);
     if (!same_scene) raster.set_scene(surface_source_->scene);
     raster.set_pose(surface_source_->pose);
     return raster;

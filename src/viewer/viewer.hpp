@@ -14,7 +14,7 @@
 #include "base/log.hpp"
 #include "base/slot.hpp"
 #include "base/trace.hpp"
-#include "gl/objects.hpp"
+#include "gl/programs.hpp"
 #include "gl/share_group.hpp"
 #include "render/compositor.hpp"
 #include "render/host_depth.hpp"
@@ -103,7 +103,9 @@ class Viewer {
  public:
   using GetProc = void* (*)(void* user, const char* name);
   /// restore_state: [GL] calls leave the GL state as they found it.
-  Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace = {});
+  /// programs: of viewers that share them; null: of its own.
+  Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace = {},
+         std::shared_ptr<gl::ProgramPool> programs = nullptr);
   ~Viewer();
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
@@ -195,9 +197,10 @@ class Viewer {
   };
   // All that lives in one context.
   struct Gl {
-    explicit Gl(gl::FunctionsPtr gl);
+    Gl(gl::FunctionsPtr gl, gl::ProgramPool& pool);
     gl::FunctionsPtr functions;
     gl::ShareGroup group;
+    gl::ProgramsPtr programs;
     gl::Limits limits;
     GlStrings strings;
     render::Progressive progressive;
@@ -257,6 +260,7 @@ class Viewer {
   std::atomic<bool> update_pending_ = false;
   std::atomic<double> upload_progress_ = 1.0;
   bool restore_state_;
+  std::shared_ptr<gl::ProgramPool> programs_;
   std::int64_t page_texels_ = 0;
 
   GridSettings grid_;

@@ -225,7 +225,7 @@ class Compositing : public cumulet::test::GlTest {
 
   void SetUp() override {
     GlTest::SetUp();
-    if (gl_) compositor_.emplace(gl_);
+    if (gl_) compositor_.emplace(gl_, programs_);
   }
 
   /// A framebuffer with a colour of that format (samples 0: a plain texture) and depth, cleared to known values.

@@ -102,7 +102,8 @@ class DepthScene {
  public:
   static constexpr glm::ivec2 size{48, 32};
 
-  explicit DepthScene(gl::FunctionsPtr gl) : functions_(std::move(gl)), depth_(functions_) {
+  DepthScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
+      : functions_(std::move(gl)), depth_(std::in_place, functions_, std::move(programs)) {
     const char* vertex =
         "#version 450\nlayout(location = 0) uniform mat4 projection;\nlayout(location = 1) uniform vec4 corners[6];\n"
         "void main() { gl_Position = projection * corners[gl_VertexID]; }\n";
@@ -276,7 +277,7 @@ class HostDepths : public cumulet::test::GlTest {
   static constexpr glm::ivec2 size = DepthScene::size;
   void SetUp() override {
     GlTest::SetUp();
-    if (gl_) scene_.emplace(gl_);
+    if (gl_) scene_.emplace(gl_, programs_);
   }
   std::optional<DepthScene> scene_;
 };
@@ -373,7 +374,7 @@ TEST_P(HostDepths, TexturesAsHostsHaveThem) {
   const auto expect = [&](const char* what) {
     SCOPED_TRACE(what);
     const StateGuard guard(*gl_);
-    scene_->depth_.emplace(gl_);
+    scene_->depth_.emplace(gl_, programs_);
     scene_->update(input);
     scene_->expect_scene(camera, viewport, false, 1, 2.5e-7);
   };
@@ -563,7 +564,7 @@ TEST_P(HostDepths, LeavesTheHostsFramebufferAlone) {
   const glm::ivec4 viewport(0, 0, size);
   scene_->draw_scene(cameras[0], host.framebuffer.name(), viewport);
   scene_->update(DepthScene::input_of(cameras[0], DepthSource::framebuffer, host.framebuffer.name(), viewport));
-  HostDepth again(gl_);
+  HostDepth again(gl_, programs_);
   const std::vector<float> first = scene_->read();
   const StateGuard guard(*gl_);
   EXPECT_TRUE(
@@ -610,13 +611,13 @@ TEST(DefaultFramebufferDepth, IsReadLikeAnother) {
     SCOPED_TRACE(depth_bits);
     DefaultFramebuffer screen(DepthScene::size, depth_bits, stencil_bits);
     if (screen.context == nullptr) GTEST_SKIP() << "no such OSMesa context";
-    const gl::FunctionsPtr gl = gl::load_functions(DefaultFramebuffer::get_proc, &screen);
-    DepthScene scene(gl);
+    const gl::FunctionsPtr functions = gl::load_functions(DefaultFramebuffer::get_proc, &screen);
+    DepthScene scene(functions, std::make_shared<gl::Programs>(*functions, nullptr));
     const glm::ivec4 viewport(5, 3, 40, 27);
     scene.draw_scene(cameras[0], 0, viewport);
     scene.update(DepthScene::input_of(cameras[0], DepthSource::framebuffer, 0, viewport));
     scene.expect_scene(cameras[0], viewport, false, 1, depth_bits == 16 ? 1.0 / 65535.0 : 2.5e-7);
-    EXPECT_EQ(gl->GetError(), GLenum{GL_NO_ERROR});
+    EXPECT_EQ(functions->GetError(), GLenum{GL_NO_ERROR});
   }
 }
 

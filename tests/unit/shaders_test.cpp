@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "gl/programs.hpp"
 #include "gl/shader_sources.hpp"
 #include "support/gl_state.hpp"
 
@@ -46,11 +47,10 @@ class Programs : public cumulet::test::GlTest {};
 CUMULET_GL_ON_BACKENDS(Programs);
 
 TEST_P(Programs, AreOfTheTableAlone) {
-  const Defines known{"CM_MULTISAMPLE 1"};
-  EXPECT_TRUE(gl::make_compute_program(gl_, "host_depth.comp", known));
-  const Defines unknown{"CM_MULTISAMPLE 1", "CM_NEW 1"};
+  gl::Programs programs(*gl_, nullptr);
+  EXPECT_NE(programs.get({"host_depth.comp", {"CM_MULTISAMPLE 1"}}).name(), 0U);
   try {
-    gl::make_compute_program(gl_, "host_depth.comp", unknown);
+    programs.get({"host_depth.comp", {"CM_MULTISAMPLE 1", "CM_NEW 1"}});
     FAIL() << "a variant that nobody validated";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::internal);

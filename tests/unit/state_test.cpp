@@ -34,7 +34,7 @@ CUMULET_GL_ON_BACKENDS(State);
 /// Changes all that the contract lets a call change.
 class Scribbler {
  public:
-  explicit Scribbler(const gl::FunctionsPtr& gl) : gl_(*gl) {
+  explicit Scribbler(const gl::FunctionsPtr& gl) : gl_(*gl), programs_(*gl, nullptr) {
     buffer_ = gl::make_buffer(gl, 1024, nullptr, 0, "a buffer");
     GLuint name = 0;
     gl_.CreateTextures(GL_TEXTURE_BUFFER, 1, &name);
@@ -48,11 +48,9 @@ class Scribbler {
     vertex_array_ = gl::make_vertex_array(gl);
     framebuffer_ = gl::make_framebuffer(gl);
     gl_.NamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT0, textures_[1].name(), 0);
-    const std::vector<std::string> defines{"CM_DEPTH 1"};
-    program_ = gl::make_graphics_program(gl, "composite.vert", "composite.frag", defines);
   }
   void scribble() const {
-    gl_.UseProgram(program_.name());
+    gl_.UseProgram(programs_.get({"composite.frag", {"CM_DEPTH 1"}, "composite.vert"}).name());
     gl_.BindProgramPipeline(0);
     gl_.BindVertexArray(vertex_array_.name());
     gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
@@ -115,12 +113,13 @@ class Scribbler {
   Object sampler_;
   Object vertex_array_;
   Object framebuffer_;
-  Object program_;
+  mutable gl::Programs programs_;
 };
 
 /// What the library does in a frame of its own: a picture with depth into a framebuffer that also gives depth.
 struct Frame {
-  explicit Frame(const gl::FunctionsPtr& functions) : gl_(functions), compositor(functions), depth(functions) {
+  Frame(const gl::FunctionsPtr& functions, const gl::ProgramsPtr& programs)
+      : gl_(functions), compositor(functions, programs), depth(functions, programs) {
     sum = gl::make_texture_2d(gl_, GL_RGBA32F, 8, 8, "sum");
     counts = gl::make_texture_2d(gl_, GL_RG32UI, 8, 8, "counts");
     z = gl::make_texture_2d(gl_, GL_R32F, 8, 8, "z");
@@ -220,7 +219,7 @@ TEST_P(State, EverythingComesBack) {
 }
 
 TEST_P(State, AFrameLeavesNothingAndReadsNothing) {
-  Frame frame(gl_);
+  Frame frame(gl_, programs_);
   frame.draw();
   const std::vector<float> expected = frame.read();
   EXPECT_NE(expected[4 * 9], expected[0]);           // drawn inside the viewport
@@ -338,9 +337,8 @@ GLint integer(const gl::Functions& gl, GLenum name) {
 
 TEST_P(State, ProgramsThatCannotBeUsedAgain) {
   const Scribbler scribbler(gl_);
-  const std::vector<std::string> defines{"CM_DEPTH 1"};
-  Object program = gl::make_graphics_program(gl_, "composite.vert", "composite.frag", defines);
-  const GLuint name = program.name();
+  const gl::ProgramKey key{"composite.frag", {"CM_DEPTH 1"}, "composite.vert"};
+  const GLuint name = programs_->get(key).name();
   // Relinked without success, it can run on but not be used anew.
   gl_->UseProgram(name);
   Object shader(gl_, Object::Kind::shader, gl_->CreateShader(GL_FRAGMENT_SHADER));
@@ -359,10 +357,11 @@ TEST_P(State, ProgramsThatCannotBeUsedAgain) {
   EXPECT_EQ(integer(*gl_, GL_CURRENT_PROGRAM), 0);
 
   // Deleted while current, it lives until another is used.
-  Object second = gl::make_graphics_program(gl_, "composite.vert", "composite.frag", defines);
-  const auto second_name = static_cast<GLint>(second.name());
-  gl_->UseProgram(second.name());
-  second = {};
+  auto others = std::make_unique<gl::Programs>(*gl_, nullptr);
+  const GLuint second = others->get(key).name();
+  const auto second_name = static_cast<GLint>(second);
+  gl_->UseProgram(second);
+  others.reset();
   { const StateGuard untouched(*gl_); }
   EXPECT_EQ(integer(*gl_, GL_CURRENT_PROGRAM), second_name);
   {

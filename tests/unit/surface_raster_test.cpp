@@ -131,7 +131,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
  protected:
   void SetUp() override {
     GlTest::SetUp();
-    if (gl_) raster_ = std::make_unique<SurfaceRaster>(gl_);
+    if (gl_) raster_ = std::make_unique<SurfaceRaster>(gl_, programs_);
   }
   void TearDown() override {
     raster_.reset();
@@ -818,7 +818,7 @@ TEST_P(SurfaceRasters, SpheresAreLitAsTheSharedBsdfSays) {
 // all of them; and pictures of one view are drawn over one pass.
 TEST_P(SurfaceRasters, PreviewsAreSharp) {
   using namespace cumulet::render;
-  Tracer tracer(gl_);
+  Tracer tracer(gl_, programs_);
   const glm::uvec2 size(1068U, 901U);
   for (const double budget : {1e-9, 0.1, 16.0, 1e9}) {
     const glm::uvec2 dragged = Progressive::quick_layers(tracer, size, budget, false).layer_size;
@@ -871,7 +871,7 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
   wish.content.parameters.view.size = size;
   wish.samples = 4;
   wish.held = true;
-  Progressive progressive(gl_);
+  Progressive progressive(gl_, programs_);
   const MarchData nothing;
   const auto step = [&](bool moves) {
     if (moves) {
@@ -925,7 +925,7 @@ TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
     {
       // All of it again under this state: uploads too.
       const StateGuard guard(*gl_);
-      raster_ = std::make_unique<SurfaceRaster>(gl_);
+      raster_ = std::make_unique<SurfaceRaster>(gl_, programs_);
     }
     set(scene);
     const Picture picture = draw(straight({0, 0, 0}, 0.5), lighting, {16U, 16U}, 2);

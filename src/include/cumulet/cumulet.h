@@ -111,6 +111,7 @@ typedef struct cumulet_viewer cumulet_viewer;     /* cumulet_destroy */
 typedef struct cumulet_volume cumulet_volume;     /* cumulet_volume_release */
 typedef struct cumulet_surfaces cumulet_surfaces; /* cumulet_surfaces_release */
 typedef struct cumulet_camera cumulet_camera;     /* cumulet_camera_release */
+typedef struct cumulet_programs cumulet_programs; /* cumulet_programs_release */
 
 typedef enum cumulet_status {
   CUMULET_OK = 0,
@@ -165,6 +166,29 @@ typedef enum cumulet_gl_state {
   CUMULET_GL_STATE_HOST_RESETS = 1 /* they do not: the host sets all it needs afterwards (Qt's and GTK's do) */
 } cumulet_gl_state;
 
+typedef struct cumulet_programs_desc {
+  size_t struct_size;
+  /*
+   * Where binaries of programs are kept between runs, so that the driver need not compile again: files of at most
+   * 256 MiB together, the least used go first; made with the first of them, in UTF-8. They are good for one driver and
+   * one version of the library; what is damaged or another's is ignored and written anew, and any number of processes
+   * may use one folder. What is in them runs in the driver: nobody else should be able to write there. NULL or "":
+   * nowhere. A folder that cannot be written is told by one warning in the log.
+   */
+  const char* folder;
+} cumulet_programs_desc;
+
+/*
+ * GL programs, to be shared by viewers (cumulet_create_desc): those that are attached to one context, or to contexts
+ * that share objects, compile each program once among them. Programs end with the last viewer that is attached to them,
+ * what is in the folder does not. [GL] calls of viewers that share programs wait for each other where they come from
+ * several threads at once. Any thread; error as in cumulet_create.
+ */
+CUMULET_API cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumulet_programs** out,
+                                                   char* error, size_t error_size);
+CUMULET_API cumulet_programs* cumulet_programs_retain(cumulet_programs* programs); /* returns it; NULL is allowed */
+CUMULET_API void cumulet_programs_release(cumulet_programs* programs);             /* NULL is allowed */
+
 typedef struct cumulet_create_desc {
   size_t struct_size;
   cumulet_get_proc_fn get_proc; /* NULL: detached */
@@ -176,6 +200,7 @@ typedef struct cumulet_create_desc {
   cumulet_gl_state gl_state;
   cumulet_trace_fn trace; /* NULL: none */
   void* trace_user;
+  cumulet_programs* programs; /* retained; NULL: the viewer's own, kept nowhere */
 } cumulet_create_desc;
 
 /*

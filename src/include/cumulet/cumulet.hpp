@@ -829,6 +829,49 @@ class GetProc {
   std::function<void*(const char*)> find_;
 };
 
+struct ProgramsDesc {
+  const char* folder = nullptr;
+
+  operator cumulet_programs_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_programs_desc), .folder = folder};
+  }
+};
+
+/// A share in what viewers share: a copy is one more. Empty: the viewer's own.
+class Programs {
+ public:
+  Programs() noexcept = default;
+  Programs(const Programs& other) noexcept : handle_(cumulet_programs_retain(other.handle_)) {}
+  Programs(Programs&& other) noexcept : handle_(other.release()) {}
+  Programs& operator=(Programs other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Programs() { cumulet_programs_release(handle_); }
+
+  [[nodiscard]] static Result<Programs> create(const ProgramsDesc& desc = {}) noexcept {
+    const cumulet_programs_desc c = desc;
+    return detail::made<Programs>([&](cumulet_programs** out, char* error, std::size_t size) {
+      return cumulet_programs_create(&c, out, error, size);
+    });
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_programs* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_programs* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Programs adopt(cumulet_programs* handle) noexcept {
+    Programs programs;
+    programs.handle_ = handle;
+    return programs;
+  }
+
+ private:
+  cumulet_programs* handle_ = nullptr;
+};
+
 struct CreateDesc {
   GetProc get_proc{};
   std::function<void(LogLevel, std::string_view)> log{};
@@ -836,6 +879,7 @@ struct CreateDesc {
   GlState gl_state{};
   /// name, begin and end in seconds: cumulet_trace_fn.
   std::function<void(std::string_view, double, double)> trace{};
+  Programs programs{};
 };
 
 /// Move-only.
@@ -866,7 +910,8 @@ class Viewer {
                                 .update_user = callbacks.get(),
                                 .gl_state = static_cast<cumulet_gl_state>(desc.gl_state),
                                 .trace = callbacks->trace ? Callbacks::call_trace : nullptr,
-                                .trace_user = callbacks.get()};
+                                .trace_user = callbacks.get(),
+                                .programs = desc.programs.handle()};
     auto viewer = detail::made<Viewer>(
         [&](cumulet_viewer** out, char* error, std::size_t size) { return cumulet_create(&c, out, error, size); });
     if (viewer) viewer->callbacks_ = std::move(callbacks);

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "gl/objects.hpp"
+#include "gl/programs.hpp"
 #include "headless.hpp"
 
 namespace cumulet::test {
@@ -27,6 +27,7 @@ class GlTest : public testing::TestWithParam<headless::Backend> {
       GTEST_SKIP() << error.what();
     }
     gl_ = gl::load_functions(headless::Context::get_proc, context_.get());
+    programs_ = std::make_shared<gl::Programs>(*gl_, nullptr);
   }
   void TearDown() override {
     if (gl_) {
@@ -36,6 +37,7 @@ class GlTest : public testing::TestWithParam<headless::Backend> {
 
   std::unique_ptr<headless::Context> context_;
   gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
 };
 
 /// Instantiates a suite of GlTest.

@@ -1,0 +1,217 @@
+#include "gl/programs.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include "base/error.hpp"
+#include "gl/bindings.hpp"
+#include "gl/shader_sources.hpp"
+
+namespace cumulet::gl {
+
+namespace {
+
+// KHR_parallel_shader_compile, and ARB's of the same meaning.
+constexpr GLenum completion_status = 0x91B1;
+
+FunctionsPtr copy_of(const Functions& gl) {
+  auto copy = std::make_shared<Functions>();
+  static_cast<GladGLContext&>(*copy) = gl;
+  copy->draw_buffers = gl.draw_buffers;
+  return copy;
+}
+
+std::string text_of(const ProgramKey& key) {
+  std::string all = key.name;
+  for (const std::string& define : key.defines) all.append(", ").append(define);
+  return all;
+}
+
+struct Stage {
+  GLenum type;
+  std::string name;
+  std::string source;
+};
+
+std::string source_of(const std::string& name, const std::vector<std::string>& defines, bool names_variants) {
+  const Shader* shader = find_shader(name);
+  if (shader == nullptr) throw Error(ErrorCode::internal, "no shader named " + name);
+  if (names_variants && !shader->has_variant(defines)) {
+    std::string all;
+    for (const std::string& define : defines) all.append(all.empty() ? "" : ", ").append(define);
+    throw Error(ErrorCode::internal, name + " names no variant with [" + all + "]");
+  }
+  return shader->with(defines);
+}
+
+// The last names the variants.
+std::vector<Stage> stages_of(const ProgramKey& key) {
+  if (key.vertex.empty()) return {{GL_COMPUTE_SHADER, key.name, source_of(key.name, key.defines, true)}};
+  return {{GL_VERTEX_SHADER, key.vertex, source_of(key.vertex, key.defines, false)},
+          {GL_FRAGMENT_SHADER, key.name, source_of(key.name, key.defines, true)}};
+}
+
+std::string sources_of(const ProgramKey& key) {
+  std::string all;
+  for (const Stage& stage : stages_of(key)) all += stage.source;
+  return all;
+}
+
+}  // namespace
+
+Programs::Programs(const Functions& gl, std::shared_ptr<ProgramFiles> files)
+    : gl_(copy_of(gl)),
+      group_(gl_),
+      parallel_(has_extension(gl, "GL_KHR_parallel_shader_compile") ||
+                has_extension(gl, "GL_ARB_parallel_shader_compile")) {
+  GLint formats = 0;
+  gl.GetIntegerv(GL_NUM_PROGRAM_BINARY_FORMATS, &formats);
+  if (formats > 0) files_ = std::move(files);
+  for (const GLenum name : {GL_VENDOR, GL_RENDERER, GL_VERSION}) driver_.append(string_of(gl, name)).append(1, '\n');
+  check(gl, "asking what the driver can do with programs");
+}
+
+Programs::~Programs() {
+  if (!gl_->abandoned && !group_.is_current()) abandon();
+}
+
+const Program& Programs::ask(const ProgramKey& key) {
+  auto& held = programs_[key];
+  if (!held) held = std::make_unique<Program>();
+  Program& program = *held;
+  if (program.usable()) return program;
+  if (program.state_ != Program::State::compiling) begin(key, program);
+  if (program.state_ == Program::State::compiling && complete(program)) finish(key, program);
+  return program;
+}
+
+const Program& Programs::get(const ProgramKey& key) {
+  ask(key);
+  Program& program = *programs_.at(key);
+  if (program.state_ == Program::State::compiling) finish(key, program);
+  return program;
+}
+
+void Programs::begin(const ProgramKey& key, Program& program) {
+  program.state_ = Program::State::absent;
+  const std::vector<Stage> stages = stages_of(key);
+  program.shaders_.clear();
+  program.object_ = Object(gl_, Object::Kind::program, gl_->CreateProgram());
+  check(*gl_, "creating a shader program");
+  label(*gl_, Object::Kind::program, program.object_.name(), text_of(key));
+  if (load(key, program)) {
+    program.state_ = Program::State::linked;
+    return;
+  }
+  const GLuint name = program.object_.name();
+  for (const Stage& stage : stages) {
+    const Object& shader = program.shaders_.emplace_back(gl_, Object::Kind::shader, gl_->CreateShader(stage.type));
+    const char* pointer = stage.source.c_str();
+    gl_->ShaderSource(shader.name(), 1, &pointer, nullptr);
+    gl_->CompileShader(shader.name());
+    gl_->AttachShader(name, shader.name());
+  }
+  if (files_) gl_->ProgramParameteri(name, GL_PROGRAM_BINARY_RETRIEVABLE_HINT, GL_TRUE);
+  gl_->LinkProgram(name);
+  program.state_ = Program::State::compiling;
+}
+
+bool Programs::load(const ProgramKey& key, Program& program) {
+  if (!files_) return false;
+  const auto binary = files_->find(driver_, sources_of(key));
+  if (!binary) return false;
+  const GLuint name = program.object_.name();
+  gl_->ProgramBinary(name, binary->format, binary->bytes.data(), static_cast<GLsizei>(binary->bytes.size()));
+  GLint linked = 0;
+  gl_->GetProgramiv(name, GL_LINK_STATUS, &linked);
+  clear_errors(*gl_);  // a format that the driver has no more
+  return linked != 0;
+}
+
+bool Programs::complete(const Program& program) const {
+  if (!parallel_) return true;
+  GLint done = 0;
+  gl_->GetProgramiv(program.object_.name(), completion_status, &done);
+  return done != 0;
+}
+
+void Programs::finish(const ProgramKey& key, Program& program) {
+  const GLuint name = program.object_.name();
+  GLint linked = 0;
+  gl_->GetProgramiv(name, GL_LINK_STATUS, &linked);
+  program.state_ = Program::State::failed;
+  check(*gl_, "building a shader program");
+  if (linked == 0) throw Error(ErrorCode::gl, failure(key, program));
+  for (const Object& shader : program.shaders_) gl_->DetachShader(name, shader.name());
+  program.shaders_.clear();
+  program.state_ = Program::State::linked;
+  keep(key, program);
+}
+
+std::string Programs::failure(const ProgramKey& key, const Program& program) const {
+  // The first shader that has something to say, else the linker.
+  std::array<char, 2048> log{};
+  std::string culprit = key.vertex.empty() ? key.name : key.vertex;
+  for (const Object& shader : program.shaders_) {
+    GLint compiled = 0;
+    gl_->GetShaderiv(shader.name(), GL_COMPILE_STATUS, &compiled);
+    if (compiled != 0) continue;
+    if (&shader == &program.shaders_.back()) culprit = key.name;
+    gl_->GetShaderInfoLog(shader.name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
+    if (log[0] != '\0') break;
+  }
+  if (log[0] == '\0') {
+    gl_->GetProgramInfoLog(program.object_.name(), static_cast<GLsizei>(log.size()), nullptr, log.data());
+  }
+  std::string line(log.data());
+  std::ranges::replace(line, '\n', ' ');
+  return "shader " + culprit + " does not build on this driver: " + line;
+}
+
+void Programs::keep(const ProgramKey& key, const Program& program) {
+  if (!files_) return;
+  const GLuint name = program.object_.name();
+  GLint length = 0;
+  gl_->GetProgramiv(name, GL_PROGRAM_BINARY_LENGTH, &length);
+  ProgramFiles::Binary binary;
+  binary.bytes.resize(static_cast<std::size_t>(std::max(length, 0)));
+  GLsizei written = 0;
+  gl_->GetProgramBinary(name, length, &written, &binary.format, binary.bytes.data());
+  binary.bytes.resize(static_cast<std::size_t>(std::clamp(written, 0, length)));
+  clear_errors(*gl_);  // it gives none: then there is none
+  if (binary.bytes.empty()) return;
+  try {
+    files_->keep(driver_, sources_of(key), binary);
+  } catch (const Error& error) {
+    if (log_ != nullptr) log_->warning(std::string("no program binaries are kept: ") + error.what());
+    files_.reset();  // once is enough
+  }
+}
+
+void find_out_dispatches(const FunctionsPtr& gl, Programs& programs) {
+  const ReadBack seen(gl, 4, "creating a buffer to look at");
+  programs.get({"sign.comp", {}}).use(*gl);
+  gl->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_SIGN, seen.name());
+  gl->DispatchCompute(1, 1, 1);
+  // Nothing was flushed: what is written now was written in the call.
+  std::uint32_t sign = 0;
+  std::memcpy(&sign, seen.data(), sizeof(sign));
+  gl->dispatches_in_call = sign != 0;
+  check(*gl, "the first dispatch");
+}
+
+ProgramsPtr ProgramPool::of_current(const Functions& gl) {
+  const std::scoped_lock lock(mutex_);
+  std::erase_if(groups_, [](const auto& group) { return group.expired(); });
+  for (const auto& group : groups_) {
+    if (ProgramsPtr programs = group.lock(); programs && programs->is_current()) return programs;
+  }
+  auto made = std::make_shared<Programs>(gl, files_);
+  groups_.push_back(made);
+  return made;
+}
+
+}  // namespace cumulet::gl

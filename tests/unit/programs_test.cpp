@@ -1,0 +1,234 @@
+// Programs: one of a kind for all viewers that share them, compiled once, kept in files between runs.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/error.hpp"
+#include "gl/programs.hpp"
+#include "support/c_host.hpp"
+#include "support/fake_gl.hpp"
+#include "support/folder.hpp"
+
+namespace {
+
+using cumulet::Error;
+using cumulet::gl::Program;
+using cumulet::gl::ProgramFiles;
+using cumulet::gl::ProgramKey;
+using cumulet::gl::ProgramPool;
+using cumulet::gl::Programs;
+using cumulet::headless::Backend;
+using cumulet::headless::Context;
+using cumulet::test::FakeGl;
+using cumulet::test::Folder;
+using cumulet::test::HostTarget;
+using cumulet::test::make_ball;
+using cumulet::test::make_desc;
+using cumulet::test::picture_of;
+using cumulet::test::ViewerPtr;
+using cumulet::test::VolumeRef;
+namespace fs = std::filesystem;
+namespace gl = cumulet::gl;
+
+const ProgramKey resolve{"resolve.comp", {"CM_HOLES 0", "CM_BACKGROUND 0"}};
+const ProgramKey composite{"composite.frag", {"CM_DEPTH 1"}, "composite.vert"};
+
+std::vector<fs::path> files_in(const Folder& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder.path())) files.push_back(entry.path());
+  return files;
+}
+
+std::vector<std::byte> bytes_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const auto* data = reinterpret_cast<const std::byte*>(text.data());
+  return {data, data + text.size()};
+}
+
+void write(const fs::path& path, const std::vector<std::byte>& bytes) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+class ProgramsTest : public testing::Test {
+ protected:
+  [[nodiscard]] std::uint64_t compiled() const { return fake_.calls("CompileShader") + fake_.calls("LinkProgram"); }
+  [[nodiscard]] std::shared_ptr<ProgramFiles> files() const { return std::make_shared<ProgramFiles>(folder_.path()); }
+  // In the host's stead: one viewer's picture.
+  [[nodiscard]] ViewerPtr viewer(cumulet_programs* programs) {
+    auto desc = make_desc<cumulet_create_desc>();
+    desc.get_proc = FakeGl::get_proc;
+    desc.get_proc_user = &fake_;
+    desc.programs = programs;
+    cumulet_viewer* out = nullptr;
+    std::array<char, 256> error{};
+    EXPECT_EQ(cumulet_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
+    return ViewerPtr(out);
+  }
+
+  Folder folder_;
+  Context context_ = Context::create(Backend::automatic);
+  FakeGl fake_{Context::get_proc, &context_};
+  gl::FunctionsPtr gl_ = gl::load_functions(FakeGl::get_proc, &fake_);
+};
+
+TEST_F(ProgramsTest, AreMadeOnceAndStayWhereTheyAre) {
+  Programs programs(*gl_, nullptr);
+  const Program& first = programs.get(resolve);
+  EXPECT_EQ(first.state(), Program::State::linked);
+  const auto before = compiled();
+  EXPECT_EQ(&programs.get(resolve), &first);
+  EXPECT_EQ(compiled(), before);
+  first.use(*gl_);
+  EXPECT_EQ(first.state(), Program::State::ready);
+  EXPECT_NE(programs.get(composite).name(), first.name());
+  gl_->UseProgram(0);
+}
+
+TEST_F(ProgramsTest, OneThatDoesNotBuildIsToldAndTriedAgain) {
+  Programs programs(*gl_, nullptr);
+  for (const int call : {1, 2}) {  // after glCreateProgram and glCreateShader
+    fake_.fail_allocation(call + 1);
+    EXPECT_THROW(programs.get(resolve), Error) << call;
+  }
+  fake_.fail_allocation(-1);
+  EXPECT_TRUE(programs.get(resolve).usable());
+  EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
+}
+
+TEST_F(ProgramsTest, AreSharedWhereContextsShare) {
+  ProgramPool pool;
+  const auto first = pool.of_current(*gl_);
+  EXPECT_EQ(pool.of_current(*gl_), first);
+  const Context other = Context::create(Backend::automatic);
+  FakeGl other_fake(Context::get_proc, const_cast<Context*>(&other));
+  const auto others = gl::load_functions(FakeGl::get_proc, &other_fake);
+  EXPECT_NE(pool.of_current(*others), first);
+}
+
+TEST_F(ProgramsTest, ASecondViewerCompilesNothing) {
+  auto desc = make_desc<cumulet_programs_desc>();
+  cumulet_programs* programs = nullptr;
+  ASSERT_EQ(cumulet_programs_create(&desc, &programs, nullptr, 0), CUMULET_OK);
+  const VolumeRef volume = make_ball(16, 2.0F);
+  const HostTarget target(fake_.real(), 32, 32);
+  const ViewerPtr first = viewer(programs);
+  ViewerPtr second = viewer(programs);
+  cumulet_programs_release(programs);
+  const auto picture = picture_of(first.get(), volume.get(), target);
+  const auto before = compiled();
+  EXPECT_GT(before, 0U);
+  EXPECT_EQ(picture_of(second.get(), volume.get(), target), picture);
+  EXPECT_EQ(compiled(), before);
+  // What the one leaves the other goes on with.
+  second.reset();
+  EXPECT_EQ(picture_of(first.get(), volume.get(), target), picture);
+  EXPECT_EQ(compiled(), before);
+  const ViewerPtr own = viewer(nullptr);
+  EXPECT_EQ(picture_of(own.get(), volume.get(), target), picture);
+  EXPECT_GT(compiled(), before);
+}
+
+TEST_F(ProgramsTest, ProgramsEndWithTheLastViewer) {
+  auto desc = make_desc<cumulet_programs_desc>();
+  cumulet_programs* programs = nullptr;
+  ASSERT_EQ(cumulet_programs_create(&desc, &programs, nullptr, 0), CUMULET_OK);
+  const VolumeRef volume = make_ball(16, 2.0F);
+  {
+    const HostTarget target(fake_.real(), 32, 32);
+    const ViewerPtr first = viewer(programs);
+    const ViewerPtr second = viewer(programs);
+    picture_of(first.get(), volume.get(), target);
+    picture_of(second.get(), volume.get(), target);
+  }
+  EXPECT_TRUE(fake_.alive().empty()) << fake_.alive().begin()->first;
+  EXPECT_EQ(fake_.wrong_deletes(), 0U);
+  cumulet_programs_release(programs);
+}
+
+TEST_F(ProgramsTest, BinariesOfAnEarlierRunServe) {
+  { EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable()); }
+  if (files_in(folder_).empty()) GTEST_SKIP() << "the driver gives no program binaries";
+  const auto before = compiled();
+  EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable());
+  EXPECT_EQ(compiled(), before);
+  EXPECT_TRUE(Programs(*gl_, files()).get(composite).usable());
+  EXPECT_GT(compiled(), before);
+}
+
+TEST_F(ProgramsTest, WhatIsDamagedIsIgnoredAndWrittenAnew) {
+  { EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable()); }
+  if (files_in(folder_).empty()) GTEST_SKIP() << "the driver gives no program binaries";
+  ASSERT_EQ(files_in(folder_).size(), 1U);
+  const fs::path path = files_in(folder_)[0];
+  const auto whole = bytes_of(path);
+  const std::vector<std::function<void(std::vector<std::byte>&)>> damages{
+      [](auto& bytes) { bytes.clear(); },
+      [](auto& bytes) { bytes.resize(20); },
+      [](auto& bytes) { bytes.resize(bytes.size() - 1); },
+      [](auto& bytes) { bytes.push_back(std::byte{0}); },
+      [](auto& bytes) { bytes[0] ^= std::byte{1}; },                 // another kind of file
+      [](auto& bytes) { bytes[9] ^= std::byte{1}; },                 // of another source or driver
+      [](auto& bytes) { bytes[24] ^= std::byte{1}; },                // length
+      [](auto& bytes) { bytes[bytes.size() / 2] ^= std::byte{1}; },  // content
+      [](auto& bytes) { bytes[40] ^= std::byte{1}; },                // a format that the driver does not know
+      [](auto& bytes) { std::ranges::fill(bytes, std::byte{0xff}); },
+  };
+  for (std::size_t i = 0; i < damages.size(); ++i) {
+    auto bytes = whole;
+    damages[i](bytes);
+    write(path, bytes);
+    const auto before = compiled();
+    EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable()) << i;
+    EXPECT_GT(compiled(), before) << i;
+    EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR}) << i;
+    EXPECT_EQ(bytes_of(path).size(), whole.size()) << i;
+    const auto again = compiled();
+    EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable()) << i;
+    EXPECT_EQ(compiled(), again) << i;
+  }
+}
+
+TEST(ProgramFilesTest, KeepWhatWasUsedLastWithinTheirBound) {
+  const Folder folder;
+  ProgramFiles files(folder.path(), 2500);
+  const ProgramFiles::Binary binary{7, std::vector<std::byte>(1000, std::byte{42})};
+  const auto age = [&] {
+    for (const auto& path : files_in(folder))
+      fs::last_write_time(path, fs::last_write_time(path) - std::chrono::hours(1));
+  };
+  files.keep("driver", "one", binary);
+  age();
+  files.keep("driver", "two", binary);
+  age();
+  EXPECT_TRUE(files.find("driver", "one"));
+  files.keep("driver", "three", binary);
+  EXPECT_EQ(files_in(folder).size(), 2U);
+  const auto one = files.find("driver", "one");
+  ASSERT_TRUE(one);
+  EXPECT_EQ(one->format, 7U);
+  EXPECT_EQ(one->bytes, binary.bytes);
+  EXPECT_FALSE(files.find("driver", "two"));
+  EXPECT_FALSE(files.find("another driver", "one"));
+}
+
+TEST(ProgramFilesTest, WhatCannotBeWrittenIsAnErrorOfOneLine) {
+  const Folder folder;
+  write(folder / "file", {});  // where a folder shall be
+  ProgramFiles files(folder / "file" / "inside");
+  EXPECT_FALSE(files.find("driver", "source"));
+  try {
+    files.keep("driver", "source", {1, {std::byte{1}}});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), cumulet::ErrorCode::file);
+    EXPECT_NE(std::string(error.what()).find(folder.path().string()), std::string::npos);
+  }
+}
+
+}  // namespace
