@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 
 namespace cumulet {
@@ -11,6 +12,13 @@ inline double milliseconds(std::chrono::steady_clock::duration duration) {
 /// Below 0 if that has passed.
 inline double milliseconds_until(std::chrono::steady_clock::time_point moment) {
   return milliseconds(moment - std::chrono::steady_clock::now());
+}
+
+/// From now; of what is negative or endless, now and eleven days.
+inline std::chrono::steady_clock::time_point deadline_after(double milliseconds) {
+  using Clock = std::chrono::steady_clock;
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                            std::chrono::duration<double, std::milli>(std::clamp(milliseconds, 0.0, 1e9)));
 }
 
 }  // namespace cumulet

@@ -38,9 +38,7 @@ std::uint32_t Progressive::enough(std::uint32_t divisor) const {
   return std::clamp(std::min(affordable, preview_samples), 1U, wanted);
 }
 
-glm::uvec2 Progressive::size_of(std::uint32_t divisor) const {
-  return (wish_.content.parameters.view.size + divisor - 1U) / divisor;
-}
+glm::uvec2 Progressive::size_of(std::uint32_t divisor) const { return (wish_.content.size + divisor - 1U) / divisor; }
 
 bool Progressive::is_enough() const {
   const Picture& picture = *working_->picture;
@@ -51,7 +49,7 @@ bool Progressive::is_enough() const {
 
 std::uint32_t Progressive::coarsest(double budget_ms) const {
   if (!wish_.content.preview) return 1;
-  const double pixels = double(wish_.content.parameters.view.size.x) * wish_.content.parameters.view.size.y;
+  const double pixels = double(wish_.content.size.x) * wish_.content.size.y;
   std::uint32_t divisor = finest_;
   while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > answer_frames * answer_rate_ * budget_ms)
     divisor *= 2;
@@ -82,7 +80,7 @@ PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size,
 
 PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms,
                                       bool still) const {
-  const glm::uvec2 size = wish_.content.parameters.view.size;
+  const glm::uvec2 size = wish_.content.size;
   PictureSettings settings;
   if (surfaces.raster != nullptr && divisor > finest_) {
     settings = quick_layers(tracer_, size, budget_ms, still);
@@ -100,12 +98,12 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& sur
 
 bool Progressive::blurs() const {
   return working_ && working_->picture->layered() == Layered::beneath &&
-         working_->picture->layers().size != wish_.content.parameters.view.size;
+         working_->picture->layers().size != wish_.content.size;
 }
 
 void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces,
                         const PictureSettings& settings) {
-  PictureParameters parameters = wish_.content.parameters;
+  PictureParameters parameters = wish_.parameters;
   parameters.view.size = size_of(divisor);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();
@@ -120,22 +118,22 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
     }
     throw;
   }
-  working_ = Work{&picture, wish_.content.generation, divisor, scene_met(surfaces)};
+  working_ = Work{&picture, wish_.content.data, divisor, scene_met(surfaces)};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
 
 bool Progressive::needs_depth() const {
-  return wish_.depth && shown_ && shown_->picture->volume_z() == 0 && shown_->generation == wish_.content.generation;
+  return wish_.depth && shown_ && shown_->picture->volume_z() == 0 && shown_->data == wish_.content.data;
 }
 
 void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
   const PictureWish::Content& last = wish_.content;
-  const bool resized = wish.content.parameters.view.size != last.parameters.view.size;
+  const bool resized = wish.content.size != last.size;
   const bool changed = state() == State::idle || wish.content != last;
   stillness_.see(changed, wish.held, Clock::now());
   if (changed) {
-    const bool other_data = resized || wish.content.generation != last.generation;
+    const bool other_data = resized || wish.content.data != last.data;
     if (other_data) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
     // So do paths on another scene's triangles.

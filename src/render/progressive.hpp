@@ -5,28 +5,38 @@
 #include <optional>
 #include <vector>
 
+#include "base/revision.hpp"
+#include "render/host_depth.hpp"
 #include "render/schedule.hpp"
 #include "render/tracer.hpp"
+#include "scene/snapshot.hpp"
 
 namespace cumulet::render {
 
 /// What a picture shall show.
 struct PictureWish {
-  /// What samples depend on: where it changes, a picture is begun anew.
+  /// What samples depend on: where it changes, a picture is begun anew. Values are the newest there are; what comes to
+  /// GL by and by is known by its revision there.
   struct Content {
-    PictureParameters parameters;  // at full resolution
+    scene::Part<std::optional<scene::Viewpoint>> viewpoint;
+    scene::Part<scene::Lights> lights;
+    std::vector<scene::Part<scene::Medium>> media;
+    Revision<MarchData> data;
+    Revision<SurfaceData> surfaces;
+    Revision<HostDepth> host_depth;
+    core::CmIntegrator integrator{};
+    glm::uvec2 size{0U};  // full resolution
     View view = View::shaded;
-    std::uint64_t generation = 0;          // of the data
-    std::uint64_t surface_generation = 0;  // of the host's depth
-    bool surfaces_traced = true;           // paths meet triangles
-    bool preview = true;                   // coarse first; else at full resolution only
-    bool volume_alone = false;             // at full resolution, sum what met the volume first apart as well
+    bool surfaces_traced = true;  // paths meet triangles
+    bool preview = true;          // coarse first; else at full resolution only
+    bool volume_alone = false;    // at full resolution, sum what met the volume first apart as well
     bool operator==(const Content&) const = default;
   };
   Content content;
-  std::uint32_t samples = 1;  // a pixel
-  bool depth = false;         // find the volume's depth at half opacity as well
-  bool held = false;          // a hand is at what changes it: another change is likely
+  PictureParameters parameters;  // of the content, at full resolution
+  std::uint32_t samples = 1;     // a pixel
+  bool depth = false;            // find the volume's depth at half opacity as well
+  bool held = false;             // a hand is at what changes it: another change is likely
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
@@ -59,9 +69,9 @@ class Progressive {
   void settle();
   /// What is to be read back: without preview the picture under way.
   [[nodiscard]] Picture* newest() { return newest_work() ? newest_work()->picture : nullptr; }
-  /// Whether that is of the data of this generation.
-  [[nodiscard]] bool newest_is_of(std::uint64_t generation) const {
-    return newest_work() && newest_work()->generation == generation;
+  /// Whether that is of these data.
+  [[nodiscard]] bool newest_is_of(Revision<MarchData> data) const {
+    return newest_work() && newest_work()->data == data;
   }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
   [[nodiscard]] bool converged() const;
@@ -83,7 +93,7 @@ class Progressive {
   // A picture, and what it is of.
   struct Work {
     Picture* picture = nullptr;
-    std::uint64_t generation = 0;           // of the data
+    Revision<MarchData> data;
     std::uint32_t divisor = 1;              // of the resolution
     const surface::Scene* scene = nullptr;  // whose triangles its paths meet
   };

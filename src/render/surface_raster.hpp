@@ -8,21 +8,12 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "scene/snapshot.hpp"
 #include "surface/scene.hpp"
 
 namespace cumulet::render {
 
-/// What the surfaces are seen through: viewer::ViewFrame without its depth. World space. A ray through (x, y), both -1
-/// to 1, y up: perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along
-/// forward. The ray's parameter is the view depth z.
-struct SurfaceView {
-  glm::dvec3 eye{0.0};
-  glm::dvec3 forward{0.0, 0.0, -1.0};
-  glm::dvec3 right{1.0, 0.0, 0.0};
-  glm::dvec3 up{0.0, 1.0, 0.0};
-  bool orthographic = false;
-  bool operator==(const SurfaceView&) const = default;
-};
+using SurfaceView = scene::Viewpoint;
 
 /// Beside the lights of the pose.
 struct SurfaceLighting {

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 
+#include "scene/snapshot.hpp"
 #include "viewer/subject.hpp"
 
 namespace cumulet::viewer {
@@ -29,17 +30,9 @@ struct CameraPose {
   bool operator==(const CameraPose&) const = default;
 };
 
-/// What one picture is seen through, all in world space. A ray through (x, y), both -1 to 1, y up:
-/// perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along forward.
-/// forward has length 1 along the view axis (off-axis projections add a share of right and up to it), so that the ray's
-/// parameter is the distance z from the eye's plane; a depth buffer holds depth_a + depth_b / z, or + depth_b z where
-/// orthographic.
-struct ViewFrame {
-  glm::dvec3 eye{0.0};  // orthographic: in the near plane (z counts from there, and depth_a, depth_b say so)
-  glm::dvec3 forward{0.0, 0.0, -1.0};
-  glm::dvec3 right{1.0, 0.0, 0.0};  // scaled by half the picture's width at z = 1 (orthographic: half its width)
-  glm::dvec3 up{0.0, 1.0, 0.0};     // likewise
-  bool orthographic = false;
+/// What one picture is seen through, and the host's depth: a depth buffer holds depth_a + depth_b / z, or + depth_b z
+/// where orthographic.
+struct ViewFrame : scene::Viewpoint {
   double depth_a = 1.0;
   double depth_b = -0.1;
   bool operator==(const ViewFrame&) const = default;

@@ -12,76 +12,16 @@
 #include <vector>
 
 #include "base/log.hpp"
-#include "base/slot.hpp"
 #include "base/trace.hpp"
-#include "gl/programs.hpp"
-#include "gl/share_group.hpp"
-#include "render/compositor.hpp"
-#include "render/host_depth.hpp"
-#include "render/progressive.hpp"
+#include "scene/snapshot.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/camera.hpp"
+#include "viewer/context.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_builder.hpp"
 
 namespace cumulet::viewer {
-
-/// cumulet_aov.
-enum class Aov {
-  beauty = 0,
-  volume = 1,
-  transmittance = 2,
-  surface_depth = 3,
-  volume_depth = 4,
-  normal = 5,
-  albedo = 6
-};
-
-enum class Target { framebuffer = 0, texture = 1, none = 2 };
-
-/// cumulet_frame_desc, checked.
-struct Frame {
-  double budget_ms = 10.0;  // negative: trace nothing
-  Target target = Target::framebuffer;
-  GLuint framebuffer = 0;
-  glm::uvec2 size{0U};
-  glm::ivec4 viewport{0};  // never zero where size is not
-  bool flip_y = false;
-  GLenum format = GL_RGBA8;
-  render::ColourEncoding encoding = render::ColourEncoding::srgb;
-  bool blend_over = true;
-  bool write_depth = false;
-  render::DepthSource depth_source = render::DepthSource::none;
-  GLuint depth_name = 0;
-  bool depth_flip_y = false;
-  bool depth_unchanged = false;
-};
-
-struct FrameResult {
-  bool more = false;
-  bool converged = false;
-  bool loading = false;
-  bool failed = false;
-  bool preview = false;
-  bool undrawn = false;
-  double progress = 0.0;
-  glm::uvec2 size{0U};
-  GLuint texture = 0;
-  GLuint depth_texture = 0;
-};
-
-struct Pick {
-  bool hit = false;
-  glm::dvec3 position{0.0};
-  double distance = 0.0;
-};
-
-struct GlStrings {
-  std::string vendor;
-  std::string renderer;
-  std::string version;
-};
 
 struct Stats {
   std::uint64_t cells = 0;
@@ -164,61 +104,12 @@ class Viewer {
   /// What the shaders were told of the picture under way; for tests.
   const core::CmParameters& trace_parameters();
   /// Where every dispatch of paths that ends is told, or null; for tests.
-  void set_dispatch_log(std::vector<render::DispatchRecord>* log) { gl().progressive.tracer().set_log(log); }
+  void set_dispatch_log(std::vector<render::DispatchRecord>* log) { gl().progressive().tracer().set_log(log); }
   /// Pages of cell records end after so many texels; 0: at the driver's limit; for tests.
   void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
 
  private:
-  // All that drawing shows of a picture.
-  struct DrawnAs {
-    std::uint64_t revision = 0;
-    bool done = false;
-    bool holes = false;
-    GLuint volume_z = 0;
-    bool operator==(const DrawnAs&) const = default;
-  };
-  using MarchSourcePtr = scene::MarchSourcePtr;
-  // Under way, and with which settings it was begun.
-  struct Upload {
-    MarchSourcePtr of;
-    std::uint64_t settings = 0;
-    std::unique_ptr<render::MarchUpload> work;
-  };
-  struct TargetKind {
-    glm::uvec2 size{0U};
-    GLenum format = 0;
-    bool depth = false;
-    bool operator==(const TargetKind&) const = default;
-    [[nodiscard]] std::uint64_t bytes() const;
-  };
-  struct TargetTextures {
-    gl::Object colour;
-    gl::Object depth;
-  };
-  // All that lives in one context.
-  struct Gl {
-    Gl(gl::FunctionsPtr gl, gl::ProgramPool& pool);
-    gl::FunctionsPtr functions;
-    gl::ShareGroup group;
-    gl::ProgramsPtr programs;
-    gl::Limits limits;
-    GlStrings strings;
-    render::Progressive progressive;
-    render::Compositor compositor;
-    render::Reserve reserve;
-    render::HostDepth host_depth;
-    Slot<render::MarchData, MarchSourcePtr> data;
-    std::optional<Upload> upload;  // of what data will be
-    Slot<render::SurfaceData, SurfacePtr> surfaces;
-    Slot<render::SurfaceRaster, SurfacePtr> raster;  // where it is of use
-    std::optional<DrawnAs> drawn;                    // last; nothing where that was older than what there was
-    render::Picture empty;
-    std::optional<std::uint64_t> alone_failed;  // settings at which the surfaces beneath it could not be drawn
-    Slot<TargetTextures, TargetKind> target;
-    bool knows_dispatches = false;
-  };
-
-  [[nodiscard]] Gl& gl() const;
+  [[nodiscard]] Context& gl() const;
   // A setting changed.
   void touch();
   // Runs a [GL] call's body between state guard and error handling.
@@ -228,31 +119,16 @@ class Viewer {
   void request_build();
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
-  [[nodiscard]] render::PictureParameters parameters() const;
-  // Whether the host's own work takes of the cores that ours runs on.
-  static bool shares_cores(const Gl& g);
-  // When tracing ends: what drawing will take is the budget's, too.
-  static render::Deadline deadline_of(const Gl& g, const Frame& frame, bool shares);
-  void prepare(const Frame& frame, render::Deadline deadline);
-  void trace(const Frame& frame, render::Deadline deadline);
-  // Whether there is a target of any size.
-  [[nodiscard]] bool draws(const Frame& frame) const;
-  void draw_surfaces_alone(const Frame& frame);
-  void draw(const Frame& frame, FrameResult& result);
-  void make_target_textures(Gl& g, const Frame& frame) const;
-  void upload(Gl& g, render::Deadline deadline);
-  void upload_surfaces(Gl& g);
+  // What a frame needs before anything is uploaded.
+  void prepare(const Frame& frame);
+  // The scene as it is now: the last snapshot, if nothing changed.
+  scene::SnapshotPtr snapshot();
+  Shot shot();
   [[nodiscard]] std::optional<Bounds> box() const;
   /// What cameras fit; good for as long as nothing changes.
   [[nodiscard]] std::optional<Subject> subject() const;
   [[nodiscard]] std::vector<double> seen_reach(const glm::dvec3& direction, std::span<const glm::dvec3> normals) const;
   VolumePtr empty_volume();
-  [[nodiscard]] render::Surfaces surfaces() const;
-  render::Picture& readable();
-  static void read_means(Gl& g, const render::Picture& picture, bool with_background, float* rgba);
-  // What the compositor draws of it, as linear radiance.
-  static void read_composite(Gl& g, const render::Picture& picture, bool transparent, float* rgba);
-  void upload_raster(Gl& g);
 
   Log log_;
   Trace trace_;
@@ -265,7 +141,6 @@ class Viewer {
 
   GridSettings grid_;
   Medium medium_;
-  Light light_;
   SurfaceSettings surface_settings_;
   SurfaceAssetPtr surface_asset_;  // newest
   SurfacePtr surface_source_;      // newest that is posed
@@ -276,12 +151,12 @@ class Viewer {
   Navigation navigation_;
   std::chrono::steady_clock::time_point last_frame_time_{};
 
-  VolumePtr volume_;              // newest
-  VolumePtr empty_volume_;        // where there are surfaces alone
-  Built built_;                   // newest, and what is uploaded again in a new context
-  std::uint64_t generation_ = 1;  // of the data in GL
+  VolumePtr volume_;             // newest
+  VolumePtr empty_volume_;       // where there are surfaces alone
+  Built built_;                  // newest, and what is uploaded again in a new context
+  scene::Snapshot scene_;        // as it is now: of it snapshots are made
+  scene::SnapshotPtr snapshot_;  // the newest
   std::uint64_t settings_revision_ = 1;
-  std::uint64_t surface_generation_ = 1;  // of the host's depth and the surfaces
   glm::uvec2 frame_size_{0U};             // of the last frame's picture
   std::optional<ViewFrame> view_;         // of the last frame
   std::optional<ViewFrame> traced_view_;  // of the last frame that traced
@@ -290,7 +165,7 @@ class Viewer {
   glm::uvec2 built_size_{0U};
   render::Totals totals_;
 
-  std::unique_ptr<Gl> gl_;
+  std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;
 };

@@ -868,7 +868,7 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
   surfaces.raster = raster_.get();
   surfaces.view = straight({0, 0, 0}, 0.5);
   PictureWish wish;
-  wish.content.parameters.view.size = size;
+  wish.content.size = wish.parameters.view.size = size;
   wish.samples = 4;
   wish.held = true;
   Progressive progressive(gl_, programs_);
@@ -876,7 +876,7 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
   const auto step = [&](bool moves) {
     if (moves) {
       surfaces.view.eye.x += 0.01;
-      wish.content.parameters.view.eye.x += 0.01F;
+      wish.content.viewpoint.set(surfaces.view);
     }
     progressive.advance(wish, nothing, surfaces, std::chrono::steady_clock::now(), 0.1);
   };

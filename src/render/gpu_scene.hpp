@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "base/revision.hpp"
+#include "base/slot.hpp"
+#include "render/march_data.hpp"
+#include "render/surface_data.hpp"
+#include "render/surface_raster.hpp"
+#include "render/tracer.hpp"
+#include "scene/snapshot.hpp"
+
+namespace cumulet::render {
+
+/// What of a scene is in one context, which may be older than the newest snapshot: each part comes as a whole. All
+/// calls that change it need the context current and a StateGuard around.
+class GpuScene {
+ public:
+  GpuScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs, gl::Limits limits)
+      : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits) {}
+
+  struct Wanted {
+    bool raster = true;            // the surface pass as well
+    std::uint64_t settings = 0;    // another after each change of a setting: what failed is tried again
+    std::int64_t page_texels = 0;  // where pages of cell records end; 0: at the driver's limit
+  };
+  /// Brings what differs from the snapshot, until about the deadline. Throws Error(out_of_memory, unsupported, gl) for
+  /// a part that cannot be brought; what there is of it stays, but surfaces go.
+  void update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline);
+
+  /// Null: no volume, and no picture.
+  [[nodiscard]] const MarchData* data() const { return data_.get(); }
+  /// Another with other data.
+  [[nodiscard]] Revision<MarchData> data_revision() const { return data_revision_; }
+  /// Another where paths meet other triangles, or other surfaces are drawn.
+  [[nodiscard]] Revision<SurfaceData> surfaces_revision() const { return surfaces_revision_; }
+  [[nodiscard]] bool draws_surfaces() const { return static_cast<bool>(raster_); }
+  [[nodiscard]] bool uploading() const { return upload_.has_value(); }
+  /// 0 to 1, of what is under way; else 1.
+  [[nodiscard]] double progress() const { return upload_ ? upload_->work->progress() : 1.0; }
+  /// Of that volume, if it is the last that came, or is coming.
+  [[nodiscard]] std::optional<double> upload_seconds(const scene::MarchSourcePtr& of) const;
+  [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? data_->bytes() : 0; }
+  [[nodiscard]] std::uint64_t surface_bytes() const;
+
+  /// What paths end at, but for the host's depth. traced: they meet triangles, if there is a surface pass, too.
+  [[nodiscard]] Surfaces surfaces(const scene::Snapshot& snapshot, bool traced);
+  /// Of a picture of that size of what is here, as the snapshot has it seen and lit. Only with data and view.
+  [[nodiscard]] PictureParameters parameters(const scene::Snapshot& snapshot, const Surfaces& surfaces,
+                                             const core::CmIntegrator& integrator, glm::uvec2 size) const;
+
+ private:
+  using SurfacePtr = std::shared_ptr<const SurfaceSource>;
+  void update_surfaces(const SurfacePtr& source, const Wanted& wanted);
+  void update_raster(const SurfacePtr& source, const Wanted& wanted);
+  void drop_data();
+  void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
+
+  gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
+  gl::Limits limits_;
+  // Under way, and with which settings it was begun.
+  struct Upload {
+    scene::MarchSourcePtr of;
+    std::uint64_t settings = 0;
+    std::unique_ptr<MarchUpload> work;
+  };
+  Slot<MarchData, scene::MarchSourcePtr> data_;
+  Revision<MarchData> data_revision_;
+  std::optional<Upload> upload_;  // of what data will be
+  struct Took {
+    scene::MarchSourcePtr of;
+    double seconds = 0.0;
+  };
+  Took took_;  // the newest upload
+  Slot<SurfaceData, SurfacePtr> surfaces_;
+  Slot<SurfaceRaster, SurfacePtr> raster_;  // where it is of use
+  Revision<SurfaceData> surfaces_revision_;
+};
+
+}  // namespace cumulet::render

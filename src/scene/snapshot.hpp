@@ -1,0 +1,72 @@
+#pragma once
+
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "scene/march_source.hpp"
+#include "scene/part.hpp"
+
+namespace cumulet::render {
+struct SurfaceSource;
+}
+
+namespace cumulet::scene {
+
+/// What a volume is of.
+struct Medium {
+  double density_scale = 1.0;  ///< extinction a unit of the grid's value
+  glm::vec3 albedo{1.0F};
+  float anisotropy = 0.0F;
+  glm::vec3 emission{0.0F};
+  bool operator==(const Medium&) const = default;
+};
+
+/// The lights that are far away.
+struct Lights {
+  glm::dvec3 to_sun{0.0, 1.0, 0.0};  ///< world, unit
+  glm::vec3 sun_irradiance{0.0F};    ///< on a plane that faces it
+  glm::vec3 sky_radiance{0.0F};      ///< the same from everywhere
+  bool operator==(const Lights&) const = default;
+};
+
+/// What one picture is seen through, all in world space. A ray through (x, y), both -1 to 1, y up:
+/// perspective: from eye along forward + x right + y up; orthographic: from eye + x right + y up along forward.
+/// forward has length 1 along the view axis (off-axis projections add a share of right and up to it), so that the ray's
+/// parameter is the distance z from the eye's plane.
+struct Viewpoint {
+  glm::dvec3 eye{0.0};  // orthographic: in the near plane, from which z counts
+  glm::dvec3 forward{0.0, 0.0, -1.0};
+  glm::dvec3 right{1.0, 0.0, 0.0};  // scaled by half the picture's width at z = 1 (orthographic: half its width)
+  glm::dvec3 up{0.0, 1.0, 0.0};     // likewise
+  bool orthographic = false;
+  bool operator==(const Viewpoint&) const = default;
+};
+
+/// Its place in the world is its source's.
+struct Volume {
+  MarchSourcePtr source;  ///< null: not there yet
+  Part<Medium> medium;
+  bool operator==(const Volume&) const = default;
+};
+
+/// Surfaces in a pose.
+struct Model {
+  std::shared_ptr<const render::SurfaceSource> source;
+  bool operator==(const Model&) const = default;
+};
+
+/// All that a picture can show, as it is at one moment. Sources are values that never change: another one is another
+/// pointer. What changes in place is parts.
+struct Snapshot {
+  std::vector<Volume> volumes;  ///< at most one yet
+  std::vector<Model> models;    ///< likewise
+  Part<Lights> lights;
+  Part<std::optional<Viewpoint>> view;  ///< none: nothing is to be seen
+  /// O(volumes + models).
+  bool operator==(const Snapshot&) const = default;
+};
+using SnapshotPtr = std::shared_ptr<const Snapshot>;
+
+}  // namespace cumulet::scene

@@ -1,0 +1,244 @@
+#include "viewer/context.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <utility>
+
+#include "base/milliseconds.hpp"
+#include "gl/transient_framebuffer.hpp"
+
+namespace cumulet::viewer {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Of a frame's budget.
+constexpr double most_of_drawing = 0.5;
+
+}  // namespace
+
+Context::Context(gl::FunctionsPtr gl, gl::ProgramPool& programs)
+    : functions_(std::move(gl)),
+      group_(functions_),
+      programs_(programs.of_current(*functions_)),
+      limits_(gl::query_limits(*functions_)),
+      scene_(functions_, programs_, limits_),
+      progressive_(functions_, programs_),
+      compositor_(functions_, programs_),
+      host_depth_(functions_, programs_) {
+  strings_ = {gl::string_of(*functions_, GL_VENDOR), gl::string_of(*functions_, GL_RENDERER),
+              gl::string_of(*functions_, GL_VERSION)};
+  gl::check(*functions_, "reading the context's limits");
+}
+
+void Context::find_out_dispatches() {
+  if (std::exchange(knows_dispatches_, true)) return;
+  gl::find_out_dispatches(functions_, *programs_);
+}
+
+bool Context::shares_cores() const {
+  return functions_->dispatches_in_call && compositor_.drawn() && !gl::Fence(functions_).passed();
+}
+
+render::Deadline Context::deadline_of(const Frame& frame, bool shares) const {
+  const double keep = shares ? reserve_.of(frame.budget_ms) : 0.0;
+  const double drawing =
+      frame.target == Target::none ? 0.0 : std::min(compositor_.expected_ms(), most_of_drawing * frame.budget_ms);
+  return deadline_after(frame.budget_ms - keep - drawing);
+}
+
+void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline) {
+  if (scene_.data() != nullptr && shot.scene->volumes.front().source == nullptr) progressive_.reset();
+  const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
+  scene_.update(*shot.scene, {raster, shot.settings, page_texels}, deadline);
+}
+
+render::Surfaces Context::surfaces(const Shot& shot) {
+  render::Surfaces surfaces = scene_.surfaces(*shot.scene, shot.surfaces.light != SurfaceLight::none);
+  if (host_depth_.texture() != 0) {
+    surfaces.depth = host_depth_.texture();
+    surfaces.layers = host_depth_.layers();
+    surfaces.size = host_depth_.size();
+  }
+  return surfaces;
+}
+
+render::PictureParameters Context::parameters(const Shot& shot, const render::Surfaces& surfaces) const {
+  core::CmIntegrator integrator{};
+  integrator.seed = shot.sampling.seed;
+  integrator.max_bounces = shot.max_bounces;
+  integrator.blurred_roughness = shot.surfaces.indirect_roughness;
+  integrator.light_among_surfaces = shot.surfaces.light == SurfaceLight::full ? 1U : 0U;
+  return scene_.parameters(*shot.scene, surfaces, integrator, shot.size);
+}
+
+void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadline) {
+  if (!shot.view()) return;
+  render::HostDepthInput input;
+  input.source = frame.depth_source;
+  input.name = frame.depth_name;
+  input.viewport = frame.viewport;
+  input.target_size = frame.size;
+  input.flip_y = frame.depth_flip_y;
+  input.orthographic = shot.view()->orthographic;
+  input.depth_a = shot.depth_a;
+  input.depth_b = shot.depth_b;
+  input.unchanged = frame.depth_unchanged && shot.view_rests;
+  if (host_depth_.update(input)) host_depth_revision_.advance();
+  if (scene_.data() == nullptr) return;
+  const render::Surfaces met = surfaces(shot);
+  render::PictureWish wish;
+  wish.parameters = parameters(shot, met);
+  wish.content.viewpoint = shot.scene->view;
+  wish.content.lights = shot.scene->lights;
+  for (const scene::Volume& volume : shot.scene->volumes) wish.content.media.push_back(volume.medium);
+  wish.content.data = scene_.data_revision();
+  wish.content.surfaces = scene_.surfaces_revision();
+  wish.content.host_depth = host_depth_revision_;
+  wish.content.integrator = wish.parameters.integrator;
+  wish.content.size = shot.size;
+  wish.content.view = shot.sampling.view;
+  wish.content.surfaces_traced = met.traced;
+  wish.content.preview = shot.sampling.preview;
+  wish.content.volume_alone = shot.sampling.volume_alone;
+  wish.samples = std::max(1U, shot.sampling.samples);
+  wish.depth = frame.write_depth;
+  wish.held = shot.held;
+  progressive_.advance(wish, *scene_.data(), met, deadline, frame.budget_ms);
+}
+
+std::uint64_t Context::TargetKind::bytes() const {
+  const std::uint64_t colour = format == GL_RGBA32F ? 16 : (format == GL_RGBA16F ? 8 : 4);
+  return std::uint64_t{size.x} * size.y * (colour + (depth ? 4 : 0));
+}
+
+void Context::make_target_textures(const Shot& shot, const Frame& frame) {
+  const TargetKind kind{frame.size, frame.format, frame.write_depth};
+  TargetKind with_depth = kind;  // serves those without as well
+  with_depth.depth = true;
+  if (!target_.wants(kind, shot.settings) || (target_ && target_.of() == with_depth)) return;
+  target_.make(kind, shot.settings, [&] {
+    const int width = static_cast<int>(kind.size.x);
+    const int height = static_cast<int>(kind.size.y);
+    TargetTextures made;
+    made.colour = gl::make_texture_2d(functions_, kind.format, width, height, "creating the target texture");
+    if (kind.depth) {
+      made.depth = gl::make_texture_2d(functions_, GL_DEPTH_COMPONENT32F, width, height, "creating the target's depth");
+    }
+    return made;
+  });
+}
+
+bool Context::draws(const Shot& shot, const Frame& frame) {
+  return frame.target != Target::none && shot.size.x > 0 && shot.size.y > 0;
+}
+
+void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
+  if (progressive_.shown() != nullptr || !draws(shot, frame)) return;
+  render::Tracer& tracer = progressive_.tracer();
+  const bool able = scene_.draws_surfaces() && shot.view() && alone_failed_ != shot.settings;
+  if (empty_.sum() == 0 || (!able && empty_.layered() != render::Layered::no)) tracer.clear(empty_);
+  tracer.set_background(empty_, shot.scene->lights->sky_radiance);
+  if (!able || frame.budget_ms < 0.0) return;
+  alone_failed_ = shot.settings;  // unless it succeeds
+  tracer.draw_layers(empty_, surfaces(shot),
+                     render::Progressive::quick_layers(tracer, shot.size, frame.budget_ms, shot.view_rests));
+  alone_failed_.reset();
+}
+
+render::PictureTextures Context::textures_of(const render::Picture& picture, const render::Picture* before) const {
+  render::PictureTextures textures;
+  textures.sum = picture.sum();
+  textures.background = picture.background();
+  textures.counts = picture.counts();
+  textures.size = picture.size();
+  textures.holes = picture.has_holes();
+  textures.volume_z = picture.volume_z();
+  textures.picture = picture.begun();
+  textures.revision = picture.revision();
+  if (before != nullptr) {
+    textures.sum_before = before->sum();
+    textures.background_before = before->background();
+    textures.counts_before = before->counts();
+  }
+  if (picture.layered() == render::Layered::beneath) {
+    textures.beneath = &picture.layers();
+    textures.host_z = host_depth_.texture();
+    textures.host_layers = host_depth_.layers();
+  }
+  return textures;
+}
+
+void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
+  const render::Picture* shown = progressive_.shown();
+  if (shown != nullptr) result.size = shown->size();
+  if (!draws(shot, frame)) return;
+  if (shown == nullptr) shown = &empty_;
+  render::Display display;
+  display.exposure_stops = shot.display.exposure_stops;
+  display.tone_map = shot.display.tone_map;
+  display.legend = shown->view() != render::View::shaded;
+  display.transparent = shot.display.transparent;
+  display.encoding = frame.encoding;
+  render::FrameTarget target;
+  target.framebuffer = frame.framebuffer;
+  target.viewport = frame.viewport;
+  target.flip_y = frame.flip_y;
+  target.blend_over = frame.blend_over;
+  target.write_depth = frame.write_depth && shown->volume_z() != 0;
+  if (shot.view()) {
+    target.orthographic = shot.view()->orthographic;
+    target.depth_a = shot.depth_a;
+    target.depth_b = shot.depth_b;
+    target.reversed = target.orthographic ? shot.depth_b < 0.0 : shot.depth_b > 0.0;
+  }
+  render::PictureTextures picture = textures_of(*shown, shown == &empty_ ? nullptr : progressive_.before());
+  picture.may_lag = !shown->done();
+  if (frame.target == Target::framebuffer) {
+    compositor_.draw(picture, display, target);
+    return;
+  }
+  make_target_textures(shot, frame);
+  if (!target_) return;
+  const glm::uvec2 size = target_.of().size;
+  target.viewport = size == frame.size ? frame.viewport : glm::ivec4(0, 0, size);
+  const bool depth = frame.write_depth && target_->depth;
+  const gl::TransientFramebuffer framebuffer(*functions_, target_->colour.name(), depth ? target_->depth.name() : 0);
+  constexpr std::array<float, 4> nothing{};
+  functions_->ClearNamedFramebufferfv(framebuffer.name(), GL_COLOR, 0, nothing.data());
+  if (depth) {
+    const float far = target.reversed ? 0.0F : 1.0F;
+    functions_->ClearNamedFramebufferfv(framebuffer.name(), GL_DEPTH, 0, &far);
+    result.depth_texture = target_->depth.name();
+  }
+  target.framebuffer = framebuffer.name();
+  target.blend_over = false;
+  compositor_.draw(picture, display, target);
+  result.texture = target_->colour.name();
+}
+
+void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
+  const bool drawing = draws(shot, frame);
+  if (const render::Picture* shown = progressive_.shown()) {
+    const DrawnAs now{shown->revision(), shown->done(), shown->has_holes(), shown->volume_z()};
+    if (drawing) drawn_ = compositor_.lags() ? std::nullopt : std::optional(now);
+    result.undrawn = !drawing && drawn_ != now;
+  }
+  const bool pending = host_depth_.pending() || (drawing && compositor_.lags());
+  const bool pictures = scene_.data() != nullptr && shot.view();
+  result.loading = scene_.uploading();
+  result.converged = pictures && !pending && !scene_.uploading() && progressive_.converged();
+  result.more = scene_.uploading() || (pictures && (pending || progressive_.more()));
+  result.progress = progressive_.progress();
+  result.preview = result.size != glm::uvec2(0U) && result.size != shot.size;
+}
+
+std::uint64_t Context::bytes() const {
+  const glm::u64vec2 depth_size = host_depth_.size();
+  return scene_.data_bytes() + scene_.surface_bytes() + progressive_.bytes() + empty_.bytes() +
+         (target_ ? target_.of().bytes() : 0) + depth_size.x * depth_size.y * host_depth_.layers() * 4;
+}
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/revision.hpp"
+#include "base/slot.hpp"
+#include "gl/programs.hpp"
+#include "gl/share_group.hpp"
+#include "render/compositor.hpp"
+#include "render/gpu_scene.hpp"
+#include "render/host_depth.hpp"
+#include "render/progressive.hpp"
+#include "viewer/frame.hpp"
+#include "viewer/settings.hpp"
+
+namespace cumulet::viewer {
+
+struct GlStrings {
+  std::string vendor;
+  std::string renderer;
+  std::string version;
+};
+
+/// All that pictures are made of, frozen at one moment: settings change beside it.
+struct Shot {
+  scene::SnapshotPtr scene;
+  glm::uvec2 size{0U};   // of the picture
+  double depth_a = 0.0;  // as ViewFrame's, where the scene has a view
+  double depth_b = 0.0;
+  bool view_rests = false;  // as it was in the last frame that traced
+  bool held = false;        // a hand is at the view
+  std::uint32_t max_bounces = 0;
+  Sampling sampling;
+  SurfaceSettings surfaces;
+  DisplaySettings display;
+  std::uint64_t settings = 0;  // another after each change of one: what failed is tried again
+
+  [[nodiscard]] const std::optional<scene::Viewpoint>& view() const { return *scene->view; }
+};
+
+/// All that a viewer has in one GL context: shots in, pictures out. All calls but those that tell need the context
+/// current and a StateGuard around.
+class Context {
+ public:
+  /// programs: of all viewers that share them.
+  Context(gl::FunctionsPtr gl, gl::ProgramPool& programs);
+
+  [[nodiscard]] const gl::FunctionsPtr& functions() const { return functions_; }
+  [[nodiscard]] const gl::ShareGroup& group() const { return group_; }
+  [[nodiscard]] const gl::ProgramsPtr& programs() const { return programs_; }
+  [[nodiscard]] const GlStrings& strings() const { return strings_; }
+  [[nodiscard]] const render::GpuScene& scene() const { return scene_; }
+  [[nodiscard]] render::Progressive& progressive() { return progressive_; }
+  /// Before anything else, once.
+  void find_out_dispatches();
+
+  // ---- a frame ----
+
+  /// Whether the host's own work takes of the cores that ours runs on.
+  [[nodiscard]] bool shares_cores() const;
+  /// When tracing ends: what drawing will take is the budget's, too.
+  [[nodiscard]] render::Deadline deadline_of(const Frame& frame, bool shares) const;
+  /// page_texels: as GpuScene's.
+  void upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline);
+  void trace(const Shot& shot, const Frame& frame, render::Deadline deadline);
+  /// The surfaces need not wait for the volume.
+  void draw_surfaces_alone(const Shot& shot, const Frame& frame);
+  void draw(const Shot& shot, const Frame& frame, FrameResult& result);
+  /// What is known after the frame.
+  void tell(const Shot& shot, const Frame& frame, FrameResult& result);
+  /// What it took, where the host shared the cores.
+  void learn(const Frame& frame, double taken_ms) { reserve_.learn(frame.budget_ms, taken_ms); }
+
+  // ---- reading back: waits for what is under way ----
+
+  /// What is read. Throws Error(invalid_argument) before the first.
+  render::Picture& readable();
+  [[nodiscard]] Pick pick(const Shot& shot, double x, double y);
+  /// Throws Error(invalid_argument) for too few values, or what was not gathered.
+  void read_aov(const Shot& shot, Aov aov, float* values, std::size_t count);
+  void read_linear(bool transparent, float* rgba, std::size_t count);
+  [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
+
+  /// All that it has there.
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  // All that drawing shows of a picture.
+  struct DrawnAs {
+    std::uint64_t revision = 0;
+    bool done = false;
+    bool holes = false;
+    GLuint volume_z = 0;
+    bool operator==(const DrawnAs&) const = default;
+  };
+  struct TargetKind {
+    glm::uvec2 size{0U};
+    GLenum format = 0;
+    bool depth = false;
+    bool operator==(const TargetKind&) const = default;
+    [[nodiscard]] std::uint64_t bytes() const;
+  };
+  struct TargetTextures {
+    gl::Object colour;
+    gl::Object depth;
+  };
+
+  // Whether there is a target of any size.
+  [[nodiscard]] static bool draws(const Shot& shot, const Frame& frame);
+  [[nodiscard]] render::Surfaces surfaces(const Shot& shot);
+  [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::Surfaces& surfaces) const;
+  void make_target_textures(const Shot& shot, const Frame& frame);
+  // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
+  void read_means(const render::Picture& picture, bool with_background, float* rgba);
+  // What the compositor draws of it, as linear radiance.
+  void read_composite(const render::Picture& picture, bool transparent, float* rgba);
+  [[nodiscard]] render::PictureTextures textures_of(const render::Picture& picture,
+                                                    const render::Picture* before) const;
+
+  gl::FunctionsPtr functions_;
+  gl::ShareGroup group_;
+  gl::ProgramsPtr programs_;
+  gl::Limits limits_;
+  GlStrings strings_;
+  render::GpuScene scene_;
+  render::Progressive progressive_;
+  render::Compositor compositor_;
+  render::Reserve reserve_;
+  render::HostDepth host_depth_;
+  Revision<render::HostDepth> host_depth_revision_;
+  std::optional<DrawnAs> drawn_;  // last; nothing where that was older than what there was
+  render::Picture empty_;
+  std::optional<std::uint64_t> alone_failed_;  // settings at which the surfaces beneath it could not be drawn
+  Slot<TargetTextures, TargetKind> target_;
+  bool knows_dispatches_ = false;
+};
+
+}  // namespace cumulet::viewer

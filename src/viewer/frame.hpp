@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+
+#include "gl/api.hpp"
+#include "render/display.hpp"
+#include "render/host_depth.hpp"
+
+namespace cumulet::viewer {
+
+enum class Target { framebuffer = 0, texture = 1, none = 2 };
+
+/// cumulet_frame_desc, checked.
+struct Frame {
+  double budget_ms = 10.0;  // negative: trace nothing
+  Target target = Target::framebuffer;
+  GLuint framebuffer = 0;
+  glm::uvec2 size{0U};
+  glm::ivec4 viewport{0};  // never zero where size is not
+  bool flip_y = false;
+  GLenum format = GL_RGBA8;
+  render::ColourEncoding encoding = render::ColourEncoding::srgb;
+  bool blend_over = true;
+  bool write_depth = false;
+  render::DepthSource depth_source = render::DepthSource::none;
+  GLuint depth_name = 0;
+  bool depth_flip_y = false;
+  bool depth_unchanged = false;
+};
+
+struct FrameResult {
+  bool more = false;
+  bool converged = false;
+  bool loading = false;
+  bool failed = false;
+  bool preview = false;
+  bool undrawn = false;
+  double progress = 0.0;
+  glm::uvec2 size{0U};
+  GLuint texture = 0;
+  GLuint depth_texture = 0;
+};
+
+struct Pick {
+  bool hit = false;
+  glm::dvec3 position{0.0};
+  double distance = 0.0;
+};
+
+/// cumulet_aov.
+enum class Aov {
+  beauty = 0,
+  volume = 1,
+  transmittance = 2,
+  surface_depth = 3,
+  volume_depth = 4,
+  normal = 5,
+  albedo = 6
+};
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,116 @@
+// What a context gives back of its pictures.
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "base/error.hpp"
+#include "gl/transient_framebuffer.hpp"
+#include "viewer/context.hpp"
+
+namespace cumulet::viewer {
+
+using glm::dvec3;
+
+Pick Context::pick(const Shot& shot, double x, double y) {
+  const auto& view = shot.view();
+  if (scene_.data() == nullptr || !view || !(x >= 0.0 && y >= 0.0 && x < shot.size.x && y < shot.size.y)) return {};
+  const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
+  const render::Surfaces met = surfaces(shot);
+  const float z = progressive_.tracer().pick(*scene_.data(), parameters(shot, met), met, pixel);
+  if (!(z > 0.0F)) return {};
+  const double right = 2.0 * (pixel.x + 0.5) / shot.size.x - 1.0;
+  const double up = 1.0 - 2.0 * (pixel.y + 0.5) / shot.size.y;
+  const dvec3 aside = right * view->right + up * view->up;
+  const dvec3 origin = view->orthographic ? view->eye + aside : view->eye;
+  const dvec3 ray = view->orthographic ? view->forward : view->forward + aside;
+  return {true, origin + double(z) * ray, double(z) * glm::length(ray)};
+}
+
+render::Picture& Context::readable() {
+  progressive_.settle();
+  render::Picture* picture = progressive_.newest();
+  if (picture == nullptr) throw Error(ErrorCode::invalid_argument, "nothing has been rendered yet");
+  return *picture;
+}
+
+void Context::read_means(const render::Picture& picture, bool with_background, float* rgba) {
+  if (picture.layered() != render::Layered::beneath) {
+    progressive_.tracer().read(picture, with_background, rgba);
+    return;
+  }
+  std::vector<float> opaque;
+  if (with_background) {
+    opaque.resize(std::size_t{picture.size().x} * picture.size().y * 4);
+    read_composite(picture, false, opaque.data());
+  }
+  read_composite(picture, true, rgba);
+  for (std::size_t i = 0; i < opaque.size(); ++i) {
+    if (i % 4 != 3) rgba[i] = opaque[i];
+  }
+}
+
+void Context::read_composite(const render::Picture& picture, bool transparent, float* rgba) {
+  const glm::ivec2 size(picture.size());
+  const gl::Object flat = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the texture to read");
+  const gl::TransientFramebuffer framebuffer(*functions_, flat.name(), 0);
+  render::Display display;
+  display.transparent = transparent;
+  display.encoding = render::ColourEncoding::hdr;
+  render::FrameTarget target;
+  target.framebuffer = framebuffer.name();
+  target.viewport = {0, 0, size};
+  target.flip_y = true;  // the first row is the top
+  target.blend_over = false;
+  compositor_.draw(textures_of(picture, nullptr), display, target);
+  functions_->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
+  gl::check(*functions_, "reading the picture back");
+}
+
+void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t count) {
+  using render::PixelFact;
+  render::Picture& picture = readable();
+  if (picture.view() != render::View::shaded) {
+    throw Error(ErrorCode::invalid_argument, "the picture is a debug view: there are AOVs of shaded ones alone");
+  }
+  const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
+  const bool colour = aov == Aov::beauty || aov == Aov::volume;
+  const std::array<PixelFact, 7> facts{{{},
+                                        {},
+                                        PixelFact::transmittance,
+                                        PixelFact::surface_z,
+                                        PixelFact::volume_z,
+                                        PixelFact::normal,
+                                        PixelFact::albedo}};
+  const PixelFact fact = facts.at(static_cast<std::size_t>(aov));
+  const std::size_t floats = pixels * (colour ? 4 : render::channels_of(fact));
+  if (values == nullptr || count < floats) {
+    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+  }
+  if (aov == Aov::beauty) {
+    read_means(picture, false, values);
+  } else if (aov == Aov::volume) {
+    if (!picture.volume_alone()) {
+      throw Error(ErrorCode::invalid_argument,
+                  "the volume alone was not gathered: set volume_alone of cumulet_sampling_desc, and wait for the full "
+                  "resolution");
+    }
+    progressive_.tracer().read_volume(picture, values);
+  } else {
+    if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision())) {
+      throw Error(ErrorCode::invalid_argument,
+                  "the picture is of what was shown before: render until there is a newer");
+    }
+    progressive_.tracer().read_fact(picture, *scene_.data(), surfaces(shot), fact, values);
+  }
+}
+
+void Context::read_linear(bool transparent, float* rgba, std::size_t count) {
+  const render::Picture& picture = readable();
+  const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
+  if (rgba == nullptr || count < pixels * 4)
+    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " floats");
+  read_means(picture, !transparent, rgba);
+}
+
+}  // namespace cumulet::viewer

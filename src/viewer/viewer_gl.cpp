@@ -1,0 +1,228 @@
+// What of a viewer needs its context: frames, and reading back.
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <utility>
+
+#include "base/error.hpp"
+#include "base/milliseconds.hpp"
+#include "gl/state_guard.hpp"
+#include "render/display.hpp"
+#include "viewer/viewer.hpp"
+
+namespace cumulet::viewer {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+}  // namespace
+
+Context& Viewer::gl() const {
+  if (!gl_) throw Error(ErrorCode::detached, "the viewer is attached to no GL context");
+  return *gl_;
+}
+
+void Viewer::attach(GetProc get_proc, void* user) {
+  if (gl_) throw Error(ErrorCode::invalid_argument, "the viewer is attached to a GL context already");
+  auto functions = gl::load_functions(get_proc, user);
+  gl::clear_errors(*functions);
+  gl_ = std::make_unique<Context>(std::move(functions), *programs_);
+  notify();
+}
+
+void Viewer::detach() {
+  if (!gl_) return;
+  const gl::FunctionsPtr functions = gl_->functions();
+  if (gl::was_reset(*functions)) {
+    context_lost();
+    return;
+  }
+  gl_->group().require();
+  gl_.reset();
+  gl::clear_errors(*functions);
+}
+
+void Viewer::context_lost() {
+  if (!gl_) return;
+  gl_->functions()->abandoned = true;
+  const gl::ProgramsPtr programs = gl_->programs();
+  gl_.reset();
+  // Others may be attached to another context of the group.
+  if (programs.use_count() == 1) programs->abandon();
+}
+
+template <class Body>
+void Viewer::with_gl(Body&& body) {
+  Context& g = gl();
+  const gl::FunctionsPtr functions = g.functions();
+  try {
+    gl::clear_errors(*functions);
+    gl::check_reset(*functions);
+    g.group().require();  // before anything is begun that could not be undone
+    const gl::Programs::Turn turn(g.programs(), log_);
+    const gl::StateGuard guard(*functions, restore_state_);
+    g.find_out_dispatches();
+    body(g);
+  } catch (const Error& error) {
+    // Whatever failed: in a lost context everything does.
+    const bool lost = error.code() == ErrorCode::context_lost || gl::was_reset(*functions);
+    if (lost) context_lost();
+    if (lost && error.code() != ErrorCode::context_lost) throw Error(ErrorCode::context_lost, gl::reset_message);
+    throw;
+  }
+  gl::clear_errors(*functions);
+}
+
+// ---- frames ----
+
+void Viewer::prepare(const Frame& frame) {
+  sync();
+  const auto now = Clock::now();
+  const double since = std::chrono::duration<double>(now - last_frame_time_).count();
+  last_frame_time_ = now;
+  const auto box = this->box();
+  navigation_.advance(std::min(since, 0.25), *camera_, box);
+
+  // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
+  const bool scene = volume_ || surface_source_;
+  if (!scene) built_ = {};
+  // Surfaces alone are surfaces in an empty volume.
+  if (!volume_ && scene && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
+
+  frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
+  view_.reset();
+  // Without a scene the camera may wait for its bounds.
+  if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
+    view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
+  if (frame.budget_ms < 0.0) return;
+
+  last_view_ = std::exchange(traced_view_, view_);
+  if (grid_.camera_adaptive && view_ && volume_ && (view_ != built_view_ || frame_size_ != built_size_)) {
+    const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
+    if (rests) {
+      builder_.build(volume_, *build_settings());
+      built_view_ = view_;
+      built_size_ = frame_size_;
+    }
+  }
+}
+
+FrameResult Viewer::render(const Frame& frame) {
+  const Trace::Span frame_span(trace_, "frame");
+  FrameResult result;
+  std::optional<Error> failure;
+  // Before anything new is seen, so that what comes later is told again.
+  update_pending_ = false;
+  with_gl([&](Context& g) {
+    // Each part does what it can: a failure is told once, after what there was has been drawn.
+    const auto attempt = [&](const char* name, auto&& part) {
+      const gl::DebugGroup group(*g.functions(), name);
+      const Trace::Span span(trace_, name);
+      try {
+        part();
+      } catch (const Error& error) {
+        if (error.code() == ErrorCode::context_lost) throw;
+        gl::check_reset(*g.functions());
+        if (!failure) failure = error;
+        gl::clear_errors(*g.functions());
+      }
+    };
+    const auto begun = Clock::now();
+    const bool shares = g.shares_cores();
+    const render::Deadline deadline = g.deadline_of(frame, shares);
+    attempt("cumulet: upload", [&] {
+      prepare(frame);
+      if (frame.budget_ms >= 0.0) g.upload(shot(), page_texels_, deadline);
+    });
+    upload_progress_ = g.scene().progress();
+    if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
+    const Shot shot = this->shot();
+    if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
+    attempt("cumulet: surfaces alone", [&] { g.draw_surfaces_alone(shot, frame); });
+    attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
+    g.tell(shot, frame, result);
+    if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
+    if (builder_.busy() || surface_builder_.busy()) {
+      result.loading = true;
+      result.converged = false;
+    }
+    const auto failed = [](const Worker::Status& status) {
+      return status.failure && status.failure->code() != ErrorCode::cancelled;
+    };
+    result.failed = failed(builder_.status()) || failed(surface_builder_.status());
+    const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
+    result.more = result.more || navigation_.moving() || waits_to_build;
+  });
+  if (failure) throw Error(*failure);
+  return result;
+}
+
+// ---- reading back ----
+
+Pick Viewer::pick(double x, double y) {
+  Pick pick;
+  with_gl([&](Context& g) { pick = g.pick(shot(), x, y); });
+  return pick;
+}
+
+void Viewer::read_aov(Aov aov, float* values, std::size_t count) {
+  with_gl([&](Context& g) { g.read_aov(shot(), aov, values, count); });
+}
+
+void Viewer::read_linear(float* rgba, std::size_t count) {
+  with_gl([&](Context& g) {
+    g.read_linear(display_.transparent, rgba, count);
+    totals_ = g.totals();
+  });
+}
+
+void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
+  std::size_t pixels = 0;
+  bool legend = false;
+  with_gl([&](Context& g) {
+    const render::Picture& picture = g.readable();
+    pixels = std::size_t{picture.size().x} * picture.size().y;
+    legend = picture.view() != render::View::shaded;
+  });
+  if (rgba == nullptr || count < pixels * 4)
+    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " bytes");
+  std::vector<float> linear(pixels * 4);
+  read_linear(linear.data(), linear.size());
+  render::Display display;
+  display.exposure_stops = display_.exposure_stops;
+  display.tone_map = display_.tone_map;
+  display.legend = legend;
+  display.transparent = display_.transparent;
+  render::to_display(linear, display, {rgba, pixels * 4});
+}
+
+double Viewer::measure_noise() {
+  with_gl([&](Context& g) { totals_ = g.totals(); });
+  return totals_.noise;
+}
+
+const core::CmParameters& Viewer::trace_parameters() { return gl().readable().parameters(); }
+
+Stats Viewer::stats() {
+  sync();
+  Stats s;
+  s.cells = built_.cells;
+  s.levels = built_.levels;
+  s.limited = built_.limited;
+  s.active_voxels = volume_ ? volume_->volume().active_voxels : 0;
+  s.build_seconds = built_.seconds;
+  s.steps = totals_.steps;
+  if (gl_) {
+    s.cell_bytes = gl_->scene().data_bytes();
+    s.gl_bytes = gl_->bytes();
+    s.strings = gl_->strings();
+    s.trace_seconds = gl_->progressive().trace_seconds();
+    const render::Picture* picture = gl_->progressive().newest();
+    s.samples = picture != nullptr ? picture->samples() : 0;
+  }
+  return s;
+}
+
+}  // namespace cumulet::viewer
