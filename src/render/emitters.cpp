@@ -12,6 +12,7 @@
 
 #include "base/progress_part.hpp"
 #include "render/luminance.hpp"
+#include "render/srgb.hpp"
 
 namespace cumulet::render {
 
@@ -32,15 +33,6 @@ constexpr float least_share = 0.05F;
 constexpr std::uint32_t certain = std::numeric_limits<std::uint32_t>::max();
 
 using FromSrgb = std::array<float, 256>;
-
-FromSrgb from_srgb() {
-  FromSrgb table{};
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    const double v = static_cast<double>(i) / 255.0;
-    table[i] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
-  }
-  return table;
-}
 
 vec3 texel(const FromSrgb& linear, const Image& image, std::size_t i) {
   return {linear[image.rgba[4 * i]], linear[image.rgba[4 * i + 1]], linear[image.rgba[4 * i + 2]]};
@@ -120,7 +112,7 @@ class Emission {
 }  // namespace
 
 std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene, const Progress* progress) {
-  const FromSrgb linear = from_srgb();
+  const FromSrgb linear = srgb_decoding();
   std::vector<Emission> emissions;
   emissions.reserve(scene.materials.size());
   for (const Material& material : scene.materials) emissions.emplace_back(linear, scene, material, progress);

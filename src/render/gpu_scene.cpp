@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "base/error.hpp"
 #include "render/light_choice.hpp"
@@ -16,42 +17,65 @@ using Clock = std::chrono::steady_clock;
 
 void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline) {
   const scene::MarchSourcePtr volume = snapshot.volumes.empty() ? nullptr : snapshot.volumes.front().source;
-  const SurfacePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
+  const SurfaceSourcePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
   if (!volume) drop_data();
-  update_surfaces(model, wanted);
+  update_surfaces(model, wanted, deadline);
   if (volume) update_data(volume, wanted, deadline);
-  update_raster(model, wanted);
 }
 
-void GpuScene::update_raster(const SurfacePtr& source, const Wanted& wanted) {
-  if (!wanted.raster || !source) {
-    raster_.clear();
-    return;
-  }
-  if (!raster_.wants(source, wanted.settings)) return;
-  // Paths that met triangles for want of it end at it from now on.
-  if (!raster_) surfaces_revision_.advance();
-  const bool same_scene = raster_ && raster_.of()->scene == source->scene;
-  std::optional<SurfaceRaster> last = raster_.take();  // where this fails rays meet the triangles
-  if (!same_scene) last.reset();
-  raster_.make(source, wanted.settings, [&] {
-    SurfaceRaster raster = last ? *std::move(last) : SurfaceRaster(gl_, programs_);
-    if (!same_scene) raster.set_scene(source->scene);
-    raster.set_pose(source->pose);
-    return raster;
-  });
-}
-
-void GpuScene::update_surfaces(const SurfacePtr& source, const Wanted& wanted) {
+void GpuScene::update_surfaces(const SurfaceSourcePtr& source, const Wanted& wanted, Deadline deadline) {
   if (!source) {
     if (!surfaces_.empty()) surfaces_revision_.advance();
     surfaces_.clear();
-    return;
+    surface_upload_.reset();
   }
-  if (!surfaces_.wants(source, wanted.settings)) return;
+  if (!source || !wanted.raster) show_raster(source, nullptr);
+  // As with volumes: what is under way goes on to its end. What paths meet and what is drawn changes at once, or a
+  // picture would be of two poses.
+  while (source) {
+    if (!surface_upload_) {
+      const bool paths = surfaces_.wants(source, wanted.settings);
+      const bool raster = wanted.raster && raster_.wants(source, wanted.settings);
+      if (!paths && !raster) break;
+      const SurfaceParts parts = !raster ? SurfaceParts::paths : (paths ? SurfaceParts::both : SurfaceParts::raster);
+      surface_upload_ = SurfacesUnderWay{source, wanted.settings, parts, nullptr};
+    }
+    SurfacesUnderWay& upload = *surface_upload_;
+    try {
+      if (!upload.work) {
+        upload.work = std::make_unique<SurfaceUpload>(gl_, programs_, limits_, upload.of, upload.parts, surfaces_.get(),
+                                                      raster_ ? *raster_ : nullptr);
+      }
+      if (!upload.work->advance(deadline)) break;
+      finish_surfaces();
+    } catch (const Error&) {
+      if (upload.work && upload.work->done()) {
+        finish_surfaces();
+      } else {
+        surfaces_.fail(upload.of, upload.settings);
+        raster_.fail(upload.of, upload.settings);
+        surface_upload_.reset();
+      }
+      throw;
+    }
+  }
+}
+
+void GpuScene::finish_surfaces() {
+  const SurfacesUnderWay upload = *std::exchange(surface_upload_, std::nullopt);
   surfaces_revision_.advance();
-  std::optional<SurfaceData> last = surfaces_.take();
-  surfaces_.make(source, wanted.settings, [&] { return SurfaceData(gl_, limits_, *source, last ? &*last : nullptr); });
+  if (auto data = upload.work->take_data()) surfaces_.put(upload.of, std::move(*data));
+  if (upload.parts == SurfaceParts::paths) return;
+  const RasterContentPtr raster = upload.work->take_raster();
+  show_raster(upload.of, raster);  // where it failed rays meet the triangles
+  if (!raster) raster_.fail(upload.of, upload.settings);
+}
+
+void GpuScene::show_raster(const SurfaceSourcePtr& of, const RasterContentPtr& content) {
+  if (!content && raster_.empty()) return;
+  surface_pass_.show(content);
+  raster_.clear();
+  if (content) raster_.put(of, content);
 }
 
 void GpuScene::drop_data() {
@@ -66,7 +90,7 @@ void GpuScene::update_data(const scene::MarchSourcePtr& source, const Wanted& wa
   while (upload_ || data_.wants(source, wanted.settings)) {
     const auto begun = Clock::now();
     if (!upload_) {
-      upload_ = Upload{source, wanted.settings, nullptr};
+      upload_ = VolumeUnderWay{source, wanted.settings, nullptr};
       took_ = {source, 0.0};
     }
     const scene::MarchSourcePtr of = upload_->of;
@@ -86,19 +110,24 @@ void GpuScene::update_data(const scene::MarchSourcePtr& source, const Wanted& wa
   }
 }
 
+double GpuScene::progress() const {
+  if (upload_ && upload_->work) return upload_->work->progress();
+  return surface_upload_ && surface_upload_->work ? surface_upload_->work->progress() : 1.0;
+}
+
 std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) const {
   if (took_.of == nullptr || took_.of != of) return std::nullopt;
   return took_.seconds;
 }
 
 std::uint64_t GpuScene::surface_bytes() const {
-  return (surfaces_ ? surfaces_->bytes() : 0) + (raster_ ? raster_->bytes() : 0);
+  return (surfaces_ ? surfaces_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0);
 }
 
 Surfaces GpuScene::surfaces(const scene::Snapshot& snapshot, bool traced) {
   Surfaces surfaces;
   surfaces.scene = surfaces_.get();
-  surfaces.raster = raster_.get();
+  surfaces.raster = raster_ ? &surface_pass_ : nullptr;
   surfaces.traced = traced || surfaces.raster == nullptr;
   if (*snapshot.view) surfaces.view = **snapshot.view;
   const scene::Lights& lights = *snapshot.lights;

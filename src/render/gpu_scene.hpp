@@ -7,8 +7,7 @@
 #include "base/revision.hpp"
 #include "base/slot.hpp"
 #include "render/march_data.hpp"
-#include "render/surface_data.hpp"
-#include "render/surface_raster.hpp"
+#include "render/surface_upload.hpp"
 #include "render/tracer.hpp"
 #include "scene/snapshot.hpp"
 
@@ -19,7 +18,7 @@ namespace cumulet::render {
 class GpuScene {
  public:
   GpuScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs, gl::Limits limits)
-      : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits) {}
+      : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits), surface_pass_(gl_) {}
 
   struct Wanted {
     bool raster = true;            // the surface pass as well
@@ -27,7 +26,8 @@ class GpuScene {
     std::int64_t page_texels = 0;  // where pages of cell records end; 0: at the driver's limit
   };
   /// Brings what differs from the snapshot, until about the deadline. Throws Error(out_of_memory, unsupported, gl) for
-  /// a part that cannot be brought; what there is of it stays, but surfaces go.
+  /// a part that cannot be brought; what there is of it stays.
+  /// Where surfaces can be met but not drawn, they are met alone.
   void update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline);
 
   /// Null: no volume, and no picture.
@@ -37,9 +37,9 @@ class GpuScene {
   /// Another where paths meet other triangles, or other surfaces are drawn.
   [[nodiscard]] Revision<SurfaceData> surfaces_revision() const { return surfaces_revision_; }
   [[nodiscard]] bool draws_surfaces() const { return static_cast<bool>(raster_); }
-  [[nodiscard]] bool uploading() const { return upload_.has_value(); }
+  [[nodiscard]] bool uploading() const { return upload_ || surface_upload_; }
   /// 0 to 1, of what is under way; else 1.
-  [[nodiscard]] double progress() const { return upload_ ? upload_->work->progress() : 1.0; }
+  [[nodiscard]] double progress() const;
   /// Of that volume, if it is the last that came, or is coming.
   [[nodiscard]] std::optional<double> upload_seconds(const scene::MarchSourcePtr& of) const;
   [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? data_->bytes() : 0; }
@@ -52,9 +52,9 @@ class GpuScene {
                                              const core::CmIntegrator& integrator, glm::uvec2 size) const;
 
  private:
-  using SurfacePtr = std::shared_ptr<const SurfaceSource>;
-  void update_surfaces(const SurfacePtr& source, const Wanted& wanted);
-  void update_raster(const SurfacePtr& source, const Wanted& wanted);
+  void update_surfaces(const SurfaceSourcePtr& source, const Wanted& wanted, Deadline deadline);
+  void finish_surfaces();
+  void show_raster(const SurfaceSourcePtr& of, const RasterContentPtr& content);
   void drop_data();
   void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
 
@@ -62,21 +62,29 @@ class GpuScene {
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
   // Under way, and with which settings it was begun.
-  struct Upload {
+  struct VolumeUnderWay {
     scene::MarchSourcePtr of;
     std::uint64_t settings = 0;
     std::unique_ptr<MarchUpload> work;
   };
   Slot<MarchData, scene::MarchSourcePtr> data_;
   Revision<MarchData> data_revision_;
-  std::optional<Upload> upload_;  // of what data will be
+  std::optional<VolumeUnderWay> upload_;  // of what data will be
   struct Took {
     scene::MarchSourcePtr of;
     double seconds = 0.0;
   };
   Took took_;  // the newest upload
-  Slot<SurfaceData, SurfacePtr> surfaces_;
-  Slot<SurfaceRaster, SurfacePtr> raster_;  // where it is of use
+  struct SurfacesUnderWay {
+    SurfaceSourcePtr of;
+    std::uint64_t settings = 0;
+    SurfaceParts parts = SurfaceParts::both;
+    std::unique_ptr<SurfaceUpload> work;
+  };
+  Slot<SurfaceData, SurfaceSourcePtr> surfaces_;
+  Slot<RasterContentPtr, SurfaceSourcePtr> raster_;  // where it is of use
+  SurfaceRaster surface_pass_;                       // shows that
+  std::optional<SurfacesUnderWay> surface_upload_;   // of what both will be
   Revision<SurfaceData> surfaces_revision_;
 };
 

@@ -17,7 +17,6 @@ using glm::ivec3;
 using glm::vec3;
 
 constexpr std::int64_t max_pages = 8;
-constexpr std::size_t piece_bytes = std::size_t{2} << 20U;  // about a millisecond
 
 void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   const int widest = std::max({size.x, size.y, size.z});
@@ -78,7 +77,7 @@ core::CmGrid grid_parameters(const grid::Cube& cube, const vec3& low, const vec3
 
 MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, scene::MarchSourcePtr source,
                          std::int64_t page_texels)
-    : gl_(std::move(gl)), limits_(limits), source_(std::move(source)) {
+    : gl_(std::move(gl)), limits_(limits), source_(std::move(source)), upload_(gl_, "uploading the volume") {
   data_.march_ = source_->march;
   if (source_->march == March::tet) {
     plan_tet(page_texels);
@@ -88,31 +87,16 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, scene::M
   }
 }
 
-bool MarchUpload::advance(Deadline deadline) {
-  while (next_ < steps_.size()) {
-    steps_[next_]();
-    gl::check(*gl_, "uploading the volume");
-    ++next_;
-    if (std::chrono::steady_clock::now() >= deadline) break;
-  }
-  return next_ == steps_.size();
-}
-
 void MarchUpload::plan_texture_buffer(const void* bytes, std::size_t size, std::size_t capacity, GLenum format,
                                       const char* what, std::function<void(gl::Object)> place) {
   const std::size_t index = data_.buffers_.size();
   data_.buffers_.emplace_back();
   data_.bytes_ += capacity;
-  steps_.emplace_back([this, index, capacity, format, what, place = std::move(place)] {
+  upload_.add([this, index, capacity, format, what, place = std::move(place)] {
     data_.buffers_[index] = gl::make_buffer(gl_, capacity, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
     place(gl::make_texture_buffer(gl_, format, data_.buffers_[index], what));
   });
-  for (std::size_t first = 0; first < size; first += piece_bytes) {
-    steps_.emplace_back([this, index, first, count = std::min(piece_bytes, size - first), bytes] {
-      gl_->NamedBufferSubData(data_.buffers_[index].name(), static_cast<GLintptr>(first),
-                              static_cast<GLsizeiptr>(count), static_cast<const char*>(bytes) + first);
-    });
-  }
+  upload_.add_bytes([this, index] { return data_.buffers_[index].name(); }, 0, bytes, size);
 }
 
 void MarchUpload::plan_tet(std::int64_t page_texels) {
@@ -144,7 +128,7 @@ void MarchUpload::plan_tet(std::int64_t page_texels) {
                       "uploading the point-location tree",
                       [this](gl::Object texture) { data_.textures_[0] = std::move(texture); });
   data_.bytes_ += 26 * sizeof(grid::RootEntry);
-  steps_.emplace_back([this] {
+  upload_.add([this] {
     std::array<grid::RootEntry, 26> roots{};
     std::copy(source_->grid->roots.begin(), source_->grid->roots.end(), roots.begin());
     data_.roots_ = gl::make_buffer(gl_, sizeof(roots), roots.data(), 0, "uploading the root cells");
@@ -156,7 +140,7 @@ void MarchUpload::plan_dense() {
   require_3d(limits_, size, "the dense march");
   data_.bytes_ =
       static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z) * 2;
-  steps_.emplace_back([this, size] {
+  upload_.add([this, size] {
     data_.textures_[1] = gl::make_texture_3d(gl_, GL_R16F, size.x, size.y, size.z, "creating the dense texture");
   });
   // One layer of bricks at a time: bounded memory.
@@ -164,7 +148,7 @@ void MarchUpload::plan_dense() {
   for (int z = low & ~7; z < low + size.z; z += volume::brick_size) {
     const int first = std::max(z, low);
     const int last = std::min(z + volume::brick_size, low + size.z);
-    steps_.emplace_back([this, size, low, first, last] {
+    upload_.add([this, size, low, first, last] {
       std::vector<std::uint16_t> slab;
       fill_slab(*source_, first, last, slab);
       gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 2);
@@ -187,7 +171,7 @@ void MarchUpload::plan_brick() {
   plan_texture_buffer(source_->brick_values.data(), bytes, bytes, GL_R16F, "uploading bricks",
                       [this](gl::Object texture) { data_.textures_[1] = std::move(texture); });
   data_.bytes_ += source_->brick_slots.size() * 4;
-  steps_.emplace_back([this, bricks] {
+  upload_.add([this, bricks] {
     data_.textures_[2] = gl::make_texture_3d(gl_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
     gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
     gl_->TextureSubImage3D(data_.textures_[2].name(), 0, 0, 0, 0, bricks.x, bricks.y, bricks.z, GL_RED_INTEGER,

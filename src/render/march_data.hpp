@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -10,13 +9,12 @@
 
 #include "gl/objects.hpp"
 #include "render/parameters.hpp"
+#include "render/upload.hpp"
 #include "scene/march_source.hpp"
 
 namespace cumulet::render {
 
 using scene::March;
-
-using Deadline = std::chrono::steady_clock::time_point;
 
 /// Of a volume in this cube, whose data are inside low to high (cube space).
 core::CmGrid grid_parameters(const grid::Cube& cube, const glm::vec3& low, const glm::vec3& high);
@@ -50,9 +48,11 @@ class MarchUpload {
   /// the limit that does not suffice; allocates nothing yet.
   MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, scene::MarchSourcePtr source,
               std::int64_t page_texels = 0);
-  /// Works until the deadline, one piece at least. Returns whether all is there. Throws Error(out_of_memory, gl).
-  bool advance(Deadline deadline);
-  [[nodiscard]] double progress() const { return steps_.empty() ? 1.0 : double(next_) / double(steps_.size()); }
+  MarchUpload(const MarchUpload&) = delete;
+  MarchUpload& operator=(const MarchUpload&) = delete;
+  /// As Upload has them.
+  bool advance(Deadline deadline) { return upload_.advance(deadline); }
+  [[nodiscard]] double progress() const { return upload_.progress(); }
   /// Only after advance returned true.
   MarchData take() { return std::move(data_); }
 
@@ -68,8 +68,7 @@ class MarchUpload {
   gl::Limits limits_;
   scene::MarchSourcePtr source_;
   MarchData data_;
-  std::vector<std::function<void()>> steps_;
-  std::size_t next_ = 0;
+  Upload upload_;  // its steps use the above
 };
 
 }  // namespace cumulet::render

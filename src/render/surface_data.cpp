@@ -163,7 +163,7 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   }
   source.tables.textures = size_of(words);
   for (const surface::Texture& texture : scene.textures) {
-    const TextureAtlas::Place& place = source.atlas.places[texture.image];
+    const TextureAtlas::Place& place = source.atlas->places[texture.image];
     words.emplace_back(place.corner.x | place.corner.y << 16U, place.size.x | place.size.y << 16U, place.layer,
                        wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << core::CM_WRAP_T_SHIFT |
                            (texture.sampler.magnify == surface::Filter::nearest ? core::CM_TEXTURE_NEAREST : 0U));
@@ -207,23 +207,15 @@ uvec2 halved_to_fit(uvec2 size, std::uint32_t largest) {
   return size;
 }
 
-// Every 2 x 2 texels to their mean; colours stay as they are encoded: for previews of very large images that will do.
-std::vector<std::uint8_t> halve(const std::vector<std::uint8_t>& rgba, uvec2 size) {
-  const uvec2 half = glm::max(size / 2U, uvec2(1U));
-  std::vector<std::uint8_t> out(std::size_t{half.x} * half.y * 4);
-  for (std::uint32_t y = 0; y < half.y; ++y) {
-    for (std::uint32_t x = 0; x < half.x; ++x) {
-      for (std::uint32_t c = 0; c < 4; ++c) {
-        unsigned sum = 0;
-        for (std::uint32_t i = 0; i < 4; ++i) {
-          const uvec2 from = glm::min(uvec2(2 * x + (i & 1U), 2 * y + (i >> 1U)), size - 1U);
-          sum += rgba[(std::size_t{from.y} * size.x + from.x) * 4 + c];
-        }
-        out[(std::size_t{y} * half.x + x) * 4 + c] = static_cast<std::uint8_t>((sum + 2) / 4);
-      }
+// What is put into the atlas for images that are larger than their places, as they are encoded.
+void shrink_images(TextureAtlas& atlas, const std::vector<surface::Image>& images, const Progress* progress) {
+  atlas.smaller.resize(images.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    std::vector<std::uint8_t>& smaller = atlas.smaller[i];
+    for (uvec2 size(images[i].width, images[i].height); size != atlas.places[i].size; size = glm::max(size / 2U, 1U)) {
+      smaller = half_of(smaller.empty() ? images[i].rgba : smaller, size, false, progress);
     }
   }
-  return out;
 }
 
 }  // namespace
@@ -276,7 +268,11 @@ std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene
   build(*source, progress);
   check(progress);
   source->emissive = emissive_triangles(*source->scene, progress);
-  source->atlas = pack_atlas(source->scene->images, largest_layer);
+  TextureAtlas atlas = pack_atlas(source->scene->images, largest_layer);
+  shrink_images(atlas, source->scene->images, progress);
+  source->atlas = std::make_shared<const TextureAtlas>(std::move(atlas));
+  source->raster = make_raster_source(source->scene, progress);
+  source->centres = blended_centres(*source->raster, source->pose, progress);
   check(progress);
   pack_words(*source, progress);
   return source;
@@ -299,58 +295,59 @@ std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& la
   check(progress);
   source->emissive = last.emissive;
   source->atlas = last.atlas;
+  source->raster = last.raster;
+  source->centres = blended_centres(*source->raster, source->pose, progress);
   pack_words(*source, progress);
   return source;
 }
 
-SurfaceData::SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, const SurfaceSource& source,
-                         SurfaceData* last)
-    : scene_(source.scene.get()),
-      tables_(source.tables),
-      emitted_flux_(source.emitted_flux),
-      lamp_flux_(source.lamp_flux),
-      cross_section_(source.cross_section) {
-  const std::size_t count = std::max<std::size_t>(1, source.words.size());
-  if (static_cast<std::int64_t>(count) > limits.texture_buffer_texels) {
+std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, Upload& upload,
+                                               const SurfaceSource& source, const SurfaceData* last) {
+  constexpr const char* tables = "creating the surfaces' tables";
+  const auto count = static_cast<std::int64_t>(source.words.size());
+  const TextureAtlas& atlas = *source.atlas;
+  if (count > limits.texture_buffer_texels) {
     throw Error(ErrorCode::unsupported, "the surfaces need " + std::to_string(count) +
                                             " texels of a texture buffer; this driver's "
                                             "GL_MAX_TEXTURE_BUFFER_SIZE is " +
                                             std::to_string(limits.texture_buffer_texels));
   }
-  const uvec4 none(0U);
-  buffer_ = gl::make_buffer(gl, count * sizeof(uvec4), source.words.empty() ? &none : source.words.data(), 0,
-                            "creating the surfaces' tables");
-  words_ = gl::make_texture_buffer(gl, GL_RGBA32UI, buffer_, "creating the surfaces' tables");
-  bytes_ = count * sizeof(uvec4);
-  const TextureAtlas& atlas = source.atlas;
-  if (last != nullptr && last->scene_ == scene_) {
-    atlas_ = last->atlas_;
-  } else {
-    if (static_cast<int>(atlas.edge) > limits.texture_size_2d) {
-      throw Error(ErrorCode::unsupported, "the surfaces' images need textures " + std::to_string(atlas.edge) +
-                                              " wide; this driver's GL_MAX_TEXTURE_SIZE is " +
-                                              std::to_string(limits.texture_size_2d));
-    }
-    const int layers = static_cast<int>(std::max(1U, atlas.layers));
-    const int edge = static_cast<int>(atlas.edge);
-    atlas_ = std::make_shared<gl::Object>(
-        gl::make_texture_2d_array(gl, GL_RGBA8, edge, edge, layers, "creating the surfaces' images"));
-    for (std::size_t i = 0; i < atlas.places.size(); ++i) {
-      const surface::Image& image = source.scene->images[i];
-      const TextureAtlas::Place& place = atlas.places[i];
-      const std::vector<std::uint8_t>* rgba = &image.rgba;
-      std::vector<std::uint8_t> smaller;
-      for (uvec2 size(image.width, image.height); size != place.size; size = glm::max(size / 2U, uvec2(1U))) {
-        smaller = halve(*rgba, size);
-        rgba = &smaller;
-      }
-      gl->TextureSubImage3D(atlas_->name(), 0, static_cast<int>(place.corner.x), static_cast<int>(place.corner.y),
-                            static_cast<int>(place.layer), static_cast<int>(place.size.x),
-                            static_cast<int>(place.size.y), 1, GL_RGBA, GL_UNSIGNED_BYTE, rgba->data());
-    }
+  if (static_cast<int>(atlas.edge) > limits.texture_size_2d) {
+    throw Error(ErrorCode::unsupported, "the surfaces' images need textures " + std::to_string(atlas.edge) +
+                                            " wide; this driver's GL_MAX_TEXTURE_SIZE is " +
+                                            std::to_string(limits.texture_size_2d));
   }
-  bytes_ += std::uint64_t{atlas.edge} * atlas.edge * std::max(1U, atlas.layers) * 4;
-  gl::check(*gl, "uploading the surfaces");
+  auto data = std::make_unique<SurfaceData>();
+  SurfaceData* const to = data.get();
+  to->scene_ = source.scene.get();
+  to->tables_ = source.tables;
+  to->emitted_flux_ = source.emitted_flux;
+  to->lamp_flux_ = source.lamp_flux;
+  to->cross_section_ = source.cross_section;
+  const std::size_t bytes = source.words.size() * sizeof(uvec4);
+  to->bytes_ = bytes + std::uint64_t{atlas.edge} * atlas.edge * std::max(1U, atlas.layers) * 4;
+  upload.add([gl, to, bytes] {
+    to->buffer_ = gl::make_buffer(gl, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, tables);
+    to->words_ = gl::make_texture_buffer(gl, GL_RGBA32UI, to->buffer_, tables);
+  });
+  upload.add_bytes([to] { return to->buffer_.name(); }, 0, source.words.data(), bytes);
+  if (last != nullptr && last->scene_ == to->scene_) {
+    to->atlas_ = last->atlas_;
+    return data;
+  }
+  to->atlas_ = std::make_shared<gl::Object>();
+  upload.add([gl, to, &atlas] {
+    const int edge = static_cast<int>(atlas.edge);
+    *to->atlas_ = gl::make_texture_2d_array(gl, GL_RGBA8, edge, edge, static_cast<int>(std::max(1U, atlas.layers)),
+                                            "creating the surfaces' images");
+  });
+  for (std::size_t i = 0; i < atlas.places.size(); ++i) {
+    const TextureAtlas::Place& place = atlas.places[i];
+    const auto& rgba = atlas.smaller[i].empty() ? source.scene->images[i].rgba : atlas.smaller[i];
+    upload.add_image([to] { return to->atlas_->name(); }, {place.corner, place.size, 0, static_cast<int>(place.layer)},
+                     rgba.data());
+  }
+  return data;
 }
 
 void SurfaceData::bind(const gl::Functions& gl) const {

@@ -8,6 +8,7 @@
 #include "render/emitters.hpp"
 #include "render/march_data.hpp"
 #include "render/parameters.hpp"
+#include "render/raster_source.hpp"
 #include "surface/bvh.hpp"
 #include "surface/scene.hpp"
 
@@ -23,6 +24,8 @@ struct TextureAtlas {
   std::uint32_t edge = 1;  // of a layer
   std::uint32_t layers = 0;
   std::vector<Place> places;  // of each image
+  /// Of each image, what is put there where that is not the image itself.
+  std::vector<std::vector<std::uint8_t>> smaller;
 };
 
 /// Shelves of falling height. largest: the widest layer the driver takes; images beyond it are halved until they fit.
@@ -40,7 +43,9 @@ struct SurfaceSource {
   double emitted_flux = 0.0;       // luminance of all that emissive triangles emit
   double lamp_flux = 0.0;          // and lamps
   double cross_section = 0.0;      // of the scene's bounding sphere
-  TextureAtlas atlas;
+  std::shared_ptr<const TextureAtlas> atlas;
+  std::shared_ptr<const RasterSource> raster;
+  std::vector<glm::vec3> centres;  // of the raster's blended triangles
 };
 
 /// Builds the BVH and the tables. Throws Error(cancelled).
@@ -50,12 +55,13 @@ std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene
 std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& last, surface::Pose pose,
                                                          Progress* progress);
 
-/// A SurfaceSource in GL. All calls need the context current and a StateGuard around.
+/// What paths read of a SurfaceSource on the GPU. All calls need the context current and a StateGuard around.
 class SurfaceData {
  public:
-  /// Uploads all of it; images are taken over from `last` (may be null) where the scene is the same. Throws Error(gl,
-  /// out_of_memory, unsupported).
-  SurfaceData(const gl::FunctionsPtr& gl, const gl::Limits& limits, const SurfaceSource& source, SurfaceData* last);
+  /// Plans how it comes to GL: it is whole when all steps are done, and they may not outlive it. Images are shared with
+  /// `last` (may be null) where the scene is the same. Throws Error(unsupported).
+  static std::unique_ptr<SurfaceData> plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, Upload& upload,
+                                           const SurfaceSource& source, const SurfaceData* last);
   void bind(const gl::Functions& gl) const;
   [[nodiscard]] const core::CmSurfaceTables& tables() const { return tables_; }
   /// Whether there are punctual lights, and emissive triangles.

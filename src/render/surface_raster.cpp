@@ -10,14 +10,12 @@
 #include <tuple>
 
 #include "base/error.hpp"
-#include "base/shared_code.hpp"
 #include "gl/bindings.hpp"
 #include "render/punctual.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
 #include "jitter.glsl"
-#include "surface_parameters.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::render {
@@ -28,8 +26,6 @@ using core::CmLight;
 using core::CmMaterial;
 using core::CmSurfaceView;
 using surface::AlphaMode;
-
-std::size_t padded(std::size_t bytes, std::size_t alignment) { return (bytes + alignment - 1) / alignment * alignment; }
 
 /// World, from the eye, to picture coordinates x z, y z (orthographic: x, y) and view depth z.
 glm::dmat3 to_view(const SurfaceView& view) {
@@ -92,242 +88,167 @@ gl::Object make_scene_sampler(const gl::FunctionsPtr& gl, const surface::Sampler
   return object;
 }
 
-gl::Object make_scene_texture(const gl::FunctionsPtr& gl, const surface::Image& image, bool srgb, GLint most) {
-  const auto width = static_cast<GLsizei>(image.width);
-  const auto height = static_cast<GLsizei>(image.height);
-  if (image.width > static_cast<std::uint32_t>(most) || image.height > static_cast<std::uint32_t>(most)) {
-    throw Error(ErrorCode::unsupported, "image \"" + image.name + "\" is " + std::to_string(image.width) + "x" +
-                                            std::to_string(image.height) + "; the GL driver's largest texture is " +
-                                            std::to_string(most));
-  }
-  GLsizei levels = 1;
-  while (std::max(width, height) >> levels > 0) ++levels;
-  GLuint name = 0;
-  gl->CreateTextures(GL_TEXTURE_2D, 1, &name);
-  gl::Object texture(gl, gl::Object::Kind::texture, name);
-  gl->TextureStorage2D(name, levels, srgb ? GL_SRGB8_ALPHA8 : GL_RGBA8, width, height);
-  gl->TextureSubImage2D(name, 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
-  gl->GenerateTextureMipmap(name);
-  gl::check(*gl, "uploading a texture of the scene");
-  return texture;
-}
-
-std::array<const surface::TextureUse*, core::CM_MAPS> uses_of(const surface::Material& m) {
-  return {&m.base_color_texture,     &m.metallic_roughness_texture, &m.normal_texture,
-          &m.occlusion_texture,      &m.emission_texture,           &m.specular_texture,
-          &m.specular_color_texture, &m.clearcoat_texture,          &m.clearcoat_roughness_texture,
-          &m.transmission_texture};
-}
-
-bool is_colour(int map) {
-  return map == core::CM_MAP_BASE_COLOR || map == core::CM_MAP_EMISSION || map == core::CM_MAP_SPECULAR_COLOR;
-}
-
-CmMaterial block_of(const surface::Material& m) {
-  CmMaterial block{};
-  block.base_color = m.base_color;
-  block.emission = glm::vec4(m.emission, m.alpha_cutoff);
-  block.reflection = glm::vec4(m.metallic, m.roughness, m.normal_scale, m.occlusion_strength);
-  const float r = m.ior > 0.0F ? (m.ior - 1.0F) / (m.ior + 1.0F) : 1.0F;
-  block.specular = glm::vec4(m.specular_color * (r * r), m.specular);
-  block.coat = glm::vec4(m.clearcoat, m.clearcoat_roughness, m.transmission, 0.0F);
-  block.flags.z = m.unlit ? 1U : 0U;
-  const auto uses = uses_of(m);
-  for (std::size_t map = 0; map < uses.size(); ++map) {
-    const surface::TextureUse& use = *uses[map];
-    if (use.uv_set == 1) block.flags.y |= 1U << map;
-    for (int row = 0; row < 2; ++row) {
-      block.uv_rows[2 * map + static_cast<std::size_t>(row)] =
-          glm::vec4(use.transform[0][row], use.transform[1][row], use.transform[2][row], 0.0F);
-    }
-  }
-  return block;
-}
-
 }  // namespace
 
 glm::vec2 surface_jitter(unsigned layer, unsigned layers) { return core::cm_layer_jitter(layer, layers); }
 
-void SurfaceRaster::upload_textures(Assets& assets) const {
-  const surface::Scene& scene = *assets.scene;
-  GLint most = 0;
-  gl_->GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
-  // An image that serves as colour and as data becomes two textures.
-  std::map<std::pair<std::uint32_t, bool>, GLuint> made;
-  std::map<std::tuple<GLint, GLint, GLint, surface::Filter>, GLuint> samplers;
-  const auto texture_of = [&](std::uint32_t image, bool srgb) {
-    GLuint& name = made[{image, srgb}];
-    if (name == 0) {
-      assets.textures.push_back(make_scene_texture(gl_, scene.images.at(image), srgb, most));
-      assets.bytes += scene.images.at(image).rgba.size() * 4 / 3;  // with its smaller levels
-      name = assets.textures.back().name();
+// Adds the steps of a content to an upload.
+class RasterContent::Planner {
+ public:
+  Planner(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const gl::Limits& limits, Upload& upload)
+      : gl_(gl), programs_(programs), limits_(limits), upload_(upload) {}
+
+  void fix(const std::shared_ptr<Fixed>& fixed) {
+    const RasterSource& source = *fixed->source;
+    const surface::Scene& scene = *source.scene;
+    Fixed* const to = fixed.get();
+    to->textures.resize(source.textures.size());
+    for (std::size_t i = 0; i < source.textures.size(); ++i) add_texture(*to, i);
+    upload_.add([gl = gl_, to] {
+      for (const surface::Sampler& sampler : to->source->samplers) {
+        to->samplers.push_back(make_scene_sampler(gl, sampler));
+      }
+    });
+    to->program_of.resize(source.materials.size());
+    for (std::size_t i = 0; i < source.materials.size(); ++i) {
+      upload_.add([programs = programs_, to, i] { programs->ask(key_of(to->source->materials[i])); });
     }
-    return name;
-  };
-  const auto sampler_of = [&](const surface::Sampler& sampler) {
-    GLuint& name = samplers[{wrap_of(sampler.wrap_s), wrap_of(sampler.wrap_t), minify_of(sampler), sampler.magnify}];
-    if (name == 0) {
-      assets.samplers.push_back(make_scene_sampler(gl_, sampler));
-      name = assets.samplers.back().name();
+    for (std::size_t i = 0; i < source.materials.size(); ++i) {
+      upload_.add(
+          [programs = programs_, to, i] { to->program_of[i] = &programs->get(key_of(to->source->materials[i])); });
     }
-    return name;
-  };
-  for (const surface::Material& material : scene.materials) {
-    Material& result = assets.materials.emplace_back();
-    // What transmits is drawn as what blends.
-    result.pass = material.transmission > 0.0F && !material.unlit ? AlphaMode::blend : material.alpha_mode;
-    result.double_sided = material.double_sided;
-    const auto uses = uses_of(material);
-    for (std::size_t map = 0; map < uses.size(); ++map) {
-      if (uses[map]->texture < 0) continue;
-      const surface::Texture& texture = scene.textures.at(static_cast<std::size_t>(uses[map]->texture));
-      result.maps[map] = {texture_of(texture.image, is_colour(static_cast<int>(map))), sampler_of(texture.sampler)};
+    add_buffer(to->material_block, source.material_blocks, "uploading the scene's materials");
+    to->bytes += source.material_blocks.size();
+    if (scene.attributes.empty() || scene.indices.empty()) return;
+    static_assert(sizeof(surface::VertexAttributes) == 32 && sizeof(surface::PosedVertex) == 40);
+    add_buffer(to->attributes, scene.attributes, "uploading the scene's vertices");
+    add_buffer(to->indices, scene.indices, "uploading the scene's indices");
+    to->bytes += scene.attributes.size() * sizeof(surface::VertexAttributes) +
+                 (scene.indices.size() + source.blended.size() * 3) * sizeof(std::uint32_t);
+    if (source.blended.empty()) return;
+    upload_.add([gl = gl_, to] {
+      to->sorted_indices = gl::make_buffer(gl, to->source->blended.size() * 3 * sizeof(std::uint32_t), nullptr,
+                                           GL_DYNAMIC_STORAGE_BIT, "creating the indices of blended triangles");
+    });
+  }
+
+  /// A buffer of just these, made before the first of them is copied.
+  template <class T>
+  void add_buffer(gl::Object& buffer, const std::vector<T>& values, const char* what) {
+    const std::size_t bytes = values.size() * sizeof(T);
+    if (bytes == 0) return;
+    gl::Object* const to = &buffer;
+    upload_.add(
+        [gl = gl_, to, bytes, what] { *to = gl::make_buffer(gl, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, what); });
+    upload_.add_bytes([to] { return to->name(); }, 0, values.data(), bytes);
+  }
+
+ private:
+  void add_texture(Fixed& to, std::size_t i) {
+    const RasterSource::Texture& texture = to.source->textures[i];
+    const surface::Image& image = to.source->scene->images.at(texture.image);
+    const auto most = static_cast<std::uint32_t>(limits_.texture_size_2d);
+    if (image.width > most || image.height > most) {
+      throw Error(ErrorCode::unsupported, "image \"" + image.name + "\" is " + std::to_string(image.width) + "x" +
+                                              std::to_string(image.height) + "; the GL driver's largest texture is " +
+                                              std::to_string(most));
+    }
+    upload_.add([gl = gl_, &to, i] { to.textures[i] = make_texture(gl, *to.source, i); });
+    const auto name = [&to, i] { return to.textures[i].name(); };
+    glm::uvec2 size(image.width, image.height);
+    upload_.add_image(name, {glm::uvec2(0U), size, 0, std::nullopt}, image.rgba.data());
+    to.bytes += image.rgba.size();
+    for (std::size_t level = 0; level < texture.smaller.size(); ++level) {
+      size = glm::max(size / 2U, glm::uvec2(1U));
+      upload_.add_image(name, {glm::uvec2(0U), size, static_cast<int>(level) + 1, std::nullopt},
+                        texture.smaller[level].data());
+      to.bytes += texture.smaller[level].size();
     }
   }
+
+  static gl::Object make_texture(const gl::FunctionsPtr& gl, const RasterSource& source, std::size_t i) {
+    const RasterSource::Texture& texture = source.textures[i];
+    const surface::Image& image = source.scene->images[texture.image];
+    GLuint name = 0;
+    gl->CreateTextures(GL_TEXTURE_2D, 1, &name);
+    gl::Object made(gl, gl::Object::Kind::texture, name);
+    gl->TextureStorage2D(name, static_cast<GLsizei>(texture.smaller.size() + 1),
+                         texture.srgb ? GL_SRGB8_ALPHA8 : GL_RGBA8, static_cast<GLsizei>(image.width),
+                         static_cast<GLsizei>(image.height));
+    gl::label(*gl, gl::Object::Kind::texture, name, "a texture of the scene");
+    gl::check(*gl, "creating a texture of the scene");
+    return made;
+  }
+
+  // What a material's program is compiled for: how it covers, bits of its maps, whether it has a coat.
+  static gl::ProgramKey key_of(const RasterSource::Material& material) {
+    return {"surface.frag",
+            {"CM_ALPHA " + std::to_string(static_cast<int>(material.pass)),
+             "CM_USED " + std::to_string(material.used()), material.coated ? "CM_COATED 1" : "CM_COATED 0"},
+            "surface.vert"};
+  }
+
+  const gl::FunctionsPtr& gl_;
+  const gl::ProgramsPtr& programs_;
+  const gl::Limits& limits_;
+  Upload& upload_;
+};
+
+std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
+                                                         const gl::Limits& limits, Upload& upload, Input input,
+                                                         const RasterContent* last) {
+  if (input.pose->vertices.size() != input.scene->scene->attributes.size()) {
+    throw Error(ErrorCode::internal, "a pose of another scene");
+  }
+  const auto content = std::make_shared<RasterContent>();
+  Planner planner(gl, programs, limits, upload);
+  if (last != nullptr && last->fixed_->source == input.scene) {
+    content->fixed_ = last->fixed_;
+  } else {
+    content->fixed_ = std::make_shared<Fixed>();
+    content->fixed_->source = std::move(input.scene);
+    planner.fix(content->fixed_);
+  }
+  content->pose_ = std::move(input.pose);
+  content->centres_ = std::move(input.centres);
+  if (!content->scene().scene->indices.empty()) {
+    planner.add_buffer(content->posed_, content->pose_->vertices, "uploading the scene's posed vertices");
+    content->posed_bytes_ = content->pose_->vertices.size() * sizeof(surface::PosedVertex);
+  }
+  return content;
 }
 
-void SurfaceRaster::make_programs(Assets& assets) const {
-  for (std::size_t i = 0; i < assets.materials.size(); ++i) {
-    const surface::Material& material = assets.scene->materials[i];
-    std::uint32_t used = 0;
-    const auto uses = uses_of(material);
-    for (std::size_t map = 0; map < uses.size(); ++map) used |= uses[map]->texture >= 0 ? 1U << map : 0U;
-    const bool coated = material.clearcoat > 0.0F;
-    const gl::Program& program =
-        programs_->get({"surface.frag",
-                        {"CM_ALPHA " + std::to_string(static_cast<int>(assets.materials[i].pass)),
-                         "CM_USED " + std::to_string(used), coated ? "CM_COATED 1" : "CM_COATED 0"},
-                        "surface.vert"});
-    assets.materials[i].program = &program;
-    if (std::ranges::find(assets.programs, &program) == assets.programs.end()) assets.programs.push_back(&program);
-  }
-}
-
-void SurfaceRaster::upload_materials(Assets& assets) const {
-  GLint alignment = 1;
-  gl_->GetIntegerv(GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT, &alignment);
-  const std::size_t stride = padded(sizeof(CmMaterial), static_cast<std::size_t>(std::max(alignment, 1)));
-  std::vector<std::byte> bytes(stride * assets.scene->materials.size());
-  for (std::size_t i = 0; i < assets.scene->materials.size(); ++i) {
-    const CmMaterial block = block_of(assets.scene->materials[i]);
-    std::memcpy(bytes.data() + i * stride, &block, sizeof(block));
-  }
-  assets.material_stride = static_cast<GLintptr>(stride);
-  if (!bytes.empty()) {
-    assets.material_block = gl::make_buffer(gl_, bytes.size(), bytes.data(), 0, "uploading the scene's materials");
-  }
-}
-
-void SurfaceRaster::prepare_draws(Assets& assets) const {
-  const std::vector<surface::Draw>& draws = assets.scene->draws;
-  for (std::uint32_t i = 0; i < draws.size(); ++i) {
-    const surface::Draw& draw = draws[i];
-    if (draw.index_count == 0) continue;
-    if (assets.materials.at(draw.material).pass != AlphaMode::blend) {
-      assets.solid.push_back({draw.first_index, draw.index_count, i});
-      continue;
-    }
-    for (std::uint32_t t = 0; t < draw.index_count; t += 3) assets.blended.push_back({draw.first_index + t, 3, i});
-  }
-  std::stable_sort(assets.solid.begin(), assets.solid.end(), [&](const Batch& a, const Batch& b) {
-    const auto key = [&](const Batch& batch) {
-      const std::uint32_t material = draws[batch.draw].material;
-      return std::pair(assets.materials[material].pass, material);
-    };
-    return key(a) < key(b);
-  });
-  if (!assets.blended.empty()) {
-    assets.sorted_indices = gl::make_buffer(gl_, assets.blended.size() * 3 * sizeof(std::uint32_t), nullptr,
-                                            GL_DYNAMIC_STORAGE_BIT, "creating the indices of blended triangles");
-  }
-}
-
-void SurfaceRaster::set_scene(surface::ScenePtr scene) {
-  Assets assets;
-  assets.scene = std::move(scene);
-  if (assets.scene != nullptr) {
-    const surface::Scene& s = *assets.scene;
-    upload_textures(assets);
-    make_programs(assets);
-    upload_materials(assets);
-    prepare_draws(assets);
-    if (!s.attributes.empty() && !s.indices.empty()) {
-      static_assert(sizeof(surface::VertexAttributes) == 32 && sizeof(surface::PosedVertex) == 40);
-      assets.attributes = gl::make_buffer(gl_, s.attributes.size() * sizeof(surface::VertexAttributes),
-                                          s.attributes.data(), 0, "uploading the scene's vertices");
-      assets.indices = gl::make_buffer(gl_, s.indices.size() * sizeof(std::uint32_t), s.indices.data(), 0,
-                                       "uploading the scene's indices");
-      assets.posed = gl::make_buffer(gl_, s.attributes.size() * sizeof(surface::PosedVertex), nullptr,
-                                     GL_DYNAMIC_STORAGE_BIT, "creating the scene's posed vertices");
-      assets.bytes += s.attributes.size() * (sizeof(surface::VertexAttributes) + sizeof(surface::PosedVertex)) +
-                      (s.indices.size() + assets.blended.size() * 3) * sizeof(std::uint32_t);
-    }
-  }
-  assets_ = std::move(assets);
-  content_ = std::make_shared<char>();
-  posed_ = false;
-  flipped_.clear();
-  lights_.clear();
-  centres_.clear();
+void SurfaceRaster::show(std::shared_ptr<const RasterContent> content) {
+  content_ = std::move(content);
+  shown_ = std::make_shared<char>();
   sorted_.clear();
   sorted_view_.reset();
 }
 
-void SurfaceRaster::set_pose(const surface::Pose& pose) {
-  const surface::Scene* scene = assets_.scene.get();
-  if (scene == nullptr || pose.vertices.size() != scene->attributes.size()) {
-    throw Error(ErrorCode::internal, "a pose of another scene");
-  }
-  content_ = std::make_shared<char>();
-  std::vector<glm::vec3> centres;
-  centres.reserve(assets_.blended.size());
-  for (const Batch& triangle : assets_.blended) {
-    glm::vec3 centre(0.0F);
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      centre += pose.vertices[scene->indices[triangle.first + i]].position * (1.0F / 3.0F);
-    }
-    centres.push_back(centre);
-  }
-  flipped_ = pose.flipped;
-  flipped_.resize(scene->draws.size(), 0);
-  double_sided_ = pose.double_sided;
-  lights_ = pose.lights;
-  low_ = pose.low;
-  high_ = pose.high;
-  centres_ = std::move(centres);
-  sorted_view_.reset();
-  if (assets_.posed) {
-    gl_->NamedBufferSubData(assets_.posed.name(), 0,
-                            static_cast<GLsizeiptr>(pose.vertices.size() * sizeof(surface::PosedVertex)),
-                            pose.vertices.data());
-    gl::check(*gl_, "uploading the scene's posed vertices");
-  }
-  posed_ = static_cast<bool>(assets_.posed);
-}
-
 void SurfaceRaster::sort_blended(const SurfaceView& view) {
-  if (assets_.blended.empty() || sorted_view_ == view) return;
+  if (!blends() || sorted_view_ == view) return;
+  const std::vector<glm::vec3>& centres = *content_->centres_;
   const glm::dmat3 matrix = to_view(view);
   const glm::dvec3 row(matrix[0][2], matrix[1][2], matrix[2][2]);
-  std::vector<double> z(centres_.size());
-  std::transform(centres_.begin(), centres_.end(), z.begin(),
+  std::vector<double> z(centres.size());
+  std::transform(centres.begin(), centres.end(), z.begin(),
                  [&](const glm::vec3& centre) { return glm::dot(row, glm::dvec3(centre) - view.eye); });
-  std::vector<std::uint32_t> order(centres_.size());
+  std::vector<std::uint32_t> order(centres.size());
   std::iota(order.begin(), order.end(), 0U);
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return z[a] > z[b]; });
   std::vector<std::uint32_t> indices;
   indices.reserve(order.size() * 3);
   sorted_.clear();
   for (const std::uint32_t i : order) {
-    const Batch& triangle = assets_.blended[i];
+    const Batch& triangle = content_->scene().blended[i];
     if (sorted_.empty() || sorted_.back().draw != triangle.draw) {
       sorted_.push_back({static_cast<std::uint32_t>(indices.size()), 0, triangle.draw});
     }
     sorted_.back().count += 3;
-    const auto first = assets_.scene->indices.begin() + triangle.first;
+    const auto first = content_->scene().scene->indices.begin() + triangle.first;
     indices.insert(indices.end(), first, first + 3);
   }
-  gl_->NamedBufferSubData(assets_.sorted_indices.name(), 0,
+  gl_->NamedBufferSubData(content_->fixed_->sorted_indices.name(), 0,
                           static_cast<GLsizeiptr>(indices.size() * sizeof(std::uint32_t)), indices.data());
   sorted_view_ = view;
 }
@@ -335,7 +256,7 @@ void SurfaceRaster::sort_blended(const SurfaceView& view) {
 void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into) {
   const auto width = static_cast<int>(size.x);
   const auto height = static_cast<int>(size.y);
-  const bool blended = !assets_.blended.empty();
+  const bool blended = blends();
   if (!depth_test_ || size != depth_test_size_) {
     depth_test_ = {};
     depth_test_ = gl::make_texture_2d(gl_, GL_DEPTH_COMPONENT32F, width, height, "creating the surfaces' depth test");
@@ -375,7 +296,8 @@ void SurfaceRaster::make_fixtures() {
 void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& lighting) {
   const glm::dmat3 matrix = to_view(view);
   const glm::vec3 eye(view.eye);
-  const glm::dvec2 depth = depth_of(view, matrix, low_, high_);
+  const glm::dvec2 depth = content_ ? depth_of(view, matrix, content_->pose_->low, content_->pose_->high)
+                                    : depth_of(view, matrix, view.eye, view.eye);
   CmSurfaceView block{};
   block.eye_high = glm::vec4(eye, 0.0F);
   block.eye_low = glm::vec4(glm::vec3(view.eye - glm::dvec3(eye)), 0.0F);
@@ -387,17 +309,19 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sun_direction = glm::vec4(lighting.sun_direction, 0.0F);
   block.sun_irradiance = glm::vec4(lighting.sun_irradiance, 0.0F);
   block.sky_radiance = glm::vec4(lighting.sky_radiance, 0.0F);
-  block.counts.x = static_cast<std::uint32_t>(lights_.size());
+  const std::span<const surface::PunctualLight> lamps =
+      content_ ? std::span(content_->pose_->lights) : std::span<const surface::PunctualLight>();
+  block.counts.x = static_cast<std::uint32_t>(lamps.size());
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
-  const std::size_t bytes = std::max<std::size_t>(lights_.size(), 1) * sizeof(CmLight);
+  const std::size_t bytes = std::max<std::size_t>(lamps.size(), 1) * sizeof(CmLight);
   if (!light_buffer_ || light_bytes_ < bytes) {
     light_buffer_ = gl::make_buffer(gl_, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the surfaces' lights");
     light_bytes_ = bytes;
   }
   std::vector<CmLight> lights;
-  lights.reserve(lights_.size());
-  for (const surface::PunctualLight& light : lights_) lights.push_back(punctual_light(light, view.eye));
+  lights.reserve(lamps.size());
+  for (const surface::PunctualLight& light : lamps) lights.push_back(punctual_light(light, view.eye));
   if (!lights.empty()) {
     gl_->NamedBufferSubData(light_buffer_.name(), 0, static_cast<GLsizeiptr>(lights.size() * sizeof(CmLight)),
                             lights.data());
@@ -408,23 +332,25 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
 
 void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) const {
   const auto& gl = *gl_;
+  const RasterContent::Fixed& fixed = *content_->fixed_;
+  const RasterSource& source = *fixed.source;
   const gl::Program* program = nullptr;
   std::optional<std::uint32_t> bound;
   for (const Batch& batch : batches) {
-    const std::uint32_t index = assets_.scene->draws[batch.draw].material;
-    const Material& material = assets_.materials[index];
-    if (program != material.program) material.program->use(gl);
-    program = material.program;
+    const std::uint32_t index = source.scene->draws[batch.draw].material;
+    const RasterSource::Material& material = source.materials[index];
+    if (program != fixed.program_of[index]) fixed.program_of[index]->use(gl);
+    program = fixed.program_of[index];
     if (bound != index) {
       for (GLuint i = 0; i < material.maps.size(); ++i) {
-        const Map& map = material.maps[i];
+        const auto& map = material.maps[i];
         const GLuint unit = core::CM_UNIT_MAPS + i;
-        gl.BindTextureUnit(unit, map.texture != 0 ? map.texture : white_.name());
-        gl.BindSampler(unit, map.sampler);
+        gl.BindTextureUnit(unit, map ? fixed.textures[map->texture].name() : white_.name());
+        gl.BindSampler(unit, map ? fixed.samplers[map->sampler].name() : 0);
       }
-      gl.BindBufferRange(GL_UNIFORM_BUFFER, core::CM_UNIFORM_MATERIAL, assets_.material_block.name(),
-                         assets_.material_stride * static_cast<GLintptr>(index), sizeof(CmMaterial));
-      if (material.double_sided || double_sided_) {
+      gl.BindBufferRange(GL_UNIFORM_BUFFER, core::CM_UNIFORM_MATERIAL, fixed.material_block.name(),
+                         static_cast<GLintptr>(RasterSource::material_stride * index), sizeof(CmMaterial));
+      if (material.double_sided || content_->pose_->double_sided) {
         gl.Disable(GL_CULL_FACE);
       } else {
         gl.Enable(GL_CULL_FACE);
@@ -432,7 +358,7 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
       bound = index;
     }
     // The picture stands on its head in the target, which turns the winding round.
-    gl.FrontFace(mirrored == (flipped_[batch.draw] != 0) ? GL_CW : GL_CCW);
+    gl.FrontFace(mirrored == (content_->pose_->flipped[batch.draw] != 0) ? GL_CW : GL_CCW);
     const std::uintptr_t offset = std::uintptr_t{batch.first} * sizeof(std::uint32_t);
     // NOLINTNEXTLINE(performance-no-int-to-ptr): so GL takes offsets
     const void* start = reinterpret_cast<const void*>(offset);
@@ -456,11 +382,12 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
   const std::array<GLenum, 2> buffers{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
   gl.NamedFramebufferDrawBuffers(target, 2, buffers.data());
   gl::Object vertex_array;
-  if (posed_) {
+  const bool drawable = content_ != nullptr && content_->drawable();
+  if (drawable) {
     vertex_array = gl::make_vertex_array(gl_);
     const GLuint array = vertex_array.name();
-    gl.VertexArrayVertexBuffer(array, 0, assets_.posed.name(), 0, sizeof(surface::PosedVertex));
-    gl.VertexArrayVertexBuffer(array, 1, assets_.attributes.name(), 0, sizeof(surface::VertexAttributes));
+    gl.VertexArrayVertexBuffer(array, 0, content_->posed_.name(), 0, sizeof(surface::PosedVertex));
+    gl.VertexArrayVertexBuffer(array, 1, content_->fixed_->attributes.name(), 0, sizeof(surface::VertexAttributes));
     const auto attribute = [&](GLuint location, GLint components, GLuint offset, GLuint binding) {
       gl.EnableVertexArrayAttrib(array, location);
       gl.VertexArrayAttribFormat(array, location, components, GL_FLOAT, GL_FALSE, offset);
@@ -501,17 +428,19 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     const float far = 0.0F;
     gl.ClearNamedFramebufferfv(target, GL_DEPTH, 0, &far);
     const glm::vec2 shift = (glm::vec2(0.5F) - surface_jitter(layer, layers)) * 2.0F / glm::vec2(size);
-    for (const gl::Program* program : assets_.programs) gl.ProgramUniform2f(program->name(), 0, shift.x, shift.y);
-    if (posed_) {
-      gl.VertexArrayElementBuffer(vertex_array.name(), assets_.indices.name());
-      draw_batches(assets_.solid, mirrored);
+    if (drawable) {
+      for (const gl::Program* program : content_->fixed_->program_of) {
+        gl.ProgramUniform2f(program->name(), 0, shift.x, shift.y);
+      }
+      gl.VertexArrayElementBuffer(vertex_array.name(), content_->fixed_->indices.name());
+      draw_batches(content_->scene().solid, mirrored);
     }
     if (!into.blended) continue;
     clear_to(layers + layer);
-    if (!posed_) continue;
+    if (!drawable) continue;
     for (GLuint i = 0; i < buffers.size(); ++i) gl.Enablei(GL_BLEND, i);
     gl.DepthMask(GL_FALSE);
-    gl.VertexArrayElementBuffer(vertex_array.name(), assets_.sorted_indices.name());
+    gl.VertexArrayElementBuffer(vertex_array.name(), content_->fixed_->sorted_indices.name());
     draw_batches(sorted_, mirrored);
     for (GLuint i = 0; i < buffers.size(); ++i) gl.Disablei(GL_BLEND, i);
   }

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "render/raster_source.hpp"
+#include "render/upload.hpp"
 #include "scene/snapshot.hpp"
 #include "surface/scene.hpp"
 
@@ -38,6 +40,52 @@ struct SurfaceLayers {
 /// glsl/jitter.glsl.
 glm::vec2 surface_jitter(unsigned layer, unsigned layers);
 
+/// A scene in a pose, as the surface pass draws it in one context.
+class RasterContent {
+ public:
+  struct Input {
+    std::shared_ptr<const RasterSource> scene;
+    std::shared_ptr<const surface::Pose> pose;  ///< of that scene
+    std::shared_ptr<const std::vector<glm::vec3>> centres;
+  };
+  /// Plans how this comes to GL: it is whole when all steps are done, and they may not outlive it. What does not move
+  /// is shared with `last` (may be null) where the scene is the same. Throws Error(unsupported) for an image that is
+  /// larger than the driver's textures, Error(internal) for a pose of another scene.
+  static std::shared_ptr<const RasterContent> plan(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
+                                                   const gl::Limits& limits, Upload& upload, Input input,
+                                                   const RasterContent* last);
+
+  /// Whether the scene has BLEND triangles, which have layers of their own.
+  [[nodiscard]] bool blends() const { return !scene().blended.empty(); }
+  /// GL memory.
+  [[nodiscard]] std::uint64_t bytes() const { return fixed_->bytes + posed_bytes_; }
+
+ private:
+  friend class SurfaceRaster;
+  /// What does not move.
+  struct Fixed {
+    std::shared_ptr<const RasterSource> source;
+    gl::Object attributes;
+    gl::Object indices;
+    gl::Object sorted_indices;  // of blended triangles
+    gl::Object material_block;
+    std::vector<gl::Object> textures;
+    std::vector<gl::Object> samplers;
+    std::vector<const gl::Program*> program_of;  // a material
+    std::uint64_t bytes = 0;
+  };
+  class Planner;
+
+  [[nodiscard]] const RasterSource& scene() const { return *fixed_->source; }
+  [[nodiscard]] bool drawable() const { return static_cast<bool>(posed_); }
+
+  std::shared_ptr<Fixed> fixed_;
+  std::shared_ptr<const surface::Pose> pose_;
+  std::shared_ptr<const std::vector<glm::vec3>> centres_;
+  gl::Object posed_;  // vertices; none where there is no triangle
+  std::uint64_t posed_bytes_ = 0;
+};
+
 /// Draws a glTF scene into layers; the mean of BLEND layers over the others is the anti-aliased picture.
 ///
 /// Materials are metallic-roughness with KHR_materials_ior, _specular, _clearcoat, _emissive_strength and _unlit, as
@@ -52,65 +100,24 @@ glm::vec2 surface_jitter(unsigned layer, unsigned layers);
 /// Needs the context current and a StateGuard around; leaves any state that the guard puts back. GL 4.5 core.
 class SurfaceRaster {
  public:
-  SurfaceRaster(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
+  explicit SurfaceRaster(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// Uploads what does not move; null: no surfaces. The pose is gone then. Throws Error(out_of_memory), or
-  /// Error(unsupported) for an image that is larger than the driver's textures, and keeps what was.
-  void set_scene(surface::ScenePtr scene);
-  /// Uploads what moves. The pose is of the scene. Throws Error(out_of_memory); Error(internal) for one that is not.
-  void set_pose(const surface::Pose& pose);
-  /// Renders layers 1 to 8 of size > 0, into textures that are made anew where they do not fit. Without scene or pose
-  /// they are empty. Throws Error(out_of_memory), the layers then gone or of an undefined content, and Error(internal)
-  /// for a view that spans no space. O(layers (triangles + pixels)).
+  /// From now on draws this, which is whole; null: no surfaces.
+  void show(std::shared_ptr<const RasterContent> content);
+  /// Renders layers 1 to 8 of size > 0, into textures that are made anew where they do not fit. Where it shows
+  /// nothing they are empty. Throws Error(out_of_memory), the layers then gone or of an undefined content, and
+  /// Error(internal) for a view that spans no space. O(layers (triangles + pixels)).
   void draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
             SurfaceLayers& into);
 
-  /// Another with every scene and every pose: what is drawn of one and the same looks the same.
-  [[nodiscard]] const std::shared_ptr<const void>& content() const { return content_; }
-  /// Whether the scene has BLEND triangles, which have layers of their own.
-  [[nodiscard]] bool blends() const { return !assets_.blended.empty(); }
-  /// GL memory of the scene, without layers.
-  [[nodiscard]] std::uint64_t bytes() const { return assets_.bytes; }
+  /// Another with every show(): what is drawn of one and the same looks the same.
+  [[nodiscard]] const std::shared_ptr<const void>& content() const { return shown_; }
+  /// Whether what it shows has BLEND triangles, which have layers of their own.
+  [[nodiscard]] bool blends() const { return content_ != nullptr && content_->blends(); }
 
  private:
-  /// A range of indices with one state.
-  struct Batch {
-    std::uint32_t first = 0;
-    std::uint32_t count = 0;
-    std::uint32_t draw = 0;
-  };
-  /// One use of a texture: names are into Assets.
-  struct Map {
-    GLuint texture = 0;
-    GLuint sampler = 0;
-  };
-  struct Material {
-    std::array<Map, 10> maps{};
-    surface::AlphaMode pass = surface::AlphaMode::opaque;
-    bool double_sided = false;
-    const gl::Program* program = nullptr;
-  };
-  struct Assets {
-    surface::ScenePtr scene;
-    gl::Object attributes;
-    gl::Object indices;
-    gl::Object material_block;
-    GLintptr material_stride = 0;
-    std::vector<gl::Object> textures;
-    std::vector<gl::Object> samplers;
-    std::vector<Material> materials;
-    std::vector<const gl::Program*> programs;  // of the materials, each once
-    std::vector<Batch> solid;                  // OPAQUE, then MASK
-    std::vector<Batch> blended;                // a triangle each
-    gl::Object posed;                          // vertices
-    gl::Object sorted_indices;                 // of blended triangles
-    std::uint64_t bytes = 0;
-  };
+  using Batch = RasterSource::Batch;
 
-  void upload_textures(Assets& assets) const;
-  void make_programs(Assets& assets) const;
-  void upload_materials(Assets& assets) const;
-  void prepare_draws(Assets& assets) const;
   void sort_blended(const SurfaceView& view);
   void make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into);
   void make_fixtures();
@@ -118,17 +125,9 @@ class SurfaceRaster {
   void draw_batches(std::span<const Batch> batches, bool mirrored) const;
 
   gl::FunctionsPtr gl_;
-  gl::ProgramsPtr programs_;
-  Assets assets_;
-  std::shared_ptr<const void> content_;
-  bool posed_ = false;
-  bool double_sided_ = false;  // all materials of the pose
-  std::vector<std::uint8_t> flipped_;
-  std::vector<surface::PunctualLight> lights_;
-  glm::dvec3 low_{0.0};
-  glm::dvec3 high_{0.0};
-  std::vector<glm::vec3> centres_;  // of blended triangles
-  std::vector<Batch> sorted_;       // of blended triangles, into sorted_indices
+  std::shared_ptr<const RasterContent> content_;
+  std::shared_ptr<const void> shown_;
+  std::vector<Batch> sorted_;  // of blended triangles, into sorted_indices
   std::optional<SurfaceView> sorted_view_;
 
   gl::Object white_;

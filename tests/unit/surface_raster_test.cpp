@@ -39,12 +39,14 @@ namespace {
 using cumulet::Error;
 using cumulet::ErrorCode;
 using cumulet::gl::StateGuard;
+using RasterContentPtr = std::shared_ptr<const cumulet::render::RasterContent>;
 using cumulet::render::surface_jitter;
 using cumulet::render::SurfaceLayers;
 using cumulet::render::SurfaceLighting;
 using cumulet::render::SurfaceRaster;
 using cumulet::render::SurfaceView;
 namespace core = cumulet::core;
+namespace render = cumulet::render;
 namespace surface = cumulet::surface;
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
@@ -131,7 +133,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
  protected:
   void SetUp() override {
     GlTest::SetUp();
-    if (gl_) raster_ = std::make_unique<SurfaceRaster>(gl_, programs_);
+    if (gl_) raster_ = std::make_unique<SurfaceRaster>(gl_);
   }
   void TearDown() override {
     raster_.reset();
@@ -141,8 +143,18 @@ class SurfaceRasters : public cumulet::test::GlTest {
 
   void set(const std::shared_ptr<HandScene>& scene) {
     const StateGuard guard(*gl_);
-    raster_->set_scene(scene);
-    raster_->set_pose(scene->pose(0.0, 0));
+    raster_->show(content_of(scene, scene->pose(0.0, 0)));
+  }
+  /// In GL.
+  RasterContentPtr content_of(const std::shared_ptr<HandScene>& scene, surface::Pose pose) {
+    auto source = render::make_raster_source(scene);
+    auto centres = std::make_shared<const std::vector<glm::vec3>>(render::blended_centres(*source, pose));
+    render::Upload upload(gl_, "uploading");
+    auto content = render::RasterContent::plan(
+        gl_, programs_, cumulet::gl::query_limits(*gl_), upload,
+        {std::move(source), std::make_shared<const surface::Pose>(std::move(pose)), std::move(centres)}, nullptr);
+    EXPECT_TRUE(upload.advance(render::Deadline::max()));
+    return content;
   }
   Picture draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size = {32U, 32U},
                unsigned layers = 1) {
@@ -218,7 +230,7 @@ TEST_P(SurfaceRasters, NothingIsInfinitelyFarAndTransparent) {
   EXPECT_NEAR(draw(straight({0, 0, 0}, 1.0), {}).centre_z(), 2.0F, 1e-6F);
   {
     const StateGuard guard(*gl_);
-    raster_->set_scene(nullptr);
+    raster_->show(nullptr);
   }
   EXPECT_EQ(draw(straight({0, 0, 0}, 1.0), {}).centre_z(), infinite);
 }
@@ -848,7 +860,7 @@ TEST_P(SurfaceRasters, PreviewsAreSharp) {
   EXPECT_NE(&coarse.layers(), &fine.layers()) << "another view";
   tracer.draw_layers(coarse, surfaces, settings);
   EXPECT_EQ(&coarse.layers(), &fine.layers());
-  raster_->set_pose(scene->pose(0.0, 0));
+  raster_->show(content_of(scene, scene->pose(0.0, 0)));
   tracer.draw_layers(fine, surfaces, settings);
   EXPECT_NE(&coarse.layers(), &fine.layers()) << "another pose";
   EXPECT_LE(tracer.bytes(), 2 * bytes) << "what no picture shows is used again";
@@ -925,7 +937,7 @@ TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
     {
       // All of it again under this state: uploads too.
       const StateGuard guard(*gl_);
-      raster_ = std::make_unique<SurfaceRaster>(gl_, programs_);
+      raster_ = std::make_unique<SurfaceRaster>(gl_);
     }
     set(scene);
     const Picture picture = draw(straight({0, 0, 0}, 0.5), lighting, {16U, 16U}, 2);
@@ -952,11 +964,11 @@ TEST_P(SurfaceRasters, RefusesWhatDoesNotFit) {
   };
   surface::Pose pose = scene->pose(0.0, 0);
   pose.vertices.pop_back();
-  EXPECT_EQ(code_of([&] { raster_->set_pose(pose); }), ErrorCode::internal);
+  EXPECT_EQ(code_of([&] { content_of(scene, pose); }), ErrorCode::internal);
   const auto huge = std::make_shared<HandScene>();
   huge->add_matte(glm::vec3(1.0F)).base_color_texture.texture =
       huge->add_texture(1U << 20U, 1, std::vector<std::uint8_t>(std::size_t{4} << 20U));
-  EXPECT_EQ(code_of([&] { raster_->set_scene(huge); }), ErrorCode::unsupported);
+  EXPECT_EQ(code_of([&] { content_of(huge, huge->pose(0.0, 0)); }), ErrorCode::unsupported);
   SurfaceView flat = straight({0, 0, 0}, 0.5);
   flat.up = flat.right;
   EXPECT_EQ(code_of([&] { raster_->draw(flat, {}, {4U, 4U}, 1, layers_); }), ErrorCode::internal);

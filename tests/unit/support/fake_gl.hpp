@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
 #include <unordered_map>
 #include <utility>
@@ -72,6 +73,8 @@ class FakeGl {
     return count;
   }
   [[nodiscard]] std::uint64_t allocations() const { return allocations_; }
+  /// Bytes that were copied to buffers and textures (of four bytes a texel) from main memory.
+  [[nodiscard]] std::uint64_t uploaded() const { return uploaded_; }
   /// The allocation that was refused last, "" if none was.
   [[nodiscard]] const std::string& refused() const { return refused_; }
   /// Objects made and not deleted, by kind: "Buffers", "Textures", "Shader", "Sync", ...
@@ -186,6 +189,7 @@ class FakeGl {
           return Result();
         }
       }
+      fake->uploaded_ += bytes_of(args...);
       if constexpr (starts(name, "Delete")) fake->deleted(kind_of(name), convert(args)...);
       if constexpr (std::is_void_v<Result>) {
         (fake->real_.*Member)(args...);
@@ -198,6 +202,21 @@ class FakeGl {
     }
 
    private:
+    static std::uint64_t bytes_of([[maybe_unused]] Args... args) {
+      [[maybe_unused]] const std::tuple<Args...> all(args...);
+      [[maybe_unused]] const auto product = [](auto... sizes) { return (std::uint64_t{4} * ... * sizes); };
+      if constexpr (F == Fn::NamedBufferSubData) {
+        return std::get<2>(all);
+      } else if constexpr (F == Fn::NamedBufferStorage) {
+        return std::get<2>(all) != nullptr ? std::get<1>(all) : 0;
+      } else if constexpr (F == Fn::TextureSubImage2D) {
+        return product(std::get<4>(all), std::get<5>(all));
+      } else if constexpr (F == Fn::TextureSubImage3D) {
+        return product(std::get<5>(all), std::get<6>(all), std::get<7>(all));
+      } else {
+        return 0;
+      }
+    }
     template <class Value>
     static auto convert(Value value) {
       if constexpr (std::is_same_v<Value, GLsync>) {
@@ -238,6 +257,7 @@ class FakeGl {
   std::uint64_t calls_ = 0;
   std::array<std::uint64_t, static_cast<std::size_t>(Fn::count)> calls_of_{};
   std::uint64_t allocations_ = 0;
+  std::uint64_t uploaded_ = 0;
   std::int64_t fail_at_ = -1;
   bool fail_storage_ = false;
   std::int64_t lose_at_ = -1;

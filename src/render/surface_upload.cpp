@@ -1,0 +1,38 @@
+#include "render/surface_upload.hpp"
+
+#include "base/error.hpp"
+
+namespace cumulet::render {
+
+SurfaceUpload::SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
+                             SurfaceSourcePtr source, SurfaceParts parts, const SurfaceData* last_data,
+                             RasterContentPtr last_raster)
+    : gl_(gl),
+      programs_(std::move(programs)),
+      limits_(limits),
+      source_(std::move(source)),
+      last_raster_(std::move(last_raster)),
+      paths_(gl, "uploading the surfaces"),
+      raster_(gl, "uploading the surfaces of previews"),
+      raster_due_(parts != SurfaceParts::paths) {
+  if (parts != SurfaceParts::raster) data_ = SurfaceData::plan(gl_, limits_, paths_, *source_, last_data);
+}
+
+bool SurfaceUpload::advance(Deadline deadline) {
+  if (!paths_.advance(deadline)) return false;
+  if (!raster_due_) return true;
+  try {
+    if (!content_) {
+      const RasterContent::Input input{source_->raster, {source_, &source_->pose}, {source_, &source_->centres}};
+      content_ = RasterContent::plan(gl_, programs_, limits_, raster_, input, last_raster_.get());
+    }
+    raster_due_ = !raster_.advance(deadline);
+  } catch (const Error&) {
+    content_.reset();
+    raster_due_ = false;
+    throw;
+  }
+  return !raster_due_;
+}
+
+}  // namespace cumulet::render

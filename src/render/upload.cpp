@@ -1,0 +1,50 @@
+#include "render/upload.hpp"
+
+#include <algorithm>
+
+namespace cumulet::render {
+
+void Upload::add_pieces(std::size_t bytes, const std::function<void(std::size_t, std::size_t)>& copy,
+                        std::size_t unit) {
+  const std::size_t piece = std::max(piece_bytes / unit, std::size_t{1}) * unit;
+  for (std::size_t first = 0; first < bytes; first += piece) {
+    add([copy, first, count = std::min(piece, bytes - first)] { copy(first, count); });
+  }
+}
+
+void Upload::add_bytes(std::function<GLuint()> buffer, std::size_t offset, const void* bytes, std::size_t size) {
+  add_pieces(size, [this, buffer = std::move(buffer), offset, from = static_cast<const std::byte*>(bytes)](
+                       std::size_t first, std::size_t count) {
+    gl_->NamedBufferSubData(buffer(), static_cast<GLintptr>(offset + first), static_cast<GLsizeiptr>(count),
+                            from + first);
+  });
+}
+
+void Upload::add_image(std::function<GLuint()> texture, const Rectangle& to, const std::uint8_t* rgba) {
+  const std::size_t row = std::size_t{to.size.x} * 4;
+  const auto copy = [this, texture = std::move(texture), to, rgba, row](std::size_t first, std::size_t count) {
+    const auto x = static_cast<GLint>(to.corner.x);
+    const auto y = static_cast<GLint>(to.corner.y + first / row);
+    const auto width = static_cast<GLsizei>(to.size.x);
+    const auto height = static_cast<GLsizei>(count / row);
+    if (to.layer) {
+      gl_->TextureSubImage3D(texture(), to.level, x, y, *to.layer, width, height, 1, GL_RGBA, GL_UNSIGNED_BYTE,
+                             rgba + first);
+    } else {
+      gl_->TextureSubImage2D(texture(), to.level, x, y, width, height, GL_RGBA, GL_UNSIGNED_BYTE, rgba + first);
+    }
+  };
+  add_pieces(row * to.size.y, copy, row);
+}
+
+bool Upload::advance(Deadline deadline) {
+  while (next_ < steps_.size()) {
+    steps_[next_]();
+    gl::check(*gl_, what_);
+    ++next_;
+    if (std::chrono::steady_clock::now() >= deadline) break;
+  }
+  return done();
+}
+
+}  // namespace cumulet::render

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "gl/objects.hpp"
+
+namespace cumulet::render {
+
+using Deadline = std::chrono::steady_clock::time_point;
+
+/// The way of anything large to GL: steps of about a millisecond each, as many at a time as fit before a deadline.
+/// All calls but those that plan need the context current and a StateGuard around.
+class Upload {
+ public:
+  /// What a step copies at most, but for rows of images that are longer.
+  static constexpr std::size_t piece_bytes = std::size_t{2} << 20U;
+
+  /// A part of a texture: of one level and, if it is an array, of one layer.
+  struct Rectangle {
+    glm::uvec2 corner{0U};
+    glm::uvec2 size{0U};
+    int level = 0;
+    std::optional<int> layer;
+  };
+
+  /// what: of errors of GL's, "uploading the volume".
+  Upload(gl::FunctionsPtr gl, const char* what) : gl_(std::move(gl)), what_(what) {}
+  Upload(const Upload&) = delete;
+  Upload& operator=(const Upload&) = delete;
+
+  // To plan; what the steps look at has to live until the last was made.
+  void add(std::function<void()> step) { steps_.push_back(std::move(step)); }
+  /// A step for each piece of this many bytes: copy(first, count). Pieces are of whole units.
+  void add_pieces(std::size_t bytes, const std::function<void(std::size_t, std::size_t)>& copy, std::size_t unit = 1);
+  /// Into a buffer with GL_DYNAMIC_STORAGE_BIT, asked for by name when it is there.
+  void add_bytes(std::function<GLuint()> buffer, std::size_t offset, const void* bytes, std::size_t size);
+  /// Into an 8-bit RGBA texture, of rows from the top without gaps.
+  void add_image(std::function<GLuint()> texture, const Rectangle& to, const std::uint8_t* rgba);
+
+  /// Works until the deadline, one step at least. Returns whether all are done. Throws what a step throws, and
+  /// Error(out_of_memory, gl); then there is nothing to go on with.
+  bool advance(Deadline deadline);
+  [[nodiscard]] bool done() const { return next_ == steps_.size(); }
+  [[nodiscard]] double progress() const { return steps_.empty() ? 1.0 : double(next_) / double(steps_.size()); }
+
+ private:
+  gl::FunctionsPtr gl_;
+  const char* what_;
+  std::vector<std::function<void()>> steps_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace cumulet::render
