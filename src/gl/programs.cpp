@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <span>
+#include <string_view>
 #include <utility>
 
 #include "base/error.hpp"
@@ -93,6 +95,16 @@ const Program& Programs::get(const ProgramKey& key) {
   Program& program = *programs_.at(key);
   if (program.state_ == Program::State::compiling) finish(key, program);
   return program;
+}
+
+Programs::Counts Programs::counts() const {
+  Counts counts;
+  for (const auto& [key, program] : programs_) {
+    ++counts.asked;
+    counts.usable += program->usable() ? 1 : 0;
+    counts.ready += program->state() == Program::State::ready ? 1 : 0;
+  }
+  return counts;
 }
 
 void Programs::begin(const ProgramKey& key, Program& program) {
@@ -189,6 +201,31 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
     if (log_ != nullptr) log_->warning(std::string("no program binaries are kept: ") + error.what());
     files_.reset();  // once is enough
   }
+}
+
+std::vector<ProgramKey> all_programs() {
+  std::vector<ProgramKey> all;
+  for (const Shader& shader : shaders()) {
+    if (shader.name.ends_with(".vert")) continue;
+    const std::string name(shader.name);
+    const bool fragment = shader.name.ends_with(".frag");
+    const std::string vertex = fragment ? name.substr(0, name.size() - 4) + "vert" : "";
+    for (const std::span<const ShaderMacro> macros : shader.variants) {
+      std::vector<ProgramKey> keys{{name, {}, vertex}};
+      for (const ShaderMacro& macro : macros) {
+        std::vector<ProgramKey> longer;
+        for (const ProgramKey& key : keys) {
+          for (const std::string_view value : macro.values.first(macro.range ? 1 : macro.values.size())) {
+            longer.push_back(key);
+            longer.back().defines.push_back(std::string(macro.name) + " " + std::string(value));
+          }
+        }
+        keys = std::move(longer);
+      }
+      all.insert(all.end(), keys.begin(), keys.end());
+    }
+  }
+  return all;
 }
 
 void find_out_dispatches(const FunctionsPtr& gl, Programs& programs) {

@@ -96,6 +96,13 @@ class Programs {
   const Program& ask(const ProgramKey& key);
   /// The same, linked: waits for the driver.
   const Program& get(const ProgramKey& key);
+  /// Those that were asked for, and those of them that were used: the driver has no more to compile for these.
+  struct Counts {
+    std::size_t asked = 0;
+    std::size_t usable = 0;
+    std::size_t ready = 0;
+  };
+  [[nodiscard]] Counts counts() const;
   /// Whether the driver compiles while the calling thread does other things (KHR_parallel_shader_compile).
   [[nodiscard]] bool parallel() const { return parallel_; }
   /// Whether a context of the group is current on the calling thread.
@@ -125,6 +132,9 @@ class Programs {
 };
 
 using ProgramsPtr = std::shared_ptr<Programs>;
+
+/// Every variant in the table; of macros with a range of numbers the first.
+std::vector<ProgramKey> all_programs();
 
 /// Finds out Functions::dispatches_in_call, by a small dispatch. Needs a StateGuard around. Throws on a GL error.
 void find_out_dispatches(const FunctionsPtr& gl, Programs& programs);

@@ -66,9 +66,13 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
     if (older && picture.may_lag && !resolves_now()) return newest_;
   }
   if (no_memory_for_ == picture.size) return nullptr;
-  const gl::Program& program = programs_->get(
+  const gl::Program& program = programs_->ask(
       {"resolve.comp",
        {picture.holes ? "CM_HOLES 1" : "CM_HOLES 0", "CM_BACKGROUND " + std::to_string(static_cast<int>(background))}});
+  if (!program.usable()) {
+    lags_ = true;
+    return alike ? newest_ : nullptr;
+  }
   const gl::DebugGroup group(*gl_, "cumulet: resolve");
   const auto begun = Clock::now();
   Means* means = nullptr;
@@ -127,15 +131,24 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const Background without = display.transparent ? Background::left_out : Background::added;
   Means* const means = resolve(picture, layered ? Background::apart : without);
   const auto begun = Clock::now();
-  const bool resolved = means != nullptr;
-  const glm::uvec2 size = resolved ? means->of.size : picture.size;
+  // Without means either there is no memory for them, or the driver is at their program still.
+  const bool resolved = means != nullptr || lags_;
+  const glm::uvec2 size = means != nullptr ? means->of.size : picture.size;
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
   std::vector<std::string> defines{"CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
                                    resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
                                    display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
   if (layered) defines.emplace_back("CM_LAYERS 1");
-  const gl::Program& program = programs_->get(key_of(std::move(defines)));
+  const Inputs inputs{layered, resolved, bilinear};
+  const gl::Program* const wanted = &programs_->ask(key_of(std::move(defines)));
+  if (!wanted->usable()) lags_ = true;
+  // Until it is there, the tone map or encoding of before.
+  const bool last = !wanted->usable() && colour_ != nullptr && colour_inputs_ == inputs;
+  const gl::Program* const shown = last ? colour_ : wanted;
+  if ((resolved && means == nullptr) || !shown->usable()) return;
+  colour_ = shown;
+  colour_inputs_ = inputs;
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
                       static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
@@ -145,7 +158,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, resolved ? means->background.name() : picture.background);
   }
 
-  const GLuint colour = program.name();
+  const GLuint colour = shown->name();
   gl.ProgramUniform4i(colour, 0, viewport.x, viewport.y, viewport.z, viewport.w);
   gl.ProgramUniform1i(colour, 1, as_bool(target.flip_y));
   gl.ProgramUniform1f(colour, 2, exposure_of(display));
@@ -172,12 +185,15 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   }
   gl.Disable(GL_DEPTH_TEST);
   gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  program.use(gl);
+  shown->use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
 
-  if (target.write_depth && picture.volume_z != 0) {
-    const gl::Program& depth_program = programs_->get(key_of({"CM_DEPTH 1"}));
-    const GLuint depth = depth_program.name();
+  const bool depths = target.write_depth && picture.volume_z != 0;
+  const gl::Program* const depth_program = depths ? &programs_->ask(key_of({"CM_DEPTH 1"})) : nullptr;
+  if (depth_program != nullptr && !depth_program->usable()) {
+    lags_ = true;
+  } else if (depth_program != nullptr) {
+    const GLuint depth = depth_program->name();
     gl.BindTextureUnit(core::CM_UNIT_VOLUME_Z, picture.volume_z);
     gl.ProgramUniform4i(depth, 0, viewport.x, viewport.y, viewport.z, viewport.w);
     gl.ProgramUniform1i(depth, 1, as_bool(target.flip_y));
@@ -187,7 +203,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     gl.Enable(GL_DEPTH_TEST);
     gl.DepthFunc(target.reversed ? GL_GEQUAL : GL_LEQUAL);
     gl.DepthMask(GL_TRUE);
-    depth_program.use(gl);
+    depth_program->use(gl);
     gl.DrawArrays(GL_TRIANGLES, 0, 3);
     gl.Disable(GL_DEPTH_TEST);
     gl.DepthMask(GL_FALSE);

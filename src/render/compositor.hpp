@@ -63,7 +63,8 @@ class Compositor {
   /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
   [[nodiscard]] bool drawn() const { return newest_ == nullptr || newest_->drawn.passed(); }
   /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
-  /// that the device has not come to: to be drawn again.
+  /// that the device has not come to, or as it was drawn then, or nothing, its programs not being there yet: to be
+  /// drawn again.
   [[nodiscard]] bool lags() const { return lags_; }
 
  private:
@@ -100,6 +101,15 @@ class Compositor {
   gl::ProgramsPtr programs_;
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
+  // What a program that draws colours reads.
+  struct Inputs {
+    bool layered = false;
+    bool resolved = false;
+    bool bilinear = false;
+    bool operator==(const Inputs&) const = default;
+  };
+  const gl::Program* colour_ = nullptr;  // the last
+  Inputs colour_inputs_;
   std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
   std::optional<Error> no_memory_;           // to be told
   double resolve_ms_ = 0.0;                  // within the call

@@ -189,6 +189,7 @@ bool HostDepth::update(const HostDepthInput& input) {
     size_ = glm::uvec2(0U);
     layers_ = 0;
     asked_.clear();
+    waits_ = false;
     return had;
   }
   const gl::DebugGroup group(*gl_, "cumulet: host depth");
@@ -204,7 +205,9 @@ bool HostDepth::update(const HostDepthInput& input) {
   const auto layers = static_cast<unsigned>(std::clamp(source.samples, 1, most_layers));
   const bool multisample = source.samples > 0;
   const gl::Program& program =
-      programs_->get({"host_depth.comp", {multisample ? "CM_MULTISAMPLE 1" : "CM_MULTISAMPLE 0"}});
+      programs_->ask({"host_depth.comp", {multisample ? "CM_MULTISAMPLE 1" : "CM_MULTISAMPLE 0"}});
+  waits_ = !program.usable();
+  if (waits_) return earlier;
   if (!sampler_) sampler_ = gl::make_sampler(gl_);
   if (!changed_) changed_ = gl::make_buffer(gl_, 4, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the depth's flag");
   if (!answers_) answers_ = gl::ReadBack(gl_, most_asked * 4, "creating the depth's flags");

@@ -36,7 +36,7 @@ class HostDepth {
   /// the viewport; z is then what it was. O(pixels).
   bool update(const HostDepthInput& input);
   /// Whether it is still to be told if z differs: a later update will.
-  [[nodiscard]] bool pending() const { return !asked_.empty(); }
+  [[nodiscard]] bool pending() const { return waits_ || !asked_.empty(); }
   /// GL_TEXTURE_2D_ARRAY, r32f; 0 without input.
   [[nodiscard]] GLuint texture() const { return z_.name(); }
   [[nodiscard]] glm::uvec2 size() const { return size_; }
@@ -74,6 +74,7 @@ class HostDepth {
     gl::Fence fence;
   };
   std::deque<Asked> asked_;
+  bool waits_ = false;  // for its program
   std::size_t next_place_ = 0;
 };
 

@@ -101,6 +101,10 @@ bool Progressive::blurs() const {
          working_->picture->layers().size != wish_.content.size;
 }
 
+bool Progressive::able(const MarchData& data, const Surfaces& surfaces, const PictureSettings& settings) {
+  return tracer_.able(data, wish_.parameters, surfaces, settings);
+}
+
 void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces,
                         const PictureSettings& settings) {
   PictureParameters parameters = wish_.parameters;
@@ -162,11 +166,18 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
       if (blurs() && rests) schedule_.drop();
       if (state() == State::due) {
         first_divisor_ = coarsest(budget_ms);
-        start(first_divisor_, data, surfaces, settings(first_divisor_, surfaces, budget_ms, rests));
+        const PictureSettings first = settings(first_divisor_, surfaces, budget_ms, rests);
+        const bool ready = able(data, surfaces, first);
+        // The driver may be at the others meanwhile.
+        if (first_divisor_ > finest_) able(data, surfaces, settings(finest_, surfaces, budget_ms, true));
+        if (!ready) return;
+        start(first_divisor_, data, surfaces, first);
         schedule_.begin();
       } else if (state() == State::refining && working_->divisor > finest_ && is_enough()) {
         const std::uint32_t divisor = working_->divisor / 2;
-        start(divisor, data, surfaces, settings(divisor, surfaces, budget_ms, true));
+        const PictureSettings finer = settings(divisor, surfaces, budget_ms, true);
+        if (!able(data, surfaces, finer)) return;
+        start(divisor, data, surfaces, finer);
       }
       work(data, surfaces, deadline);
     } while (state() != State::done && Clock::now() < deadline);

@@ -105,6 +105,8 @@ class Progressive {
                                          bool still) const;
   // Whether what is under way is over a coarser surface pass than what rests shall be.
   [[nodiscard]] bool blurs() const;
+  // Whether start() can begin; until then there is what there was.
+  bool able(const MarchData& data, const Surfaces& surfaces, const PictureSettings& settings);
   Picture& acquire(glm::uvec2 size);
   void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, const PictureSettings& settings);
   [[nodiscard]] bool needs_depth() const;

@@ -114,8 +114,10 @@ class RasterContent::Planner {
       upload_.add([programs = programs_, to, i] { programs->ask(key_of(to->source->materials[i])); });
     }
     for (std::size_t i = 0; i < source.materials.size(); ++i) {
-      upload_.add(
-          [programs = programs_, to, i] { to->program_of[i] = &programs->get(key_of(to->source->materials[i])); });
+      upload_.add_until([programs = programs_, to, i] {
+        to->program_of[i] = &programs->ask(key_of(to->source->materials[i]));
+        return to->program_of[i]->usable();
+      });
     }
     add_buffer(to->material_block, source.material_blocks, "uploading the scene's materials");
     to->bytes += source.material_blocks.size();

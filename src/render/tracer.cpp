@@ -149,7 +149,8 @@ std::uint64_t Picture::bytes() const {
 const Tracer::Program& Tracer::program(const MarchData& data, const char* name, std::span<const std::string> more) {
   gl::ProgramKey key{name, data.defines()};
   key.defines.insert(key.defines.end(), more.begin(), more.end());
-  const gl::Program& made = programs_->get(key);
+  const gl::Program& made = asked_ ? programs_->ask(key) : programs_->get(key);
+  if (asked_) asked_ = *asked_ && made.usable();
   Program& program = used_[std::move(key)];
   program.object = &made;
   return program;
@@ -161,6 +162,48 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   if (picture.traced_ == 0 && picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
   return program(data, "trace.comp", more);
+}
+
+template <class Find>
+bool Tracer::asked(Find&& find) {
+  if (!programs_->parallel()) return true;
+  asked_ = true;
+  try {
+    find();
+  } catch (...) {
+    asked_.reset();
+    throw;
+  }
+  return *std::exchange(asked_, std::nullopt);
+}
+
+void Tracer::find_programs(const Picture& picture, const MarchData& data, const Surfaces& surfaces) {
+  if (picture.view_ == View::shaded) {
+    trace_program(picture, data);
+  } else {
+    inspect_program(data, surfaces, "inspect.comp");
+  }
+}
+
+unsigned Tracer::traced_of(const PictureParameters& parameters, const Surfaces& surfaces,
+                           const PictureSettings& settings) {
+  // A preview's volume is lit by sun and sky alone, as its surfaces are, so that it comes at once; by what the scene
+  // has where there is no other light.
+  const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
+  const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
+  const SurfaceData* met = settings.view == View::shaded && !preview ? surfaces.met() : nullptr;
+  return met == nullptr ? 0 : (met->emitters() ? 2 : 1);
+}
+
+bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,
+                  const PictureSettings& settings) {
+  const bool layered = settings.view == View::shaded && settings.layered != Layered::no && surfaces.raster != nullptr;
+  Picture like;
+  like.view_ = settings.view;
+  like.traced_ = traced_of(parameters, surfaces, settings);
+  like.layered_ = layered ? settings.layered : Layered::no;
+  like.volume_alone_ = settings.view == View::shaded && settings.volume_alone;
+  return asked([&] { find_programs(like, data, surfaces); });
 }
 
 const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name) {
@@ -261,12 +304,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   if (!picture.sum_ || size != picture.size_) allocate(picture, size);
   picture.complete_ = false;
   picture.facts_.reset();
-  // A preview's volume is lit by sun and sky alone, as its surfaces are, so that it comes at once; by what the scene
-  // has where there is no other light.
-  const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
-  const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const SurfaceData* met = shaded && !preview ? surfaces.met() : nullptr;
-  picture.traced_ = met == nullptr ? 0 : (met->emitters() ? 2 : 1);
+  picture.view_ = settings.view;
+  picture.traced_ = traced_of(parameters, surfaces, settings);
   picture.layered_ = Layered::no;
   if (shaded && settings.layered != Layered::no && surfaces.raster != nullptr) {
     draw_layers(picture, surfaces, settings);
@@ -281,11 +320,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
     picture.volume_sum_ = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
                                               "creating the sum of the volume alone");
   }
-  if (shaded) {
-    trace_program(picture, data);
-  } else {
-    inspect_program(data, surfaces, "inspect.comp");
-  }
+  find_programs(picture, data, surfaces);
   picture.parameters_ = assemble(parameters, data, surfaces);
   picture.target_samples_ = samples;
   if (picture.layered_ != Layered::no) {
@@ -293,7 +328,6 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
     picture.parameters_.layers = {layers.layers, layers.blended ? 1U : 0U, layers.size,
                                   picture.layered_ == Layered::within ? 1U : 0U};
   }
-  picture.view_ = settings.view;
   if (!shaded) picture.parameters_.dispatch.view = static_cast<std::uint32_t>(settings.view);
   picture.tile_size_ = tile;
   picture.tiles_ = (size + tile - 1U) / tile;
@@ -577,6 +611,7 @@ bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameter
 
 bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
   if (picture.depth_done_) return true;
+  if (!asked([&] { inspect_program(data, surfaces, "inspect.comp"); })) return false;
   if (!picture.volume_z_) {
     picture.volume_z_ = gl::make_texture_2d(gl_, GL_R32F, static_cast<int>(picture.size_.x),
                                             static_cast<int>(picture.size_.y), "creating the depth texture");

@@ -158,6 +158,10 @@ class Tracer {
   Tracer(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
       : gl_(gl), programs_(std::move(programs)), flights_(gl), rasters_(std::move(gl)) {}
 
+  /// Whether the programs are there that begin() with these settings needs, without waiting for a driver that compiles
+  /// them in parallel; where it does not, they will be. Throws if one does not build.
+  bool able(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,
+            const PictureSettings& settings);
   /// Starts a picture anew, of so many samples a pixel. Throws with the picture as it was, or not complete.
   void begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
              const Surfaces& surfaces, const PictureSettings& settings);
@@ -222,6 +226,14 @@ class Tracer {
   // Whether the surface pass is done, where a dispatch that reads it would wait for it.
   bool layers_ready(Deadline deadline);
   const Program& program(const MarchData& data, const char* name, std::span<const std::string> more);
+  // Whether these are there: they are asked for, not waited for, while find looks them up.
+  template <class Find>
+  bool asked(Find&& find);
+  // All that a picture is traced with.
+  void find_programs(const Picture& picture, const MarchData& data, const Surfaces& surfaces);
+  // What paths of a picture with these settings meet.
+  static unsigned traced_of(const PictureParameters& parameters, const Surfaces& surfaces,
+                            const PictureSettings& settings);
   const Program& trace_program(const Picture& picture, const MarchData& data);
   const Program& inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name);
   // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
@@ -238,6 +250,7 @@ class Tracer {
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   std::uint64_t revision_ = 0;                              // the newest of its pictures'
+  std::optional<bool> asked_;                               // in asked(): whether all so far are there
   std::map<gl::ProgramKey, Program> used_;                  // those that this one used, and what they cost
   std::vector<std::shared_ptr<DrawnLayers>> drawn_layers_;  // pictures share them
   gl::Object paths_;

@@ -39,8 +39,9 @@ void Upload::add_image(std::function<GLuint()> texture, const Rectangle& to, con
 
 bool Upload::advance(Deadline deadline) {
   while (next_ < steps_.size()) {
-    steps_[next_]();
+    const bool made = steps_[next_]();
     gl::check(*gl_, what_);
+    if (!made) break;
     ++next_;
     if (std::chrono::steady_clock::now() >= deadline) break;
   }

@@ -36,7 +36,14 @@ class Upload {
   Upload& operator=(const Upload&) = delete;
 
   // To plan; what the steps look at has to live until the last was made.
-  void add(std::function<void()> step) { steps_.push_back(std::move(step)); }
+  void add(std::function<void()> step) {
+    add_until([step = std::move(step)] {
+      step();
+      return true;
+    });
+  }
+  /// What is not done before it returns true, which it is asked once a call.
+  void add_until(std::function<bool()> step) { steps_.push_back(std::move(step)); }
   /// A step for each piece of this many bytes: copy(first, count). Pieces are of whole units.
   void add_pieces(std::size_t bytes, const std::function<void(std::size_t, std::size_t)>& copy, std::size_t unit = 1);
   /// Into a buffer with GL_DYNAMIC_STORAGE_BIT, asked for by name when it is there.
@@ -44,8 +51,8 @@ class Upload {
   /// Into an 8-bit RGBA texture, of rows from the top without gaps.
   void add_image(std::function<GLuint()> texture, const Rectangle& to, const std::uint8_t* rgba);
 
-  /// Works until the deadline, one step at least. Returns whether all are done. Throws what a step throws, and
-  /// Error(out_of_memory, gl); then there is nothing to go on with.
+  /// Works until the deadline, one step at least, or to one that has to wait. Returns whether all are done. Throws what
+  /// a step throws, and Error(out_of_memory, gl); then there is nothing to go on with.
   bool advance(Deadline deadline);
   [[nodiscard]] bool done() const { return next_ == steps_.size(); }
   [[nodiscard]] double progress() const { return steps_.empty() ? 1.0 : double(next_) / double(steps_.size()); }
@@ -53,7 +60,7 @@ class Upload {
  private:
   gl::FunctionsPtr gl_;
   const char* what_;
-  std::vector<std::function<void()>> steps_;
+  std::vector<std::function<bool()>> steps_;
   std::size_t next_ = 0;
 };
 

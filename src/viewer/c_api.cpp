@@ -349,6 +349,22 @@ cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_frame_desc* 
   });
 }
 
+cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet_frame_desc* frame, cumulet_warm_up_scope scope,
+                               cumulet_warm_up_result* result) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const core::Frame f = read_frame(frame);
+    require(f.budget_ms >= 0.0, "cumulet_frame_desc.budget_ms is negative");
+    require(number(scope) <= CUMULET_WARM_UP_ALL, "the scope is unknown");
+    if (result != nullptr) read_desc(result, "cumulet_warm_up_result");
+    const core::WarmUp done = v.warm_up(f, number(scope) == CUMULET_WARM_UP_ALL);
+    if (result == nullptr) return;
+    cumulet_warm_up_result out{};
+    out.more = done.more ? 1 : 0;
+    out.progress = done.progress;
+    write_desc(result, out, "cumulet_warm_up_result");
+  });
+}
+
 cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick) {
   return guarded(viewer, [&](core::Viewer& v) {
     read_desc(pick, "cumulet_pick");

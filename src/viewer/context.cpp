@@ -74,8 +74,7 @@ render::PictureParameters Context::parameters(const Shot& shot, const render::Su
   return scene_.parameters(*shot.scene, surfaces, integrator, shot.size);
 }
 
-void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadline) {
-  if (!shot.view()) return;
+void Context::take_host_depth(const Shot& shot, const Frame& frame) {
   render::HostDepthInput input;
   input.source = frame.depth_source;
   input.name = frame.depth_name;
@@ -87,8 +86,9 @@ void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadl
   input.depth_b = shot.depth_b;
   input.unchanged = frame.depth_unchanged && shot.view_rests;
   if (host_depth_.update(input)) host_depth_revision_.advance();
-  if (scene_.data() == nullptr) return;
-  const render::Surfaces met = surfaces(shot);
+}
+
+render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const render::Surfaces& met) const {
   render::PictureWish wish;
   wish.parameters = parameters(shot, met);
   wish.content.viewpoint = shot.scene->view;
@@ -106,7 +106,15 @@ void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadl
   wish.samples = std::max(1U, shot.sampling.samples);
   wish.depth = frame.write_depth;
   wish.held = shot.held;
-  progressive_.advance(wish, *scene_.data(), met, deadline, frame.budget_ms);
+  return wish;
+}
+
+void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadline) {
+  if (!shot.view()) return;
+  take_host_depth(shot, frame);
+  if (scene_.data() == nullptr) return;
+  const render::Surfaces met = surfaces(shot);
+  progressive_.advance(wish(shot, frame, met), *scene_.data(), met, deadline, frame.budget_ms);
 }
 
 std::uint64_t Context::TargetKind::bytes() const {
@@ -171,29 +179,39 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   return textures;
 }
 
-void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
-  const render::Picture* shown = progressive_.shown();
-  if (shown != nullptr) result.size = shown->size();
-  if (!draws(shot, frame)) return;
-  if (shown == nullptr) shown = &empty_;
+render::Display Context::display(const Shot& shot, const Frame& frame, const render::Picture& shown) {
   render::Display display;
   display.exposure_stops = shot.display.exposure_stops;
   display.tone_map = shot.display.tone_map;
-  display.legend = shown->view() != render::View::shaded;
+  display.legend = shown.view() != render::View::shaded;
   display.transparent = shot.display.transparent;
   display.encoding = frame.encoding;
+  return display;
+}
+
+render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const render::Picture& shown) {
   render::FrameTarget target;
   target.framebuffer = frame.framebuffer;
   target.viewport = frame.viewport;
   target.flip_y = frame.flip_y;
   target.blend_over = frame.blend_over;
-  target.write_depth = frame.write_depth && shown->volume_z() != 0;
+  target.write_depth = frame.write_depth && shown.volume_z() != 0;
   if (shot.view()) {
     target.orthographic = shot.view()->orthographic;
     target.depth_a = shot.depth_a;
     target.depth_b = shot.depth_b;
     target.reversed = target.orthographic ? shot.depth_b < 0.0 : shot.depth_b > 0.0;
   }
+  return target;
+}
+
+void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
+  const render::Picture* shown = progressive_.shown();
+  if (shown != nullptr) result.size = shown->size();
+  if (!draws(shot, frame)) return;
+  if (shown == nullptr) shown = &empty_;
+  const render::Display display = this->display(shot, frame, *shown);
+  render::FrameTarget target = this->target(shot, frame, *shown);
   render::PictureTextures picture = textures_of(*shown, shown == &empty_ ? nullptr : progressive_.before());
   picture.may_lag = !shown->done();
   if (frame.target == Target::framebuffer) {

@@ -13,6 +13,7 @@
 #include "render/gpu_scene.hpp"
 #include "render/host_depth.hpp"
 #include "render/progressive.hpp"
+#include "render/rehearsal.hpp"
 #include "viewer/frame.hpp"
 #include "viewer/settings.hpp"
 
@@ -74,6 +75,12 @@ class Context {
   /// What it took, where the host shared the cores.
   void learn(const Frame& frame, double taken_ms) { reserve_.learn(frame.budget_ms, taken_ms); }
 
+  // ---- before the first ----
+
+  /// Compiles and uses once the programs that frames like this need, until about the deadline; all: compiles every
+  /// other, too. waits: for what may need others still.
+  WarmUp warm_up(const Shot& shot, const Frame& frame, bool all, bool waits, render::Deadline deadline);
+
   // ---- reading back: waits for what is under way ----
 
   /// What is read. Throws Error(invalid_argument) before the first.
@@ -112,6 +119,13 @@ class Context {
   [[nodiscard]] static bool draws(const Shot& shot, const Frame& frame);
   [[nodiscard]] render::Surfaces surfaces(const Shot& shot);
   [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::Surfaces& surfaces) const;
+  void take_host_depth(const Shot& shot, const Frame& frame);
+  [[nodiscard]] render::PictureWish wish(const Shot& shot, const Frame& frame, const render::Surfaces& met) const;
+  [[nodiscard]] static render::Display display(const Shot& shot, const Frame& frame, const render::Picture& shown);
+  [[nodiscard]] static render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown);
+  // Whether all programs are warm.
+  bool rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline);
+  void rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown);
   void make_target_textures(const Shot& shot, const Frame& frame);
   // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
   void read_means(const render::Picture& picture, bool with_background, float* rgba);
@@ -135,6 +149,8 @@ class Context {
   render::Picture empty_;
   std::optional<std::uint64_t> alone_failed_;  // settings at which the surfaces beneath it could not be drawn
   Slot<TargetTextures, TargetKind> target_;
+  std::unique_ptr<render::Rehearsal> rehearsal_;  // under way
+  double warm_ = 0.0;                             // the part of it that was told
   bool knows_dispatches_ = false;
 };
 

@@ -42,6 +42,12 @@ struct FrameResult {
   GLuint depth_texture = 0;
 };
 
+/// What cumulet_warm_up has come to.
+struct WarmUp {
+  bool more = false;
+  double progress = 0.0;
+};
+
 struct Pick {
   bool hit = false;
   glm::dvec3 position{0.0};

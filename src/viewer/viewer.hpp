@@ -89,6 +89,8 @@ class Viewer {
   void frame_all();
 
   FrameResult render(const Frame& frame);
+  /// Compiles and uses once the programs that frames like this need; all: compiles every other, too.
+  WarmUp warm_up(const Frame& frame, bool all);
   Pick pick(double x, double y);
   /// Throws Error(invalid_argument) without a volume.
   Bounds bounds();

@@ -159,6 +159,20 @@ FrameResult Viewer::render(const Frame& frame) {
   return result;
 }
 
+WarmUp Viewer::warm_up(const Frame& frame, bool all) {
+  WarmUp result;
+  with_gl([&](Context& g) {
+    const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
+    const Trace::Span span(trace_, "cumulet: warm-up");
+    const render::Deadline deadline = deadline_after(frame.budget_ms);
+    prepare(frame);
+    g.upload(shot(), page_texels_, deadline);
+    upload_progress_ = g.scene().progress();
+    result = g.warm_up(shot(), frame, all, builder_.busy() || surface_builder_.busy(), deadline);
+  });
+  return result;
+}
+
 // ---- reading back ----
 
 Pick Viewer::pick(double x, double y) {

@@ -1011,6 +1011,138 @@ TEST_F(Contract, Contract24LogsErrorsAndNoExceptions) {
     EXPECT_NE(std::string(cumulet_status_text(status)), "");
 }
 
+/// Two panes in a ball of make_ball(16), one of which covers half.
+cumulet::test::SurfacesRef make_panes() {
+  const std::array<float, 9> opaque{-5.0F, -5.0F, 0.0F, 5.0F, -5.0F, 0.0F, 0.0F, 6.0F, 1.0F};
+  const std::array<float, 9> veil{-9.0F, -2.0F, 9.0F, 9.0F, -2.0F, 9.0F, 0.0F, 2.0F, 9.0F};
+  std::array<cumulet_mesh_desc, 2> meshes{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
+  for (std::size_t i = 0; i < 2; ++i) {
+    meshes.at(i).positions = i == 0 ? opaque.data() : veil.data();
+    meshes.at(i).vertex_count = 3;
+    meshes.at(i).double_sided = 1;
+  }
+  const std::array<float, 4> half{0.9F, 0.2F, 0.1F, 0.5F};
+  std::copy(half.begin(), half.end(), meshes[1].base_color);
+  return cumulet::test::make_surfaces(meshes);
+}
+
+/// Until all is warm: the progress that was told.
+std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& frame) {
+  std::vector<double> told;
+  auto result = make_desc<cumulet_warm_up_result>();
+  do {
+    EXPECT_EQ(cumulet_warm_up(viewer, &frame, CUMULET_WARM_UP_SCENE, &result), CUMULET_OK)
+        << cumulet_last_error(viewer);
+    told.push_back(result.progress);
+  } while (result.more != 0 && told.size() < 10000);
+  EXPECT_EQ(result.more, 0);
+  return told;
+}
+
+TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
+  const cumulet::test::SurfacesRef panes = make_panes();
+  const auto compiled = [&] { return fake_.calls("CompileShader") + fake_.calls("LinkProgram"); };
+  struct Case {
+    cumulet_preview preview;
+    bool surfaces;
+    bool texture;
+  };
+  for (const auto& [preview, surfaces, texture] :
+       {Case{CUMULET_PREVIEW_AUTO, false, false}, Case{CUMULET_PREVIEW_AUTO, true, true},
+        Case{CUMULET_PREVIEW_OFF, true, false}}) {
+    SCOPED_TRACE(std::to_string(preview) + (surfaces ? " surfaces" : "") + (texture ? " texture" : ""));
+    const ViewerPtr own = viewer();
+    ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
+    if (surfaces) {
+      ASSERT_EQ(cumulet_set_surfaces(own.get(), panes.get()), CUMULET_OK);
+    }
+    auto sampling = make_desc<cumulet_sampling_desc>();
+    sampling.samples = 2;
+    sampling.preview = preview;
+    sampling.volume_alone = surfaces ? 1 : 0;
+    ASSERT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
+    ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+    auto frame = target_.frame();
+    frame.budget_ms = 5.0;
+    frame.write_depth = 1;
+    if (texture) {
+      frame.target = CUMULET_TARGET_TEXTURE;
+      frame.framebuffer = 0;
+      frame.format = GL_RGBA16F;
+    }
+    const Picture before = target_.pixels();
+    const std::vector<double> told = warm_up(own.get(), frame);
+    EXPECT_TRUE(std::ranges::is_sorted(told));
+    EXPECT_EQ(told.back(), 1.0);
+    EXPECT_EQ(target_.pixels(), before) << "it draws nothing";
+    const auto programs = compiled();
+    const auto uses = fake_.first_uses();
+    converge(own.get(), frame);
+    auto pick = make_desc<cumulet_pick>();
+    ASSERT_EQ(cumulet_pick_at(own.get(), 16.0, 16.0, &pick), CUMULET_OK);
+    EXPECT_EQ(compiled(), programs);
+    EXPECT_EQ(fake_.first_uses(), uses);
+    EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
+    // Once more has nothing to do.
+    warm_up(own.get(), frame);
+    EXPECT_EQ(compiled(), programs);
+  }
+}
+
+TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
+  const cumulet::test::SurfacesRef panes = make_panes();
+  fake_.compile_in_parallel();
+  fake_.finish_compiling(true);  // the first call alone asks for a program and waits
+  const ViewerPtr own = viewer();
+  const auto frame = target_.frame();
+  auto result = make_desc<cumulet_frame_result>();
+  ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+  const auto stalls = [&](const char* what) {
+    SCOPED_TRACE(what);
+    fake_.finish_compiling(false);
+    const auto waited = fake_.waits();
+    const auto linked = fake_.calls("LinkProgram");
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK) << cumulet_last_error(own.get());
+      EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U);
+      EXPECT_EQ(result.flags & CUMULET_RENDER_CONVERGED, 0U);
+    }
+    EXPECT_EQ(fake_.waits(), waited);
+    EXPECT_GT(fake_.calls("LinkProgram"), linked);
+    fake_.finish_compiling(true);
+  };
+  stalls("the first picture");
+  converge(own.get(), frame);
+  const Picture volume_alone = target_.pixels();
+  ASSERT_EQ(cumulet_set_surfaces(own.get(), panes.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+  stalls("surfaces");
+  EXPECT_EQ(difference(target_.pixels(), volume_alone), "") << "the last picture shows until then";
+  converge(own.get(), frame);
+  EXPECT_NE(difference(target_.pixels(), volume_alone), "");
+  // Another tone map: the old one serves.
+  auto display = make_desc<cumulet_display_desc>();
+  display.tone_map = CUMULET_TONE_MAP_CLIP;
+  ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
+  stalls("a tone map");
+  // A warm-up does not wait either, and ends when the driver does.
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.view = CUMULET_VIEW_STEPS;
+  ASSERT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
+  fake_.finish_compiling(false);
+  const auto waited = fake_.waits();
+  auto warm = make_desc<cumulet_warm_up_result>();
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(cumulet_warm_up(own.get(), &frame, CUMULET_WARM_UP_SCENE, &warm), CUMULET_OK);
+    EXPECT_EQ(warm.more, 1);
+  }
+  EXPECT_EQ(fake_.waits(), waited);
+  fake_.finish_compiling(true);
+  warm_up(own.get(), frame);
+}
+
 // Every example host runs in tests/embed; here the smallest, if it is built.
 TEST(ContractHosts, Contract25TheSmallestHostRuns) {
   namespace fs = std::filesystem;

@@ -909,6 +909,38 @@ typedef struct cumulet_frame_result {
 CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_frame_desc* frame,
                                           cumulet_frame_result* result);
 
+typedef enum cumulet_warm_up_scope {
+  CUMULET_WARM_UP_SCENE = 0, /* the programs that frames of the present scene with the present settings need */
+  CUMULET_WARM_UP_ALL = 1    /* these, and all others of the library are compiled (not used: a driver that compiles more
+                                in the first use does so then); but for rare ones: grids beyond the driver's limit of a texture
+                                buffer, sets of maps that the scene's materials do not have */
+} cumulet_warm_up_scope;
+
+typedef struct cumulet_warm_up_result {
+  size_t struct_size;
+  int32_t more;    /* 1: call again */
+  double progress; /* 0 to 1: never less than in the call before; 1 where more is 0 */
+} cumulet_warm_up_result;
+
+/*
+ * [GL] Compiles the programs of frames like this one, and uses each once for next to nothing, so that no frame waits
+ * for the driver later: drivers compile where a program is linked, or where it is first used. As cumulet_render it
+ * takes up what the worker has made and uploads, so that all the scene's programs are known; it draws nothing into the
+ * frame's target, and reads its depth. Call it after cumulet_wait, or once a frame, until more is 0, and show a bar:
+ *
+ *     do {
+ *       cumulet_warm_up(viewer, &frame, CUMULET_WARM_UP_SCENE, &result);
+ *     } while (result.more);
+ *
+ * A call works for about the frame's budget_ms (not negative), but a driver that does not compile in parallel
+ * (KHR_parallel_shader_compile) takes as long as it takes for the program under way. Where the driver does,
+ * cumulet_render does not wait for programs either: until one is there the last picture, a coarser one or the surfaces
+ * alone are shown. Without a call of this every program is made in the frame that first needs it. result may be NULL.
+ * Programs that are there already, another viewer's (cumulet_programs) or a folder's, are not compiled again.
+ */
+CUMULET_API cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet_frame_desc* frame,
+                                           cumulet_warm_up_scope scope, cumulet_warm_up_result* result);
+
 typedef struct cumulet_pick {
   size_t struct_size;
   int32_t hit;        /* 1: a surface is met, or the volume reaches half opacity, along the pixel's ray */

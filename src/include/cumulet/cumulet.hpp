@@ -763,6 +763,11 @@ struct FrameResult {
   }
 };
 
+struct WarmUpResult {
+  bool more = false;
+  double progress = 0.0;
+};
+
 struct Pick {
   bool hit = false;
   Vector position{};
@@ -1011,6 +1016,14 @@ class Viewer {
                        .height = height,
                        .texture = texture,
                        .depth_texture = depth_texture};
+  }
+  [[nodiscard]] Result<WarmUpResult> warm_up(const FrameDesc& frame, WarmUpScope scope = {}) noexcept {
+    const cumulet_frame_desc desc = frame;
+    auto c = detail::sized<cumulet_warm_up_result>();
+    if (auto done = result(cumulet_warm_up(handle(), &desc, static_cast<cumulet_warm_up_scope>(scope), &c)); !done) {
+      return done.error();
+    }
+    return WarmUpResult{.more = c.more != 0, .progress = c.progress};
   }
   [[nodiscard]] Result<Pick> pick_at(double x, double y) noexcept {
     auto c = detail::sized<cumulet_pick>();

@@ -72,6 +72,8 @@ class FakeGl {
     }
     return count;
   }
+  /// Dispatches and draws with a program that was not used before: drivers may compile in them.
+  [[nodiscard]] std::uint64_t first_uses() const { return used_.size(); }
   [[nodiscard]] std::uint64_t allocations() const { return allocations_; }
   /// Bytes that were copied to buffers and textures (of four bytes a texel) from main memory.
   [[nodiscard]] std::uint64_t uploaded() const { return uploaded_; }
@@ -96,6 +98,12 @@ class FakeGl {
   /// The n-th call from now (0 is the next) finds the context lost. Negative: never. From then on calls do nothing.
   void lose_context(std::int64_t n) { lose_at_ = n < 0 ? -1 : static_cast<std::int64_t>(calls_) + n; }
   [[nodiscard]] bool lost() const { return lost_; }
+
+  /// Says that the driver compiles in parallel, and is never done before finish_compiling(true).
+  void compile_in_parallel() { parallel_ = true; }
+  void finish_compiling(bool finish) { compiled_ = finish; }
+  /// Questions about programs and shaders that a driver could not have answered while it was compiling.
+  [[nodiscard]] std::uint64_t waits() const { return waits_; }
 
  private:
   static FakeGl*& current() {
@@ -190,6 +198,16 @@ class FakeGl {
         }
       }
       fake->uploaded_ += bytes_of(args...);
+      if constexpr (F == Fn::UseProgram) fake->use(args...);
+      if constexpr (starts(name, "DispatchCompute") || starts(name, "DrawArrays") || starts(name, "DrawElements")) {
+        fake->used_.insert(fake->program_);
+      }
+      if constexpr (F == Fn::GetProgramiv || F == Fn::GetShaderiv) {
+        if (fake->answer(args...)) return Result();
+      }
+      if constexpr (F == Fn::GetStringi) {
+        if (const GLubyte* extension = fake->extension(args...)) return extension;
+      }
       if constexpr (starts(name, "Delete")) fake->deleted(kind_of(name), convert(args)...);
       if constexpr (std::is_void_v<Result>) {
         (fake->real_.*Member)(args...);
@@ -251,6 +269,24 @@ class FakeGl {
     return map;
   }
 
+  void use(GLuint program) {
+    program_ = program;
+    if (parallel_ && !compiled_ && program != 0 && used_.count(program) == 0) ++waits_;
+  }
+  // GL_COMPLETION_STATUS_KHR; all other questions wait for the driver.
+  bool answer(GLuint /*name*/, GLenum what, GLint* value) {
+    if (parallel_ && what == 0x91B1) {
+      *value = compiled_ ? 1 : 0;
+      return true;
+    }
+    if (parallel_ && !compiled_) ++waits_;
+    return false;
+  }
+  const GLubyte* extension(GLenum what, GLuint index) const {
+    const bool first = parallel_ && what == GL_EXTENSIONS && index == 0;
+    return first ? reinterpret_cast<const GLubyte*>("GL_KHR_parallel_shader_compile") : nullptr;
+  }
+
   GetProc get_proc_;
   void* user_;
   GladGLContext real_{};
@@ -266,6 +302,11 @@ class FakeGl {
   std::string refused_;
   std::map<std::string, std::set<std::uintptr_t>> alive_;
   std::uint64_t wrong_deletes_ = 0;
+  std::set<GLuint> used_;
+  GLuint program_ = 0;
+  bool parallel_ = false;
+  bool compiled_ = false;
+  std::uint64_t waits_ = 0;
 };
 
 }  // namespace cumulet::test

@@ -1,0 +1,82 @@
+// What of a viewer's context is done before the first frame.
+
+#include <algorithm>
+#include <chrono>
+
+#include "gl/transient_framebuffer.hpp"
+#include "viewer/context.hpp"
+
+namespace cumulet::viewer {
+
+WarmUp Context::warm_up(const Shot& shot, const Frame& frame, bool all, bool waits, render::Deadline deadline) {
+  if (!rehearsal_) {
+    rehearsal_ = std::make_unique<render::Rehearsal>(functions_, programs_);
+    warm_ = 0.0;
+  }
+  WarmUp result;
+  try {
+    result.more = waits || scene_.uploading() || !rehearse(shot, frame, all, deadline);
+  } catch (...) {
+    rehearsal_.reset();
+    throw;
+  }
+  if (!result.more) rehearsal_.reset();
+  // Half of it is to compile them, but of those that are not used.
+  const gl::Programs::Counts counts = programs_->counts();
+  const std::size_t wanted = all ? std::max(counts.asked, gl::all_programs().size()) : counts.asked;
+  const std::size_t done = counts.usable + (all ? counts.usable : counts.ready);
+  const double part = 0.5 * static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(1, wanted));
+  warm_ = result.more ? std::max(warm_, std::min(part, 0.99)) : 1.0;
+  result.progress = warm_;
+  return result;
+}
+
+bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline) {
+  rehearsal_->begin();
+  const bool drawing = draws(shot, frame);
+  if (drawing) {
+    render::Picture& empty = rehearsal_->empty();
+    if (empty.sum() == 0) rehearsal_->tracer().clear(empty);
+    rehearsal_->tracer().set_background(empty, shot.scene->lights->sky_radiance);
+    rehearse_drawing(shot, frame, empty);
+  }
+  if (shot.view()) {
+    take_host_depth(shot, frame);
+    const auto draw = [&](const render::Picture& shown) {
+      if (drawing) rehearse_drawing(shot, frame, shown);
+    };
+    if (scene_.data() != nullptr) {
+      const render::Surfaces met = surfaces(shot);
+      if (!rehearsal_->advance(wish(shot, frame, met), *scene_.data(), met, deadline, draw)) return false;
+    }
+    if (host_depth_.pending()) return false;
+  }
+  if (rehearsal_->lags()) return false;
+  if (!all) return true;
+  bool there = true;
+  for (const gl::ProgramKey& key : gl::all_programs()) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+    there = programs_->ask(key).usable() && there;
+  }
+  return there;
+}
+
+void Context::rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown) {
+  const render::PictureTextures picture = textures_of(shown, nullptr);
+  render::FrameTarget target = this->target(shot, frame, shown);
+  if (frame.target == Target::framebuffer) {
+    rehearsal_->draw(picture, display(shot, frame, shown), target);
+    return;
+  }
+  const gl::Object colour = gl::make_texture_2d(functions_, frame.format, 1, 1, "creating a target to rehearse with");
+  gl::Object depth;
+  if (frame.write_depth) {
+    depth = gl::make_texture_2d(functions_, GL_DEPTH_COMPONENT32F, 1, 1, "creating a target's depth to rehearse with");
+  }
+  const gl::TransientFramebuffer framebuffer(*functions_, colour.name(), depth.name());
+  target.framebuffer = framebuffer.name();
+  target.blend_over = false;
+  rehearsal_->draw(picture, display(shot, frame, shown), target);
+}
+
+}  // namespace cumulet::viewer
