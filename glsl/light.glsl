@@ -1,8 +1,250 @@
-// What paths see of the lights. Shared by GLSL and C++.
+// Lights: what each kind sends, how paths look for them, and how likely they find them so. src/light has the table of
+// which there are and how likely each kind is looked for. Shared by GLSL and C++.
+//
+// A look for light at a vertex is for one kind, by its chance: cm_light_sample. Flights come to some kinds as well, by
+// escaping to what is far away or by meeting a triangle. What either finds counts by the balance heuristic (Veach and
+// Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995), in which the density of
+// looks is cm_light_pdf, whoever asks.
+//
+// A kind is a number and a line of CM_FAR_LIGHTS or CM_NEAR_LIGHTS, which is
+//   its number, its chance, a sample, a density, and, if it is far away, a radiance, with
+//   CmLightSample sample(path, here, u)   here: world, where looks start
+//   float density(hit)                    by solid angle; 0 of kinds without extent, which no flight comes to
+//   vec3 radiance(w)
 #ifndef CM_LIGHT_GLSL
 #define CM_LIGHT_GLSL
 
-// Radiance from the sky along w (world, unit).
+#define CM_LIGHT_SKY 0u       // everywhere: looked for in a direction that a flight might take
+#define CM_LIGHT_SUN 1u       // far away, without extent
+#define CM_LIGHT_TRIANGLE 2u  // emissive
+#define CM_LIGHT_LAMP 3u      // punctual
+#define CM_LIGHT_GLOW 4u      // the medium's own: flights that leave surfaces are aimed at its box
+#define CM_LIGHT_OTHER 5u     // of CM_MORE_LIGHTS
+
+// What a look has found.
+struct CmLightSample {
+  uint kind;
+  vec3 radiance;   // that comes from there; of kinds without extent an irradiance
+  vec3 direction;  // world, unit
+  float distance;  // 3e38: far away
+  float density;   // with which it is found: by solid angle; without extent, the chance
+};
+
+// What a ray comes to.
+struct CmLightHit {
+  uint kind;
+  vec3 o;         // cube space: where the ray starts
+  vec3 w;         // world, unit: its direction
+  float flight;   // density with which flights take that
+  uint triangle;  // met
+  vec3 point;     // world: of the triangle
+  vec3 normal;    // world, unit: the triangle's
+};
+
+CM_FN CmLightHit cm_light_hit(uint kind, vec3 o, vec3 w, float flight) {
+  CmLightHit hit;
+  hit.kind = kind;
+  hit.o = o;
+  hit.w = w;
+  hit.flight = flight;
+  hit.triangle = 0u;
+  hit.point = vec3(0.0f, 0.0f, 0.0f);
+  hit.normal = w;
+  return hit;
+}
+
+// ---- The sky
+
 CM_FN vec3 cm_sky_radiance(vec3 w) { return cm.lights.sky_radiance; }
+CM_FN float cm_sky_pdf(CmLightHit hit) { return hit.flight; }
+CM_FN CmLightSample cm_sky_along(vec3 w, float flight) {
+  return CmLightSample(CM_LIGHT_SKY, cm_sky_radiance(w), w, 3.0e38f, flight);
+}
+// To be had by cm_sky_along, once it is known where flights might go; the density is the chance alone until then.
+CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+  return cm_sky_along(vec3(0.0f, 1.0f, 0.0f), 1.0f);
+}
+
+// ---- The sun
+
+CM_FN CmLightSample cm_sun_sample() {
+  return CmLightSample(CM_LIGHT_SUN, cm.lights.sun_irradiance, cm.lights.sun_direction, 3.0e38f, 1.0f);
+}
+
+#if CM_SURFACES
+
+// ---- Lamps
+
+// Each as likely as the others.
+CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+  uint word = cm.surfaces.lamps +
+              CM_LAMP_WORDS * min(uint(u * float(cm.surfaces.lamp_count)), cm.surfaces.lamp_count - 1u);
+  CmLight lamp = CmLight(cm_floats(word), cm_floats(word + 1u), cm_floats(word + 2u), cm_floats(word + 3u));
+  CmLightSample light;
+  light.kind = CM_LIGHT_LAMP;
+  light.radiance = cm_punctual_irradiance(lamp, here, light.direction, light.distance);
+  light.density = 1.0f / float(cm.surfaces.lamp_count);
+  return light;
+}
+
+// ---- Emissive triangles; their table is that of src/light/emitters.hpp
+
+CM_FN uvec4 cm_emitter(uint i) { return cm_words(cm.surfaces.emitters + i); }
+
+// Density by solid angle of a point on one, picked by power and then by area: `way` from where it is looked at, under
+// `cosine` to its normal.
+CM_FN float cm_emitter_density(uvec4 entry, vec3 way, float cosine) {
+  return abs(uintBitsToFloat(entry.w)) * dot(way, way) / max(abs(cosine), 1e-12f);
+}
+
+// 0 of a triangle that is not in the table. O(log n).
+CM_FN float cm_triangle_pdf(CmLightHit hit) {
+  uint low = 0u;
+  uint high = cm.surfaces.emitter_count;
+  while (low + 1u < high) {
+    uint middle = (low + high) >> 1u;
+    bool below = cm_emitter(middle).x <= hit.triangle;
+    low = below ? middle : low;
+    high = below ? high : middle;
+  }
+  uvec4 entry = cm_emitter(low);
+  vec3 way = hit.point - cm_from_cube_point(hit.o);
+  return entry.x == hit.triangle ? cm_emitter_density(entry, way, dot(hit.normal, hit.w)) : 0.0f;
+}
+
+// O(1). The distance is to just before it.
+CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+  uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
+  float u_a = cm_random(p.random, p.stream);
+  float u_b = cm_random(p.random, p.stream);
+  uint i;
+  uint unused;
+  umulExtended(pick.x, cm.surfaces.emitter_count, i, unused);
+  uvec4 entry = cm_emitter(i);
+  if (pick.y > entry.y) entry = cm_emitter(entry.z);
+  float root = sqrt(u_a);
+  CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0f - u_b), root * u_b));
+  vec3 a = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.x));
+  vec3 b = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.y));
+  vec3 c = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.z));
+  vec3 g = cross(b - a, c - a);
+  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
+  vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
+  bool along = dot(g, point - here) > 0.0f;  // seen from where the vertices turn clockwise
+  vec3 way = cm_offset_origin(point, along ? -g : g) - here;
+  float length_2 = max(dot(way, way), 1e-24f);
+  CmLightSample light;
+  light.kind = CM_LIGHT_TRIANGLE;
+  light.direction = way * inversesqrt(length_2);
+  light.distance = sqrt(length_2) * 0.99999f;
+  light.density = cm_emitter_density(entry, way, dot(g, light.direction));
+  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
+  uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
+  bool front = along == (uintBitsToFloat(entry.w) < 0.0f);
+  light.radiance = front || (flags & CM_ONE_SIDED) == 0u ? cm_emission(m) : vec3(0.0f, 0.0f, 0.0f);
+  if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + CM_MATERIAL_COAT).y > 0.0f) {
+    light.radiance *= cm_coverage(m);
+  }
+  return light;
+}
+
+// ---- The glowing medium: points of its box, each as likely
+
+CM_FN vec3 cm_glow_direction(vec3 o, vec3 u, vec3 otherwise) {
+  vec3 way = cm_to_world(mix(cm.grid.box_min, cm.grid.box_max, u) - o);
+  return dot(way, way) > 0.0f ? normalize(way) : otherwise;
+}
+
+// The integral of t^2 over the ray's part inside, over the box's volume.
+CM_FN float cm_glow_pdf(CmLightHit hit) {
+  vec2 range = cm_box_range(hit.o, cm_to_cube(hit.w));
+  vec3 box = cm.grid.box_max - cm.grid.box_min;
+  float cubes = max(0.0f, range.y - range.x) * (dot(range, range) + range.x * range.y);
+  return cubes / max(3.0f * cm.grid.unit_volume * box.x * box.y * box.z, 1e-30f);
+}
+
+#endif
+
+// ---- All kinds
+
+CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
+
+// A test's own (tests/unit/support/disc_light.glsl).
+#ifndef CM_MORE_LIGHTS
+#define CM_MORE_LIGHTS(LIGHT)
+#endif
+
+#define CM_FAR_LIGHTS(LIGHT) \
+  LIGHT(CM_LIGHT_SKY, cm.lights.sky_chance, cm_sky_sample, cm_sky_pdf, cm_sky_radiance) CM_MORE_LIGHTS(LIGHT)
+
+#if CM_SURFACES > 1
+#define CM_NEAR_LIGHTS(LIGHT)                                                                         \
+  LIGHT(CM_LIGHT_TRIANGLE, cm.lights.triangle_chance, cm_triangle_sample, cm_triangle_pdf, cm_unused) \
+  LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)
+#elif CM_SURFACES
+#define CM_NEAR_LIGHTS(LIGHT) LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)
+#else
+#define CM_NEAR_LIGHTS(LIGHT)
+#endif
+
+// The share of what one technique finds that counts, where another might have found it.
+CM_FN float cm_balance(float mine, float other) { return mine / max(mine + other, 1e-30f); }
+
+#define CM_DENSITY(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
+  if (hit.kind == NUMBER) return CHANCE * PDF(hit);
+
+// Of looks for light, to come to what a ray has come to.
+CM_FN float cm_light_pdf(CmLightHit hit) {
+  CM_FAR_LIGHTS(CM_DENSITY)
+  CM_NEAR_LIGHTS(CM_DENSITY)
+#if CM_SURFACES
+  if (hit.kind == CM_LIGHT_GLOW) return cm.lights.glow_chance * cm_glow_pdf(hit);
+#endif
+  return 0.0f;
+}
+
+#define CM_LOOK(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
+  if (u >= before && u < before + CHANCE) {            \
+    light = SAMPLE(p, here, (u - before) / CHANCE);    \
+    light.density *= CHANCE;                           \
+  }                                                    \
+  before += CHANCE;
+
+// A look for light: u decides for which kind; what the others leave is the sun's.
+CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+  CmLightSample light = cm_sun_sample();
+  float before = 0.0f;
+  CM_FAR_LIGHTS(CM_LOOK)
+#if CM_SURFACES
+  // Many lights may share the rest: a number with all its bits for them.
+  if (u >= before && cm.lights.triangle_chance + cm.lights.lamp_chance > 0.0f) {
+    u = before + (1.0f - before) * cm_random(p.random, p.stream);
+  }
+#endif
+  CM_NEAR_LIGHTS(CM_LOOK)
+  if (light.kind == CM_LIGHT_SUN) light.density = max(0.0f, 1.0f - before);
+  return light;
+}
+
+// Whether flights come to what a look has found by escaping to it.
+#define CM_IS_FAR(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) || light.kind == NUMBER
+CM_FN bool cm_is_far(CmLightSample light) { return false CM_FAR_LIGHTS(CM_IS_FAR); }
+
+// What a flight brings along w, which it took with that density, if it escapes with that transmittance.
+#define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
+  brought += RADIANCE(w) * cm_balance(transmittance * flight, cm_light_pdf(cm_light_hit(NUMBER, o, w, flight)));
+CM_FN vec3 cm_far_light(vec3 o, vec3 w, float flight, float transmittance) {
+  vec3 brought = vec3(0.0f, 0.0f, 0.0f);
+  CM_FAR_LIGHTS(CM_ESCAPED)
+  return brought;
+}
+
+// What is behind all, as cameras see it.
+#define CM_SEEN(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) seen += RADIANCE(w);
+CM_FN vec3 cm_background_radiance(vec3 w) {
+  vec3 seen = vec3(0.0f, 0.0f, 0.0f);
+  CM_FAR_LIGHTS(CM_SEEN)
+  return seen;
+}
 
 #endif

@@ -62,15 +62,16 @@ CM_BLOCK(CmMedium) {
   CM_EQUALITY(CmMedium)
 };
 
-// Lights that are far away, and how next-event estimation chooses: Viewer.
+// Lights that are far away, and the chances with which paths look for each kind (glsl/light.glsl): light::LightTable.
 CM_BLOCK(CmLights) {
   CM_ALIGN(16) vec3 sun_direction;  // world, unit, towards the sun
   uint any;                         // 1: there is light to look for
   CM_ALIGN(16) vec3 sun_irradiance;
-  float sky_probability;  // that an estimate is to the sky; all other lights have the rest
+  float sky_chance;
   CM_ALIGN(16) vec3 sky_radiance;
-  float emitter_probability;  // of estimates that are not to the sky: to emissive triangles
-  float glow_probability;     // that a flight from a surface is aimed at the medium's own light
+  float triangle_chance;
+  float lamp_chance;  // of all lamps together; what these leave is the sun's
+  float glow_chance;  // that a flight from a surface is aimed at the medium's own light
   CM_EQUALITY(CmLights)
 };
 

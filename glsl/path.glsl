@@ -22,8 +22,8 @@
 #define CM_PATH_GLSL
 
 #include "ray.glsl"
-#include "light.glsl"
 #include "path_state.glsl"
+#include "light.glsl"
 #include "path_vertex.glsl"
 
 // Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
@@ -143,7 +143,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel, uvec2 at) {
   p.blurred = 0u;
   p.in_volume = 0u;
   p.at_layer = 0u;
-  p.light = cm_sky_radiance(p.w);
+  p.light = cm_background_radiance(p.w);
   p.depth_0 = -log(1.0f - cm_unit_float(even.z));
   p.depth = p.depth_0;
   p.ray = CM_RAY_FLIGHT;
@@ -158,18 +158,17 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel, uvec2 at) {
   }
 }
 
-// A ray has left the box, or come to its end: what it brings. The sky: a flight escapes with probability T, next-event
-// estimation has density q of the same directions. The balance heuristic gives T / (q + T) to the one, and q / (q + T),
-// times T / q, to the other.
+// A ray has left the box, or come to its end: what it brings. A flight that escapes with transmittance T may have been
+// found by a look as well, and what a look has found, with transmittance T, by a flight that escapes.
 CM_FN void cm_escape(CM_INOUT(CmPath) p) {
-  bool flight = p.ray == CM_RAY_FLIGHT;
   float depth = p.depth_0 - p.depth;
   float transmittance = exp(-depth);
-  float balanced = transmittance / max(cm.lights.sky_probability + transmittance, 1e-30f);
-  float survival = flight ? 1.0f : min(1.0f, exp(CM_SHADOW_DEPTH - depth));
-  float weight = p.ray == CM_RAY_TO_LAMP ? transmittance : (p.bounces == 0u ? 0.0f : balanced);
-  vec3 light = flight ? p.throughput * cm_sky_radiance(p.w) : p.light;
-  p.radiance += light * (weight / survival);
+  if (p.ray == CM_RAY_FLIGHT) {
+    if (p.bounces > 0u) p.radiance += p.throughput * cm_far_light(p.o, p.w, p.density, transmittance);
+  } else {
+    float survival = min(1.0f, exp(CM_SHADOW_DEPTH - depth));
+    p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.density)));
+  }
 }
 
 // The medium's own light: S e^-x dx over the flight. A collision tells of S (its chance is 1 - e^-x), but seldom in a
@@ -202,39 +201,43 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided) {
   return ends;
 }
 
-// A shadow ray after a collision (if there is light), a new flight after that: each along a direction of the phase
-// function or of the surface's lobes, but for those to lamps. One next-event estimate: to the sky with probability q,
-// else to a lamp.
+// A look for light after a collision or on a triangle, if there is light; a new flight after that.
 CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   float u_0 = cm_random(p.random, p.stream);
   float u_1 = cm_random(p.random, p.stream);
   float u_2 = cm_random(p.random, p.stream);
-  bool shadow = arrived && cm.lights.any != 0u;
-  bool to_lamp = shadow && u_2 >= cm.lights.sky_probability;
-  CmLampSample lamp = cm_choose_lamp(p, vertex, to_lamp);
-  CmDirection next = cm_direction(p, vertex, lamp, to_lamp, u_0, u_1);
-  // A flight may happen on an emissive triangle that was looked for.
-  if (lamp.emitter && next.may_meet) lamp.density += next.density;
-  if (!shadow) {
-    p.throughput *= next.weight;
-    p.w = next.w;
-    if (cm_blurs(next)) p.blurred = 1u;
+  bool looks = arrived && cm.lights.any != 0u;
+  CmLightSample light = cm_sky_sample(p, p.o, u_2);  // flights go where they might find the sky
+  if (looks) light = cm_light_sample(p, cm_look_from(p, vertex), u_2);
+  vec3 w = cm_turn_direction(p, vertex, u_0, u_1);
+  bool along = light.kind == CM_LIGHT_SKY;
+  CmTurn turn = cm_turn(p, vertex, along ? w : light.direction);
+  if (along) light = cm_sky_along(w, light.density * turn.density);
+  p.density = turn.density;
+  if (looks) {
+    // What escapes weighs looks and flights with the transmittance that it finds; among triangles, without.
+    if (light.kind == CM_LIGHT_TRIANGLE && !turn.lifted) light.density += turn.density;
+    float rare = 1.0f / max(light.density, 1e-30f);
+    p.light = p.throughput * light.radiance * (turn.share * rare);
+    p.density = cm_is_far(light) ? turn.density * rare : 0.0f;
+  } else {
+    p.throughput *= turn.weight;
+    p.w = w;
+    if (cm_blurs(turn)) p.blurred = 1u;
   }
-  p.light = p.throughput * (to_lamp ? lamp.radiance * (next.share / max(lamp.density, 1e-30f))
-                                    : cm_sky_radiance(next.w) * next.weight);
-  p.density = next.may_meet ? next.density : 0.0f;
-  p.d = cm_to_cube(to_lamp ? lamp.direction : next.w);
-  p.ray = to_lamp ? CM_RAY_TO_LAMP : (shadow ? CM_RAY_TO_SKY : CM_RAY_FLIGHT);
-  p.depth_0 = cm_random_depth(p.random, p.stream) + (shadow ? CM_SHADOW_DEPTH : 0.0f);
+  p.lifted = turn.lifted ? 1u : 0u;
+  p.d = cm_to_cube(light.direction);
+  p.ray = looks ? CM_RAY_TO_LIGHT : CM_RAY_FLIGHT;
+  p.depth_0 = cm_random_depth(p.random, p.stream) + (looks ? CM_SHADOW_DEPTH : 0.0f);
   p.depth = p.depth_0;
-  p.reach = to_lamp ? lamp.distance : 3.0e38f;
+  p.reach = light.distance;
   if (CM_SURFACES == 0) {
     p.t = 0.0f;
     p.t_end = cm_box_range(p.o, p.d).y;
     p.cell = p.start_cell;
     p.cache = CM_NONE;
   } else {
-    if (shadow && !(max(p.light.x, max(p.light.y, p.light.z)) > 0.0f)) p.reach = 0.0f;  // no light to look for
+    if (looks && !(max(p.light.x, max(p.light.y, p.light.z)) > 0.0f)) p.reach = 0.0f;  // no light to look for
     p.stage = CM_STAGE_AIM;
   }
 }

@@ -8,10 +8,9 @@
 #define CM_STAGE_FLY 2u     // marches
 #define CM_STAGE_DONE 3u    // nothing: its pixel has the samples it shall have
 
-// What its ray is. The last two are next-event estimates: shadow rays.
+// What its ray is.
 #define CM_RAY_FLIGHT 0u
-#define CM_RAY_TO_LAMP 1u  // the sun's, lamps' and emissive triangles'
-#define CM_RAY_TO_SKY 2u
+#define CM_RAY_TO_LIGHT 1u  // a next-event estimate: a shadow ray
 
 // Where its ray starts.
 #define CM_AT_CAMERA 0u
@@ -35,18 +34,20 @@
 //   blurred         1: it was scattered wider than a surface of the least roughness does
 //   in_volume       1: this sample met the volume first
 //   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
+//   density         of a flight: by solid angle, with which it took its direction; of a shadow ray to what flights may
+//                   come to by escaping: the flights' density there over the look's own; else 0
 //   random, stream  of its random numbers
 // and among triangles
 //   triangle, weights     that o is on, of its second and third vertex
 //   behind          1: the path met the side from which its vertices turn clockwise
 //   reach           the ray's own end: a lamp, the host's surface
-//   density         of a flight: by solid angle, of its direction; 0: whoever looked for light may count it all
+//   lifted          1: the ray started above the triangle that its path had met
 #define CM_PATH_FIELDS(VEC3, VEC2, UVEC2, FLOAT, UINT)                                                               \
   VEC3(o) VEC3(d) VEC3(w) VEC3(throughput) VEC3(radiance) VEC3(light) FLOAT(t) FLOAT(t_end) FLOAT(depth)             \
   FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell) UINT(stage) UINT(ray) UINT(start) UINT(bounces)           \
-  UINT(blurred) UINT(in_volume) UINT(at_layer) UINT(random) UINT(stream)
+  UINT(blurred) UINT(in_volume) UINT(at_layer) FLOAT(density) UINT(random) UINT(stream)
 #define CM_PATH_TRIANGLE_FIELDS(VEC3, VEC2, UVEC2, FLOAT, UINT)                                                      \
-  UINT(triangle) VEC2(weights) UINT(behind) FLOAT(reach) FLOAT(density)
+  UINT(triangle) VEC2(weights) UINT(behind) FLOAT(reach) UINT(lifted)
 
 #define CM_PATH_VEC3(name) vec3 name;
 #define CM_PATH_VEC2(name) vec2 name;

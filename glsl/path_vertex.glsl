@@ -19,23 +19,13 @@
 #define CM_EVENTS 8
 #endif
 
-// What a next-event estimate that is not to the sky looks for.
-struct CmLampSample {
-  vec3 radiance;    // an irradiance, of lamps and the sun: their density has no solid angle
-  vec3 direction;   // world, unit
-  float distance;   // 3e38: far away
-  float density;    // by solid angle, or the chance; of all ways in which the estimate could come to look there
-  bool emitter;     // an emissive triangle: flights may happen on it too
-};
-
-// The direction that a ray takes from a vertex (its own, or to the lamp).
-struct CmDirection {
-  vec3 w;              // sampled; world, unit
-  vec3 share;          // of light that goes on along the ray: the phase function, or the BSDF times the cosine
-  float density;       // by solid angle, with which flights take it
+// What a path does with light along a direction from a vertex.
+struct CmTurn {
+  vec3 share;          // of light that goes on: the phase function, or the BSDF times the cosine
+  float density;       // by solid angle, with which flights take the direction
   float lobe_density;  // the same, of the lobes alone
   vec3 weight;         // share over density
-  bool may_meet;       // flights along it may count what they meet of the emissive triangles
+  bool lifted;         // the ray starts above its triangle
 };
 
 #if CM_SURFACES
@@ -44,15 +34,6 @@ struct CmVertex {
   bool on_triangle;
   CmSurfacePoint surface;  // if so
 };
-
-// The density, by solid angle, of directions w (world) from o (cube space) to points of the box, each as likely: the
-// integral of t^2 over the ray's part inside, over the box's volume.
-float cm_glow_density(vec3 o, vec3 w) {
-  vec2 range = cm_box_range(o, cm_to_cube(w));
-  vec3 box = cm.grid.box_max - cm.grid.box_min;
-  float cubes = max(0.0, range.y - range.x) * (dot(range, range) + range.x * range.y);
-  return cubes / max(3.0 * cm.grid.unit_volume * box.x * box.y * box.z, 1e-30);
-}
 
 // Whether a triangle ends the ray before the event does: then o, once moved, is on it. Asked after the march, not
 // before: in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the medium.
@@ -93,12 +74,14 @@ CmVertex cm_vertex(inout CmPath p, bool on_triangle, bool met) {
     vertex.surface.material.roughness = max(vertex.surface.material.roughness, least);
     vertex.surface.material.clearcoat_roughness = max(vertex.surface.material.clearcoat_roughness, least);
   }
-  // The flight that met it, and the next-event estimate before: the balance heuristic, whatever the medium between.
+  // The look for light before the flight that met it might have found it, whatever the medium between; not at the same
+  // angle where the flight started above its triangle: then looks alone count.
   if (CM_SURFACES > 1 && met && p.bounces > 0u && !vertex.surface.unlit) {
-    vec3 way = vertex.surface.position - cm_from_cube_point(p.o);
-    float other = cm_emitter_met(p.triangle, way, dot(vertex.surface.geometric, p.w));
-    other *= (1.0 - cm.lights.sky_probability) * cm.lights.emitter_probability;
-    vertex.surface.emission *= p.density / max(p.density + other, 1e-30);
+    CmLightHit hit = cm_light_hit(CM_LIGHT_TRIANGLE, p.o, p.w, p.density);
+    hit.triangle = p.triangle;
+    hit.point = vertex.surface.position;
+    hit.normal = vertex.surface.geometric;
+    vertex.surface.emission *= p.lifted != 0u ? 0.0 : cm_balance(p.density, cm_light_pdf(hit));
   }
   if (met) p.radiance += p.throughput * vertex.surface.emission;
   return vertex;
@@ -112,67 +95,46 @@ bool cm_stand(inout CmPath p, CmVertex vertex) {
   return vertex.surface.unlit;
 }
 
-// The sun, a lamp or an emissive triangle, if one is to be looked for.
-CmLampSample cm_choose_lamp(inout CmPath p, CmVertex vertex, bool wanted) {
-  CmLampSample lamp = CmLampSample(cm.lights.sun_irradiance, cm.lights.sun_direction, 3.0e38,
-                                   1.0 - cm.lights.sky_probability, false);
-  if (!wanted || (cm.surfaces.lamp_count == 0u && CM_SURFACES == 1)) return lamp;
-  vec3 here = cm_from_cube_point(p.o);
-  float u = cm_random(p.random, p.stream);
-  float share = CM_SURFACES > 1 ? cm.lights.emitter_probability : 0.0;
-  if (CM_SURFACES > 1) {
-    lamp.emitter = u < share;
-    lamp.density *= lamp.emitter ? share : 1.0 - share;
-    u = max(0.0, u - share) / max(1.0 - share, 1e-6);
-  }
-  cm_lamp(here, u, lamp.radiance, lamp.direction, lamp.distance);
-  if (CM_SURFACES > 1 && lamp.emitter) {
-    uvec2 words = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
-    float u_a = cm_random(p.random, p.stream);
-    float u_b = cm_random(p.random, p.stream);
-    if (vertex.on_triangle) here = cm_offset_origin(vertex.surface.position, vertex.surface.geometric);
-    float density = 1.0;
-    lamp.radiance = cm_emitter_sample(here, words, vec2(u_a, u_b), lamp.direction, lamp.distance, density);
-    lamp.density *= density;
-  }
-  return lamp;
+// Where looks for light start, in the world.
+vec3 cm_look_from(CmPath p, CmVertex vertex) {
+  if (vertex.on_triangle) return cm_offset_origin(vertex.surface.position, vertex.surface.geometric);
+  return cm_from_cube_point(p.o);
 }
 
-// A direction to go on in; what it says of the ray's own is of the lamp's, if the ray is to one.
-CmDirection cm_direction(inout CmPath p, CmVertex vertex, CmLampSample lamp, bool to_lamp, float u_0, float u_1) {
-  CmDirection next;
-  next.w = cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531 * u_1);
-  next.may_meet = true;
+// A direction that a flight might take. Some that leave a triangle are aimed at the glowing medium.
+vec3 cm_turn_direction(inout CmPath p, CmVertex vertex, float u_0, float u_1) {
+  if (!vertex.on_triangle) return cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531 * u_1);
+  float u_3 = cm_random(p.random, p.stream);
+  float to_glow = cm.lights.glow_chance;
+  bool aimed = u_3 < to_glow;
+  u_3 = aimed ? u_3 / to_glow : (u_3 - to_glow) / (1.0 - to_glow);
+  vec3 w = cm_surface_sample(vertex.surface, p.w, u_0, u_1, u_3);
+  return aimed ? cm_glow_direction(p.o, vec3(u_0, u_1, u_3), w) : w;
+}
+
+CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
+  CmTurn turn;
+  turn.lifted = false;
   if (vertex.on_triangle) {
-    float u_3 = cm_random(p.random, p.stream);
-    // A glowing medium is looked for by some of the flights: towards a point of its box, each as likely.
-    float to_glow = cm.lights.glow_probability;
-    bool guided = u_3 < to_glow;
-    u_3 = guided ? u_3 / to_glow : (u_3 - to_glow) / (1.0 - to_glow);
-    vec3 goal = mix(cm.grid.box_min, cm.grid.box_max, vec3(u_0, u_1, u_3));
-    vec3 to_goal = cm_to_world(goal - p.o);
-    next.w = cm_surface_sample(vertex.surface, p.w, u_0, u_1, u_3);
-    if (guided && dot(to_goal, to_goal) > 0.0) next.w = normalize(to_goal);
-    vec3 wi = to_lamp ? lamp.direction : next.w;
-    next.share = cm_surface_eval(vertex.surface, p.w, wi);
-    next.lobe_density = cm_surface_pdf(vertex.surface, p.w, wi);
-    next.density = next.lobe_density + to_glow * (cm_glow_density(p.o, wi) - next.lobe_density);
-    // Rays that start above the triangle see a lamp at another angle than it is looked for: that alone counts then.
-    next.may_meet = !vertex.surface.lifted || cm_lift_share(dot(vertex.surface.geometric, wi)) <= 0.0;
+    turn.share = cm_surface_eval(vertex.surface, p.w, wi);
+    turn.lobe_density = cm_surface_pdf(vertex.surface, p.w, wi);
+    turn.density = (1.0 - cm.lights.glow_chance) * turn.lobe_density +
+                   cm_light_pdf(cm_light_hit(CM_LIGHT_GLOW, p.o, wi, turn.lobe_density));
+    turn.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0;
   } else {
-    next.lobe_density = cm_phase(cm.medium.anisotropy, dot(p.w, to_lamp ? lamp.direction : next.w));
-    next.density = next.lobe_density;
-    next.share = vec3(next.lobe_density);
+    turn.lobe_density = cm_phase(cm.medium.anisotropy, dot(p.w, wi));
+    turn.density = turn.lobe_density;
+    turn.share = vec3(turn.lobe_density);
   }
-  next.weight = next.density > 0.0 ? next.share / next.density : vec3(0.0);
-  return next;
+  turn.weight = turn.density > 0.0 ? turn.share / turn.density : vec3(0.0);
+  return turn;
 }
 
 // Whether a path is scattered wider than a surface of the least roughness does: a quarter of that lobe's highest
 // density, and no matte surface is smooth.
-bool cm_blurs(CmDirection next) {
+bool cm_blurs(CmTurn turn) {
   float alpha = cm_alpha(cm.integrator.blurred_roughness);
-  return next.lobe_density < max(0.35, 0.25 * CM_INV_PI * 0.25 / (alpha * alpha));
+  return turn.lobe_density < max(0.35, 0.25 * CM_INV_PI * 0.25 / (alpha * alpha));
 }
 
 #else
@@ -184,30 +146,22 @@ struct CmVertex {
 CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) { return false; }
 CM_FN CmVertex cm_vertex(CM_INOUT(CmPath) p, bool on_triangle, bool met) { return CmVertex(false); }
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }
-CM_FN bool cm_blurs(CmDirection next) { return false; }
-
-// The sun.
-CM_FN CmLampSample cm_choose_lamp(CM_INOUT(CmPath) p, CmVertex vertex, bool wanted) {
-  CmLampSample lamp;
-  lamp.radiance = cm.lights.sun_irradiance;
-  lamp.direction = cm.lights.sun_direction;
-  lamp.distance = 3.0e38f;
-  lamp.density = 1.0f - cm.lights.sky_probability;
-  lamp.emitter = false;
-  return lamp;
-}
+CM_FN bool cm_blurs(CmTurn turn) { return false; }
+CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }
 
 // The phase function samples itself exactly.
-CM_FN CmDirection cm_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmLampSample lamp, bool to_lamp, float u_0,
-                               float u_1) {
-  CmDirection next;
-  next.w = cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531f * u_1);
-  next.density = cm_phase(cm.medium.anisotropy, dot(p.w, lamp.direction));
-  next.lobe_density = next.density;
-  next.share = vec3(next.density, next.density, next.density);
-  next.weight = vec3(1.0f, 1.0f, 1.0f);
-  next.may_meet = false;
-  return next;
+CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
+  return cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531f * u_1);
+}
+
+CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
+  CmTurn turn;
+  turn.density = cm_phase(cm.medium.anisotropy, dot(p.w, wi));
+  turn.lobe_density = turn.density;
+  turn.share = vec3(turn.density, turn.density, turn.density);
+  turn.weight = vec3(1.0f, 1.0f, 1.0f);
+  turn.lifted = false;
+  return turn;
 }
 
 #endif

@@ -5,7 +5,9 @@
 #include "frame.glsl"
 
 CM_FN float cm_phase(float g, float cosine) {
-  float d = 1.0f + g * g - 2.0f * g * cosine;
+  // 1 + g^2 - 2 g cosine, which is never 0, without the cancellation.
+  float k = abs(g);
+  float d = (1.0f - k) * (1.0f - k) + 2.0f * max(0.0f, k - g * cosine);
   return 0.0795774715f * (1.0f - g * g) / (d * sqrt(d));
 }
 

@@ -6,6 +6,12 @@
 
 CM_FN vec3 cm_to_cube(vec3 v) { return cm.grid.to_cube_x * v.x + cm.grid.to_cube_y * v.y + cm.grid.to_cube_z * v.z; }
 
+CM_FN vec3 cm_to_world(vec3 v) {
+  return cm.grid.from_cube_x * v.x + cm.grid.from_cube_y * v.y + cm.grid.from_cube_z * v.z;
+}
+CM_FN vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm.grid.cube_origin; }
+CM_FN vec3 cm_to_cube_point(vec3 p) { return cm_to_cube(p - cm.grid.cube_origin); }
+
 // Where a ray is inside the box: t.x to t.y, empty if t.x > t.y.
 CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
   float t_in = 0.0f;

@@ -19,14 +19,6 @@ uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
 bool cm_hit_back = false;  // what it met last
 
-vec3 cm_to_world(vec3 v) { return cm.grid.from_cube_x * v.x + cm.grid.from_cube_y * v.y + cm.grid.from_cube_z * v.z; }
-vec3 cm_world_origin() { return cm.grid.cube_origin; }
-vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm_world_origin(); }
-vec3 cm_to_cube_point(vec3 p) {
-  vec3 v = p - cm_world_origin();
-  return cm.grid.to_cube_x * v.x + cm.grid.to_cube_y * v.y + cm.grid.to_cube_z * v.z;
-}
-
 vec2 cm_ggx_albedo(float roughness, float cosine) {
   vec2 place = cm_ggx_albedo_place(roughness, cosine);
   ivec2 cell = min(ivec2(place), CM_GGX_ALBEDO_SIZE - 2);
@@ -298,76 +290,6 @@ vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, out vec
   vec3 p = weight.x * position[0] + weight.y * position[1] + weight.z * position[2];
   shift = cm_lift_share(dot(g, d)) * cm_lift(p, weight, position, normals, g);
   return cm_offset_origin(p + shift, g);
-}
-
-// One of the sun and the punctual lights, as likely as each other; divided by that chance. light: irradiance at right
-// angles to to_light (KHR_lights_punctual).
-void cm_lamp(vec3 here, float u, inout vec3 light, inout vec3 to_light, inout float distance) {
-  bool sun = max(light.x, max(light.y, light.z)) > 0.0;
-  uint count = cm.surfaces.lamp_count + (sun ? 1u : 0u);
-  uint choice = min(uint(u * float(count)), count - 1u);
-  if (choice == cm.surfaces.lamp_count) {
-    light *= float(count);
-    return;
-  }
-  uint word = cm.surfaces.lamps + CM_LAMP_WORDS * choice;
-  CmLight lamp = CmLight(cm_floats(word), cm_floats(word + 1u), cm_floats(word + 2u), cm_floats(word + 3u));
-  light = cm_punctual_irradiance(lamp, here, to_light, distance) * float(count);
-}
-
-// The emissive triangles' table, see src/render/emitters.hpp.
-uvec4 cm_emitter(uint i) { return cm_words(cm.surfaces.emitters + i); }
-
-// Density by solid angle of a point on an emissive triangle, picked by power and then by area: `way` from where it is
-// looked at, under `cosine` to its normal.
-float cm_emitter_density(uvec4 entry, vec3 way, float cosine) {
-  return abs(uintBitsToFloat(entry.w)) * dot(way, way) / max(abs(cosine), 1e-12);
-}
-
-// The same of a triangle that a ray has met; 0 where it is not in the table. O(log n).
-float cm_emitter_met(uint triangle, vec3 way, float cosine) {
-  uint low = 0u;
-  uint high = cm.surfaces.emitter_count;
-  while (low + 1u < high) {
-    uint middle = (low + high) >> 1u;
-    bool below = cm_emitter(middle).x <= triangle;
-    low = below ? middle : low;
-    high = below ? high : middle;
-  }
-  uvec4 entry = cm_emitter(low);
-  return entry.x == triangle ? cm_emitter_density(entry, way, cosine) : 0.0;
-}
-
-// A point on an emissive triangle: what it sends to `here`, from where and with which density by solid angle. distance:
-// to just before it. O(1).
-vec3 cm_emitter_sample(vec3 here, uvec2 pick, vec2 u, out vec3 to_light, out float distance, out float density) {
-  uint i;
-  uint unused;
-  umulExtended(pick.x, cm.surfaces.emitter_count, i, unused);
-  uvec4 entry = cm_emitter(i);
-  if (pick.y > entry.y) entry = cm_emitter(entry.z);
-  float root = sqrt(u.x);
-  CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0 - u.y), root * u.y));
-  vec3 a = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.x + CM_VERTEX_PLACE).xyz;
-  vec3 b = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.y + CM_VERTEX_PLACE).xyz;
-  vec3 c = cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.z + CM_VERTEX_PLACE).xyz;
-  vec3 g = cross(b - a, c - a);
-  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
-  vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
-  bool along = dot(g, point - here) > 0.0;  // seen from where the vertices turn clockwise
-  vec3 way = cm_offset_origin(point, along ? -g : g) - here;
-  float length_2 = max(dot(way, way), 1e-24);
-  to_light = way * inversesqrt(length_2);
-  distance = sqrt(length_2) * 0.99999;
-  density = cm_emitter_density(entry, way, dot(g, to_light));
-  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
-  uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
-  vec3 emission = cm_emission(m);
-  if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + CM_MATERIAL_COAT).y > 0.0) {
-    emission *= cm_coverage(m);
-  }
-  bool front = along == (uintBitsToFloat(entry.w) < 0.0);
-  return front || (flags & CM_ONE_SIDED) == 0u ? emission : vec3(0.0);
 }
 
 #endif

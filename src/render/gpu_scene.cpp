@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/error.hpp"
-#include "render/light_choice.hpp"
+#include "light/light_table.hpp"
 
 namespace cumulet::render {
 
@@ -130,7 +130,7 @@ Surfaces GpuScene::surfaces(const scene::Snapshot& snapshot, bool traced) {
   surfaces.raster = raster_ ? &surface_pass_ : nullptr;
   surfaces.traced = traced || surfaces.raster == nullptr;
   if (*snapshot.view) surfaces.view = **snapshot.view;
-  const scene::Lights& lights = *snapshot.lights;
+  const light::DistantLights& lights = *snapshot.lights;
   surfaces.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance};
   return surfaces;
 }
@@ -140,7 +140,6 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Su
   const scene::Viewpoint& view = **snapshot.view;
   const scene::MarchSource& source = *data_.of();
   const scene::Medium& medium = *snapshot.volumes.front().medium;
-  const scene::Lights& lights = *snapshot.lights;
   PictureParameters p;
   p.view.eye = glm::vec3(glm::inverse(source.cube.to_world) * glm::dvec4(view.eye, 1.0));
   p.view.orthographic = view.orthographic ? 1U : 0U;
@@ -152,8 +151,10 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Su
   p.medium.extinction = static_cast<float>(std::min(1e30, medium.density_scale * std::max(source.max_value, 1e-30F)));
   p.medium.source = medium.emission;
   p.medium.anisotropy = medium.anisotropy;
-  p.lights = light_parameters({lights.to_sun, lights.sun_irradiance, lights.sky_radiance}, surfaces.met(),
-                              integrator.light_among_surfaces != 0U && medium.emission != glm::vec3(0.0F));
+  const bool glow = integrator.light_among_surfaces != 0U && medium.emission != glm::vec3(0.0F);
+  const SurfaceData* met = surfaces.met();
+  const light::LightTable table(*snapshot.lights, met != nullptr ? met->lights() : light::SceneLights{}, glow);
+  p.lights = table.parameters();
   p.integrator = integrator;
   return p;
 }

@@ -19,7 +19,7 @@ struct PictureWish {
   /// GL by and by is known by its revision there.
   struct Content {
     scene::Part<std::optional<scene::Viewpoint>> viewpoint;
-    scene::Part<scene::Lights> lights;
+    scene::Part<light::DistantLights> lights;
     std::vector<scene::Part<scene::Medium>> media;
     Revision<MarchData> data;
     Revision<SurfaceData> surfaces;

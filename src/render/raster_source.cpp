@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "base/progress_part.hpp"
-#include "render/srgb.hpp"
+#include "base/srgb.hpp"
 
 namespace cumulet::core {
 #include "display.glsl"

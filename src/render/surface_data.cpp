@@ -15,8 +15,7 @@
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
 #include "gl/bindings.hpp"
-#include "render/luminance.hpp"
-#include "render/punctual.hpp"
+#include "light/lamps.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
@@ -102,21 +101,14 @@ std::uint32_t wrap_bits(surface::Wrap wrap) {
 
 std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
 
-void add_lights(std::vector<uvec4>& words, const std::vector<surface::PunctualLight>& lights) {
-  for (const surface::PunctualLight& light : lights) {
-    const core::CmLight record = punctual_light(light, glm::dvec3(0.0));
+void add_lamps(std::vector<uvec4>& words, const std::vector<surface::PunctualLight>& lamps) {
+  for (const surface::PunctualLight& lamp : lamps) {
+    const core::CmLight record = light::lamp_record(lamp, glm::dvec3(0.0));
     words.push_back(bits(record.position));
     words.push_back(bits(record.direction));
     words.push_back(bits(record.intensity));
     words.push_back(bits(record.cone));
   }
-}
-
-double flux_of(const surface::PunctualLight& light, double cross_section) {
-  using Kind = surface::PunctualLight::Kind;
-  const double solid_angle =
-      2.0 * std::numbers::pi * (light.kind == Kind::spot ? 1.0 - std::cos(double{light.outer_cone}) : 2.0);
-  return luminance(glm::dvec3(light.intensity)) * (light.kind == Kind::directional ? cross_section : solid_angle);
 }
 
 void pack_words(SurfaceSource& source, const Progress* progress) {
@@ -170,10 +162,10 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   }
   source.tables.lamps = size_of(words);
   source.tables.lamp_count = static_cast<std::uint32_t>(source.pose.lights.size());
-  add_lights(words, source.pose.lights);
+  add_lamps(words, source.pose.lights);
 
   check(progress);
-  const EmitterTable table = emitter_table(source.emissive, scene, source.pose, progress);
+  const light::EmitterTable table = light::emitter_table(source.emissive, scene, source.pose, progress);
   source.tables.emitters = size_of(words);
   source.tables.emitter_count = size_of(table.entries);
   words.insert(words.end(), table.entries.begin(), table.entries.end());
@@ -184,14 +176,9 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   words.insert(words.end(), cells.begin(), cells.end());
   source.tables.ggx_albedo_averages = size_of(words);
   words.insert(words.end(), averages.begin(), averages.end());
-  source.emitted_flux = table.flux;
+  source.lights = light::scene_lights(source.pose, table);
   source.tables.low = glm::prevFloat(vec3(source.pose.low));
   source.tables.high = glm::nextFloat(vec3(source.pose.high));
-  const double radius = 0.5 * glm::length(source.pose.high - source.pose.low);
-  source.cross_section = std::numbers::pi * radius * radius;
-  for (const surface::PunctualLight& light : source.pose.lights) {
-    source.lamp_flux += flux_of(light, source.cross_section);
-  }
 }
 
 void build(SurfaceSource& source, const Progress* progress) {
@@ -267,7 +254,7 @@ std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene
   source->pose = std::move(pose);
   build(*source, progress);
   check(progress);
-  source->emissive = emissive_triangles(*source->scene, progress);
+  source->emissive = light::emissive_triangles(*source->scene, progress);
   TextureAtlas atlas = pack_atlas(source->scene->images, largest_layer);
   shrink_images(atlas, source->scene->images, progress);
   source->atlas = std::make_shared<const TextureAtlas>(std::move(atlas));
@@ -321,9 +308,7 @@ std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const
   SurfaceData* const to = data.get();
   to->scene_ = source.scene.get();
   to->tables_ = source.tables;
-  to->emitted_flux_ = source.emitted_flux;
-  to->lamp_flux_ = source.lamp_flux;
-  to->cross_section_ = source.cross_section;
+  to->lights_ = source.lights;
   const std::size_t bytes = source.words.size() * sizeof(uvec4);
   to->bytes_ = bytes + std::uint64_t{atlas.edge} * atlas.edge * std::max(1U, atlas.layers) * 4;
   upload.add([gl, to, bytes] {
@@ -353,12 +338,6 @@ std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const
 void SurfaceData::bind(const gl::Functions& gl) const {
   gl.BindTextureUnit(core::CM_UNIT_SCENE_WORDS, words_.name());
   gl.BindTextureUnit(core::CM_UNIT_ATLAS, atlas_->name());
-}
-
-double SurfaceData::emitter_share(double sun) const {
-  if (!emitters()) return 0.0;
-  const double others = lamp_flux_ + sun * cross_section_;
-  return others > 0.0 ? std::clamp(emitted_flux_ / (emitted_flux_ + others), 0.2, 0.8) : 1.0;
 }
 
 }  // namespace cumulet::render

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "gl/objects.hpp"
-#include "render/emitters.hpp"
+#include "light/emitters.hpp"
+#include "light/scene_lights.hpp"
 #include "render/march_data.hpp"
 #include "render/parameters.hpp"
 #include "render/raster_source.hpp"
@@ -37,12 +38,10 @@ struct SurfaceSource {
   surface::Pose pose;
   surface::Bvh bvh;
   double built_cost = 0.0;  // of the tree before it was refitted
-  std::vector<EmissiveTriangle> emissive;
+  std::vector<light::EmissiveTriangle> emissive;
   std::vector<glm::uvec4> words;   // the tables of glsl/surface.glsl
   core::CmSurfaceTables tables{};  // where each begins
-  double emitted_flux = 0.0;       // luminance of all that emissive triangles emit
-  double lamp_flux = 0.0;          // and lamps
-  double cross_section = 0.0;      // of the scene's bounding sphere
+  light::SceneLights lights;
   std::shared_ptr<const TextureAtlas> atlas;
   std::shared_ptr<const RasterSource> raster;
   std::vector<glm::vec3> centres;  // of the raster's blended triangles
@@ -64,12 +63,7 @@ class SurfaceData {
                                            const SurfaceSource& source, const SurfaceData* last);
   void bind(const gl::Functions& gl) const;
   [[nodiscard]] const core::CmSurfaceTables& tables() const { return tables_; }
-  /// Whether there are punctual lights, and emissive triangles.
-  [[nodiscard]] bool lamps() const { return tables_.lamp_count > 0; }
-  [[nodiscard]] bool emitters() const { return tables_.emitter_count > 0; }
-  /// The chance that a look for light, but for the sky's, goes to an emissive triangle: their share of the flux of
-  /// lamps and sun as well, but 0.2 to 0.8 where there are others. sun: luminance of its irradiance.
-  [[nodiscard]] double emitter_share(double sun) const;
+  [[nodiscard]] const light::SceneLights& lights() const { return lights_; }
   /// What it is of, to tell one from another.
   [[nodiscard]] const surface::Scene* scene() const { return scene_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
@@ -80,9 +74,7 @@ class SurfaceData {
   std::shared_ptr<gl::Object> atlas_;
   const surface::Scene* scene_ = nullptr;
   core::CmSurfaceTables tables_{};
-  double emitted_flux_ = 0.0;
-  double lamp_flux_ = 0.0;
-  double cross_section_ = 0.0;
+  light::SceneLights lights_;
   std::uint64_t bytes_ = 0;
 };
 

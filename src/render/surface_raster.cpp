@@ -11,7 +11,7 @@
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
-#include "render/punctual.hpp"
+#include "light/lamps.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
@@ -323,7 +323,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   }
   std::vector<CmLight> lights;
   lights.reserve(lamps.size());
-  for (const surface::PunctualLight& light : lamps) lights.push_back(punctual_light(light, view.eye));
+  for (const surface::PunctualLight& lamp : lamps) lights.push_back(light::lamp_record(lamp, view.eye));
   if (!lights.empty()) {
     gl_->NamedBufferSubData(light_buffer_.name(), 0, static_cast<GLsizeiptr>(lights.size() * sizeof(CmLight)),
                             lights.data());

@@ -8,10 +8,10 @@
 #include <thread>
 
 #include "base/error.hpp"
+#include "base/luminance.hpp"
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
 #include "gl/state_guard.hpp"
-#include "render/luminance.hpp"
 
 namespace cumulet::core {
 #include "path_state.glsl"
@@ -192,7 +192,7 @@ unsigned Tracer::traced_of(const PictureParameters& parameters, const Surfaces& 
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
   const SurfaceData* met = settings.view == View::shaded && !preview ? surfaces.met() : nullptr;
-  return met == nullptr ? 0 : (met->emitters() ? 2 : 1);
+  return met == nullptr ? 0 : (met->lights().triangles > 0 ? 2 : 1);
 }
 
 bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,

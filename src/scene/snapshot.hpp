@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "light/distant_lights.hpp"
 #include "scene/march_source.hpp"
 #include "scene/part.hpp"
 
@@ -21,14 +22,6 @@ struct Medium {
   float anisotropy = 0.0F;
   glm::vec3 emission{0.0F};
   bool operator==(const Medium&) const = default;
-};
-
-/// The lights that are far away.
-struct Lights {
-  glm::dvec3 to_sun{0.0, 1.0, 0.0};  ///< world, unit
-  glm::vec3 sun_irradiance{0.0F};    ///< on a plane that faces it
-  glm::vec3 sky_radiance{0.0F};      ///< the same from everywhere
-  bool operator==(const Lights&) const = default;
 };
 
 /// What one picture is seen through, all in world space. A ray through (x, y), both -1 to 1, y up:
@@ -62,7 +55,7 @@ struct Model {
 struct Snapshot {
   std::vector<Volume> volumes;  ///< at most one yet
   std::vector<Model> models;    ///< likewise
-  Part<Lights> lights;
+  Part<light::DistantLights> lights;
   Part<std::optional<Viewpoint>> view;  ///< none: nothing is to be seen
   /// O(volumes + models).
   bool operator==(const Snapshot&) const = default;

@@ -7,7 +7,7 @@
 #include <map>
 #include <numbers>
 
-#include "render/emitters.hpp"
+#include "light/emitters.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
@@ -24,8 +24,8 @@ using glm::dvec3;
 using glm::ivec3;
 using glm::vec2;
 using glm::vec3;
-using render::EmissiveTriangle;
-using render::EmitterTable;
+using light::EmissiveTriangle;
+using light::EmitterTable;
 using render::March;
 using surface::Material;
 using test::camera_at;
@@ -186,9 +186,9 @@ TEST(Emitters, ArePickedByPower) {
     scene->add_quad(square(static_cast<float>(i), 0.1F * static_cast<float>(i * i), i % 3 == 0), i % 4);
   }
   scene->rest.flipped[5] = 1;
-  const std::vector<EmissiveTriangle> emissive = render::emissive_triangles(*scene);
+  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene);
   ASSERT_EQ(emissive.size(), 40U);
-  const EmitterTable table = render::emitter_table(emissive, *scene, scene->rest);
+  const EmitterTable table = light::emitter_table(emissive, *scene, scene->rest);
   double sum = 0.0;
   double flux = 0.0;
   const std::map<std::uint32_t, double> chance = chances(table);
@@ -213,7 +213,7 @@ TEST(Emitters, ArePickedByPower) {
   double one_sided = 0.0;
   for (const glm::uvec4& entry : table.entries) one_sided += entry.x / 2 % 4 == 1 ? area_of(*scene, entry.x) : 0.0;
   scene->rest.double_sided = true;
-  EXPECT_NEAR(render::emitter_table(emissive, *scene, scene->rest).flux / (flux + pi * one_sided), 1.0, 1e-6);
+  EXPECT_NEAR(light::emitter_table(emissive, *scene, scene->rest).flux / (flux + pi * one_sided), 1.0, 1e-6);
 }
 
 TEST(Emitters, WithoutAreaOrLightAreNone) {
@@ -228,9 +228,9 @@ TEST(Emitters, WithoutAreaOrLightAreNone) {
   scene->materials[1].emission_texture.texture = 0;
   scene->add_quad(square(0.0F, 0.0F, true), 0);
   scene->add_quad(square(0.0F, 1.0F, true), 1);
-  const std::vector<EmissiveTriangle> emissive = render::emissive_triangles(*scene);
+  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene);
   EXPECT_EQ(emissive.size(), 2U);
-  const EmitterTable table = render::emitter_table(emissive, *scene, scene->rest);
+  const EmitterTable table = light::emitter_table(emissive, *scene, scene->rest);
   EXPECT_TRUE(table.entries.empty());
   EXPECT_EQ(table.flux, 0.0);
 }
@@ -247,7 +247,7 @@ TEST(Emitters, TexturesSayWhichTrianglesShine) {
       scene->attributes[i].uv[0] = vec2(middle, 0.5F) + 0.2F * (scene->attributes[i].uv[0] - 0.5F);
     }
   }
-  const std::vector<EmissiveTriangle> emissive = render::emissive_triangles(*scene);
+  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene);
   ASSERT_EQ(emissive.size(), 4U);
   EXPECT_NEAR(emissive[0].luminance, 0.503, 0.001);
   EXPECT_NEAR(emissive[1].luminance, 0.503, 0.001);
@@ -263,8 +263,8 @@ TEST(Emitters, AnotherPoseHasAnotherTable) {
   for (std::size_t i = 4; i < 8; ++i)
     pose.vertices[i].position.x = 32.0F + 3.0F * (pose.vertices[i].position.x - 32.0F);
   const auto second = render::make_surface_source(*first, pose, nullptr);
-  EXPECT_NEAR(first->emitted_flux, pi * 400.0 * 2.0, 1e-2);
-  EXPECT_NEAR(second->emitted_flux, pi * 1200.0 * 2.0, 1e-2);
+  EXPECT_NEAR(first->lights.triangle_flux, pi * 400.0 * 2.0, 1e-2);
+  EXPECT_NEAR(second->lights.triangle_flux, pi * 1200.0 * 2.0, 1e-2);
   const float density = glm::uintBitsToFloat(second->words.at(second->tables.emitters).w);
   EXPECT_NEAR(density * 1200.0, 1.0, 1e-5);
 }

@@ -9,7 +9,7 @@ using namespace cumulet::scene;
 TEST(Snapshot, APartIsAnotherWhereItsValueIs) {
   Snapshot draft;
   const Snapshot before = draft;
-  Lights lights = *draft.lights;
+  cumulet::light::DistantLights lights = *draft.lights;
   draft.lights.set(lights);  // the same again
   EXPECT_EQ(draft, before);
   lights.sky_radiance = glm::vec3(1.0F);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace cumulet::render {
+namespace cumulet {
 
 /// The linear value of each 8-bit sRGB value.
 inline std::array<float, 256> srgb_decoding() {
@@ -16,4 +16,4 @@ inline std::array<float, 256> srgb_decoding() {
   return table;
 }
 
-}  // namespace cumulet::render
+}  // namespace cumulet

@@ -12,13 +12,13 @@ namespace cumulet::core {
 #include "punctual.glsl"
 }  // namespace cumulet::core
 
-namespace cumulet::render {
+namespace cumulet::light {
 
 /// origin: what positions count from.
-inline core::CmLight punctual_light(const surface::PunctualLight& light, const glm::dvec3& eye) {
+inline core::CmLight lamp_record(const surface::PunctualLight& light, const glm::dvec3& origin) {
   using Kind = surface::PunctualLight::Kind;
   core::CmLight result{};
-  result.position = glm::vec4(glm::dvec3(light.position) - eye, light.kind == Kind::directional ? 0.0 : 1.0);
+  result.position = glm::vec4(glm::dvec3(light.position) - origin, light.kind == Kind::directional ? 0.0 : 1.0);
   result.direction = glm::vec4(light.direction, light.range);
   result.intensity = glm::vec4(light.intensity, 0.0F);
   result.cone = glm::vec4(0.0F, 1.0F, 0.0F, 0.0F);
@@ -30,4 +30,4 @@ inline core::CmLight punctual_light(const surface::PunctualLight& light, const g
   return result;
 }
 
-}  // namespace cumulet::render
+}  // namespace cumulet::light

@@ -1,4 +1,4 @@
-#include "render/emitters.hpp"
+#include "light/emitters.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -10,11 +10,11 @@
 #include <limits>
 #include <numbers>
 
+#include "base/luminance.hpp"
 #include "base/progress_part.hpp"
-#include "render/luminance.hpp"
-#include "render/srgb.hpp"
+#include "base/srgb.hpp"
 
-namespace cumulet::render {
+namespace cumulet::light {
 
 namespace {
 
@@ -197,4 +197,4 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
   return table;
 }
 
-}  // namespace cumulet::render
+}  // namespace cumulet::light

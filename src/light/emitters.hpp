@@ -8,7 +8,7 @@
 
 #include "surface/scene.hpp"
 
-namespace cumulet::render {
+namespace cumulet::light {
 
 /// A triangle whose material emits. What a pose does not change.
 struct EmissiveTriangle {
@@ -36,4 +36,4 @@ struct EmitterTable {
 EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const surface::Scene& scene,
                            const surface::Pose& pose, const Progress* progress = nullptr);
 
-}  // namespace cumulet::render
+}  // namespace cumulet::light

@@ -2,7 +2,7 @@
 
 #include <glm/glm.hpp>
 
-namespace cumulet::render {
+namespace cumulet {
 
 /// Of linear Rec. 709 colour.
 template <class T>
@@ -10,4 +10,4 @@ T luminance(const glm::vec<3, T>& v) {
   return glm::dot(v, glm::vec<3, T>(T(0.2126), T(0.7152), T(0.0722)));
 }
 
-}  // namespace cumulet::render
+}  // namespace cumulet

@@ -1,0 +1,9 @@
+#pragma once
+
+// glsl/parameters.glsl as C++: the uniform block of every kernel that makes pictures.
+
+#include "base/shared_code.hpp"
+
+namespace cumulet::core {
+#include "parameters.glsl"
+}  // namespace cumulet::core

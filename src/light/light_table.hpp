@@ -1,0 +1,41 @@
+#pragma once
+
+// Which lights there are, and how likely paths look for each kind: one selection over all of them. No GL.
+
+#include <vector>
+
+#include "base/parameters.hpp"
+#include "light/distant_lights.hpp"
+#include "light/scene_lights.hpp"
+
+namespace cumulet::light {
+
+/// The kinds of glsl/light.glsl.
+enum class Kind { sky, sun, triangle, lamp, glow };
+
+/// A value: made anew when a light changes.
+class LightTable {
+ public:
+  /// All the lights of a kind.
+  struct Entry {
+    Kind kind = Kind::sky;
+    /// Of what is looked for at a vertex, the share that these are; their shares sum to 1, or there is no light. Of
+    /// glow: the share of flights that surfaces send off towards it.
+    float chance = 0.0F;
+  };
+
+  /// glow: whether the medium's own light falls on surfaces.
+  LightTable(const DistantLights& distant, const SceneLights& scene, bool glow);
+
+  [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
+  /// 0 for a kind that is not there.
+  [[nodiscard]] float chance(Kind kind) const;
+  /// What kernels are told.
+  [[nodiscard]] core::CmLights parameters() const;
+
+ private:
+  DistantLights distant_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace cumulet::light

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+
+#include "light/emitters.hpp"
+#include "surface/scene.hpp"
+
+namespace cumulet::light {
+
+/// What there is of a scene's own lights in a pose. Flux: the luminance of all that they send out.
+struct SceneLights {
+  std::uint32_t lamps = 0;      ///< punctual
+  std::uint32_t triangles = 0;  ///< emissive
+  double lamp_flux = 0.0;
+  double triangle_flux = 0.0;
+  double cross_section = 0.0;  ///< of the scene's bounding sphere: what it takes of a distant light
+};
+
+/// triangles: of the same pose.
+SceneLights scene_lights(const surface::Pose& pose, const EmitterTable& triangles);
+
+}  // namespace cumulet::light
