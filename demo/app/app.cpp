@@ -60,8 +60,8 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
           nullptr) == 0)
     throw std::runtime_error("the OpenGL functions cannot be loaded");
   context_ = window_->make_shared_context();
-  renderer_ =
-      std::make_unique<Renderer>(*gl_, context_.get(), Window::wake, options_.trace.empty() ? nullptr : &timeline_);
+  renderer_ = std::make_unique<Renderer>(*gl_, context_.get(), Window::wake,
+                                         options_.trace.empty() ? nullptr : &timeline_, options_.shader_cache);
   // Sizes in the scene are for pictures: here the window has its own.
   model_.scene.width = 1280;
   model_.scene.height = 720;
@@ -550,6 +550,10 @@ void App::take_statistics(const std::vector<Event>& events) {
 
   if (changed_at_ && drawn_ >= changed_number_)
     charts.picture_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - *std::exchange(changed_at_, std::nullopt))));
+
+  const double device = device_seconds(status.stats);
+  if (device > device_seconds_) charts.device_ms.add(static_cast<float>(1000.0 * (device - device_seconds_)));
+  device_seconds_ = device;
 
   constexpr double rate_period = 0.5;
   const bool more = (status.frame.flags & CUMULET_RENDER_MORE) != 0;

@@ -92,6 +92,7 @@ class App {
   double last_event_ = 0.0;
   double last_motion_ = -1.0;
   double rate_since_ = 0.0;
+  double device_seconds_ = 0.0;  // as they were told last
   std::uint64_t rate_samples_ = 0;
 
   Wish wish_;  // sent last; its camera, volume and surfaces as they are known to the viewer

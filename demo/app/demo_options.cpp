@@ -42,6 +42,10 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
                  "Write when frames, their passes and jobs ran, for chrome://tracing and Perfetto")
       ->type_name("FILE.json")
       ->group(group);
+  app.add_option("--shader-cache", options.shader_cache,
+                 "Keep what the driver made of shaders in this folder, for the next run")
+      ->type_name("DIR")
+      ->group(group);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene);

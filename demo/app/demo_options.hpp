@@ -15,7 +15,8 @@ struct DemoOptions {
   double ui_scale = 0.0;  // 0: as the screen asks
   std::string replay;
   std::string record;
-  std::string trace;  // empty: none
+  std::string trace;         // empty: none
+  std::string shader_cache;  // likewise: a folder
 };
 
 /// cumulet-demo's arguments, without the program's name. Nothing if they asked for --help or --version, whose text

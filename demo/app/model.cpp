@@ -69,6 +69,11 @@ void Series::add(float value) {
   values_.push_back(value);
 }
 
+double device_seconds(const cumulet_stats& stats) {
+  return stats.pass_seconds_upload + stats.pass_seconds_host_depth + stats.pass_seconds_surfaces +
+         stats.pass_seconds_trace + stats.pass_seconds_inspect + stats.pass_seconds_display;
+}
+
 Model::Model() {
   navigation.struct_size = sizeof navigation;
   navigation.speed = 1.0;

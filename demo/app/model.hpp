@@ -119,7 +119,11 @@ struct Charts {
   Series picture_ms;  // from a change to the window with the picture that was drawn next
   Series samples_per_second;
   Series noise_percent;
+  Series device_ms;  // that the library's passes took, a frame of the window
 };
+
+/// Of all passes.
+double device_seconds(const cumulet_stats& stats);
 
 /// All that the user interface shows and changes.
 struct Model {

@@ -326,6 +326,15 @@ void Panel::statistics(const Model& model) {
   ui_.plot("Noise", "Relative standard error of the picture, measured each second while it refines.",
            charts.noise_percent.values(),
            status.noise > 0.0 ? print("%.2f %%", 100.0 * status.noise) : std::string("-"));
+  ui_.plot("Device time", "Milliseconds of the GPU that the library's passes took, from frame to frame.",
+           charts.device_ms.values(), print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
+  if (const double all = device_seconds(stats); all > 0.0) {
+    const auto share = [all](double seconds) { return 100.0 * seconds / all; };
+    ui_.fact("Trace, surfaces", print("%.0f %%, ", share(stats.pass_seconds_trace)) +
+                                    print("%.0f %%", share(stats.pass_seconds_surfaces)));
+    ui_.fact("Upload, display", print("%.0f %%, ", share(stats.pass_seconds_upload)) +
+                                    print("%.0f %%", share(stats.pass_seconds_display)));
+  }
   ImGui::Spacing();
   if (!status.has_volume) return;
   ui_.fact("Active voxels", short_count(static_cast<double>(stats.active_voxels)));

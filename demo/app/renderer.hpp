@@ -31,9 +31,11 @@ namespace cumulet::demo {
 class Renderer {
  public:
   /// gl: the window's. context shares objects with it, is current in no thread, and outlives the renderer. wake is
-  /// called from any thread when there is an answer to take. timeline, or null: is told of the viewer's work. Throws
+  /// called from any thread when there is an answer to take. timeline, or null: is told of the viewer's work.
+  /// shader_cache: a folder, or "". Throws
   /// std::runtime_error.
-  Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline);
+  Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline,
+           std::string shader_cache);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
   /// Stops what is under way, soon.
@@ -72,6 +74,7 @@ class Renderer {
   GLFWwindow* context_;
   std::function<void()> wake_;
   Timeline* timeline_;
+  std::string shader_cache_;
 
   // The thread's own.
   std::unique_ptr<GladGLContext> gl_;

@@ -34,7 +34,8 @@ bool same_wish(const Wish& a, const Wish& b) {
   return rest(a) == rest(b) && same(a.navigation, b.navigation) && same_scene(a.scene, b.scene);
 }
 
-Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline)
+Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline,
+                 const std::string& shader_cache)
     : shared_(std::make_unique<Shared>()) {
   shared_->wake = std::move(wake);
   cumulet_create_desc desc{};
@@ -49,6 +50,8 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
   }
+  const auto programs = make_programs(shader_cache);
+  desc.programs = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());

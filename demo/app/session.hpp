@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <shader_cache.hpp>
 #include <string>
 #include <timeline.hpp>
 #include <vector>
@@ -86,7 +87,8 @@ struct Answer {
 class Session {
  public:
   /// wake is called from any thread when there is something new to draw. Throws std::runtime_error.
-  Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline);
+  Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline,
+          const std::string& shader_cache);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session() = default;

@@ -14,6 +14,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <program.hpp>
+#include <shader_cache.hpp>
 #include <stdexcept>
 #include <string>
 #include <timeline.hpp>
@@ -66,7 +67,7 @@ struct DestroyViewer {
 };
 using Viewer = std::unique_ptr<cumulet_viewer, DestroyViewer>;
 
-Viewer create_viewer(Context& context, Progress& progress, Timeline* timeline) {
+Viewer create_viewer(Context& context, Progress& progress, Timeline* timeline, const std::string& shader_cache) {
   cumulet_create_desc desc{};
   desc.struct_size = sizeof desc;
   desc.get_proc = Context::get_proc;
@@ -77,6 +78,8 @@ Viewer create_viewer(Context& context, Progress& progress, Timeline* timeline) {
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
   }
+  const auto programs = cumulet::demo::make_programs(shader_cache);
+  desc.programs = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK)
@@ -240,6 +243,13 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   add_stage("records", stats.build_seconds_records);
   add_stage("upload", stats.build_seconds_upload);
   json["trace_seconds"] = stats.trace_seconds;
+  Json& passes = json["pass_seconds"];
+  passes["upload"] = stats.pass_seconds_upload;
+  passes["host_depth"] = stats.pass_seconds_host_depth;
+  passes["surfaces"] = stats.pass_seconds_surfaces;
+  passes["trace"] = stats.pass_seconds_trace;
+  passes["inspect"] = stats.pass_seconds_inspect;
+  passes["display"] = stats.pass_seconds_display;
   json["samples"] = stats.samples;
   if (stats.trace_seconds > 0.0) json["samples_per_second"] = static_cast<double>(stats.samples) / stats.trace_seconds;
   if (stats.samples > 0)
@@ -266,7 +276,8 @@ void render(const RenderOptions& options) {
   progress.stage("loading " + (options.scene.volume.empty() ? options.scene.surfaces : options.scene.volume));
   Context context = Context::create(backend_of(options.backend));
   Timeline timeline;
-  const Viewer viewer = create_viewer(context, progress, options.trace.empty() ? nullptr : &timeline);
+  const Viewer viewer =
+      create_viewer(context, progress, options.trace.empty() ? nullptr : &timeline, options.shader_cache);
   check_memory(viewer, options);
   const auto& scene = options.scene;
   cumulet_sampling_desc sampling = scene.sampling;

@@ -478,6 +478,13 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.trace = text;
       },
       "When frames, their passes and the workers' jobs ran, for chrome://tracing and Perfetto");
+  add(
+      app, group, "--shader-cache", "DIR",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the folder's name is empty");
+        options.shader_cache = text;
+      },
+      "Keep what the driver made of shaders in this folder, for the next run");
   add_choice(app, group, "--backend",
              std::array{Name{"auto", BackendChoice::automatic}, Name{"egl", BackendChoice::egl},
                         Name{"osmesa", BackendChoice::osmesa}},

@@ -36,6 +36,7 @@ struct RenderOptions {
   OutputFormat format = OutputFormat::png;
   std::string stats;              // empty: none
   std::string trace;              // likewise
+  std::string shader_cache;       // a folder; empty: none
   bool info = false;              // tell what is in the files, render nothing
   bool json = false;              // as JSON
   std::vector<cumulet_aov> aovs;  // layers of an .exr beside the picture

@@ -15,6 +15,16 @@ Object make_texture(const FunctionsPtr& gl, GLenum target) {
   return {gl, Object::Kind::texture, name};
 }
 
+// Else the driver's error is that a value is invalid.
+void require_size(const Functions& gl, int width, int height, const char* what) {
+  GLint most = 0;
+  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  if (width <= most && height <= most) return;
+  throw Error(ErrorCode::unsupported, std::string(what) + ": " + std::to_string(width) + "x" + std::to_string(height) +
+                                          " texels are more than this driver's GL_MAX_TEXTURE_SIZE, " +
+                                          std::to_string(most));
+}
+
 Object finish_texture(const FunctionsPtr& gl, Object texture, const char* what) {
   label(*gl, Object::Kind::texture, texture.name(), what);
   // No mipmaps and no filter: complete for texelFetch on every driver, in integer formats too.
@@ -120,6 +130,7 @@ Object make_texture_buffer(const FunctionsPtr& gl, GLenum format, const Object& 
 }
 
 Object make_texture_2d(const FunctionsPtr& gl, GLenum format, int width, int height, const char* what) {
+  require_size(*gl, width, height, what);
   Object texture = make_texture(gl, GL_TEXTURE_2D);
   gl->TextureStorage2D(texture.name(), 1, format, width, height);
   return finish_texture(gl, std::move(texture), what);
@@ -127,6 +138,7 @@ Object make_texture_2d(const FunctionsPtr& gl, GLenum format, int width, int hei
 
 Object make_texture_2d_array(const FunctionsPtr& gl, GLenum format, int width, int height, int layers,
                              const char* what) {
+  require_size(*gl, width, height, what);
   Object texture = make_texture(gl, GL_TEXTURE_2D_ARRAY);
   gl->TextureStorage3D(texture.name(), 1, format, width, height, layers);
   return finish_texture(gl, std::move(texture), what);

@@ -202,6 +202,11 @@ std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr&
   if (input.pose->vertices.size() != input.scene->scene->attributes.size()) {
     throw Error(ErrorCode::internal, "a pose of another scene");
   }
+  if (static_cast<std::int64_t>(input.pose->lights.size() * sizeof(CmLight)) > limits.storage_block_bytes) {
+    throw Error(ErrorCode::unsupported, std::to_string(input.pose->lights.size()) +
+                                            " lights are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
+                                            std::to_string(limits.storage_block_bytes) + ", holds");
+  }
   const auto content = std::make_shared<RasterContent>();
   Planner planner(gl, programs, limits, upload);
   if (last != nullptr && last->fixed_->source == input.scene) {

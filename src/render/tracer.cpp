@@ -392,6 +392,7 @@ void Tracer::collect() {
   while (const auto landed = flights_.land()) {
     const Dispatched& what = landed->what;
     const double ms = landed->ms.value_or(landed->at_most_ms);
+    (landed->words.empty() ? seconds_.inspect : seconds_.trace) += 1e-3 * landed->ms.value_or(0.0);
     if (landed->words.empty()) {
       if (what.cost) what.cost->learn(what.slots, landed->ms ? ms : 0.0, ms);
       continue;
@@ -415,6 +416,7 @@ void Tracer::collect() {
     }
   }
   while (const auto landed = rasters_.land()) {
+    seconds_.surfaces += 1e-3 * landed->ms.value_or(0.0);
     const double rate = landed->what.lanes / std::max(1e-3, landed->ms.value_or(landed->at_most_ms));
     if (landed->ms || rate > raster_rate_) raster_rate_ += 0.3 * (rate - raster_rate_);
   }

@@ -13,6 +13,7 @@
 #include "render/march_data.hpp"
 #include "render/pace.hpp"
 #include "render/parameters.hpp"
+#include "render/pass_timer.hpp"
 #include "render/surface_data.hpp"
 #include "render/surface_raster.hpp"
 
@@ -194,6 +195,8 @@ class Tracer {
   void settle(Picture& picture);
   /// Every dispatch that ends is told; for tests.
   void set_log(std::vector<DispatchRecord>* log) { log_ = log; }
+  /// Trace, inspect and surfaces.
+  [[nodiscard]] const PassSeconds& seconds() const { return seconds_; }
   /// Pixels a millisecond that the surface pass drew lately.
   [[nodiscard]] double raster_rate() const { return raster_rate_; }
   [[nodiscard]] std::uint64_t bytes() const;
@@ -261,6 +264,7 @@ class Tracer {
   Flights flights_;
   Flights rasters_;
   std::vector<DispatchRecord>* log_ = nullptr;
+  PassSeconds seconds_;
   double raster_rate_ = 2e4;
 };
 

@@ -429,6 +429,12 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.build_seconds_upload = seconds.upload;
     s.build_seconds_total = seconds.load + seconds.statistics + seconds.refine + seconds.records + seconds.upload;
     s.trace_seconds = had.trace_seconds;
+    s.pass_seconds_upload = had.pass_seconds.upload;
+    s.pass_seconds_host_depth = had.pass_seconds.host_depth;
+    s.pass_seconds_surfaces = had.pass_seconds.surfaces;
+    s.pass_seconds_trace = had.pass_seconds.trace;
+    s.pass_seconds_inspect = had.pass_seconds.inspect;
+    s.pass_seconds_display = had.pass_seconds.display;
     s.samples = had.samples;
     s.steps = had.steps;
     if (const auto volume = v.volume()) {

@@ -27,6 +27,9 @@ Context::Context(gl::FunctionsPtr gl, gl::ProgramPool& programs)
       scene_(functions_, programs_, limits_),
       progressive_(functions_, programs_),
       compositor_(functions_, programs_),
+      upload_timer_(functions_),
+      host_depth_timer_(functions_),
+      display_timer_(functions_),
       host_depth_(functions_, programs_) {
   strings_ = {gl::string_of(*functions_, GL_VENDOR), gl::string_of(*functions_, GL_RENDERER),
               gl::string_of(*functions_, GL_VERSION)};
@@ -52,7 +55,12 @@ render::Deadline Context::deadline_of(const Frame& frame, bool shares) const {
 void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline) {
   if (scene_.data() != nullptr && shot.scene->volumes.front().source == nullptr) progressive_.reset();
   const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
-  scene_.update(*shot.scene, {raster, shot.settings, page_texels}, deadline);
+  const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, page_texels}, deadline); };
+  if (scene_.uploading()) {
+    upload_timer_.run(update);
+  } else {
+    update();
+  }
 }
 
 render::Surfaces Context::surfaces(const Shot& shot) {
@@ -85,7 +93,14 @@ void Context::take_host_depth(const Shot& shot, const Frame& frame) {
   input.depth_a = shot.depth_a;
   input.depth_b = shot.depth_b;
   input.unchanged = frame.depth_unchanged && shot.view_rests;
-  if (host_depth_.update(input)) host_depth_revision_.advance();
+  const auto update = [&] {
+    if (host_depth_.update(input)) host_depth_revision_.advance();
+  };
+  if (input.source == render::DepthSource::none) {
+    update();
+  } else {
+    host_depth_timer_.run(update);
+  }
 }
 
 render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const render::Surfaces& met) const {
@@ -215,7 +230,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   render::PictureTextures picture = textures_of(*shown, shown == &empty_ ? nullptr : progressive_.before());
   picture.may_lag = !shown->done();
   if (frame.target == Target::framebuffer) {
-    compositor_.draw(picture, display, target);
+    display_timer_.run([&] { compositor_.draw(picture, display, target); });
     return;
   }
   make_target_textures(shot, frame);
@@ -233,7 +248,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   }
   target.framebuffer = framebuffer.name();
   target.blend_over = false;
-  compositor_.draw(picture, display, target);
+  display_timer_.run([&] { compositor_.draw(picture, display, target); });
   result.texture = target_->colour.name();
 }
 
@@ -251,6 +266,14 @@ void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
   result.more = scene_.uploading() || (pictures && (pending || progressive_.more()));
   result.progress = progressive_.progress();
   result.preview = result.size != glm::uvec2(0U) && result.size != shot.size;
+}
+
+render::PassSeconds Context::pass_seconds() const {
+  render::PassSeconds seconds = progressive_.tracer().seconds();
+  seconds.upload = upload_timer_.seconds();
+  seconds.host_depth = host_depth_timer_.seconds();
+  seconds.display = display_timer_.seconds();
+  return seconds;
 }
 
 std::uint64_t Context::bytes() const {

@@ -12,6 +12,7 @@
 #include "render/compositor.hpp"
 #include "render/gpu_scene.hpp"
 #include "render/host_depth.hpp"
+#include "render/pass_timer.hpp"
 #include "render/progressive.hpp"
 #include "render/rehearsal.hpp"
 #include "viewer/frame.hpp"
@@ -91,6 +92,8 @@ class Context {
   void read_linear(bool transparent, float* rgba, std::size_t count);
   [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
 
+  /// Of the context's life.
+  [[nodiscard]] render::PassSeconds pass_seconds() const;
   /// All that it has there.
   [[nodiscard]] std::uint64_t bytes() const;
 
@@ -143,6 +146,9 @@ class Context {
   render::Progressive progressive_;
   render::Compositor compositor_;
   render::Reserve reserve_;
+  render::PassTimer upload_timer_;
+  render::PassTimer host_depth_timer_;
+  render::PassTimer display_timer_;
   render::HostDepth host_depth_;
   Revision<render::HostDepth> host_depth_revision_;
   std::optional<DrawnAs> drawn_;  // last; nothing where that was older than what there was

@@ -32,6 +32,7 @@ struct Stats {
   std::uint64_t active_voxels = 0;
   BuildSeconds build_seconds;
   double trace_seconds = 0.0;
+  render::PassSeconds pass_seconds;
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
   GlStrings strings;

@@ -233,6 +233,7 @@ Stats Viewer::stats() {
     s.gl_bytes = gl_->bytes();
     s.strings = gl_->strings();
     s.trace_seconds = gl_->progressive().trace_seconds();
+    s.pass_seconds = gl_->pass_seconds();
     const render::Picture* picture = gl_->progressive().newest();
     s.samples = picture != nullptr ? picture->samples() : 0;
   }

@@ -474,6 +474,42 @@ TEST_F(Contract, ObjectsAndPassesHaveNames) {
   EXPECT_EQ(fake_.calls("PushDebugGroup"), fake_.calls("PopDebugGroup"));
 }
 
+TEST_F(Contract, PassesAreTimedWithoutWaiting) {
+  const auto seconds = [&] {
+    auto stats = make_desc<cumulet_stats>();
+    EXPECT_EQ(cumulet_get_stats(v_, &stats), CUMULET_OK);
+    return stats;
+  };
+  EXPECT_EQ(seconds().pass_seconds_trace, 0.0);
+  const auto begun = std::chrono::steady_clock::now();
+  picture_of(v_, volume_.get(), target_);
+  // What is under way is known some frames later.
+  for (int i = 0; i < 5; ++i) {
+    gl_.Finish();
+    auto frame = target_.frame();
+    ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+  }
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begun;
+  const cumulet_stats first = seconds();
+  EXPECT_GT(first.pass_seconds_trace, 0.0);
+  EXPECT_GT(first.pass_seconds_display, 0.0);
+  EXPECT_LE(first.pass_seconds_trace + first.pass_seconds_display, taken.count());
+  EXPECT_EQ(first.pass_seconds_inspect, 0.0);
+  EXPECT_EQ(first.pass_seconds_host_depth, 0.0);
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.view = CUMULET_VIEW_STEPS;
+  ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
+  auto frame = target_.frame();
+  frame.depth_source = CUMULET_DEPTH_SOURCE_FRAMEBUFFER;
+  frame.depth_name = target_.framebuffer();
+  converge(v_, frame);
+  gl_.Finish();
+  ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+  EXPECT_GT(seconds().pass_seconds_inspect, 0.0);
+  EXPECT_GT(seconds().pass_seconds_host_depth, 0.0);
+  EXPECT_EQ(fake_.alive().count("Queries"), 0U) << "contexts do not share them";
+}
+
 TEST_F(Contract, FramesPassesAndJobsAreToldAsTheyEnd) {
   struct Told {
     std::mutex mutex;

@@ -412,6 +412,7 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--tone-map", "aces"},
                                         {"--stats", ""},
                                         {"--trace", ""},
+                                        {"--shader-cache", ""},
                                         {"--spp"},
                                         {"--volume", ""}};
   for (const Arguments& arguments : wrong) {

@@ -147,11 +147,15 @@ class SurfaceRasters : public cumulet::test::GlTest {
   }
   /// In GL.
   RasterContentPtr content_of(const std::shared_ptr<HandScene>& scene, surface::Pose pose) {
+    return content_of(scene, std::move(pose), cumulet::gl::query_limits(*gl_));
+  }
+  RasterContentPtr content_of(const std::shared_ptr<HandScene>& scene, surface::Pose pose,
+                              const cumulet::gl::Limits& limits) {
     auto source = render::make_raster_source(scene);
     auto centres = std::make_shared<const std::vector<glm::vec3>>(render::blended_centres(*source, pose));
     render::Upload upload(gl_, "uploading");
     auto content = render::RasterContent::plan(
-        gl_, programs_, cumulet::gl::query_limits(*gl_), upload,
+        gl_, programs_, limits, upload,
         {std::move(source), std::make_shared<const surface::Pose>(std::move(pose)), std::move(centres)}, nullptr);
     EXPECT_TRUE(upload.advance(render::Deadline::max()));
     return content;
@@ -969,6 +973,18 @@ TEST_P(SurfaceRasters, RefusesWhatDoesNotFit) {
   huge->add_matte(glm::vec3(1.0F)).base_color_texture.texture =
       huge->add_texture(1U << 20U, 1, std::vector<std::uint8_t>(std::size_t{4} << 20U));
   EXPECT_EQ(code_of([&] { content_of(huge, huge->pose(0.0, 0)); }), ErrorCode::unsupported);
+  surface::Pose lit = scene->pose(0.0, 0);
+  lit.lights.resize(3);
+  cumulet::gl::Limits few = cumulet::gl::query_limits(*gl_);
+  few.storage_block_bytes = 64;
+  EXPECT_EQ(code_of([&] { content_of(scene, lit, few); }), ErrorCode::unsupported);
+  try {
+    cumulet::gl::make_texture_2d(gl_, GL_R32F, few.texture_size_2d + 1, 1, "creating a picture");
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::unsupported);
+    EXPECT_NE(std::string(error.what()).find("GL_MAX_TEXTURE_SIZE"), std::string::npos) << error.what();
+  }
   SurfaceView flat = straight({0, 0, 0}, 0.5);
   flat.up = flat.right;
   EXPECT_EQ(code_of([&] { raster_->draw(flat, {}, {4U, 4U}, 1, layers_); }), ErrorCode::internal);

@@ -912,8 +912,8 @@ CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_
 typedef enum cumulet_warm_up_scope {
   CUMULET_WARM_UP_SCENE = 0, /* the programs that frames of the present scene with the present settings need */
   CUMULET_WARM_UP_ALL = 1    /* these, and all others of the library are compiled (not used: a driver that compiles more
-                                in the first use does so then); but for rare ones: grids beyond the driver's limit of a texture
-                                buffer, sets of maps that the scene's materials do not have */
+                                in the first use does so then); but for rare ones: grids beyond the driver's limit of a
+                                texture    buffer, sets of maps that the scene's materials do not have */
 } cumulet_warm_up_scope;
 
 typedef struct cumulet_warm_up_result {
@@ -1013,6 +1013,17 @@ typedef struct cumulet_stats {
   char gl_version[128];
   int32_t limited;   /* 1: max_cells, not the threshold, ended the refinement */
   uint64_t gl_bytes; /* all GL memory the viewer holds */
+  /*
+   * What passes took of the device since the viewer was attached, as far as it is known by now, for nothing waits to
+   * know it: the difference between two calls is what a graph shows. On a driver that runs dispatches within the call
+   * (Mesa's llvmpipe), what they took of the call, without drawing that it puts off.
+   */
+  double pass_seconds_upload;
+  double pass_seconds_host_depth;
+  double pass_seconds_surfaces; /* the surface pass of previews */
+  double pass_seconds_trace;
+  double pass_seconds_inspect; /* debug views, and the volume's depth */
+  double pass_seconds_display;
 } cumulet_stats;
 
 CUMULET_API cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats);

@@ -801,6 +801,12 @@ struct Stats {
   Text<128> gl_version;
   bool limited = false;
   std::uint64_t gl_bytes = 0;
+  double pass_seconds_upload = 0.0;
+  double pass_seconds_host_depth = 0.0;
+  double pass_seconds_surfaces = 0.0;
+  double pass_seconds_trace = 0.0;
+  double pass_seconds_inspect = 0.0;
+  double pass_seconds_display = 0.0;
 };
 
 // ---- Viewer ---------------------------------------------------------------------------------------------------------
@@ -1056,8 +1062,8 @@ class Viewer {
     auto c = detail::sized<cumulet_stats>();
     if (auto done = result(cumulet_get_stats(handle(), &c)); !done) return done.error();
     const auto& [struct_size, cells, levels, cell_bytes, active_voxels, total, load, statistics, refine, records,
-                 upload, trace, samples, steps, bounds_min, bounds_max, vendor, renderer, gl_version, limited,
-                 gl_bytes] = c;
+                 upload, trace, samples, steps, bounds_min, bounds_max, vendor, renderer, gl_version, limited, gl_bytes,
+                 pass_upload, pass_host_depth, pass_surfaces, pass_trace, pass_inspect, pass_display] = c;
     return Stats{.cells = cells,
                  .levels = levels,
                  .cell_bytes = cell_bytes,
@@ -1076,7 +1082,13 @@ class Viewer {
                  .gl_renderer = Text<128>(renderer),
                  .gl_version = Text<128>(gl_version),
                  .limited = limited != 0,
-                 .gl_bytes = gl_bytes};
+                 .gl_bytes = gl_bytes,
+                 .pass_seconds_upload = pass_upload,
+                 .pass_seconds_host_depth = pass_host_depth,
+                 .pass_seconds_surfaces = pass_surfaces,
+                 .pass_seconds_trace = pass_trace,
+                 .pass_seconds_inspect = pass_inspect,
+                 .pass_seconds_display = pass_display};
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }

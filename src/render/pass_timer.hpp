@@ -1,0 +1,56 @@
+#pragma once
+
+#include <utility>
+
+#include "base/error.hpp"
+#include "render/pace.hpp"
+
+namespace cumulet::render {
+
+/// Seconds on the device that passes took, as far as they are known by now.
+struct PassSeconds {
+  double upload = 0.0;
+  double host_depth = 0.0;
+  double surfaces = 0.0;
+  double trace = 0.0;
+  double inspect = 0.0;
+  double display = 0.0;
+};
+
+/// Times a pass as Flights times dispatches: without waiting, each time that not too many are under way.
+class PassTimer {
+ public:
+  explicit PassTimer(gl::FunctionsPtr gl) : flights_(std::move(gl)) {}
+
+  /// Runs the pass.
+  template <class Pass>
+  void run(Pass&& pass) {
+    while (const auto landed = flights_.land()) seconds_ += 1e-3 * landed->ms.value_or(0.0);
+    if (flights_.full()) {
+      pass();
+      return;
+    }
+    try {
+      flights_.begin(Flights::Kind::dispatch);
+    } catch (const Error&) {  // no memory for the times: the pass may have what it needs
+      pass();
+      return;
+    }
+    struct End {
+      Flights& flights;
+      explicit End(Flights& of) : flights(of) {}
+      End(const End&) = delete;
+      End& operator=(const End&) = delete;
+      ~End() { flights.end({}, 0, 0); }
+    };
+    const End end(flights_);
+    pass();
+  }
+  [[nodiscard]] double seconds() const { return seconds_; }
+
+ private:
+  Flights flights_;
+  double seconds_ = 0.0;
+};
+
+}  // namespace cumulet::render
