@@ -1,0 +1,22 @@
+// A kind of light that is in no shader of the library: a disc far away, of finite angle. What glsl/light.glsl wants of a
+// kind; whoever includes this has
+//   vec3 cm_disc_to, float cm_disc_cosine, vec3 cm_disc_radiance_in   its middle, world, unit; of its angle; radiance
+#ifndef CM_DISC_LIGHT_GLSL
+#define CM_DISC_LIGHT_GLSL
+
+CM_FN vec3 cm_disc_radiance(vec3 w) {
+  return dot(w, cm_disc_to) > cm_disc_cosine ? cm_disc_radiance_in : vec3(0.0f, 0.0f, 0.0f);
+}
+
+CM_FN float cm_disc_pdf(CmLightHit hit) {
+  return dot(hit.w, cm_disc_to) > cm_disc_cosine ? 1.0f / (6.28318531f * (1.0f - cm_disc_cosine)) : 0.0f;
+}
+
+CM_FN CmLightSample cm_disc_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+  float cosine = 1.0f - u * (1.0f - cm_disc_cosine);
+  vec3 w = cm_around(cm_disc_to, cosine, 6.28318531f * cm_random(p.random, p.stream));
+  return CmLightSample(CM_LIGHT_OTHER, cm_disc_radiance_in, w, 3.0e38f,
+                       1.0f / (6.28318531f * (1.0f - cm_disc_cosine)));
+}
+
+#endif
