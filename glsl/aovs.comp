@@ -29,8 +29,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #endif
 #include "ray.glsl"
 
-layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform writeonly image2D cm_normal;     // and transmittance
-layout(rgba32ui, binding = CM_IMAGE_ALBEDO) uniform writeonly uimage2D cm_albedo;   // and surface z: floats
+layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform writeonly image2D cm_normal;
+layout(rgba32f, binding = CM_IMAGE_ALBEDO) uniform writeonly image2D cm_albedo;
+layout(r32f, binding = CM_IMAGE_TRANSMITTANCE) uniform writeonly image2D cm_transmittance;
+layout(r32f, binding = CM_IMAGE_SURFACE_Z) uniform writeonly image2D cm_surface_depth;
 layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 
 #define CM_RAYS 16
@@ -39,7 +41,8 @@ layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 void main() {
   uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
   if (pixel.x >= cm.dispatch.tile_size.x || pixel.y >= cm.dispatch.rows.y) return;
-  vec4 normal = vec4(0.0);
+  vec3 normal = vec3(0.0);
+  float transmittance = 0.0;
   vec3 albedo = vec3(0.0);
   float surface_z = CM_INFINITE;
   float volume_z = CM_INFINITE;
@@ -58,7 +61,7 @@ void main() {
     if (cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, hit)) {
       surface_t = hit.t;
       CmSurfacePoint point = cm_surface_point(hit.triangle, hit.barycentrics, w);
-      normal.xyz += point.material.normal;
+      normal += point.material.normal;
       albedo += point.material.base_color;
     }
 #endif
@@ -87,11 +90,11 @@ void main() {
         cell = next;
       }
     }
-    normal.w += exp(-used);
+    transmittance += exp(-used);
   }
-  normal /= float(CM_RAYS);
-  albedo /= float(CM_RAYS);
-  imageStore(cm_normal, ivec2(pixel), normal);
-  imageStore(cm_albedo, ivec2(pixel), uvec4(floatBitsToUint(albedo), floatBitsToUint(surface_z)));
+  imageStore(cm_normal, ivec2(pixel), vec4(normal / float(CM_RAYS), 0.0));
+  imageStore(cm_albedo, ivec2(pixel), vec4(albedo / float(CM_RAYS), 0.0));
+  imageStore(cm_transmittance, ivec2(pixel), vec4(transmittance / float(CM_RAYS)));
+  imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));
   imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z));
 }

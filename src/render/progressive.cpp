@@ -128,7 +128,8 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
 }
 
 bool Progressive::needs_depth() const {
-  return wish_.depth && shown_ && shown_->picture->volume_z() == 0 && shown_->data == wish_.content.data;
+  return wish_.depth && shown_ && !shown_->picture->film().has(film_layers::depth) &&
+         shown_->data == wish_.content.data;
 }
 
 void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {

@@ -62,7 +62,7 @@ class Progressive {
   void reset();
 
   /// The newest whole picture; null before the first.
-  [[nodiscard]] const Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
+  [[nodiscard]] Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
   /// What was shown before, where that may have pixels without a sample; else null.
   [[nodiscard]] const Picture* before() const { return shown_ && shown_->picture->has_holes() ? before_ : nullptr; }
   /// Waits for what is under way, so that what is read back is all there is.

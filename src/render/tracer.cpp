@@ -140,12 +140,6 @@ void Picture::end_tile() {
   if (!done_) begin_tile();
 }
 
-std::uint64_t Picture::bytes() const {
-  const std::uint64_t pixel =
-      (sum_ ? 40U : 0U) + (volume_z_ ? 4U : 0U) + (volume_sum_ ? 16U : 0U) + (facts_ ? 36U : 0U);
-  return std::uint64_t{size_.x} * size_.y * pixel;
-}
-
 const Tracer::Program& Tracer::program(const MarchData& data, const char* name, std::span<const std::string> more) {
   gl::ProgramKey key{name, data.defines()};
   key.defines.insert(key.defines.end(), more.begin(), more.end());
@@ -220,19 +214,25 @@ void Tracer::make_shared_objects() {
     uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
 }
 
-void Tracer::allocate(Picture& picture, glm::uvec2 size) const {
-  const int width = static_cast<int>(size.x);
-  const int height = static_cast<int>(size.y);
-  gl::Object sum = gl::make_texture_2d(gl_, GL_RGBA32F, width, height, "creating the accumulation texture");
-  gl::Object background = gl::make_texture_2d(gl_, GL_RGBA32F, width, height, "creating the background's texture");
-  gl::Object counts = gl::make_texture_2d(gl_, GL_RG32UI, width, height, "creating the sample counts");
-  picture.sum_ = std::move(sum);
-  picture.background_ = std::move(background);
-  picture.counts_ = std::move(counts);
-  picture.volume_z_ = {};
-  picture.volume_sum_ = {};
-  picture.facts_.reset();
-  picture.size_ = size;
+std::vector<FilmLayer> Tracer::accumulated(const Picture& picture) {
+  std::vector<FilmLayer> layers{film_layers::radiance, film_layers::background, film_layers::counts};
+  if (picture.volume_alone_) layers.push_back(film_layers::volume);
+  return layers;
+}
+
+void Tracer::empty(Picture& picture, const glm::vec3& background, std::uint32_t samples) {
+  const auto clear = [&](Film& film, Deadline) {
+    const glm::vec4 zero(0.0F);
+    const glm::vec4 behind(background, 0.0F);
+    const glm::uvec2 count(samples, 0U);
+    gl_->ClearTexImage(film.texture(film_layers::radiance), 0, GL_RGBA, GL_FLOAT, &zero);
+    gl_->ClearTexImage(film.texture(film_layers::background), 0, GL_RGBA, GL_FLOAT, &behind);
+    gl_->ClearTexImage(film.texture(film_layers::counts), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &count);
+    if (picture.volume_alone_) gl_->ClearTexImage(film.texture(film_layers::volume), 0, GL_RGBA, GL_FLOAT, &zero);
+    gl::check(*gl_, "clearing the accumulation");
+    return true;
+  };
+  run(gl_, picture.film_, {"cumulet: begin a picture", {}, accumulated(picture), clear}, Deadline::max());
 }
 
 void Tracer::drop_unused_layers() {
@@ -301,9 +301,9 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
     paths_ = gl::make_buffer(gl_, lanes * lane_bytes, nullptr, 0, "creating the path buffer");
     paths_lanes_ = lanes;
   }
-  if (!picture.sum_ || size != picture.size_) allocate(picture, size);
   picture.complete_ = false;
-  picture.facts_.reset();
+  picture.size_ = size;
+  picture.film_.begin(size);
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, surfaces, settings);
   picture.layered_ = Layered::no;
@@ -314,12 +314,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
     drop_unused_layers();
   }
   picture.volume_alone_ = shaded && settings.volume_alone;
-  if (!picture.volume_alone_) {
-    picture.volume_sum_ = {};
-  } else if (!picture.volume_sum_) {
-    picture.volume_sum_ = gl::make_texture_2d(gl_, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y),
-                                              "creating the sum of the volume alone");
-  }
+  if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
+  for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
   find_programs(picture, data, surfaces);
   picture.parameters_ = assemble(parameters, data, surfaces);
   picture.target_samples_ = samples;
@@ -343,19 +339,13 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.begin_tile();
   picture.begun_ = picture.revision_ = ++revision_;
   picture.depth_row_ = 0;
-  picture.depth_done_ = false;
-  const glm::vec4 zero(0.0F);
-  const glm::uvec2 none(0U);
-  const glm::vec4 background(shaded ? parameters.lights.sky_radiance : glm::vec3(0.0F), 0.0F);
-  gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
-  gl_->ClearTexImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, &background);
-  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &none);
-  if (picture.volume_sum_) gl_->ClearTexImage(picture.volume_sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
-  gl::check(*gl_, "clearing the accumulation");
+  picture.facts_row_ = 0;
+  empty(picture, shaded ? parameters.lights.sky_radiance : glm::vec3(0.0F), 0);
 }
 
 void Tracer::clear(Picture& picture) {
-  allocate(picture, glm::uvec2(1));
+  picture.size_ = glm::uvec2(1U);
+  picture.film_.begin(picture.size_);
   picture.layered_ = Layered::no;
   picture.layers_.reset();
   drop_unused_layers();
@@ -364,19 +354,12 @@ void Tracer::clear(Picture& picture) {
   picture.view_ = View::shaded;
   picture.complete_ = picture.done_ = true;
   picture.holes_ = false;
-  const glm::vec4 zero(0.0F);
-  const glm::uvec2 one(1U, 0U);
-  gl_->ClearTexImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
-  gl_->ClearTexImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, &zero);
-  gl_->ClearTexImage(picture.counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &one);
-  gl::check(*gl_, "making the empty picture");
+  empty(picture, glm::vec3(0.0F), 1);
 }
 
 void Tracer::set_background(Picture& picture, const glm::vec3& radiance) {
   if (picture.parameters_.lights.sky_radiance == radiance) return;
-  const glm::vec4 texel(radiance, 0.0F);
-  gl_->ClearTexImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, &texel);
-  gl::check(*gl_, "making the empty picture");
+  empty(picture, radiance, 1);
   picture.parameters_.lights.sky_radiance = radiance;
   picture.revision_ = ++revision_;
 }
@@ -442,6 +425,13 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surf
   collect();
   picture.end_tile();
   if (picture.done_) return true;
+  const std::vector<FilmLayer> layers = accumulated(picture);
+  const auto work = [&](Film&, Deadline until) { return accumulate(picture, data, surfaces, until, until_complete); };
+  return run(gl_, picture.film_, {"cumulet: samples", layers, layers, work}, deadline);
+}
+
+bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+                        bool until_complete) {
   if (picture.layered_ != Layered::no && !layers_ready(deadline)) return false;
   const bool shaded = picture.view_ == View::shaded;
   const Program& program = shaded ? trace_program(picture, data) : inspect_program(data, surfaces, "inspect.comp");
@@ -454,13 +444,13 @@ bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surf
   }
   if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PATHS, paths_.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BLOCKS, blocks_.name());
-  gl_->BindImageTexture(core::CM_IMAGE_SUM, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
-  gl_->BindImageTexture(core::CM_IMAGE_BACKGROUND, picture.background_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
-                        GL_RGBA32F);
-  // What is bound shall fit the format, though this view does not write it.
-  gl_->BindImageTexture(core::CM_IMAGE_VOLUME_SUM, picture.volume_sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE,
-                        picture.volume_sum_ ? GL_RGBA32F : GL_R32F);
+  const Film& film = picture.film_;
+  film.bind(*gl_, core::CM_IMAGE_SUM, film_layers::radiance, GL_READ_WRITE);
+  film.bind(*gl_, core::CM_IMAGE_COUNTS, film_layers::counts, GL_READ_WRITE);
+  film.bind(*gl_, core::CM_IMAGE_BACKGROUND, film_layers::background, GL_READ_WRITE);
+  // What is bound shall fit the format, though nothing writes it: inspect.comp has the depth there.
+  film.bind(*gl_, core::CM_IMAGE_VOLUME_SUM, picture.volume_alone_ ? film_layers::volume : film_layers::depth,
+            GL_READ_WRITE);
   if (!shaded) {
     core::CmParameters parameters = picture.parameters_;
     describe(surfaces, parameters);
@@ -612,75 +602,57 @@ bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameter
 }
 
 bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
-  if (picture.depth_done_) return true;
+  if (picture.film_.has(film_layers::depth)) return true;
   if (!asked([&] { inspect_program(data, surfaces, "inspect.comp"); })) return false;
-  if (!picture.volume_z_) {
-    picture.volume_z_ = gl::make_texture_2d(gl_, GL_R32F, static_cast<int>(picture.size_.x),
-                                            static_cast<int>(picture.size_.y), "creating the depth texture");
-  }
-  make_shared_objects();
-  const Program& program = inspect_program(data, surfaces, "inspect.comp");
-  program.object->use(*gl_);
-  bind(data, surfaces);
-  gl_->BindImageTexture(core::CM_IMAGE_SUM, picture.sum_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, picture.counts_.name(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
-  gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, picture.volume_z_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
-  core::CmParameters parameters = picture.parameters_;
-  describe(surfaces, parameters);
-  parameters.dispatch.view = view_depth;
-  picture.depth_done_ = inspect(picture, parameters, program, picture.depth_row_, deadline);
-  return picture.depth_done_;
+  const auto work = [&](const Film& film, Deadline until) {
+    make_shared_objects();
+    const Program& program = inspect_program(data, surfaces, "inspect.comp");
+    program.object->use(*gl_);
+    bind(data, surfaces);
+    film.bind(*gl_, core::CM_IMAGE_SUM, film_layers::radiance, GL_READ_WRITE);
+    film.bind(*gl_, core::CM_IMAGE_COUNTS, film_layers::counts, GL_READ_WRITE);
+    film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, film_layers::depth, GL_WRITE_ONLY);
+    core::CmParameters parameters = picture.parameters_;
+    describe(surfaces, parameters);
+    parameters.dispatch.view = view_depth;
+    return inspect(picture, parameters, program, picture.depth_row_, until);
+  };
+  return run(gl_, picture.film_, {"cumulet: depth", {}, {film_layers::depth}, work}, deadline);
 }
 
-void Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces) {
-  if (picture.facts_) return;
-  const int width = static_cast<int>(picture.size_.x);
-  const int height = static_cast<int>(picture.size_.y);
-  constexpr const char* what = "creating the textures of what is known of pixels";
-  Picture::Facts facts{gl::make_texture_2d(gl_, GL_RGBA32F, width, height, what),
-                       gl::make_texture_2d(gl_, GL_RGBA32UI, width, height, what),
-                       gl::make_texture_2d(gl_, GL_R32F, width, height, what)};
-  make_shared_objects();
-  const Program& program = inspect_program(data, surfaces, "aovs.comp");
-  program.object->use(*gl_);
-  bind(data, surfaces);
-  gl_->BindImageTexture(core::CM_IMAGE_NORMAL, facts.normal.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_ALBEDO, facts.albedo.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
-  gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, facts.volume_z.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
-  core::CmParameters parameters = picture.parameters_;
-  describe(surfaces, parameters);
-  std::uint32_t row = 0;
-  while (!inspect(picture, parameters, program, row, Clock::now() + std::chrono::seconds(1))) {
-  }
-  picture.facts_ = std::move(facts);
+bool Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
+  using namespace film_layers;
+  if (picture.film_.has(normal)) return true;
+  const auto work = [&](const Film& film, Deadline until) {
+    make_shared_objects();
+    const Program& program = inspect_program(data, surfaces, "aovs.comp");
+    program.object->use(*gl_);
+    bind(data, surfaces);
+    film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_WRITE_ONLY);
+    film.bind(*gl_, core::CM_IMAGE_ALBEDO, albedo, GL_WRITE_ONLY);
+    film.bind(*gl_, core::CM_IMAGE_TRANSMITTANCE, transmittance, GL_WRITE_ONLY);
+    film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
+    film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_WRITE_ONLY);
+    core::CmParameters parameters = picture.parameters_;
+    describe(surfaces, parameters);
+    return inspect(picture, parameters, program, picture.facts_row_, until);
+  };
+  const Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z}, work};
+  return run(gl_, picture.film_, pass, deadline);
 }
 
 void Tracer::read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact,
                        float* values) {
-  find_facts(picture, data, surfaces);
-  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
-  if (fact == PixelFact::volume_z) {
-    gl_->GetTextureImage(picture.facts_->volume_z.name(), 0, GL_RED, GL_FLOAT, static_cast<GLsizei>(pixels * 4),
-                         values);
-    gl::check(*gl_, "reading what is known of pixels");
-    return;
+  while (!find_facts(picture, data, surfaces, Clock::now() + std::chrono::seconds(1))) {
   }
-  std::vector<glm::vec4> texels(pixels);
-  const auto bytes = static_cast<GLsizei>(pixels * sizeof(glm::vec4));
-  if (fact == PixelFact::normal || fact == PixelFact::transmittance) {
-    gl_->GetTextureImage(picture.facts_->normal.name(), 0, GL_RGBA, GL_FLOAT, bytes, texels.data());
-  } else {
-    gl_->GetTextureImage(picture.facts_->albedo.name(), 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, bytes, texels.data());
-  }
-  gl::check(*gl_, "reading what is known of pixels");
+  const std::array<FilmLayer, 5> layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
+                                        film_layers::normal, film_layers::albedo};
+  const FilmLayer& layer = layers.at(static_cast<std::size_t>(fact));
   const std::size_t channels = channels_of(fact);
-  for (std::size_t i = 0; i < pixels; ++i) {
-    if (channels == 1) {
-      values[i] = texels[i].w;
-    } else {
-      for (int c = 0; c < 3; ++c) values[3 * i + static_cast<std::size_t>(c)] = texels[i][c];
-    }
-  }
+  const std::size_t floats = std::size_t{picture.size_.x} * picture.size_.y * channels;
+  gl_->GetTextureImage(picture.film_.texture(layer), 0, channels == 1 ? GL_RED : GL_RGB, GL_FLOAT,
+                       static_cast<GLsizei>(floats * sizeof(float)), values);
+  gl::check(*gl_, "reading what is known of pixels");
 }
 
 float Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,
@@ -708,7 +680,7 @@ float Tracer::pick(const MarchData& data, const PictureParameters& parameters, c
 }
 
 void Tracer::read(const Picture& picture, bool with_background, float* rgba) const {
-  read_means(picture, picture.sum_.name(), rgba);
+  read_means(picture, film_layers::radiance, rgba);
   if (!with_background) return;
   const std::vector<glm::vec4> background = read_background(picture);
   for (std::size_t i = 0; i < background.size(); ++i) {
@@ -718,23 +690,24 @@ void Tracer::read(const Picture& picture, bool with_background, float* rgba) con
 
 std::vector<glm::vec4> Tracer::read_background(const Picture& picture) const {
   std::vector<glm::vec4> background(std::size_t{picture.size_.x} * picture.size_.y);
-  gl_->GetTextureImage(picture.background_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(background.size() * 16),
-                       background.data());
+  gl_->GetTextureImage(picture.film_.texture(film_layers::background), 0, GL_RGBA, GL_FLOAT,
+                       static_cast<GLsizei>(background.size() * 16), background.data());
   gl::check(*gl_, "reading the background back");
   return background;
 }
 
 std::vector<glm::uvec2> Tracer::read_counts(const Picture& picture) const {
   std::vector<glm::uvec2> counts(std::size_t{picture.size_.x} * picture.size_.y);
-  gl_->GetTextureImage(picture.counts_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT,
+  gl_->GetTextureImage(picture.film_.texture(film_layers::counts), 0, GL_RG_INTEGER, GL_UNSIGNED_INT,
                        static_cast<GLsizei>(counts.size() * 8), counts.data());
   gl::check(*gl_, "reading the sample counts back");
   return counts;
 }
 
-void Tracer::read_means(const Picture& picture, GLuint sum, float* rgba) const {
+void Tracer::read_means(const Picture& picture, const FilmLayer& sum, float* rgba) const {
   const std::vector<glm::uvec2> counts = read_counts(picture);
-  gl_->GetTextureImage(sum, 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(counts.size() * 16), rgba);
+  gl_->GetTextureImage(picture.film_.texture(sum), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(counts.size() * 16),
+                       rgba);
   gl::check(*gl_, "reading the picture back");
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const float scale = counts[i].x > 0 ? 1.0F / static_cast<float>(counts[i].x) : 0.0F;
@@ -742,16 +715,15 @@ void Tracer::read_means(const Picture& picture, GLuint sum, float* rgba) const {
   }
 }
 
-void Tracer::read_volume(const Picture& picture, float* rgba) const {
-  read_means(picture, picture.volume_sum_.name(), rgba);
-}
+void Tracer::read_volume(const Picture& picture, float* rgba) const { read_means(picture, film_layers::volume, rgba); }
 
 Totals Tracer::totals(const Picture& picture) const {
-  if (!picture.counts_) return {};
+  if (!picture.film_.has(film_layers::counts)) return {};
   const std::vector<glm::uvec2> counts = read_counts(picture);
   const std::vector<glm::vec4> background = read_background(picture);
   std::vector<glm::vec4> sums(counts.size());
-  gl_->GetTextureImage(picture.sum_.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(sums.size() * 16), sums.data());
+  gl_->GetTextureImage(picture.film_.texture(film_layers::radiance), 0, GL_RGBA, GL_FLOAT,
+                       static_cast<GLsizei>(sums.size() * 16), sums.data());
   gl::check(*gl_, "reading the picture back");
   Totals totals;
   double error = 0.0;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "render/film.hpp"
 #include "render/march_data.hpp"
 #include "render/pace.hpp"
 #include "render/parameters.hpp"
@@ -96,16 +97,14 @@ class Picture {
   [[nodiscard]] bool volume_alone() const { return volume_alone_; }
   /// Asks for this many samples, if that is more: goes on where it was.
   void extend(std::uint32_t samples);
-  [[nodiscard]] GLuint sum() const { return sum_.name(); }
-  [[nodiscard]] GLuint counts() const { return counts_.name(); }
-  [[nodiscard]] GLuint background() const { return background_.name(); }
+  /// What passes have made of it.
+  [[nodiscard]] const Film& film() const { return film_; }
+  [[nodiscard]] Film& film() { return film_; }
   /// Another with every picture that is begun.
   [[nodiscard]] std::uint64_t begun() const { return begun_; }
   /// Another with everything that was sent off to be added to it.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// View depth z at half opacity, once Tracer::trace_depth is done; else 0.
-  [[nodiscard]] GLuint volume_z() const { return depth_done_ ? volume_z_.name() : 0; }
-  [[nodiscard]] std::uint64_t bytes() const;
+  [[nodiscard]] std::uint64_t bytes() const { return film_.bytes(); }
 
  private:
   friend class Tracer;
@@ -113,24 +112,13 @@ class Picture {
   std::uint32_t target_samples_ = 1;
   View view_ = View::shaded;
   glm::uvec2 size_{0U};
-  gl::Object sum_;         // rgba32f: of radiance in front of the background, and of alpha
-  gl::Object background_;  // rgba32f: mean of its radiance, and of the squared luminance of all
-  gl::Object counts_;      // rg32ui: samples, and cells marched
+  Film film_;
   std::uint64_t begun_ = 0;
   std::uint64_t revision_ = 0;
-  gl::Object volume_z_;
-  gl::Object volume_sum_;
   bool volume_alone_ = false;
   std::shared_ptr<const SurfaceLayers> layers_;  // of Tracer::drawn_layers_
   Layered layered_ = Layered::no;
   unsigned traced_ = 0;  // 1: paths meet triangles; 2: and look for those that emit
-  // Per-pixel facts of what is seen (aovs.comp), once made.
-  struct Facts {
-    gl::Object normal;  // and transmittance
-    gl::Object albedo;  // and surface z, as words
-    gl::Object volume_z;
-  };
-  std::optional<Facts> facts_;
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   void begin_tile();
@@ -149,8 +137,9 @@ class Picture {
   bool holes_ = true;
   bool complete_ = false;
   bool done_ = false;
+  // Rows that the depth and facts passes have come to.
   std::uint32_t depth_row_ = 0;
-  bool depth_done_ = false;
+  std::uint32_t facts_row_ = 0;
 };
 
 /// Traces pictures by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
@@ -243,12 +232,16 @@ class Tracer {
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);
   void make_shared_objects();
-  void allocate(Picture& picture, glm::uvec2 size) const;
+  // The pass that empties what samples are added to, and what all is that.
+  void empty(Picture& picture, const glm::vec3& background, std::uint32_t samples);
+  static std::vector<FilmLayer> accumulated(const Picture& picture);
+  bool accumulate(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+                  bool until_complete);
   void bind(const MarchData& data, const Surfaces& surfaces) const;
-  void read_means(const Picture& picture, GLuint sum, float* rgba) const;
+  void read_means(const Picture& picture, const FilmLayer& sum, float* rgba) const;
   [[nodiscard]] std::vector<glm::vec4> read_background(const Picture& picture) const;
   [[nodiscard]] std::vector<glm::uvec2> read_counts(const Picture& picture) const;
-  void find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces);
+  bool find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline);
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;

@@ -162,7 +162,8 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
   if (progressive_.shown() != nullptr || !draws(shot, frame)) return;
   render::Tracer& tracer = progressive_.tracer();
   const bool able = scene_.draws_surfaces() && shot.view() && alone_failed_ != shot.settings;
-  if (empty_.sum() == 0 || (!able && empty_.layered() != render::Layered::no)) tracer.clear(empty_);
+  if (!empty_.film().has(render::film_layers::radiance) || (!able && empty_.layered() != render::Layered::no))
+    tracer.clear(empty_);
   tracer.set_background(empty_, shot.scene->lights->sky_radiance);
   if (!able || frame.budget_ms < 0.0) return;
   alone_failed_ = shot.settings;  // unless it succeeds
@@ -173,18 +174,19 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
 
 render::PictureTextures Context::textures_of(const render::Picture& picture, const render::Picture* before) const {
   render::PictureTextures textures;
-  textures.sum = picture.sum();
-  textures.background = picture.background();
-  textures.counts = picture.counts();
+  const render::Film& film = picture.film();
+  textures.sum = film.texture(render::film_layers::radiance);
+  textures.background = film.texture(render::film_layers::background);
+  textures.counts = film.texture(render::film_layers::counts);
   textures.size = picture.size();
   textures.holes = picture.has_holes();
-  textures.volume_z = picture.volume_z();
+  if (film.has(render::film_layers::depth)) textures.volume_z = film.texture(render::film_layers::depth);
   textures.picture = picture.begun();
   textures.revision = picture.revision();
   if (before != nullptr) {
-    textures.sum_before = before->sum();
-    textures.background_before = before->background();
-    textures.counts_before = before->counts();
+    textures.sum_before = before->film().texture(render::film_layers::radiance);
+    textures.background_before = before->film().texture(render::film_layers::background);
+    textures.counts_before = before->film().texture(render::film_layers::counts);
   }
   if (picture.layered() == render::Layered::beneath) {
     textures.beneath = &picture.layers();
@@ -192,6 +194,18 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
     textures.host_layers = host_depth_.layers();
   }
   return textures;
+}
+
+void Context::composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
+                        const render::FrameTarget& target) {
+  using namespace render::film_layers;
+  render::Pass pass{"cumulet: composite", {radiance, background, counts}, {}, {}};
+  if (target.write_depth) pass.reads.push_back(depth);
+  pass.work = [&](const render::Film&, render::Deadline) {
+    compositor_.draw(picture, display, target);
+    return true;
+  };
+  render::run(functions_, film, pass, render::Deadline::max());
 }
 
 render::Display Context::display(const Shot& shot, const Frame& frame, const render::Picture& shown) {
@@ -210,7 +224,7 @@ render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const 
   target.viewport = frame.viewport;
   target.flip_y = frame.flip_y;
   target.blend_over = frame.blend_over;
-  target.write_depth = frame.write_depth && shown.volume_z() != 0;
+  target.write_depth = frame.write_depth && shown.film().has(render::film_layers::depth);
   if (shot.view()) {
     target.orthographic = shot.view()->orthographic;
     target.depth_a = shot.depth_a;
@@ -221,7 +235,7 @@ render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const 
 }
 
 void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
-  const render::Picture* shown = progressive_.shown();
+  render::Picture* shown = progressive_.shown();
   if (shown != nullptr) result.size = shown->size();
   if (!draws(shot, frame)) return;
   if (shown == nullptr) shown = &empty_;
@@ -230,7 +244,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   render::PictureTextures picture = textures_of(*shown, shown == &empty_ ? nullptr : progressive_.before());
   picture.may_lag = !shown->done();
   if (frame.target == Target::framebuffer) {
-    display_timer_.run([&] { compositor_.draw(picture, display, target); });
+    display_timer_.run([&] { composite(shown->film(), picture, display, target); });
     return;
   }
   make_target_textures(shot, frame);
@@ -248,14 +262,15 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   }
   target.framebuffer = framebuffer.name();
   target.blend_over = false;
-  display_timer_.run([&] { compositor_.draw(picture, display, target); });
+  display_timer_.run([&] { composite(shown->film(), picture, display, target); });
   result.texture = target_->colour.name();
 }
 
 void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
   const bool drawing = draws(shot, frame);
   if (const render::Picture* shown = progressive_.shown()) {
-    const DrawnAs now{shown->revision(), shown->done(), shown->has_holes(), shown->volume_z()};
+    const DrawnAs now{shown->revision(), shown->done(), shown->has_holes(),
+                      shown->film().has(render::film_layers::depth)};
     if (drawing) drawn_ = compositor_.lags() ? std::nullopt : std::optional(now);
     result.undrawn = !drawing && drawn_ != now;
   }

@@ -103,7 +103,7 @@ class Context {
     std::uint64_t revision = 0;
     bool done = false;
     bool holes = false;
-    GLuint volume_z = 0;
+    bool depth = false;
     bool operator==(const DrawnAs&) const = default;
   };
   struct TargetKind {
@@ -130,10 +130,13 @@ class Context {
   bool rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline);
   void rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown);
   void make_target_textures(const Shot& shot, const Frame& frame);
+  // The last pass, as Compositor::draw: of a film, whose textures these are.
+  void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
+                 const render::FrameTarget& target);
   // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
-  void read_means(const render::Picture& picture, bool with_background, float* rgba);
+  void read_means(render::Picture& picture, bool with_background, float* rgba);
   // What the compositor draws of it, as linear radiance.
-  void read_composite(const render::Picture& picture, bool transparent, float* rgba);
+  void read_composite(render::Picture& picture, bool transparent, float* rgba);
   [[nodiscard]] render::PictureTextures textures_of(const render::Picture& picture,
                                                     const render::Picture* before) const;
 

@@ -34,7 +34,7 @@ render::Picture& Context::readable() {
   return *picture;
 }
 
-void Context::read_means(const render::Picture& picture, bool with_background, float* rgba) {
+void Context::read_means(render::Picture& picture, bool with_background, float* rgba) {
   if (picture.layered() != render::Layered::beneath) {
     progressive_.tracer().read(picture, with_background, rgba);
     return;
@@ -50,7 +50,7 @@ void Context::read_means(const render::Picture& picture, bool with_background, f
   }
 }
 
-void Context::read_composite(const render::Picture& picture, bool transparent, float* rgba) {
+void Context::read_composite(render::Picture& picture, bool transparent, float* rgba) {
   const glm::ivec2 size(picture.size());
   const gl::Object flat = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the texture to read");
   const gl::TransientFramebuffer framebuffer(*functions_, flat.name(), 0);
@@ -62,7 +62,7 @@ void Context::read_composite(const render::Picture& picture, bool transparent, f
   target.viewport = {0, 0, size};
   target.flip_y = true;  // the first row is the top
   target.blend_over = false;
-  compositor_.draw(textures_of(picture, nullptr), display, target);
+  composite(picture.film(), textures_of(picture, nullptr), display, target);
   functions_->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
   gl::check(*functions_, "reading the picture back");
 }
@@ -106,7 +106,7 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
 }
 
 void Context::read_linear(bool transparent, float* rgba, std::size_t count) {
-  const render::Picture& picture = readable();
+  render::Picture& picture = readable();
   const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
   if (rgba == nullptr || count < pixels * 4)
     throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " floats");

@@ -36,7 +36,7 @@ bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::D
   const bool drawing = draws(shot, frame);
   if (drawing) {
     render::Picture& empty = rehearsal_->empty();
-    if (empty.sum() == 0) rehearsal_->tracer().clear(empty);
+    if (!empty.film().has(render::film_layers::radiance)) rehearsal_->tracer().clear(empty);
     rehearsal_->tracer().set_background(empty, shot.scene->lights->sky_radiance);
     rehearse_drawing(shot, frame, empty);
   }

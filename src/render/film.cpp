@@ -1,0 +1,69 @@
+#include "render/film.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "base/error.hpp"
+
+namespace cumulet::render {
+
+void Film::begin(glm::uvec2 size) {
+  if (size != size_) held_.clear();
+  size_ = size;
+  for (Held& held : held_) held.written = false;
+}
+
+const Film::Held* Film::find(const FilmLayer& layer) const {
+  const auto found = std::ranges::find(held_, layer, &Held::layer);
+  return found == held_.end() ? nullptr : &*found;
+}
+
+bool Film::has(const FilmLayer& layer) const {
+  const Held* held = find(layer);
+  return held != nullptr && held->written;
+}
+
+GLuint Film::texture(const FilmLayer& layer) const {
+  const Held* held = find(layer);
+  return held == nullptr ? 0 : held->texture.name();
+}
+
+void Film::make(const gl::FunctionsPtr& gl, const FilmLayer& layer) {
+  if (find(layer) != nullptr) return;
+  const std::string what = std::string("creating the picture's layer ") + layer.name;
+  held_.push_back(
+      {layer, gl::make_texture_2d(gl, layer.format, static_cast<int>(size_.x), static_cast<int>(size_.y), what.c_str()),
+       false});
+}
+
+void Film::drop(const FilmLayer& layer) {
+  std::erase_if(held_, [&](const Held& held) { return held.layer == layer; });
+}
+
+std::uint64_t Film::bytes() const {
+  std::uint64_t pixel = 0;
+  for (const Held& held : held_) pixel += held.layer.pixel_bytes;
+  return std::uint64_t{size_.x} * size_.y * pixel;
+}
+
+void Film::bind(const gl::Functions& gl, GLuint unit, const FilmLayer& layer, GLenum access) const {
+  gl.BindImageTexture(unit, texture(layer), 0, GL_FALSE, 0, access, layer.format);
+}
+
+bool run(const gl::FunctionsPtr& gl, Film& film, const Pass& pass, std::chrono::steady_clock::time_point deadline) {
+  const gl::DebugGroup group(*gl, pass.name);
+  for (const FilmLayer& layer : pass.reads) {
+    if (!film.has(layer)) {
+      throw Error(ErrorCode::internal, std::string("the pass ") + pass.name + " reads the layer " + layer.name +
+                                           ", which nothing has written");
+    }
+  }
+  for (const FilmLayer& layer : pass.writes) film.make(gl, layer);
+  if (!pass.work(film, deadline)) return false;
+  for (Film::Held& held : film.held_) {
+    if (std::ranges::find(pass.writes, held.layer) != pass.writes.end()) held.written = true;
+  }
+  return true;
+}
+
+}  // namespace cumulet::render
