@@ -239,8 +239,8 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   if (shown != nullptr) result.size = shown->size();
   if (!draws(shot, frame)) return;
   if (shown == nullptr) shown = &empty_;
-  const render::Display display = this->display(shot, frame, *shown);
-  render::FrameTarget target = this->target(shot, frame, *shown);
+  const render::Display display = Context::display(shot, frame, *shown);
+  render::FrameTarget target = Context::target(shot, frame, *shown);
   render::PictureTextures picture = textures_of(*shown, shown == &empty_ ? nullptr : progressive_.before());
   picture.may_lag = !shown->done();
   if (frame.target == Target::framebuffer) {

@@ -63,7 +63,7 @@ bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::D
 
 void Context::rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown) {
   const render::PictureTextures picture = textures_of(shown, nullptr);
-  render::FrameTarget target = this->target(shot, frame, shown);
+  render::FrameTarget target = Context::target(shot, frame, shown);
   if (frame.target == Target::framebuffer) {
     rehearsal_->draw(picture, display(shot, frame, shown), target);
     return;
