@@ -11,7 +11,7 @@ const int CM_IMAGES = 8;
 // Texture units. Kernels of paths and views:
 const int CM_UNIT_CELLS = 0;  // to 7: pages of cell records
 const int CM_UNIT_LAYER_COLOUR = 8;
-const int CM_UNIT_SCENE_WORDS = 9;
+const int CM_UNIT_SCENE_WORDS = 9;  // a page of a WordHeap, as the tree's
 const int CM_UNIT_ATLAS = 10;
 const int CM_UNIT_HOST_DEPTH = 11;
 const int CM_UNIT_TREE = 12;

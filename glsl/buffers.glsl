@@ -68,8 +68,8 @@ uvec4 cm_record(uint cell, uint part) {
 }
 
 uint cm_tree(uint node) {
-  uvec4 words = texelFetch(cm_tree_words, int(node >> 2));
-  return cm_link(words, node & 3u);
+  uint word = cm.grid.tree + node;
+  return cm_link(texelFetch(cm_tree_words, int(word >> 2)), word & 3u);
 }
 
 uint cm_root_leaf(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].x : cm_roots[root >> 1].z; }

@@ -50,6 +50,7 @@ CM_BLOCK(CmGrid) {
   CM_ALIGN(16) vec3 box_max;
   uint levels;      // of bisection
   uint page_shift;  // log2 of cells a page
+  uint tree;        // where the point-location tree begins in its page, in 4-byte words
   CM_EQUALITY(CmGrid)
 };
 
@@ -79,6 +80,7 @@ CM_BLOCK(CmLights) {
 CM_BLOCK(CmSurfaceTables) {
   CM_ALIGN(16) vec3 low;   // world
   CM_ALIGN(16) vec3 high;
+  uint words;    // where all of them begin in their page; the others count from here
   uint records;  // of the triangle tree
   uint triangles;
   uint vertices;

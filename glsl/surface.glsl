@@ -8,8 +8,8 @@
 layout(binding = CM_UNIT_SCENE_WORDS) uniform usamplerBuffer cm_scene_words;
 layout(binding = CM_UNIT_ATLAS) uniform sampler2DArray cm_atlas;
 
-uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(word)); }
-vec4 cm_floats(uint word) { return uintBitsToFloat(texelFetch(cm_scene_words, int(word))); }
+uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(cm.surfaces.words + word)); }
+vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }
 
 uvec4 cm_bvh_node(uint texel) { return cm_words(texel); }
 uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.surfaces.records + texel); }

@@ -43,8 +43,8 @@ void GpuScene::update_surfaces(const SurfaceSourcePtr& source, const Wanted& wan
     SurfacesUnderWay& upload = *surface_upload_;
     try {
       if (!upload.work) {
-        upload.work = std::make_unique<SurfaceUpload>(gl_, programs_, limits_, upload.of, upload.parts, surfaces_.get(),
-                                                      raster_ ? *raster_ : nullptr);
+        upload.work = std::make_unique<SurfaceUpload>(gl_, programs_, limits_, heap_, upload.of, upload.parts,
+                                                      surfaces_.get(), raster_ ? *raster_ : nullptr);
       }
       if (!upload.work->advance(deadline)) break;
       finish_surfaces();
@@ -95,7 +95,7 @@ void GpuScene::update_data(const scene::MarchSourcePtr& source, const Wanted& wa
     }
     const scene::MarchSourcePtr of = upload_->of;
     try {
-      if (!upload_->work) upload_->work = std::make_unique<MarchUpload>(gl_, limits_, of, wanted.page_texels);
+      if (!upload_->work) upload_->work = std::make_unique<MarchUpload>(gl_, limits_, heap_, of, wanted.page_texels);
       const bool done = upload_->work->advance(deadline);
       took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
       if (!done) break;
@@ -120,8 +120,8 @@ std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) 
   return took_.seconds;
 }
 
-std::uint64_t GpuScene::surface_bytes() const {
-  return (surfaces_ ? surfaces_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0);
+std::uint64_t GpuScene::other_bytes() const {
+  return (surfaces_ ? surfaces_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) + heap_.free_bytes();
 }
 
 Surfaces GpuScene::surfaces(const scene::Snapshot& snapshot, bool traced) {

@@ -18,7 +18,11 @@ namespace cumulet::render {
 class GpuScene {
  public:
   GpuScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs, gl::Limits limits)
-      : gl_(std::move(gl)), programs_(std::move(programs)), limits_(limits), surface_pass_(gl_) {}
+      : gl_(std::move(gl)),
+        programs_(std::move(programs)),
+        limits_(limits),
+        heap_(gl_, {.largest_page = static_cast<std::size_t>(limits.texture_buffer_texels) * 16}),
+        surface_pass_(gl_) {}
 
   struct Wanted {
     bool raster = true;            // the surface pass as well
@@ -43,7 +47,8 @@ class GpuScene {
   /// Of that volume, if it is the last that came, or is coming.
   [[nodiscard]] std::optional<double> upload_seconds(const scene::MarchSourcePtr& of) const;
   [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? data_->bytes() : 0; }
-  [[nodiscard]] std::uint64_t surface_bytes() const;
+  /// Of surfaces, and of what is kept for more.
+  [[nodiscard]] std::uint64_t other_bytes() const;
 
   /// What paths end at, but for the host's depth. traced: they meet triangles, if there is a surface pass, too.
   [[nodiscard]] Surfaces surfaces(const scene::Snapshot& snapshot, bool traced);
@@ -61,6 +66,7 @@ class GpuScene {
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
+  gl::WordHeap heap_;
   // Under way, and with which settings it was begun.
   struct VolumeUnderWay {
     scene::MarchSourcePtr of;

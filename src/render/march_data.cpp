@@ -75,12 +75,12 @@ core::CmGrid grid_parameters(const grid::Cube& cube, const vec3& low, const vec3
   return grid;
 }
 
-MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, scene::MarchSourcePtr source,
-                         std::int64_t page_texels)
+MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap,
+                         scene::MarchSourcePtr source, std::int64_t page_texels)
     : gl_(std::move(gl)), limits_(limits), source_(std::move(source)), upload_(gl_, "uploading the volume") {
   data_.march_ = source_->march;
   if (source_->march == March::tet) {
-    plan_tet(page_texels);
+    plan_tet(heap, page_texels);
   } else {
     data_.grid_ = grid_parameters(source_->cube, vec3(source_->box_low), vec3(source_->box_low + source_->box_size));
     source_->march == March::dense ? plan_dense() : plan_brick();
@@ -96,10 +96,10 @@ void MarchUpload::plan_texture_buffer(const void* bytes, std::size_t size, std::
     data_.buffers_[index] = gl::make_buffer(gl_, capacity, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
     place(gl::make_texture_buffer(gl_, format, data_.buffers_[index], what));
   });
-  upload_.add_bytes([this, index] { return data_.buffers_[index].name(); }, 0, bytes, size);
+  upload_.add_bytes([this, index] { return Upload::Place{data_.buffers_[index].name(), 0}; }, bytes, size);
 }
 
-void MarchUpload::plan_tet(std::int64_t page_texels) {
+void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
   const grid::TetGrid& grid = *source_->grid;
   data_.linear_ = source_->linear;
   data_.grid_ = grid_parameters(grid.cube, grid.content_min, grid.content_max);
@@ -110,8 +110,7 @@ void MarchUpload::plan_tet(std::int64_t page_texels) {
   if (page_cells < cells)
     page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
   data_.grid_.page_shift = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
-  const std::int64_t tree_texels = std::max<std::int64_t>((static_cast<std::int64_t>(grid.tree.size()) + 3) / 4, 1);
-  if (cells > page_cells * max_pages || tree_texels > limits_.texture_buffer_texels) {
+  if (cells > page_cells * max_pages) {
     throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " + std::to_string(max_pages) +
                                             " texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
                                             std::to_string(texels) + " texels");
@@ -122,11 +121,17 @@ void MarchUpload::plan_tet(std::int64_t page_texels) {
     plan_texture_buffer(grid.cells.data() + first, bytes, bytes, GL_RGBA32UI, "uploading cell records",
                         [this](gl::Object page) { data_.pages_.push_back(std::move(page)); });
   }
-  // Whole texels: the tree as it lies, its last texel filled up.
-  const std::size_t tree_bytes = grid.tree.size() * 4;
-  plan_texture_buffer(grid.tree.data(), tree_bytes, static_cast<std::size_t>(tree_texels) * 16, GL_RGBA32UI,
-                      "uploading the point-location tree",
-                      [this](gl::Object texture) { data_.textures_[0] = std::move(texture); });
+  const std::size_t tree_bytes = grid.tree.size() * sizeof(std::uint32_t);
+  data_.bytes_ += tree_bytes;
+  upload_.add([this, &heap, tree_bytes] {
+    data_.tree_ = heap.take(tree_bytes, "creating the point-location tree");
+    data_.grid_.tree = static_cast<std::uint32_t>(data_.tree_.offset() / sizeof(std::uint32_t));
+  });
+  upload_.add_bytes(
+      [this] {
+        return Upload::Place{data_.tree_.buffer(), data_.tree_.offset()};
+      },
+      grid.tree.data(), tree_bytes);
   data_.bytes_ += 26 * sizeof(grid::RootEntry);
   upload_.add([this] {
     std::array<grid::RootEntry, 26> roots{};
@@ -141,7 +146,7 @@ void MarchUpload::plan_dense() {
   data_.bytes_ =
       static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z) * 2;
   upload_.add([this, size] {
-    data_.textures_[1] = gl::make_texture_3d(gl_, GL_R16F, size.x, size.y, size.z, "creating the dense texture");
+    data_.textures_[0] = gl::make_texture_3d(gl_, GL_R16F, size.x, size.y, size.z, "creating the dense texture");
   });
   // One layer of bricks at a time: bounded memory.
   const int low = source_->box_low.z;
@@ -152,7 +157,7 @@ void MarchUpload::plan_dense() {
       std::vector<std::uint16_t> slab;
       fill_slab(*source_, first, last, slab);
       gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 2);
-      gl_->TextureSubImage3D(data_.textures_[1].name(), 0, 0, 0, first - low, size.x, size.y, last - first, GL_RED,
+      gl_->TextureSubImage3D(data_.textures_[0].name(), 0, 0, 0, first - low, size.x, size.y, last - first, GL_RED,
                              GL_HALF_FLOAT, slab.data());
       gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
     });
@@ -169,12 +174,12 @@ void MarchUpload::plan_brick() {
   }
   const std::size_t bytes = source_->brick_values.size() * 2;
   plan_texture_buffer(source_->brick_values.data(), bytes, bytes, GL_R16F, "uploading bricks",
-                      [this](gl::Object texture) { data_.textures_[1] = std::move(texture); });
+                      [this](gl::Object texture) { data_.textures_[0] = std::move(texture); });
   data_.bytes_ += source_->brick_slots.size() * 4;
   upload_.add([this, bricks] {
-    data_.textures_[2] = gl::make_texture_3d(gl_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
+    data_.textures_[1] = gl::make_texture_3d(gl_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
     gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    gl_->TextureSubImage3D(data_.textures_[2].name(), 0, 0, 0, 0, bricks.x, bricks.y, bricks.z, GL_RED_INTEGER,
+    gl_->TextureSubImage3D(data_.textures_[1].name(), 0, 0, 0, 0, bricks.x, bricks.y, bricks.z, GL_RED_INTEGER,
                            GL_UNSIGNED_INT, source_->brick_slots.data());
   });
 }
@@ -187,10 +192,11 @@ std::vector<std::string> MarchData::defines() const {
 void MarchData::bind(const gl::Functions& gl) const {
   for (std::size_t i = 0; i < pages_.size(); ++i)
     gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), pages_[i].name());
-  constexpr std::array<GLuint, 3> units{core::CM_UNIT_TREE, core::CM_UNIT_VOXELS, core::CM_UNIT_BRICK_SLOTS};
+  constexpr std::array<GLuint, 2> units{core::CM_UNIT_VOXELS, core::CM_UNIT_BRICK_SLOTS};
   for (std::size_t i = 0; i < textures_.size(); ++i) {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
+  if (tree_) gl.BindTextureUnit(core::CM_UNIT_TREE, tree_.texture());
   if (roots_) gl.BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_ROOTS, roots_.name());
 }
 }  // namespace cumulet::render

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gl/objects.hpp"
+#include "gl/word_heap.hpp"
 #include "render/parameters.hpp"
 #include "render/upload.hpp"
 #include "scene/march_source.hpp"
@@ -35,7 +36,8 @@ class MarchData {
   bool linear_ = false;
   std::vector<gl::Object> buffers_;
   std::vector<gl::Object> pages_;
-  std::array<gl::Object, 3> textures_;  // the tree; voxels, or values of bricks; slots of bricks
+  std::array<gl::Object, 2> textures_;  // voxels, or values of bricks; slots of bricks
+  gl::WordHeap::Span tree_;
   gl::Object roots_;
   core::CmGrid grid_{};
   std::uint64_t bytes_ = 0;
@@ -46,7 +48,7 @@ class MarchUpload {
  public:
   /// page_texels: where a page of records ends; 0: where the driver's limit is. Throws Error(unsupported) that names
   /// the limit that does not suffice; allocates nothing yet.
-  MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, scene::MarchSourcePtr source,
+  MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap, scene::MarchSourcePtr source,
               std::int64_t page_texels = 0);
   MarchUpload(const MarchUpload&) = delete;
   MarchUpload& operator=(const MarchUpload&) = delete;
@@ -57,7 +59,7 @@ class MarchUpload {
   MarchData take() { return std::move(data_); }
 
  private:
-  void plan_tet(std::int64_t page_texels);
+  void plan_tet(gl::WordHeap& heap, std::int64_t page_texels);
   void plan_dense();
   void plan_brick();
   // Steps that make a texture buffer (of capacity bytes) and fill it from memory that lives as long as the source.

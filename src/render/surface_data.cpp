@@ -288,17 +288,9 @@ std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& la
   return source;
 }
 
-std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, Upload& upload,
-                                               const SurfaceSource& source, const SurfaceData* last) {
-  constexpr const char* tables = "creating the surfaces' tables";
-  const auto count = static_cast<std::int64_t>(source.words.size());
+std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, gl::WordHeap& heap,
+                                               Upload& upload, const SurfaceSource& source, const SurfaceData* last) {
   const TextureAtlas& atlas = *source.atlas;
-  if (count > limits.texture_buffer_texels) {
-    throw Error(ErrorCode::unsupported, "the surfaces need " + std::to_string(count) +
-                                            " texels of a texture buffer; this driver's "
-                                            "GL_MAX_TEXTURE_BUFFER_SIZE is " +
-                                            std::to_string(limits.texture_buffer_texels));
-  }
   if (static_cast<int>(atlas.edge) > limits.texture_size_2d) {
     throw Error(ErrorCode::unsupported, "the surfaces' images need textures " + std::to_string(atlas.edge) +
                                             " wide; this driver's GL_MAX_TEXTURE_SIZE is " +
@@ -311,11 +303,15 @@ std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const
   to->lights_ = source.lights;
   const std::size_t bytes = source.words.size() * sizeof(uvec4);
   to->bytes_ = bytes + std::uint64_t{atlas.edge} * atlas.edge * std::max(1U, atlas.layers) * 4;
-  upload.add([gl, to, bytes] {
-    to->buffer_ = gl::make_buffer(gl, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, tables);
-    to->words_ = gl::make_texture_buffer(gl, GL_RGBA32UI, to->buffer_, tables);
+  upload.add([&heap, to, bytes] {
+    to->words_ = heap.take(bytes, "creating the surfaces' tables");
+    to->tables_.words = static_cast<std::uint32_t>(to->words_.offset() / sizeof(uvec4));
   });
-  upload.add_bytes([to] { return to->buffer_.name(); }, 0, source.words.data(), bytes);
+  upload.add_bytes(
+      [to] {
+        return Upload::Place{to->words_.buffer(), to->words_.offset()};
+      },
+      source.words.data(), bytes);
   if (last != nullptr && last->scene_ == to->scene_) {
     to->atlas_ = last->atlas_;
     return data;
@@ -336,7 +332,7 @@ std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const
 }
 
 void SurfaceData::bind(const gl::Functions& gl) const {
-  gl.BindTextureUnit(core::CM_UNIT_SCENE_WORDS, words_.name());
+  gl.BindTextureUnit(core::CM_UNIT_SCENE_WORDS, words_.texture());
   gl.BindTextureUnit(core::CM_UNIT_ATLAS, atlas_->name());
 }
 

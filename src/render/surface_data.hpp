@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gl/objects.hpp"
+#include "gl/word_heap.hpp"
 #include "light/emitters.hpp"
 #include "light/scene_lights.hpp"
 #include "render/march_data.hpp"
@@ -59,8 +60,8 @@ class SurfaceData {
  public:
   /// Plans how it comes to GL: it is whole when all steps are done, and they may not outlive it. Images are shared with
   /// `last` (may be null) where the scene is the same. Throws Error(unsupported).
-  static std::unique_ptr<SurfaceData> plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, Upload& upload,
-                                           const SurfaceSource& source, const SurfaceData* last);
+  static std::unique_ptr<SurfaceData> plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, gl::WordHeap& heap,
+                                           Upload& upload, const SurfaceSource& source, const SurfaceData* last);
   void bind(const gl::Functions& gl) const;
   [[nodiscard]] const core::CmSurfaceTables& tables() const { return tables_; }
   [[nodiscard]] const light::SceneLights& lights() const { return lights_; }
@@ -69,8 +70,7 @@ class SurfaceData {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
-  gl::Object buffer_;
-  gl::Object words_;
+  gl::WordHeap::Span words_;
   std::shared_ptr<gl::Object> atlas_;
   const surface::Scene* scene_ = nullptr;
   core::CmSurfaceTables tables_{};

@@ -5,8 +5,8 @@
 namespace cumulet::render {
 
 SurfaceUpload::SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
-                             SurfaceSourcePtr source, SurfaceParts parts, const SurfaceData* last_data,
-                             RasterContentPtr last_raster)
+                             gl::WordHeap& heap, SurfaceSourcePtr source, SurfaceParts parts,
+                             const SurfaceData* last_data, RasterContentPtr last_raster)
     : gl_(gl),
       programs_(std::move(programs)),
       limits_(limits),
@@ -15,7 +15,7 @@ SurfaceUpload::SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
       paths_(gl, "uploading the surfaces"),
       raster_(gl, "uploading the surfaces of previews"),
       raster_due_(parts != SurfaceParts::paths) {
-  if (parts != SurfaceParts::raster) data_ = SurfaceData::plan(gl_, limits_, paths_, *source_, last_data);
+  if (parts != SurfaceParts::raster) data_ = SurfaceData::plan(gl_, limits_, heap, paths_, *source_, last_data);
 }
 
 bool SurfaceUpload::advance(Deadline deadline) {

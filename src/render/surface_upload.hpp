@@ -20,8 +20,9 @@ class SurfaceUpload {
  public:
   /// What the scene shares with the last of each, which may be null, is taken from there. Throws Error(unsupported) for
   /// what paths need; allocates nothing yet.
-  SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits, SurfaceSourcePtr source,
-                SurfaceParts parts, const SurfaceData* last_data, RasterContentPtr last_raster);
+  SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits, gl::WordHeap& heap,
+                SurfaceSourcePtr source, SurfaceParts parts, const SurfaceData* last_data,
+                RasterContentPtr last_raster);
   /// Works until the deadline, one piece at least. Returns whether all is there. Throws Error(out_of_memory, gl,
   /// unsupported): then nothing is to be had, unless done().
   bool advance(Deadline deadline);

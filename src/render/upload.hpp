@@ -46,8 +46,12 @@ class Upload {
   void add_until(std::function<bool()> step) { steps_.push_back(std::move(step)); }
   /// A step for each piece of this many bytes: copy(first, count). Pieces are of whole units.
   void add_pieces(std::size_t bytes, const std::function<void(std::size_t, std::size_t)>& copy, std::size_t unit = 1);
-  /// Into a buffer with GL_DYNAMIC_STORAGE_BIT, asked for by name when it is there.
-  void add_bytes(std::function<GLuint()> buffer, std::size_t offset, const void* bytes, std::size_t size);
+  /// Into a buffer with GL_DYNAMIC_STORAGE_BIT, from `offset` on: asked for when it is there.
+  struct Place {
+    GLuint buffer = 0;
+    std::size_t offset = 0;
+  };
+  void add_bytes(std::function<Place()> to, const void* bytes, std::size_t size);
   /// Into an 8-bit RGBA texture, of rows from the top without gaps.
   void add_image(std::function<GLuint()> texture, const Rectangle& to, const std::uint8_t* rgba);
 

@@ -70,7 +70,7 @@ TEST_P(Uploads, ImagesAndBuffersArriveWhole) {
   Upload upload(gl_, "uploading");
   upload.add_image([&] { return flat.name(); }, {glm::uvec2(0U), {width, height}, 0, std::nullopt}, rgba.data());
   upload.add_image([&] { return layers.name(); }, {{9U, 5U}, {width, height}, 0, 1}, rgba.data());
-  upload.add_bytes([&] { return buffer.name(); }, 16, rgba.data(), rgba.size());
+  upload.add_bytes([&] { return Upload::Place{buffer.name(), 16}; }, rgba.data(), rgba.size());
   int advances = 1;
   while (!upload.advance(Deadline::min())) ++advances;
   EXPECT_EQ(advances, 9);
@@ -197,7 +197,7 @@ TEST_F(SurfaceUploads, TheLastPoseStaysUntilTheNextIsWhole) {
 TEST_F(SurfaceUploads, APoseAFrameIsShownAsOftenAsItCanBe) {
   converge();
   std::vector<double> shown{0.0};
-  for (int i = 1; i <= 150; ++i) {
+  for (int i = 1; i <= 70; ++i) {
     pose(0.01 * i);
     render(1e-6);
     const double now = risen();
@@ -206,7 +206,7 @@ TEST_F(SurfaceUploads, APoseAFrameIsShownAsOftenAsItCanBe) {
       shown.push_back(now);
     }
   }
-  EXPECT_GE(shown.size(), 4U);
+  EXPECT_GE(shown.size(), 3U);
 }
 
 TEST_F(SurfaceUploads, AFailureIsToldOnceAndTheLastPoseStays) {

@@ -1,0 +1,84 @@
+#include "gl/word_heap.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "base/error.hpp"
+
+namespace cumulet::gl {
+
+namespace {
+
+constexpr std::size_t whole(std::size_t bytes) {
+  return (std::max<std::size_t>(bytes, 1) + WordHeap::alignment - 1) / WordHeap::alignment * WordHeap::alignment;
+}
+
+}  // namespace
+
+void WordHeap::Pages::drop_empty(std::size_t kept) {
+  std::erase_if(all, [&](const std::unique_ptr<Page>& page) {
+    if (!page->units.empty()) return false;
+    if (kept == 0) return true;
+    --kept;
+    return false;
+  });
+}
+
+WordHeap::Span::~Span() {
+  if (page_ == nullptr) return;
+  page_->units.give_back(first_, units_);
+  // What changes all the time finds a page again; what is gone leaves none.
+  const bool any = std::ranges::any_of(pages_->all, [](const auto& page) { return !page->units.empty(); });
+  pages_->drop_empty(any ? 1 : 0);
+}
+
+WordHeap::Span WordHeap::take_of(Page& page, std::size_t units) const {
+  const auto first = page.units.take(units);
+  Span span;
+  if (!first) return span;
+  span.pages_ = pages_;
+  span.page_ = &page;
+  span.first_ = *first;
+  span.units_ = units;
+  return span;
+}
+
+WordHeap::Span WordHeap::take(std::size_t wanted, const char* what) {
+  const std::size_t needed = whole(wanted);
+  if (needed > sizes_.largest_page) {
+    throw Error(ErrorCode::unsupported, std::string(what) + " needs " + std::to_string(needed) +
+                                            " bytes; this driver's GL_MAX_TEXTURE_BUFFER_SIZE holds " +
+                                            std::to_string(sizes_.largest_page));
+  }
+  for (const auto& page : pages_->all) {
+    if (Span span = take_of(*page, needed / alignment)) return span;
+  }
+  pages_->drop_empty(0);
+  const std::uint64_t room = sizes_.most_bytes - std::min<std::uint64_t>(bytes(), sizes_.most_bytes);
+  if (needed > room) {
+    throw Error(ErrorCode::out_of_memory, std::string(what) + " needs " + std::to_string(needed) + " bytes; " +
+                                              std::to_string(room) + " are left of " +
+                                              std::to_string(sizes_.most_bytes));
+  }
+  const std::size_t usual = std::min({whole(sizes_.page_bytes), sizes_.largest_page / alignment * alignment,
+                                      static_cast<std::size_t>(room) / alignment * alignment});
+  const std::size_t size = std::max(needed, usual);
+  Object buffer = make_buffer(gl_, size, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+  Object texture = make_texture_buffer(gl_, GL_RGBA32UI, buffer, what);
+  auto page = std::make_unique<Page>(std::move(buffer), std::move(texture), size);
+  return take_of(*pages_->all.emplace_back(std::move(page)), needed / alignment);
+}
+
+std::uint64_t WordHeap::bytes() const {
+  std::uint64_t sum = 0;
+  for (const auto& page : pages_->all) sum += page->units.size() * alignment;
+  return sum;
+}
+
+std::uint64_t WordHeap::free_bytes() const {
+  std::uint64_t sum = 0;
+  for (const auto& page : pages_->all) sum += page->units.free() * alignment;
+  return sum;
+}
+
+}  // namespace cumulet::gl
