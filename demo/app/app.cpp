@@ -60,8 +60,9 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
           nullptr) == 0)
     throw std::runtime_error("the OpenGL functions cannot be loaded");
   context_ = window_->make_shared_context();
-  renderer_ = std::make_unique<Renderer>(*gl_, context_.get(), Window::wake,
-                                         options_.trace.empty() ? nullptr : &timeline_, options_.shader_cache);
+  renderer_ =
+      std::make_unique<Renderer>(*gl_, context_.get(), Window::wake, options_.trace.empty() ? nullptr : &timeline_,
+                                 options_.shader_cache, options_.shaders);
   // Sizes in the scene are for pictures: here the window has its own.
   model_.scene.width = 1280;
   model_.scene.height = 720;

@@ -46,6 +46,10 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
                  "Keep what the driver made of shaders in this folder, for the next run")
       ->type_name("DIR")
       ->group(group);
+  app.add_option("--shaders", options.shaders,
+                 "Take the shaders of this folder (a copy of glsl/), anew as they change: in debug builds")
+      ->type_name("DIR")
+      ->group(group);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene);

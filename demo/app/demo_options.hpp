@@ -17,6 +17,7 @@ struct DemoOptions {
   std::string record;
   std::string trace;         // empty: none
   std::string shader_cache;  // likewise: a folder
+  std::string shaders;       // likewise
 };
 
 /// cumulet-demo's arguments, without the program's name. Nothing if they asked for --help or --version, whose text

@@ -32,10 +32,10 @@ class Renderer {
  public:
   /// gl: the window's. context shares objects with it, is current in no thread, and outlives the renderer. wake is
   /// called from any thread when there is an answer to take. timeline, or null: is told of the viewer's work.
-  /// shader_cache: a folder, or "". Throws
+  /// shader_cache, shaders: folders, or "". Throws
   /// std::runtime_error.
   Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline,
-           std::string shader_cache);
+           std::string shader_cache, std::string shaders);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
   /// Stops what is under way, soon.
@@ -75,6 +75,7 @@ class Renderer {
   std::function<void()> wake_;
   Timeline* timeline_;
   std::string shader_cache_;
+  std::string shaders_;
 
   // The thread's own.
   std::unique_ptr<GladGLContext> gl_;

@@ -35,7 +35,7 @@ bool same_wish(const Wish& a, const Wish& b) {
 }
 
 Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline,
-                 const std::string& shader_cache)
+                 const std::string& shader_cache, const std::string& shaders)
     : shared_(std::make_unique<Shared>()) {
   shared_->wake = std::move(wake);
   cumulet_create_desc desc{};
@@ -50,7 +50,7 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
   }
-  const auto programs = make_programs(shader_cache);
+  const auto programs = make_programs(shader_cache, shaders);
   desc.programs = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};

@@ -88,7 +88,7 @@ class Session {
  public:
   /// wake is called from any thread when there is something new to draw. Throws std::runtime_error.
   Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline,
-          const std::string& shader_cache);
+          const std::string& shader_cache, const std::string& shaders);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session() = default;

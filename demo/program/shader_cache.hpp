@@ -13,11 +13,14 @@ struct ReleasePrograms {
   void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
 };
 
-/// Programs that are kept in a folder; "": nowhere. Throws std::runtime_error.
-inline std::unique_ptr<cumulet_programs, ReleasePrograms> make_programs(const std::string& folder) {
+/// Programs that are kept in a folder, of the shaders of another; "": nowhere, and the library's own. Throws
+/// std::runtime_error.
+inline std::unique_ptr<cumulet_programs, ReleasePrograms> make_programs(const std::string& folder,
+                                                                        const std::string& shaders) {
   cumulet_programs_desc desc{};
   desc.struct_size = sizeof desc;
   desc.folder = folder.c_str();
+  desc.shaders = shaders.c_str();
   cumulet_programs* programs = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_programs_create(&desc, &programs, error.data(), error.size()) != CUMULET_OK)

@@ -78,7 +78,7 @@ Viewer create_viewer(Context& context, Progress& progress, Timeline* timeline, c
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
   }
-  const auto programs = cumulet::demo::make_programs(shader_cache);
+  const auto programs = cumulet::demo::make_programs(shader_cache, {});
   desc.programs = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};

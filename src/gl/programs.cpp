@@ -38,7 +38,8 @@ struct Stage {
   std::string source;
 };
 
-std::string source_of(const std::string& name, const std::vector<std::string>& defines, bool names_variants) {
+std::string source_of(const ShaderFolder* folder, const std::string& name, const std::vector<std::string>& defines,
+                      bool names_variants) {
   const Shader* shader = find_shader(name);
   if (shader == nullptr) throw Error(ErrorCode::internal, "no shader named " + name);
   if (names_variants && !shader->has_variant(defines)) {
@@ -46,29 +47,34 @@ std::string source_of(const std::string& name, const std::vector<std::string>& d
     for (const std::string& define : defines) all.append(all.empty() ? "" : ", ").append(define);
     throw Error(ErrorCode::internal, name + " names no variant with [" + all + "]");
   }
-  return shader->with(defines);
+  if (folder == nullptr) return shader->with(defines);
+  const std::string text = folder->source(name);
+  Shader own = *shader;
+  own.source = text;
+  return own.with(defines);
 }
 
 // The last names the variants.
-std::vector<Stage> stages_of(const ProgramKey& key) {
-  if (key.vertex.empty()) return {{GL_COMPUTE_SHADER, key.name, source_of(key.name, key.defines, true)}};
-  return {{GL_VERTEX_SHADER, key.vertex, source_of(key.vertex, key.defines, false)},
-          {GL_FRAGMENT_SHADER, key.name, source_of(key.name, key.defines, true)}};
+std::vector<Stage> stages_of(const ShaderFolder* folder, const ProgramKey& key) {
+  if (key.vertex.empty()) return {{GL_COMPUTE_SHADER, key.name, source_of(folder, key.name, key.defines, true)}};
+  return {{GL_VERTEX_SHADER, key.vertex, source_of(folder, key.vertex, key.defines, false)},
+          {GL_FRAGMENT_SHADER, key.name, source_of(folder, key.name, key.defines, true)}};
 }
 
-std::string sources_of(const ProgramKey& key) {
+std::string sources_of(const ShaderFolder* folder, const ProgramKey& key) {
   std::string all;
-  for (const Stage& stage : stages_of(key)) all += stage.source;
+  for (const Stage& stage : stages_of(folder, key)) all += stage.source;
   return all;
 }
 
 }  // namespace
 
-Programs::Programs(const Functions& gl, std::shared_ptr<ProgramFiles> files)
+Programs::Programs(const Functions& gl, std::shared_ptr<ProgramFiles> files, std::shared_ptr<ShaderFolder> shaders)
     : gl_(copy_of(gl)),
       group_(gl_),
       parallel_(has_extension(gl, "GL_KHR_parallel_shader_compile") ||
-                has_extension(gl, "GL_ARB_parallel_shader_compile")) {
+                has_extension(gl, "GL_ARB_parallel_shader_compile")),
+      shaders_(std::move(shaders)) {
   GLint formats = 0;
   gl.GetIntegerv(GL_NUM_PROGRAM_BINARY_FORMATS, &formats);
   if (formats > 0) files_ = std::move(files);
@@ -97,6 +103,24 @@ const Program& Programs::get(const ProgramKey& key) {
   return program;
 }
 
+void Programs::refresh() {
+  if (!shaders_ || !shaders_->changed()) return;
+  for (auto& [key, program] : programs_) {
+    if (!program->usable()) continue;
+    Program fresh;
+    try {
+      begin(key, fresh);
+      if (fresh.state_ == Program::State::compiling) finish(key, fresh);
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::context_lost) throw;
+      if (log_ != nullptr) log_->warning(error.what());
+      continue;
+    }
+    program->object_ = std::move(fresh.object_);
+    revision_.advance();
+  }
+}
+
 Programs::Counts Programs::counts() const {
   Counts counts;
   for (const auto& [key, program] : programs_) {
@@ -109,7 +133,7 @@ Programs::Counts Programs::counts() const {
 
 void Programs::begin(const ProgramKey& key, Program& program) {
   program.state_ = Program::State::absent;
-  const std::vector<Stage> stages = stages_of(key);
+  const std::vector<Stage> stages = stages_of(shaders_.get(), key);
   program.shaders_.clear();
   program.object_ = Object(gl_, Object::Kind::program, gl_->CreateProgram());
   check(*gl_, "creating a shader program");
@@ -133,7 +157,7 @@ void Programs::begin(const ProgramKey& key, Program& program) {
 
 bool Programs::load(const ProgramKey& key, Program& program) {
   if (!files_) return false;
-  const auto binary = files_->find(driver_, sources_of(key));
+  const auto binary = files_->find(driver_, sources_of(shaders_.get(), key));
   if (!binary) return false;
   const GLuint name = program.object_.name();
   gl_->ProgramBinary(name, binary->format, binary->bytes.data(), static_cast<GLsizei>(binary->bytes.size()));
@@ -196,7 +220,7 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
   clear_errors(*gl_);  // it gives none: then there is none
   if (binary.bytes.empty()) return;
   try {
-    files_->keep(driver_, sources_of(key), binary);
+    files_->keep(driver_, sources_of(shaders_.get(), key), binary);
   } catch (const Error& error) {
     if (log_ != nullptr) log_->warning(std::string("no program binaries are kept: ") + error.what());
     files_.reset();  // once is enough
@@ -246,7 +270,7 @@ ProgramsPtr ProgramPool::of_current(const Functions& gl) {
   for (const auto& group : groups_) {
     if (ProgramsPtr programs = group.lock(); programs && programs->is_current()) return programs;
   }
-  auto made = std::make_shared<Programs>(gl, files_);
+  auto made = std::make_shared<Programs>(gl, files_, shaders_);
   groups_.push_back(made);
   return made;
 }

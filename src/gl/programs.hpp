@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "base/log.hpp"
+#include "base/revision.hpp"
 #include "gl/objects.hpp"
 #include "gl/program_files.hpp"
+#include "gl/shader_folder.hpp"
 #include "gl/share_group.hpp"
 
 namespace cumulet::gl {
@@ -64,7 +66,8 @@ class Program {
 class Programs {
  public:
   /// Of the current context. files: where binaries are kept between runs; none: nowhere. Throws on a GL error.
-  Programs(const Functions& gl, std::shared_ptr<ProgramFiles> files);
+  /// shaders: what their sources are instead of what is embedded; null: those.
+  Programs(const Functions& gl, std::shared_ptr<ProgramFiles> files, std::shared_ptr<ShaderFolder> shaders = nullptr);
   Programs(const Programs&) = delete;
   Programs& operator=(const Programs&) = delete;
   Programs(Programs&&) = delete;
@@ -96,6 +99,11 @@ class Programs {
   const Program& ask(const ProgramKey& key);
   /// The same, linked: waits for the driver.
   const Program& get(const ProgramKey& key);
+  /// Builds programs anew whose sources have changed. One that does not build is one line in the log, and stays what it
+  /// was.
+  void refresh();
+  /// Another whenever that changed any.
+  [[nodiscard]] const Revision<Programs>& revision() const { return revision_; }
   /// Those that were asked for, and those of them that were used: the driver has no more to compile for these.
   struct Counts {
     std::size_t asked = 0;
@@ -125,6 +133,8 @@ class Programs {
   ShareGroup group_;
   bool parallel_ = false;
   std::shared_ptr<ProgramFiles> files_;
+  std::shared_ptr<ShaderFolder> shaders_;
+  Revision<Programs> revision_;
   std::string driver_;  // what binaries are good for
   std::map<ProgramKey, std::unique_ptr<Program>> programs_;
   std::mutex turn_;
@@ -143,13 +153,15 @@ void find_out_dispatches(const FunctionsPtr& gl, Programs& programs);
 /// Safe from any thread.
 class ProgramPool {
  public:
-  explicit ProgramPool(std::shared_ptr<ProgramFiles> files = nullptr) : files_(std::move(files)) {}
+  explicit ProgramPool(std::shared_ptr<ProgramFiles> files = nullptr, std::shared_ptr<ShaderFolder> shaders = nullptr)
+      : files_(std::move(files)), shaders_(std::move(shaders)) {}
   /// Those of the current context's group. Throws on a GL error.
   ProgramsPtr of_current(const Functions& gl);
 
  private:
   std::mutex mutex_;
   std::shared_ptr<ProgramFiles> files_;
+  std::shared_ptr<ShaderFolder> shaders_;
   std::vector<std::weak_ptr<Programs>> groups_;
 };
 

@@ -22,19 +22,20 @@ class PassTimer {
  public:
   explicit PassTimer(gl::FunctionsPtr gl) : flights_(std::move(gl)) {}
 
-  /// Runs the pass.
+  /// Runs the pass. Throws what it throws, and once Error(out_of_memory) where there is no memory for its times.
   template <class Pass>
   void run(Pass&& pass) {
     while (const auto landed = flights_.land()) seconds_ += 1e-3 * landed->ms.value_or(0.0);
-    if (flights_.full()) {
+    if (!times_ || flights_.full()) {
       pass();
       return;
     }
     try {
       flights_.begin(Flights::Kind::dispatch);
-    } catch (const Error&) {  // no memory for the times: the pass may have what it needs
+    } catch (const Error&) {  // no memory for the times: that is told once, and the pass may have what it needs
+      times_ = false;
       pass();
-      return;
+      throw;
     }
     struct End {
       Flights& flights;
@@ -50,6 +51,7 @@ class PassTimer {
 
  private:
   Flights flights_;
+  bool times_ = true;
   double seconds_ = 0.0;
 };
 

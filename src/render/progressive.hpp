@@ -24,6 +24,7 @@ struct PictureWish {
     Revision<MarchData> data;
     Revision<SurfaceData> surfaces;
     Revision<HostDepth> host_depth;
+    Revision<gl::Programs> programs;
     core::CmIntegrator integrator{};
     glm::uvec2 size{0U};  // full resolution
     View view = View::shaded;

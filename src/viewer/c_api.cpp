@@ -131,8 +131,16 @@ cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumule
   return cumulet::c_abi::make_handle(out, error, error_size, [&] {
     const cumulet_programs_desc d = read_desc(desc, "cumulet_programs_desc");
     const bool kept = d.folder != nullptr && *d.folder != '\0';
-    return std::make_shared<cumulet::gl::ProgramPool>(kept ? std::make_shared<cumulet::gl::ProgramFiles>(d.folder)
-                                                           : nullptr);
+    std::shared_ptr<cumulet::gl::ShaderFolder> shaders;
+    if (d.shaders != nullptr && *d.shaders != '\0') {
+      if (!cumulet::gl::reloads_shaders) {
+        throw cumulet::Error(cumulet::ErrorCode::unsupported,
+                             "shaders of a folder are for debug builds of the library");
+      }
+      shaders = std::make_shared<cumulet::gl::ShaderFolder>(d.shaders);
+    }
+    return std::make_shared<cumulet::gl::ProgramPool>(
+        kept ? std::make_shared<cumulet::gl::ProgramFiles>(d.folder) : nullptr, std::move(shaders));
   });
 }
 

@@ -112,6 +112,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.content.data = scene_.data_revision();
   wish.content.surfaces = scene_.surfaces_revision();
   wish.content.host_depth = host_depth_revision_;
+  wish.content.programs = programs_->revision();
   wish.content.integrator = wish.parameters.integrator;
   wish.content.size = shot.size;
   wish.content.view = shot.sampling.view;

@@ -64,6 +64,7 @@ void Viewer::with_gl(Body&& body) {
     const gl::Programs::Turn turn(g.programs(), log_);
     const gl::StateGuard guard(*functions, restore_state_);
     g.find_out_dispatches();
+    if constexpr (gl::reloads_shaders) g.programs()->refresh();
     body(g);
   } catch (const Error& error) {
     // Whatever failed: in a lost context everything does.

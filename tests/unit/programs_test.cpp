@@ -5,6 +5,7 @@
 #include <fstream>
 #include <functional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/error.hpp"
@@ -192,6 +193,47 @@ TEST_F(ProgramsTest, WhatIsDamagedIsIgnoredAndWrittenAnew) {
     EXPECT_TRUE(Programs(*gl_, files()).get(resolve).usable()) << i;
     EXPECT_EQ(compiled(), again) << i;
   }
+}
+
+TEST_F(ProgramsTest, ShadersOfAFolderAreReadAnew) {
+  fs::copy(CUMULET_GLSL_DIR, folder_.path());
+  const fs::path file = folder_ / "resolve.comp";
+  const auto original = bytes_of(file);
+  const auto edit = [&](const std::string& more) {
+    auto bytes = original;
+    for (const char c : more) bytes.push_back(static_cast<std::byte>(c));
+    const auto before = fs::last_write_time(file);
+    write(file, bytes);
+    fs::last_write_time(file, before + std::chrono::seconds(2));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it looks so often
+  };
+  std::vector<std::string> told;
+  const auto tell = [](void* user, cumulet::LogLevel /*level*/, const char* message) {
+    static_cast<std::vector<std::string>*>(user)->emplace_back(message);
+  };
+  const cumulet::Log log(tell, &told);
+  const auto programs = std::make_shared<Programs>(*gl_, nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
+  const Programs::Turn turn(programs, log);
+  const Program& program = programs->get(resolve);
+  programs->refresh();
+  const GLuint first = program.name();
+  const auto revision = programs->revision();
+  edit("\n");
+  programs->refresh();
+  const GLuint second = program.name();
+  EXPECT_NE(second, first);
+  EXPECT_NE(programs->revision(), revision);
+  EXPECT_TRUE(program.usable());
+  const auto newer = programs->revision();
+  edit("nonsense\n");
+  programs->refresh();
+  EXPECT_EQ(program.name(), second);
+  EXPECT_EQ(programs->revision(), newer);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].find('\n'), std::string::npos);
+  EXPECT_NE(told[0].find("resolve.comp"), std::string::npos);
+  fs::remove(file);
+  EXPECT_THROW(programs->get({"resolve.comp", {"CM_HOLES 1", "CM_BACKGROUND 0"}}), Error);
 }
 
 TEST(ProgramFilesTest, KeepWhatWasUsedLastWithinTheirBound) {

@@ -176,6 +176,12 @@ typedef struct cumulet_programs_desc {
    * nowhere. A folder that cannot be written is told by one warning in the log.
    */
   const char* folder;
+  /*
+   * For those who work on the library: the shaders of this folder (a copy of glsl/) instead of the library's own, read
+   * anew when they change; one that does not build is told by one warning, and the one before it serves on. Debug
+   * builds of the library alone: CUMULET_ERROR_UNSUPPORTED in others. NULL or "": the library's own.
+   */
+  const char* shaders;
 } cumulet_programs_desc;
 
 /*

@@ -842,9 +842,10 @@ class GetProc {
 
 struct ProgramsDesc {
   const char* folder = nullptr;
+  const char* shaders = nullptr;
 
   operator cumulet_programs_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_programs_desc), .folder = folder};
+    return {.struct_size = sizeof(cumulet_programs_desc), .folder = folder, .shaders = shaders};
   }
 };
 
