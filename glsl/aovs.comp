@@ -17,11 +17,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "random.glsl"
 #include "phase.glsl"
 #include "buffers.glsl"
-#if CM_MARCH == 0
-#include "march_tet.glsl"
-#else
-#include "march_voxel.glsl"
-#endif
+#include "march.glsl"
 #if CM_SURFACES
 #define CM_BVH_SHARED_STACK 64u
 #include "bsdf.glsl"
@@ -60,7 +56,7 @@ void main() {
     cm_hit_camera = true;
     if (cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, hit)) {
       surface_t = hit.t;
-      CmSurfacePoint point = cm_surface_point(hit.triangle, hit.barycentrics, w);
+      CmSurfacePoint point = cm_surface_point(hit.triangle, hit.barycentrics, w, !hit.front);
       normal += point.material.normal;
       albedo += point.material.base_color;
     }

@@ -31,6 +31,7 @@ float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, ou
 }
 #endif
 
+#ifdef CM_MARCH
 #if CM_MARCH == 0
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
 layout(binding = CM_UNIT_CELLS) uniform usamplerBuffer cm_cells[CM_PAGES];
@@ -84,4 +85,5 @@ uint cm_brick_slot(ivec3 brick) {
   return texelFetch(cm_brick_slots, brick - (ivec3(cm.grid.box_min) >> 3), 0).x;
 }
 float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * 512u + index)).x; }
+#endif
 #endif

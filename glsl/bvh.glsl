@@ -18,7 +18,7 @@
 
 #define CM_BVH_LEAF 0x80000000u
 #define CM_BVH_NONE 0xffffffffu
-#define CM_BVH_STACK 32  // the builder's trees are no deeper
+#define CM_BVH_STACK 24  // the builder's trees are no deeper
 
 // A triangle's flags. The other bits are the includer's.
 #define CM_TRIANGLE_ASK 0x80000000u        // cm_hit_accept decides
@@ -65,6 +65,26 @@ CM_FN vec2 cm_bvh_slabs(vec3 low, vec3 high, vec3 o, vec3 inverse, vec3 slack) {
   return vec2(max(max(near.x, near.y), near.z), min(min(far.x, far.y), far.z) * 1.000001f);
 }
 
+// One over d, and the slack that goes with it.
+CM_FN vec3 cm_bvh_inverse(vec3 d, CM_OUT(vec3) slack) {
+  vec3 size = abs(d);
+  float longest = max(max(size.x, size.y), size.z);
+  // A product of slack and a box's distance beyond any t; what lies 1e-12 off a slab still counts as inside.
+  bvec3 flat_axis = lessThan(size, vec3(longest * 1.0e-24f));
+  slack = mix(vec3(0.0f), vec3(1.0e25f), flat_axis);
+  return mix(1.0f / mix(d, vec3(1.0f), flat_axis), vec3(1.0e37f), flat_axis);
+}
+
+#ifdef CM_BVH_LOW
+// Whether the ray comes near any triangle: if not, none is hit.
+CM_FN bool cm_bvh_near(vec3 o, vec3 d, float t_min, float t_max) {
+  vec3 slack;
+  vec3 inverse = cm_bvh_inverse(d, slack);
+  vec2 bounds = cm_bvh_slabs(CM_BVH_LOW, CM_BVH_HIGH, o, inverse, slack);
+  return max(bounds.x, t_min) <= min(bounds.y, t_max);
+}
+#endif
+
 // The nearest hit, or with `any` the first one found.
 CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_OUT(CmHit) hit) {
   hit.t = min(t_max, 1.0e25f);  // beyond any hit, short of where the builder puts an empty box
@@ -78,10 +98,8 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
   bool sound = longest >= 1.0e-12f && size.x <= 1.0e12f && size.y <= 1.0e12f && size.z <= 1.0e12f &&
                abs(o.x) <= 1.0e12f && abs(o.y) <= 1.0e12f && abs(o.z) <= 1.0e12f;
   float t_first = max(t_min, 0.0f);
-  // A product of slack and a box's distance beyond any t; what lies 1e-12 off a slab still counts as inside.
-  bvec3 flat_axis = lessThan(size, vec3(longest * 1.0e-24f));
-  vec3 slack = mix(vec3(0.0f), vec3(1.0e25f), flat_axis);
-  vec3 inverse = mix(1.0f / mix(d, vec3(1.0f), flat_axis), vec3(1.0e37f), flat_axis);
+  vec3 slack;
+  vec3 inverse = cm_bvh_inverse(d, slack);
   // Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013: the ray becomes the z axis.
   uint axis = size.z >= size.x && size.z >= size.y ? 2u : (size.y >= size.x ? 1u : 0u);
   vec3 turned = cm_bvh_turn(d, axis);
@@ -95,8 +113,7 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
   int top = 0;
   uint link = sound ? 0u : CM_BVH_NONE;
 #ifdef CM_BVH_LOW
-  vec2 bounds = cm_bvh_slabs(CM_BVH_LOW, CM_BVH_HIGH, o, inverse, slack);
-  if (!(max(bounds.x, t_first) <= min(bounds.y, hit.t))) link = CM_BVH_NONE;
+  if (!cm_bvh_near(o, d, t_first, hit.t)) link = CM_BVH_NONE;
 #endif
   while (link != CM_BVH_NONE) {
     while (link < CM_BVH_LEAF) {

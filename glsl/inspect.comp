@@ -12,11 +12,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "random.glsl"
 #include "phase.glsl"
 #include "buffers.glsl"
-#if CM_MARCH == 0
-#include "march_tet.glsl"
-#else
-#include "march_voxel.glsl"
-#endif
+#include "march.glsl"
 #if CM_SURFACES
 #define CM_BVH_SHARED_STACK 64u
 #include "bsdf.glsl"

@@ -6,7 +6,16 @@
 #define CM_STAGE_CAMERA 0u  // begins: a camera ray is due
 #define CM_STAGE_AIM 1u     // its ray's way through the box is to be found
 #define CM_STAGE_FLY 2u     // marches
-#define CM_STAGE_DONE 3u    // nothing: its pixel has the samples it shall have
+#define CM_STAGE_MEET 3u    // the tree is asked whether a triangle is nearer than the event that the march came to
+#define CM_STAGE_EVENT 4u   // what follows the event, in the medium
+#define CM_STAGE_VERTEX 5u  // what follows on a triangle: one that a flight has met, or that a shadow ray started on
+#define CM_STAGE_FINISH 6u  // its sample is to be added to the pixel
+#define CM_STAGE_DONE 7u    // nothing: its pixel has the samples it shall have
+
+// The event that ends a ray.
+#define CM_EVENT_NONE 0u
+#define CM_EVENT_COLLISION 1u  // with the medium: its optical depth is used up; of shadow rays: or a triangle stops it
+#define CM_EVENT_ESCAPE 2u     // out of the box, or at its end
 
 // What its ray is.
 #define CM_RAY_FLIGHT 0u
@@ -17,47 +26,71 @@
 #define CM_IN_MEDIUM 1u
 #define CM_ON_TRIANGLE 2u
 
-// The one list of a path's fields: the struct, how it is loaded and stored (glsl/trace.comp), by words, and
-// so its size.
-//   o               the ray's start, cube space
+// The one list of a path's fields: the struct, how it is packed into words (glsl/path_store.glsl), and so its size. In
+// parts, for kernels that change some of them only.
+// CM_PATH_RAY, the ray under way:
+//   o               its start, cube space
 //   d               its direction, cube space, per unit of world distance
+//   t, t_end        world distance from o, and where the ray leaves the box, or ends
+//   depth, depth_0  optical depth left before the collision (or the end of the shadow ray), and at the ray's start
+//   cell, cache     that the ray is in, and what the march keeps of it; start_cell: it was in at o, in the medium
+//   reach           its own end: a lamp, the host's surface
+// CM_PATH_SAMPLE, the sample so far:
 //   w               world direction of flight, kept during shadow rays
 //   throughput      of the path
 //   radiance        of this sample so far, without what is behind all
 //   light           what the ray brings if nothing stops it: a shadow ray; a camera ray, of a layer's colour or of what
 //                   is behind all
-//   t, t_end        world distance from o, and where the ray leaves the box, or ends
-//   depth, depth_0  optical depth left before the collision (or the end of the shadow ray), and at the ray's start
-//   cell, cache     that the ray is in, and what the march keeps of it; start_cell: it was in at o, in the medium
-//   stage, ray, start     as above
-//   bounces         events of the path so far
-//   blurred         1: it was scattered wider than a surface of the least roughness does
-//   in_volume       1: this sample met the volume first
-//   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
 //   density         of a flight: by solid angle, with which it took its direction; of a shadow ray to what flights may
 //                   come to by escaping: the flights' density there over the look's own; else 0
 //   random, stream  of its random numbers
-// and among triangles
+//   bounces         events of the path so far
+//   steps           cells marched for this sample
+// CM_PATH_ENDS, what is known of the ray's ends:
 //   triangle, weights     that o is on, of its second and third vertex
-//   behind          1: the path met the side from which its vertices turn clockwise
-//   reach           the ray's own end: a lamp, the host's surface
+//   stage, event, ray, start     as above
+//   behind          1: the path met the side of the triangle from which its vertices turn clockwise
+//   back            1: it met the back
+//   blurred         1: it was scattered wider than a surface of the least roughness does
+//   in_volume       1: this sample met the volume first
+//   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
 //   lifted          1: the ray started above the triangle that its path had met
-#define CM_PATH_FIELDS(VEC3, VEC2, UVEC2, FLOAT, UINT)                                                               \
-  VEC3(o) VEC3(d) VEC3(w) VEC3(throughput) VEC3(radiance) VEC3(light) FLOAT(t) FLOAT(t_end) FLOAT(depth)             \
-  FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell) UINT(stage) UINT(ray) UINT(start) UINT(bounces)           \
-  UINT(blurred) UINT(in_volume) UINT(at_layer) FLOAT(density) UINT(random) UINT(stream)
-#define CM_PATH_TRIANGLE_FIELDS(VEC3, VEC2, UVEC2, FLOAT, UINT)                                                      \
-  UINT(triangle) VEC2(weights) UINT(behind) FLOAT(reach) UINT(lifted)
+// BITS have a number of bits of a word that they share with their neighbours.
+#define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
+  VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
+  FLOAT(reach)
+#define CM_PATH_SAMPLE(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
+  VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(radiance) UINT(bounces) VEC3(light) UINT(steps)            \
+  FLOAT(density)
+#define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
+  UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 1) BITS(start, 2) BITS(behind, 1)             \
+  BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1)
 
 #define CM_PATH_VEC3(name) vec3 name;
 #define CM_PATH_VEC2(name) vec2 name;
 #define CM_PATH_UVEC2(name) uvec2 name;
 #define CM_PATH_FLOAT(name) float name;
 #define CM_PATH_UINT(name) uint name;
+#define CM_PATH_BITS(name, bits) uint name;
+
+// Quads of words that each part takes: a part's words, and one for its bits.
+#define CM_PATH_THREE(name) +3
+#define CM_PATH_TWO(name) +2
+#define CM_PATH_ONE(name) +1
+#define CM_PATH_NO_WORD(name, bits)
+#define CM_PATH_NO_BITS(name)
+#define CM_PATH_BITS_OF(name, bits) +bits
+#define CM_PATH_WORDS(PART)                                                                                          \
+  (0 PART(CM_PATH_THREE, CM_PATH_TWO, CM_PATH_TWO, CM_PATH_ONE, CM_PATH_ONE, CM_PATH_NO_WORD) +                      \
+   (31 PART(CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_BITS_OF)) / 32)
+#define CM_RAY_QUADS ((CM_PATH_WORDS(CM_PATH_RAY) + 3) / 4)
+#define CM_SAMPLE_QUADS ((CM_PATH_WORDS(CM_PATH_SAMPLE) + 3) / 4)
+#define CM_ENDS_QUADS ((CM_PATH_WORDS(CM_PATH_ENDS) + 3) / 4)
 
 struct CmPath {
-  CM_PATH_FIELDS(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT)
-  CM_PATH_TRIANGLE_FIELDS(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT)
+  CM_PATH_RAY(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+  CM_PATH_SAMPLE(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+  CM_PATH_ENDS(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
 };
 
 // A pixel's samples so far.
@@ -68,7 +101,6 @@ struct CmPixel {
   float square;     // mean of squared luminance, of both together
   uint samples;     // finished
   uint steps;       // cells marched, of all of them
-  uint marches;     // calls of cm_fly in this dispatch
 };
 
 #endif

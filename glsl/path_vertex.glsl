@@ -3,21 +3,8 @@
 #ifndef CM_PATH_VERTEX_GLSL
 #define CM_PATH_VERTEX_GLSL
 
-#define CM_EVENT_NONE 0u
-#define CM_EVENT_COLLISION 1u
-#define CM_EVENT_ESCAPE 2u
-
 // Next-event transmittance below e^-2 is estimated by Russian roulette: an opaque way out costs no more than it tells.
 #define CM_SHADOW_DEPTH 2.0f
-
-// Cells marched before events are looked at: keeps neighbouring lanes together.
-#ifndef CM_CHUNK
-#define CM_CHUNK 8
-#endif
-// Events between looks at whether a new camera ray is due.
-#ifndef CM_EVENTS
-#define CM_EVENTS 8
-#endif
 
 // What a path does with light along a direction from a vertex.
 struct CmTurn {
@@ -35,12 +22,21 @@ struct CmVertex {
   CmSurfacePoint surface;  // if so
 };
 
-// Whether a triangle ends the ray before the event does: then o, once moved, is on it. Asked after the march, not
-// before: in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the medium.
-bool cm_meet(inout CmPath p, uint event) {
+// Whether a triangle may be nearer than the event that the ray has come to. The tree is asked after the march, not
+// before: in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the
+// medium.
+bool cm_asks(CmPath p) {
   bool flight = p.ray == CM_RAY_FLIGHT;
-  if (event == CM_EVENT_NONE || (event == CM_EVENT_COLLISION && !flight)) return false;
+  if (p.event == CM_EVENT_COLLISION && !flight) return false;
   if (p.bounces == 0u && cm.layers.count != 0u) return false;
+  if (p.start == CM_ON_TRIANGLE) return flight || p.reach > 0.0;  // from a little above it
+  float reach = p.event == CM_EVENT_COLLISION ? p.t : p.reach;
+  return cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0, reach);
+}
+
+// Asks the tree.
+void cm_meet(inout CmPath p) {
+  bool flight = p.ray == CM_RAY_FLIGHT;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_from_cube_point(p.o);
   if (p.start == CM_ON_TRIANGLE) {
@@ -52,14 +48,15 @@ bool cm_meet(inout CmPath p, uint event) {
   cm_hit_seed = p.random;
   cm_hit_camera = p.bounces == 0u;
   CmHit hit;
-  bool met = cm_bvh_trace(o, d, 0.0, event == CM_EVENT_COLLISION ? p.t : p.reach, !flight, hit);
+  bool met = cm_bvh_trace(o, d, 0.0, p.event == CM_EVENT_COLLISION ? p.t : p.reach, !flight, hit);
+  if (met && !flight) p.event = CM_EVENT_COLLISION;
   if (met && flight) {
     p.triangle = hit.triangle;
     p.weights = hit.barycentrics;
-    cm_hit_back = !hit.front;
+    p.back = hit.front ? 0u : 1u;
   }
-  if (met && !flight) p.light = vec3(0.0);
-  return met && flight;
+  bool vertex = flight ? met : p.start == CM_ON_TRIANGLE;
+  p.stage = vertex ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
 }
 
 // What a path has met, and its light.
@@ -67,7 +64,7 @@ CmVertex cm_vertex(inout CmPath p, bool on_triangle, bool met) {
   CmVertex vertex;
   vertex.on_triangle = on_triangle;
   if (!on_triangle) return vertex;
-  vertex.surface = cm_surface_point(p.triangle, p.weights, p.w);
+  vertex.surface = cm_surface_point(p.triangle, p.weights, p.w, p.back != 0u);
   // Path space regularization: Kaplanyan and Dachsbacher, 2013.
   if (p.blurred != 0u) {
     float least = cm.integrator.blurred_roughness;
@@ -143,7 +140,8 @@ struct CmVertex {
   bool on_triangle;  // never
 };
 
-CM_FN bool cm_meet(CM_INOUT(CmPath) p, uint event) { return false; }
+CM_FN bool cm_asks(CmPath p) { return false; }
+CM_FN void cm_meet(CM_INOUT(CmPath) p) {}
 CM_FN CmVertex cm_vertex(CM_INOUT(CmPath) p, bool on_triangle, bool met) { return CmVertex(false); }
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }
 CM_FN bool cm_blurs(CmTurn turn) { return false; }

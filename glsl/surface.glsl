@@ -17,7 +17,6 @@ uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.surfaces.records + texel)
 // What the ray under way is, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
-bool cm_hit_back = false;  // what it met last
 
 vec2 cm_ggx_albedo(float roughness, float cosine) {
   vec2 place = cm_ggx_albedo_place(roughness, cosine);
@@ -106,17 +105,13 @@ vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
   bvec2 clamped = bvec2((t.w & CM_WRAP_MASK) == CM_WRAP_CLAMP, ((t.w >> CM_WRAP_T_SHIFT) & CM_WRAP_MASK) == CM_WRAP_CLAMP);
   vec2 at = uv - 2.0 * floor(0.5 * uv) * vec2(clamped.x ? 0.0 : 1.0, clamped.y ? 0.0 : 1.0);
   at = clamp(at, vec2(-4.0), vec2(4.0)) * size;
-  vec4 value;
-  if ((t.w & CM_TEXTURE_NEAREST) != 0u) {
-    value = cm_atlas_texel(t, ivec2(floor(at)));
-    return srgb ? vec4(cm_from_srgb(value.rgb), value.a) : value;
-  }
-  vec2 low = floor(at - 0.5);
-  vec2 f = at - 0.5 - low;
+  bool nearest = (t.w & CM_TEXTURE_NEAREST) != 0u;
+  vec2 low = floor(nearest ? at : at - 0.5);
+  vec2 f = nearest ? vec2(0.0) : at - 0.5 - low;
   vec4 sum = vec4(0.0);
-  for (int i = 0; i < 4; ++i) {
+  for (int i = 0; i < (nearest ? 1 : 4); ++i) {
     ivec2 offset = ivec2(i & 1, i >> 1);
-    value = cm_atlas_texel(t, ivec2(low) + offset);
+    vec4 value = cm_atlas_texel(t, ivec2(low) + offset);
     if (srgb) value.rgb = cm_from_srgb(value.rgb);
     sum += value * (offset.x == 1 ? f.x : 1.0 - f.x) * (offset.y == 1 ? f.y : 1.0 - f.y);
   }
@@ -185,14 +180,44 @@ vec3 cm_lift(vec3 p, vec3 weight, vec3 position[3], vec3 normal[3], vec3 geometr
 const float CM_GRAZING = 0.1;
 float cm_lift_share(float cosine) { return clamp(1.0 - cosine / CM_GRAZING, 0.0, 1.0); }
 
+// A material's textures at a point.
+struct CmMaps {
+  vec4 base_color;
+  vec4 metallic_roughness;
+  vec4 normal;
+  vec4 emission;
+  vec4 specular;
+  vec4 specular_color;
+  vec4 clearcoat;
+  vec4 clearcoat_roughness;
+};
+
+// In a loop: one after the other they would be the most of a kernel's code.
+CmMaps cm_maps(uint material, CmVertexMix m) {
+  CmMaps maps;
+  for (uint use = CM_USE_BASE_COLOR; use <= CM_USE_CLEARCOAT_ROUGHNESS; use += 2u) {
+    bool srgb = use == CM_USE_BASE_COLOR || use == CM_USE_EMISSION || use == CM_USE_SPECULAR_COLOR;
+    vec4 value = cm_texture(material, use, m, srgb);
+    if (use == CM_USE_BASE_COLOR) maps.base_color = value;
+    if (use == CM_USE_METALLIC_ROUGHNESS) maps.metallic_roughness = value;
+    if (use == CM_USE_NORMAL) maps.normal = value;
+    if (use == CM_USE_EMISSION) maps.emission = value;
+    if (use == CM_USE_SPECULAR) maps.specular = value;
+    if (use == CM_USE_SPECULAR_COLOR) maps.specular_color = value;
+    if (use == CM_USE_CLEARCOAT) maps.clearcoat = value;
+    if (use == CM_USE_CLEARCOAT_ROUGHNESS) maps.clearcoat_roughness = value;
+  }
+  return maps;
+}
+
 // What a material emits where it is seen from its front.
 vec3 cm_emission(CmVertexMix m) {
   vec3 emission = cm_floats(cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w + CM_MATERIAL_EMISSION).rgb;
   return emission * cm_texture(m.corner.w, CM_USE_EMISSION, m, true).rgb;
 }
 
-// The point of a triangle that a path along w (world) has met. cm_hit_back: on its back.
-CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
+// The point of a triangle that a path along w (world) has met, on its back or its front.
+CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
   CmSurfacePoint point;
   CmVertexMix m = cm_vertex_mix(triangle, weights);
   uint material = m.corner.w;
@@ -223,18 +248,19 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   bool back = dot(normal, point.geometric) < 0.0;
   point.material.smooth_normal = back ? -normal : normal;
 
-  vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * cm_texture(material, CM_USE_BASE_COLOR, m, true) * m.color;
+  CmMaps maps = cm_maps(material, m);
+  vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * maps.base_color * m.color;
   vec4 a = cm_floats(word + CM_MATERIAL_REFLECTION);
   vec4 b = cm_floats(word + CM_MATERIAL_SPECULAR_COLOR);
   vec4 c = cm_floats(word + CM_MATERIAL_COAT);
   uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
-  vec4 rough = cm_texture(material, CM_USE_METALLIC_ROUGHNESS, m, false);
+  vec4 rough = maps.metallic_roughness;
 
   if (cm_words(word + CM_USE_NORMAL).x != 0u) {
     vec3 t = tangent.xyz - dot(tangent.xyz, normal) * normal;
     float hand = tangent.w < 0.0 ? -1.0 : 1.0;
     if (dot(t, t) > 1e-12) {
-      vec3 n = cm_texture(material, CM_USE_NORMAL, m, false).xyz * 2.0 - 1.0;
+      vec3 n = maps.normal.xyz * 2.0 - 1.0;
       n.xy *= c.z;
       t = normalize(t);
       vec3 bumped = n.x * t + n.y * hand * cross(normal, t) + n.z * normal;
@@ -245,18 +271,19 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w) {
   point.material.matte_normal = normal;
   normal = cm_bend_normal(normal, point.geometric, -w);
 
+  vec3 emission = cm_floats(word + CM_MATERIAL_EMISSION).rgb * maps.emission.rgb;
   point.unlit = (flags & CM_UNLIT) != 0u;
-  point.emission = cm_hit_back && (flags & CM_ONE_SIDED) != 0u ? vec3(0.0) : cm_emission(m);
+  point.emission = from_back && (flags & CM_ONE_SIDED) != 0u ? vec3(0.0) : emission;
   if (point.unlit) point.emission = base.rgb;
   point.material.base_color = base.rgb;
   point.material.metallic = clamp(a.x * rough.b, 0.0, 1.0);
   point.material.roughness = clamp(a.y * rough.g, 0.0, 1.0);
   point.material.normal = normal;
-  float specular = a.w * cm_texture(material, CM_USE_SPECULAR, m, false).a;
-  point.material.f0 = min(a.z * b.rgb * cm_texture(material, CM_USE_SPECULAR_COLOR, m, true).rgb, vec3(1.0)) * specular;
+  float specular = a.w * maps.specular.a;
+  point.material.f0 = min(a.z * b.rgb * maps.specular_color.rgb, vec3(1.0)) * specular;
   point.material.specular = specular;
-  point.material.clearcoat = b.w * cm_texture(material, CM_USE_CLEARCOAT, m, false).r;
-  point.material.clearcoat_roughness = c.x * cm_texture(material, CM_USE_CLEARCOAT_ROUGHNESS, m, false).g;
+  point.material.clearcoat = b.w * maps.clearcoat.r;
+  point.material.clearcoat_roughness = c.x * maps.clearcoat_roughness.g;
   return point;
 }
 

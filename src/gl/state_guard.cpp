@@ -112,6 +112,7 @@ StateGuard::~StateGuard() {
   restore_textures();
   restore_ranges(GL_SHADER_STORAGE_BUFFER);
   restore_ranges(GL_UNIFORM_BUFFER);
+  restore_dispatch_indirect();
   restore_images();
   restore_pixels();
   restore_raster();
@@ -204,6 +205,9 @@ void StateGuard::buffer(GLenum target) {
       break;
     case GL_UNIFORM_BUFFER:
       if (uniform_generic_.use()) uniform_generic_.value = get(GL_UNIFORM_BUFFER_BINDING);
+      break;
+    case GL_DISPATCH_INDIRECT_BUFFER:
+      if (dispatch_indirect_.use()) dispatch_indirect_.value = get(GL_DISPATCH_INDIRECT_BUFFER_BINDING);
       break;
     case GL_PIXEL_PACK_BUFFER:
       pixels(true);
@@ -441,6 +445,12 @@ void StateGuard::restore_ranges(GLenum target) const {
   }
   const Saved<GLint>& generic = storage ? storage_generic_ : uniform_generic_;
   if (generic.used) gl.BindBuffer(target, alive(name_of(generic.value)) ? name_of(generic.value) : 0);
+}
+
+void StateGuard::restore_dispatch_indirect() const {
+  if (!dispatch_indirect_.used) return;
+  const GLuint buffer = name_of(dispatch_indirect_.value);
+  plain().BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, buffer != 0 && plain().IsBuffer(buffer) != GL_FALSE ? buffer : 0);
 }
 
 void StateGuard::restore_images() const {

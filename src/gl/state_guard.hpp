@@ -124,6 +124,7 @@ class StateGuard {
   void restore_bindings() const;
   void restore_textures() const;
   void restore_ranges(GLenum target) const;
+  void restore_dispatch_indirect() const;
   void restore_images() const;
   void restore_pixels() const;
   void restore_raster() const;
@@ -138,7 +139,7 @@ class StateGuard {
   std::array<std::array<Saved<GLint>, targets>, units> textures_{};
   std::array<Saved<GLint>, units> samplers_{};
   std::array<Saved<BufferRange>, ranges> storage_{}, uniform_{};
-  Saved<GLint> storage_generic_, uniform_generic_;
+  Saved<GLint> storage_generic_, uniform_generic_, dispatch_indirect_;
   std::array<Saved<ImageUnit>, images> images_{};
   Saved<Pixels> pack_, unpack_;
   Saved<Raster> raster_;

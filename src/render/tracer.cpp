@@ -13,22 +13,13 @@
 #include "gl/bindings.hpp"
 #include "gl/state_guard.hpp"
 
-namespace cumulet::core {
-#include "path_state.glsl"
-}  // namespace cumulet::core
-
 namespace cumulet::render {
 
 namespace {
 
-// All of its fields are words, and are stored as such.
-constexpr std::size_t lane_bytes = sizeof(core::CmPath);
-static_assert(alignof(core::CmPath) == 4);
-
 constexpr std::uint32_t tile_edge = 512;
-constexpr std::uint32_t block_width = 128;  // trace.comp's
-constexpr std::uint32_t block_height = 8;
-constexpr std::uint32_t begins_pass = 0x80000000U;
+constexpr std::uint32_t block_width = PathKernels::block_width;
+constexpr std::uint32_t block_height = PathKernels::block_height;
 constexpr double hasty_rest = 0.03;    // of a tile's pixels
 constexpr double dispatch_ms = 500.0;  // well under any driver's watchdog, well over the cost of a dispatch
 constexpr double least_ms = 1.0;       // whatever the budget, so that there is progress
@@ -59,6 +50,8 @@ void describe(const Surfaces& surfaces, core::CmParameters& parameters) {
   parameters.host_depth = {surfaces.size, surfaces.depth != 0 ? surfaces.layers : 0};
   if (surfaces.scene != nullptr) parameters.surfaces = surfaces.scene->tables();
 }
+
+const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
 core::CmParameters assemble(const PictureParameters& picture, const MarchData& data, const Surfaces& surfaces) {
   core::CmParameters parameters{};
@@ -140,8 +133,9 @@ void Picture::end_tile() {
   if (!done_) begin_tile();
 }
 
-const Tracer::Program& Tracer::program(const MarchData& data, const char* name, std::span<const std::string> more) {
-  gl::ProgramKey key{name, data.defines()};
+const Tracer::Program& Tracer::program(std::vector<std::string> defines, const char* name,
+                                       std::span<const std::string> more) {
+  gl::ProgramKey key{name, std::move(defines)};
   key.defines.insert(key.defines.end(), more.begin(), more.end());
   const gl::Program& made = asked_ ? programs_->ask(key) : programs_->get(key);
   if (asked_) asked_ = *asked_ && made.usable();
@@ -151,11 +145,29 @@ const Tracer::Program& Tracer::program(const MarchData& data, const char* name, 
 }
 
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
+  if (picture.traced_ > 0) {
+    const std::array<std::string, 1> surfaces{surfaces_macro(picture.traced_)};
+    return program(data.defines(), "trace_travel.comp", surfaces);
+  }
   std::vector<std::string> more;
-  if (picture.traced_ > 0) more.emplace_back(picture.traced_ > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1");
-  if (picture.traced_ == 0 && picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
+  if (picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
-  return program(data, "trace.comp", more);
+  return program(data.defines(), "trace.comp", more);
+}
+
+StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& data) {
+  const std::string surfaces = surfaces_macro(picture.traced_);
+  std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
+  if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
+  std::vector<std::string> begin = camera;
+  begin[1] = "CM_DENSE 1";
+  StagePrograms programs;
+  programs.begin = program(begin, "trace_camera.comp").object;
+  programs.travel = trace_program(picture, data).object;
+  programs.meet = program({"CM_SURFACES 1"}, "trace_meet.comp").object;
+  programs.shade = program({surfaces}, "trace_shade.comp").object;
+  programs.camera = program(camera, "trace_camera.comp").object;
+  return programs;
 }
 
 template <class Find>
@@ -172,7 +184,9 @@ bool Tracer::asked(Find&& find) {
 }
 
 void Tracer::find_programs(const Picture& picture, const MarchData& data, const Surfaces& surfaces) {
-  if (picture.view_ == View::shaded) {
+  if (picture.view_ == View::shaded && picture.traced_ > 0) {
+    stage_programs(picture, data);
+  } else if (picture.view_ == View::shaded) {
     trace_program(picture, data);
   } else {
     inspect_program(data, surfaces, "inspect.comp");
@@ -202,14 +216,10 @@ bool Tracer::able(const MarchData& data, const PictureParameters& parameters, co
 
 const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name) {
   const std::array<std::string, 1> more{"CM_SURFACES 1"};
-  return program(data, name, std::span(more).first(surfaces.scene != nullptr ? 1 : 0));
+  return program(data.defines(), name, std::span(more).first(surfaces.scene != nullptr ? 1 : 0));
 }
 
 void Tracer::make_shared_objects() {
-  if (!blocks_) {
-    blocks_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
-                              "creating the counters");
-  }
   if (!uniforms_)
     uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
 }
@@ -240,7 +250,7 @@ void Tracer::drop_unused_layers() {
 }
 
 std::uint64_t Tracer::bytes() const {
-  std::uint64_t bytes = paths_lanes_ * lane_bytes;
+  std::uint64_t bytes = kernels_.bytes();
   for (const auto& drawn : drawn_layers_) bytes += drawn->layers.bytes();
   return bytes;
 }
@@ -295,12 +305,6 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   make_shared_objects();
   const glm::uvec2 tile = glm::min(size, glm::uvec2(tile_edge));
   const std::size_t lanes = std::size_t{tile.x} * tile.y;
-  if (shaded && lanes > paths_lanes_) {
-    paths_ = {};
-    paths_lanes_ = 0;
-    paths_ = gl::make_buffer(gl_, lanes * lane_bytes, nullptr, 0, "creating the path buffer");
-    paths_lanes_ = lanes;
-  }
   picture.complete_ = false;
   picture.size_ = size;
   picture.film_.begin(size);
@@ -316,6 +320,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.volume_alone_ = shaded && settings.volume_alone;
   if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
+  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0);
   find_programs(picture, data, surfaces);
   picture.parameters_ = assemble(parameters, data, surfaces);
   picture.target_samples_ = samples;
@@ -385,16 +390,16 @@ void Tracer::collect() {
     const double full = landed->words[0].x;
     const double high = full > 0.0 ? ms * what.lanes / full : std::numeric_limits<double>::infinity();
     if (what.cost) what.cost->learn(what.slots, landed->ms ? ms / what.rounds : 0.0, high);
-    for (std::size_t i = 1; i < landed->words.size(); ++i) *what.samples += landed->words[i].w;
+    for (const std::uint32_t block : what.blocks) *what.samples += landed->words[1 + block].w;
     if (log_ != nullptr) {
       const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_width * block_height;
       log_->push_back(
           {what.aim_ms, ms, lanes, static_cast<std::uint32_t>(what.lanes), what.rounds, what.most_ms > 0.0});
     }
-    for (std::size_t i = 0; i < what.blocks.size(); ++i) {
-      Block& block = (*what.tile)[what.blocks[i]];
-      block.unfinished = landed->words[1 + i].y;
-      block.empty = landed->words[1 + i].z;
+    for (const std::uint32_t index : what.blocks) {
+      Block& block = (*what.tile)[index];
+      block.unfinished = landed->words[1 + index].y;
+      block.empty = landed->words[1 + index].z;
       --block.under_way;
     }
   }
@@ -442,8 +447,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces&
     gl_->BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, picture.layers_->colour.name());
     gl_->BindTextureUnit(core::CM_UNIT_LAYER_Z, picture.layers_->z.name());
   }
-  if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PATHS, paths_.name());
-  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BLOCKS, blocks_.name());
+  kernels_.bind();
   const Film& film = picture.film_;
   film.bind(*gl_, core::CM_IMAGE_SUM, film_layers::radiance, GL_READ_WRITE);
   film.bind(*gl_, core::CM_IMAGE_COUNTS, film_layers::counts, GL_READ_WRITE);
@@ -469,7 +473,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces&
       auto what = choose(picture, program.cost, std::clamp(left, 0.0, aim), false);
       if (!what && !sent && flights_.empty()) what = choose(picture, program.cost, least_ms, true);
       if (what) {
-        dispatch(picture, surfaces, std::move(*what));
+        dispatch(picture, data, surfaces, std::move(*what));
         sent = true;
         collect();
         picture.end_tile();
@@ -513,13 +517,14 @@ std::optional<Dispatched> Tracer::choose(Picture& picture, const std::shared_ptr
   if (what.blocks.empty() || (cost_ms.value_or(least_ms) > aim_ms && !anyway)) return std::nullopt;
   what.rounds = first_rounds;
   if (cost_ms) {
-    what.rounds = static_cast<std::uint32_t>(std::clamp(aim_ms / *cost_ms, 1.0, double(most_rounds)));
+    const std::uint32_t most = picture.traced_ > 0 ? PathKernels::most_rounds() : most_rounds;
+    what.rounds = static_cast<std::uint32_t>(std::clamp(aim_ms / *cost_ms, 1.0, double(most)));
     what.most_ms = *cost_ms * what.rounds;
   }
   return what;
 }
 
-void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, Dispatched what) {
+void Tracer::dispatch(Picture& picture, const MarchData& data, const Surfaces& surfaces, Dispatched what) {
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
@@ -535,10 +540,10 @@ void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, Dispatched wha
   const std::size_t step = far_step(count);
   for (std::size_t i = 0; i < count; ++i) dealt[i] = what.blocks[i * step % count];
   what.blocks = std::move(dealt);
-  std::vector<glm::uvec4> words(1 + count, glm::uvec4(0U));
+  std::vector<glm::uvec4> words(1 + picture.blocks_->size(), glm::uvec4(0U));
   for (std::size_t i = 0; i < count; ++i) {
     Block& block = (*picture.blocks_)[what.blocks[i]];
-    words[1 + i].x = what.blocks[i] | (block.begins ? begins_pass : 0U);
+    words[1 + i].x = what.blocks[i] | (block.begins ? PathKernels::begins_pass : 0U);
     block.begins = false;
     ++block.under_way;
   }
@@ -546,11 +551,16 @@ void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, Dispatched wha
   what.tile = picture.blocks_;
   what.samples = picture.samples_;
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
-  gl_->NamedBufferSubData(blocks_.name(), 0, static_cast<GLsizeiptr>(words.size() * sizeof(glm::uvec4)), words.data());
+  kernels_.set_counters(words);
+  const bool stages = picture.traced_ > 0;
+  const StagePrograms programs = stages ? stage_programs(picture, data) : StagePrograms{};
   flights_.begin(Flights::Kind::dispatch);
-  const std::uint32_t across = (std::min(extent.x, block_width) + 7) / 8;
-  gl_->DispatchCompute(across, static_cast<GLuint>(count), 1);
-  flights_.end(std::move(what), blocks_.name(), words.size());
+  if (stages) {
+    kernels_.run_stages(programs, extent.x, count, what.rounds);
+  } else {
+    kernels_.run_one(extent.x, count);
+  }
+  flights_.end(std::move(what), kernels_.counters(), words.size());
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |
                                GL_BUFFER_UPDATE_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT |
                                GL_TEXTURE_FETCH_BARRIER_BIT);

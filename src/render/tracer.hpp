@@ -15,6 +15,7 @@
 #include "render/pace.hpp"
 #include "render/parameters.hpp"
 #include "render/pass_timer.hpp"
+#include "render/path_kernels.hpp"
 #include "render/surface_data.hpp"
 #include "render/surface_raster.hpp"
 
@@ -146,7 +147,7 @@ class Picture {
 class Tracer {
  public:
   Tracer(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
-      : gl_(gl), programs_(std::move(programs)), flights_(gl), rasters_(std::move(gl)) {}
+      : gl_(gl), programs_(std::move(programs)), kernels_(gl), flights_(gl), rasters_(std::move(gl)) {}
 
   /// Whether the programs are there that begin() with these settings needs, without waiting for a driver that compiles
   /// them in parallel; where it does not, they will be. Throws if one does not build.
@@ -212,12 +213,12 @@ class Tracer {
   // What to dispatch: nothing if it is likely to take longer than the aim. anyway: the least, then.
   static std::optional<Dispatched> choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
                                           bool anyway);
-  void dispatch(Picture& picture, const Surfaces& surfaces, Dispatched what);
+  void dispatch(Picture& picture, const MarchData& data, const Surfaces& surfaces, Dispatched what);
   // Takes up what has ended.
   void collect();
   // Whether the surface pass is done, where a dispatch that reads it would wait for it.
   bool layers_ready(Deadline deadline);
-  const Program& program(const MarchData& data, const char* name, std::span<const std::string> more);
+  const Program& program(std::vector<std::string> defines, const char* name, std::span<const std::string> more = {});
   // Whether these are there: they are asked for, not waited for, while find looks them up.
   template <class Find>
   bool asked(Find&& find);
@@ -226,7 +227,9 @@ class Tracer {
   // What paths of a picture with these settings meet.
   static unsigned traced_of(const PictureParameters& parameters, const Surfaces& surfaces,
                             const PictureSettings& settings);
+  // The one kernel, or what the paths' time goes by where they are run by stages.
   const Program& trace_program(const Picture& picture, const MarchData& data);
+  StagePrograms stage_programs(const Picture& picture, const MarchData& data);
   const Program& inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name);
   // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
@@ -249,9 +252,7 @@ class Tracer {
   std::optional<bool> asked_;                               // in asked(): whether all so far are there
   std::map<gl::ProgramKey, Program> used_;                  // those that this one used, and what they cost
   std::vector<std::shared_ptr<DrawnLayers>> drawn_layers_;  // pictures share them
-  gl::Object paths_;
-  std::size_t paths_lanes_ = 0;
-  gl::Object blocks_;  // what a dispatch covers, and what it did
+  PathKernels kernels_;
   gl::Object uniforms_;
   gl::Object pick_;
   Flights flights_;

@@ -40,7 +40,7 @@ std::vector<std::uint32_t> triangle_flags(const Scene& scene, const Pose& pose);
 /// Memory for n triangles: 48 n bytes of records and 20 n to 30 n of nodes; build() has 150 n in use at its most.
 class Bvh {
  public:
-  static constexpr int max_depth = 32;
+  static constexpr int max_depth = 24;
   static constexpr std::uint32_t max_leaf = 4;
   static constexpr std::uint32_t leaf_bit = 0x80000000U;
   static constexpr std::size_t max_triangles = (std::size_t{1} << 29U) - max_leaf;

@@ -41,7 +41,8 @@ struct CpuDisc {
 #define CM_MARCH 1
 #include "march_voxel.glsl"
 #define CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, cm_disc_chance, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)
-#include "path.glsl"
+#include "support/traced_pixel.inc"
+#include "run.glsl"
 #include "support/disc_light.glsl"
 #undef CM_MARCH
 };
@@ -164,9 +165,10 @@ TEST_P(NewLight, ADiscOfFiniteAngleIsFoundByLooksAndByFlights) {
       double mean = 0.0;
       for (std::uint32_t i = 0; i < 64; ++i) {
         core::CpuDisc::CmPath path{};
-        core::CpuDisc::CmPixel pixel{};
-        cpu.cm_run(path, pixel, {i % 8, i / 8}, 100000000);
-        means.at(i) = pixel.sum.x / 256.0;
+        cpu.traced_pixel = {};
+        std::uint32_t traced = 0;
+        cpu.cm_run(path, traced, {i % 8, i / 8}, 100000000);
+        means.at(i) = cpu.traced_pixel.sum.x / 256.0;
         mean += means.at(i) / 64.0;
       }
       double square = 0.0;

@@ -66,6 +66,7 @@ class Scribbler {
     for (GLuint i = 0; i < StateGuard::images; ++i) {
       gl_.BindImageTexture(i, textures_[2].name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_RGBA32F);
     }
+    gl_.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, buffer_.name());
     gl_.BindBuffer(GL_PIXEL_PACK_BUFFER, buffer_.name());
     gl_.BindBuffer(GL_PIXEL_UNPACK_BUFFER, buffer_.name());
     gl_.PixelStorei(GL_PACK_ALIGNMENT, 2);

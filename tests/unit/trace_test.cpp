@@ -371,9 +371,10 @@ void expect_cpu_agrees(Tracer& cpu, const test::Picture& gpu, std::uint32_t samp
   for (std::uint32_t i = 0; i < gpu.pixels.size(); ++i) {
     typename Tracer::CmPath path{};
     cpu.cm.dispatch.samples = samples;
-    typename Tracer::CmPixel pixel{};
-    cpu.cm_run(path, pixel, {i % gpu.width, i / gpu.width}, 1000000);
-    const glm::vec4 sum = pixel.sum / static_cast<float>(samples) + glm::vec4(pixel.background, 0.0F);
+    cpu.traced_pixel = {};
+    std::uint32_t traced = 0;
+    cpu.cm_run(path, traced, {i % gpu.width, i / gpu.width}, 1000000);
+    const glm::vec4 sum = cpu.traced_pixel.sum / static_cast<float>(samples) + glm::vec4(cpu.traced_pixel.background, 0.0F);
     same += glm::distance(sum, gpu.pixels[i]) < 2e-3F ? 1 : 0;
   }
   // Where a logarithm or a cosine rounds the other way, a path may part from its twin.

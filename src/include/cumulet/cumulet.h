@@ -42,7 +42,8 @@
  *     a call does not use it neither asks for nor sets; what it does it asks for once, and puts back. It may use:
  *       - the current program and program pipeline, the vertex array binding, the draw and read framebuffer bindings
  *       - active texture; on units 0-15 the texture bindings of every target and the sampler
- *       - storage buffer bindings 0-7, uniform buffer bindings 0-7 and their generic points, image units 0-7
+ *       - storage buffer bindings 0-7, uniform buffer bindings 0-7 and their generic points, the dispatch indirect
+ *         buffer, image units 0-7
  *       - pixel pack and unpack buffers and all pixel store parameters
  *       - viewport 0, scissor test and box 0, colour mask (of every draw buffer), depth mask, function, test and range,
  *         depth clamp, stencil test

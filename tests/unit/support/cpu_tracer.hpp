@@ -26,7 +26,8 @@ struct CpuTetLinear {
 #include "random.glsl"
 #define CM_LINEAR 1
 #include "march_tet.glsl"
-#include "path.glsl"
+#include "support/traced_pixel.inc"
+#include "run.glsl"
 #undef CM_LINEAR
 };
 
@@ -39,6 +40,8 @@ struct CpuTetLinear {
 #undef CM_PATH_STATE_GLSL
 #undef CM_PATH_VERTEX_GLSL
 #undef CM_PATH_GLSL
+#undef CM_FLIGHT_GLSL
+#undef CM_RUN_GLSL
 
 struct CpuDense {
   CmParameters cm{};
@@ -50,7 +53,8 @@ struct CpuDense {
 #include "random.glsl"
 #define CM_MARCH 1
 #include "march_voxel.glsl"
-#include "path.glsl"
+#include "support/traced_pixel.inc"
+#include "run.glsl"
 #undef CM_MARCH
 };
 

@@ -1,0 +1,110 @@
+// The stages of a path that march. Shared by GLSL and C++; the includer provides what
+// glsl/path.glsl asks for, and
+//   uvec3 cm_march_enter(vec3 p)                  the cell (or voxel) that holds point p of cube space
+//   void cm_march_step(uvec3 cell, o, d, inv_d, t, t_1, r_0, r_1, next)
+// which gives the part of the ray inside the cell, from t to t_1, the density at both ends (linear between them), and
+// the next cell; next.x == CM_NONE outside. The third word of a cell is the march's own cache, CM_NONE when unknown.
+//
+// Free paths are sampled exactly: an optical depth -ln(1 - u) is used up along the march; inside a cell the depth is a
+// quadratic in t, inverted in closed form. No majorant, no step size.
+#ifndef CM_FLIGHT_GLSL
+#define CM_FLIGHT_GLSL
+
+#include "path.glsl"
+
+// Cells marched before events are looked at: keeps neighbouring lanes together.
+#ifndef CM_CHUNK
+#define CM_CHUNK 8
+#endif
+// Events between looks at whether a new camera ray is due.
+#ifndef CM_EVENTS
+#define CM_EVENTS 8
+#endif
+
+// A ray's way through the box, as far as it reaches.
+CM_FN void cm_aim(CM_INOUT(CmPath) p) {
+  vec2 range = cm_box_range(p.o, p.d);
+  p.t = range.x;
+  p.t_end = max(0.0f, min(range.y, p.reach));
+  p.cell = uvec2(CM_NONE, 0u);
+  p.cache = CM_NONE;
+  if (range.x < p.t_end) {
+    p.cell = p.start_cell;
+    if (p.start != CM_IN_MEDIUM) {
+      uvec3 cell = cm_march_enter(clamp(p.o + range.x * p.d, cm.grid.box_min, cm.grid.box_max));
+      p.cell = uvec2(cell.x, cell.y);
+      p.cache = cell.z;
+    }
+  }
+  p.stage = CM_STAGE_FLY;
+}
+
+// Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
+CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
+  vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / p.d;
+  uint event = CM_SURFACES != 0 && p.cell.x == CM_NONE ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
+  uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
+  float e_0 = 0.0f;
+  float e_1 = 0.0f;
+  float span = 0.0f;
+  for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
+    float t_1 = 0.0f;
+    float r_0 = 0.0f;
+    float r_1 = 0.0f;
+    uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
+    cm_march_step(cell, p.o, p.d, inv_d, p.t, t_1, r_0, r_1, next);
+    p.steps += 1u;
+    e_0 = cm.medium.extinction * r_0;
+    e_1 = cm.medium.extinction * r_1;
+    span = t_1 - p.t;
+    float used = 0.5f * (e_0 + e_1) * span;
+    // To a surface or a lamp inside the cell, not beyond.
+    if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(e_0, e_1, span, p.t_end - p.t);
+    if (used > p.depth) {
+      event = CM_EVENT_COLLISION;
+    } else {
+      p.depth -= used;
+      p.t = t_1;
+      cell = next;
+      if (next.x == CM_NONE || t_1 >= p.t_end) event = CM_EVENT_ESCAPE;
+    }
+  }
+  p.cell = uvec2(cell.x, cell.y);
+  p.cache = cell.z;
+  // After the loop, not in it: software drivers run both sides of every branch, each step.
+  if (event == CM_EVENT_COLLISION) {
+    float left = p.t_end - p.t;
+    float way = cm_depth_distance(e_0, e_1, span, p.depth);
+    p.t += way;
+    p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e_0, e_1, span, left));
+    if (way >= left) event = CM_EVENT_ESCAPE;  // behind a surface
+  } else if (CM_SURFACES == 0 && event == CM_EVENT_ESCAPE && p.t > p.t_end) {
+    p.depth += cm_depth_of(e_1, e_0, span, p.t - p.t_end);
+  }
+  return event;
+}
+
+// What the path does once its ray has come to an event.
+CM_FN uint cm_after_flight(CmPath p) {
+  if (cm_asks(p)) return CM_STAGE_MEET;
+  return p.ray != CM_RAY_FLIGHT && p.start == CM_ON_TRIANGLE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
+}
+
+// The medium's part of a path: what follows the last event, and some way on, until it waits for triangles, its sample is
+// done, or that was enough. Returns how often it marched.
+CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
+  uint marches = 0u;
+  for (int j = 0; j < CM_EVENTS && (p.stage == CM_STAGE_AIM || p.stage == CM_STAGE_FLY || p.stage == CM_STAGE_EVENT);
+       ++j) {
+    if (p.stage == CM_STAGE_EVENT) cm_handle(p, false);
+    if (CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) cm_aim(p);
+    if (p.stage == CM_STAGE_FLY) {
+      p.event = cm_fly(p);
+      marches += 1u;
+      if (p.event != CM_EVENT_NONE) p.stage = cm_after_flight(p);
+    }
+  }
+  return marches;
+}
+
+#endif

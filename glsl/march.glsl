@@ -1,0 +1,6 @@
+// The march of CM_MARCH.
+#if CM_MARCH == 0
+#include "march_tet.glsl"
+#else
+#include "march_voxel.glsl"
+#endif

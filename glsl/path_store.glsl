@@ -1,0 +1,112 @@
+// Where paths are kept between dispatches: a plane of lanes for each four words of a path. A lane is a pixel of the tile.
+// Those who include this have glsl/path_state.glsl before it.
+#ifndef CM_PATH_STORE_GLSL
+#define CM_PATH_STORE_GLSL
+
+layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
+layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
+  uvec4 cm_total;     // x: full rounds that lanes marched
+  uvec4 cm_blocks[];  // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block of the tile its
+                      // pixels without their target samples, those without any and its samples finished in this dispatch
+};
+
+// The tile's pixels in blocks.
+#define CM_BLOCK_WIDTH 128u
+#define CM_BLOCK_HEIGHT 8u
+#define CM_BEGINS 0x80000000u  // a pass
+
+#define CM_ZERO_VEC3(name) p.name = vec3(0.0);
+#define CM_ZERO_VEC2(name) p.name = vec2(0.0);
+#define CM_ZERO_UVEC2(name) p.name = uvec2(0u);
+#define CM_ZERO_FLOAT(name) p.name = 0.0;
+#define CM_ZERO_UINT(name) p.name = 0u;
+#define CM_ZERO_BITS(name, bits) p.name = 0u;
+
+uint cm_lanes() { return cm.dispatch.tile_size.x * cm.dispatch.tile_size.y; }
+
+// Words of a part, in the list's order; the places are constants to every compiler.
+#define CM_UNPACK_UINT(name) p.name = words[word++];
+#define CM_UNPACK_FLOAT(name) p.name = uintBitsToFloat(words[word++]);
+#define CM_UNPACK_UVEC2(name) CM_UNPACK_UINT(name.x) CM_UNPACK_UINT(name.y)
+#define CM_UNPACK_VEC2(name) CM_UNPACK_FLOAT(name.x) CM_UNPACK_FLOAT(name.y)
+#define CM_UNPACK_VEC3(name) CM_UNPACK_VEC2(name) CM_UNPACK_FLOAT(name.z)
+#define CM_UNPACK_BITS(name, bits) p.name = bitfieldExtract(words[word], at_bit, bits); at_bit += bits;
+
+#define CM_PACK_UINT(name) words[word++] = p.name;
+#define CM_PACK_FLOAT(name) words[word++] = floatBitsToUint(p.name);
+#define CM_PACK_UVEC2(name) CM_PACK_UINT(name.x) CM_PACK_UINT(name.y)
+#define CM_PACK_VEC2(name) CM_PACK_FLOAT(name.x) CM_PACK_FLOAT(name.y)
+#define CM_PACK_VEC3(name) CM_PACK_VEC2(name) CM_PACK_FLOAT(name.z)
+#define CM_PACK_BITS(name, bits) words[word] |= p.name << at_bit; at_bit += bits;
+
+// How a part is loaded and stored; first: its first quad's place in a path.
+#define CM_LOAD(PART, quads, first)                                                                               \
+  uint words[4 * quads];                                                                                          \
+  for (int i = 0; i < quads; ++i) {                                                                               \
+    uvec4 quad = cm_paths[lane + uint(first + i) * cm_lanes()];                                                   \
+    words[4 * i] = quad.x;                                                                                        \
+    words[4 * i + 1] = quad.y;                                                                                    \
+    words[4 * i + 2] = quad.z;                                                                                    \
+    words[4 * i + 3] = quad.w;                                                                                    \
+  }                                                                                                               \
+  int word = 0;                                                                                                   \
+  int at_bit = 0;                                                                                                 \
+  PART(CM_UNPACK_VEC3, CM_UNPACK_VEC2, CM_UNPACK_UVEC2, CM_UNPACK_FLOAT, CM_UNPACK_UINT, CM_UNPACK_BITS)
+#define CM_STORE(PART, quads, first)                                                                              \
+  uint words[4 * quads];                                                                                          \
+  for (int i = 0; i < 4 * quads; ++i) words[i] = 0u;                                                              \
+  int word = 0;                                                                                                   \
+  int at_bit = 0;                                                                                                 \
+  PART(CM_PACK_VEC3, CM_PACK_VEC2, CM_PACK_UVEC2, CM_PACK_FLOAT, CM_PACK_UINT, CM_PACK_BITS)                      \
+  for (int i = 0; i < quads; ++i) {                                                                               \
+    cm_paths[lane + uint(first + i) * cm_lanes()] =                                                               \
+        uvec4(words[4 * i], words[4 * i + 1], words[4 * i + 2], words[4 * i + 3]);                                \
+  }
+
+void cm_load_ray(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_RAY, CM_RAY_QUADS, 0) }
+void cm_store_ray(CmPath p, uint lane) { CM_STORE(CM_PATH_RAY, CM_RAY_QUADS, 0) }
+void cm_load_sample(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_SAMPLE, CM_SAMPLE_QUADS, CM_RAY_QUADS) }
+void cm_store_sample(CmPath p, uint lane) { CM_STORE(CM_PATH_SAMPLE, CM_SAMPLE_QUADS, CM_RAY_QUADS) }
+void cm_load_ends(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_ENDS, CM_ENDS_QUADS, CM_RAY_QUADS + CM_SAMPLE_QUADS) }
+void cm_store_ends(CmPath p, uint lane) { CM_STORE(CM_PATH_ENDS, CM_ENDS_QUADS, CM_RAY_QUADS + CM_SAMPLE_QUADS) }
+
+CmPath cm_begin_path() {
+  CmPath p;
+  CM_PATH_RAY(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+  CM_PATH_SAMPLE(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+  CM_PATH_ENDS(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+  p.stage = CM_STAGE_CAMERA;
+  return p;
+}
+
+CmPath cm_load_path(uint lane) {
+  CmPath p = cm_begin_path();
+  cm_load_ray(p, lane);
+  cm_load_sample(p, lane);
+  cm_load_ends(p, lane);
+  return p;
+}
+
+void cm_store_path(CmPath p, uint lane) {
+  cm_store_ray(p, lane);
+  cm_store_sample(p, lane);
+  cm_store_ends(p, lane);
+}
+
+uint cm_lane_of(uvec2 local) { return local.y * cm.dispatch.tile_size.x + local.x; }
+uvec2 cm_local_of(uint lane) { return uvec2(lane % cm.dispatch.tile_size.x, lane / cm.dispatch.tile_size.x); }
+uint cm_blocks_across() { return (cm.dispatch.tile_size.x + CM_BLOCK_WIDTH - 1u) / CM_BLOCK_WIDTH; }
+uint cm_block_of(uvec2 local) {
+  return local.y / CM_BLOCK_HEIGHT * cm_blocks_across() + local.x / CM_BLOCK_WIDTH;
+}
+
+// A kernel that has a row of work groups for each block of the dispatch: this lane's pixel of the tile, perhaps outside,
+// and whether a pass begins, so that every pixel goes on from the samples it has.
+uvec2 cm_block_pixel() {
+  uint block = cm_blocks[gl_WorkGroupID.y].x & ~CM_BEGINS;
+  uvec2 corner = uvec2(block % cm_blocks_across() * CM_BLOCK_WIDTH, block / cm_blocks_across() * CM_BLOCK_HEIGHT);
+  return corner + uvec2(gl_GlobalInvocationID.x, gl_LocalInvocationID.y);
+}
+bool cm_block_begins() { return (cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u; }
+
+#endif

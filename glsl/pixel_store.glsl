@@ -1,0 +1,41 @@
+// A pixel's samples so far, in the film's images.
+#ifndef CM_PIXEL_STORE_GLSL
+#define CM_PIXEL_STORE_GLSL
+
+layout(rgba32f, binding = CM_IMAGE_SUM) uniform image2D cm_sum;
+layout(rg32ui, binding = CM_IMAGE_COUNTS) uniform uimage2D cm_counts;          // samples, steps
+layout(rgba32f, binding = CM_IMAGE_BACKGROUND) uniform image2D cm_background;  // and the mean of squared luminance
+#if CM_AOVS
+layout(rgba32f, binding = CM_IMAGE_VOLUME_SUM) uniform image2D cm_volume_sum;  // of the samples that met the volume first
+#endif
+
+uint cm_pixel_samples(uvec2 at) { return imageLoad(cm_counts, ivec2(at)).x; }
+
+CmPixel cm_load_pixel(uvec2 at) {
+  ivec2 texel = ivec2(at);
+  uvec4 counts = imageLoad(cm_counts, texel);
+  vec4 means = imageLoad(cm_background, texel);
+  CmPixel pixel;
+  pixel.sum = imageLoad(cm_sum, texel);
+  pixel.volume = vec4(0.0);
+#if CM_AOVS
+  pixel.volume = imageLoad(cm_volume_sum, texel);
+#endif
+  pixel.background = means.rgb;
+  pixel.square = means.w;
+  pixel.samples = counts.x;
+  pixel.steps = counts.y;
+  return pixel;
+}
+
+void cm_store_pixel(CmPixel pixel, uvec2 at) {
+  ivec2 texel = ivec2(at);
+  imageStore(cm_sum, texel, pixel.sum);
+#if CM_AOVS
+  imageStore(cm_volume_sum, texel, pixel.volume);
+#endif
+  imageStore(cm_background, texel, vec4(pixel.background, pixel.square));
+  imageStore(cm_counts, texel, uvec4(pixel.samples, pixel.steps, 0u, 0u));
+}
+
+#endif

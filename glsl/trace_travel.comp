@@ -1,0 +1,34 @@
+#version 450
+// The medium's part of paths among triangles: glsl/path_queue.glsl.
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..8 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: CM_SURFACES=1,2
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// A path that waits leaves its lane to the next one in the queue: few events a visit, and longer marches.
+#define CM_EVENTS 2
+#define CM_CHUNK 16
+
+#include "bindings.glsl"
+#include "shared.glsl"
+#include "parameters.glsl"
+#include "cell.glsl"
+#include "random.glsl"
+#include "phase.glsl"
+#include "buffers.glsl"
+#include "bsdf.glsl"
+#include "surface.glsl"
+#include "march.glsl"
+#include "flight.glsl"
+#include "path_store.glsl"
+#include "path_queue.glsl"
+
+void main() {
+  uint count = cm_queue_count(CM_QUEUE_TRAVEL);
+  if (cm_queue_place() >= count) return;
+  if (cm_queue_place() == 0u) atomicAdd(cm_total.x, count);
+  uint lane = cm_queue_lane(CM_QUEUE_TRAVEL);
+  CmPath p = cm_load_path(lane);
+  cm_travel(p);
+  cm_store_path(p, lane);
+  cm_send_on(p, lane);
+}

@@ -1,0 +1,95 @@
+#include "render/path_kernels.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "gl/bindings.hpp"
+#include "render/parameters.hpp"
+
+namespace cumulet::core {
+#include "path_queue.glsl"
+#include "path_state.glsl"
+}  // namespace cumulet::core
+
+namespace cumulet::render {
+
+namespace {
+
+constexpr std::size_t lane_bytes = std::size_t{16} * (CM_RAY_QUADS + CM_SAMPLE_QUADS + CM_ENDS_QUADS);
+
+// A head is what glDispatchComputeIndirect reads, and how many paths wait.
+constexpr std::size_t head_bytes = sizeof(glm::uvec4);
+constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MOST_ROUNDS + 1) * head_bytes;
+constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // a lane
+
+std::uint32_t groups_across(std::uint32_t tile_width) {
+  return (std::min(tile_width, PathKernels::block_width) + 7) / 8;
+}
+
+}  // namespace
+
+void PathKernels::reserve(std::size_t lanes, bool stages) {
+  if (!blocks_) {
+    blocks_ = gl::make_buffer(gl_, (1 + most_blocks) * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
+                              "creating the counters");
+  }
+  if (lanes > paths_lanes_) {
+    paths_ = {};
+    paths_lanes_ = 0;
+    paths_ = gl::make_buffer(gl_, lanes * lane_bytes, nullptr, 0, "creating the path buffer");
+    paths_lanes_ = lanes;
+  }
+  if (stages && lanes > queues_lanes_) {
+    queues_ = {};
+    queues_lanes_ = 0;
+    queues_ = gl::make_buffer(gl_, heads_bytes + lanes * queue_bytes, nullptr, GL_DYNAMIC_STORAGE_BIT,
+                              "creating the queues of paths");
+    queues_lanes_ = lanes;
+  }
+}
+
+void PathKernels::bind() const {
+  if (paths_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_PATHS, paths_.name());
+  if (blocks_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_BLOCKS, blocks_.name());
+  if (queues_) gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_QUEUES, queues_.name());
+}
+
+void PathKernels::set_counters(std::span<const glm::uvec4> words) const {
+  gl_->NamedBufferSubData(blocks_.name(), 0, static_cast<GLsizeiptr>(words.size_bytes()), words.data());
+}
+
+void PathKernels::run_one(std::uint32_t tile_width, std::size_t blocks) const {
+  gl_->DispatchCompute(groups_across(tile_width), static_cast<GLuint>(blocks), 1);
+}
+
+void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t tile_width, std::size_t blocks,
+                             std::uint32_t rounds) const {
+  const std::vector<glm::uvec4> heads(std::size_t{CM_QUEUES} * (rounds + 1), glm::uvec4(0U, 1U, 1U, 0U));
+  gl_->NamedBufferSubData(queues_.name(), 0, static_cast<GLsizeiptr>(heads.size() * head_bytes), heads.data());
+  gl_->BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, queues_.name());
+  const auto settle = [this] {
+    gl::memory_barrier(*gl_,
+                       GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
+  };
+  programs.begin->use(*gl_);
+  run_one(tile_width, blocks);
+  settle();
+  const std::array<const gl::Program*, CM_QUEUES> order{programs.travel, programs.meet, programs.shade,
+                                                        programs.camera};
+  for (std::uint32_t round = 0; round < rounds; ++round) {
+    for (std::uint32_t queue = 0; queue < CM_QUEUES; ++queue) {
+      gl_->ProgramUniform1ui(order[queue]->name(), CM_ROUND_LOCATION, round);
+      order[queue]->use(*gl_);
+      gl_->DispatchComputeIndirect(static_cast<GLintptr>((std::size_t{round} * CM_QUEUES + queue) * head_bytes));
+      settle();
+    }
+  }
+}
+
+std::uint32_t PathKernels::most_rounds() { return CM_MOST_ROUNDS; }
+
+std::uint64_t PathKernels::bytes() const {
+  return paths_lanes_ * lane_bytes + (queues_ ? heads_bytes + queues_lanes_ * queue_bytes : 0);
+}
+
+}  // namespace cumulet::render

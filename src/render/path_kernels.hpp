@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <span>
+
+#include "gl/programs.hpp"
+
+namespace cumulet::render {
+
+/// Programs that trace paths among triangles, each the paths that wait for it: glsl/path_queue.glsl.
+struct StagePrograms {
+  const gl::Program* begin = nullptr;  // trace_camera.comp over all pixels of a dispatch
+  const gl::Program* travel = nullptr;
+  const gl::Program* meet = nullptr;
+  const gl::Program* shade = nullptr;
+  const gl::Program* camera = nullptr;
+};
+
+/// What kernels of paths keep between dispatches, and how a dispatch is run: as one kernel, or as several over queues.
+/// All calls need the context current and a StateGuard around.
+class PathKernels {
+ public:
+  static constexpr std::uint32_t block_width = 128;  // glsl/path_store.glsl's
+  static constexpr std::uint32_t block_height = 8;
+  static constexpr std::uint32_t begins_pass = 0x80000000U;
+  static constexpr std::size_t most_blocks = 256;
+
+  explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
+
+  /// Makes room for the paths of a tile, with queues if they are to be run by stages. Throws on a GL error.
+  void reserve(std::size_t lanes, bool stages);
+  /// Binds all that reserve made.
+  void bind() const;
+  /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).
+  [[nodiscard]] GLuint counters() const { return blocks_.name(); }
+  void set_counters(std::span<const glm::uvec4> words) const;
+  /// One kernel over so many blocks of a tile of that width; its program is in use.
+  void run_one(std::uint32_t tile_width, std::size_t blocks) const;
+  /// Rounds of stages over so many blocks.
+  void run_stages(const StagePrograms& programs, std::uint32_t tile_width, std::size_t blocks,
+                  std::uint32_t rounds) const;
+  /// Rounds that run_stages does at most.
+  static std::uint32_t most_rounds();
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  gl::FunctionsPtr gl_;
+  gl::Object paths_;
+  std::size_t paths_lanes_ = 0;
+  gl::Object queues_;
+  std::size_t queues_lanes_ = 0;
+  gl::Object blocks_;
+};
+
+}  // namespace cumulet::render
