@@ -113,6 +113,47 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   return means;
 }
 
+const gl::Program* Compositor::colour_program(const Inputs& inputs, const Display& display) {
+  std::vector<std::string> defines{"CM_DEPTH 0", inputs.bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
+                                   inputs.resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
+                                   "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
+                                   display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
+  if (inputs.layered) defines.emplace_back("CM_LAYERS 1");
+  const gl::Program& wanted = programs_->ask(key_of(std::move(defines)));
+  if (wanted.usable()) {
+    colour_ = &wanted;
+    colour_inputs_ = inputs;
+    return colour_;
+  }
+  lags_ = true;
+  return colour_inputs_ == inputs ? colour_ : nullptr;
+}
+
+void Compositor::draw_depth(const PictureTextures& picture, const FrameTarget& target) {
+  const auto& gl = *gl_;
+  const gl::Program& program = programs_->ask(key_of({"CM_DEPTH 1"}));
+  if (!program.usable()) {
+    lags_ = true;
+    return;
+  }
+  const GLuint depth = program.name();
+  const glm::ivec4 viewport = target.viewport;
+  gl.BindTextureUnit(core::CM_UNIT_VOLUME_Z, picture.volume_z);
+  gl.ProgramUniform4i(depth, 0, viewport.x, viewport.y, viewport.z, viewport.w);
+  gl.ProgramUniform1i(depth, 1, as_bool(target.flip_y));
+  gl.ProgramUniform2f(depth, 2, static_cast<GLfloat>(target.depth_a), static_cast<GLfloat>(target.depth_b));
+  gl.ProgramUniform1i(depth, 3, as_bool(target.orthographic));
+  gl.ColorMaski(0, GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  gl.Enable(GL_DEPTH_TEST);
+  gl.DepthFunc(target.reversed ? GL_GEQUAL : GL_LEQUAL);
+  gl.DepthMask(GL_TRUE);
+  program.use(gl);
+  gl.DrawArrays(GL_TRIANGLES, 0, 3);
+  gl.Disable(GL_DEPTH_TEST);
+  gl.DepthMask(GL_FALSE);
+  gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+}
+
 void Compositor::draw(const PictureTextures& picture, const Display& display, const FrameTarget& target) {
   const glm::ivec4 viewport = target.viewport;
   if (picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0 || viewport.z <= 0 || viewport.w <= 0) return;
@@ -135,20 +176,8 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool resolved = means != nullptr || lags_;
   const glm::uvec2 size = means != nullptr ? means->of.size : picture.size;
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
-  std::vector<std::string> defines{"CM_DEPTH 0", bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
-                                   resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
-                                   "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
-                                   display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
-  if (layered) defines.emplace_back("CM_LAYERS 1");
-  const Inputs inputs{layered, resolved, bilinear};
-  const gl::Program* const wanted = &programs_->ask(key_of(std::move(defines)));
-  if (!wanted->usable()) lags_ = true;
-  // Until it is there, the tone map or encoding of before.
-  const bool last = !wanted->usable() && colour_ != nullptr && colour_inputs_ == inputs;
-  const gl::Program* const shown = last ? colour_ : wanted;
-  if ((resolved && means == nullptr) || !shown->usable()) return;
-  colour_ = shown;
-  colour_inputs_ = inputs;
+  const gl::Program* const shown = colour_program({layered, resolved, bilinear}, display);
+  if ((resolved && means == nullptr) || shown == nullptr) return;
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
                       static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
@@ -188,27 +217,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   shown->use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
 
-  const bool depths = target.write_depth && picture.volume_z != 0;
-  const gl::Program* const depth_program = depths ? &programs_->ask(key_of({"CM_DEPTH 1"})) : nullptr;
-  if (depth_program != nullptr && !depth_program->usable()) {
-    lags_ = true;
-  } else if (depth_program != nullptr) {
-    const GLuint depth = depth_program->name();
-    gl.BindTextureUnit(core::CM_UNIT_VOLUME_Z, picture.volume_z);
-    gl.ProgramUniform4i(depth, 0, viewport.x, viewport.y, viewport.z, viewport.w);
-    gl.ProgramUniform1i(depth, 1, as_bool(target.flip_y));
-    gl.ProgramUniform2f(depth, 2, static_cast<GLfloat>(target.depth_a), static_cast<GLfloat>(target.depth_b));
-    gl.ProgramUniform1i(depth, 3, as_bool(target.orthographic));
-    gl.ColorMaski(0, GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    gl.Enable(GL_DEPTH_TEST);
-    gl.DepthFunc(target.reversed ? GL_GEQUAL : GL_LEQUAL);
-    gl.DepthMask(GL_TRUE);
-    depth_program->use(gl);
-    gl.DrawArrays(GL_TRIANGLES, 0, 3);
-    gl.Disable(GL_DEPTH_TEST);
-    gl.DepthMask(GL_FALSE);
-    gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  }
+  if (target.write_depth && picture.volume_z != 0) draw_depth(picture, target);
   if (resolved && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
   draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);
   gl::check(gl, "drawing the picture");

@@ -91,6 +91,16 @@ class Compositor {
     MeansOf of;
     gl::Fence drawn;
   };
+  // What a program that draws colours reads.
+  struct Inputs {
+    bool layered = false;
+    bool resolved = false;
+    bool bilinear = false;
+    bool operator==(const Inputs&) const = default;
+  };
+  // Until the one for this display is there, the one of before; null if that reads something else.
+  const gl::Program* colour_program(const Inputs& inputs, const Display& display);
+  void draw_depth(const PictureTextures& picture, const FrameTarget& target);
   // The means to draw; null if there is no memory for them.
   Means* resolve(const PictureTextures& picture, Background background);
   // To be written; null if as many as there may be wait to be drawn. Else newest_ may be gone.
@@ -101,13 +111,6 @@ class Compositor {
   gl::ProgramsPtr programs_;
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
-  // What a program that draws colours reads.
-  struct Inputs {
-    bool layered = false;
-    bool resolved = false;
-    bool bilinear = false;
-    bool operator==(const Inputs&) const = default;
-  };
   const gl::Program* colour_ = nullptr;  // the last
   Inputs colour_inputs_;
   std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
