@@ -5,8 +5,10 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <random>
 #include <span>
+#include <string_view>
 #include <system_error>
 
 #include "base/error.hpp"
@@ -18,8 +20,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<char, 8> magic{'C', 'U', 'M', 'P', 'R', 'O', 'G', '1'};
-constexpr const char* suffix = ".program";
-constexpr const char* unfinished = ".part";
+constexpr std::string_view suffix = ".program";
+constexpr std::string_view unfinished = ".part";
 constexpr auto given_up = std::chrono::hours(1);  // what a writer has left behind
 
 struct Key {
@@ -59,7 +61,29 @@ fs::path file_of(const fs::path& folder, const Key& key) {
   std::array<char, 33> digits{};
   std::snprintf(digits.data(), digits.size(), "%016llx%016llx", static_cast<unsigned long long>(key.first),
                 static_cast<unsigned long long>(key.second));
-  return folder / (std::string(digits.data()) + suffix);
+  return folder / std::string(digits.data()).append(suffix);
+}
+
+// Whether that is such a file's name.
+bool is_whole(std::string_view name) {
+  constexpr std::size_t digits = 32;
+  if (!name.ends_with(suffix)) return false;
+  name.remove_suffix(suffix.size());
+  return name.size() == digits && name.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
+
+// One that keep() has begun: a number and unfinished after it.
+bool is_part(std::string_view name) {
+  if (!name.ends_with(unfinished)) return false;
+  name.remove_suffix(unfinished.size());
+  const std::size_t end = name.find_last_not_of("0123456789") + 1;
+  return end < name.size() && is_whole(name.substr(0, end));
+}
+
+// Of all that a driver is given.
+std::uint64_t sum_of(std::uint64_t format, std::span<const std::byte> bytes) {
+  const std::array<std::uint64_t, 2> words{format, bytes.size()};
+  return hash(bytes, hash(std::as_bytes(std::span(words)), basis));
 }
 
 [[noreturn]] void fail(const fs::path& path, const std::string& why) {
@@ -82,7 +106,7 @@ std::optional<ProgramFiles::Binary> ProgramFiles::find(const std::string& driver
   file.read(reinterpret_cast<char*>(&header), sizeof(header));
   file.read(reinterpret_cast<char*>(binary.bytes.data()), static_cast<std::streamsize>(binary.bytes.size()));
   if (!file || header.kind != magic || header.key != key || header.length != binary.bytes.size() ||
-      header.sum != hash(binary.bytes, basis)) {
+      header.format > std::numeric_limits<std::uint32_t>::max() || header.sum != sum_of(header.format, binary.bytes)) {
     return std::nullopt;
   }
   binary.format = static_cast<std::uint32_t>(header.format);
@@ -101,7 +125,7 @@ void ProgramFiles::keep(const std::string& driver, const std::string& source, co
   part += std::to_string(std::random_device{}());  // another process may write the same
   part += unfinished;
   {
-    const Header header{magic, key, binary.bytes.size(), hash(binary.bytes, basis), binary.format};
+    const Header header{magic, key, binary.bytes.size(), sum_of(binary.format, binary.bytes), binary.format};
     std::ofstream file(part, std::ios::binary | std::ios::trunc);
     file.write(reinterpret_cast<const char*>(&header), sizeof(header));
     file.write(reinterpret_cast<const char*>(binary.bytes.data()), static_cast<std::streamsize>(binary.bytes.size()));
@@ -134,8 +158,9 @@ void ProgramFiles::make_room() const {
     std::error_code gone;  // by another process
     const File file{at->path(), at->last_write_time(gone), at->file_size(gone)};
     if (gone) continue;
-    if (file.path.extension() == unfinished && now - file.time > given_up) fs::remove(file.path, gone);
-    if (file.path.extension() != suffix) continue;
+    const std::string name = file.path.filename().string();
+    if (is_part(name) && now - file.time > given_up) fs::remove(file.path, gone);
+    if (!is_whole(name)) continue;
     bytes += file.size;
     files.push_back(file);
   }

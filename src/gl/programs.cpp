@@ -91,21 +91,33 @@ const Program& Programs::ask(const ProgramKey& key) {
   if (!held) held = std::make_unique<Program>();
   Program& program = *held;
   if (program.usable()) return program;
+  if (program.failure_) throw Error(*program.failure_);
   if (program.state_ != Program::State::compiling) begin(key, program);
   if (program.state_ == Program::State::compiling && complete(program)) finish(key, program);
   return program;
 }
 
 const Program& Programs::get(const ProgramKey& key) {
+  if (const auto found = programs_.find(key); found != programs_.end()) found->second->failure_.reset();
   ask(key);
   Program& program = *programs_.at(key);
   if (program.state_ == Program::State::compiling) finish(key, program);
   return program;
 }
 
+void Programs::try_again() {
+  for (auto& [key, program] : programs_) program->failure_.reset();
+}
+
+Program::State Programs::state(const ProgramKey& key) const {
+  const auto found = programs_.find(key);
+  return found == programs_.end() ? Program::State::absent : found->second->state();
+}
+
 void Programs::refresh() {
   if (!shaders_ || !shaders_->changed()) return;
   for (auto& [key, program] : programs_) {
+    if (std::exchange(program->failure_, std::nullopt)) revision_.advance();
     if (!program->usable()) continue;
     Program fresh;
     try {
@@ -127,6 +139,7 @@ Programs::Counts Programs::counts() const {
     ++counts.asked;
     counts.usable += program->usable() ? 1 : 0;
     counts.ready += program->state() == Program::State::ready ? 1 : 0;
+    counts.failed += program->state() == Program::State::failed ? 1 : 0;
   }
   return counts;
 }
@@ -180,7 +193,10 @@ void Programs::finish(const ProgramKey& key, Program& program) {
   gl_->GetProgramiv(name, GL_LINK_STATUS, &linked);
   program.state_ = Program::State::failed;
   check(*gl_, "building a shader program");
-  if (linked == 0) throw Error(ErrorCode::gl, failure(key, program));
+  if (linked == 0) {
+    program.failure_ = Error(ErrorCode::gl, failure(key, program));
+    throw Error(*program.failure_);
+  }
   for (const Object& shader : program.shaders_) gl_->DetachShader(name, shader.name());
   program.shaders_.clear();
   program.state_ = Program::State::linked;

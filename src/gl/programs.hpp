@@ -3,11 +3,13 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "base/error.hpp"
 #include "base/log.hpp"
 #include "base/revision.hpp"
 #include "gl/objects.hpp"
@@ -35,7 +37,7 @@ class Program {
     compiling,  // the driver is at it
     linked,     // it can be used; the driver may compile more in the first use
     ready,      // it was used
-    failed,     // it does not build; asked for again, it is tried again
+    failed,     // it does not build
   };
   Program() = default;
   Program(const Program&) = delete;
@@ -57,7 +59,8 @@ class Program {
  private:
   friend class Programs;
   Object object_;
-  std::vector<Object> shaders_;  // while it compiles
+  std::vector<Object> shaders_;   // while it compiles
+  std::optional<Error> failure_;  // why the driver does not build it
   mutable State state_ = State::absent;
 };
 
@@ -93,22 +96,28 @@ class Programs {
   };
 
   /// The program, begun if it is not there: where the driver compiles in parallel it may still be compiling, else it is
-  /// linked on return. Throws Error(gl) with the driver's log if it does not build, and Error(internal) for macros that
-  /// are none of the variants that the shader's source names: those are validated, and their cost on GPUs is known
-  /// (tests/gpu_cost).
+  /// linked on return. Throws Error(gl) with the driver's log if it does not build, again and again without asking the
+  /// driver anew until try_again(), and Error(internal) for macros that are none of the variants that the shader's
+  /// source names: those are validated, and their cost on GPUs is known (tests/gpu_cost).
   const Program& ask(const ProgramKey& key);
-  /// The same, linked: waits for the driver.
+  /// The same, linked: waits for the driver, and tries again what did not build.
   const Program& get(const ProgramKey& key);
+  /// What did not build is built anew where it is asked for next.
+  void try_again();
+  /// Without asking the driver.
+  [[nodiscard]] Program::State state(const ProgramKey& key) const;
   /// Builds programs anew whose sources have changed. One that does not build is one line in the log, and stays what it
   /// was.
   void refresh();
-  /// Another whenever that changed any.
+  /// Another whenever that changed any, or one that did not build may do so now.
   [[nodiscard]] const Revision<Programs>& revision() const { return revision_; }
-  /// Those that were asked for, and those of them that were used: the driver has no more to compile for these.
+  /// Those that were asked for, and those of them that were used: the driver has no more to compile for these, nor for
+  /// those that failed.
   struct Counts {
     std::size_t asked = 0;
     std::size_t usable = 0;
     std::size_t ready = 0;
+    std::size_t failed = 0;
   };
   [[nodiscard]] Counts counts() const;
   /// Whether the driver compiles while the calling thread does other things (KHR_parallel_shader_compile).

@@ -91,15 +91,36 @@ TEST_F(ProgramsTest, AreMadeOnceAndStayWhereTheyAre) {
   gl_->UseProgram(0);
 }
 
-TEST_F(ProgramsTest, OneThatDoesNotBuildIsToldAndTriedAgain) {
-  Programs programs(*gl_, nullptr);
+TEST_F(ProgramsTest, OneThatDoesNotBuildIsToldAndTriedAgainWhenThatIsAskedFor) {
   for (const int call : {1, 2}) {  // after glCreateProgram and glCreateShader
+    SCOPED_TRACE(call);
+    Programs programs(*gl_, nullptr);
+    const auto message = [&] {
+      try {
+        programs.ask(resolve);
+      } catch (const Error& error) {
+        return std::string(error.what());
+      }
+      return std::string();
+    };
     fake_.fail_allocation(call + 1);
-    EXPECT_THROW(programs.get(resolve), Error) << call;
+    const std::string told = message();
+    fake_.fail_allocation(-1);
+    EXPECT_NE(told.find("resolve.comp"), std::string::npos) << told;
+    EXPECT_EQ(programs.state(resolve), Program::State::failed);
+    EXPECT_EQ(programs.counts().failed, 1U);
+    const auto before = compiled();
+    EXPECT_EQ(message(), told);
+    EXPECT_EQ(compiled(), before);
+    programs.try_again();
+    EXPECT_EQ(message(), "");
+    EXPECT_EQ(programs.state(resolve), Program::State::linked);
+    fake_.fail_allocation(call + 1);
+    EXPECT_THROW(programs.get(composite), Error);
+    fake_.fail_allocation(-1);
+    EXPECT_TRUE(programs.get(composite).usable());
+    EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
   }
-  fake_.fail_allocation(-1);
-  EXPECT_TRUE(programs.get(resolve).usable());
-  EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
 }
 
 TEST_F(ProgramsTest, AreSharedWhereContextsShare) {
@@ -257,6 +278,42 @@ TEST(ProgramFilesTest, KeepWhatWasUsedLastWithinTheirBound) {
   EXPECT_EQ(one->bytes, binary.bytes);
   EXPECT_FALSE(files.find("driver", "two"));
   EXPECT_FALSE(files.find("another driver", "one"));
+}
+
+TEST(ProgramFilesTest, TouchWhatTheyHaveWrittenAlone) {
+  const Folder folder;
+  const std::string ours(32, 'a');
+  const std::vector<std::string> foreign{"notes.program",          "film.part",
+                                         ours + ".part",           ours + ".program.part",
+                                         ours + "a.program1.part", "x" + ours.substr(1) + ".program",
+                                         ours + ".programme1.part"};
+  const std::string left = ours + ".program123.part";
+  for (const std::string& name : foreign) write(folder / name, std::vector<std::byte>(5000));
+  write(folder / left, {std::byte{0}});
+  for (const auto& path : files_in(folder)) {
+    fs::last_write_time(path, fs::last_write_time(path) - std::chrono::hours(2));
+  }
+  ProgramFiles files(folder.path(), 1500);
+  files.keep("driver", "one", {7, std::vector<std::byte>(1000)});
+  EXPECT_TRUE(files.find("driver", "one"));
+  for (const std::string& name : foreign) EXPECT_TRUE(fs::exists(folder / name)) << name;
+  EXPECT_FALSE(fs::exists(folder / left));
+}
+
+TEST(ProgramFilesTest, NoBitOfAHeaderIsTrusted) {
+  const Folder folder;
+  ProgramFiles files(folder.path());
+  files.keep("driver", "source", {7, std::vector<std::byte>(100, std::byte{42})});
+  const fs::path path = files_in(folder).at(0);
+  const auto whole = bytes_of(path);
+  for (std::size_t i = 0; i < 48; ++i) {
+    auto bytes = whole;
+    bytes[i] ^= std::byte{1};
+    write(path, bytes);
+    EXPECT_FALSE(files.find("driver", "source")) << i;
+  }
+  write(path, whole);
+  EXPECT_TRUE(files.find("driver", "source"));
 }
 
 TEST(ProgramFilesTest, WhatCannotBeWrittenIsAnErrorOfOneLine) {
