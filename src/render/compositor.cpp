@@ -28,8 +28,8 @@ bool Compositor::resolves_now() const { return milliseconds(Clock::now() - resol
 
 double Compositor::expected_ms() const { return draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0); }
 
-Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart) {
-  const bool waits = gl_->dispatches_in_call && !gl::Fence(gl_).passed();
+Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool overwrite) {
+  const bool waits = !overwrite && gl_->dispatches_in_call && !gl::Fence(gl_).passed();
   if (waits) {
     std::erase_if(means_, [this](const auto& means) { return means.get() != newest_ && means->drawn.passed(); });
     if (means_.size() >= most_means) return nullptr;
@@ -54,7 +54,11 @@ Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart) {
   return &means;
 }
 
-Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background) {
+const gl::Program& Compositor::program(const gl::ProgramKey& key, bool waits) {
+  return waits ? programs_->get(key) : programs_->ask(key);
+}
+
+Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background, bool waits) {
   lags_ = false;
   const MeansOf wanted{
       picture.sum,     picture.holes ? picture.sum_before : 0, picture.holes, background, picture.size, picture.picture,
@@ -66,9 +70,10 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
     if (older && picture.may_lag && !resolves_now()) return newest_;
   }
   if (no_memory_for_ == picture.size) return nullptr;
-  const gl::Program& program = programs_->ask(
+  const gl::Program& program = Compositor::program(
       {"resolve.comp",
-       {picture.holes ? "CM_HOLES 1" : "CM_HOLES 0", "CM_BACKGROUND " + std::to_string(static_cast<int>(background))}});
+       {picture.holes ? "CM_HOLES 1" : "CM_HOLES 0", "CM_BACKGROUND " + std::to_string(static_cast<int>(background))}},
+      waits);
   if (!program.usable()) {
     lags_ = true;
     return alike ? newest_ : nullptr;
@@ -77,7 +82,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   const auto begun = Clock::now();
   Means* means = nullptr;
   try {
-    means = free_means(picture.size, background == Background::apart);
+    means = free_means(picture.size, background == Background::apart, waits);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::out_of_memory) throw;
     means_.clear();
@@ -113,25 +118,25 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   return means;
 }
 
-const gl::Program* Compositor::colour_program(const Inputs& inputs, const Display& display) {
-  std::vector<std::string> defines{"CM_DEPTH 0", inputs.bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
-                                   inputs.resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
+const gl::Program* Compositor::colour_program(const Kind& kind, const Display& display, bool waits) {
+  std::vector<std::string> defines{"CM_DEPTH 0", kind.bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
+                                   kind.resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
-                                   display.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
-  if (inputs.layered) defines.emplace_back("CM_LAYERS 1");
-  const gl::Program& wanted = programs_->ask(key_of(std::move(defines)));
+                                   kind.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
+  if (kind.layered) defines.emplace_back("CM_LAYERS 1");
+  const gl::Program& wanted = program(key_of(std::move(defines)), waits);
   if (wanted.usable()) {
     colour_ = &wanted;
-    colour_inputs_ = inputs;
+    colour_kind_ = kind;
     return colour_;
   }
   lags_ = true;
-  return colour_inputs_ == inputs ? colour_ : nullptr;
+  return colour_kind_ == kind ? colour_ : nullptr;
 }
 
 void Compositor::draw_depth(const PictureTextures& picture, const FrameTarget& target) {
   const auto& gl = *gl_;
-  const gl::Program& program = programs_->ask(key_of({"CM_DEPTH 1"}));
+  const gl::Program& program = Compositor::program(key_of({"CM_DEPTH 1"}), target.waits);
   if (!program.usable()) {
     lags_ = true;
     return;
@@ -170,13 +175,14 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
   const Background without = display.transparent ? Background::left_out : Background::added;
-  Means* const means = resolve(picture, layered ? Background::apart : without);
+  Means* const means = resolve(picture, layered ? Background::apart : without, target.waits);
   const auto begun = Clock::now();
   // Without means either there is no memory for them, or the driver is at their program still.
   const bool resolved = means != nullptr || lags_;
   const glm::uvec2 size = means != nullptr ? means->of.size : picture.size;
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
-  const gl::Program* const shown = colour_program({layered, resolved, bilinear}, display);
+  const gl::Program* const shown =
+      colour_program({layered, resolved, bilinear, display.encoding}, display, target.waits);
   if ((resolved && means == nullptr) || shown == nullptr) return;
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),

@@ -40,6 +40,7 @@ struct FrameTarget {
   glm::ivec4 viewport{0};  // as glViewport
   bool flip_y = false;     // true: the picture's top row at y = 0
   bool blend_over = true;
+  bool waits = false;  // for the driver's compiler: the picture is read back, and may not lag
   // Depth to write, where the picture has volume_z: a + b / z, or a + b z where orthographic.
   bool write_depth = false;
   bool reversed = false;
@@ -91,20 +92,24 @@ class Compositor {
     MeansOf of;
     gl::Fence drawn;
   };
-  // What a program that draws colours reads.
-  struct Inputs {
+  // What a program that draws colours reads, and what its target takes.
+  struct Kind {
     bool layered = false;
     bool resolved = false;
     bool bilinear = false;
-    bool operator==(const Inputs&) const = default;
+    ColourEncoding encoding = ColourEncoding::srgb;
+    bool operator==(const Kind&) const = default;
   };
-  // Until the one for this display is there, the one of before; null if that reads something else.
-  const gl::Program* colour_program(const Inputs& inputs, const Display& display);
+  // waits: one that is linked.
+  const gl::Program& program(const gl::ProgramKey& key, bool waits);
+  // Until the one for this display is there, the one of before; null if that is of another kind.
+  const gl::Program* colour_program(const Kind& kind, const Display& display, bool waits);
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
   // The means to draw; null if there is no memory for them.
-  Means* resolve(const PictureTextures& picture, Background background);
-  // To be written; null if as many as there may be wait to be drawn. Else newest_ may be gone.
-  Means* free_means(glm::uvec2 size, bool apart);
+  Means* resolve(const PictureTextures& picture, Background background, bool waits);
+  // To be written; null if as many as there may be wait to be drawn. Else newest_ may be gone. overwrite: takes one
+  // that is still to be drawn.
+  Means* free_means(glm::uvec2 size, bool apart, bool overwrite);
   [[nodiscard]] bool resolves_now() const;
 
   gl::FunctionsPtr gl_;
@@ -112,7 +117,7 @@ class Compositor {
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
   const gl::Program* colour_ = nullptr;  // the last
-  Inputs colour_inputs_;
+  Kind colour_kind_;
   std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
   std::optional<Error> no_memory_;           // to be told
   double resolve_ms_ = 0.0;                  // within the call

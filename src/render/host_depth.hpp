@@ -37,6 +37,8 @@ class HostDepth {
   bool update(const HostDepthInput& input);
   /// Whether it is still to be told if z differs: a later update will.
   [[nodiscard]] bool pending() const { return waits_ || !asked_.empty(); }
+  /// Whether the last update could not read, the driver being at its program still.
+  [[nodiscard]] bool waits_for_program() const { return waits_; }
   /// GL_TEXTURE_2D_ARRAY, r32f; 0 without input.
   [[nodiscard]] GLuint texture() const { return z_.name(); }
   [[nodiscard]] glm::uvec2 size() const { return size_; }
@@ -74,7 +76,7 @@ class HostDepth {
     gl::Fence fence;
   };
   std::deque<Asked> asked_;
-  bool waits_ = false;  // for its program
+  bool waits_ = false;
   std::size_t next_place_ = 0;
 };
 

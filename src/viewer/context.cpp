@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <utility>
 
 #include "base/milliseconds.hpp"
@@ -11,8 +10,6 @@
 namespace cumulet::viewer {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // Of a frame's budget.
 constexpr double most_of_drawing = 0.5;
@@ -37,8 +34,9 @@ Context::Context(gl::FunctionsPtr gl, gl::ProgramPool& programs)
 }
 
 void Context::find_out_dispatches() {
-  if (std::exchange(knows_dispatches_, true)) return;
+  if (knows_dispatches_) return;
   gl::find_out_dispatches(functions_, *programs_);
+  knows_dispatches_ = true;
 }
 
 bool Context::shares_cores() const {
@@ -53,6 +51,7 @@ render::Deadline Context::deadline_of(const Frame& frame, bool shares) const {
 }
 
 void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline) {
+  if (std::exchange(tried_, shot.settings) != shot.settings) programs_->try_again();
   if (scene_.data() != nullptr && shot.scene->volumes.front().source == nullptr) progressive_.reset();
   const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
   const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, page_texels}, deadline); };
@@ -253,7 +252,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   const glm::uvec2 size = target_.of().size;
   target.viewport = size == frame.size ? frame.viewport : glm::ivec4(0, 0, size);
   const bool depth = frame.write_depth && target_->depth;
-  const gl::TransientFramebuffer framebuffer(*functions_, target_->colour.name(), depth ? target_->depth.name() : 0);
+  const gl::TransientFramebuffer framebuffer(functions_, target_->colour.name(), depth ? target_->depth.name() : 0);
   constexpr std::array<float, 4> nothing{};
   functions_->ClearNamedFramebufferfv(framebuffer.name(), GL_COLOR, 0, nothing.data());
   if (depth) {
@@ -275,13 +274,22 @@ void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
     if (drawing) drawn_ = compositor_.lags() ? std::nullopt : std::optional(now);
     result.undrawn = !drawing && drawn_ != now;
   }
-  const bool pending = host_depth_.pending() || (drawing && compositor_.lags());
+  const bool lags = drawing && compositor_.lags();
+  const bool pending = host_depth_.pending() || lags;
   const bool pictures = scene_.data() != nullptr && shot.view();
   result.loading = scene_.uploading();
   result.converged = pictures && !pending && !scene_.uploading() && progressive_.converged();
-  result.more = scene_.uploading() || (pictures && (pending || progressive_.more()));
+  result.more = scene_.uploading() || lags || (pictures && (pending || progressive_.more()));
   result.progress = progressive_.progress();
   result.preview = result.size != glm::uvec2(0U) && result.size != shot.size;
+}
+
+bool Context::is_news(const Shot& shot, const Error& failure) {
+  if (failure.code() != ErrorCode::gl) return true;
+  std::pair<std::uint64_t, std::string> now(shot.settings, failure.what());
+  const bool news = told_ != now;
+  told_ = std::move(now);
+  return news;
 }
 
 render::PassSeconds Context::pass_seconds() const {

@@ -4,7 +4,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "base/error.hpp"
 #include "base/revision.hpp"
 #include "base/slot.hpp"
 #include "gl/programs.hpp"
@@ -73,13 +75,15 @@ class Context {
   void draw(const Shot& shot, const Frame& frame, FrameResult& result);
   /// What is known after the frame.
   void tell(const Shot& shot, const Frame& frame, FrameResult& result);
+  /// Whether the frame's failure is to be told: what does not build fails in each until a setting changes.
+  [[nodiscard]] bool is_news(const Shot& shot, const Error& failure);
   /// What it took, where the host shared the cores.
   void learn(const Frame& frame, double taken_ms) { reserve_.learn(frame.budget_ms, taken_ms); }
 
   // ---- before the first ----
 
   /// Compiles and uses once the programs that frames like this need, until about the deadline; all: compiles every
-  /// other, too. waits: for what may need others still.
+  /// other, too, and throws what does not build in the end. waits: for what may need others still.
   WarmUp warm_up(const Shot& shot, const Frame& frame, bool all, bool waits, render::Deadline deadline);
 
   // ---- reading back: waits for what is under way ----
@@ -128,6 +132,12 @@ class Context {
   [[nodiscard]] static render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown);
   // Whether all programs are warm.
   bool rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline);
+  // Those of such a frame.
+  bool rehearse_frame(const Shot& shot, const Frame& frame, render::Deadline deadline);
+  // What part returns; true as well where it throws Error(gl), which is kept: others need not wait for what does not
+  // build.
+  template <class Part>
+  bool done_or_failed(Part&& part);
   void rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown);
   void make_target_textures(const Shot& shot, const Frame& frame);
   // The last pass, as Compositor::draw: of a film, whose textures these are.
@@ -154,12 +164,15 @@ class Context {
   render::PassTimer display_timer_;
   render::HostDepth host_depth_;
   Revision<render::HostDepth> host_depth_revision_;
-  std::optional<DrawnAs> drawn_;  // last; nothing where that was older than what there was
+  std::optional<std::pair<std::uint64_t, std::string>> told_;  // the last failure of OpenGL's, and at which settings
+  std::optional<DrawnAs> drawn_;                               // last; nothing where that was older than what there was
   render::Picture empty_;
   std::optional<std::uint64_t> alone_failed_;  // settings at which the surfaces beneath it could not be drawn
   Slot<TargetTextures, TargetKind> target_;
   std::unique_ptr<render::Rehearsal> rehearsal_;  // under way
   double warm_ = 0.0;                             // the part of it that was told
+  std::optional<Error> unbuilt_;                  // the first failure in it, to be told in the end
+  std::optional<std::uint64_t> tried_;            // settings at which programs that do not build were tried
   bool knows_dispatches_ = false;
 };
 

@@ -53,7 +53,7 @@ void Context::read_means(render::Picture& picture, bool with_background, float* 
 void Context::read_composite(render::Picture& picture, bool transparent, float* rgba) {
   const glm::ivec2 size(picture.size());
   const gl::Object flat = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the texture to read");
-  const gl::TransientFramebuffer framebuffer(*functions_, flat.name(), 0);
+  const gl::TransientFramebuffer framebuffer(functions_, flat.name(), 0);
   render::Display display;
   display.transparent = transparent;
   display.encoding = render::ColourEncoding::hdr;
@@ -62,6 +62,7 @@ void Context::read_composite(render::Picture& picture, bool transparent, float* 
   target.viewport = {0, 0, size};
   target.flip_y = true;  // the first row is the top
   target.blend_over = false;
+  target.waits = true;
   composite(picture.film(), textures_of(picture, nullptr), display, target);
   functions_->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
   gl::check(*functions_, "reading the picture back");

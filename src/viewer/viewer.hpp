@@ -124,6 +124,8 @@ class Viewer {
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.
   void prepare(const Frame& frame);
+  // What status() and stats() tell of it.
+  void follow_upload(const Context& g);
   // The scene as it is now: the last snapshot, if nothing changed.
   scene::SnapshotPtr snapshot();
   Shot shot();

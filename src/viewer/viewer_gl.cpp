@@ -110,6 +110,11 @@ void Viewer::prepare(const Frame& frame) {
   }
 }
 
+void Viewer::follow_upload(const Context& g) {
+  upload_progress_ = g.scene().progress();
+  if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
+}
+
 FrameResult Viewer::render(const Frame& frame) {
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
@@ -137,8 +142,7 @@ FrameResult Viewer::render(const Frame& frame) {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), page_texels_, deadline);
     });
-    upload_progress_ = g.scene().progress();
-    if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
+    follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
     attempt("cumulet: surfaces alone", [&] { g.draw_surfaces_alone(shot, frame); });
@@ -155,6 +159,7 @@ FrameResult Viewer::render(const Frame& frame) {
     result.failed = failed(builder_.status()) || failed(surface_builder_.status());
     const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
     result.more = result.more || navigation_.moving() || waits_to_build;
+    if (failure && !g.is_news(shot, *failure)) failure.reset();
   });
   if (failure) throw Error(*failure);
   return result;
@@ -168,7 +173,7 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
     const render::Deadline deadline = deadline_after(frame.budget_ms);
     prepare(frame);
     g.upload(shot(), page_texels_, deadline);
-    upload_progress_ = g.scene().progress();
+    follow_upload(g);
     result = g.warm_up(shot(), frame, all, builder_.busy() || surface_builder_.busy(), deadline);
   });
   return result;

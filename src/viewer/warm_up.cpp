@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "base/error.hpp"
 #include "gl/transient_framebuffer.hpp"
 #include "viewer/context.hpp"
 
@@ -12,6 +13,7 @@ WarmUp Context::warm_up(const Shot& shot, const Frame& frame, bool all, bool wai
   if (!rehearsal_) {
     rehearsal_ = std::make_unique<render::Rehearsal>(functions_, programs_);
     warm_ = 0.0;
+    unbuilt_.reset();
   }
   WarmUp result;
   try {
@@ -24,14 +26,41 @@ WarmUp Context::warm_up(const Shot& shot, const Frame& frame, bool all, bool wai
   // Half of it is to compile them, but of those that are not used.
   const gl::Programs::Counts counts = programs_->counts();
   const std::size_t wanted = all ? std::max(counts.asked, gl::all_programs().size()) : counts.asked;
-  const std::size_t done = counts.usable + (all ? counts.usable : counts.ready);
+  const std::size_t done = 2 * counts.failed + counts.usable + (all ? counts.usable : counts.ready);
   const double part = 0.5 * static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(1, wanted));
   warm_ = result.more ? std::max(warm_, std::min(part, 0.99)) : 1.0;
   result.progress = warm_;
   return result;
 }
 
+template <class Part>
+bool Context::done_or_failed(Part&& part) {
+  try {
+    return part();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::gl) throw;
+    gl::check_reset(*functions_);
+    gl::clear_errors(*functions_);
+    if (!unbuilt_) unbuilt_ = error;
+    return true;
+  }
+}
+
 bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline) {
+  if (!all) return rehearse_frame(shot, frame, deadline);
+  if (!done_or_failed([&] { return rehearse_frame(shot, frame, deadline); })) return false;
+  bool there = true;
+  for (const gl::ProgramKey& key : gl::all_programs()) {
+    const gl::Program::State before = programs_->state(key);
+    there = done_or_failed([&] { return programs_->ask(key).usable(); }) && there;
+    // One at least in each call, however long the frame's own took.
+    if (programs_->state(key) != before && std::chrono::steady_clock::now() >= deadline) return false;
+  }
+  if (there && unbuilt_) throw Error(*unbuilt_);
+  return there;
+}
+
+bool Context::rehearse_frame(const Shot& shot, const Frame& frame, render::Deadline deadline) {
   rehearsal_->begin();
   const bool drawing = draws(shot, frame);
   if (drawing) {
@@ -49,16 +78,9 @@ bool Context::rehearse(const Shot& shot, const Frame& frame, bool all, render::D
       const render::Surfaces met = surfaces(shot);
       if (!rehearsal_->advance(wish(shot, frame, met), *scene_.data(), met, deadline, draw)) return false;
     }
-    if (host_depth_.pending()) return false;
+    if (host_depth_.waits_for_program()) return false;
   }
-  if (rehearsal_->lags()) return false;
-  if (!all) return true;
-  bool there = true;
-  for (const gl::ProgramKey& key : gl::all_programs()) {
-    if (std::chrono::steady_clock::now() >= deadline) return false;
-    there = programs_->ask(key).usable() && there;
-  }
-  return there;
+  return !rehearsal_->lags();
 }
 
 void Context::rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown) {
@@ -73,7 +95,7 @@ void Context::rehearse_drawing(const Shot& shot, const Frame& frame, const rende
   if (frame.write_depth) {
     depth = gl::make_texture_2d(functions_, GL_DEPTH_COMPONENT32F, 1, 1, "creating a target's depth to rehearse with");
   }
-  const gl::TransientFramebuffer framebuffer(*functions_, colour.name(), depth.name());
+  const gl::TransientFramebuffer framebuffer(functions_, colour.name(), depth.name());
   target.framebuffer = framebuffer.name();
   target.blend_over = false;
   rehearsal_->draw(picture, display(shot, frame, shown), target);

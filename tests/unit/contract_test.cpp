@@ -1111,6 +1111,9 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
     EXPECT_TRUE(std::ranges::is_sorted(told));
     EXPECT_EQ(told.back(), 1.0);
     EXPECT_EQ(target_.pixels(), before) << "it draws nothing";
+    auto stats = make_desc<cumulet_stats>();
+    ASSERT_EQ(cumulet_get_stats(own.get(), &stats), CUMULET_OK);
+    EXPECT_GT(stats.build_seconds_upload, 0.0);
     const auto programs = compiled();
     const auto uses = fake_.first_uses();
     converge(own.get(), frame);
@@ -1128,11 +1131,14 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
 TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   const cumulet::test::SurfacesRef panes = make_panes();
   fake_.compile_in_parallel();
-  fake_.finish_compiling(true);  // the first call alone asks for a program and waits
   const ViewerPtr own = viewer();
   const auto frame = target_.frame();
   auto result = make_desc<cumulet_frame_result>();
+  ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK);  // it alone waits, for a small program
+  EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U) << "nothing is drawn yet of what there is without a scene";
+  fake_.finish_compiling(true);
   ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK);
+  EXPECT_EQ(result.flags & CUMULET_RENDER_MORE, 0U);
   ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
   const auto stalls = [&](const char* what) {
@@ -1163,6 +1169,17 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   display.tone_map = CUMULET_TONE_MAP_CLIP;
   ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
   stalls("a tone map");
+  // Another encoding is for another target: nothing serves but its own.
+  converge(own.get(), frame);
+  target_.clear({0.2F, 0.4F, 0.6F, 1.0F});
+  const Picture cleared = target_.pixels();
+  auto linear = frame;
+  linear.colour = CUMULET_COLOUR_LINEAR;
+  fake_.finish_compiling(false);
+  ASSERT_EQ(cumulet_render(own.get(), &linear, &result), CUMULET_OK);
+  EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U);
+  EXPECT_EQ(difference(target_.pixels(), cleared), "");
+  fake_.finish_compiling(true);
   // A warm-up does not wait either, and ends when the driver does.
   auto sampling = make_desc<cumulet_sampling_desc>();
   sampling.view = CUMULET_VIEW_STEPS;
@@ -1177,6 +1194,110 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   EXPECT_EQ(fake_.waits(), waited);
   fake_.finish_compiling(true);
   warm_up(own.get(), frame);
+}
+
+TEST_F(Contract, Contract26cReadingBackWaitsForTheDriver) {
+  const cumulet::test::SurfacesRef panes = make_panes();
+  fake_.compile_in_parallel();
+  fake_.finish_compiling(true);
+  const ViewerPtr own = viewer();
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 4096;
+  ASSERT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_surfaces(own.get(), panes.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+  auto frame = target_.frame();
+  frame.budget_ms = 0.01;
+  auto result = make_desc<cumulet_frame_result>();
+  for (int i = 0; i < 1000 && (result.flags & CUMULET_RENDER_PREVIEW) == 0; ++i) {
+    ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK) << cumulet_last_error(own.get());
+  }
+  ASSERT_NE(result.flags & CUMULET_RENDER_PREVIEW, 0U) << "with surfaces beneath, which the compositor reads back";
+  std::vector<float> first(std::size_t{side} * side * 4);
+  std::vector<float> later(first.size());
+  fake_.finish_compiling(false);
+  ASSERT_EQ(cumulet_read_linear(own.get(), first.data(), first.size()), CUMULET_OK);
+  fake_.finish_compiling(true);
+  ASSERT_EQ(cumulet_read_linear(own.get(), later.data(), later.size()), CUMULET_OK);
+  EXPECT_EQ(first, later);
+}
+
+// Of drivers that answer later, each call's question about the depth is open when it ends (zink).
+TEST_F(Contract, Contract26dAWarmUpWithTheHostsDepthEnds) {
+  const HostTarget scene(gl_, side, side);
+  const ViewerPtr own = viewer();
+  ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+  auto frame = target_.frame();
+  frame.depth_source = CUMULET_DEPTH_SOURCE_FRAMEBUFFER;
+  frame.depth_name = scene.framebuffer();
+  warm_up(own.get(), frame);
+  const auto linked = fake_.calls("LinkProgram");
+  converge(own.get(), frame);
+  EXPECT_EQ(fake_.calls("LinkProgram"), linked);
+}
+
+// Whatever the frame's own part takes of the budget; and one that does not build keeps none of the others from it.
+TEST_F(Contract, Contract26eAWarmUpOfAllEnds) {
+  const ViewerPtr own = viewer();
+  auto frame = target_.frame();
+  frame.budget_ms = 1e-3;
+  auto result = make_desc<cumulet_warm_up_result>();
+  const auto step = [&] { return cumulet_warm_up(own.get(), &frame, CUMULET_WARM_UP_ALL, &result); };
+  const auto run = [&] {
+    cumulet_status status = CUMULET_OK;
+    for (int i = 0; i < 10000; ++i) {
+      status = step();
+      if (status != CUMULET_OK || result.more == 0) return status;
+    }
+    ADD_FAILURE() << "it never ends";
+    return status;
+  };
+  const auto linked = [&] { return fake_.calls("LinkProgram"); };
+  for (int i = 0; i < 10000 && result.progress < 0.2; ++i) {
+    ASSERT_EQ(step(), CUMULET_OK) << cumulet_last_error(own.get());
+    ASSERT_EQ(result.more, 1);
+  }
+  ASSERT_GE(result.progress, 0.2);
+  fake_.fail_linking(true);
+  for (const auto begun = linked(); linked() == begun;) ASSERT_EQ(step(), CUMULET_OK);
+  fake_.fail_linking(false);
+  EXPECT_EQ(run(), CUMULET_ERROR_GL) << "told in the end";
+  EXPECT_NE(std::string(cumulet_last_error(own.get())).find("does not build"), std::string::npos);
+  EXPECT_GT(result.progress, 0.9);
+  // Again it is told, and not built; a setting gives it another chance.
+  const auto before = linked();
+  EXPECT_EQ(run(), CUMULET_ERROR_GL);
+  EXPECT_EQ(linked(), before);
+  auto display = make_desc<cumulet_display_desc>();
+  ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
+  EXPECT_EQ(run(), CUMULET_OK) << cumulet_last_error(own.get());
+  EXPECT_EQ(result.progress, 1.0);
+  EXPECT_EQ(linked(), before + 1);
+}
+
+TEST_F(Contract, Contract26fAFrameThatCannotBeDrawnIsToldOnceAndNotBuiltEachTime) {
+  const ViewerPtr own = viewer();
+  const auto frame = target_.frame();
+  auto none = frame;
+  none.target = CUMULET_TARGET_NONE;
+  ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
+  converge(own.get(), none);
+  fake_.fail_linking(true);
+  EXPECT_EQ(cumulet_render(own.get(), &frame, nullptr), CUMULET_ERROR_GL);
+  const auto linked = fake_.calls("LinkProgram");
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(cumulet_render(own.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(own.get());
+  }
+  EXPECT_EQ(fake_.calls("LinkProgram"), linked);
+  fake_.fail_linking(false);
+  auto display = make_desc<cumulet_display_desc>();
+  display.exposure_stops = 1.0F;
+  ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
+  const Picture before = target_.pixels();
+  converge(own.get(), frame);
+  EXPECT_NE(difference(target_.pixels(), before), "");
 }
 
 // Every example host runs in tests/embed; here the smallest, if it is built.

@@ -95,6 +95,8 @@ class FakeGl {
   void fail_allocation(std::int64_t n) { fail_at_ = n < 0 ? -1 : static_cast<std::int64_t>(allocations_) + n; }
   /// From now on every allocation of storage for a buffer or texture fails, and nothing else.
   void fail_storage(bool fail) { fail_storage_ = fail; }
+  /// Likewise no program links.
+  void fail_linking(bool fail) { fail_linking_ = fail; }
   /// The n-th call from now (0 is the next) finds the context lost. Negative: never. From then on calls do nothing.
   void lose_context(std::int64_t n) { lose_at_ = n < 0 ? -1 : static_cast<std::int64_t>(calls_) + n; }
   [[nodiscard]] bool lost() const { return lost_; }
@@ -191,7 +193,8 @@ class FakeGl {
       }
       if constexpr (allocates(name)) {
         const auto n = static_cast<std::int64_t>(fake->allocations_++);
-        if (n == fake->fail_at_ || (fake->fail_storage_ && contains(name, "Storage"))) {
+        if (n == fake->fail_at_ || (fake->fail_storage_ && contains(name, "Storage")) ||
+            (fake->fail_linking_ && F == Fn::LinkProgram)) {
           fake->refused_ = name;
           if constexpr (F != Fn::CompileShader && F != Fn::LinkProgram) fake->error_ = GL_OUT_OF_MEMORY;
           return Result();
@@ -296,6 +299,7 @@ class FakeGl {
   std::uint64_t uploaded_ = 0;
   std::int64_t fail_at_ = -1;
   bool fail_storage_ = false;
+  bool fail_linking_ = false;
   std::int64_t lose_at_ = -1;
   bool lost_ = false;
   GLenum error_ = GL_NO_ERROR;
