@@ -1,6 +1,6 @@
 """Resolve #include "x.glsl" in glsl/, validate each shader, and write one C++ file that holds them all.
 
-A shader that is compiled with macros says in comments with which, for gl::Programs builds no others:
+A shader that is compiled with macros says in comments with which ones; gl::Programs builds no others:
 
     // variants: CM_MARCH=0 CM_PAGES=1..8 or CM_MARCH=1,2
     // variants: - or CM_LAYERS=1

@@ -42,14 +42,17 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
                  "Write when frames, their passes and jobs ran, for chrome://tracing and Perfetto")
       ->type_name("FILE.json")
       ->group(group);
-  app.add_option("--shader-cache", options.shader_cache,
-                 "Keep what the driver made of shaders in this folder, for the next run")
-      ->type_name("DIR")
-      ->group(group);
-  app.add_option("--shaders", options.shaders,
-                 "Take the shaders of this folder (a copy of glsl/), anew as they change: in debug builds")
-      ->type_name("DIR")
-      ->group(group);
+  const auto add_folder = [&](const char* name, std::string& folder, const char* help) {
+    const auto set = [name, &folder](const std::string& text) {
+      if (text.empty()) throw CLI::ValidationError(name, "the folder's name is empty");
+      folder = text;
+    };
+    app.add_option_function<std::string>(name, set, help)->type_name("DIR")->group(group);
+  };
+  add_folder("--shader-cache", options.shader_cache,
+             "Keep what the driver made of shaders in this folder, for the next run");
+  add_folder("--shaders", options.shaders,
+             "Take the shaders of this folder (a copy of glsl/), anew as they change: in debug builds");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene);

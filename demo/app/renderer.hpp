@@ -32,8 +32,7 @@ class Renderer {
  public:
   /// gl: the window's. context shares objects with it, is current in no thread, and outlives the renderer. wake is
   /// called from any thread when there is an answer to take. timeline, or null: is told of the viewer's work.
-  /// shader_cache, shaders: folders, or "". Throws
-  /// std::runtime_error.
+  /// shader_cache, shaders: folders, or "". Throws std::runtime_error.
   Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline,
            std::string shader_cache, std::string shaders);
   Renderer(const Renderer&) = delete;

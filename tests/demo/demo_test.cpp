@@ -403,6 +403,9 @@ TEST(DemoOptions, TakeTheSceneFlagsAndAFile) {
   EXPECT_FALSE(parse_demo_options({}, out)->sized);
   EXPECT_THROW(static_cast<void>(parse_demo_options({"a.vdb", "--volume", "b.vdb"}, out)), UsageError);
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--ui-scale", "nan"}, out)), UsageError);
+  EXPECT_THROW(static_cast<void>(parse_demo_options({"--shader-cache", ""}, out)), UsageError);
+  EXPECT_THROW(static_cast<void>(parse_demo_options({"--shaders", ""}, out)), UsageError);
+  EXPECT_EQ(parse_demo_options({"--shader-cache", "kept"}, out)->shader_cache, "kept");
 }
 
 TEST(Model, DefaultsAreSpelledOut) {

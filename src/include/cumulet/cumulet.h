@@ -13,7 +13,8 @@
  * between the two (cumulet_load_surfaces, cumulet_set_surfaces).
  *
  * The library makes no window and no context and links no OpenGL: functions come from the host's get_proc callback.
- * There are no globals: viewers, in one context or several, in one thread or several, do not know of each other.
+ * There are no globals: viewers, in one context or several, in one thread or several, do not know of each other, unless
+ * they share programs (cumulet_programs).
  *
  * Life cycle
  *     A viewer is attached to a GL context or detached. cumulet_create attaches it if given get_proc, else
@@ -27,14 +28,15 @@
  *     Calls for one viewer must not overlap, from whatever thread they come, with two exceptions that are safe at any
  *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
  *     objects with it, current on the calling thread: without, they are CUMULET_ERROR_GL each time and change nothing,
- *     and the next call with it goes on. No other call touches GL. Camera, volume and surfaces handles may be used from
- *     any thread at any time. Files are read, grids are built and surfaces are posed on worker threads of the viewer's
- *     own; cumulet_render uploads what they made, within its time budget, and shows the last good picture until then.
- *     The newest wish wins and none starves: what changes faster than it is read, built, posed or uploaded is shown as
- *     often as it can be, and the newest last. The update callback comes from any thread, a worker's included, and not
- *     after cumulet_destroy. Neither it nor the log callback may call the library, but for the two exceptions and to
- *     retain and release handles: any other call from inside one, for whatever viewer or handle, is refused with
- *     CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing).
+ *     and the next call with it goes on. No other call touches GL. Camera, volume, surfaces and programs handles may be
+ *     used from any thread at any time. Files are read, grids are built and surfaces are posed on worker threads of the
+ *     viewer's own; cumulet_render uploads what they made, within its time budget, and shows the last good picture
+ *     until then. The newest wish wins and none starves: what changes faster than it is read, built, posed or uploaded
+ *     is shown as often as it can be, and the newest last. The update callback comes from any thread, a worker's
+ *     included, and not after cumulet_destroy. Neither it nor the log callback may call the library, but for the two
+ *     exceptions and to retain and release handles: any other call from inside one, for whatever viewer or handle, is
+ *     refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while [GL] calls of
+ *     other viewers with the same programs wait for their turn: take no lock in them that is held around a [GL] call.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -142,7 +144,10 @@ typedef enum cumulet_log_level {
   CUMULET_LOG_ERROR = 3
 } cumulet_log_level;
 
-/* The address of a GL function, or NULL. Called during cumulet_create and cumulet_attach only. */
+/*
+ * The address of a GL function, or NULL. Called during cumulet_create and cumulet_attach only. The functions are called
+ * for as long as the viewer is attached, and any other viewer that shares its programs (cumulet_programs).
+ */
 typedef void* (*cumulet_get_proc_fn)(void* user, const char* name);
 /* From the calling thread or the viewer's worker; message, one line, lives until return. */
 typedef void (*cumulet_log_fn)(void* user, cumulet_log_level level, const char* message);
@@ -154,11 +159,10 @@ typedef void (*cumulet_log_fn)(void* user, cumulet_log_level level, const char* 
 typedef void (*cumulet_update_fn)(void* user);
 
 /*
- * A piece of work has ended, for a timeline: "frame" (cumulet_render), its passes ("cumulet: trace"), or a job of a
- * worker
- * ("building the grid", a file). From the thread that did it; begin and end are seconds of its steady clock
- * (CLOCK_MONOTONIC); pieces of one thread lie in each other or apart. name lives until return. As for the update
- * callback: do not call the library.
+ * A piece of work has ended, for a timeline: "frame" (cumulet_render), its passes ("cumulet: trace"), a
+ * "cumulet: warm-up", or a job of a worker ("building the grid", a file). From the thread that did it; begin and end
+ * are seconds of its steady clock (CLOCK_MONOTONIC); pieces of one thread lie in each other or apart. name lives until
+ * return. As for the update callback: do not call the library.
  */
 typedef void (*cumulet_trace_fn)(void* user, const char* name, double begin, double end);
 
@@ -189,7 +193,9 @@ typedef struct cumulet_programs_desc {
  * GL programs, to be shared by viewers (cumulet_create_desc): those that are attached to one context, or to contexts
  * that share objects, compile each program once among them. Programs end with the last viewer that is attached to them,
  * what is in the folder does not. [GL] calls of viewers that share programs wait for each other where they come from
- * several threads at once. Any thread; error as in cumulet_create.
+ * several threads at once; callbacks of the one whose turn it is come meanwhile: take no lock in them that is held
+ * around a [GL] call. Functions that get_proc gave one of these viewers stay callable until none of them is attached.
+ * Any thread; error as in cumulet_create.
  */
 CUMULET_API cumulet_status cumulet_programs_create(const cumulet_programs_desc* desc, cumulet_programs** out,
                                                    char* error, size_t error_size);
@@ -919,14 +925,15 @@ CUMULET_API cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_
 typedef enum cumulet_warm_up_scope {
   CUMULET_WARM_UP_SCENE = 0, /* the programs that frames of the present scene with the present settings need */
   CUMULET_WARM_UP_ALL = 1    /* these, and all others of the library are compiled (not used: a driver that compiles more
-                                in the first use does so then); but for rare ones: grids beyond the driver's limit of a
-                                texture    buffer, sets of maps that the scene's materials do not have */
+                                in the first use does so then), but for rare ones: for grids beyond the driver's limit
+                                of a texture buffer, for sets of maps that the scene's materials do not have. One that
+                                does not build is told once all others are there */
 } cumulet_warm_up_scope;
 
 typedef struct cumulet_warm_up_result {
   size_t struct_size;
   int32_t more;    /* 1: call again */
-  double progress; /* 0 to 1: never less than in the call before; 1 where more is 0 */
+  double progress; /* 0 to 1, within one warm-up (until more is 0) never less than before; 1 where more is 0 */
 } cumulet_warm_up_result;
 
 /*
@@ -935,15 +942,18 @@ typedef struct cumulet_warm_up_result {
  * takes up what the worker has made and uploads, so that all the scene's programs are known; it draws nothing into the
  * frame's target, and reads its depth. Call it after cumulet_wait, or once a frame, until more is 0, and show a bar:
  *
- *     do {
- *       cumulet_warm_up(viewer, &frame, CUMULET_WARM_UP_SCENE, &result);
- *     } while (result.more);
+ *     while (cumulet_warm_up(viewer, &frame, CUMULET_WARM_UP_SCENE, &result) == CUMULET_OK && result.more) show_bar();
+ *
+ * A call that fails leaves result as it was, and ends the warm-up: another begins anew. A load that failed ends it with
+ * more 0. With CUMULET_TARGET_NONE, or without a size, no drawing is warmed. For navigation, and for grids that follow
+ * the camera, a call counts as a frame.
  *
  * A call works for about the frame's budget_ms (not negative), but a driver that does not compile in parallel
  * (KHR_parallel_shader_compile) takes as long as it takes for the program under way. Where the driver does,
  * cumulet_render does not wait for programs either: until one is there the last picture, a coarser one or the surfaces
- * alone are shown. Without a call of this every program is made in the frame that first needs it. result may be NULL.
- * Programs that are there already, another viewer's (cumulet_programs) or a folder's, are not compiled again.
+ * alone are shown; a viewer's first [GL] call in a context alone waits, for one small program. Without a call of this
+ * every program is made in the frame that first needs it. result may be NULL. Programs that are there already, another
+ * viewer's (cumulet_programs) or a folder's, are not compiled again.
  */
 CUMULET_API cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet_frame_desc* frame,
                                            cumulet_warm_up_scope scope, cumulet_warm_up_result* result);
