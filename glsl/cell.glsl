@@ -169,15 +169,16 @@ CM_FN void cm_cell_exit(CmFrame f, uint shape, CM_OUT(float) t_exit, CM_OUT(uint
   float cap_o = cap_y ? f.o.y : (cap_z ? f.o.z : 0.0f);
   float cap_d = cap_y ? f.d.y : (cap_z ? f.d.z : 0.0f);
   float far_away = 3.0e38f;
-  float n_d_0 = -f.d.z;
-  float n_d_1 = f.d.y - f.d.x;
-  float n_d_2 = f.d.z - f.d.y;
-  float n_d_3 = f.d.x + cap_d;
-  float t_0 = n_d_0 > 0.0f ? (f.o.z - f.v0.z) / n_d_0 : far_away;
-  float t_1 = n_d_1 > 0.0f ? ((f.v0.y - f.v0.x) - (f.o.y - f.o.x)) / n_d_1 : far_away;
-  float t_2 = n_d_2 > 0.0f ? ((f.v0.z - f.v0.y) - (f.o.z - f.o.y)) / n_d_2 : far_away;
-  float cap_c = (f.v0.x + cap_a) + (cell_class == 1u ? unit : 2.0f * unit);
-  float t_3 = n_d_3 > 0.0f ? (cap_c - (f.o.x + cap_o)) / n_d_3 : far_away;
+  // Precise: both cells of a face round its distance alike.
+  CM_PRECISE float n_d_0 = -f.d.z;
+  CM_PRECISE float n_d_1 = f.d.y - f.d.x;
+  CM_PRECISE float n_d_2 = f.d.z - f.d.y;
+  CM_PRECISE float n_d_3 = f.d.x + cap_d;
+  CM_PRECISE float t_0 = n_d_0 > 0.0f ? (f.o.z - f.v0.z) / n_d_0 : far_away;
+  CM_PRECISE float t_1 = n_d_1 > 0.0f ? ((f.v0.y - f.v0.x) - (f.o.y - f.o.x)) / n_d_1 : far_away;
+  CM_PRECISE float t_2 = n_d_2 > 0.0f ? ((f.v0.z - f.v0.y) - (f.o.z - f.o.y)) / n_d_2 : far_away;
+  CM_PRECISE float cap_c = (f.v0.x + cap_a) + (cell_class == 1u ? unit : 2.0f * unit);
+  CM_PRECISE float t_3 = n_d_3 > 0.0f ? (cap_c - (f.o.x + cap_o)) / n_d_3 : far_away;
   t_exit = min(min(t_0, t_1), min(t_2, t_3));
   face = t_exit >= far_away ? CM_NONE : (t_exit == t_0 ? 0u : (t_exit == t_1 ? 1u : (t_exit == t_2 ? 2u : 3u)));
 }

@@ -16,7 +16,7 @@
 #ifndef CM_CHUNK
 #define CM_CHUNK 8
 #endif
-// Events between looks at whether a new camera ray is due.
+// Events at most before the kernel does something else.
 #ifndef CM_EVENTS
 #define CM_EVENTS 8
 #endif

@@ -124,7 +124,7 @@ CM_BLOCK(CmIntegrator) {
 CM_BLOCK(CmDispatch) {
   CM_ALIGN(8) uvec2 tile_corner;  // pixels
   CM_ALIGN(8) uvec2 tile_size;
-  uint rounds;   // that a lane runs at most
+  uint rounds;   // that a lane of trace.comp runs at most
   uint samples;  // that a pixel shall have
   uint view;     // of inspect.comp
   uint picks;    // 1: inspect.comp looks at one pixel, the tile's, and tells of it at (0, 0)

@@ -134,8 +134,9 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   float u_1 = cm_random(p.random, p.stream);
   float u_2 = cm_random(p.random, p.stream);
   bool looks = arrived && cm.lights.any != 0u;
-  CmLightSample light = cm_sky_sample(p, p.o, u_2);  // flights go where they might find the sky
-  if (looks) light = cm_light_sample(p, cm_look_from(p, vertex), u_2);
+  vec3 here = cm_look_from(p, vertex);
+  CmLightSample light = cm_sky_sample(p, here, u_2);  // flights go where they might find the sky
+  if (looks) light = cm_light_sample(p, here, u_2);
   vec3 w = cm_turn_direction(p, vertex, u_0, u_1);
   bool along = light.kind == CM_LIGHT_SKY;
   CmTurn turn = cm_turn(p, vertex, along ? w : light.direction);

@@ -27,7 +27,7 @@
 #define CM_ON_TRIANGLE 2u
 
 // The one list of a path's fields: the struct, how it is packed into words (glsl/path_store.glsl), and so its size. In
-// parts, for kernels that change some of them only.
+// parts: a kernel need not store what it does not change.
 // CM_PATH_RAY, the ray under way:
 //   o               its start, cube space
 //   d               its direction, cube space, per unit of world distance

@@ -5,7 +5,7 @@
 
 layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
-  uvec4 cm_total;     // x: full rounds that lanes marched
+  uvec4 cm_total;     // x: rounds that lanes marched: full ones, or visits of trace_travel.comp
   uvec4 cm_blocks[];  // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block of the tile its
                       // pixels without their target samples, those without any and its samples finished in this dispatch
 };

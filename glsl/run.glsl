@@ -1,4 +1,4 @@
-// All stages of a path in one kernel. Shared by GLSL and C++; the includer provides what glsl/flight.glsl asks for, and
+// All stages of a path that meets no triangles, in one kernel. Shared by GLSL and C++; the includer provides what glsl/flight.glsl asks for, and
 //   CmPixel cm_load_pixel(uvec2 at)               what a pixel's samples have come to
 //   void cm_store_pixel(CmPixel pixel, uvec2 at)
 #ifndef CM_RUN_GLSL
@@ -6,19 +6,16 @@
 
 #include "flight.glsl"
 
-// At most so many rounds of the samples of a pixel, which has so many. Returns how often
-// it marched.
+// At most so many rounds of the samples of a pixel, which has so many. Returns how often it marched.
 CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rounds) {
   uint marches = 0u;
   for (uint i = 0u; i < rounds && p.stage != CM_STAGE_DONE; ++i) {
     if (p.stage == CM_STAGE_CAMERA) {
       cm_camera(p, samples, at);
-      if (CM_SURFACES == 0) cm_aim(p);
-      if (CM_SURFACES == 0 && p.cell.x == CM_NONE) p.stage = CM_STAGE_FINISH;
+      cm_aim(p);
+      if (p.cell.x == CM_NONE) p.stage = CM_STAGE_FINISH;
     }
     marches += cm_travel(p);
-    if (CM_SURFACES != 0 && p.stage == CM_STAGE_MEET) cm_meet(p);
-    if (CM_SURFACES != 0 && p.stage == CM_STAGE_VERTEX) cm_handle(p, true);
     if (p.stage == CM_STAGE_FINISH) {
       CmPixel pixel = cm_load_pixel(at);
       cm_finish(p, pixel);

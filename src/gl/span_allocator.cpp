@@ -1,6 +1,7 @@
 #include "gl/span_allocator.hpp"
 
 #include <iterator>
+#include <utility>
 
 namespace cumulet::gl {
 
@@ -11,8 +12,12 @@ std::optional<std::size_t> SpanAllocator::take(std::size_t size) {
   }
   if (best == gaps_.end()) return std::nullopt;
   const auto [first, all] = *best;
-  gaps_.erase(best);
-  if (all > size) gaps_.emplace(first + size, all - size);
+  auto rest = gaps_.extract(best);  // put back without memory, which there may be none of
+  if (all > size) {
+    rest.key() = first + size;
+    rest.mapped() = all - size;
+    gaps_.insert(std::move(rest));
+  }
   free_ -= size;
   return first;
 }

@@ -82,6 +82,7 @@ void GpuScene::drop_data() {
   if (data_) data_revision_.advance();
   data_.clear();
   upload_.reset();
+  took_ = {};  // and what it holds in main memory
 }
 
 void GpuScene::update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline) {

@@ -42,7 +42,13 @@ class PassTimer {
       explicit End(Flights& of) : flights(of) {}
       End(const End&) = delete;
       End& operator=(const End&) = delete;
-      ~End() { flights.end({}, 0, 0); }
+      ~End() {
+        try {
+          flights.end({}, 0, 0);
+        } catch (const std::exception&) {  // no memory to know of it: nothing is told of this one
+          flights.finish();
+        }
+      }
     };
     const End end(flights_);
     pass();

@@ -1,6 +1,7 @@
 #include "render/path_kernels.hpp"
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 #include "gl/bindings.hpp"

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <optional>
 #include <span>
 
 #include "gl/programs.hpp"

@@ -28,7 +28,10 @@ class SurfaceUpload {
   bool advance(Deadline deadline);
   /// Whether all is there, or all but a raster that could not be made.
   [[nodiscard]] bool done() const { return paths_.done() && !raster_due_; }
-  [[nodiscard]] double progress() const { return 0.5 * (paths_.progress() + (raster_due_ ? raster_.progress() : 1.0)); }
+  [[nodiscard]] double progress() const {
+    const double raster = content_ ? raster_.progress() : 0.0;  // planned once paths have theirs
+    return 0.5 * (paths_.progress() + (raster_due_ ? raster : 1.0));
+  }
 
   // Once it is done; null where that was not asked for. The raster: where it failed, too.
   std::unique_ptr<SurfaceData> take_data() { return std::move(data_); }

@@ -357,6 +357,7 @@ void Tracer::clear(Picture& picture) {
   picture.parameters_ = {};
   picture.begun_ = picture.revision_ = ++revision_;
   picture.view_ = View::shaded;
+  picture.depth_row_ = picture.facts_row_ = 0;
   picture.complete_ = picture.done_ = true;
   picture.holes_ = false;
   empty(picture, glm::vec3(0.0F), 1);
@@ -525,6 +526,8 @@ std::optional<Dispatched> Tracer::choose(Picture& picture, const std::shared_ptr
 }
 
 void Tracer::dispatch(Picture& picture, const MarchData& data, const Surfaces& surfaces, Dispatched what) {
+  const bool stages = picture.traced_ > 0;
+  const StagePrograms programs = stages ? stage_programs(picture, data) : StagePrograms{};
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
@@ -552,8 +555,6 @@ void Tracer::dispatch(Picture& picture, const MarchData& data, const Surfaces& s
   what.samples = picture.samples_;
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
   kernels_.set_counters(words);
-  const bool stages = picture.traced_ > 0;
-  const StagePrograms programs = stages ? stage_programs(picture, data) : StagePrograms{};
   flights_.begin(Flights::Kind::dispatch);
   if (stages) {
     kernels_.run_stages(programs, extent.x, count, what.rounds);

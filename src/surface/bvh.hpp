@@ -43,7 +43,7 @@ class Bvh {
   static constexpr int max_depth = 24;
   static constexpr std::uint32_t max_leaf = 4;
   static constexpr std::uint32_t leaf_bit = 0x80000000U;
-  static constexpr std::size_t max_triangles = (std::size_t{1} << 29U) - max_leaf;
+  static constexpr std::size_t max_triangles = std::size_t{max_leaf} << unsigned{max_depth};
 
   /// Four texels.
   struct Node {

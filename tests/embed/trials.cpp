@@ -335,6 +335,9 @@ void Caller::call_all() {
   cumulet_camera* new_camera = nullptr;
   cumulet_volume* new_volume = nullptr;
   cumulet_surfaces* new_surfaces = nullptr;
+  cumulet_programs* new_programs = nullptr;
+  auto programs = make_desc<cumulet_programs_desc>();
+  auto warm_up = make_desc<cumulet_warm_up_result>();
 
   // The exceptions.
   for (cumulet_viewer* v : {viewer, other}) {
@@ -343,9 +346,11 @@ void Caller::call_all() {
   }
   names.insert({"cumulet_cancel", "cumulet_status_text", "cumulet_version", "cumulet_volume_retain",
                 "cumulet_volume_release", "cumulet_surfaces_retain", "cumulet_surfaces_release",
-                "cumulet_camera_release", "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
+                "cumulet_programs_retain", "cumulet_programs_release", "cumulet_camera_release",
+                "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
+  cumulet_programs_release(cumulet_programs_retain(nullptr));
   cumulet_camera_release(nullptr);
   cumulet_inspection_release(nullptr);
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
@@ -355,6 +360,7 @@ void Caller::call_all() {
   if (std::string(cumulet_last_error(viewer)).empty()) wrong.push_back("cumulet_last_error");
 
   CALL(cumulet_create, &create, &new_viewer, nullptr, 0);
+  CALL(cumulet_programs_create, &programs, &new_programs, nullptr, 0);
   CALL(cumulet_volume_open, "none.vdb", nullptr, &new_volume, nullptr, 0);
   CALL(cumulet_volume_from_dense, &dense, &new_volume, nullptr, 0);
   CALL(cumulet_volume_from_sparse, &sparse, &new_volume, nullptr, 0);
@@ -410,6 +416,7 @@ void Caller::call_all() {
     CALL(cumulet_set_navigation, v, &navigation);
     CALL(cumulet_input, v, &event, &handled);
     CALL(cumulet_render, v, &frame, nullptr);
+    CALL(cumulet_warm_up, v, &frame, CUMULET_WARM_UP_SCENE, &warm_up);
     CALL(cumulet_pick_at, v, 0.0, 0.0, &pick);
     CALL(cumulet_get_bounds, v, low.data(), high.data());
     CALL(cumulet_read_linear, v, one.data(), one.size());
@@ -419,7 +426,7 @@ void Caller::call_all() {
     CALL(cumulet_get_stats, v, &stats);
   }
   if (new_viewer != nullptr || new_camera != nullptr || new_volume != nullptr || new_surfaces != nullptr ||
-      new_inspection != nullptr) {
+      new_inspection != nullptr || new_programs != nullptr) {
     wrong.push_back("a refused call gave a handle");
   }
 }

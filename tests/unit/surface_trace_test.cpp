@@ -422,6 +422,28 @@ TEST_P(SurfaceTrace, CoverageIsAShareOfTheRays) {
   }
 }
 
+// Neither budgets nor tiles: no path is lost or run twice between kernels, rounds and dispatches.
+TEST_P(SurfaceTrace, SeedAndSamplesAloneDecideTheImage) {
+  auto scene = std::make_shared<StillScene>();
+  scene->add(test::diffuse(vec3(0.8F)));
+  Material lit = test::diffuse(vec3(0.5F));
+  lit.emission = vec3(3.0F);
+  scene->add(lit);
+  scene->add_sphere({8.0F, 10.0F, 11.0F}, 4.0F, 0);
+  scene->add_sphere({17.0F, 9.0F, 11.0F}, 3.0F, 1);
+  const auto make_one = [&] {
+    auto viewer = make();
+    viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(0), 3));
+    viewer->set_light(sun_at(40.0F, vec3(2.0F), vec3(0.5F)));
+    viewer->viewer().show_surfaces(test::source_of(scene));
+    return viewer;
+  };
+  const test::Image image{600, 10, 3, 9, render::View::shaded};  // two tiles, the second of odd width
+  const test::Picture one = test::render(*make_one(), image);
+  EXPECT_GT(one.mean().x, 0.1F);
+  EXPECT_EQ(one.pixels, test::render(*make_one(), image, 0.5).pixels);
+}
+
 TEST_P(SurfaceTrace, SurfacesNeedNoVolume) {
   const auto viewer = make();
   viewer->set_light(sun_at(90.0F, vec3(1.0F), vec3(1.0F)));
