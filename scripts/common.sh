@@ -32,7 +32,7 @@ install_packages() {
   local package missing=() wanted
   mapfile -t wanted < <(sed -E -e 's/#.*//' -e "s/^$1: *//" -e '/:/d' -e '/^[[:space:]]*$/d' scripts/packages.txt)
   for package in "${wanted[@]}"; do
-    [[ $(dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null || true) == *installed* ]] || missing+=("$package")
+    dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
   done
   [ "${#missing[@]}" -gt 0 ] || { say "packages: all ${#wanted[@]} are here"; return; }
 
