@@ -41,9 +41,9 @@ struct CpuDisc {
 #define CM_MARCH 1
 #include "march_voxel.glsl"
 #define CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, cm_disc_chance, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)
-#include "support/traced_pixel.inc"
 #include "run.glsl"
 #include "support/disc_light.glsl"
+#include "support/traced_pixel.inc"
 #undef CM_MARCH
 };
 

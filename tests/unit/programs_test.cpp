@@ -192,7 +192,7 @@ TEST_F(ProgramsTest, WhatIsDamagedIsIgnoredAndWrittenAnew) {
   const std::vector<std::function<void(std::vector<std::byte>&)>> damages{
       [](auto& bytes) { bytes.clear(); },
       [](auto& bytes) { bytes.resize(20); },
-      [](auto& bytes) { bytes.resize(bytes.size() - 1); },
+      [](auto& bytes) { bytes.pop_back(); },
       [](auto& bytes) { bytes.push_back(std::byte{0}); },
       [](auto& bytes) { bytes[0] ^= std::byte{1}; },                 // another kind of file
       [](auto& bytes) { bytes[9] ^= std::byte{1}; },                 // of another source or driver

@@ -374,7 +374,8 @@ void expect_cpu_agrees(Tracer& cpu, const test::Picture& gpu, std::uint32_t samp
     cpu.traced_pixel = {};
     std::uint32_t traced = 0;
     cpu.cm_run(path, traced, {i % gpu.width, i / gpu.width}, 1000000);
-    const glm::vec4 sum = cpu.traced_pixel.sum / static_cast<float>(samples) + glm::vec4(cpu.traced_pixel.background, 0.0F);
+    const glm::vec4 sum =
+        cpu.traced_pixel.sum / static_cast<float>(samples) + glm::vec4(cpu.traced_pixel.background, 0.0F);
     same += glm::distance(sum, gpu.pixels[i]) < 2e-3F ? 1 : 0;
   }
   // Where a logarithm or a cosine rounds the other way, a path may part from its twin.

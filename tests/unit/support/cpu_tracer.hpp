@@ -26,8 +26,8 @@ struct CpuTetLinear {
 #include "random.glsl"
 #define CM_LINEAR 1
 #include "march_tet.glsl"
-#include "support/traced_pixel.inc"
 #include "run.glsl"
+#include "support/traced_pixel.inc"
 #undef CM_LINEAR
 };
 
@@ -53,8 +53,8 @@ struct CpuDense {
 #include "random.glsl"
 #define CM_MARCH 1
 #include "march_voxel.glsl"
-#include "support/traced_pixel.inc"
 #include "run.glsl"
+#include "support/traced_pixel.inc"
 #undef CM_MARCH
 };
 
