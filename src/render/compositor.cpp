@@ -54,11 +54,13 @@ Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool over
   return &means;
 }
 
-const gl::Program& Compositor::program(const gl::ProgramKey& key, bool waits) {
-  return waits ? programs_->get(key) : programs_->ask(key);
+const gl::Program& Compositor::program(const gl::ProgramKey& key, Wait wait, bool serves) {
+  if (wait == Wait::always) return programs_->get(key);
+  const gl::Program& program = programs_->ask(key);  // throws again what has failed
+  return program.usable() || wait == Wait::never || serves ? program : programs_->get(key);
 }
 
-Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background, bool waits) {
+Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background, Wait wait) {
   lags_ = false;
   const MeansOf wanted{
       picture.sum,     picture.holes ? picture.sum_before : 0, picture.holes, background, picture.size, picture.picture,
@@ -73,7 +75,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   const gl::Program& program = Compositor::program(
       {"resolve.comp",
        {picture.holes ? "CM_HOLES 1" : "CM_HOLES 0", "CM_BACKGROUND " + std::to_string(static_cast<int>(background))}},
-      waits);
+      wait, alike);
   if (!program.usable()) {
     lags_ = true;
     return alike ? newest_ : nullptr;
@@ -82,7 +84,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   const auto begun = Clock::now();
   Means* means = nullptr;
   try {
-    means = free_means(picture.size, background == Background::apart, waits);
+    means = free_means(picture.size, background == Background::apart, wait == Wait::always);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::out_of_memory) throw;
     means_.clear();
@@ -118,25 +120,26 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   return means;
 }
 
-const gl::Program* Compositor::colour_program(const Kind& kind, const Display& display, bool waits) {
+const gl::Program* Compositor::colour_program(const Kind& kind, const Display& display, Wait wait) {
   std::vector<std::string> defines{"CM_DEPTH 0", kind.bilinear ? "CM_BILINEAR 1" : "CM_BILINEAR 0",
                                    kind.resolved ? "CM_RESOLVED 1" : "CM_RESOLVED 0",
                                    "CM_TONE_MAP " + std::to_string(curve_of(display)) + "u",
                                    kind.encoding == ColourEncoding::srgb ? "CM_ENCODE true" : "CM_ENCODE false"};
   if (kind.layered) defines.emplace_back("CM_LAYERS 1");
-  const gl::Program& wanted = program(key_of(std::move(defines)), waits);
+  const bool serves = colour_ != nullptr && colour_kind_ == kind;  // the one of before
+  const gl::Program& wanted = program(key_of(std::move(defines)), wait, serves);
   if (wanted.usable()) {
     colour_ = &wanted;
     colour_kind_ = kind;
     return colour_;
   }
   lags_ = true;
-  return colour_kind_ == kind ? colour_ : nullptr;
+  return serves ? colour_ : nullptr;
 }
 
 void Compositor::draw_depth(const PictureTextures& picture, const FrameTarget& target) {
   const auto& gl = *gl_;
-  const gl::Program& program = Compositor::program(key_of({"CM_DEPTH 1"}), target.waits);
+  const gl::Program& program = Compositor::program(key_of({"CM_DEPTH 1"}), target.wait, false);
   if (!program.usable()) {
     lags_ = true;
     return;
@@ -175,14 +178,14 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
   const Background without = display.transparent ? Background::left_out : Background::added;
-  Means* const means = resolve(picture, layered ? Background::apart : without, target.waits);
+  Means* const means = resolve(picture, layered ? Background::apart : without, target.wait);
   const auto begun = Clock::now();
   // Without means either there is no memory for them, or the driver is at their program still.
   const bool resolved = means != nullptr || lags_;
   const glm::uvec2 size = means != nullptr ? means->of.size : picture.size;
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
   const gl::Program* const shown =
-      colour_program({layered, resolved, bilinear, display.encoding}, display, target.waits);
+      colour_program({layered, resolved, bilinear, display.encoding}, display, target.wait);
   if ((resolved && means == nullptr) || shown == nullptr) return;
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),

@@ -35,12 +35,19 @@ struct PictureTextures {
   bool may_lag = false;  // more samples of it are on their way: those of some frames ago may be drawn
 };
 
+/// When drawing waits for the driver's compiler.
+enum class Wait {
+  never,    ///< what is not there yet draws nothing
+  to_show,  ///< where nothing was drawn yet that serves instead
+  always,   ///< what is drawn is read back, and may not lag
+};
+
 struct FrameTarget {
   GLuint framebuffer = 0;
   glm::ivec4 viewport{0};  // as glViewport
   bool flip_y = false;     // true: the picture's top row at y = 0
   bool blend_over = true;
-  bool waits = false;  // for the driver's compiler: the picture is read back, and may not lag
+  Wait wait = Wait::to_show;
   // Depth to write, where the picture has volume_z: a + b / z, or a + b z where orthographic.
   bool write_depth = false;
   bool reversed = false;
@@ -64,8 +71,8 @@ class Compositor {
   /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
   [[nodiscard]] bool drawn() const { return newest_ == nullptr || newest_->drawn.passed(); }
   /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
-  /// that the device has not come to, or as it was drawn then, or nothing, its programs not being there yet: to be
-  /// drawn again.
+  /// that the device has not come to, or as it was drawn then, or nothing (Wait::never), its programs not being there
+  /// yet: to be drawn again.
   [[nodiscard]] bool lags() const { return lags_; }
 
  private:
@@ -100,13 +107,13 @@ class Compositor {
     ColourEncoding encoding = ColourEncoding::srgb;
     bool operator==(const Kind&) const = default;
   };
-  // waits: one that is linked.
-  const gl::Program& program(const gl::ProgramKey& key, bool waits);
+  // serves: something else may be drawn until it is linked.
+  const gl::Program& program(const gl::ProgramKey& key, Wait wait, bool serves);
   // Until the one for this display is there, the one of before; null if that is of another kind.
-  const gl::Program* colour_program(const Kind& kind, const Display& display, bool waits);
+  const gl::Program* colour_program(const Kind& kind, const Display& display, Wait wait);
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
   // The means to draw; null if there is no memory for them.
-  Means* resolve(const PictureTextures& picture, Background background, bool waits);
+  Means* resolve(const PictureTextures& picture, Background background, Wait wait);
   // To be written; null if as many as there may be wait to be drawn. Else newest_ may be gone. overwrite: takes one
   // that is still to be drawn.
   Means* free_means(glm::uvec2 size, bool apart, bool overwrite);

@@ -36,6 +36,7 @@ bool Rehearsal::advance(PictureWish wish, const MarchData& data, const Surfaces&
 void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarget target) {
   picture.revision.reset();
   picture.may_lag = false;
+  target.wait = Wait::never;
   gl_->Enablei(GL_SCISSOR_TEST, 0);
   gl_->ScissorIndexed(0, 0, 0, 0, 0);
   const glm::ivec4 whole = target.viewport;

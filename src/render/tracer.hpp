@@ -181,6 +181,8 @@ class Tracer {
   /// A fact a pixel (PixelFact), each channels_of(fact) floats. Finds them first, if need be.
   void read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
+  /// What this context does from now on comes after what is under way, whichever made that. Waits for nothing.
+  void order() const { flights_.order(); }
   /// Waits for what is under way, so that all that is known of the picture is exact.
   void settle(Picture& picture);
   /// Every dispatch that ends is told; for tests.

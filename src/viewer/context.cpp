@@ -52,7 +52,10 @@ render::Deadline Context::deadline_of(const Frame& frame, bool shares) const {
 
 void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline) {
   if (std::exchange(tried_, shot.settings) != shot.settings) programs_->try_again();
-  if (scene_.data() != nullptr && shot.scene->volumes.front().source == nullptr) progressive_.reset();
+  // What another context of the group has under way may read memory that is written now.
+  progressive_.tracer().order();
+  const std::vector<scene::Volume>& volumes = shot.scene->volumes;
+  if (scene_.data() != nullptr && (volumes.empty() || volumes.front().source == nullptr)) progressive_.reset();
   const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
   const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, page_texels}, deadline); };
   if (scene_.uploading()) {

@@ -62,7 +62,7 @@ void Context::read_composite(render::Picture& picture, bool transparent, float* 
   target.viewport = {0, 0, size};
   target.flip_y = true;  // the first row is the top
   target.blend_over = false;
-  target.waits = true;
+  target.wait = render::Wait::always;
   composite(picture.film(), textures_of(picture, nullptr), display, target);
   functions_->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
   gl::check(*functions_, "reading the picture back");

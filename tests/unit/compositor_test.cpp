@@ -281,6 +281,7 @@ class Compositing : public cumulet::test::GlTest {
     const Target made = make_target(format, samples);
     const std::vector<glm::vec4> untouched = read(made, format, samples);
     FrameTarget target = wanted;
+    target.wait = render::Wait::always;
     target.framebuffer = made.framebuffer.name();
     {
       const StateGuard guard(*gl_);

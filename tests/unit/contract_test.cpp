@@ -1134,11 +1134,11 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   const ViewerPtr own = viewer();
   const auto frame = target_.frame();
   auto result = make_desc<cumulet_frame_result>();
-  ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK);  // it alone waits, for a small program
-  EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U) << "nothing is drawn yet of what there is without a scene";
-  fake_.finish_compiling(true);
+  // Without a warm-up the first waits, for programs that draw: there is nothing to show instead.
   ASSERT_EQ(cumulet_render(own.get(), &frame, &result), CUMULET_OK);
   EXPECT_EQ(result.flags & CUMULET_RENDER_MORE, 0U);
+  EXPECT_GT(fake_.waits(), 0U);
+  fake_.finish_compiling(true);
   ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
   const auto stalls = [&](const char* what) {
@@ -1169,7 +1169,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   display.tone_map = CUMULET_TONE_MAP_CLIP;
   ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
   stalls("a tone map");
-  // Another encoding is for another target: nothing serves but its own.
+  // Another encoding is for another target: nothing serves but its own, which is waited for.
   converge(own.get(), frame);
   target_.clear({0.2F, 0.4F, 0.6F, 1.0F});
   const Picture cleared = target_.pixels();
@@ -1177,8 +1177,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   linear.colour = CUMULET_COLOUR_LINEAR;
   fake_.finish_compiling(false);
   ASSERT_EQ(cumulet_render(own.get(), &linear, &result), CUMULET_OK);
-  EXPECT_NE(result.flags & CUMULET_RENDER_MORE, 0U);
-  EXPECT_EQ(difference(target_.pixels(), cleared), "");
+  EXPECT_NE(difference(target_.pixels(), cleared), "");
   fake_.finish_compiling(true);
   // A warm-up does not wait either, and ends when the driver does.
   auto sampling = make_desc<cumulet_sampling_desc>();

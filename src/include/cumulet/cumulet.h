@@ -951,7 +951,8 @@ typedef struct cumulet_warm_up_result {
  * A call works for about the frame's budget_ms (not negative), but a driver that does not compile in parallel
  * (KHR_parallel_shader_compile) takes as long as it takes for the program under way. Where the driver does,
  * cumulet_render does not wait for programs either: until one is there the last picture, a coarser one or the surfaces
- * alone are shown; a viewer's first [GL] call in a context alone waits, for one small program. Without a call of this
+ * alone are shown. But a viewer's first [GL] call in a context waits, for one small program, and a frame that has
+ * nothing to show instead (the first, one of another encoding) for those that draw. Without a call of this
  * every program is made in the frame that first needs it. result may be NULL. Programs that are there already, another
  * viewer's (cumulet_programs) or a folder's, are not compiled again.
  */
