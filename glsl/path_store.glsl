@@ -10,10 +10,7 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
                       // pixels without their target samples, those without any and its samples finished in this dispatch
 };
 
-// The tile's pixels in blocks.
-#define CM_BLOCK_WIDTH 128u
-#define CM_BLOCK_HEIGHT 8u
-#define CM_BEGINS 0x80000000u  // a pass
+#include "path_blocks.glsl"
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
 #define CM_ZERO_VEC2(name) p.name = vec2(0.0);

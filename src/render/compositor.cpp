@@ -28,11 +28,15 @@ bool Compositor::resolves_now() const { return milliseconds(Clock::now() - resol
 
 double Compositor::expected_ms() const { return draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0); }
 
-Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool overwrite) {
+Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool overwrite, bool newest_serves) {
   const bool waits = !overwrite && gl_->dispatches_in_call && !gl::Fence(gl_).passed();
   if (waits) {
     std::erase_if(means_, [this](const auto& means) { return means.get() != newest_ && means->drawn.passed(); });
-    if (means_.size() >= most_means) return nullptr;
+    if (means_.size() >= most_means) {
+      if (newest_serves) return nullptr;
+      newest_ = nullptr;
+      means_.erase(means_.begin());
+    }
   } else {
     newest_ = nullptr;
     means_.resize(std::min<std::size_t>(means_.size(), 1));
@@ -84,7 +88,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   const auto begun = Clock::now();
   Means* means = nullptr;
   try {
-    means = free_means(picture.size, background == Background::apart, wait == Wait::always);
+    means = free_means(picture.size, background == Background::apart, wait == Wait::always, alike);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::out_of_memory) throw;
     means_.clear();
@@ -93,8 +97,8 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
     no_memory_ = error;
     return nullptr;  // slower and with holes, but drawn
   }
-  lags_ = means == nullptr && alike;
-  if (means == nullptr) return alike ? newest_ : nullptr;
+  lags_ = means == nullptr;
+  if (lags_) return newest_;
   const auto& gl = *gl_;
   const bool before = picture.sum_before != 0;
   gl.BindTextureUnit(core::CM_UNIT_SUM, picture.sum);

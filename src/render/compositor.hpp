@@ -114,9 +114,10 @@ class Compositor {
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
   // The means to draw; null if there is no memory for them.
   Means* resolve(const PictureTextures& picture, Background background, Wait wait);
-  // To be written; null if as many as there may be wait to be drawn. Else newest_ may be gone. overwrite: takes one
-  // that is still to be drawn.
-  Means* free_means(glm::uvec2 size, bool apart, bool overwrite);
+  // To be written. Where as many as there may be wait to be drawn: null if the newest serves as well, else in place of
+  // the oldest, whose memory the driver keeps until it is drawn. Else newest_ may be gone. overwrite: takes one that is
+  // still to be drawn.
+  Means* free_means(glm::uvec2 size, bool apart, bool overwrite, bool newest_serves);
   [[nodiscard]] bool resolves_now() const;
 
   gl::FunctionsPtr gl_;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gl/bindings.hpp"
+#include "render/pace.hpp"
 #include "render/parameters.hpp"
 
 namespace cumulet::core {
@@ -31,7 +32,7 @@ std::uint32_t groups_across(std::uint32_t tile_width) {
 
 void PathKernels::reserve(std::size_t lanes, bool stages) {
   if (!blocks_) {
-    blocks_ = gl::make_buffer(gl_, (1 + most_blocks) * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
+    blocks_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
                               "creating the counters");
   }
   if (lanes > paths_lanes_) {

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "gl/programs.hpp"
+#include "path_blocks.glsl"
 
 namespace cumulet::render {
 
@@ -21,10 +22,9 @@ struct StagePrograms {
 /// All calls need the context current and a StateGuard around.
 class PathKernels {
  public:
-  static constexpr std::uint32_t block_width = 128;  // glsl/path_store.glsl's
-  static constexpr std::uint32_t block_height = 8;
-  static constexpr std::uint32_t begins_pass = 0x80000000U;
-  static constexpr std::size_t most_blocks = 256;
+  static constexpr std::uint32_t block_width = CM_BLOCK_WIDTH;
+  static constexpr std::uint32_t block_height = CM_BLOCK_HEIGHT;
+  static constexpr std::uint32_t begins_pass = CM_BEGINS;
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 

@@ -465,6 +465,8 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces&
     *picture.samples_ = std::uint64_t{picture.size_.x} * std::min(picture.view_row_, picture.size_.y);
     return picture.done_;
   }
+  std::optional<StagePrograms> stages;
+  if (picture.traced_ > 0) stages = stage_programs(picture, data);
   until_complete = until_complete && !picture.complete_;
   const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
   bool sent = false;
@@ -474,7 +476,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces&
       auto what = choose(picture, program.cost, std::clamp(left, 0.0, aim), false);
       if (!what && !sent && flights_.empty()) what = choose(picture, program.cost, least_ms, true);
       if (what) {
-        dispatch(picture, data, surfaces, std::move(*what));
+        dispatch(picture, surfaces, stages, std::move(*what));
         sent = true;
         collect();
         picture.end_tile();
@@ -525,9 +527,8 @@ std::optional<Dispatched> Tracer::choose(Picture& picture, const std::shared_ptr
   return what;
 }
 
-void Tracer::dispatch(Picture& picture, const MarchData& data, const Surfaces& surfaces, Dispatched what) {
-  const bool stages = picture.traced_ > 0;
-  const StagePrograms programs = stages ? stage_programs(picture, data) : StagePrograms{};
+void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, const std::optional<StagePrograms>& stages,
+                      Dispatched what) {
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
   describe(surfaces, parameters);
@@ -557,7 +558,7 @@ void Tracer::dispatch(Picture& picture, const MarchData& data, const Surfaces& s
   kernels_.set_counters(words);
   flights_.begin(Flights::Kind::dispatch);
   if (stages) {
-    kernels_.run_stages(programs, extent.x, count, what.rounds);
+    kernels_.run_stages(*stages, extent.x, count, what.rounds);
   } else {
     kernels_.run_one(extent.x, count);
   }

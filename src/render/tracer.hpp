@@ -215,7 +215,9 @@ class Tracer {
   // What to dispatch: nothing if it is likely to take longer than the aim. anyway: the least, then.
   static std::optional<Dispatched> choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
                                           bool anyway);
-  void dispatch(Picture& picture, const MarchData& data, const Surfaces& surfaces, Dispatched what);
+  // stages: what paths among triangles are run by; without them the program in use is the one kernel.
+  void dispatch(Picture& picture, const Surfaces& surfaces, const std::optional<StagePrograms>& stages,
+                Dispatched what);
   // Takes up what has ended.
   void collect();
   // Whether the surface pass is done, where a dispatch that reads it would wait for it.

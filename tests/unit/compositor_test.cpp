@@ -15,6 +15,7 @@
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
 #include "image.hpp"
+#include "support/busy_host.hpp"
 #include "support/gl_state.hpp"
 
 namespace {
@@ -567,6 +568,39 @@ TEST_P(Compositing, PixelsWithoutASampleShowWhatWasThereBefore) {
       EXPECT_EQ(value.z > 0.0F, row < 7 && !has_before) << row;  // the background alone
     }
   }
+}
+
+// As many pictures as may wait for a busy device do, and none of them is like the next: that one is drawn as they are,
+// by programs that are there.
+TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
+  gl::find_out_dispatches(gl_, *programs_);
+  const Picture picture(gl_, 21, 13, false);
+  const Target made = make_target(GL_RGBA32F, 0);
+  FrameTarget target;
+  target.viewport = {7, 5, 21, 13};
+  target.blend_over = false;
+  target.framebuffer = made.framebuffer.name();
+  const auto draw = [&](bool transparent) {
+    Display display;
+    display.transparent = transparent;
+    const StateGuard guard(*gl_);
+    compositor_->draw(picture.textures(), display, target);
+  };
+  for (const bool transparent : {false, true}) {
+    check(picture, {.transparent = transparent}, target, GL_RGBA32F, 0);
+  }
+  const std::size_t programs = programs_->counts().asked;
+  const cumulet::test::BusyHost host(*gl_, 500.0);
+  host.queue();
+  for (int i = 0; i < 8; ++i) {
+    draw(i % 2 == 1);
+    EXPECT_FALSE(compositor_->lags());
+  }
+  EXPECT_EQ(programs_->counts().asked, programs);
+  const std::vector<glm::vec4> got = read(made, GL_RGBA32F, 0);
+  check(picture, {.transparent = true}, target, GL_RGBA32F, 0);
+  draw(true);
+  EXPECT_EQ(read(made, GL_RGBA32F, 0), got);
 }
 
 TEST_P(Compositing, NothingToDraw) {

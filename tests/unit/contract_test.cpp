@@ -1047,21 +1047,6 @@ TEST_F(Contract, Contract24LogsErrorsAndNoExceptions) {
     EXPECT_NE(std::string(cumulet_status_text(status)), "");
 }
 
-/// Two panes in a ball of make_ball(16), one of which covers half.
-cumulet::test::SurfacesRef make_panes() {
-  const std::array<float, 9> opaque{-5.0F, -5.0F, 0.0F, 5.0F, -5.0F, 0.0F, 0.0F, 6.0F, 1.0F};
-  const std::array<float, 9> veil{-9.0F, -2.0F, 9.0F, 9.0F, -2.0F, 9.0F, 0.0F, 2.0F, 9.0F};
-  std::array<cumulet_mesh_desc, 2> meshes{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
-  for (std::size_t i = 0; i < 2; ++i) {
-    meshes.at(i).positions = i == 0 ? opaque.data() : veil.data();
-    meshes.at(i).vertex_count = 3;
-    meshes.at(i).double_sided = 1;
-  }
-  const std::array<float, 4> half{0.9F, 0.2F, 0.1F, 0.5F};
-  std::copy(half.begin(), half.end(), meshes[1].base_color);
-  return cumulet::test::make_surfaces(meshes);
-}
-
 /// Until all is warm: the progress that was told.
 std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& frame) {
   std::vector<double> told;
@@ -1076,7 +1061,7 @@ std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& fr
 }
 
 TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
-  const cumulet::test::SurfacesRef panes = make_panes();
+  const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
   const auto compiled = [&] { return fake_.calls("CompileShader") + fake_.calls("LinkProgram"); };
   struct Case {
     cumulet_preview preview;
@@ -1129,7 +1114,7 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
 }
 
 TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
-  const cumulet::test::SurfacesRef panes = make_panes();
+  const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
   fake_.compile_in_parallel();
   const ViewerPtr own = viewer();
   const auto frame = target_.frame();
@@ -1196,7 +1181,7 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
 }
 
 TEST_F(Contract, Contract26cReadingBackWaitsForTheDriver) {
-  const cumulet::test::SurfacesRef panes = make_panes();
+  const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
   fake_.compile_in_parallel();
   fake_.finish_compiling(true);
   const ViewerPtr own = viewer();

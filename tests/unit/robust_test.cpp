@@ -72,21 +72,6 @@ Picture shown(const Host& host, cumulet_viewer* viewer, cumulet_status* status =
   return host.target.pixels();
 }
 
-/// Two panes across a ball of make_ball(12): an opaque one and one that covers half.
-SurfacesRef make_panes() {
-  const std::array<float, 9> opaque{-4.0F, -4.0F, 0.0F, 4.0F, -4.0F, 0.0F, 0.0F, 5.0F, 1.0F};
-  const std::array<float, 9> veil{-9.0F, -2.0F, 9.0F, 9.0F, -2.0F, 9.0F, 0.0F, 2.0F, 9.0F};
-  std::array<cumulet_mesh_desc, 2> meshes{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
-  for (std::size_t i = 0; i < 2; ++i) {
-    meshes.at(i).positions = i == 0 ? opaque.data() : veil.data();
-    meshes.at(i).vertex_count = 3;
-    meshes.at(i).double_sided = 1;
-  }
-  const std::array<float, 4> half{0.9F, 0.2F, 0.1F, 0.5F};
-  std::copy(half.begin(), half.end(), meshes[1].base_color);
-  return cumulet::test::make_surfaces(meshes);
-}
-
 void light_surfaces(cumulet_viewer* viewer, cumulet_surface_light light) {
   auto settings = make_desc<cumulet_surface_settings_desc>();
   settings.light = light;
@@ -186,7 +171,7 @@ TEST(Robust, NewVolumesSizesAndSettingsDoNotPileUpObjects) {
 
 TEST(Robust, SurfacesLeaveNothing) {
   Host host;
-  const SurfacesRef panes = make_panes();
+  const SurfacesRef panes = cumulet::test::make_panes(4.0F);
   Picture first;
   for (int life = 0; life < (sanitized ? 4 : 24); ++life) {
     {
@@ -274,7 +259,7 @@ TEST_F(OutOfMemory, ANewVolumeThatDoesNotFitLeavesTheOldOne) {
 
 // Previews and --surface-light none have textures of their own to lose.
 TEST_F(OutOfMemory, SurfacesThatDoNotFitLeaveTheVolume) {
-  const SurfacesRef panes = make_panes();
+  const SurfacesRef panes = cumulet::test::make_panes(4.0F);
   for (const auto mode : {CUMULET_PREVIEW_OFF, CUMULET_PREVIEW_AUTO}) {
     preview(viewer_.get(), mode);
     for (const auto light : {CUMULET_SURFACE_LIGHT_FULL, CUMULET_SURFACE_LIGHT_NONE}) {
@@ -501,7 +486,7 @@ TEST_F(ContextLossAt, AnyCallWhileRendering) {
 }
 
 TEST_F(ContextLossAt, AnyCallWithSurfaces) {
-  const SurfacesRef panes = make_panes();
+  const SurfacesRef panes = cumulet::test::make_panes(4.0F);
   ASSERT_EQ(cumulet_set_surfaces(viewer_.get(), panes.get()), CUMULET_OK);
   light_surfaces(viewer_.get(), CUMULET_SURFACE_LIGHT_NONE);
   measure();

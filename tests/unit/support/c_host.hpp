@@ -85,6 +85,21 @@ inline SurfacesRef make_surfaces(std::span<const cumulet_mesh_desc> meshes) {
   return SurfacesRef(out);
 }
 
+/// Two panes across a ball of make_ball: an opaque one that reaches so far, and one that covers half.
+inline SurfacesRef make_panes(float reach) {
+  const std::array<float, 9> opaque{-reach, -reach, 0.0F, reach, -reach, 0.0F, 0.0F, reach + 1.0F, 1.0F};
+  const std::array<float, 9> veil{-9.0F, -2.0F, 9.0F, 9.0F, -2.0F, 9.0F, 0.0F, 2.0F, 9.0F};
+  std::array<cumulet_mesh_desc, 2> meshes{make_desc<cumulet_mesh_desc>(), make_desc<cumulet_mesh_desc>()};
+  for (std::size_t i = 0; i < 2; ++i) {
+    meshes.at(i).positions = i == 0 ? opaque.data() : veil.data();
+    meshes.at(i).vertex_count = 3;
+    meshes.at(i).double_sided = 1;
+  }
+  const std::array<float, 4> half{0.9F, 0.2F, 0.1F, 0.5F};
+  std::copy(half.begin(), half.end(), meshes[1].base_color);
+  return make_surfaces(meshes);
+}
+
 inline GladGLContext load_gl(cumulet_get_proc_fn get_proc, void* user) {
   std::pair<cumulet_get_proc_fn, void*> loader(get_proc, user);
   GladGLContext gl{};

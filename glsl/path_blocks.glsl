@@ -1,0 +1,9 @@
+// The tile's pixels in blocks, of which a dispatch has some. Shared by GLSL and C++.
+#ifndef CM_PATH_BLOCKS_GLSL
+#define CM_PATH_BLOCKS_GLSL
+
+#define CM_BLOCK_WIDTH 128u
+#define CM_BLOCK_HEIGHT 8u
+#define CM_BEGINS 0x80000000u  // with a block's number: a pass begins
+
+#endif
