@@ -76,7 +76,7 @@ CM_BLOCK(CmLights) {
   CM_EQUALITY(CmLights)
 };
 
-// The box of all triangles, and first words of the tables of glsl/surface.glsl and their sizes: render::SurfaceData.
+// The box of all triangles, and first words of the tables of glsl/surface.glsl and their sizes: render::ModelData.
 CM_BLOCK(CmSurfaceTables) {
   CM_ALIGN(16) vec3 low;   // world
   CM_ALIGN(16) vec3 high;

@@ -17,34 +17,34 @@ using Clock = std::chrono::steady_clock;
 
 void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline) {
   const scene::MarchSourcePtr volume = snapshot.volumes.empty() ? nullptr : snapshot.volumes.front().source;
-  const SurfaceSourcePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
+  const scene::ModelSourcePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
   if (!volume) drop_data();
-  update_surfaces(model, wanted, deadline);
+  update_model(model, wanted, deadline);
   if (volume) update_data(volume, wanted, deadline);
 }
 
-void GpuScene::update_surfaces(const SurfaceSourcePtr& source, const Wanted& wanted, Deadline deadline) {
+void GpuScene::update_model(const scene::ModelSourcePtr& source, const Wanted& wanted, Deadline deadline) {
   if (!source) {
-    if (!surfaces_.empty()) surfaces_revision_.advance();
-    surfaces_.clear();
-    surface_upload_.reset();
+    if (!model_.empty()) model_revision_.advance();
+    model_.clear();
+    model_upload_.reset();
   }
   if (!source || !wanted.raster) show_raster(source, nullptr);
   // As with volumes: what is under way goes on to its end. What paths meet and what is drawn changes at once, or a
   // picture would be of two poses.
   while (source) {
-    if (!surface_upload_) {
-      const bool paths = surfaces_.wants(source, wanted.settings);
+    if (!model_upload_) {
+      const bool paths = model_.wants(source, wanted.settings);
       const bool raster = wanted.raster && raster_.wants(source, wanted.settings);
       if (!paths && !raster) break;
-      const SurfaceParts parts = !raster ? SurfaceParts::paths : (paths ? SurfaceParts::both : SurfaceParts::raster);
-      surface_upload_ = SurfacesUnderWay{source, wanted.settings, parts, nullptr};
+      const ModelParts parts = !raster ? ModelParts::paths : (paths ? ModelParts::both : ModelParts::raster);
+      model_upload_ = ModelUnderWay{source, wanted.settings, parts, nullptr};
     }
-    SurfacesUnderWay& upload = *surface_upload_;
+    ModelUnderWay& upload = *model_upload_;
     try {
       if (!upload.work) {
-        upload.work = std::make_unique<SurfaceUpload>(gl_, programs_, limits_, heap_, upload.of, upload.parts,
-                                                      surfaces_.get(), raster_ ? *raster_ : nullptr);
+        upload.work = std::make_unique<ModelUpload>(gl_, programs_, limits_, heap_, upload.of, upload.parts,
+                                                    model_.get(), raster_ ? *raster_ : nullptr);
       }
       if (!upload.work->advance(deadline)) break;
       finish_surfaces();
@@ -52,9 +52,9 @@ void GpuScene::update_surfaces(const SurfaceSourcePtr& source, const Wanted& wan
       if (upload.work && upload.work->done()) {
         finish_surfaces();
       } else {
-        surfaces_.fail(upload.of, upload.settings);
+        model_.fail(upload.of, upload.settings);
         raster_.fail(upload.of, upload.settings);
-        surface_upload_.reset();
+        model_upload_.reset();
       }
       throw;
     }
@@ -62,16 +62,16 @@ void GpuScene::update_surfaces(const SurfaceSourcePtr& source, const Wanted& wan
 }
 
 void GpuScene::finish_surfaces() {
-  const SurfacesUnderWay upload = *std::exchange(surface_upload_, std::nullopt);
-  surfaces_revision_.advance();
-  if (auto data = upload.work->take_data()) surfaces_.put(upload.of, std::move(*data));
-  if (upload.parts == SurfaceParts::paths) return;
+  const ModelUnderWay upload = *std::exchange(model_upload_, std::nullopt);
+  model_revision_.advance();
+  if (auto data = upload.work->take_data()) model_.put(upload.of, std::move(*data));
+  if (upload.parts == ModelParts::paths) return;
   const RasterContentPtr raster = upload.work->take_raster();
   show_raster(upload.of, raster);  // where it failed rays meet the triangles
   if (!raster) raster_.fail(upload.of, upload.settings);
 }
 
-void GpuScene::show_raster(const SurfaceSourcePtr& of, const RasterContentPtr& content) {
+void GpuScene::show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content) {
   if (!content && raster_.empty()) return;
   surface_pass_.show(content);
   raster_.clear();
@@ -113,7 +113,7 @@ void GpuScene::update_data(const scene::MarchSourcePtr& source, const Wanted& wa
 
 double GpuScene::progress() const {
   if (upload_ && upload_->work) return upload_->work->progress();
-  return surface_upload_ && surface_upload_->work ? surface_upload_->work->progress() : 1.0;
+  return model_upload_ && model_upload_->work ? model_upload_->work->progress() : 1.0;
 }
 
 std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) const {
@@ -122,21 +122,21 @@ std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) 
 }
 
 std::uint64_t GpuScene::other_bytes() const {
-  return (surfaces_ ? surfaces_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) + heap_.free_bytes();
+  return (model_ ? model_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) + heap_.free_bytes();
 }
 
-Surfaces GpuScene::surfaces(const scene::Snapshot& snapshot, bool traced) {
-  Surfaces surfaces;
-  surfaces.scene = surfaces_.get();
-  surfaces.raster = raster_ ? &surface_pass_ : nullptr;
-  surfaces.traced = traced || surfaces.raster == nullptr;
-  if (*snapshot.view) surfaces.view = **snapshot.view;
+Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
+  Obstacles obstacles;
+  obstacles.scene = model_.get();
+  obstacles.raster = raster_ ? &surface_pass_ : nullptr;
+  obstacles.traced = traced || obstacles.raster == nullptr;
+  if (*snapshot.view) obstacles.view = **snapshot.view;
   const light::DistantLights& lights = *snapshot.lights;
-  surfaces.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance};
-  return surfaces;
+  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance};
+  return obstacles;
 }
 
-PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Surfaces& surfaces,
+PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Obstacles& obstacles,
                                        const core::CmIntegrator& integrator, glm::uvec2 size) const {
   const scene::Viewpoint& view = **snapshot.view;
   const scene::MarchSource& source = *data_.of();
@@ -153,7 +153,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Su
   p.medium.source = medium.emission;
   p.medium.anisotropy = medium.anisotropy;
   const bool glow = integrator.light_among_surfaces != 0U && medium.emission != glm::vec3(0.0F);
-  const SurfaceData* met = surfaces.met();
+  const ModelData* met = obstacles.met();
   const light::LightTable table(*snapshot.lights, met != nullptr ? met->lights() : light::SceneLights{}, glow);
   p.lights = table.parameters();
   p.integrator = integrator;

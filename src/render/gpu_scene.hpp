@@ -7,7 +7,7 @@
 #include "base/revision.hpp"
 #include "base/slot.hpp"
 #include "render/march_data.hpp"
-#include "render/surface_upload.hpp"
+#include "render/model_upload.hpp"
 #include "render/tracer.hpp"
 #include "scene/snapshot.hpp"
 
@@ -39,9 +39,9 @@ class GpuScene {
   /// Another with other data.
   [[nodiscard]] Revision<MarchData> data_revision() const { return data_revision_; }
   /// Another where paths meet other triangles, or other surfaces are drawn.
-  [[nodiscard]] Revision<SurfaceData> surfaces_revision() const { return surfaces_revision_; }
+  [[nodiscard]] Revision<ModelData> model_revision() const { return model_revision_; }
   [[nodiscard]] bool draws_surfaces() const { return static_cast<bool>(raster_); }
-  [[nodiscard]] bool uploading() const { return upload_ || surface_upload_; }
+  [[nodiscard]] bool uploading() const { return upload_ || model_upload_; }
   /// 0 to 1, of what is under way; else 1.
   [[nodiscard]] double progress() const;
   /// Of that volume, if it is the last that came, or is coming.
@@ -51,15 +51,15 @@ class GpuScene {
   [[nodiscard]] std::uint64_t other_bytes() const;
 
   /// What paths end at, but for the host's depth. traced: they meet triangles, if there is a surface pass, too.
-  [[nodiscard]] Surfaces surfaces(const scene::Snapshot& snapshot, bool traced);
+  [[nodiscard]] Obstacles obstacles(const scene::Snapshot& snapshot, bool traced);
   /// Of a picture of that size of what is here, as the snapshot has it seen and lit. Only with data and view.
-  [[nodiscard]] PictureParameters parameters(const scene::Snapshot& snapshot, const Surfaces& surfaces,
+  [[nodiscard]] PictureParameters parameters(const scene::Snapshot& snapshot, const Obstacles& obstacles,
                                              const core::CmIntegrator& integrator, glm::uvec2 size) const;
 
  private:
-  void update_surfaces(const SurfaceSourcePtr& source, const Wanted& wanted, Deadline deadline);
+  void update_model(const scene::ModelSourcePtr& source, const Wanted& wanted, Deadline deadline);
   void finish_surfaces();
-  void show_raster(const SurfaceSourcePtr& of, const RasterContentPtr& content);
+  void show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content);
   void drop_data();
   void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
 
@@ -81,17 +81,17 @@ class GpuScene {
     double seconds = 0.0;
   };
   Took took_;  // the newest upload
-  struct SurfacesUnderWay {
-    SurfaceSourcePtr of;
+  struct ModelUnderWay {
+    scene::ModelSourcePtr of;
     std::uint64_t settings = 0;
-    SurfaceParts parts = SurfaceParts::both;
-    std::unique_ptr<SurfaceUpload> work;
+    ModelParts parts = ModelParts::both;
+    std::unique_ptr<ModelUpload> work;
   };
-  Slot<SurfaceData, SurfaceSourcePtr> surfaces_;
-  Slot<RasterContentPtr, SurfaceSourcePtr> raster_;  // where it is of use
-  SurfaceRaster surface_pass_;                       // shows that
-  std::optional<SurfacesUnderWay> surface_upload_;   // of what both will be
-  Revision<SurfaceData> surfaces_revision_;
+  Slot<ModelData, scene::ModelSourcePtr> model_;
+  Slot<RasterContentPtr, scene::ModelSourcePtr> raster_;  // where it is of use
+  SurfaceRaster surface_pass_;                            // shows that
+  std::optional<ModelUnderWay> model_upload_;             // of what both will be
+  Revision<ModelData> model_revision_;
 };
 
 }  // namespace cumulet::render

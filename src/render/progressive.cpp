@@ -23,8 +23,8 @@ constexpr double answer_frames = 2.0;
 using State = Schedule::State;
 using Clock = std::chrono::steady_clock;
 
-const surface::Scene* scene_met(const Surfaces& surfaces) {
-  const SurfaceData* met = surfaces.met();
+const surface::Scene* scene_met(const Obstacles& obstacles) {
+  const ModelData* met = obstacles.met();
   return met != nullptr ? met->scene() : nullptr;
 }
 
@@ -78,16 +78,16 @@ PictureSettings Progressive::quick_layers(const Tracer& tracer, glm::uvec2 size,
   return settings;
 }
 
-PictureSettings Progressive::settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms,
+PictureSettings Progressive::settings(std::uint32_t divisor, const Obstacles& obstacles, double budget_ms,
                                       bool still) const {
   const glm::uvec2 size = wish_.content.size;
   PictureSettings settings;
-  if (surfaces.raster != nullptr && divisor > finest_) {
+  if (obstacles.raster != nullptr && divisor > finest_) {
     settings = quick_layers(tracer_, size, budget_ms, still);
-  } else if (surfaces.raster != nullptr && !surfaces.traced) {
+  } else if (obstacles.raster != nullptr && !obstacles.traced) {
     settings.layered = Layered::within;
     settings.layer_size = size;
-    const double layer_bytes = (surfaces.raster->blends() ? 24.0 : 12.0) * size.x * size.y;
+    const double layer_bytes = (obstacles.raster->blends() ? 24.0 : 12.0) * size.x * size.y;
     settings.layers = static_cast<unsigned>(std::clamp(most_layer_bytes / layer_bytes, 1.0, 8.0));
   }
   settings.view = wish_.content.view;
@@ -101,18 +101,18 @@ bool Progressive::blurs() const {
          working_->picture->layers().size != wish_.content.size;
 }
 
-bool Progressive::able(const MarchData& data, const Surfaces& surfaces, const PictureSettings& settings) {
-  return tracer_.able(data, wish_.parameters, surfaces, settings);
+bool Progressive::able(const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings) {
+  return tracer_.able(data, wish_.parameters, obstacles, settings);
 }
 
-void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces,
+void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obstacles& obstacles,
                         const PictureSettings& settings) {
   PictureParameters parameters = wish_.parameters;
   parameters.view.size = size_of(divisor);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();
   try {
-    tracer_.begin(picture, data, parameters, enough(divisor), surfaces, settings);
+    tracer_.begin(picture, data, parameters, enough(divisor), obstacles, settings);
   } catch (const Error& error) {
     const bool memory = error.code() == ErrorCode::out_of_memory && wish_.content.preview && divisor < coarsest_divisor;
     if (memory) {
@@ -122,7 +122,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Surf
     }
     throw;
   }
-  working_ = Work{&picture, wish_.content.data, divisor, scene_met(surfaces)};
+  working_ = Work{&picture, wish_.content.data, divisor, scene_met(obstacles)};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
@@ -132,7 +132,7 @@ bool Progressive::needs_depth() const {
          shown_->data == wish_.content.data;
 }
 
-void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
+void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
   const PictureWish::Content& last = wish_.content;
   const bool resized = wish.content.size != last.size;
   const bool changed = state() == State::idle || wish.content != last;
@@ -142,7 +142,7 @@ void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
     if (other_data) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
     // So do paths on another scene's triangles.
-    if (other_data || wish.content.preview != last.preview || (working_ && scene_met(surfaces) != working_->scene)) {
+    if (other_data || wish.content.preview != last.preview || (working_ && scene_met(obstacles) != working_->scene)) {
       working_.reset();
     }
     schedule_.change(working_ && wish.content.preview);
@@ -157,9 +157,9 @@ void Progressive::take(const PictureWish& wish, const Surfaces& surfaces) {
   wish_ = wish;
 }
 
-void Progressive::advance(const PictureWish& wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+void Progressive::advance(const PictureWish& wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                           double budget_ms) {
-  take(wish, surfaces);
+  take(wish, obstacles);
   if (state() == State::failed) return;
   try {
     do {
@@ -167,20 +167,20 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
       if (blurs() && rests) schedule_.drop();
       if (state() == State::due) {
         first_divisor_ = coarsest(budget_ms);
-        const PictureSettings first = settings(first_divisor_, surfaces, budget_ms, rests);
-        const bool ready = able(data, surfaces, first);
+        const PictureSettings first = settings(first_divisor_, obstacles, budget_ms, rests);
+        const bool ready = able(data, obstacles, first);
         // The driver may be at the others meanwhile.
-        if (first_divisor_ > finest_) able(data, surfaces, settings(finest_, surfaces, budget_ms, true));
+        if (first_divisor_ > finest_) able(data, obstacles, settings(finest_, obstacles, budget_ms, true));
         if (!ready) return;
-        start(first_divisor_, data, surfaces, first);
+        start(first_divisor_, data, obstacles, first);
         schedule_.begin();
       } else if (state() == State::refining && working_->divisor > finest_ && is_enough()) {
         const std::uint32_t divisor = working_->divisor / 2;
-        const PictureSettings finer = settings(divisor, surfaces, budget_ms, true);
-        if (!able(data, surfaces, finer)) return;
-        start(divisor, data, surfaces, finer);
+        const PictureSettings finer = settings(divisor, obstacles, budget_ms, true);
+        if (!able(data, obstacles, finer)) return;
+        start(divisor, data, obstacles, finer);
       }
-      work(data, surfaces, deadline);
+      work(data, obstacles, deadline);
     } while (state() != State::done && Clock::now() < deadline);
   } catch (const Error& error) {
     working_.reset();
@@ -193,11 +193,11 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
   }
 }
 
-void Progressive::work(const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
+void Progressive::work(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
   Picture& picture = *working_->picture;
   const auto begun = Clock::now();
   const bool was_complete = picture.complete();
-  tracer_.trace(picture, data, surfaces, deadline, working_->divisor > finest_);
+  tracer_.trace(picture, data, obstacles, deadline, working_->divisor > finest_);
   const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
   trace_seconds_ += seconds;
   if (!was_complete) answer_seconds_ += seconds;
@@ -208,7 +208,7 @@ void Progressive::work(const MarchData& data, const Surfaces& surfaces, Deadline
     }
     if (shown() != &picture) before_ = shown_ ? shown_->picture : nullptr;
     shown_ = working_;
-    if (needs_depth()) tracer_.trace_depth(picture, data, surfaces, deadline);
+    if (needs_depth()) tracer_.trace_depth(picture, data, obstacles, deadline);
   }
   follow();
 }

@@ -22,7 +22,7 @@ struct PictureWish {
     scene::Part<light::DistantLights> lights;
     std::vector<scene::Part<scene::Medium>> media;
     Revision<MarchData> data;
-    Revision<SurfaceData> surfaces;
+    Revision<ModelData> model;
     Revision<HostDepth> host_depth;
     Revision<gl::Programs> programs;
     core::CmIntegrator integrator{};
@@ -57,7 +57,7 @@ class Progressive {
 
   /// Works on the wish until about the deadline. Throws once where a picture cannot be made, and goes on with what
   /// there is, or coarser, later.
-  void advance(const PictureWish& wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+  void advance(const PictureWish& wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                double budget_ms);
   /// Forgets all pictures.
   void reset();
@@ -102,19 +102,19 @@ class Progressive {
     return wish_.content.preview || !working_ ? shown_ : working_;
   }
   [[nodiscard]] std::uint32_t coarsest(double budget_ms) const;
-  [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Surfaces& surfaces, double budget_ms,
+  [[nodiscard]] PictureSettings settings(std::uint32_t divisor, const Obstacles& obstacles, double budget_ms,
                                          bool still) const;
   // Whether what is under way is over a coarser surface pass than what rests shall be.
   [[nodiscard]] bool blurs() const;
   // Whether start() can begin; until then there is what there was.
-  bool able(const MarchData& data, const Surfaces& surfaces, const PictureSettings& settings);
+  bool able(const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
   Picture& acquire(glm::uvec2 size);
-  void start(std::uint32_t divisor, const MarchData& data, const Surfaces& surfaces, const PictureSettings& settings);
+  void start(std::uint32_t divisor, const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
   [[nodiscard]] bool needs_depth() const;
   // What of the work under way is still of use for this wish.
-  void take(const PictureWish& wish, const Surfaces& surfaces);
+  void take(const PictureWish& wish, const Obstacles& obstacles);
   // Goes on with what is under way, and shows it once it is whole.
-  void work(const MarchData& data, const Surfaces& surfaces, Deadline deadline);
+  void work(const MarchData& data, const Obstacles& obstacles, Deadline deadline);
   // Tells the schedule how far what is under way has come.
   void follow();
 

@@ -15,7 +15,7 @@ constexpr double coarse_ms = 0.05;
 
 }  // namespace
 
-bool Rehearsal::advance(PictureWish wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+bool Rehearsal::advance(PictureWish wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                         const std::function<void(const Picture&)>& draw) {
   const glm::uvec2 size = wish.content.size;
   wish.content.size = wish.parameters.view.size = {edge_like(size.x), edge_like(size.y)};
@@ -23,10 +23,10 @@ bool Rehearsal::advance(PictureWish wish, const MarchData& data, const Surfaces&
   wish.held = false;
   const auto now = [] { return std::chrono::steady_clock::now(); };
   do {
-    progressive_.advance(wish, data, surfaces, now(), coarse_ms);  // a picture at a time, so that each is drawn
+    progressive_.advance(wish, data, obstacles, now(), coarse_ms);  // a picture at a time, so that each is drawn
     if (progressive_.shown() != nullptr) draw(*progressive_.shown());
     if (!progressive_.more() && !lags_) {
-      if (!std::exchange(picked_, true)) tracer().pick(data, wish.parameters, surfaces, glm::uvec2(0U));
+      if (!std::exchange(picked_, true)) tracer().pick(data, wish.parameters, obstacles, glm::uvec2(0U));
       return true;
     }
   } while (now() < deadline);

@@ -18,7 +18,7 @@ class Rehearsal {
 
   /// Works on it until about the deadline, one program at least. draw is told each picture, to call draw() with it.
   /// Returns whether all is done.
-  bool advance(PictureWish wish, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+  bool advance(PictureWish wish, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                const std::function<void(const Picture&)>& draw);
   /// Whether something could not be drawn since begin(), the driver being at its program.
   [[nodiscard]] bool lags() const { return lags_; }

@@ -99,7 +99,7 @@ class RasterContent::Planner {
       : gl_(gl), programs_(programs), limits_(limits), upload_(upload) {}
 
   void fix(const std::shared_ptr<Fixed>& fixed) {
-    const RasterSource& source = *fixed->source;
+    const scene::RasterSource& source = *fixed->source;
     const surface::Scene& scene = *source.scene;
     Fixed* const to = fixed.get();
     to->textures.resize(source.textures.size());
@@ -147,7 +147,7 @@ class RasterContent::Planner {
 
  private:
   void add_texture(Fixed& to, std::size_t i) {
-    const RasterSource::Texture& texture = to.source->textures[i];
+    const scene::RasterSource::Texture& texture = to.source->textures[i];
     const surface::Image& image = to.source->scene->images.at(texture.image);
     const auto most = static_cast<std::uint32_t>(limits_.texture_size_2d);
     if (image.width > most || image.height > most) {
@@ -168,8 +168,8 @@ class RasterContent::Planner {
     }
   }
 
-  static gl::Object make_texture(const gl::FunctionsPtr& gl, const RasterSource& source, std::size_t i) {
-    const RasterSource::Texture& texture = source.textures[i];
+  static gl::Object make_texture(const gl::FunctionsPtr& gl, const scene::RasterSource& source, std::size_t i) {
+    const scene::RasterSource::Texture& texture = source.textures[i];
     const surface::Image& image = source.scene->images[texture.image];
     GLuint name = 0;
     gl->CreateTextures(GL_TEXTURE_2D, 1, &name);
@@ -183,7 +183,7 @@ class RasterContent::Planner {
   }
 
   // What a material's program is compiled for: how it covers, bits of its maps, whether it has a coat.
-  static gl::ProgramKey key_of(const RasterSource::Material& material) {
+  static gl::ProgramKey key_of(const scene::RasterSource::Material& material) {
     return {"surface.frag",
             {"CM_ALPHA " + std::to_string(static_cast<int>(material.pass)),
              "CM_USED " + std::to_string(material.used()), material.coated ? "CM_COATED 1" : "CM_COATED 0"},
@@ -340,12 +340,12 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
 void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) const {
   const auto& gl = *gl_;
   const RasterContent::Fixed& fixed = *content_->fixed_;
-  const RasterSource& source = *fixed.source;
+  const scene::RasterSource& source = *fixed.source;
   const gl::Program* program = nullptr;
   std::optional<std::uint32_t> bound;
   for (const Batch& batch : batches) {
     const std::uint32_t index = source.scene->draws[batch.draw].material;
-    const RasterSource::Material& material = source.materials[index];
+    const scene::RasterSource::Material& material = source.materials[index];
     if (program != fixed.program_of[index]) fixed.program_of[index]->use(gl);
     program = fixed.program_of[index];
     if (bound != index) {
@@ -356,7 +356,7 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
         gl.BindSampler(unit, map ? fixed.samplers[map->sampler].name() : 0);
       }
       gl.BindBufferRange(GL_UNIFORM_BUFFER, core::CM_UNIFORM_MATERIAL, fixed.material_block.name(),
-                         static_cast<GLintptr>(RasterSource::material_stride * index), sizeof(CmMaterial));
+                         static_cast<GLintptr>(scene::RasterSource::material_stride * index), sizeof(CmMaterial));
       if (material.double_sided || content_->pose_->double_sided) {
         gl.Disable(GL_CULL_FACE);
       } else {

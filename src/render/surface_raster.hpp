@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "gl/programs.hpp"
-#include "render/raster_source.hpp"
 #include "render/upload.hpp"
+#include "scene/raster_source.hpp"
 #include "scene/snapshot.hpp"
 #include "surface/scene.hpp"
 
@@ -44,7 +44,7 @@ glm::vec2 surface_jitter(unsigned layer, unsigned layers);
 class RasterContent {
  public:
   struct Input {
-    std::shared_ptr<const RasterSource> scene;
+    std::shared_ptr<const scene::RasterSource> scene;
     std::shared_ptr<const surface::Pose> pose;  ///< of that scene
     std::shared_ptr<const std::vector<glm::vec3>> centres;
   };
@@ -64,7 +64,7 @@ class RasterContent {
   friend class SurfaceRaster;
   /// What does not move.
   struct Fixed {
-    std::shared_ptr<const RasterSource> source;
+    std::shared_ptr<const scene::RasterSource> source;
     gl::Object attributes;
     gl::Object indices;
     gl::Object sorted_indices;  // of blended triangles
@@ -76,7 +76,7 @@ class RasterContent {
   };
   class Planner;
 
-  [[nodiscard]] const RasterSource& scene() const { return *fixed_->source; }
+  [[nodiscard]] const scene::RasterSource& scene() const { return *fixed_->source; }
   [[nodiscard]] bool drawable() const { return static_cast<bool>(posed_); }
 
   std::shared_ptr<Fixed> fixed_;
@@ -116,7 +116,7 @@ class SurfaceRaster {
   [[nodiscard]] bool blends() const { return content_ != nullptr && content_->blends(); }
 
  private:
-  using Batch = RasterSource::Batch;
+  using Batch = scene::RasterSource::Batch;
 
   void sort_blended(const SurfaceView& view);
   void make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into);

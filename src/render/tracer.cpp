@@ -46,21 +46,21 @@ std::size_t far_step(std::size_t n) {
 void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 
 // Surfaces may be others than when a picture was begun: poses and the host's depth change.
-void describe(const Surfaces& surfaces, core::CmParameters& parameters) {
-  parameters.host_depth = {surfaces.size, surfaces.depth != 0 ? surfaces.layers : 0};
-  if (surfaces.scene != nullptr) parameters.surfaces = surfaces.scene->tables();
+void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
+  parameters.host_depth = {obstacles.size, obstacles.depth != 0 ? obstacles.layers : 0};
+  if (obstacles.scene != nullptr) parameters.surfaces = obstacles.scene->tables();
 }
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
-core::CmParameters assemble(const PictureParameters& picture, const MarchData& data, const Surfaces& surfaces) {
+core::CmParameters assemble(const PictureParameters& picture, const MarchData& data, const Obstacles& obstacles) {
   core::CmParameters parameters{};
   parameters.view = picture.view;
   parameters.grid = data.grid();
   parameters.medium = picture.medium;
   parameters.lights = picture.lights;
   parameters.integrator = picture.integrator;
-  describe(surfaces, parameters);
+  describe(obstacles, parameters);
   return parameters;
 }
 
@@ -183,40 +183,40 @@ bool Tracer::asked(Find&& find) {
   return *std::exchange(asked_, std::nullopt);
 }
 
-void Tracer::find_programs(const Picture& picture, const MarchData& data, const Surfaces& surfaces) {
+void Tracer::find_programs(const Picture& picture, const MarchData& data, const Obstacles& obstacles) {
   if (picture.view_ == View::shaded && picture.traced_ > 0) {
     stage_programs(picture, data);
   } else if (picture.view_ == View::shaded) {
     trace_program(picture, data);
   } else {
-    inspect_program(data, surfaces, "inspect.comp");
+    inspect_program(data, obstacles, "inspect.comp");
   }
 }
 
-unsigned Tracer::traced_of(const PictureParameters& parameters, const Surfaces& surfaces,
+unsigned Tracer::traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
                            const PictureSettings& settings) {
   // A preview's volume is lit by sun and sky alone, as its surfaces are, so that it comes at once; by what the scene
   // has where there is no other light.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const SurfaceData* met = settings.view == View::shaded && !preview ? surfaces.met() : nullptr;
+  const ModelData* met = settings.view == View::shaded && !preview ? obstacles.met() : nullptr;
   return met == nullptr ? 0 : (met->lights().triangles > 0 ? 2 : 1);
 }
 
-bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,
+bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
                   const PictureSettings& settings) {
-  const bool layered = settings.view == View::shaded && settings.layered != Layered::no && surfaces.raster != nullptr;
+  const bool layered = settings.view == View::shaded && settings.layered != Layered::no && obstacles.raster != nullptr;
   Picture like;
   like.view_ = settings.view;
-  like.traced_ = traced_of(parameters, surfaces, settings);
+  like.traced_ = traced_of(parameters, obstacles, settings);
   like.layered_ = layered ? settings.layered : Layered::no;
   like.volume_alone_ = settings.view == View::shaded && settings.volume_alone;
-  return asked([&] { find_programs(like, data, surfaces); });
+  return asked([&] { find_programs(like, data, obstacles); });
 }
 
-const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name) {
+const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name) {
   const std::array<std::string, 1> more{"CM_SURFACES 1"};
-  return program(data.defines(), name, std::span(more).first(surfaces.scene != nullptr ? 1 : 0));
+  return program(data.defines(), name, std::span(more).first(obstacles.scene != nullptr ? 1 : 0));
 }
 
 void Tracer::make_shared_objects() {
@@ -255,7 +255,7 @@ std::uint64_t Tracer::bytes() const {
   return bytes;
 }
 
-void Tracer::draw_layers(Picture& picture, const Surfaces& surfaces, const PictureSettings& settings) {
+void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const PictureSettings& settings) {
   // The surface pass leaves any state it likes; what comes after it in the frame counts on the known one.
   struct Known {
     const gl::Functions& gl;
@@ -270,7 +270,7 @@ void Tracer::draw_layers(Picture& picture, const Surfaces& surfaces, const Pictu
   picture.layered_ = Layered::no;
   picture.layers_.reset();
   const glm::uvec2 size = settings.layer_size;
-  const LayersOf wanted{surfaces.raster->content(), surfaces.view, surfaces.lighting, size, settings.layers};
+  const LayersOf wanted{obstacles.raster->content(), obstacles.view, obstacles.lighting, size, settings.layers};
   const auto found = std::ranges::find_if(drawn_layers_, [&](const auto& drawn) { return drawn->of == wanted; });
   if (found != drawn_layers_.end()) {
     picture.layers_ = {*found, &(*found)->layers};
@@ -285,7 +285,7 @@ void Tracer::draw_layers(Picture& picture, const Surfaces& surfaces, const Pictu
   collect();
   const bool measured = !rasters_.full();
   if (measured) rasters_.begin(Flights::Kind::draws);
-  surfaces.raster->draw(surfaces.view, surfaces.lighting, size, settings.layers, made->layers);
+  obstacles.raster->draw(obstacles.view, obstacles.lighting, size, settings.layers, made->layers);
   if (measured) {
     Dispatched what;
     what.lanes = double(size.x) * size.y * settings.layers;
@@ -299,7 +299,7 @@ void Tracer::draw_layers(Picture& picture, const Surfaces& surfaces, const Pictu
 }
 
 void Tracer::begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
-                   const Surfaces& surfaces, const PictureSettings& settings) {
+                   const Obstacles& obstacles, const PictureSettings& settings) {
   const glm::uvec2 size = parameters.view.size;
   const bool shaded = settings.view == View::shaded;
   make_shared_objects();
@@ -309,10 +309,10 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.size_ = size;
   picture.film_.begin(size);
   picture.view_ = settings.view;
-  picture.traced_ = traced_of(parameters, surfaces, settings);
+  picture.traced_ = traced_of(parameters, obstacles, settings);
   picture.layered_ = Layered::no;
-  if (shaded && settings.layered != Layered::no && surfaces.raster != nullptr) {
-    draw_layers(picture, surfaces, settings);
+  if (shaded && settings.layered != Layered::no && obstacles.raster != nullptr) {
+    draw_layers(picture, obstacles, settings);
   } else {
     picture.layers_.reset();
     drop_unused_layers();
@@ -321,8 +321,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
   if (shaded) kernels_.reserve(lanes, picture.traced_ > 0);
-  find_programs(picture, data, surfaces);
-  picture.parameters_ = assemble(parameters, data, surfaces);
+  find_programs(picture, data, obstacles);
+  picture.parameters_ = assemble(parameters, data, obstacles);
   picture.target_samples_ = samples;
   if (picture.layered_ != Layered::no) {
     const SurfaceLayers& layers = *picture.layers_;
@@ -370,10 +370,10 @@ void Tracer::set_background(Picture& picture, const glm::vec3& radiance) {
   picture.revision_ = ++revision_;
 }
 
-void Tracer::bind(const MarchData& data, const Surfaces& surfaces) const {
+void Tracer::bind(const MarchData& data, const Obstacles& obstacles) const {
   data.bind(*gl_);
-  if (surfaces.depth != 0) gl_->BindTextureUnit(core::CM_UNIT_HOST_DEPTH, surfaces.depth);
-  if (surfaces.scene != nullptr) surfaces.scene->bind(*gl_);
+  if (obstacles.depth != 0) gl_->BindTextureUnit(core::CM_UNIT_HOST_DEPTH, obstacles.depth);
+  if (obstacles.scene != nullptr) obstacles.scene->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
 }
 
@@ -426,24 +426,24 @@ void Tracer::settle(Picture& picture) {
   picture.end_tile();
 }
 
-bool Tracer::trace(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+bool Tracer::trace(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                    bool until_complete) {
   collect();
   picture.end_tile();
   if (picture.done_) return true;
   const std::vector<FilmLayer> layers = accumulated(picture);
-  const auto work = [&](Film&, Deadline until) { return accumulate(picture, data, surfaces, until, until_complete); };
+  const auto work = [&](Film&, Deadline until) { return accumulate(picture, data, obstacles, until, until_complete); };
   return run(gl_, picture.film_, {"cumulet: samples", layers, layers, work}, deadline);
 }
 
-bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                         bool until_complete) {
   if (picture.layered_ != Layered::no && !layers_ready(deadline)) return false;
   const bool shaded = picture.view_ == View::shaded;
-  const Program& program = shaded ? trace_program(picture, data) : inspect_program(data, surfaces, "inspect.comp");
+  const Program& program = shaded ? trace_program(picture, data) : inspect_program(data, obstacles, "inspect.comp");
   flights_.order();
   program.object->use(*gl_);
-  bind(data, surfaces);
+  bind(data, obstacles);
   if (picture.layered_ != Layered::no) {
     gl_->BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, picture.layers_->colour.name());
     gl_->BindTextureUnit(core::CM_UNIT_LAYER_Z, picture.layers_->z.name());
@@ -458,7 +458,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces&
             GL_READ_WRITE);
   if (!shaded) {
     core::CmParameters parameters = picture.parameters_;
-    describe(surfaces, parameters);
+    describe(obstacles, parameters);
     picture.revision_ = ++revision_;
     picture.done_ = picture.complete_ = inspect(picture, parameters, program, picture.view_row_, deadline);
     picture.holes_ = !picture.done_;
@@ -476,7 +476,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Surfaces&
       auto what = choose(picture, program.cost, std::clamp(left, 0.0, aim), false);
       if (!what && !sent && flights_.empty()) what = choose(picture, program.cost, least_ms, true);
       if (what) {
-        dispatch(picture, surfaces, stages, std::move(*what));
+        dispatch(picture, obstacles, stages, std::move(*what));
         sent = true;
         collect();
         picture.end_tile();
@@ -527,11 +527,11 @@ std::optional<Dispatched> Tracer::choose(Picture& picture, const std::shared_ptr
   return what;
 }
 
-void Tracer::dispatch(Picture& picture, const Surfaces& surfaces, const std::optional<StagePrograms>& stages,
+void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
                       Dispatched what) {
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
-  describe(surfaces, parameters);
+  describe(obstacles, parameters);
   parameters.dispatch.tile_corner = picture.tile_corner();
   parameters.dispatch.tile_size = extent;
   parameters.dispatch.rounds = what.rounds;
@@ -613,49 +613,49 @@ bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameter
   return row >= picture.size_.y;
 }
 
-bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
+bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
   if (picture.film_.has(film_layers::depth)) return true;
-  if (!asked([&] { inspect_program(data, surfaces, "inspect.comp"); })) return false;
+  if (!asked([&] { inspect_program(data, obstacles, "inspect.comp"); })) return false;
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
-    const Program& program = inspect_program(data, surfaces, "inspect.comp");
+    const Program& program = inspect_program(data, obstacles, "inspect.comp");
     program.object->use(*gl_);
-    bind(data, surfaces);
+    bind(data, obstacles);
     film.bind(*gl_, core::CM_IMAGE_SUM, film_layers::radiance, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_COUNTS, film_layers::counts, GL_READ_WRITE);
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, film_layers::depth, GL_WRITE_ONLY);
     core::CmParameters parameters = picture.parameters_;
-    describe(surfaces, parameters);
+    describe(obstacles, parameters);
     parameters.dispatch.view = view_depth;
     return inspect(picture, parameters, program, picture.depth_row_, until);
   };
   return run(gl_, picture.film_, {"cumulet: depth", {}, {film_layers::depth}, work}, deadline);
 }
 
-bool Tracer::find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline) {
+bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
   using namespace film_layers;
   if (picture.film_.has(normal)) return true;
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
-    const Program& program = inspect_program(data, surfaces, "aovs.comp");
+    const Program& program = inspect_program(data, obstacles, "aovs.comp");
     program.object->use(*gl_);
-    bind(data, surfaces);
+    bind(data, obstacles);
     film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_ALBEDO, albedo, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_TRANSMITTANCE, transmittance, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_WRITE_ONLY);
     core::CmParameters parameters = picture.parameters_;
-    describe(surfaces, parameters);
+    describe(obstacles, parameters);
     return inspect(picture, parameters, program, picture.facts_row_, until);
   };
   const Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z}, work};
   return run(gl_, picture.film_, pass, deadline);
 }
 
-void Tracer::read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact,
+void Tracer::read_fact(Picture& picture, const MarchData& data, const Obstacles& obstacles, PixelFact fact,
                        float* values) {
-  while (!find_facts(picture, data, surfaces, Clock::now() + std::chrono::seconds(1))) {
+  while (!find_facts(picture, data, obstacles, Clock::now() + std::chrono::seconds(1))) {
   }
   const std::array<FilmLayer, 5> layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
                                         film_layers::normal, film_layers::albedo};
@@ -667,18 +667,18 @@ void Tracer::read_fact(Picture& picture, const MarchData& data, const Surfaces& 
   gl::check(*gl_, "reading what is known of pixels");
 }
 
-float Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,
+float Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
                    glm::uvec2 pixel) {
   make_shared_objects();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
-  core::CmParameters p = assemble(parameters, data, surfaces);
+  core::CmParameters p = assemble(parameters, data, obstacles);
   p.dispatch.tile_corner = pixel;
   p.dispatch.tile_size = glm::uvec2(1U);
   p.dispatch.view = view_depth;
   p.dispatch.picks = 1;
   p.dispatch.rows = {0U, 1U};
-  inspect_program(data, surfaces, "inspect.comp").object->use(*gl_);
-  bind(data, surfaces);
+  inspect_program(data, obstacles, "inspect.comp").object->use(*gl_);
+  bind(data, obstacles);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   gl_->BindImageTexture(core::CM_IMAGE_COUNTS, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);

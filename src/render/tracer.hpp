@@ -12,11 +12,11 @@
 #include "gl/programs.hpp"
 #include "render/film.hpp"
 #include "render/march_data.hpp"
+#include "render/model_data.hpp"
 #include "render/pace.hpp"
 #include "render/parameters.hpp"
 #include "render/pass_timer.hpp"
 #include "render/path_kernels.hpp"
-#include "render/surface_data.hpp"
 #include "render/surface_raster.hpp"
 
 namespace cumulet::render {
@@ -31,18 +31,18 @@ struct Totals {
 };
 
 /// What paths end at beside the volume: the host's depth as render::HostDepth keeps it, and triangles.
-struct Surfaces {
+struct Obstacles {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
   glm::uvec2 size{0U};
-  const SurfaceData* scene = nullptr;
+  const ModelData* scene = nullptr;
   bool traced = true;               // paths meet the scene's triangles; else only the surface pass knows of them
   SurfaceRaster* raster = nullptr;  // the surface pass, and what it is drawn with
   SurfaceView view;
   SurfaceLighting lighting;
 
   /// The scene whose triangles paths meet; null: they meet none.
-  [[nodiscard]] const SurfaceData* met() const { return traced ? scene : nullptr; }
+  [[nodiscard]] const ModelData* met() const { return traced ? scene : nullptr; }
 };
 
 /// What camera rays of a picture do with the surface pass.
@@ -151,35 +151,35 @@ class Tracer {
 
   /// Whether the programs are there that begin() with these settings needs, without waiting for a driver that compiles
   /// them in parallel; where it does not, they will be. Throws if one does not build.
-  bool able(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces,
+  bool able(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
             const PictureSettings& settings);
   /// Starts a picture anew, of so many samples a pixel. Throws with the picture as it was, or not complete.
   void begin(Picture& picture, const MarchData& data, const PictureParameters& parameters, std::uint32_t samples,
-             const Surfaces& surfaces, const PictureSettings& settings);
+             const Obstacles& obstacles, const PictureSettings& settings);
   /// Traces until about the deadline, and returns with dispatches under way: no call but those that read waits for
   /// them. No dispatch is sent that would likely end after the deadline, but for the first. The last picture begun or
   /// traced goes on; another loses the paths under way. until_complete: no further than every pixel's first sample, if
   /// that was not there before. Returns whether every pixel has its target samples.
-  bool trace(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+  bool trace(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
              bool until_complete = false);
   /// Finds the depth at half opacity until about the deadline; returns whether it is there.
-  bool trace_depth(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline);
+  bool trace_depth(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
   /// View depth z at half opacity of one pixel of a picture with these parameters; 0: not so opaque.
-  float pick(const MarchData& data, const PictureParameters& parameters, const Surfaces& surfaces, glm::uvec2 pixel);
+  float pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles, glm::uvec2 pixel);
   /// A picture of one transparent pixel, before a black background: what there is before the first.
   void clear(Picture& picture);
   /// Of clear's picture.
   void set_background(Picture& picture, const glm::vec3& radiance);
   /// Draws the surface pass for a picture, unless another picture has the same; begin does, and who shows one of
   /// clear's with the surfaces beneath.
-  void draw_layers(Picture& picture, const Surfaces& surfaces, const PictureSettings& settings);
+  void draw_layers(Picture& picture, const Obstacles& obstacles, const PictureSettings& settings);
 
   /// width * height * 4 floats: mean radiance, with the background's or without, and alpha; (0,0) top left.
   void read(const Picture& picture, bool with_background, float* rgba) const;
   /// The same without background of samples that met the volume before any surface; alpha is their share.
   void read_volume(const Picture& picture, float* rgba) const;
   /// A fact a pixel (PixelFact), each channels_of(fact) floats. Finds them first, if need be.
-  void read_fact(Picture& picture, const MarchData& data, const Surfaces& surfaces, PixelFact fact, float* values);
+  void read_fact(Picture& picture, const MarchData& data, const Obstacles& obstacles, PixelFact fact, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
   /// What this context does from now on comes after what is under way, whichever made that. Waits for nothing.
   void order() const { flights_.order(); }
@@ -187,7 +187,7 @@ class Tracer {
   void settle(Picture& picture);
   /// Every dispatch that ends is told; for tests.
   void set_log(std::vector<DispatchRecord>* log) { log_ = log; }
-  /// Trace, inspect and surfaces.
+  /// Trace, inspect and obstacles.
   [[nodiscard]] const PassSeconds& seconds() const { return seconds_; }
   /// Pixels a millisecond that the surface pass drew lately.
   [[nodiscard]] double raster_rate() const { return raster_rate_; }
@@ -216,7 +216,7 @@ class Tracer {
   static std::optional<Dispatched> choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
                                           bool anyway);
   // stages: what paths among triangles are run by; without them the program in use is the one kernel.
-  void dispatch(Picture& picture, const Surfaces& surfaces, const std::optional<StagePrograms>& stages,
+  void dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
                 Dispatched what);
   // Takes up what has ended.
   void collect();
@@ -227,14 +227,14 @@ class Tracer {
   template <class Find>
   bool asked(Find&& find);
   // All that a picture is traced with.
-  void find_programs(const Picture& picture, const MarchData& data, const Surfaces& surfaces);
+  void find_programs(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   // What paths of a picture with these settings meet.
-  static unsigned traced_of(const PictureParameters& parameters, const Surfaces& surfaces,
+  static unsigned traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
                             const PictureSettings& settings);
   // The one kernel, or what the paths' time goes by where they are run by stages.
   const Program& trace_program(const Picture& picture, const MarchData& data);
   StagePrograms stage_programs(const Picture& picture, const MarchData& data);
-  const Program& inspect_program(const MarchData& data, const Surfaces& surfaces, const char* name);
+  const Program& inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name);
   // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);
@@ -242,13 +242,13 @@ class Tracer {
   // The pass that empties what samples are added to, and what all is that.
   void empty(Picture& picture, const glm::vec3& background, std::uint32_t samples);
   static std::vector<FilmLayer> accumulated(const Picture& picture);
-  bool accumulate(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline,
+  bool accumulate(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                   bool until_complete);
-  void bind(const MarchData& data, const Surfaces& surfaces) const;
+  void bind(const MarchData& data, const Obstacles& obstacles) const;
   void read_means(const Picture& picture, const FilmLayer& sum, float* rgba) const;
   [[nodiscard]] std::vector<glm::vec4> read_background(const Picture& picture) const;
   [[nodiscard]] std::vector<glm::uvec2> read_counts(const Picture& picture) const;
-  bool find_facts(Picture& picture, const MarchData& data, const Surfaces& surfaces, Deadline deadline);
+  bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;

@@ -7,11 +7,8 @@
 
 #include "light/distant_lights.hpp"
 #include "scene/march_source.hpp"
+#include "scene/model_source.hpp"
 #include "scene/part.hpp"
-
-namespace cumulet::render {
-struct SurfaceSource;
-}
 
 namespace cumulet::scene {
 
@@ -46,7 +43,7 @@ struct Volume {
 
 /// Surfaces in a pose.
 struct Model {
-  std::shared_ptr<const render::SurfaceSource> source;
+  ModelSourcePtr source;
   bool operator==(const Model&) const = default;
 };
 

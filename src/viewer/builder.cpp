@@ -8,7 +8,7 @@
 
 namespace cumulet::viewer {
 
-VolumePtr VolumeFile::read(const Log& log, Progress* progress) const {
+VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
   volume::ScalarVolume volume = volume::import_volume(path, grid_name, log, progress);
   volume.index_to_world = to_world * volume.index_to_world;
   try {
@@ -26,7 +26,7 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
   worker_.replace({file.path, Progress::Stage::loading,
                    [this, file, load](Progress& progress) {
                      Stopwatch watch;
-                     const VolumePtr volume = file.read(log_, &progress);
+                     const VolumeAssetPtr volume = file.read(log_, &progress);
                      const double seconds = watch.lap();
                      {
                        const std::scoped_lock handing(mutex_);
@@ -40,7 +40,7 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
                    true});
 }
 
-void Builder::build(VolumePtr volume, const BuildSettings& settings) {
+void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings) {
   const std::scoped_lock lock(mutex_);
   load_.reset();  // in place of a load that waits
   worker_.post({"building the grid", Progress::Stage::refining,
@@ -73,7 +73,7 @@ bool Builder::configure_load(const std::optional<BuildSettings>& settings) {
   return true;
 }
 
-std::optional<VolumePtr> Builder::take_loaded() {
+std::optional<VolumeAssetPtr> Builder::take_loaded() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(loaded_, std::nullopt);
 }
@@ -90,7 +90,7 @@ bool Builder::busy() const {
   return loaded_ || built_;
 }
 
-void Builder::build_of(const VolumePtr& volume, const BuildSettings& settings, double load_seconds,
+void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds,
                        Progress& progress) {
   Built built = make(volume, settings, progress);
   built.seconds.load = load_seconds;
@@ -99,7 +99,7 @@ void Builder::build_of(const VolumePtr& volume, const BuildSettings& settings, d
   built_ = std::move(built);
 }
 
-Built Builder::make(const VolumePtr& volume, const BuildSettings& settings, Progress& progress) const {
+Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress) const {
   Built built;
   built.volume = volume;
   const auto statistics = volume->statistics(progress, built.seconds.statistics);

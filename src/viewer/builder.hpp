@@ -25,7 +25,7 @@ struct VolumeFile {
   glm::dmat4 to_world{1.0};  ///< affine, from the file's own world space
 
   /// Throws what import_volume and VolumeAsset throw.
-  [[nodiscard]] VolumePtr read(const Log& log, Progress* progress) const;
+  [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress) const;
 };
 
 /// What a march is made with.
@@ -44,7 +44,7 @@ struct BuildSeconds {
 
 /// A march's data in main memory, ready for any context.
 struct Built {
-  VolumePtr volume;
+  VolumeAssetPtr volume;
   scene::MarchSourcePtr source;
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
@@ -65,7 +65,7 @@ class Builder {
   /// does: another file is another subject, and files may take minutes.
   void load(const VolumeFile& file, std::optional<BuildSettings> settings);
   /// Builds of this volume, after what is under way.
-  void build(VolumePtr volume, const BuildSettings& settings);
+  void build(VolumeAssetPtr volume, const BuildSettings& settings);
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
   void cancel();
@@ -73,7 +73,7 @@ class Builder {
   void cancel_loads();
 
   /// The newest volume that was read, once.
-  std::optional<VolumePtr> take_loaded();
+  std::optional<VolumeAssetPtr> take_loaded();
   /// The newest result, once.
   std::optional<Built> take_built();
 
@@ -89,13 +89,13 @@ class Builder {
     std::optional<BuildSettings> settings;
     bool open = true;
   };
-  void build_of(const VolumePtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress);
-  Built make(const VolumePtr& volume, const BuildSettings& settings, Progress& progress) const;
+  void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress);
+  Built make(const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress) const;
 
   Log log_;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;  // held by its job
-  std::optional<VolumePtr> loaded_;
+  std::optional<VolumeAssetPtr> loaded_;
   std::optional<Built> built_;
   Worker worker_;  // last: its thread uses all of the above
 };

@@ -12,7 +12,7 @@
 #include "viewer/volume_asset.hpp"
 
 struct cumulet_volume {
-  cumulet::viewer::VolumePtr asset;
+  cumulet::viewer::VolumeAssetPtr asset;
   std::atomic<int> references = 1;
 };
 

@@ -18,7 +18,7 @@ struct cumulet_inspection {
 
 namespace {
 
-viewer::VolumePtr asset_of(const std::string& name, volume::ScalarVolume volume) {
+viewer::VolumeAssetPtr asset_of(const std::string& name, volume::ScalarVolume volume) {
   try {
     return std::make_shared<const viewer::VolumeAsset>(std::move(volume));
   } catch (const Error& e) {

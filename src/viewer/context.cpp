@@ -65,23 +65,23 @@ void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadlin
   }
 }
 
-render::Surfaces Context::surfaces(const Shot& shot) {
-  render::Surfaces surfaces = scene_.surfaces(*shot.scene, shot.surfaces.light != SurfaceLight::none);
+render::Obstacles Context::obstacles(const Shot& shot) {
+  render::Obstacles obstacles = scene_.obstacles(*shot.scene, shot.surfaces.light != SurfaceLight::none);
   if (host_depth_.texture() != 0) {
-    surfaces.depth = host_depth_.texture();
-    surfaces.layers = host_depth_.layers();
-    surfaces.size = host_depth_.size();
+    obstacles.depth = host_depth_.texture();
+    obstacles.layers = host_depth_.layers();
+    obstacles.size = host_depth_.size();
   }
-  return surfaces;
+  return obstacles;
 }
 
-render::PictureParameters Context::parameters(const Shot& shot, const render::Surfaces& surfaces) const {
+render::PictureParameters Context::parameters(const Shot& shot, const render::Obstacles& obstacles) const {
   core::CmIntegrator integrator{};
   integrator.seed = shot.sampling.seed;
   integrator.max_bounces = shot.max_bounces;
   integrator.blurred_roughness = shot.surfaces.indirect_roughness;
   integrator.light_among_surfaces = shot.surfaces.light == SurfaceLight::full ? 1U : 0U;
-  return scene_.parameters(*shot.scene, surfaces, integrator, shot.size);
+  return scene_.parameters(*shot.scene, obstacles, integrator, shot.size);
 }
 
 void Context::take_host_depth(const Shot& shot, const Frame& frame) {
@@ -105,14 +105,14 @@ void Context::take_host_depth(const Shot& shot, const Frame& frame) {
   }
 }
 
-render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const render::Surfaces& met) const {
+render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const {
   render::PictureWish wish;
   wish.parameters = parameters(shot, met);
   wish.content.viewpoint = shot.scene->view;
   wish.content.lights = shot.scene->lights;
   for (const scene::Volume& volume : shot.scene->volumes) wish.content.media.push_back(volume.medium);
   wish.content.data = scene_.data_revision();
-  wish.content.surfaces = scene_.surfaces_revision();
+  wish.content.model = scene_.model_revision();
   wish.content.host_depth = host_depth_revision_;
   wish.content.programs = programs_->revision();
   wish.content.integrator = wish.parameters.integrator;
@@ -131,7 +131,7 @@ void Context::trace(const Shot& shot, const Frame& frame, render::Deadline deadl
   if (!shot.view()) return;
   take_host_depth(shot, frame);
   if (scene_.data() == nullptr) return;
-  const render::Surfaces met = surfaces(shot);
+  const render::Obstacles met = obstacles(shot);
   progressive_.advance(wish(shot, frame, met), *scene_.data(), met, deadline, frame.budget_ms);
 }
 
@@ -170,7 +170,7 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
   tracer.set_background(empty_, shot.scene->lights->sky_radiance);
   if (!able || frame.budget_ms < 0.0) return;
   alone_failed_ = shot.settings;  // unless it succeeds
-  tracer.draw_layers(empty_, surfaces(shot),
+  tracer.draw_layers(empty_, obstacles(shot),
                      render::Progressive::quick_layers(tracer, shot.size, frame.budget_ms, shot.view_rests));
   alone_failed_.reset();
 }

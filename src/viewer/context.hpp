@@ -124,10 +124,10 @@ class Context {
 
   // Whether there is a target of any size.
   [[nodiscard]] static bool draws(const Shot& shot, const Frame& frame);
-  [[nodiscard]] render::Surfaces surfaces(const Shot& shot);
-  [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::Surfaces& surfaces) const;
+  [[nodiscard]] render::Obstacles obstacles(const Shot& shot);
+  [[nodiscard]] render::PictureParameters parameters(const Shot& shot, const render::Obstacles& obstacles) const;
   void take_host_depth(const Shot& shot, const Frame& frame);
-  [[nodiscard]] render::PictureWish wish(const Shot& shot, const Frame& frame, const render::Surfaces& met) const;
+  [[nodiscard]] render::PictureWish wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const;
   [[nodiscard]] static render::Display display(const Shot& shot, const Frame& frame, const render::Picture& shown);
   [[nodiscard]] static render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown);
   // Whether all programs are warm.

@@ -16,7 +16,7 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   const auto& view = shot.view();
   if (scene_.data() == nullptr || !view || !(x >= 0.0 && y >= 0.0 && x < shot.size.x && y < shot.size.y)) return {};
   const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
-  const render::Surfaces met = surfaces(shot);
+  const render::Obstacles met = obstacles(shot);
   const float z = progressive_.tracer().pick(*scene_.data(), parameters(shot, met), met, pixel);
   if (!(z > 0.0F)) return {};
   const double right = 2.0 * (pixel.x + 0.5) / shot.size.x - 1.0;
@@ -102,7 +102,7 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
       throw Error(ErrorCode::invalid_argument,
                   "the picture is of what was shown before: render until there is a newer");
     }
-    progressive_.tracer().read_fact(picture, *scene_.data(), surfaces(shot), fact, values);
+    progressive_.tracer().read_fact(picture, *scene_.data(), obstacles(shot), fact, values);
   }
 }
 

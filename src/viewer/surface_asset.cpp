@@ -16,15 +16,15 @@ SurfaceAsset::Rest SurfaceAsset::rest() const {
   return *rest_;
 }
 
-SurfacePtr SurfaceAsset::posed(SurfaceChoice choice, Progress& progress) const {
+scene::ModelSourcePtr SurfaceAsset::posed(SurfaceChoice choice, Progress& progress) const {
   const auto lock = patient_lock(mutex_, progress);
-  SurfacePtr last = newest_.lock();
+  scene::ModelSourcePtr last = newest_.lock();
   if (last && newest_choice_ == choice) return last;
   progress.check();
   surface::Pose pose = scene_->pose(choice.time, choice.animation, &progress);
   pose.double_sided = choice.double_sided;
-  SurfacePtr made = last ? render::make_surface_source(*last, std::move(pose), &progress)
-                         : render::make_surface_source(scene_, std::move(pose), &progress);
+  scene::ModelSourcePtr made = last ? scene::make_model_source(*last, std::move(pose), &progress)
+                                    : scene::make_model_source(scene_, std::move(pose), &progress);
   newest_ = made;
   newest_choice_ = choice;
   return made;

@@ -8,12 +8,10 @@
 #include <utility>
 
 #include "base/progress.hpp"
-#include "render/surface_data.hpp"
+#include "scene/model_source.hpp"
 #include "viewer/bounds.hpp"
 
 namespace cumulet::viewer {
-
-using SurfacePtr = std::shared_ptr<const render::SurfaceSource>;
 
 /// What of an asset a viewer shows.
 struct SurfaceChoice {
@@ -41,7 +39,7 @@ class SurfaceAsset {
   [[nodiscard]] Rest rest() const;
   /// The scene as chosen. If a viewer holds just that already, the same; if another choice, a refit of it.
   /// Throws Error(cancelled).
-  [[nodiscard]] SurfacePtr posed(SurfaceChoice choice, Progress& progress) const;
+  [[nodiscard]] scene::ModelSourcePtr posed(SurfaceChoice choice, Progress& progress) const;
 
  private:
   surface::ScenePtr scene_;
@@ -49,7 +47,7 @@ class SurfaceAsset {
   mutable std::mutex rest_mutex_;
   mutable std::optional<Rest> rest_;
   mutable std::mutex mutex_;
-  mutable std::weak_ptr<const render::SurfaceSource> newest_;  // as long as somebody shows it
+  mutable std::weak_ptr<const scene::ModelSource> newest_;  // as long as somebody shows it
   mutable SurfaceChoice newest_choice_;
 };
 

@@ -12,7 +12,7 @@ void SurfaceBuilder::load(const std::string& path, SurfaceChoice choice) {
 
 void SurfaceBuilder::read(const std::string& path, Load& load, Progress& progress) {
   const auto asset = std::make_shared<const SurfaceAsset>(surface::import_gltf(path, log_, &progress), path);
-  SurfacePtr made;
+  scene::ModelSourcePtr made;
   SurfaceChoice choice;
   for (;;) {
     {
@@ -56,7 +56,7 @@ bool SurfaceBuilder::configure_load(SurfaceChoice choice) {
 void SurfaceBuilder::pose(SurfaceAssetPtr asset, SurfaceChoice choice) {
   worker_.post(
       {"posing the surfaces", Progress::Stage::loading, [this, asset = std::move(asset), choice](Progress& progress) {
-         PosedSurfaces made{nullptr, asset->posed(choice, progress)};
+         PosedModel made{nullptr, asset->posed(choice, progress)};
          const std::scoped_lock lock(mutex_);
          progress.check();
          // What a load read, and nobody has taken yet, stays what was read.
@@ -65,7 +65,7 @@ void SurfaceBuilder::pose(SurfaceAssetPtr asset, SurfaceChoice choice) {
        }});
 }
 
-std::optional<PosedSurfaces> SurfaceBuilder::take() {
+std::optional<PosedModel> SurfaceBuilder::take() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(result_, std::nullopt);
 }

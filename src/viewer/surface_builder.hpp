@@ -16,9 +16,9 @@
 namespace cumulet::viewer {
 
 /// What there is to show.
-struct PosedSurfaces {
+struct PosedModel {
   SurfaceAssetPtr asset;  ///< if it was read from a file, which
-  SurfacePtr source;
+  scene::ModelSourcePtr source;
 };
 
 /// Reads glTF scenes and poses them on a thread of its own. The newest wish wins, and none starves, as Builder has it.
@@ -39,7 +39,7 @@ class SurfaceBuilder {
   /// Loads alone: other surfaces are there.
   void cancel_loads();
   /// The newest result, once.
-  std::optional<PosedSurfaces> take();
+  std::optional<PosedModel> take();
   /// Whether there is work under way, or a result that nobody took.
   [[nodiscard]] bool busy() const;
   [[nodiscard]] Worker::Status status() const { return worker_.status(); }
@@ -57,7 +57,7 @@ class SurfaceBuilder {
   Log log_;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;  // held by its job
-  std::optional<PosedSurfaces> result_;
+  std::optional<PosedModel> result_;
   Worker worker_;  // last: its thread uses all of the above
 };
 

@@ -79,7 +79,7 @@ void Viewer::sync() {
   }
   if (auto surfaces = surface_builder_.take()) {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
-    surface_source_ = std::move(surfaces->source);
+    model_source_ = std::move(surfaces->source);
   }
 }
 
@@ -106,7 +106,7 @@ void Viewer::load_volume(const VolumeFile& file) {
   touch();
 }
 
-void Viewer::set_volume(VolumePtr volume) {
+void Viewer::set_volume(VolumeAssetPtr volume) {
   if (volume) {
     builder_.cancel_loads();  // builds go on: a host may set volumes faster than they build
   } else {
@@ -123,7 +123,7 @@ void Viewer::set_volume(VolumePtr volume) {
   touch();
 }
 
-VolumePtr Viewer::volume() {
+VolumeAssetPtr Viewer::volume() {
   sync();
   return volume_;
 }
@@ -144,11 +144,11 @@ void Viewer::load_surfaces(const std::string& path) {
   touch();
 }
 
-void Viewer::show_surfaces(SurfacePtr surfaces) {
+void Viewer::show_surfaces(scene::ModelSourcePtr surfaces) {
   surface_builder_.cancel();
   sync();
   surface_asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
-  surface_source_ = std::move(surfaces);
+  model_source_ = std::move(surfaces);
   touch();
 }
 
@@ -163,7 +163,7 @@ void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
   if (surface_asset_) {
     surface_builder_.pose(surface_asset_, surface_settings_.choice);
   } else {
-    surface_source_ = nullptr;
+    model_source_ = nullptr;
   }
   touch();
 }
@@ -184,12 +184,12 @@ void Viewer::set_surface_settings(const SurfaceSettings& settings) {
 
 void Viewer::use_surface_camera(std::size_t index) {
   sync();
-  const std::size_t count = surface_source_ ? surface_source_->pose.cameras.size() : 0;
+  const std::size_t count = model_source_ ? model_source_->pose.cameras.size() : 0;
   if (index >= count) {
     throw Error(ErrorCode::invalid_argument,
                 "there is no camera " + std::to_string(index) + ": the surfaces have " + std::to_string(count));
   }
-  const surface::SceneCamera& seen = surface_source_->pose.cameras[index];
+  const surface::SceneCamera& seen = model_source_->pose.cameras[index];
   const dvec3 eye(seen.to_world[3]);
   const dvec3 forward = -glm::normalize(dvec3(seen.to_world[2]));
   CameraPose pose = camera_->pose();
@@ -290,8 +290,8 @@ void Viewer::frame_all() {
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
   if (volume_ && !volume_->volume().empty()) box = volume_->bounds();
-  if (surface_source_ && surface_source_->scene->triangle_count() > 0) {
-    const surface::Pose& pose = surface_source_->pose;
+  if (model_source_ && model_source_->scene->triangle_count() > 0) {
+    const surface::Pose& pose = model_source_->pose;
     box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};
   }
   return box;
@@ -316,8 +316,8 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   if (volume_) {
     for (const dvec3& p : volume_->coarse().visible(direction, medium_.density_scale)) add(p);
   }
-  if (surface_source_) {
-    for (const surface::PosedVertex& vertex : surface_source_->pose.vertices) add(vertex.position);
+  if (model_source_) {
+    for (const surface::PosedVertex& vertex : model_source_->pose.vertices) add(vertex.position);
   }
   return reach;
 }
@@ -351,12 +351,12 @@ grid::RefineCamera Viewer::refine_camera() const {
   return refine;
 }
 
-VolumePtr Viewer::empty_volume() {
+VolumeAssetPtr Viewer::empty_volume() {
   if (!empty_volume_) {
     volume::ScalarVolume empty;
     empty.name = "nothing";
     empty.bounds_max = glm::ivec3(0);
-    const dvec3 middle = 0.5 * (surface_source_->pose.low + surface_source_->pose.high);
+    const dvec3 middle = 0.5 * (model_source_->pose.low + model_source_->pose.high);
     empty.index_to_world[3] = glm::dvec4(middle, 1.0);
     empty_volume_ = std::make_shared<const VolumeAsset>(std::move(empty));
   }
@@ -366,7 +366,7 @@ VolumePtr Viewer::empty_volume() {
 scene::SnapshotPtr Viewer::snapshot() {
   scene_.volumes.front().source = built_.source;
   scene_.models.clear();
-  if (surface_source_) scene_.models.push_back({surface_source_});
+  if (model_source_) scene_.models.push_back({model_source_});
   scene_.view.set(view_ ? std::optional<scene::Viewpoint>(*view_) : std::nullopt);
   if (!snapshot_ || *snapshot_ != scene_) snapshot_ = std::make_shared<const scene::Snapshot>(scene_);
   return snapshot_;

@@ -57,9 +57,9 @@ class Viewer {
   [[nodiscard]] bool attached() const { return gl_ != nullptr; }
 
   void load_volume(const VolumeFile& file);
-  void set_volume(VolumePtr volume);
+  void set_volume(VolumeAssetPtr volume);
   /// The newest volume; null if there is none.
-  VolumePtr volume();
+  VolumeAssetPtr volume();
   void rebuild();
   void cancel();
   /// Throws how the last job ended, or Error(timeout).
@@ -69,7 +69,7 @@ class Viewer {
 
   void load_surfaces(const std::string& path);
   /// Shows these at once. Cancels a load under way.
-  void show_surfaces(SurfacePtr surfaces);
+  void show_surfaces(scene::ModelSourcePtr surfaces);
   /// Poses these, then shows them; null: none, at once. Cancels a load under way.
   void set_surfaces(SurfaceAssetPtr surfaces);
   /// The newest; null if there are none.
@@ -133,7 +133,7 @@ class Viewer {
   /// What cameras fit; good for as long as nothing changes.
   [[nodiscard]] std::optional<Subject> subject() const;
   [[nodiscard]] std::vector<double> seen_reach(const glm::dvec3& direction, std::span<const glm::dvec3> normals) const;
-  VolumePtr empty_volume();
+  VolumeAssetPtr empty_volume();
 
   Log log_;
   Trace trace_;
@@ -147,8 +147,8 @@ class Viewer {
   GridSettings grid_;
   Medium medium_;
   SurfaceSettings surface_settings_;
-  SurfaceAssetPtr surface_asset_;  // newest
-  SurfacePtr surface_source_;      // newest that is posed
+  SurfaceAssetPtr surface_asset_;       // newest
+  scene::ModelSourcePtr model_source_;  // newest that is posed
   Sampling sampling_;
   DisplaySettings display_;
   std::shared_ptr<Camera> camera_;
@@ -156,8 +156,8 @@ class Viewer {
   Navigation navigation_;
   std::chrono::steady_clock::time_point last_frame_time_{};
 
-  VolumePtr volume_;             // newest
-  VolumePtr empty_volume_;       // where there are surfaces alone
+  VolumeAssetPtr volume_;        // newest
+  VolumeAssetPtr empty_volume_;  // where there are surfaces alone
   Built built_;                  // newest, and what is uploaded again in a new context
   scene::Snapshot scene_;        // as it is now: of it snapshots are made
   scene::SnapshotPtr snapshot_;  // the newest

@@ -87,7 +87,7 @@ void Viewer::prepare(const Frame& frame) {
   navigation_.advance(std::min(since, 0.25), *camera_, box);
 
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
-  const bool scene = volume_ || surface_source_;
+  const bool scene = volume_ || model_source_;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume.
   if (!volume_ && scene && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);

@@ -33,6 +33,6 @@ class VolumeAsset {
   mutable std::shared_ptr<const grid::Statistics> statistics_;
 };
 
-using VolumePtr = std::shared_ptr<const VolumeAsset>;
+using VolumeAssetPtr = std::shared_ptr<const VolumeAsset>;
 
 }  // namespace cumulet::viewer

@@ -75,7 +75,7 @@ bool Context::rehearse_frame(const Shot& shot, const Frame& frame, render::Deadl
       if (drawing) rehearse_drawing(shot, frame, shown);
     };
     if (scene_.data() != nullptr) {
-      const render::Surfaces met = surfaces(shot);
+      const render::Obstacles met = obstacles(shot);
       if (!rehearsal_->advance(wish(shot, frame, met), *scene_.data(), met, deadline, draw)) return false;
     }
     if (host_depth_.waits_for_program()) return false;

@@ -7,7 +7,7 @@ namespace cumulet::bench {
 
 struct Asset {
   std::string name;
-  viewer::VolumePtr volume;
+  viewer::VolumeAssetPtr volume;
   double mean_optical_depth = 0.0;  ///< at density scale 1
   double load_seconds = 0.0;        ///< 0 for a synthetic one
 };

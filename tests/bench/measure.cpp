@@ -163,7 +163,7 @@ std::vector<double> rates(const std::vector<Run>& runs) {
 /// What surfaces cost: the matched grid with them, in turn with the volume alone.
 SurfaceResult measure_surfaces(headless::Context& context, const Asset& asset, const Options& options, Subject& alone,
                                const TargetResult& target, double density_scale) {
-  const viewer::SurfacePtr surfaces = surfaces_in(asset.volume->bounds());
+  const scene::ModelSourcePtr surfaces = surfaces_in(asset.volume->bounds());
   Subject with(context, asset.volume, alone.kind(), options, density_scale);
   with.refine(grid::Criterion::deviation, target.rows[static_cast<std::size_t>(alone.kind())].threshold,
               options.max_cells);

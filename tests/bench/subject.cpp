@@ -37,7 +37,7 @@ viewer::Light bench_light() {
   return light;
 }
 
-Subject::Subject(headless::Context& context, viewer::VolumePtr volume, Kind kind, const Options& options,
+Subject::Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
                  double density_scale)
     : kind_(kind), size_(options.size), albedo_(options.albedo), density_scale_(density_scale), still_(context) {
   still_.viewer().camera()->frame(volume->bounds(), 1.0);
@@ -60,7 +60,7 @@ void Subject::refine(grid::Criterion criterion, double threshold, std::uint64_t 
   still_.build();
 }
 
-void Subject::show(viewer::SurfacePtr surfaces) { still_.viewer().show_surfaces(std::move(surfaces)); }
+void Subject::show(scene::ModelSourcePtr surfaces) { still_.viewer().show_surfaces(std::move(surfaces)); }
 
 void Subject::light_surfaces(viewer::SurfaceLight light) {
   viewer::SurfaceSettings settings;

@@ -33,13 +33,13 @@ struct Run {
 class Subject {
  public:
   /// density_scale: of the shaded picture. The context must be current, now and until the end.
-  Subject(headless::Context& context, viewer::VolumePtr volume, Kind kind, const Options& options,
+  Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
           double density_scale);
 
   /// Makes the tetrahedral grid anew; not for dense and brick.
   void refine(grid::Criterion criterion, double threshold, std::uint64_t max_cells);
   /// Surfaces in the picture from now on.
-  void show(viewer::SurfacePtr surfaces);
+  void show(scene::ModelSourcePtr surfaces);
   void light_surfaces(viewer::SurfaceLight light);
   /// Traces samples a pixel.
   Run shaded(std::uint32_t samples, std::uint32_t seed);

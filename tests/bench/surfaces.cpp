@@ -6,7 +6,7 @@
 
 namespace cumulet::bench {
 
-viewer::SurfacePtr surfaces_in(const viewer::Bounds& bounds) {
+scene::ModelSourcePtr surfaces_in(const viewer::Bounds& bounds) {
   const glm::vec3 low(bounds.min);
   const glm::vec3 extent(bounds.max - bounds.min);
   const auto scene = std::make_shared<test::StillScene>();

@@ -32,7 +32,7 @@ class Still {
   void set_volume(volume::ScalarVolume volume) {
     set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(volume)));
   }
-  void set_volume(viewer::VolumePtr volume) { viewer_->set_volume(std::move(volume)); }
+  void set_volume(viewer::VolumeAssetPtr volume) { viewer_->set_volume(std::move(volume)); }
   void set_grid(const viewer::GridSettings& settings) {
     adaptive_ = settings.camera_adaptive;
     viewer_->set_grid(settings);

@@ -6,7 +6,7 @@
 #include <memory>
 #include <numbers>
 
-#include "render/surface_data.hpp"
+#include "render/model_data.hpp"
 #include "support/meshes.hpp"
 
 namespace cumulet::test {
@@ -121,9 +121,9 @@ inline surface::Material diffuse(glm::vec3 albedo) {
   return m;
 }
 
-inline std::shared_ptr<const render::SurfaceSource> source_of(std::shared_ptr<const StillScene> scene) {
+inline std::shared_ptr<const scene::ModelSource> source_of(std::shared_ptr<const StillScene> scene) {
   surface::Pose pose = scene->pose(0.0, 0);
-  return render::make_surface_source(std::move(scene), std::move(pose), nullptr);
+  return scene::make_model_source(std::move(scene), std::move(pose), nullptr);
 }
 
 }  // namespace cumulet::test

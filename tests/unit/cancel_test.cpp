@@ -21,7 +21,7 @@
 
 #include "base/progress.hpp"
 #include "grid/tet_grid.hpp"
-#include "render/surface_data.hpp"
+#include "render/model_data.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
 #include "support/volumes.hpp"
@@ -326,7 +326,7 @@ TEST(Cancel, Surfaces) {
     const auto scene = surface::import_gltf(file, "large", {}, {}, &progress);
     progress.at(0.99);
     const auto source =
-        render::make_surface_source(scene, scene->pose(0.0, std::numeric_limits<std::size_t>::max()), &progress);
+        scene::make_model_source(scene, scene->pose(0.0, std::numeric_limits<std::size_t>::max()), &progress);
     progress.at(1.0);
   });
 }
@@ -335,7 +335,7 @@ TEST(Cancel, Pictures) {
   const std::vector<std::uint8_t> file = test::seed_picture(2400).glb();
   expect_stops([&](Progress& progress) {
     const auto scene = surface::import_gltf(file, "picture", {}, {}, &progress);
-    (void)render::make_surface_source(scene, scene->pose(0.0, 0, &progress), &progress);
+    (void)scene::make_model_source(scene, scene->pose(0.0, 0, &progress), &progress);
   });
 }
 

@@ -10,8 +10,8 @@ namespace {
 
 using namespace cumulet;
 using glm::vec3;
+using scene::ModelSourcePtr;
 using viewer::SurfaceAsset;
-using viewer::SurfacePtr;
 
 /// Notes how often it is posed; time is its height.
 class CountedScene final : public test::StillScene {
@@ -37,11 +37,11 @@ TEST(SurfaceAsset, ViewersOfOneMomentShareItsPose) {
   const auto scene = std::make_shared<const CountedScene>();
   const SurfaceAsset asset(scene, "counted");
   Progress progress;
-  SurfacePtr first = asset.posed({1.0, 0}, progress);
+  scene::ModelSourcePtr first = asset.posed({1.0, 0}, progress);
   EXPECT_EQ(first->pose.high.y, 1.0);
   EXPECT_EQ(asset.posed({1.0, 0}, progress), first);
   EXPECT_EQ(scene->poses, 1);
-  const SurfacePtr second = asset.posed({2.0, 0}, progress);
+  const scene::ModelSourcePtr second = asset.posed({2.0, 0}, progress);
   EXPECT_NE(second, first);
   EXPECT_EQ(second->pose.high.y, 2.0);
   EXPECT_EQ(first->pose.high.y, 1.0);
@@ -53,7 +53,7 @@ TEST(SurfaceAsset, KeepsNoPoseThatNobodyShows) {
   const auto scene = std::make_shared<const CountedScene>();
   const SurfaceAsset asset(scene, "counted");
   Progress progress;
-  std::weak_ptr<const render::SurfaceSource> watched = asset.posed({1.0, 0}, progress);
+  std::weak_ptr<const scene::ModelSource> watched = asset.posed({1.0, 0}, progress);
   EXPECT_TRUE(watched.expired());
   EXPECT_EQ(asset.posed({1.0, 0}, progress)->pose.high.y, 1.0);
   EXPECT_EQ(scene->poses, 2);

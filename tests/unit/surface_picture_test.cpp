@@ -403,7 +403,7 @@ TEST_P(SurfacePicture, SurfacesAreThereBeforeTheVolume) {
   EXPECT_NEAR(seen, 2.0F, 0.01F);
   // And gone with them.
   viewer_->viewer().set_surfaces(nullptr);
-  viewer_->set_volume(viewer::VolumePtr());
+  viewer_->set_volume(viewer::VolumeAssetPtr());
   EXPECT_EQ(red(), 0.0F);
 }
 

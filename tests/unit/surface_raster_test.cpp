@@ -151,8 +151,8 @@ class SurfaceRasters : public cumulet::test::GlTest {
   }
   RasterContentPtr content_of(const std::shared_ptr<HandScene>& scene, surface::Pose pose,
                               const cumulet::gl::Limits& limits) {
-    auto source = render::make_raster_source(scene);
-    auto centres = std::make_shared<const std::vector<glm::vec3>>(render::blended_centres(*source, pose));
+    auto source = cumulet::scene::make_raster_source(scene);
+    auto centres = std::make_shared<const std::vector<glm::vec3>>(cumulet::scene::blended_centres(*source, pose));
     render::Upload upload(gl_, "uploading");
     auto content = render::RasterContent::plan(
         gl_, programs_, limits, upload,
@@ -847,7 +847,7 @@ TEST_P(SurfaceRasters, PreviewsAreSharp) {
   scene->add_wall(-2.0F, 3.0F, 0);
   set(scene);
   const StateGuard guard(*gl_);
-  Surfaces surfaces;
+  Obstacles surfaces;
   surfaces.raster = raster_.get();
   surfaces.view = straight({0, 0, 0}, 0.5);
   PictureSettings settings;
@@ -880,7 +880,7 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
   set(scene);
   const StateGuard guard(*gl_);
   const glm::uvec2 size(1068U, 901U);
-  Surfaces surfaces;
+  Obstacles surfaces;
   surfaces.raster = raster_.get();
   surfaces.view = straight({0, 0, 0}, 0.5);
   PictureWish wish;

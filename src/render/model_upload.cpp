@@ -1,12 +1,12 @@
-#include "render/surface_upload.hpp"
+#include "render/model_upload.hpp"
 
 #include "base/error.hpp"
 
 namespace cumulet::render {
 
-SurfaceUpload::SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
-                             gl::WordHeap& heap, SurfaceSourcePtr source, SurfaceParts parts,
-                             const SurfaceData* last_data, RasterContentPtr last_raster)
+ModelUpload::ModelUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
+                         gl::WordHeap& heap, scene::ModelSourcePtr source, ModelParts parts, const ModelData* last_data,
+                         RasterContentPtr last_raster)
     : gl_(gl),
       programs_(std::move(programs)),
       limits_(limits),
@@ -14,11 +14,11 @@ SurfaceUpload::SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
       last_raster_(std::move(last_raster)),
       paths_(gl, "uploading the surfaces"),
       raster_(gl, "uploading the surfaces of previews"),
-      raster_due_(parts != SurfaceParts::paths) {
-  if (parts != SurfaceParts::raster) data_ = SurfaceData::plan(gl_, limits_, heap, paths_, *source_, last_data);
+      raster_due_(parts != ModelParts::paths) {
+  if (parts != ModelParts::raster) data_ = ModelData::plan(gl_, limits_, heap, paths_, *source_, last_data);
 }
 
-bool SurfaceUpload::advance(Deadline deadline) {
+bool ModelUpload::advance(Deadline deadline) {
   if (!paths_.advance(deadline)) return false;
   if (!raster_due_) return true;
   try {

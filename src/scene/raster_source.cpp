@@ -1,4 +1,4 @@
-#include "render/raster_source.hpp"
+#include "scene/raster_source.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -15,7 +15,7 @@ namespace cumulet::core {
 #include "display.glsl"
 }  // namespace cumulet::core
 
-namespace cumulet::render {
+namespace cumulet::scene {
 
 namespace {
 
@@ -199,4 +199,4 @@ std::vector<glm::vec3> blended_centres(const RasterSource& source, const surface
   return centres;
 }
 
-}  // namespace cumulet::render
+}  // namespace cumulet::scene

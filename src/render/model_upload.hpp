@@ -3,26 +3,24 @@
 #include <memory>
 #include <utility>
 
-#include "render/surface_data.hpp"
+#include "render/model_data.hpp"
 #include "render/surface_raster.hpp"
 
 namespace cumulet::render {
 
-using SurfaceSourcePtr = std::shared_ptr<const SurfaceSource>;
 using RasterContentPtr = std::shared_ptr<const RasterContent>;
 
 /// What comes of surfaces on the GPU: for paths, and for the surface pass.
-enum class SurfaceParts { paths, raster, both };
+enum class ModelParts { paths, raster, both };
 
 /// Brings posed surfaces to GL piece by piece, beside what is shown until then. All calls need the context current and
 /// a StateGuard around.
-class SurfaceUpload {
+class ModelUpload {
  public:
   /// What the scene shares with the last of each, which may be null, is taken from there. Throws Error(unsupported) for
   /// what paths need; allocates nothing yet.
-  SurfaceUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits, gl::WordHeap& heap,
-                SurfaceSourcePtr source, SurfaceParts parts, const SurfaceData* last_data,
-                RasterContentPtr last_raster);
+  ModelUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits, gl::WordHeap& heap,
+              scene::ModelSourcePtr source, ModelParts parts, const ModelData* last_data, RasterContentPtr last_raster);
   /// Works until the deadline, one piece at least. Returns whether all is there. Throws Error(out_of_memory, gl,
   /// unsupported): then nothing is to be had, unless done().
   bool advance(Deadline deadline);
@@ -34,16 +32,16 @@ class SurfaceUpload {
   }
 
   // Once it is done; null where that was not asked for. The raster: where it failed, too.
-  std::unique_ptr<SurfaceData> take_data() { return std::move(data_); }
+  std::unique_ptr<ModelData> take_data() { return std::move(data_); }
   RasterContentPtr take_raster() { return std::move(content_); }
 
  private:
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
-  SurfaceSourcePtr source_;
+  scene::ModelSourcePtr source_;
   RasterContentPtr last_raster_;
-  std::unique_ptr<SurfaceData> data_;
+  std::unique_ptr<ModelData> data_;
   RasterContentPtr content_;
   Upload paths_;  // its steps use the above
   Upload raster_;

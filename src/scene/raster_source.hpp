@@ -17,7 +17,7 @@ namespace cumulet::core {
 #include "surface_parameters.glsl"
 }  // namespace cumulet::core
 
-namespace cumulet::render {
+namespace cumulet::scene {
 
 /// What SurfaceRaster needs of a scene, in main memory, so that a frame only copies it. Shared by its poses. No GL.
 struct RasterSource {
@@ -69,4 +69,4 @@ std::vector<glm::vec3> blended_centres(const RasterSource& source, const surface
 std::vector<std::uint8_t> half_of(const std::vector<std::uint8_t>& rgba, glm::uvec2 size, bool srgb,
                                   const Progress* progress = nullptr);
 
-}  // namespace cumulet::render
+}  // namespace cumulet::scene

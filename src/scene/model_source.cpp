@@ -1,4 +1,4 @@
-#include "render/surface_data.hpp"
+#include "scene/model_source.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -14,7 +14,6 @@
 #include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
-#include "gl/bindings.hpp"
 #include "light/lamps.hpp"
 #include "surface/ggx_albedo.hpp"
 
@@ -22,7 +21,7 @@ namespace cumulet::core {
 #include "surface_tables.glsl"
 }  // namespace cumulet::core
 
-namespace cumulet::render {
+namespace cumulet::scene {
 
 namespace {
 
@@ -35,7 +34,6 @@ using surface::AlphaMode;
 using surface::Material;
 using surface::TextureUse;
 
-constexpr std::uint32_t usual_edge = 2048;
 constexpr std::uint32_t largest_layer = 16384;  // what any driver of GL 4.5 takes
 
 uvec4 bits(const vec4& v) { return glm::floatBitsToUint(v); }
@@ -111,7 +109,7 @@ void add_lamps(std::vector<uvec4>& words, const std::vector<surface::PunctualLig
   }
 }
 
-void pack_words(SurfaceSource& source, const Progress* progress) {
+void pack_words(ModelSource& source, const Progress* progress) {
   const surface::Scene& scene = *source.scene;
   std::vector<uvec4>& words = source.words;
   const auto nodes = std::as_bytes(source.bvh.nodes());
@@ -181,17 +179,12 @@ void pack_words(SurfaceSource& source, const Progress* progress) {
   source.tables.high = glm::nextFloat(vec3(source.pose.high));
 }
 
-void build(SurfaceSource& source, const Progress* progress) {
+void build(ModelSource& source, const Progress* progress) {
   check(progress);
   const std::vector<std::uint32_t> flags = surface::triangle_flags(*source.scene, source.pose);
   check(progress);
   source.bvh = surface::Bvh::build(source.pose.vertices, source.scene->indices, flags, progress);
   source.built_cost = source.bvh.cost();
-}
-
-uvec2 halved_to_fit(uvec2 size, std::uint32_t largest) {
-  while (std::max(size.x, size.y) > largest) size = glm::max(size / 2U, uvec2(1U));
-  return size;
 }
 
 // What is put into the atlas for images that are larger than their places, as they are encoded.
@@ -207,49 +200,8 @@ void shrink_images(TextureAtlas& atlas, const std::vector<surface::Image>& image
 
 }  // namespace
 
-TextureAtlas pack_atlas(const std::vector<surface::Image>& images, std::uint32_t largest) {
-  TextureAtlas atlas;
-  atlas.places.resize(images.size());
-  if (images.empty()) return atlas;
-  std::uint32_t widest = 1;
-  std::uint64_t texels = 0;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const uvec2 size = halved_to_fit({images[i].width, images[i].height}, largest);
-    atlas.places[i].size = size;
-    widest = std::max({widest, size.x, size.y});
-    texels += std::uint64_t{size.x} * size.y;
-  }
-  const auto square = std::bit_ceil(static_cast<std::uint32_t>(std::ceil(std::sqrt(double(texels)))));
-  atlas.edge = std::min(largest, std::max(widest, std::min(square, usual_edge)));
-  std::vector<std::size_t> order(images.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(
-      order, [&](std::size_t a, std::size_t b) { return atlas.places[a].size.y > atlas.places[b].size.y; });
-  uvec2 at(0U);
-  std::uint32_t shelf = 0;
-  for (const std::size_t i : order) {
-    TextureAtlas::Place& place = atlas.places[i];
-    if (at.x + place.size.x > atlas.edge) {
-      at = {0U, at.y + shelf};
-      shelf = 0;
-    }
-    if (at.y + place.size.y > atlas.edge) {
-      at = uvec2(0U);
-      shelf = 0;
-      ++atlas.layers;
-    }
-    place.corner = at;
-    place.layer = atlas.layers;
-    at.x += place.size.x;
-    shelf = std::max(shelf, place.size.y);
-  }
-  ++atlas.layers;
-  return atlas;
-}
-
-std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene, surface::Pose pose,
-                                                         Progress* progress) {
-  auto source = make_left<SurfaceSource>();
+ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Progress* progress) {
+  auto source = make_left<ModelSource>();
   source->scene = std::move(scene);
   source->pose = std::move(pose);
   build(*source, progress);
@@ -265,9 +217,8 @@ std::shared_ptr<const SurfaceSource> make_surface_source(surface::ScenePtr scene
   return source;
 }
 
-std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& last, surface::Pose pose,
-                                                         Progress* progress) {
-  auto source = make_left<SurfaceSource>();
+ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Progress* progress) {
+  auto source = make_left<ModelSource>();
   source->scene = last.scene;
   source->pose = std::move(pose);
   check(progress);
@@ -288,52 +239,4 @@ std::shared_ptr<const SurfaceSource> make_surface_source(const SurfaceSource& la
   return source;
 }
 
-std::unique_ptr<SurfaceData> SurfaceData::plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, gl::WordHeap& heap,
-                                               Upload& upload, const SurfaceSource& source, const SurfaceData* last) {
-  const TextureAtlas& atlas = *source.atlas;
-  if (static_cast<int>(atlas.edge) > limits.texture_size_2d) {
-    throw Error(ErrorCode::unsupported, "the surfaces' images need textures " + std::to_string(atlas.edge) +
-                                            " wide; this driver's GL_MAX_TEXTURE_SIZE is " +
-                                            std::to_string(limits.texture_size_2d));
-  }
-  auto data = std::make_unique<SurfaceData>();
-  SurfaceData* const to = data.get();
-  to->scene_ = source.scene.get();
-  to->tables_ = source.tables;
-  to->lights_ = source.lights;
-  const std::size_t bytes = source.words.size() * sizeof(uvec4);
-  to->bytes_ = bytes + std::uint64_t{atlas.edge} * atlas.edge * std::max(1U, atlas.layers) * 4;
-  upload.add([&heap, to, bytes] {
-    to->words_ = heap.take(bytes, "creating the surfaces' tables");
-    to->tables_.words = static_cast<std::uint32_t>(to->words_.offset() / sizeof(uvec4));
-  });
-  upload.add_bytes(
-      [to] {
-        return Upload::Place{to->words_.buffer(), to->words_.offset()};
-      },
-      source.words.data(), bytes);
-  if (last != nullptr && last->scene_ == to->scene_) {
-    to->atlas_ = last->atlas_;
-    return data;
-  }
-  to->atlas_ = std::make_shared<gl::Object>();
-  upload.add([gl, to, &atlas] {
-    const int edge = static_cast<int>(atlas.edge);
-    *to->atlas_ = gl::make_texture_2d_array(gl, GL_RGBA8, edge, edge, static_cast<int>(std::max(1U, atlas.layers)),
-                                            "creating the surfaces' images");
-  });
-  for (std::size_t i = 0; i < atlas.places.size(); ++i) {
-    const TextureAtlas::Place& place = atlas.places[i];
-    const auto& rgba = atlas.smaller[i].empty() ? source.scene->images[i].rgba : atlas.smaller[i];
-    upload.add_image([to] { return to->atlas_->name(); }, {place.corner, place.size, 0, static_cast<int>(place.layer)},
-                     rgba.data());
-  }
-  return data;
-}
-
-void SurfaceData::bind(const gl::Functions& gl) const {
-  gl.BindTextureUnit(core::CM_UNIT_SCENE_WORDS, words_.texture());
-  gl.BindTextureUnit(core::CM_UNIT_ATLAS, atlas_->name());
-}
-
-}  // namespace cumulet::render
+}  // namespace cumulet::scene
