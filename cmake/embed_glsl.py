@@ -124,7 +124,8 @@ def main():
         literal = "\n".join(f'R"glsl({chunk})glsl"' for chunk in chunks)
         parts.append(f"static constexpr char {symbol}[] =\n{literal};\n")
         parts.append(variant_tables(symbol, variants))
-        entries.append(f'    {{"{path.name}", {symbol}, {symbol}_variants}},')
+        # With its size: to find it is more than clang does in a constant.
+        entries.append(f'    {{"{path.name}", {{{symbol}, sizeof({symbol}) - 1}}, {symbol}_variants}},')
     parts.append("static constexpr Shader all_shaders[] = {\n" + "\n".join(entries) + "\n};\n")
     parts.append("std::span<const Shader> shaders() { return all_shaders; }\n")
     parts.append("}  // namespace cumulet::gl\n")
