@@ -20,7 +20,6 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "march.glsl"
 #if CM_SURFACES
 #define CM_BVH_SHARED_STACK 64u
-#include "bsdf.glsl"
 #include "surface.glsl"
 #endif
 #include "ray.glsl"

@@ -1,5 +1,5 @@
 // What a surface reflects: the metallic-roughness material of glTF 2.0 (appendix B) with KHR_materials_ior, _specular
-// and _clearcoat. Shared by GLSL and C++; the includer provides
+// and _clearcoat. Shared by GLSL and C++; the includer has before this
 //   vec2 cm_ggx_albedo(float roughness, float cosine)
 //   vec2 cm_ggx_albedo_average(float roughness)
 // of src/surface/ggx_albedo.hpp's table: a GGX lobe with a Fresnel term of f0 and f90 reflects f0 x + f90 y of constant
@@ -20,9 +20,6 @@
 #define CM_BSDF_GLSL
 #include "frame.glsl"
 #include "ggx.glsl"
-
-CM_FN vec2 cm_ggx_albedo(float roughness, float cosine);
-CM_FN vec2 cm_ggx_albedo_average(float roughness);
 
 struct CmSurface {
   vec3 base_color;            // linear, 0 to 1

@@ -1,4 +1,4 @@
-// Bindings of the marches' data, and of the host's depth.
+// Bindings of the marches' data, of surfaces' and of the host's depth.
 layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_surface;
 
 float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
@@ -29,6 +29,14 @@ float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, ou
   }
   return z;
 }
+#endif
+
+#if CM_SURFACES
+layout(binding = CM_UNIT_SCENE_WORDS) uniform usamplerBuffer cm_scene_words;
+layout(binding = CM_UNIT_ATLAS) uniform sampler2DArray cm_atlas;
+
+uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(cm.surfaces.words + word)); }
+vec4 cm_atlas_value(ivec3 at) { return texelFetch(cm_atlas, at, 0); }
 #endif
 
 #ifdef CM_MARCH

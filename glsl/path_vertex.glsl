@@ -25,17 +25,17 @@ struct CmVertex {
 // Whether a triangle may be nearer than the event that the ray has come to. The tree is asked after the march, not
 // before: in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the
 // medium.
-bool cm_asks(CmPath p) {
+CM_FN bool cm_asks(CmPath p) {
   bool flight = p.ray == CM_RAY_FLIGHT;
   if (p.event == CM_EVENT_COLLISION && !flight) return false;
   if (p.bounces == 0u && cm.layers.count != 0u) return false;
-  if (p.start == CM_ON_TRIANGLE) return flight || p.reach > 0.0;  // from a little above it
+  if (p.start == CM_ON_TRIANGLE) return flight || p.reach > 0.0f;  // from a little above it
   float reach = p.event == CM_EVENT_COLLISION ? p.t : p.reach;
-  return cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0, reach);
+  return cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, reach);
 }
 
 // Asks the tree.
-void cm_meet(inout CmPath p) {
+CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   bool flight = p.ray == CM_RAY_FLIGHT;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_from_cube_point(p.o);
@@ -48,7 +48,7 @@ void cm_meet(inout CmPath p) {
   cm_hit_seed = p.random;
   cm_hit_camera = p.bounces == 0u;
   CmHit hit;
-  bool met = cm_bvh_trace(o, d, 0.0, p.event == CM_EVENT_COLLISION ? p.t : p.reach, !flight, hit);
+  bool met = cm_bvh_trace(o, d, 0.0f, p.event == CM_EVENT_COLLISION ? p.t : p.reach, !flight, hit);
   if (met && !flight) p.event = CM_EVENT_COLLISION;
   if (met && flight) {
     p.triangle = hit.triangle;
@@ -60,7 +60,7 @@ void cm_meet(inout CmPath p) {
 }
 
 // What a path has met, and its light.
-CmVertex cm_vertex(inout CmPath p, bool on_triangle, bool met) {
+CM_FN CmVertex cm_vertex(CM_INOUT(CmPath) p, bool on_triangle, bool met) {
   CmVertex vertex;
   vertex.on_triangle = on_triangle;
   if (!on_triangle) return vertex;
@@ -78,14 +78,14 @@ CmVertex cm_vertex(inout CmPath p, bool on_triangle, bool met) {
     hit.triangle = p.triangle;
     hit.point = vertex.surface.position;
     hit.normal = vertex.surface.geometric;
-    vertex.surface.emission *= p.lifted != 0u ? 0.0 : cm_balance(p.density, cm_light_pdf(hit));
+    vertex.surface.emission *= p.lifted != 0u ? 0.0f : cm_balance(p.density, cm_light_pdf(hit));
   }
   if (met) p.radiance += p.throughput * vertex.surface.emission;
   return vertex;
 }
 
 // The path is on the triangle that it has met, after cm_arrive. Whether it ends there.
-bool cm_stand(inout CmPath p, CmVertex vertex) {
+CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
   p.o = cm_to_cube_point(vertex.surface.position);
   p.start = CM_ON_TRIANGLE;
   p.behind = vertex.surface.behind ? 1u : 0u;
@@ -93,45 +93,45 @@ bool cm_stand(inout CmPath p, CmVertex vertex) {
 }
 
 // Where looks for light start, in the world.
-vec3 cm_look_from(CmPath p, CmVertex vertex) {
+CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) {
   if (vertex.on_triangle) return cm_offset_origin(vertex.surface.position, vertex.surface.geometric);
   return cm_from_cube_point(p.o);
 }
 
 // A direction that a flight might take. Some that leave a triangle are aimed at the glowing medium.
-vec3 cm_turn_direction(inout CmPath p, CmVertex vertex, float u_0, float u_1) {
-  if (!vertex.on_triangle) return cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531 * u_1);
+CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
+  if (!vertex.on_triangle) return cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531f * u_1);
   float u_3 = cm_random(p.random, p.stream);
   float to_glow = cm.lights.glow_chance;
   bool aimed = u_3 < to_glow;
-  u_3 = aimed ? u_3 / to_glow : (u_3 - to_glow) / (1.0 - to_glow);
+  u_3 = aimed ? u_3 / to_glow : (u_3 - to_glow) / (1.0f - to_glow);
   vec3 w = cm_surface_sample(vertex.surface, p.w, u_0, u_1, u_3);
   return aimed ? cm_glow_direction(p.o, vec3(u_0, u_1, u_3), w) : w;
 }
 
-CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
+CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
   CmTurn turn;
   turn.lifted = false;
   if (vertex.on_triangle) {
     turn.share = cm_surface_eval(vertex.surface, p.w, wi);
     turn.lobe_density = cm_surface_pdf(vertex.surface, p.w, wi);
-    turn.density = (1.0 - cm.lights.glow_chance) * turn.lobe_density +
+    turn.density = (1.0f - cm.lights.glow_chance) * turn.lobe_density +
                    cm_light_pdf(cm_light_hit(CM_LIGHT_GLOW, p.o, wi, turn.lobe_density));
-    turn.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0;
+    turn.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
   } else {
     turn.lobe_density = cm_phase(cm.medium.anisotropy, dot(p.w, wi));
     turn.density = turn.lobe_density;
     turn.share = vec3(turn.lobe_density);
   }
-  turn.weight = turn.density > 0.0 ? turn.share / turn.density : vec3(0.0);
+  turn.weight = turn.density > 0.0f ? turn.share / turn.density : vec3(0.0f);
   return turn;
 }
 
 // Whether a path is scattered wider than a surface of the least roughness does: a quarter of that lobe's highest
 // density, and no matte surface is smooth.
-bool cm_blurs(CmTurn turn) {
+CM_FN bool cm_blurs(CmTurn turn) {
   float alpha = cm_alpha(cm.integrator.blurred_roughness);
-  return turn.lobe_density < max(0.35, 0.25 * CM_INV_PI * 0.25 / (alpha * alpha));
+  return turn.lobe_density < max(0.35f, 0.25f * CM_INV_PI * 0.25f / (alpha * alpha));
 }
 
 #else

@@ -6,8 +6,22 @@
 #include "bindings.glsl"
 #include "shared.glsl"
 #include "surface_parameters.glsl"
-#include "bsdf.glsl"
+#include "ggx.glsl"
 #include "punctual.glsl"
+
+layout(binding = CM_UNIT_GGX_ALBEDO) uniform sampler2D cm_albedo_table;  // surface/ggx_albedo.hpp's
+
+vec2 cm_ggx_albedo(float roughness, float cosine) {
+  vec2 place = cm_ggx_albedo_place(roughness, cosine);
+  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
+}
+
+vec2 cm_ggx_albedo_average(float roughness) {
+  vec2 place = vec2(float(CM_GGX_ALBEDO_SIZE), cm_ggx_albedo_place(roughness, 0.0).y);
+  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
+}
+
+#include "bsdf.glsl"
 
 layout(location = 0) in vec3 cm_from_eye;  // world axes
 layout(location = 1) in vec3 cm_shading_normal;
@@ -17,7 +31,6 @@ layout(location = 4) in vec4 cm_vertex_color;
 layout(location = 5) in float cm_z;
 
 layout(binding = CM_UNIT_MAPS) uniform sampler2D cm_maps[CM_MAPS];
-layout(binding = CM_UNIT_GGX_ALBEDO) uniform sampler2D cm_albedo_table;  // surface/ggx_albedo.hpp's
 layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLights { CmLight cm_lights[]; };  // from the eye
 
 layout(location = 0) out vec4 cm_colour;
@@ -73,16 +86,6 @@ vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
   if (dot(g, wo) < 0.0) g = -g;
   matte_normal = n * side;
   return cm_bend_normal(matte_normal, g, wo);
-}
-
-vec2 cm_ggx_albedo(float roughness, float cosine) {
-  vec2 place = cm_ggx_albedo_place(roughness, cosine);
-  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
-}
-
-vec2 cm_ggx_albedo_average(float roughness) {
-  vec2 place = vec2(float(CM_GGX_ALBEDO_SIZE), cm_ggx_albedo_place(roughness, 0.0).y);
-  return textureLod(cm_albedo_table, (place + 0.5) / vec2(textureSize(cm_albedo_table, 0)), 0.0).xy;
 }
 
 void main() {

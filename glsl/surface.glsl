@@ -1,24 +1,23 @@
 // Triangles and materials as the path tracer meets them: what the tables of one buffer of words say of a point
-// (surface_tables.glsl). Includes bvh.glsl; needs bsdf.glsl before it.
+// (surface_tables.glsl). Includes bvh.glsl and bsdf.glsl. Shared by GLSL and C++; the includer provides
+//   uvec4 cm_words(uint word)       of the tables
+//   vec4 cm_atlas_value(ivec3 at)   of the layers of images: a texel of straight alpha, each channel from 0 to 1
 #ifndef CM_SURFACE_GLSL
 #define CM_SURFACE_GLSL
+#include "ggx.glsl"
 #include "punctual.glsl"
 #include "surface_tables.glsl"
 
-layout(binding = CM_UNIT_SCENE_WORDS) uniform usamplerBuffer cm_scene_words;
-layout(binding = CM_UNIT_ATLAS) uniform sampler2DArray cm_atlas;
+CM_FN vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }
 
-uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(cm.surfaces.words + word)); }
-vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }
-
-uvec4 cm_bvh_node(uint texel) { return cm_words(texel); }
-uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.surfaces.records + texel); }
+CM_FN uvec4 cm_bvh_node(uint texel) { return cm_words(texel); }
+CM_FN uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.surfaces.records + texel); }
 
 // What the ray under way is, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
 
-vec2 cm_ggx_albedo(float roughness, float cosine) {
+CM_FN vec2 cm_ggx_albedo(float roughness, float cosine) {
   vec2 place = cm_ggx_albedo_place(roughness, cosine);
   ivec2 cell = min(ivec2(place), CM_GGX_ALBEDO_SIZE - 2);
   vec2 f = place - vec2(cell);
@@ -28,19 +27,22 @@ vec2 cm_ggx_albedo(float roughness, float cosine) {
   return mix(low, high, f.y);
 }
 
-vec2 cm_ggx_albedo_average(float roughness) {
-  float place = cm_ggx_albedo_place(roughness, 0.0).y;
+CM_FN vec2 cm_ggx_albedo_average(float roughness) {
+  float place = cm_ggx_albedo_place(roughness, 0.0f).y;
   int row = min(int(place), CM_GGX_ALBEDO_SIZE - 2);
-  uvec2 ends = cm_words(cm.surfaces.ggx_albedo_averages + uint(row)).xy;
+  uvec4 ends = cm_words(cm.surfaces.ggx_albedo_averages + uint(row));
   return mix(unpackHalf2x16(ends.x), unpackHalf2x16(ends.y), place - float(row));
 }
 
+#include "bsdf.glsl"
+
 // Unit vector of two signed 16-bit octahedral coordinates (Cigolle et al., "A Survey of Efficient Representations for
 // Independent Unit Vectors", JCGT 3(2), 2014).
-vec3 cm_octahedral(uint word) {
+CM_FN vec3 cm_octahedral(uint word) {
   vec2 e = unpackSnorm2x16(word);
-  vec3 v = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-  if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(v.xy, vec2(0.0)));
+  vec3 v = vec3(e, 1.0f - abs(e.x) - abs(e.y));
+  vec2 over = (1.0f - abs(vec2(e.y, e.x))) * mix(vec2(-1.0f), vec2(1.0f), greaterThanEqual(e, vec2(0.0f)));
+  if (v.z < 0.0f) v = vec3(over, v.z);
   return normalize(v);
 }
 
@@ -52,24 +54,24 @@ struct CmVertexMix {
   vec4 color;
 };
 
-CmVertexMix cm_vertex_mix(uint triangle, vec2 weights) {
+CM_FN CmVertexMix cm_vertex_mix(uint triangle, vec2 weights) {
   CmVertexMix m;
   m.corner = cm_words(cm.surfaces.triangles + triangle);
-  m.weight = vec3(1.0 - weights.x - weights.y, weights);
-  vec4 uv = vec4(0.0);
-  m.color = vec4(0.0);
+  m.weight = vec3(1.0f - weights.x - weights.y, weights);
+  vec4 uv = vec4(0.0f);
+  m.color = vec4(0.0f);
   for (int i = 0; i < 3; ++i) {
     uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
     uv += m.weight[i] * cm_floats(vertex + CM_VERTEX_UV);
     uvec4 last = cm_words(vertex + CM_VERTEX_REST);
     m.color += m.weight[i] * vec4(unpackUnorm2x16(last.z), unpackUnorm2x16(last.w));
   }
-  m.uv_0 = uv.xy;
-  m.uv_1 = uv.zw;
+  m.uv_0 = vec2(uv.x, uv.y);
+  m.uv_1 = vec2(uv.z, uv.w);
   return m;
 }
 
-int cm_wrap(int i, int size, uint mode) {
+CM_FN int cm_wrap(int i, int size, uint mode) {
   if (mode == CM_WRAP_CLAMP) return clamp(i, 0, size - 1);
   int period = mode == CM_WRAP_MIRRORED ? 2 * size : size;
   i = i % period;
@@ -77,70 +79,70 @@ int cm_wrap(int i, int size, uint mode) {
   return i < size ? i : period - 1 - i;
 }
 
-vec4 cm_atlas_texel(uvec4 texture_words, ivec2 at) {
+CM_FN vec4 cm_atlas_texel(uvec4 texture_words, ivec2 at) {
   ivec2 size = ivec2(texture_words.y & 0xffffu, texture_words.y >> 16);
   ivec2 corner = ivec2(texture_words.x & 0xffffu, texture_words.x >> 16);
   at = ivec2(cm_wrap(at.x, size.x, texture_words.w & CM_WRAP_MASK),
              cm_wrap(at.y, size.y, (texture_words.w >> CM_WRAP_T_SHIFT) & CM_WRAP_MASK));
-  return texelFetch(cm_atlas, ivec3(corner + at, int(texture_words.z)), 0);
+  return cm_atlas_value(ivec3(corner + at, int(texture_words.z)));
 }
 
-vec3 cm_from_srgb(vec3 v) {
-  return mix(v / 12.92, pow((v + 0.055) / 1.055, vec3(2.4)), greaterThan(v, vec3(0.04045)));
+CM_FN vec3 cm_from_srgb(vec3 v) {
+  return mix(v / 12.92f, pow((v + 0.055f) / 1.055f, vec3(2.4f)), greaterThan(v, vec3(0.04045f)));
 }
 
 // A material's texture at a point, filtered bilinearly (samples are spread over the pixel: that is the minification
 // filter); white where there is none.
-vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
+CM_FN vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
   uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * material + use;
   uvec4 head = cm_words(word);
-  if (head.x == 0u) return vec4(1.0);
+  if (head.x == 0u) return vec4(1.0f);
   vec4 tail = cm_floats(word + 1u);
-  vec3 rest = uintBitsToFloat(head.yzw);
+  vec3 rest = uintBitsToFloat(uvec3(head.y, head.z, head.w));
   vec2 uv = (head.x & CM_USE_SECOND_UV) != 0u ? m.uv_1 : m.uv_0;
-  uv = vec2(rest.x * uv.x + rest.z * uv.y, rest.y * uv.x + tail.x * uv.y) + tail.yz;
+  uv = vec2(rest.x * uv.x + rest.z * uv.y, rest.y * uv.x + tail.x * uv.y) + vec2(tail.y, tail.z);
   uvec4 t = cm_words(cm.surfaces.textures + (head.x & ~CM_USE_SECOND_UV) - 1u);
   vec2 size = vec2(t.y & 0xffffu, t.y >> 16);
   // Far outside, whole turns would lose the fraction's precision: each wrap mode repeats after two.
   bvec2 clamped = bvec2((t.w & CM_WRAP_MASK) == CM_WRAP_CLAMP, ((t.w >> CM_WRAP_T_SHIFT) & CM_WRAP_MASK) == CM_WRAP_CLAMP);
-  vec2 at = uv - 2.0 * floor(0.5 * uv) * vec2(clamped.x ? 0.0 : 1.0, clamped.y ? 0.0 : 1.0);
-  at = clamp(at, vec2(-4.0), vec2(4.0)) * size;
+  vec2 at = uv - 2.0f * floor(0.5f * uv) * vec2(clamped.x ? 0.0f : 1.0f, clamped.y ? 0.0f : 1.0f);
+  at = clamp(at, vec2(-4.0f), vec2(4.0f)) * size;
   bool nearest = (t.w & CM_TEXTURE_NEAREST) != 0u;
-  vec2 low = floor(nearest ? at : at - 0.5);
-  vec2 f = nearest ? vec2(0.0) : at - 0.5 - low;
-  vec4 sum = vec4(0.0);
+  vec2 low = floor(nearest ? at : at - 0.5f);
+  vec2 f = nearest ? vec2(0.0f) : at - 0.5f - low;
+  vec4 sum = vec4(0.0f);
   for (int i = 0; i < (nearest ? 1 : 4); ++i) {
     ivec2 offset = ivec2(i & 1, i >> 1);
     vec4 value = cm_atlas_texel(t, ivec2(low) + offset);
-    if (srgb) value.rgb = cm_from_srgb(value.rgb);
-    sum += value * (offset.x == 1 ? f.x : 1.0 - f.x) * (offset.y == 1 ? f.y : 1.0 - f.y);
+    if (srgb) value = vec4(cm_from_srgb(vec3(value)), value.a);
+    sum += value * (offset.x == 1 ? f.x : 1.0f - f.x) * (offset.y == 1 ? f.y : 1.0f - f.y);
   }
   return sum;
 }
 
-uint cm_material_flags(uint material) { return cm_words(cm.surfaces.materials + CM_MATERIAL_WORDS * material + CM_MATERIAL_FLAGS).x; }
+CM_FN uint cm_material_flags(uint material) { return cm_words(cm.surfaces.materials + CM_MATERIAL_WORDS * material + CM_MATERIAL_FLAGS).x; }
 
 // The share of rays that end at a point of a triangle. Coverage (BLEND) and transmission are chances, so that no order of
 // surfaces and volume has to be found.
-float cm_coverage(CmVertexMix m) {
+CM_FN float cm_coverage(CmVertexMix m) {
   uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
   uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
   float transmission = cm_floats(word + CM_MATERIAL_COAT).y;
   vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
-  if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + CM_MATERIAL_EMISSION).w) return 0.0;
-  float solid = (flags & CM_ALPHA_BLEND) != 0u ? clamp(base.a, 0.0, 1.0) : 1.0;
-  if (transmission > 0.0) {
+  if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + CM_MATERIAL_EMISSION).w) return 0.0f;
+  float solid = (flags & CM_ALPHA_BLEND) != 0u ? clamp(base.a, 0.0f, 1.0f) : 1.0f;
+  if (transmission > 0.0f) {
     // Thin and clear: what passes goes straight on, in the share of the base colour's luminance.
     float passes = transmission * cm_texture(m.corner.w, CM_USE_TRANSMISSION, m, false).r;
-    solid *= 1.0 - passes * clamp(dot(base.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0, 1.0);
+    solid *= 1.0f - passes * clamp(dot(vec3(base), vec3(0.2126f, 0.7152f, 0.0722f)), 0.0f, 1.0f);
   }
   return solid;
 }
 
 // Whether a ray ends at a triangle that asks.
-bool cm_hit_accept(uint triangle, vec2 weights) {
+CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
   float solid = cm_coverage(cm_vertex_mix(triangle, weights));
-  return solid >= 1.0 || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x) < solid;
+  return solid >= 1.0f || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x) < solid;
 }
 
 // Cameras see through the backs of single-sided materials; light does not.
@@ -163,13 +165,13 @@ struct CmSurfacePoint {
 // From a point of a triangle to the smooth surface that its vertices' normals speak of, where that bulges towards
 // `geometric`: the mean of the point's projections onto the vertices' tangent planes (Hanika, "Hacking the Shadow
 // Terminator", Ray Tracing Gems II, chapter 4, 2021). 0 where it is flat, to what normals of 16 bits can tell.
-vec3 cm_lift(vec3 p, vec3 weight, vec3 position[3], vec3 normal[3], vec3 geometric) {
-  vec3 lift = vec3(0.0);
+CM_FN vec3 cm_lift(vec3 p, vec3 weight, vec3 position[3], vec3 normal[3], vec3 geometric) {
+  vec3 lift = vec3(0.0f);
   for (int i = 0; i < 3; ++i) {
-    vec3 n = dot(normal[i], geometric) < 0.0 ? -normal[i] : normal[i];
+    vec3 n = dot(normal[i], geometric) < 0.0f ? -normal[i] : normal[i];
     vec3 from = p - position[i];
-    float below = -dot(from, n) - 1e-4 * (abs(from.x) + abs(from.y) + abs(from.z));
-    lift += weight[i] * max(0.0, below) * n;
+    float below = -dot(from, n) - 1e-4f * (abs(from.x) + abs(from.y) + abs(from.z));
+    lift += weight[i] * max(0.0f, below) * n;
   }
   return lift;
 }
@@ -177,8 +179,8 @@ vec3 cm_lift(vec3 p, vec3 weight, vec3 position[3], vec3 normal[3], vec3 geometr
 // How much of that a ray starts above the triangle, `cosine` to its normal: all of it along the triangle and below. So
 // light that the smooth normals face is not stopped by the flat triangles that stand for them, and nothing is lost at
 // their edges; whoever looks for light and whoever happens on it start alike.
-const float CM_GRAZING = 0.1;
-float cm_lift_share(float cosine) { return clamp(1.0 - cosine / CM_GRAZING, 0.0, 1.0); }
+const float CM_GRAZING = 0.1f;
+CM_FN float cm_lift_share(float cosine) { return clamp(1.0f - cosine / CM_GRAZING, 0.0f, 1.0f); }
 
 // A material's textures at a point.
 struct CmMaps {
@@ -193,7 +195,7 @@ struct CmMaps {
 };
 
 // In a loop: one after the other they would be the most of a kernel's code.
-CmMaps cm_maps(uint material, CmVertexMix m) {
+CM_FN CmMaps cm_maps(uint material, CmVertexMix m) {
   CmMaps maps;
   for (uint use = CM_USE_BASE_COLOR; use <= CM_USE_CLEARCOAT_ROUGHNESS; use += 2u) {
     bool srgb = use == CM_USE_BASE_COLOR || use == CM_USE_EMISSION || use == CM_USE_SPECULAR_COLOR;
@@ -211,41 +213,41 @@ CmMaps cm_maps(uint material, CmVertexMix m) {
 }
 
 // What a material emits where it is seen from its front.
-vec3 cm_emission(CmVertexMix m) {
-  vec3 emission = cm_floats(cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w + CM_MATERIAL_EMISSION).rgb;
-  return emission * cm_texture(m.corner.w, CM_USE_EMISSION, m, true).rgb;
+CM_FN vec3 cm_emission(CmVertexMix m) {
+  vec4 emission = cm_floats(cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w + CM_MATERIAL_EMISSION);
+  return vec3(emission) * vec3(cm_texture(m.corner.w, CM_USE_EMISSION, m, true));
 }
 
 // The point of a triangle that a path along w (world) has met, on its back or its front.
-CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
+CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
   CmSurfacePoint point;
   CmVertexMix m = cm_vertex_mix(triangle, weights);
   uint material = m.corner.w;
   uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * material;
   vec3 position[3];
   vec3 normals[3];
-  vec3 normal = vec3(0.0);
-  vec4 tangent = vec4(0.0);
+  vec3 normal = vec3(0.0f);
+  vec4 tangent = vec4(0.0f);
   for (int i = 0; i < 3; ++i) {
     uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
     uvec4 first = cm_words(vertex + CM_VERTEX_PLACE);
     uvec4 last = cm_words(vertex + CM_VERTEX_REST);
-    position[i] = uintBitsToFloat(first.xyz);
+    position[i] = cm_bvh_floats(first);
     normals[i] = cm_octahedral(first.w);
     normal += m.weight[i] * normals[i];
     float hand = uintBitsToFloat(last.y);
-    if (hand != 0.0) tangent += m.weight[i] * vec4(cm_octahedral(last.x), hand);
+    if (hand != 0.0f) tangent += m.weight[i] * vec4(cm_octahedral(last.x), hand);
   }
   point.position = m.weight.x * position[0] + m.weight.y * position[1] + m.weight.z * position[2];
   vec3 g = cross(position[1] - position[0], position[2] - position[0]);
   // Scaled first: the cross product of a tiny triangle has no length in fp32.
-  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
-  point.behind = dot(g, w) > 0.0;
+  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
+  point.behind = dot(g, w) > 0.0f;
   point.geometric = point.behind ? -g : g;
-  point.lifted = cm_lift(point.position, m.weight, position, normals, point.geometric) != vec3(0.0);
+  point.lifted = cm_lift(point.position, m.weight, position, normals, point.geometric) != vec3(0.0f);
   float normal_length = length(normal);
-  normal = normal_length > 1e-6 ? normal / normal_length : g;
-  bool back = dot(normal, point.geometric) < 0.0;
+  normal = normal_length > 1e-6f ? normal / normal_length : g;
+  bool back = dot(normal, point.geometric) < 0.0f;
   point.material.smooth_normal = back ? -normal : normal;
 
   CmMaps maps = cm_maps(material, m);
@@ -257,30 +259,29 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_b
   vec4 rough = maps.metallic_roughness;
 
   if (cm_words(word + CM_USE_NORMAL).x != 0u) {
-    vec3 t = tangent.xyz - dot(tangent.xyz, normal) * normal;
-    float hand = tangent.w < 0.0 ? -1.0 : 1.0;
-    if (dot(t, t) > 1e-12) {
-      vec3 n = maps.normal.xyz * 2.0 - 1.0;
-      n.xy *= c.z;
+    vec3 t = vec3(tangent) - dot(vec3(tangent), normal) * normal;
+    float hand = tangent.w < 0.0f ? -1.0f : 1.0f;
+    if (dot(t, t) > 1e-12f) {
+      vec3 n = (vec3(maps.normal) * 2.0f - 1.0f) * vec3(c.z, c.z, 1.0f);
       t = normalize(t);
       vec3 bumped = n.x * t + n.y * hand * cross(normal, t) + n.z * normal;
-      if (dot(bumped, bumped) > 1e-12) normal = normalize(bumped);
+      if (dot(bumped, bumped) > 1e-12f) normal = normalize(bumped);
     }
   }
   if (back) normal = -normal;
   point.material.matte_normal = normal;
   normal = cm_bend_normal(normal, point.geometric, -w);
 
-  vec3 emission = cm_floats(word + CM_MATERIAL_EMISSION).rgb * maps.emission.rgb;
+  vec3 emission = vec3(cm_floats(word + CM_MATERIAL_EMISSION)) * vec3(maps.emission);
   point.unlit = (flags & CM_UNLIT) != 0u;
-  point.emission = from_back && (flags & CM_ONE_SIDED) != 0u ? vec3(0.0) : emission;
-  if (point.unlit) point.emission = base.rgb;
-  point.material.base_color = base.rgb;
-  point.material.metallic = clamp(a.x * rough.b, 0.0, 1.0);
-  point.material.roughness = clamp(a.y * rough.g, 0.0, 1.0);
+  point.emission = from_back && (flags & CM_ONE_SIDED) != 0u ? vec3(0.0f) : emission;
+  if (point.unlit) point.emission = vec3(base);
+  point.material.base_color = vec3(base);
+  point.material.metallic = clamp(a.x * rough.b, 0.0f, 1.0f);
+  point.material.roughness = clamp(a.y * rough.g, 0.0f, 1.0f);
   point.material.normal = normal;
   float specular = a.w * maps.specular.a;
-  point.material.f0 = min(a.z * b.rgb * maps.specular_color.rgb, vec3(1.0)) * specular;
+  point.material.f0 = min(a.z * vec3(b) * vec3(maps.specular_color), vec3(1.0f)) * specular;
   point.material.specular = specular;
   point.material.clearcoat = b.w * maps.clearcoat.r;
   point.material.clearcoat_roughness = c.x * maps.clearcoat_roughness.g;
@@ -289,31 +290,31 @@ CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_b
 
 // Reflected share of light from wi (world, unit) towards where the path came from, times the cosine. Not 0 below the
 // triangle: what is seen there from the ray's start counts, often the surface itself.
-vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_eval(point.material, -w, wi); }
+CM_FN vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_eval(point.material, -w, wi); }
 
 // Density of cm_surface_sample's directions by solid angle.
-float cm_surface_pdf(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_pdf(point.material, -w, wi); }
+CM_FN float cm_surface_pdf(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_pdf(point.material, -w, wi); }
 
 // A direction to go on in.
-vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1, float u_2) {
+CM_FN vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1, float u_2) {
   return cm_bsdf_sample(point.material, -w, u_0, u_1, u_2);
 }
 
 // Where a ray along d (world, unit) starts from a point of a triangle, in the world: beside it, on the side that its
 // path came from. shift: from the point itself, but for the rounding.
-vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, out vec3 shift) {
+CM_FN vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, CM_OUT(vec3) shift) {
   uvec4 corner = cm_words(cm.surfaces.triangles + triangle);
   vec3 position[3];
   vec3 normals[3];
   for (int i = 0; i < 3; ++i) {
     uvec4 first = cm_words(cm.surfaces.vertices + CM_VERTEX_WORDS * corner[i] + CM_VERTEX_PLACE);
-    position[i] = uintBitsToFloat(first.xyz);
+    position[i] = cm_bvh_floats(first);
     normals[i] = cm_octahedral(first.w);
   }
   vec3 g = cross(position[1] - position[0], position[2] - position[0]);
-  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38));
+  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
   if (behind) g = -g;
-  vec3 weight = vec3(1.0 - weights.x - weights.y, weights);
+  vec3 weight = vec3(1.0f - weights.x - weights.y, weights);
   vec3 p = weight.x * position[0] + weight.y * position[1] + weight.z * position[2];
   shift = cm_lift_share(dot(g, d)) * cm_lift(p, weight, position, normals, g);
   return cm_offset_origin(p + shift, g);

@@ -11,7 +11,6 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "phase.glsl"
 #define CM_BVH_SHARED_STACK 64u
 #include "buffers.glsl"
-#include "bsdf.glsl"
 #include "surface.glsl"
 #include "path.glsl"
 #include "path_store.glsl"

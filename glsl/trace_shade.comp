@@ -10,7 +10,6 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "random.glsl"
 #include "phase.glsl"
 #include "buffers.glsl"
-#include "bsdf.glsl"
 #include "surface.glsl"
 #include "path.glsl"
 #include "path_store.glsl"

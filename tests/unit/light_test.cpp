@@ -36,14 +36,10 @@ struct CpuDisc {
   float cm_disc_chance = 1.0F;
   float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
   float cm_voxel(ivec3 voxel) const { return test::value_at(*volume, voxel + origin) / volume->max_value; }
-#include "phase.glsl"
-#include "random.glsl"
 #define CM_MARCH 1
-#include "march_voxel.glsl"
 #define CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, cm_disc_chance, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)
-#include "run.glsl"
 #include "support/disc_light.glsl"
-#include "support/traced_pixel.inc"
+#include "support/traced.inc"
 #undef CM_MARCH
 };
 
@@ -164,11 +160,7 @@ TEST_P(NewLight, ADiscOfFiniteAngleIsFoundByLooksAndByFlights) {
       std::array<double, 64> means{};
       double mean = 0.0;
       for (std::uint32_t i = 0; i < 64; ++i) {
-        core::CpuDisc::CmPath path{};
-        cpu.traced_pixel = {};
-        std::uint32_t traced = 0;
-        cpu.cm_run(path, traced, {i % 8, i / 8}, 100000000);
-        means.at(i) = cpu.traced_pixel.sum.x / 256.0;
+        means.at(i) = cpu.traced({i % 8, i / 8}).sum.x / 256.0;
         mean += means.at(i) / 64.0;
       }
       double square = 0.0;

@@ -1,4 +1,4 @@
-// The tracer against analytic answers, an independent path tracer, its own source on the CPU, and itself.
+// The tracer against analytic answers, an independent path tracer, and itself.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,6 @@
 #include <random>
 
 #include "base/error.hpp"
-#include "support/cpu_tracer.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/volumes.hpp"
 
@@ -363,54 +362,6 @@ TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
   test::Image reseeded = image;
   reseeded.seed = 10;
   EXPECT_NE(one.pixels, test::render(*viewer, reseeded).pixels);
-}
-
-template <class Tracer>
-void expect_cpu_agrees(Tracer& cpu, const test::Picture& gpu, std::uint32_t samples) {
-  std::size_t same = 0;
-  for (std::uint32_t i = 0; i < gpu.pixels.size(); ++i) {
-    typename Tracer::CmPath path{};
-    cpu.cm.dispatch.samples = samples;
-    cpu.traced_pixel = {};
-    std::uint32_t traced = 0;
-    cpu.cm_run(path, traced, {i % gpu.width, i / gpu.width}, 1000000);
-    const glm::vec4 sum =
-        cpu.traced_pixel.sum / static_cast<float>(samples) + glm::vec4(cpu.traced_pixel.background, 0.0F);
-    same += glm::distance(sum, gpu.pixels[i]) < 2e-3F ? 1 : 0;
-  }
-  // Where a logarithm or a cosine rounds the other way, a path may part from its twin.
-  EXPECT_GT(static_cast<double>(same), 0.95 * static_cast<double>(gpu.pixels.size()));
-}
-
-TEST_P(Trace, TheCpuTracesTheSamePaths) {
-  const auto volume = test::noise_volume({40, 36, 30}, ivec3(0), 2);
-  const auto viewer = make();
-  viewer->set_volume(volume);
-  viewer->set_medium({0.3, vec3(0.9F), 0.4F, 0});
-  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
-  const test::Image image{24, 24, 1, 5, render::View::shaded};
-
-  grid::RefineSettings refine;
-  refine.threshold = 0.02;
-  const grid::Statistics statistics(volume, grid::fit_cube(volume));
-  const grid::DiamondSet diamonds(statistics, refine);
-  grid::GridBuilder builder(statistics, diamonds);
-  builder.bisect();
-  const grid::TetGrid tets = builder.records(refine.cells, volume.max_value);
-  viewer->set_grid(settings_of(kinds[0], 0.02));
-  const test::Picture tet = test::render(*viewer, image);
-  core::CpuTetLinear cpu_tet;
-  cpu_tet.cm = viewer->viewer().trace_parameters();
-  cpu_tet.grid = &tets;
-  expect_cpu_agrees(cpu_tet, tet, 1);
-
-  viewer->set_grid(settings_of(kinds[2], 0.02));
-  const test::Picture dense = test::render(*viewer, image);
-  core::CpuDense cpu_dense;
-  cpu_dense.cm = viewer->viewer().trace_parameters();
-  cpu_dense.volume = &volume;
-  cpu_dense.origin = statistics.cube().origin;
-  expect_cpu_agrees(cpu_dense, dense, 1);
 }
 
 TEST_P(Trace, CameraInsideOnFacesEdgesAndVertices) {

@@ -1,20 +1,21 @@
 #pragma once
 
-#include <vector>
+#include <stdexcept>
 
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
 #include "render/parameters.hpp"
+#include "render/surface_data.hpp"
 #include "support/volumes.hpp"
 
-// Marches share one signature; each leaves some of it unused.
+// Functions of variants share their signatures; each leaves some of it unused.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
-// The shaders' path tracer as C++: the same source, with the marches' data in memory.
+// The shaders' path tracer as C++: the same source, with data in memory.
 namespace cumulet::core {
 
-struct CpuTetLinear {
+struct CpuTetData {
   CmParameters cm{};
   const grid::TetGrid* grid = nullptr;
   float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
@@ -22,41 +23,71 @@ struct CpuTetLinear {
   uint cm_tree(uint node) const { return grid->tree[node]; }
   uint cm_root_leaf(uint root) const { return grid->roots[root].first_leaf; }
   uint cm_root_node(uint root) const { return grid->roots[root].first_internal; }
-#include "phase.glsl"
-#include "random.glsl"
-#define CM_LINEAR 1
-#include "march_tet.glsl"
-#include "run.glsl"
-#include "support/traced_pixel.inc"
-#undef CM_LINEAR
 };
 
-#undef CM_RANDOM_GLSL
-#undef CM_PHASE_GLSL
-#undef CM_FRAME_GLSL
-#undef CM_MARCH_TET_GLSL
-#undef CM_RAY_GLSL
-#undef CM_LIGHT_GLSL
-#undef CM_PATH_STATE_GLSL
-#undef CM_PATH_VERTEX_GLSL
-#undef CM_PATH_GLSL
-#undef CM_FLIGHT_GLSL
-#undef CM_RUN_GLSL
+#define CM_MARCH 0
+#define CM_LINEAR 1
 
-struct CpuDense {
+struct CpuTet : CpuTetData {
+#include "support/traced.inc"
+};
+
+struct CpuSurfaceData {
+  const render::SurfaceSource* surfaces = nullptr;
+  uvec4 cm_words(uint word) const { return surfaces->words.at(word); }
+  vec4 cm_atlas_value(ivec3 at) const {
+    const render::TextureAtlas& atlas = *surfaces->atlas;
+    for (std::size_t i = 0; i < atlas.places.size(); ++i) {
+      const render::TextureAtlas::Place& place = atlas.places[i];
+      const uvec2 texel = uvec2(ivec2(at)) - place.corner;  // beyond any size to the left or above
+      if (uint(at.z) != place.layer || texel.x >= place.size.x || texel.y >= place.size.y) continue;
+      const auto& rgba = atlas.smaller[i].empty() ? surfaces->scene->images[i].rgba : atlas.smaller[i];
+      const std::uint8_t* const value = &rgba.at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
+      return vec4(value[0], value[1], value[2], value[3]) / 255.0F;
+    }
+    throw std::out_of_range("no image there");
+  }
+  // Camera rays are not ended by the surface pass, which is drawn where paths meet no triangles.
+  static float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, vec4& colour) { return 3.0e38F; }
+};
+
+#undef CM_SURFACES
+#define CM_SURFACES 1
+struct CpuTetSurfaces : CpuTetData, CpuSurfaceData {
+#include "support/traced.inc"
+};
+
+#undef CM_SURFACES
+#define CM_SURFACES 2
+struct CpuTetEmitters : CpuTetData, CpuSurfaceData {
+#include "support/traced.inc"
+};
+
+#undef CM_MARCH
+#undef CM_LINEAR
+#define CM_MARCH 1
+#define CM_LINEAR 0
+
+struct CpuDenseData {
   CmParameters cm{};
   const volume::ScalarVolume* volume = nullptr;
   ivec3 origin{0};
   float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
   float cm_voxel(ivec3 voxel) const { return test::value_at(*volume, voxel + origin) / volume->max_value; }
-#include "phase.glsl"
-#include "random.glsl"
-#define CM_MARCH 1
-#include "march_voxel.glsl"
-#include "run.glsl"
-#include "support/traced_pixel.inc"
-#undef CM_MARCH
 };
+
+struct CpuDenseEmitters : CpuDenseData, CpuSurfaceData {
+#include "support/traced.inc"
+};
+
+#undef CM_SURFACES
+#define CM_SURFACES 0
+struct CpuDense : CpuDenseData {
+#include "support/traced.inc"
+};
+
+#undef CM_MARCH
+#undef CM_LINEAR
 
 }  // namespace cumulet::core
 

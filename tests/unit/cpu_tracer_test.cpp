@@ -1,0 +1,183 @@
+// The tracer against its own source on the CPU.
+
+#include "support/cpu_tracer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "support/gl_viewer.hpp"
+#include "support/surfaces.hpp"
+#include "support/volumes.hpp"
+
+// Mesa's OSMesa keeps its framebuffers for ever.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+using namespace cumulet;
+using glm::ivec3;
+using glm::vec3;
+using render::March;
+using surface::Material;
+using test::StillScene;
+
+class CpuTracer : public test::ViewerTest {};
+CUMULET_ON_BACKENDS(CpuTracer);
+
+viewer::GridSettings settings_of(March march, double threshold = 0.02) {
+  viewer::GridSettings s;
+  s.build.march = march;
+  s.build.refine.threshold = threshold;
+  return s;
+}
+
+grid::TetGrid grid_of(const volume::ScalarVolume& volume, const viewer::GridSettings& settings) {
+  const grid::Statistics statistics(volume, grid::fit_cube(volume));
+  const grid::DiamondSet diamonds(statistics, settings.build.refine);
+  grid::GridBuilder builder(statistics, diamonds);
+  builder.bisect();
+  return builder.records(settings.build.refine.cells, volume.max_value);
+}
+
+/// The share of pixels that are the twin's.
+template <class Twin>
+double same_pixels(Twin& twin, const test::Picture& gpu) {
+  std::size_t same = 0;
+  for (std::uint32_t i = 0; i < gpu.pixels.size(); ++i) {
+    const typename Twin::CmPixel pixel = twin.traced({i % gpu.width, i / gpu.width});
+    const glm::vec4 mean = pixel.sum / static_cast<float>(pixel.samples) + glm::vec4(pixel.background, 0.0F);
+    const float size = std::max(1.0F, glm::length(gpu.pixels[i]));
+    same += glm::distance(mean, gpu.pixels[i]) < 2e-3F * size ? 1 : 0;
+  }
+  return double(same) / double(gpu.pixels.size());
+}
+
+TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
+  const auto volume = test::noise_volume({40, 36, 30}, ivec3(0), 2);
+  const auto viewer = make();
+  viewer->set_volume(volume);
+  viewer->set_medium({0.3, vec3(0.9F), 0.4F, 0});
+  viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
+  const test::Image image{24, 24, 1, 5, render::View::shaded};
+
+  // Where a logarithm or a cosine rounds the other way, a path may part from its twin.
+  viewer->set_grid(settings_of(March::tet));
+  const test::Picture tet = test::render(*viewer, image);
+  const grid::TetGrid grid = grid_of(volume, settings_of(March::tet));
+  core::CpuTet cpu_tet;
+  cpu_tet.cm = viewer->viewer().trace_parameters();
+  cpu_tet.cm.dispatch.samples = image.samples;
+  cpu_tet.grid = &grid;
+  EXPECT_GT(same_pixels(cpu_tet, tet), 0.99);
+
+  viewer->set_grid(settings_of(March::dense));
+  const test::Picture dense = test::render(*viewer, image);
+  core::CpuDense cpu_dense;
+  cpu_dense.cm = viewer->viewer().trace_parameters();
+  cpu_dense.cm.dispatch.samples = image.samples;
+  cpu_dense.volume = &volume;
+  cpu_dense.origin = grid::fit_cube(volume).origin;
+  EXPECT_GT(same_pixels(cpu_dense, dense), 0.99);
+}
+
+/// A room around a volume: a textured floor, a coated ball, a veil, and a lamp that shines in.
+std::shared_ptr<StillScene> room() {
+  auto scene = std::make_shared<StillScene>();
+  std::mt19937 random(3);
+  std::uniform_int_distribution<int> byte(60, 255);
+  std::vector<std::uint8_t> texels;
+  for (int i = 0; i < 4 * 8 * 8; ++i) texels.push_back(static_cast<std::uint8_t>(byte(random)));
+  Material floor = test::diffuse(vec3(0.8F));
+  floor.base_color_texture.texture = scene->add_texture(8, 8, texels);
+  floor.base_color_texture.transform = glm::mat3x2(3.0F, 0.0F, 0.0F, 3.0F, 0.25F, 0.0F);
+  scene->add_quad({{{-40, -8, 70}, {80, -8, 70}, {80, -8, -40}, {-40, -8, -40}}}, scene->add(floor));
+  Material ball;
+  ball.base_color = {0.7F, 0.4F, 0.2F, 1.0F};
+  ball.metallic = 0.3F;
+  ball.roughness = 0.4F;
+  ball.clearcoat = 0.5F;
+  ball.clearcoat_roughness = 0.2F;
+  scene->add_sphere({6.0F, 2.0F, 34.0F}, 9.0F, scene->add(ball), 12);
+  Material veil = test::diffuse(vec3(0.9F, 0.9F, 0.3F));
+  veil.base_color.a = 0.5F;
+  veil.alpha_mode = surface::AlphaMode::blend;
+  veil.double_sided = true;
+  scene->add_quad({{{22, -8, 44}, {40, -8, 40}, {40, 14, 40}, {22, 14, 44}}}, scene->add(veil));
+  surface::PunctualLight lamp;
+  lamp.intensity = vec3(900.0F, 700.0F, 400.0F);
+  lamp.position = {44.0F, 30.0F, 30.0F};
+  scene->rest.lights = {lamp};
+  return scene;
+}
+
+/// And what glows: a triangle mesh in the air.
+std::shared_ptr<StillScene> room_with_emitters() {
+  auto scene = room();
+  Material glow = test::diffuse(vec3(0.2F));
+  glow.emission = {6.0F, 2.0F, 1.0F};
+  scene->add_sphere({-4.0F, 16.0F, 12.0F}, 4.0F, scene->add(glow), 8);
+  return scene;
+}
+
+class CpuTracerSurfaces : public CpuTracer {
+ protected:
+  void SetUp() override {
+    CpuTracer::SetUp();
+    if (IsSkipped()) return;
+    still_ = make();
+    still_->set_volume(volume_);
+    viewer::Medium medium{0.2, vec3(0.9F), 0.4F, 0};
+    still_->set_medium(medium);
+    still_->set_light({40.0F, 30.0F, vec3(1.0F), vec3(0.2F, 0.3F, 0.5F)});
+    still_->set_camera(test::camera_at({50.0, 34.0, 90.0}, {17.0, 6.0, 18.0}, 40.0));
+  }
+  template <class Twin>
+  double same(Twin& twin, const std::shared_ptr<StillScene>& scene, const viewer::GridSettings& settings,
+              const test::Image& image) {
+    const auto surfaces = test::source_of(scene);
+    still_->viewer().show_surfaces(surfaces);
+    still_->set_grid(settings);
+    const test::Picture picture = test::render(*still_, image);
+    twin.surfaces = surfaces.get();
+    twin.cm = still_->viewer().trace_parameters();
+    twin.cm.dispatch.samples = image.samples;
+    return same_pixels(twin, picture);
+  }
+
+  const volume::ScalarVolume volume_ = test::noise_volume({34, 30, 32}, ivec3(0), 2);
+  std::unique_ptr<test::Still> still_;
+};
+CUMULET_ON_BACKENDS(CpuTracerSurfaces);
+
+TEST_P(CpuTracerSurfaces, PathsAmongTrianglesAreTheSame) {
+  const viewer::GridSettings settings = settings_of(March::tet);
+  const grid::TetGrid grid = grid_of(volume_, settings);
+  core::CpuTetSurfaces twin;
+  twin.grid = &grid;
+  for (const std::uint32_t seed : {1U, 2U}) {
+    EXPECT_GT(same(twin, room(), settings, {32, 32, 1, seed, render::View::shaded}), 0.99);
+  }
+}
+
+TEST_P(CpuTracerSurfaces, PathsAmongEmittersAreTheSame) {
+  const viewer::GridSettings tet = settings_of(March::tet);
+  const grid::TetGrid grid = grid_of(volume_, tet);
+  core::CpuTetEmitters twin;
+  twin.grid = &grid;
+  for (const std::uint32_t seed : {1U, 2U}) {
+    EXPECT_GT(same(twin, room_with_emitters(), tet, {32, 32, 1, seed, render::View::shaded}), 0.99);
+  }
+  // Every sample counts, not the first alone.
+  EXPECT_GT(same(twin, room_with_emitters(), tet, {32, 32, 4, 3, render::View::shaded}), 0.98);
+
+  core::CpuDenseEmitters dense;
+  dense.volume = &volume_;
+  dense.origin = grid::fit_cube(volume_).origin;
+  EXPECT_GT(same(dense, room_with_emitters(), settings_of(March::dense), {32, 32, 1, 1, render::View::shaded}), 0.99);
+}
+
+}  // namespace
