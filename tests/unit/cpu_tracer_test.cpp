@@ -138,11 +138,11 @@ class CpuTracerSurfaces : public CpuTracer {
   template <class Twin>
   double same(Twin& twin, const std::shared_ptr<StillScene>& scene, const viewer::GridSettings& settings,
               const test::Image& image) {
-    const auto surfaces = test::source_of(scene);
-    still_->viewer().show_surfaces(surfaces);
+    const auto model = test::source_of(scene);
+    still_->viewer().show_surfaces(model);
     still_->set_grid(settings);
     const test::Picture picture = test::render(*still_, image);
-    twin.surfaces = surfaces.get();
+    twin.model = model.get();
     twin.cm = still_->viewer().trace_parameters();
     twin.cm.dispatch.samples = image.samples;
     return same_pixels(twin, picture);

@@ -38,8 +38,9 @@ struct CpuDisc {
   float cm_voxel(ivec3 voxel) const { return test::value_at(*volume, voxel + origin) / volume->max_value; }
 #define CM_MARCH 1
 #define CM_MORE_LIGHTS(LIGHT) LIGHT(CM_LIGHT_OTHER, cm_disc_chance, cm_disc_sample, cm_disc_pdf, cm_disc_radiance)
-#include "support/disc_light.glsl"
 #include "support/traced.inc"
+
+#include "support/disc_light.glsl"
 #undef CM_MARCH
 };
 

@@ -5,7 +5,7 @@
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
 #include "render/parameters.hpp"
-#include "render/surface_data.hpp"
+#include "scene/model_source.hpp"
 #include "support/volumes.hpp"
 
 // Functions of variants share their signatures; each leaves some of it unused.
@@ -33,15 +33,15 @@ struct CpuTet : CpuTetData {
 };
 
 struct CpuSurfaceData {
-  const render::SurfaceSource* surfaces = nullptr;
-  uvec4 cm_words(uint word) const { return surfaces->words.at(word); }
+  const scene::ModelSource* model = nullptr;
+  uvec4 cm_words(uint word) const { return model->words.at(word); }
   vec4 cm_atlas_value(ivec3 at) const {
-    const render::TextureAtlas& atlas = *surfaces->atlas;
+    const scene::TextureAtlas& atlas = *model->atlas;
     for (std::size_t i = 0; i < atlas.places.size(); ++i) {
-      const render::TextureAtlas::Place& place = atlas.places[i];
+      const scene::TextureAtlas::Place& place = atlas.places[i];
       const uvec2 texel = uvec2(ivec2(at)) - place.corner;  // beyond any size to the left or above
       if (uint(at.z) != place.layer || texel.x >= place.size.x || texel.y >= place.size.y) continue;
-      const auto& rgba = atlas.smaller[i].empty() ? surfaces->scene->images[i].rgba : atlas.smaller[i];
+      const auto& rgba = atlas.smaller[i].empty() ? model->scene->images[i].rgba : atlas.smaller[i];
       const std::uint8_t* const value = &rgba.at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
       return vec4(value[0], value[1], value[2], value[3]) / 255.0F;
     }
