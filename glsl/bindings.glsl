@@ -51,6 +51,7 @@ const int CM_IMAGE_SUM = 0;
 const int CM_IMAGE_COUNTS = 1;
 const int CM_IMAGE_VOLUME_SUM = 2;
 const int CM_IMAGE_BACKGROUND = 3;
+const int CM_IMAGE_MOMENTS = 4;
 const int CM_IMAGE_VOLUME_Z = 2;  // inspect.comp, aovs.comp
 const int CM_IMAGE_NORMAL = 0;    // aovs.comp
 const int CM_IMAGE_ALBEDO = 1;

@@ -10,6 +10,7 @@ namespace cumulet::render {
 void Film::begin(glm::uvec2 size) {
   if (size != size_) held_.clear();
   size_ = size;
+  std::erase_if(held_, [](const Held& held) { return !held.written; });
   for (Held& held : held_) held.written = false;
 }
 

@@ -23,16 +23,17 @@ struct FilmLayer {
 namespace film_layers {
 /// Sums over the samples: radiance in front of the background, and alpha.
 inline constexpr FilmLayer radiance{"radiance", GL_RGBA32F, 16};
-/// Means over the samples: the background's radiance, which alpha is already taken off; and the squared luminance of
-/// both, of which the variance is made.
-inline constexpr FilmLayer background{"background", GL_RGBA32F, 16};
+/// Means over the samples of the background's radiance, which alpha is already taken off.
+inline constexpr FilmLayer background{"background", GL_RGBA32F, 16};  // rgb32f is no image format
+/// Means over the samples of the squared luminance of both, of which the variance is made.
+inline constexpr FilmLayer moments{"moments", GL_R32F, 4};
 /// Samples, and cells marched.
 inline constexpr FilmLayer counts{"counts", GL_RG32UI, 8};
 /// As radiance, of the samples that met the volume before any surface; alpha is their number.
 inline constexpr FilmLayer volume{"volume", GL_RGBA32F, 16};
 /// View depth z at half opacity, to be written as depth; 0 where the volume is not so opaque.
 inline constexpr FilmLayer depth{"depth", GL_R32F, 4};
-inline constexpr FilmLayer normal{"normal", GL_RGBA32F, 16};  // rgb32f is no image format
+inline constexpr FilmLayer normal{"normal", GL_RGBA32F, 16};
 inline constexpr FilmLayer albedo{"albedo", GL_RGBA32F, 16};
 inline constexpr FilmLayer transmittance{"transmittance", GL_R32F, 4};
 inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
@@ -43,7 +44,8 @@ inline constexpr FilmLayer volume_z{"volume z", GL_R32F, 4};
 /// Calls that take GL need the context current and a StateGuard around.
 class Film {
  public:
-  /// A picture anew: nothing is written. Textures of the same size wait to be written again, others go.
+  /// A picture anew: nothing is written. Textures of the same size that the last one wrote wait to be written again,
+  /// others go.
   void begin(glm::uvec2 size);
   [[nodiscard]] glm::uvec2 size() const { return size_; }
   /// Whether a pass has written it, of this picture.

@@ -143,6 +143,11 @@ void Flights::end(Dispatched what, GLuint buffer, std::size_t words) {
   flying_.push_back(std::move(next_));
 }
 
+void Flights::give_up() {
+  if (queries_[0] != 0) gl_->DeleteQueries(2, queries_.data());
+  queries_ = {};
+}
+
 std::optional<Flights::Landed> Flights::land() {
   if (flying_.empty()) return std::nullopt;
   Flight& first = flying_.front();

@@ -102,6 +102,8 @@ class Flights {
   /// Around a dispatch; at most `most` of them may be under way. words of the buffer are kept as they are then.
   void begin(Kind kind);
   void end(Dispatched what, GLuint buffer, std::size_t words);
+  /// Instead of end(): nothing came of it.
+  void give_up();
   /// The oldest, if it is over. Never waits.
   std::optional<Landed> land();
   /// Waits until all are over; land() gives them.

@@ -225,7 +225,8 @@ void Tracer::make_shared_objects() {
 }
 
 std::vector<FilmLayer> Tracer::accumulated(const Picture& picture) {
-  std::vector<FilmLayer> layers{film_layers::radiance, film_layers::background, film_layers::counts};
+  std::vector<FilmLayer> layers{film_layers::radiance, film_layers::background, film_layers::moments,
+                                film_layers::counts};
   if (picture.volume_alone_) layers.push_back(film_layers::volume);
   return layers;
 }
@@ -237,6 +238,7 @@ void Tracer::empty(Picture& picture, const glm::vec3& background, std::uint32_t 
     const glm::uvec2 count(samples, 0U);
     gl_->ClearTexImage(film.texture(film_layers::radiance), 0, GL_RGBA, GL_FLOAT, &zero);
     gl_->ClearTexImage(film.texture(film_layers::background), 0, GL_RGBA, GL_FLOAT, &behind);
+    gl_->ClearTexImage(film.texture(film_layers::moments), 0, GL_RED, GL_FLOAT, &zero);
     gl_->ClearTexImage(film.texture(film_layers::counts), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &count);
     if (picture.volume_alone_) gl_->ClearTexImage(film.texture(film_layers::volume), 0, GL_RGBA, GL_FLOAT, &zero);
     gl::check(*gl_, "clearing the accumulation");
@@ -285,7 +287,12 @@ void Tracer::draw_layers(Picture& picture, const Obstacles& obstacles, const Pic
   collect();
   const bool measured = !rasters_.full();
   if (measured) rasters_.begin(Flights::Kind::draws);
-  obstacles.raster->draw(obstacles.view, obstacles.lighting, size, settings.layers, made->layers);
+  try {
+    obstacles.raster->draw(obstacles.view, obstacles.lighting, size, settings.layers, made->layers);
+  } catch (...) {
+    if (measured) rasters_.give_up();
+    throw;
+  }
   if (measured) {
     Dispatched what;
     what.lanes = double(size.x) * size.y * settings.layers;
@@ -453,6 +460,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   film.bind(*gl_, core::CM_IMAGE_SUM, film_layers::radiance, GL_READ_WRITE);
   film.bind(*gl_, core::CM_IMAGE_COUNTS, film_layers::counts, GL_READ_WRITE);
   film.bind(*gl_, core::CM_IMAGE_BACKGROUND, film_layers::background, GL_READ_WRITE);
+  film.bind(*gl_, core::CM_IMAGE_MOMENTS, film_layers::moments, GL_READ_WRITE);
   // What is bound shall fit the format, though nothing writes it: inspect.comp has the depth there.
   film.bind(*gl_, core::CM_IMAGE_VOLUME_SUM, picture.volume_alone_ ? film_layers::volume : film_layers::depth,
             GL_READ_WRITE);
@@ -618,6 +626,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacle
   if (!asked([&] { inspect_program(data, obstacles, "inspect.comp"); })) return false;
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
+    flights_.order();
     const Program& program = inspect_program(data, obstacles, "inspect.comp");
     program.object->use(*gl_);
     bind(data, obstacles);
@@ -637,6 +646,7 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
   if (picture.film_.has(normal)) return true;
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
+    flights_.order();
     const Program& program = inspect_program(data, obstacles, "aovs.comp");
     program.object->use(*gl_);
     bind(data, obstacles);
@@ -670,6 +680,7 @@ void Tracer::read_fact(Picture& picture, const MarchData& data, const Obstacles&
 float Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
                    glm::uvec2 pixel) {
   make_shared_objects();
+  flights_.order();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
   core::CmParameters p = assemble(parameters, data, obstacles);
   p.dispatch.tile_corner = pixel;
@@ -691,29 +702,26 @@ float Tracer::pick(const MarchData& data, const PictureParameters& parameters, c
   return z;
 }
 
+template <class Texel>
+std::vector<Texel> Tracer::texels(const Picture& picture, const FilmLayer& layer, GLenum format, GLenum type) const {
+  std::vector<Texel> texels(std::size_t{picture.size_.x} * picture.size_.y);
+  gl_->GetTextureImage(picture.film_.texture(layer), 0, format, type,
+                       static_cast<GLsizei>(texels.size() * sizeof(Texel)), texels.data());
+  gl::check(*gl_, "reading the picture back");
+  return texels;
+}
+
 void Tracer::read(const Picture& picture, bool with_background, float* rgba) const {
   read_means(picture, film_layers::radiance, rgba);
   if (!with_background) return;
-  const std::vector<glm::vec4> background = read_background(picture);
+  const auto background = texels<glm::vec3>(picture, film_layers::background, GL_RGB, GL_FLOAT);
   for (std::size_t i = 0; i < background.size(); ++i) {
     for (int c = 0; c < 3; ++c) rgba[4 * i + static_cast<std::size_t>(c)] += background[i][c];
   }
 }
 
-std::vector<glm::vec4> Tracer::read_background(const Picture& picture) const {
-  std::vector<glm::vec4> background(std::size_t{picture.size_.x} * picture.size_.y);
-  gl_->GetTextureImage(picture.film_.texture(film_layers::background), 0, GL_RGBA, GL_FLOAT,
-                       static_cast<GLsizei>(background.size() * 16), background.data());
-  gl::check(*gl_, "reading the background back");
-  return background;
-}
-
 std::vector<glm::uvec2> Tracer::read_counts(const Picture& picture) const {
-  std::vector<glm::uvec2> counts(std::size_t{picture.size_.x} * picture.size_.y);
-  gl_->GetTextureImage(picture.film_.texture(film_layers::counts), 0, GL_RG_INTEGER, GL_UNSIGNED_INT,
-                       static_cast<GLsizei>(counts.size() * 8), counts.data());
-  gl::check(*gl_, "reading the sample counts back");
-  return counts;
+  return texels<glm::uvec2>(picture, film_layers::counts, GL_RG_INTEGER, GL_UNSIGNED_INT);
 }
 
 void Tracer::read_means(const Picture& picture, const FilmLayer& sum, float* rgba) const {
@@ -732,11 +740,9 @@ void Tracer::read_volume(const Picture& picture, float* rgba) const { read_means
 Totals Tracer::totals(const Picture& picture) const {
   if (!picture.film_.has(film_layers::counts)) return {};
   const std::vector<glm::uvec2> counts = read_counts(picture);
-  const std::vector<glm::vec4> background = read_background(picture);
-  std::vector<glm::vec4> sums(counts.size());
-  gl_->GetTextureImage(picture.film_.texture(film_layers::radiance), 0, GL_RGBA, GL_FLOAT,
-                       static_cast<GLsizei>(sums.size() * 16), sums.data());
-  gl::check(*gl_, "reading the picture back");
+  const auto background = texels<glm::vec3>(picture, film_layers::background, GL_RGB, GL_FLOAT);
+  const auto squares = texels<float>(picture, film_layers::moments, GL_RED, GL_FLOAT);
+  const auto sums = texels<glm::vec4>(picture, film_layers::radiance, GL_RGBA, GL_FLOAT);
   Totals totals;
   double error = 0.0;
   double brightness = 0.0;
@@ -746,7 +752,7 @@ Totals Tracer::totals(const Picture& picture) const {
     totals.steps += counts[i].y;
     if (n < 2.0) continue;
     const double mean = luminance(glm::dvec3(sums[i]) / n + glm::dvec3(background[i]));
-    error += std::max(0.0, double(background[i].w) - mean * mean) / (n - 1.0);
+    error += std::max(0.0, double(squares[i]) - mean * mean) / (n - 1.0);
     brightness += mean;
   }
   if (brightness > 0.0) totals.noise = std::sqrt(error * double(counts.size())) / brightness;

@@ -187,7 +187,7 @@ class Tracer {
   void settle(Picture& picture);
   /// Every dispatch that ends is told; for tests.
   void set_log(std::vector<DispatchRecord>* log) { log_ = log; }
-  /// Trace, inspect and obstacles.
+  /// Trace, inspect and surfaces.
   [[nodiscard]] const PassSeconds& seconds() const { return seconds_; }
   /// Pixels a millisecond that the surface pass drew lately.
   [[nodiscard]] double raster_rate() const { return raster_rate_; }
@@ -246,7 +246,9 @@ class Tracer {
                   bool until_complete);
   void bind(const MarchData& data, const Obstacles& obstacles) const;
   void read_means(const Picture& picture, const FilmLayer& sum, float* rgba) const;
-  [[nodiscard]] std::vector<glm::vec4> read_background(const Picture& picture) const;
+  template <class Texel>
+  [[nodiscard]] std::vector<Texel> texels(const Picture& picture, const FilmLayer& layer, GLenum format,
+                                          GLenum type) const;
   [[nodiscard]] std::vector<glm::uvec2> read_counts(const Picture& picture) const;
   bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
 

@@ -71,6 +71,21 @@ TEST_P(Films, LayersAreThereFromTheFirstPassThatWritesThem) {
   EXPECT_EQ(film_.bytes(), 4U * 2U * 4U);
 }
 
+TEST_P(Films, WhatAPictureDoesNotWriteGoesWithTheNext) {
+  const StateGuard guard(*gl_);
+  ASSERT_TRUE(run(fill(layers::radiance, 3.0F)));
+  ASSERT_TRUE(run(fill(layers::normal, 1.0F)));
+  const GLuint radiance = film_.texture(layers::radiance);
+  film_.begin(film_.size());
+  EXPECT_FALSE(film_.has(layers::normal));
+  EXPECT_EQ(film_.bytes(), 4U * 2U * 32U);
+  ASSERT_TRUE(run(fill(layers::radiance, 4.0F)));
+  EXPECT_EQ(film_.texture(layers::radiance), radiance);
+  film_.begin(film_.size());
+  EXPECT_EQ(film_.texture(layers::normal), 0U);
+  EXPECT_EQ(film_.bytes(), 4U * 2U * 16U);
+}
+
 TEST_P(Films, APassWhoseInputIsMissingIsRefused) {
   const StateGuard guard(*gl_);
   const auto why = [&] {
