@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 
 #include "base/callback_scope.hpp"
 
@@ -12,22 +14,21 @@ enum class LogLevel { debug = 0, info = 1, warning = 2, error = 3 };
 /// message is dropped. May be called from any thread.
 class Log {
  public:
-  using Function = void (*)(void* user, LogLevel level, const char* message);
+  using Function = std::function<void(LogLevel level, const char* message)>;
 
   Log() = default;
-  Log(Function function, void* user) : function_(function), user_(user) {}
+  explicit Log(Function function) : function_(std::move(function)) {}
 
   void write(LogLevel level, const std::string& message) const {
-    if (function_ == nullptr) return;
+    if (!function_) return;
     const CallbackScope inside;
-    function_(user_, level, message.c_str());
+    function_(level, message.c_str());
   }
   void info(const std::string& message) const { write(LogLevel::info, message); }
   void warning(const std::string& message) const { write(LogLevel::warning, message); }
 
  private:
-  Function function_ = nullptr;
-  void* user_ = nullptr;
+  Function function_;
 };
 
 }  // namespace cumulet

@@ -59,7 +59,8 @@ struct Built {
 class Builder {
  public:
   /// notify: called on the worker after a job ended.
-  Builder(Log log, std::function<void()> notify, Trace trace = {}) : log_(log), worker_(std::move(notify), trace) {}
+  Builder(Log log, std::function<void()> notify, Trace trace = {})
+      : log_(std::move(log)), worker_(std::move(notify), trace) {}
 
   /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way, as Worker::replace()
   /// does: another file is another subject, and files may take minutes.

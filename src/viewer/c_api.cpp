@@ -113,13 +113,17 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     if (out == nullptr) refuse("out is NULL");
     const cumulet_create_desc d = read_desc(desc, "cumulet_create_desc");
     require(number(d.gl_state) <= CUMULET_GL_STATE_HOST_RESETS, "cumulet_create_desc.gl_state is unknown");
-    // The two level enums have the same values; the callback is wrapped by its type alone.
-    const auto log = reinterpret_cast<cumulet::Log::Function>(reinterpret_cast<void (*)()>(d.log));
+    cumulet::Log log;
+    if (d.log != nullptr) {
+      log = cumulet::Log([call = d.log, user = d.log_user](cumulet::LogLevel level, const char* message) {
+        call(user, static_cast<cumulet_log_level>(level), message);
+      });
+    }
     std::function<void()> update;
     if (d.update != nullptr) update = [call = d.update, user = d.update_user] { call(user); };
     auto viewer = std::make_unique<cumulet_viewer>();
     viewer->viewer = std::make_unique<core::Viewer>(
-        cumulet::Log(log, d.log_user), std::move(update), d.gl_state == CUMULET_GL_STATE_RESTORE,
+        std::move(log), std::move(update), d.gl_state == CUMULET_GL_STATE_RESTORE,
         cumulet::Trace(d.trace, d.trace_user), d.programs == nullptr ? nullptr : d.programs->asset);
     if (d.get_proc != nullptr) viewer->viewer->attach(d.get_proc, d.get_proc_user);
     *out = viewer.release();

@@ -27,7 +27,7 @@ class SurfaceBuilder {
  public:
   /// notify: called on the worker after a job ended.
   SurfaceBuilder(Log log, std::function<void()> notify, Trace trace = {})
-      : log_(log), worker_(std::move(notify), trace) {}
+      : log_(std::move(log)), worker_(std::move(notify), trace) {}
 
   /// Reads a file, then poses it. Replaces what is under way, as Worker::replace() does.
   void load(const std::string& path, SurfaceChoice choice);

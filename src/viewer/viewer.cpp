@@ -29,15 +29,15 @@ dvec3 to_sun(const Light& light) {
 
 Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace,
                std::shared_ptr<gl::ProgramPool> programs)
-    : log_(log),
+    : log_(std::move(log)),
       trace_(trace),
       update_(std::move(update)),
       restore_state_(restore_state),
       programs_(programs ? std::move(programs) : std::make_shared<gl::ProgramPool>()),
       builder_(
-          log, [this] { notify(); }, trace),
+          log_, [this] { notify(); }, trace),
       surface_builder_(
-          log, [this] { notify(); }, trace) {
+          log_, [this] { notify(); }, trace) {
   scene_.volumes.resize(1);
   set_medium({});
   set_light({});

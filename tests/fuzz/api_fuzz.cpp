@@ -19,6 +19,7 @@ namespace {
 
 using cumulet::headless::Context;
 using cumulet::test::CameraRef;
+using cumulet::test::ProgramsRef;
 using cumulet::test::SurfacesRef;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
@@ -47,9 +48,16 @@ class Program {
   void run() {
     auto desc = described<cumulet_create_desc>();
     desc.struct_size = sizeof desc;
-    const bool draws = data_.ConsumeIntegralInRange(0, 7) == 7;
-    desc.get_proc = draws ? Context::get_proc : nullptr;
-    desc.get_proc_user = draws ? &context() : nullptr;
+    draws_ = data_.ConsumeIntegralInRange(0, 7) == 7;
+    make_programs();
+    desc.programs = programs_.get();
+    desc.trace = [](void*, const char* name, double begin, double end) {
+      check_line(name);
+      if (!(begin <= end)) fail("a span that ends before it begins");
+    };
+    desc.trace_user = nullptr;
+    desc.get_proc = draws_ ? Context::get_proc : nullptr;
+    desc.get_proc_user = draws_ ? &context() : nullptr;
     desc.log = [](void*, cumulet_log_level, const char* message) { check_line(message); };
     desc.log_user = nullptr;
     desc.update = nullptr;
@@ -129,6 +137,15 @@ class Program {
   void made(Make make) {
     std::array<char, 256> error{};
     if (make(error.data(), error.size()) != CUMULET_OK) check_line(error.data());
+  }
+
+  void make_programs() {
+    auto desc = described<cumulet_programs_desc>();
+    desc.folder = data_.ConsumeBool() ? "/dev/null/nowhere" : nullptr;
+    desc.shaders = data_.ConsumeIntegralInRange(0, 7) == 7 ? "/dev/null/nowhere" : nullptr;
+    cumulet_programs* programs = nullptr;
+    made([&](char* error, std::size_t size) { return cumulet_programs_create(&desc, &programs, error, size); });
+    programs_.reset(programs);
   }
 
   void make_dense() {
@@ -226,12 +243,25 @@ class Program {
     told(function(viewer_.get(), out.data()));
   }
 
-  void render() {
+  cumulet_frame_desc small_frame() {
     auto frame = described<cumulet_frame_desc>();
     frame.budget_ms = data_.PickValueInArray({-1.0, 0.0, 2.0});
     frame.width = data_.ConsumeIntegralInRange<std::uint32_t>(0, 33);
     frame.height = data_.ConsumeIntegralInRange<std::uint32_t>(0, 33);
     if (data_.ConsumeBool()) std::memset(frame.viewport, 0, sizeof frame.viewport);
+    return frame;
+  }
+
+  void warm_up() {
+    const cumulet_frame_desc frame = small_frame();
+    std::array<cumulet_warm_up_result, 2> result{};
+    result[0] = described<cumulet_warm_up_result>();
+    told(cumulet_warm_up(viewer_.get(), &frame, static_cast<cumulet_warm_up_scope>(data_.ConsumeIntegralInRange(0, 2)),
+                         result.data()));
+  }
+
+  void render() {
+    const cumulet_frame_desc frame = small_frame();
     std::array<cumulet_frame_result, 2> result{};
     result[0] = described<cumulet_frame_result>();
     told(cumulet_render(viewer_.get(), &frame, result.data()));
@@ -351,7 +381,7 @@ class Program {
 
   void call() {
     cumulet_viewer* viewer = viewer_.get();
-    switch (data_.ConsumeIntegralInRange(0, 21)) {
+    switch (data_.ConsumeIntegralInRange(0, 23)) {
       case 0:
         return make_dense();
       case 1:
@@ -396,13 +426,19 @@ class Program {
         return cumulet_cancel(viewer);
       case 20:
         return told(cumulet_rebuild(viewer));
+      case 21:
+        return warm_up();
+      case 22:
+        return told(cumulet_use_surface_camera(viewer, data_.ConsumeIntegralInRange(0U, 2U)));
       default:
-        return told(data_.ConsumeBool() ? cumulet_use_surface_camera(viewer, data_.ConsumeIntegralInRange(0U, 2U))
-                                        : cumulet_detach(viewer));
+        told(cumulet_detach(viewer));
+        if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));
     }
   }
 
   FuzzedDataProvider data_;
+  bool draws_ = false;
+  ProgramsRef programs_;
   VolumeRef volume_;
   SurfacesRef surfaces_;
   ViewerPtr viewer_;

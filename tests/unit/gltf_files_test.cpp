@@ -56,13 +56,11 @@ const std::map<std::string, std::size_t> triangles = {
 struct Lines {
   std::vector<std::string> warnings;
   std::vector<std::string> all;
+  Log log{[this](LogLevel level, const char* message) {
+    all.emplace_back(message);
+    if (level >= LogLevel::warning) warnings.emplace_back(message);
+  }};
 };
-
-void note(void* user, LogLevel level, const char* message) {
-  auto* lines = static_cast<Lines*>(user);
-  lines->all.emplace_back(message);
-  if (level >= LogLevel::warning) lines->warnings.emplace_back(message);
-}
 
 bool one_line(const std::string& text) { return !text.empty() && text.find_first_of("\n\r") == std::string::npos; }
 
@@ -79,7 +77,7 @@ TEST(GltfFiles, EachIsImportedOrRefusedByOneLine) {
     const auto expected = refused.find(name);
     Lines lines;
     try {
-      const ScenePtr scene = import_gltf(entry.path().string(), Log(note, &lines));
+      const ScenePtr scene = import_gltf(entry.path().string(), lines.log);
       EXPECT_EQ(expected, refused.end()) << "was imported";
       EXPECT_EQ(test::broken(*scene), "");
       for (const double time : {0.0, 0.37, 1e6, -1.0}) {
@@ -126,7 +124,7 @@ TEST(GltfFiles, WhatTheValidatorCallsValidLoadsAndTheRestIsTold) {
     }
     Lines lines;
     try {
-      const ScenePtr scene = import_gltf(file, Log(note, &lines));
+      const ScenePtr scene = import_gltf(file, lines.log);
       EXPECT_EQ(test::broken(*scene), "");
       EXPECT_EQ(test::broken(*scene, scene->pose(0.5)), "");
       // Most show nothing at all, and are told of for that.
@@ -156,7 +154,7 @@ TEST(GltfFiles, ImagesThatCannotBeHadCostAWarningEach) {
   const auto file = models / "bevy/AnisotropyBarnLamp/AnisotropyBarnLamp.gltf";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no shared data";
   Lines lines;
-  const ScenePtr scene = import_gltf(file.string(), Log(note, &lines));
+  const ScenePtr scene = import_gltf(file.string(), lines.log);
   EXPECT_EQ(scene->images.size(), 1U);
   std::size_t ktx2 = 0;
   for (const std::string& line : lines.warnings) ktx2 += line.find("KTX2") != std::string::npos ? 1 : 0;

@@ -26,11 +26,9 @@ using test::json;
 struct Lines {
   std::vector<std::string> infos;
   std::vector<std::string> warnings;
-  Log log{[](void* user, LogLevel level, const char* message) {
-            auto* lines = static_cast<Lines*>(user);
-            (level >= LogLevel::warning ? lines->warnings : lines->infos).emplace_back(message);
-          },
-          this};
+  Log log{[this](LogLevel level, const char* message) {
+    (level >= LogLevel::warning ? warnings : infos).emplace_back(message);
+  }};
 };
 
 bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }

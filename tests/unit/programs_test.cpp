@@ -229,10 +229,7 @@ TEST_F(ProgramsTest, ShadersOfAFolderAreReadAnew) {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));  // it looks so often
   };
   std::vector<std::string> told;
-  const auto tell = [](void* user, cumulet::LogLevel /*level*/, const char* message) {
-    static_cast<std::vector<std::string>*>(user)->emplace_back(message);
-  };
-  const cumulet::Log log(tell, &told);
+  const cumulet::Log log([&](cumulet::LogLevel /*level*/, const char* message) { told.emplace_back(message); });
   const auto programs = std::make_shared<Programs>(*gl_, nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
   const Programs::Turn turn(programs, log);
   const Program& program = programs->get(resolve);

@@ -118,10 +118,10 @@ class Mountains : public testing::Test {
     const test::Folder folder;
     const std::filesystem::path file = folder / "mountains.glb";
     std::ofstream(file, std::ios::binary) << glb_;
-    const auto note = [](void* lines, LogLevel level, const char* line) {
-      if (level >= LogLevel::warning) static_cast<std::vector<std::string>*>(lines)->emplace_back(line);
-    };
-    scene_ = surface::import_gltf(file.string(), Log(note, &warnings_));
+    const Log log([this](LogLevel level, const char* line) {
+      if (level >= LogLevel::warning) warnings_.emplace_back(line);
+    });
+    scene_ = surface::import_gltf(file.string(), log);
     pose_ = scene_->pose(0.0);
     std::uint32_t length = 0;
     std::memcpy(&length, glb_.data() + 12, sizeof length);

@@ -45,10 +45,9 @@ using openvdb::FloatGrid;
 
 struct Messages {
   std::vector<std::string> warnings;
-  cumulet::Log log{[](void* user, cumulet::LogLevel level, const char* text) {
-                     if (level == cumulet::LogLevel::warning) static_cast<Messages*>(user)->warnings.emplace_back(text);
-                   },
-                   this};
+  cumulet::Log log{[this](cumulet::LogLevel level, const char* text) {
+    if (level == cumulet::LogLevel::warning) warnings.emplace_back(text);
+  }};
 };
 
 /// Point queries on a volume, by the contract in volume.hpp.

@@ -115,11 +115,9 @@ std::vector<std::string> warnings(const std::vector<Mesh>& meshes, const json& m
     model.root["meshes"].back()["name"] = "Box\n" + std::to_string(model.root["meshes"].size());
   }
   std::vector<std::string> lines;
-  const Log log(
-      [](void* user, LogLevel level, const char* line) {
-        if (level >= LogLevel::warning) static_cast<std::vector<std::string>*>(user)->emplace_back(line);
-      },
-      &lines);
+  const Log log([&](LogLevel level, const char* line) {
+    if (level >= LogLevel::warning) lines.emplace_back(line);
+  });
   import_gltf(model.gltf(), "made.gltf", std::nullopt, log, nullptr, {});
   return lines;
 }

@@ -39,6 +39,10 @@ struct ReleaseSurfaces {
 };
 using SurfacesRef = std::unique_ptr<cumulet_surfaces, ReleaseSurfaces>;
 using VolumeRef = std::unique_ptr<cumulet_volume, ReleaseVolume>;
+struct ReleasePrograms {
+  void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
+};
+using ProgramsRef = std::unique_ptr<cumulet_programs, ReleasePrograms>;
 struct ReleaseCamera {
   void operator()(cumulet_camera* camera) const { cumulet_camera_release(camera); }
 };
