@@ -48,7 +48,7 @@ layout(std140, binding = CM_UNIFORM_ROOTS) uniform CmRoots { uvec4 cm_roots[13];
 
 uvec4 cm_record(uint cell, uint part) {
 #if CM_PAGES == 1
-  return texelFetch(cm_cells[0], int(cell * 2u + part));
+  return texelFetch(cm_cells[0], int((cm.grid.first_cell + cell) * 2u + part));
 #else
   uint page = cell >> cm.grid.page_shift;
   int texel = int((cell & ((1u << cm.grid.page_shift) - 1u)) * 2u + part);

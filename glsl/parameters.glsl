@@ -50,6 +50,7 @@ CM_BLOCK(CmGrid) {
   CM_ALIGN(16) vec3 box_max;
   uint levels;      // of bisection
   uint page_shift;  // log2 of cells a page
+  uint first_cell;  // where the records begin in their page; of several pages 0
   uint tree;        // where the point-location tree begins in its page, in 4-byte words
   CM_EQUALITY(CmGrid)
 };

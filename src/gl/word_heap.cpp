@@ -44,14 +44,26 @@ WordHeap::Span WordHeap::take_of(Page& page, std::size_t units) const {
 }
 
 WordHeap::Span WordHeap::take(std::size_t wanted, const char* what) {
-  const std::size_t needed = whole(wanted);
+  const std::size_t units = whole(wanted) / alignment;
+  const std::size_t usual = whole(sizes_.page_bytes) / alignment;
+  for (const auto& page : pages_->all) {
+    // A large one that is empty is not kept for a trifle.
+    if (page->units.empty() && page->units.size() > std::max(usual, 4 * units)) continue;
+    if (Span span = take_of(*page, units)) return span;
+  }
+  return take_of_new_page(units, usual, what);
+}
+
+WordHeap::Span WordHeap::take_page(std::size_t wanted, const char* what) {
+  return take_of_new_page(whole(wanted) / alignment, 0, what);
+}
+
+WordHeap::Span WordHeap::take_of_new_page(std::size_t units, std::size_t usual, const char* what) {
+  const std::size_t needed = units * alignment;
   if (needed > sizes_.largest_page) {
     throw Error(ErrorCode::unsupported, std::string(what) + " needs " + std::to_string(needed) +
                                             " bytes; this driver's GL_MAX_TEXTURE_BUFFER_SIZE holds " +
                                             std::to_string(sizes_.largest_page));
-  }
-  for (const auto& page : pages_->all) {
-    if (Span span = take_of(*page, needed / alignment)) return span;
   }
   pages_->drop_empty(0);
   const std::uint64_t room = sizes_.most_bytes - std::min<std::uint64_t>(bytes(), sizes_.most_bytes);
@@ -60,13 +72,12 @@ WordHeap::Span WordHeap::take(std::size_t wanted, const char* what) {
                                               std::to_string(room) + " are left of " +
                                               std::to_string(sizes_.most_bytes));
   }
-  const std::size_t usual = std::min({whole(sizes_.page_bytes), sizes_.largest_page / alignment * alignment,
-                                      static_cast<std::size_t>(room) / alignment * alignment});
-  const std::size_t size = std::max(needed, usual);
+  const std::size_t most = std::min<std::uint64_t>(sizes_.largest_page, room) / alignment;
+  const std::size_t size = std::max(units, std::min(usual, most)) * alignment;
   Object buffer = make_buffer(gl_, size, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
   Object texture = make_texture_buffer(gl_, GL_RGBA32UI, buffer, what);
   auto page = std::make_unique<Page>(std::move(buffer), std::move(texture), size);
-  return take_of(*pages_->all.emplace_back(std::move(page)), needed / alignment);
+  return take_of(*pages_->all.emplace_back(std::move(page)), units);
 }
 
 std::uint64_t WordHeap::bytes() const {

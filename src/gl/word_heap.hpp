@@ -84,6 +84,8 @@ class WordHeap {
   /// binds at once, Error(out_of_memory) beyond most_bytes or where GL has no more, and then nothing has changed but
   /// that pages without a span are gone. O(pages + gaps).
   Span take(std::size_t wanted, const char* what);
+  /// The same, from the beginning of a page that nothing else is in.
+  Span take_page(std::size_t wanted, const char* what);
 
   [[nodiscard]] std::size_t pages() const { return pages_->all.size(); }
   /// Of all pages.
@@ -93,6 +95,8 @@ class WordHeap {
 
  private:
   Span take_of(Page& page, std::size_t units) const;
+  // The page has usual units where that is more.
+  Span take_of_new_page(std::size_t units, std::size_t usual, const char* what);
 
   FunctionsPtr gl_;
   Sizes sizes_;

@@ -118,8 +118,21 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
   for (std::int64_t first = 0; first < cells; first += page_cells) {
     const std::int64_t count = std::min(page_cells, cells - first);
     const std::size_t bytes = static_cast<std::size_t>(count) * sizeof(grid::CellRecord);
-    plan_texture_buffer(grid.cells.data() + first, bytes, bytes, GL_RGBA32UI, "uploading cell records",
-                        [this](gl::Object page) { data_.pages_.push_back(std::move(page)); });
+    const std::size_t index = data_.cells_.size();
+    data_.cells_.emplace_back();
+    data_.bytes_ += bytes;
+    // Of several pages each is whole: shaders find a record's by its number alone.
+    const bool alone = cells > page_cells;
+    upload_.add([this, &heap, index, bytes, alone] {
+      const char* what = "creating the pages of cell records";
+      gl::WordHeap::Span& span = data_.cells_[index] = alone ? heap.take_page(bytes, what) : heap.take(bytes, what);
+      data_.grid_.first_cell = static_cast<std::uint32_t>(span.offset() / sizeof(grid::CellRecord));
+    });
+    upload_.add_bytes(
+        [this, index] {
+          return Upload::Place{data_.cells_[index].buffer(), data_.cells_[index].offset()};
+        },
+        grid.cells.data() + first, bytes);
   }
   const std::size_t tree_bytes = grid.tree.size() * sizeof(std::uint32_t);
   data_.bytes_ += tree_bytes;
@@ -186,12 +199,12 @@ void MarchUpload::plan_brick() {
 
 std::vector<std::string> MarchData::defines() const {
   return {"CM_MARCH " + std::to_string(static_cast<int>(march_)), std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
-          "CM_PAGES " + std::to_string(std::max<std::size_t>(pages_.size(), 1))};
+          "CM_PAGES " + std::to_string(std::max<std::size_t>(cells_.size(), 1))};
 }
 
 void MarchData::bind(const gl::Functions& gl) const {
-  for (std::size_t i = 0; i < pages_.size(); ++i)
-    gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), pages_[i].name());
+  for (std::size_t i = 0; i < cells_.size(); ++i)
+    gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), cells_[i].texture());
   constexpr std::array<GLuint, 2> units{core::CM_UNIT_VOXELS, core::CM_UNIT_BRICK_SLOTS};
   for (std::size_t i = 0; i < textures_.size(); ++i) {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());

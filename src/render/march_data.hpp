@@ -35,8 +35,8 @@ class MarchData {
   March march_ = March::tet;
   bool linear_ = false;
   std::vector<gl::Object> buffers_;
-  std::vector<gl::Object> pages_;
-  std::array<gl::Object, 2> textures_;  // voxels, or values of bricks; slots of bricks
+  std::vector<gl::WordHeap::Span> cells_;  // a page's records each
+  std::array<gl::Object, 2> textures_;     // voxels, or values of bricks; slots of bricks
   gl::WordHeap::Span tree_;
   gl::Object roots_;
   core::CmGrid grid_{};

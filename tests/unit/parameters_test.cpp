@@ -47,6 +47,7 @@ const std::array fields{
     CM_FIELD(grid, box_max),
     CM_FIELD(grid, levels),
     CM_FIELD(grid, page_shift),
+    CM_FIELD(grid, first_cell),
     CM_FIELD(grid, tree),
     CM_FIELD(medium, albedo),
     CM_FIELD(medium, extinction),

@@ -134,6 +134,28 @@ TEST_P(Heaps, WhatComesAndGoesFindsItsPageAgain) {
   for (std::size_t i = 2; i < buffers.size(); ++i) EXPECT_EQ(buffers[i], buffers[i - 2]);
 }
 
+// A large thing is gone, a small one comes while another is there: the large page is not kept for it.
+TEST_P(Heaps, ALargePageIsNotKeptForATrifle) {
+  WordHeap heap(gl_, {.page_bytes = 1U << 12U});
+  WordHeap::Span small = heap.take(1000, "creating");
+  WordHeap::Span large = heap.take(1000000, "creating");
+  large = {};
+  EXPECT_EQ(heap.pages(), 2U) << "another as large may come";
+  const WordHeap::Span other = heap.take(4000, "creating");
+  EXPECT_LE(heap.bytes(), 2U << 12U);
+}
+
+TEST_P(Heaps, APageMayBelongToOneSpan) {
+  WordHeap heap(gl_, {.page_bytes = 1U << 14U, .largest_page = 1U << 16U});
+  const WordHeap::Span before = filled(heap, 100, 1);
+  const WordHeap::Span page = heap.take_page(5000, "creating");
+  EXPECT_EQ(page.offset(), 0U);
+  EXPECT_NE(page.buffer(), before.buffer());
+  const WordHeap::Span after = filled(heap, 100, 2);
+  EXPECT_NE(after.buffer(), page.buffer());
+  EXPECT_THROW((void)heap.take_page((1U << 16U) + 1, "creating"), Error);
+}
+
 TEST_P(Heaps, LimitsAreErrorsAndLoseNothing) {
   WordHeap heap(gl_, {.page_bytes = 1U << 14U, .largest_page = 1U << 16U, .most_bytes = 80000});
   EXPECT_EQ(code_of(heap, (1U << 16U) + 1), ErrorCode::unsupported);
