@@ -1,7 +1,7 @@
 #version 450
 // An accumulation as displayed colour, or its depth.
 // Variants, not uniforms, choose what a pixel does: software drivers run both sides of every branch.
-// CM_LAYERS 1: surfaces beneath, in front of the background.
+// CM_LAYERS 1: surfaces of the rectangle's size beneath, in front of the background.
 // variants: CM_DEPTH=1 or CM_DEPTH=0 CM_BILINEAR=0,1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false or CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false CM_LAYERS=1
 #ifndef CM_LAYERS
 #define CM_LAYERS 0
@@ -83,9 +83,8 @@ void main() {
   ivec2 last = size - 1;
 #if CM_LAYERS
   ivec2 layer_size = textureSize(cm_layer_z, 0).xy;
-  vec2 share = (vec2(pixel) + 0.5) / vec2(cm_viewport.zw);
   // Of the coarse pixels around, those count whose middle sees as far: no seam of the volume along silhouettes.
-  float here = 1.0 / texelFetch(cm_layer_z, ivec3(share * vec2(layer_size), 0), 0).x;
+  float here = 1.0 / texelFetch(cm_layer_z, ivec3(pixel, 0), 0).x;
   vec4 value = vec4(0.0);
   vec3 background = vec3(0.0);
   float sum = 0.0;
@@ -101,19 +100,7 @@ void main() {
   }
   value /= sum;
   background /= sum;
-  vec4 behind = vec4(0.0);
-  if (layer_size == cm_viewport.zw) {
-    behind = cm_surfaces(pixel);
-  } else {
-    vec2 on_layer = share * vec2(layer_size);
-    vec2 corner = floor(on_layer - 0.5);
-    vec2 within = on_layer - 0.5 - corner;
-    for (int i = 0; i < 4; ++i) {
-      ivec2 offset = ivec2(i & 1, i >> 1);
-      vec2 part = mix(1.0 - within, within, vec2(offset));
-      behind += part.x * part.y * cm_surfaces(clamp(ivec2(corner) + offset, ivec2(0), layer_size - 1));
-    }
-  }
+  vec4 behind = cm_surfaces(pixel);
   value += (1.0 - value.a) * behind;
   if (!cm_transparent) value = vec4(value.rgb + background * (1.0 - behind.a), 1.0);
 #else

@@ -36,6 +36,7 @@ constexpr double event_glow = 0.7;   // seconds of frames after an event: toolti
 constexpr double motion_rest = 0.4;  // seconds without motion that end a step of undo
 constexpr double replay_frame = 1.0 / 60.0;
 constexpr double least_frame = 1.0 / 60.0;  // seconds from one frame to the next
+constexpr double picture_frame = 0.15;      // that a window may wait for a picture that is under way
 
 }  // namespace
 
@@ -142,11 +143,15 @@ void App::frame() {
     take();
   }
   follow_history();
-  draw();
+  const bool drawn = draw();
   obey(order_);
   if (recorder_) recorder_->frame(events, model_.status.busy || waiting());
-  window_->swap();
-  take_statistics(events);
+  if (drawn) {
+    window_->swap();
+    ++drawn_frames_;
+    take_frame_time(events);
+  }
+  take_statistics();
   ++frames_;
 
   const std::string name = std::filesystem::path(model_.scene.volume).filename().string();
@@ -523,32 +528,49 @@ void App::step_history(bool back) {
   if (model_.navigation.turntable_degrees_per_second != 0.0) model_.scene.camera = camera;
 }
 
-void App::draw() {
-  gl_->BindFramebuffer(GL_FRAMEBUFFER, 0);
-  gl_->Disable(GL_SCISSOR_TEST);
-  constexpr float dark = 0.075f;
-  gl_->ClearColor(dark, dark * 1.08f, dark * 1.2f, 1.0f);
-  gl_->Clear(GL_COLOR_BUFFER_BIT);
+bool App::draw() {
   const Renderer::Picture picture = renderer_->picture();
   if (picture.texture != 0) {
     // NOLINTNEXTLINE(performance-no-int-to-ptr): so ImGui has textures
     auto* texture = reinterpret_cast<ImTextureID>(std::uintptr_t{picture.texture});
     const ImVec2 low(static_cast<float>(viewport_.x), static_cast<float>(viewport_.y));
     const ImVec2 high(low.x + static_cast<float>(viewport_.width), low.y + static_cast<float>(viewport_.height));
-    ImGui::GetBackgroundDrawList()->AddImage(texture, low, high, {0.0f, 1.0f}, {1.0f, 0.0f});
+    ImDrawList& behind = *ImGui::GetBackgroundDrawList();
+    // It is opaque, and blending costs software drivers as much as all the rest of it.
+    const auto cover = [](const ImDrawList*, const ImDrawCmd* command) {
+      static_cast<const GladGLContext*>(command->UserCallbackData)->Disable(GL_BLEND);
+    };
+    behind.AddCallback(cover, gl_.get());
+    behind.AddImage(texture, low, high, {0.0f, 1.0f}, {1.0f, 0.0f});
+    behind.AddCallback(ImDrawCallback_ResetRenderState, nullptr);
   }
-  Window::draw_ui();
+  // A hand that drags moves sixty times a second, and on software drivers a window costs as much as a picture: what
+  // would look as before is not drawn, and what changes beside the picture that a hand is at waits for the next one.
+  const bool changed = window_->ui_changed();
+  const bool waits = viewport_buttons_ != 0 && now_ - drawn_at_ < picture_frame;
+  if (drawn_pictures_ == pictures_ && order_.screenshot.empty() && (!changed || waits)) return false;
+  gl_->BindFramebuffer(GL_FRAMEBUFFER, 0);
+  gl_->Disable(GL_SCISSOR_TEST);
+  constexpr float dark = 0.075f;
+  gl_->ClearColor(dark, dark * 1.08f, dark * 1.2f, 1.0f);
+  gl_->Clear(GL_COLOR_BUFFER_BIT);
+  window_->draw_ui();
+  drawn_pictures_ = pictures_;
+  drawn_at_ = now_;
+  return true;
 }
 
-void App::take_statistics(const std::vector<Event>& events) {
-  const Status& status = model_.status;
-  Charts& charts = model_.charts;
+void App::take_frame_time(const std::vector<Event>& events) {
   // From the first that a hand did of what this frame shows.
   double begun = now_;
   for (const Event& event : events)
     if (event.time > 0.0) begun = std::min(begun, event.time);
-  charts.frame_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - begun)));
+  model_.charts.frame_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - begun)));
+}
 
+void App::take_statistics() {
+  const Status& status = model_.status;
+  Charts& charts = model_.charts;
   if (changed_at_ && drawn_ >= changed_number_)
     charts.picture_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - *std::exchange(changed_at_, std::nullopt))));
 
@@ -599,6 +621,7 @@ void App::write_report(const std::string& path) const {
   const Status& status = model_.status;
   Json json;
   json["frames"] = frames_;
+  json["drawn_frames"] = drawn_frames_;
   json["idle_frames"] = player_ ? player_->idle_frames() : 0;
   json["converged"] = (status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
   json["preview"] = (status.frame.flags & CUMULET_RENDER_PREVIEW) != 0;

@@ -63,8 +63,10 @@ class App {
   /// Whether a load is still to end, be it that the viewer has not heard of it yet.
   [[nodiscard]] bool waiting() const;
   void complain(const std::string& cause);
-  void draw();
-  void take_statistics(const std::vector<Event>& events);
+  /// Whether there was anything to draw that the window does not show already.
+  bool draw();
+  void take_frame_time(const std::vector<Event>& events);
+  void take_statistics();
   void obey(const Player::Order& order);
   void save_window(const std::string& path);
   void write_report(const std::string& path) const;
@@ -113,9 +115,12 @@ class App {
   bool camera_moved_ = false;
   bool starting_ = true;        // until what the command line named is there, or is not
   std::string opening_scene_;   // a scene file whose parts are still to come
-  std::uint64_t pictures_ = 0;  // that the window has shown
-  std::string last_state_;      // the state line of the frame before this
+  std::uint64_t pictures_ = 0;  // that came to be shown
+  std::uint64_t drawn_pictures_ = 0;
+  double drawn_at_ = -1.0;
+  std::string last_state_;  // the state line of the frame before this
   std::uint64_t frames_ = 0;
+  std::uint64_t drawn_frames_ = 0;  // the others would have looked as the one before
 };
 
 }  // namespace cumulet::demo

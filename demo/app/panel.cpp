@@ -440,9 +440,11 @@ void Panel::state_line(const Model& model) {
   ImGui::TextUnformatted(text.c_str());
   ImGui::End();
   ImGui::PopStyleVar();
+  // In whole pixels: less gives no frame another look.
   ImGui::GetForegroundDrawList()->AddRectFilled(
       {0.0f, static_cast<float>(view_.height) - ui_.px(2.0f)},
-      {static_cast<float>(view_.width * part), static_cast<float>(view_.height)}, IM_COL32(95, 143, 191, 200));
+      {static_cast<float>(std::floor(view_.width * part)), static_cast<float>(view_.height)},
+      IM_COL32(95, 143, 191, 200));
 }
 
 void Panel::help(Model& model) {

@@ -444,8 +444,8 @@ void Session::measure_noise() {
   const cumulet_frame_result& frame = status_.frame;
   const std::uint64_t samples = status_.stats.samples;
   const bool refining = (frame.flags & (CUMULET_RENDER_MORE | CUMULET_RENDER_CONVERGED)) != 0 && !wish_.held &&
-                        !wish_.paused && frame.progress > 0.0 && (frame.flags & CUMULET_RENDER_PREVIEW) == 0 &&
-                        scene_.sampling.view == CUMULET_VIEW_SHADED;
+                        !wish_.paused && frame.width > 0 && frame.progress > 0.0 &&
+                        (frame.flags & CUMULET_RENDER_PREVIEW) == 0 && scene_.sampling.view == CUMULET_VIEW_SHADED;
   // Fewer samples than when it was measured: another picture.
   if (samples < noise_samples_) status_.noise = 0.0;
   const double now = glfwGetTime();

@@ -330,6 +330,7 @@ void Ui::plot(const char* label, const char* tip, const std::vector<float>& valu
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   ImGui::InvisibleButton((std::string("##") + label).c_str(), {width, height});
   remember(label, tip);
+  if (!ImGui::IsItemVisible()) return;  // what is not seen gives no frame another look
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   const ImVec2 end(corner.x + width, corner.y + height);
   draw.AddRectFilled(corner, end, colour_of(ImGuiCol_FrameBg), px(4.0f));

@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "ui.hpp"
 
@@ -20,6 +22,27 @@ std::string glfw_error() {
   const char* text = nullptr;
   glfwGetError(&text);
   return text == nullptr ? "unknown cause" : text;
+}
+
+// All that what is drawn depends on, but for the textures' texels.
+std::vector<std::byte> bytes_of(const ImDrawData& data) {
+  std::vector<std::byte> bytes;
+  const auto add = [&](const auto* values, int count) {
+    const auto part = std::as_bytes(std::span(values, static_cast<std::size_t>(count)));
+    bytes.insert(bytes.end(), part.begin(), part.end());
+  };
+  add(&data.DisplayPos, 1);
+  add(&data.DisplaySize, 1);
+  for (const ImDrawList* list : std::span(data.CmdLists, static_cast<std::size_t>(data.CmdListsCount))) {
+    add(list->VtxBuffer.Data, list->VtxBuffer.Size);
+    add(list->IdxBuffer.Data, list->IdxBuffer.Size);
+    for (const ImDrawCmd& command : list->CmdBuffer) {
+      add(&command.ClipRect, 1);
+      add(&command.TextureId, 1);
+      add(&command.ElemCount, 1);
+    }
+  }
+  return bytes;
 }
 
 Input& input_of(GLFWwindow* window) { return static_cast<Window*>(glfwGetWindowUserPointer(window))->input(); }
@@ -116,6 +139,8 @@ void Window::listen() {
     event.path = paths[0];
     input_of(w).push(event);
   });
+  glfwSetWindowRefreshCallback(
+      window, [](GLFWwindow* w) { static_cast<Window*>(glfwGetWindowUserPointer(w))->damaged_ = true; });
   glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {
     if (focused == GLFW_FALSE) input_of(w).push(make(Event::Type::focus_lost));
   });
@@ -212,9 +237,16 @@ void Window::begin_frame(const std::vector<Event>& events, double frame_seconds)
   ImGui::NewFrame();
 }
 
-void Window::draw_ui() {
+bool Window::ui_changed() {
   ImGui::Render();
+  ui_ = bytes_of(*ImGui::GetDrawData());
+  return damaged_ || ui_ != drawn_ui_;
+}
+
+void Window::draw_ui() {
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  drawn_ui_ = std::exchange(ui_, {});
+  damaged_ = false;
 }
 
 void Window::swap() { glfwSwapBuffers(window_.get()); }

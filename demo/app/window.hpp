@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "input.hpp"
 
@@ -44,8 +46,11 @@ class Window {
   static void set_ui_scale(float scale);
   /// Begins ImGui's frame with these events. frame_seconds: 0 for the time that has passed.
   void begin_frame(const std::vector<Event>& events, double frame_seconds);
-  /// Draws what ImGui has.
-  static void draw_ui();
+  /// Ends ImGui's frame. Whether it would look other than the last that was drawn, or the window system has lost that:
+  /// textures are taken for what they were.
+  [[nodiscard]] bool ui_changed();
+  /// Draws what ImGui has, and remembers it.
+  void draw_ui();
   void swap();
 
   /// Another context that shares objects with the window's, for another thread. Made, and let go, in this one, while
@@ -70,6 +75,9 @@ class Window {
   Context window_;
   Input input_;
   std::string title_;
+  std::vector<std::byte> drawn_ui_;
+  std::vector<std::byte> ui_;
+  bool damaged_ = true;  // what was drawn is not on the screen
 };
 
 }  // namespace cumulet::demo

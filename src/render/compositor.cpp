@@ -6,6 +6,7 @@
 
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
+#include "gl/transient_framebuffer.hpp"
 
 namespace cumulet::render {
 
@@ -166,6 +167,89 @@ void Compositor::draw_depth(const PictureTextures& picture, const FrameTarget& t
   gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
 }
 
+void Compositor::aim(const FrameTarget& target, const Display& display) const {
+  const auto& gl = *gl_;
+  const glm::vec4 viewport(target.viewport);
+  gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
+  gl.ViewportIndexedf(0, viewport.x, viewport.y, viewport.z, viewport.w);
+  if (display.encoding == ColourEncoding::srgb_framebuffer) {
+    gl.Enable(GL_FRAMEBUFFER_SRGB);
+  } else {
+    gl.Disable(GL_FRAMEBUFFER_SRGB);
+  }
+  if (target.blend_over && display.transparent) {  // else it is opaque
+    gl.Enablei(GL_BLEND, 0);
+    gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
+    gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  } else {
+    gl.Disablei(GL_BLEND, 0);
+  }
+  gl.Disable(GL_DEPTH_TEST);
+  gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+}
+
+void Compositor::place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target) {
+  const glm::ivec4 viewport = target.viewport;
+  gl.ProgramUniform4i(program.name(), 0, viewport.x, viewport.y, viewport.z, viewport.w);
+  gl.ProgramUniform1i(program.name(), 1, as_bool(target.flip_y));
+}
+
+void Compositor::draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
+                             const FrameTarget& target) const {
+  const auto& gl = *gl_;
+  const bool resolved = shown.means != nullptr;
+  gl.BindTextureUnit(core::CM_UNIT_SUM, resolved ? shown.means->texture.name() : picture.sum);
+  if (!resolved) gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
+  if (shown.layered || !resolved) {
+    gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, resolved ? shown.means->background.name() : picture.background);
+  }
+  const GLuint colour = shown.program->name();
+  place(gl, *shown.program, target);
+  gl.ProgramUniform1f(colour, 2, exposure_of(display));
+  gl.ProgramUniform1i(colour, 3, as_bool(display.transparent));
+  if (shown.layered) {
+    const SurfaceLayers& layers = *picture.beneath;
+    gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, layers.colour.name());
+    gl.BindTextureUnit(core::CM_UNIT_LAYER_Z, layers.z.name());
+    if (picture.host_z != 0) gl.BindTextureUnit(core::CM_UNIT_HOST_DEPTH, picture.host_z);
+    gl.ProgramUniform4i(colour, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
+                        picture.host_z != 0 ? static_cast<GLint>(picture.host_layers) : 0, 0);
+  }
+  aim(target, display);
+  shown.program->use(gl);
+  gl.DrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, const PictureTextures& picture,
+                               const Display& display, const FrameTarget& target) {
+  const auto& gl = *gl_;
+  // Bytes of what is not encoded would show steps.
+  const GLenum format = display.encoding == ColourEncoding::srgb ? GL_RGBA8 : GL_RGBA32F;
+  const Small kind{picture.beneath->size, format};
+  const glm::ivec2 size(kind.size);
+  if (!small_ || small_kind_ != kind) {
+    small_ = {};
+    small_ = gl::make_texture_2d(gl_, kind.format, size.x, size.y, "creating the texture to enlarge");
+    gl.TextureParameteri(small_.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    gl.TextureParameteri(small_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    gl.TextureParameteri(small_.name(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    gl.TextureParameteri(small_.name(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    small_kind_ = kind;
+  }
+  const gl::TransientFramebuffer framebuffer(gl_, small_.name(), 0);
+  FrameTarget small;
+  small.framebuffer = framebuffer.name();
+  small.viewport = {0, 0, size};
+  small.flip_y = true;
+  small.blend_over = false;
+  draw_colour(shown, picture, display, small);
+  gl.BindTextureUnit(core::CM_UNIT_SUM, small_.name());
+  place(gl, enlarge, target);
+  aim(target, display);
+  enlarge.use(gl);
+  gl.DrawArrays(GL_TRIANGLES, 0, 3);
+}
+
 void Compositor::draw(const PictureTextures& picture, const Display& display, const FrameTarget& target) {
   const glm::ivec4 viewport = target.viewport;
   if (picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0 || viewport.z <= 0 || viewport.w <= 0) return;
@@ -190,46 +274,17 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
   const gl::Program* const shown =
       colour_program({layered, resolved, bilinear, display.encoding}, display, target.wait);
-  if ((resolved && means == nullptr) || shown == nullptr) return;
-  gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
-  gl.ViewportIndexedf(0, static_cast<GLfloat>(viewport.x), static_cast<GLfloat>(viewport.y),
-                      static_cast<GLfloat>(viewport.z), static_cast<GLfloat>(viewport.w));
-  gl.BindTextureUnit(core::CM_UNIT_SUM, resolved ? means->texture.name() : picture.sum);
-  if (!resolved) gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
-  if (layered || !resolved) {
-    gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, resolved ? means->background.name() : picture.background);
+  const gl::Program* enlarge = nullptr;
+  if (layered && glm::ivec2(picture.beneath->size) != glm::ivec2(viewport.z, viewport.w)) {
+    enlarge = &program({"enlarge.frag", {}, "composite.vert"}, target.wait, false);
+    if (!enlarge->usable()) lags_ = true;
   }
-
-  const GLuint colour = shown->name();
-  gl.ProgramUniform4i(colour, 0, viewport.x, viewport.y, viewport.z, viewport.w);
-  gl.ProgramUniform1i(colour, 1, as_bool(target.flip_y));
-  gl.ProgramUniform1f(colour, 2, exposure_of(display));
-  gl.ProgramUniform1i(colour, 3, as_bool(display.transparent));
-  if (layered) {
-    const SurfaceLayers& layers = *picture.beneath;
-    gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, layers.colour.name());
-    gl.BindTextureUnit(core::CM_UNIT_LAYER_Z, layers.z.name());
-    if (picture.host_z != 0) gl.BindTextureUnit(core::CM_UNIT_HOST_DEPTH, picture.host_z);
-    gl.ProgramUniform4i(colour, 5, static_cast<GLint>(layers.layers), as_bool(layers.blended),
-                        picture.host_z != 0 ? static_cast<GLint>(picture.host_layers) : 0, 0);
-  }
-  if (display.encoding == ColourEncoding::srgb_framebuffer) {
-    gl.Enable(GL_FRAMEBUFFER_SRGB);
+  if ((resolved && means == nullptr) || shown == nullptr || (enlarge != nullptr && !enlarge->usable())) return;
+  if (enlarge != nullptr) {
+    draw_enlarged(*enlarge, {means, shown, layered}, picture, display, target);
   } else {
-    gl.Disable(GL_FRAMEBUFFER_SRGB);
+    draw_colour({means, shown, layered}, picture, display, target);
   }
-  if (target.blend_over && display.transparent) {  // else it is opaque
-    gl.Enablei(GL_BLEND, 0);
-    gl.BlendEquationSeparatei(0, GL_FUNC_ADD, GL_FUNC_ADD);
-    gl.BlendFuncSeparatei(0, GL_ONE, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  } else {
-    gl.Disablei(GL_BLEND, 0);
-  }
-  gl.Disable(GL_DEPTH_TEST);
-  gl.ColorMaski(0, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  shown->use(gl);
-  gl.DrawArrays(GL_TRIANGLES, 0, 3);
-
   if (target.write_depth && picture.volume_z != 0) draw_depth(picture, target);
   if (resolved && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
   draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);

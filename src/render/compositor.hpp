@@ -56,9 +56,10 @@ struct FrameTarget {
   double depth_b = 0.0;
 };
 
-/// Draws an accumulation over a rectangle of a framebuffer: one triangle, bilinear where sizes differ.
-/// Needs the context current and a StateGuard around; leaves any state it likes.
-/// Vertex arrays and framebuffers belong to one context of a share group: those it needs live for one call.
+/// Draws an accumulation over a rectangle of a framebuffer: one triangle, bilinear where sizes differ. One over
+/// surfaces of another size than the rectangle is drawn at theirs first, which is most of the work, and enlarged as
+/// displayed. Needs the context current and a StateGuard around; leaves any state it likes. Vertex arrays and
+/// framebuffers belong to one context of a share group: those it needs live for one call.
 class Compositor {
  public:
   Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
@@ -111,6 +112,19 @@ class Compositor {
   const gl::Program& program(const gl::ProgramKey& key, Wait wait, bool serves);
   // Until the one for this display is there, the one of before; null if that is of another kind.
   const gl::Program* colour_program(const Kind& kind, const Display& display, Wait wait);
+  // What is drawn of a picture.
+  struct Shown {
+    const Means* means = nullptr;  // null: what there is in the picture itself
+    const gl::Program* program = nullptr;
+    bool layered = false;
+  };
+  // A rectangle of a framebuffer, and how it takes colours.
+  void aim(const FrameTarget& target, const Display& display) const;
+  static void place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target);
+  void draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,
+                   const FrameTarget& target) const;
+  void draw_enlarged(const gl::Program& enlarge, const Shown& shown, const PictureTextures& picture,
+                     const Display& display, const FrameTarget& target);
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
   // The means to draw; null if there is no memory for them.
   Means* resolve(const PictureTextures& picture, Background background, Wait wait);
@@ -124,6 +138,13 @@ class Compositor {
   gl::ProgramsPtr programs_;
   std::vector<std::unique_ptr<Means>> means_;
   Means* newest_ = nullptr;
+  struct Small {
+    glm::uvec2 size{0U};
+    GLenum format = GL_RGBA8;
+    bool operator==(const Small&) const = default;
+  };
+  gl::Object small_;  // what is to be enlarged
+  Small small_kind_;
   const gl::Program* colour_ = nullptr;  // the last
   Kind colour_kind_;
   std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another

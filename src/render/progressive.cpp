@@ -181,7 +181,8 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
         start(divisor, data, obstacles, finer);
       }
       work(data, obstacles, deadline);
-    } while (state() != State::done && Clock::now() < deadline);
+      // What is due now is drawn after the answer to the wish before it has been shown, and of the newest wish then.
+    } while (state() != State::done && state() != State::due && Clock::now() < deadline);
   } catch (const Error& error) {
     working_.reset();
     if (finest_ == 1 || error.code() != ErrorCode::out_of_memory) {

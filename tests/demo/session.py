@@ -299,6 +299,16 @@ def test_idle(s):
     assert s.report("idle")["idle_frames"] <= 3, s.report("idle")["idle_frames"]
 
 
+def test_unchanged(s):
+    """A frame that would look as the one before is not drawn; what changes in it is, though no picture does."""
+    s.play("replay", ["wait loaded", "wait converged", "frames 60", 'report "before.json"', "frames 60",
+                      'report "after.json"', "key f1", "frames 5", *shot("help")], "--volume", s.cumulus)
+    before, after = s.report("before"), s.report("after")
+    assert after["frames"] - before["frames"] >= 60
+    assert after["drawn_frames"] - before["drawn_frames"] <= 3, (before["drawn_frames"], after["drawn_frames"])
+    assert s.report("help")["drawn_frames"] > after["drawn_frames"]
+
+
 def test_record(s):
     steps = ["wait loaded", "drag viewport 0.4 0.5 to viewport 0.6 0.6", "frames 5", "key ]", 'click "View"', "frames 3",
              'click "View/Steps"', "frames 3", "key ctrl+o", "frames 3", f'text "{s.fire}"', "key enter", "wait loaded"]

@@ -603,6 +603,69 @@ TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
   EXPECT_EQ(read(made, GL_RGBA32F, 0), got);
 }
 
+// What is beneath a picture is drawn as fine as it is, and enlarged as it is displayed: each of its pixels once.
+TEST_P(Compositing, SurfacesOfAnotherSizeAreEnlargedAsDisplayed) {
+  const glm::ivec2 coarse(9, 7);
+  render::SurfaceLayers layers;
+  layers.size = glm::uvec2(coarse);
+  layers.layers = 1;
+  layers.colour = gl::make_texture_2d_array(gl_, GL_RGBA16F, coarse.x, coarse.y, 1, "colour");
+  layers.z = gl::make_texture_2d_array(gl_, GL_R32F, coarse.x, coarse.y, 1, "z");
+  std::vector<glm::vec4> colours;
+  for (int i = 0; i < coarse.x * coarse.y; ++i)
+    colours.emplace_back(float(i % 8) / 8.0F, float(i % 5) / 4.0F, float(i % 3) / 2.0F, 1.0F);
+  const std::vector<float> near(colours.size(), 1.0F);
+  gl_->TextureSubImage3D(layers.colour.name(), 0, 0, 0, 0, coarse.x, coarse.y, 1, GL_RGBA, GL_FLOAT, colours.data());
+  gl_->TextureSubImage3D(layers.z.name(), 0, 0, 0, 0, coarse.x, coarse.y, 1, GL_RED, GL_FLOAT, near.data());
+  const Picture like(gl_, 3, 2, false);
+  const std::vector<glm::vec4> nothing(6, glm::vec4(0.0F));
+  gl_->TextureSubImage2D(like.sum_texture.name(), 0, 0, 0, 3, 2, GL_RGBA, GL_FLOAT, nothing.data());
+  PictureTextures picture = like.textures();
+  picture.beneath = &layers;
+  const glm::ivec4 viewport(3, 4, 31, 22);
+  for (const ColourEncoding encoding : {ColourEncoding::srgb, ColourEncoding::hdr}) {
+    for (const bool flip : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "encoding " << int(encoding) << " flip " << flip);
+      Display display;
+      display.tone_map = ToneMap::clip;
+      display.encoding = encoding;
+      const Target made = make_target(GL_RGBA32F, 0);
+      FrameTarget target;
+      target.framebuffer = made.framebuffer.name();
+      target.viewport = viewport;
+      target.flip_y = flip;
+      target.wait = render::Wait::always;
+      {
+        const StateGuard guard(*gl_);
+        compositor_->draw(picture, display, target);
+      }
+      const std::vector<glm::vec4> got = read(made, GL_RGBA32F, 0);
+      const auto shown = [&](glm::ivec2 p) {
+        p = glm::clamp(p, glm::ivec2(0), coarse - 1);
+        glm::dvec4 colour(colours[static_cast<std::size_t>(p.y * coarse.x + p.x)]);
+        for (int k = 0; k < 3 && encoding == ColourEncoding::srgb; ++k)
+          colour[k] = image::srgb_encode(static_cast<float>(colour[k]));
+        return colour;
+      };
+      for (int y = 0; y < viewport.w; ++y) {
+        for (int x = 0; x < viewport.z; ++x) {
+          const int row = flip ? y : viewport.w - 1 - y;
+          const glm::dvec2 at =
+              (glm::dvec2(x, row) + 0.5) * glm::dvec2(coarse) / glm::dvec2(viewport.z, viewport.w) - 0.5;
+          const glm::ivec2 low(glm::floor(at));
+          const glm::dvec2 part = at - glm::dvec2(low);
+          const glm::dvec4 expected =
+              glm::mix(glm::mix(shown(low), shown(low + glm::ivec2(1, 0)), part.x),
+                       glm::mix(shown(low + glm::ivec2(0, 1)), shown(low + glm::ivec2(1, 1)), part.x), part.y);
+          const auto i = static_cast<std::size_t>((y + viewport.y) * size.x + x + viewport.x);
+          // Drivers filter by weights of eight bits.
+          for (int k = 0; k < 4; ++k) ASSERT_NEAR(got[i][k], expected[k], 0.01) << x << ' ' << y << ' ' << k;
+        }
+      }
+    }
+  }
+}
+
 TEST_P(Compositing, NothingToDraw) {
   const Picture picture(gl_, 8, 8, false);
   const Target made = make_target(GL_RGBA8, 0);
