@@ -88,7 +88,7 @@ std::vector<Variant> covering(const gl::Shader& shader) {
 std::vector<Kernel> kernels() {
   std::vector<Kernel> all;
   for (const gl::Shader& shader : gl::shaders()) {
-    if (shader.name.ends_with(".vert")) continue;  // goes with the fragment shader of its name
+    if (shader.name.ends_with(".vert")) continue;  // goes with a fragment shader
     for (const Variant& variant : covering(shader)) {
       Kernel kernel{std::string(shader.name), {}, {}, {}};
       std::vector<std::string> defines;
@@ -101,7 +101,9 @@ std::vector<Kernel> kernels() {
       } else {
         const std::string stem(shader.name.substr(0, shader.name.find('.')));
         kernel.fragment = shader.with(defines);
-        kernel.vertex = gl::find_shader(stem + ".vert")->with(defines);
+        // What has none of its name covers a rectangle.
+        const gl::Shader* vertex = gl::find_shader(stem + ".vert");
+        kernel.vertex = (vertex != nullptr ? vertex : gl::find_shader("composite.vert"))->with(defines);
       }
       all.push_back(std::move(kernel));
     }
