@@ -33,7 +33,8 @@ void run(const bench::Options& options) {
   if (!options.readme.empty() && !std::ifstream(options.readme)) {
     throw std::runtime_error(options.readme.string() + ": cannot be read");
   }
-  std::filesystem::create_directories(options.out);
+  const bool all = !(options.surfaces_threshold > 0.0);
+  if (all) std::filesystem::create_directories(options.out);
   headless::Context context = headless::Context::create(options.backend);
   const bench::Machine machine = machine_of(context);
   bench::progress(machine.gl_renderer);
@@ -46,9 +47,14 @@ void run(const bench::Options& options) {
       continue;
     }
     bench::progress(input.name);
+    if (!all) {
+      bench::measure_surfaces_alone(context, bench::load_asset(input), options);
+      continue;
+    }
     results.push_back(bench::measure(context, bench::load_asset(input), options));
     bench::write_report(machine, options, results, {}, skipped);  // what is done is not lost
   }
+  if (!all) return;
   bench::progress("triangle trees");
   bench::write_report(machine, options, results, bench::measure_trees(options), skipped);
   bench::progress("written: " + (options.out / "report.md").string());

@@ -148,6 +148,10 @@ std::vector<std::vector<Run>> take_turns(std::size_t subjects, int repeats, Meas
   return runs;
 }
 
+double density_scale_of(const Asset& asset, const Options& options) {
+  return options.optical_depth / std::max(asset.mean_optical_depth, 1e-30);
+}
+
 /// Samples a pixel that take about as long as a run shall, where one takes so many seconds.
 std::uint32_t samples_within(const Options& options, double seconds) {
   const double samples = options.seconds_a_run / std::max(seconds, 1e-3);
@@ -160,13 +164,12 @@ std::vector<double> rates(const std::vector<Run>& runs) {
   return result;
 }
 
-/// What surfaces cost: the matched grid with them, in turn with the volume alone.
+/// What surfaces cost: a grid of that threshold, as `alone` has it, with them, in turn with the volume alone.
 SurfaceResult measure_surfaces(headless::Context& context, const Asset& asset, const Options& options, Subject& alone,
-                               const TargetResult& target, double density_scale) {
+                               double threshold, double density_scale) {
   const scene::ModelSourcePtr surfaces = surfaces_in(asset.volume->bounds());
   Subject with(context, asset.volume, alone.kind(), options, density_scale);
-  with.refine(grid::Criterion::deviation, target.rows[static_cast<std::size_t>(alone.kind())].threshold,
-              options.max_cells);
+  with.refine(grid::Criterion::deviation, threshold, options.max_cells);
   with.show(surfaces);
   const auto run = [&](std::size_t i, std::uint32_t samples, std::uint32_t seed) {
     if (i == 0) return alone.shaded(samples, seed);
@@ -234,7 +237,7 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
   const glm::ivec3 voxels = asset.volume->volume().bounds_max - asset.volume->volume().bounds_min + 1;
   result.voxels = {voxels.x, voxels.y, voxels.z};
   result.active_voxels = asset.volume->volume().active_voxels;
-  const double density_scale = options.optical_depth / std::max(asset.mean_optical_depth, 1e-30);
+  const double density_scale = density_scale_of(asset, options);
   result.density_scale = density_scale;
 
   progress("  build");
@@ -321,10 +324,21 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
     result.targets.push_back(std::move(table));
     if (result.targets.size() > 1) continue;
     progress("  surfaces");
-    result.surfaces = measure_surfaces(context, asset, options, *subjects[static_cast<std::size_t>(Kind::tet_linear)],
-                                       result.targets.front(), density_scale);
+    const auto linear = static_cast<std::size_t>(Kind::tet_linear);
+    result.surfaces = measure_surfaces(context, asset, options, *subjects[linear],
+                                       result.targets.front().rows[linear].threshold, density_scale);
   }
   return result;
+}
+
+void measure_surfaces_alone(headless::Context& context, const Asset& asset, const Options& options) {
+  const double density_scale = density_scale_of(asset, options);
+  Subject alone(context, asset.volume, Kind::tet_linear, options, density_scale);
+  alone.refine(grid::Criterion::deviation, options.surfaces_threshold, options.max_cells);
+  const SurfaceResult result =
+      measure_surfaces(context, asset, options, alone, options.surfaces_threshold, density_scale);
+  progress(text("    %.0f cells, %.0f triangles, the volume alone %.0f samples/s",
+                static_cast<double>(alone.stats().cells), static_cast<double>(result.triangles), result.alone.median));
 }
 
 std::vector<TreeTimes> measure_trees(const Options& options) {

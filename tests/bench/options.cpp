@@ -58,6 +58,9 @@ ParseResult parse(int argc, char** argv) {
   app.add_option("--data-dir", shared_data, "Holds vdb/wdas/wdas_cloud_sixteenth.vdb (default: ../shared/data)");
   app.add_option("--out", o.out, "Folder for what is written (default: bench-out)");
   app.add_option("--update-readme", o.readme, "Put the main table between this file's bench:begin and bench:end");
+  app.add_option("--surfaces-only", o.surfaces_threshold,
+                 "Only what surfaces cost, on a linear grid of that threshold, to standard error")
+      ->check(CLI::PositiveNumber);
   const std::map<std::string, headless::Backend> backends{
       {"auto", headless::Backend::automatic}, {"egl", headless::Backend::egl}, {"osmesa", headless::Backend::osmesa}};
   app.add_option("--backend", backend, "auto|egl|osmesa")->check(CLI::IsMember({"auto", "egl", "osmesa"}));

@@ -39,6 +39,7 @@ struct Options {
   std::uint64_t build_cells = 5'000'000;
   std::size_t tree_triangles = 1'000'000;
   bool quick = false;
+  double surfaces_threshold = 0.0;  ///< above 0: only what surfaces cost is measured, on a grid of that threshold
 };
 
 /// The options, or the exit status that wrong usage (or --help) means; explains itself.
