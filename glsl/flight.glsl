@@ -96,7 +96,7 @@ CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
   uint marches = 0u;
   for (int j = 0; j < CM_EVENTS && (p.stage == CM_STAGE_AIM || p.stage == CM_STAGE_FLY || p.stage == CM_STAGE_EVENT);
        ++j) {
-    if (p.stage == CM_STAGE_EVENT) cm_handle(p, false);
+    if (p.stage == CM_STAGE_EVENT) cm_handle(p, cm_in_medium());
     if (CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) cm_aim(p);
     if (p.stage == CM_STAGE_FLY) {
       p.event = cm_fly(p);

@@ -3,7 +3,7 @@
 //   cm                                            the parameters
 //   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface there
 //
-// The stages are functions: here cm_camera, cm_handle (which is cm_escape, cm_glow, cm_arrive and cm_scatter) and
+// The stages are functions: here cm_camera, cm_handle (which is cm_escape, cm_glow, cm_arrive, cm_look and cm_scatter) and
 // cm_finish; in glsl/path_vertex.glsl cm_meet, and what else differs where there are triangles; in glsl/flight.glsl
 // cm_aim and cm_fly, which march. One kernel runs them all (glsl/trace.comp), or several do, each over the paths that
 // wait for it (glsl/path_queue.glsl).
@@ -128,16 +128,31 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided) {
   return ends;
 }
 
-// A look for light after a collision or on a triangle, if there is light; a new flight after that.
-CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
-  float u_0 = cm_random(p.random, p.stream);
-  float u_1 = cm_random(p.random, p.stream);
+// A look for light after a collision or on a triangle, if there is light.
+struct CmLook {
+  bool looks;  // else light is where flights might find the sky
+  CmLightSample light;
+  float u_0;  // for the direction of a flight
+  float u_1;
+};
+
+CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
+  CmLook look;
+  look.u_0 = cm_random(p.random, p.stream);
+  look.u_1 = cm_random(p.random, p.stream);
   float u_2 = cm_random(p.random, p.stream);
-  bool looks = arrived && cm.lights.any != 0u;
+  look.looks = arrived && cm.lights.any != 0u;
   vec3 here = cm_look_from(p, vertex);
-  CmLightSample light = cm_sky_sample(p, here, u_2);  // flights go where they might find the sky
-  if (looks) light = cm_light_sample(p, here, u_2);
-  vec3 w = cm_turn_direction(p, vertex, u_0, u_1);
+  look.light = cm_sky_sample(p, here, u_2);
+  if (look.looks) look.light = cm_light_sample(p, here, u_2);
+  return look;
+}
+
+// The look's ray, or a new flight after it.
+CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
+  bool looks = look.looks;
+  CmLightSample light = look.light;
+  vec3 w = cm_turn_direction(p, vertex, look.u_0, look.u_1);
   bool along = light.kind == CM_LIGHT_SKY;
   CmTurn turn = cm_turn(p, vertex, along ? w : light.direction);
   if (along) light = cm_sky_along(w, light.density * turn.density);
@@ -150,7 +165,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
     p.density = cm_is_far(light) ? turn.density * rare : 0.0f;
   } else {
     p.throughput *= turn.weight;
-    p.w = w;
+    p.w = light.direction;
     if (cm_blurs(turn)) p.blurred = 1u;
   }
   p.lifted = turn.lifted ? 1u : 0u;
@@ -171,25 +186,33 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   }
 }
 
-// What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
-// on_triangle, a constant where it is called: in stage CM_STAGE_VERTEX, else CM_STAGE_EVENT.
-CM_FN void cm_handle(CM_INOUT(CmPath) p, bool on_triangle) {
+// What a ray that came to an event has brought; whether the path is finished. arrived: it goes on from the ray's end.
+CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived) {
   bool flight = p.ray == CM_RAY_FLIGHT;
-  bool met = on_triangle && flight;
+  bool met = vertex.on_triangle && flight;
   bool escaped = p.event == CM_EVENT_ESCAPE && !met;
   bool collided = flight && p.event == CM_EVENT_COLLISION && !met;
   if (escaped) cm_escape(p);
   bool finished = escaped && flight;
-  CmVertex vertex = cm_vertex(p, on_triangle, met);
+  if (met) cm_see(p, vertex);
   // Without light among surfaces: what has left one sees the sky alone, and the volume sees none.
   bool dark = CM_SURFACES != 0 && cm.integrator.light_among_surfaces == 0u && p.bounces > 0u &&
               (met || (collided && p.start == CM_ON_TRIANGLE));
   cm_glow(p, flight, collided && !dark);
-  if (collided || met) {
+  arrived = collided || met;
+  if (arrived) {
     finished = cm_arrive(p, collided) || dark;
     if (met) finished = cm_stand(p, vertex) || finished;
   }
-  if (!finished) cm_scatter(p, vertex, collided || met);
+  return finished;
+}
+
+// What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
+// In stage CM_STAGE_VERTEX it is on a triangle, else, in CM_STAGE_EVENT, in the medium.
+CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {
+  bool arrived;
+  bool finished = cm_end_ray(p, vertex, arrived);
+  if (!finished) cm_scatter(p, vertex, cm_look(p, vertex, arrived));
   if (finished) p.stage = CM_STAGE_FINISH;
 }
 

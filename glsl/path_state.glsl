@@ -35,17 +35,18 @@
 //   depth, depth_0  optical depth left before the collision (or the end of the shadow ray), and at the ray's start
 //   cell, cache     that the ray is in, and what the march keeps of it; start_cell: it was in at o, in the medium
 //   reach           its own end: a lamp, the host's surface
-// CM_PATH_SAMPLE, the sample so far:
+// CM_PATH_SUM, the sample so far:
+//   radiance        without what is behind all
+//   bounces         events of the path
+//   steps           cells marched
+// CM_PATH_FLIGHT, what goes on to the next ray:
 //   w               world direction of flight, kept during shadow rays
 //   throughput      of the path
-//   radiance        of this sample so far, without what is behind all
 //   light           what the ray brings if nothing stops it: a shadow ray; a camera ray, of a layer's colour or of what
 //                   is behind all
 //   density         of a flight: by solid angle, with which it took its direction; of a shadow ray to what flights may
 //                   come to by escaping: the flights' density there over the look's own; else 0
 //   random, stream  of its random numbers
-//   bounces         events of the path so far
-//   steps           cells marched for this sample
 // CM_PATH_ENDS, what is known of the ray's ends:
 //   triangle, weights     that o is on, of its second and third vertex
 //   stage, event, ray, start     as above
@@ -59,9 +60,9 @@
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
-#define CM_PATH_SAMPLE(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
-  VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(radiance) UINT(bounces) VEC3(light) UINT(steps)            \
-  FLOAT(density)
+#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps)
+#define CM_PATH_FLIGHT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
+  VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(light) FLOAT(density)
 #define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 1) BITS(start, 2) BITS(behind, 1)             \
   BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1)
@@ -84,12 +85,15 @@
   (0 PART(CM_PATH_THREE, CM_PATH_TWO, CM_PATH_TWO, CM_PATH_ONE, CM_PATH_ONE, CM_PATH_NO_WORD) +                      \
    (31 PART(CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_NO_BITS, CM_PATH_BITS_OF)) / 32)
 #define CM_RAY_QUADS ((CM_PATH_WORDS(CM_PATH_RAY) + 3) / 4)
-#define CM_SAMPLE_QUADS ((CM_PATH_WORDS(CM_PATH_SAMPLE) + 3) / 4)
+#define CM_SUM_QUADS ((CM_PATH_WORDS(CM_PATH_SUM) + 3) / 4)
+#define CM_FLIGHT_QUADS ((CM_PATH_WORDS(CM_PATH_FLIGHT) + 3) / 4)
 #define CM_ENDS_QUADS ((CM_PATH_WORDS(CM_PATH_ENDS) + 3) / 4)
+#define CM_PATH_QUADS (CM_RAY_QUADS + CM_SUM_QUADS + CM_FLIGHT_QUADS + CM_ENDS_QUADS)
 
 struct CmPath {
   CM_PATH_RAY(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
-  CM_PATH_SAMPLE(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+  CM_PATH_SUM(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+  CM_PATH_FLIGHT(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
   CM_PATH_ENDS(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
 };
 

@@ -62,15 +62,21 @@ uint cm_lanes() { return cm.dispatch.tile_size.x * cm.dispatch.tile_size.y; }
 
 void cm_load_ray(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_RAY, CM_RAY_QUADS, 0) }
 void cm_store_ray(CmPath p, uint lane) { CM_STORE(CM_PATH_RAY, CM_RAY_QUADS, 0) }
-void cm_load_sample(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_SAMPLE, CM_SAMPLE_QUADS, CM_RAY_QUADS) }
-void cm_store_sample(CmPath p, uint lane) { CM_STORE(CM_PATH_SAMPLE, CM_SAMPLE_QUADS, CM_RAY_QUADS) }
-void cm_load_ends(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_ENDS, CM_ENDS_QUADS, CM_RAY_QUADS + CM_SAMPLE_QUADS) }
-void cm_store_ends(CmPath p, uint lane) { CM_STORE(CM_PATH_ENDS, CM_ENDS_QUADS, CM_RAY_QUADS + CM_SAMPLE_QUADS) }
+#define CM_FIRST_SUM CM_RAY_QUADS
+void cm_load_sum(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_SUM, CM_SUM_QUADS, CM_FIRST_SUM) }
+void cm_store_sum(CmPath p, uint lane) { CM_STORE(CM_PATH_SUM, CM_SUM_QUADS, CM_FIRST_SUM) }
+#define CM_FIRST_FLIGHT (CM_RAY_QUADS + CM_SUM_QUADS)
+void cm_load_flight(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_FLIGHT, CM_FLIGHT_QUADS, CM_FIRST_FLIGHT) }
+void cm_store_flight(CmPath p, uint lane) { CM_STORE(CM_PATH_FLIGHT, CM_FLIGHT_QUADS, CM_FIRST_FLIGHT) }
+#define CM_FIRST_ENDS (CM_PATH_QUADS - CM_ENDS_QUADS)
+void cm_load_ends(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_ENDS, CM_ENDS_QUADS, CM_FIRST_ENDS) }
+void cm_store_ends(CmPath p, uint lane) { CM_STORE(CM_PATH_ENDS, CM_ENDS_QUADS, CM_FIRST_ENDS) }
 
 CmPath cm_begin_path() {
   CmPath p;
   CM_PATH_RAY(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
-  CM_PATH_SAMPLE(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+  CM_PATH_SUM(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+  CM_PATH_FLIGHT(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
   CM_PATH_ENDS(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
   p.stage = CM_STAGE_CAMERA;
   return p;
@@ -79,14 +85,16 @@ CmPath cm_begin_path() {
 CmPath cm_load_path(uint lane) {
   CmPath p = cm_begin_path();
   cm_load_ray(p, lane);
-  cm_load_sample(p, lane);
+  cm_load_sum(p, lane);
+  cm_load_flight(p, lane);
   cm_load_ends(p, lane);
   return p;
 }
 
 void cm_store_path(CmPath p, uint lane) {
   cm_store_ray(p, lane);
-  cm_store_sample(p, lane);
+  cm_store_sum(p, lane);
+  cm_store_flight(p, lane);
   cm_store_ends(p, lane);
 }
 

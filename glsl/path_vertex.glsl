@@ -59,11 +59,16 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   p.stage = vertex ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
 }
 
-// What a path has met, and its light.
-CM_FN CmVertex cm_vertex(CM_INOUT(CmPath) p, bool on_triangle, bool met) {
+CM_FN CmVertex cm_in_medium() {
   CmVertex vertex;
-  vertex.on_triangle = on_triangle;
-  if (!on_triangle) return vertex;
+  vertex.on_triangle = false;
+  return vertex;
+}
+
+// Of the triangle that the path is on, or has met: of its fields it needs w and CM_PATH_ENDS.
+CM_FN CmVertex cm_on_triangle(CmPath p) {
+  CmVertex vertex;
+  vertex.on_triangle = true;
   vertex.surface = cm_surface_point(p.triangle, p.weights, p.w, p.back != 0u);
   // Path space regularization: Kaplanyan and Dachsbacher, 2013.
   if (p.blurred != 0u) {
@@ -71,17 +76,22 @@ CM_FN CmVertex cm_vertex(CM_INOUT(CmPath) p, bool on_triangle, bool met) {
     vertex.surface.material.roughness = max(vertex.surface.material.roughness, least);
     vertex.surface.material.clearcoat_roughness = max(vertex.surface.material.clearcoat_roughness, least);
   }
+  return vertex;
+}
+
+// The light of what a path has met.
+CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
+  vec3 emission = vertex.surface.emission;
   // The look for light before the flight that met it might have found it, whatever the medium between; not at the same
   // angle where the flight started above its triangle: then looks alone count.
-  if (CM_SURFACES > 1 && met && p.bounces > 0u && !vertex.surface.unlit) {
+  if (CM_SURFACES > 1 && p.bounces > 0u && !vertex.surface.unlit) {
     CmLightHit hit = cm_light_hit(CM_LIGHT_TRIANGLE, p.o, p.w, p.density);
     hit.triangle = p.triangle;
     hit.point = vertex.surface.position;
     hit.normal = vertex.surface.geometric;
-    vertex.surface.emission *= p.lifted != 0u ? 0.0f : cm_balance(p.density, cm_light_pdf(hit));
+    emission *= p.lifted != 0u ? 0.0f : cm_balance(p.density, cm_light_pdf(hit));
   }
-  if (met) p.radiance += p.throughput * vertex.surface.emission;
-  return vertex;
+  p.radiance += p.throughput * emission;
 }
 
 // The path is on the triangle that it has met, after cm_arrive. Whether it ends there.
@@ -142,7 +152,8 @@ struct CmVertex {
 
 CM_FN bool cm_asks(CmPath p) { return false; }
 CM_FN void cm_meet(CM_INOUT(CmPath) p) {}
-CM_FN CmVertex cm_vertex(CM_INOUT(CmPath) p, bool on_triangle, bool met) { return CmVertex(false); }
+CM_FN CmVertex cm_in_medium() { return CmVertex(false); }
+CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {}
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }
 CM_FN bool cm_blurs(CmTurn turn) { return false; }
 CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }

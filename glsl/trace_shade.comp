@@ -15,11 +15,55 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path_store.glsl"
 #include "path_queue.glsl"
 
+// What has ended with the ray takes no registers.
+void cm_forget_ray(inout CmPath p) {
+  p.t = 0.0;
+  p.d = vec3(0.0);
+  p.t_end = 0.0;
+  p.depth = 0.0;
+  p.depth_0 = 0.0;
+  p.cell = uvec2(0u);
+  p.cache = 0u;
+  p.start_cell = uvec2(0u);
+  p.reach = 0.0;
+  p.light = vec3(0.0);
+  p.density = 0.0;
+  p.event = CM_EVENT_NONE;
+}
+
+// A triangle, a look for light and what the path is of would not fit into the registers that leave GPUs lanes to wait
+// with: each is loaded when it is needed, and stored, or loaded again, rather than kept.
 void main() {
   if (cm_queue_place() >= cm_queue_count(CM_QUEUE_SHADE)) return;
   uint lane = cm_queue_lane(CM_QUEUE_SHADE);
-  CmPath p = cm_load_path(lane);
-  cm_handle(p, true);
-  cm_store_path(p, lane);
+  CmPath p = cm_begin_path();
+  cm_load_flight(p, lane);
+  cm_load_ends(p, lane);
+  CmVertex vertex = cm_on_triangle(p);
+  p = cm_load_path(lane);
+  bool arrived;
+  bool finished = cm_end_ray(p, vertex, arrived);
+  cm_store_sum(p, lane);
+  cm_forget_ray(p);
+  CmPath kept = cm_begin_path();
+  if (finished) {
+    p.stage = CM_STAGE_FINISH;
+  } else {
+    cm_store_flight(p, lane);
+    CmLook look = cm_look(p, vertex, arrived);
+    cm_load_flight(kept, lane);
+    p.w = kept.w;
+    p.throughput = kept.throughput;
+    cm_scatter(p, vertex, look);
+  }
+  cm_store_ray(p, lane);
+  cm_store_flight(p, lane);
+  cm_load_ends(kept, lane);
+  p.triangle = kept.triangle;
+  p.weights = kept.weights;
+  p.back = kept.back;
+  p.in_volume = kept.in_volume;
+  p.at_layer = kept.at_layer;
+  cm_store_ends(p, lane);
   cm_send_on(p, lane);
 }

@@ -17,7 +17,7 @@ namespace cumulet::render {
 
 namespace {
 
-constexpr std::size_t lane_bytes = std::size_t{16} * (CM_RAY_QUADS + CM_SAMPLE_QUADS + CM_ENDS_QUADS);
+constexpr std::size_t lane_bytes = std::size_t{16} * CM_PATH_QUADS;
 
 // A head is what glDispatchComputeIndirect reads, and how many paths wait.
 constexpr std::size_t head_bytes = sizeof(glm::uvec4);
