@@ -474,6 +474,7 @@ void App::accept(const Answer& answer) {
     set_volume(wish_.scene, answer.volume);
   }
   if (answer.surfaces_edit == wish_.surfaces_edit) model_.scene.surfaces = wish_.scene.surfaces = answer.surfaces;
+  if (answer.status.compiled) model_.charts.compiled_percent.add(static_cast<float>(100.0 * *answer.status.compiled));
   if (answer.status.noise > 0.0 && answer.status.noise != model_.status.noise)
     model_.charts.noise_percent.add(static_cast<float>(100.0 * answer.status.noise));
   if (answer.density_scale) {
@@ -637,6 +638,7 @@ void App::write_report(const std::string& path) const {
   json["undo_steps"] = history_->depth();
   json["frame_ms"] = model_.charts.frame_ms.values();
   json["picture_ms"] = model_.charts.picture_ms.values();
+  json["compiled_percent"] = model_.charts.compiled_percent.values();
   json["pictures"] = pictures_;
   json["grid"] = status.grid;
   json["state"] = last_state_;

@@ -105,6 +105,8 @@ void spell_out_defaults(SceneOptions& scene) {
   if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
 }
 
+namespace {
+
 const char* stage_text(cumulet_stage stage) {
   switch (stage) {
     case CUMULET_STAGE_LOADING:
@@ -121,6 +123,13 @@ const char* stage_text(cumulet_stage stage) {
       break;
   }
   return "Starting";
+}
+
+}  // namespace
+
+Work work_of(const Status& status) {
+  if (status.work.stage == CUMULET_STAGE_IDLE && status.compiled) return {"Compiling shaders", *status.compiled, false};
+  return {stage_text(status.work.stage), std::clamp(status.work.fraction, 0.0, 1.0), true};
 }
 
 std::string suggest_path(const Model& model, const std::string& ending) {

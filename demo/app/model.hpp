@@ -107,7 +107,8 @@ struct Status {
   cumulet_stats stats{};
   cumulet_surfaces_info surfaces{};
   cumulet_animation_info animation{};  // that is set, of those
-  bool busy = false;                   // a file is read or a grid is built
+  std::optional<double> compiled;      // the part of the first scene's programs that is, until all are
+  bool busy = false;                   // a file is read, a grid is built or programs are compiled
   bool has_volume = false;
   std::string grid;    // of the file, that is shown
   double noise = 0.0;  // relative standard error, 0: not known
@@ -119,7 +120,8 @@ struct Charts {
   Series picture_ms;  // from a change to the window with the picture that was drawn next
   Series samples_per_second;
   Series noise_percent;
-  Series device_ms;  // that the library's passes took, a frame of the window
+  Series compiled_percent;  // of the first scene's programs
+  Series device_ms;         // that the library's passes took, a frame of the window
 };
 
 /// Of all passes.
@@ -150,8 +152,13 @@ void tell(Model& model, bool error, const std::string& text, double now);
 /// Replaces the zeros that stand for a default by what they stand for (cumulet.h), so that controls can show them.
 void spell_out_defaults(SceneOptions& scene);
 
-/// "Reading the file", "Refining the grid", ...
-[[nodiscard]] const char* stage_text(cumulet_stage stage);
+/// What keeps the viewer busy: "Reading the file", "Refining the grid", ..., and the part of it that is done.
+struct Work {
+  const char* name;
+  double part;
+  bool stops;  // cumulet_cancel ends it
+};
+[[nodiscard]] Work work_of(const Status& status);
 
 /// Where a new file may go: the volume's name, a free number and the ending, in the folder used last.
 [[nodiscard]] std::string suggest_path(const Model& model, const std::string& ending);

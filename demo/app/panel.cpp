@@ -361,7 +361,7 @@ void Panel::hint() const {
 }
 
 void Panel::loading(const Model& model, std::vector<Command>& commands) {
-  const Status& status = model.status;
+  const Work work = work_of(model.status);
   const float width = std::min(ui_.px(380.0f), static_cast<float>(view_.width) - ui_.px(24.0f));
   ImGui::SetNextWindowPos({static_cast<float>(view_.width) * 0.5f, ui_.px(12.0f)}, ImGuiCond_Always, {0.5f, 0.0f});
   ImGui::SetNextWindowSize({width, 0.0f});
@@ -369,16 +369,18 @@ void Panel::loading(const Model& model, std::vector<Command>& commands) {
   ImGui::Begin("loading", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
   const float button = ui_.px(76.0f);
   const std::string name = file_name(model.scene.volume);
-  ImGui::TextUnformatted(stage_text(status.work.stage));
+  ImGui::TextUnformatted(work.name);
   if (!name.empty()) {
     ImGui::SameLine();
     ImGui::TextDisabled("%s", name.c_str());
   }
-  ImGui::ProgressBar(static_cast<float>(std::clamp(status.work.fraction, 0.0, 1.0)),
-                     {-button - ImGui::GetStyle().ItemSpacing.x, ImGui::GetFrameHeight()});
-  ImGui::SameLine();
-  if (ui_.button("Cancel", "Stops; what is shown stays (Escape).", {button, 0.0f}))
-    commands.push_back({Action::cancel_load});
+  const float right = work.stops ? button + ImGui::GetStyle().ItemSpacing.x : 0.0f;
+  ImGui::ProgressBar(static_cast<float>(work.part), {-std::max(right, 1.0f), ImGui::GetFrameHeight()});
+  if (work.stops) {
+    ImGui::SameLine();
+    if (ui_.button("Cancel", "Stops; what is shown stays (Escape).", {button, 0.0f}))
+      commands.push_back({Action::cancel_load});
+  }
   ImGui::End();
 }
 

@@ -170,15 +170,25 @@ void Renderer::turn() {
     while (free == shown_ || free == ready_) ++free;
     poked_ = false;  // whatever it was about, this frame sees it
   }
+  const bool sized = wish_.width > 0 && wish_.height > 0;
+  if (sized && session_->cold()) {
+    prepare(slots_[free], wish_.width, wish_.height);
+    session_->warm_up(slots_[free].framebuffer);
+    publish(free, false);
+    return;
+  }
   session_->work();
   // What is under way is drawn once it is there, rather than the last picture once more.
-  const bool draws = wish_.width > 0 && wish_.height > 0 && session_->has_news();
-  if (draws) draw(slots_[free], wish_.width, wish_.height);
+  const bool draws = sized && session_->has_news();
+  if (draws) {
+    prepare(slots_[free], wish_.width, wish_.height);
+    draw(slots_[free]);
+  }
   publish(free, draws);
 }
 
 // The slot is this thread's alone here.
-void Renderer::draw(Slot& slot, std::uint32_t width, std::uint32_t height) {
+void Renderer::prepare(Slot& slot, std::uint32_t width, std::uint32_t height) {
   const GladGLContext& gl = *gl_;
   if (slot.read != nullptr) {
     gl.ClientWaitSync(slot.read, 0, patience);
@@ -198,6 +208,10 @@ void Renderer::draw(Slot& slot, std::uint32_t width, std::uint32_t height) {
     gl.TextureParameteri(texture, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
     gl.NamedFramebufferTexture(slot.framebuffer, GL_COLOR_ATTACHMENT0, texture, 0);
   }
+}
+
+void Renderer::draw(const Slot& slot) {
+  const GladGLContext& gl = *gl_;
   constexpr float dark = 0.075f;
   constexpr std::array<float, 4> nothing = {dark, dark * 1.08f, dark * 1.2f, 1.0f};
   gl.ClearNamedFramebufferfv(slot.framebuffer, GL_COLOR, 0, nothing.data());

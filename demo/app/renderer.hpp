@@ -66,7 +66,9 @@ class Renderer {
   };
   void work(std::promise<void>& ready);
   void turn();
-  void draw(Slot& slot, std::uint32_t width, std::uint32_t height);
+  // Makes it a picture of that size, to be drawn over.
+  void prepare(Slot& slot, std::uint32_t width, std::uint32_t height);
+  void draw(const Slot& slot);
   void publish(std::size_t slot, bool drawn);
 
   const GladGLContext* window_gl_;

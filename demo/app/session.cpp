@@ -247,6 +247,25 @@ void Session::draw(unsigned framebuffer) {
   drawn_display_ = scene_.display;
 }
 
+bool Session::cold() const {
+  const bool loads = waiting_ || waiting_for_surfaces_ || status_.compiled;
+  return !warm_ && loads && !wish_.paused;
+}
+
+void Session::warm_up(unsigned framebuffer) {
+  cumulet_frame_desc frame = this->frame();
+  frame.budget_ms = wish_.budget_ms;
+  frame.framebuffer = framebuffer;
+  cumulet_warm_up_result result{};
+  result.struct_size = sizeof result;
+  const bool works = check(cumulet_warm_up(viewer_.get(), &frame, CUMULET_WARM_UP_SCENE, &result));
+  status_.compiled.reset();
+  if (works && result.more != 0) status_.compiled = result.progress;
+  see_work();
+  // After a load that failed the next is the first.
+  warm_ = !status_.compiled && status_.work.status == CUMULET_OK;
+}
+
 void Session::work() {
   cumulet_frame_desc frame = this->frame();
   frame.budget_ms = wish_.paused ? -1.0 : wish_.budget_ms;
@@ -254,13 +273,18 @@ void Session::work() {
   status_.frame = {};
   status_.frame.struct_size = sizeof status_.frame;
   check(cumulet_render(viewer_.get(), &frame, &status_.frame));
+  see_work();
+}
+
+void Session::see_work() {
   status_.work = {};
   status_.work.struct_size = sizeof status_.work;
   static_cast<void>(cumulet_get_progress(viewer_.get(), &status_.work));
   status_.stats.struct_size = sizeof status_.stats;
   static_cast<void>(cumulet_get_stats(viewer_.get(), &status_.stats));
   const bool was_busy = status_.busy;
-  status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
+  status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
+                 (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
   if (waiting_for_surfaces_ && !status_.busy) finish_surfaces();
   if (waiting_ && !status_.busy)
     finish_load();
@@ -285,7 +309,11 @@ void Session::see_camera() {
   scene_.camera = known_->camera = now;
 }
 
-bool Session::more() const { return !wish_.paused && (status_.frame.flags & CUMULET_RENDER_MORE) != 0; }
+bool Session::more() const {
+  const bool compiles =
+      status_.compiled && (status_.work.stage == CUMULET_STAGE_IDLE || status_.work.stage == CUMULET_STAGE_UPLOADING);
+  return !wish_.paused && (compiles || (status_.frame.flags & CUMULET_RENDER_MORE) != 0);
+}
 
 Answer Session::answer() {
   Answer answer;

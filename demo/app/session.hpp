@@ -97,6 +97,10 @@ class Session {
   void follow(const Wish& wish);
   void input(const ViewerInput& input);
   void execute(const Request& request);
+  /// Whether the programs of the first scene are still to be compiled: warm_up, in place of work.
+  [[nodiscard]] bool cold() const;
+  /// Works on what the first picture needs, to be drawn into a framebuffer of its size.
+  void warm_up(unsigned framebuffer);
   /// Works on the last wish for its budget.
   void work();
   /// Whether draw would draw anything but what it drew last.
@@ -141,6 +145,8 @@ class Session {
   void remove_surfaces();
   void finish_surfaces();
   [[nodiscard]] cumulet_frame_desc frame() const;
+  // What has come of a call that works.
+  void see_work();
   // What the library says of those it shows.
   void read_surfaces();
   void finish_load();
@@ -169,6 +175,7 @@ class Session {
   cumulet_display_desc drawn_display_{};
   VolumeChoice shown_volume_;
   std::string shown_surfaces_;
+  bool warm_ = false;  // the first scene's programs are there
   bool waiting_for_surfaces_ = false;
   bool waiting_ = false;
   std::optional<cumulet_camera_desc> fit_;  // the camera to place when the volume is there

@@ -170,21 +170,45 @@ cumulet_stats stats_of(const Viewer& viewer) {
   return stats;
 }
 
-cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& options, double budget_ms) {
+constexpr double budget_ms = 200.0;  // how often the bar moves, and how long Ctrl-C may take
+
+cumulet_frame_desc frame_of(const RenderOptions& options) {
   cumulet_frame_desc frame{};
   frame.struct_size = sizeof frame;
   frame.target = CUMULET_TARGET_NONE;
   frame.width = options.scene.width;
   frame.height = options.scene.height;
   frame.budget_ms = budget_ms;
-  cumulet_frame_result result{};
-  result.struct_size = sizeof result;
-  const cumulet_status status = cumulet_render(viewer.get(), &frame, &result);
+  return frame;
+}
+
+void check_frame(const Viewer& viewer, const RenderOptions& options, cumulet_status status) {
   if (status == CUMULET_ERROR_OUT_OF_MEMORY) {
     throw std::runtime_error(cumulet::demo::needs_text(options) + ": " + cumulet_last_error(viewer.get()));
   }
   check(viewer, status);
+}
+
+cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& options) {
+  const cumulet_frame_desc frame = frame_of(options);
+  cumulet_frame_result result{};
+  result.struct_size = sizeof result;
+  check_frame(viewer, options, cumulet_render(viewer.get(), &frame, &result));
   return result;
+}
+
+/// All that the samples need is there before the first of them, so that their times are theirs alone.
+void warm_up(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
+  const cumulet_frame_desc frame = frame_of(options);
+  cumulet_warm_up_result result{};
+  result.struct_size = sizeof result;
+  do {
+    progress.stage("compiling shaders", result.progress);
+    check_frame(viewer, options, cumulet_warm_up(viewer.get(), &frame, CUMULET_WARM_UP_SCENE, &result));
+    // A camera-adaptive grid is built once the size is known.
+    if (result.more != 0) wait(viewer, progress);
+    check_not_interrupted();
+  } while (result.more != 0);
 }
 
 void check_animation(const Viewer& viewer, const RenderOptions& options) {
@@ -304,13 +328,12 @@ void render(const RenderOptions& options) {
   if (scene.surface_camera >= 0)
     check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));
 
+  warm_up(viewer, options, progress);
   const double total = static_cast<double>(scene.width) * scene.height * sampling.samples;
-  constexpr double budget_ms = 200.0;  // how often the bar moves, and how long Ctrl-C may take
   cumulet_frame_result frame{};
   bool began = false;
   while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
-    frame = render_frame(viewer, options, budget_ms);
-    // A camera-adaptive grid is built once the first frame has told the size.
+    frame = render_frame(viewer, options);
     if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
     if (frame.width > 0 || frame.progress > 0.0) {
       began = true;

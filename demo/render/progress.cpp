@@ -26,6 +26,14 @@ std::string format_count(double count) {
   return text.data();
 }
 
+std::string bar(double part) {
+  part = std::clamp(part, 0.0, 1.0);
+  const auto filled = static_cast<std::size_t>(part * bar_width);
+  std::string line = "[";
+  line.append(filled, '#').append(bar_width - filled, '.').append("] ");
+  return line.append(std::to_string(static_cast<int>(part * 100.0))).append(" %");
+}
+
 }  // namespace
 
 std::string format_duration(double seconds) {
@@ -48,6 +56,11 @@ void Progress::stage(const std::string& what) {
   show(what + " ...");
 }
 
+void Progress::stage(const std::string& what, double part) {
+  rendering_ = false;
+  show(what + " " + bar(part));
+}
+
 void Progress::render(double part, double total) {
   if (!rendering_) {
     start_ = Clock::now();
@@ -59,9 +72,7 @@ void Progress::render(double part, double total) {
 
 std::string rendering_line(double part, double gained, double seconds, double total) {
   part = std::clamp(part, 0.0, 1.0);
-  const auto filled = static_cast<std::size_t>(part * bar_width);
-  std::string line = "rendering [" + std::string(filled, '#') + std::string(bar_width - filled, '.') + "] ";
-  line += std::to_string(static_cast<int>(part * 100.0)) + " %";
+  std::string line = "rendering " + bar(part);
   if (gained > 0.0 && seconds >= least_seconds) {
     line += "  " + format_count(gained * total / seconds) + "samples/s";
     line += "  ETA " + format_duration(seconds * (1.0 - part) / gained);

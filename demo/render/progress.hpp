@@ -16,6 +16,8 @@ class Progress {
 
   /// A stage whose length is not known.
   void stage(const std::string& what);
+  /// One of which a part is done, 0 to 1.
+  void stage(const std::string& what, double part);
   /// Rendering, with part of all samples done; total is their number. Rates are of what was done since the first call.
   void render(double part, double total);
   /// Wipes the line, so that something else can be printed.

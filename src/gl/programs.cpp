@@ -248,8 +248,11 @@ std::vector<ProgramKey> all_programs() {
   for (const Shader& shader : shaders()) {
     if (shader.name.ends_with(".vert")) continue;
     const std::string name(shader.name);
-    const bool fragment = shader.name.ends_with(".frag");
-    const std::string vertex = fragment ? name.substr(0, name.size() - 4) + "vert" : "";
+    std::string vertex;
+    if (name.ends_with(".frag")) {
+      vertex = name.substr(0, name.size() - 4) + "vert";
+      if (find_shader(vertex) == nullptr) vertex = "composite.vert";  // it covers a rectangle
+    }
     for (const std::span<const ShaderMacro> macros : shader.variants) {
       std::vector<ProgramKey> keys{{name, {}, vertex}};
       for (const ShaderMacro& macro : macros) {

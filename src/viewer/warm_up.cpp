@@ -16,8 +16,9 @@ WarmUp Context::warm_up(const Shot& shot, const Frame& frame, bool all, bool wai
     unbuilt_.reset();
   }
   WarmUp result;
+  const bool known = !waits && !scene_.uploading();
   try {
-    result.more = waits || scene_.uploading() || !rehearse(shot, frame, all, deadline);
+    result.more = !known || !rehearse(shot, frame, all, deadline);
   } catch (...) {
     rehearsal_.reset();
     throw;
@@ -28,7 +29,7 @@ WarmUp Context::warm_up(const Shot& shot, const Frame& frame, bool all, bool wai
   const std::size_t wanted = all ? std::max(counts.asked, gl::all_programs().size()) : counts.asked;
   const std::size_t done = 2 * counts.failed + counts.usable + (all ? counts.usable : counts.ready);
   const double part = 0.5 * static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(1, wanted));
-  warm_ = result.more ? std::max(warm_, std::min(part, 0.99)) : 1.0;
+  if (known) warm_ = result.more ? std::max(warm_, std::min(part, 0.99)) : 1.0;
   result.progress = warm_;
   return result;
 }

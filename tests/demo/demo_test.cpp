@@ -552,4 +552,17 @@ INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
                                            std::make_pair(1.0f, ImVec2(640, 400)),
                                            std::make_pair(1.25f, ImVec2(1024, 3000))));
 
+TEST(WorkOf, ShadersAreCompiledWhereNothingIsLoaded) {
+  Status status;
+  status.compiled = 0.25;
+  EXPECT_STREQ(work_of(status).name, "Compiling shaders");
+  EXPECT_EQ(work_of(status).part, 0.25);
+  EXPECT_FALSE(work_of(status).stops);
+  status.work.stage = CUMULET_STAGE_REFINING;
+  status.work.fraction = 0.5;
+  EXPECT_STREQ(work_of(status).name, "Refining the grid");
+  EXPECT_EQ(work_of(status).part, 0.5);
+  EXPECT_TRUE(work_of(status).stops);
+}
+
 }  // namespace

@@ -169,6 +169,16 @@ def test_change(s):
             assert_differ(a, b, area)
 
 
+def test_warm_up(s):
+    s.play("replay", ["wait loaded", *shot("loaded"), "wait converged", *shot("first"), "key n", *SETTLE, *shot("later")],
+           "--volume", s.cumulus)
+    first, report, area = look(s, "first")
+    assert_drawn(first, area)
+    parts = s.report("loaded")["compiled_percent"]
+    assert parts and parts == sorted(parts), parts
+    assert s.report("later")["compiled_percent"] == parts, "once"
+
+
 def test_glow(s):
     s.play("replay", [*SETTLE, *shot("dark"), 'drag "Glow" 0.02 0.5 to "Glow" 0.6 0.5', *SETTLE, *shot("glowing"), "key ctrl+z",
                       *SETTLE, *shot("undone")], "--volume", s.fire, "--spp", "16")

@@ -1048,12 +1048,12 @@ TEST_F(Contract, Contract24LogsErrorsAndNoExceptions) {
 }
 
 /// Until all is warm: the progress that was told.
-std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& frame) {
+std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& frame,
+                            cumulet_warm_up_scope scope = CUMULET_WARM_UP_SCENE) {
   std::vector<double> told;
   auto result = make_desc<cumulet_warm_up_result>();
   do {
-    EXPECT_EQ(cumulet_warm_up(viewer, &frame, CUMULET_WARM_UP_SCENE, &result), CUMULET_OK)
-        << cumulet_last_error(viewer);
+    EXPECT_EQ(cumulet_warm_up(viewer, &frame, scope, &result), CUMULET_OK) << cumulet_last_error(viewer);
     told.push_back(result.progress);
   } while (result.more != 0 && told.size() < 10000);
   EXPECT_EQ(result.more, 0);
@@ -1288,6 +1288,47 @@ TEST_F(Contract, Contract26fAFrameThatCannotBeDrawnIsToldOnceAndNotBuiltEachTime
   const Picture before = target_.pixels();
   converge(own.get(), frame);
   EXPECT_NE(difference(target_.pixels(), before), "");
+}
+
+// What another scene needs is there then, and nothing of it is built twice.
+TEST_F(Contract, Contract26gAWarmUpOfAllIsForEveryScene) {
+  const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
+  const auto compiled = [&] { return fake_.calls("CompileShader") + fake_.calls("LinkProgram"); };
+  const ViewerPtr own = viewer();
+  ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+  auto frame = target_.frame();
+  frame.budget_ms = 5.0;
+  const std::vector<double> told = warm_up(own.get(), frame, CUMULET_WARM_UP_ALL);
+  EXPECT_TRUE(std::ranges::is_sorted(told));
+  EXPECT_GT(std::set(told.begin(), told.end()).size(), 10U) << "piece by piece";
+  EXPECT_LT(told.front(), 0.5);
+  EXPECT_EQ(told.back(), 1.0);
+  const auto programs = compiled();
+  EXPECT_LT(warm_up(own.get(), frame, CUMULET_WARM_UP_ALL).size(), 20U);
+  EXPECT_EQ(compiled(), programs) << "once more has nothing to do";
+  const auto expect_nothing_compiled = [&](const char* what) {
+    SCOPED_TRACE(what);
+    ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+    converge(own.get(), frame);
+    EXPECT_EQ(compiled(), programs);
+  };
+  expect_nothing_compiled("the volume");
+  auto grid = make_desc<cumulet_grid_desc>();
+  for (const cumulet_march march : {CUMULET_MARCH_DENSE, CUMULET_MARCH_BRICK, CUMULET_MARCH_TET}) {
+    grid.march = march;
+    ASSERT_EQ(cumulet_set_grid(own.get(), &grid), CUMULET_OK);
+    expect_nothing_compiled("another march");
+  }
+  ASSERT_EQ(cumulet_set_surfaces(own.get(), panes.get()), CUMULET_OK);
+  expect_nothing_compiled("surfaces");
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 2;
+  for (const cumulet_view view : {CUMULET_VIEW_CELLS, CUMULET_VIEW_STEPS, CUMULET_VIEW_SHADED}) {
+    sampling.view = view;
+    ASSERT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
+    expect_nothing_compiled("another view");
+  }
 }
 
 // Every example host runs in tests/embed; here the smallest, if it is built.
