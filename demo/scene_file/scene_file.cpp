@@ -12,6 +12,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <program.hpp>
 #include <set>
 #include <settings.hpp>
 #include <stdexcept>
@@ -37,7 +38,7 @@ constexpr double max_u32 = 4294967295.0;
 constexpr double max_integer = 9007199254740992.0;
 
 [[noreturn]] void fail(const std::string& file, const std::string& cause) {
-  throw std::runtime_error(file + ": " + cause);
+  throw std::runtime_error(file + ": " + one_line(cause));  // a key may be of any text
 }
 
 /// A file's keys, each named by its path, such as "light.sun.irradiance", and taken out of it when it is read: what is

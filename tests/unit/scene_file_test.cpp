@@ -190,6 +190,8 @@ TEST(SceneFile, AVolumeIsFoundFromTheFilesFolder) {
   EXPECT_NE(scene_text(scene, "/p/s.json").find("\"a/cloud.vdb\""), std::string::npos);
   EXPECT_NE(scene_text(scene, "/q/s.json").find("\"/p/a/cloud.vdb\""), std::string::npos);
   EXPECT_EQ(parse_scene(scene_text(scene, "/p/s.json"), "/p/s.json").volume, "/p/a/cloud.vdb");
+  scene.volume = "/p/a//b/../cloud.vdb";
+  EXPECT_NE(scene_text(scene, "/p/s.json").find("\"a/cloud.vdb\""), std::string::npos) << "in normal form";
 }
 
 TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
@@ -237,6 +239,7 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
   for (const char* text : {"", "{", "[]", "1", "nonsense", R"({"cumulet_scene": 1,})", R"({"cumulet_scene": 2})", "{}",
                            R"({"cumulet_scene": "1"})", R"({"medium": {"density_scale": 1e999}})", "\xff\xfe"})
     EXPECT_EQ(error_of(text).rfind("dir/s.json: ", 0), 0u) << text;
+  EXPECT_EQ(error_of(with(R"("col\nour": {})")).find('\n'), std::string::npos);
   // A hostile depth ends in an error, not on the stack.
   EXPECT_NE(error_of(std::string(500000, '[')), "");
 }
