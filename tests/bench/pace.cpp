@@ -1,13 +1,17 @@
 // How well cumulet_render keeps its budget: what a call takes over 5, 10 and 16 ms, at rest and while the sun is
-// dragged, alone and beside a host that queues GPU work of its own; and the loop of README's host, until it converges.
-// By hand:
+// dragged, alone and beside a host that queues GPU work of its own; what the system alone makes of a call that only
+// looks at the clock until its budget is over, on two cores as the tracer of a software driver; and the loop of
+// README's host, until it converges. By hand:
 //
 //     cumulet-bench-pace VOLUME [FRAMES] [MILLISECONDS OF THE HOST'S WORK]
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <future>
+#include <stdexcept>
 #include <vector>
 
 #include "support/busy_host.hpp"
@@ -32,6 +36,18 @@ struct Scenario {
   bool drags;
   bool busy;
 };
+
+/// A call that keeps two cores until so long after now.
+void control(double budget_ms) {
+  const auto until = Clock::now() + std::chrono::duration<double, std::milli>(budget_ms);
+  const auto spin = [until] {
+    while (Clock::now() < until) {
+    }
+  };
+  const auto other = std::async(std::launch::async, spin);
+  spin();
+  other.wait();
+}
 
 class Bench {
  public:
@@ -70,25 +86,21 @@ class Bench {
     for (float& value : light.sun_irradiance) value = 2.5F;
     for (float& value : light.sky_radiance) value = 0.3F;
     light.sun_elevation_degrees = 40.0F;
-    std::vector<double> taken;
-    for (int i = -frames_ / 4; i < frames_; ++i) {
+    const std::vector<double> taken = times(scenario.busy, [&](int i) {
       if (scenario.drags) {
         light.sun_azimuth_degrees = static_cast<float>(i);
         must(viewer.get(), cumulet_set_light(viewer.get(), &light));
       }
-      if (scenario.busy) host_.queue();
-      const auto start = Clock::now();
-      frame(viewer.get(), budget_ms);
-      if (i >= 0) taken.push_back(ms_since(start));
-      gl_.Finish();  // as a swap of buffers might
-    }
+      return [&] { frame(viewer.get(), budget_ms); };
+    });
     auto stats = cumulet::test::make_desc<cumulet_stats>();
     must(viewer.get(), cumulet_get_stats(viewer.get(), &stats));
-    std::ranges::sort(taken);
-    const auto at = [&](double part) { return taken[static_cast<std::size_t>(part * double(taken.size() - 1))]; };
-    std::printf("| %-22s | %4.0f | %6.2f | %6.2f | %7.2f | %9llu |\n", scenario.name, budget_ms, at(0.5), at(0.95),
-                taken.back(), static_cast<unsigned long long>(stats.samples));
-    std::fflush(stdout);
+    tell(scenario.name, budget_ms, taken, stats.samples);
+  }
+
+  void pace_of_control(const char* name, bool busy, double budget_ms) {
+    const auto call = [&](int) { return [&] { control(budget_ms); }; };
+    tell(name, budget_ms, times(busy, call), 0);
   }
 
   void readme_loop() {
@@ -106,6 +118,28 @@ class Bench {
   }
 
  private:
+  // Of calls in as many frames, sorted; prepare(frame) gives the call.
+  template <class Prepare>
+  std::vector<double> times(bool busy, Prepare&& prepare) {
+    std::vector<double> taken;
+    for (int i = -frames_ / 4; i < frames_; ++i) {
+      const auto call = prepare(i);
+      if (busy) host_.queue();
+      const auto start = Clock::now();
+      call();
+      if (i >= 0) taken.push_back(ms_since(start));
+      gl_.Finish();  // as a swap of buffers might
+    }
+    std::ranges::sort(taken);
+    return taken;
+  }
+  static void tell(const char* name, double budget_ms, const std::vector<double>& taken, std::uint64_t samples) {
+    const auto at = [&](double part) { return taken[static_cast<std::size_t>(part * double(taken.size() - 1))]; };
+    std::printf("| %-22s | %4.0f | %6.2f | %6.2f | %7.2f | %9llu |\n", name, budget_ms, at(0.5), at(0.95), taken.back(),
+                static_cast<unsigned long long>(samples));
+    std::fflush(stdout);
+  }
+
   Context context_;
   GladGLContext gl_;
   cumulet::test::HostTarget target_;
@@ -130,6 +164,10 @@ int main(int argc, char** argv) {
                                      Scenario{"rest off, busy host", CUMULET_PREVIEW_OFF, false, true},
                                      Scenario{"drag, busy host", CUMULET_PREVIEW_AUTO, true, true}}) {
       for (const double budget_ms : {5.0, 10.0, 16.0}) bench.pace(scenario, budget_ms);
+    }
+    for (const bool busy : {false, true}) {
+      for (const double budget_ms : {5.0, 10.0, 16.0})
+        bench.pace_of_control(busy ? "control, busy host" : "control", busy, budget_ms);
     }
     bench.readme_loop();
     return 0;
