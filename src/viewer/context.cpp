@@ -43,11 +43,11 @@ bool Context::shares_cores() const {
   return functions_->dispatches_in_call && compositor_.drawn() && !gl::Fence(functions_).passed();
 }
 
-render::Deadline Context::deadline_of(const Frame& frame, bool shares) const {
+render::Deadline Context::deadline_of(const Frame& frame, render::Deadline begun, bool shares) const {
   const double keep = shares ? reserve_.of(frame.budget_ms) : 0.0;
   const double drawing =
       frame.target == Target::none ? 0.0 : std::min(compositor_.expected_ms(), most_of_drawing * frame.budget_ms);
-  return deadline_after(frame.budget_ms - keep - drawing);
+  return deadline_after(frame.budget_ms - keep - drawing + milliseconds_until(begun));
 }
 
 void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline) {

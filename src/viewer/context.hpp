@@ -65,8 +65,8 @@ class Context {
 
   /// Whether the host's own work takes of the cores that ours runs on.
   [[nodiscard]] bool shares_cores() const;
-  /// When tracing ends: what drawing will take is the budget's, too.
-  [[nodiscard]] render::Deadline deadline_of(const Frame& frame, bool shares) const;
+  /// When tracing ends of a call that was begun then: what drawing will take is the budget's, too.
+  [[nodiscard]] render::Deadline deadline_of(const Frame& frame, render::Deadline begun, bool shares) const;
   /// page_texels: as GpuScene's.
   void upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline);
   void trace(const Shot& shot, const Frame& frame, render::Deadline deadline);

@@ -116,6 +116,7 @@ void Viewer::follow_upload(const Context& g) {
 }
 
 FrameResult Viewer::render(const Frame& frame) {
+  const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
   std::optional<Error> failure;
@@ -135,9 +136,9 @@ FrameResult Viewer::render(const Frame& frame) {
         gl::clear_errors(*g.functions());
       }
     };
-    const auto begun = Clock::now();
+    // Asking the driver may take some of the budget: who wakes its threads may lose a core to them.
     const bool shares = g.shares_cores();
-    const render::Deadline deadline = g.deadline_of(frame, shares);
+    const render::Deadline deadline = g.deadline_of(frame, begun, shares);
     attempt("cumulet: upload", [&] {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), page_texels_, deadline);
