@@ -60,7 +60,10 @@ CM_BLOCK(CmMedium) {
   CM_ALIGN(16) vec3 albedo;  // of single scattering
   float extinction;          // of stored density 1, 1 / world unit
   CM_ALIGN(16) vec3 source;  // radiance: emission coefficient over extinction
-  float anisotropy;          // Henyey-Greenstein's g
+  float anisotropy;          // these four: CmPhase of glsl/phase.glsl
+  float second_anisotropy;
+  float second_bend;
+  float second_share;
   CM_EQUALITY(CmMedium)
 };
 

@@ -15,6 +15,27 @@ struct CmTurn {
   bool lifted;         // the ray starts above its triangle
 };
 
+// Of a medium whose phase function has a second lobe. A variant, for software drivers run what is not taken.
+#ifndef CM_SECOND_LOBE
+#define CM_SECOND_LOBE 0
+#endif
+
+#if CM_SECOND_LOBE
+CM_FN CmPhase cm_lobes() {
+  CmPhase phase;
+  phase.anisotropy = cm.medium.anisotropy;
+  phase.second_anisotropy = cm.medium.second_anisotropy;
+  phase.second_bend = cm.medium.second_bend;
+  phase.second_share = cm.medium.second_share;
+  return phase;
+}
+CM_FN float cm_medium_phase(float cosine) { return cm_phase(cm_lobes(), cosine); }
+CM_FN float cm_medium_cosine(float u) { return cm_phase_cosine(cm_lobes(), u); }
+#else
+CM_FN float cm_medium_phase(float cosine) { return cm_henyey_greenstein(cm.medium.anisotropy, cosine); }
+CM_FN float cm_medium_cosine(float u) { return cm_henyey_greenstein_cosine(cm.medium.anisotropy, u); }
+#endif
+
 #if CM_SURFACES
 
 struct CmVertex {
@@ -110,7 +131,7 @@ CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) {
 
 // A direction that a flight might take. Some that leave a triangle are aimed at the glowing medium.
 CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
-  if (!vertex.on_triangle) return cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531f * u_1);
+  if (!vertex.on_triangle) return cm_around(p.w, cm_medium_cosine(u_0), 6.28318531f * u_1);
   float u_3 = cm_random(p.random, p.stream);
   float to_glow = cm.lights.glow_chance;
   bool aimed = u_3 < to_glow;
@@ -129,7 +150,7 @@ CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
                    cm_light_pdf(cm_light_hit(CM_LIGHT_GLOW, p.o, wi, turn.lobe_density));
     turn.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
   } else {
-    turn.lobe_density = cm_phase(cm.medium.anisotropy, dot(p.w, wi));
+    turn.lobe_density = cm_medium_phase(dot(p.w, wi));
     turn.density = turn.lobe_density;
     turn.share = vec3(turn.lobe_density);
   }
@@ -160,12 +181,12 @@ CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) { return cm_from_cube_point(p
 
 // The phase function samples itself exactly.
 CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
-  return cm_around(p.w, cm_phase_cosine(cm.medium.anisotropy, u_0), 6.28318531f * u_1);
+  return cm_around(p.w, cm_medium_cosine(u_0), 6.28318531f * u_1);
 }
 
 CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
   CmTurn turn;
-  turn.density = cm_phase(cm.medium.anisotropy, dot(p.w, wi));
+  turn.density = cm_medium_phase(dot(p.w, wi));
   turn.lobe_density = turn.density;
   turn.share = vec3(turn.density, turn.density, turn.density);
   turn.weight = vec3(1.0f, 1.0f, 1.0f);

@@ -4,6 +4,7 @@
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..8 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
 // variants: - or CM_LAYERS=1
 // variants: - or CM_AOVS=1
+// variants: - or CM_SECOND_LOBE=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

@@ -151,7 +151,10 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   p.medium.albedo = medium.albedo;
   p.medium.extinction = static_cast<float>(std::min(1e30, medium.density_scale * std::max(source.max_value, 1e-30F)));
   p.medium.source = medium.emission;
-  p.medium.anisotropy = medium.anisotropy;
+  p.medium.anisotropy = medium.phase.anisotropy;
+  p.medium.second_anisotropy = medium.phase.second_anisotropy;
+  p.medium.second_bend = medium.phase.second_bend;
+  p.medium.second_share = medium.phase.second_share;
   const bool glow = integrator.light_among_surfaces != 0U && medium.emission != glm::vec3(0.0F);
   const ModelData* met = obstacles.met();
   const light::LightTable table(*snapshot.lights, met != nullptr ? met->lights() : light::SceneLights{}, glow);

@@ -146,12 +146,14 @@ const Tracer::Program& Tracer::program(std::vector<std::string> defines, const c
 
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
   if (picture.traced_ > 0) {
-    const std::array<std::string, 1> surfaces{surfaces_macro(picture.traced_)};
-    return program(data.defines(), "trace_travel.comp", surfaces);
+    std::vector<std::string> more{surfaces_macro(picture.traced_)};
+    if (picture.second_lobe_) more.emplace_back("CM_SECOND_LOBE 1");
+    return program(data.defines(), "trace_travel.comp", more);
   }
   std::vector<std::string> more;
   if (picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
+  if (picture.second_lobe_) more.emplace_back("CM_SECOND_LOBE 1");
   return program(data.defines(), "trace.comp", more);
 }
 
@@ -209,6 +211,7 @@ bool Tracer::able(const MarchData& data, const PictureParameters& parameters, co
   Picture like;
   like.view_ = settings.view;
   like.traced_ = traced_of(parameters, obstacles, settings);
+  like.second_lobe_ = parameters.medium.second_share > 0.0F;
   like.layered_ = layered ? settings.layered : Layered::no;
   like.volume_alone_ = settings.view == View::shaded && settings.volume_alone;
   return asked([&] { find_programs(like, data, obstacles); });
@@ -317,6 +320,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.film_.begin(size);
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, obstacles, settings);
+  picture.second_lobe_ = parameters.medium.second_share > 0.0F;
   picture.layered_ = Layered::no;
   if (shaded && settings.layered != Layered::no && obstacles.raster != nullptr) {
     draw_layers(picture, obstacles, settings);

@@ -119,7 +119,8 @@ class Picture {
   bool volume_alone_ = false;
   std::shared_ptr<const SurfaceLayers> layers_;  // of Tracer::drawn_layers_
   Layered layered_ = Layered::no;
-  unsigned traced_ = 0;  // 1: paths meet triangles; 2: and look for those that emit
+  unsigned traced_ = 0;       // 1: paths meet triangles; 2: and look for those that emit
+  bool second_lobe_ = false;  // of the medium's phase function
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   void begin_tile();

@@ -9,6 +9,7 @@
 #include "scene/march_source.hpp"
 #include "scene/model_source.hpp"
 #include "scene/part.hpp"
+#include "scene/phase.hpp"
 
 namespace cumulet::scene {
 
@@ -16,7 +17,7 @@ namespace cumulet::scene {
 struct Medium {
   double density_scale = 1.0;  ///< extinction a unit of the grid's value
   glm::vec3 albedo{1.0F};
-  float anisotropy = 0.0F;
+  Phase phase;
   glm::vec3 emission{0.0F};
   bool operator==(const Medium&) const = default;
 };

@@ -29,6 +29,10 @@ inline constexpr std::array surface_light_choices = {
     Choice{"shadows", CUMULET_SURFACE_LIGHT_SHADOWS, "Shadows",
            "Sun, sky, lamps and what glows only, and the shadows of all: faster."},
     Choice{"none", CUMULET_SURFACE_LIGHT_NONE, "None", "Rasterised, without shadows: the fastest."}};
+inline constexpr std::array phase_choices = {
+    Choice{"hg", CUMULET_PHASE_HG, "One lobe", "Henyey-Greenstein's."},
+    Choice{"two-lobe", CUMULET_PHASE_TWO_LOBE, "Two lobes", "Of Henyey-Greenstein: say, one forward and one back."},
+    Choice{"mie", CUMULET_PHASE_MIE, "Droplets", "What water droplets of one size do: clouds and fog."}};
 inline constexpr std::array view_choices = {
     Choice{"shaded", CUMULET_VIEW_SHADED, "Shaded", "The path-traced picture."},
     Choice{"cells", CUMULET_VIEW_CELLS, "Cells", "The cells on a cut through the middle, coloured by level."},
@@ -73,7 +77,7 @@ struct Table<cumulet_medium_desc> {
                        "is absorbed."}}),
       Setting(&Desc::anisotropy, {.name = "anisotropy", .range = {-1.0, 1.0, true},
         .key = "medium.anisotropy", .flag = "--anisotropy", .type = "G",
-        .help = "Henyey-Greenstein g, between -1 and 1 (default: 0, isotropic)",
+        .help = "Henyey-Greenstein g, of two lobes the first one's, between -1 and 1 (default: 0, isotropic)",
         .row = {.label = "Anisotropy",
                 .tip = "Henyey-Greenstein g: below 0 light turns back, above 0 it goes on forward.",
                 .least = -0.99, .most = 0.99}}),
@@ -91,7 +95,29 @@ struct Table<cumulet_medium_desc> {
                 .most = 1000.0,
                 .colour = "Glow colour",
                 .colour_tip = "The colour of the medium's own light, as it looks on the screen.",
-                .hue = {1.0F, 0.35F, 0.08F}}})};
+                .hue = {1.0F, 0.35F, 0.08F}}}),
+      Setting(&Desc::phase, {.name = "phase", .choices = phase_choices,
+        .key = "medium.phase", .flag = "--phase",
+        .help = "Where light goes that the medium scatters (default: hg)",
+        .row = {.label = "Phase function", .tip = "Where light goes that the medium scatters."}}),
+      Setting(&Desc::second_anisotropy, {.name = "second_anisotropy", .range = {-1.0, 1.0, true},
+        .key = "medium.second_anisotropy", .flag = "--second-anisotropy", .type = "G",
+        .help = "g of the second of two lobes, between -1 and 1 (default: 0)",
+        .row = {.label = "Second anisotropy",
+                .tip = "Of two lobes the second one's Henyey-Greenstein g.",
+                .least = -0.99, .most = 0.99}}),
+      Setting(&Desc::second_share, {.name = "second_share", .range = {0.0, 1.0}, .given = Range{0.01, 1.0}, .zero = 0.5,
+        .key = "medium.second_share", .flag = "--second-share", .type = "S",
+        .help = "Part of the light in the second of two lobes, from 0.01 to 1 (default: 0.5)",
+        .row = {.label = "Second share",
+                .tip = "Of two lobes the part of the light that is in the second one.",
+                .least = 0.01, .most = 1.0}}),
+      Setting(&Desc::droplet_diameter, {.name = "droplet_diameter", .range = {5.0, 50.0}, .zero = 20.0,
+        .key = "medium.droplet_diameter", .flag = "--droplet-diameter", .type = "UM",
+        .help = "Of droplets (mie), from 5 to 50 micrometres (default: 20)",
+        .row = {.label = "Droplet diameter",
+                .tip = "Of droplets, in micrometres: fog has small ones, clouds have some of 20.",
+                .least = 5.0, .most = 50.0, .format = "%.1f µm"}})};
 };
 
 template <>

@@ -24,7 +24,8 @@ std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& d
     const bool light = setting.range.most == settings::light_range.most;
     return holds ? "" : (light ? "is negative or not finite" : setting.range.refusal());
   } else if constexpr (settings::Real<Value>) {
-    return setting.range.holds(value) ? "" : setting.range.refusal();
+    const bool stands_for_another = value == Value{} && setting.zero != 0.0;
+    return stands_for_another || setting.range.holds(value) ? "" : setting.range.refusal();
   } else {
     static_assert(settings::Count<Value>);
     return "";

@@ -10,6 +10,7 @@
 
 #include "render/display.hpp"
 #include "render/tracer.hpp"
+#include "scene/phase.hpp"
 #include "settings/settings.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/surface_builder.hpp"
@@ -38,13 +39,22 @@ struct GridSettings {
 struct Medium {
   double density_scale = 1.0;
   glm::vec3 albedo{1.0F};
-  float anisotropy = 0.0F;
+  scene::Phase phase;
   std::uint32_t max_bounces = 0;
   glm::vec3 emission{0.0F};
 
   static Medium of(const cumulet_medium_desc& d) {
-    return {d.density_scale, 1.0F - glm::make_vec3(d.coalbedo), d.anisotropy, d.max_bounces,
-            glm::make_vec3(d.emission)};
+    return {d.density_scale, 1.0F - glm::make_vec3(d.coalbedo), phase_of(d), d.max_bounces, glm::make_vec3(d.emission)};
+  }
+  static scene::Phase phase_of(const cumulet_medium_desc& d) {
+    switch (d.phase) {
+      case CUMULET_PHASE_TWO_LOBE:
+        return {d.anisotropy, d.second_anisotropy, 0.0F, d.second_share};
+      case CUMULET_PHASE_MIE:
+        return scene::mie_phase(d.droplet_diameter);
+      default:
+        return {.anisotropy = d.anisotropy};
+    }
   }
 };
 

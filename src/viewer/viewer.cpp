@@ -244,7 +244,7 @@ void Viewer::set_grid(const GridSettings& settings) {
 
 void Viewer::set_medium(const Medium& medium) {
   medium_ = medium;
-  scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.anisotropy, medium.emission});
+  scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.phase, medium.emission});
   touch();
 }
 

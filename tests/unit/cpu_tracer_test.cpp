@@ -60,7 +60,7 @@ TEST_P(CpuTracer, PathsInAVolumeAreTheSame) {
   const auto volume = test::noise_volume({40, 36, 30}, ivec3(0), 2);
   const auto viewer = make();
   viewer->set_volume(volume);
-  viewer->set_medium({0.3, vec3(0.9F), 0.4F, 0});
+  viewer->set_medium({0.3, vec3(0.9F), {0.4F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   const test::Image image{24, 24, 1, 5, render::View::shaded};
 
@@ -130,7 +130,7 @@ class CpuTracerSurfaces : public CpuTracer {
     if (IsSkipped()) return;
     still_ = make();
     still_->set_volume(volume_);
-    viewer::Medium medium{0.2, vec3(0.9F), 0.4F, 0};
+    viewer::Medium medium{0.2, vec3(0.9F), {.anisotropy = 0.4F}, 0};
     still_->set_medium(medium);
     still_->set_light({40.0F, 30.0F, vec3(1.0F), vec3(0.2F, 0.3F, 0.5F)});
     still_->set_camera(test::camera_at({50.0, 34.0, 90.0}, {17.0, 6.0, 18.0}, 40.0));

@@ -72,7 +72,7 @@ viewer::Medium medium(double density, float albedo, float anisotropy = 0.0F, std
   viewer::Medium m;
   m.density_scale = density;
   m.albedo = vec3(albedo);
-  m.anisotropy = anisotropy;
+  m.phase.anisotropy = anisotropy;
   m.max_bounces = max_bounces;
   return m;
 }

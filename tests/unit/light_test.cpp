@@ -145,7 +145,7 @@ TEST_P(NewLight, ADiscOfFiniteAngleIsFoundByLooksAndByFlights) {
   const double sigma = 0.08;
   viewer->set_camera(test::camera_at({19.5, 7.5, 900.0}, {19.5, 7.5, 0.0}, 0.01));
   for (const float g : {0.0F, 0.5F}) {
-    viewer->set_medium({sigma, vec3(1.0F), g, 1});
+    viewer->set_medium({sigma, vec3(1.0F), {g}, 1});
     viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.0F)});
     const test::Picture picture = test::render(*viewer, {8, 8, 1, 1, render::View::shaded});
     core::CpuDisc cpu;

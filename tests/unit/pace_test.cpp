@@ -93,7 +93,7 @@ class Pace : public test::StillTest {
     StillTest::SetUp();
     if (IsSkipped()) return;
     still_->set_volume(test::noise_volume({40, 40, 40}, ivec3(0), 2));
-    still_->set_medium({1.0, vec3(1.0F), 0.3F, 0});
+    still_->set_medium({1.0, vec3(1.0F), {0.3F}, 0});
     // A cloud in the lower half, sky in the upper.
     still_->set_camera(test::camera_at({20.0, 40.0, 120.0}, {20.0, 40.0, 0.0}, 36.0));
   }

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/shared_code.hpp"
+#include "scene/phase.hpp"
 
 namespace cumulet::core {
 #include "phase.glsl"
@@ -24,7 +25,7 @@ TEST(Phase, IntegratesToOneAndHasMeanCosineG) {
     const int n = 400000;
     for (int i = 0; i < n; ++i) {
       const double cosine = -1.0 + 2.0 * (i + 0.5) / n;
-      const double p = cm_phase(g, static_cast<float>(cosine)) * 2.0 * std::numbers::pi * 2.0 / n;
+      const double p = cm_henyey_greenstein(g, static_cast<float>(cosine)) * 2.0 * std::numbers::pi * 2.0 / n;
       sum += p;
       mean += p * cosine;
     }
@@ -40,16 +41,69 @@ TEST(Phase, SamplingFollowsTheDensity) {
     std::array<double, 20> expected{};
     std::array<double, 20> got{};
     for (int i = 0; i < n; ++i) {
-      const float cosine = cm_phase_cosine(g, (static_cast<float>(i) + 0.5F) / static_cast<float>(n));
+      const float cosine = cm_henyey_greenstein_cosine(g, (static_cast<float>(i) + 0.5F) / static_cast<float>(n));
       ASSERT_GE(cosine, -1.0F);
       ASSERT_LE(cosine, 1.0F);
       got[static_cast<std::size_t>(std::min(19.0F, (cosine + 1.0F) * 10.0F))] += 1.0 / n;
       const double c = -1.0 + 2.0 * (i + 0.5) / n;
       expected[static_cast<std::size_t>(std::min(19.0, (c + 1.0) * 10.0))] +=
-          cm_phase(g, static_cast<float>(c)) * 4.0 * std::numbers::pi / n;
+          cm_henyey_greenstein(g, static_cast<float>(c)) * 4.0 * std::numbers::pi / n;
     }
     for (std::size_t b = 0; b < 20; ++b) EXPECT_NEAR(got[b], expected[b], 2e-3) << "g " << g << " bin " << b;
   }
+}
+
+CmPhase phase_of(const cumulet::scene::Phase& p) {
+  return {p.anisotropy, p.second_anisotropy, p.second_bend, p.second_share};
+}
+
+// Each by quadrature in double precision, over what its sampling gives for evenly spread u. The lobe of droplets is a
+// few degrees wide: bins are even in the square root of 1 - cosine.
+TEST(Phase, MixturesIntegrateToOneAndAreSampledAsTheyAre) {
+  const auto bin_of = [](double cosine) {
+    return std::min(29, static_cast<int>(30.0 * std::sqrt((1.0 - cosine) / 2.0)));
+  };
+  for (const cumulet::scene::Phase& made :
+       {cumulet::scene::Phase{0.8F, -0.4F, 0.0F, 0.3F}, cumulet::scene::Phase{0.5F, 0.0F, 0.0F, 1.0F},
+        cumulet::scene::mie_phase(5.0F), cumulet::scene::mie_phase(20.0F), cumulet::scene::mie_phase(50.0F)}) {
+    const CmPhase phase = phase_of(made);
+    SCOPED_TRACE(testing::Message() << phase.anisotropy << ' ' << phase.second_anisotropy << ' ' << phase.second_bend);
+    std::array<double, 30> expected{};
+    std::array<double, 30> got{};
+    double sum = 0.0;
+    const int n = 1000000;
+    for (int i = 0; i < n; ++i) {
+      const double r = (i + 0.5) / n;  // the square root of (1 - cosine) / 2
+      const double cosine = 1.0 - 2.0 * r * r;
+      const double p = cm_phase(phase, static_cast<float>(cosine)) * 2.0 * std::numbers::pi * 4.0 * r / n;
+      expected[static_cast<std::size_t>(bin_of(cosine))] += p;
+      sum += p;
+      const float sampled = cm_phase_cosine(phase, (static_cast<float>(i) + 0.5F) / static_cast<float>(n));
+      ASSERT_GE(sampled, -1.0F);
+      ASSERT_LE(sampled, 1.0F);
+      got[static_cast<std::size_t>(bin_of(sampled))] += 1.0 / n;
+    }
+    EXPECT_NEAR(sum, 1.0, 2e-3);
+    for (std::size_t b = 0; b < 30; ++b) EXPECT_NEAR(got[b], expected[b], 2e-3) << b;
+  }
+}
+
+// The fit's own figures for 20 micrometres (Jendersie and d'Eon 2023), and Draine's mean cosine
+// g (1 + bend (3 + 2 g^2) / 5) / (1 + bend (1 + 2 g^2) / 3).
+TEST(Phase, DropletsGoForward) {
+  const cumulet::scene::Phase made = cumulet::scene::mie_phase(20.0F);
+  EXPECT_NEAR(made.anisotropy, 0.99461, 1e-4);
+  EXPECT_NEAR(made.second_anisotropy, 0.59378, 1e-4);
+  EXPECT_NEAR(made.second_bend, 27.113, 1e-2);
+  EXPECT_NEAR(made.second_share, 0.49818, 1e-4);
+  const CmPhase phase = phase_of(made);
+  double mean = 0.0;
+  const int n = 200000;
+  for (int i = 0; i < n; ++i) mean += cm_phase_cosine(phase, (static_cast<float>(i) + 0.5F) / n) / double(n);
+  const double g = made.second_anisotropy;
+  const double a = made.second_bend;
+  const double draine = g * (1.0 + a * (3.0 + 2.0 * g * g) / 5.0) / (1.0 + a * (1.0 + 2.0 * g * g) / 3.0);
+  EXPECT_NEAR(mean, (1.0 - made.second_share) * made.anisotropy + made.second_share * draine, 1e-3);
 }
 
 TEST(Phase, DirectionsAreUnitAndAtTheirCosine) {

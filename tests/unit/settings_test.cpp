@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
@@ -48,7 +49,7 @@ void set_sample(const Setting<Desc, Value>& setting, Value& value) {
   } else if constexpr (settings::Count<Value>) {
     value = 7;
   } else {
-    value = Value{0.25};
+    value = static_cast<Value>(std::max(0.25, setting.given_range().least));
   }
 }
 
@@ -66,7 +67,7 @@ std::string sample_text(const Setting<Desc, Value>& setting, const Value& value)
   } else if constexpr (settings::Count<Value>) {
     return "7";
   } else {
-    return "0.25";
+    return settings::number_text(value);
   }
 }
 

@@ -348,7 +348,7 @@ TEST_P(SurfacePicture, AovsAreTheAnalyticOnes) {
 TEST_P(SurfacePicture, AGlowIsTheVolumesAlone) {
   for (const SurfaceLight mode : {SurfaceLight::none, SurfaceLight::full}) {
     show(scene(), mode);
-    viewer_->set_medium({sigma, vec3(0.0F), 0.0F, 0, vec3(2.0F)});
+    viewer_->set_medium({sigma, vec3(0.0F), {0.0F}, 0, vec3(2.0F)});
     trace_for_aovs(64);
     const std::vector<float> volume = read(Aov::volume, 4);
     const std::vector<float> transmittance = read(Aov::transmittance, 1);

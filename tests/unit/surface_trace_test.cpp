@@ -132,7 +132,7 @@ TEST_P(SurfaceTrace, AFurnaceWithSurfacesInsideIsOne) {
   for (const double density : {1e-6, 0.5}) {
     viewer::Medium medium;
     medium.density_scale = density;
-    medium.anisotropy = 0.4F;
+    medium.phase.anisotropy = 0.4F;
     viewer->set_medium(medium);
     for (const March kind : {March::tet, March::brick}) {
       viewer->set_grid(march(kind));
@@ -318,7 +318,7 @@ TEST_P(SurfaceTrace, AFireLightsTheFloor) {
   const auto viewer = make();
   viewer->set_volume(slab());
   viewer->set_light({});
-  viewer->set_medium({4.0, vec3(0.0F), 0.0F, 0, {3.0F, 1.0F, 0.0F}});
+  viewer->set_medium({4.0, vec3(0.0F), {0.0F}, 0, {3.0F, 1.0F, 0.0F}});
   viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.8F)))));
   // Under the slab's edge.
   viewer->set_camera(test::camera_at({131.5, 0.0, 31.5}, {31.5, -10.0, 31.5}, 0.05));
@@ -357,7 +357,7 @@ TEST_P(SurfaceTrace, AGlowEndsAtASurface) {
     for (const auto light : {viewer::SurfaceLight::full, viewer::SurfaceLight::none}) {
       viewer->viewer().set_surface_settings({{}, light});
       for (const double sigma : {0.02, 0.5}) {
-        viewer->set_medium({sigma, vec3(0.0F), 0.0F, 0, vec3(2.0F)});
+        viewer->set_medium({sigma, vec3(0.0F), {0.0F}, 0, vec3(2.0F)});
         const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
         const double opacity = 1.0 - std::exp(-sigma * 3.8);
         EXPECT_NEAR(picture.mean().x, 2.0 * opacity, 8.0 * std::sqrt(opacity * (1.0 - opacity)) / 256.0)

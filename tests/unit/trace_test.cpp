@@ -85,7 +85,7 @@ TEST_P(Trace, WhiteFurnaceIsOneEverywhere) {
   for (const float g : {0.0F, 0.8F, -0.5F}) {
     viewer::Medium medium;
     medium.density_scale = 0.5;
-    medium.anisotropy = g;
+    medium.phase.anisotropy = g;
     viewer->set_medium(medium);
     for (const Kind& kind : {kinds[0], kinds[3]}) {
       viewer->set_grid(settings_of(kind, 0.02));
@@ -110,7 +110,7 @@ TEST_P(Trace, AGlowingSlabInEveryMarch) {
   for (const Kind& kind : kinds) {
     viewer->set_grid(settings_of(kind, -1.0));
     for (const double sigma : {0.02, 0.1, 2.0}) {
-      viewer->set_medium({sigma, vec3(0.0F), 0.0F, 0, {4.0F, 2.0F, 0.0F}});
+      viewer->set_medium({sigma, vec3(0.0F), {0.0F}, 0, {4.0F, 2.0F, 0.0F}});
       const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
       const double through = std::exp(-sigma * 8.0);
       const double error = 4.0 * std::sqrt((through + 1.0 / 3.0) * (1.0 - through) / (256.0 * 64.0));
@@ -127,7 +127,7 @@ TEST_P(Trace, AMediumInBalanceIsInvisible) {
   viewer->set_volume(test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3));
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(2.0F, 1.0F, 0.5F)});
   const vec3 albedo(0.2F, 0.7F, 0.99F);
-  viewer->set_medium({1.0, albedo, 0.5F, 0, (1.0F - albedo) * vec3(2.0F, 1.0F, 0.5F)});
+  viewer->set_medium({1.0, albedo, {0.5F}, 0, (1.0F - albedo) * vec3(2.0F, 1.0F, 0.5F)});
   for (const Kind& kind : {kinds[0], kinds[3]}) {
     viewer->set_grid(settings_of(kind, 0.02));
     const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
@@ -249,7 +249,7 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
 
   const auto viewer = make();
   viewer->set_volume(volume);
-  viewer->set_medium({0.6, vec3(albedo), 0.4F, 0, {0.2F, 0.1F, 0.05F}});
+  viewer->set_medium({0.6, vec3(albedo), {0.4F}, 0, {0.2F, 0.1F, 0.05F}});
   viewer->set_light({40.0F, 25.0F, {3.0F, 2.5F, 2.0F}, {0.3F, 0.5F, 0.8F}});
   viewer->set_camera(test::camera_at(eye, target, fovy));
   for (const Kind& kind : kinds) {
@@ -274,11 +274,16 @@ TEST_P(Trace, SingleScatteringMatchesQuadrature) {
   const auto viewer = make();
   viewer->set_volume(box_volume({400, 16, 16}));
   const double sigma = 0.15;
-  for (const float g : {0.0F, 0.6F}) {
-    viewer->set_medium({sigma, vec3(0.9F, 0.5F, 0.2F), g, 1});
+  const auto lobe = [](double g) { return (1.0 - g * g) / (4.0 * std::numbers::pi * std::pow(1.0 + g * g, 1.5)); };
+  const scene::Phase droplets = scene::mie_phase(8.0F);
+  for (const scene::Phase& medium :
+       {scene::Phase{0.0F}, scene::Phase{0.6F}, scene::Phase{0.8F, -0.3F, 0.0F, 0.4F}, droplets}) {
+    viewer->set_medium({sigma, vec3(0.9F, 0.5F, 0.2F), medium, 1});
     viewer->set_light({0.0F, 90.0F, {5.0F, 5.0F, 5.0F}, {0.0F, 0.0F, 0.0F}});
     viewer->set_camera(test::camera_at({199.5, 7.5, 900.0}, {199.5, 7.5, 0.0}, 0.01));
-    const double phase = (1.0 - g * g) / (4.0 * std::numbers::pi * std::pow(1.0 + g * g, 1.5));
+    const double g = medium.second_anisotropy;
+    const double second = lobe(g) / (1.0 + medium.second_bend * (1.0 + 2.0 * g * g) / 3.0);
+    const double phase = (1.0 - medium.second_share) * lobe(medium.anisotropy) + medium.second_share * second;
     const double expected = phase * 5.0 * std::exp(-sigma * 8.0) * (1.0 - std::exp(-sigma * 16.0));
     for (const Kind& kind : {kinds[0], kinds[2]}) {
       viewer->set_grid(settings_of(kind, 0.02));
@@ -293,7 +298,7 @@ TEST_P(Trace, SingleScatteringMatchesQuadrature) {
 TEST_P(Trace, MarchesAgreeOnConstantCellsAtVoxelResolution) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(7, -3, 0), 2));
-  viewer->set_medium({0.4, vec3(0.98F), 0.5F, 0});
+  viewer->set_medium({0.4, vec3(0.98F), {0.5F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   std::array<test::Picture, 4> pictures;
   for (std::size_t i = 0; i < kinds.size(); ++i) {
@@ -315,7 +320,7 @@ TEST_P(Trace, MarchesAgreeOnConstantCellsAtVoxelResolution) {
 TEST_P(Trace, PagesChangeNothing) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(0), 2));
-  viewer->set_medium({0.4, vec3(1.0F), 0.0F, 0});
+  viewer->set_medium({0.4, vec3(1.0F), {0.0F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   const viewer::GridSettings settings = settings_of(kinds[0], 0.01);
   viewer->set_grid(settings);
@@ -348,7 +353,7 @@ TEST_P(Trace, PagesChangeNothing) {
 TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
-  viewer->set_medium({0.4, vec3(1.0F), 0.3F, 0});
+  viewer->set_medium({0.4, vec3(1.0F), {0.3F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   // Wider than a tile, so that several take part.
   const test::Image image{600, 10, 5, 9, render::View::shaded};
@@ -356,7 +361,7 @@ TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
   EXPECT_EQ(one.pixels, test::render(*viewer, image, 0.5).pixels);
   const auto other = make();
   other->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
-  other->set_medium({0.4, vec3(1.0F), 0.3F, 0});
+  other->set_medium({0.4, vec3(1.0F), {0.3F}, 0});
   other->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   EXPECT_EQ(one.pixels, test::render(*other, image).pixels);
   test::Image reseeded = image;
@@ -367,7 +372,7 @@ TEST_P(Trace, SeedAndSamplesAloneDecideTheImage) {
 TEST_P(Trace, CameraInsideOnFacesEdgesAndVertices) {
   const auto viewer = make();
   viewer->set_volume(test::noise_volume({32, 32, 32}, ivec3(0), 1));
-  viewer->set_medium({0.2, vec3(0.9F), 0.0F, 0});
+  viewer->set_medium({0.2, vec3(0.9F), {0.0F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(2.0F), vec3(0.5F)});
   // Cube space is index space plus a half: halves are faces, edges and vertices of cells.
   const std::array<dvec3, 6> eyes{{{15.5, 15.5, 15.5},
@@ -404,7 +409,7 @@ TEST_P(Trace, AnyAffineTransformKeepsWorldDistances) {
   const double through = std::exp(-sigma * 8.0 * glm::length(axis));
   const auto viewer = make();
   viewer->set_volume(volume);
-  viewer->set_medium({sigma, vec3(0.0F), 0.0F, 0});
+  viewer->set_medium({sigma, vec3(0.0F), {0.0F}, 0});
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   viewer->set_camera(test::camera_at(centre + 20.0 * axis, centre, 0.2));
   for (const Kind& kind : kinds) {
@@ -421,7 +426,7 @@ TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
       glm::rotate(glm::translate(glm::dmat4(1.0), dvec3(5, 6, 7)), 1.1, glm::normalize(dvec3(1, 1, 0)));
   turned.index_to_world = rotation;
   const auto viewer = make();
-  viewer->set_medium({0.5, vec3(0.9F), 0.5F, 0});
+  viewer->set_medium({0.5, vec3(0.9F), {0.5F}, 0});
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   const test::Image image{32, 32, 8, 1, render::View::shaded};
   viewer->set_grid(settings_of(kinds[0], 0.02));
@@ -441,7 +446,7 @@ TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
 
 TEST_P(Trace, AFewVoxelsAreAVolume) {
   const auto viewer = make();
-  viewer->set_medium({1.0, vec3(0.0F), 0.0F, 0});
+  viewer->set_medium({1.0, vec3(0.0F), {0.0F}, 0});
   for (const int size : {1, 3, 8, 9}) {
     viewer->set_volume(box_volume(ivec3(size)));
     viewer->set_camera(
@@ -457,7 +462,7 @@ TEST_P(Trace, AFewVoxelsAreAVolume) {
 TEST_P(Trace, DensityViewIsTheOpacity) {
   const auto viewer = make();
   viewer->set_volume(box_volume({64, 64, 8}));
-  viewer->set_medium({0.1, vec3(1.0F), 0.0F, 0});
+  viewer->set_medium({0.1, vec3(1.0F), {0.0F}, 0});
   viewer->set_camera(test::camera_at({31.5, 31.5, 500.0}, {31.5, 31.5, 0.0}, 0.5));
   for (const Kind& kind : kinds) {
     viewer->set_grid(settings_of(kind, 0.02));

@@ -26,7 +26,7 @@ class ViewerFrames : public test::StillTest {
  protected:
   void SetUp() override {
     StillTest::SetUp();
-    if (!IsSkipped()) still_->set_medium({0.4, vec3(1.0F), 0.3F, 0});
+    if (!IsSkipped()) still_->set_medium({0.4, vec3(1.0F), {0.3F}, 0});
   }
   void show_noise() const {
     still_->set_volume(test::noise_volume({30, 30, 30}, ivec3(0), 2));
@@ -121,10 +121,10 @@ TEST_P(ViewerFrames, ChangesRestartOnlyWhatDependsOnThem) {
   EXPECT_TRUE(still_converged());
   viewer().set_display({2.0F, render::ToneMap::filmic, true});
   EXPECT_TRUE(still_converged());
-  viewer().set_medium({0.4, vec3(1.0F), 0.3F, 0});  // the same again
+  viewer().set_medium({0.4, vec3(1.0F), {0.3F}, 0});  // the same again
   viewer().set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   EXPECT_TRUE(still_converged());
-  viewer().set_medium({0.8, vec3(1.0F), 0.3F, 0});
+  viewer().set_medium({0.8, vec3(1.0F), {0.3F}, 0});
   const viewer::FrameResult result = viewer().render(frame(48, 48, 0.001));
   EXPECT_FALSE(result.converged);
   EXPECT_FALSE(result.loading);  // the cells stay
@@ -160,7 +160,7 @@ TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
   // A ball of radius 10, away from the middle of a box that is all but empty.
   const auto ball = [](const ivec3& p) { return glm::distance(vec3(p), vec3(50, 24, 30)) < 10.0F ? 1.0F : 1e-5F; };
   still_->set_volume(test::make_volume({80, 60, 70}, ivec3(0), ball));
-  viewer().set_medium({3.0, vec3(1.0F), 0.0F, 1});
+  viewer().set_medium({3.0, vec3(1.0F), {0.0F}, 1});
   viewer().set_light({0.0F, 90.0F, vec3(1.0F), vec3(0.0F)});
   viewer::DisplaySettings display;
   display.transparent = true;
@@ -199,7 +199,7 @@ TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
   }
 
   // Nothing that is seen: the bounds.
-  viewer().set_medium({1e-6, vec3(1.0F), 0.0F, 1});
+  viewer().set_medium({1e-6, vec3(1.0F), {0.0F}, 1});
   viewer().frame_all();
   viewer::Camera plain(viewer().camera()->pose());
   plain.fit(viewer().bounds(), 0.9);
@@ -213,7 +213,7 @@ TEST_P(ViewerFrames, CamerasFitWhatIsSeenAndNotTheHazeAroundIt) {
   viewer().camera()->set(test::camera_at({50, 24, 400}, {50, 24, 0}));
   viewer().frame_all();
   EXPECT_NEAR(viewer().camera()->pose().target.x, 20.0, 0.5);
-  viewer().set_medium({3.0, vec3(1.0F), 0.0F, 1});
+  viewer().set_medium({3.0, vec3(1.0F), {0.0F}, 1});
   viewer().frame_all();
   EXPECT_NEAR(viewer().camera()->pose().target.x, 35.0, 0.5);
 }
@@ -224,7 +224,7 @@ class ViewerSlab : public ViewerFrames {
     ViewerFrames::SetUp();
     if (IsSkipped()) return;
     still_->set_volume(test::make_volume({64, 64, 16}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
-    viewer().set_medium({0.1, vec3(0.0F), 0.0F, 0});
+    viewer().set_medium({0.1, vec3(0.0F), {0.0F}, 0});
     viewer().set_sampling({64, 1, render::View::shaded, false});
     viewer::CameraPose pose;
     pose.eye = {31.5, 31.5, 215.5};
@@ -301,7 +301,7 @@ TEST_P(ViewerSlab, PickingFindsHalfOpacity) {
   EXPECT_NEAR(pick.distance, 200.0 + depth, 0.05);
   EXPECT_FALSE(viewer().pick(-1.0, 3.0).hit);
   EXPECT_FALSE(viewer().pick(std::nan(""), 3.0).hit);
-  viewer().set_medium({0.01, vec3(0.0F), 0.0F, 0});  // never half opaque
+  viewer().set_medium({0.01, vec3(0.0F), {0.0F}, 0});  // never half opaque
   converge(frame(32, 32));
   EXPECT_FALSE(viewer().pick(16.0, 16.0).hit);
 }
@@ -331,7 +331,7 @@ TEST_P(ViewerSlab, WritesItsDepthForTheHost) {
 }
 
 TEST_P(ViewerSlab, NoiseIsTheSpreadBetweenSeeds) {
-  viewer().set_medium({0.1, vec3(0.9F), 0.0F, 0});
+  viewer().set_medium({0.1, vec3(0.9F), {0.0F}, 0});
   std::vector<std::vector<float>> pictures;
   double told = 0.0;
   for (std::uint32_t seed = 0; seed < 12; ++seed) {

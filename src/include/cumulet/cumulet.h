@@ -628,12 +628,19 @@ typedef struct cumulet_grid_desc {
   double pixel_size;       /* pixels a cell's longest edge must cover to be split; 0: 1 */
 } cumulet_grid_desc;
 
+/* Where light goes that a medium scatters. */
+typedef enum cumulet_phase {
+  CUMULET_PHASE_HG = 0,       /* Henyey-Greenstein's lobe */
+  CUMULET_PHASE_TWO_LOBE = 1, /* two of them */
+  CUMULET_PHASE_MIE = 2       /* water droplets: a fit of Mie's theory (Jendersie and d'Eon 2023) */
+} cumulet_phase;
+
 /* The participating medium. A change restarts accumulation; the cells stay. */
 typedef struct cumulet_medium_desc {
   size_t struct_size;
   double density_scale; /* extinction = density_scale x grid value, 1 / world unit; 0: 1 */
   float coalbedo[3];    /* 1 - single-scattering albedo, each in [0, 1]; 0: nothing is absorbed */
-  float anisotropy;     /* Henyey-Greenstein g in (-1, 1); 0: isotropic */
+  float anisotropy;     /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic */
   uint32_t max_bounces; /* scattering events a path may have; 0: no limit */
   /*
    * Source radiance: each point gives off extinction x emission per unit of length, so that a body of the medium too
@@ -641,6 +648,10 @@ typedef struct cumulet_medium_desc {
    * (CUMULET_SURFACE_LIGHT_FULL), as fire does. 0: dark.
    */
   float emission[3];
+  cumulet_phase phase;
+  float second_anisotropy; /* two lobes: g of the second one, in (-1, 1); 0: isotropic */
+  float second_share;      /* two lobes: part of the light that is in the second one, in [0, 1]; 0: 0.5 */
+  float droplet_diameter;  /* Mie: in micrometres, in [5, 50]; 0: 20, as in a cloud */
 } cumulet_medium_desc;
 
 /* A distant sun (a delta direction, invisible to camera rays) and a sky of constant radiance. Restarts accumulation. */

@@ -1,0 +1,17 @@
+#include "scene/phase.hpp"
+
+#include <cmath>
+
+namespace cumulet::scene {
+
+Phase mie_phase(float diameter) {
+  const double d = diameter;
+  const double g_forward = std::exp(-0.0990567 / (d - 1.67154));
+  const double g_draine = std::exp(-2.20679 / (d + 3.91029) - 0.428934);
+  const double alpha = std::exp(3.62489 - 8.29288 / (d + 5.52825));
+  const double share = std::exp(-0.599085 / (d - 0.641583) - 0.665888);
+  return {static_cast<float>(g_forward), static_cast<float>(g_draine), static_cast<float>(alpha),
+          static_cast<float>(share)};
+}
+
+}  // namespace cumulet::scene
