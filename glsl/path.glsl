@@ -3,13 +3,12 @@
 //   cm                                            the parameters
 //   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface there
 //
-// The stages are functions: here cm_camera, cm_handle (which is cm_escape, cm_glow, cm_arrive, cm_look and cm_scatter) and
-// cm_finish; in glsl/path_vertex.glsl cm_meet, and what else differs where there are triangles; in glsl/flight.glsl
+// The stages are functions: here cm_camera, cm_handle (which is cm_end_ray, cm_look and cm_scatter) and cm_finish; in glsl/path_vertex.glsl cm_meet, and what else differs where there are triangles; in glsl/flight.glsl
 // cm_aim and cm_fly, which march. One kernel runs them all (glsl/trace.comp), or several do, each over the paths that
 // wait for it (glsl/path_queue.glsl).
 //
-// With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has bvh.glsl, bsdf.glsl
-// and surface.glsl before this. With 2 next-event estimates are for emissive triangles, too. With CM_LAYERS 1 (which
+// With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has surface.glsl
+// before this. With 2 next-event estimates are for emissive triangles, too. With CM_LAYERS 1 (which
 // CM_SURFACES implies) camera rays may end at the surface pass instead:
 //   float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour)   its view depth
 // With CM_AOVS 1 samples that first met the volume are summed apart, too.
@@ -212,7 +211,11 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
 CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {
   bool arrived;
   bool finished = cm_end_ray(p, vertex, arrived);
-  if (!finished) cm_scatter(p, vertex, cm_look(p, vertex, arrived));
+  if (!finished) {
+    // Not in one call: of p, which both change, the outer one may have a copy of before.
+    CmLook look = cm_look(p, vertex, arrived);
+    cm_scatter(p, vertex, look);
+  }
   if (finished) p.stage = CM_STAGE_FINISH;
 }
 

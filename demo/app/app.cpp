@@ -91,6 +91,7 @@ void App::run() {
 double App::patience() const {
   if (stepped() || window_->input().pending()) return 0.0;
   double wait = player_ ? order_.idle : std::numeric_limits<double>::infinity();
+  if (owes_) wait = std::min(wait, std::max(drawn_at_ + picture_frame - now_, least_frame));
   constexpr double glow_frame = 1.0 / 30.0;
   if (now_ - last_event_ < event_glow) return std::min(wait, glow_frame);
   constexpr double blink = 0.4;
@@ -149,8 +150,8 @@ void App::frame() {
   if (drawn) {
     window_->swap();
     ++drawn_frames_;
-    take_frame_time(events);
   }
+  take_frame_time(events, drawn);
   take_statistics();
   ++frames_;
 
@@ -474,6 +475,7 @@ void App::accept(const Answer& answer) {
     set_volume(wish_.scene, answer.volume);
   }
   if (answer.surfaces_edit == wish_.surfaces_edit) model_.scene.surfaces = wish_.scene.surfaces = answer.surfaces;
+  if (model_.status.compiled && !answer.status.compiled) model_.charts.compiled_percent.add(100.0f);
   if (answer.status.compiled) model_.charts.compiled_percent.add(static_cast<float>(100.0 * *answer.status.compiled));
   if (answer.status.noise > 0.0 && answer.status.noise != model_.status.noise)
     model_.charts.noise_percent.add(static_cast<float>(100.0 * answer.status.noise));
@@ -549,7 +551,9 @@ bool App::draw() {
   // would look as before is not drawn, and what changes beside the picture that a hand is at waits for the next one.
   const bool changed = window_->ui_changed();
   const bool waits = viewport_buttons_ != 0 && now_ - drawn_at_ < picture_frame;
+  owes_ = changed && waits;
   if (drawn_pictures_ == pictures_ && order_.screenshot.empty() && (!changed || waits)) return false;
+  owes_ = false;
   gl_->BindFramebuffer(GL_FRAMEBUFFER, 0);
   gl_->Disable(GL_SCISSOR_TEST);
   constexpr float dark = 0.075f;
@@ -561,12 +565,17 @@ bool App::draw() {
   return true;
 }
 
-void App::take_frame_time(const std::vector<Event>& events) {
+void App::take_frame_time(const std::vector<Event>& events, bool drawn) {
   // From the first that a hand did of what this frame shows.
-  double begun = now_;
+  double begun = owed_since_.value_or(now_);
   for (const Event& event : events)
     if (event.time > 0.0) begun = std::min(begun, event.time);
-  model_.charts.frame_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - begun)));
+  owed_since_.reset();
+  if (drawn) {
+    model_.charts.frame_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - begun)));
+  } else if (owes_) {
+    owed_since_ = begun;
+  }
 }
 
 void App::take_statistics() {

@@ -65,7 +65,7 @@ class App {
   void complain(const std::string& cause);
   /// Whether there was anything to draw that the window does not show already.
   bool draw();
-  void take_frame_time(const std::vector<Event>& events);
+  void take_frame_time(const std::vector<Event>& events, bool drawn);
   void take_statistics();
   void obey(const Player::Order& order);
   void save_window(const std::string& path);
@@ -118,7 +118,9 @@ class App {
   std::uint64_t pictures_ = 0;  // that came to be shown
   std::uint64_t drawn_pictures_ = 0;
   double drawn_at_ = -1.0;
-  std::string last_state_;  // the state line of the frame before this
+  bool owes_ = false;                 // a frame of what changed, as one that would have shown it was not drawn
+  std::optional<double> owed_since_;  // when a hand first did what that shows
+  std::string last_state_;            // the state line of the frame before this
   std::uint64_t frames_ = 0;
   std::uint64_t drawn_frames_ = 0;  // the others would have looked as the one before
 };

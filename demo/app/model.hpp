@@ -116,7 +116,7 @@ struct Status {
 
 /// What of it is drawn over time.
 struct Charts {
-  Series frame_ms;    // of the window's frames, whatever is traced meanwhile
+  Series frame_ms;    // of the window's frames that were drawn, whatever is traced meanwhile
   Series picture_ms;  // from a change to the window with the picture that was drawn next
   Series samples_per_second;
   Series noise_percent;

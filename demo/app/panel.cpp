@@ -206,7 +206,12 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
   using Desc = cumulet_medium_desc;
   Desc& medium = model.scene.medium;
   settings::for_each<Desc>([&](const auto& setting) {
+    const bool of_lobes = setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_share);
+    ImGui::BeginDisabled((of_lobes && medium.phase != CUMULET_PHASE_TWO_LOBE) ||
+                         (setting.is(&Desc::droplet_diameter) && medium.phase != CUMULET_PHASE_MIE) ||
+                         (setting.is(&Desc::anisotropy) && medium.phase == CUMULET_PHASE_MIE));
     rows_.draw(setting, medium.*setting.field);
+    ImGui::EndDisabled();
     if (setting.is(&Desc::density_scale)) {
       ImGui::BeginDisabled(!model.status.has_volume);
       if (ui_.button("Auto density", "A scale at which the volume is a body: a mean optical depth of 8.",

@@ -69,7 +69,7 @@ class Player {
   Player(std::vector<ReplayStep> steps, std::string path);
   /// Throws std::runtime_error, "path:line: cause", when a control or the end of a wait does not come.
   [[nodiscard]] Order next(const ReplayHost& host, Input& input);
-  /// Frames drawn during the last idle.
+  /// Frames during the last idle, drawn or not.
   [[nodiscard]] int idle_frames() const { return idle_frames_; }
 
  private:

@@ -21,6 +21,8 @@ namespace {
 
 using settings::same;
 
+constexpr double patience = 1.0;  // seconds without a picture, where there could be part of one
+
 }  // namespace
 
 bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b) { return same(a, b); }
@@ -176,6 +178,13 @@ void Session::finish_surfaces() {
     check(cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene_.surface_camera)));
 }
 
+bool Session::has_surfaces() const {
+  cumulet_surfaces* shown = nullptr;
+  if (cumulet_get_surfaces(viewer_.get(), &shown) != CUMULET_OK || shown == nullptr) return false;
+  cumulet_surfaces_release(shown);
+  return true;
+}
+
 void Session::read_surfaces() {
   cumulet_surfaces* shown = nullptr;
   check(cumulet_get_surfaces(viewer_.get(), &shown));
@@ -249,21 +258,28 @@ void Session::draw(unsigned framebuffer) {
 
 bool Session::cold() const {
   const bool loads = waiting_ || waiting_for_surfaces_ || status_.compiled;
-  return !warm_ && loads && !wish_.paused;
+  return !warm_ && loads && !wish_.paused && status_.frame.width == 0;
 }
 
 void Session::warm_up(unsigned framebuffer) {
   cumulet_frame_desc frame = this->frame();
   frame.budget_ms = wish_.budget_ms;
   frame.framebuffer = framebuffer;
+  status_.frame = {};
+  status_.frame.struct_size = sizeof status_.frame;
   cumulet_warm_up_result result{};
   result.struct_size = sizeof result;
   const bool works = check(cumulet_warm_up(viewer_.get(), &frame, CUMULET_WARM_UP_SCENE, &result));
   status_.compiled.reset();
   if (works && result.more != 0) status_.compiled = result.progress;
   see_work();
-  // After a load that failed the next is the first.
-  warm_ = !status_.compiled && status_.work.status == CUMULET_OK;
+  // Surfaces that are there are shown while a volume is read for long. After a load that failed the next is the first.
+  const double now = glfwGetTime();
+  if (!cold_since_) cold_since_ = now;
+  const bool early =
+      waiting_ && status_.work.stage != CUMULET_STAGE_IDLE && now - *cold_since_ > patience && has_surfaces();
+  if (early) status_.compiled.reset();
+  warm_ = early || (!status_.compiled && status_.work.status == CUMULET_OK);
 }
 
 void Session::work() {

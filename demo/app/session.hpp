@@ -147,6 +147,7 @@ class Session {
   [[nodiscard]] cumulet_frame_desc frame() const;
   // What has come of a call that works.
   void see_work();
+  [[nodiscard]] bool has_surfaces() const;
   // What the library says of those it shows.
   void read_surfaces();
   void finish_load();
@@ -175,7 +176,8 @@ class Session {
   cumulet_display_desc drawn_display_{};
   VolumeChoice shown_volume_;
   std::string shown_surfaces_;
-  bool warm_ = false;  // the first scene's programs are there
+  bool warm_ = false;                 // the first scene's programs are there
+  std::optional<double> cold_since_;  // seconds, when the first of them was asked for
   bool waiting_for_surfaces_ = false;
   bool waiting_ = false;
   std::optional<cumulet_camera_desc> fit_;  // the camera to place when the volume is there

@@ -209,6 +209,7 @@ void warm_up(const Viewer& viewer, const RenderOptions& options, Progress& progr
     if (result.more != 0) wait(viewer, progress);
     check_not_interrupted();
   } while (result.more != 0);
+  progress.stage("compiling shaders", 1.0);
 }
 
 void check_animation(const Viewer& viewer, const RenderOptions& options) {

@@ -248,11 +248,7 @@ std::vector<ProgramKey> all_programs() {
   for (const Shader& shader : shaders()) {
     if (shader.name.ends_with(".vert")) continue;
     const std::string name(shader.name);
-    std::string vertex;
-    if (name.ends_with(".frag")) {
-      vertex = name.substr(0, name.size() - 4) + "vert";
-      if (find_shader(vertex) == nullptr) vertex = "composite.vert";  // it covers a rectangle
-    }
+    const std::string vertex = name.ends_with(".frag") ? vertex_shader_of(name) : "";
     for (const std::span<const ShaderMacro> macros : shader.variants) {
       std::vector<ProgramKey> keys{{name, {}, vertex}};
       for (const ShaderMacro& macro : macros) {

@@ -31,5 +31,7 @@ struct Shader {
 std::span<const Shader> shaders();
 /// Null if there is none of that name.
 const Shader* find_shader(std::string_view name);
+/// The vertex shader that a fragment shader goes with: of its name, else one that covers a rectangle.
+std::string vertex_shader_of(std::string_view fragment_shader);
 
 }  // namespace cumulet::gl

@@ -36,4 +36,9 @@ const Shader* find_shader(std::string_view name) {
   return found == all.end() ? nullptr : &*found;
 }
 
+std::string vertex_shader_of(std::string_view fragment_shader) {
+  const std::string own = std::string(fragment_shader.substr(0, fragment_shader.find('.'))) + ".vert";
+  return find_shader(own) != nullptr ? own : "composite.vert";
+}
+
 }  // namespace cumulet::gl

@@ -9,10 +9,10 @@ class TransientFramebuffer {
  public:
   /// depth: 0: none. Throws Error(gl).
   TransientFramebuffer(const FunctionsPtr& gl, GLuint colour, GLuint depth) : framebuffer_(make_framebuffer(gl)) {
-    label(*gl, Object::Kind::framebuffer, name(), "framebuffer of the target");
+    label(*gl, Object::Kind::framebuffer, name(), "framebuffer of one call");
     gl->NamedFramebufferTexture(name(), GL_COLOR_ATTACHMENT0, colour, 0);
     if (depth != 0) gl->NamedFramebufferTexture(name(), GL_DEPTH_ATTACHMENT, depth, 0);
-    check(*gl, "making the target's framebuffer");
+    check(*gl, "making a framebuffer for one call");
   }
   [[nodiscard]] GLuint name() const { return framebuffer_.name(); }
 

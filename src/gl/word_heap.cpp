@@ -15,11 +15,14 @@ constexpr std::size_t whole(std::size_t bytes) {
 
 }  // namespace
 
-void WordHeap::Pages::drop_empty(std::size_t kept) {
+void WordHeap::Pages::drop_empty(bool all_of_them) {
+  std::size_t used = 0;
+  for (const auto& page : all) used += page->units.size() - page->units.free();
+  std::size_t most = all_of_them || used == 0 ? 0 : std::max(usual_units, 2 * used);
   std::erase_if(all, [&](const std::unique_ptr<Page>& page) {
     if (!page->units.empty()) return false;
-    if (kept == 0) return true;
-    --kept;
+    if (page->units.size() > most) return true;
+    most = 0;
     return false;
   });
 }
@@ -27,9 +30,7 @@ void WordHeap::Pages::drop_empty(std::size_t kept) {
 WordHeap::Span::~Span() {
   if (page_ == nullptr) return;
   page_->units.give_back(first_, units_);
-  // What changes all the time finds a page again; what is gone leaves none.
-  const bool any = std::ranges::any_of(pages_->all, [](const auto& page) { return !page->units.empty(); });
-  pages_->drop_empty(any ? 1 : 0);
+  pages_->drop_empty(false);
 }
 
 WordHeap::Span WordHeap::take_of(Page& page, std::size_t units) const {
@@ -47,8 +48,8 @@ WordHeap::Span WordHeap::take(std::size_t wanted, const char* what) {
   const std::size_t units = whole(wanted) / alignment;
   const std::size_t usual = whole(sizes_.page_bytes) / alignment;
   for (const auto& page : pages_->all) {
-    // A large one that is empty is not kept for a trifle.
-    if (page->units.empty() && page->units.size() > std::max(usual, 4 * units)) continue;
+    // A trifle shall not keep a large one.
+    if (page->units.size() > std::max(usual, 4 * units)) continue;
     if (Span span = take_of(*page, units)) return span;
   }
   return take_of_new_page(units, usual, what);
@@ -65,7 +66,7 @@ WordHeap::Span WordHeap::take_of_new_page(std::size_t units, std::size_t usual, 
                                             " bytes; this driver's GL_MAX_TEXTURE_BUFFER_SIZE holds " +
                                             std::to_string(sizes_.largest_page));
   }
-  pages_->drop_empty(0);
+  pages_->drop_empty(true);
   const std::uint64_t room = sizes_.most_bytes - std::min<std::uint64_t>(bytes(), sizes_.most_bytes);
   if (needed > room) {
     throw Error(ErrorCode::out_of_memory, std::string(what) + " needs " + std::to_string(needed) + " bytes; " +

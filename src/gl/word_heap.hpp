@@ -35,8 +35,10 @@ class WordHeap {
   };
   struct Pages {
     std::vector<std::unique_ptr<Page>> all;
-    // Those without a span, but for so many.
-    void drop_empty(std::size_t kept);
+    std::size_t usual_units = 0;  // of a page
+    // Those without a span, but for one: what changes all the time finds it again. None that is large beside what is in
+    // use.
+    void drop_empty(bool all_of_them);
   };
 
  public:
@@ -78,7 +80,9 @@ class WordHeap {
     std::size_t units_ = 0;
   };
 
-  WordHeap(FunctionsPtr gl, Sizes sizes) : gl_(std::move(gl)), sizes_(sizes), pages_(std::make_shared<Pages>()) {}
+  WordHeap(FunctionsPtr gl, Sizes sizes) : gl_(std::move(gl)), sizes_(sizes), pages_(std::make_shared<Pages>()) {
+    pages_->usual_units = sizes_.page_bytes / alignment;
+  }
 
   /// Of undefined content. what: "creating the surfaces' tables". Throws Error(unsupported) for more than the driver
   /// binds at once, Error(out_of_memory) beyond most_bytes or where GL has no more, and then nothing has changed but

@@ -227,9 +227,16 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
   const GLenum format = display.encoding == ColourEncoding::srgb ? GL_RGBA8 : GL_RGBA32F;
   const Small kind{picture.beneath->size, format};
   const glm::ivec2 size(kind.size);
+  if (no_memory_for_small_ == kind) return;  // once is told, and at rest there is a picture
   if (!small_ || small_kind_ != kind) {
     small_ = {};
-    small_ = gl::make_texture_2d(gl_, kind.format, size.x, size.y, "creating the texture to enlarge");
+    try {
+      small_ = gl::make_texture_2d(gl_, kind.format, size.x, size.y, "creating the texture to enlarge");
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::out_of_memory) no_memory_for_small_ = kind;
+      throw;
+    }
+    no_memory_for_small_.reset();
     gl.TextureParameteri(small_.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     gl.TextureParameteri(small_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     gl.TextureParameteri(small_.name(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
@@ -248,6 +255,17 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
   aim(target, display);
   enlarge.use(gl);
   gl.DrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+std::uint64_t Compositor::bytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& means : means_) {
+    bytes += std::uint64_t{means->of.size.x} * means->of.size.y * (means->background ? 32 : 16);
+  }
+  if (small_) {
+    bytes += std::uint64_t{small_kind_.size.x} * small_kind_.size.y * (small_kind_.format == GL_RGBA8 ? 4 : 16);
+  }
+  return bytes;
 }
 
 void Compositor::draw(const PictureTextures& picture, const Display& display, const FrameTarget& target) {
@@ -283,6 +301,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   if (enlarge != nullptr) {
     draw_enlarged(*enlarge, {means, shown, layered}, picture, display, target);
   } else {
+    small_ = {};
     draw_colour({means, shown, layered}, picture, display, target);
   }
   if (target.write_depth && picture.volume_z != 0) draw_depth(picture, target);

@@ -67,6 +67,8 @@ class Compositor {
   /// depth there; alpha is premultiplied after exposure, tone map and encoding. Throws Error(invalid_argument) for a
   /// name that is no framebuffer, or one that is not complete.
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
+  /// Of GL memory.
+  [[nodiscard]] std::uint64_t bytes() const;
   /// Milliseconds that the next call of draw will take, as far as is known.
   [[nodiscard]] double expected_ms() const;
   /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
@@ -145,6 +147,7 @@ class Compositor {
   };
   gl::Object small_;  // what is to be enlarged
   Small small_kind_;
+  std::optional<Small> no_memory_for_small_;
   const gl::Program* colour_ = nullptr;  // the last
   Kind colour_kind_;
   std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another

@@ -10,8 +10,8 @@ namespace cumulet::render {
 void Film::begin(glm::uvec2 size) {
   if (size != size_) held_.clear();
   size_ = size;
-  std::erase_if(held_, [](const Held& held) { return !held.written; });
-  for (Held& held : held_) held.written = false;
+  std::erase_if(held_, [](const Held& held) { return !held.asked; });
+  for (Held& held : held_) held.written = held.asked = false;
 }
 
 const Film::Held* Film::find(const FilmLayer& layer) const {
@@ -30,11 +30,14 @@ GLuint Film::texture(const FilmLayer& layer) const {
 }
 
 void Film::make(const gl::FunctionsPtr& gl, const FilmLayer& layer) {
-  if (find(layer) != nullptr) return;
+  if (const auto found = std::ranges::find(held_, layer, &Held::layer); found != held_.end()) {
+    found->asked = true;
+    return;
+  }
   const std::string what = std::string("creating the picture's layer ") + layer.name;
   held_.push_back(
       {layer, gl::make_texture_2d(gl, layer.format, static_cast<int>(size_.x), static_cast<int>(size_.y), what.c_str()),
-       false});
+       false, true});
 }
 
 void Film::drop(const FilmLayer& layer) {

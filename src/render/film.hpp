@@ -44,8 +44,8 @@ inline constexpr FilmLayer volume_z{"volume z", GL_R32F, 4};
 /// Calls that take GL need the context current and a StateGuard around.
 class Film {
  public:
-  /// A picture anew: nothing is written. Textures of the same size that the last one wrote wait to be written again,
-  /// others go.
+  /// A picture anew: nothing is written. Textures of the same size that the last one asked for wait to be
+  /// written again, others go.
   void begin(glm::uvec2 size);
   [[nodiscard]] glm::uvec2 size() const { return size_; }
   /// Whether a pass has written it, of this picture.
@@ -66,6 +66,7 @@ class Film {
     FilmLayer layer;
     gl::Object texture;
     bool written = false;
+    bool asked = true;  // for, by a pass of this picture
   };
   [[nodiscard]] const Held* find(const FilmLayer& layer) const;
 

@@ -47,10 +47,10 @@ void GpuScene::update_model(const scene::ModelSourcePtr& source, const Wanted& w
                                                     model_.get(), raster_ ? *raster_ : nullptr);
       }
       if (!upload.work->advance(deadline)) break;
-      finish_surfaces();
+      finish_model();
     } catch (const Error&) {
       if (upload.work && upload.work->done()) {
-        finish_surfaces();
+        finish_model();
       } else {
         model_.fail(upload.of, upload.settings);
         raster_.fail(upload.of, upload.settings);
@@ -61,7 +61,7 @@ void GpuScene::update_model(const scene::ModelSourcePtr& source, const Wanted& w
   }
 }
 
-void GpuScene::finish_surfaces() {
+void GpuScene::finish_model() {
   const ModelUnderWay upload = *std::exchange(model_upload_, std::nullopt);
   model_revision_.advance();
   if (auto data = upload.work->take_data()) model_.put(upload.of, std::move(*data));

@@ -58,7 +58,7 @@ class GpuScene {
 
  private:
   void update_model(const scene::ModelSourcePtr& source, const Wanted& wanted, Deadline deadline);
-  void finish_surfaces();
+  void finish_model();
   void show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content);
   void drop_data();
   void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);

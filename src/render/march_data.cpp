@@ -87,18 +87,6 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
   }
 }
 
-void MarchUpload::plan_texture_buffer(const void* bytes, std::size_t size, std::size_t capacity, GLenum format,
-                                      const char* what, std::function<void(gl::Object)> place) {
-  const std::size_t index = data_.buffers_.size();
-  data_.buffers_.emplace_back();
-  data_.bytes_ += capacity;
-  upload_.add([this, index, capacity, format, what, place = std::move(place)] {
-    data_.buffers_[index] = gl::make_buffer(gl_, capacity, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
-    place(gl::make_texture_buffer(gl_, format, data_.buffers_[index], what));
-  });
-  upload_.add_bytes([this, index] { return Upload::Place{data_.buffers_[index].name(), 0}; }, bytes, size);
-}
-
 void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
   const grid::TetGrid& grid = *source_->grid;
   data_.linear_ = source_->linear;
@@ -186,8 +174,17 @@ void MarchUpload::plan_brick() {
                                             std::to_string(limits_.texture_buffer_texels));
   }
   const std::size_t bytes = source_->brick_values.size() * 2;
-  plan_texture_buffer(source_->brick_values.data(), bytes, bytes, GL_R16F, "uploading bricks",
-                      [this](gl::Object texture) { data_.textures_[0] = std::move(texture); });
+  data_.bytes_ += bytes;
+  upload_.add([this, bytes] {
+    const char* what = "creating the buffer of bricks";
+    data_.brick_values_ = gl::make_buffer(gl_, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+    data_.textures_[0] = gl::make_texture_buffer(gl_, GL_R16F, data_.brick_values_, what);
+  });
+  upload_.add_bytes(
+      [this] {
+        return Upload::Place{data_.brick_values_.name(), 0};
+      },
+      source_->brick_values.data(), bytes);
   data_.bytes_ += source_->brick_slots.size() * 4;
   upload_.add([this, bricks] {
     data_.textures_[1] = gl::make_texture_3d(gl_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <vector>
@@ -34,7 +33,7 @@ class MarchData {
   friend class MarchUpload;
   March march_ = March::tet;
   bool linear_ = false;
-  std::vector<gl::Object> buffers_;
+  gl::Object brick_values_;
   std::vector<gl::WordHeap::Span> cells_;  // a page's records each
   std::array<gl::Object, 2> textures_;     // voxels, or values of bricks; slots of bricks
   gl::WordHeap::Span tree_;
@@ -62,9 +61,6 @@ class MarchUpload {
   void plan_tet(gl::WordHeap& heap, std::int64_t page_texels);
   void plan_dense();
   void plan_brick();
-  // Steps that make a texture buffer (of capacity bytes) and fill it from memory that lives as long as the source.
-  void plan_texture_buffer(const void* bytes, std::size_t size, std::size_t capacity, GLenum format, const char* what,
-                           std::function<void(gl::Object)> place);
 
   gl::FunctionsPtr gl_;
   gl::Limits limits_;

@@ -146,6 +146,7 @@ void Flights::end(Dispatched what, GLuint buffer, std::size_t words) {
 void Flights::give_up() {
   if (queries_[0] != 0) gl_->DeleteQueries(2, queries_.data());
   queries_ = {};
+  next_place_ = next_.place;
 }
 
 std::optional<Flights::Landed> Flights::land() {

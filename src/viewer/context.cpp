@@ -305,7 +305,7 @@ render::PassSeconds Context::pass_seconds() const {
 
 std::uint64_t Context::bytes() const {
   const glm::u64vec2 depth_size = host_depth_.size();
-  return scene_.data_bytes() + scene_.other_bytes() + progressive_.bytes() + empty_.bytes() +
+  return scene_.data_bytes() + scene_.other_bytes() + progressive_.bytes() + empty_.bytes() + compositor_.bytes() +
          (target_ ? target_.of().bytes() : 0) + depth_size.x * depth_size.y * host_depth_.layers() * 4;
 }
 

@@ -168,10 +168,10 @@ FrameResult Viewer::render(const Frame& frame) {
 
 WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   WarmUp result;
+  const render::Deadline deadline = deadline_after(frame.budget_ms);
   with_gl([&](Context& g) {
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
-    const render::Deadline deadline = deadline_after(frame.budget_ms);
     prepare(frame);
     g.upload(shot(), page_texels_, deadline);
     follow_upload(g);

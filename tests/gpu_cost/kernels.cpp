@@ -99,11 +99,8 @@ std::vector<Kernel> kernels() {
       if (shader.name.ends_with(".comp")) {
         kernel.compute = shader.with(defines);
       } else {
-        const std::string stem(shader.name.substr(0, shader.name.find('.')));
         kernel.fragment = shader.with(defines);
-        // What has none of its name covers a rectangle.
-        const gl::Shader* vertex = gl::find_shader(stem + ".vert");
-        kernel.vertex = (vertex != nullptr ? vertex : gl::find_shader("composite.vert"))->with(defines);
+        kernel.vertex = gl::find_shader(gl::vertex_shader_of(shader.name))->with(defines);
       }
       all.push_back(std::move(kernel));
     }

@@ -592,10 +592,12 @@ TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
   const std::size_t programs = programs_->counts().asked;
   const cumulet::test::BusyHost host(*gl_, 500.0);
   host.queue();
+  const gl::Fence queued(gl_);
   for (int i = 0; i < 8; ++i) {
     draw(i % 2 == 1);
     EXPECT_FALSE(compositor_->lags());
   }
+  EXPECT_FALSE(queued.passed()) << "the device was not busy";
   EXPECT_EQ(programs_->counts().asked, programs);
   const std::vector<glm::vec4> got = read(made, GL_RGBA32F, 0);
   check(picture, {.transparent = true}, target, GL_RGBA32F, 0);

@@ -10,7 +10,6 @@ namespace {
 
 using namespace cumulet;
 using glm::vec3;
-using scene::ModelSourcePtr;
 using viewer::SurfaceAsset;
 
 /// Notes how often it is posed; time is its height.

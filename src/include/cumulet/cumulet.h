@@ -640,7 +640,7 @@ typedef struct cumulet_medium_desc {
   size_t struct_size;
   double density_scale; /* extinction = density_scale x grid value, 1 / world unit; 0: 1 */
   float coalbedo[3];    /* 1 - single-scattering albedo, each in [0, 1]; 0: nothing is absorbed */
-  float anisotropy;     /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic */
+  float anisotropy;     /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic. Not of Mie */
   uint32_t max_bounces; /* scattering events a path may have; 0: no limit */
   /*
    * Source radiance: each point gives off extinction x emission per unit of length, so that a body of the medium too
