@@ -3,13 +3,14 @@
 //   cm                                            the parameters
 //   float cm_surface_z(uvec2 pixel, vec2 within, uint layer)   view depth of the host's surface there
 //
-// The stages are functions: here cm_camera, cm_handle (which is cm_end_ray, cm_look and cm_scatter) and cm_finish; in glsl/path_vertex.glsl cm_meet, and what else differs where there are triangles; in glsl/flight.glsl
-// cm_aim and cm_fly, which march. One kernel runs them all (glsl/trace.comp), or several do, each over the paths that
-// wait for it (glsl/path_queue.glsl).
+// The stages are functions: here cm_camera, cm_handle (which is cm_end_ray, cm_look and cm_scatter) and cm_finish; in
+// glsl/path_vertex.glsl cm_meet, and what else differs where there are triangles; in glsl/flight.glsl cm_aim and cm_fly,
+// which march. One kernel runs them all (glsl/trace.comp), or several do, each over the paths that wait for it
+// (glsl/path_queue.glsl).
 //
-// With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has surface.glsl
-// before this. With 2 next-event estimates are for emissive triangles, too. With CM_LAYERS 1 (which
-// CM_SURFACES implies) camera rays may end at the surface pass instead:
+// With CM_SURFACES 1 flights end at triangles as well, and go on from them; the includer then has surface.glsl before
+// this. With 2 next-event estimates are for emissive triangles, too. With CM_LAYERS 1 (which CM_SURFACES implies) camera
+// rays may end at the surface pass instead:
 //   float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, out vec4 colour)   its view depth
 // With CM_AOVS 1 samples that first met the volume are summed apart, too.
 #ifndef CM_PATH_GLSL

@@ -551,9 +551,9 @@ bool App::draw() {
   // would look as before is not drawn, and what changes beside the picture that a hand is at waits for the next one.
   const bool changed = window_->ui_changed();
   const bool waits = viewport_buttons_ != 0 && now_ - drawn_at_ < picture_frame;
-  owes_ = changed && waits;
-  if (drawn_pictures_ == pictures_ && order_.screenshot.empty() && (!changed || waits)) return false;
-  owes_ = false;
+  const bool draws = drawn_pictures_ != pictures_ || !order_.screenshot.empty() || (changed && !waits);
+  owes_ = changed && !draws;
+  if (!draws) return false;
   gl_->BindFramebuffer(GL_FRAMEBUFFER, 0);
   gl_->Disable(GL_SCISSOR_TEST);
   constexpr float dark = 0.075f;

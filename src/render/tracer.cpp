@@ -205,15 +205,20 @@ unsigned Tracer::traced_of(const PictureParameters& parameters, const Obstacles&
   return met == nullptr ? 0 : (met->lights().triangles > 0 ? 2 : 1);
 }
 
+void Tracer::classify(Picture& picture, const PictureParameters& parameters, const Obstacles& obstacles,
+                      const PictureSettings& settings) {
+  const bool shaded = settings.view == View::shaded;
+  picture.view_ = settings.view;
+  picture.traced_ = traced_of(parameters, obstacles, settings);
+  picture.second_lobe_ = parameters.medium.second_share > 0.0F;
+  picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
+  picture.volume_alone_ = shaded && settings.volume_alone;
+}
+
 bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
                   const PictureSettings& settings) {
-  const bool layered = settings.view == View::shaded && settings.layered != Layered::no && obstacles.raster != nullptr;
   Picture like;
-  like.view_ = settings.view;
-  like.traced_ = traced_of(parameters, obstacles, settings);
-  like.second_lobe_ = parameters.medium.second_share > 0.0F;
-  like.layered_ = layered ? settings.layered : Layered::no;
-  like.volume_alone_ = settings.view == View::shaded && settings.volume_alone;
+  classify(like, parameters, obstacles, settings);
   return asked([&] { find_programs(like, data, obstacles); });
 }
 
@@ -318,17 +323,13 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.complete_ = false;
   picture.size_ = size;
   picture.film_.begin(size);
-  picture.view_ = settings.view;
-  picture.traced_ = traced_of(parameters, obstacles, settings);
-  picture.second_lobe_ = parameters.medium.second_share > 0.0F;
-  picture.layered_ = Layered::no;
-  if (shaded && settings.layered != Layered::no && obstacles.raster != nullptr) {
+  classify(picture, parameters, obstacles, settings);
+  if (picture.layered_ != Layered::no) {
     draw_layers(picture, obstacles, settings);
   } else {
     picture.layers_.reset();
     drop_unused_layers();
   }
-  picture.volume_alone_ = shaded && settings.volume_alone;
   if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
   if (shaded) kernels_.reserve(lanes, picture.traced_ > 0);

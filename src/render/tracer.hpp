@@ -230,6 +230,9 @@ class Tracer {
   // All that a picture is traced with.
   void find_programs(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   // What paths of a picture with these settings meet.
+  // What of a picture decides which programs make it.
+  static void classify(Picture& picture, const PictureParameters& parameters, const Obstacles& obstacles,
+                       const PictureSettings& settings);
   static unsigned traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
                             const PictureSettings& settings);
   // The one kernel, or what the paths' time goes by where they are run by stages.

@@ -147,6 +147,13 @@ class CpuTracerSurfaces : public CpuTracer {
     twin.cm.dispatch.samples = image.samples;
     return same_pixels(twin, picture);
   }
+  /// With one sample a pixel.
+  template <class Twin>
+  void expect_same(Twin& twin, const std::shared_ptr<StillScene>& scene, const viewer::GridSettings& settings) {
+    for (const std::uint32_t seed : {1U, 2U}) {
+      EXPECT_GT(same(twin, scene, settings, {32, 32, 1, seed, render::View::shaded}), 0.99);
+    }
+  }
 
   const volume::ScalarVolume volume_ = test::noise_volume({34, 30, 32}, ivec3(0), 2);
   std::unique_ptr<test::Still> still_;
@@ -158,9 +165,7 @@ TEST_P(CpuTracerSurfaces, PathsAmongTrianglesAreTheSame) {
   const grid::TetGrid grid = grid_of(volume_, settings);
   core::CpuTetSurfaces twin;
   twin.grid = &grid;
-  for (const std::uint32_t seed : {1U, 2U}) {
-    EXPECT_GT(same(twin, room(), settings, {32, 32, 1, seed, render::View::shaded}), 0.99);
-  }
+  expect_same(twin, room(), settings);
 }
 
 TEST_P(CpuTracerSurfaces, PathsAmongEmittersAreTheSame) {
@@ -168,9 +173,7 @@ TEST_P(CpuTracerSurfaces, PathsAmongEmittersAreTheSame) {
   const grid::TetGrid grid = grid_of(volume_, tet);
   core::CpuTetEmitters twin;
   twin.grid = &grid;
-  for (const std::uint32_t seed : {1U, 2U}) {
-    EXPECT_GT(same(twin, room_with_emitters(), tet, {32, 32, 1, seed, render::View::shaded}), 0.99);
-  }
+  expect_same(twin, room_with_emitters(), tet);
   // Every sample counts, not the first alone.
   EXPECT_GT(same(twin, room_with_emitters(), tet, {32, 32, 4, 3, render::View::shaded}), 0.98);
 
