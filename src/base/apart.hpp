@@ -1,11 +1,13 @@
 #pragma once
 
 #include <chrono>
+#include <exception>
 #include <functional>
 #include <future>
 #include <memory>
 #include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "base/progress.hpp"
 
@@ -23,12 +25,21 @@ template <class Call>
 std::invoke_result_t<Call&> apart(const Progress* progress, Call call) {
   if (progress == nullptr) return call();
   progress->check();
-  using Result = std::invoke_result_t<Call&>;
-  const auto task = std::make_shared<std::packaged_task<Result()>>(std::move(call));
-  std::future<Result> result = task->get_future();
+  // What it throws is handed over like what it returns: none but the caller owns it then.
+  using Outcome = std::variant<std::invoke_result_t<Call&>, std::exception_ptr>;
+  const auto task = std::make_shared<std::packaged_task<Outcome()>>([call = std::move(call)]() mutable {
+    try {
+      return Outcome(std::in_place_index<0>, call());
+    } catch (...) {
+      return Outcome(std::in_place_index<1>, std::current_exception());
+    }
+  });
+  std::future<Outcome> result = task->get_future();
   leave([task] { (*task)(); });
   while (result.wait_for(std::chrono::milliseconds(5)) != std::future_status::ready) progress->check();
-  return result.get();
+  Outcome outcome = result.get();
+  if (outcome.index() == 1) std::rethrow_exception(std::get<1>(std::move(outcome)));
+  return std::get<0>(std::move(outcome));
 }
 
 /// Owns what takes long to free, a tree of many nodes or gigabytes: its last owner does not wait for that.
