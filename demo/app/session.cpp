@@ -155,12 +155,7 @@ void Session::remove_surfaces() {
 
 void Session::finish_surfaces() {
   waiting_for_surfaces_ = false;
-  const cumulet_progress& work = status_.work;
-  const bool failed = work.status != CUMULET_OK &&
-                      std::string_view(static_cast<const char*>(work.message)).starts_with(scene_.surfaces);
-  if (failed) {
-    tell(true, work.message);
-    files_.push_back({scene_.surfaces, Answer::File::Fate::failed});
+  if (load_failed(status_.work.surfaces_status, status_.work.surfaces_message, scene_.surfaces)) {
     scene_.surfaces = known_->surfaces = shown_surfaces_;
     return;
   }
@@ -298,21 +293,46 @@ void Session::see_work() {
   static_cast<void>(cumulet_get_progress(viewer_.get(), &status_.work));
   status_.stats.struct_size = sizeof status_.stats;
   static_cast<void>(cumulet_get_stats(viewer_.get(), &status_.stats));
-  const bool was_busy = status_.busy;
   status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
                  (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
-  if (waiting_for_surfaces_ && !status_.busy) finish_surfaces();
-  if (waiting_ && !status_.busy)
-    finish_load();
-  else if (was_busy && !status_.busy && status_.work.status != CUMULET_OK &&
-           status_.work.status != CUMULET_ERROR_CANCELLED)
-    tell(true, status_.work.message);
+  see_ends();
   see_camera();
   measure_noise();
 
   const std::lock_guard lock(shared_->mutex);
   for (const std::string& warning : shared_->warnings) tell(false, warning);
   shared_->warnings.clear();
+}
+
+void Session::see_ends() {
+  const cumulet_progress& work = status_.work;
+  if (!status_.busy) {
+    // What is built anew of what is shown may fail, too.
+    const auto tell_news = [this](cumulet_status status, const char* message, cumulet_status told) {
+      if (status != told && status != CUMULET_OK && status != CUMULET_ERROR_CANCELLED) tell(true, message);
+    };
+    if (waiting_for_surfaces_)
+      finish_surfaces();
+    else
+      tell_news(work.surfaces_status, work.surfaces_message, told_surfaces_);
+    if (waiting_)
+      finish_load();
+    else
+      tell_news(work.volume_status, work.volume_message, told_volume_);
+  }
+  if (!status_.busy || work.surfaces_status == CUMULET_OK) told_surfaces_ = work.surfaces_status;
+  if (!status_.busy || work.volume_status == CUMULET_OK) told_volume_ = work.volume_status;
+}
+
+bool Session::load_failed(cumulet_status status, const char* message, const std::string& path) {
+  if (status == CUMULET_OK) return false;
+  if (status == CUMULET_ERROR_CANCELLED) {
+    tell(false, "Cancelled: " + path);
+  } else {
+    tell(true, message);
+    files_.push_back({path, Answer::File::Fate::failed});
+  }
+  return true;
 }
 
 void Session::see_camera() {
@@ -352,11 +372,7 @@ Answer Session::answer() {
 
 void Session::finish_load() {
   waiting_ = false;
-  const cumulet_progress& work = status_.work;
-  if (work.status != CUMULET_OK) {
-    const bool cancelled = work.status == CUMULET_ERROR_CANCELLED;
-    tell(!cancelled, cancelled ? "Cancelled: " + scene_.volume : work.message);
-    if (!cancelled) files_.push_back({scene_.volume, Answer::File::Fate::failed});
+  if (load_failed(status_.work.volume_status, status_.work.volume_message, scene_.volume)) {
     set_volume(scene_, shown_volume_);
     set_volume(*known_, shown_volume_);
     fit_.reset();

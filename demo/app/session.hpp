@@ -152,6 +152,10 @@ class Session {
   void read_surfaces();
   void finish_load();
   void set_camera();
+  /// Of loads and builds.
+  void see_ends();
+  /// Told, if it did not succeed.
+  bool load_failed(cumulet_status status, const char* message, const std::string& path);
   void see_camera();
   void move_by_keys(int key);
   void measure_noise();
@@ -180,6 +184,8 @@ class Session {
   std::optional<double> cold_since_;  // seconds, when the first of them was asked for
   bool waiting_for_surfaces_ = false;
   bool waiting_ = false;
+  cumulet_status told_surfaces_ = CUMULET_OK;  // how the last job of each ended, as far as that was told
+  cumulet_status told_volume_ = CUMULET_OK;
   std::optional<cumulet_camera_desc> fit_;  // the camera to place when the volume is there
   bool suggest_ = false;
   std::optional<double> density_scale_;

@@ -49,6 +49,11 @@ void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings) {
                 }});
 }
 
+Built Builder::build_now(const VolumeAssetPtr& volume, const BuildSettings& settings) const {
+  Progress progress;
+  return make(volume, settings, progress);
+}
+
 void Builder::cancel() {
   {
     const std::scoped_lock lock(mutex_);

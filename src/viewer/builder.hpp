@@ -67,6 +67,8 @@ class Builder {
   void load(const VolumeFile& file, std::optional<BuildSettings> settings);
   /// Builds of this volume, after what is under way.
   void build(VolumeAssetPtr volume, const BuildSettings& settings);
+  /// Here, and by no job.
+  [[nodiscard]] Built build_now(const VolumeAssetPtr& volume, const BuildSettings& settings) const;
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
   void cancel();

@@ -217,8 +217,13 @@ cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* pr
     cumulet_progress p{};
     p.stage = static_cast<cumulet_stage>(status.stage);
     p.fraction = status.fraction;
-    p.status = status.failure ? status_of(status.failure->code()) : CUMULET_OK;
-    copy_text(status.failure ? status.failure->what() : "", p.message, sizeof p.message);
+    const auto tell = [](const std::optional<cumulet::Error>& failure, cumulet_status& code, auto& message) {
+      code = failure ? status_of(failure->code()) : CUMULET_OK;
+      copy_text(failure ? failure->what() : "", message, sizeof message);
+    };
+    tell(status.volume_failure ? status.volume_failure : status.surfaces_failure, p.status, p.message);
+    tell(status.volume_failure, p.volume_status, p.volume_message);
+    tell(status.surfaces_failure, p.surfaces_status, p.surfaces_message);
     write_desc(progress, p, "cumulet_progress");
   });
 }

@@ -218,11 +218,11 @@ void Viewer::wait(double timeout_ms) {
   if (const auto failure = builder_.status().failure) throw Error(*failure);
 }
 
-Worker::Status Viewer::status() const {
-  Worker::Status status = builder_.status();
+Viewer::Status Viewer::status() const {
+  const Worker::Status volume = builder_.status();
   const double upload = upload_progress_.load(std::memory_order_relaxed);
   const Worker::Status surfaces = surface_builder_.status();
-  if (!status.failure) status.failure = surfaces.failure;
+  Status status{volume.stage, volume.fraction, volume.failure, surfaces.failure};
   if (status.stage == Progress::Stage::idle) {
     status.stage = surfaces.stage;
     status.fraction = surfaces.fraction;

@@ -64,8 +64,13 @@ class Viewer {
   void cancel();
   /// Throws how the last job ended, or Error(timeout).
   void wait(double timeout_ms);
-  /// As Builder's, and uploading.
-  [[nodiscard]] Worker::Status status() const;
+  struct Status {
+    Progress::Stage stage = Progress::Stage::idle;  ///< of the volume's jobs, else of the surfaces', else uploading
+    double fraction = 0.0;
+    std::optional<Error> volume_failure;  ///< how the last job of each ended, if not well
+    std::optional<Error> surfaces_failure;
+  };
+  [[nodiscard]] Status status() const;
 
   void load_surfaces(const std::string& path);
   /// Shows these at once. Cancels a load under way.

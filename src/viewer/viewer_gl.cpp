@@ -89,8 +89,8 @@ void Viewer::prepare(const Frame& frame) {
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
   const bool scene = volume_ || model_source_;
   if (!scene) built_ = {};
-  // Surfaces alone are surfaces in an empty volume.
-  if (!volume_ && scene && !built_.source && !builder_.busy()) builder_.build(empty_volume(), grid_.build);
+  // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
+  if (!volume_ && scene && !built_.source && !builder_.busy()) built_ = builder_.build_now(empty_volume(), grid_.build);
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   view_.reset();

@@ -520,6 +520,20 @@ def test_failures(s):
     s.play("later", ["wait loaded", f'drop "{s.out}/cut.vdb"', "frames 3", "wait loaded", *shot("later")], "--volume",
            s.cumulus)
     assert s.report("later")["recent"] == [s.cumulus], s.report("later")["recent"]
+    # One fails, the other is there; and a failure that takes long is one line, too.
+    text = b'{"asset": {"version": "2.0"}, "x": "' + b"a" * 40_000_000 + b'"'
+    text += b" " * (-len(text) % 4)
+    (s.out / "late.glb").write_bytes(struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text)
+    for volume, surfaces, there, missing in ((s.cumulus, "late.glb", s.cumulus, "late.glb"),
+                                             (s.cumulus, "missing.glb", s.cumulus, "missing.glb"),
+                                             ("missing.vdb", str(mountains), str(mountains), "missing.vdb")):
+        done = s.start([*SIZE, volume, "--gltf", surfaces, "--replay", "replay.replay"])
+        lines = done.stderr.splitlines()
+        assert done.returncode == 0 and len(lines) == 1 and missing in lines[0], done
+        report = s.report("report")
+        assert [m["text"] for m in report["messages"] if m["error"] and missing in m["text"]], report["messages"]
+        assert report["recent"][0] == there and missing not in " ".join(report["recent"]), report["recent"]
+        assert report["has_volume"] == (there == volume) and ("surfaces" in report["scene"]) == (there == surfaces), report
 
 
 def test_grids(s):

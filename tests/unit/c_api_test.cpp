@@ -167,6 +167,9 @@ TEST_F(CApi, MissingFileNamesIt) {
   EXPECT_EQ(progress.stage, CUMULET_STAGE_IDLE);
   EXPECT_EQ(progress.status, CUMULET_ERROR_FILE);
   EXPECT_EQ(error(), std::string(progress.message));
+  EXPECT_EQ(progress.volume_status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(error(), std::string(progress.volume_message));
+  EXPECT_EQ(progress.surfaces_status, CUMULET_OK);
   auto frame = make_desc<cumulet_frame_desc>();
   auto result = make_desc<cumulet_frame_result>();
   EXPECT_EQ(cumulet_render(viewer_, &frame, &result), CUMULET_OK);
@@ -384,6 +387,18 @@ TEST_F(CApiSurfaces, DoubleSidedShowsBacksThatGlow) {
   EXPECT_NE(error().find("double_sided is not 0 or 1"), std::string::npos);
 }
 
+TEST_F(CApiSurfaces, SurfacesDoNotHideThatTheVolumeFailed) {
+  ASSERT_EQ(cumulet_load_volume(viewer_, "no such cloud.vdb", nullptr), CUMULET_OK);
+  ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_ERROR_FILE);
+  look(viewer_, 10.0);
+  EXPECT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_ERROR_FILE);
+  auto progress = make_desc<cumulet_progress>();
+  ASSERT_EQ(cumulet_get_progress(viewer_, &progress), CUMULET_OK);
+  EXPECT_EQ(progress.volume_status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(progress.surfaces_status, CUMULET_OK);
+}
+
 TEST_F(CApiSurfaces, ABadFileLosesNothing) {
   ASSERT_EQ(cumulet_load_surfaces(viewer_, path_.c_str()), CUMULET_OK);
   ASSERT_EQ(cumulet_wait(viewer_, -1.0), CUMULET_OK) << error();
@@ -393,6 +408,10 @@ TEST_F(CApiSurfaces, ABadFileLosesNothing) {
   auto progress = make_desc<cumulet_progress>();
   ASSERT_EQ(cumulet_get_progress(viewer_, &progress), CUMULET_OK);
   EXPECT_EQ(progress.status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(progress.surfaces_status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(error(), std::string(progress.surfaces_message));
+  EXPECT_EQ(progress.volume_status, CUMULET_OK);
+  EXPECT_EQ(std::string(progress.volume_message), "");
   cumulet_surfaces* kept = shown();
   EXPECT_EQ(info_of(kept).triangles, 1U);
   cumulet_surfaces_release(kept);

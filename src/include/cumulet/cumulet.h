@@ -585,6 +585,12 @@ typedef struct cumulet_progress {
   double fraction;       /* of the stage, 0 to 1 */
   cumulet_status status; /* of the last load or build that ended: CUMULET_OK, its error, or CANCELLED */
   char message[512];     /* its cause in one line, "" if it succeeded */
+  /* The same of the volume's and of the surfaces' alone: where one fails the other may be there. `status` is the
+   * volume's unless that is CUMULET_OK. */
+  cumulet_status volume_status;
+  char volume_message[512];
+  cumulet_status surfaces_status;
+  char surfaces_message[512];
 } cumulet_progress;
 
 /* What the worker does. Any thread, any time. */

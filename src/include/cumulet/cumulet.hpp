@@ -779,6 +779,10 @@ struct Progress {
   double fraction = 0.0;
   StatusCode status{};
   Text<512> message;
+  StatusCode volume_status{};
+  Text<512> volume_message;
+  StatusCode surfaces_status{};
+  Text<512> surfaces_message;
 };
 
 struct Stats {
@@ -958,11 +962,16 @@ class Viewer {
     auto c = detail::sized<cumulet_progress>();
     // Safe at any time, which the last error is not.
     if (auto done = detail::result(cumulet_get_progress(handle(), &c)); !done) return done.error();
-    const auto& [struct_size, stage, fraction, status, message] = c;
+    const auto& [struct_size, stage, fraction, status, message, volume_status, volume_message, surfaces_status,
+                 surfaces_message] = c;
     return Progress{.stage = static_cast<Stage>(stage),
                     .fraction = fraction,
                     .status = static_cast<StatusCode>(status),
-                    .message = Text<512>(message)};
+                    .message = Text<512>(message),
+                    .volume_status = static_cast<StatusCode>(volume_status),
+                    .volume_message = Text<512>(volume_message),
+                    .surfaces_status = static_cast<StatusCode>(surfaces_status),
+                    .surfaces_message = Text<512>(surfaces_message)};
   }
   [[nodiscard]] Result<> wait(double timeout_ms = -1.0) noexcept { return result(cumulet_wait(handle(), timeout_ms)); }
   [[nodiscard]] Result<> rebuild() noexcept { return result(cumulet_rebuild(handle())); }
