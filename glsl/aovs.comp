@@ -6,7 +6,7 @@
 //   transmittance of the volume up to the nearest surface, ours or the host's, or beyond the volume; mean
 //   surface z     view depth of that surface at the pixel's centre, infinity where there is none
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..8 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

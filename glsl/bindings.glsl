@@ -9,7 +9,9 @@ const int CM_BUFFERS = 8;  // of storage buffers, and of uniform buffers
 const int CM_IMAGES = 8;
 
 // Texture units. Kernels of paths and views:
-const int CM_UNIT_CELLS = 0;  // to 7: pages of cell records
+const int CM_UNIT_CELLS = 0;        // to 5: pages of cell records
+const int CM_UNIT_EMISSION = 6;     // of cells
+const int CM_UNIT_ENVIRONMENT = 7;  // a page of a WordHeap
 const int CM_UNIT_LAYER_COLOUR = 8;
 const int CM_UNIT_SCENE_WORDS = 9;  // a page of a WordHeap, as the tree's
 const int CM_UNIT_ATLAS = 10;

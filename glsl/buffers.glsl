@@ -66,12 +66,6 @@ uvec4 cm_record(uint cell, uint part) {
 #if CM_PAGES > 5
   if (page == 4u) return texelFetch(cm_cells[4], texel);
 #endif
-#if CM_PAGES > 6
-  if (page == 5u) return texelFetch(cm_cells[5], texel);
-#endif
-#if CM_PAGES > 7
-  if (page == 6u) return texelFetch(cm_cells[6], texel);
-#endif
   return texelFetch(cm_cells[CM_PAGES - 1], texel);
 #endif
 }

@@ -1,7 +1,7 @@
 #version 450
 // The path tracer as one kernel, where paths meet no triangles. One lane a pixel of some blocks of the tile: loads its
 // path, runs it for a bounded number of rounds, stores it.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..8 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
 // variants: - or CM_LAYERS=1
 // variants: - or CM_AOVS=1
 // variants: - or CM_SECOND_LOBE=1
