@@ -1,0 +1,94 @@
+// The colours of black bodies against published ones, and how bright they are.
+
+#include "light/black_body.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "base/luminance.hpp"
+
+namespace {
+
+using cumulet::light::black_body_colour;
+using cumulet::light::black_body_radiance;
+using cumulet::light::BlackBody;
+
+glm::dvec2 uv_of_xy(double x, double y) { return glm::dvec2(4.0 * x, 9.0 * y) / (-2.0 * x + 12.0 * y + 3.0); }
+
+// CIE 1976 u'v' of linear Rec. 709.
+glm::dvec2 uv_of(const glm::dvec3& c) {
+  const double x = 0.4123908 * c.r + 0.3575843 * c.g + 0.1804808 * c.b;
+  const double y = 0.2126390 * c.r + 0.7151687 * c.g + 0.0721923 * c.b;
+  const double z = 0.0193308 * c.r + 0.1191948 * c.g + 0.9505322 * c.b;
+  return glm::dvec2(4.0 * x, 9.0 * y) / (x + 15.0 * y + 3.0 * z);
+}
+
+// Chromaticities of the Planckian locus as they are published.
+struct Published {
+  double kelvin;
+  double x;
+  double y;
+};
+constexpr std::array<Published, 4> locus = {
+    {{2000.0, 0.52669, 0.41331}, {2856.0, 0.44757, 0.40745}, {6500.0, 0.3135, 0.3237}, {10000.0, 0.28063, 0.28828}}};
+
+TEST(BlackBody, ColoursAreThoseOfPlancksLaw) {
+  for (const Published& p : locus) {
+    EXPECT_LT(glm::distance(uv_of(black_body_colour(p.kelvin)), uv_of_xy(p.x, p.y)), 0.0005) << p.kelvin << " K";
+  }
+}
+
+TEST(BlackBody, ColoursHaveLuminanceOne) {
+  for (double kelvin = 100.0; kelvin < 1.0e5; kelvin *= 1.1) {
+    const glm::dvec3 colour = black_body_colour(kelvin);
+    EXPECT_NEAR(cumulet::luminance(colour), 1.0, 1.0e-9) << kelvin << " K";
+    EXPECT_GE(std::min({colour.r, colour.g, colour.b}), 0.0) << kelvin << " K";
+  }
+}
+
+// Of 1500 K, at x = 0.58568, y = 0.39323, blue is negative: it goes, and the ratio of red to green stays.
+TEST(BlackBody, WhatRec709CannotMixIsClipped) {
+  EXPECT_GT(black_body_colour(1930.0).b, 0.0);
+  EXPECT_EQ(black_body_colour(1800.0).b, 0.0);
+  const glm::dvec3 clipped = black_body_colour(1500.0);
+  const glm::dvec3 xyz = glm::dvec3(0.58568, 0.39323, 1.0 - 0.58568 - 0.39323) / 0.39323;
+  const double red = glm::dot(glm::dvec3(3.2404542, -1.5371385, -0.4985314), xyz);
+  const double green = glm::dot(glm::dvec3(-0.9692660, 1.8760108, 0.0415560), xyz);
+  EXPECT_EQ(clipped.b, 0.0);
+  EXPECT_NEAR(clipped.g / clipped.r, green / red, 0.002 * green / red);
+  EXPECT_EQ(black_body_colour(500.0).g, 0.0);
+}
+
+TEST(BlackBody, RadianceIsStefanBoltzmannsAtFullIntensity) {
+  const double constant = 1.0e-6 * 5.670373e-8 / std::numbers::pi;
+  EXPECT_DOUBLE_EQ(black_body_radiance(2000.0, 1.0), constant * 1.6e13);
+  EXPECT_DOUBLE_EQ(black_body_radiance(2000.0, 0.25), constant * (0.75 + 0.25 * 1.6e13));
+  EXPECT_EQ(black_body_radiance(2000.0, 0.0), 0.0);
+  EXPECT_EQ(black_body_radiance(99.0, 1.0), 0.0);
+}
+
+TEST(BlackBody, TheTableIsAsGoodAsWhatItHolds) {
+  const BlackBody table;
+  for (double kelvin = 101.0; kelvin < 39999.0; kelvin *= 1.0173) {
+    const glm::dvec3 fast(table.emission(static_cast<float>(kelvin), 0.7F));
+    EXPECT_LT(glm::distance(uv_of(fast), uv_of(black_body_colour(kelvin))), 0.0005) << kelvin << " K";
+    EXPECT_NEAR(cumulet::luminance(fast) / black_body_radiance(kelvin, 0.7), 1.0, 1.0e-5) << kelvin << " K";
+  }
+}
+
+TEST(BlackBody, WhatIsNotATemperatureIsDark) {
+  const BlackBody table;
+  for (const float kelvin : {-300.0F, 0.0F, 99.0F, std::numeric_limits<float>::quiet_NaN()}) {
+    EXPECT_EQ(table.emission(kelvin, 1.0F), glm::vec3(0.0F)) << kelvin;
+  }
+  EXPECT_EQ(table.emission(1500.0F, 0.0F), glm::vec3(0.0F));
+  const glm::vec3 hot = table.emission(1.0e6F, 1.0F);
+  EXPECT_TRUE(std::isfinite(hot.r) && hot.b > hot.r);
+}
+
+}  // namespace
