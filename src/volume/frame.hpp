@@ -15,18 +15,28 @@ struct VolumeFrame {
   ScalarVolume density;                               ///< empty where the file has none
   std::optional<ScalarVolume> temperature;            ///< in the file's unit: 0 to 3, as simulations have it, or kelvin
   std::optional<ScalarVolume> flame;                  ///< how much burns there
-  std::optional<std::array<ScalarVolume, 3>> colour;  ///< of what scatters: linear Rec. 709
+  std::optional<std::array<ScalarVolume, 3>> colour;  ///< of what scatters: linear Rec. 709; red, green, blue
 };
 
-/// Which grids of a file are which field. Empty: by name; "none": the field is left out.
+/// Which grids of a file are which field. "none" leaves a field out. Empty: the scalar fog grid whose name, in whatever
+/// case, comes first among
+///   density      density, smoke, soot; of a file without all of density, temperature and flame what import_volume
+///   reads temperature  temperature, heat, temp flame        flame, flames, fire, burn, fuel colour       cd_, color_,
+///   colour_, followed by r, g and b: three grids
+/// but for grids that are named for another field.
 struct GridNames {
   std::string density;
   std::string temperature;
   std::string flame;
-  std::string colour;  ///< a grid of vectors, or of "colour" the three "colour_r", "colour_g", "colour_b"
+  std::string colour;  ///< of "colour" the grids "colour_r", "colour_g" and "colour_b"
 };
 
-/// Reads what import_volume does, and what belongs to it.
+/// Reads the fields of a .vdb or .nvdb file, each as import_volume reads a grid. The lattice is density's; without
+/// density, that of temperature or flame, whichever has the smaller voxels or else more active ones, so that such a
+/// file renders as fire.
+///
+/// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
+/// out. A warning names the grids that are not shown, as import_volume's.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
 

@@ -79,70 +79,81 @@ std::string describe(const std::vector<GridInfo>& grids, const std::vector<std::
   return out;
 }
 
-// What is shown of a file without a grid called density, the first of these first, in whatever case.
-constexpr std::array likely_names = {"density", "smoke", "soot", "flames", "flame", "fire", "temperature", "heat"};
+// What is shown as density of a file that has none, the first of these first.
+constexpr std::array<std::string_view, 5> likely_names = {"flames", "flame", "fire", "temperature", "heat"};
 
-std::string lower_case(std::string text) {
+}  // namespace
+
+std::string detail::lower_case(std::string text) {
   for (char& c : text)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return text;
 }
 
-/// What a message says of a choice that nobody made; empty where it needs no word.
-std::string remark_on_choice(const std::vector<GridInfo>& grids, const std::string& name, std::size_t chosen) {
+std::string detail::remark_on_choice(const std::vector<GridInfo>& grids, std::size_t chosen,
+                                     std::span<const std::size_t> shown) {
   std::vector<std::size_t> others;
   bool one_density = lower_case(grids[chosen].name) == "density";
   for (std::size_t i = 0; i < grids.size(); ++i) {
-    if (i == chosen || !grids[i].refusal.empty()) continue;
+    if (!grids[i].refusal.empty() || std::ranges::find(shown, i) != shown.end()) continue;
     others.push_back(i);
     one_density = one_density && grids[i].name != grids[chosen].name;
   }
-  if (!name.empty() || others.empty() || one_density) return {};
+  if (others.empty() || one_density) return {};
   return "shows its grid " + describe(grids[chosen]) + "; there is also " + describe(grids, others);
 }
 
-}  // namespace
+std::vector<std::size_t> detail::named(const std::vector<GridInfo>& grids, const std::string& name) {
+  const auto all_with = [&](auto member) {
+    std::vector<std::size_t> found;
+    for (std::size_t i = 0; i < grids.size(); ++i) {
+      if (grids[i].*member == name) found.push_back(i);
+    }
+    return found;
+  };
+  // "density[1]" picks one of several grids of the same name; an exact name comes first.
+  std::vector<std::size_t> found = all_with(&GridInfo::name);
+  return found.empty() ? all_with(&GridInfo::unique_name) : found;
+}
+
+std::optional<std::size_t> detail::first_fog(const std::vector<GridInfo>& grids,
+                                             std::span<const std::string_view> names,
+                                             std::span<const std::size_t> taken) {
+  for (const std::string_view name : names) {
+    for (std::size_t i = 0; i < grids.size(); ++i) {
+      if (!grids[i].refusal.empty() || std::ranges::find(taken, i) != taken.end()) continue;
+      if (lower_case(grids[i].name) == name) return i;
+    }
+  }
+  return std::nullopt;
+}
+
+void detail::fail_without(const std::vector<GridInfo>& grids, const std::string& what) {
+  std::vector<std::size_t> all(grids.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  fail(what + describe(grids, all));
+}
 
 std::size_t detail::choose_grid(const std::vector<GridInfo>& grids, const std::string& name) {
   if (grids.empty()) fail("holds no grids");
-  std::vector<std::size_t> all(grids.size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
-
-  const auto where = [&](const auto& predicate) {
-    std::vector<std::size_t> found;
-    std::copy_if(all.begin(), all.end(), std::back_inserter(found), [&](std::size_t i) { return predicate(grids[i]); });
-    return found;
-  };
-  const auto named = [&](const std::string& wanted) {
-    // "density[1]" picks one of several grids of the same name; an exact name comes first.
-    std::vector<std::size_t> found = where([&](const GridInfo& e) { return e.name == wanted; });
-    return found.empty() ? where([&](const GridInfo& e) { return e.unique_name == wanted; }) : found;
-  };
-  const auto only_usable = [&](const std::vector<std::size_t>& candidates) {
+  if (!name.empty()) {
+    const std::vector<std::size_t> found = named(grids, name);
+    if (found.empty()) fail_without(grids, "has no grid \"" + name + "\"; it has ");
     std::vector<std::size_t> usable;
-    for (const std::size_t i : candidates) {
+    for (const std::size_t i : found) {
       if (grids[i].refusal.empty()) usable.push_back(i);
     }
-    if (usable.empty()) fail("grid \"" + grids[candidates[0]].unique_name + "\" " + grids[candidates[0]].refusal);
+    if (usable.empty()) fail("grid \"" + grids[found[0]].unique_name + "\" " + grids[found[0]].refusal);
     if (usable.size() > 1) fail("several grids are called so, choose one by name: " + describe(grids, usable));
     return usable[0];
-  };
-
-  if (!name.empty()) {
-    const auto found = named(name);
-    if (found.empty()) fail("has no grid \"" + name + "\"; it has " + describe(grids, all));
-    return only_usable(found);
   }
 
-  const auto usable = where([](const GridInfo& e) { return e.refusal.empty(); });
-  for (const char* likely : likely_names) {
-    for (const std::size_t i : usable) {
-      if (lower_case(grids[i].name) == likely) return i;
-    }
-  }
-  if (!usable.empty()) return usable[0];
+  if (const auto density = first_fog(grids, density_names)) return *density;
+  if (const auto likely = first_fog(grids, likely_names)) return *likely;
+  const auto first = std::ranges::find_if(grids, [](const GridInfo& e) { return e.refusal.empty(); });
+  if (first != grids.end()) return static_cast<std::size_t>(first - grids.begin());
   if (grids.size() == 1) fail("grid \"" + grids[0].unique_name + "\" " + grids[0].refusal);
-  fail("no scalar fog volume among its grids: " + describe(grids, all));
+  fail_without(grids, "no scalar fog volume among its grids: ");
 }
 
 namespace {
@@ -289,15 +300,14 @@ void check_transform(const glm::dmat4& m) {
 }  // namespace
 
 ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::string& log_prefix, Progress* progress,
-                              double from) {
-  const auto at = [&](double part) { return from + part * (1.0 - from); };
+                              Portion portion) {
   check_transform(source.index_to_world);
 
   const auto made = make_left<ScalarVolume>();
   ScalarVolume& out = *made;
   out.index_to_world = source.index_to_world;
 
-  ProgressPart looking(progress, at(0.0), at(0.2), source.leaves->count());
+  ProgressPart looking(progress, portion.at(0.0), portion.at(0.2), source.leaves->count());
   ActiveRegion region = active_leaf_region(*source.leaves, looking);
   for (const SourceTile& tile : source.tiles) {
     if (tile.active) region.box.expand({tile.box.min, tile.box.max});
@@ -336,7 +346,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   };
   std::vector<char> constant(order.size());
   std::vector<float> constant_value(order.size());
-  ProgressPart checking(progress, at(0.3), at(0.6), order.size());
+  ProgressPart checking(progress, portion.at(0.3), portion.at(0.6), order.size());
   const BrickTotals bricks = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, order.size(), 64), BrickTotals{},
       [&](const tbb::blocked_range<std::size_t>& range, BrickTotals sum) {
@@ -399,7 +409,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
     }
   }
   out.brick_origins.resize(kept.size());
-  ProgressPart copying(progress, at(0.6), 1.0, kept.size());
+  ProgressPart copying(progress, portion.at(0.6), portion.to, kept.size());
   copying.resize(out.brick_values, kept.size() * brick_voxels);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kept.size(), 64),
                     [&](const tbb::blocked_range<std::size_t>& range) {
@@ -426,22 +436,29 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file) {
   return naming(file.string(), [&] { return open(file, nullptr)->grids(); });
 }
 
+ScalarVolume detail::import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log,
+                                 Progress* progress, Portion portion) {
+  const GridInfo& entry = reader.grids()[grid];
+  const std::string name = one_line(file + ": grid \"" + entry.unique_name + "\"");
+  return naming(name, [&] {
+    constexpr double reading = 0.7;
+    SourceGrid source = reader.read(grid, portion.part(0.0, reading), log, name + ": ");
+    ScalarVolume volume = assemble(std::move(source), log, name + ": ", progress, portion.part(reading, 1.0));
+    volume.name = entry.name;
+    return volume;
+  });
+}
+
 ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
                            Progress* progress) {
   return naming(file.string(), [&] {
-    std::unique_ptr<Reader> reader = open(file, progress);
+    const std::unique_ptr<Reader> reader = open(file, progress);
     const std::size_t chosen = choose_grid(reader->grids(), grid_name);
-    const GridInfo entry = reader->grids()[chosen];
-    const std::string remark = remark_on_choice(reader->grids(), grid_name, chosen);
-    if (!remark.empty()) log.warning(one_line(file.string() + ": " + remark));
-    const std::string name = one_line(file.string() + ": grid \"" + entry.unique_name + "\"");
-    return naming(name, [&] {
-      SourceGrid source = reader->read(chosen, log, name + ": ");
-      reader.reset();  // its buffers are not needed beside the volume's own
-      ScalarVolume volume = assemble(std::move(source), log, name + ": ", progress, read_part);
-      volume.name = entry.name;
-      return volume;
-    });
+    if (grid_name.empty()) {
+      const std::string remark = remark_on_choice(reader->grids(), chosen, std::span(&chosen, 1));
+      if (!remark.empty()) log.warning(one_line(file.string() + ": " + remark));
+    }
+    return import_grid(*reader, chosen, file.string(), log, progress, {reader->opened(), 1.0});
   });
 }
 

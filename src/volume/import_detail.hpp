@@ -10,6 +10,8 @@
 #include <ios>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -49,6 +51,15 @@ struct SourceGrid {
   std::unique_ptr<LeafSource> leaves;
 };
 
+/// A span of a load's fraction.
+struct Portion {
+  double from = 0.0;
+  double to = 1.0;
+
+  [[nodiscard]] double at(double part) const { return from + part * (to - from); }
+  [[nodiscard]] Portion part(double a, double b) const { return {at(a), at(b)}; }
+};
+
 /// One open file. Methods throw whatever their library throws; the caller words it.
 class Reader {
  public:
@@ -62,24 +73,40 @@ class Reader {
   [[nodiscard]] virtual const std::vector<Metadata>& metadata() const = 0;
   /// "OpenVDB 224", "NanoVDB 32.3".
   [[nodiscard]] virtual const std::string& format() const = 0;
+  /// What opening took of the load's fraction.
+  [[nodiscard]] virtual double opened() const { return 0.0; }
   /// Reads the tree of the grid at this place of grids(), whose values are not none. log_prefix begins every warning.
-  virtual SourceGrid read(std::size_t grid, const Log& log, const std::string& log_prefix) = 0;
+  virtual SourceGrid read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) = 0;
 };
-
-/// Reading is this part of loading; the shared half does the rest.
-inline constexpr double read_part = 0.7;
 
 /// By content, not by name.
 std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress);
 /// Where import_volume looks for this name, or without one. Throws as import_volume does.
 std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name);
+/// Whose name, or else whose unique name, is this one.
+std::vector<std::size_t> named(const std::vector<GridInfo>& grids, const std::string& name);
+/// The scalar fog grid whose name, in whatever case, comes first among these; of several the file's first. taken: grids
+/// that it is not.
+std::optional<std::size_t> first_fog(const std::vector<GridInfo>& grids, std::span<const std::string_view> names,
+                                     std::span<const std::size_t> taken = {});
+inline constexpr std::array<std::string_view, 3> density_names = {"density", "smoke", "soot"};
+/// What a message says of a grid that is shown though nobody named it; empty where it needs no word. shown: all that
+/// are, of whatever field.
+std::string remark_on_choice(const std::vector<GridInfo>& grids, std::size_t chosen,
+                             std::span<const std::size_t> shown);
+/// what, followed by all grids.
+[[noreturn]] void fail_without(const std::vector<GridInfo>& grids, const std::string& what);
+std::string lower_case(std::string text);
 
 std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* progress);
 std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file, Progress* progress);
 
-/// The shared half: from the tree as its source has it to the volume's contract. from: where the fraction stands.
+/// The shared half: from the tree as its source has it to the volume's contract.
 ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_prefix, Progress* progress,
-                      double from);
+                      Portion portion);
+/// One scalar grid of an open file, read and assembled.
+ScalarVolume import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log, Progress* progress,
+                         Portion portion);
 
 std::string to_string(glm::ivec3 v);
 

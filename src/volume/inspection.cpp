@@ -103,7 +103,7 @@ const GridFacts& Inspection::facts(std::size_t grid) {
   if (grids_[grid].values != Values::none) {
     try {
       // A reader of its own: one that fails leaves its stream in no state to go on from.
-      found.values = values_of(open(file_, nullptr)->read(grid, {}, ""));
+      found.values = values_of(open(file_, nullptr)->read(grid, {}, {}, ""));
     } catch (const std::bad_alloc&) {
       throw Error(ErrorCode::out_of_memory, one_line(file_.string() + ": not enough memory to read it"));
     } catch (const std::ios_base::failure&) {

@@ -229,7 +229,7 @@ class Disjointness {
 };
 
 ScalarVolume finish(SourceGrid source, const std::string& name, const Log& log, Progress* progress, double from) {
-  ScalarVolume volume = assemble(std::move(source), log, one_line(name) + ": ", progress, from);
+  ScalarVolume volume = assemble(std::move(source), log, one_line(name) + ": ", progress, {from, 1.0});
   volume.name = name;
   return volume;
 }

@@ -254,8 +254,8 @@ class NanoReader final : public Reader {
   [[nodiscard]] const std::vector<Metadata>& metadata() const override { return metadata_; }
   [[nodiscard]] const std::string& format() const override { return format_; }
 
-  SourceGrid read(std::size_t index, const Log& log, const std::string& log_prefix) override {
-    Handle handle = load(places_[index]);
+  SourceGrid read(std::size_t index, Portion portion, const Log& log, const std::string& log_prefix) override {
+    Handle handle = load(places_[index], portion);
     if (handle.size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
     const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle.data());
     if (grid->mMagic != NANOVDB_MAGIC_NUMBER) fail("the file is damaged: no grid where one should be");
@@ -339,13 +339,13 @@ class NanoReader final : public Reader {
   }
 
   /// Reads and decodes a grid, believing no size: NanoVDB's own reader does, and cannot be stopped.
-  Handle load(const Place& place) {
+  Handle load(const Place& place, Portion portion) {
     // No codec packs tighter than zlib's 1032 to 1: a larger claim is no reason to allocate.
     constexpr std::uint64_t most_expansion = 1040;
     if (place.memory_bytes == 0 || place.memory_bytes / most_expansion > place.file_bytes) fail(sizes_differ);
     if (place.codec == Codec::NONE && place.memory_bytes != place.file_bytes) fail(sizes_differ);
-    ProgressPart& part =
-        stream_.begin(0.0, read_part, place.file_bytes + (place.codec == Codec::NONE ? 0 : place.memory_bytes));
+    ProgressPart& part = stream_.begin(portion.from, portion.to,
+                                       place.file_bytes + (place.codec == Codec::NONE ? 0 : place.memory_bytes));
     auto buffer = nanovdb::HostBuffer::create(place.memory_bytes);
     std::uint64_t position = place.position;
     std::uint64_t rest = place.file_bytes;

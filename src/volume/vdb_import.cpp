@@ -191,15 +191,17 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   [[nodiscard]] const std::vector<Metadata>& metadata() const override { return file_metadata_; }
   [[nodiscard]] const std::string& format() const override { return format_; }
 
-  SourceGrid read(std::size_t index, const Log& /*log*/, const std::string& /*log_prefix*/) override {
+  [[nodiscard]] double opened() const override { return inputHasGridOffsets() ? 0.0 : 0.35; }
+
+  SourceGrid read(std::size_t index, Portion portion, const Log& /*log*/, const std::string& /*log_prefix*/) override {
     SourceGrid out;
-    openvdb::GridBase::Ptr grid = read_grid(descriptors_[index]);
+    openvdb::GridBase::Ptr grid = read_grid(descriptors_[index], portion);
     if (descriptors_[index].isInstance()) {
       const auto parent = std::find_if(descriptors_.begin(), descriptors_.end(), [&](const auto& d) {
         return d.uniqueName() == descriptors_[index].instanceParentName();
       });
       if (parent == descriptors_.end() || parent->isInstance()) fail("it shares the tree of a grid that is missing");
-      grid->setTree(read_grid(*parent)->baseTreePtr());
+      grid->setTree(read_grid(*parent, portion)->baseTreePtr());
     }
     const auto matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
     // OpenVDB multiplies row vectors from the left: its rows are our columns.
@@ -271,7 +273,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     metadata.readMeta(stream_);
     file_metadata_ = metadata_of(metadata);
     const std::int32_t count = readGridCount(stream_);
-    if (!inputHasGridOffsets()) stream_.begin(0.0, 0.5 * read_part, static_cast<std::uint64_t>(size_));
+    if (!inputHasGridOffsets()) stream_.begin(0.0, opened(), static_cast<std::uint64_t>(size_));
     if (count < 0) fail("the file is damaged: negative grid count");
     for (std::int32_t i = 0; i < count; ++i) read_entry();
   }
@@ -361,14 +363,12 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     return own;
   }
 
-  openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor) {
-    // An instance holds no tree. Without offsets the directory was a whole reading of the file, and this one may come
-    // close to another.
-    if (descriptor.isInstance()) {
-    } else if (inputHasGridOffsets()) {
-      stream_.begin(0.0, read_part, static_cast<std::uint64_t>(descriptor.getEndPos() - descriptor.getGridPos()));
-    } else {
-      stream_.begin(0.5 * read_part, read_part, static_cast<std::uint64_t>(size_));
+  openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor, Portion portion) {
+    // An instance holds no tree. Without offsets a grid's end is unknown, and the file's the best guess.
+    if (!descriptor.isInstance()) {
+      const std::int64_t bytes =
+          inputHasGridOffsets() ? descriptor.getEndPos() - descriptor.getGridPos() : size_ - descriptor.getGridPos();
+      stream_.begin(portion.from, portion.to, static_cast<std::uint64_t>(bytes));
     }
     openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(descriptor.gridType());
     own_tree(*grid);

@@ -27,6 +27,7 @@
 
 #include "base/error.hpp"
 #include "support/folder.hpp"
+#include "support/vdb_files.hpp"
 
 #if defined(__SANITIZE_ADDRESS__)
 #include <sanitizer/lsan_interface.h>
@@ -35,6 +36,8 @@
 namespace {
 
 namespace fs = std::filesystem;
+using cumulet::test::fog;
+using cumulet::test::Messages;
 using cumulet::volume::import_volume;
 using cumulet::volume::list_grids;
 using cumulet::volume::ScalarVolume;
@@ -42,13 +45,6 @@ using cumulet::volume::Tile;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
-
-struct Messages {
-  std::vector<std::string> warnings;
-  cumulet::Log log{[this](cumulet::LogLevel level, const char* text) {
-    if (level == cumulet::LogLevel::warning) warnings.emplace_back(text);
-  }};
-};
 
 /// Point queries on a volume, by the contract in volume.hpp.
 class Lookup {
@@ -186,15 +182,6 @@ class VolumeImport : public ::testing::Test {
 
   cumulet::test::Folder folder_;
 };
-
-#define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
-
-FloatGrid::Ptr fog(const std::string& name, float background = 0.0F) {
-  auto grid = FloatGrid::create(background);
-  grid->setName(name);
-  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-  return grid;
-}
 
 FloatGrid::Ptr reference(const fs::path& file, const std::string& name) {
   openvdb::io::File in(file.string());
