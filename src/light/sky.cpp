@@ -1,0 +1,393 @@
+#include "light/sky.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "light/spectrum.hpp"
+
+namespace cumulet::light {
+
+namespace {
+
+using glm::dvec3;
+using glm::vec3;
+using std::numbers::pi;
+
+// km
+constexpr double ground = 6360.0;
+constexpr double top = 6460.0;
+constexpr double air_scale_height = 8.0;
+constexpr double aerosol_scale_height = 1.2;
+constexpr double ozone_height = 25.0;
+constexpr double ozone_half_width = 15.0;
+
+constexpr double sun_angular_radius = 0.00465;  // radians
+constexpr double sun_outside = 5.0;             // its irradiance outside of the atmosphere, all colours alike
+constexpr double aerosol_albedo = 0.9;          // of what aerosols take out of a ray, the part that they scatter
+constexpr double aerosol_anisotropy = 0.8;
+constexpr double ozone_column = 300.0 * 2.687e20;  // 300 Dobson units, molecules per square metre
+
+// 370 to 380, ..., 780 to 790 nm: the sun's irradiance outside of the atmosphere, W / (m^2 nm) (ASTM G-173), and
+// ozone's cross-section at 233 K, m^2 (Serdyuchenko et al. 2014), each the mean over the bin, as collected by Bruneton
+// (2017).
+constexpr std::array<double, 42> solar_irradiance = {
+    1.14259, 1.01249, 1.14716, 1.72765, 1.73054, 1.6887,  1.61253, 1.91198, 2.03474, 2.02042, 2.02212,
+    1.93377, 1.95809, 1.91686, 1.8298,  1.8685,  1.8931,  1.85149, 1.8504,  1.8341,  1.8345,  1.8147,
+    1.78158, 1.7533,  1.6965,  1.68194, 1.64654, 1.6048,  1.52143, 1.55622, 1.5113,  1.474,   1.4482,
+    1.41018, 1.36775, 1.34188, 1.31429, 1.28303, 1.26758, 1.2367,  1.2082,  1.18737};
+constexpr std::array<double, 42> ozone_cross_section = {
+    2.182e-28, 2.818e-28, 6.636e-28, 1.527e-27, 2.763e-27, 5.52e-27,  8.451e-27, 1.582e-26, 2.316e-26,
+    3.669e-26, 4.924e-26, 7.752e-26, 9.016e-26, 1.48e-25,  1.602e-25, 2.139e-25, 2.755e-25, 3.091e-25,
+    3.5e-25,   4.266e-25, 4.672e-25, 4.398e-25, 4.701e-25, 5.019e-25, 4.305e-25, 3.74e-25,  3.215e-25,
+    2.662e-25, 2.238e-25, 1.852e-25, 1.473e-25, 1.209e-25, 9.423e-26, 7.455e-26, 6.566e-26, 5.105e-26,
+    4.15e-26,  4.228e-26, 3.237e-26, 2.451e-26, 2.801e-26, 2.534e-26};
+
+// Every second sample of a Spectrum.
+constexpr std::size_t band_count = 21;
+using Bands = std::array<float, band_count>;
+
+constexpr std::size_t sample_of(std::size_t band) { return 2 * band; }
+
+double at_band(const std::array<double, 42>& bins, std::size_t band) {
+  return 0.5 * (bins[sample_of(band)] + bins[sample_of(band) + 1]);
+}
+
+// What a band adds to a colour: a Spectrum that falls to nothing at the bands beside it.
+std::array<vec3, band_count> band_colours() {
+  std::array<vec3, band_count> colours{};
+  dvec3 all(0.0);
+  for (std::size_t band = 0; band < band_count; ++band) {
+    const double sun = at_band(solar_irradiance, band);
+    Spectrum spectrum{};
+    const std::size_t sample = sample_of(band);
+    spectrum[sample] = sun;
+    if (sample > 0) spectrum[sample - 1] = 0.5 * sun;
+    if (sample + 1 < spectrum.size()) spectrum[sample + 1] = 0.5 * sun;
+    const dvec3 colour = rec709(spectrum);
+    all += colour;
+    colours[band] = vec3(colour);
+  }
+  for (vec3& colour : colours) colour *= vec3(sun_outside / all);
+  return colours;
+}
+
+// Of air, aerosols and ozone how much there is per km, in units of what lies above the ground in all.
+dvec3 density(double height) {
+  return {std::exp(-height / air_scale_height) / air_scale_height,
+          std::exp(-height / aerosol_scale_height) / aerosol_scale_height,
+          std::max(0.0, 1.0 - std::abs(height - ozone_height) / ozone_half_width) / ozone_half_width};
+}
+
+// Distances along a ray that starts at radius r, at the cosine mu from straight up.
+double to_top(double r, double mu) {
+  return std::max(0.0, -r * mu + std::sqrt(std::max(0.0, r * r * (mu * mu - 1.0) + top * top)));
+}
+double horizon(double r) { return -std::sqrt(std::max(0.0, 1.0 - (ground / r) * (ground / r))); }
+bool meets_ground(double r, double mu) { return mu < horizon(r); }
+double to_ground(double r, double mu) {
+  return std::max(0.0, -r * mu - std::sqrt(std::max(0.0, r * r * (mu * mu - 1.0) + ground * ground)));
+}
+
+// A piecewise linear table's place: between i and i + 1.
+struct Between {
+  std::size_t i = 0;
+  float part = 0.0F;
+};
+Between between(double share, std::size_t count) {
+  const double at = std::clamp(share, 0.0, 1.0) * static_cast<double>(count - 1);
+  const std::size_t i = std::min(static_cast<std::size_t>(at), count - 2);
+  return {i, static_cast<float>(at - static_cast<double>(i))};
+}
+double share_of(std::size_t i, std::size_t count) { return static_cast<double>(i) / static_cast<double>(count - 1); }
+
+// How much of air, aerosols and ozone lies on rays that leave the atmosphere. By Bruneton and Neyret's mapping,
+// "Precomputed Atmospheric Scattering" (2008), which is smooth at the horizon.
+class Paths {
+ public:
+  Paths() : table_(radii * cosines) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, radii), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        const double tangent = farthest() * share_of(i, radii);  // to where the ray along the ground touches it
+        const double r = std::sqrt(tangent * tangent + ground * ground);
+        for (std::size_t j = 0; j < cosines; ++j) {
+          const double d = (top - r) + (tangent + farthest() - (top - r)) * share_of(j, cosines);
+          const double mu = d > 0.0 ? std::clamp((top * top - r * r - d * d) / (2.0 * r * d), -1.0, 1.0) : 1.0;
+          table_[i * cosines + j] = vec3(sum(r, mu));
+        }
+      }
+    });
+  }
+
+  // Of a ray that does not meet the ground.
+  [[nodiscard]] vec3 operator()(double r, double mu) const {
+    const double tangent = std::sqrt(std::max(0.0, r * r - ground * ground));
+    const double nearest = top - r;
+    const double length = to_top(r, mu);
+    const Between i = between(tangent / farthest(), radii);
+    const Between j = between((length - nearest) / (tangent + farthest() - nearest), cosines);
+    const vec3* row = &table_[i.i * cosines + j.i];
+    return glm::mix(glm::mix(row[0], row[1], j.part), glm::mix(row[cosines], row[cosines + 1], j.part), i.part);
+  }
+
+ private:
+  static constexpr std::size_t radii = 32;
+  static constexpr std::size_t cosines = 128;
+
+  static double farthest() { return std::sqrt(top * top - ground * ground); }
+
+  static dvec3 sum(double r, double mu) {
+    constexpr int steps = 128;
+    const double length = to_top(r, mu);
+    dvec3 result(0.0);
+    for (int i = 0; i < steps; ++i) {
+      // Closer together at the start, where the air is densest.
+      const double x = (i + 0.5) / steps;
+      const double t = length * x * x;
+      const double height = std::sqrt(r * r + t * t + 2.0 * r * mu * t) - ground;
+      result += density(std::max(height, 0.0)) * (2.0 * x * length / steps);
+    }
+    return result;
+  }
+
+  std::vector<vec3> table_;
+};
+
+// The air, and light in it as if the sun's were white and of irradiance 1.
+class Atmosphere {
+ public:
+  explicit Atmosphere(const SkyModel& model) : ground_albedo_(static_cast<float>(model.ground_albedo)) {
+    // Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight" (1999), after Angstrom.
+    const double aerosols = std::max(0.0, 0.04608 * model.turbidity - 0.04586);
+    for (std::size_t band = 0; band < band_count; ++band) {
+      const double um = 1.0e-3 * wavelength(sample_of(band));
+      const double um2 = um * um;
+      // Hansen and Travis, "Light Scattering in Planetary Atmospheres" (1974).
+      air_[band] = static_cast<float>(0.008569 / (um2 * um2) * (1.0 + 0.0113 / um2 + 0.00013 / (um2 * um2)));
+      aerosols_[band] = static_cast<float>(aerosols * std::pow(um, -1.3));
+      ozone_[band] = static_cast<float>(ozone_column * at_band(ozone_cross_section, band));
+    }
+    scatter_more();
+  }
+
+  // Of the sun's light at radius r, where it stands at the cosine mu from straight up.
+  [[nodiscard]] Bands sunlight(double r, double mu) const {
+    const double above = (mu - horizon(r)) / sun_angular_radius;
+    Bands result{};
+    if (above <= -1.0) return result;
+    // The part of the disc that the ground does not hide.
+    const double edge = std::min(above, 1.0);
+    const auto part = static_cast<float>(0.5 + (edge * std::sqrt(1.0 - edge * edge) + std::asin(edge)) / pi);
+    const vec3 path = paths_(r, std::max(mu, horizon(r)));
+    for (std::size_t b = 0; b < band_count; ++b) {
+      result[b] = part * std::exp(-(path.x * air_[b] + path.y * aerosols_[b] + path.z * ozone_[b]));
+    }
+    return result;
+  }
+
+  // Along a ray from radius r: calls visit(radius, cosine of the sun, per band: what aerosols and air scatter and what
+  // reaches the start) a step. Returns what comes through from its end.
+  template <class Visit>
+  Bands march(double r, double mu, double azimuth, double sun_mu, int steps, const Visit& visit) const {
+    const dvec3 start(0.0, r, 0.0);
+    const double across = std::sqrt(std::max(0.0, 1.0 - mu * mu));
+    const dvec3 along(across * std::cos(azimuth), mu, across * std::sin(azimuth));
+    const dvec3 sun(std::sqrt(std::max(0.0, 1.0 - sun_mu * sun_mu)), sun_mu, 0.0);
+    const double length = meets_ground(r, mu) ? to_ground(r, mu) : to_top(r, mu);
+    Bands through{};
+    through.fill(1.0F);
+    for (int i = 0; i < steps; ++i) {
+      // Closer together at the start, as in Paths.
+      const double x0 = static_cast<double>(i) / steps;
+      const double x1 = static_cast<double>(i + 1) / steps;
+      const double x = 0.5 * (x0 + x1);
+      const dvec3 at = start + length * x * x * along;
+      const double radius = glm::length(at);
+      const vec3 amount(density(std::max(0.0, radius - ground)) * (length * (x1 * x1 - x0 * x0)));
+      Bands air{};
+      Bands aerosols{};
+      for (std::size_t b = 0; b < band_count; ++b) {
+        const float by_air = amount.x * air_[b];
+        const float by_aerosols = amount.y * aerosols_[b];
+        const float depth = by_air + by_aerosols + amount.z * ozone_[b];
+        const float passes = std::exp(-depth);
+        // The mean over the step of what comes through from there.
+        const float mean = depth > 1.0e-4F ? (1.0F - passes) / depth : 1.0F - 0.5F * depth;
+        air[b] = through[b] * mean * by_air;
+        aerosols[b] = through[b] * mean * by_aerosols * static_cast<float>(aerosol_albedo);
+        through[b] *= passes;
+      }
+      visit(radius, glm::dot(at, sun) / radius, air, aerosols);
+    }
+    return through;
+  }
+
+  // Of light scattered more than once what a unit of scattering adds, from everywhere alike.
+  [[nodiscard]] Bands more(double r, double sun_mu) const {
+    const Between i = between(std::sqrt(std::max(0.0, r - ground) / (top - ground)), more_radii);
+    const Between j = between(0.5 + 0.5 * std::copysign(std::sqrt(std::abs(sun_mu)), sun_mu), more_cosines);
+    const Bands* row = &more_[i.i * more_cosines + j.i];
+    Bands result{};
+    for (std::size_t b = 0; b < band_count; ++b) {
+      const float low = glm::mix(row[0][b], row[1][b], j.part);
+      const float high = glm::mix(row[more_cosines][b], row[more_cosines + 1][b], j.part);
+      result[b] = glm::mix(low, high, i.part);
+    }
+    return result;
+  }
+
+ private:
+  static constexpr std::size_t more_radii = 10;
+  static constexpr std::size_t more_cosines = 32;
+
+  void scatter_more() {
+    more_.resize(more_radii * more_cosines);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, more_.size()), [&](const auto& range) {
+      for (std::size_t k = range.begin(); k != range.end(); ++k) {
+        const double height = share_of(k / more_cosines, more_radii);
+        const double side = 2.0 * share_of(k % more_cosines, more_cosines) - 1.0;
+        more_[k] = scattered_more(ground + (top - ground) * height * height, side * std::abs(side));
+      }
+    });
+  }
+
+  // Hillaire's: the second scattering with even phase functions, and all that follow as a geometric series of it.
+  [[nodiscard]] Bands scattered_more(double r, double sun_mu) const {
+    constexpr int cosines = 16;
+    constexpr int azimuths = 2;
+    constexpr int steps = 16;
+    constexpr float each = 1.0F / (cosines * azimuths);
+    Bands second{};
+    Bands again{};
+    for (int i = 0; i < cosines * azimuths; ++i) {
+      const int ring = i / azimuths;
+      const double mu = (ring + 0.5) / cosines * 2.0 - 1.0;
+      const double azimuth = (i % azimuths + 0.5) / azimuths * pi;
+      const auto visit = [&](double radius, double sun, const Bands& air, const Bands& aerosols) {
+        const Bands light = sunlight(radius, sun);
+        for (std::size_t b = 0; b < band_count; ++b) {
+          const float scattered = air[b] + aerosols[b];
+          second[b] += each * scattered * light[b] * static_cast<float>(0.25 / pi);
+          again[b] += each * scattered;
+        }
+      };
+      const Bands through = march(r, mu, azimuth, sun_mu, steps, visit);
+      if (!meets_ground(r, mu)) continue;
+      const double length = to_ground(r, mu);
+      const double across = std::sqrt(std::max(0.0, 1.0 - mu * mu));
+      const double sun_across = std::sqrt(std::max(0.0, 1.0 - sun_mu * sun_mu));
+      const double sun =
+          ((r + length * mu) * sun_mu + length * across * std::cos(azimuth) * sun_across) / ground;  // where it ends
+      if (!(sun > 0.0)) continue;
+      const Bands light = sunlight(ground, sun);
+      const float back = each * ground_albedo_ * static_cast<float>(sun / pi);
+      for (std::size_t b = 0; b < band_count; ++b) second[b] += back * through[b] * light[b];
+    }
+    for (std::size_t b = 0; b < band_count; ++b) second[b] /= 1.0F - again[b];
+    return second;
+  }
+
+  float ground_albedo_;
+  Paths paths_;
+  // Optical depths of all that is straight above the ground.
+  Bands air_{};
+  Bands aerosols_{};
+  Bands ozone_{};
+  std::vector<Bands> more_;
+};
+
+double air_phase(double cosine) { return 3.0 / (16.0 * pi) * (1.0 + cosine * cosine); }
+
+// Cornette and Shanks, "Physically Reasonable Analytic Expression for the Single-Scattering Phase Function" (1992).
+double aerosol_phase(double cosine) {
+  constexpr double g = aerosol_anisotropy;
+  return 3.0 / (8.0 * pi) * (1.0 - g * g) * (1.0 + cosine * cosine) /
+         ((2.0 + g * g) * std::pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
+}
+
+vec3 colour_of(const std::array<vec3, band_count>& colours, const Bands& bands) {
+  vec3 sum(0.0F);
+  for (std::size_t b = 0; b < band_count; ++b) sum += bands[b] * colours[b];
+  return sum;
+}
+
+double elevation_of_row(std::size_t row, std::size_t rows) {
+  const double share = share_of(row, rows);
+  return 0.5 * pi * share * share;
+}
+
+}  // namespace
+
+Sky::Sky(const SkyModel& model, const dvec3& to_sun) : to_sun_(to_sun), table_(rows * columns) {
+  constexpr int steps = 40;
+  const Atmosphere atmosphere(model);
+  const std::array<vec3, band_count> colours = band_colours();
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, table_.size()), [&](const auto& range) {
+    for (std::size_t k = range.begin(); k != range.end(); ++k) {
+      const double mu = std::sin(elevation_of_row(k / columns, rows));
+      const double azimuth = pi * share_of(k % columns, columns);
+      Bands once_by_air{};
+      Bands once_by_aerosols{};
+      Bands more{};
+      atmosphere.march(ground, mu, azimuth, to_sun.y, steps,
+                       [&](double radius, double sun, const Bands& air, const Bands& aerosols) {
+                         const Bands light = atmosphere.sunlight(radius, sun);
+                         const Bands even = atmosphere.more(radius, sun);
+                         for (std::size_t b = 0; b < band_count; ++b) {
+                           once_by_air[b] += air[b] * light[b];
+                           once_by_aerosols[b] += aerosols[b] * light[b];
+                           more[b] += (air[b] + aerosols[b]) * even[b];
+                         }
+                       });
+      table_[k] = {colour_of(colours, once_by_air), colour_of(colours, once_by_aerosols), colour_of(colours, more)};
+    }
+  });
+
+  sun_irradiance_ = glm::max(colour_of(colours, atmosphere.sunlight(ground, to_sun.y)), vec3(0.0F));
+
+  // Evenly over the disc below the hemisphere, by which its light falls on the ground.
+  constexpr int rings = 64;
+  constexpr int sectors = 128;
+  dvec3 sum(0.0);
+  for (int i = 0; i < rings; ++i) {
+    const double across = std::sqrt((i + 0.5) / rings);
+    for (int j = 0; j < sectors; ++j) {
+      const double azimuth = 2.0 * pi * (j + 0.5) / sectors;
+      const dvec3 direction(across * std::sin(azimuth), std::sqrt(1.0 - across * across), across * std::cos(azimuth));
+      sum += dvec3(radiance(direction));
+    }
+  }
+  sky_irradiance_ = vec3(sum * (pi / (rings * sectors)));
+
+  const vec3 falls = sky_irradiance_ + sun_irradiance_ * static_cast<float>(std::max(0.0, to_sun.y));
+  ground_radiance_ = falls * static_cast<float>(model.ground_albedo / pi);
+}
+
+Sky::Scattered Sky::scattered(double elevation, double azimuth) const {
+  const Between row = between(std::sqrt(elevation / (0.5 * pi)), rows);
+  const Between column = between(azimuth / pi, columns);
+  const Scattered* at = &table_[row.i * columns + column.i];
+  const auto mixed = [&](vec3 Scattered::*part) {
+    return glm::mix(glm::mix(at[0].*part, at[1].*part, column.part),
+                    glm::mix(at[columns].*part, at[columns + 1].*part, column.part), row.part);
+  };
+  return {mixed(&Scattered::air), mixed(&Scattered::aerosols), mixed(&Scattered::more)};
+}
+
+vec3 Sky::radiance(const dvec3& direction) const {
+  if (direction.y < 0.0) return ground_radiance_;
+  // From the sun's azimuth, to either side alike.
+  const double sine = direction.x * to_sun_.z - direction.z * to_sun_.x;
+  const double cosine = direction.x * to_sun_.x + direction.z * to_sun_.z;
+  const Scattered s = scattered(std::asin(std::min(direction.y, 1.0)), std::abs(std::atan2(sine, cosine)));
+  const double from_sun = std::clamp(glm::dot(direction, to_sun_), -1.0, 1.0);
+  return glm::max(s.air * static_cast<float>(air_phase(from_sun)) +
+                      s.aerosols * static_cast<float>(aerosol_phase(from_sun)) + s.more,
+                  vec3(0.0F));
+}
+
+}  // namespace cumulet::light
