@@ -31,12 +31,19 @@ struct GridNames {
   std::string colour;  ///< of "colour" the grids "colour_r", "colour_g" and "colour_b"
 };
 
-/// Reads the fields of a .vdb or .nvdb file, each as import_volume reads a grid. The lattice is density's; without
-/// density, that of temperature or flame, whichever has the smaller voxels or else more active ones, so that such a
-/// file renders as fire.
+/// Reads the fields of a .vdb or .nvdb file, each as import_volume reads a grid.
+///
+/// The lattice is density's; without density, that of temperature or flame, whichever has the smaller voxels or else
+/// more active ones, so that such a file renders as fire. A field whose voxels are in the same places, to a thousandth
+/// of a voxel, is taken as it is. Another one is resampled: a voxel is its trilinear interpolation between voxel
+/// centres, at the centre of that voxel; where a step of the lattice is more than 1.5 of the field's voxels, the mean
+/// of interpolations at equal distances within the voxel, an axis one for every voxel of the field in a step, 8 at
+/// most. Beyond the field's bounds stands 0, to which it falls off within one of its voxels. Active are then the voxels
+/// that are not 0. Offsets of whole voxels so move values exactly.
 ///
 /// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
-/// out. A warning names the grids that are not shown, as import_volume's.
+/// out. Warnings: as import_volume's; the grids that are not shown; temperature or colour that lies nowhere over
+/// density. An info tells of temperatures that seem to be kelvin, degrees Celsius, or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
 

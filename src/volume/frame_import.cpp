@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <sstream>
 #include <vector>
 
 #include "volume/frame.hpp"
-#include "volume/import_detail.hpp"
+#include "volume/resample.hpp"
 
 namespace cumulet::volume {
 
@@ -96,69 +97,133 @@ bool finer(const ScalarVolume& a, const ScalarVolume& b) {
   return a.active_voxels > b.active_voxels;
 }
 
-/// Whether voxels of both lie in the same places, within a thousandth of a voxel.
-bool same_lattice(const glm::dmat4& field, const glm::dmat4& lattice, const Box& voxels) {
-  const glm::dmat4 to_field = glm::inverse(field) * lattice;
-  for (int corner = 0; corner < 8; ++corner) {
-    const glm::dvec4 p((corner & 1) != 0 ? voxels.max.x : voxels.min.x, (corner & 2) != 0 ? voxels.max.y : voxels.min.y,
-                       (corner & 4) != 0 ? voxels.max.z : voxels.min.z, 1.0);
-    const glm::dvec4 moved = glm::abs(to_field * p - p);
-    if (!(std::max({moved.x, moved.y, moved.z}) < 1e-3)) return false;
-  }
-  return true;
+bool apart(const ScalarVolume& a, const ScalarVolume& b) {
+  return Box{a.bounds_min, a.bounds_max}.clipped({b.bounds_min, b.bounds_max}).empty();
 }
 
-void put_on(const glm::dmat4& lattice, ScalarVolume& field) {
-  if (!same_lattice(field.index_to_world, lattice, {field.bounds_min, field.bounds_max})) {
-    fail("is on another lattice than the file's other fields");
+/// What the values of a temperature seem to be where they are not what simulations have, 0 to 3.
+std::string remark_on_temperature(const ScalarVolume& field) {
+  constexpr float hottest_simulated = 20.0F;
+  std::ostringstream out;
+  if (field.max_value > hottest_simulated) {
+    out << "reaches " << field.max_value;
+    if (field.negative_voxels > 0) {
+      out << " and has negative values, as degrees Celsius do: the scale of those is 1, the offset 273.15";
+    } else {
+      out << ", as kelvin do: the scale of those is 1";
+    }
+  } else if (field.max_value > 0.0F && field.max_value <= 1.0F) {
+    out << "reaches " << field.max_value << " only, as temperatures from 0 to 1 do: those may want a larger scale";
   }
-  field.index_to_world = lattice;
+  return out.str();
 }
+
+class FrameImport {
+ public:
+  FrameImport(std::string file, const Log& log, Progress* progress)
+      : file_(std::move(file)), log_(log), progress_(progress) {}
+
+  VolumeFrame run(Reader& reader, const GridNames& names) {
+    const Chosen chosen = choose(reader.grids(), names);
+    if (by_name(names.density) && chosen.density) {
+      remark(LogLevel::warning, file_, remark_on_choice(reader.grids(), *chosen.density, chosen.all()));
+    }
+    constexpr double reading = 0.8;
+    const Portion whole{reader.opened(), 1.0};
+    read(reader, chosen, whole.part(0.0, reading));
+    if (!chosen.density) {
+      const bool by_flame = out_.flame && (!out_.temperature || finer(*out_.flame, *out_.temperature));
+      out_.density.index_to_world = (by_flame ? *out_.flame : *out_.temperature).index_to_world;
+      out_.density.bounds_max = out_.density.bounds_min;
+    }
+    place(whole.part(reading, 1.0));
+    return std::move(out_);
+  }
+
+ private:
+  void read(Reader& reader, const Chosen& chosen, Portion portion) {
+    Shares shares(portion, chosen.all().size());
+    const auto field = [&](std::size_t grid) {
+      return import_grid(reader, grid, file_, log_, progress_, shares.next());
+    };
+    if (chosen.density) out_.density = field(*chosen.density);
+    if (chosen.temperature) {
+      out_.temperature = field(*chosen.temperature);
+      remark(LogLevel::info, name_of(*out_.temperature), remark_on_temperature(*out_.temperature));
+    }
+    if (chosen.flame) out_.flame = field(*chosen.flame);
+    if (!chosen.colour.empty()) std::ranges::transform(chosen.colour, out_.colour.emplace().begin(), field);
+  }
+
+  void place(Portion portion) {
+    std::vector<ScalarVolume*> fields;
+    if (out_.temperature) fields.push_back(&*out_.temperature);
+    if (out_.flame) fields.push_back(&*out_.flame);
+    if (out_.colour) std::ranges::transform(*out_.colour, std::back_inserter(fields), [](auto& c) { return &c; });
+    Shares shares(portion, fields.size());
+    for (ScalarVolume* field : fields) {
+      const std::string name = name_of(*field);
+      naming(name, [&] { put_on_lattice(*field, shares.next()); });
+    }
+    if (out_.temperature) warn_if_apart(*out_.temperature);
+    if (out_.colour && std::ranges::all_of(*out_.colour, [&](auto& c) { return apart(c, out_.density); })) {
+      warn_if_apart((*out_.colour)[0]);
+    }
+  }
+
+  void put_on_lattice(ScalarVolume& field, Portion portion) const {
+    const glm::dmat4& lattice = out_.density.index_to_world;
+    if (!field.empty() && !same_places(field.index_to_world, lattice, {field.bounds_min, field.bounds_max})) {
+      constexpr double sampling = 0.7;
+      SourceGrid placed = resample(field, lattice, progress_, portion.part(0.0, sampling));
+      // What there is to say of its values is said.
+      ScalarVolume volume = assemble(std::move(placed), {}, {}, progress_, portion.part(sampling, 1.0));
+      volume.name = field.name;
+      volume.negative_voxels = field.negative_voxels;
+      volume.non_finite_voxels = field.non_finite_voxels;
+      field = std::move(volume);
+    }
+    field.index_to_world = lattice;
+  }
+
+  void warn_if_apart(const ScalarVolume& field) const {
+    if (field.empty() || out_.density.empty() || !apart(field, out_.density)) return;
+    remark(LogLevel::warning, name_of(field), "lies nowhere over \"" + out_.density.name + "\"");
+  }
+
+  [[nodiscard]] std::string name_of(const ScalarVolume& field) const { return file_ + ": grid \"" + field.name + "\""; }
+
+  void remark(LogLevel level, const std::string& what, const std::string& text) const {
+    if (!text.empty()) log_.write(level, one_line(what + ": " + text));
+  }
+
+  /// Equal shares of a load's fraction.
+  class Shares {
+   public:
+    Shares(Portion portion, std::size_t count) : portion_(portion), share_(1.0 / static_cast<double>(count)) {}
+    Portion next() {
+      const double from = share_ * done_++;
+      return portion_.part(from, from + share_);
+    }
+
+   private:
+    Portion portion_;
+    double share_;
+    int done_ = 0;
+  };
+
+  std::string file_;
+  const Log& log_;
+  Progress* progress_;
+  VolumeFrame out_;
+};
 
 }  // namespace
 
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress) {
-  return naming(file.string(), [&] {
-    const std::unique_ptr<Reader> reader = open(file, progress);
-    const std::vector<GridInfo>& grids = reader->grids();
-    const Chosen chosen = choose(grids, names);
-    const std::vector<std::size_t> shown = chosen.all();
-    if (by_name(names.density) && chosen.density) {
-      const std::string remark = remark_on_choice(grids, *chosen.density, shown);
-      if (!remark.empty()) log.warning(one_line(file.string() + ": " + remark));
-    }
-
-    const Portion whole{reader->opened(), 1.0};
-    const double share = 1.0 / static_cast<double>(shown.size());
-    std::size_t done = 0;
-    const auto import = [&](std::size_t grid) {
-      const double from = share * static_cast<double>(done++);
-      return import_grid(*reader, grid, file.string(), log, progress, whole.part(from, from + share));
-    };
-    VolumeFrame out;
-    if (chosen.density) out.density = import(*chosen.density);
-    if (chosen.temperature) out.temperature = import(*chosen.temperature);
-    if (chosen.flame) out.flame = import(*chosen.flame);
-    if (!chosen.colour.empty()) {
-      auto& colour = out.colour.emplace();
-      for (std::size_t i = 0; i < colour.size(); ++i) colour[i] = import(chosen.colour[i]);
-    }
-
-    if (!chosen.density) {
-      const bool by_flame = out.flame && (!out.temperature || finer(*out.flame, *out.temperature));
-      out.density.index_to_world = (by_flame ? *out.flame : *out.temperature).index_to_world;
-      out.density.bounds_max = out.density.bounds_min;
-    }
-    const auto place = [&](ScalarVolume& field) {
-      naming(one_line(file.string() + ": grid \"" + field.name + "\""),
-             [&] { put_on(out.density.index_to_world, field); });
-    };
-    if (out.temperature) place(*out.temperature);
-    if (out.flame) place(*out.flame);
-    if (out.colour) std::ranges::for_each(*out.colour, place);
-    return out;
-  });
+  return naming(file.string(),
+                [&] { return FrameImport(file.string(), log, progress).run(*open(file, progress), names); });
 }
 
 }  // namespace cumulet::volume

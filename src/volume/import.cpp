@@ -35,13 +35,13 @@ std::string detail::to_string(glm::ivec3 v) {
   return out.str();
 }
 
-namespace {
-
-// Longer than any asset, short enough that every voxel count and index difference fits its integer.
-constexpr int max_extent = 1 << 20;
-constexpr int max_coordinate = 1 << 30;
-
-}  // namespace
+ActiveMask detail::not_zero(std::span<const float, brick_voxels> values) {
+  ActiveMask mask{};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    mask[i / 64] |= std::uint64_t{values[i] != 0.0F ? 1U : 0U} << (i % 64);
+  }
+  return mask;
+}
 
 std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress* progress) {
   namespace fs = std::filesystem;

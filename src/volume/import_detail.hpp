@@ -26,6 +26,12 @@ namespace cumulet::volume::detail {
 
 /// Word x holds the 64 voxels of the slab x; bit y * 8 + z (both libraries' leaf masks).
 using ActiveMask = std::array<std::uint64_t, brick_size>;
+/// Those of a brick's voxels that are not zero.
+ActiveMask not_zero(std::span<const float, brick_voxels> values);
+
+// Longer than any asset, short enough that every voxel count and index difference fits its integer.
+inline constexpr int max_extent = 1 << 20;
+inline constexpr int max_coordinate = 1 << 30;
 
 /// The leaves of one grid, still in their library's own memory. Safe to read from many threads.
 class LeafSource {

@@ -33,11 +33,7 @@ class DenseLeaves final : public LeafSource {
   [[nodiscard]] ActiveMask active(std::size_t leaf) const override {
     std::array<float, brick_voxels> brick;
     values(leaf, brick.data());
-    ActiveMask mask{};
-    for (std::size_t i = 0; i < brick.size(); ++i) {
-      mask[i / 64] |= std::uint64_t{brick[i] != 0.0F ? 1U : 0U} << (i % 64);
-    }
-    return mask;
+    return not_zero(brick);
   }
   void values(std::size_t leaf, float* out) const override {
     const glm::ivec3 origin = origins_[leaf];

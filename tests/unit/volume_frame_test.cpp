@@ -3,6 +3,9 @@
 #include "volume/frame.hpp"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <random>
 
 #include "base/error.hpp"
 #include "support/folder.hpp"
@@ -164,6 +167,232 @@ TEST_F(Frame, WhatIsNotShownIsRemarkedOn) {
   (void)import_frame(write({dot("smoke", 1.0F), dot("temperature", 1.0F), dot("shadow", 1.0F)}), {}, messages.log);
   ASSERT_EQ(messages.warnings.size(), 1U);
   EXPECT_HAS(messages.warnings[0], "shows its grid \"smoke\" (float, fog volume); there is also \"shadow\"");
+}
+
+// --- fields on another lattice ---
+
+/// A box of voxels of function(world), with this transform.
+template <class Function>
+FloatGrid::Ptr box(const std::string& name, const openvdb::math::Mat4d& index_to_world, int size, Function function) {
+  auto grid = fog(name);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(index_to_world));
+  auto accessor = grid->getAccessor();
+  for (Coord c(0); c.x() < size; ++c.x()) {
+    for (c.y() = 0; c.y() < size; ++c.y()) {
+      for (c.z() = 0; c.z() < size; ++c.z()) accessor.setValue(c, function(grid->indexToWorld(c)));
+    }
+  }
+  return grid;
+}
+
+using openvdb::Vec3d;
+
+openvdb::math::Mat4d scaled(double voxel, const Vec3d& first = Vec3d(0.0)) {
+  openvdb::math::Mat4d m;
+  m.setToScale(Vec3d(voxel));
+  m.postTranslate(first);
+  return m;
+}
+
+float plane(const Vec3d& p) { return static_cast<float>(2.0 + 0.125 * p.x() - 0.0625 * p.y() + 0.03125 * p.z()); }
+
+/// Compares at every voxel whose place is within the box [low, high].
+template <class Function>
+void expect_values(const ScalarVolume& v, const Vec3d& low, const Vec3d& high, Function function, double tolerance) {
+  int compared = 0;
+  for (glm::ivec3 p = v.bounds_min; p.x <= v.bounds_max.x; ++p.x) {
+    for (p.y = v.bounds_min.y; p.y <= v.bounds_max.y; ++p.y) {
+      for (p.z = v.bounds_min.z; p.z <= v.bounds_max.z; ++p.z) {
+        const glm::dvec4 w = v.index_to_world * glm::dvec4(p, 1.0);
+        const Vec3d world(w.x, w.y, w.z);
+        if (world.x() < low.x() || world.y() < low.y() || world.z() < low.z()) continue;
+        if (world.x() > high.x() || world.y() > high.y() || world.z() > high.z()) continue;
+        ASSERT_NEAR(value_at(v, p), function(world), tolerance) << world;
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 100);
+}
+
+/// What a field holds over all of space.
+double integral(const ScalarVolume& v) {
+  double sum = 0.0;
+  for (glm::ivec3 p = v.bounds_min; p.x <= v.bounds_max.x; ++p.x) {
+    for (p.y = v.bounds_min.y; p.y <= v.bounds_max.y; ++p.y) {
+      for (p.z = v.bounds_min.z; p.z <= v.bounds_max.z; ++p.z) sum += value_at(v, p);
+    }
+  }
+  return sum * std::abs(glm::determinant(glm::dmat3(v.index_to_world)));
+}
+
+TEST_F(Frame, CoarserFieldsAreInterpolated) {
+  // A plane is what trilinear interpolation keeps.
+  const auto density = box("density", scaled(0.5), 40, [](const Vec3d&) { return 1.0F; });
+  const auto heat = box("heat", scaled(1.75, Vec3d(1.0, 2.0, 3.0)), 8, plane);
+  const VolumeFrame frame = import_frame(write({density, heat}), {}, {});
+  ASSERT_TRUE(frame.temperature);
+  const ScalarVolume& v = *frame.temperature;
+  EXPECT_EQ(v.index_to_world, frame.density.index_to_world);
+  EXPECT_EQ(v.name, "heat");
+  // From the first centre to the last; then down to 0 at the next, which is one of the lattice's.
+  expect_values(v, Vec3d(1.0, 2.0, 3.0), Vec3d(1.0, 2.0, 3.0) + 7.0 * 1.75, plane, 1e-5);
+  EXPECT_EQ(v.bounds_min, glm::ivec3(-1, 1, 3));
+  EXPECT_EQ(v.bounds_max, glm::ivec3(29, 31, 33));
+  const ScalarVolume alone = import_volume(path(), "heat", {});
+  EXPECT_NEAR(integral(v), integral(alone), 1e-2 * integral(alone));
+}
+
+TEST_F(Frame, TurnedAndShearedLatticesAreInterpolated) {
+  openvdb::math::Mat4d turned = scaled(0.8, Vec3d(4.0, 5.0, 6.0));
+  turned.preRotate(openvdb::math::Z_AXIS, 0.7);
+  turned.preRotate(openvdb::math::X_AXIS, -0.4);
+  turned.preShear(openvdb::math::X_AXIS, openvdb::math::Y_AXIS, 0.3);
+  const auto density = box("density", scaled(1.0), 20, [](const Vec3d&) { return 1.0F; });
+  const auto flame = box("flame", turned, 20, plane);
+  const VolumeFrame frame = import_frame(write({density, flame}), {}, {});
+  ASSERT_TRUE(frame.flame);
+  const Vec3d centre = flame->indexToWorld(Vec3d(9.5));
+  expect_values(*frame.flame, centre - 3.0, centre + 3.0, plane, 1e-5);
+  const ScalarVolume alone = import_volume(path(), "flame", {});
+  EXPECT_NEAR(integral(*frame.flame), integral(alone), 2e-3 * integral(alone));
+}
+
+TEST_F(Frame, FinerFieldsAreAveraged) {
+  // Voxels of the lattice hold 2, 3 and 4 of the field's, whole: noise keeps its mean, voxel by voxel.
+  std::mt19937 random(5);
+  for (const int ratio : {2, 3, 4}) {
+    const auto density = box("density", scaled(ratio), 16, [](const Vec3d&) { return 1.0F; });
+    const Vec3d first(-0.5 * (ratio - 1));
+    const auto noise = [&](const Vec3d&) { return static_cast<float>(random() % 1000) / 1000.0F; };
+    const auto heat = box("temperature", scaled(1.0, first), 16 * ratio, noise);
+    const VolumeFrame frame = import_frame(write({density, heat}), {}, {});
+    ASSERT_TRUE(frame.temperature);
+    const auto mean = [&](const Vec3d& world) {
+      double sum = 0.0;
+      const Coord low = Coord::round(heat->worldToIndex(world + first));
+      for (int i = 0; i < ratio * ratio * ratio; ++i) {
+        sum += heat->tree().getValue(low.offsetBy(i % ratio, i / ratio % ratio, i / ratio / ratio));
+      }
+      return sum / (ratio * ratio * ratio);
+    };
+    expect_values(*frame.temperature, Vec3d(-1.0), Vec3d(16.0 * ratio), mean, 1e-5);
+    EXPECT_EQ(frame.temperature->bounds_min, glm::ivec3(0));
+    EXPECT_EQ(frame.temperature->bounds_max, glm::ivec3(15));
+  }
+}
+
+TEST_F(Frame, AnOffsetOfWholeVoxelsMovesValuesExactly) {
+  std::mt19937 random(6);
+  const auto noise = [&](const Vec3d&) { return static_cast<float>(random()); };
+  const auto density = box("density", scaled(0.1), 4, noise);
+  // As float arithmetic has it, which is not exactly 3 voxels.
+  const auto flame = box("flame", scaled(0.1, Vec3d(static_cast<double>(0.3F))), 20, noise);
+  const VolumeFrame frame = import_frame(write({density, flame}), {}, {});
+  ASSERT_TRUE(frame.flame);
+  EXPECT_EQ(frame.flame->bounds_min, glm::ivec3(3));
+  EXPECT_EQ(frame.flame->bounds_max, glm::ivec3(22));
+  EXPECT_EQ(frame.flame->active_voxels, 8000U);
+  for (auto it = flame->cbeginValueOn(); it; ++it) {
+    const Coord c = it.getCoord();
+    ASSERT_EQ(value_at(*frame.flame, glm::ivec3(c.x(), c.y(), c.z()) + 3), *it) << c;
+  }
+}
+
+TEST_F(Frame, TilesAndBackgroundsStaySparse) {
+  const auto density = dot("density", 1.0F);
+  auto heat = fog("temperature", 0.25F);
+  heat->setTransform(openvdb::math::Transform::createLinearTransform(scaled(2.0, Vec3d(0.3, 0.6, 0.9))));
+  heat->tree().addTile(2, Coord(0), 0.5F, true);
+  heat->tree().addTile(1, Coord(256, 256, 256), 0.75F, true);
+  const VolumeFrame frame = import_frame(write({density, heat}), {}, {});
+  ASSERT_TRUE(frame.temperature);
+  const ScalarVolume& v = *frame.temperature;
+  EXPECT_EQ(v.bounds_min, glm::ivec3(-1));
+  EXPECT_EQ(v.bounds_max, glm::ivec3(528));
+  EXPECT_EQ(value_at(v, glm::ivec3(100)), 0.5F);
+  EXPECT_EQ(value_at(v, glm::ivec3(400)), 0.25F);
+  EXPECT_EQ(value_at(v, glm::ivec3(520)), 0.75F);
+  EXPECT_LT(v.brick_origins.size(), 40000U);
+  EXPECT_LT(v.tiles.size(), 40000U);
+}
+
+TEST_F(Frame, WithoutDensityTheFinestFieldGivesTheLattice) {
+  const auto ones = [](const Vec3d&) { return 1.0F; };
+  auto heat = box("temperature", scaled(0.5), 10, ones);
+  auto flame = box("flame", scaled(0.25), 10, ones);
+  EXPECT_EQ(import_frame(write({heat, flame}), {}, {}).density.index_to_world[0][0], 0.25);
+  EXPECT_EQ(import_frame(write({flame, heat}), naming({{&GridNames::flame, "none"}}), {}).density.index_to_world[0][0],
+            0.5);
+  // Of the same size the one of more voxels, which is then as it was.
+  heat = box("temperature", scaled(0.25, Vec3d(0.1)), 11, ones);
+  const VolumeFrame frame = import_frame(write({flame, heat}), {}, {});
+  EXPECT_TRUE(frame.density.empty());
+  EXPECT_NEAR(frame.density.index_to_world[3][0], 0.1, 1e-12);
+  ASSERT_TRUE(frame.flame && frame.temperature);
+  EXPECT_EQ(frame.flame->index_to_world, frame.density.index_to_world);
+  EXPECT_EQ(frame.temperature->active_voxels, 1331U);
+}
+
+TEST_F(Frame, FieldsBesideDensityAreKeptAndTold) {
+  const auto ones = [](const Vec3d&) { return 1.0F; };
+  const openvdb::GridPtrVec grids = {box("density", scaled(1.0), 10, ones),
+                                     box("flame", scaled(1.0, Vec3d(100.0)), 10, ones),
+                                     box("temperature", scaled(0.9, Vec3d(100.0)), 10, ones)};
+  Messages messages;
+  const VolumeFrame frame = import_frame(write(grids), {}, messages.log);
+  EXPECT_EQ(frame.flame->bounds_min, glm::ivec3(100));
+  EXPECT_EQ(frame.temperature->bounds_min, glm::ivec3(100));
+  ASSERT_EQ(messages.warnings.size(), 1U);
+  EXPECT_HAS(messages.warnings[0], path().string() + ": grid \"temperature\": lies nowhere over \"density\"");
+}
+
+TEST_F(Frame, ALatticeOutOfReachIsRefused) {
+  auto far = dot("flame", 1.0F);
+  far->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e9)));
+  EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": is too far off or too large");
+}
+
+TEST_F(Frame, ResamplingIsTheSameWhateverTheThreadsAndCanBeStopped) {
+  std::mt19937 random(8);
+  const auto noise = [&](const Vec3d&) { return static_cast<float>(random() % 1000); };
+  write({box("density", scaled(1.0), 10, noise), box("flame", scaled(0.7, Vec3d(0.2)), 60, noise)});
+  const auto read = [&](int threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    return import_frame(path(), {}, {});
+  };
+  const VolumeFrame one = read(1);
+  expect_same(*one.flame, *read(4).flame);
+
+  cumulet::Progress progress;
+  progress.cancel();
+  try {
+    (void)import_frame(path(), {}, {}, &progress);
+    ADD_FAILURE() << "was not cancelled";
+  } catch (const cumulet::Error& e) {
+    EXPECT_EQ(e.code(), cumulet::ErrorCode::cancelled);
+  }
+  cumulet::Progress whole;
+  (void)import_frame(path(), {}, {}, &whole);
+  EXPECT_NEAR(whole.fraction(), 1.0, 1e-9);
+}
+
+TEST_F(Frame, TemperaturesThatAreNotASimulationsAreRemarkedOn) {
+  struct Case {
+    float low, high;
+    std::string hint;
+  };
+  for (const Case& c : {Case{0.0F, 2.5F, ""}, Case{0.0F, 0.9F, "as temperatures from 0 to 1 do"},
+                        Case{0.0F, 1800.0F, "as kelvin do"}, Case{-5.0F, 900.0F, "as degrees Celsius do"}}) {
+    auto heat = dot("temperature", c.high);
+    heat->tree().setValue(Coord(5, 5, 5), c.low);
+    Messages messages;
+    (void)import_frame(write({dot("density", 1.0F), heat}), {}, messages.log);
+    ASSERT_EQ(messages.hints.size(), c.hint.empty() ? 0U : 1U);
+    if (!c.hint.empty()) {
+      EXPECT_HAS(messages.hints[0], c.hint);
+    }
+  }
 }
 
 TEST_F(Frame, SimulatedFiresAreReadAsTheyAre) {
