@@ -70,6 +70,11 @@ uvec4 cm_record(uint cell, uint part) {
 #endif
 }
 
+#if CM_EMISSION
+layout(binding = CM_UNIT_EMISSION) uniform usamplerBuffer cm_emission_records;
+uvec4 cm_emission_record(uint cell) { return texelFetch(cm_emission_records, int(cm.grid.first_emission + cell)); }
+#endif
+
 uint cm_tree(uint node) {
   uint word = cm.grid.tree + node;
   return cm_link(texelFetch(cm_tree_words, int(word >> 2)), word & 3u);
@@ -77,7 +82,14 @@ uint cm_tree(uint node) {
 
 uint cm_root_leaf(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].x : cm_roots[root >> 1].z; }
 uint cm_root_node(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].y : cm_roots[root >> 1].w; }
-#elif CM_MARCH == 1
+#else
+#if CM_EMISSION
+layout(binding = CM_UNIT_EMISSION) uniform sampler3D cm_emission_voxels;
+vec3 cm_emission_voxel(ivec3 voxel) {
+  return cm.grid.emission_unit * texelFetch(cm_emission_voxels, voxel - ivec3(cm.grid.box_min), 0).rgb;
+}
+#endif
+#if CM_MARCH == 1
 layout(binding = CM_UNIT_VOXELS) uniform sampler3D cm_voxels;
 float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(cm.grid.box_min), 0).x; }
 #else
@@ -87,5 +99,6 @@ uint cm_brick_slot(ivec3 brick) {
   return texelFetch(cm_brick_slots, brick - (ivec3(cm.grid.box_min) >> 3), 0).x;
 }
 float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * 512u + index)).x; }
+#endif
 #endif
 #endif

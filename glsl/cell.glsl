@@ -13,14 +13,14 @@
 // shapes of docs/architecture.md. Faces are numbered 0: z >= 0, 1: x >= y, 2: y >= z, 3: the cap.
 //
 // Shape word, 16 bits: 0-2 sign of frame axes x, y, z; 3-4, 5-6, 7-8 cube axis behind frame axis x, y, z;
-// 9-10 class; 11-15 exponent.
+// 9-10 class; 11-14 exponent; 15, of records, that the cell gives off light.
 #ifndef CM_CELL_GLSL
 #define CM_CELL_GLSL
 
 #define CM_NONE 0xffffffffu
 
 CM_FN uint cm_shape_class(uint shape) { return (shape >> 9) & 3u; }
-CM_FN uint cm_shape_exponent(uint shape) { return (shape >> 11) & 31u; }
+CM_FN uint cm_shape_exponent(uint shape) { return (shape >> 11) & 15u; }
 // 2^exponent and 2^-exponent, exactly.
 CM_FN float cm_shape_unit(uint shape) { return uintBitsToFloat((127u + cm_shape_exponent(shape)) << 23); }
 CM_FN float cm_shape_inverse_unit(uint shape) { return uintBitsToFloat((127u - cm_shape_exponent(shape)) << 23); }
@@ -137,11 +137,12 @@ CM_FN void cm_root_cell(uint root, uint exponent, CM_OUT(vec3) v0, CM_OUT(uint) 
 }
 
 // The record, 32 bytes: links (4 neighbours across faces 0 to 3, CM_NONE outside) and
-// data: x = v0.x | v0.y << 16, y = v0.z | shape << 16, z = half2(density at the centroid, gradient x),
+// data: x = v0.x | v0.y << 16, y = v0.z | shape << 16 | CM_RECORD_EMITS if it gives off light (glsl/emission.glsl), z = half2(density at the centroid, gradient x),
 // w = half2(gradient y, z); gradient along the frame's axes per unit, density relative to the volume's maximum.
 CM_FN vec3 cm_record_v0(uvec4 data) {
   return vec3(float(data.x & 0xffffu), float(data.x >> 16), float(data.y & 0xffffu));
 }
+#define CM_RECORD_EMITS 0x80000000u
 CM_FN uint cm_record_shape(uvec4 data) { return data.y >> 16; }
 
 // A ray and a cell's v0 in the cell's frame, not scaled.

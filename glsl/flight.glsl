@@ -4,9 +4,15 @@
 //   void cm_march_step(uvec3 cell, o, d, inv_d, t, t_1, r_0, r_1, next)
 // which gives the part of the ray inside the cell, from t to t_1, the density at both ends (linear between them), and
 // the next cell; next.x == CM_NONE outside. The third word of a cell is the march's own cache, CM_NONE when unknown.
+// With CM_EMISSION also
+//   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
 //
 // Free paths are sampled exactly: an optical depth -ln(1 - u) is used up along the march; inside a cell the depth is a
 // quadratic in t, inverted in closed form. No majorant, no step size.
+//
+// What cells give off by themselves is integrated along flights up to where they end (Simon, Hanika, Zirr and
+// Dachsbacher, "Line Integration for Rendering Heterogeneous Emissive Volumes", EGSR 2017): they get as far as t with the
+// chance that is the transmittance, so that needs no other weight.
 #ifndef CM_FLIGHT_GLSL
 #define CM_FLIGHT_GLSL
 
@@ -47,12 +53,19 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   float e_0 = 0.0f;
   float e_1 = 0.0f;
   float span = 0.0f;
+#if CM_EMISSION
+  CmEmission emission;
+  vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
+#endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
     float r_0 = 0.0f;
     float r_1 = 0.0f;
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
     cm_march_step(cell, p.o, p.d, inv_d, p.t, t_1, r_0, r_1, next);
+#if CM_EMISSION
+    emission = cm_march_emission(cell, p.o, p.d);
+#endif
     p.steps += 1u;
     e_0 = cm.medium.extinction * r_0;
     e_1 = cm.medium.extinction * r_1;
@@ -63,6 +76,9 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
     } else {
+#if CM_EMISSION
+      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));
+#endif
       p.depth -= used;
       p.t = t_1;
       cell = next;
@@ -75,17 +91,26 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   if (event == CM_EVENT_COLLISION) {
     float left = p.t_end - p.t;
     float way = cm_depth_distance(e_0, e_1, span, p.depth);
+#if CM_EMISSION
+    emitted += cm_emitted(emission, p.t, p.t + min(way, left));
+#endif
     p.t += way;
     p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e_0, e_1, span, left));
     if (way >= left) event = CM_EVENT_ESCAPE;  // behind a surface
   } else if (CM_SURFACES == 0 && event == CM_EVENT_ESCAPE && p.t > p.t_end) {
     p.depth += cm_depth_of(e_1, e_0, span, p.t - p.t_end);
   }
+#if CM_EMISSION
+  if (p.ray == CM_RAY_FLIGHT && !cm_is_dark(p)) p.radiance += p.throughput * emitted;
+#endif
   return event;
 }
 
 // What the path does once its ray has come to an event.
 CM_FN uint cm_after_flight(CmPath p) {
+  if (CM_EMISSION != 0 && p.ray == CM_RAY_FLIGHT) {
+    return p.found == CM_FOUND_TRIANGLE && p.event == CM_EVENT_ESCAPE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
+  }
   if (cm_asks(p)) return CM_STAGE_MEET;
   return p.ray != CM_RAY_FLIGHT && p.start == CM_ON_TRIANGLE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
 }
@@ -97,7 +122,13 @@ CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
   for (int j = 0; j < CM_EVENTS && (p.stage == CM_STAGE_AIM || p.stage == CM_STAGE_FLY || p.stage == CM_STAGE_EVENT);
        ++j) {
     if (p.stage == CM_STAGE_EVENT) cm_handle(p, cm_in_medium());
-    if (CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) cm_aim(p);
+    if (CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) {
+      if (CM_EMISSION != 0 && cm_asks_first(p)) {
+        p.stage = CM_STAGE_MEET;
+      } else {
+        cm_aim(p);
+      }
+    }
     if (p.stage == CM_STAGE_FLY) {
       p.event = cm_fly(p);
       marches += 1u;

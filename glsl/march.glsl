@@ -1,4 +1,7 @@
 // The march of CM_MARCH.
+#if CM_EMISSION
+#include "emission.glsl"
+#endif
 #if CM_MARCH == 0
 #include "march_tet.glsl"
 #else

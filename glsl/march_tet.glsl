@@ -2,6 +2,8 @@
 //   uvec4 cm_record(uint cell, uint part)   part 0: links, part 1: data (glsl/cell.glsl)
 //   uint cm_tree(uint node)                 the point-location tree
 //   uint cm_root_leaf(uint root), uint cm_root_node(uint root)
+// and with CM_EMISSION
+//   uvec4 cm_emission_record(uint cell)     glsl/emission.glsl
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
@@ -53,5 +55,20 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
 #endif
   next = uvec3(cm_link(links, face), 0u, CM_NONE);
 }
+
+#if CM_EMISSION
+CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
+  uvec4 data = cm_record(cell.x, 1u);
+  CmEmission e;
+  e.mean = vec3(0.0f, 0.0f, 0.0f);
+  e.at_0 = 0.0f;
+  e.slope = 0.0f;
+  if ((data.y & CM_RECORD_EMITS) != 0u) {
+    uint shape = cm_record_shape(data);
+    e = cm_cell_emission(cm_emission_record(cell.x), cm_cell_frame(cm_record_v0(data), shape, o, d), shape);
+  }
+  return e;
+}
+#endif
 
 #endif

@@ -4,6 +4,8 @@
 //   float cm_voxel(ivec3 voxel)                   dense: density of a voxel of the box
 //   uint cm_brick_slot(ivec3 brick)               bricks: slot of a brick of the box, CM_EMPTY_BRICK if it is empty
 //   float cm_brick_voxel(uint slot, uint index)   bricks: density; index = (x * 8 + y) * 8 + z
+// and with CM_EMISSION
+//   vec3 cm_emission_voxel(ivec3 voxel)           of the box; nothing in empty bricks
 #ifndef CM_MARCH_VOXEL_GLSL
 #define CM_MARCH_VOXEL_GLSL
 
@@ -72,5 +74,15 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
 #endif
   if (outside) next.x = CM_NONE;
 }
+
+#if CM_EMISSION
+CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
+  CmEmission e;
+  e.mean = cm_emission_voxel(cm_voxel_of(cell));
+  e.at_0 = 1.0f;
+  e.slope = 0.0f;
+  return e;
+}
+#endif
 
 #endif

@@ -13,6 +13,9 @@
 #ifndef CM_AOVS
 #define CM_AOVS 0
 #endif
+#ifndef CM_EMISSION
+#define CM_EMISSION 0
+#endif
 
 #ifdef __cplusplus
 #define CM_ALIGN(bytes) alignas(bytes)
@@ -52,6 +55,8 @@ CM_BLOCK(CmGrid) {
   uint page_shift;  // log2 of cells a page
   uint first_cell;  // where the records begin in their page; of several pages 0
   uint tree;        // where the point-location tree begins in its page, in 4-byte words
+  uint first_emission;  // where the records of what cells give off begin in their page
+  float emission_unit;  // radiance a world unit of length of what is stored as 1 for voxels
   CM_EQUALITY(CmGrid)
 };
 
@@ -64,6 +69,7 @@ CM_BLOCK(CmMedium) {
   float second_anisotropy;
   float second_bend;
   float second_share;
+  uint emits;  // 1: its cells give off light (CM_EMISSION)
   CM_EQUALITY(CmMedium)
 };
 

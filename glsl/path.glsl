@@ -80,6 +80,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint sample_number, uvec2 at) {
   p.depth_0 = -log(1.0f - cm_unit_float(even.z));
   p.depth = p.depth_0;
   p.ray = CM_RAY_FLIGHT;
+  p.found = CM_FOUND_NOT_ASKED;
   p.start = CM_AT_CAMERA;
   // Samples go through the layers in turn, each pixel from one of its own.
   uint layer = (shift.x >> 16) + sample_number;
@@ -171,6 +172,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   p.lifted = turn.lifted ? 1u : 0u;
   p.d = cm_to_cube(light.direction);
   p.ray = looks ? CM_RAY_TO_LIGHT : CM_RAY_FLIGHT;
+  p.found = CM_FOUND_NOT_ASKED;
   p.depth_0 = cm_random_depth(p.random, p.stream) + (looks ? CM_SHADOW_DEPTH : 0.0f);
   p.depth = p.depth_0;
   p.reach = light.distance;
@@ -195,9 +197,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   if (escaped) cm_escape(p);
   bool finished = escaped && flight;
   if (met) cm_see(p, vertex);
-  // Without light among surfaces: what has left one sees the sky alone, and the volume sees none.
-  bool dark = CM_SURFACES != 0 && cm.integrator.light_among_surfaces == 0u && p.bounces > 0u &&
-              (met || (collided && p.start == CM_ON_TRIANGLE));
+  bool dark = (met && cm_among_surfaces_dark(p)) || (collided && cm_is_dark(p));
   cm_glow(p, flight, collided && !dark);
   arrived = collided || met;
   if (arrived) {

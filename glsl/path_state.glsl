@@ -26,6 +26,11 @@
 #define CM_IN_MEDIUM 1u
 #define CM_ON_TRIANGLE 2u
 
+// What is known of triangles before a flight marches, in media that give off light.
+#define CM_FOUND_NOT_ASKED 0u
+#define CM_FOUND_NONE 1u
+#define CM_FOUND_TRIANGLE 2u  // it ends there
+
 // The one list of a path's fields: the struct, how it is packed into words (glsl/path_store.glsl), and so its size. In
 // parts: a kernel need not store what it does not change.
 // CM_PATH_RAY, the ray under way:
@@ -49,7 +54,7 @@
 //   random, stream  of its random numbers
 // CM_PATH_ENDS, what is known of the ray's ends:
 //   triangle, weights     that o is on, of its second and third vertex
-//   stage, event, ray, start     as above
+//   stage, event, ray, start, found     as above
 //   behind          1: the path met the side of the triangle from which its vertices turn clockwise
 //   back            1: it met the back
 //   blurred         1: it was scattered wider than a surface of the least roughness does
@@ -64,7 +69,7 @@
 #define CM_PATH_FLIGHT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
   VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(light) FLOAT(density)
 #define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
-  UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 1) BITS(start, 2) BITS(behind, 1)             \
+  UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 1) BITS(start, 2) BITS(found, 2) BITS(behind, 1)            \
   BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1)
 
 #define CM_PATH_VEC3(name) vec3 name;

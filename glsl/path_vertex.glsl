@@ -36,6 +36,12 @@ CM_FN float cm_medium_phase(float cosine) { return cm_henyey_greenstein(cm.mediu
 CM_FN float cm_medium_cosine(float u) { return cm_henyey_greenstein_cosine(cm.medium.anisotropy, u); }
 #endif
 
+// Without light among surfaces: what has left one sees the sky alone, and the volume sees none.
+CM_FN bool cm_among_surfaces_dark(CmPath p) {
+  return CM_SURFACES != 0 && cm.integrator.light_among_surfaces == 0u && p.bounces > 0u;
+}
+CM_FN bool cm_is_dark(CmPath p) { return cm_among_surfaces_dark(p) && p.start == CM_ON_TRIANGLE; }
+
 #if CM_SURFACES
 
 struct CmVertex {
@@ -55,9 +61,17 @@ CM_FN bool cm_asks(CmPath p) {
   return cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, reach);
 }
 
+// Whether the tree is to be asked before the flight marches: what it takes up on its way depends on where it ends.
+CM_FN bool cm_asks_first(CmPath p) {
+  if (p.ray != CM_RAY_FLIGHT || p.found != CM_FOUND_NOT_ASKED) return false;
+  if (p.bounces == 0u && cm.layers.count != 0u) return false;
+  return p.start == CM_ON_TRIANGLE || cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, p.reach);
+}
+
 // Asks the tree.
 CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   bool flight = p.ray == CM_RAY_FLIGHT;
+  bool first = flight && cm.medium.emits != 0u;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_from_cube_point(p.o);
   if (p.start == CM_ON_TRIANGLE) {
@@ -69,15 +83,20 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   cm_hit_seed = p.random;
   cm_hit_camera = p.bounces == 0u;
   CmHit hit;
-  bool met = cm_bvh_trace(o, d, 0.0f, p.event == CM_EVENT_COLLISION ? p.t : p.reach, !flight, hit);
+  float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;
+  bool met = cm_bvh_trace(o, d, 0.0f, reach, !flight, hit);
   if (met && !flight) p.event = CM_EVENT_COLLISION;
   if (met && flight) {
     p.triangle = hit.triangle;
     p.weights = hit.barycentrics;
     p.back = hit.front ? 0u : 1u;
   }
+  if (first) {
+    p.found = met ? CM_FOUND_TRIANGLE : CM_FOUND_NONE;
+    if (met) p.reach = hit.t;
+  }
   bool vertex = flight ? met : p.start == CM_ON_TRIANGLE;
-  p.stage = vertex ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
+  p.stage = first ? CM_STAGE_AIM : (vertex ? CM_STAGE_VERTEX : CM_STAGE_EVENT);
 }
 
 CM_FN CmVertex cm_in_medium() {
@@ -172,6 +191,7 @@ struct CmVertex {
 };
 
 CM_FN bool cm_asks(CmPath p) { return false; }
+CM_FN bool cm_asks_first(CmPath p) { return false; }
 CM_FN void cm_meet(CM_INOUT(CmPath) p) {}
 CM_FN CmVertex cm_in_medium() { return CmVertex(false); }
 CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {}

@@ -5,6 +5,7 @@
 // variants: - or CM_LAYERS=1
 // variants: - or CM_AOVS=1
 // variants: - or CM_SECOND_LOBE=1
+// variants: - or CM_EMISSION=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"
@@ -28,6 +29,7 @@ void cm_forget_triangles(inout CmPath p) {
   p.behind = 0u;
   p.back = 0u;
   p.lifted = 0u;
+  p.found = CM_FOUND_NOT_ASKED;
 }
 
 void main() {

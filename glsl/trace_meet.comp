@@ -21,6 +21,7 @@ void main() {
   uint lane = cm_queue_lane(CM_QUEUE_MEET);
   CmPath p = cm_load_path(lane);
   cm_meet(p);
+  if (cm.medium.emits != 0u) cm_store_ray(p, lane);  // which ends there
   cm_store_ends(p, lane);
   cm_send_on(p, lane);
 }

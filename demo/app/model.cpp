@@ -82,12 +82,17 @@ Model::Model() {
   status.stats.struct_size = sizeof status.stats;
 }
 
-VolumeChoice volume_of(const SceneOptions& scene) { return {scene.volume, scene.grid_name, scene.up}; }
+VolumeChoice volume_of(const SceneOptions& scene) {
+  return {scene.volume, scene.grid_name, scene.up, scene.temperature_grid, scene.flame_grid, scene.color_grid};
+}
 
 void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
   scene.volume = volume.file;
   scene.grid_name = volume.grid_name;
   scene.up = volume.up;
+  scene.temperature_grid = volume.temperature_grid;
+  scene.flame_grid = volume.flame_grid;
+  scene.color_grid = volume.color_grid;
 }
 
 void tell(Model& model, bool error, const std::string& text, double now) {

@@ -75,6 +75,9 @@ struct VolumeChoice {
   std::string file;
   std::string grid_name = {};
   UpAxis up = UpAxis::y;
+  std::string temperature_grid = {};
+  std::string flame_grid = {};
+  std::string color_grid = {};
 
   bool operator==(const VolumeChoice&) const = default;
 };

@@ -303,6 +303,15 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   add(
       app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
       "Grid to show (default: density, else the likeliest)");
+  add(
+      app, group, "--temperature-grid", "NAME", [&](const std::string& text) { scene.temperature_grid = text; },
+      "Its temperature (default: by name; none)");
+  add(
+      app, group, "--flame-grid", "NAME", [&](const std::string& text) { scene.flame_grid = text; },
+      "Its flame (default: by name; none)");
+  add(
+      app, group, "--color-grid", "NAME", [&](const std::string& text) { scene.color_grid = text; },
+      "What colours it (default: by name; none)");
   add_choice(app, group, "--up", up_names, scene.up, "The volume's up axis (default: y; Blender's and Mantaflow's: z)");
   add(
       app, group, "--gltf", "FILE",

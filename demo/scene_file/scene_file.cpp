@@ -240,6 +240,9 @@ void read_scene(Reader& reader, SceneOptions& scene) {
     reader.wrong("cumulet_scene", "version " + std::to_string(version) + " is not known: this program reads 1");
   reader.text("volume.file", scene.volume);
   reader.text("volume.grid", scene.grid_name);
+  reader.text("medium.temperature_grid", scene.temperature_grid);
+  reader.text("medium.flame_grid", scene.flame_grid);
+  reader.text("medium.color_grid", scene.color_grid);
   reader.choice("volume.up", up_names, scene.up);
   reader.text("surfaces.file", scene.surfaces);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
@@ -293,6 +296,8 @@ std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const
   } else if constexpr (settings::Switch<Value>) {
     return value != 0;
   } else if constexpr (settings::Triple<Value>) {
+    if (setting.zero != 0.0 && std::ranges::all_of(value, [](auto component) { return component == 0; }))
+      return std::nullopt;
     const auto one = setting.spelling == Spelling::complement ? albedo_of : shortest;
     return Json{one(value[0]), one(value[1]), one(value[2])};
   } else {
@@ -325,6 +330,9 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   json["volume"]["file"] = volume;
   if (!scene.grid_name.empty()) json["volume"]["grid"] = scene.grid_name;
   if (scene.up != UpAxis::y) json["volume"]["up"] = name_of(up_names, scene.up);
+  if (!scene.temperature_grid.empty()) json["medium"]["temperature_grid"] = scene.temperature_grid;
+  if (!scene.flame_grid.empty()) json["medium"]["flame_grid"] = scene.flame_grid;
+  if (!scene.color_grid.empty()) json["medium"]["color_grid"] = scene.color_grid;
 
   if (!surfaces.empty()) {
     Json& shown = json["surfaces"];
@@ -384,7 +392,10 @@ cumulet_volume_file_desc volume_file(const SceneOptions& scene) {
   cumulet_volume_file_desc desc{};
   desc.struct_size = sizeof desc;
   desc.path = scene.volume.c_str();
-  desc.grid_name = scene.grid_name.empty() ? nullptr : scene.grid_name.c_str();
+  desc.grid_name = scene.grid_name.c_str();
+  desc.temperature_grid = scene.temperature_grid.c_str();
+  desc.flame_grid = scene.flame_grid.c_str();
+  desc.color_grid = scene.color_grid.c_str();
   if (scene.up == UpAxis::z) {
     constexpr std::array upright = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0};
     std::copy(upright.begin(), upright.end(), desc.to_world);

@@ -14,7 +14,10 @@ enum class UpAxis { y, z };
 /// default, as there.
 struct SceneOptions {
   std::string volume;
-  std::string grid_name;
+  std::string grid_name;         // of density; "", here and below: by name
+  std::string temperature_grid;  // "none": without, here and below
+  std::string flame_grid;
+  std::string color_grid;
   UpAxis up = UpAxis::y;             // of the volume's file
   std::string surfaces;              // a glTF file; "": none
   std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera

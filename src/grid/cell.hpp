@@ -1,9 +1,10 @@
 #pragma once
 
-// glsl/cell.glsl as C++: shapes, records, children and faces of cells.
+// glsl/cell.glsl and emission.glsl as C++: shapes, records, children and faces of cells, and what they give off.
 
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
 #include "cell.glsl"
+#include "emission.glsl"
 }  // namespace cumulet::core

@@ -8,7 +8,7 @@
 
 namespace cumulet::grid {
 
-Cube fit_cube(const volume::ScalarVolume& volume) {
+Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max) {
   const double determinant = glm::determinant(glm::dmat3(volume.index_to_world));
   if (!std::isfinite(determinant) || determinant == 0.0) {
     throw Error(ErrorCode::file, "grid '" + volume.name + "' has a transform that flattens space");
@@ -16,8 +16,8 @@ Cube fit_cube(const volume::ScalarVolume& volume) {
   Cube cube;
   std::int64_t extent = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    cube.origin[axis] = volume.bounds_min[axis] & ~(volume::brick_size - 1);
-    extent = std::max<std::int64_t>(extent, std::int64_t{volume.bounds_max[axis]} - cube.origin[axis] + 1);
+    cube.origin[axis] = bounds_min[axis] & ~(volume::brick_size - 1);
+    extent = std::max<std::int64_t>(extent, std::int64_t{bounds_max[axis]} - cube.origin[axis] + 1);
   }
   while ((std::int64_t{1} << cube.log2_size) < extent) ++cube.log2_size;
   if (cube.log2_size > Cube::max_log2_size) {

@@ -19,7 +19,10 @@ struct Cube {
   [[nodiscard]] int size() const { return 1 << log2_size; }
 };
 
-/// Throws Error(unsupported) for bounds wider than 2^15 voxels.
-Cube fit_cube(const volume::ScalarVolume& volume);
+/// Over these bounds of the volume's lattice, inclusive. Throws Error(unsupported) if they are wider than 2^15 voxels.
+Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max);
+inline Cube fit_cube(const volume::ScalarVolume& volume) {
+  return fit_cube(volume, volume.bounds_min, volume.bounds_max);
+}
 
 }  // namespace cumulet::grid

@@ -43,8 +43,8 @@ class EdgeLengths {
 // The criterion's squared value for a cell.
 class Measure {
  public:
-  Measure(const Statistics& statistics, const RefineSettings& settings) : settings_(&settings) {
-    const double depth = statistics.mean_optical_depth();
+  // depth: of the mean ray; what deviations count against.
+  Measure(double depth, const RefineSettings& settings) : settings_(&settings) {
     scale_ = depth > 0.0 ? static_cast<float>(1.0 / (depth * depth)) : 0.0F;
   }
 
@@ -162,9 +162,9 @@ bool DiamondCursor::is_split(const ivec3& vertex) {
 // The criterion over all cells of the statistics.
 class DiamondSet::Evaluation {
  public:
-  Evaluation(const Statistics& statistics, const RefineSettings& settings)
+  Evaluation(const Statistics& statistics, double depth, const RefineSettings& settings)
       : statistics_(&statistics),
-        measure_(statistics, settings),
+        measure_(depth, settings),
         camera_(settings),
         edge_length_(statistics.cube().to_world) {
     // A node's bounding sphere: half its world diagonal, the longest of four.
@@ -313,29 +313,43 @@ double estimate_floor(const Evaluation& evaluation, std::uint64_t max_cells, dou
 
 }  // namespace
 
-DiamondSet::DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress)
+DiamondSet::DiamondSet(const Statistics& statistics, const Emission* emission, const RefineSettings& settings,
+                       Progress* progress)
     : log2_size_(statistics.cube().log2_size) {
   check(progress);
-  const auto evaluation = std::make_unique<const Evaluation>(statistics, settings);
+  Evaluations evaluations;
+  evaluations.push_back(std::make_unique<const Evaluation>(statistics, statistics.mean_optical_depth(), settings));
+  for (std::size_t i = 0; emission != nullptr && i < 3; ++i)
+    evaluations.push_back(
+        std::make_unique<const Evaluation>(emission->component(i), emission->mean_radiance(), settings));
   const double threshold = std::max(settings.threshold, 0.0);
-  double floor = estimate_floor(*evaluation, settings.max_cells, threshold * threshold, progress);
-  evaluate(*evaluation, floor, progress, 0.02, 0.5);
+  double floor = 0.0;
+  for (const auto& evaluation : evaluations)
+    floor = std::max(floor, estimate_floor(*evaluation, settings.max_cells, threshold * threshold, progress));
+  evaluate(evaluations, floor, progress, 0.02, 0.5);
   choose_cut(settings.max_cells, progress);
   if (!limited_ && floor > threshold * threshold) {
     // The estimate was too high after all.
     map_.clear();
-    evaluate(*evaluation, threshold * threshold, progress, 0.5, progress_part);
+    evaluate(evaluations, threshold * threshold, progress, 0.5, progress_part);
     choose_cut(settings.max_cells, progress);
   }
 }
 
-void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared, Progress* progress, double from,
+void DiamondSet::evaluate(const Evaluations& evaluations, double floor_squared, Progress* progress, double from,
                           double to) {
-  const Statistics& statistics = evaluation.statistics();
   std::uint64_t nodes = 0;
-  for (int size = 3; size < log2_size_; ++size) nodes += statistics.nodes_of_size(size).size();
+  for (const auto& evaluation : evaluations) {
+    for (int size = 3; size < log2_size_; ++size) nodes += evaluation->statistics().nodes_of_size(size).size();
+  }
   const double closing = from + 0.8 * (to - from);
   ProgressPart part(progress, from, closing, nodes);
+  for (const auto& evaluation : evaluations) evaluate(*evaluation, floor_squared, part);
+  close(progress, closing, to);
+}
+
+void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared, ProgressPart& part) {
+  const Statistics& statistics = evaluation.statistics();
   const auto floor = static_cast<float>(floor_squared);
   // Inside bricks: 511 cells in each of six trees.
   const auto& bricks = statistics.nodes_of_size(3);
@@ -376,7 +390,6 @@ void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared, Pr
                       [&](const ivec3& vertex, float squared) { raise(vertex, quantize(squared)); });
     }
   }
-  close(progress, closing, to);
 }
 
 std::vector<DiamondSet::Block*> DiamondSet::blocks_of(int scale, const Progress* progress) const {

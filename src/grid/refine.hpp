@@ -8,8 +8,10 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
+#include <vector>
 
-#include "base/progress.hpp"
+#include "base/progress_part.hpp"
+#include "grid/emission.hpp"
 #include "grid/statistics.hpp"
 
 namespace cumulet::grid {
@@ -50,7 +52,11 @@ class DiamondSet {
  public:
   /// Evaluates the criterion for every cell of the statistics, in parallel. O(active nodes). progress: as for
   /// Statistics; the fraction ends at progress_part, and GridBuilder::bisect goes on from there.
-  DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress = nullptr);
+  /// emission: cells are split for it as they are for density, if there is any.
+  DiamondSet(const Statistics& statistics, const Emission* emission, const RefineSettings& settings,
+             Progress* progress = nullptr);
+  DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress = nullptr)
+      : DiamondSet(statistics, nullptr, settings, progress) {}
 
   static constexpr double progress_part = 0.6;
 
@@ -96,7 +102,9 @@ class DiamondSet {
     std::uint64_t key_ = ~std::uint64_t{0};
     Block* block_ = nullptr;
   };
-  void evaluate(const Evaluation& evaluation, double floor_squared, Progress* progress, double from, double to);
+  using Evaluations = std::vector<std::unique_ptr<const Evaluation>>;
+  void evaluate(const Evaluations& evaluations, double floor_squared, Progress* progress, double from, double to);
+  void evaluate(const Evaluation& evaluation, double floor_squared, ProgressPart& part);
   void close(Progress* progress, double from, double to);
   void close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks, const Progress* progress);
   void close_block(const Block& block, int octave, int odd_coordinates);

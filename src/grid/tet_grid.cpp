@@ -5,7 +5,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
+#include <optional>
 
 #include "base/error.hpp"
 #include "grid/cell.hpp"
@@ -22,6 +24,21 @@ vec3 v0_of(const std::array<std::uint16_t, 3>& v) { return {v[0], v[1], v[2]}; }
 
 std::array<std::uint16_t, 3> pack_v0(const vec3& v) {
   return {static_cast<std::uint16_t>(v.x), static_cast<std::uint16_t>(v.y), static_cast<std::uint16_t>(v.z)};
+}
+
+// Of position and value in the cell's frame and unit.
+vec3 covariance(const Moments& m, std::uint32_t shape, const vec3& centroid) {
+  const dvec3 in_cube = m.first / m.volume - dvec3(centroid) * m.mean();
+  return core::cm_to_frame(vec3(in_cube), shape) / core::cm_shape_unit(shape);
+}
+
+std::uint32_t pack_emission_gradient(const vec3& gradient) {
+  std::uint32_t word = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float part = std::clamp(gradient[axis] / CM_EMISSION_STEEPEST, -1.0F, 1.0F);
+    word |= (static_cast<std::uint32_t>(std::lround(511.0F * part)) & 0x3ffU) << static_cast<unsigned>(10 * axis);
+  }
+  return word;
 }
 
 // Vertex opposite to each face (faces 0 to 3), by class: see the frame of glsl/cell.glsl.
@@ -287,7 +304,35 @@ class GridBuilder::LeafMoments {
   const BrickTree* tree_ = nullptr;
 };
 
-CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& gradient) const {
+// What leaves give off: the sum of three components, each fitted.
+class GridBuilder::LeafEmission {
+ public:
+  LeafEmission(const Emission& emission, CellKind cells)
+      : component_{LeafMoments(emission.component(0)), LeafMoments(emission.component(1)),
+                   LeafMoments(emission.component(2))},
+        linear_(cells == CellKind::linear) {}
+  EmissionRecord operator()(const Node& node, const vec3& centroid) {
+    const std::uint32_t cell_class = core::cm_shape_class(node.shape);
+    EmissionRecord record{};
+    vec3 slope(0.0F);
+    float sum = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      const Moments m = component_[static_cast<std::size_t>(i)](node, centroid);
+      record.mean[i] = static_cast<float>(std::clamp(m.mean(), double(m.min), double(m.max)));
+      sum += record.mean[i];
+      if (linear_ && m.min < m.max)
+        slope += fit_linear(cell_class, covariance(m, node.shape, centroid), record.mean[i]).gradient;
+    }
+    if (sum > 0.0F) record.gradient = pack_emission_gradient(slope / sum);
+    return record;
+  }
+
+ private:
+  std::array<LeafMoments, 3> component_;
+  bool linear_;
+};
+
+CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& gradient, bool emits) const {
   const Node& node = nodes_[index];
   CellRecord record{};
   for (unsigned face = 0; face < 4; ++face) {
@@ -295,13 +340,13 @@ CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& grad
     record.links[static_cast<int>(face)] = other == CM_NONE ? CM_NONE : first_leaf_[other];
   }
   record.data.x = node.v0[0] | (std::uint32_t{node.v0[1]} << 16U);
-  record.data.y = node.v0[2] | (std::uint32_t{node.shape} << 16U);
+  record.data.y = node.v0[2] | (std::uint32_t{node.shape} << 16U) | (emits ? CM_RECORD_EMITS : 0U);
   record.data.z = glm::packHalf2x16({mean, gradient.x});
   record.data.w = glm::packHalf2x16({gradient.y, gradient.z});
   return record;
 }
 
-TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress) {
+TetGrid GridBuilder::records(CellKind cells, float max_value, const Emission* emission, Progress* progress) {
   TetGrid grid;
   grid.cube = statistics_->cube();
   grid.limited = diamonds_->limited();
@@ -310,6 +355,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress
   const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
   ProgressPart places(progress, 0.0, 0.1, nodes_.size());
   places.resize(grid.cells, count);
+  if (emission != nullptr) places.resize(grid.emission, count);
   number_nodes(grid, places);
 
   struct Box {
@@ -321,6 +367,8 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress
   ProgressPart part(progress, 0.1, 1.0, count);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
     LeafMoments moments(*statistics_);
+    std::optional<LeafEmission> emitted;
+    if (emission != nullptr) emitted.emplace(*emission, cells);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -333,19 +381,24 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, Progress* progress
       const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
       vec3 gradient(0.0F);
       if (cells == CellKind::linear && m.min < m.max) {
-        const dvec3 covariance = m.first / m.volume - dvec3(centroid) * m.mean();
-        const vec3 in_frame = core::cm_to_frame(vec3(covariance), shape) / unit;
+        const vec3 in_frame = covariance(m, shape, centroid);
         gradient =
             fit_linear(cell_class, in_frame, static_cast<float>(mean)).gradient * static_cast<float>(to_relative);
       }
-      if (m.max > 0.0F) {
+      bool emits = false;
+      if (emitted) {
+        const EmissionRecord given = (*emitted)(node, centroid);
+        emits = glm::any(glm::greaterThan(given.mean, vec3(0.0F)));
+        grid.emission[rank] = given;
+      }
+      if (m.max > 0.0F || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);
           box.low = glm::min(box.low, vertex);
           box.high = glm::max(box.high, vertex);
         }
       }
-      grid.cells[rank] = record(leaf_nodes_[rank], static_cast<float>(mean * to_relative), gradient);
+      grid.cells[rank] = record(leaf_nodes_[rank], static_cast<float>(mean * to_relative), gradient, emits);
     }
     part.add(range.size());
   });

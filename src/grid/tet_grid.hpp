@@ -18,6 +18,13 @@ struct CellRecord {
 };
 static_assert(sizeof(CellRecord) == 32);
 
+/// What a cell gives off, as the shaders read it: glsl/emission.glsl has the layout.
+struct EmissionRecord {
+  glm::vec3 mean;  ///< radiance a world unit of length
+  std::uint32_t gradient;
+};
+static_assert(sizeof(EmissionRecord) == 16);
+
 /// Where in the leaves and in the tree a root cell's part begins.
 struct RootEntry {
   std::uint32_t first_leaf = 0;
@@ -35,11 +42,15 @@ struct TetGrid {
   std::array<RootEntry, 25> roots{};  ///< 24 and an end mark
   std::uint32_t levels = 0;           ///< deepest bisection level of a cell; the roots are level 0
   float density_unit = 1.0F;          ///< grid value of a record's density 1
-  glm::vec3 content_min{0.0F};        ///< cube-space box that holds every cell with density
+  /// One a cell; empty where no cell gives off light.
+  std::vector<EmissionRecord> emission;
+  glm::vec3 content_min{0.0F};  ///< cube-space box that holds every cell with density or emission
   glm::vec3 content_max{0.0F};
   bool limited = false;  ///< max_cells ended the refinement
 
-  [[nodiscard]] std::uint64_t bytes() const { return cells.size() * sizeof(CellRecord) + tree.size() * 4 + 200; }
+  [[nodiscard]] std::uint64_t bytes() const {
+    return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + tree.size() * 4 + 200;
+  }
 };
 
 /// Bisects the control cube by the set's diamonds, links neighbours as it goes, and fits densities.
@@ -50,7 +61,11 @@ class GridBuilder {
   /// Throws Error(unsupported) for more than 2^31 nodes. progress, here and below: as for Statistics. Cancelled, the
   /// builder is of no use; but records() may be called again.
   void bisect(Progress* progress = nullptr);
-  TetGrid records(CellKind cells, float max_value, Progress* progress = nullptr);
+  /// emission: of the cells, if any; over the same cube.
+  TetGrid records(CellKind cells, float max_value, const Emission* emission, Progress* progress = nullptr);
+  TetGrid records(CellKind cells, float max_value, Progress* progress = nullptr) {
+    return records(cells, max_value, nullptr, progress);
+  }
 
  private:
   struct Node {
@@ -73,8 +88,9 @@ class GridBuilder {
   // The roots and the tree of point location.
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
+  class LeafEmission;
   // mean and gradient: in units of the grid's density_unit.
-  [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient) const;
+  [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient, bool emits) const;
 
   const Statistics* statistics_;
   const DiamondSet* diamonds_;

@@ -155,7 +155,9 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   p.medium.second_anisotropy = medium.phase.second_anisotropy;
   p.medium.second_bend = medium.phase.second_bend;
   p.medium.second_share = medium.phase.second_share;
-  const bool glow = integrator.light_among_surfaces != 0U && medium.emission != glm::vec3(0.0F);
+  const bool emits = source.emits();
+  p.medium.emits = emits ? 1U : 0U;
+  const bool glow = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
   const ModelData* met = obstacles.met();
   const light::LightTable table(*snapshot.lights, met != nullptr ? met->lights() : light::SceneLights{}, glow);
   p.lights = table.parameters();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <glm/gtc/packing.hpp>
+#include <span>
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
@@ -16,7 +17,7 @@ namespace {
 using glm::ivec3;
 using glm::vec3;
 
-constexpr std::int64_t max_pages = 8;
+constexpr std::int64_t max_pages = 6;
 
 void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   const int widest = std::max({size.x, size.y, size.z});
@@ -27,15 +28,13 @@ void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   }
 }
 
-// Slices first to last (not included) of a dense volume, as half floats.
-void fill_slab(const scene::MarchSource& source, int first, int last, std::vector<std::uint16_t>& slab) {
-  const grid::Statistics& statistics = *source.statistics;
+// Slices first to last (not included) of a dense volume, as half floats: `stride` a voxel, of which this is one.
+void fill_slab(const scene::MarchSource& source, const grid::Statistics& statistics, float scale, int first, int last,
+               std::span<std::uint16_t> slab, std::size_t stride) {
   const ivec3 low = source.box_low;
   const ivec3 high = low + source.box_size;
   const auto row = static_cast<std::size_t>(source.box_size.x);
   const std::size_t slice = row * static_cast<std::size_t>(source.box_size.y);
-  slab.resize(slice * static_cast<std::size_t>(last - first));
-  const float scale = source.density_a_value();
   tbb::parallel_for(low.y >> 3, (high.y + 7) >> 3, [&](int by) {
     for (int x = low.x & ~7; x < high.x; x += volume::brick_size) {
       const grid::Statistics::Node& node = statistics.node_at({x, by * 8, first & ~7});
@@ -46,8 +45,9 @@ void fill_slab(const scene::MarchSource& source, int first, int last, std::vecto
         for (int j = from.y; j < to.y; ++j) {
           for (int i = from.x; i < to.x; ++i) {
             const float value = values == nullptr ? node.uniform : values[(i & 7) * 64 + (j & 7) * 8 + (k & 7)];
-            slab[static_cast<std::size_t>(k - first) * slice + static_cast<std::size_t>(j - low.y) * row +
-                 static_cast<std::size_t>(i - low.x)] = glm::packHalf1x16(value * scale);
+            const std::size_t at = static_cast<std::size_t>(k - first) * slice +
+                                   static_cast<std::size_t>(j - low.y) * row + static_cast<std::size_t>(i - low.x);
+            slab[at * stride] = glm::packHalf1x16(value * scale);
           }
         }
       }
@@ -84,6 +84,7 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
   } else {
     data_.grid_ = grid_parameters(source_->cube, vec3(source_->box_low), vec3(source_->box_low + source_->box_size));
     source_->march == March::dense ? plan_dense() : plan_brick();
+    if (source_->emission) plan_emission_voxels();
   }
 }
 
@@ -122,6 +123,26 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
         },
         grid.cells.data() + first, bytes);
   }
+  if (!grid.emission.empty()) {
+    if (cells > texels) {
+      throw Error(
+          ErrorCode::unsupported,
+          "what " + std::to_string(cells) +
+              " cells give off needs more than one texture buffer of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
+              std::to_string(texels) + " texels");
+    }
+    const std::size_t bytes = grid.emission.size() * sizeof(grid::EmissionRecord);
+    data_.bytes_ += bytes;
+    upload_.add([this, &heap, bytes] {
+      data_.emission_ = heap.take(bytes, "creating what cells give off");
+      data_.grid_.first_emission = static_cast<std::uint32_t>(data_.emission_.offset() / sizeof(grid::EmissionRecord));
+    });
+    upload_.add_bytes(
+        [this] {
+          return Upload::Place{data_.emission_.buffer(), data_.emission_.offset()};
+        },
+        grid.emission.data(), bytes);
+  }
   const std::size_t tree_bytes = grid.tree.size() * sizeof(std::uint32_t);
   data_.bytes_ += tree_bytes;
   upload_.add([this, &heap, tree_bytes] {
@@ -144,21 +165,41 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
 void MarchUpload::plan_dense() {
   const ivec3 size = source_->box_size;
   require_3d(limits_, size, "the dense march");
-  data_.bytes_ =
-      static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z) * 2;
-  upload_.add([this, size] {
-    data_.textures_[0] = gl::make_texture_3d(gl_, GL_R16F, size.x, size.y, size.z, "creating the dense texture");
+  plan_voxels(data_.textures_[0], {&*source_->statistics}, GL_R16F, GL_RED, source_->density_a_value(),
+              "creating the dense texture");
+}
+
+void MarchUpload::plan_emission_voxels() {
+  require_3d(limits_, source_->box_size, "what voxels give off");
+  const grid::Emission& emission = *source_->emission;
+  data_.grid_.emission_unit = emission.max_radiance();
+  plan_voxels(data_.emission_voxels_, {&emission.component(0), &emission.component(1), &emission.component(2), nullptr},
+              GL_RGBA16F, GL_RGBA, 1.0F / emission.max_radiance(), "creating what voxels give off");
+}
+
+void MarchUpload::plan_voxels(gl::Object& texture, std::vector<const grid::Statistics*> components, GLenum format,
+                              GLenum channels, float scale, const char* what) {
+  const ivec3 size = source_->box_size;
+  const std::size_t stride = components.size();
+  data_.bytes_ += static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
+                  static_cast<std::uint64_t>(size.z) * 2 * stride;
+  upload_.add([this, &texture, size, format, what] {
+    texture = gl::make_texture_3d(gl_, format, size.x, size.y, size.z, what);
   });
   // One layer of bricks at a time: bounded memory.
   const int low = source_->box_low.z;
   for (int z = low & ~7; z < low + size.z; z += volume::brick_size) {
     const int first = std::max(z, low);
     const int last = std::min(z + volume::brick_size, low + size.z);
-    upload_.add([this, size, low, first, last] {
-      std::vector<std::uint16_t> slab;
-      fill_slab(*source_, first, last, slab);
+    upload_.add([this, &texture, components, size, channels, scale, stride, low, first, last] {
+      std::vector<std::uint16_t> slab(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
+                                      static_cast<std::size_t>(last - first) * stride);
+      for (std::size_t i = 0; i < stride; ++i) {
+        if (components[i] != nullptr)
+          fill_slab(*source_, *components[i], scale, first, last, std::span(slab).subspan(i), stride);
+      }
       gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 2);
-      gl_->TextureSubImage3D(data_.textures_[0].name(), 0, 0, 0, first - low, size.x, size.y, last - first, GL_RED,
+      gl_->TextureSubImage3D(texture.name(), 0, 0, 0, first - low, size.x, size.y, last - first, channels,
                              GL_HALF_FLOAT, slab.data());
       gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
     });
@@ -206,6 +247,8 @@ void MarchData::bind(const gl::Functions& gl) const {
   for (std::size_t i = 0; i < textures_.size(); ++i) {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
+  if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_EMISSION, emission_voxels_.name());
+  if (emission_) gl.BindTextureUnit(core::CM_UNIT_EMISSION, emission_.texture());
   if (tree_) gl.BindTextureUnit(core::CM_UNIT_TREE, tree_.texture());
   if (roots_) gl.BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_ROOTS, roots_.name());
 }

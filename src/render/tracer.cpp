@@ -144,16 +144,21 @@ const Tracer::Program& Tracer::program(std::vector<std::string> defines, const c
   return program;
 }
 
+void Tracer::add_medium(const Picture& picture, std::vector<std::string>& defines) {
+  if (picture.second_lobe_) defines.emplace_back("CM_SECOND_LOBE 1");
+  if (picture.emits_) defines.emplace_back("CM_EMISSION 1");
+}
+
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
   if (picture.traced_ > 0) {
     std::vector<std::string> more{surfaces_macro(picture.traced_)};
-    if (picture.second_lobe_) more.emplace_back("CM_SECOND_LOBE 1");
+    add_medium(picture, more);
     return program(data.defines(), "trace_travel.comp", more);
   }
   std::vector<std::string> more;
   if (picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
-  if (picture.second_lobe_) more.emplace_back("CM_SECOND_LOBE 1");
+  add_medium(picture, more);
   return program(data.defines(), "trace.comp", more);
 }
 
@@ -211,6 +216,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, obstacles, settings);
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
+  picture.emits_ = parameters.medium.emits != 0U;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
 }

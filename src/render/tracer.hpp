@@ -121,6 +121,7 @@ class Picture {
   Layered layered_ = Layered::no;
   unsigned traced_ = 0;       // 1: paths meet triangles; 2: and look for those that emit
   bool second_lobe_ = false;  // of the medium's phase function
+  bool emits_ = false;        // its cells give off light
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   void begin_tile();
@@ -236,6 +237,7 @@ class Tracer {
   static unsigned traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
                             const PictureSettings& settings);
   // The one kernel, or what the paths' time goes by where they are run by stages.
+  static void add_medium(const Picture& picture, std::vector<std::string>& defines);
   const Program& trace_program(const Picture& picture, const MarchData& data);
   StagePrograms stage_programs(const Picture& picture, const MarchData& data);
   const Program& inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name);

@@ -21,7 +21,8 @@ void pack_bricks(MarchSource& source) {
     for (int y = 0; y < source.brick_count.y; ++y) {
       for (int x = 0; x < source.brick_count.x; ++x) {
         const grid::Statistics::Node& node = statistics.node_at((first + ivec3(x, y, z)) * 8);
-        if (node.is_uniform() && node.uniform == 0.0F) {
+        const bool dark = !source.emission || source.emission->is_zero((first + ivec3(x, y, z)) * 8);
+        if (node.is_uniform() && node.uniform == 0.0F && dark) {
           source.brick_slots.push_back(empty);
           continue;
         }
@@ -55,13 +56,21 @@ MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool line
 }
 
 MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
-                              std::shared_ptr<const grid::Statistics> statistics) {
+                              std::shared_ptr<const grid::Statistics> statistics,
+                              std::shared_ptr<const grid::Emission> emission) {
   MarchSource source;
   source.march = march;
   source.cube = statistics->cube();
   source.max_value = volume->max_value;
-  source.box_low = volume->bounds_min - source.cube.origin;
-  source.box_size = volume->bounds_max - volume->bounds_min + 1;
+  ivec3 low = volume->bounds_min;
+  ivec3 high = volume->bounds_max;
+  if (emission) {
+    low = volume->empty() ? emission->bounds_min() : glm::min(low, emission->bounds_min());
+    high = volume->empty() ? emission->bounds_max() : glm::max(high, emission->bounds_max());
+  }
+  source.box_low = low - source.cube.origin;
+  source.box_size = high - low + 1;
+  source.emission = std::move(emission);
   source.volume = std::move(volume);
   source.statistics = std::move(statistics);
   if (march == March::brick) pack_bricks(source);

@@ -85,7 +85,7 @@ struct Facts {
   const char* name;                           // the field's, in C and C++
   Range range = any_number;                   // what the C API takes
   std::optional<Range> given = std::nullopt;  // what scene files and flags take, if that is another
-  double zero = 0.0;                          // what 0 stands for
+  double zero = 0.0;                          // what 0 stands for, of three numbers: all of them 0
   std::span<const Choice> choices = {};       // of an enum
   Spelling spelling = Spelling::as_is;
   const char* key = "";   // in scene files: "medium.anisotropy"
@@ -171,6 +171,10 @@ constexpr void spell_out_zeros(Desc& desc) {
     using Value = std::remove_reference_t<decltype(value)>;
     if constexpr (Count<Value> || Real<Value>) {
       if (value == Value{} && setting.zero != 0.0) value = static_cast<Value>(setting.zero);
+    } else if constexpr (Triple<Value>) {
+      const bool none = value[0] == 0.0F && value[1] == 0.0F && value[2] == 0.0F;
+      for (auto& component : value)
+        component = none && setting.zero != 0.0 ? static_cast<float>(setting.zero) : component;
     }
   });
 }

@@ -1,5 +1,6 @@
 #include "viewer/builder.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/apart.hpp"
@@ -9,10 +10,14 @@
 namespace cumulet::viewer {
 
 VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
-  volume::ScalarVolume volume = volume::import_volume(path, grid_name, log, progress);
-  volume.index_to_world = to_world * volume.index_to_world;
+  volume::VolumeFrame frame = volume::import_frame(path, grids, log, progress);
+  const auto place = [&](volume::ScalarVolume& field) { field.index_to_world = to_world * field.index_to_world; };
+  place(frame.density);
+  if (frame.temperature) place(*frame.temperature);
+  if (frame.flame) place(*frame.flame);
+  if (frame.colour) std::ranges::for_each(*frame.colour, place);
   try {
-    return std::make_shared<const VolumeAsset>(std::move(volume), progress);
+    return std::make_shared<const VolumeAsset>(std::move(frame), progress);
   } catch (const Error& e) {
     if (e.code() == ErrorCode::cancelled) throw;
     throw Error(e.code(), path + ": " + e.what());
@@ -109,21 +114,24 @@ Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings,
   built.volume = volume;
   const auto statistics = volume->statistics(progress, built.seconds.statistics);
   Stopwatch watch;
+  const auto emission = volume->emission(settings.emission, progress);
+  built.seconds.statistics += watch.lap();
   progress.begin(Progress::Stage::refining);
   if (settings.march != scene::March::tet) {
     const std::shared_ptr<const volume::ScalarVolume> voxels(volume, &volume->volume());
-    built.source =
-        std::make_shared<const scene::MarchSource>(scene::make_voxel_source(settings.march, voxels, statistics));
+    built.source = std::make_shared<const scene::MarchSource>(
+        scene::make_voxel_source(settings.march, voxels, statistics, emission));
     built.seconds.records = watch.lap();
     return built;
   }
-  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, settings.refine, &progress);
+  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, emission.get(), settings.refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
   built.seconds.refine = watch.lap();
   progress.begin(Progress::Stage::records);
   const float max_value = volume->volume().max_value;
-  auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, &progress));
+  auto grid =
+      make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, emission.get(), &progress));
   builder.reset();
   built.seconds.records = watch.lap();
   built.cells = grid->cells.size();

@@ -12,19 +12,20 @@
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "grid/refine.hpp"
+#include "scene/emission.hpp"
 #include "scene/march_source.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"
 
 namespace cumulet::viewer {
 
-/// One grid of a file, and where it stands.
+/// A file, what of it is shown, and where it stands.
 struct VolumeFile {
   std::string path;
-  std::string grid_name;
+  volume::GridNames grids;
   glm::dmat4 to_world{1.0};  ///< affine, from the file's own world space
 
-  /// Throws what import_volume and VolumeAsset throw.
+  /// Throws what import_frame and VolumeAsset throw.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress) const;
 };
 
@@ -32,6 +33,7 @@ struct VolumeFile {
 struct BuildSettings {
   scene::March march = scene::March::tet;
   grid::RefineSettings refine;
+  scene::Emission emission;
 };
 
 struct BuildSeconds {

@@ -182,7 +182,7 @@ cumulet_status cumulet_context_lost(cumulet_viewer* viewer) {
 cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
-    v.load_volume({path, grid_name == nullptr ? "" : grid_name});
+    v.load_volume({path, {.density = grid_name == nullptr ? "" : grid_name}});
   });
 }
 

@@ -42,9 +42,16 @@ struct Medium {
   scene::Phase phase;
   std::uint32_t max_bounces = 0;
   glm::vec3 emission{0.0F};
+  scene::Emission field_emission = {};  // of what its grids give off
 
   static Medium of(const cumulet_medium_desc& d) {
-    return {d.density_scale, 1.0F - glm::make_vec3(d.coalbedo), phase_of(d), d.max_bounces, glm::make_vec3(d.emission)};
+    return {d.density_scale,
+            1.0F - glm::make_vec3(d.coalbedo),
+            phase_of(d),
+            d.max_bounces,
+            glm::make_vec3(d.emission),
+            {d.flame_strength, glm::make_vec3(d.flame_color), d.temperature_scale, d.temperature_offset, d.blackbody,
+             glm::make_vec3(d.blackbody_tint)}};
   }
   static scene::Phase phase_of(const cumulet_medium_desc& d) {
     switch (d.phase) {

@@ -238,12 +238,16 @@ Viewer::Status Viewer::status() const {
 
 void Viewer::set_grid(const GridSettings& settings) {
   grid_ = settings;
+  grid_.build.emission = medium_.field_emission;
   request_build();
   touch();
 }
 
 void Viewer::set_medium(const Medium& medium) {
+  const bool other_emission = grid_.build.emission != medium.field_emission;
   medium_ = medium;
+  grid_.build.emission = medium.field_emission;
+  if (other_emission) request_build();
   scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.phase, medium.emission});
   touch();
 }
@@ -289,7 +293,7 @@ void Viewer::frame_all() {
 
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
-  if (volume_ && !volume_->volume().empty()) box = volume_->bounds();
+  if (volume_ && !volume_->empty()) box = volume_->bounds();
   if (model_source_ && model_source_->scene->triangle_count() > 0) {
     const surface::Pose& pose = model_source_->pose;
     box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};

@@ -1,6 +1,8 @@
 #include "viewer/volume_asset.hpp"
 
 #include <chrono>
+#include <limits>
+#include <utility>
 
 #include "base/apart.hpp"
 #include "grid/cube.hpp"
@@ -8,10 +10,36 @@
 
 namespace cumulet::viewer {
 
-VolumeAsset::VolumeAsset(volume::ScalarVolume volume, const Progress* progress)
-    : volume_(make_left<const volume::ScalarVolume>(std::move(volume))), coarse_(*volume_, progress) {
-  grid::fit_cube(*volume_);
-  bounds_ = world_bounds(volume_->bounds_min, volume_->bounds_max, volume_->index_to_world);
+namespace {
+
+// Of voxels, inclusive.
+struct Box {
+  glm::ivec3 low{std::numeric_limits<int>::max()};
+  glm::ivec3 high{std::numeric_limits<int>::min()};
+
+  void add(const volume::ScalarVolume& field) {
+    if (field.empty()) return;
+    low = glm::min(low, field.bounds_min);
+    high = glm::max(high, field.bounds_max);
+  }
+  [[nodiscard]] bool empty() const { return low.x > high.x; }
+};
+
+}  // namespace
+
+VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
+    : frame_(make_left<const volume::VolumeFrame>(std::move(frame))), coarse_(frame_->density, progress) {
+  const volume::ScalarVolume& density = frame_->density;
+  Box shown;
+  shown.add(density);
+  if (frame_->flame) shown.add(*frame_->flame);
+  Box all = shown;
+  if (frame_->temperature) all.add(*frame_->temperature);
+  if (shown.empty()) shown = all;
+  empty_ = all.empty();
+  if (empty_) shown = all = {density.bounds_min, density.bounds_max};
+  cube_ = grid::fit_cube(density, all.low, all.high);
+  bounds_ = world_bounds(shown.low, shown.high, density.index_to_world);
 }
 
 std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progress, double& seconds) const {
@@ -20,10 +48,16 @@ std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progre
   const auto lock = patient_lock(mutex_, progress);
   if (!statistics_) {
     const auto start = std::chrono::steady_clock::now();
-    statistics_ = make_left<const grid::Statistics>(*volume_, grid::fit_cube(*volume_), &progress);
+    statistics_ = make_left<const grid::Statistics>(frame_->density, cube_, &progress);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   return statistics_;
+}
+
+std::shared_ptr<const grid::Emission> VolumeAsset::emission(const scene::Emission& emission, Progress& progress) const {
+  auto radiance = scene::emission_of(*frame_, emission, &progress);
+  if (!radiance) return nullptr;
+  return make_left<const grid::Emission>(*std::move(radiance), cube_, &progress);
 }
 
 }  // namespace cumulet::viewer

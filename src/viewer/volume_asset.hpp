@@ -5,9 +5,10 @@
 
 #include "base/progress.hpp"
 #include "grid/statistics.hpp"
+#include "scene/emission.hpp"
 #include "viewer/bounds.hpp"
+#include "volume/frame.hpp"
 #include "volume/optical_depth.hpp"
-#include "volume/volume.hpp"
 
 namespace cumulet::viewer {
 
@@ -15,18 +16,29 @@ namespace cumulet::viewer {
 class VolumeAsset {
  public:
   /// Throws Error(unsupported) for what no control cube holds.
-  explicit VolumeAsset(volume::ScalarVolume volume, const Progress* progress = nullptr);
+  explicit VolumeAsset(volume::VolumeFrame frame, const Progress* progress = nullptr);
+  explicit VolumeAsset(volume::ScalarVolume density, const Progress* progress = nullptr)
+      : VolumeAsset(volume::VolumeFrame{.density = std::move(density)}, progress) {}
 
-  [[nodiscard]] const volume::ScalarVolume& volume() const { return *volume_; }
-  /// World bounds of the active voxels.
+  /// Its density.
+  [[nodiscard]] const volume::ScalarVolume& volume() const { return frame_->density; }
+  [[nodiscard]] const volume::VolumeFrame& frame() const { return *frame_; }
+  /// Whether no field has an active voxel.
+  [[nodiscard]] bool empty() const { return empty_; }
+  /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such.
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return coarse_; }
   /// The first caller computes them; others wait, and if the first is cancelled the next one computes them. seconds
   /// receives what computing took, 0 if they were there. Throws Error(cancelled) if this caller's progress is.
   [[nodiscard]] std::shared_ptr<const grid::Statistics> statistics(Progress& progress, double& seconds) const;
+  /// What it gives off by itself; null if nothing. Computed anew with each call.
+  [[nodiscard]] std::shared_ptr<const grid::Emission> emission(const scene::Emission& emission,
+                                                               Progress& progress) const;
 
  private:
-  std::shared_ptr<const volume::ScalarVolume> volume_;
+  std::shared_ptr<const volume::VolumeFrame> frame_;
+  bool empty_ = true;
+  grid::Cube cube_;
   volume::CoarseVolume coarse_;
   Bounds bounds_;
   mutable std::mutex mutex_;

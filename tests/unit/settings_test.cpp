@@ -162,10 +162,21 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
     for (std::string key; std::getline(parts, key, '`');)
       if (key.find('.') != std::string::npos) told.insert(key);
   }
-  std::set<std::string> keys = {
-      "volume.file",   "volume.grid",   "volume.up", "surfaces.file",       "surfaces.camera",
-      "camera.eye",    "camera.target", "camera.up", "camera.fovy_degrees", "camera.orthographic_height",
-      "picture.width", "picture.height"};
+  std::set<std::string> keys = {"volume.file",
+                                "volume.grid",
+                                "volume.up",
+                                "medium.temperature_grid",
+                                "medium.flame_grid",
+                                "medium.color_grid",
+                                "surfaces.file",
+                                "surfaces.camera",
+                                "camera.eye",
+                                "camera.target",
+                                "camera.up",
+                                "camera.fovy_degrees",
+                                "camera.orthographic_height",
+                                "picture.width",
+                                "picture.height"};
   for_each_descriptor([&](auto part, auto) {
     settings::for_each<std::decay_t<decltype(SceneOptions().*part)>>([&](const auto& setting) {
       if (*setting.key != '\0') keys.insert(setting.key);

@@ -337,7 +337,7 @@ TEST_P(Trace, PagesChangeNothing) {
   viewer->set_grid(settings);
   try {
     viewer->build();
-    FAIL() << "8 pages of 32 cells cannot hold " << cells;
+    FAIL() << "6 pages of 32 cells cannot hold " << cells;
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::unsupported);
     EXPECT_NE(std::string(error.what()).find("GL_MAX_TEXTURE_BUFFER_SIZE"), std::string::npos) << error.what();

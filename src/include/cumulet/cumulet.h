@@ -272,6 +272,13 @@ typedef struct cumulet_volume_file_desc {
    * 0,0,0,1.
    */
   double to_world[16];
+  /*
+   * What else of the file is shown. NULL or "": by name (as docs/grids.md says); "none": not at all; else a grid's
+   * name, and that it is not there is an error. Grids of other voxels than density's are resampled to these.
+   */
+  const char* temperature_grid;
+  const char* flame_grid;
+  const char* color_grid;
 } cumulet_volume_file_desc;
 
 CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
@@ -658,6 +665,19 @@ typedef struct cumulet_medium_desc {
   float second_anisotropy; /* two lobes: g of the second one, in (-1, 1); 0: isotropic */
   float second_share;      /* two lobes: part of the light that is in the second one, in [0, 1]; 0: 0.5 */
   float droplet_diameter;  /* Mie: in micrometres, in [5, 50]; 0: 20, as in a cloud */
+  /*
+   * What flame and temperature grids give off: radiance a world unit of length, whatever the density there,
+   *   flame_strength x flame_color x flame
+   *   + 1e-6 sigma / pi x mix(1, T^4, blackbody) x blackbody_tint x the colour of a black body of T kelvin, of
+   * luminance 1 with T = temperature_offset + temperature_scale x temperature, where that is not 0; dark below 100 K.
+   * As Blender's Principled Volume but for the scale: files hold 0 to 3 or so. Another value builds the grid anew.
+   */
+  float flame_strength;     /* 0: 1; to be without flames, flame_grid "none" */
+  float flame_color[3];     /* linear Rec. 709; all 0: white */
+  float temperature_scale;  /* kelvin; 0: 1500 */
+  float temperature_offset; /* kelvin */
+  float blackbody;          /* intensity; 0: none */
+  float blackbody_tint[3];  /* all 0: white */
 } cumulet_medium_desc;
 
 /* A distant sun (a delta direction, invisible to camera rays) and a sky of constant radiance. Restarts accumulation. */

@@ -295,9 +295,18 @@ struct VolumeFileDesc {
   const char* path = nullptr;
   const char* grid_name = nullptr;
   Matrix to_world{};
+  const char* temperature_grid = nullptr;
+  const char* flame_grid = nullptr;
+  const char* color_grid = nullptr;
 
   operator cumulet_volume_file_desc() const noexcept {
-    cumulet_volume_file_desc c{.struct_size = sizeof c, .path = path, .grid_name = grid_name, .to_world = {}};
+    cumulet_volume_file_desc c{.struct_size = sizeof c,
+                               .path = path,
+                               .grid_name = grid_name,
+                               .to_world = {},
+                               .temperature_grid = temperature_grid,
+                               .flame_grid = flame_grid,
+                               .color_grid = color_grid};
     std::ranges::copy(to_world, c.to_world);
     return c;
   }

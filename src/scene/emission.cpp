@@ -1,0 +1,184 @@
+#include "scene/emission.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/progress_part.hpp"
+#include "light/black_body.hpp"
+
+namespace cumulet::scene {
+
+namespace {
+
+using glm::ivec3;
+using glm::vec3;
+using volume::brick_size;
+using volume::brick_voxels;
+using volume::ScalarVolume;
+
+bool before(const ivec3& a, const ivec3& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); }
+
+bool holds(const ivec3& low, const ivec3& high, const ivec3& p) {
+  return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
+}
+
+using Values = std::array<float, brick_voxels>;
+
+// Of the brick at this origin.
+void read(const ScalarVolume& field, const ivec3& origin, Values& values) {
+  const auto found = std::ranges::lower_bound(field.brick_origins, origin, before);
+  if (found != field.brick_origins.end() && *found == origin) {
+    const auto* from = field.brick_values.data() + (found - field.brick_origins.begin()) * brick_voxels;
+    std::copy(from, from + brick_voxels, values.begin());
+    return;
+  }
+  std::vector<const volume::Tile*> tiles;
+  for (const volume::Tile& tile : field.tiles) {
+    const bool apart =
+        glm::any(glm::greaterThan(tile.min, origin + (brick_size - 1))) || glm::any(glm::lessThan(tile.max, origin));
+    if (!apart) tiles.push_back(&tile);
+  }
+  for (int v = 0; v < brick_voxels; ++v) {
+    const ivec3 p = origin + ivec3(v / 64, (v / 8) % 8, v % 8);
+    float& value = values[static_cast<std::size_t>(v)];
+    value = holds(field.bounds_min, field.bounds_max, p) ? field.background : 0.0F;
+    for (const volume::Tile* tile : tiles) {
+      if (holds(tile->min, tile->max, p)) value = tile->value;
+    }
+  }
+}
+
+// Bricks of fields, as whole numbers of them: what they have, and what their tiles and backgrounds fill.
+class BrickSet {
+ public:
+  void add(const ScalarVolume& field) {
+    origins_.insert(origins_.end(), field.brick_origins.begin(), field.brick_origins.end());
+    for (const volume::Tile& tile : field.tiles) {
+      if (tile.value > 0.0F) add(tile.min, tile.max);
+    }
+    if (field.background > 0.0F) add(field.bounds_min, field.bounds_max);
+  }
+  std::vector<ivec3> take() {
+    std::ranges::sort(origins_, before);
+    const auto rest = std::ranges::unique(origins_);
+    origins_.erase(rest.begin(), rest.end());
+    return std::move(origins_);
+  }
+
+ private:
+  void add(const ivec3& low, const ivec3& high) {
+    const ivec3 first = low >> 3;
+    const glm::i64vec3 count = glm::i64vec3(high >> 3) - glm::i64vec3(first) + std::int64_t{1};
+    filled_ += count.x * count.y * count.z;
+    constexpr std::int64_t most = std::int64_t{1} << 18;
+    if (filled_ > most) {
+      throw Error(ErrorCode::unsupported,
+                  "a temperature or flame without detail fills more than " + std::to_string(most) + " bricks");
+    }
+    for (int x = 0; x < count.x; ++x) {
+      for (int y = 0; y < count.y; ++y) {
+        for (int z = 0; z < count.z; ++z) origins_.push_back((first + ivec3(x, y, z)) * brick_size);
+      }
+    }
+  }
+
+  std::vector<ivec3> origins_;
+  std::int64_t filled_ = 0;
+};
+
+class Glow {
+ public:
+  explicit Glow(const Emission& emission)
+      : emission_(emission), flame_(static_cast<float>(emission.flame_strength) * emission.flame_colour) {}
+
+  [[nodiscard]] vec3 operator()(float temperature, float flame) const {
+    vec3 light = flame * flame_;
+    if (temperature > 0.0F && emission_.blackbody > 0.0) {
+      const double kelvin =
+          emission_.temperature_offset + emission_.temperature_scale * static_cast<double>(temperature);
+      light += black_body_.emission(static_cast<float>(kelvin), static_cast<float>(emission_.blackbody)) *
+               emission_.blackbody_tint;
+    }
+    return light;
+  }
+
+ private:
+  Emission emission_;
+  vec3 flame_;
+  light::BlackBody black_body_;
+};
+
+}  // namespace
+
+std::optional<grid::Emission::Radiance> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
+                                                    const Progress* progress) {
+  const bool burns =
+      frame.flame && !frame.flame->empty() && emission.flame_strength > 0.0 && emission.flame_colour != vec3(0.0F);
+  const bool hot = frame.temperature && !frame.temperature->empty() && emission.blackbody > 0.0 &&
+                   emission.blackbody_tint != vec3(0.0F);
+  if (!burns && !hot) return std::nullopt;
+  BrickSet set;
+  if (burns) set.add(*frame.flame);
+  if (hot) set.add(*frame.temperature);
+  const std::vector<ivec3> origins = set.take();
+
+  const Glow glow(emission);
+  std::array<std::vector<float>, 3> values;
+  for (auto& component : values) component.resize(origins.size() * brick_voxels);
+  std::vector<vec3> most(origins.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 16), [&](const auto& range) {
+    check(progress);
+    Values flame{};
+    Values temperature{};
+    for (std::size_t b = range.begin(); b != range.end(); ++b) {
+      if (burns) read(*frame.flame, origins[b], flame);
+      if (hot) read(*frame.temperature, origins[b], temperature);
+      for (std::size_t v = 0; v < brick_voxels; ++v) {
+        const vec3 light = glow(temperature[v], flame[v]);
+        most[b] = glm::max(most[b], light);
+        for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)][b * brick_voxels + v] = light[i];
+      }
+    }
+  });
+
+  grid::Emission::Radiance radiance;
+  ScalarVolume& first = radiance[0];
+  first.index_to_world = (burns ? *frame.flame : *frame.temperature).index_to_world;
+  first.bounds_min = ivec3(std::numeric_limits<int>::max());
+  first.bounds_max = ivec3(std::numeric_limits<int>::min());
+  // Bricks that glow, moved to the front.
+  std::size_t kept = 0;
+  vec3 max_value(0.0F);
+  for (std::size_t b = 0; b < origins.size(); ++b) {
+    if (most[b] == vec3(0.0F)) continue;
+    max_value = glm::max(max_value, most[b]);
+    first.brick_origins.push_back(origins[b]);
+    first.bounds_min = glm::min(first.bounds_min, origins[b]);
+    first.bounds_max = glm::max(first.bounds_max, origins[b] + (brick_size - 1));
+    for (auto& component : values) {
+      if (kept == b) break;
+      const auto from = component.begin() + static_cast<std::ptrdiff_t>(b * brick_voxels);
+      std::copy(from, from + brick_voxels, component.begin() + static_cast<std::ptrdiff_t>(kept * brick_voxels));
+    }
+    ++kept;
+  }
+  if (kept == 0) return std::nullopt;
+  first.active_voxels = kept * brick_voxels;
+  radiance[2] = radiance[1] = first;
+  constexpr std::array<const char*, 3> names{"emission, red", "emission, green", "emission, blue"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    values[i].resize(kept * brick_voxels);
+    radiance[i].name = names[i];
+    radiance[i].brick_values = std::move(values[i]);
+    radiance[i].max_value = max_value[static_cast<int>(i)];
+  }
+  return radiance;
+}
+
+}  // namespace cumulet::scene

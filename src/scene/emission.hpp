@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <glm/glm.hpp>
+#include <optional>
+
+#include "grid/emission.hpp"
+#include "volume/frame.hpp"
+
+namespace cumulet::scene {
+
+/// What of a volume's fields gives off light: Blender's Principled Volume, but for the default of temperature_scale.
+struct Emission {
+  double flame_strength = 1.0;  ///< radiance a world unit of length where flame is 1
+  glm::vec3 flame_colour{1.0F};
+  double temperature_scale = 1500.0;  ///< kelvin = offset + scale x the field's value
+  double temperature_offset = 0.0;
+  double blackbody = 0.0;  ///< intensity of black body light (light::BlackBody); 0: none
+  glm::vec3 blackbody_tint{1.0F};
+  bool operator==(const Emission&) const = default;
+};
+
+/// Flame x strength x colour + what a black body of the temperature gives off: radiance a world unit of length, linear
+/// Rec. 709, voxel by voxel on the fields' lattice. Nothing if there is no such field, or none of them glows. O(bricks
+/// of both) time and memory. Throws Error(unsupported) for temperatures that glow over a box of more than 2^27 voxels
+/// without any detail.
+std::optional<grid::Emission::Radiance> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
+                                                    const Progress* progress = nullptr);
+
+}  // namespace cumulet::scene

@@ -1,0 +1,292 @@
+// What cells give off by themselves: fields into radiance, its grid, and pictures against closed forms.
+
+#include "scene/emission.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/error.hpp"
+#include "light/black_body.hpp"
+#include "support/gl_viewer.hpp"
+#include "support/surfaces.hpp"
+#include "support/volumes.hpp"
+
+// Mesa's OSMesa keeps its framebuffers for ever.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+namespace {
+
+using namespace cumulet;
+using glm::ivec3;
+using glm::vec3;
+using scene::March;
+using volume::ScalarVolume;
+using volume::VolumeFrame;
+
+// ---- Fields into radiance
+
+ScalarVolume nothing() {
+  ScalarVolume empty;
+  empty.bounds_max = ivec3(0);
+  return empty;
+}
+
+ScalarVolume field(const ivec3& size, const ivec3& low, float value) {
+  return test::make_volume(size, low, [=](const ivec3& /*p*/) { return value; });
+}
+
+float radiance_at(const grid::Emission::Radiance& radiance, int component, const ivec3& p) {
+  return test::value_at(radiance[static_cast<std::size_t>(component)], p);
+}
+
+TEST(Emission, IsNothingWithoutAFieldThatGlows) {
+  VolumeFrame frame{.density = field(ivec3(8), ivec3(0), 1.0F)};
+  EXPECT_FALSE(scene::emission_of(frame, {.blackbody = 1.0}));
+  frame.temperature = field(ivec3(8), ivec3(0), 1.0F);
+  EXPECT_FALSE(scene::emission_of(frame, {})) << "temperature alone does not shine at intensity 0";
+  EXPECT_FALSE(scene::emission_of(frame, {.temperature_scale = 99.0, .blackbody = 1.0})) << "dark below 100 K";
+  EXPECT_TRUE(scene::emission_of(frame, {.blackbody = 1.0}));
+  frame.flame = field(ivec3(8), ivec3(0), 1.0F);
+  EXPECT_TRUE(scene::emission_of(frame, {}));
+  EXPECT_FALSE(scene::emission_of(frame, {.flame_strength = 0.0}));
+}
+
+TEST(Emission, IsFlameAndBlackBodyTogether) {
+  VolumeFrame frame{.density = nothing()};
+  frame.flame = field({8, 8, 8}, ivec3(0), 2.0F);
+  frame.temperature = field({12, 8, 8}, {4, 0, 0}, 1.5F);
+  const scene::Emission emission{.flame_strength = 3.0,
+                                 .flame_colour = {1.0F, 0.5F, 0.25F},
+                                 .temperature_scale = 1200.0,
+                                 .temperature_offset = 200.0,
+                                 .blackbody = 0.5,
+                                 .blackbody_tint = {1.0F, 2.0F, 1.0F}};
+  const auto radiance = scene::emission_of(frame, emission);
+  ASSERT_TRUE(radiance);
+  const vec3 hot = vec3(light::black_body_colour(2000.0) * light::black_body_radiance(2000.0, 0.5)) * vec3(1, 2, 1);
+  for (int i = 0; i < 3; ++i) {
+    const float flame = 6.0F * emission.flame_colour[i];
+    EXPECT_FLOAT_EQ(radiance_at(*radiance, i, {1, 1, 1}), flame);
+    EXPECT_NEAR(radiance_at(*radiance, i, {5, 1, 1}), flame + hot[i], 2e-3F * hot[i] + 1e-6F);
+    EXPECT_NEAR(radiance_at(*radiance, i, {12, 7, 7}), hot[i], 2e-3F * hot[i] + 1e-12F);
+  }
+}
+
+TEST(Emission, TilesAndBackgroundsGlow) {
+  VolumeFrame frame{.density = nothing()};
+  ScalarVolume& flame = frame.flame.emplace(field({8, 8, 8}, ivec3(0), 1.0F));
+  flame.bounds_max = {39, 7, 7};
+  flame.tiles.push_back({{16, 0, 0}, {23, 7, 7}, 2.0F});
+  flame.background = 0.5F;
+  const auto radiance = scene::emission_of(frame, {});
+  ASSERT_TRUE(radiance);
+  EXPECT_EQ(radiance_at(*radiance, 0, {3, 3, 3}), 1.0F);
+  EXPECT_EQ(radiance_at(*radiance, 1, {20, 3, 3}), 2.0F);
+  EXPECT_EQ(radiance_at(*radiance, 2, {30, 3, 3}), 0.5F);
+  EXPECT_EQ((*radiance)[0].bounds_max.x, 39);
+  flame.bounds_max = ivec3(1023);
+  EXPECT_THROW(scene::emission_of(frame, {}), Error) << "more bricks than anything without detail is worth";
+}
+
+// ---- Pictures
+
+struct Kind {
+  March march;
+  grid::CellKind cells;
+};
+constexpr std::array<Kind, 4> kinds{{{March::tet, grid::CellKind::linear},
+                                     {March::tet, grid::CellKind::constant},
+                                     {March::dense, grid::CellKind::constant},
+                                     {March::brick, grid::CellKind::constant}}};
+
+class EmissionPicture : public test::ViewerTest {
+ protected:
+  static void show(test::Still& viewer, VolumeFrame frame) {
+    viewer.set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+  }
+  static void set(test::Still& viewer, const Kind& kind, double threshold = -1.0) {
+    viewer::GridSettings s;
+    s.build.march = kind.march;
+    s.build.refine.cells = kind.cells;
+    s.build.refine.threshold = threshold;
+    viewer.set_grid(s);
+  }
+  // Looks down -z at the middle of a slab of 64 x 64 voxels.
+  static test::Picture look(test::Still& viewer, double from = 500.0, std::uint32_t samples = 64) {
+    viewer.set_camera(test::camera_at({31.5, 31.5, from}, {31.5, 31.5, from - 1.0}, 0.5));
+    return test::render(viewer, {16, 16, samples, 1, render::View::shaded});
+  }
+};
+CUMULET_ON_BACKENDS(EmissionPicture);
+
+TEST_P(EmissionPicture, AFlameWithoutDensityIsExact) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = nothing()};
+  frame.flame = field({64, 64, 8}, ivec3(0), 2.0F);
+  show(*viewer, std::move(frame));
+  viewer::Medium medium;
+  medium.field_emission.flame_strength = 0.25;
+  medium.field_emission.flame_colour = {1.0F, 0.5F, 0.0F};
+  viewer->set_medium(medium);
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.125F)});
+  for (const Kind& kind : kinds) {
+    set(*viewer, kind);
+    for (const double from : {500.0, 3.5}) {
+      const test::Picture picture = look(*viewer, from, 4);
+      const float length = from > 100.0 ? 8.0F : 4.0F;
+      for (const glm::vec4& pixel : picture.pixels) {
+        EXPECT_NEAR(pixel.x, 0.125F + 0.5F * length, 2e-3F);
+        EXPECT_NEAR(pixel.y, 0.125F + 0.25F * length, 2e-3F);
+        EXPECT_NEAR(pixel.z, 0.125F, 1e-6F);
+        EXPECT_EQ(pixel.w, 0.0F) << "it covers nothing";
+      }
+    }
+  }
+}
+
+TEST_P(EmissionPicture, ASlabThatAbsorbsFollowsTheClosedForm) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 1.0F)};
+  frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
+  show(*viewer, std::move(frame));
+  viewer->set_light({});
+  for (const Kind& kind : kinds) {
+    set(*viewer, kind);
+    for (const double sigma : {0.05, 0.4}) {
+      viewer::Medium medium;
+      medium.density_scale = sigma;
+      medium.albedo = vec3(0.0F);
+      viewer->set_medium(medium);
+      const test::Picture picture = look(*viewer);
+      const double through = 8.0 * sigma;
+      const double mean = (1.0 - std::exp(-through)) / sigma;
+      // Of min(free path, 8).
+      const double square = 2.0 / (sigma * sigma) * (1.0 - std::exp(-through) * (1.0 + through));
+      const double error = std::sqrt((square - mean * mean) / (256.0 * 64.0));
+      EXPECT_NEAR(picture.mean().x, mean, 4.0 * error) << sigma;
+    }
+  }
+}
+
+// What gives off as much as it takes from a sky of radiance 1 cannot be told from it.
+TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
+  const auto viewer = make();
+  const ScalarVolume noise = test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3);
+  VolumeFrame frame{.density = noise};
+  frame.flame = noise;
+  show(*viewer, std::move(frame));
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
+  viewer::Medium medium;
+  medium.density_scale = 0.5;
+  medium.albedo = vec3(0.75F);
+  medium.phase.anisotropy = 0.4F;
+  medium.field_emission.flame_strength = 0.5 * 0.25;
+  viewer->set_medium(medium);
+  for (const Kind& kind : kinds) {
+    // Where cells average, density and emission still go together.
+    set(*viewer, kind, kind.march == March::tet ? 0.05 : -1.0);
+    const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
+    double square = 0.0;
+    for (const glm::vec4& p : picture.pixels) square += (p.x - 1.0) * (p.x - 1.0);
+    EXPECT_NEAR(picture.mean().x, 1.0, 4.0 * std::sqrt(square) / 576.0 + 1e-4);
+  }
+}
+
+// A front that is hot and thin, in smoke that does not vary: cells are split for what it gives off.
+TEST_P(EmissionPicture, CellsAreSplitForWhatGlows) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = field(ivec3(64), ivec3(0), 1.0F)};
+  frame.flame = test::make_volume(ivec3(64), ivec3(0), [](const ivec3& p) {
+    return std::exp(-0.5F * static_cast<float>((p.x - 20) * (p.x - 20))) * (p.y > 32 ? 1.0F : 0.0F);
+  });
+  show(*viewer, std::move(frame));
+  viewer->set_light({});
+  viewer::Medium medium;
+  medium.density_scale = 0.01;
+  viewer->set_medium(medium);
+  std::vector<test::Picture> pictures;
+  for (const Kind& kind : {kinds[0], kinds[2]}) {
+    set(*viewer, kind, 0.02);
+    viewer->set_camera(test::camera_at({31.5, 31.5, 200.0}, {31.5, 31.5, 31.5}, 22.0));
+    pictures.push_back(test::render(*viewer, {32, 32, 64, 1, render::View::shaded}));
+    if (kind.march == March::tet) {
+      EXPECT_GT(viewer->viewer().stats().cells, 5000U);
+    }
+  }
+  double square = 0.0;
+  double all = 0.0;
+  for (std::size_t i = 0; i < pictures[0].pixels.size(); ++i) {
+    const double difference = pictures[0].pixels[i].x - pictures[1].pixels[i].x;
+    square += difference * difference;
+    all += pictures[1].pixels[i].x * pictures[1].pixels[i].x;
+  }
+  EXPECT_LT(std::sqrt(square / all), 0.03);
+}
+
+// Rays end at triangles before what is behind them adds to the picture, whatever stands where.
+TEST_P(EmissionPicture, EndsAtSurfaces) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = nothing()};
+  frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
+  show(*viewer, std::move(frame));
+  viewer->set_light({});
+  test::StillScene wall;
+  wall.add_quad({vec3(-100, -100, 5.25), vec3(100, -100, 5.25), vec3(100, 100, 5.25), vec3(-100, 100, 5.25)},
+                wall.add(test::diffuse(vec3(0.0F))));
+  viewer->viewer().show_surfaces(test::source_of(std::make_shared<test::StillScene>(wall)));
+  for (const Kind& kind : kinds) {
+    set(*viewer, kind);
+    const test::Picture picture = look(*viewer, 500.0, 16);
+    for (const glm::vec4& pixel : picture.pixels) EXPECT_NEAR(pixel.x, 7.5F - 5.25F, 2e-3F);
+  }
+}
+
+// A floor right below a wide slab that glows: what comes from each direction is its way through the slab, 8 / cosine,
+// as far as the slab goes.
+TEST_P(EmissionPicture, LightsAFloor) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = nothing()};
+  frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
+  show(*viewer, std::move(frame));
+  viewer->set_light({});
+  test::StillScene floor;
+  floor.add_quad({vec3(31, 31, -0.75), vec3(32, 31, -0.75), vec3(32, 32, -0.75), vec3(31, 32, -0.75)},
+                 floor.add(test::diffuse(vec3(0.5F))));
+  viewer->viewer().show_surfaces(test::source_of(std::make_shared<test::StillScene>(floor)));
+  // Half-space integral of 0.5 / pi x cosine x length, over the box -0.5 to 63.5 and 0 to 8 above z = -0.5.
+  double light = 0.0;
+  constexpr int steps = 400;
+  for (int i = 0; i < steps; ++i) {
+    for (int j = 0; j < steps; ++j) {
+      const double r = std::sqrt((i + 0.5) / steps);
+      const double phi = 2.0 * M_PI * (j + 0.5) / steps;
+      const double x = r * std::cos(phi);
+      const double y = r * std::sin(phi);
+      const double z = std::sqrt(1.0 - r * r);
+      const double enter = 0.25 / z;
+      double leave = 8.25 / z;
+      if (x != 0.0) leave = std::min(leave, 32.0 / std::abs(x));
+      if (y != 0.0) leave = std::min(leave, 32.0 / std::abs(y));
+      light += std::max(0.0, leave - enter);
+    }
+  }
+  light *= 0.5 / (steps * steps);
+  for (const Kind& kind : {kinds[0], kinds[2]}) {
+    set(*viewer, kind);
+    viewer->set_camera(test::camera_at({31.5, 31.5, -0.6}, {31.5, 31.5, -1.0}, 30.0));
+    const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
+    double mean = 0.0;
+    double square = 0.0;
+    for (const glm::vec4& pixel : picture.pixels) {
+      mean += pixel.x / 256.0;
+      square += pixel.x * pixel.x / 256.0;
+    }
+    const double error = std::sqrt((square - mean * mean) / 256.0);
+    EXPECT_NEAR(mean, light, 4.0 * error + 1e-3 * light);
+    EXPECT_LT(error, 0.02 * light);
+  }
+}
+
+}  // namespace
