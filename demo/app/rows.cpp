@@ -58,6 +58,13 @@ bool Rows::draw(const settings::Facts& facts, float (&value)[3]) {
     for (std::size_t i = 0; i < 3; ++i) value[i] = std::clamp(1.0f - spelled[i], 0.0f, 1.0f);
     return true;
   }
+  if (*row.colour == '\0') {
+    if (!ui_.colour(row.label, row.tip, value)) return false;
+    // 0 is the library's default.
+    constexpr float dark = 1e-6f;
+    if (facts.zero != 0.0) value[0] = std::max(value[0], dark);
+    return true;
+  }
   std::array<float, 3>& kept = hues_.try_emplace(row.label, row.hue).first->second;
   float strength = std::max({value[0], value[1], value[2]});
   if (strength > 0.0f)

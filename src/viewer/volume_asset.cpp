@@ -55,7 +55,10 @@ std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progre
 }
 
 std::shared_ptr<const grid::Emission> VolumeAsset::emission(const scene::Emission& emission, Progress& progress) const {
-  auto radiance = scene::emission_of(*frame_, emission, &progress);
+  scene::Emission given = emission;
+  // What has a temperature alone would be nothing.
+  if (given.blackbody == 0.0 && frame_->density.empty() && !frame_->flame) given.blackbody = 1.0;
+  auto radiance = scene::emission_of(*frame_, given, &progress);
   if (!radiance) return nullptr;
   return make_left<const grid::Emission>(*std::move(radiance), cube_, &progress);
 }

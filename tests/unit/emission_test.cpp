@@ -146,6 +146,20 @@ TEST_P(EmissionPicture, AFlameWithoutDensityIsExact) {
   }
 }
 
+// A file with a temperature and nothing else is fire, too.
+TEST_P(EmissionPicture, ATemperatureAloneShines) {
+  const auto viewer = make();
+  viewer->set_light({});
+  for (const bool smoke : {false, true}) {
+    VolumeFrame frame{.density = smoke ? field({64, 64, 8}, ivec3(0), 1e-3F) : nothing()};
+    frame.temperature = field({64, 64, 8}, ivec3(0), 1.0F);
+    show(*viewer, std::move(frame));
+    const double luminance = light::black_body_radiance(1500.0, 1.0) * 8.0;
+    const glm::dvec4 mean = look(*viewer, 500.0, 4).mean();
+    EXPECT_NEAR(0.2126 * mean.x + 0.7152 * mean.y + 0.0722 * mean.z, smoke ? 0.0 : luminance, 1e-2 * luminance);
+  }
+}
+
 TEST_P(EmissionPicture, ASlabThatAbsorbsFollowsTheClosedForm) {
   const auto viewer = make();
   VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 1.0F)};

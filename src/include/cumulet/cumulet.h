@@ -676,7 +676,7 @@ typedef struct cumulet_medium_desc {
   float flame_color[3];     /* linear Rec. 709; all 0: white */
   float temperature_scale;  /* kelvin; 0: 1500 */
   float temperature_offset; /* kelvin */
-  float blackbody;          /* intensity; 0: none */
+  float blackbody;          /* intensity; 0: none, but 1 for a volume of a temperature without density and flame */
   float blackbody_tint[3];  /* all 0: white */
 } cumulet_medium_desc;
 
