@@ -18,17 +18,19 @@ struct VolumeFrame {
   std::optional<std::array<ScalarVolume, 3>> colour = {};  ///< of what scatters: linear Rec. 709; red, green, blue
 };
 
-/// Which grids of a file are which field. "none" leaves a field out. Empty: the scalar fog grid whose name, in whatever
-/// case, comes first among these, but for grids that are named for another field:
-/// - density: density, smoke, soot; of a file without all of density, temperature and flame what import_volume reads;
-/// - temperature: temperature, heat, temp;
-/// - flame: flame, flames, fire, burn, fuel;
-/// - colour: cd_, color_, colour_, followed by r, g and b: three grids.
+/// Which grids of a file are which field. "none" leaves a field out. Empty: the grid whose name, in whatever case,
+/// comes first among those below, but for one that is named for another field.
 struct GridNames {
+  /// density, smoke, soot; of a file without any of density, temperature and flame, what import_volume reads.
   std::string density = {};
+  /// temperature, heat, temp.
   std::string temperature = {};
+  /// flame, flames, fire, burn, fuel.
   std::string flame = {};
-  std::string colour = {};  ///< of "colour" the grids "colour_r", "colour_g" and "colour_b"
+  /// cd, color, colour, of vectors of floats that are not staggered. Three grids of numbers are read only if they are
+  /// named, "color" for "color_r", "color_g" and "color_b": those that Mantaflow writes hold colour times density, as
+  /// it advects them. They are taken as they are, as Cycles takes them.
+  std::string colour = {};
 };
 
 /// Reads the fields of a .vdb or .nvdb file, each as import_volume reads a grid.
@@ -42,8 +44,9 @@ struct GridNames {
 /// that are not 0. Offsets of whole voxels so move values exactly.
 ///
 /// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
-/// out. Warnings: as import_volume's; the grids that are not shown; temperature or colour that lies nowhere over
-/// density. An info tells of temperatures that seem to be kelvin, degrees Celsius, or from 0 to 1.
+/// out. Warnings: import_volume's; the grids that are not shown; temperature or colour that lies nowhere over
+/// density. An info tells of colour in three grids that is not read, and of temperatures that seem to be kelvin,
+/// degrees Celsius, or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
 

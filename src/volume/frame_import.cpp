@@ -21,7 +21,7 @@ constexpr const char* no_grid = "none";
 /// Places in the file's list of grids.
 struct Chosen {
   std::optional<std::size_t> density, temperature, flame;
-  std::vector<std::size_t> colour;  ///< none, or red, green and blue
+  std::vector<std::size_t> colour;  ///< none; one of vectors; or red, green and blue
 
   [[nodiscard]] std::vector<std::size_t> all() const {
     std::vector<std::size_t> out = colour;
@@ -46,19 +46,30 @@ std::vector<std::size_t> channels(const std::vector<GridInfo>& grids, const std:
   return found;
 }
 
+/// Why a grid holds no colours; empty if it may.
+std::string colour_refusal(const GridInfo& grid) {
+  if (grid.values != Values::lengths || grid.type == "vec3i") return "is of type " + grid.type + ", not vec3s or vec3d";
+  if (grid.grid_class == "staggered") return "is staggered: velocities, not colours";
+  return {};
+}
+
 std::vector<std::size_t> choose_colour(const std::vector<GridInfo>& grids, const std::string& name) {
   if (name == no_grid) return {};
   if (!by_name(name)) {
-    std::vector<std::size_t> found = channels(grids, name);
-    if (found.empty()) {
+    std::vector<std::size_t> of_channels = channels(grids, name);
+    const std::vector<std::size_t> whole = named(grids, name);
+    const bool usable = std::ranges::any_of(whole, [&](std::size_t i) { return colour_refusal(grids[i]).empty(); });
+    if (!of_channels.empty() && !usable) return of_channels;
+    if (whole.empty()) {
       fail_without(grids, "has no grid of vectors \"" + name + "\", nor all of \"" + name + "_r\", \"" + name +
                               "_g\" and \"" + name + "_b\"; it has ");
     }
-    return found;
+    return {choose_named(grids, name, colour_refusal)};
   }
   for (const std::string_view likely : colour_names) {
-    std::vector<std::size_t> found = channels(grids, std::string(likely));
-    if (!found.empty()) return found;
+    for (std::size_t i = 0; i < grids.size(); ++i) {
+      if (lower_case(grids[i].name) == likely && colour_refusal(grids[i]).empty()) return {i};
+    }
   }
   return {};
 }
@@ -128,6 +139,7 @@ class FrameImport {
     if (by_name(names.density) && chosen.density) {
       remark(LogLevel::warning, file_, remark_on_choice(reader.grids(), *chosen.density, chosen.all()));
     }
+    if (by_name(names.colour) && chosen.colour.empty()) remark_on_colour(reader.grids());
     constexpr double reading = 0.8;
     const Portion whole{reader.opened(), 1.0};
     read(reader, chosen, whole.part(0.0, reading));
@@ -152,7 +164,11 @@ class FrameImport {
       remark(LogLevel::info, name_of(*out_.temperature), remark_on_temperature(*out_.temperature));
     }
     if (chosen.flame) out_.flame = field(*chosen.flame);
-    if (!chosen.colour.empty()) std::ranges::transform(chosen.colour, out_.colour.emplace().begin(), field);
+    if (chosen.colour.size() == 1) {
+      out_.colour = import_vector_grid(reader, chosen.colour[0], file_, log_, progress_, shares.next());
+    } else if (!chosen.colour.empty()) {
+      std::ranges::transform(chosen.colour, out_.colour.emplace().begin(), field);
+    }
   }
 
   void place(Portion portion) {
@@ -184,6 +200,15 @@ class FrameImport {
       field = std::move(volume);
     }
     field.index_to_world = lattice;
+  }
+
+  void remark_on_colour(const std::vector<GridInfo>& grids) const {
+    for (const std::string_view name : colour_names) {
+      const std::vector<std::size_t> found = channels(grids, std::string(name));
+      if (found.empty()) continue;
+      remark(LogLevel::info, file_, "colour is read from " + describe(grids, found) + " only if it is named");
+      return;
+    }
   }
 
   void warn_if_apart(const ScalarVolume& field) const {

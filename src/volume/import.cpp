@@ -69,15 +69,19 @@ std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress
 
 namespace {
 
-std::string describe(const GridInfo& entry) {
+std::string label(const GridInfo& entry) {
   return "\"" + entry.unique_name + "\" (" + entry.type + ", " + entry.grid_class + ")";
 }
 
-std::string describe(const std::vector<GridInfo>& grids, const std::vector<std::size_t>& which) {
+}  // namespace
+
+std::string detail::describe(const std::vector<GridInfo>& grids, std::span<const std::size_t> which) {
   std::string out;
-  for (const std::size_t i : which) out += (out.empty() ? "" : ", ") + describe(grids[i]);
+  for (const std::size_t i : which) out += (out.empty() ? "" : ", ") + label(grids[i]);
   return out;
 }
+
+namespace {
 
 // What is shown as density of a file that has none, the first of these first.
 constexpr std::array<std::string_view, 5> likely_names = {"flames", "flame", "fire", "temperature", "heat"};
@@ -100,7 +104,7 @@ std::string detail::remark_on_choice(const std::vector<GridInfo>& grids, std::si
     one_density = one_density && grids[i].name != grids[chosen].name;
   }
   if (others.empty() || one_density) return {};
-  return "shows its grid " + describe(grids[chosen]) + "; there is also " + describe(grids, others);
+  return "shows its grid " + label(grids[chosen]) + "; there is also " + describe(grids, others);
 }
 
 std::vector<std::size_t> detail::named(const std::vector<GridInfo>& grids, const std::string& name) {
@@ -134,20 +138,20 @@ void detail::fail_without(const std::vector<GridInfo>& grids, const std::string&
   fail(what + describe(grids, all));
 }
 
+std::size_t detail::choose_named(const std::vector<GridInfo>& grids, const std::string& name,
+                                 const std::function<std::string(const GridInfo&)>& refusal) {
+  const std::vector<std::size_t> found = named(grids, name);
+  if (found.empty()) fail_without(grids, "has no grid \"" + name + "\"; it has ");
+  std::vector<std::size_t> usable;
+  std::ranges::copy_if(found, std::back_inserter(usable), [&](std::size_t i) { return refusal(grids[i]).empty(); });
+  if (usable.empty()) fail("grid \"" + grids[found[0]].unique_name + "\" " + refusal(grids[found[0]]));
+  if (usable.size() > 1) fail("several grids are called so, choose one by name: " + describe(grids, usable));
+  return usable[0];
+}
+
 std::size_t detail::choose_grid(const std::vector<GridInfo>& grids, const std::string& name) {
   if (grids.empty()) fail("holds no grids");
-  if (!name.empty()) {
-    const std::vector<std::size_t> found = named(grids, name);
-    if (found.empty()) fail_without(grids, "has no grid \"" + name + "\"; it has ");
-    std::vector<std::size_t> usable;
-    for (const std::size_t i : found) {
-      if (grids[i].refusal.empty()) usable.push_back(i);
-    }
-    if (usable.empty()) fail("grid \"" + grids[found[0]].unique_name + "\" " + grids[found[0]].refusal);
-    if (usable.size() > 1) fail("several grids are called so, choose one by name: " + describe(grids, usable));
-    return usable[0];
-  }
-
+  if (!name.empty()) return choose_named(grids, name, &GridInfo::refusal);
   if (const auto density = first_fog(grids, density_names)) return *density;
   if (const auto likely = first_fog(grids, likely_names)) return *likely;
   const auto first = std::ranges::find_if(grids, [](const GridInfo& e) { return e.refusal.empty(); });
@@ -446,6 +450,28 @@ ScalarVolume detail::import_grid(Reader& reader, std::size_t grid, const std::st
     ScalarVolume volume = assemble(std::move(source), log, name + ": ", progress, portion.part(reading, 1.0));
     volume.name = entry.name;
     return volume;
+  });
+}
+
+std::array<ScalarVolume, 3> detail::import_vector_grid(Reader& reader, std::size_t grid, const std::string& file,
+                                                       const Log& log, Progress* progress, Portion portion) {
+  const GridInfo& entry = reader.grids()[grid];
+  const std::string name = one_line(file + ": grid \"" + entry.unique_name + "\"");
+  return naming(name, [&] {
+    constexpr double reading = 0.7;
+    std::array<SourceGrid, 3> sources = reader.read_vector(grid, portion.part(0.0, reading), log, name + ": ");
+    std::array<ScalarVolume, 3> out;
+    double from = reading;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double to = from + (1.0 - reading) / 3.0;
+      // They are empty together, which is said once.
+      const Log& heard = axis > 0 && out[0].empty() ? Log() : log;
+      out[axis] =
+          assemble(std::move(sources[axis]), heard, name + ", " + "xyz"[axis] + ": ", progress, portion.part(from, to));
+      out[axis].name = entry.name;
+      from = to;
+    }
+    return out;
   });
 }
 

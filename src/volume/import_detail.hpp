@@ -3,9 +3,11 @@
 // Private to volume/: what file readers and memory hand to the shared half of the importer, and that half.
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <glm/glm.hpp>
 #include <ios>
 #include <limits>
@@ -32,6 +34,31 @@ ActiveMask not_zero(std::span<const float, brick_voxels> values);
 // Longer than any asset, short enough that every voxel count and index difference fits its integer.
 inline constexpr int max_extent = 1 << 20;
 inline constexpr int max_coordinate = 1 << 30;
+
+/// What is taken of a grid's values: numbers as they are, and of vectors the lengths.
+struct Lengths {
+  template <typename Value>
+  float operator()(const Value& value) const {
+    if constexpr (std::is_arithmetic_v<Value>) {
+      return static_cast<float>(value);
+    } else {
+      const double x = value[0];
+      const double y = value[1];
+      const double z = value[2];
+      return static_cast<float>(std::sqrt(x * x + y * y + z * z));
+    }
+  }
+};
+
+/// Of vectors.
+struct Component {
+  int axis;
+
+  template <typename Value>
+  float operator()(const Value& value) const {
+    return static_cast<float>(value[axis]);
+  }
+};
 
 /// The leaves of one grid, still in their library's own memory. Safe to read from many threads.
 class LeafSource {
@@ -83,13 +110,19 @@ class Reader {
   [[nodiscard]] virtual double opened() const { return 0.0; }
   /// Reads the tree of the grid at this place of grids(), whose values are not none. log_prefix begins every warning.
   virtual SourceGrid read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) = 0;
+  /// The components of one whose values are lengths.
+  virtual std::array<SourceGrid, 3> read_vector(std::size_t grid, Portion portion, const Log& log,
+                                                const std::string& log_prefix) = 0;
 };
 
 /// By content, not by name.
 std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress);
 /// Where import_volume looks for this name, or without one. Throws as import_volume does.
 std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name);
-/// Whose name, or else whose unique name, is this one.
+/// The one of this name, or else unique name, that is not refused. Throws where there is none or are several.
+std::size_t choose_named(const std::vector<GridInfo>& grids, const std::string& name,
+                         const std::function<std::string(const GridInfo&)>& refusal);
+/// All of this name, or else unique name.
 std::vector<std::size_t> named(const std::vector<GridInfo>& grids, const std::string& name);
 /// The scalar fog grid whose name, in whatever case, comes first among these; of several the file's first. taken: grids
 /// that it is not.
@@ -102,6 +135,7 @@ std::string remark_on_choice(const std::vector<GridInfo>& grids, std::size_t cho
                              std::span<const std::size_t> shown);
 /// what, followed by all grids.
 [[noreturn]] void fail_without(const std::vector<GridInfo>& grids, const std::string& what);
+std::string describe(const std::vector<GridInfo>& grids, std::span<const std::size_t> which);
 std::string lower_case(std::string text);
 
 std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* progress);
@@ -113,6 +147,9 @@ ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_
 /// One scalar grid of an open file, read and assembled.
 ScalarVolume import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log, Progress* progress,
                          Portion portion);
+/// The components of a grid of vectors.
+std::array<ScalarVolume, 3> import_vector_grid(Reader& reader, std::size_t grid, const std::string& file,
+                                               const Log& log, Progress* progress, Portion portion);
 
 std::string to_string(glm::ivec3 v);
 

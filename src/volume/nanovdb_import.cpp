@@ -60,17 +60,19 @@ bool is_scalar(nanovdb::GridType type) {
   }
 }
 
+bool is_vector(nanovdb::GridType type) { return type == nanovdb::GridType::Vec3f || type == nanovdb::GridType::Vec3d; }
+
 glm::ivec3 child_offset(std::uint32_t i, unsigned log2_table, unsigned log2_child) {
   const std::uint32_t mask = (1U << log2_table) - 1U;
   return {glm::uvec3(i >> (2U * log2_table), (i >> log2_table) & mask, i & mask) << log2_child};
 }
 
-template <typename BuildT>
+template <typename BuildT, typename Pick>
 class NanoLeaves final : public LeafSource {
  public:
   using LeafT = nanovdb::NanoLeaf<BuildT>;
 
-  explicit NanoLeaves(Handle handle) : handle_(std::move(handle)) {}
+  NanoLeaves(std::shared_ptr<const Handle> handle, Pick pick) : handle_(std::move(handle)), pick_(pick) {}
   void add(const LeafT* leaf, glm::ivec3 origin) {
     leaves_.push_back(leaf);
     origins_.push_back(origin);
@@ -87,17 +89,18 @@ class NanoLeaves final : public LeafSource {
   }
   void values(std::size_t leaf, float* out) const override {
     const auto* data = leaves_[leaf]->data();
-    for (std::uint32_t i = 0; i < brick_voxels; ++i) out[i] = static_cast<float>(data->getValue(i));
+    for (std::uint32_t i = 0; i < brick_voxels; ++i) out[i] = pick_(data->getValue(i));
   }
 
  private:
-  Handle handle_;  // owns the memory of the leaves
+  std::shared_ptr<const Handle> handle_;  // owns the memory of the leaves
+  Pick pick_;
   std::vector<const LeafT*> leaves_;
   std::vector<glm::ivec3> origins_;
 };
 
 /// Walks a grid's buffer and believes none of its offsets: NanoVDB itself checks nothing.
-template <typename BuildT>
+template <typename BuildT, typename Pick = Lengths>
 class NanoWalk {
  public:
   using GridT = nanovdb::NanoGrid<BuildT>;
@@ -107,18 +110,19 @@ class NanoWalk {
   using LowerT = nanovdb::NanoLower<BuildT>;
   using LeafT = nanovdb::NanoLeaf<BuildT>;
 
-  static SourceGrid run(Handle handle, const Log& log, const std::string& log_prefix, const Progress* progress) {
-    NanoWalk walk(handle.data(), handle.size(), progress);
+  static SourceGrid run(std::shared_ptr<const Handle> handle, const Log& log, const std::string& log_prefix,
+                        const Progress* progress, Pick pick = {}) {
+    NanoWalk walk(handle->data(), handle->size(), progress, pick);
     walk.tree(log, log_prefix);
-    auto leaves = std::make_unique<NanoLeaves<BuildT>>(std::move(handle));
+    auto leaves = std::make_unique<NanoLeaves<BuildT, Pick>>(std::move(handle), pick);
     for (const auto& [leaf, origin] : walk.leaves_) leaves->add(leaf, origin);
     walk.out_.leaves = std::move(leaves);
     return std::move(walk.out_);
   }
 
  private:
-  NanoWalk(const std::uint8_t* begin, std::uint64_t size, const Progress* progress)
-      : begin_(begin), size_(size), progress_(progress) {}
+  NanoWalk(const std::uint8_t* begin, std::uint64_t size, const Progress* progress, Pick pick)
+      : begin_(begin), size_(size), progress_(progress), pick_(pick) {}
 
   [[noreturn]] static void damaged(const char* what) { fail(std::string("the file is damaged: ") + what); }
 
@@ -170,7 +174,7 @@ class NanoWalk {
       for (int column = 0; column < 3; ++column) out_.index_to_world[column][row] = map.mMatD[row * 3 + column];
       out_.index_to_world[3][row] = map.mVecD[row];
     }
-    out_.background = static_cast<float>(root->data()->mBackground);
+    out_.background = pick_(root->data()->mBackground);
 
     constexpr auto size = static_cast<int>(UpperT::DIM);
     std::map<std::array<int, 3>, bool> regions;
@@ -183,7 +187,7 @@ class NanoWalk {
       if (entry->isChild()) {
         upper(*at<UpperT>(root, entry->child), origin);
       } else {
-        tile(origin, size, static_cast<float>(entry->value), entry->isActive());
+        tile(origin, size, pick_(entry->value), entry->isActive());
       }
     }
   }
@@ -197,7 +201,7 @@ class NanoWalk {
       if (data->isChild(i)) {
         lower(*at<LowerT>(data, data->mTable[i].child), child);
       } else {
-        tile(child, size, static_cast<float>(data->getValue(i)), data->isActive(i));
+        tile(child, size, pick_(data->getValue(i)), data->isActive(i));
       }
     }
   }
@@ -219,7 +223,7 @@ class NanoWalk {
         count(0, bytes);
         leaves_.emplace_back(leaf, child);
       } else {
-        tile(child, brick_size, static_cast<float>(data->getValue(i)), data->isActive(i));
+        tile(child, brick_size, pick_(data->getValue(i)), data->isActive(i));
       }
     }
   }
@@ -227,6 +231,7 @@ class NanoWalk {
   const std::uint8_t* begin_;
   std::uint64_t size_;
   const Progress* progress_;
+  Pick pick_;
   std::uint32_t declared_[3] = {};
   std::uint64_t visited_[3] = {};
   std::uint64_t node_bytes_ = 0;
@@ -255,12 +260,8 @@ class NanoReader final : public Reader {
   [[nodiscard]] const std::string& format() const override { return format_; }
 
   SourceGrid read(std::size_t index, Portion portion, const Log& log, const std::string& log_prefix) override {
-    Handle handle = load(places_[index], portion);
-    if (handle.size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
-    const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle.data());
-    if (grid->mMagic != NANOVDB_MAGIC_NUMBER) fail("the file is damaged: no grid where one should be");
-    if (grid->mGridType != places_[index].type) fail("the file is damaged: grid and directory differ in type");
-    switch (grid->mGridType) {
+    std::shared_ptr<const Handle> handle = load_checked(index, portion);
+    switch (places_[index].type) {
       case nanovdb::GridType::Float:
         return NanoWalk<float>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::Double:
@@ -273,9 +274,30 @@ class NanoReader final : public Reader {
         return NanoWalk<nanovdb::Fp16>::run(std::move(handle), log, log_prefix, progress_);
       case nanovdb::GridType::FpN:
         return NanoWalk<nanovdb::FpN>::run(std::move(handle), log, log_prefix, progress_);
+      case nanovdb::GridType::Vec3f:
+        return NanoWalk<nanovdb::Vec3f>::run(std::move(handle), log, log_prefix, progress_);
+      case nanovdb::GridType::Vec3d:
+        return NanoWalk<nanovdb::Vec3d>::run(std::move(handle), log, log_prefix, progress_);
       default:
-        fail("is of a type that cannot be read");
+        fail(unreadable);
     }
+  }
+
+  std::array<SourceGrid, 3> read_vector(std::size_t index, Portion portion, const Log& log,
+                                        const std::string& log_prefix) override {
+    const std::shared_ptr<const Handle> handle = load_checked(index, portion);
+    const auto components = [&]<typename BuildT>() {
+      std::array<SourceGrid, 3> out;
+      for (int axis = 0; axis < 3; ++axis) {
+        // What is wrong with the grid is said once.
+        const Log& heard = axis > 0 ? Log() : log;
+        out[axis] = NanoWalk<BuildT, Component>::run(handle, heard, log_prefix, progress_, Component{axis});
+      }
+      return out;
+    };
+    if (places_[index].type == nanovdb::GridType::Vec3f) return components.template operator()<nanovdb::Vec3f>();
+    if (places_[index].type == nanovdb::GridType::Vec3d) return components.template operator()<nanovdb::Vec3d>();
+    fail(unreadable);
   }
 
  private:
@@ -324,7 +346,9 @@ class NanoReader final : public Reader {
       entry.type = type_name(meta.gridType);
       entry.grid_class = class_name(meta.gridClass);
       entry.refusal = scalar_fog_refusal(entry.type, entry.grid_class, is_scalar(meta.gridType));
-      entry.values = is_scalar(meta.gridType) ? Values::scalars : Values::none;
+      entry.values = is_scalar(meta.gridType)   ? Values::scalars
+                     : is_vector(meta.gridType) ? Values::lengths
+                                                : Values::none;
       entries_.push_back(std::move(entry));
     }
     for (std::size_t i = first; i < places_.size(); ++i) {
@@ -336,6 +360,15 @@ class NanoReader final : public Reader {
       position += places_[i].file_bytes;
     }
     return position;
+  }
+
+  std::shared_ptr<const Handle> load_checked(std::size_t index, Portion portion) {
+    auto handle = std::make_shared<const Handle>(load(places_[index], portion));
+    if (handle->size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
+    const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle->data());
+    if (grid->mMagic != NANOVDB_MAGIC_NUMBER) fail("the file is damaged: no grid where one should be");
+    if (grid->mGridType != places_[index].type) fail("the file is damaged: grid and directory differ in type");
+    return handle;
   }
 
   /// Reads and decodes a grid, believing no size: NanoVDB's own reader does, and cannot be stopped.
@@ -436,6 +469,7 @@ class NanoReader final : public Reader {
     });
   }
 
+  static constexpr const char* unreadable = "is of a type that cannot be read";
   static constexpr const char* sizes_differ = "the file is damaged: its sizes do not agree";
   static constexpr std::uint64_t most_chunk = std::uint64_t{1} << 30U;  ///< that NanoVDB packs into one Blosc frame
   static constexpr std::uint64_t most_piece = std::uint64_t{4} << 20U;  ///< decoded between looks at the cancel flag

@@ -36,22 +36,15 @@ std::string class_name(openvdb::GridClass grid_class) {
 
 glm::ivec3 to_glm(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
 
-template <typename Value>
-float to_float(const Value& value) {
-  if constexpr (std::is_arithmetic_v<Value>) {
-    return static_cast<float>(value);
-  } else {
-    return static_cast<float>(openvdb::Vec3d(value).length());
-  }
-}
-
-template <typename TreeT>
+template <typename TreeT, typename Pick>
 class VdbLeaves final : public LeafSource {
  public:
   using LeafT = typename TreeT::LeafNodeType;
   static_assert(LeafT::DIM == brick_size);
 
-  explicit VdbLeaves(typename TreeT::ConstPtr tree) : tree_(std::move(tree)) { tree_->getNodes(leaves_); }
+  VdbLeaves(typename TreeT::ConstPtr tree, Pick pick) : tree_(std::move(tree)), pick_(pick) {
+    tree_->getNodes(leaves_);
+  }
 
   [[nodiscard]] std::size_t count() const override { return leaves_.size(); }
   [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return to_glm(leaves_[leaf]->origin()); }
@@ -64,38 +57,46 @@ class VdbLeaves final : public LeafSource {
   }
   void values(std::size_t leaf, float* out) const override {
     const auto* data = leaves_[leaf]->buffer().data();
-    for (int i = 0; i < brick_voxels; ++i) out[i] = to_float(data[i]);
+    for (int i = 0; i < brick_voxels; ++i) out[i] = pick_(data[i]);
   }
 
  private:
   typename TreeT::ConstPtr tree_;
+  Pick pick_;
   std::vector<const LeafT*> leaves_;
 };
 
 /// Collects the tiles of a node and of all internal nodes below it.
-template <typename NodeT>
-void collect_tiles(const NodeT& node, float background, std::vector<SourceTile>& tiles) {
+template <typename NodeT, typename Pick>
+void collect_tiles(const NodeT& node, Pick pick, float background, std::vector<SourceTile>& tiles) {
   using ChildT = typename NodeT::ChildNodeType;
   constexpr auto size = static_cast<int>(ChildT::DIM);
   for (auto it = node.cbeginValueAll(); it; ++it) {
-    const float value = to_float(*it);
+    const float value = pick(*it);
     if (!it.isValueOn() && value == background) continue;
     const glm::ivec3 min = to_glm(it.getCoord());
     tiles.push_back({{min, min + (size - 1), value}, it.isValueOn()});
   }
   if constexpr (ChildT::LEVEL > 0) {
-    for (auto it = node.cbeginChildOn(); it; ++it) collect_tiles(*it, background, tiles);
+    for (auto it = node.cbeginChildOn(); it; ++it) collect_tiles(*it, pick, background, tiles);
   }
 }
 
-template <typename GridT>
-void take_tree(const openvdb::GridBase& grid, SourceGrid& out) {
+template <typename GridT, typename Pick>
+SourceGrid take_grid(const openvdb::GridBase& grid, Pick pick) {
   using TreeT = typename GridT::TreeType;
   const auto tree = static_cast<const GridT&>(grid).treePtr();
   const auto& root = tree->root();
-  out.background = to_float(root.background());
-  collect_tiles(root, out.background, out.tiles);
-  out.leaves = std::make_unique<VdbLeaves<TreeT>>(tree);
+  SourceGrid out;
+  const auto matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
+  // OpenVDB multiplies row vectors from the left: its rows are our columns.
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) out.index_to_world[column][row] = matrix(column, row);
+  }
+  out.background = pick(root.background());
+  collect_tiles(root, pick, out.background, out.tiles);
+  out.leaves = std::make_unique<VdbLeaves<TreeT, Pick>>(tree, pick);
+  return out;
 }
 
 /// The same tree, but one that frees what it has read when its stream throws: OpenVDB's own root forgets the child that
@@ -194,22 +195,23 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   [[nodiscard]] double opened() const override { return inputHasGridOffsets() ? 0.0 : 0.35; }
 
   SourceGrid read(std::size_t index, Portion portion, const Log& /*log*/, const std::string& /*log_prefix*/) override {
+    const openvdb::GridBase::Ptr grid = read_whole(index, portion);
     SourceGrid out;
-    openvdb::GridBase::Ptr grid = read_grid(descriptors_[index], portion);
-    if (descriptors_[index].isInstance()) {
-      const auto parent = std::find_if(descriptors_.begin(), descriptors_.end(), [&](const auto& d) {
-        return d.uniqueName() == descriptors_[index].instanceParentName();
-      });
-      if (parent == descriptors_.end() || parent->isInstance()) fail("it shares the tree of a grid that is missing");
-      grid->setTree(read_grid(*parent, portion)->baseTreePtr());
-    }
-    const auto matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
-    // OpenVDB multiplies row vectors from the left: its rows are our columns.
-    for (int column = 0; column < 4; ++column) {
-      for (int row = 0; row < 4; ++row) out.index_to_world[column][row] = matrix(column, row);
-    }
-    with_type(*grid, [&]<typename GridT>() { take_tree<GridT>(*grid, out); });
-    if (!out.leaves) fail("is of a type that cannot be read");
+    with_type(*grid, [&]<typename GridT>() { out = take_grid<GridT>(*grid, Lengths()); });
+    if (!out.leaves) fail(unreadable);
+    return out;
+  }
+
+  std::array<SourceGrid, 3> read_vector(std::size_t index, Portion portion, const Log& /*log*/,
+                                        const std::string& /*log_prefix*/) override {
+    const openvdb::GridBase::Ptr grid = read_whole(index, portion);
+    std::array<SourceGrid, 3> out;
+    with_type(*grid, [&]<typename GridT>() {
+      if constexpr (!std::is_arithmetic_v<typename GridT::ValueType>) {
+        for (int axis = 0; axis < 3; ++axis) out[axis] = take_grid<GridT>(*grid, Component{axis});
+      }
+    });
+    if (!out[0].leaves) fail(unreadable);
     return out;
   }
 
@@ -363,6 +365,19 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     return own;
   }
 
+  /// With the tree that it may share with another.
+  openvdb::GridBase::Ptr read_whole(std::size_t index, Portion portion) {
+    openvdb::GridBase::Ptr grid = read_grid(descriptors_[index], portion);
+    if (descriptors_[index].isInstance()) {
+      const auto parent = std::find_if(descriptors_.begin(), descriptors_.end(), [&](const auto& d) {
+        return d.uniqueName() == descriptors_[index].instanceParentName();
+      });
+      if (parent == descriptors_.end() || parent->isInstance()) fail("it shares the tree of a grid that is missing");
+      grid->setTree(read_grid(*parent, portion)->baseTreePtr());
+    }
+    return grid;
+  }
+
   openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor, Portion portion) {
     // An instance holds no tree. Without offsets a grid's end is unknown, and the file's the best guess.
     if (!descriptor.isInstance()) {
@@ -377,6 +392,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     readGrid(grid, descriptor, stream_);
     return grid;
   }
+
+  static constexpr const char* unreadable = "is of a type that cannot be read";
 
   openvdb::io::StreamMetadata::Ptr metadata_;  // the stream points to it
   std::vector<Metadata> file_metadata_;

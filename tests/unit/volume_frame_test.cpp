@@ -1,10 +1,17 @@
 // The fields of one file, on one lattice.
 
+#define NANOVDB_USE_ZIP
+#define NANOVDB_USE_BLOSC
+
 #include "volume/frame.hpp"
 
 #include <gtest/gtest.h>
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
+#include <openvdb/io/Stream.h>
 #include <tbb/global_control.h>
 
+#include <fstream>
 #include <random>
 
 #include "base/error.hpp"
@@ -151,15 +158,103 @@ TEST_F(Frame, WhatIsAskedForAndMissingIsNamed) {
 TEST_F(Frame, ColourOfThreeGrids) {
   const auto file = write(
       {dot("density", 1.0F), dot("color_r", 0.25F), dot("color_g", 0.5F), dot("color_b", 0.75F), dot("x_r", 1.0F)});
-  for (const std::string name : {"", "color"}) {
-    const VolumeFrame frame = import_frame(file, naming({{&GridNames::colour, name}}), {});
-    ASSERT_TRUE(frame.colour);
-    EXPECT_EQ((*frame.colour)[0].max_value, 0.25F);
-    EXPECT_EQ((*frame.colour)[1].max_value, 0.5F);
-    EXPECT_EQ((*frame.colour)[2].max_value, 0.75F);
-  }
-  EXPECT_FALSE(import_frame(file, naming({{&GridNames::colour, "none"}}), {}).colour);
+  const VolumeFrame frame = import_frame(file, naming({{&GridNames::colour, "color"}}), {});
+  ASSERT_TRUE(frame.colour);
+  EXPECT_EQ((*frame.colour)[0].max_value, 0.25F);
+  EXPECT_EQ((*frame.colour)[1].max_value, 0.5F);
+  EXPECT_EQ((*frame.colour)[2].max_value, 0.75F);
+  Messages messages;
+  EXPECT_FALSE(import_frame(file, {}, messages.log).colour);
+  ASSERT_EQ(messages.hints.size(), 1U);
+  EXPECT_HAS(messages.hints[0], "colour is read from \"color_r\"");
   EXPECT_HAS(refusal(file, naming({{&GridNames::colour, "x"}})), "\"x_g\"");
+}
+
+openvdb::Vec3SGrid::Ptr colours(const std::string& name) {
+  auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
+  grid->setName(name);
+  for (int i = 0; i < 100; ++i) {
+    const float value = static_cast<float>(i) / 128.0F;
+    grid->tree().setValue(Coord(i % 11, i % 7, i % 5), openvdb::Vec3f(value, 1.0F - value, 0.25F));
+  }
+  grid->tree().addTile(1, Coord(16, 0, 0), openvdb::Vec3f(0.0F, 0.5F, 1.0F), true);
+  return grid;
+}
+
+void expect_colours(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
+  ASSERT_TRUE(frame.colour);
+  for (int axis = 0; axis < 3; ++axis) {
+    const ScalarVolume& v = (*frame.colour)[static_cast<std::size_t>(axis)];
+    EXPECT_EQ(v.active_voxels, grid.activeVoxelCount());
+    for (auto it = grid.cbeginValueOn(); it; ++it) {
+      const Coord c = it.getCoord();
+      ASSERT_EQ(value_at(v, glm::ivec3(c.x(), c.y(), c.z())), (*it)[axis]) << c;
+    }
+  }
+}
+
+TEST_F(Frame, ColourOfVectors) {
+  for (const bool half : {false, true}) {
+    const auto grid = colours("Cd");
+    grid->setSaveFloatAsHalf(half);
+    auto velocity = colours("color");
+    velocity->setGridClass(openvdb::GRID_STAGGERED);
+    const auto file = write({dot("density", 1.0F), velocity, grid, dot("Cd_r", 1.0F)});
+    expect_colours(import_frame(file, {}, {}), *grid);
+    expect_colours(import_frame(file, naming({{&GridNames::colour, "Cd"}}), {}), *grid);
+    EXPECT_FALSE(import_frame(file, naming({{&GridNames::colour, "none"}}), {}).colour);
+    EXPECT_HAS(refusal(file, naming({{&GridNames::colour, "color"}})), "grid \"color\" is staggered");
+    EXPECT_HAS(refusal(file, naming({{&GridNames::colour, "density"}})), "is of type float, not vec3s");
+  }
+}
+
+TEST_F(Frame, AllBlackAndEmptyColours) {
+  auto black = colours("Cd");
+  black->tree().clear();
+  black->tree().setValue(Coord(1, 2, 3), openvdb::Vec3f(0.0F));
+  VolumeFrame frame = import_frame(write({dot("density", 1.0F), black}), {}, {});
+  ASSERT_TRUE(frame.colour);
+  EXPECT_EQ((*frame.colour)[1].max_value, 0.0F);
+  black->tree().clear();
+  Messages messages;
+  frame = import_frame(write({dot("density", 1.0F), black}), {}, messages.log);
+  ASSERT_TRUE(frame.colour);
+  EXPECT_TRUE((*frame.colour)[2].empty());
+  EXPECT_EQ(messages.warnings.size(), 1U);
+}
+
+TEST_F(Frame, NanoVdbHasTheSameFields) {
+  const auto density = dot("density", 1.0F);
+  const auto heat = dot("heat", 2.5F);
+  const auto flame = dot("Flame", 0.5F);
+  const auto colour = colours("Cd");
+  const VolumeFrame truth = import_frame(write({density, heat, flame, colour}), {}, {});
+  for (const auto codec : {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP, nanovdb::io::Codec::BLOSC}) {
+    std::vector<nanovdb::GridHandle<>> handles;
+    for (const auto& grid : {density, heat, flame}) handles.push_back(nanovdb::openToNanoVDB(*grid));
+    handles.push_back(nanovdb::openToNanoVDB(*colour));
+    const auto file = folder_ / "frame.nvdb";
+    nanovdb::io::writeGrids(file.string(), handles, codec);
+    const VolumeFrame frame = import_frame(file, {}, {});
+    expect_same(frame.density, truth.density);
+    ASSERT_TRUE(frame.temperature && frame.flame);
+    expect_same(*frame.temperature, *truth.temperature);
+    expect_same(*frame.flame, *truth.flame);
+    expect_colours(frame, *colour);
+  }
+}
+
+TEST_F(Frame, FilesThatCameThroughAPipeHaveTheSameFields) {
+  const auto grid = colours("Cd");
+  {
+    std::ofstream out(path(), std::ios::binary);
+    openvdb::io::Stream(out).write(openvdb::GridCPtrVec{dot("temperature", 2.0F), grid, dot("density", 1.0F)});
+  }
+  cumulet::Progress progress;
+  const VolumeFrame frame = import_frame(path(), {}, {}, &progress);
+  EXPECT_EQ(frame.density.max_value, 1.0F);
+  EXPECT_EQ(frame.temperature->max_value, 2.0F);
+  expect_colours(frame, *grid);
 }
 
 TEST_F(Frame, WhatIsNotShownIsRemarkedOn) {
@@ -400,7 +495,7 @@ TEST_F(Frame, SimulatedFiresAreReadAsTheyAre) {
   if (!fs::exists(data)) GTEST_SKIP() << "no " << data;
   const auto smoke = data / "mantaflow_fire/fluid_data_0015.vdb";
   Messages messages;
-  VolumeFrame frame = import_frame(smoke, {}, messages.log);
+  VolumeFrame frame = import_frame(smoke, naming({{&GridNames::colour, "color"}}), messages.log);
   expect_same(frame.density, import_volume(smoke, "density", {}));
   ASSERT_TRUE(frame.temperature && frame.flame && frame.colour);
   expect_same(*frame.temperature, import_volume(smoke, "temperature", {}));
