@@ -41,7 +41,8 @@ struct GridNames {
 /// centres, at the centre of that voxel; where a step of the lattice is more than 1.5 of the field's voxels, the mean
 /// of interpolations at equal distances within the voxel, an axis one for every voxel of the field in a step, 8 at
 /// most. Beyond the field's bounds stands 0, to which it falls off within one of its voxels. Active are then the voxels
-/// that are not 0. Offsets of whole voxels so move values exactly.
+/// that are not 0. Offsets of whole voxels so move values exactly. What would fill more than 2^21 bricks of the lattice
+/// is refused, and voxels smaller than a 64th of the lattice's.
 ///
 /// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
 /// out. Warnings: import_volume's; the grids that are not shown; temperature or colour that lies nowhere over

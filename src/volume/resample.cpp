@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <deque>
 
@@ -16,7 +17,12 @@ constexpr double much_finer = 1.5;
 constexpr double most_samples = 8.0;  // an axis
 // Of a voxel: transforms that differ by rounding alone give the field's own values.
 constexpr double alike = 1e-4;
-constexpr double far_off = max_coordinate;
+// Farther than what any voxel is made of.
+constexpr double far_off = double{max_coordinate} + max_extent;
+// Beyond that much finer, what a brick is made of fills memory.
+constexpr double most_finer = 64.0;
+// Of the lattice; 4 GiB of values.
+constexpr std::uint64_t most_bricks = std::uint64_t{1} << 21U;
 
 struct Brick {
   glm::ivec3 origin;
@@ -77,6 +83,23 @@ class Window {
     return cell.values[((p.x & 7) * brick_size + (p.y & 7)) * brick_size + (p.z & 7)];
   }
 
+  /// The value all over a box within the window's, if cells alone tell it.
+  [[nodiscard]] std::optional<double> constant(const Box& box) const {
+    const glm::ivec3 min = (box.min >> 3) - low_;
+    const glm::ivec3 max = (box.max >> 3) - low_;
+    const float value = cells_[place(min)].constant;
+    if (value != 0.0F && !Box{field_->bounds_min, field_->bounds_max}.contains(box)) return std::nullopt;
+    for (glm::ivec3 c = min; c.x <= max.x; ++c.x) {
+      for (c.y = min.y; c.y <= max.y; ++c.y) {
+        for (c.z = min.z; c.z <= max.z; ++c.z) {
+          const Cell& cell = cells_[place(c)];
+          if (cell.values != nullptr || cell.constant != value) return std::nullopt;
+        }
+      }
+    }
+    return value;
+  }
+
   /// Trilinear between the centres of voxels.
   [[nodiscard]] double at(glm::dvec3 p) const {
     const glm::dvec3 nearest = glm::round(p);
@@ -134,6 +157,7 @@ class Resampling {
         part_(progress, portion.from, portion.to, pieces(0)) {
     for (int axis = 0; axis < 3; ++axis) {
       const double step = glm::length(glm::dvec3(to_field_[axis]));
+      if (!(step <= most_finer)) fail("has voxels too small for the lattice of the file's other fields");
       const double wanted = step > much_finer ? std::ceil(step - alike) : 1.0;
       samples_[axis] = static_cast<int>(std::min(wanted, most_samples));
       // From a voxel's centre to its outermost sample.
@@ -147,10 +171,13 @@ class Resampling {
         image(glm::inverse(to_field_), glm::dvec3(field_.bounds_min) - 1.0, glm::dvec3(field_.bounds_max) + 1.0);
     const glm::dvec3 min = glm::floor(span.min - reach_);
     const glm::dvec3 max = glm::ceil(span.max + reach_);
-    if (!glm::all(glm::lessThan(glm::max(glm::abs(min), glm::abs(max)), glm::dvec3(far_off))) ||
+    if (!glm::all(glm::lessThan(glm::max(glm::abs(min), glm::abs(max)), glm::dvec3(max_coordinate))) ||
         !glm::all(glm::lessThan(max - min, glm::dvec3(max_extent)))) {
       fail("is too far off or too large for the lattice of the file's other fields");
     }
+    // Each of the field's bricks fills as many as it is larger by.
+    const double larger = 1.0 / std::abs(glm::determinant(glm::dmat3(to_field_)));
+    if (static_cast<double>(field_.brick_origins.size()) * larger > static_cast<double>(most_bricks)) too_large();
     box_ = {glm::ivec3(min), glm::ivec3(max)};
     const glm::ivec3 low = box_.min & ~(brick_size - 1);
     int size = brick_size;
@@ -168,12 +195,14 @@ class Resampling {
  private:
   static constexpr int told_depth = 3;  ///< progress is told of cubes of this depth
 
+  [[noreturn]] static void too_large() { fail("has voxels too large for the lattice of the file's other fields"); }
+
   static std::uint64_t pieces(int depth) { return std::uint64_t{1} << (3 * std::max(told_depth - depth, 0)); }
 
   /// The field's voxels that a box of the lattice is made of.
   [[nodiscard]] Box support(const Box& box) const {
     const Span span = image(to_field_, glm::dvec3(box.min) - reach_, glm::dvec3(box.max) + reach_);
-    // No farther than any voxel is: a cube of the lattice may be of any size.
+    // A cube of the lattice may be of any size.
     const auto voxel = [](const glm::dvec3& p) { return glm::ivec3(glm::clamp(p, -far_off, far_off)); };
     return {voxel(glm::floor(span.min - alike)), voxel(glm::ceil(span.max + alike))};
   }
@@ -221,11 +250,14 @@ class Resampling {
   }
 
   void sample(glm::ivec3 origin, const Box& needed, const Items& items) {
+    if (sampled_.fetch_add(1, std::memory_order_relaxed) >= most_bricks) too_large();
     const Window window(field_, needed, items);
     Brick brick{origin, {}};
     bool any = false;
     for (int i = 0; i < brick_voxels; ++i) {
-      const double value = average(window, glm::dvec3(origin + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7)));
+      const glm::ivec3 voxel = origin + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7);
+      const std::optional<double> known = window.constant(support({voxel, voxel}));
+      const double value = known ? *known : average(window, glm::dvec3(voxel));
       brick.values[static_cast<std::size_t>(i)] = static_cast<float>(value);
       any = any || value > 0.0;
     }
@@ -252,6 +284,7 @@ class Resampling {
   glm::dvec3 reach_{0.0};
   Box box_;
   ProgressPart part_;
+  std::atomic<std::uint64_t> sampled_ = 0;
   BrickLeaves::Bricks bricks_;
   tbb::enumerable_thread_specific<std::vector<SourceTile>> tiles_;
 };

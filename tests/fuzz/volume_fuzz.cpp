@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +12,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "volume/frame.hpp"
 #include "volume/inspection.hpp"
 #include "volume/volume.hpp"
 
@@ -68,6 +70,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string path = file.path();
   try {
     check_volume(cumulet::volume::import_volume(path, "", {}));
+  } catch (const cumulet::Error& error) {
+    check_line(error.what(), path);
+  } catch (const std::bad_alloc&) {  // told by the caller
+  }
+  try {
+    const cumulet::volume::VolumeFrame frame = cumulet::volume::import_frame(path, {}, {});
+    check_volume(frame.density);
+    if (frame.temperature) check_volume(*frame.temperature);
+    if (frame.flame) check_volume(*frame.flame);
+    if (frame.colour) std::ranges::for_each(*frame.colour, check_volume);
   } catch (const cumulet::Error& error) {
     check_line(error.what(), path);
   } catch (const std::bad_alloc&) {  // told by the caller

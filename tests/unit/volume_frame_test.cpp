@@ -11,6 +11,7 @@
 #include <openvdb/io/Stream.h>
 #include <tbb/global_control.h>
 
+#include <chrono>
 #include <fstream>
 #include <random>
 
@@ -446,6 +447,37 @@ TEST_F(Frame, ALatticeOutOfReachIsRefused) {
   auto far = dot("flame", 1.0F);
   far->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e9)));
   EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": is too far off or too large");
+  far->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e-3)));
+  EXPECT_HAS(refusal(write({dot("density", 1.0F), far}), {}), "grid \"flame\": has voxels too small");
+  // The lowest and highest places that there are.
+  auto wide = fog("flame");
+  wide->tree().setValue(Coord(1 << 30), 1.0F);
+  wide->setTransform(openvdb::math::Transform::createLinearTransform(scaled(0.5)));
+  const VolumeFrame frame = import_frame(write({dot("density", 1.0F), wide}), {}, {});
+  EXPECT_EQ(frame.flame->bounds_min, glm::ivec3(1 << 29));
+  EXPECT_EQ(frame.flame->max_value, 0.125F);
+}
+
+TEST_F(Frame, ALatticeFarFinerThanAFieldIsRefusedAtOnce) {
+  std::mt19937 random(9);
+  const auto coarse = box("flame", scaled(1.0), 60, [&](const Vec3d&) { return static_cast<float>(random() % 1000); });
+  auto density = dot("density", 1.0F);
+  density->setTransform(openvdb::math::Transform::createLinearTransform(scaled(0.01)));
+  EXPECT_HAS(refusal(write({density, coarse}), {}), "grid \"flame\": has voxels too large for the lattice");
+}
+
+TEST_F(Frame, WhereAFieldIsFarFinerEmptySpaceCostsLittle) {
+  // 500 dots, a brick each, 40 times finer than the lattice.
+  auto dots = fog("flame");
+  std::mt19937 random(10);
+  const auto pick = [&] { return static_cast<int>(random() % 20000); };
+  for (int i = 0; i < 500; ++i) dots->tree().setValue(Coord(pick(), pick(), pick()), 1.0F);
+  auto density = dot("density", 1.0F);
+  density->setTransform(openvdb::math::Transform::createLinearTransform(scaled(40.0)));
+  const auto before = std::chrono::steady_clock::now();
+  const VolumeFrame frame = import_frame(write({density, dots}), {}, {});
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(20));
+  EXPECT_LE(frame.flame->brick_origins.size(), 1000U);
 }
 
 TEST_F(Frame, ResamplingIsTheSameWhateverTheThreadsAndCanBeStopped) {
