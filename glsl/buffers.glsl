@@ -39,6 +39,11 @@ uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(cm.surfaces.wo
 vec4 cm_atlas_value(ivec3 at) { return texelFetch(cm_atlas, at, 0); }
 #endif
 
+#if CM_ENVIRONMENT
+layout(binding = CM_UNIT_ENVIRONMENT) uniform usamplerBuffer cm_environment_words;
+uvec4 cm_environment_word(uint i) { return texelFetch(cm_environment_words, int(cm.environment.words + i)); }
+#endif
+
 #ifdef CM_MARCH
 #if CM_MARCH == 0
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.

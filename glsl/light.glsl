@@ -20,6 +20,7 @@
 #define CM_LIGHT_LAMP 3u      // punctual
 #define CM_LIGHT_GLOW 4u      // the medium's own: flights that leave surfaces are aimed at its box
 #define CM_LIGHT_OTHER 5u     // of CM_MORE_LIGHTS
+#define CM_LIGHT_ENVIRONMENT 6u  // a picture of all that is far away, instead of the sky
 
 // What a look has found.
 struct CmLightSample {
@@ -64,6 +65,14 @@ CM_FN CmLightSample cm_sky_along(vec3 w, float flight) {
 CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   return cm_sky_along(vec3(0.0f, 1.0f, 0.0f), 1.0f);
 }
+
+#if CM_ENVIRONMENT
+
+// ---- The environment
+
+#include "environment.glsl"
+
+#endif
 
 // ---- The sun
 
@@ -174,8 +183,14 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 #define CM_MORE_LIGHTS(LIGHT)
 #endif
 
+#if CM_ENVIRONMENT
+#define CM_FAR_LIGHTS(LIGHT)                                                                       \
+  LIGHT(CM_LIGHT_ENVIRONMENT, cm.lights.environment_chance, cm_environment_sample, cm_environment_pdf, \
+        cm_environment_radiance) CM_MORE_LIGHTS(LIGHT)
+#else
 #define CM_FAR_LIGHTS(LIGHT) \
   LIGHT(CM_LIGHT_SKY, cm.lights.sky_chance, cm_sky_sample, cm_sky_pdf, cm_sky_radiance) CM_MORE_LIGHTS(LIGHT)
+#endif
 
 #if CM_SURFACES > 1
 #define CM_NEAR_LIGHTS(LIGHT)                                                                         \

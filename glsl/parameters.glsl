@@ -16,6 +16,9 @@
 #ifndef CM_EMISSION
 #define CM_EMISSION 0
 #endif
+#ifndef CM_ENVIRONMENT
+#define CM_ENVIRONMENT 0
+#endif
 
 #ifdef __cplusplus
 #define CM_ALIGN(bytes) alignas(bytes)
@@ -79,10 +82,13 @@ CM_BLOCK(CmLights) {
   uint any;                         // 1: there is light to look for
   CM_ALIGN(16) vec3 sun_irradiance;
   float sky_chance;
-  CM_ALIGN(16) vec3 sky_radiance;
+  CM_ALIGN(16) vec3 sky_radiance;  // of an environment the mean, which previews' surfaces see
   float triangle_chance;
   float lamp_chance;  // of all lamps together; what these leave is the sun's
   float glow_chance;  // that a flight from a surface is aimed at the medium's own light
+  float environment_chance;
+  float environment_strength;        // times the picture's radiance
+  CM_ALIGN(8) vec2 environment_turn;  // cosine and sine of its angle
   CM_EQUALITY(CmLights)
 };
 
@@ -103,6 +109,14 @@ CM_BLOCK(CmSurfaceTables) {
   uint ggx_albedo;  // src/surface/ggx_albedo.hpp's cells
   uint ggx_albedo_averages;
   CM_EQUALITY(CmSurfaceTables)
+};
+
+// The picture of all that is far away (glsl/environment.glsl): render::EnvironmentData.
+CM_BLOCK(CmEnvironment) {
+  CM_ALIGN(8) uvec2 size;  // texels
+  uint words;              // where they begin in their page
+  float density;           // of looks by solid angle, over weight by sine
+  CM_EQUALITY(CmEnvironment)
 };
 
 // The surface pass that camera rays end at: Tracer::begin.
@@ -152,6 +166,7 @@ layout(std140, binding = CM_UNIFORM_PARAMETERS) uniform CmParameters {
   CmMedium medium;
   CmLights lights;
   CmSurfaceTables surfaces;
+  CmEnvironment environment;
   CmLayers layers;
   CmHostDepth host_depth;
   CmIntegrator integrator;

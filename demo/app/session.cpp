@@ -116,6 +116,8 @@ void Session::follow(const Wish& wish) {
   };
   give(&SceneOptions::medium, cumulet_set_medium);
   give(&SceneOptions::light, cumulet_set_light);
+  give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
+  follow_environment();
   give(&SceneOptions::sampling, cumulet_set_sampling);
   give(&SceneOptions::display, cumulet_set_display);
   if (!(wish_.held && status_.busy)) give(&SceneOptions::grid, cumulet_set_grid);
@@ -124,6 +126,21 @@ void Session::follow(const Wish& wish) {
   navigation_ = wish_.navigation;
   follow_surfaces();
   follow_volume();
+}
+
+void Session::follow_environment() {
+  if (known_->environment == scene_.environment) return;
+  known_->environment = scene_.environment;
+  cumulet_environment* environment = nullptr;
+  if (!scene_.environment.empty()) {
+    std::array<char, 1024> error{};
+    if (cumulet_environment_open(scene_.environment.c_str(), &environment, error.data(), error.size()) != CUMULET_OK) {
+      tell(true, error.data());
+      return;
+    }
+  }
+  check(cumulet_set_environment(viewer_.get(), environment));
+  cumulet_environment_release(environment);
 }
 
 void Session::follow_surfaces() {

@@ -141,6 +141,8 @@ class Session {
   /// Tells a failed call.
   bool check(cumulet_status status);
   void follow_volume();
+  // One that cannot be read leaves the one before it.
+  void follow_environment();
   void follow_surfaces();
   void remove_surfaces();
   void finish_surfaces();

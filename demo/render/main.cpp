@@ -129,6 +129,18 @@ void set_camera(const Viewer& viewer, const cumulet_camera_desc& desc) {
   if (status != CUMULET_OK) throw std::runtime_error("the camera is not usable");
 }
 
+void set_environment(const Viewer& viewer, const cumulet::demo::SceneOptions& scene) {
+  if (scene.environment.empty()) return;
+  cumulet_environment* environment = nullptr;
+  std::array<char, 1024> error{};
+  if (cumulet_environment_open(scene.environment.c_str(), &environment, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  const cumulet_status status = cumulet_set_environment(viewer.get(), environment);
+  cumulet_environment_release(environment);
+  check(viewer, status);
+  check(viewer, cumulet_set_environment_settings(viewer.get(), &scene.environment_settings));
+}
+
 /// Until the library's worker is done. Throws its error.
 void wait(const Viewer& viewer, Progress& progress) {
   cumulet_progress state{};
@@ -311,6 +323,7 @@ void render(const RenderOptions& options) {
   check(viewer, cumulet_set_grid(viewer.get(), &scene.grid));
   check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   check(viewer, cumulet_set_light(viewer.get(), &scene.light));
+  set_environment(viewer, scene);
   check(viewer, cumulet_set_sampling(viewer.get(), &sampling));
   check(viewer, cumulet_set_display(viewer.get(), &scene.display));
   set_camera(viewer, scene.camera);

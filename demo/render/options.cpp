@@ -340,12 +340,20 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   };
   add_settings(app, "Medium", scene.medium, take_auto);
 
-  group = "Light (default: daylight; given one of the two, the other is dark)";
+  group = "Light (default: daylight; given sun, sky or environment, the others are dark)";
   add(
       app, group, "--sun", "\"azimuth,elevation r,g,b\"",
       [&](const std::string& text) { parse_sun(text, scene.light); },
       "Degrees from +Z towards +X and above the horizon; irradiance");
   add_settings(app, group, scene.light);
+  add(
+      app, group, "--env", "FILE",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        scene.set_environment(text);
+      },
+      "Environment, an equirectangular .hdr or .exr picture, instead of the sky; +Y is up, its middle is +Z");
+  add_settings(app, group, scene.environment_settings);
   add_settings(app, "Grid", scene.grid);
 
   group = "Picture";
@@ -404,11 +412,16 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
 }  // namespace
 
 void finish_scene_options(const CLI::App& app, SceneOptions& scene) {
+  for (const char* flag : {"--env-rotation", "--env-strength"}) {
+    if (app.count(flag) > 0 && scene.environment.empty())
+      throw UsageError(std::string(flag) + " needs an environment: --env, or a --scene that names one");
+  }
   for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-camera"}) {
     if (app.count(flag) > 0 && scene.surfaces.empty())
       throw UsageError(std::string(flag) + " needs a model: --gltf, or a --scene that names one");
   }
-  if (app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0) scene.set_daylight();
+  if (app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 && app.count("--env") == 0)
+    scene.set_daylight();
 }
 
 bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {

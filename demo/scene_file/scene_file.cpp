@@ -249,7 +249,8 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   read_camera(reader, scene.camera);
   // Without a word, a file of this version means 1: there was no other way.
   scene.auto_density_scale = reader.word("medium.density_scale", "auto");
-  if (!reader.has("light")) scene.set_daylight();
+  reader.text("environment.file", scene.environment);
+  if (!reader.has("light") && scene.environment.empty()) scene.set_daylight();
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
@@ -324,7 +325,8 @@ void write_settings(Json& json, const Desc& desc) {
   });
 }
 
-Json to_json(const SceneOptions& scene, const std::string& volume, const std::string& surfaces) {
+Json to_json(const SceneOptions& scene, const std::string& volume, const std::string& surfaces,
+             const std::string& environment) {
   Json json;
   json["cumulet_scene"] = format_version;
   json["volume"]["file"] = volume;
@@ -355,6 +357,10 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   if (scene.auto_density_scale && scene.medium.density_scale == 0.0) json["medium"]["density_scale"] = "auto";
   write_settings(json, scene.medium);
   write_settings(json, scene.light);
+  if (!environment.empty()) {
+    json["environment"]["file"] = environment;
+    write_settings(json, scene.environment_settings);
+  }
   write_settings(json, scene.grid);
   json["picture"]["width"] = scene.width;
   json["picture"]["height"] = scene.height;
@@ -419,6 +425,13 @@ void SceneOptions::set_daylight() {
   std::copy(sky.begin(), sky.end(), light.sky_radiance);
 }
 
+void SceneOptions::set_environment(const std::string& file) {
+  SceneOptions day;
+  day.set_daylight();
+  if (settings::same(light, day.light)) light = SceneOptions().light;
+  environment = file;
+}
+
 SceneOptions parse_scene(const std::string& text, const std::string& path) {
   Json json;
   Repeats repeats;
@@ -441,7 +454,7 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
   Reader reader(path, std::move(json));
   read_scene(reader, scene);
   const fs::path folder = fs::path(path).parent_path();
-  for (std::string* file : {&scene.volume, &scene.surfaces})
+  for (std::string* file : {&scene.volume, &scene.surfaces, &scene.environment})
     if (!file->empty() && fs::path(*file).is_relative()) *file = (folder / *file).string();
   return scene;
 }
@@ -456,7 +469,8 @@ SceneOptions load_scene(const std::string& path) {
 
 std::string scene_text(const SceneOptions& scene, const std::string& path) {
   // A file's name may be in any encoding: what is not UTF-8 is replaced, not thrown at.
-  return to_json(scene, portable_file(scene.volume, path), portable_file(scene.surfaces, path))
+  return to_json(scene, portable_file(scene.volume, path), portable_file(scene.surfaces, path),
+                 portable_file(scene.environment, path))
              .dump(2, ' ', false, Json::error_handler_t::replace) +
          "\n";
 }
@@ -466,7 +480,7 @@ void save_scene(const SceneOptions& scene, const std::string& path) {
 }
 
 bool same_scene(const SceneOptions& a, const SceneOptions& b) {
-  return to_json(a, a.volume, a.surfaces) == to_json(b, b.volume, b.surfaces);
+  return to_json(a, a.volume, a.surfaces, a.environment) == to_json(b, b.volume, b.surfaces, b.environment);
 }
 
 }  // namespace cumulet::demo

@@ -27,6 +27,8 @@ struct SceneOptions {
   cumulet_medium_desc medium{};
   bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
   cumulet_light_desc light{};
+  std::string environment;  // a .hdr or .exr file; "": the light's sky
+  cumulet_environment_settings_desc environment_settings{};
   cumulet_camera_desc camera{};
   cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
@@ -35,6 +37,8 @@ struct SceneOptions {
   SceneOptions();
   /// A pleasant day, what is lit when nothing says how: a sun from the right of a default camera, above and before it.
   void set_daylight();
+  /// Surrounds the scene by this file. Daylight, which nobody chose, goes.
+  void set_environment(const std::string& file);
 };
 
 /// Calls visit with each of a scene's groups of settings.
@@ -43,6 +47,7 @@ void for_each_group(Scene& scene, Visit&& visit) {
   visit(scene.surface);
   visit(scene.medium);
   visit(scene.light);
+  visit(scene.environment_settings);
   visit(scene.grid);
   visit(scene.sampling);
   visit(scene.display);

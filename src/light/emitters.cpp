@@ -7,12 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "base/luminance.hpp"
 #include "base/progress_part.hpp"
 #include "base/srgb.hpp"
+#include "light/alias_table.hpp"
 
 namespace cumulet::light {
 
@@ -30,7 +31,6 @@ using surface::Wrap;
 // miss.
 constexpr int looks = 16;
 constexpr float least_share = 0.05F;
-constexpr std::uint32_t certain = std::numeric_limits<std::uint32_t>::max();
 
 using FromSrgb = std::array<float, 256>;
 
@@ -152,8 +152,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
     const double sides = pose.double_sided || scene.materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
     const double emitted = area * t.luminance * sides;
     if (!(emitted > 0.0) || !std::isfinite(emitted)) continue;
-    table.entries.emplace_back(t.triangle, certain, static_cast<std::uint32_t>(power.size()),
-                               pose.flipped[t.draw] != 0 ? 1U : 0U);
+    table.entries.emplace_back(t.triangle, 0U, 0U, pose.flipped[t.draw] != 0 ? 1U : 0U);
     areas.push_back(area);
     power.push_back(emitted);
     sum += emitted;
@@ -162,26 +161,11 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
   check(progress);
 
   const std::size_t n = power.size();
-  std::vector<std::uint32_t> small;
-  std::vector<std::uint32_t> large;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    power[i] *= static_cast<double>(n) / sum;  // in units of the mean
-    (power[i] < 1.0 ? small : large).push_back(i);
+  const std::vector<Alias> aliases = alias_table(std::move(power), sum, progress);
+  for (std::size_t i = 0; i < n; ++i) {
+    table.entries[i].y = aliases[i].stays;
+    table.entries[i].z = aliases[i].other;
   }
-  // What is left at the end, by rounding alone or with the mean's power, stands for itself.
-  while (!small.empty() && !large.empty()) {
-    const std::uint32_t low = small.back();
-    const std::uint32_t high = large.back();
-    small.pop_back();
-    table.entries[low].y = static_cast<std::uint32_t>(power[low] * certain);
-    table.entries[low].z = high;
-    power[high] -= 1.0 - power[low];
-    if (power[high] < 1.0) {
-      large.pop_back();
-      small.push_back(high);
-    }
-  }
-  check(progress);
   // Chances as the table's words give them, not as they were meant.
   std::vector<double> chance(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {

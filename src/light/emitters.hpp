@@ -22,8 +22,7 @@ struct EmissiveTriangle {
 /// texels of emissive images, on TBB's threads. Throws Error(cancelled).
 std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene, const Progress* progress = nullptr);
 
-/// Picks triangles in proportion to their power (Walker's alias method: Vose, "A Linear Algorithm for Generating Random
-/// Numbers with a Given Distribution", IEEE Transactions on Software Engineering 17(9), 1991).
+/// Picks triangles in proportion to their power (light/alias_table.hpp).
 struct EmitterTable {
   /// One a triangle that has an area, in ascending order of x: x: triangle; y: entry i, drawn evenly, stands for itself
   /// where a random word is at most y, z: else for this entry; w: a float, the chance to be picked per area, negative

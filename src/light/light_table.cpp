@@ -1,6 +1,7 @@
 #include "light/light_table.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "base/luminance.hpp"
@@ -16,6 +17,13 @@ double sky_chance(double sun, double sky, bool near) {
   return near ? 0.25 : 1.0;
 }
 
+// Flights that escape find it, too; but one with a sun in it seldom.
+double environment_chance(double sun, double environment, bool near) {
+  if (sun > 0.0 && environment > 0.0) return std::clamp(environment / (environment + sun), 0.2, 0.8);
+  if (!(environment > 0.0)) return 0.0;
+  return near ? 0.5 : 1.0;
+}
+
 // Of what is not the sky: the triangles' share of the flux, but 0.2 to 0.8 where there are others.
 double triangle_share(const SceneLights& scene, double sun) {
   if (scene.triangles == 0) return 0.0;
@@ -23,20 +31,34 @@ double triangle_share(const SceneLights& scene, double sun) {
   return others > 0.0 ? std::clamp(scene.triangle_flux / (scene.triangle_flux + others), 0.2, 0.8) : 1.0;
 }
 
+DistantLights with_mean(DistantLights distant, const Surroundings& surroundings) {
+  distant.sky_radiance = sky_of(distant, surroundings);
+  return distant;
+}
+
 }  // namespace
 
-LightTable::LightTable(const DistantLights& distant, const SceneLights& scene, bool glow) : distant_(distant) {
+glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings) {
+  if (!surroundings.environment) return distant.sky_radiance;
+  return glm::vec3(surroundings.environment->mean * double{surroundings.strength});
+}
+
+LightTable::LightTable(const DistantLights& distant, const Surroundings& surroundings, const SceneLights& scene,
+                       bool glow)
+    : distant_(with_mean(distant, surroundings)), surroundings_(surroundings) {
   const double sun = luminance(glm::dvec3(distant.sun_irradiance));
-  const double sky = 4.0 * std::numbers::pi * luminance(glm::dvec3(distant.sky_radiance));
+  const double sky = 4.0 * std::numbers::pi * luminance(glm::dvec3(distant_.sky_radiance));
   const auto add = [&](Kind kind, double chance) {
     if (chance > 0.0) entries_.push_back({kind, static_cast<float>(chance)});
   };
-  const double to_sky = sky_chance(sun, sky, scene.lamps + scene.triangles > 0);
-  const double to_triangles = (1.0 - to_sky) * triangle_share(scene, sun);
+  const bool near = scene.lamps + scene.triangles > 0;
+  const bool surrounded = surroundings.environment != nullptr;
+  const double to_far = surrounded ? environment_chance(sun, sky, near) : sky_chance(sun, sky, near);
+  const double to_triangles = (1.0 - to_far) * triangle_share(scene, sun);
   // The sun and each lamp alike.
   const double alike = scene.lamps + (sun > 0.0 ? 1.0 : 0.0);
-  const double to_one = alike > 0.0 ? (1.0 - to_sky - to_triangles) / alike : 0.0;
-  add(Kind::sky, to_sky);
+  const double to_one = alike > 0.0 ? (1.0 - to_far - to_triangles) / alike : 0.0;
+  add(surrounded ? Kind::environment : Kind::sky, to_far);
   add(Kind::triangle, to_triangles);
   add(Kind::lamp, scene.lamps * to_one);
   if (sun > 0.0) add(Kind::sun, to_one);
@@ -58,6 +80,10 @@ core::CmLights LightTable::parameters() const {
   p.triangle_chance = chance(Kind::triangle);
   p.lamp_chance = chance(Kind::lamp);
   p.glow_chance = chance(Kind::glow);
+  p.environment_chance = chance(Kind::environment);
+  p.environment_strength = surroundings_.strength;
+  const double angle = surroundings_.rotation_degrees * std::numbers::pi / 180.0;
+  p.environment_turn = glm::vec2(std::cos(angle), std::sin(angle));
   return p;
 }
 

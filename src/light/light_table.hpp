@@ -6,12 +6,16 @@
 
 #include "base/parameters.hpp"
 #include "light/distant_lights.hpp"
+#include "light/environment.hpp"
 #include "light/scene_lights.hpp"
 
 namespace cumulet::light {
 
 /// The kinds of glsl/light.glsl.
-enum class Kind { sky, sun, triangle, lamp, glow };
+enum class Kind { sky, sun, triangle, lamp, glow, environment };
+
+/// The sky's radiance; the mean over all directions of an environment that is there instead.
+glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings);
 
 /// A value: made anew when a light changes.
 class LightTable {
@@ -24,8 +28,9 @@ class LightTable {
     float chance = 0.0F;
   };
 
-  /// glow: whether the medium's own light falls on surfaces.
-  LightTable(const DistantLights& distant, const SceneLights& scene, bool glow);
+  /// glow: whether the medium's own light falls on surfaces. Surroundings with an environment are there instead of the
+  /// sky.
+  LightTable(const DistantLights& distant, const Surroundings& surroundings, const SceneLights& scene, bool glow);
 
   [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
   /// 0 for a kind that is not there.
@@ -35,6 +40,7 @@ class LightTable {
 
  private:
   DistantLights distant_;
+  Surroundings surroundings_;
   std::vector<Entry> entries_;
 };
 

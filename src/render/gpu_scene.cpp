@@ -19,6 +19,7 @@ void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Dea
   const scene::MarchSourcePtr volume = snapshot.volumes.empty() ? nullptr : snapshot.volumes.front().source;
   const scene::ModelSourcePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
   if (!volume) drop_data();
+  update_environment(snapshot.surroundings->environment, wanted, deadline);
   update_model(model, wanted, deadline);
   if (volume) update_data(volume, wanted, deadline);
 }
@@ -78,6 +79,31 @@ void GpuScene::show_raster(const scene::ModelSourcePtr& of, const RasterContentP
   if (content) raster_.put(of, content);
 }
 
+void GpuScene::update_environment(const light::EnvironmentPtr& environment, const Wanted& wanted, Deadline deadline) {
+  if (!environment) {
+    if (environment_) environment_revision_.advance();
+    environment_.clear();
+    environment_upload_.reset();
+    return;
+  }
+  while (environment_upload_ || environment_.wants(environment, wanted.settings)) {
+    if (!environment_upload_) environment_upload_ = EnvironmentUnderWay{environment, wanted.settings, nullptr};
+    EnvironmentUnderWay& upload = *environment_upload_;
+    const light::EnvironmentPtr of = upload.of;
+    try {
+      if (!upload.work) upload.work = std::make_unique<EnvironmentUpload>(gl_, heap_, of);
+      if (!upload.work->advance(deadline)) break;
+      environment_.put(of, upload.work->take());
+      environment_upload_.reset();
+      environment_revision_.advance();
+    } catch (const Error&) {
+      environment_.fail(of, upload.settings);
+      environment_upload_.reset();
+      throw;
+    }
+  }
+}
+
 void GpuScene::drop_data() {
   if (data_) data_revision_.advance();
   data_.clear();
@@ -113,7 +139,8 @@ void GpuScene::update_data(const scene::MarchSourcePtr& source, const Wanted& wa
 
 double GpuScene::progress() const {
   if (upload_ && upload_->work) return upload_->work->progress();
-  return model_upload_ && model_upload_->work ? model_upload_->work->progress() : 1.0;
+  if (model_upload_ && model_upload_->work) return model_upload_->work->progress();
+  return environment_upload_ && environment_upload_->work ? environment_upload_->work->progress() : 1.0;
 }
 
 std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) const {
@@ -122,7 +149,14 @@ std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) 
 }
 
 std::uint64_t GpuScene::other_bytes() const {
-  return (model_ ? model_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) + heap_.free_bytes();
+  return (model_ ? model_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) +
+         (environment_ ? environment_->bytes() : 0) + heap_.free_bytes();
+}
+
+light::Surroundings GpuScene::surroundings(const scene::Snapshot& snapshot) const {
+  light::Surroundings surroundings = *snapshot.surroundings;
+  surroundings.environment = environment_ ? environment_.of() : nullptr;
+  return surroundings;
 }
 
 Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
@@ -132,7 +166,8 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   obstacles.traced = traced || obstacles.raster == nullptr;
   if (*snapshot.view) obstacles.view = **snapshot.view;
   const light::DistantLights& lights = *snapshot.lights;
-  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance};
+  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, light::sky_of(lights, surroundings(snapshot))};
+  obstacles.environment = environment_.get();
   return obstacles;
 }
 
@@ -159,8 +194,10 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   p.medium.emits = emits ? 1U : 0U;
   const bool glow = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
   const ModelData* met = obstacles.met();
-  const light::LightTable table(*snapshot.lights, met != nullptr ? met->lights() : light::SceneLights{}, glow);
+  const light::LightTable table(*snapshot.lights, surroundings(snapshot),
+                                met != nullptr ? met->lights() : light::SceneLights{}, glow);
   p.lights = table.parameters();
+  if (environment_) p.environment = environment_->parameters();
   p.integrator = integrator;
   return p;
 }

@@ -6,6 +6,7 @@
 
 #include "base/revision.hpp"
 #include "base/slot.hpp"
+#include "render/environment_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_upload.hpp"
 #include "render/tracer.hpp"
@@ -40,8 +41,10 @@ class GpuScene {
   [[nodiscard]] Revision<MarchData> data_revision() const { return data_revision_; }
   /// Another where paths meet other triangles, or other surfaces are drawn.
   [[nodiscard]] Revision<ModelData> model_revision() const { return model_revision_; }
+  /// Another with another environment, or none.
+  [[nodiscard]] Revision<EnvironmentData> environment_revision() const { return environment_revision_; }
   [[nodiscard]] bool draws_surfaces() const { return static_cast<bool>(raster_); }
-  [[nodiscard]] bool uploading() const { return upload_ || model_upload_; }
+  [[nodiscard]] bool uploading() const { return upload_ || model_upload_ || environment_upload_; }
   /// 0 to 1, of what is under way; else 1.
   [[nodiscard]] double progress() const;
   /// Of that volume, if it is the last that came, or is coming.
@@ -50,6 +53,8 @@ class GpuScene {
   /// Of surfaces, and of what is kept for more.
   [[nodiscard]] std::uint64_t other_bytes() const;
 
+  /// As the snapshot has it, of the environment that is here.
+  [[nodiscard]] light::Surroundings surroundings(const scene::Snapshot& snapshot) const;
   /// What paths end at, but for the host's depth. traced: they meet triangles, if there is a surface pass, too.
   [[nodiscard]] Obstacles obstacles(const scene::Snapshot& snapshot, bool traced);
   /// Of a picture of that size of what is here, as the snapshot has it seen and lit. Only with data and view.
@@ -61,6 +66,7 @@ class GpuScene {
   void finish_model();
   void show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content);
   void drop_data();
+  void update_environment(const light::EnvironmentPtr& environment, const Wanted& wanted, Deadline deadline);
   void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
 
   gl::FunctionsPtr gl_;
@@ -92,6 +98,14 @@ class GpuScene {
   SurfaceRaster surface_pass_;                            // shows that
   std::optional<ModelUnderWay> model_upload_;             // of what both will be
   Revision<ModelData> model_revision_;
+  struct EnvironmentUnderWay {
+    light::EnvironmentPtr of;
+    std::uint64_t settings = 0;
+    std::unique_ptr<EnvironmentUpload> work;
+  };
+  Slot<EnvironmentData, light::EnvironmentPtr> environment_;
+  std::optional<EnvironmentUnderWay> environment_upload_;
+  Revision<EnvironmentData> environment_revision_;
 };
 
 }  // namespace cumulet::render

@@ -9,6 +9,7 @@ struct PictureParameters {
   core::CmView view{};
   core::CmMedium medium{};
   core::CmLights lights{};
+  core::CmEnvironment environment{};
   core::CmIntegrator integrator{};
   bool operator==(const PictureParameters&) const = default;
 };

@@ -20,9 +20,11 @@ struct PictureWish {
   struct Content {
     scene::Part<std::optional<scene::Viewpoint>> viewpoint;
     scene::Part<light::DistantLights> lights;
+    scene::Part<light::Surroundings> surroundings;
     std::vector<scene::Part<scene::Medium>> media;
     Revision<MarchData> data;
     Revision<ModelData> model;
+    Revision<EnvironmentData> environment;
     Revision<HostDepth> host_depth;
     Revision<gl::Programs> programs;
     core::CmIntegrator integrator{};

@@ -51,6 +51,8 @@ void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
   if (obstacles.scene != nullptr) parameters.surfaces = obstacles.scene->tables();
 }
 
+constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
+
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
 core::CmParameters assemble(const PictureParameters& picture, const MarchData& data, const Obstacles& obstacles) {
@@ -59,6 +61,7 @@ core::CmParameters assemble(const PictureParameters& picture, const MarchData& d
   parameters.grid = data.grid();
   parameters.medium = picture.medium;
   parameters.lights = picture.lights;
+  parameters.environment = picture.environment;
   parameters.integrator = picture.integrator;
   describe(obstacles, parameters);
   return parameters;
@@ -153,26 +156,30 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   if (picture.traced_ > 0) {
     std::vector<std::string> more{surfaces_macro(picture.traced_)};
     add_medium(picture, more);
+    if (picture.environment_) more.emplace_back(environment_macro);
     return program(data.defines(), "trace_travel.comp", more);
   }
   std::vector<std::string> more;
   if (picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
   add_medium(picture, more);
+  if (picture.environment_) more.emplace_back(environment_macro);
   return program(data.defines(), "trace.comp", more);
 }
 
 StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& data) {
-  const std::string surfaces = surfaces_macro(picture.traced_);
+  std::vector<std::string> shade{surfaces_macro(picture.traced_)};
+  if (picture.environment_) shade.emplace_back(environment_macro);
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
+  if (picture.environment_) camera.emplace_back(environment_macro);
   std::vector<std::string> begin = camera;
   begin[1] = "CM_DENSE 1";
   StagePrograms programs;
   programs.begin = program(begin, "trace_camera.comp").object;
   programs.travel = trace_program(picture, data).object;
   programs.meet = program({"CM_SURFACES 1"}, "trace_meet.comp").object;
-  programs.shade = program({surfaces}, "trace_shade.comp").object;
+  programs.shade = program(shade, "trace_shade.comp").object;
   programs.camera = program(camera, "trace_camera.comp").object;
   return programs;
 }
@@ -217,6 +224,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.traced_ = traced_of(parameters, obstacles, settings);
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
   picture.emits_ = parameters.medium.emits != 0U;
+  picture.environment_ = obstacles.environment != nullptr;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
 }
@@ -392,6 +400,7 @@ void Tracer::bind(const MarchData& data, const Obstacles& obstacles) const {
   data.bind(*gl_);
   if (obstacles.depth != 0) gl_->BindTextureUnit(core::CM_UNIT_HOST_DEPTH, obstacles.depth);
   if (obstacles.scene != nullptr) obstacles.scene->bind(*gl_);
+  if (obstacles.environment != nullptr) obstacles.environment->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "render/environment_data.hpp"
 #include "render/film.hpp"
 #include "render/march_data.hpp"
 #include "render/model_data.hpp"
@@ -30,7 +31,7 @@ struct Totals {
   double noise = 0.0;
 };
 
-/// What paths end at beside the volume: the host's depth as render::HostDepth keeps it, and triangles.
+/// What paths end at beside the volume: the host's depth as render::HostDepth keeps it, triangles, and an environment.
 struct Obstacles {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
@@ -40,6 +41,7 @@ struct Obstacles {
   SurfaceRaster* raster = nullptr;  // the surface pass, and what it is drawn with
   SurfaceView view;
   SurfaceLighting lighting;
+  const EnvironmentData* environment = nullptr;  // of those that escape
 
   /// The scene whose triangles paths meet; null: they meet none.
   [[nodiscard]] const ModelData* met() const { return traced ? scene : nullptr; }
@@ -122,6 +124,7 @@ class Picture {
   unsigned traced_ = 0;       // 1: paths meet triangles; 2: and look for those that emit
   bool second_lobe_ = false;  // of the medium's phase function
   bool emits_ = false;        // its cells give off light
+  bool environment_ = false;  // paths that escape come to one
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   void begin_tile();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "light/distant_lights.hpp"
+#include "light/environment.hpp"
 #include "scene/march_source.hpp"
 #include "scene/model_source.hpp"
 #include "scene/part.hpp"
@@ -54,6 +55,7 @@ struct Snapshot {
   std::vector<Volume> volumes;  ///< at most one yet
   std::vector<Model> models;    ///< likewise
   Part<light::DistantLights> lights;
+  Part<light::Surroundings> surroundings;
   Part<std::optional<Viewpoint>> view;  ///< none: nothing is to be seen
   /// O(volumes + models).
   bool operator==(const Snapshot&) const = default;

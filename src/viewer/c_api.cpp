@@ -10,6 +10,7 @@ struct cumulet_viewer {
   std::string last_error;
   cumulet::c_abi::KeptHandle<cumulet_volume> volume;
   cumulet::c_abi::KeptHandle<cumulet_surfaces> surfaces;
+  cumulet::c_abi::KeptHandle<cumulet_environment> environment;
 };
 
 namespace {
@@ -251,6 +252,26 @@ cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_d
 
 cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
+}
+
+cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    v.set_environment(environment == nullptr ? nullptr : environment->asset);
+    viewer->environment.keep(environment);
+  });
+}
+
+cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(out != nullptr, "out is NULL");
+    *out = nullptr;
+    *out = viewer->environment.of(v.environment());
+  });
+}
+
+cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer, const cumulet_environment_settings_desc* desc) {
+  return guarded(
+      viewer, [&](core::Viewer& v) { v.set_environment_settings(core::EnvironmentSettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path) {

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "gl/programs.hpp"
+#include "light/environment.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/surface_asset.hpp"
@@ -18,6 +19,11 @@ struct cumulet_volume {
 
 struct cumulet_surfaces {
   cumulet::viewer::SurfaceAssetPtr asset;
+  std::atomic<int> references = 1;
+};
+
+struct cumulet_environment {
+  cumulet::light::EnvironmentPtr asset;
   std::atomic<int> references = 1;
 };
 

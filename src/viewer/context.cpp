@@ -6,6 +6,7 @@
 
 #include "base/milliseconds.hpp"
 #include "gl/transient_framebuffer.hpp"
+#include "light/light_table.hpp"
 
 namespace cumulet::viewer {
 
@@ -110,9 +111,11 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.parameters = parameters(shot, met);
   wish.content.viewpoint = shot.scene->view;
   wish.content.lights = shot.scene->lights;
+  wish.content.surroundings = shot.scene->surroundings;
   for (const scene::Volume& volume : shot.scene->volumes) wish.content.media.push_back(volume.medium);
   wish.content.data = scene_.data_revision();
   wish.content.model = scene_.model_revision();
+  wish.content.environment = scene_.environment_revision();
   wish.content.host_depth = host_depth_revision_;
   wish.content.programs = programs_->revision();
   wish.content.integrator = wish.parameters.integrator;
@@ -167,7 +170,7 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
   const bool able = scene_.draws_surfaces() && shot.view() && alone_failed_ != shot.settings;
   if (!empty_.film().has(render::film_layers::radiance) || (!able && empty_.layered() != render::Layered::no))
     tracer.clear(empty_);
-  tracer.set_background(empty_, shot.scene->lights->sky_radiance);
+  tracer.set_background(empty_, light::sky_of(*shot.scene->lights, scene_.surroundings(*shot.scene)));
   if (!able || frame.budget_ms < 0.0) return;
   alone_failed_ = shot.settings;  // unless it succeeds
   tracer.draw_layers(empty_, obstacles(shot),

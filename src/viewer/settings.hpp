@@ -77,6 +77,13 @@ struct Light {
   }
 };
 
+struct EnvironmentSettings {
+  float rotation_degrees = 0.0F;
+  float strength = 1.0F;
+
+  static EnvironmentSettings of(const cumulet_environment_settings_desc& d) { return {d.rotation_degrees, d.strength}; }
+};
+
 enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
 
 struct SurfaceSettings {

@@ -257,6 +257,22 @@ void Viewer::set_light(const Light& light) {
   touch();
 }
 
+void Viewer::set_environment(light::EnvironmentPtr environment) {
+  if (environment && environment->replaced > 0) {
+    log_.warning(environment->name + ": " + std::to_string(environment->replaced) +
+                 " pixels are not finite or negative, and count as 0");
+  }
+  light::Surroundings surroundings = *scene_.surroundings;
+  surroundings.environment = std::move(environment);
+  scene_.surroundings.set(std::move(surroundings));
+  touch();
+}
+
+void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
+  scene_.surroundings.set({environment(), settings.rotation_degrees, settings.strength});
+  touch();
+}
+
 void Viewer::set_sampling(const Sampling& sampling) {
   sampling_ = sampling;
   touch();

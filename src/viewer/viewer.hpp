@@ -86,6 +86,10 @@ class Viewer {
   void set_grid(const GridSettings& settings);
   void set_medium(const Medium& medium);
   void set_light(const Light& light);
+  /// Null: the sky of the light.
+  void set_environment(light::EnvironmentPtr environment);
+  void set_environment_settings(const EnvironmentSettings& settings);
+  [[nodiscard]] const light::EnvironmentPtr& environment() const { return scene_.surroundings->environment; }
   void set_sampling(const Sampling& sampling);
   void set_display(const DisplaySettings& display);
   void set_camera(std::shared_ptr<Camera> camera);

@@ -5,6 +5,7 @@
 
 #include "base/error.hpp"
 #include "gl/transient_framebuffer.hpp"
+#include "light/light_table.hpp"
 #include "viewer/context.hpp"
 
 namespace cumulet::viewer {
@@ -67,7 +68,7 @@ bool Context::rehearse_frame(const Shot& shot, const Frame& frame, render::Deadl
   if (drawing) {
     render::Picture& empty = rehearsal_->empty();
     if (!empty.film().has(render::film_layers::radiance)) rehearsal_->tracer().clear(empty);
-    rehearsal_->tracer().set_background(empty, shot.scene->lights->sky_radiance);
+    rehearsal_->tracer().set_background(empty, light::sky_of(*shot.scene->lights, scene_.surroundings(*shot.scene)));
     rehearse_drawing(shot, frame, empty);
   }
   if (shot.view()) {

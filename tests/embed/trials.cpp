@@ -312,6 +312,9 @@ void Caller::call_all() {
   const auto triangles = make_desc<cumulet_triangles_desc>();
   const auto medium = make_desc<cumulet_medium_desc>();
   const auto light = make_desc<cumulet_light_desc>();
+  const auto environment = make_desc<cumulet_environment_desc>();
+  const auto environment_settings = make_desc<cumulet_environment_settings_desc>();
+  auto environment_info = make_desc<cumulet_environment_info>();
   const auto grid = make_desc<cumulet_grid_desc>();
   const auto sampling = make_desc<cumulet_sampling_desc>();
   const auto display = make_desc<cumulet_display_desc>();
@@ -335,6 +338,7 @@ void Caller::call_all() {
   cumulet_camera* new_camera = nullptr;
   cumulet_volume* new_volume = nullptr;
   cumulet_surfaces* new_surfaces = nullptr;
+  cumulet_environment* new_environment = nullptr;
   cumulet_programs* new_programs = nullptr;
   auto programs = make_desc<cumulet_programs_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
@@ -347,11 +351,13 @@ void Caller::call_all() {
   names.insert({"cumulet_cancel", "cumulet_status_text", "cumulet_version", "cumulet_volume_retain",
                 "cumulet_volume_release", "cumulet_surfaces_retain", "cumulet_surfaces_release",
                 "cumulet_programs_retain", "cumulet_programs_release", "cumulet_camera_release",
-                "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
+                "cumulet_environment_retain", "cumulet_environment_release", "cumulet_inspection_release",
+                "cumulet_destroy", "cumulet_last_error"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
   cumulet_camera_release(nullptr);
+  cumulet_environment_release(cumulet_environment_retain(nullptr));
   cumulet_inspection_release(nullptr);
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
   // Refused without a status.
@@ -373,6 +379,9 @@ void Caller::call_all() {
   CALL(cumulet_volume_get_info, volume, &volume_info);
   CALL(
       cumulet_list_grids, "none.vdb", [](void*, const char*, const char*, const char*) {}, nullptr, nullptr, 0);
+  CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
+  CALL(cumulet_environment_from_pixels, &environment, &new_environment, nullptr, 0);
+  CALL(cumulet_environment_get_info, new_environment, &environment_info);
   CALL(cumulet_surfaces_open, "none.glb", &new_surfaces, nullptr, 0);
   CALL(cumulet_surfaces_from_memory, bytes.data(), bytes.size(), nullptr, nullptr, &new_surfaces, nullptr, 0);
   CALL(cumulet_surfaces_from_triangles, &triangles, &new_surfaces, nullptr, 0);
@@ -408,6 +417,9 @@ void Caller::call_all() {
     CALL(cumulet_set_grid, v, &grid);
     CALL(cumulet_set_medium, v, &medium);
     CALL(cumulet_set_light, v, &light);
+    CALL(cumulet_set_environment, v, nullptr);
+    CALL(cumulet_get_environment, v, &new_environment);
+    CALL(cumulet_set_environment_settings, v, &environment_settings);
     CALL(cumulet_set_sampling, v, &sampling);
     CALL(cumulet_set_display, v, &display);
     CALL(cumulet_set_camera, v, camera);
@@ -426,7 +438,7 @@ void Caller::call_all() {
     CALL(cumulet_get_stats, v, &stats);
   }
   if (new_viewer != nullptr || new_camera != nullptr || new_volume != nullptr || new_surfaces != nullptr ||
-      new_inspection != nullptr || new_programs != nullptr) {
+      new_environment != nullptr || new_inspection != nullptr || new_programs != nullptr) {
     wrong.push_back("a refused call gave a handle");
   }
 }

@@ -77,7 +77,7 @@ TEST(Lights, SharesSumToOneOrThereIsNoLight) {
           light::DistantLights distant;
           distant.sun_irradiance = vec3(sun);
           distant.sky_radiance = vec3(sky);
-          const LightTable table(distant, scene_of(lamps, triangles), true);
+          const LightTable table(distant, {}, scene_of(lamps, triangles), true);
           double sum = 0.0;
           for (const LightTable::Entry& entry : table.entries()) {
             if (entry.kind != Kind::glow) sum += entry.chance;
@@ -98,7 +98,7 @@ TEST(Lights, SharesSumToOneOrThereIsNoLight) {
 TEST(Lights, TheSunAndEachLampAlike) {
   light::DistantLights distant;
   distant.sun_irradiance = vec3(2.0F);
-  const LightTable table(distant, scene_of(4, 0), false);
+  const LightTable table(distant, {}, scene_of(4, 0), false);
   EXPECT_NEAR(table.chance(Kind::sun), 0.2, 1e-6);
   EXPECT_NEAR(table.chance(Kind::lamp), 0.8, 1e-6);
   EXPECT_EQ(table.chance(Kind::glow), 0.0F);

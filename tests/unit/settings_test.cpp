@@ -28,6 +28,7 @@ template <class Visit>
 void for_each_descriptor(Visit&& visit) {
   visit(&SceneOptions::medium, cumulet_set_medium);
   visit(&SceneOptions::light, cumulet_set_light);
+  visit(&SceneOptions::environment_settings, cumulet_set_environment_settings);
   visit(&SceneOptions::grid, cumulet_set_grid);
   visit(&SceneOptions::surface, cumulet_set_surface_settings);
   visit(&SceneOptions::sampling, cumulet_set_sampling);
@@ -119,6 +120,7 @@ void expect_all_fields() {
 TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
   expect_all_fields<cumulet_medium_desc>();
   expect_all_fields<cumulet_light_desc>();
+  expect_all_fields<cumulet_environment_settings_desc>();
   expect_all_fields<cumulet_grid_desc>();
   expect_all_fields<cumulet_surface_settings_desc>();
   expect_all_fields<cumulet_sampling_desc>();
@@ -139,6 +141,7 @@ TEST(Settings, SceneFilesKeepEach) {
       EXPECT_TRUE(keys.insert(setting.key).second) << setting.key;
       SceneOptions scene;
       scene.surfaces = "/a.glb";
+      scene.environment = "/a.hdr";
       const SceneOptions before = scene;
       set_sample(setting, scene.*part.*setting.field);
       EXPECT_FALSE(same_scene(scene, before)) << setting.key;
@@ -176,7 +179,8 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
                                 "camera.fovy_degrees",
                                 "camera.orthographic_height",
                                 "picture.width",
-                                "picture.height"};
+                                "picture.height",
+                                "environment.file"};
   for_each_descriptor([&](auto part, auto) {
     settings::for_each<std::decay_t<decltype(SceneOptions().*part)>>([&](const auto& setting) {
       if (*setting.key != '\0') keys.insert(setting.key);
@@ -200,8 +204,9 @@ TEST(Settings, AFlagSetsEach) {
       set_sample(setting, scene.*part.*setting.field);
       const std::string text = sample_text(setting, scene.*part.*setting.field);
       std::ostringstream out;
-      const auto options = demo::parse_render_options(
-          {"--volume", "a.vdb", "--gltf", "a.glb", "-o", "a.png", std::string(setting.flag) + "=" + text}, out);
+      const auto options = demo::parse_render_options({"--volume", "a.vdb", "--gltf", "a.glb", "--env", "a.hdr", "-o",
+                                                       "a.png", std::string(setting.flag) + "=" + text},
+                                                      out);
       ASSERT_TRUE(options.has_value());
       EXPECT_TRUE(equal(options->scene.*part.*setting.field, scene.*part.*setting.field)) << setting.flag;
     });

@@ -110,11 +110,12 @@ extern "C" {
 #define CUMULET_VERSION_MINOR 2
 #define CUMULET_VERSION_PATCH 0
 
-typedef struct cumulet_viewer cumulet_viewer;     /* cumulet_destroy */
-typedef struct cumulet_volume cumulet_volume;     /* cumulet_volume_release */
-typedef struct cumulet_surfaces cumulet_surfaces; /* cumulet_surfaces_release */
-typedef struct cumulet_camera cumulet_camera;     /* cumulet_camera_release */
-typedef struct cumulet_programs cumulet_programs; /* cumulet_programs_release */
+typedef struct cumulet_viewer cumulet_viewer;           /* cumulet_destroy */
+typedef struct cumulet_volume cumulet_volume;           /* cumulet_volume_release */
+typedef struct cumulet_surfaces cumulet_surfaces;       /* cumulet_surfaces_release */
+typedef struct cumulet_camera cumulet_camera;           /* cumulet_camera_release */
+typedef struct cumulet_programs cumulet_programs;       /* cumulet_programs_release */
+typedef struct cumulet_environment cumulet_environment; /* cumulet_environment_release */
 
 typedef enum cumulet_status {
   CUMULET_OK = 0,
@@ -509,6 +510,49 @@ typedef struct cumulet_animation_info {
 CUMULET_API cumulet_status cumulet_surfaces_get_animation(const cumulet_surfaces* surfaces, uint32_t index,
                                                           cumulet_animation_info* info);
 
+/* ---- Environments ------------------------------------------------------------------------------------------------ */
+
+/*
+ * A picture of all that is far away, equirectangular, as a light: immutable, counted, free of GL, to surround any
+ * number of viewers. Rows go from +Y, the upper edge, down to -Y; the middle is at +Z, and a quarter of the width left
+ * of it is +X. Values are linear Rec. 709 radiance, bilinear between the middles of pixels. Pixels that are not finite,
+ * negative or above 1e30 count as 0: cumulet_environment_info tells, cumulet_set_environment logs a warning. It holds
+ * 16 bytes a pixel, and as many in GL. These calls are synchronous, some 0.2 s for 2048 x 1024 pixels, for any thread;
+ * error as in cumulet_create.
+ */
+
+/* Reads a Radiance (.hdr) or OpenEXR (.exr) file, of up to 16384 pixels a side, told apart by content. */
+CUMULET_API cumulet_status cumulet_environment_open(const char* path, cumulet_environment** out, char* error,
+                                                    size_t error_size);
+
+/* A host's own pixels, copied. */
+typedef struct cumulet_environment_desc {
+  size_t struct_size;
+  const float* values; /* 3 a pixel, first pixel top left */
+  uint64_t value_count;
+  uint32_t width; /* 1 to 16384; value_count is 3 x width x height */
+  uint32_t height;
+  const char* name; /* for messages; NULL: "environment" */
+} cumulet_environment_desc;
+
+CUMULET_API cumulet_status cumulet_environment_from_pixels(const cumulet_environment_desc* desc,
+                                                           cumulet_environment** out, char* error, size_t error_size);
+
+CUMULET_API cumulet_environment* cumulet_environment_retain(cumulet_environment* environment); /* NULL is allowed */
+CUMULET_API void cumulet_environment_release(cumulet_environment* environment);                /* likewise */
+
+typedef struct cumulet_environment_info {
+  size_t struct_size;
+  char name[128]; /* the path, or what the host named it */
+  uint32_t width;
+  uint32_t height;
+  uint64_t replaced_pixels; /* that count as 0 */
+  double mean_radiance[3];  /* over all directions */
+} cumulet_environment_info;
+
+CUMULET_API cumulet_status cumulet_environment_get_info(const cumulet_environment* environment,
+                                                        cumulet_environment_info* info);
+
 /* ---- What a viewer shows, and the work behind it ---------------------------------------------------------------- */
 
 /*
@@ -689,6 +733,13 @@ typedef struct cumulet_light_desc {
   float sky_radiance[3];       /* 0: black */
 } cumulet_light_desc;
 
+/* How a viewer is surrounded by its environment (cumulet_set_environment). Restarts accumulation. */
+typedef struct cumulet_environment_settings_desc {
+  size_t struct_size;
+  float rotation_degrees; /* from +Z towards +X, -360 to 360 */
+  float strength;         /* times its radiance, up to 1e6; 0: 1 */
+} cumulet_environment_settings_desc;
+
 typedef enum cumulet_view {
   CUMULET_VIEW_SHADED = 0,
   CUMULET_VIEW_CELLS = 1,    /* the cells on a cut through the middle, coloured by level, with their edges */
@@ -719,7 +770,7 @@ typedef enum cumulet_tone_map {
 } cumulet_tone_map;
 
 typedef enum cumulet_background {
-  CUMULET_BACKGROUND_SKY = 0,        /* the sky's radiance behind the volume: opaque */
+  CUMULET_BACKGROUND_SKY = 0,        /* the sky's radiance, or the environment, behind the volume: opaque */
   CUMULET_BACKGROUND_TRANSPARENT = 1 /* premultiplied colour and alpha: what the framebuffer holds shows through */
 } cumulet_background;
 
@@ -734,6 +785,16 @@ typedef struct cumulet_display_desc {
 CUMULET_API cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc);
 CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc);
 CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
+/*
+ * This environment is there instead of the sky of cumulet_light_desc: it lights volume and surfaces and is the
+ * background, uploaded within the next frames. The sun of cumulet_light_desc stays. What previews rasterise, and
+ * CUMULET_SURFACE_LIGHT_NONE, has the light of its mean from everywhere. NULL: the sky again.
+ */
+CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment);
+/* The environment last set, retained for the caller, who releases it; NULL if there is none. */
+CUMULET_API cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out);
+CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer,
+                                                            const cumulet_environment_settings_desc* desc);
 CUMULET_API cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc);
 CUMULET_API cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc);
 

@@ -652,6 +652,79 @@ class Surfaces {
   cumulet_surfaces* handle_ = nullptr;
 };
 
+// ---- Environments ---------------------------------------------------------------------------------------------------
+
+struct EnvironmentDesc {
+  std::span<const float> values;  ///< 3 a pixel
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  const char* name = nullptr;
+};
+
+struct EnvironmentInfo {
+  Text<128> name;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint64_t replaced_pixels = 0;
+  Vector mean_radiance{};
+};
+
+/// A share in an immutable environment: a copy is one more.
+class Environment {
+ public:
+  Environment() noexcept = default;
+  Environment(const Environment& other) noexcept : handle_(cumulet_environment_retain(other.handle_)) {}
+  Environment(Environment&& other) noexcept : handle_(other.release()) {}
+  Environment& operator=(Environment other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Environment() { cumulet_environment_release(handle_); }
+
+  [[nodiscard]] static Result<Environment> open(const std::string& path) noexcept {
+    return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
+      return cumulet_environment_open(path.c_str(), out, error, size);
+    });
+  }
+  [[nodiscard]] static Result<Environment> from_pixels(const EnvironmentDesc& desc) noexcept {
+    const cumulet_environment_desc c{.struct_size = sizeof c,
+                                     .values = desc.values.data(),
+                                     .value_count = desc.values.size(),
+                                     .width = desc.width,
+                                     .height = desc.height,
+                                     .name = desc.name};
+    return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
+      return cumulet_environment_from_pixels(&c, out, error, size);
+    });
+  }
+
+  [[nodiscard]] Result<EnvironmentInfo> info() const noexcept {
+    auto c = detail::sized<cumulet_environment_info>();
+    if (auto done = detail::result(cumulet_environment_get_info(handle_, &c)); !done) return done.error();
+    const auto& [struct_size, name, width, height, replaced_pixels, mean_radiance] = c;
+    return EnvironmentInfo{.name = Text<128>(name),
+                           .width = width,
+                           .height = height,
+                           .replaced_pixels = replaced_pixels,
+                           .mean_radiance = std::to_array(mean_radiance)};
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_environment* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_environment* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Environment adopt(cumulet_environment* handle) noexcept {
+    Environment environment;
+    environment.handle_ = handle;
+    return environment;
+  }
+
+ private:
+  cumulet_environment* handle_ = nullptr;
+};
+
 // ---- Camera and input -----------------------------------------------------------------------------------------------
 
 struct CameraMatrices {
@@ -1007,6 +1080,19 @@ class Viewer {
     return result(cumulet_use_surface_camera(handle(), index));
   }
   [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
+  /// Empty: the light's sky.
+  [[nodiscard]] Result<> set_environment(const Environment& environment) noexcept {
+    return result(cumulet_set_environment(handle(), environment.handle()));
+  }
+  /// Empty if there is none.
+  [[nodiscard]] Result<Environment> get_environment() noexcept {
+    cumulet_environment* out = nullptr;
+    if (auto done = result(cumulet_get_environment(handle(), &out)); !done) return done.error();
+    return Environment::adopt(out);
+  }
+  [[nodiscard]] Result<> set_environment_settings(const EnvironmentSettingsDesc& desc) noexcept {
+    return set(cumulet_set_environment_settings, desc);
+  }
   [[nodiscard]] Result<> set_sampling(const SamplingDesc& desc) noexcept { return set(cumulet_set_sampling, desc); }
   [[nodiscard]] Result<> set_display(const DisplayDesc& desc) noexcept { return set(cumulet_set_display, desc); }
 

@@ -1,0 +1,77 @@
+// What surrounds all: an equirectangular picture whose upper edge is at +Y and whose middle is at +Z, turned from +Z
+// towards +X. Shared by GLSL and C++; the includer provides
+//   cm                                  the parameters
+//   uvec4 cm_environment_word(uint i)   texel i, by rows from the top: src/light/environment.hpp
+//
+// Radiance is bilinear between the middles of texels. So is the density of looks over the picture: a texel is picked by
+// its luminance times the solid angle of its row, and a point by the tent about its middle. So there is no direction
+// that light comes from and no look may take, and a sun of one texel is found as often as it is bright.
+#ifndef CM_ENVIRONMENT_GLSL
+#define CM_ENVIRONMENT_GLSL
+
+// Three halves, and the high half of a power of two.
+CM_FN vec3 cm_environment_texel(uint i) {
+  uvec4 word = cm_environment_word(i);
+  vec2 rg = unpackHalf2x16(word.z);
+  vec2 b = unpackHalf2x16(word.w & 0xffffu);
+  return vec3(rg.x, rg.y, b.x) * uintBitsToFloat(word.w & 0xffff0000u);
+}
+
+struct CmSurrounding {
+  vec3 radiance;
+  float density;  // of looks, by solid angle
+};
+
+CM_FN CmSurrounding cm_surrounding(vec3 w) {
+  vec2 turn = cm.lights.environment_turn;
+  uvec2 size = cm.environment.size;
+  float across = sqrt(w.x * w.x + w.z * w.z);
+  float azimuth = across > 0.0f ? atan(turn.x * w.x - turn.y * w.z, turn.x * w.z + turn.y * w.x) : 0.0f;
+  vec2 at = vec2(0.5f - 0.159154943f * azimuth, 0.318309886f * atan(across, w.y)) * vec2(size) - 0.5f;
+  vec2 low = floor(at);
+  vec2 f = at - low;
+  uint x_0 = low.x < 0.0f ? size.x - 1u : min(uint(low.x), size.x - 1u);
+  uint x_1 = x_0 + 1u < size.x ? x_0 + 1u : 0u;
+  uint y_0 = low.y < 0.0f ? 0u : min(uint(low.y), size.y - 1u);
+  uint y_1 = low.y < 0.0f ? 0u : min(y_0 + 1u, size.y - 1u);
+  vec3 row_0 = mix(cm_environment_texel(y_0 * size.x + x_0), cm_environment_texel(y_0 * size.x + x_1), f.x);
+  vec3 row_1 = mix(cm_environment_texel(y_1 * size.x + x_0), cm_environment_texel(y_1 * size.x + x_1), f.x);
+  vec3 luminance = vec3(0.2126f, 0.7152f, 0.0722f);
+  float angle = 3.14159265f / float(size.y);
+  float weight = mix(dot(row_0, luminance) * sin((float(y_0) + 0.5f) * angle),
+                     dot(row_1, luminance) * sin((float(y_1) + 0.5f) * angle), f.y);
+  CmSurrounding found;
+  found.radiance = cm.lights.environment_strength * mix(row_0, row_1, f.y);
+  found.density = cm.environment.density * weight / max(across, 1e-6f);
+  return found;
+}
+
+// From -1 to 1, likeliest 0.
+CM_FN float cm_tent(float u) { return u < 0.5f ? sqrt(2.0f * u) - 1.0f : 1.0f - sqrt(2.0f - 2.0f * u); }
+
+CM_FN vec3 cm_environment_radiance(vec3 w) { return cm_surrounding(w).radiance; }
+CM_FN float cm_environment_pdf(CmLightHit hit) { return cm_surrounding(hit.w).density; }
+
+CM_FN CmLightSample cm_environment_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+  uvec2 size = cm.environment.size;
+  uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x7f4a7c15u)));
+  uint i;
+  uint unused;
+  umulExtended(pick.x, size.x * size.y, i, unused);
+  uvec4 word = cm_environment_word(i);
+  if (pick.y > word.x) i = word.y;
+  float x = float(i % size.x) + 0.5f + cm_tent(cm_random(p.random, p.stream));
+  float y = float(i / size.x) + 0.5f + cm_tent(cm_random(p.random, p.stream));
+  // What is beyond a pole is as what is before it.
+  float height = float(size.y);
+  y = y < 0.0f ? -y : (y > height ? 2.0f * height - y : y);
+  float azimuth = 6.28318531f * (0.5f - x / float(size.x));
+  float down = 3.14159265f * y / height;
+  vec2 level = sin(down) * vec2(sin(azimuth), cos(azimuth));
+  vec2 turn = cm.lights.environment_turn;
+  vec3 w = vec3(turn.x * level.x + turn.y * level.y, cos(down), turn.x * level.y - turn.y * level.x);
+  CmSurrounding found = cm_surrounding(w);
+  return CmLightSample(CM_LIGHT_ENVIRONMENT, found.radiance, w, 3.0e38f, found.density);
+}
+
+#endif

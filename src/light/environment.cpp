@@ -1,0 +1,101 @@
+#include "light/environment.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/gtc/packing.hpp>
+#include <numbers>
+#include <utility>
+
+#include "base/error.hpp"
+#include "base/luminance.hpp"
+#include "light/alias_table.hpp"
+
+namespace cumulet::light {
+
+namespace {
+
+using glm::vec3;
+
+// Above, sums and products of radiance would not be finite.
+constexpr float brightest = 1e30F;
+
+/// A colour as Environment's z and w; what is read back of it follows.
+struct Packed {
+  std::uint32_t z = 0;
+  std::uint32_t w = 0;
+};
+
+Packed pack(const vec3& colour) {
+  const float most = std::max(colour.x, std::max(colour.y, colour.z));
+  if (!(most > 0.0F)) return {};
+  // The largest of the three from 1 to 2, so that its half has all its digits; of the smallest floats fewer.
+  const auto unit = std::max(std::bit_cast<std::uint32_t>(most) & 0x7F800000U, 0x00800000U);
+  const vec3 halves = colour / std::bit_cast<float>(unit);
+  return {glm::packHalf2x16({halves.x, halves.y}), glm::packHalf2x16({halves.z, 0.0F}) | unit};
+}
+
+vec3 unpack(const Packed& packed) {
+  const glm::vec2 rg = glm::unpackHalf2x16(packed.z);
+  const glm::vec2 b = glm::unpackHalf2x16(packed.w & 0xFFFFU);
+  return vec3(rg, b.x) * std::bit_cast<float>(packed.w & 0xFFFF0000U);
+}
+
+void check_size(const EnvironmentPixels& pixels, const std::string& name) {
+  const auto refuse = [&](const std::string& cause) { throw Error(ErrorCode::file, name + ": " + cause); };
+  const std::string size = std::to_string(pixels.width) + "x" + std::to_string(pixels.height);
+  if (pixels.width == 0 || pixels.height == 0) refuse("an environment of " + size + " pixels");
+  if (pixels.width > Environment::max_side || pixels.height > Environment::max_side) {
+    refuse("an environment of " + size + " pixels; at most " + std::to_string(Environment::max_side) + " a side");
+  }
+  if (pixels.values.size() != std::size_t{pixels.width} * pixels.height) {
+    refuse("an environment of " + size + " pixels has " + std::to_string(pixels.values.size()));
+  }
+}
+
+}  // namespace
+
+EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name) {
+  check_size(pixels, name);
+  auto made = std::make_shared<Environment>();
+  made->name = name;
+  made->width = pixels.width;
+  made->height = pixels.height;
+  made->words.reserve(pixels.values.size());
+  std::vector<double> weights;
+  weights.reserve(pixels.values.size());
+  double sines = 0.0;
+  double sum = 0.0;
+  for (std::uint32_t y = 0; y < pixels.height; ++y) {
+    const double sine = std::sin(std::numbers::pi * (y + 0.5) / pixels.height);
+    for (std::uint32_t x = 0; x < pixels.width; ++x) {
+      vec3 colour = pixels.values[std::size_t{y} * pixels.width + x];
+      bool good = true;
+      for (int c = 0; c < 3; ++c) {
+        if (colour[c] >= 0.0F && colour[c] <= brightest) continue;
+        good = false;
+        colour[c] = 0.0F;
+      }
+      if (!good) ++made->replaced;
+      const Packed packed = pack(colour);
+      const glm::dvec3 kept(unpack(packed));
+      weights.push_back(luminance(kept) * sine);
+      sum += weights.back();
+      made->mean += sine * kept;
+      sines += sine;
+      made->words.emplace_back(Alias::certain, static_cast<std::uint32_t>(made->words.size()), packed.z, packed.w);
+    }
+  }
+  made->mean /= sines;
+  if (!(sum > 0.0)) return made;
+  const double unit = 2.0 * std::numbers::pi * std::numbers::pi / static_cast<double>(weights.size());
+  made->density = static_cast<float>(1.0 / (sum * unit));
+  const std::vector<Alias> aliases = alias_table(std::move(weights), sum);
+  for (std::size_t i = 0; i < aliases.size(); ++i) {
+    made->words[i].x = aliases[i].stays;
+    made->words[i].y = aliases[i].other;
+  }
+  return made;
+}
+
+}  // namespace cumulet::light

@@ -1,0 +1,55 @@
+#pragma once
+
+// An equirectangular picture of all that is far away, as a light. No GL.
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace cumulet::light {
+
+/// Radiance of all directions, linear Rec. 709, rows from the top (+Y) down; the middle is at +Z and +X left of it, as
+/// seen from within.
+struct EnvironmentPixels {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<glm::vec3> values;
+};
+
+/// The picture with what it takes to look for light in it (glsl/environment.glsl). Immutable, and shared.
+struct Environment {
+  static constexpr std::uint32_t max_side = 16384;
+
+  std::string name;  ///< for messages
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  /// One a texel. x: texel i, drawn evenly, stands for itself where a random word is at most x, y: else for this texel
+  /// (Walker's alias method, as of light::EmitterTable), by luminance times the sine of the row's angle from +Y; z, w:
+  /// red and green, blue as halves in units of the float whose upper half is w's.
+  std::vector<glm::uvec4> words;
+  glm::dvec3 mean{0.0};  ///< over all directions
+  /// Of looks by solid angle, over a texel's weight by the sine: the weights' sum times a texel's solid angle by the
+  /// sine, inverted. 0: there is no light.
+  float density = 0.0F;
+  std::uint64_t replaced = 0;  ///< pixels that were not finite, negative or above 1e30, which count as 0
+
+  [[nodiscard]] std::size_t texels() const { return words.size(); }
+};
+using EnvironmentPtr = std::shared_ptr<const Environment>;
+
+/// O(texels). Throws Error(file) that begins with the name for a picture without pixels, of a side above max_side, or
+/// with another number of values.
+EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name);
+
+/// How a scene is surrounded by one.
+struct Surroundings {
+  EnvironmentPtr environment;     ///< null: by the sky of DistantLights
+  float rotation_degrees = 0.0F;  ///< about +Y, from +Z towards +X
+  float strength = 1.0F;          ///< times its radiance
+  bool operator==(const Surroundings&) const = default;
+};
+
+}  // namespace cumulet::light

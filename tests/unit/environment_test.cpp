@@ -1,0 +1,317 @@
+// Environments: what is read, how they are sampled, and that they light as other lights do that are known.
+
+#include "light/environment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "base/error.hpp"
+#include "grid/cell.hpp"
+#include "light/environment_file.hpp"
+#include "light/light_table.hpp"
+#include "support/folder.hpp"
+#include "support/gl_viewer.hpp"
+#include "support/volumes.hpp"
+
+// Mesa's OSMesa keeps its framebuffers for ever.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+
+// Marches share one signature; each leaves some of it unused. So do kinds of light.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+
+namespace cumulet::core {
+
+/// The shaders' path tracer over voxels, as C++, in an environment.
+struct CpuEnvironment {
+  CmParameters cm{};
+  const volume::ScalarVolume* volume = nullptr;
+  const light::Environment* environment = nullptr;
+  ivec3 origin{0};
+  float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
+  float cm_voxel(ivec3 voxel) const { return test::value_at(*volume, voxel + origin) / volume->max_value; }
+  uvec4 cm_environment_word(uint i) const { return environment->words.at(i); }
+#define CM_MARCH 1
+#undef CM_ENVIRONMENT
+#define CM_ENVIRONMENT 1
+#include "support/traced.inc"
+#undef CM_MARCH
+};
+
+}  // namespace cumulet::core
+
+#pragma GCC diagnostic pop
+
+namespace {
+
+using namespace cumulet;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+constexpr double pi = std::numbers::pi;
+
+light::EnvironmentPtr made(std::uint32_t width, std::uint32_t height,
+                           const std::function<vec3(std::uint32_t, std::uint32_t)>& radiance) {
+  light::EnvironmentPixels pixels{width, height, {}};
+  for (std::uint32_t y = 0; y < height; ++y) {
+    for (std::uint32_t x = 0; x < width; ++x) pixels.values.push_back(radiance(x, y));
+  }
+  return light::make_environment(pixels, "test");
+}
+
+core::CpuEnvironment twin(const light::Environment& environment, float degrees = 0.0F) {
+  core::CpuEnvironment cpu;
+  cpu.environment = &environment;
+  cpu.cm.environment = {{environment.width, environment.height}, 0, environment.density};
+  cpu.cm.lights.environment_strength = 1.0F;
+  cpu.cm.lights.environment_turn = {std::cos(glm::radians(degrees)), std::sin(glm::radians(degrees))};
+  return cpu;
+}
+
+vec3 direction(double azimuth, double down) {
+  return {std::sin(down) * std::sin(azimuth), std::cos(down), std::sin(down) * std::cos(azimuth)};
+}
+
+TEST(Environment, TheMiddleIsAtZAndTheLeftIsTowardsXAndTurnsFromZToX) {
+  const auto environment = made(64, 32, [](std::uint32_t x, std::uint32_t y) {
+    return vec3(x == 16 ? 1.0F : 0.0F, y < 8 ? 1.0F : 0.0F, x == 32 ? 1.0F : 0.0F);
+  });
+  const auto at = [&](const vec3& w, float degrees) {
+    return twin(*environment, degrees).cm_environment_radiance(glm::normalize(w));
+  };
+  EXPECT_GT(at({0.0F, 0.0F, 1.0F}, 0.0F).z, 0.4F);
+  EXPECT_GT(at({1.0F, 0.0F, 0.0F}, 0.0F).x, 0.4F);
+  EXPECT_EQ(at({-1.0F, 0.0F, 0.0F}, 0.0F).x, 0.0F);
+  EXPECT_EQ(at({0.0F, 1.0F, 0.0F}, 0.0F).y, 1.0F);
+  EXPECT_EQ(at({0.0F, -1.0F, 0.0F}, 0.0F).y, 0.0F);
+  EXPECT_GT(at({1.0F, 0.0F, 0.0F}, 90.0F).z, 0.4F);
+  EXPECT_GT(at({0.0F, 0.0F, -1.0F}, 90.0F).x, 0.4F);
+}
+
+// Of random texels, a few of them very bright.
+light::EnvironmentPtr uneven() {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> unit(0.0F, 1.0F);
+  return made(48, 24, [&](std::uint32_t, std::uint32_t) {
+    const float u = unit(random);
+    return u < 0.3F ? vec3(0.0F) : vec3(u, u * u, unit(random)) * (u > 0.99F ? 3000.0F : 1.0F);
+  });
+}
+
+TEST(Environment, TheDensityOfLooksIntegratesToOneAndIsThatOfWhatIsDrawn) {
+  const auto environment = uneven();
+  core::CpuEnvironment cpu = twin(*environment, 70.0F);
+  constexpr std::size_t columns = 12;
+  constexpr std::size_t rows = 6;
+  std::vector<double> expected(columns * rows);
+  constexpr int fine = 96;  // points along each side of a bin
+  double sum = 0.0;
+  for (std::size_t bin = 0; bin < expected.size(); ++bin) {
+    for (int i = 0; i < fine * fine; ++i) {
+      const double azimuth = 2.0 * pi * (double(bin % columns) + (i % fine + 0.5) / fine) / columns;
+      const double down =
+          pi * (double(bin / columns) + (double(i) / fine - i % fine / double(fine) + 0.5 / fine)) / rows;
+      const double area = 2.0 * pi * pi / (columns * rows) / (fine * fine) * std::sin(down);
+      expected[bin] += area * cpu.cm_surrounding(direction(azimuth, down)).density;
+    }
+    sum += expected[bin];
+  }
+  EXPECT_NEAR(sum, 1.0, 2e-3);
+  constexpr int draws = 400000;
+  std::vector<double> drawn(expected.size());
+  core::CmPath p{};
+  p.random = 1;
+  p.stream = 3;
+  double mean = 0.0;
+  for (int i = 0; i < draws; ++i) {
+    const core::CmLightSample sample = cpu.cm_environment_sample(p, vec3(0.0F), 0.5F);
+    EXPECT_NEAR(glm::length(sample.direction), 1.0F, 1e-4F);
+    double azimuth = std::atan2(double(sample.direction.x), double(sample.direction.z)) / (2.0 * pi);
+    if (azimuth < 0.0) azimuth += 1.0;
+    const double down = std::acos(std::clamp(double(sample.direction.y), -1.0, 1.0)) / pi;
+    const auto column = std::min(columns - 1, static_cast<std::size_t>(azimuth * columns));
+    const auto row = std::min(rows - 1, static_cast<std::size_t>(down * rows));
+    drawn[row * columns + column] += 1.0;
+    mean += sample.radiance.y / sample.density / draws;
+  }
+  for (std::size_t bin = 0; bin < expected.size(); ++bin) {
+    const double count = expected[bin] * draws;
+    EXPECT_NEAR(drawn[bin], count, 4.5 * std::sqrt(count) + 0.004 * count + 2.0) << bin;
+  }
+  EXPECT_NEAR(mean, 4.0 * pi * environment->mean.y, 0.02 * mean);
+}
+
+TEST(Environment, PixelsThatAreNoRadianceCountAsZeroAndAreTold) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto environment = made(2, 2, [&](std::uint32_t x, std::uint32_t y) {
+    if (y == 0) return x == 0 ? vec3(nan, 1.0F, 1.0F) : vec3(1.0F, -1.0F, 1.0F);
+    return x == 0 ? vec3(std::numeric_limits<float>::infinity()) : vec3(1.0F);
+  });
+  EXPECT_EQ(environment->replaced, 3U);
+  EXPECT_NEAR(environment->mean.x, 0.5, 1e-6);
+  EXPECT_NEAR(environment->mean.y, 0.5, 1e-6);
+  const auto dark = made(4, 2, [](std::uint32_t, std::uint32_t) { return vec3(0.0F); });
+  EXPECT_EQ(dark->density, 0.0F);
+  EXPECT_EQ(light::LightTable({}, {dark}, {}, false).parameters().any, 0U);
+}
+
+TEST(Environment, KeepsEveryMagnitude) {
+  for (const float value : {1e30F, 72704.0F, 1.0F, 0.3F, 1e-12F, 1e-38F}) {
+    const auto environment = made(1, 1, [&](std::uint32_t, std::uint32_t) { return vec3(value, 0.5F * value, 0.0F); });
+    const core::CpuEnvironment cpu = twin(*environment);
+    const vec3 kept = cpu.cm_environment_texel(0);
+    EXPECT_NEAR(kept.x / value, 1.0F, 6e-4F) << value;
+    EXPECT_NEAR(kept.y / value, 0.5F, 6e-4F) << value;
+    EXPECT_EQ(kept.z, 0.0F);
+  }
+}
+
+std::string refusal(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::file);
+    return error.what();
+  }
+  return "";
+}
+
+std::string refusal_of(const light::EnvironmentPixels& pixels) {
+  return refusal([&] { light::make_environment(pixels, "host"); });
+}
+
+TEST(Environment, SizesThatAreNoneAreRefusedInALine) {
+  EXPECT_EQ(refusal_of({0, 4, {}}), "host: an environment of 0x4 pixels");
+  EXPECT_EQ(refusal_of({32768, 1, {}}), "host: an environment of 32768x1 pixels; at most 16384 a side");
+  EXPECT_EQ(refusal_of({2, 2, {vec3(1.0F)}}), "host: an environment of 2x2 pixels has 1");
+}
+
+std::string radiance_file(const std::string& resolution, const std::string& body) {
+  return "#?RADIANCE\n# a comment\nFORMAT=32-bit_rle_rgbe\n\n" + resolution + "\n" + body;
+}
+
+TEST(EnvironmentFile, RadianceIsReadFlatAndInRuns) {
+  const test::Folder folder;
+  const std::string path = (folder / "a.hdr").string();
+  const auto read = [&](const std::string& text) {
+    std::ofstream(path, std::ios::binary) << text;
+    return light::read_environment(path);
+  };
+  const std::string flat("\x80\x40\x20\x81\x80\x80\x80\x82", 8);
+  const light::EnvironmentPixels two = read(radiance_file("-Y 1 +X 2", flat));
+  EXPECT_EQ(two.values.at(0), vec3(1.0F, 0.5F, 0.25F));
+  EXPECT_EQ(two.values.at(1), vec3(2.0F));
+  std::string runs("\x02\x02\x00\x08", 4);
+  for (const char* channel : {"\x88\x80", "\x88\x40", "\x08\x20\x20\x20\x20\x20\x20\x20\x10", "\x88\x81"})
+    runs += channel;
+  const light::EnvironmentPixels eight = read(radiance_file("-Y 1 +X 8", runs));
+  EXPECT_EQ(eight.values.at(0), vec3(1.0F, 0.5F, 0.25F));
+  EXPECT_EQ(eight.values.at(7), vec3(1.0F, 0.5F, 0.125F));
+  const auto why = [&](const std::string& text) { return refusal([&] { read(text); }); };
+  EXPECT_EQ(why(""), path + ": a Radiance picture that is cut short");
+  EXPECT_EQ(why("no picture\n"), path + ": neither a Radiance (.hdr) nor an OpenEXR file");
+  EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs.substr(0, 8))), path + ": a Radiance picture that is cut short");
+  EXPECT_EQ(why(radiance_file("-Y 9999 +X 9999", runs)), path + ": a Radiance picture that is cut short");
+  EXPECT_EQ(why(radiance_file("-Y 16 +X 32000", runs)),
+            path + ": an environment of 32000x16 pixels; at most 16384 a side");
+  EXPECT_EQ(why(radiance_file("+X 8 -Y 1", runs)), path + ": a resolution of '+X 8 -Y 1', not '-Y HEIGHT +X WIDTH'");
+  runs[4] = '\xff';
+  EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs)), path + ": a run beyond its row");
+  EXPECT_EQ(refusal([&] { light::read_environment((folder / "none.hdr").string()); }),
+            (folder / "none.hdr").string() + ": No such file or directory");
+  EXPECT_NE(why(std::string("\x76\x2f\x31\x01nonsense", 12)).find(path + ": not a readable OpenEXR file: "),
+            std::string::npos);
+}
+
+class Surrounded : public test::ViewerTest {
+ protected:
+  struct Seen {
+    dvec3 mean{0.0};
+    double error = 0.0;  // of the mean's first channel
+  };
+  // Of two seeds.
+  static Seen see(test::Still& still, std::uint32_t samples) {
+    Seen seen;
+    std::vector<test::Picture> pictures;
+    for (const std::uint32_t seed : {1U, 2U}) pictures.push_back(test::render(still, {24, 24, samples, seed}));
+    for (const test::Picture& picture : pictures) seen.mean += 0.5 * dvec3(picture.mean());
+    double squares = 0.0;
+    const std::size_t count = pictures[0].pixels.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const double difference = double(pictures[0].pixels[i].x) - pictures[1].pixels[i].x;
+      squares += difference * difference;
+    }
+    seen.error = 0.5 * std::sqrt(squares) / double(count);
+    return seen;
+  }
+  static void expect_same(const Seen& a, const Seen& b, double share) {
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(a.mean[c], b.mean[c], 4.0 * std::hypot(a.error, b.error) + share * b.mean[c]) << c;
+    }
+  }
+  std::unique_ptr<test::Still> ball(float g, vec3 albedo) {
+    auto still = make();
+    still->set_volume(test::make_volume(
+        ivec3(20), ivec3(0), [](const ivec3& p) { return glm::length(glm::vec3(p) - 9.5F) < 9.0F ? 1.0F : 0.0F; }));
+    still->set_camera(test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 25.0));
+    still->set_medium({0.15, albedo, {g}, 0});
+    return still;
+  }
+};
+CUMULET_ON_BACKENDS(Surrounded);
+
+TEST_P(Surrounded, ByOneColourAsByASkyOfIt) {
+  const vec3 colour(0.25F, 0.5F, 1.0F);
+  const auto still = ball(0.6F, vec3(0.9F, 0.8F, 1.0F));
+  still->set_light({30.0F, 20.0F, vec3(0.5F), colour});
+  const Seen sky = see(*still, 32);
+  still->set_light({30.0F, 20.0F, vec3(0.5F), vec3(7.0F)});  // of which nothing is seen
+  still->viewer().set_environment(made(16, 8, [&](std::uint32_t, std::uint32_t) { return 0.5F * colour; }));
+  still->viewer().set_environment_settings({40.0F, 2.0F});
+  expect_same(see(*still, 32), sky, 1e-3);
+  still->viewer().set_environment(nullptr);
+  still->set_light({30.0F, 20.0F, vec3(0.5F), colour});
+  expect_same(see(*still, 32), sky, 0.0);
+}
+
+TEST_P(Surrounded, AFurnaceIsOfOneColour) {
+  const auto still = ball(0.0F, vec3(1.0F));
+  still->set_light({});
+  still->viewer().set_environment(made(8, 4, [](std::uint32_t, std::uint32_t) { return vec3(1.0F); }));
+  const Seen seen = see(*still, 64);
+  EXPECT_NEAR(seen.mean.x, 1.0, 4.0 * seen.error + 1e-4);
+  EXPECT_LT(seen.error, 2e-3);
+}
+
+TEST_P(Surrounded, ABrightTexelIsASun) {
+  const auto still = ball(0.3F, vec3(0.9F));
+  constexpr std::uint32_t width = 512;
+  constexpr std::uint32_t height = 256;
+  constexpr std::uint32_t column = 150;
+  constexpr std::uint32_t row = 90;
+  const double down = pi * (row + 0.5) / height;
+  const double azimuth = 2.0 * pi * (0.5 - (column + 0.5) / width);
+  const double solid_angle = std::sin(down) * (2.0 * pi / width) * (pi / height);
+  still->set_light({static_cast<float>(glm::degrees(azimuth)), static_cast<float>(90.0 - glm::degrees(down)),
+                    vec3(3.0F), vec3(0.0F)});
+  const Seen sun = see(*still, 64);
+  still->set_light({});
+  still->viewer().set_environment(made(width, height, [&](std::uint32_t x, std::uint32_t y) {
+    return x == column && y == row ? vec3(static_cast<float>(3.0 / solid_angle)) : vec3(0.0F);
+  }));
+  const Seen texel = see(*still, 64);
+  expect_same(texel, sun, 5e-3);
+  EXPECT_LT(texel.error, 3.0 * sun.error);  // no fireflies
+}
+
+}  // namespace
