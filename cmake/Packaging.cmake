@@ -2,7 +2,7 @@
 # completions and desktop files, the documents and the licences.
 # `cpack -G TGZ`: the same and every shared library it needs in one portable .tar.gz (bundle.cmake).
 # `cpack -G DEB`: three Debian packages that need Debian's own libraries (debian.cmake): libcumulet0 is what a host's
-# package depends on, so it brings no program's needs (a window, OpenEXR); libcumulet-dev has what compiling takes;
+# package depends on, so it brings no program's needs (a window); libcumulet-dev has what compiling takes;
 # cumulet the programs.
 include(CMakePackageConfigHelpers)
 
