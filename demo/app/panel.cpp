@@ -178,7 +178,15 @@ void Panel::light(Model& model) {
                "Drag the sun: the direction is its azimuth, the rim the horizon, the centre overhead. By keyboard: "
                "Space, then the arrows, then Space. The triangle is the camera.",
                light.sun_azimuth_degrees, light.sun_elevation_degrees, static_cast<float>(azimuth));
-  rows(light);
+  using Desc = cumulet_light_desc;
+  const bool physical = light.sky == CUMULET_SKY_PHYSICAL;
+  settings::for_each<Desc>([&](const auto& setting) {
+    const bool of_constant = setting.is(&Desc::sun_irradiance) || setting.is(&Desc::sky_radiance);
+    const bool of_physical = setting.is(&Desc::turbidity) || setting.is(&Desc::ground_albedo);
+    ImGui::BeginDisabled((of_constant && physical) || (of_physical && !physical));
+    rows_.draw(setting, light.*setting.field);
+    ImGui::EndDisabled();
+  });
 }
 
 void Panel::surfaces(Model& model) {

@@ -170,13 +170,27 @@ cumulet_camera_desc parse_camera(std::string_view text) {
 
 void parse_sun(std::string_view text, cumulet_light_desc& light) {
   const std::vector<std::string_view> parts = words(text);
-  if (parts.size() != 2) throw UsageError(in_quotes(text) + " is not \"azimuth,elevation r,g,b\"");
+  if (parts.empty() || parts.size() > 2) throw UsageError(in_quotes(text) + " is not \"azimuth,elevation r,g,b\"");
   const std::vector<double> angles = parse_numbers(parts[0], 2);
   if (std::abs(angles[0]) > 360.0) throw UsageError("the azimuth is not from -360 to 360 degrees");
   if (std::abs(angles[1]) > 90.0) throw UsageError("the elevation is not from -90 to 90 degrees");
-  parse_light(parts[1], light.sun_irradiance);
+  if (parts.size() == 2) parse_light(parts[1], light.sun_irradiance);
   light.sun_azimuth_degrees = static_cast<float>(angles[0]);
   light.sun_elevation_degrees = static_cast<float>(angles[1]);
+}
+
+void parse_sky_model(std::string_view text, cumulet_light_desc& light) {
+  const std::vector<double> numbers = parse_numbers(text, 2);
+  const auto take = [&](float cumulet_light_desc::*field, double number) {
+    settings::with(field, [&](const auto& setting) {
+      if (!setting.given_range().holds(number))
+        throw UsageError("the " + std::string(setting.row.label) + " " + setting.given_range().refusal());
+    });
+    light.*field = static_cast<float>(number);
+  };
+  take(&cumulet_light_desc::turbidity, numbers[0]);
+  take(&cumulet_light_desc::ground_albedo, numbers[1]);
+  light.sky = CUMULET_SKY_PHYSICAL;
 }
 
 /// CLI11 takes "-.5" for a flag. Glued to the flag before it, it is a value.
@@ -344,7 +358,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   add(
       app, group, "--sun", "\"azimuth,elevation r,g,b\"",
       [&](const std::string& text) { parse_sun(text, scene.light); },
-      "Degrees from +Z towards +X and above the horizon; irradiance");
+      "Degrees from +Z towards +X and above the horizon; irradiance, which a --sky-model gives by itself");
   add_settings(app, group, scene.light);
   add(
       app, group, "--env", "FILE",
@@ -354,6 +368,10 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       },
       "Environment, an equirectangular .hdr or .exr picture, instead of the sky; +Y is up, its middle is +Z");
   add_settings(app, group, scene.environment_settings);
+  add(
+      app, group, "--sky-model", "\"turbidity,ground_albedo\"",
+      [&](const std::string& text) { parse_sky_model(text, scene.light); },
+      "A clear day's sun and sky: from 1 (no aerosols) over 3 (clear) to 10, and what the ground sends back, 0 to 1");
   add_settings(app, "Grid", scene.grid);
 
   group = "Picture";
@@ -419,6 +437,15 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene) {
   for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-camera"}) {
     if (app.count(flag) > 0 && scene.surfaces.empty())
       throw UsageError(std::string(flag) + " needs a model: --gltf, or a --scene that names one");
+  }
+  for (const char* flag : {"--sky", "--env"}) {
+    if (app.count(flag) > 0 && app.count("--sky-model") > 0)
+      throw UsageError(std::string(flag) + " and --sky-model exclude each other");
+  }
+  if (app.count("--sky") > 0) scene.light.sky = CUMULET_SKY_CONSTANT;
+  if (app.count("--sun") > 0 && scene.light.sky == CUMULET_SKY_CONSTANT) {
+    const std::string sun = app.get_option("--sun")->results().back();
+    if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " has no irradiance and no --sky-model");
   }
   if (app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 && app.count("--env") == 0)
     scene.set_daylight();

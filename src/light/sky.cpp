@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 
 #include "light/spectrum.hpp"
@@ -388,6 +389,24 @@ vec3 Sky::radiance(const dvec3& direction) const {
   return glm::max(s.air * static_cast<float>(air_phase(from_sun)) +
                       s.aerosols * static_cast<float>(aerosol_phase(from_sun)) + s.more,
                   vec3(0.0F));
+}
+
+Daylight make_daylight(const SkyModel& model, const dvec3& to_sun) {
+  const Sky sky(model, to_sun);
+  EnvironmentPixels pixels{.width = 512, .height = 256, .values = {}};
+  pixels.values.resize(std::size_t{pixels.width} * pixels.height);
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, pixels.height), [&](const auto& range) {
+    for (std::uint32_t y = range.begin(); y != range.end(); ++y) {
+      const double elevation = pi * (0.5 - (y + 0.5) / pixels.height);
+      for (std::uint32_t x = 0; x < pixels.width; ++x) {
+        const double azimuth = 2.0 * pi * (0.5 - (x + 0.5) / pixels.width);
+        const double across = std::cos(elevation);
+        const dvec3 direction(std::sin(azimuth) * across, std::sin(elevation), std::cos(azimuth) * across);
+        pixels.values[std::size_t{y} * pixels.width + x] = sky.radiance(direction);
+      }
+    }
+  });
+  return {model, to_sun, sky.sun_irradiance(), make_environment(pixels, "the physical sky")};
 }
 
 }  // namespace cumulet::light

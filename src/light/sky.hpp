@@ -6,6 +6,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "light/environment.hpp"
+
 namespace cumulet::light {
 
 /// What the sky depends on beside the sun's place.
@@ -53,5 +55,16 @@ class Sky {
   glm::vec3 sky_irradiance_{0.0F};
   glm::vec3 ground_radiance_{0.0F};
 };
+
+/// Of a sky what a picture is lit by.
+struct Daylight {
+  SkyModel model;
+  glm::dvec3 to_sun{0.0, 1.0, 0.0};
+  glm::vec3 sun_irradiance{0.0F};
+  EnvironmentPtr surroundings;  ///< all but the sun, 512 x 256
+};
+
+/// As Sky's constructor.
+Daylight make_daylight(const SkyModel& model, const glm::dvec3& to_sun);
 
 }  // namespace cumulet::light

@@ -33,6 +33,9 @@ inline constexpr std::array phase_choices = {
     Choice{"hg", CUMULET_PHASE_HG, "One lobe", "Henyey-Greenstein's."},
     Choice{"two-lobe", CUMULET_PHASE_TWO_LOBE, "Two lobes", "Of Henyey-Greenstein: say, one forward and one back."},
     Choice{"mie", CUMULET_PHASE_MIE, "Droplets", "What water droplets of one size do: clouds and fog."}};
+inline constexpr std::array sky_choices = {
+    Choice{"constant", CUMULET_SKY_CONSTANT, "Constant", "One colour from everywhere."},
+    Choice{"physical", CUMULET_SKY_PHYSICAL, "Physical", "A clear day's, with the sun where it stands."}};
 inline constexpr std::array view_choices = {
     Choice{"shaded", CUMULET_VIEW_SHADED, "Shaded", "The path-traced picture."},
     Choice{"cells", CUMULET_VIEW_CELLS, "Cells", "The cells on a cut through the middle, coloured by level."},
@@ -181,7 +184,21 @@ struct Table<cumulet_light_desc> {
                 .tip = "Radiance from everywhere; 0: black.",
                 .most = 100.0,
                 .colour = "Sky colour",
-                .colour_tip = "The sky's colour, as it looks on the screen."}})};
+                .colour_tip = "The sky's colour, as it looks on the screen."}}),
+      Setting(&Desc::sky, {.name = "sky", .choices = sky_choices,
+        .key = "light.sky.model",
+        .row = {.label = "Sky",
+                .tip = "Where sun and sky have their light from."}}),
+      Setting(&Desc::turbidity, {.name = "turbidity", .range = {1.0, 10.0}, .zero = 3.0,
+        .key = "light.sky.turbidity",
+        .row = {.label = "Turbidity",
+                .tip = "Of a physical sky: 2 is very clear, 3 clear, 6 hazy.",
+                .least = 1.0, .most = 10.0, .format = "%.1f"}}),
+      Setting(&Desc::ground_albedo, {.name = "ground_albedo", .range = {0.0, 1.0},
+        .key = "light.sky.ground_albedo",
+        .row = {.label = "Ground albedo",
+                .tip = "Of a physical sky: what the ground sends back.",
+                .most = 1.0}})};
 };
 
 template <>

@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <glm/gtc/type_ptr.hpp>
+#include <optional>
 
+#include "light/sky.hpp"
 #include "render/display.hpp"
 #include "render/tracer.hpp"
 #include "scene/phase.hpp"
@@ -70,10 +72,13 @@ struct Light {
   float sun_elevation_degrees = 0.0F;
   glm::vec3 sun_irradiance{0.0F};
   glm::vec3 sky_radiance{0.0F};
+  std::optional<light::SkyModel> sky = std::nullopt;  ///< then neither of the two before is meant
 
   static Light of(const cumulet_light_desc& d) {
-    return {d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
-            glm::make_vec3(d.sky_radiance)};
+    Light light{d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
+                glm::make_vec3(d.sky_radiance), std::nullopt};
+    if (d.sky == CUMULET_SKY_PHYSICAL) light.sky = {.turbidity = d.turbidity, .ground_albedo = d.ground_albedo};
+    return light;
   }
 };
 

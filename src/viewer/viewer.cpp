@@ -253,7 +253,8 @@ void Viewer::set_medium(const Medium& medium) {
 }
 
 void Viewer::set_light(const Light& light) {
-  scene_.lights.set({to_sun(light), light.sun_irradiance, light.sky_radiance});
+  light_ = light;
+  surround();
   touch();
 }
 
@@ -262,15 +263,29 @@ void Viewer::set_environment(light::EnvironmentPtr environment) {
     log_.warning(environment->name + ": " + std::to_string(environment->replaced) +
                  " pixels are not finite or negative, and count as 0");
   }
-  light::Surroundings surroundings = *scene_.surroundings;
-  surroundings.environment = std::move(environment);
-  scene_.surroundings.set(std::move(surroundings));
+  environment_ = std::move(environment);
+  surround();
   touch();
 }
 
 void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
-  scene_.surroundings.set({environment(), settings.rotation_degrees, settings.strength});
+  environment_settings_ = settings;
+  surround();
   touch();
+}
+
+void Viewer::surround() {
+  light::DistantLights lights{to_sun(light_), light_.sun_irradiance, light_.sky_radiance};
+  light::Surroundings surroundings{environment_, environment_settings_.rotation_degrees,
+                                   environment_settings_.strength};
+  if (light_.sky) {
+    if (!daylight_ || daylight_->model != *light_.sky || daylight_->to_sun != lights.to_sun)
+      daylight_ = light::make_daylight(*light_.sky, lights.to_sun);
+    lights.sun_irradiance = daylight_->sun_irradiance;
+    if (!environment_) surroundings = {.environment = daylight_->surroundings};
+  }
+  scene_.lights.set(lights);
+  scene_.surroundings.set(std::move(surroundings));
 }
 
 void Viewer::set_sampling(const Sampling& sampling) {

@@ -89,7 +89,7 @@ class Viewer {
   /// Null: the sky of the light.
   void set_environment(light::EnvironmentPtr environment);
   void set_environment_settings(const EnvironmentSettings& settings);
-  [[nodiscard]] const light::EnvironmentPtr& environment() const { return scene_.surroundings->environment; }
+  [[nodiscard]] const light::EnvironmentPtr& environment() const { return environment_; }
   void set_sampling(const Sampling& sampling);
   void set_display(const DisplaySettings& display);
   void set_camera(std::shared_ptr<Camera> camera);
@@ -124,6 +124,8 @@ class Viewer {
   [[nodiscard]] Context& gl() const;
   // A setting changed.
   void touch();
+  // What the light and the environment make of the scene's.
+  void surround();
   // Runs a [GL] call's body between state guard and error handling.
   template <class Body>
   void with_gl(Body&& body);
@@ -155,6 +157,10 @@ class Viewer {
 
   GridSettings grid_;
   Medium medium_;
+  Light light_;
+  std::optional<light::Daylight> daylight_;  // of the physical sky last asked for
+  light::EnvironmentPtr environment_;        // the host's
+  EnvironmentSettings environment_settings_;
   SurfaceSettings surface_settings_;
   SurfaceAssetPtr surface_asset_;       // newest
   scene::ModelSourcePtr model_source_;  // newest that is posed

@@ -176,6 +176,20 @@ TEST(Options, LightGivenIsTheOnlyLight) {
   expect_rgb(night.scene.light.sky_radiance, 0.0f, 0.0f, 0.0f);
 }
 
+TEST(Options, ASkyModelTakesItsSunsPlaceAlone) {
+  const RenderOptions clear = parse({"--sky-model", "2.5,.25", "--sun", "120,20"});
+  EXPECT_EQ(clear.scene.light.sky, CUMULET_SKY_PHYSICAL);
+  EXPECT_EQ(clear.scene.light.turbidity, 2.5f);
+  EXPECT_EQ(clear.scene.light.ground_albedo, 0.25f);
+  EXPECT_EQ(clear.scene.light.sun_azimuth_degrees, 120.0f);
+  EXPECT_EQ(clear.scene.light.sun_elevation_degrees, 20.0f);
+  // By itself it is of the default's time of day.
+  const RenderOptions day = parse({"--sky-model", "3,0"});
+  EXPECT_EQ(day.scene.light.sky, CUMULET_SKY_PHYSICAL);
+  EXPECT_EQ(day.scene.light.sun_elevation_degrees, parse({}).scene.light.sun_elevation_degrees);
+  EXPECT_EQ(parse({"--sky", "1,1,1"}).scene.light.sky, CUMULET_SKY_CONSTANT);
+}
+
 TEST(Options, ViewNames) {
   EXPECT_EQ(parse({"--view", "wireframe"}).scene.sampling.view, CUMULET_VIEW_WIREFRAME);
   EXPECT_EQ(parse({"--view", "cells"}).scene.sampling.view, CUMULET_VIEW_CELLS);
@@ -405,6 +419,11 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--sun", "60,40 1,1,-1"},
                                         {"--sky", "1"},
                                         {"--sky", "1,1,1e39"},
+                                        {"--sky-model", "3"},
+                                        {"--sky-model", "0.5,0.3"},
+                                        {"--sky-model", "3,1.5"},
+                                        {"--sky-model", "3,0.3", "--sky", "1,1,1"},
+                                        {"--sky-model", "3,0.3", "--env", "a.hdr"},
                                         {"--view", "nice"},
                                         {"--backend", "glx"},
                                         {"--exposure", "1,5"},

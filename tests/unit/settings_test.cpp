@@ -211,9 +211,9 @@ TEST(Settings, AFlagSetsEach) {
       EXPECT_TRUE(equal(options->scene.*part.*setting.field, scene.*part.*setting.field)) << setting.flag;
     });
   });
-  // --sun sets three at once.
-  EXPECT_EQ(without, (std::set<std::string>{"background", "preview", "sun_azimuth_degrees", "sun_elevation_degrees",
-                                            "sun_irradiance", "volume_alone"}));
+  // --sun and --sky-model set three at once.
+  EXPECT_EQ(without, (std::set<std::string>{"background", "ground_albedo", "preview", "sky", "sun_azimuth_degrees",
+                                            "sun_elevation_degrees", "sun_irradiance", "turbidity", "volume_alone"}));
 }
 
 TEST(Settings, TheLibraryTakesEachAndNamesWhatItRefuses) {

@@ -9,9 +9,16 @@
 #include <numbers>
 
 #include "base/luminance.hpp"
+#include "support/gl_viewer.hpp"
+#include "support/volumes.hpp"
+
+// Mesa's OSMesa keeps its framebuffers for ever.
+extern "C" const char* __lsan_default_suppressions();
+extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 namespace {
 
+using namespace cumulet;
 using cumulet::luminance;
 using cumulet::light::Sky;
 using cumulet::light::SkyModel;
@@ -138,6 +145,55 @@ TEST(Sky, TheSameTwice) {
   for (double e = -5.0; e <= 90.0; e += 5.0) {
     EXPECT_EQ(one.radiance(direction(e, 3.0 * e)), two.radiance(direction(e, 3.0 * e)));
   }
+}
+
+class SkyPicture : public test::ViewerTest {};
+CUMULET_ON_BACKENDS(SkyPicture);
+
+// The same samples of the same seed, so that nothing is random between two pictures of the same light.
+TEST_P(SkyPicture, IsLitByItsSunAndByAPictureOfIt) {
+  const SkyModel model{.turbidity = 2.0, .ground_albedo = 0.4};
+  const Sky day(model, direction(25.0, 40.0));
+  // Of the sevens nothing is seen.
+  const viewer::Light physical{40.0F, 25.0F, vec3(7.0F), vec3(7.0F), model};
+  const viewer::Light sun{40.0F, 25.0F, day.sun_irradiance(), vec3(0.0F)};
+  const auto still = make();
+  still->set_volume(test::make_volume(glm::ivec3(20), glm::ivec3(0), [](const glm::ivec3& p) {
+    return glm::length(vec3(p) - 9.5F) < 9.0F ? 1.0F : 0.0F;
+  }));
+  still->set_camera(test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 25.0));
+  still->set_medium({0.15, vec3(0.9F), {0.3F}, 0});
+  const auto seen = [&] { return dvec3(test::render(*still, {24, 24, 16, 1}).mean()); };
+  const auto expect_same = [](const dvec3& a, const dvec3& b) {
+    EXPECT_LT(glm::distance(a, b), 1e-3 * glm::length(b));
+  };
+
+  still->set_light(physical);
+  const dvec3 whole = seen();
+  light::EnvironmentPixels pixels{512, 256, {}};
+  for (std::uint32_t y = 0; y < pixels.height; ++y) {
+    for (std::uint32_t x = 0; x < pixels.width; ++x)
+      pixels.values.push_back(
+          day.radiance(direction(90.0 - 180.0 * (y + 0.5) / 256.0, 180.0 - 360.0 * (x + 0.5) / 512.0)));
+  }
+  still->set_light(sun);
+  still->viewer().set_environment(light::make_environment(pixels, "a picture of it"));
+  expect_same(seen(), whole);
+
+  // A host's environment is there instead of the sky, and the sun stays.
+  still->viewer().set_environment(light::make_environment({1, 1, {vec3(0.0F)}}, "black"));
+  const dvec3 alone = seen();
+  still->set_light(physical);
+  expect_same(seen(), alone);
+  EXPECT_GT(whole.b, 1.2 * alone.b);
+  still->viewer().set_environment(nullptr);
+  expect_same(seen(), whole);
+
+  // Where the picture's parts are.
+  const dvec3 away = glm::normalize(dvec3(0.3, 0.2, 1.0));
+  still->set_camera(test::camera_at({9.5, 9.5, 60.0}, dvec3(9.5, 9.5, 60.0) + away, 0.5));
+  const dvec3 background = seen();
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(background[c] / day.radiance(away)[c], 1.0, 5e-3) << c;
 }
 
 }  // namespace

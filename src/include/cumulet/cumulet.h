@@ -724,13 +724,28 @@ typedef struct cumulet_medium_desc {
   float blackbody_tint[3];  /* all 0: white */
 } cumulet_medium_desc;
 
-/* A distant sun (a delta direction, invisible to camera rays) and a sky of constant radiance. Restarts accumulation. */
+/* Where sun and sky have their light from. */
+typedef enum cumulet_sky {
+  CUMULET_SKY_CONSTANT = 0, /* sun_irradiance; sky_radiance, the same from everywhere */
+  /*
+   * Of a clear day with the sun where it is (Hillaire 2020), seen from the ground at sea level: neither sun_irradiance
+   * nor sky_radiance. Below the horizon lies the lit ground. White and unit are the sun's light outside of the
+   * atmosphere, whose irradiance is 5 (some 27 klx to 1): about 4 on the ground at noon, next to none after sunset.
+   * cumulet_set_light then takes some 0.1 s.
+   */
+  CUMULET_SKY_PHYSICAL = 1
+} cumulet_sky;
+
+/* A distant sun (a delta direction, invisible to camera rays) and a sky. Restarts accumulation. */
 typedef struct cumulet_light_desc {
   size_t struct_size;
   float sun_azimuth_degrees;   /* direction towards the sun, from +Z towards +X */
   float sun_elevation_degrees; /* above the horizon */
   float sun_irradiance[3];     /* on a surface that faces it; 0: no sun */
   float sky_radiance[3];       /* 0: black */
+  cumulet_sky sky;
+  float turbidity;     /* physical: Linke's, in [1, 10]: 1 no aerosols, 2 very clear, 3 clear, 6 hazy; 0: 3 */
+  float ground_albedo; /* physical: what the ground sends back to the air, in [0, 1]; 0: black */
 } cumulet_light_desc;
 
 /* How a viewer is surrounded by its environment (cumulet_set_environment). Restarts accumulation. */
