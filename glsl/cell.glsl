@@ -137,7 +137,7 @@ CM_FN void cm_root_cell(uint root, uint exponent, CM_OUT(vec3) v0, CM_OUT(uint) 
 }
 
 // The record, 32 bytes: links (4 neighbours across faces 0 to 3, CM_NONE outside) and
-// data: x = v0.x | v0.y << 16, y = v0.z | shape << 16 | CM_RECORD_EMITS if it gives off light (glsl/emission.glsl), z = half2(density at the centroid, gradient x),
+// data: x = v0.x | v0.y << 16, y = v0.z | shape << 16 | CM_RECORD_EMITS if it gives off light (glsl/channels.glsl), z = half2(density at the centroid, gradient x),
 // w = half2(gradient y, z); gradient along the frame's axes per unit, density relative to the volume's maximum.
 CM_FN vec3 cm_record_v0(uvec4 data) {
   return vec3(float(data.x & 0xffffu), float(data.x >> 16), float(data.y & 0xffffu));

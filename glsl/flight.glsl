@@ -6,6 +6,8 @@
 // the next cell; next.x == CM_NONE outside. The third word of a cell is the march's own cache, CM_NONE when unknown.
 // With CM_EMISSION also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
+// and with CM_COLOUR
+//   vec3 cm_march_colour(uvec2 cell)              of what scatters
 //
 // Free paths are sampled exactly: an optical depth -ln(1 - u) is used up along the march; inside a cell the depth is a
 // quadratic in t, inverted in closed form. No majorant, no step size.

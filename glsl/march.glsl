@@ -1,6 +1,6 @@
 // The march of CM_MARCH.
-#if CM_EMISSION
-#include "emission.glsl"
+#if CM_EMISSION || CM_COLOUR
+#include "channels.glsl"
 #endif
 #if CM_MARCH == 0
 #include "march_tet.glsl"

@@ -3,7 +3,9 @@
 //   uint cm_tree(uint node)                 the point-location tree
 //   uint cm_root_leaf(uint root), uint cm_root_node(uint root)
 // and with CM_EMISSION
-//   uvec4 cm_emission_record(uint cell)     glsl/emission.glsl
+//   uvec4 cm_emission_record(uint cell)     glsl/channels.glsl
+// and with CM_COLOUR
+//   uint cm_colour_record(uint cell)        likewise
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
@@ -69,6 +71,10 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   }
   return e;
 }
+#endif
+
+#if CM_COLOUR
+CM_FN vec3 cm_march_colour(uvec2 cell) { return cm_cell_colour(cm_colour_record(cell.x)); }
 #endif
 
 #endif

@@ -6,6 +6,8 @@
 //   float cm_brick_voxel(uint slot, uint index)   bricks: density; index = (x * 8 + y) * 8 + z
 // and with CM_EMISSION
 //   vec3 cm_emission_voxel(ivec3 voxel)           of the box; nothing in empty bricks
+// and with CM_COLOUR
+//   vec3 cm_scattering_voxel(ivec3 voxel)         density x colour
 #ifndef CM_MARCH_VOXEL_GLSL
 #define CM_MARCH_VOXEL_GLSL
 
@@ -82,6 +84,19 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   e.at_0 = 1.0f;
   e.slope = 0.0f;
   return e;
+}
+#endif
+
+#if CM_COLOUR
+CM_FN vec3 cm_march_colour(uvec2 cell) {
+  ivec3 voxel = cm_voxel_of(uvec3(cell.x, cell.y, CM_NONE));
+#if CM_MARCH == 2
+  float density = cm_brick_voxel(cm_brick_slot(voxel >> 3),
+                                 uint(((voxel.x & 7) << 6) | ((voxel.y & 7) << 3) | (voxel.z & 7)));
+#else
+  float density = cm_voxel(voxel);
+#endif
+  return min(cm_scattering_voxel(voxel) / max(density, 1e-30f), vec3(1.0f, 1.0f, 1.0f));
 }
 #endif
 

@@ -19,6 +19,9 @@
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
 #endif
+#ifndef CM_COLOUR
+#define CM_COLOUR 0
+#endif
 
 #ifdef __cplusplus
 #define CM_ALIGN(bytes) alignas(bytes)
@@ -59,6 +62,7 @@ CM_BLOCK(CmGrid) {
   uint first_cell;  // where the records begin in their page; of several pages 0
   uint tree;        // where the point-location tree begins in its page, in 4-byte words
   uint first_emission;  // where the records of what cells give off begin in their page
+  uint first_colour;    // and their colours, in 4-byte words
   float emission_unit;  // radiance a world unit of length of what is stored as 1 for voxels
   CM_EQUALITY(CmGrid)
 };
@@ -72,7 +76,8 @@ CM_BLOCK(CmMedium) {
   float second_anisotropy;
   float second_bend;
   float second_share;
-  uint emits;  // 1: its cells give off light (CM_EMISSION)
+  uint emits;     // 1: its cells give off light (CM_EMISSION)
+  uint coloured;  // 1: what scatters has a colour a cell (CM_COLOUR)
   CM_EQUALITY(CmMedium)
 };
 

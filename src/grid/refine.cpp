@@ -313,15 +313,18 @@ double estimate_floor(const Evaluation& evaluation, std::uint64_t max_cells, dou
 
 }  // namespace
 
-DiamondSet::DiamondSet(const Statistics& statistics, const Emission* emission, const RefineSettings& settings,
+DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                        Progress* progress)
     : log2_size_(statistics.cube().log2_size) {
   check(progress);
   Evaluations evaluations;
   evaluations.push_back(std::make_unique<const Evaluation>(statistics, statistics.mean_optical_depth(), settings));
-  for (std::size_t i = 0; emission != nullptr && i < 3; ++i)
-    evaluations.push_back(
-        std::make_unique<const Evaluation>(emission->component(i), emission->mean_radiance(), settings));
+  const auto add = [&](const RgbField* field, double depth) {
+    for (std::size_t i = 0; field != nullptr && i < 3; ++i)
+      evaluations.push_back(std::make_unique<const Evaluation>(field->component(i), depth, settings));
+  };
+  add(channels.emission.get(), channels.emission ? channels.emission->mean_depth() : 0.0);
+  add(channels.scattering.get(), statistics.mean_optical_depth());
   const double threshold = std::max(settings.threshold, 0.0);
   double floor = 0.0;
   for (const auto& evaluation : evaluations)

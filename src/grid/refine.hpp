@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/progress_part.hpp"
-#include "grid/emission.hpp"
+#include "grid/rgb_field.hpp"
 #include "grid/statistics.hpp"
 
 namespace cumulet::grid {
@@ -52,11 +52,11 @@ class DiamondSet {
  public:
   /// Evaluates the criterion for every cell of the statistics, in parallel. O(active nodes). progress: as for
   /// Statistics; the fraction ends at progress_part, and GridBuilder::bisect goes on from there.
-  /// emission: cells are split for it as they are for density, if there is any.
-  DiamondSet(const Statistics& statistics, const Emission* emission, const RefineSettings& settings,
+  /// channels: cells are split for them as they are for density.
+  DiamondSet(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
              Progress* progress = nullptr);
   DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress = nullptr)
-      : DiamondSet(statistics, nullptr, settings, progress) {}
+      : DiamondSet(statistics, {}, settings, progress) {}
 
   static constexpr double progress_part = 0.6;
 

@@ -307,7 +307,7 @@ class GridBuilder::LeafMoments {
 // What leaves give off: the sum of three components, each fitted.
 class GridBuilder::LeafEmission {
  public:
-  LeafEmission(const Emission& emission, CellKind cells)
+  LeafEmission(const RgbField& emission, CellKind cells)
       : component_{LeafMoments(emission.component(0)), LeafMoments(emission.component(1)),
                    LeafMoments(emission.component(2))},
         linear_(cells == CellKind::linear) {}
@@ -332,6 +332,26 @@ class GridBuilder::LeafEmission {
   bool linear_;
 };
 
+// The colour of what scatters in leaves.
+class GridBuilder::LeafColour {
+ public:
+  explicit LeafColour(const RgbField& scattering)
+      : component_{LeafMoments(scattering.component(0)), LeafMoments(scattering.component(1)),
+                   LeafMoments(scattering.component(2))} {}
+  std::uint32_t operator()(const Node& node, const vec3& centroid, double density) {
+    vec3 colour(0.0F);
+    for (int i = 0; density > 0.0 && i < 3; ++i)
+      colour[i] = static_cast<float>(component_[static_cast<std::size_t>(i)](node, centroid).mass / density);
+    const auto whole = [](float part, float most) {
+      return static_cast<std::uint32_t>(std::lround(most * std::clamp(part, 0.0F, 1.0F)));
+    };
+    return whole(colour.x, 2047.0F) | (whole(colour.y, 2047.0F) << 11U) | (whole(colour.z, 1023.0F) << 22U);
+  }
+
+ private:
+  std::array<LeafMoments, 3> component_;
+};
+
 CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& gradient, bool emits) const {
   const Node& node = nodes_[index];
   CellRecord record{};
@@ -346,7 +366,7 @@ CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& grad
   return record;
 }
 
-TetGrid GridBuilder::records(CellKind cells, float max_value, const Emission* emission, Progress* progress) {
+TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& channels, Progress* progress) {
   TetGrid grid;
   grid.cube = statistics_->cube();
   grid.limited = diamonds_->limited();
@@ -355,7 +375,8 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Emission* em
   const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
   ProgressPart places(progress, 0.0, 0.1, nodes_.size());
   places.resize(grid.cells, count);
-  if (emission != nullptr) places.resize(grid.emission, count);
+  if (channels.emission) places.resize(grid.emission, count);
+  if (channels.scattering) places.resize(grid.colour, count);
   number_nodes(grid, places);
 
   struct Box {
@@ -368,7 +389,9 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Emission* em
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
     LeafMoments moments(*statistics_);
     std::optional<LeafEmission> emitted;
-    if (emission != nullptr) emitted.emplace(*emission, cells);
+    if (channels.emission) emitted.emplace(*channels.emission, cells);
+    std::optional<LeafColour> coloured;
+    if (channels.scattering) coloured.emplace(*channels.scattering);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -391,6 +414,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Emission* em
         emits = glm::any(glm::greaterThan(given.mean, vec3(0.0F)));
         grid.emission[rank] = given;
       }
+      if (coloured) grid.colour[rank] = (*coloured)(node, centroid, m.mass);
       if (m.max > 0.0F || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);

@@ -18,7 +18,7 @@ struct CellRecord {
 };
 static_assert(sizeof(CellRecord) == 32);
 
-/// What a cell gives off, as the shaders read it: glsl/emission.glsl has the layout.
+/// What a cell gives off, as the shaders read it: glsl/channels.glsl has the layout.
 struct EmissionRecord {
   glm::vec3 mean;  ///< radiance a world unit of length
   std::uint32_t gradient;
@@ -44,12 +44,15 @@ struct TetGrid {
   float density_unit = 1.0F;          ///< grid value of a record's density 1
   /// One a cell; empty where no cell gives off light.
   std::vector<EmissionRecord> emission;
+  /// One a cell, glsl/channels.glsl; empty where what scatters is white.
+  std::vector<std::uint32_t> colour;
   glm::vec3 content_min{0.0F};  ///< cube-space box that holds every cell with density or emission
   glm::vec3 content_max{0.0F};
   bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const {
-    return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + tree.size() * 4 + 200;
+    return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + colour.size() * 4 +
+           tree.size() * 4 + 200;
   }
 };
 
@@ -61,10 +64,10 @@ class GridBuilder {
   /// Throws Error(unsupported) for more than 2^31 nodes. progress, here and below: as for Statistics. Cancelled, the
   /// builder is of no use; but records() may be called again.
   void bisect(Progress* progress = nullptr);
-  /// emission: of the cells, if any; over the same cube.
-  TetGrid records(CellKind cells, float max_value, const Emission* emission, Progress* progress = nullptr);
+  /// channels: of the cells; over the same cube.
+  TetGrid records(CellKind cells, float max_value, const Channels& channels, Progress* progress = nullptr);
   TetGrid records(CellKind cells, float max_value, Progress* progress = nullptr) {
-    return records(cells, max_value, nullptr, progress);
+    return records(cells, max_value, {}, progress);
   }
 
  private:
@@ -89,6 +92,7 @@ class GridBuilder {
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
   class LeafEmission;
+  class LeafColour;
   // mean and gradient: in units of the grid's density_unit.
   [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient, bool emits) const;
 

@@ -192,6 +192,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   p.medium.second_share = medium.phase.second_share;
   const bool emits = source.emits();
   p.medium.emits = emits ? 1U : 0U;
+  p.medium.coloured = source.coloured() ? 1U : 0U;
   const bool glow = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
   const ModelData* met = obstacles.met();
   const light::LightTable table(*snapshot.lights, surroundings(snapshot),

@@ -84,7 +84,7 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
   } else {
     data_.grid_ = grid_parameters(source_->cube, vec3(source_->box_low), vec3(source_->box_low + source_->box_size));
     source_->march == March::dense ? plan_dense() : plan_brick();
-    if (source_->emission) plan_emission_voxels();
+    plan_channel_voxels();
   }
 }
 
@@ -123,25 +123,32 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
         },
         grid.cells.data() + first, bytes);
   }
-  if (!grid.emission.empty()) {
-    if (cells > texels) {
-      throw Error(
-          ErrorCode::unsupported,
-          "what " + std::to_string(cells) +
-              " cells give off needs more than one texture buffer of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
-              std::to_string(texels) + " texels");
+  const std::size_t emission_bytes = grid.emission.size() * sizeof(grid::EmissionRecord);
+  const std::size_t channel_bytes = emission_bytes + grid.colour.size() * sizeof(std::uint32_t);
+  if (channel_bytes > 0) {
+    if (static_cast<std::int64_t>(channel_bytes / 16) >= texels) {
+      throw Error(ErrorCode::unsupported, "the channels of " + std::to_string(cells) +
+                                              " cells need more than one texture buffer of this driver's "
+                                              "GL_MAX_TEXTURE_BUFFER_SIZE, " +
+                                              std::to_string(texels) + " texels");
     }
-    const std::size_t bytes = grid.emission.size() * sizeof(grid::EmissionRecord);
-    data_.bytes_ += bytes;
-    upload_.add([this, &heap, bytes] {
-      data_.emission_ = heap.take(bytes, "creating what cells give off");
-      data_.grid_.first_emission = static_cast<std::uint32_t>(data_.emission_.offset() / sizeof(grid::EmissionRecord));
+    data_.bytes_ += channel_bytes;
+    upload_.add([this, &heap, emission_bytes, channel_bytes] {
+      data_.channels_ = heap.take(channel_bytes, "creating the cells' channels");
+      data_.grid_.first_emission = static_cast<std::uint32_t>(data_.channels_.offset() / sizeof(grid::EmissionRecord));
+      data_.grid_.first_colour =
+          static_cast<std::uint32_t>((data_.channels_.offset() + emission_bytes) / sizeof(std::uint32_t));
     });
     upload_.add_bytes(
         [this] {
-          return Upload::Place{data_.emission_.buffer(), data_.emission_.offset()};
+          return Upload::Place{data_.channels_.buffer(), data_.channels_.offset()};
         },
-        grid.emission.data(), bytes);
+        grid.emission.data(), emission_bytes);
+    upload_.add_bytes(
+        [this, emission_bytes] {
+          return Upload::Place{data_.channels_.buffer(), data_.channels_.offset() + emission_bytes};
+        },
+        grid.colour.data(), channel_bytes - emission_bytes);
   }
   const std::size_t tree_bytes = grid.tree.size() * sizeof(std::uint32_t);
   data_.bytes_ += tree_bytes;
@@ -169,12 +176,19 @@ void MarchUpload::plan_dense() {
               "creating the dense texture");
 }
 
-void MarchUpload::plan_emission_voxels() {
-  require_3d(limits_, source_->box_size, "what voxels give off");
-  const grid::Emission& emission = *source_->emission;
-  data_.grid_.emission_unit = emission.max_radiance();
-  plan_voxels(data_.emission_voxels_, {&emission.component(0), &emission.component(1), &emission.component(2), nullptr},
-              GL_RGBA16F, GL_RGBA, 1.0F / emission.max_radiance(), "creating what voxels give off");
+void MarchUpload::plan_channel_voxels() {
+  const auto plan = [this](gl::Object& texture, const grid::RgbField& field, float unit, const char* what) {
+    require_3d(limits_, source_->box_size, "colour a voxel");
+    plan_voxels(texture, {&field.component(0), &field.component(1), &field.component(2), nullptr}, GL_RGBA16F, GL_RGBA,
+                1.0F / unit, what);
+  };
+  if (const grid::RgbField* emission = source_->channels.emission.get()) {
+    data_.grid_.emission_unit = emission->max_value();
+    plan(data_.emission_voxels_, *emission, data_.grid_.emission_unit, "creating what voxels give off");
+  }
+  // In units of density 1, so that the colour is this over the density.
+  if (const grid::RgbField* scattering = source_->channels.scattering.get())
+    plan(data_.scattering_voxels_, *scattering, source_->max_value, "creating what voxels scatter");
 }
 
 void MarchUpload::plan_voxels(gl::Object& texture, std::vector<const grid::Statistics*> components, GLenum format,
@@ -247,8 +261,9 @@ void MarchData::bind(const gl::Functions& gl) const {
   for (std::size_t i = 0; i < textures_.size(); ++i) {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
-  if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_EMISSION, emission_voxels_.name());
-  if (emission_) gl.BindTextureUnit(core::CM_UNIT_EMISSION, emission_.texture());
+  if (scattering_voxels_) gl.BindTextureUnit(core::CM_UNIT_SCATTERING_VOXELS, scattering_voxels_.name());
+  if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, emission_voxels_.name());
+  if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
   if (tree_) gl.BindTextureUnit(core::CM_UNIT_TREE, tree_.texture());
   if (roots_) gl.BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_ROOTS, roots_.name());
 }

@@ -36,8 +36,9 @@ class MarchData {
   gl::Object brick_values_;
   std::vector<gl::WordHeap::Span> cells_;  // a page's records each
   std::array<gl::Object, 2> textures_;     // voxels, or values of bricks; slots of bricks
-  gl::WordHeap::Span emission_;            // of cells
+  gl::WordHeap::Span channels_;            // of cells: what they give off, then their colours
   gl::Object emission_voxels_;
+  gl::Object scattering_voxels_;
   gl::WordHeap::Span tree_;
   gl::Object roots_;
   core::CmGrid grid_{};
@@ -63,7 +64,7 @@ class MarchUpload {
   void plan_tet(gl::WordHeap& heap, std::int64_t page_texels);
   void plan_dense();
   void plan_brick();
-  void plan_emission_voxels();
+  void plan_channel_voxels();
   // A 3D texture of half floats over the box. components: of a texel, null: 0.
   void plan_voxels(gl::Object& texture, std::vector<const grid::Statistics*> components, GLenum format, GLenum channels,
                    float scale, const char* what);

@@ -150,6 +150,7 @@ const Tracer::Program& Tracer::program(std::vector<std::string> defines, const c
 void Tracer::add_medium(const Picture& picture, std::vector<std::string>& defines) {
   if (picture.second_lobe_) defines.emplace_back("CM_SECOND_LOBE 1");
   if (picture.emits_) defines.emplace_back("CM_EMISSION 1");
+  if (picture.coloured_) defines.emplace_back("CM_COLOUR 1");
 }
 
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
@@ -225,6 +226,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
   picture.emits_ = parameters.medium.emits != 0U;
   picture.environment_ = obstacles.environment != nullptr;
+  picture.coloured_ = parameters.medium.coloured != 0U;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
 }

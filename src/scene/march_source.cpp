@@ -21,7 +21,7 @@ void pack_bricks(MarchSource& source) {
     for (int y = 0; y < source.brick_count.y; ++y) {
       for (int x = 0; x < source.brick_count.x; ++x) {
         const grid::Statistics::Node& node = statistics.node_at((first + ivec3(x, y, z)) * 8);
-        const bool dark = !source.emission || source.emission->is_zero((first + ivec3(x, y, z)) * 8);
+        const bool dark = !source.channels.emission || source.channels.emission->is_zero((first + ivec3(x, y, z)) * 8);
         if (node.is_uniform() && node.uniform == 0.0F && dark) {
           source.brick_slots.push_back(empty);
           continue;
@@ -56,21 +56,20 @@ MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool line
 }
 
 MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
-                              std::shared_ptr<const grid::Statistics> statistics,
-                              std::shared_ptr<const grid::Emission> emission) {
+                              std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels) {
   MarchSource source;
   source.march = march;
   source.cube = statistics->cube();
   source.max_value = volume->max_value;
   ivec3 low = volume->bounds_min;
   ivec3 high = volume->bounds_max;
-  if (emission) {
+  if (const grid::RgbField* emission = channels.emission.get()) {
     low = volume->empty() ? emission->bounds_min() : glm::min(low, emission->bounds_min());
     high = volume->empty() ? emission->bounds_max() : glm::max(high, emission->bounds_max());
   }
   source.box_low = low - source.cube.origin;
   source.box_size = high - low + 1;
-  source.emission = std::move(emission);
+  source.channels = std::move(channels);
   source.volume = std::move(volume);
   source.statistics = std::move(statistics);
   if (march == March::brick) pack_bricks(source);

@@ -29,9 +29,10 @@ struct MarchSource {
   std::vector<std::uint16_t> brick_values;  // half floats, 512 a slot
   std::vector<std::uint32_t> brick_slots;
   glm::ivec3 brick_count{0};
-  std::shared_ptr<const grid::Emission> emission;  // null: none
+  grid::Channels channels;
 
-  [[nodiscard]] bool emits() const { return emission || (grid && !grid->emission.empty()); }
+  [[nodiscard]] bool emits() const { return channels.emission || (grid && !grid->emission.empty()); }
+  [[nodiscard]] bool coloured() const { return channels.scattering || (grid && !grid->colour.empty()); }
   /// From grid values to density 0 to 1.
   [[nodiscard]] float density_a_value() const { return max_value > 0.0F ? 1.0F / max_value : 1.0F; }
 };
@@ -40,7 +41,6 @@ using MarchSourcePtr = std::shared_ptr<const MarchSource>;
 MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value);
 /// dense and brick. O(voxels of the bounds) only when uploaded; brick: O(bricks) memory.
 MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
-                              std::shared_ptr<const grid::Statistics> statistics,
-                              std::shared_ptr<const grid::Emission> emission = nullptr);
+                              std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels = {});
 
 }  // namespace cumulet::scene

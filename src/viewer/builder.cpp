@@ -114,24 +114,23 @@ Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings,
   built.volume = volume;
   const auto statistics = volume->statistics(progress, built.seconds.statistics);
   Stopwatch watch;
-  const auto emission = volume->emission(settings.emission, progress);
+  const grid::Channels channels = volume->channels(settings.emission, progress);
   built.seconds.statistics += watch.lap();
   progress.begin(Progress::Stage::refining);
   if (settings.march != scene::March::tet) {
     const std::shared_ptr<const volume::ScalarVolume> voxels(volume, &volume->volume());
     built.source = std::make_shared<const scene::MarchSource>(
-        scene::make_voxel_source(settings.march, voxels, statistics, emission));
+        scene::make_voxel_source(settings.march, voxels, statistics, channels));
     built.seconds.records = watch.lap();
     return built;
   }
-  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, emission.get(), settings.refine, &progress);
+  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, settings.refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
   built.seconds.refine = watch.lap();
   progress.begin(Progress::Stage::records);
   const float max_value = volume->volume().max_value;
-  auto grid =
-      make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, emission.get(), &progress));
+  auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, channels, &progress));
   builder.reset();
   built.seconds.records = watch.lap();
   built.cells = grid->cells.size();

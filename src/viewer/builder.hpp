@@ -12,7 +12,7 @@
 #include "base/log.hpp"
 #include "base/progress.hpp"
 #include "grid/refine.hpp"
-#include "scene/emission.hpp"
+#include "scene/channels.hpp"
 #include "scene/march_source.hpp"
 #include "viewer/volume_asset.hpp"
 #include "viewer/worker.hpp"

@@ -54,13 +54,14 @@ std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progre
   return statistics_;
 }
 
-std::shared_ptr<const grid::Emission> VolumeAsset::emission(const scene::Emission& emission, Progress& progress) const {
+grid::Channels VolumeAsset::channels(const scene::Emission& emission, Progress& progress) const {
   scene::Emission given = emission;
   // What has a temperature alone would be nothing.
   if (given.blackbody == 0.0 && frame_->density.empty() && !frame_->flame) given.blackbody = 1.0;
-  auto radiance = scene::emission_of(*frame_, given, &progress);
-  if (!radiance) return nullptr;
-  return make_left<const grid::Emission>(*std::move(radiance), cube_, &progress);
+  const auto field = [&](std::optional<grid::RgbField::Components> components) {
+    return components ? make_left<const grid::RgbField>(*std::move(components), cube_, &progress) : nullptr;
+  };
+  return {field(scene::emission_of(*frame_, given, &progress)), field(scene::scattering_of(*frame_, &progress))};
 }
 
 }  // namespace cumulet::viewer

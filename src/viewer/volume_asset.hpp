@@ -5,7 +5,7 @@
 
 #include "base/progress.hpp"
 #include "grid/statistics.hpp"
-#include "scene/emission.hpp"
+#include "scene/channels.hpp"
 #include "viewer/bounds.hpp"
 #include "volume/frame.hpp"
 #include "volume/optical_depth.hpp"
@@ -31,9 +31,8 @@ class VolumeAsset {
   /// The first caller computes them; others wait, and if the first is cancelled the next one computes them. seconds
   /// receives what computing took, 0 if they were there. Throws Error(cancelled) if this caller's progress is.
   [[nodiscard]] std::shared_ptr<const grid::Statistics> statistics(Progress& progress, double& seconds) const;
-  /// What it gives off by itself; null if nothing. Computed anew with each call.
-  [[nodiscard]] std::shared_ptr<const grid::Emission> emission(const scene::Emission& emission,
-                                                               Progress& progress) const;
+  /// What it has beside density. Computed anew with each call.
+  [[nodiscard]] grid::Channels channels(const scene::Emission& emission, Progress& progress) const;
 
  private:
   std::shared_ptr<const volume::VolumeFrame> frame_;

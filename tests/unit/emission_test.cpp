@@ -1,12 +1,13 @@
 // What cells give off by themselves: fields into radiance, its grid, and pictures against closed forms.
 
-#include "scene/emission.hpp"
+#include "scene/channels.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "base/error.hpp"
+#include "grid/cell.hpp"
 #include "light/black_body.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/surfaces.hpp"
@@ -37,7 +38,7 @@ ScalarVolume field(const ivec3& size, const ivec3& low, float value) {
   return test::make_volume(size, low, [=](const ivec3& /*p*/) { return value; });
 }
 
-float radiance_at(const grid::Emission::Radiance& radiance, int component, const ivec3& p) {
+float radiance_at(const grid::RgbField::Components& radiance, int component, const ivec3& p) {
   return test::value_at(radiance[static_cast<std::size_t>(component)], p);
 }
 
@@ -88,6 +89,46 @@ TEST(Emission, TilesAndBackgroundsGlow) {
   EXPECT_EQ((*radiance)[0].bounds_max.x, 39);
   flame.bounds_max = ivec3(1023);
   EXPECT_THROW(scene::emission_of(frame, {}), Error) << "more bricks than anything without detail is worth";
+}
+
+// ---- Colours
+
+std::array<ScalarVolume, 3> colours(const ivec3& size, const ivec3& low, vec3 (*colour)(const ivec3&)) {
+  std::array<ScalarVolume, 3> fields;
+  for (int i = 0; i < 3; ++i)
+    fields[static_cast<std::size_t>(i)] = test::make_volume(size, low, [=](const ivec3& p) { return colour(p)[i]; });
+  return fields;
+}
+
+TEST(Colour, OfACellIsThatOfItsDensity) {
+  VolumeFrame frame{.density =
+                        test::make_volume(ivec3(16), ivec3(0), [](const ivec3& p) { return p.x < 5 ? 3.0F : 0.5F; })};
+  EXPECT_FALSE(scene::scattering_of(frame));
+  frame.colour = colours(ivec3(16), ivec3(0),
+                         [](const ivec3& p) { return vec3(p.x < 5 ? 1.0F : 0.25F, p.y < 9 ? 0.5F : 0.0F, 0.125F); });
+  const grid::Cube cube = grid::fit_cube(frame.density);
+  const grid::Statistics statistics(frame.density, cube);
+  grid::Channels channels;
+  channels.scattering = std::make_shared<const grid::RgbField>(*scene::scattering_of(frame), cube);
+  grid::RefineSettings coarse;
+  coarse.threshold = 1e9;
+  const grid::DiamondSet few(statistics, coarse);
+  grid::GridBuilder builder(statistics, few);
+  builder.bisect();
+  const grid::TetGrid grid = builder.records(grid::CellKind::constant, 1.0F, channels);
+  ASSERT_EQ(grid.colour.size(), grid.cells.size());
+  // What all of them scatter.
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; i < grid.cells.size(); ++i) {
+    const double volume = 16.0 * 16.0 * 16.0 / 24.0;
+    ASSERT_EQ(grid.cells.size(), 24U);
+    sum += volume * glm::unpackHalf2x16(grid.cells[i].data.z).x * glm::dvec3(core::cm_cell_colour(grid.colour[i]));
+  }
+  const double left = 5.0 * 256.0 * 3.0;
+  const double right = 11.0 * 256.0 * 0.5;
+  EXPECT_NEAR(sum.x, left + 0.25 * right, 2e-3 * left);
+  EXPECT_NEAR(sum.y, 0.5 * 9.0 / 16.0 * (left + right), 2e-3 * left);
+  EXPECT_NEAR(sum.z, 0.125 * (left + right), 2e-3 * left);
 }
 
 // ---- Pictures
@@ -254,6 +295,50 @@ TEST_P(EmissionPicture, EndsAtSurfaces) {
     set(*viewer, kind);
     const test::Picture picture = look(*viewer, 500.0, 16);
     for (const glm::vec4& pixel : picture.pixels) EXPECT_NEAR(pixel.x, 7.5F - 5.25F, 2e-3F);
+  }
+}
+
+TEST_P(EmissionPicture, AColourIsAnAlbedo) {
+  const auto viewer = make();
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
+  viewer::Medium medium;
+  medium.density_scale = 0.3;
+  for (const Kind& kind : kinds) {
+    set(*viewer, kind);
+    VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 2.0F)};
+    medium.albedo = vec3(0.5F, 0.25F, 0.75F);
+    viewer->set_medium(medium);
+    show(*viewer, VolumeFrame{.density = frame.density});
+    const glm::dvec4 albedo = look(*viewer, 500.0, 256).mean();
+    medium.albedo = vec3(1.0F, 0.5F, 1.0F);
+    viewer->set_medium(medium);
+    frame.colour = colours({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return vec3(0.5F, 0.5F, 0.75F); });
+    show(*viewer, std::move(frame));
+    const glm::dvec4 colour = look(*viewer, 500.0, 256).mean();
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(colour[i], albedo[i], 2e-3) << i;
+  }
+}
+
+// Red on one side, green on the other, and what is collided with once.
+TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
+  const auto viewer = make();
+  viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
+  VolumeFrame frame{.density = field(ivec3(32), ivec3(0), 1.0F)};
+  frame.colour = colours(ivec3(32), ivec3(0), [](const ivec3& p) { return p.x < 16 ? vec3(1, 0, 0) : vec3(0, 1, 0); });
+  show(*viewer, std::move(frame));
+  viewer::Medium medium;
+  medium.density_scale = 10.0;
+  medium.max_bounces = 1;
+  viewer->set_medium(medium);
+  for (const Kind& kind : kinds) {
+    set(*viewer, kind);
+    for (const double x : {7.5, 23.5}) {
+      viewer->set_camera(test::camera_at({x, 15.5, 500.0}, {x, 15.5, 0.0}, 0.5));
+      const glm::dvec4 mean = test::render(*viewer, {8, 8, 16, 1, render::View::shaded}).mean();
+      // Once in a half-space: (1 - ln 2) / 2.
+      EXPECT_NEAR(x < 16.0 ? mean.x : mean.y, 0.1534, 0.02);
+      EXPECT_EQ(x < 16.0 ? mean.y : mean.x, 0.0);
+    }
   }
 }
 

@@ -1,10 +1,12 @@
-#include "scene/emission.hpp"
+#include "scene/channels.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -114,45 +116,32 @@ class Glow {
   light::BlackBody black_body_;
 };
 
-}  // namespace
-
-std::optional<grid::Emission::Radiance> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
-                                                    const Progress* progress) {
-  const bool burns =
-      frame.flame && !frame.flame->empty() && emission.flame_strength > 0.0 && emission.flame_colour != vec3(0.0F);
-  const bool hot = frame.temperature && !frame.temperature->empty() && emission.blackbody > 0.0 &&
-                   emission.blackbody_tint != vec3(0.0F);
-  if (!burns && !hot) return std::nullopt;
-  BrickSet set;
-  if (burns) set.add(*frame.flame);
-  if (hot) set.add(*frame.temperature);
-  const std::vector<ivec3> origins = set.take();
-
-  const Glow glow(emission);
+// Three components of these bricks, without those that are black: what colour() makes of what read_brick() reads.
+template <class Read, class ReadBrick, class Colour>
+grid::RgbField::Components colours_of(const glm::dmat4& index_to_world, const std::vector<ivec3>& origins,
+                                      const std::string& name, const Progress* progress, const ReadBrick& read_brick,
+                                      const Colour& colour) {
   std::array<std::vector<float>, 3> values;
   for (auto& component : values) component.resize(origins.size() * brick_voxels);
-  std::vector<vec3> most(origins.size());
+  std::vector<vec3> most(origins.size(), vec3(0.0F));
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 16), [&](const auto& range) {
     check(progress);
-    Values flame{};
-    Values temperature{};
+    Read here;
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
-      if (burns) read(*frame.flame, origins[b], flame);
-      if (hot) read(*frame.temperature, origins[b], temperature);
+      read_brick(origins[b], here);
       for (std::size_t v = 0; v < brick_voxels; ++v) {
-        const vec3 light = glow(temperature[v], flame[v]);
-        most[b] = glm::max(most[b], light);
-        for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)][b * brick_voxels + v] = light[i];
+        const vec3 one = colour(here, v);
+        most[b] = glm::max(most[b], one);
+        for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)][b * brick_voxels + v] = one[i];
       }
     }
   });
 
-  grid::Emission::Radiance radiance;
-  ScalarVolume& first = radiance[0];
-  first.index_to_world = (burns ? *frame.flame : *frame.temperature).index_to_world;
+  grid::RgbField::Components components;
+  ScalarVolume& first = components[0];
+  first.index_to_world = index_to_world;
   first.bounds_min = ivec3(std::numeric_limits<int>::max());
   first.bounds_max = ivec3(std::numeric_limits<int>::min());
-  // Bricks that glow, moved to the front.
   std::size_t kept = 0;
   vec3 max_value(0.0F);
   for (std::size_t b = 0; b < origins.size(); ++b) {
@@ -168,17 +157,64 @@ std::optional<grid::Emission::Radiance> emission_of(const volume::VolumeFrame& f
     }
     ++kept;
   }
-  if (kept == 0) return std::nullopt;
+  if (kept == 0) first.bounds_min = first.bounds_max = ivec3(0);
   first.active_voxels = kept * brick_voxels;
-  radiance[2] = radiance[1] = first;
-  constexpr std::array<const char*, 3> names{"emission, red", "emission, green", "emission, blue"};
+  components[2] = components[1] = first;
+  constexpr std::array<const char*, 3> names{", red", ", green", ", blue"};
   for (std::size_t i = 0; i < 3; ++i) {
     values[i].resize(kept * brick_voxels);
-    radiance[i].name = names[i];
-    radiance[i].brick_values = std::move(values[i]);
-    radiance[i].max_value = max_value[static_cast<int>(i)];
+    components[i].name = name + names[i];
+    components[i].brick_values = std::move(values[i]);
+    components[i].max_value = max_value[static_cast<int>(i)];
   }
+  return components;
+}
+
+}  // namespace
+
+std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
+                                                      const Progress* progress) {
+  const bool burns =
+      frame.flame && !frame.flame->empty() && emission.flame_strength > 0.0 && emission.flame_colour != vec3(0.0F);
+  const bool hot = frame.temperature && !frame.temperature->empty() && emission.blackbody > 0.0 &&
+                   emission.blackbody_tint != vec3(0.0F);
+  if (!burns && !hot) return std::nullopt;
+  BrickSet set;
+  if (burns) set.add(*frame.flame);
+  if (hot) set.add(*frame.temperature);
+  const Glow glow(emission);
+  struct Read {
+    Values flame{};
+    Values temperature{};
+  };
+  auto radiance =
+      colours_of<Read>((burns ? *frame.flame : *frame.temperature).index_to_world, set.take(), "emission", progress,
+                       [&](const ivec3& origin, Read& read_here) {
+                         if (burns) read(*frame.flame, origin, read_here.flame);
+                         if (hot) read(*frame.temperature, origin, read_here.temperature);
+                       },
+                       [&](const Read& here, std::size_t v) { return glow(here.temperature[v], here.flame[v]); });
+  if (radiance[0].empty()) return std::nullopt;
   return radiance;
+}
+
+std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame, const Progress* progress) {
+  if (!frame.colour || frame.density.empty()) return std::nullopt;
+  BrickSet set;
+  for (const ScalarVolume& component : *frame.colour) set.add(component);
+  struct Read {
+    Values density{};
+    std::array<Values, 3> colour{};
+  };
+  return colours_of<Read>(
+      frame.density.index_to_world, set.take(), "scattering", progress,
+      [&](const ivec3& origin, Read& here) {
+        read(frame.density, origin, here.density);
+        for (std::size_t i = 0; i < 3; ++i) read((*frame.colour)[i], origin, here.colour[i]);
+      },
+      [&](const Read& here, std::size_t v) {
+        return here.density[v] * vec3(here.colour[0][v], here.colour[1][v], here.colour[2][v]);
+      });
 }
 
 }  // namespace cumulet::scene

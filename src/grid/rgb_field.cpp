@@ -1,26 +1,26 @@
-#include "grid/emission.hpp"
+#include "grid/rgb_field.hpp"
 
 #include <algorithm>
 #include <utility>
 
 namespace cumulet::grid {
 
-Emission::Emission(Radiance radiance, const Cube& cube, Progress* progress) : radiance_(std::move(radiance)) {
+RgbField::RgbField(Components components, const Cube& cube, Progress* progress) : components_(std::move(components)) {
   for (std::size_t i = 0; i < statistics_.size(); ++i)
-    statistics_[i] = std::make_unique<const Statistics>(radiance_[i], cube, progress);
+    statistics_[i] = std::make_unique<const Statistics>(components_[i], cube, progress);
 }
 
-double Emission::mean_radiance() const {
+double RgbField::mean_depth() const {
   double most = 0.0;
   for (const auto& statistics : statistics_) most = std::max(most, statistics->mean_optical_depth());
   return most;
 }
 
-float Emission::max_radiance() const {
-  return std::max({radiance_[0].max_value, radiance_[1].max_value, radiance_[2].max_value});
+float RgbField::max_value() const {
+  return std::max({components_[0].max_value, components_[1].max_value, components_[2].max_value});
 }
 
-bool Emission::is_zero(const glm::ivec3& corner) const {
+bool RgbField::is_zero(const glm::ivec3& corner) const {
   return std::ranges::all_of(statistics_, [&](const auto& statistics) {
     const Statistics::Node& node = statistics->node_at(corner);
     return node.is_uniform() && node.uniform == 0.0F;

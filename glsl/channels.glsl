@@ -1,9 +1,10 @@
-// What a cell gives off by itself: radiance a world unit of length. Shared by GLSL and C++.
+// What cells carry beside density: light that they give off, and the colour of what scatters. Shared by GLSL and C++.
 //
-// A record of 16 bytes beside the cell's: the mean, three floats, linear Rec. 709; and how the whole varies over the
-// cell, a gradient over the mean along the frame's axes per unit, 10 bits an axis (src/grid/tet_grid.cpp).
-#ifndef CM_EMISSION_GLSL
-#define CM_EMISSION_GLSL
+// Light is radiance a world unit of length. A record of 16 bytes beside the cell's: the mean, three floats, linear Rec.
+// 709; and how the whole varies over the cell, a gradient over the mean along the frame's axes per unit, 10 bits an axis
+// (src/grid/tet_grid.cpp).
+#ifndef CM_CHANNELS_GLSL
+#define CM_CHANNELS_GLSL
 
 // A linear function that is nowhere negative in a cell, and 1 at its centroid, is at most 4 at a vertex: none is steeper
 // along an axis.
@@ -36,6 +37,11 @@ CM_FN CmEmission cm_cell_emission(uvec4 record, CmFrame f, uint shape) {
 CM_FN vec3 cm_emitted(CmEmission e, float t, float t_1) {
   float share = 0.5f * (max(0.0f, e.at_0 + e.slope * t) + max(0.0f, e.at_0 + e.slope * t_1));
   return e.mean * (share * max(0.0f, t_1 - t));
+}
+
+// Of what scatters, by density: 11, 11 and 10 bits of a word.
+CM_FN vec3 cm_cell_colour(uint word) {
+  return vec3(float(word & 2047u) / 2047.0f, float((word >> 11) & 2047u) / 2047.0f, float(word >> 22) / 1023.0f);
 }
 
 #endif

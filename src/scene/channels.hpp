@@ -4,7 +4,7 @@
 #include <glm/glm.hpp>
 #include <optional>
 
-#include "grid/emission.hpp"
+#include "grid/rgb_field.hpp"
 #include "volume/frame.hpp"
 
 namespace cumulet::scene {
@@ -24,7 +24,12 @@ struct Emission {
 /// Rec. 709, voxel by voxel on the fields' lattice. Nothing if there is no such field, or none of them glows. O(bricks
 /// of both) time and memory. Throws Error(unsupported) for temperatures that glow over a box of more than 2^27 voxels
 /// without any detail.
-std::optional<grid::Emission::Radiance> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
-                                                    const Progress* progress = nullptr);
+std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
+                                                      const Progress* progress = nullptr);
+
+/// Density x colour, voxel by voxel: black where the frame has no colour. Nothing if it has none at all, or no density.
+/// Throws as emission_of does.
+std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame,
+                                                        const Progress* progress = nullptr);
 
 }  // namespace cumulet::scene

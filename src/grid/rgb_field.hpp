@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "grid/statistics.hpp"
+
+namespace cumulet::grid {
+
+/// A field of colours, as the grid needs it: statistics of each component over the density's cube.
+class RgbField {
+ public:
+  using Components = std::array<volume::ScalarVolume, 3>;
+
+  /// components: red, green and blue, on the lattice that the cube is of, all with the same bounds. progress: as for
+  /// Statistics.
+  RgbField(Components components, const Cube& cube, Progress* progress = nullptr);
+  RgbField(const RgbField&) = delete;
+  RgbField& operator=(const RgbField&) = delete;
+
+  [[nodiscard]] const Statistics& component(std::size_t i) const { return *statistics_[i]; }
+  /// Of the strongest component the integral along the mean ray that meets any, along an axis.
+  [[nodiscard]] double mean_depth() const;
+  [[nodiscard]] float max_value() const;
+  /// Of what is not black: voxels, inclusive.
+  [[nodiscard]] const glm::ivec3& bounds_min() const { return components_[0].bounds_min; }
+  [[nodiscard]] const glm::ivec3& bounds_max() const { return components_[0].bounds_max; }
+  /// Whether the brick at this corner (cube space) is black.
+  [[nodiscard]] bool is_zero(const glm::ivec3& corner) const;
+
+ private:
+  Components components_;  // the statistics point into it
+  std::array<std::unique_ptr<const Statistics>, 3> statistics_;
+};
+
+/// What cells carry beside density; null: nothing.
+struct Channels {
+  /// Light that the volume gives off by itself: radiance a world unit of length, linear Rec. 709. It needs no density.
+  std::shared_ptr<const RgbField> emission;
+  /// Density x colour: the mean of products is not the product of means.
+  std::shared_ptr<const RgbField> scattering;
+};
+
+}  // namespace cumulet::grid
