@@ -75,13 +75,9 @@ uvec4 cm_record(uint cell, uint part) {
 #endif
 }
 
-#if CM_EMISSION || CM_COLOUR
+#if CM_CHANNELS
 layout(binding = CM_UNIT_CHANNELS) uniform usamplerBuffer cm_channels;
-#endif
-#if CM_EMISSION
 uvec4 cm_emission_record(uint cell) { return texelFetch(cm_channels, int(cm.grid.first_emission + cell)); }
-#endif
-#if CM_COLOUR
 uint cm_colour_record(uint cell) {
   uint word = cm.grid.first_colour + cell;
   return cm_link(texelFetch(cm_channels, int(word >> 2)), word & 3u);
@@ -96,13 +92,11 @@ uint cm_tree(uint node) {
 uint cm_root_leaf(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].x : cm_roots[root >> 1].z; }
 uint cm_root_node(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].y : cm_roots[root >> 1].w; }
 #else
-#if CM_EMISSION
+#if CM_CHANNELS
 layout(binding = CM_UNIT_CHANNELS) uniform sampler3D cm_emission_voxels;
 vec3 cm_emission_voxel(ivec3 voxel) {
   return cm.grid.emission_unit * texelFetch(cm_emission_voxels, voxel - ivec3(cm.grid.box_min), 0).rgb;
 }
-#endif
-#if CM_COLOUR
 layout(binding = CM_UNIT_SCATTERING_VOXELS) uniform sampler3D cm_scattering_voxels;
 vec3 cm_scattering_voxel(ivec3 voxel) {
   return texelFetch(cm_scattering_voxels, voxel - ivec3(cm.grid.box_min), 0).rgb;

@@ -4,9 +4,8 @@
 //   void cm_march_step(uvec3 cell, o, d, inv_d, t, t_1, r_0, r_1, next)
 // which gives the part of the ray inside the cell, from t to t_1, the density at both ends (linear between them), and
 // the next cell; next.x == CM_NONE outside. The third word of a cell is the march's own cache, CM_NONE when unknown.
-// With CM_EMISSION also
+// With CM_CHANNELS also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
-// and with CM_COLOUR
 //   vec3 cm_march_colour(uvec2 cell)              of what scatters
 //
 // Free paths are sampled exactly: an optical depth -ln(1 - u) is used up along the march; inside a cell the depth is a
@@ -55,7 +54,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   float e_0 = 0.0f;
   float e_1 = 0.0f;
   float span = 0.0f;
-#if CM_EMISSION
+#if CM_CHANNELS
   CmEmission emission;
   vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
 #endif
@@ -65,7 +64,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     float r_1 = 0.0f;
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
     cm_march_step(cell, p.o, p.d, inv_d, p.t, t_1, r_0, r_1, next);
-#if CM_EMISSION
+#if CM_CHANNELS
     emission = cm_march_emission(cell, p.o, p.d);
 #endif
     p.steps += 1u;
@@ -78,7 +77,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
     } else {
-#if CM_EMISSION
+#if CM_CHANNELS
       emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));
 #endif
       p.depth -= used;
@@ -93,7 +92,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   if (event == CM_EVENT_COLLISION) {
     float left = p.t_end - p.t;
     float way = cm_depth_distance(e_0, e_1, span, p.depth);
-#if CM_EMISSION
+#if CM_CHANNELS
     emitted += cm_emitted(emission, p.t, p.t + min(way, left));
 #endif
     p.t += way;
@@ -102,7 +101,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   } else if (CM_SURFACES == 0 && event == CM_EVENT_ESCAPE && p.t > p.t_end) {
     p.depth += cm_depth_of(e_1, e_0, span, p.t - p.t_end);
   }
-#if CM_EMISSION
+#if CM_CHANNELS
   if (p.ray == CM_RAY_FLIGHT && !cm_is_dark(p)) p.radiance += p.throughput * emitted;
 #endif
   return event;
@@ -110,7 +109,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 
 // What the path does once its ray has come to an event.
 CM_FN uint cm_after_flight(CmPath p) {
-  if (CM_EMISSION != 0 && p.ray == CM_RAY_FLIGHT) {
+  if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_FLIGHT) {
     return p.found == CM_FOUND_TRIANGLE && p.event == CM_EVENT_ESCAPE ? CM_STAGE_VERTEX : CM_STAGE_EVENT;
   }
   if (cm_asks(p)) return CM_STAGE_MEET;
@@ -125,7 +124,7 @@ CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
        ++j) {
     if (p.stage == CM_STAGE_EVENT) cm_handle(p, cm_in_medium());
     if (CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) {
-      if (CM_EMISSION != 0 && cm_asks_first(p)) {
+      if (CM_CHANNELS != 0 && cm.medium.emits != 0u && cm_asks_first(p)) {
         p.stage = CM_STAGE_MEET;
       } else {
         cm_aim(p);

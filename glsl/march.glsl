@@ -1,5 +1,5 @@
 // The march of CM_MARCH.
-#if CM_EMISSION || CM_COLOUR
+#if CM_CHANNELS
 #include "channels.glsl"
 #endif
 #if CM_MARCH == 0

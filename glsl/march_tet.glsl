@@ -2,9 +2,8 @@
 //   uvec4 cm_record(uint cell, uint part)   part 0: links, part 1: data (glsl/cell.glsl)
 //   uint cm_tree(uint node)                 the point-location tree
 //   uint cm_root_leaf(uint root), uint cm_root_node(uint root)
-// and with CM_EMISSION
+// and with CM_CHANNELS
 //   uvec4 cm_emission_record(uint cell)     glsl/channels.glsl
-// and with CM_COLOUR
 //   uint cm_colour_record(uint cell)        likewise
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
@@ -58,7 +57,7 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
   next = uvec3(cm_link(links, face), 0u, CM_NONE);
 }
 
-#if CM_EMISSION
+#if CM_CHANNELS
 CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   uvec4 data = cm_record(cell.x, 1u);
   CmEmission e;
@@ -71,9 +70,7 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   }
   return e;
 }
-#endif
 
-#if CM_COLOUR
 CM_FN vec3 cm_march_colour(uvec2 cell) { return cm_cell_colour(cm_colour_record(cell.x)); }
 #endif
 

@@ -4,9 +4,8 @@
 //   float cm_voxel(ivec3 voxel)                   dense: density of a voxel of the box
 //   uint cm_brick_slot(ivec3 brick)               bricks: slot of a brick of the box, CM_EMPTY_BRICK if it is empty
 //   float cm_brick_voxel(uint slot, uint index)   bricks: density; index = (x * 8 + y) * 8 + z
-// and with CM_EMISSION
+// and with CM_CHANNELS
 //   vec3 cm_emission_voxel(ivec3 voxel)           of the box; nothing in empty bricks
-// and with CM_COLOUR
 //   vec3 cm_scattering_voxel(ivec3 voxel)         density x colour
 #ifndef CM_MARCH_VOXEL_GLSL
 #define CM_MARCH_VOXEL_GLSL
@@ -77,17 +76,16 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
   if (outside) next.x = CM_NONE;
 }
 
-#if CM_EMISSION
+#if CM_CHANNELS
 CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   CmEmission e;
-  e.mean = cm_emission_voxel(cm_voxel_of(cell));
+  e.mean = vec3(0.0f, 0.0f, 0.0f);
+  if (cm.medium.emits != 0u) e.mean = cm_emission_voxel(cm_voxel_of(cell));
   e.at_0 = 1.0f;
   e.slope = 0.0f;
   return e;
 }
-#endif
 
-#if CM_COLOUR
 CM_FN vec3 cm_march_colour(uvec2 cell) {
   ivec3 voxel = cm_voxel_of(uvec3(cell.x, cell.y, CM_NONE));
 #if CM_MARCH == 2

@@ -13,14 +13,11 @@
 #ifndef CM_AOVS
 #define CM_AOVS 0
 #endif
-#ifndef CM_EMISSION
-#define CM_EMISSION 0
+#ifndef CM_CHANNELS
+#define CM_CHANNELS 0
 #endif
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
-#endif
-#ifndef CM_COLOUR
-#define CM_COLOUR 0
 #endif
 
 #ifdef __cplusplus
@@ -76,8 +73,8 @@ CM_BLOCK(CmMedium) {
   float second_anisotropy;
   float second_bend;
   float second_share;
-  uint emits;     // 1: its cells give off light (CM_EMISSION)
-  uint coloured;  // 1: what scatters has a colour a cell (CM_COLOUR)
+  uint emits;     // 1: its cells give off light; this one and the next only with CM_CHANNELS
+  uint coloured;  // 1: what scatters has a colour a cell
   CM_EQUALITY(CmMedium)
 };
 

@@ -117,8 +117,8 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided) {
   if (collided && p.bounces == 0u) p.in_volume = 1u;
   p.bounces += 1u;
   if (collided) p.throughput *= cm.medium.albedo;
-#if CM_COLOUR
-  if (collided) p.throughput *= cm_march_colour(p.cell);
+#if CM_CHANNELS
+  if (collided && cm.medium.coloured != 0u) p.throughput *= cm_march_colour(p.cell);
 #endif
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
   float survival = strongest < 0.5f ? max(strongest, 0.05f) : 1.0f;

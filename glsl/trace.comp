@@ -5,8 +5,7 @@
 // variants: - or CM_LAYERS=1
 // variants: - or CM_AOVS=1
 // variants: - or CM_SECOND_LOBE=1
-// variants: - or CM_EMISSION=1
-// variants: - or CM_COLOUR=1
+// variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

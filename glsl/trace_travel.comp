@@ -3,8 +3,7 @@
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
 // variants: CM_SURFACES=1,2
 // variants: - or CM_SECOND_LOBE=1
-// variants: - or CM_EMISSION=1
-// variants: - or CM_COLOUR=1
+// variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -149,8 +149,7 @@ const Tracer::Program& Tracer::program(std::vector<std::string> defines, const c
 
 void Tracer::add_medium(const Picture& picture, std::vector<std::string>& defines) {
   if (picture.second_lobe_) defines.emplace_back("CM_SECOND_LOBE 1");
-  if (picture.emits_) defines.emplace_back("CM_EMISSION 1");
-  if (picture.coloured_) defines.emplace_back("CM_COLOUR 1");
+  if (picture.channels_) defines.emplace_back("CM_CHANNELS 1");
 }
 
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
@@ -224,9 +223,8 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, obstacles, settings);
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
-  picture.emits_ = parameters.medium.emits != 0U;
+  picture.channels_ = parameters.medium.emits != 0U || parameters.medium.coloured != 0U;
   picture.environment_ = obstacles.environment != nullptr;
-  picture.coloured_ = parameters.medium.coloured != 0U;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
 }

@@ -123,9 +123,8 @@ class Picture {
   Layered layered_ = Layered::no;
   unsigned traced_ = 0;       // 1: paths meet triangles; 2: and look for those that emit
   bool second_lobe_ = false;  // of the medium's phase function
-  bool emits_ = false;        // its cells give off light
+  bool channels_ = false;     // its cells carry more than density
   bool environment_ = false;  // paths that escape come to one
-  bool coloured_ = false;     // what scatters has a colour a cell
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   void begin_tile();
