@@ -55,7 +55,7 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
              "Take the shaders of this folder (a copy of glsl/), anew as they change: in debug builds");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  finish_scene_options(app, options.scene);
+  finish_scene_options(app, options.scene, false);
   options.sized = app.count("--size") > 0;
   if (!options.open.empty() && (!options.scene.volume.empty() || app.count("--scene") > 0))
     throw UsageError("'" + options.open + "' is given as well as --volume or --scene");

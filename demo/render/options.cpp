@@ -130,6 +130,7 @@ void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc,
   } else {
     add_parsed([&value, setting](const std::string& text) {
       const std::array<double, 3> rgb = parse_rgb(text, setting.range.most);
+      if (setting.zero != 0.0 && rgb == std::array<double, 3>{}) throw UsageError(in_quotes(text) + " is black");
       const bool complement = setting.spelling == settings::Spelling::complement;
       for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(complement ? 1.0 - rgb[i] : rgb[i]);
     });
@@ -429,7 +430,7 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
 
 }  // namespace
 
-void finish_scene_options(const CLI::App& app, SceneOptions& scene) {
+void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
   for (const char* flag : {"--env-rotation", "--env-strength"}) {
     if (app.count(flag) > 0 && scene.environment.empty())
       throw UsageError(std::string(flag) + " needs an environment: --env, or a --scene that names one");
@@ -447,7 +448,8 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene) {
     const std::string sun = app.get_option("--sun")->results().back();
     if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " has no irradiance and no --sky-model");
   }
-  if (app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 && app.count("--env") == 0)
+  if (!lit && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
+      app.count("--env") == 0)
     scene.set_daylight();
 }
 
@@ -540,7 +542,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
              options.backend, "OpenGL without a display (default: auto: EGL, then OSMesa)");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  if (!lit) finish_scene_options(app, options.scene);
+  finish_scene_options(app, options.scene, lit);
   if (options.scene.volume.empty() && options.scene.surfaces.empty())
     throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
   if (options.json && !options.info) throw UsageError("--json is for --info");

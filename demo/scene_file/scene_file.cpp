@@ -220,8 +220,9 @@ void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting,
     double complement[3];
     if (!reader.three(setting.key, complement, range)) return;
     for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(1.0 - complement[i]);
-  } else {
-    reader.three(setting.key, value, range);
+  } else if (reader.three(setting.key, value, range) && setting.zero != 0.0 &&
+             std::ranges::all_of(value, [](auto component) { return component == 0; })) {
+    reader.wrong(setting.key, "is black");
   }
 }
 

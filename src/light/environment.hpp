@@ -34,7 +34,7 @@ struct Environment {
   /// Of looks by solid angle, over a texel's weight by the sine: the weights' sum times a texel's solid angle by the
   /// sine, inverted. 0: there is no light.
   float density = 0.0F;
-  std::uint64_t replaced = 0;  ///< pixels that were not finite, negative or above 1e30, which count as 0
+  std::uint64_t replaced = 0;  ///< pixels that were not finite, negative or above 1e30, where that counts as 0
 
   [[nodiscard]] std::size_t texels() const { return words.size(); }
 };

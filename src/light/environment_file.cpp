@@ -214,7 +214,13 @@ EnvironmentPixels read_environment(const std::string& path) {
   if (file && std::ranges::equal(bytes, open_exr)) return read_exr(path);
   bytes.resize(static_cast<std::size_t>(file.gcount()));
   file.clear();
-  bytes.insert(bytes.end(), std::istreambuf_iterator<char>(file), {});
+  constexpr std::size_t piece = std::size_t{1} << 20U;
+  while (file) {
+    const std::size_t before = bytes.size();
+    bytes.resize(before + piece);
+    file.read(reinterpret_cast<char*>(bytes.data() + before), piece);
+    bytes.resize(before + static_cast<std::size_t>(file.gcount()));
+  }
   if (file.bad()) fail(path, std::strerror(errno));
   return read_radiance(bytes, path);
 }

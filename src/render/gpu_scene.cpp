@@ -19,7 +19,7 @@ void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Dea
   const scene::MarchSourcePtr volume = snapshot.volumes.empty() ? nullptr : snapshot.volumes.front().source;
   const scene::ModelSourcePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
   if (!volume) drop_data();
-  update_environment(snapshot.surroundings->environment, wanted, deadline);
+  update_environment(*snapshot.surroundings, wanted, deadline);
   update_model(model, wanted, deadline);
   if (volume) update_data(volume, wanted, deadline);
 }
@@ -79,7 +79,8 @@ void GpuScene::show_raster(const scene::ModelSourcePtr& of, const RasterContentP
   if (content) raster_.put(of, content);
 }
 
-void GpuScene::update_environment(const light::EnvironmentPtr& environment, const Wanted& wanted, Deadline deadline) {
+void GpuScene::update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline) {
+  const light::EnvironmentPtr& environment = surroundings.environment;
   if (!environment) {
     if (environment_) environment_revision_.advance();
     environment_.clear();
@@ -102,6 +103,7 @@ void GpuScene::update_environment(const light::EnvironmentPtr& environment, cons
       throw;
     }
   }
+  if (environment_ && environment_.of() == environment) surroundings_ = surroundings;
 }
 
 void GpuScene::drop_data() {
@@ -154,9 +156,15 @@ std::uint64_t GpuScene::other_bytes() const {
 }
 
 light::Surroundings GpuScene::surroundings(const scene::Snapshot& snapshot) const {
-  light::Surroundings surroundings = *snapshot.surroundings;
-  surroundings.environment = environment_ ? environment_.of() : nullptr;
-  return surroundings;
+  // What is not there yet is not turned or strengthened in what is shown until then.
+  if (!environment_) return {};
+  return environment_.of() == snapshot.surroundings->environment ? *snapshot.surroundings : surroundings_;
+}
+
+light::DistantLights GpuScene::lights(const scene::Snapshot& snapshot) const {
+  light::DistantLights lights = *snapshot.lights;
+  lights.sky_radiance = light::sky_of(lights, environment_ ? surroundings(snapshot) : *snapshot.surroundings);
+  return lights;
 }
 
 Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
@@ -165,8 +173,8 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   obstacles.raster = raster_ ? &surface_pass_ : nullptr;
   obstacles.traced = traced || obstacles.raster == nullptr;
   if (*snapshot.view) obstacles.view = **snapshot.view;
-  const light::DistantLights& lights = *snapshot.lights;
-  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, light::sky_of(lights, surroundings(snapshot))};
+  const light::DistantLights lights = this->lights(snapshot);
+  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance};
   obstacles.environment = environment_.get();
   return obstacles;
 }
@@ -195,7 +203,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   p.medium.coloured = source.coloured() ? 1U : 0U;
   const bool glow = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
   const ModelData* met = obstacles.met();
-  const light::LightTable table(*snapshot.lights, surroundings(snapshot),
+  const light::LightTable table(lights(snapshot), surroundings(snapshot),
                                 met != nullptr ? met->lights() : light::SceneLights{}, glow);
   p.lights = table.parameters();
   if (environment_) p.environment = environment_->parameters();

@@ -55,6 +55,8 @@ class GpuScene {
 
   /// As the snapshot has it, of the environment that is here.
   [[nodiscard]] light::Surroundings surroundings(const scene::Snapshot& snapshot) const;
+  /// The snapshot's, and as their sky the mean of the environment that is there, or is to be.
+  [[nodiscard]] light::DistantLights lights(const scene::Snapshot& snapshot) const;
   /// What paths end at, but for the host's depth. traced: they meet triangles, if there is a surface pass, too.
   [[nodiscard]] Obstacles obstacles(const scene::Snapshot& snapshot, bool traced);
   /// Of a picture of that size of what is here, as the snapshot has it seen and lit. Only with data and view.
@@ -66,7 +68,7 @@ class GpuScene {
   void finish_model();
   void show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content);
   void drop_data();
-  void update_environment(const light::EnvironmentPtr& environment, const Wanted& wanted, Deadline deadline);
+  void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
 
   gl::FunctionsPtr gl_;
@@ -104,6 +106,7 @@ class GpuScene {
     std::unique_ptr<EnvironmentUpload> work;
   };
   Slot<EnvironmentData, light::EnvironmentPtr> environment_;
+  light::Surroundings surroundings_;  // by that
   std::optional<EnvironmentUnderWay> environment_upload_;
   Revision<EnvironmentData> environment_revision_;
 };

@@ -191,8 +191,8 @@ void MarchUpload::plan_channel_voxels() {
     plan(data_.scattering_voxels_, *scattering, source_->max_value, "creating what voxels scatter");
 }
 
-void MarchUpload::plan_voxels(gl::Object& texture, std::vector<const grid::Statistics*> components, GLenum format,
-                              GLenum channels, float scale, const char* what) {
+void MarchUpload::plan_voxels(gl::Object& texture, const std::vector<const grid::Statistics*>& components,
+                              GLenum format, GLenum channels, float scale, const char* what) {
   const ivec3 size = source_->box_size;
   const std::size_t stride = components.size();
   data_.bytes_ += static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *

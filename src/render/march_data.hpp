@@ -66,8 +66,8 @@ class MarchUpload {
   void plan_brick();
   void plan_channel_voxels();
   // A 3D texture of half floats over the box. components: of a texel, null: 0.
-  void plan_voxels(gl::Object& texture, std::vector<const grid::Statistics*> components, GLenum format, GLenum channels,
-                   float scale, const char* what);
+  void plan_voxels(gl::Object& texture, const std::vector<const grid::Statistics*>& components, GLenum format,
+                   GLenum channels, float scale, const char* what);
 
   gl::FunctionsPtr gl_;
   gl::Limits limits_;

@@ -122,7 +122,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
     }
     throw;
   }
-  working_ = Work{&picture, wish_.content.data, divisor, scene_met(obstacles)};
+  working_ = Work{&picture, wish_.content.data, divisor, scene_met(obstacles), wish_.content.environment};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
@@ -141,8 +141,10 @@ void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
     const bool other_data = resized || wish.content.data != last.data;
     if (other_data) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
-    // So do paths on another scene's triangles.
-    if (other_data || wish.content.preview != last.preview || (working_ && scene_met(obstacles) != working_->scene)) {
+    // So do paths on another scene's triangles, and its program reads what one environment has and another has not.
+    const bool other_scene =
+        working_ && (scene_met(obstacles) != working_->scene || wish.content.environment != working_->environment);
+    if (other_data || wish.content.preview != last.preview || other_scene) {
       working_.reset();
     }
     schedule_.change(working_ && wish.content.preview);

@@ -99,6 +99,7 @@ class Progressive {
     Revision<MarchData> data;
     std::uint32_t divisor = 1;              // of the resolution
     const surface::Scene* scene = nullptr;  // whose triangles its paths meet
+    Revision<EnvironmentData> environment;  // that they escape to
   };
   [[nodiscard]] const std::optional<Work>& newest_work() const {
     return wish_.content.preview || !working_ ? shown_ : working_;

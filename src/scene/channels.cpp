@@ -59,6 +59,8 @@ void read(const ScalarVolume& field, const ivec3& origin, Values& values) {
 // Bricks of fields, as whole numbers of them: what they have, and what their tiles and backgrounds fill.
 class BrickSet {
  public:
+  /// what: for messages.
+  explicit BrickSet(const char* what) : what_(what) {}
   void add(const ScalarVolume& field) {
     origins_.insert(origins_.end(), field.brick_origins.begin(), field.brick_origins.end());
     for (const volume::Tile& tile : field.tiles) {
@@ -68,8 +70,7 @@ class BrickSet {
   }
   std::vector<ivec3> take() {
     std::ranges::sort(origins_, before);
-    const auto rest = std::ranges::unique(origins_);
-    origins_.erase(rest.begin(), rest.end());
+    origins_.erase(std::unique(origins_.begin(), origins_.end()), origins_.end());
     return std::move(origins_);
   }
 
@@ -81,7 +82,7 @@ class BrickSet {
     constexpr std::int64_t most = std::int64_t{1} << 18;
     if (filled_ > most) {
       throw Error(ErrorCode::unsupported,
-                  "a temperature or flame without detail fills more than " + std::to_string(most) + " bricks");
+                  std::string(what_) + " without detail fills more than " + std::to_string(most) + " bricks");
     }
     for (int x = 0; x < count.x; ++x) {
       for (int y = 0; y < count.y; ++y) {
@@ -90,6 +91,7 @@ class BrickSet {
     }
   }
 
+  const char* what_;
   std::vector<ivec3> origins_;
   std::int64_t filled_ = 0;
 };
@@ -97,22 +99,26 @@ class BrickSet {
 class Glow {
  public:
   explicit Glow(const Emission& emission)
-      : emission_(emission), flame_(static_cast<float>(emission.flame_strength) * emission.flame_colour) {}
+      : emission_(emission), flame_(glm::dvec3(emission.flame_colour) * emission.flame_strength) {}
 
   [[nodiscard]] vec3 operator()(float temperature, float flame) const {
-    vec3 light = flame * flame_;
+    glm::dvec3 light = double{flame} * flame_;
     if (temperature > 0.0F && emission_.blackbody > 0.0) {
       const double kelvin =
           emission_.temperature_offset + emission_.temperature_scale * static_cast<double>(temperature);
-      light += black_body_.emission(static_cast<float>(kelvin), static_cast<float>(emission_.blackbody)) *
-               emission_.blackbody_tint;
+      constexpr double hottest = 1e6;
+      const vec3 body = black_body_.emission(static_cast<float>(std::min(kelvin, hottest)),
+                                             static_cast<float>(std::min(emission_.blackbody, most_radiance)));
+      light += glm::dvec3(body) * glm::dvec3(emission_.blackbody_tint);
     }
-    return light;
+    return {glm::min(light, glm::dvec3(most_radiance))};
   }
 
  private:
+  // Far above all that is seen, and far enough below what floats hold for sums over a volume.
+  static constexpr double most_radiance = 1e12;
   Emission emission_;
-  vec3 flame_;
+  glm::dvec3 flame_;
   light::BlackBody black_body_;
 };
 
@@ -179,7 +185,7 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
   const bool hot = frame.temperature && !frame.temperature->empty() && emission.blackbody > 0.0 &&
                    emission.blackbody_tint != vec3(0.0F);
   if (!burns && !hot) return std::nullopt;
-  BrickSet set;
+  BrickSet set("temperature or flame");
   if (burns) set.add(*frame.flame);
   if (hot) set.add(*frame.temperature);
   const Glow glow(emission);
@@ -200,8 +206,8 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
 
 std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame, const Progress* progress) {
   if (!frame.colour || frame.density.empty()) return std::nullopt;
-  BrickSet set;
-  for (const ScalarVolume& component : *frame.colour) set.add(component);
+  BrickSet set("density");
+  set.add(frame.density);
   struct Read {
     Values density{};
     std::array<Values, 3> colour{};
@@ -213,7 +219,8 @@ std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFram
         for (std::size_t i = 0; i < 3; ++i) read((*frame.colour)[i], origin, here.colour[i]);
       },
       [&](const Read& here, std::size_t v) {
-        return here.density[v] * vec3(here.colour[0][v], here.colour[1][v], here.colour[2][v]);
+        const vec3 colour(here.colour[0][v], here.colour[1][v], here.colour[2][v]);
+        return here.density[v] * glm::min(colour, vec3(1.0F));
       });
 }
 

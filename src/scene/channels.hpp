@@ -27,8 +27,8 @@ struct Emission {
 std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
                                                       const Progress* progress = nullptr);
 
-/// Density x colour, voxel by voxel: black where the frame has no colour. Nothing if it has none at all, or no density.
-/// Throws as emission_of does.
+/// Density x colour, of which no component counts above 1, voxel by voxel: black where the frame has no colour. Nothing
+/// if it has none at all, or no density. Throws as emission_of does.
 std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame,
                                                         const Progress* progress = nullptr);
 

@@ -63,6 +63,7 @@ MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarV
   source.max_value = volume->max_value;
   ivec3 low = volume->bounds_min;
   ivec3 high = volume->bounds_max;
+  if (volume->empty()) low = high = source.cube.origin;
   if (const grid::RgbField* emission = channels.emission.get()) {
     low = volume->empty() ? emission->bounds_min() : glm::min(low, emission->bounds_min());
     high = volume->empty() ? emission->bounds_max() : glm::max(high, emission->bounds_max());

@@ -96,16 +96,17 @@ cumulet_status cumulet_volume_get_info(const cumulet_volume* volume, cumulet_vol
   return guarded(nullptr, 0, [&] {
     require(volume != nullptr, "volume is NULL");
     const viewer::VolumeAsset& asset = *volume->asset;
+    const volume::ScalarVolume& field = asset.main_field();
     cumulet_volume_info out{};
-    copy_text(asset.volume().name, out.name, sizeof out.name);
-    out.active_voxels = asset.volume().active_voxels;
+    copy_text(field.name, out.name, sizeof out.name);
+    out.active_voxels = field.active_voxels;
     for (int axis = 0; axis < 3; ++axis) {
       out.bounds_min[axis] = asset.bounds().min[axis];
       out.bounds_max[axis] = asset.bounds().max[axis];
     }
-    out.max_value = asset.volume().max_value;
-    out.negative_voxels = asset.volume().negative_voxels;
-    out.non_finite_voxels = asset.volume().non_finite_voxels;
+    out.max_value = field.max_value;
+    out.negative_voxels = field.negative_voxels;
+    out.non_finite_voxels = field.non_finite_voxels;
     write_desc(info, out, "cumulet_volume_info");
   });
 }
@@ -115,7 +116,7 @@ cumulet_status cumulet_volume_suggest_density_scale(const cumulet_volume* volume
     require(volume != nullptr, "volume is NULL");
     require(scale != nullptr, "scale is NULL");
     const std::optional<double> suggested = volume->asset->coarse().suggest_density_scale();
-    require(suggested.has_value(), "the volume shows nothing");
+    require(suggested.has_value(), "the volume has no density");
     *scale = *suggested;
   });
 }

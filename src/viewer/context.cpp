@@ -170,7 +170,7 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
   const bool able = scene_.draws_surfaces() && shot.view() && alone_failed_ != shot.settings;
   if (!empty_.film().has(render::film_layers::radiance) || (!able && empty_.layered() != render::Layered::no))
     tracer.clear(empty_);
-  tracer.set_background(empty_, light::sky_of(*shot.scene->lights, scene_.surroundings(*shot.scene)));
+  tracer.set_background(empty_, scene_.lights(*shot.scene).sky_radiance);
   if (!able || frame.budget_ms < 0.0) return;
   alone_failed_ = shot.settings;  // unless it succeeds
   tracer.draw_layers(empty_, obstacles(shot),

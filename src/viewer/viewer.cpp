@@ -92,10 +92,11 @@ std::optional<BuildSettings> Viewer::build_settings() const {
   return settings;
 }
 
-void Viewer::request_build() {
+void Viewer::request_build(bool for_emission) {
   const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
   if (builder_.configure_load(settings)) return;
   sync();
+  if (for_emission && volume_ && !volume_->may_emit()) return;
   built_view_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
 }
@@ -247,7 +248,7 @@ void Viewer::set_medium(const Medium& medium) {
   const bool other_emission = grid_.build.emission != medium.field_emission;
   medium_ = medium;
   grid_.build.emission = medium.field_emission;
-  if (other_emission) request_build();
+  if (other_emission) request_build(true);
   scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.phase, medium.emission});
   touch();
 }
@@ -261,7 +262,7 @@ void Viewer::set_light(const Light& light) {
 void Viewer::set_environment(light::EnvironmentPtr environment) {
   if (environment && environment->replaced > 0) {
     log_.warning(environment->name + ": " + std::to_string(environment->replaced) +
-                 " pixels are not finite or negative, and count as 0");
+                 " pixels are in part not finite, negative or above 1e30, which counts as 0");
   }
   environment_ = std::move(environment);
   surround();
@@ -350,6 +351,13 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   };
   if (volume_) {
     for (const dvec3& p : volume_->coarse().visible(direction, medium_.density_scale)) add(p);
+    // What glows shows at any density.
+    if (volume_->may_emit()) {
+      const Bounds& box = volume_->bounds();
+      for (int i = 0; i < 8; ++i)
+        add({(i & 1) != 0 ? box.max.x : box.min.x, (i & 2) != 0 ? box.max.y : box.min.y,
+             (i & 4) != 0 ? box.max.z : box.min.z});
+    }
   }
   if (model_source_) {
     for (const surface::PosedVertex& vertex : model_source_->pose.vertices) add(vertex.position);

@@ -130,7 +130,7 @@ class Viewer {
   template <class Body>
   void with_gl(Body&& body);
   void sync();
-  void request_build();
+  void request_build(bool for_emission = false);
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.

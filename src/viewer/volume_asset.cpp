@@ -42,6 +42,12 @@ VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
   bounds_ = world_bounds(shown.low, shown.high, density.index_to_world);
 }
 
+const volume::ScalarVolume& VolumeAsset::main_field() const {
+  if (!frame_->density.empty()) return frame_->density;
+  if (frame_->flame && !frame_->flame->empty()) return *frame_->flame;
+  return frame_->temperature && !frame_->temperature->empty() ? *frame_->temperature : frame_->density;
+}
+
 std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progress, double& seconds) const {
   seconds = 0.0;
   progress.begin(Progress::Stage::statistics);
@@ -57,7 +63,8 @@ std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progre
 grid::Channels VolumeAsset::channels(const scene::Emission& emission, Progress& progress) const {
   scene::Emission given = emission;
   // What has a temperature alone would be nothing.
-  if (given.blackbody == 0.0 && frame_->density.empty() && !frame_->flame) given.blackbody = 1.0;
+  const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
+  if (given.blackbody == 0.0 && alone) given.blackbody = 1.0;
   const auto field = [&](std::optional<grid::RgbField::Components> components) {
     return components ? make_left<const grid::RgbField>(*std::move(components), cube_, &progress) : nullptr;
   };

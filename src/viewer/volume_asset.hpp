@@ -23,6 +23,12 @@ class VolumeAsset {
   /// Its density.
   [[nodiscard]] const volume::ScalarVolume& volume() const { return frame_->density; }
   [[nodiscard]] const volume::VolumeFrame& frame() const { return *frame_; }
+  /// Its density; of fire alone the flame, or the temperature.
+  [[nodiscard]] const volume::ScalarVolume& main_field() const;
+  /// Whether a field is there that can give off light.
+  [[nodiscard]] bool may_emit() const {
+    return (frame_->flame && !frame_->flame->empty()) || (frame_->temperature && !frame_->temperature->empty());
+  }
   /// Whether no field has an active voxel.
   [[nodiscard]] bool empty() const { return empty_; }
   /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such.

@@ -68,7 +68,7 @@ bool Context::rehearse_frame(const Shot& shot, const Frame& frame, render::Deadl
   if (drawing) {
     render::Picture& empty = rehearsal_->empty();
     if (!empty.film().has(render::film_layers::radiance)) rehearsal_->tracer().clear(empty);
-    rehearsal_->tracer().set_background(empty, light::sky_of(*shot.scene->lights, scene_.surroundings(*shot.scene)));
+    rehearsal_->tracer().set_background(empty, scene_.lights(*shot.scene).sky_radiance);
     rehearse_drawing(shot, frame, empty);
   }
   if (shot.view()) {

@@ -143,8 +143,10 @@ class FrameImport {
     constexpr double reading = 0.8;
     const Portion whole{reader.opened(), 1.0};
     read(reader, chosen, whole.part(0.0, reading));
-    if (!chosen.density) {
-      const bool by_flame = out_.flame && (!out_.temperature || finer(*out_.flame, *out_.temperature));
+    const auto any = [](const std::optional<ScalarVolume>& field) { return field && !field->empty(); };
+    if (!chosen.density || (out_.density.empty() && (any(out_.flame) || any(out_.temperature)))) {
+      const bool comparable = any(out_.flame) == any(out_.temperature) && out_.flame && out_.temperature;
+      const bool by_flame = comparable ? finer(*out_.flame, *out_.temperature) : any(out_.flame) || !out_.temperature;
       out_.density.index_to_world = (by_flame ? *out_.flame : *out_.temperature).index_to_world;
       out_.density.bounds_max = out_.density.bounds_min;
     }

@@ -75,6 +75,22 @@ TEST(Emission, IsFlameAndBlackBodyTogether) {
   }
 }
 
+TEST(Emission, IsFiniteWhateverIsGiven) {
+  VolumeFrame frame{.density = nothing()};
+  frame.flame = field(ivec3(8), ivec3(0), 1e30F);
+  frame.temperature = field(ivec3(8), ivec3(0), 1e30F);
+  const scene::Emission emission{.flame_strength = 1e30,
+                                 .flame_colour = vec3(1e30F, 0.0F, 1.0F),
+                                 .temperature_scale = 1e30,
+                                 .blackbody = 1e30,
+                                 .blackbody_tint = vec3(1e30F, 0.0F, 1.0F)};
+  const auto radiance = scene::emission_of(frame, emission);
+  ASSERT_TRUE(radiance);
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(std::isfinite(radiance_at(*radiance, i, {1, 1, 1})));
+  EXPECT_EQ(radiance_at(*radiance, 1, {1, 1, 1}), 0.0F);
+  EXPECT_GT(radiance_at(*radiance, 0, {1, 1, 1}), 1e11F);
+}
+
 TEST(Emission, TilesAndBackgroundsGlow) {
   VolumeFrame frame{.density = nothing()};
   ScalarVolume& flame = frame.flame.emplace(field({8, 8, 8}, ivec3(0), 1.0F));
@@ -98,6 +114,20 @@ std::array<ScalarVolume, 3> colours(const ivec3& size, const ivec3& low, vec3 (*
   for (int i = 0; i < 3; ++i)
     fields[static_cast<std::size_t>(i)] = test::make_volume(size, low, [=](const ivec3& p) { return colour(p)[i]; });
   return fields;
+}
+
+// Constant colours and densities have no bricks, only tiles and backgrounds, and may be large.
+TEST(Colour, MayBeConstantOverALargeBox) {
+  VolumeFrame frame{.density = field(ivec3(16), ivec3(0), 1.0F)};
+  frame.colour = colours(ivec3(8), ivec3(0), [](const ivec3& /*p*/) { return vec3(2.0F, 0.5F, 0.0F); });
+  for (ScalarVolume& component : *frame.colour) {
+    component.bounds_max = ivec3(1023);
+    component.background = component.max_value;
+  }
+  const auto scattering = scene::scattering_of(frame);
+  ASSERT_TRUE(scattering);
+  EXPECT_EQ(radiance_at(*scattering, 0, {12, 12, 12}), 1.0F) << "no more than all scatters";
+  EXPECT_EQ(radiance_at(*scattering, 1, {12, 12, 12}), 0.5F);
 }
 
 TEST(Colour, OfACellIsThatOfItsDensity) {
@@ -184,6 +214,27 @@ TEST_P(EmissionPicture, AFlameWithoutDensityIsExact) {
         EXPECT_EQ(pixel.w, 0.0F) << "it covers nothing";
       }
     }
+  }
+}
+
+// Thin smoke beside a tall flame, and a flame alone: the whole of it is in the picture.
+TEST_P(EmissionPicture, AFlameIsFramed) {
+  const auto viewer = make();
+  for (const bool smoke : {false, true}) {
+    VolumeFrame frame{.density = smoke ? field(ivec3(8), ivec3(0), 1e-3F) : nothing()};
+    frame.flame = field({8, 64, 8}, ivec3(0), 1.0F);
+    show(*viewer, std::move(frame));
+    viewer->set_light({});
+    set(*viewer, kinds[0]);
+    viewer->set_camera(test::camera_at({4.0, 32.0, 50.0}, {4.0, 32.0, 0.0}, 30.0));
+    test::render(*viewer, {64, 64, 1, 1, render::View::shaded});
+    viewer->viewer().frame_all();
+    const test::Picture picture = test::render(*viewer, {64, 64, 1, 1, render::View::shaded});
+    int rows = 0;
+    for (std::size_t y = 0; y < 64; ++y) rows += picture.pixels[y * 64 + 32].x > 1.0F ? 1 : 0;
+    EXPECT_GT(rows, 40);
+    EXPECT_EQ(picture.pixels[32].x, 0.0F);
+    EXPECT_EQ(picture.pixels[63 * 64 + 32].x, 0.0F);
   }
 }
 

@@ -201,6 +201,18 @@ std::string radiance_file(const std::string& resolution, const std::string& body
   return "#?RADIANCE\n# a comment\nFORMAT=32-bit_rle_rgbe\n\n" + resolution + "\n" + body;
 }
 
+TEST(EnvironmentFile, AFolderIsNone) {
+  const test::Folder folder;
+  const std::string path = (folder / "").string();
+  try {
+    light::read_environment(path);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::file);
+    EXPECT_EQ(std::string(error.what()).find(path), 0U) << error.what();
+  }
+}
+
 TEST(EnvironmentFile, RadianceIsReadFlatAndInRuns) {
   const test::Folder folder;
   const std::string path = (folder / "a.hdr").string();

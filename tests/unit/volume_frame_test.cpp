@@ -420,6 +420,12 @@ TEST_F(Frame, WithoutDensityTheFinestFieldGivesTheLattice) {
   EXPECT_EQ(import_frame(write({heat, flame}), {}, {}).density.index_to_world[0][0], 0.25);
   EXPECT_EQ(import_frame(write({flame, heat}), naming({{&GridNames::flame, "none"}}), {}).density.index_to_world[0][0],
             0.5);
+  // A density of nothing, as frames before the smoke have it, says nothing of voxels.
+  auto none = box("density", scaled(1.0), 10, ones);
+  none->clear();
+  const VolumeFrame early = import_frame(write({none, heat, flame}), {}, {});
+  EXPECT_EQ(early.density.index_to_world[0][0], 0.25);
+  EXPECT_TRUE(early.density.empty());
   // Of the same size the one of more voxels, which is then as it was.
   heat = box("temperature", scaled(0.25, Vec3d(0.1)), 11, ones);
   const VolumeFrame frame = import_frame(write({flame, heat}), {}, {});

@@ -515,10 +515,10 @@ CUMULET_API cumulet_status cumulet_surfaces_get_animation(const cumulet_surfaces
 /*
  * A picture of all that is far away, equirectangular, as a light: immutable, counted, free of GL, to surround any
  * number of viewers. Rows go from +Y, the upper edge, down to -Y; the middle is at +Z, and a quarter of the width left
- * of it is +X. Values are linear Rec. 709 radiance, bilinear between the middles of pixels. Pixels that are not finite,
- * negative or above 1e30 count as 0: cumulet_environment_info tells, cumulet_set_environment logs a warning. It holds
- * 16 bytes a pixel, and as many in GL. These calls are synchronous, some 0.2 s for 2048 x 1024 pixels, for any thread;
- * error as in cumulet_create.
+ * of it is +X. Values are linear Rec. 709 radiance, bilinear between the middles of pixels. What of a pixel is not
+ * finite, negative or above 1e30 counts as 0: cumulet_environment_info tells, cumulet_set_environment logs a warning.
+ * It holds 16 bytes a pixel, and as many in GL. These calls are synchronous, some 0.2 s for 2048 x 1024 pixels, for any
+ * thread; error as in cumulet_create.
  */
 
 /* Reads a Radiance (.hdr) or OpenEXR (.exr) file, of up to 16384 pixels a side, told apart by content. */
