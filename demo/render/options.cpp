@@ -130,7 +130,7 @@ void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc,
   } else {
     add_parsed([&value, setting](const std::string& text) {
       const std::array<double, 3> rgb = parse_rgb(text, setting.range.most);
-      if (setting.zero != 0.0 && rgb == std::array<double, 3>{}) throw UsageError(in_quotes(text) + " is black");
+      if (setting.zero != 0.0 && settings::all_zero(rgb)) throw UsageError(in_quotes(text) + " is black");
       const bool complement = setting.spelling == settings::Spelling::complement;
       for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(complement ? 1.0 - rgb[i] : rgb[i]);
     });

@@ -220,8 +220,7 @@ void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting,
     double complement[3];
     if (!reader.three(setting.key, complement, range)) return;
     for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(1.0 - complement[i]);
-  } else if (reader.three(setting.key, value, range) && setting.zero != 0.0 &&
-             std::ranges::all_of(value, [](auto component) { return component == 0; })) {
+  } else if (reader.three(setting.key, value, range) && setting.zero != 0.0 && settings::all_zero(value)) {
     reader.wrong(setting.key, "is black");
   }
 }
@@ -298,8 +297,7 @@ std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const
   } else if constexpr (settings::Switch<Value>) {
     return value != 0;
   } else if constexpr (settings::Triple<Value>) {
-    if (setting.zero != 0.0 && std::ranges::all_of(value, [](auto component) { return component == 0; }))
-      return std::nullopt;
+    if (setting.zero != 0.0 && settings::all_zero(value)) return std::nullopt;
     const auto one = setting.spelling == Spelling::complement ? albedo_of : shortest;
     return Json{one(value[0]), one(value[1]), one(value[2])};
   } else {

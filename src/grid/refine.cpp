@@ -105,12 +105,9 @@ class CameraLimit {
   std::vector<dvec3> planes_;
 };
 
-vec3 frame_covariance(const Moments& m, const vec3& v0, std::uint32_t shape) {
-  const std::uint32_t cell_class = core::cm_shape_class(shape);
-  const float unit = core::cm_shape_unit(shape);
-  const dvec3 centroid = dvec3(v0) + dvec3(core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape));
-  const dvec3 covariance = m.first / m.volume - centroid * m.mean();
-  return core::cm_to_frame(vec3(covariance), shape) / unit;
+dvec3 centroid_of(const vec3& v0, std::uint32_t shape) {
+  const vec3 in_frame = core::cm_frame_centroid(core::cm_shape_class(shape)) * core::cm_shape_unit(shape);
+  return dvec3(v0) + dvec3(core::cm_from_frame(in_frame, shape));
 }
 
 ivec3 midpoint(const vec3& v0, std::uint32_t shape) {
@@ -230,9 +227,9 @@ class DiamondSet::Evaluation {
     const Moments m = statistics_->moments(v0, shape);
     const double edge = edge_length_(shape);
     if (edge < shortest) return;
-    const float squared =
-        measure_.squared(core::cm_shape_class(shape), static_cast<float>(m.mean()), static_cast<float>(m.variance()),
-                         frame_covariance(m, v0, shape), m.min, m.max, static_cast<float>(edge * edge), floor);
+    const float squared = measure_.squared(
+        core::cm_shape_class(shape), static_cast<float>(m.mean()), static_cast<float>(m.variance()),
+        frame_covariance(m, shape, centroid_of(v0, shape)), m.min, m.max, static_cast<float>(edge * edge), floor);
     if (squared > floor) visit(midpoint(v0, shape), squared);
   }
 

@@ -13,6 +13,7 @@
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
 #include "grid/cell.hpp"
+#include "volume/bricks.hpp"
 
 namespace cumulet::grid {
 
@@ -131,6 +132,11 @@ double Moments::variance() const {
   if (min >= max) return 0.0;
   const double m = mean();
   return std::max(0.0, square / volume - m * m);
+}
+
+vec3 frame_covariance(const Moments& moments, std::uint32_t shape, const dvec3& centroid) {
+  const dvec3 in_cube = moments.first / moments.volume - centroid * moments.mean();
+  return core::cm_to_frame(vec3(in_cube), shape) / core::cm_shape_unit(shape);
 }
 
 LinearFit fit_linear(std::uint32_t cell_class, const vec3& covariance, float mean) {
@@ -254,20 +260,6 @@ std::optional<float> one_value(const volume::ScalarVolume& volume, const VoxelBo
   return std::nullopt;
 }
 
-// Adds the values of a brick where a tile or the background ends.
-void append_brick(const volume::ScalarVolume& volume, const ivec3& low, const std::vector<std::uint32_t>& tiles,
-                  std::vector<float>& values) {
-  const VoxelBox bounds{volume.bounds_min, volume.bounds_max};
-  for (int v = 0; v < volume::brick_voxels; ++v) {
-    const ivec3 p = low + ivec3(v / 64, (v / 8) % 8, v % 8);
-    float value = volume.background;
-    for (const std::uint32_t t : tiles) {
-      if (box_of(volume.tiles[t]).holds({p, p})) value = volume.tiles[t].value;
-    }
-    values.push_back(bounds.holds({p, p}) ? value : 0.0F);
-  }
-}
-
 // Sorts bricks [first, last) by octant about the middle; octant i (x fastest) is then [ends[i], ends[i + 1]).
 std::array<std::uint32_t, 9> sort_by_octant(const volume::ScalarVolume& volume, std::vector<std::uint32_t>& bricks,
                                             std::uint32_t first, std::uint32_t last, const ivec3& middle) {
@@ -331,7 +323,9 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
     }
     if (log2_size == 3) {
       node.values = file_bricks + static_cast<std::int32_t>(extra_values_.size() / volume::brick_voxels);
-      append_brick(volume, low, work.tiles, extra_values_);
+      // Where a tile or the background ends.
+      extra_values_.resize(extra_values_.size() + volume::brick_voxels);
+      volume::fill_brick(volume, low, work.tiles, &extra_values_[extra_values_.size() - volume::brick_voxels]);
       continue;
     }
     const auto child = static_cast<std::uint32_t>(nodes_.size());

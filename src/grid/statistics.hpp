@@ -25,13 +25,17 @@ struct Moments {
   [[nodiscard]] double variance() const;
 };
 
+/// Of position and f over a cell about its centroid, in the cell's frame and unit: integral of (f - mean)(x - centroid)
+/// / volume.
+glm::vec3 frame_covariance(const Moments& moments, std::uint32_t shape, const glm::dvec3& centroid);
+
 /// The least-squares linear fit of f over a cell, scaled so that it is nowhere negative; the mean is kept.
 struct LinearFit {
   glm::vec3 gradient{0.0F};  ///< along the cell's frame axes, per frame unit
   float explained = 0.0F;    ///< the part of the variance that the fit removes
 };
 
-/// covariance: integral of (f - mean)(x - centroid) / volume, in the cell's frame and unit.
+/// covariance: as frame_covariance has it.
 /// Normal equations with the tetrahedron's own covariance matrix, a constant of its class.
 LinearFit fit_linear(std::uint32_t cell_class, const glm::vec3& covariance, float mean);
 

@@ -26,12 +26,6 @@ std::array<std::uint16_t, 3> pack_v0(const vec3& v) {
   return {static_cast<std::uint16_t>(v.x), static_cast<std::uint16_t>(v.y), static_cast<std::uint16_t>(v.z)};
 }
 
-// Of position and value in the cell's frame and unit.
-vec3 covariance(const Moments& m, std::uint32_t shape, const vec3& centroid) {
-  const dvec3 in_cube = m.first / m.volume - dvec3(centroid) * m.mean();
-  return core::cm_to_frame(vec3(in_cube), shape) / core::cm_shape_unit(shape);
-}
-
 std::uint32_t pack_emission_gradient(const vec3& gradient) {
   std::uint32_t word = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -321,7 +315,7 @@ class GridBuilder::LeafEmission {
       record.mean[i] = static_cast<float>(std::clamp(m.mean(), double(m.min), double(m.max)));
       sum += record.mean[i];
       if (linear_ && m.min < m.max)
-        slope += fit_linear(cell_class, covariance(m, node.shape, centroid), record.mean[i]).gradient;
+        slope += fit_linear(cell_class, frame_covariance(m, node.shape, centroid), record.mean[i]).gradient;
     }
     if (sum > 0.0F) record.gradient = pack_emission_gradient(slope / sum);
     return record;
@@ -404,7 +398,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
       const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
       vec3 gradient(0.0F);
       if (cells == CellKind::linear && m.min < m.max) {
-        const vec3 in_frame = covariance(m, shape, centroid);
+        const vec3 in_frame = frame_covariance(m, shape, centroid);
         gradient =
             fit_linear(cell_class, in_frame, static_cast<float>(mean)).gradient * static_cast<float>(to_relative);
       }

@@ -41,22 +41,23 @@ vec3 unpack(const Packed& packed) {
   return vec3(rg, b.x) * std::bit_cast<float>(packed.w & 0xFFFF0000U);
 }
 
-void check_size(const EnvironmentPixels& pixels, const std::string& name) {
-  const auto refuse = [&](const std::string& cause) { throw Error(ErrorCode::file, name + ": " + cause); };
-  const std::string size = std::to_string(pixels.width) + "x" + std::to_string(pixels.height);
-  if (pixels.width == 0 || pixels.height == 0) refuse("an environment of " + size + " pixels");
-  if (pixels.width > Environment::max_side || pixels.height > Environment::max_side) {
-    refuse("an environment of " + size + " pixels; at most " + std::to_string(Environment::max_side) + " a side");
-  }
-  if (pixels.values.size() != std::size_t{pixels.width} * pixels.height) {
-    refuse("an environment of " + size + " pixels has " + std::to_string(pixels.values.size()));
-  }
-}
-
 }  // namespace
 
+void check_environment_size(const std::string& name, std::int64_t width, std::int64_t height) {
+  const std::int64_t most = Environment::max_side;
+  if (width >= 1 && height >= 1 && width <= most && height <= most) return;
+  const std::string limit = width < 1 || height < 1 ? "" : "; at most " + std::to_string(most) + " a side";
+  throw Error(ErrorCode::file,
+              name + ": an environment of " + std::to_string(width) + "x" + std::to_string(height) + " pixels" + limit);
+}
+
 EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name) {
-  check_size(pixels, name);
+  check_environment_size(name, pixels.width, pixels.height);
+  if (pixels.values.size() != std::size_t{pixels.width} * pixels.height) {
+    throw Error(ErrorCode::file, name + ": an environment of " + std::to_string(pixels.width) + "x" +
+                                     std::to_string(pixels.height) + " pixels has " +
+                                     std::to_string(pixels.values.size()));
+  }
   auto made = std::make_shared<Environment>();
   made->name = name;
   made->width = pixels.width;

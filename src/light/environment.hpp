@@ -40,8 +40,11 @@ struct Environment {
 };
 using EnvironmentPtr = std::shared_ptr<const Environment>;
 
-/// O(texels). Throws Error(file) that begins with the name for a picture without pixels, of a side above max_side, or
-/// with another number of values.
+/// Throws Error(file) that begins with the name for a picture without pixels, or of a side above max_side.
+void check_environment_size(const std::string& name, std::int64_t width, std::int64_t height);
+
+/// O(texels). Throws as check_environment_size does, and Error(file) that begins with the name for
+/// another number of values than pixels.
 EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name);
 
 /// How a scene is surrounded by one.

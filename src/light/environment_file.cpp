@@ -28,13 +28,6 @@ namespace {
   throw Error(ErrorCode::file, name + ": " + cause);
 }
 
-void check_size(const std::string& name, std::int64_t width, std::int64_t height) {
-  const auto fits = [](std::int64_t side) { return side >= 1 && side <= std::int64_t{Environment::max_side}; };
-  if (fits(width) && fits(height)) return;
-  fail(name, "an environment of " + std::to_string(width) + "x" + std::to_string(height) + " pixels; at most " +
-                 std::to_string(Environment::max_side) + " a side");
-}
-
 /// A Radiance picture (Ward, "Real Pixels", Graphics Gems II, 1991): lines of text, then rows of shared exponents.
 /// stb_image takes one that is cut short for one whose rest is black.
 class RadianceFile {
@@ -52,7 +45,7 @@ class RadianceFile {
       if (text.starts_with("EXPOSURE=")) exposure *= number(text.substr(9));
     }
     EnvironmentPixels pixels = resolution(line());
-    check_size(name_, pixels.width, pixels.height);
+    check_environment_size(name_, pixels.width, pixels.height);
     // A row is at least this long, whatever its coding.
     const std::size_t least = std::min<std::size_t>(pixels.width, 4);
     if ((bytes_.size() - at_) / least < pixels.height) cut();
@@ -164,7 +157,7 @@ EnvironmentPixels read_exr(const std::string& path) {
     const Imath::Box2i window = file.header().dataWindow();
     const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
     const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-    check_size(path, width, height);
+    check_environment_size(path, width, height);
     EnvironmentPixels pixels{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
     pixels.values.resize(std::size_t{pixels.width} * pixels.height);
     const std::int64_t stride = sizeof(glm::vec3);

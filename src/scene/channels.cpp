@@ -7,12 +7,12 @@
 #include <array>
 #include <limits>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
 #include "light/black_body.hpp"
+#include "volume/bricks.hpp"
 
 namespace cumulet::scene {
 
@@ -24,36 +24,21 @@ using volume::brick_size;
 using volume::brick_voxels;
 using volume::ScalarVolume;
 
-bool before(const ivec3& a, const ivec3& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); }
-
-bool holds(const ivec3& low, const ivec3& high, const ivec3& p) {
-  return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
-}
-
 using Values = std::array<float, brick_voxels>;
 
 // Of the brick at this origin.
 void read(const ScalarVolume& field, const ivec3& origin, Values& values) {
-  const auto found = std::ranges::lower_bound(field.brick_origins, origin, before);
-  if (found != field.brick_origins.end() && *found == origin) {
-    const auto* from = field.brick_values.data() + (found - field.brick_origins.begin()) * brick_voxels;
-    std::copy(from, from + brick_voxels, values.begin());
+  if (const float* brick = volume::find_brick(field, origin)) {
+    std::copy(brick, brick + brick_voxels, values.begin());
     return;
   }
-  std::vector<const volume::Tile*> tiles;
-  for (const volume::Tile& tile : field.tiles) {
-    const bool apart =
-        glm::any(glm::greaterThan(tile.min, origin + (brick_size - 1))) || glm::any(glm::lessThan(tile.max, origin));
-    if (!apart) tiles.push_back(&tile);
+  std::vector<std::uint32_t> tiles;
+  for (std::uint32_t t = 0; t < field.tiles.size(); ++t) {
+    const bool apart = glm::any(glm::greaterThan(field.tiles[t].min, origin + (brick_size - 1))) ||
+                       glm::any(glm::lessThan(field.tiles[t].max, origin));
+    if (!apart) tiles.push_back(t);
   }
-  for (int v = 0; v < brick_voxels; ++v) {
-    const ivec3 p = origin + ivec3(v / 64, (v / 8) % 8, v % 8);
-    float& value = values[static_cast<std::size_t>(v)];
-    value = holds(field.bounds_min, field.bounds_max, p) ? field.background : 0.0F;
-    for (const volume::Tile* tile : tiles) {
-      if (holds(tile->min, tile->max, p)) value = tile->value;
-    }
-  }
+  volume::fill_brick(field, origin, tiles, values.data());
 }
 
 // Bricks of fields, as whole numbers of them: what they have, and what their tiles and backgrounds fill.
@@ -69,7 +54,7 @@ class BrickSet {
     if (field.background > 0.0F) add(field.bounds_min, field.bounds_max);
   }
   std::vector<ivec3> take() {
-    std::ranges::sort(origins_, before);
+    std::ranges::sort(origins_, volume::lexicographic);
     origins_.erase(std::unique(origins_.begin(), origins_.end()), origins_.end());
     return std::move(origins_);
   }

@@ -127,6 +127,12 @@ concept Real = std::floating_point<Value>;
 template <class Value>
 concept Triple = std::is_array_v<Value>;
 
+/// Whether all three are 0.
+template <class Three>
+[[nodiscard]] constexpr bool all_zero(const Three& value) {
+  return value[0] == 0 && value[1] == 0 && value[2] == 0;
+}
+
 /// rows: a tuple of a descriptor's settings; name: of its struct.
 template <class Desc>
 struct Table;
@@ -172,7 +178,7 @@ constexpr void spell_out_zeros(Desc& desc) {
     if constexpr (Count<Value> || Real<Value>) {
       if (value == Value{} && setting.zero != 0.0) value = static_cast<Value>(setting.zero);
     } else if constexpr (Triple<Value>) {
-      const bool none = value[0] == 0.0F && value[1] == 0.0F && value[2] == 0.0F;
+      const bool none = all_zero(value);
       for (auto& component : value)
         component = none && setting.zero != 0.0 ? static_cast<float>(setting.zero) : component;
     }

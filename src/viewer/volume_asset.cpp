@@ -68,7 +68,13 @@ grid::Channels VolumeAsset::channels(const scene::Emission& emission, Progress& 
   const auto field = [&](std::optional<grid::RgbField::Components> components) {
     return components ? make_left<const grid::RgbField>(*std::move(components), cube_, &progress) : nullptr;
   };
-  return {field(scene::emission_of(*frame_, given, &progress)), field(scene::scattering_of(*frame_, &progress))};
+  const auto lock = patient_lock(mutex_, progress);
+  if (!channels_ || channels_->emission != given) {
+    channels_.reset();
+    channels_ = Made{
+        given, {field(scene::emission_of(*frame_, given, &progress)), field(scene::scattering_of(*frame_, &progress))}};
+  }
+  return channels_->channels;
 }
 
 }  // namespace cumulet::viewer

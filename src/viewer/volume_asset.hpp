@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include "base/progress.hpp"
 #include "grid/statistics.hpp"
@@ -37,7 +38,7 @@ class VolumeAsset {
   /// The first caller computes them; others wait, and if the first is cancelled the next one computes them. seconds
   /// receives what computing took, 0 if they were there. Throws Error(cancelled) if this caller's progress is.
   [[nodiscard]] std::shared_ptr<const grid::Statistics> statistics(Progress& progress, double& seconds) const;
-  /// What it has beside density. Computed anew with each call.
+  /// What it has beside density. The last that were asked for are kept: another threshold or camera asks for the same.
   [[nodiscard]] grid::Channels channels(const scene::Emission& emission, Progress& progress) const;
 
  private:
@@ -48,6 +49,11 @@ class VolumeAsset {
   Bounds bounds_;
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const grid::Statistics> statistics_;
+  struct Made {
+    scene::Emission emission;
+    grid::Channels channels;
+  };
+  mutable std::optional<Made> channels_;
 };
 
 using VolumeAssetPtr = std::shared_ptr<const VolumeAsset>;

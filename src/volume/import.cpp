@@ -12,10 +12,10 @@
 #include <limits>
 #include <numeric>
 #include <sstream>
-#include <tuple>
 
 #include "base/apart.hpp"
 #include "base/progress_part.hpp"
+#include "volume/bricks.hpp"
 #include "volume/import_detail.hpp"
 
 namespace cumulet::volume {
@@ -204,10 +204,6 @@ ActiveRegion detail::active_leaf_region(const LeafSource& leaves, ProgressPart& 
 }
 
 namespace {
-
-bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
-  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
-}
 
 /// A leaf's values as the volume keeps them; zero outside bounds.
 struct CleanBrick {

@@ -17,11 +17,8 @@
 #include "base/error.hpp"
 #include "support/gl_rays.hpp"
 #include "support/meshes.hpp"
+#include "support/osmesa_leaks.hpp"
 #include "surface/bvh_rays.hpp"
-
-// Mesa's OSMesa keeps its framebuffers for ever.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 // The same source with a cm_hit_accept.
 #undef CM_BVH_GLSL

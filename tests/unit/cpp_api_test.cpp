@@ -14,9 +14,7 @@
 #include "cumulet/cumulet.hpp"
 #include "headless.hpp"
 #include "support/folder.hpp"
-
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
+#include "support/osmesa_leaks.hpp"
 
 namespace {
 

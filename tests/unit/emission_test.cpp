@@ -10,12 +10,9 @@
 #include "grid/cell.hpp"
 #include "light/black_body.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/osmesa_leaks.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
-
-// Mesa's OSMesa keeps its framebuffers for ever.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 namespace {
 

@@ -19,11 +19,8 @@
 #include "light/light_table.hpp"
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/osmesa_leaks.hpp"
 #include "support/volumes.hpp"
-
-// Mesa's OSMesa keeps its framebuffers for ever.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 // Marches share one signature; each leaves some of it unused. So do kinds of light.
 #pragma GCC diagnostic push

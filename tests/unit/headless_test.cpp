@@ -1,4 +1,5 @@
 #include "headless.hpp"
+#include "support/osmesa_leaks.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +10,6 @@
 #include <string>
 #include <thread>
 #include <utility>
-
-// Mesa 22's OSMesa never frees the framebuffers it makes for itself. Asked for by LeakSanitizer, where it is built in.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 namespace {
 

@@ -59,23 +59,7 @@ std::string refused(cumulet_status status, Call&& call) {
 
 #define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
-void expect_identical(const ScalarVolume& a, const ScalarVolume& b) {
-  EXPECT_EQ(a.name, b.name);
-  EXPECT_EQ(a.index_to_world, b.index_to_world);
-  EXPECT_EQ(a.bounds_min, b.bounds_min);
-  EXPECT_EQ(a.bounds_max, b.bounds_max);
-  EXPECT_EQ(a.background, b.background);
-  EXPECT_EQ(a.max_value, b.max_value);
-  EXPECT_EQ(a.active_voxels, b.active_voxels);
-  EXPECT_EQ(a.brick_origins, b.brick_origins);
-  EXPECT_EQ(a.brick_values, b.brick_values);
-  ASSERT_EQ(a.tiles.size(), b.tiles.size());
-  for (std::size_t i = 0; i < a.tiles.size(); ++i) {
-    EXPECT_EQ(a.tiles[i].min, b.tiles[i].min);
-    EXPECT_EQ(a.tiles[i].max, b.tiles[i].max);
-    EXPECT_EQ(a.tiles[i].value, b.tiles[i].value);
-  }
-}
+using cumulet::test::expect_identical;
 
 struct Dense {
   std::vector<float> values;

@@ -11,10 +11,8 @@
 #include "support/c_host.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/osmesa_leaks.hpp"
 #include "support/volumes.hpp"
-
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 namespace {
 

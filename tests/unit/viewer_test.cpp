@@ -8,11 +8,9 @@
 
 #include "base/error.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/osmesa_leaks.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
-
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 namespace {
 

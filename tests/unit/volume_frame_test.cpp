@@ -52,19 +52,8 @@ class Frame : public ::testing::Test {
   }
   fs::path path() const { return folder_ / "frame.vdb"; }
 
-  /// The message of a refusal, which must be one line that begins with the file's name.
   static std::string refusal(const fs::path& file, const GridNames& names) {
-    try {
-      (void)import_frame(file, names, {});
-    } catch (const cumulet::Error& e) {
-      const std::string what = e.what();
-      EXPECT_EQ(e.code(), cumulet::ErrorCode::file) << what;
-      EXPECT_EQ(what.find_first_of("\n\r\t"), std::string::npos) << what;
-      EXPECT_EQ(what.rfind(file.string() + ": ", 0), 0U) << what;
-      return what;
-    }
-    ADD_FAILURE() << file << " was accepted";
-    return {};
+    return cumulet::test::refusal(file, [&] { (void)import_frame(file, names, {}); });
   }
 
   cumulet::test::Folder folder_;
@@ -76,18 +65,6 @@ FloatGrid::Ptr dot(const std::string& name, float value) {
   grid->tree().setValue(Coord(1, 2, 3), value);
   grid->tree().setValue(Coord(1, 2, 4), 0.5F * value);
   return grid;
-}
-
-void expect_same(const ScalarVolume& a, const ScalarVolume& b) {
-  EXPECT_EQ(a.name, b.name);
-  EXPECT_EQ(a.bounds_min, b.bounds_min);
-  EXPECT_EQ(a.bounds_max, b.bounds_max);
-  EXPECT_EQ(a.background, b.background);
-  EXPECT_EQ(a.max_value, b.max_value);
-  EXPECT_EQ(a.active_voxels, b.active_voxels);
-  EXPECT_EQ(a.brick_origins, b.brick_origins);
-  EXPECT_EQ(a.brick_values, b.brick_values);
-  EXPECT_EQ(a.tiles.size(), b.tiles.size());
 }
 
 TEST_F(Frame, FieldsAreFoundByTheirNamesInWhateverCase) {
@@ -237,10 +214,10 @@ TEST_F(Frame, NanoVdbHasTheSameFields) {
     const auto file = folder_ / "frame.nvdb";
     nanovdb::io::writeGrids(file.string(), handles, codec);
     const VolumeFrame frame = import_frame(file, {}, {});
-    expect_same(frame.density, truth.density);
+    cumulet::test::expect_same_voxels(frame.density, truth.density);
     ASSERT_TRUE(frame.temperature && frame.flame);
-    expect_same(*frame.temperature, *truth.temperature);
-    expect_same(*frame.flame, *truth.flame);
+    cumulet::test::expect_same_voxels(*frame.temperature, *truth.temperature);
+    cumulet::test::expect_same_voxels(*frame.flame, *truth.flame);
     expect_colours(frame, *colour);
   }
 }
@@ -495,7 +472,7 @@ TEST_F(Frame, ResamplingIsTheSameWhateverTheThreadsAndCanBeStopped) {
     return import_frame(path(), {}, {});
   };
   const VolumeFrame one = read(1);
-  expect_same(*one.flame, *read(4).flame);
+  cumulet::test::expect_same_voxels(*one.flame, *read(4).flame);
 
   cumulet::Progress progress;
   progress.cancel();
@@ -534,19 +511,19 @@ TEST_F(Frame, SimulatedFiresAreReadAsTheyAre) {
   const auto smoke = data / "mantaflow_fire/fluid_data_0015.vdb";
   Messages messages;
   VolumeFrame frame = import_frame(smoke, naming({{&GridNames::colour, "color"}}), messages.log);
-  expect_same(frame.density, import_volume(smoke, "density", {}));
+  cumulet::test::expect_same_voxels(frame.density, import_volume(smoke, "density", {}));
   ASSERT_TRUE(frame.temperature && frame.flame && frame.colour);
-  expect_same(*frame.temperature, import_volume(smoke, "temperature", {}));
-  expect_same(*frame.flame, import_volume(smoke, "flame", {}));
-  expect_same((*frame.colour)[2], import_volume(smoke, "color_b", {}));
+  cumulet::test::expect_same_voxels(*frame.temperature, import_volume(smoke, "temperature", {}));
+  cumulet::test::expect_same_voxels(*frame.flame, import_volume(smoke, "flame", {}));
+  cumulet::test::expect_same_voxels((*frame.colour)[2], import_volume(smoke, "color_b", {}));
   EXPECT_EQ(messages.warnings, std::vector<std::string>{});
 
   const auto fire = data / "embergen_fire_a/embergen_fire_a_0050.vdb";
   frame = import_frame(fire, {}, messages.log);
   EXPECT_TRUE(frame.density.empty());
   ASSERT_TRUE(frame.temperature && frame.flame);
-  expect_same(*frame.temperature, import_volume(fire, "temperature", {}));
-  expect_same(*frame.flame, import_volume(fire, "flames", {}));
+  cumulet::test::expect_same_voxels(*frame.temperature, import_volume(fire, "temperature", {}));
+  cumulet::test::expect_same_voxels(*frame.flame, import_volume(fire, "flames", {}));
   EXPECT_EQ(frame.density.index_to_world, frame.flame->index_to_world);
   EXPECT_FALSE(frame.colour);
 

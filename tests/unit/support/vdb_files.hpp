@@ -2,11 +2,14 @@
 
 // For tests that write VDB files and read them back.
 
+#include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "base/error.hpp"
 #include "base/log.hpp"
 
 #define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
@@ -21,6 +24,22 @@ struct Messages {
     if (level == LogLevel::info) hints.emplace_back(text);
   }};
 };
+
+/// The message of reading a file that is refused, which must be one line that begins with the file's name.
+template <class Read>
+std::string refusal(const std::filesystem::path& file, Read&& read) {
+  try {
+    read();
+  } catch (const Error& e) {
+    const std::string what = e.what();
+    EXPECT_EQ(e.code(), ErrorCode::file) << what;
+    EXPECT_EQ(what.find_first_of("\n\r\t"), std::string::npos) << what;
+    EXPECT_EQ(what.rfind(file.string() + ": ", 0), 0U) << what;
+    return what;
+  }
+  ADD_FAILURE() << file << " was accepted";
+  return {};
+}
 
 inline openvdb::FloatGrid::Ptr fog(const std::string& name, float background = 0.0F) {
   auto grid = openvdb::FloatGrid::create(background);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -41,6 +43,28 @@ inline float value_at(const volume::ScalarVolume& v, const glm::ivec3& p) {
     if (glm::all(glm::greaterThanEqual(p, tile.min)) && glm::all(glm::lessThanEqual(p, tile.max))) return tile.value;
   }
   return v.background;
+}
+
+/// All but where it is.
+inline void expect_same_voxels(const volume::ScalarVolume& a, const volume::ScalarVolume& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.bounds_min, b.bounds_min);
+  EXPECT_EQ(a.bounds_max, b.bounds_max);
+  EXPECT_EQ(a.background, b.background);
+  EXPECT_EQ(a.max_value, b.max_value);
+  EXPECT_EQ(a.active_voxels, b.active_voxels);
+  EXPECT_EQ(a.brick_origins, b.brick_origins);
+  EXPECT_EQ(a.brick_values, b.brick_values);
+  ASSERT_EQ(a.tiles.size(), b.tiles.size());
+  for (std::size_t i = 0; i < a.tiles.size(); ++i) {
+    EXPECT_EQ(a.tiles[i].min, b.tiles[i].min);
+    EXPECT_EQ(a.tiles[i].max, b.tiles[i].max);
+    EXPECT_EQ(a.tiles[i].value, b.tiles[i].value);
+  }
+}
+inline void expect_identical(const volume::ScalarVolume& a, const volume::ScalarVolume& b) {
+  EXPECT_EQ(a.index_to_world, b.index_to_world);
+  expect_same_voxels(a, b);
 }
 
 /// Fills bounds with function(index), brick by brick; bricks that are all zero are left out.

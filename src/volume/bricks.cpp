@@ -1,0 +1,40 @@
+#include "volume/bricks.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <tuple>
+
+namespace cumulet::volume {
+
+namespace {
+
+// Inclusive.
+bool holds(const glm::ivec3& low, const glm::ivec3& high, const glm::ivec3& p) {
+  return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
+}
+
+}  // namespace
+
+bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
+  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+}
+
+const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin) {
+  const auto found = std::ranges::lower_bound(volume.brick_origins, origin, lexicographic);
+  if (found == volume.brick_origins.end() || *found != origin) return nullptr;
+  return volume.brick_values.data() + (found - volume.brick_origins.begin()) * brick_voxels;
+}
+
+void fill_brick(const ScalarVolume& volume, const glm::ivec3& origin, std::span<const std::uint32_t> tiles,
+                float* out) {
+  for (int v = 0; v < brick_voxels; ++v) {
+    const glm::ivec3 p = origin + glm::ivec3(v / 64, (v / 8) % 8, v % 8);
+    float value = volume.background;
+    for (const std::uint32_t t : tiles) {
+      if (holds(volume.tiles[t].min, volume.tiles[t].max, p)) value = volume.tiles[t].value;
+    }
+    out[v] = holds(volume.bounds_min, volume.bounds_max, p) ? value : 0.0F;
+  }
+}
+
+}  // namespace cumulet::volume

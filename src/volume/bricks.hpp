@@ -1,0 +1,22 @@
+#pragma once
+
+// A ScalarVolume's values, brick by brick.
+
+#include <glm/glm.hpp>
+#include <span>
+
+#include "volume/volume.hpp"
+
+namespace cumulet::volume {
+
+/// The order of brick_origins: by x, then y, then z.
+bool lexicographic(const glm::ivec3& a, const glm::ivec3& b);
+
+/// The 512 values of the brick at this origin; null where the volume has none. O(log bricks).
+const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin);
+
+/// What tiles and the background give the voxels of a brick at this origin that the volume has not: 512 values.
+/// tiles: places in volume.tiles, all that meet it among them.
+void fill_brick(const ScalarVolume& volume, const glm::ivec3& origin, std::span<const std::uint32_t> tiles, float* out);
+
+}  // namespace cumulet::volume
