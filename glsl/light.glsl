@@ -15,7 +15,7 @@
 #define CM_LIGHT_GLSL
 
 #define CM_LIGHT_SKY 0u       // everywhere: looked for in a direction that a flight might take
-#define CM_LIGHT_SUN 1u       // far away, without extent
+#define CM_LIGHT_SUN 1u       // far away: a disc, or without extent
 #define CM_LIGHT_TRIANGLE 2u  // emissive
 #define CM_LIGHT_LAMP 3u      // punctual
 #define CM_LIGHT_GLOW 4u      // the medium's own: flights that leave surfaces are aimed at its box
@@ -74,10 +74,34 @@ CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
 
 #endif
 
-// ---- The sun
+// ---- The sun: a disc of even radiance. One of spread 0 is a direction, which no flight comes to.
 
-CM_FN CmLightSample cm_sun_sample() {
-  return CmLightSample(CM_LIGHT_SUN, cm.lights.sun_irradiance, cm.lights.sun_direction, 3.0e38f, 1.0f);
+CM_FN bool cm_on_sun(vec3 w) {
+  vec3 apart = w - cm.lights.sun_direction;
+  return dot(apart, apart) < 2.0f * cm.lights.sun_spread;
+}
+CM_FN vec3 cm_sun_radiance(vec3 w) { return cm_on_sun(w) ? cm.lights.sun_radiance : vec3(0.0f, 0.0f, 0.0f); }
+CM_FN float cm_sun_pdf(CmLightHit hit) {
+  return cm_on_sun(hit.w) ? 0.159154943f / cm.lights.sun_spread : 0.0f;
+}
+// Evenly over the disc.
+CM_FN CmLightSample cm_sun_sample(CmPath p) {
+  CmLightSample light =
+      CmLightSample(CM_LIGHT_SUN, cm.lights.sun_irradiance, cm.lights.sun_direction, 3.0e38f, 1.0f);
+  if (cm.lights.sun_spread > 0.0f) {
+    uvec3 h = cm_hash3(uvec3(p.random, p.stream, 0x3c6ef372u));
+    float spread = cm.lights.sun_spread * cm_unit_float(h.x);
+    float sine = sqrt(spread * (2.0f - spread));
+    float angle = 6.28318531f * cm_unit_float(h.y);
+    vec3 u;
+    vec3 v;
+    cm_frame(light.direction, u, v);
+    light.direction =
+        normalize(u * (sine * cos(angle)) + v * (sine * sin(angle)) + light.direction * (1.0f - spread));
+    light.radiance = cm.lights.sun_radiance;
+    light.density = 0.159154943f / cm.lights.sun_spread;
+  }
+  return light;
 }
 
 #if CM_SURFACES
@@ -205,6 +229,10 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 // The share of what one technique finds that counts, where another might have found it.
 CM_FN float cm_balance(float mine, float other) { return mine / max(mine + other, 1e-30f); }
 
+// The sun's chance is what the others leave.
+#define CM_LEAVE(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) -CHANCE
+CM_FN float cm_sun_chance() { return max(0.0f, 1.0f CM_FAR_LIGHTS(CM_LEAVE) CM_NEAR_LIGHTS(CM_LEAVE)); }
+
 #define CM_DENSITY(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
   if (hit.kind == NUMBER) return CHANCE * PDF(hit);
 
@@ -212,6 +240,7 @@ CM_FN float cm_balance(float mine, float other) { return mine / max(mine + other
 CM_FN float cm_light_pdf(CmLightHit hit) {
   CM_FAR_LIGHTS(CM_DENSITY)
   CM_NEAR_LIGHTS(CM_DENSITY)
+  if (hit.kind == CM_LIGHT_SUN) return cm_sun_chance() * cm_sun_pdf(hit);
 #if CM_SURFACES
   if (hit.kind == CM_LIGHT_GLOW) return cm.lights.glow_chance * cm_glow_pdf(hit);
 #endif
@@ -225,9 +254,9 @@ CM_FN float cm_light_pdf(CmLightHit hit) {
   }                                                    \
   before += CHANCE;
 
-// A look for light: u decides for which kind; what the others leave is the sun's.
+// A look for light: u decides for which kind.
 CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
-  CmLightSample light = cm_sun_sample();
+  CmLightSample light = cm_sun_sample(p);
   float before = 0.0f;
   CM_FAR_LIGHTS(CM_LOOK)
 #if CM_SURFACES
@@ -237,13 +266,15 @@ CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   }
 #endif
   CM_NEAR_LIGHTS(CM_LOOK)
-  if (light.kind == CM_LIGHT_SUN) light.density = max(0.0f, 1.0f - before);
+  if (light.kind == CM_LIGHT_SUN) light.density *= max(0.0f, 1.0f - before);
   return light;
 }
 
 // Whether flights come to what a look has found by escaping to it.
 #define CM_IS_FAR(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) || light.kind == NUMBER
-CM_FN bool cm_is_far(CmLightSample light) { return false CM_FAR_LIGHTS(CM_IS_FAR); }
+CM_FN bool cm_is_far(CmLightSample light) {
+  return (light.kind == CM_LIGHT_SUN && cm.lights.sun_spread > 0.0f) CM_FAR_LIGHTS(CM_IS_FAR);
+}
 
 // What a flight brings along w, which it took with that density, if it escapes with that transmittance.
 #define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
@@ -251,13 +282,14 @@ CM_FN bool cm_is_far(CmLightSample light) { return false CM_FAR_LIGHTS(CM_IS_FAR
 CM_FN vec3 cm_far_light(vec3 o, vec3 w, float flight, float transmittance) {
   vec3 brought = vec3(0.0f, 0.0f, 0.0f);
   CM_FAR_LIGHTS(CM_ESCAPED)
+  CM_ESCAPED(CM_LIGHT_SUN, unused, unused, unused, cm_sun_radiance)
   return brought;
 }
 
 // What is behind all, as cameras see it.
 #define CM_SEEN(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) seen += RADIANCE(w);
 CM_FN vec3 cm_background_radiance(vec3 w) {
-  vec3 seen = vec3(0.0f, 0.0f, 0.0f);
+  vec3 seen = cm_sun_radiance(w);
   CM_FAR_LIGHTS(CM_SEEN)
   return seen;
 }

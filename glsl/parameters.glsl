@@ -91,6 +91,8 @@ CM_BLOCK(CmLights) {
   float environment_chance;
   float environment_strength;        // times the picture's radiance
   CM_ALIGN(8) vec2 environment_turn;  // cosine and sine of its angle
+  CM_ALIGN(16) vec3 sun_radiance;     // of a sun that has one
+  float sun_spread;                   // 1 minus the cosine of half the angle that it takes; 0: a direction
   CM_EQUALITY(CmLights)
 };
 

@@ -184,9 +184,19 @@ void Panel::light(Model& model) {
     const bool of_constant = setting.is(&Desc::sun_irradiance) || setting.is(&Desc::sky_radiance);
     const bool of_physical = setting.is(&Desc::turbidity) || setting.is(&Desc::ground_albedo);
     ImGui::BeginDisabled((of_constant && physical) || (of_physical && !physical));
-    rows_.draw(setting, light.*setting.field);
+    if (setting.is(&Desc::sun_angle_degrees)) {
+      sun_angle(setting, light);
+    } else {
+      rows_.draw(setting, light.*setting.field);
+    }
     ImGui::EndDisabled();
   });
+}
+
+void Panel::sun_angle(const settings::Facts& facts, cumulet_light_desc& light) {
+  const float given = light.sun_angle_degrees;
+  double shown = given != 0.0F ? std::max(0.0F, given) : settings::default_sun_angle(light.sky);
+  if (rows_.draw(facts, shown)) light.sun_angle_degrees = shown > 0.0 ? static_cast<float>(shown) : -1.0F;
 }
 
 void Panel::surfaces(Model& model) {

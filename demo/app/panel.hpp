@@ -47,6 +47,7 @@ class Panel {
   }
   void absorption(float (&coalbedo)[3]);
   void threshold(settings::Facts facts, cumulet_grid_desc& grid);
+  void sun_angle(const settings::Facts& facts, cumulet_light_desc& light);
 
   void hint() const;
   void loading(const Model& model, std::vector<Command>& commands);

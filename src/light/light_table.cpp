@@ -75,6 +75,12 @@ core::CmLights LightTable::parameters() const {
   p.sun_direction = glm::vec3(distant_.to_sun);
   p.sun_irradiance = distant_.sun_irradiance;
   p.sky_radiance = distant_.sky_radiance;
+  if (const double half = distant_.sun_angle_degrees * std::numbers::pi / 360.0;
+      half > 0.0 && chance(Kind::sun) > 0.0F) {
+    // Over the disc, radiance times the cosine to its middle is the irradiance.
+    p.sun_radiance = distant_.sun_irradiance / static_cast<float>(std::numbers::pi * std::pow(std::sin(half), 2.0));
+    p.sun_spread = static_cast<float>(2.0 * std::pow(std::sin(0.5 * half), 2.0));
+  }
   p.any = std::ranges::any_of(entries_, [](const Entry& entry) { return entry.kind != Kind::glow; }) ? 1U : 0U;
   p.sky_chance = chance(Kind::sky);
   p.triangle_chance = chance(Kind::triangle);

@@ -198,7 +198,14 @@ struct Table<cumulet_light_desc> {
         .key = "light.sky.ground_albedo",
         .row = {.label = "Ground albedo",
                 .tip = "Of a physical sky: what the ground sends back.",
-                .most = 1.0}})};
+                .most = 1.0}}),
+      Setting(&Desc::sun_angle_degrees, {.name = "sun_angle_degrees", .range = {-180.0, 180.0}, .given = Range{0.0, 180.0},
+        .spelling = Spelling::zero_is_negative,
+        .key = "light.sun.angle_degrees", .flag = "--sun-angle", .type = "DEG",
+        .help = "That the sun's disc takes, up to 180; 0: none, and hard shadows (default: 0, of a --sky-model 0.53)",
+        .row = {.label = "Sun angle",
+                .tip = "That the sun's disc takes: larger is softer.",
+                .most = 30.0, .format = "%.2f°"}})};
 };
 
 template <>
@@ -391,5 +398,8 @@ struct Table<cumulet_navigation_desc> {
 [[nodiscard]] constexpr double default_threshold(cumulet_criterion criterion) {
   return criterion == CUMULET_CRITERION_RANGE_MEAN ? 1.0 : 0.02;
 }
+
+/// The sun's angle that 0 stands for.
+[[nodiscard]] constexpr float default_sun_angle(cumulet_sky sky) { return sky == CUMULET_SKY_PHYSICAL ? 0.53F : 0.0F; }
 
 }  // namespace cumulet::settings

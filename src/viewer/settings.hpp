@@ -4,6 +4,7 @@
 
 #include <cumulet/cumulet.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -73,11 +74,14 @@ struct Light {
   glm::vec3 sun_irradiance{0.0F};
   glm::vec3 sky_radiance{0.0F};
   std::optional<light::SkyModel> sky = std::nullopt;  ///< then neither of the two before is meant
+  float sun_angle_degrees = 0.0F;
 
   static Light of(const cumulet_light_desc& d) {
     Light light{d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
                 glm::make_vec3(d.sky_radiance), std::nullopt};
     if (d.sky == CUMULET_SKY_PHYSICAL) light.sky = {.turbidity = d.turbidity, .ground_albedo = d.ground_albedo};
+    light.sun_angle_degrees =
+        d.sun_angle_degrees != 0.0F ? std::max(0.0F, d.sun_angle_degrees) : settings::default_sun_angle(d.sky);
     return light;
   }
 };

@@ -276,7 +276,7 @@ void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
 }
 
 void Viewer::surround() {
-  light::DistantLights lights{to_sun(light_), light_.sun_irradiance, light_.sky_radiance};
+  light::DistantLights lights{to_sun(light_), light_.sun_irradiance, light_.sky_radiance, light_.sun_angle_degrees};
   light::Surroundings surroundings{environment_, environment_settings_.rotation_degrees,
                                    environment_settings_.strength};
   if (light_.sky) {

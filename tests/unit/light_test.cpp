@@ -14,6 +14,7 @@
 #include "support/gl_state.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/osmesa_leaks.hpp"
+#include "support/surfaces.hpp"
 #include "support/volumes.hpp"
 
 // Marches share one signature; each leaves some of it unused. So do kinds of light.
@@ -166,6 +167,112 @@ TEST_P(NewLight, ADiscOfFiniteAngleIsFoundByLooksAndByFlights) {
       const double error = std::sqrt(square) / 64.0;
       EXPECT_NEAR(mean, expected, 4.0 * error) << "g " << g << " chance " << chance;
       EXPECT_LT(error, (chance > 0.0F ? 0.02 : 0.1) * expected);
+    }
+  }
+}
+
+// A sun of that angle overhead, whose radiance is 1.
+viewer::Light overhead(double angle) {
+  viewer::Light light;
+  light.sun_elevation_degrees = 90.0F;
+  light.sun_irradiance = vec3(static_cast<float>(pi * std::pow(std::sin(0.5 * angle), 2.0)));
+  light.sun_angle_degrees = static_cast<float>(angle * 180.0 / pi);
+  return light;
+}
+
+class Sun : public test::ViewerTest {};
+CUMULET_ON_BACKENDS(Sun);
+
+TEST_P(Sun, OfAnAngleLightsAMediumAsQuadratureHasItHoweverItIsFound) {
+  const ivec3 voxels(40, 16, 24);
+  const auto volume = test::make_volume(voxels, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
+  const auto viewer = make();
+  viewer->set_volume(volume);
+  viewer::GridSettings grid;
+  grid.build.march = scene::March::dense;
+  viewer->set_grid(grid);
+  viewer->set_camera(test::camera_at({19.5, 7.5, 900.0}, {19.5, 7.5, 0.0}, 0.01));
+  const double sigma = 0.08;
+  viewer->set_light(overhead(1.2));
+  for (const float g : {0.0F, 0.5F}) {
+    viewer->set_medium({sigma, vec3(1.0F), {g}, 1});
+    const double expected = single_scattering(dvec3(voxels), sigma, g, std::cos(0.6));
+    const test::Picture picture = test::render(*viewer, {8, 8, 256, 1, render::View::shaded});
+    EXPECT_NEAR(picture.mean().x, expected, 0.02 * expected) << g;
+    // Looked for with the chance that a dark disc leaves it; without one, found by flights alone.
+    core::CpuDisc cpu;
+    cpu.cm = viewer->viewer().trace_parameters();
+    cpu.cm.dispatch.samples = 256;
+    cpu.volume = &volume;
+    cpu.origin = ivec3(grid::fit_cube(volume).origin);
+    cpu.cm_disc_radiance_in = vec3(0.0F);
+    for (const float chance : {0.0F, 0.5F, 1.0F}) {
+      cpu.cm_disc_chance = chance;
+      double mean = 0.0;
+      for (std::uint32_t i = 0; i < 64; ++i) mean += cpu.traced({i % 8, i / 8}).sum.x / 256.0 / 64.0;
+      EXPECT_NEAR(mean, expected, (chance < 1.0F ? 0.03 : 0.1) * expected) << g << " " << chance;
+    }
+  }
+}
+
+TEST_P(Sun, IsSeenAsItsDiscAndInMirrorsUnlessItHasNoAngle) {
+  const auto viewer = make();
+  surface::Material mirror;
+  mirror.metallic = 1.0F;
+  mirror.roughness = 0.0F;
+  auto scene = std::make_shared<test::StillScene>();
+  scene->add(mirror);
+  scene->add_quad({{{-9, 0, 9}, {9, 0, 9}, {9, 0, -9}, {-9, 0, -9}}}, 0);
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  const auto mean = [&](const dvec3& eye, const dvec3& target) {
+    viewer::CameraPose camera = test::camera_at(eye, target, 1.0);
+    camera.up = {0.0, 0.0, 1.0};
+    viewer->set_camera(camera);
+    const test::Picture picture = test::render(*viewer, {8, 8, 64, 1, render::View::shaded});
+    return picture.mean().x;
+  };
+  for (const double angle : {0.2, 0.0}) {
+    viewer->set_light(overhead(angle));
+    const float radiance = angle > 0.0 ? 1.0F : 0.0F;
+    EXPECT_EQ(mean({0.0, 5.0, 0.0}, {0.0, 9.0, 0.0}), radiance);
+    EXPECT_EQ(mean({0.0, 5.0, 0.0}, {0.9, 9.0, 0.0}), 0.0F) << "beside it";
+    EXPECT_NEAR(mean({0.0, 5.0, 0.0}, {0.0, 0.0, 0.0}), radiance, 0.01F) << "in a mirror";
+  }
+}
+
+TEST_P(Sun, OfAnyAngleSendsWhatItsSettingSaysAndHalfOfItAtAnEdge) {
+  const auto viewer = make();
+  auto scene = std::make_shared<test::StillScene>();
+  scene->add(test::diffuse(vec3(0.5F)));
+  scene->add_quad({{{-50, 0, 50}, {50, 0, 50}, {50, 0, -50}, {-50, 0, -50}}}, 0);
+  // A roof over all x below 0.
+  scene->add_quad({{{-400, 10, 400}, {0, 10, 400}, {0, 10, -400}, {-400, 10, -400}}}, 0);
+  viewer->viewer().show_surfaces(test::source_of(scene));
+  for (const float degrees : {0.0F, 0.53F, 40.0F}) {
+    viewer::Light light;
+    light.sun_elevation_degrees = 90.0F;
+    light.sun_irradiance = vec3(3.0F);
+    light.sun_angle_degrees = degrees;
+    viewer->set_light(light);
+    viewer->set_medium({1.0, vec3(1.0F), {}, 1});
+    const double half = degrees * pi / 360.0;
+    for (const double share : {-1.2, -0.5, 0.3, 0.7, 1.2}) {
+      // Where the edge cuts the disc, whose projection on the floor is even.
+      const double x = 10.0 * std::tan(half) * share;
+      if (degrees < 1.0F && std::abs(share) < 1.0) continue;
+      const double at = degrees > 0.0F ? x : (share > 0.0 ? 1.0 : -1.0);
+      viewer->set_camera(test::camera_at({at + 30.0, 5.0, 0.0}, {at, 0.0, 0.0}, 0.01));
+      const test::Picture picture = test::render(*viewer, {8, 8, 256, 1, render::View::shaded});
+      double sum = 0.0;
+      constexpr int n = 400;
+      for (int i = 0; i < n * n; ++i) {
+        const double mu_2 =
+            1.0 - std::pow(std::sin(half), 2.0) * (std::floor(double(i) / n) + 0.5) / n;  // even in projection
+        const double turn = 2.0 * pi * (i % n + 0.5) / n;
+        const double across = std::sqrt(1.0 - mu_2) * std::cos(turn) / std::sqrt(mu_2);
+        if (degrees > 0.0F ? at + 10.0 * across > 0.0 : at > 0.0) sum += 1.0 / (n * n);
+      }
+      EXPECT_NEAR(picture.mean().x, 0.5 / pi * 3.0 * sum, 0.008) << degrees << " degrees, at " << at;
     }
   }
 }

@@ -72,6 +72,8 @@ const std::array fields{
     CM_FIELD(lights, environment_chance),
     CM_FIELD(lights, environment_strength),
     CM_FIELD(lights, environment_turn),
+    CM_FIELD(lights, sun_radiance),
+    CM_FIELD(lights, sun_spread),
     CM_FIELD(surfaces, low),
     CM_FIELD(surfaces, high),
     CM_FIELD(surfaces, words),

@@ -153,7 +153,7 @@ TEST_P(SkyPicture, IsLitByItsSunAndByAPictureOfIt) {
   const Sky day(model, direction(25.0, 40.0));
   // Of the sevens nothing is seen.
   const viewer::Light physical{40.0F, 25.0F, vec3(7.0F), vec3(7.0F), model};
-  const viewer::Light sun{40.0F, 25.0F, day.sun_irradiance(), vec3(0.0F)};
+  const viewer::Light sun{40.0F, 25.0F, day.sun_irradiance(), vec3(0.0F)};  // of angle 0, as that of the other
   const auto still = make();
   still->set_volume(test::make_volume(glm::ivec3(20), glm::ivec3(0), [](const glm::ivec3& p) {
     return glm::length(vec3(p) - 9.5F) < 9.0F ? 1.0F : 0.0F;

@@ -736,7 +736,7 @@ typedef enum cumulet_sky {
   CUMULET_SKY_PHYSICAL = 1
 } cumulet_sky;
 
-/* A distant sun (a delta direction, invisible to camera rays) and a sky. Restarts accumulation. */
+/* A distant sun (of angle 0 a direction, which no ray sees) and a sky. Restarts accumulation. */
 typedef struct cumulet_light_desc {
   size_t struct_size;
   float sun_azimuth_degrees;   /* direction towards the sun, from +Z towards +X */
@@ -746,6 +746,11 @@ typedef struct cumulet_light_desc {
   cumulet_sky sky;
   float turbidity;     /* physical: Linke's, in [1, 10]: 1 no aerosols, 2 very clear, 3 clear, 6 hazy; 0: 3 */
   float ground_albedo; /* physical: what the ground sends back to the air, in [0, 1]; 0: black */
+  /*
+   * That the sun's disc takes, up to 180: soft shadows, and a disc that is seen. Its irradiance does not depend on it.
+   * 0: none, but 0.53 of a physical sky; negative: none.
+   */
+  float sun_angle_degrees;
 } cumulet_light_desc;
 
 /* How a viewer is surrounded by its environment (cumulet_set_environment). Restarts accumulation. */
