@@ -1,6 +1,6 @@
 #!/bin/bash
-# From a clone to a picture: installs the Debian packages that are missing, builds, writes the sample scene and renders
-# it to cumulet.png without a display. What is done already is skipped. Arguments go to cumulet-render.
+# From a clone to pictures: installs the Debian packages that are missing, builds, writes the sample scenes and renders
+# them to cumulet.png and explosion.png without a display. What is done already is skipped. Arguments go to cumulet-render.
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
 
@@ -18,16 +18,18 @@ bin=build/programs/bin
 # The scene is deterministic: written again only after its generator changed.
 scene=build/sample
 if [ ! -f "$scene/.done" ] || [ "$bin/cumulet-scene" -nt "$scene/.done" ]; then
-  say "writing the sample scene to $scene"
+  say "writing the sample scenes to $scene"
   "$bin/cumulet-scene" "$scene" || die "cumulet-scene failed"
   touch "$scene/.done"
 fi
 
-# About a minute on two cores without a GPU.
+# About a minute each on two cores without a GPU.
 [ $# -gt 0 ] || set -- --spp 16
-say "rendering $scene/sample.json"
-"$bin/cumulet-render" --scene "$scene/sample.json" -o cumulet.png "$@" || die "cumulet-render failed"
-say "the picture is in $root/cumulet.png"
+for picture in sample:cumulet sample_explosion:explosion; do
+  say "rendering $scene/${picture%:*}.json"
+  "$bin/cumulet-render" --scene "$scene/${picture%:*}.json" -o "${picture#*:}.png" "$@" || die "cumulet-render failed"
+done
+say "the pictures are cumulet.png and explosion.png in $root"
 
 if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ] && [ -x "$bin/cumulet-demo" ]; then
   say "opening the demo"

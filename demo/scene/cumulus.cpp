@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 
+#include "lobes.hpp"
 #include "noise.hpp"
 #include "scene.hpp"
 
@@ -10,22 +11,6 @@ namespace cumulet::scene {
 namespace {
 
 using glm::vec3;
-
-struct Sphere {
-  vec3 centre;
-  float radius;
-};
-
-class Random {
- public:
-  explicit Random(std::uint32_t seed) : state_(seed) {}
-  float operator()() { return unit(hash({static_cast<int>(++count_), 0, 0}, state_)); }
-  float between(float low, float high) { return low + (high - low) * (*this)(); }
-
- private:
-  std::uint32_t state_;
-  std::uint32_t count_ = 0;
-};
 
 // The skeleton: a few thermals side by side, each a stack of big lobes; lobes on lobes, smaller and smaller, outwards
 // and upwards.
@@ -73,70 +58,17 @@ std::vector<Sphere> make_lobes(std::uint32_t seed) {
   return lobes;
 }
 
-// Lobes sorted into a coarse lattice: which can be the nearest around a point.
-class Field {
- public:
-  explicit Field(std::vector<Sphere> lobes) : lobes_(std::move(lobes)) {
-    low_ = vec3(1e9F);
-    high_ = vec3(-1e9F);
-    for (const Sphere& s : lobes_) {
-      low_ = glm::min(low_, s.centre - s.radius);
-      high_ = glm::max(high_, s.centre + s.radius);
-    }
-    low_ -= reach;
-    high_ += reach;
-    size_ = glm::ivec3(glm::ceil((high_ - low_) / cell)) + 1;
-    cells_.resize(std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z));
-    for (std::uint32_t i = 0; i < lobes_.size(); ++i) {
-      const Sphere& s = lobes_[i];
-      const glm::ivec3 a((s.centre - s.radius - reach - low_) / cell);
-      const glm::ivec3 b((s.centre + s.radius + reach - low_) / cell);
-      for (int x = std::max(a.x, 0); x <= std::min(b.x, size_.x - 1); ++x) {
-        for (int y = std::max(a.y, 0); y <= std::min(b.y, size_.y - 1); ++y) {
-          for (int z = std::max(a.z, 0); z <= std::min(b.z, size_.z - 1); ++z) cells_[index({x, y, z})].push_back(i);
-        }
-      }
-    }
-  }
-
-  [[nodiscard]] vec3 low() const { return low_; }
-  [[nodiscard]] vec3 high() const { return high_; }
-
-  // Signed distance to the union of lobes, exact within reach of it, at most `reach` outside.
-  [[nodiscard]] float operator()(const vec3& p) const {
-    const glm::ivec3 c(glm::floor((p - low_) / cell));
-    if (glm::any(glm::lessThan(c, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(c, size_))) return reach;
-    float nearest = reach;
-    for (const std::uint32_t i : cells_[index(c)]) {
-      nearest = std::min(nearest, glm::distance(p, lobes_[i].centre) - lobes_[i].radius);
-    }
-    return nearest;
-  }
-
-  static constexpr float reach = 6.0F;
-
- private:
-  static constexpr float cell = 4.0F;
-  [[nodiscard]] std::size_t index(const glm::ivec3& c) const {
-    return std::size_t(c.x) + std::size_t(size_.x) * (std::size_t(c.y) + std::size_t(size_.y) * std::size_t(c.z));
-  }
-  std::vector<Sphere> lobes_;
-  vec3 low_, high_;
-  glm::ivec3 size_{0};
-  std::vector<std::vector<std::uint32_t>> cells_;
-};
-
 }  // namespace
 
 openvdb::FloatGrid::Ptr make_cumulus(const Settings& settings) {
-  const Field field(make_lobes(settings.seed));
+  const Lobes field(make_lobes(settings.seed), 6.0F);
   // The cloud fills about 92,000 cubic metres.
   const double voxel_size = std::cbrt(92000.0 / settings.voxels);
   const auto finest = static_cast<float>(2.2 * voxel_size);
   const std::uint32_t seed = settings.seed * 977U;
 
   const auto skip = [&](const vec3& centre, float radius) {
-    return field(centre) > std::min(radius + 4.5F, Field::reach - 0.01F) || centre.y + radius < -1.5F;
+    return field(centre) > std::min(radius + 4.5F, field.reach() - 0.01F) || centre.y + radius < -1.5F;
   };
   const auto value = [&](const vec3& p) -> float {
     const float rough = field(p);
@@ -163,7 +95,9 @@ openvdb::FloatGrid::Ptr make_cumulus(const Settings& settings) {
     const float inside = 0.62F + 0.3F * height + 0.22F * fbm(p * 0.09F, std::max(finest * 0.09F, 0.12F), seed + 23);
     return edge * glm::clamp(inside, 0.2F, 1.0F);
   };
-  return sample("density", voxel_size, field.low(), field.high(), 0.004F, skip, value);
+  return sample({{"density", 0.004F}}, voxel_size, field.low(), field.high(), skip,
+                [&](const vec3& p, float* values) { *values = value(p); })
+      .front();
 }
 
 }  // namespace cumulet::scene

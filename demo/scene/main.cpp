@@ -30,11 +30,12 @@ void replace(const path& file, const std::function<void(const path&)>& write) {
   std::filesystem::rename(unfinished, file);
 }
 
-void write_grids(const path& file, const openvdb::GridPtrVec& grids) {
+template <class Grids>
+void write_grids(const path& file, const Grids& grids) {
   replace(file, [&](const path& unfinished) {
     openvdb::io::File out(unfinished.string());
     out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_ZIP);
-    out.write(grids);
+    out.write(openvdb::GridCPtrVec(grids.begin(), grids.end()));
     out.close();
   });
   std::printf("%s:", file.string().c_str());
@@ -54,18 +55,26 @@ void write_surfaces(const path& file, std::uint32_t seed) {
   std::printf("%s: %zu bytes\n", file.string().c_str(), glb.size());
 }
 
+void save(const cumulet::demo::SceneOptions& scene, const path& file) {
+  cumulet::demo::save_scene(scene, file.string());
+  std::printf("%s\n", file.string().c_str());
+}
+
+void look(cumulet_camera_desc& camera, const cumulet::scene::View& view) {
+  for (glm::length_t i = 0; i < 3; ++i) {
+    camera.eye[i] = view.eye[i];
+    camera.target[i] = view.target[i];
+  }
+  camera.fovy_degrees = view.fovy_degrees;
+}
+
 // Cumulus and mountains as README shows them.
 void write_scene(const path& folder) {
   cumulet::demo::SceneOptions scene;
   scene.volume = (folder / "cumulus.vdb").string();
   scene.surfaces = (folder / "mountains.glb").string();
   scene.surface.indirect_roughness = 0.4F;  // or the sun in lake and windows makes specks
-  const cumulet::scene::View view;
-  for (glm::length_t i = 0; i < 3; ++i) {
-    scene.camera.eye[i] = view.eye[i];
-    scene.camera.target[i] = view.target[i];
-  }
-  scene.camera.fovy_degrees = view.fovy_degrees;
+  look(scene.camera, {});
   scene.medium.density_scale = 0.7;
   scene.medium.max_bounces = 16;
   scene.display.exposure_stops = 0.5F;
@@ -77,15 +86,45 @@ void write_scene(const path& folder) {
   scene.width = 800;
   scene.height = 450;
   scene.sampling.samples = 64;
-  const path file = folder / "sample.json";
-  cumulet::demo::save_scene(scene, file.string());
-  std::printf("%s\n", file.string().c_str());
+  save(scene, folder / "sample.json");
+}
+
+path explosion_file(const path& folder, int frame) {
+  std::array<char, 32> name{};
+  std::snprintf(name.data(), name.size(), "explosion_%04d.vdb", frame);
+  return folder / name.data();
+}
+
+// The explosion in the evening, half burning, half soot, as README shows it.
+void write_explosion_scene(const path& folder) {
+  cumulet::demo::SceneOptions scene;
+  scene.volume = explosion_file(folder, cumulet::scene::shown_frame).string();
+  look(scene.camera, {{4.0F, 2.2F, 22.0F}, {0.3F, 4.6F, 0.0F}, 33.0});
+  scene.medium.density_scale = 9.0;
+  std::copy_n(std::array{0.68F, 0.70F, 0.72F}.begin(), 3, scene.medium.coalbedo);
+  scene.medium.max_bounces = 12;
+  scene.medium.blackbody = 12.0F;
+  scene.medium.flame_strength = 9.0F;
+  std::copy_n(std::array{1.0F, 0.3F, 0.05F}.begin(), 3, scene.medium.flame_color);
+  scene.light.sky = CUMULET_SKY_PHYSICAL;
+  scene.light.turbidity = 4.0F;
+  scene.light.ground_albedo = 0.2F;
+  scene.light.sun_azimuth_degrees = 75.0F;
+  scene.light.sun_elevation_degrees = 9.0F;
+  scene.display.exposure_stops = 0.5F;
+  scene.display.tone_map = CUMULET_TONE_MAP_FILMIC;
+  scene.grid.threshold = 0.01;
+  scene.width = 800;
+  scene.height = 500;
+  scene.sampling.samples = 64;
+  save(scene, folder / "sample_explosion.json");
 }
 
 struct Wanted {
   std::string folder;
   std::string only;
   double voxels = 0.0;  // 0: the setting's
+  int frame = 0;        // of the explosion; 0: all
   bool full = false;
   std::uint32_t seed = 1;
 };
@@ -95,7 +134,8 @@ std::optional<Wanted> parse(std::vector<std::string> arguments) {
   Wanted wanted;
   CLI::App app(
       "Writes Cumulet's sample scene: cumulus.vdb (density), mountains.glb (the ground, a tower) and sample.json, "
-      "which shows both; and fire.vdb (density, temperature).",
+      "which shows both; and explosion_0001.vdb to explosion_0020.vdb (density, temperature, flame) and "
+      "sample_explosion.json, which shows one of them.",
       "cumulet-scene");
   app.footer("Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.");
   app.add_option("OUT_DIR", wanted.folder, "Folder to write to, made if it is missing")->required()->type_name("DIR");
@@ -103,10 +143,14 @@ std::optional<Wanted> parse(std::vector<std::string> arguments) {
   app.add_option("--voxels", wanted.voxels, "About how many active voxels, in place of the setting's")
       ->check(CLI::Range(1000.0, 1e9).description(""))
       ->type_name("N");
-  app.add_option("--seed", wanted.seed, "Another cloud, other mountains, another fire (default: 1)")->type_name("S");
+  app.add_option("--seed", wanted.seed, "Another cloud, other mountains, another explosion (default: 1)")
+      ->type_name("S");
   app.add_option("--only", wanted.only, "Write one of them")
-      ->check(CLI::IsMember({"cumulus", "mountains", "fire"}).description(""))
-      ->type_name("cumulus|mountains|fire");
+      ->check(CLI::IsMember({"cumulus", "mountains", "explosion"}).description(""))
+      ->type_name("cumulus|mountains|explosion");
+  app.add_option("--frame", wanted.frame, "Write this frame of the explosion alone; the scene file shows 12")
+      ->check(CLI::Range(1, cumulet::scene::explosion_frames).description(""))
+      ->type_name("N");
   if (!cumulet::demo::parse_arguments(app, std::move(arguments), std::cout)) return std::nullopt;
   return wanted;
 }
@@ -121,13 +165,18 @@ void write_all(const Wanted& options) {
     return options.full ? full : usual;
   };
   if (wanted("cumulus"))
-    write_grids(folder / "cumulus.vdb", {cumulet::scene::make_cumulus({voxels(22e6, 1.2e6), options.seed})});
+    write_grids(folder / "cumulus.vdb", std::array{cumulet::scene::make_cumulus({voxels(22e6, 1.2e6), options.seed})});
   if (wanted("mountains")) write_surfaces(folder / "mountains.glb", options.seed);
-  if (options.only.empty()) write_scene(folder);
-  if (wanted("fire")) {
-    openvdb::GridPtrVec grids;
-    for (const auto& grid : cumulet::scene::make_fire({voxels(4e6, 0.4e6), options.seed})) grids.push_back(grid);
-    write_grids(folder / "fire.vdb", grids);
+  if (options.only.empty()) {
+    write_scene(folder);
+    write_explosion_scene(folder);
+  }
+  if (wanted("explosion")) {
+    const cumulet::scene::Settings settings{voxels(6e6, 0.8e6), options.seed};
+    for (int frame = 1; frame <= cumulet::scene::explosion_frames; ++frame) {
+      if (options.frame > 0 && frame != options.frame) continue;
+      write_grids(explosion_file(folder, frame), cumulet::scene::make_explosion(settings, frame));
+    }
   }
 }
 

@@ -53,7 +53,7 @@ ParseResult parse(int argc, char** argv) {
   std::string samples = "build/sample-full";
   std::string backend = "auto";
   app.add_option("--input", inputs,
-                 "NAME=FILE[:GRID] or NAME=@noise:SIZE, again and again (default: disney, cumulus, fire)");
+                 "NAME=FILE[:GRID] or NAME=@noise:SIZE, again and again (default: disney, cumulus, explosion)");
   app.add_option("--sample-dir", samples, "What cumulet-scene --full wrote (default: build/sample-full)");
   app.add_option("--data-dir", shared_data, "Holds vdb/wdas/wdas_cloud_sixteenth.vdb (default: ../shared/data)");
   app.add_option("--out", o.out, "Folder for what is written (default: bench-out)");
@@ -109,7 +109,7 @@ ParseResult parse(int argc, char** argv) {
     o.inputs = {
         {"disney", std::filesystem::path(shared_data) / "vdb/wdas/wdas_cloud_sixteenth.vdb", "density", 0, true},
         {"cumulus", sample_dir / "cumulus.vdb", "density", 0, true},
-        {"fire", sample_dir / "fire.vdb", "density", 0, true}};
+        {"explosion", sample_dir / "explosion_0012.vdb", "density", 0, true}};
   }
   o.command = "cumulet-bench";
   for (int i = 1; i < argc; ++i) o.command += std::string(" ") + argv[i];

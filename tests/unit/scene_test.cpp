@@ -98,17 +98,72 @@ TEST(Cumulus, GainsDetailWithResolution) {
   EXPECT_GT(border(*cumulus(400000)), 1.12 * border(*cumulus(50000)));
 }
 
-TEST(Fire, HasSmokeAndTemperature) {
+struct Burning {
+  double soot = 0.0;    // voxels
+  double height = 0.0;  // of the soot's middle
+  double width = 0.0;
+  double hottest = 0.0;
+  double flames = 0.0;
+};
+
+Burning burning(int frame) {
   openvdb::initialize();
-  const auto grids = scene::make_fire({60000, 1});
-  ASSERT_EQ(grids.size(), 2U);
-  EXPECT_EQ(grids[0]->getName(), "density");
-  EXPECT_EQ(grids[1]->getName(), "temperature");
-  float hottest = 0.0F;
-  for (auto i = grids[1]->cbeginValueOn(); i; ++i) hottest = std::max(hottest, *i);
-  EXPECT_GT(hottest, 1500.0F);
-  EXPECT_LT(hottest, 2500.0F);
-  EXPECT_GT(grids[0]->activeVoxelCount(), 20000U);
+  const auto grids = scene::make_explosion({60000, 1}, frame);
+  Burning found;
+  std::vector<std::string> names;
+  for (const auto& grid : grids) names.push_back(grid->getName());
+  EXPECT_EQ(names, std::vector<std::string>({"density", "temperature", "flame"}));
+  double low = 1e9;
+  double high = -1e9;
+  for (auto i = grids[0]->cbeginValueOn(); i; ++i) {
+    EXPECT_TRUE(*i > 0.0F && *i <= 1.0F) << *i;
+    const auto p = grids[0]->indexToWorld(i.getCoord());
+    EXPECT_GT(p.y(), 0.0) << "the ground";
+    found.soot += 1.0;
+    found.height += p.y();
+    low = std::min(low, p.x());
+    high = std::max(high, p.x());
+  }
+  found.height /= found.soot;
+  found.width = high - low;
+  for (auto i = grids[1]->cbeginValueOn(); i; ++i) found.hottest = std::max(found.hottest, double{*i});
+  for (auto i = grids[2]->cbeginValueOn(); i; ++i) {
+    EXPECT_TRUE(*i > 0.0F && *i <= 1.0F) << *i;
+    found.flames += 1.0;
+  }
+  return found;
+}
+
+TEST(Explosion, ExpandsRisesAndCools) {
+  const Burning early = burning(3);
+  const Burning middle = burning(scene::shown_frame);
+  const Burning late = burning(scene::explosion_frames);
+  EXPECT_GT(early.hottest, 1.2) << "1800 K";
+  EXPECT_LT(early.hottest, 1.7);
+  EXPECT_GT(early.hottest, middle.hottest);
+  EXPECT_GT(middle.hottest, late.hottest);
+  EXPECT_GT(late.hottest, 0.7) << "it glows in its cracks to the end";
+  EXPECT_LT(2.0 * early.width, middle.width);
+  EXPECT_LT(early.height + 1.0, middle.height);
+  EXPECT_LT(middle.height + 1.0, late.height);
+  EXPECT_GT(early.flames / early.soot, 2.0 * late.flames / late.soot);
+  EXPECT_GT(late.flames, 0.0) << "no frame has an empty grid";
+  EXPECT_NEAR(late.soot, 60000.0, 20000.0);
+}
+
+TEST(Explosion, IsTheSameWhateverTheThreads) {
+  openvdb::initialize();
+  std::vector<openvdb::FloatGrid::Ptr> one;
+  {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
+    one = scene::make_explosion({30000, 1}, 7);
+  }
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 4);
+  const auto four = scene::make_explosion({30000, 1}, 7);
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_TRUE(same(*one[i], *four[i])) << one[i]->getName();
+  EXPECT_FALSE(same(*one[0], *scene::make_explosion({30000, 2}, 7)[0]));
+  EXPECT_THROW((void)scene::make_explosion({30000, 1}, 0), std::runtime_error);
+  EXPECT_THROW((void)scene::make_explosion({30000, 1}, 21), std::runtime_error);
 }
 
 // The mountains as the importer has them, and the names of their nodes.
