@@ -355,7 +355,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   };
   add_settings(app, "Medium", scene.medium, take_auto);
 
-  group = "Light (default: daylight; given sun, sky or environment, the others are dark)";
+  group = "Light (default: a clear day; given sun, sky or environment, the others are dark)";
   add(
       app, group, "--sun", "\"azimuth,elevation r,g,b\"",
       [&](const std::string& text) { parse_sun(text, scene.light); },
@@ -449,8 +449,14 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
     if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " has no irradiance and no --sky-model");
   }
   if (!lit && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
-      app.count("--env") == 0)
+      app.count("--env") == 0) {
+    const cumulet_light_desc given = scene.light;
     scene.set_daylight();
+    if (app.count("--sky-model") > 0) {
+      scene.light.turbidity = given.turbidity;
+      scene.light.ground_albedo = given.ground_albedo;
+    }
+  }
 }
 
 bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {

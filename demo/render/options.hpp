@@ -19,7 +19,7 @@ namespace cumulet::demo {
 /// Light stays dark if none is given: see finish_scene_options. The scene must outlive the app's parse, which throws
 /// what load_scene does.
 void add_scene_options(CLI::App& app, SceneOptions& scene);
-/// What can be said only after the parse: default daylight, unless lit (a scene file was given otherwise than by
+/// What can be said only after the parse: a clear day by default, unless lit (a scene file was given otherwise than by
 /// --scene); and which flags exclude each other. Throws UsageError.
 void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit);
 

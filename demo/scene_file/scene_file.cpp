@@ -250,7 +250,7 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   // Without a word, a file of this version means 1: there was no other way.
   scene.auto_density_scale = reader.word("medium.density_scale", "auto");
   reader.text("environment.file", scene.environment);
-  if (!reader.has("light") && scene.environment.empty()) scene.set_daylight();
+  if (!reader.has("light") && scene.environment.empty()) scene.set_daylight_of_version_1();
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
@@ -416,6 +416,13 @@ std::string animation_refusal(const SceneOptions& scene, std::uint32_t animation
 }
 
 void SceneOptions::set_daylight() {
+  set_daylight_of_version_1();
+  light.sky = CUMULET_SKY_PHYSICAL;
+  light.turbidity = 2.5f;
+  light.ground_albedo = 0.3f;
+}
+
+void SceneOptions::set_daylight_of_version_1() {
   light.sun_azimuth_degrees = 65.0f;
   light.sun_elevation_degrees = 40.0f;
   constexpr std::array<float, 3> sun = {4.4f, 4.05f, 3.55f};
@@ -426,8 +433,10 @@ void SceneOptions::set_daylight() {
 
 void SceneOptions::set_environment(const std::string& file) {
   SceneOptions day;
+  SceneOptions first;
   day.set_daylight();
-  if (settings::same(light, day.light)) light = SceneOptions().light;
+  first.set_daylight_of_version_1();
+  if (settings::same(light, day.light) || settings::same(light, first.light)) light = SceneOptions().light;
   environment = file;
 }
 

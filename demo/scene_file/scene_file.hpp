@@ -35,8 +35,10 @@ struct SceneOptions {
   cumulet_display_desc display{};
 
   SceneOptions();
-  /// A pleasant day, what is lit when nothing says how: a sun from the right of a default camera, above and before it.
+  /// A clear day, what is lit when nothing says how: a sun from the right of a default camera, above and before it.
   void set_daylight();
+  /// What scene files of version 1 mean that say nothing of light: the same sun, in a sky of one colour.
+  void set_daylight_of_version_1();
   /// Surrounds the scene by this file. Daylight, which nobody chose, goes.
   void set_environment(const std::string& file);
 };
@@ -61,8 +63,8 @@ void for_each_group(Scene& scene, Visit&& visit) {
 [[nodiscard]] std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations);
 
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
-/// volume is taken from its folder. What the text does not say is as in SceneOptions(), in daylight. Throws
-/// std::runtime_error, one line with the path, the key and the cause.
+/// volume is taken from its folder. What the text does not say is as in SceneOptions(), in daylight of version 1.
+/// Throws std::runtime_error, one line with the path, the key and the cause.
 [[nodiscard]] SceneOptions parse_scene(const std::string& text, const std::string& path);
 /// Reads a file. Throws likewise.
 [[nodiscard]] SceneOptions load_scene(const std::string& path);

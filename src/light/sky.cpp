@@ -391,8 +391,9 @@ vec3 Sky::radiance(const dvec3& direction) const {
                   vec3(0.0F));
 }
 
-Daylight make_daylight(const SkyModel& model, const dvec3& to_sun) {
-  const Sky sky(model, to_sun);
+Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees) {
+  const double up = sun_elevation_degrees * pi / 180.0;
+  const Sky sky(model, {0.0, std::sin(up), std::cos(up)});
   EnvironmentPixels pixels{.width = 512, .height = 256, .values = {}};
   pixels.values.resize(std::size_t{pixels.width} * pixels.height);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, pixels.height), [&](const auto& range) {
@@ -406,7 +407,7 @@ Daylight make_daylight(const SkyModel& model, const dvec3& to_sun) {
       }
     }
   });
-  return {model, to_sun, sky.sun_irradiance(), make_environment(pixels, "the physical sky")};
+  return {model, sun_elevation_degrees, sky.sun_irradiance(), make_environment(pixels, "the physical sky")};
 }
 
 }  // namespace cumulet::light

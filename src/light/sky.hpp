@@ -56,15 +56,15 @@ class Sky {
   glm::vec3 ground_radiance_{0.0F};
 };
 
-/// Of a sky what a picture is lit by.
+/// Of a sky what a picture is lit by, the same whatever the sun's azimuth.
 struct Daylight {
   SkyModel model;
-  glm::dvec3 to_sun{0.0, 1.0, 0.0};
+  double sun_elevation_degrees = 90.0;
   glm::vec3 sun_irradiance{0.0F};
-  EnvironmentPtr surroundings;  ///< all but the sun, 512 x 256
+  EnvironmentPtr surroundings;  ///< all but the sun, 512 x 256; the sun is at azimuth 0, +Z
 };
 
 /// As Sky's constructor.
-Daylight make_daylight(const SkyModel& model, const glm::dvec3& to_sun);
+Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees);
 
 }  // namespace cumulet::light

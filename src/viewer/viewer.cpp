@@ -280,10 +280,12 @@ void Viewer::surround() {
   light::Surroundings surroundings{environment_, environment_settings_.rotation_degrees,
                                    environment_settings_.strength};
   if (light_.sky) {
-    if (!daylight_ || daylight_->model != *light_.sky || daylight_->to_sun != lights.to_sun)
-      daylight_ = light::make_daylight(*light_.sky, lights.to_sun);
+    const double elevation = light_.sun_elevation_degrees;
+    if (!daylight_ || daylight_->model != *light_.sky || daylight_->sun_elevation_degrees != elevation)
+      daylight_ = light::make_daylight(*light_.sky, elevation);
     lights.sun_irradiance = daylight_->sun_irradiance;
-    if (!environment_) surroundings = {.environment = daylight_->surroundings};
+    if (!environment_)
+      surroundings = {.environment = daylight_->surroundings, .rotation_degrees = light_.sun_azimuth_degrees};
   }
   scene_.lights.set(lights);
   scene_.surroundings.set(std::move(surroundings));

@@ -188,6 +188,17 @@ TEST(Options, ASkyModelTakesItsSunsPlaceAlone) {
   EXPECT_EQ(day.scene.light.sky, CUMULET_SKY_PHYSICAL);
   EXPECT_EQ(day.scene.light.sun_elevation_degrees, parse({}).scene.light.sun_elevation_degrees);
   EXPECT_EQ(parse({"--sky", "1,1,1"}).scene.light.sky, CUMULET_SKY_CONSTANT);
+  EXPECT_EQ(parse({"--sun", "0,90 1,1,1"}).scene.light.sky, CUMULET_SKY_CONSTANT);
+  EXPECT_EQ(parse({"--env", "a.hdr"}).scene.light.sky, CUMULET_SKY_CONSTANT);
+}
+
+TEST(Options, WithoutAWordOfLightItIsAClearDay) {
+  const RenderOptions day = parse({});
+  EXPECT_EQ(day.scene.light.sky, CUMULET_SKY_PHYSICAL);
+  EXPECT_GT(day.scene.light.turbidity, 0.0f);
+  const RenderOptions soft = parse({"--sun-angle", "5"});
+  EXPECT_EQ(soft.scene.light.sky, CUMULET_SKY_PHYSICAL);
+  EXPECT_EQ(soft.scene.light.sun_angle_degrees, 5.0f);
 }
 
 TEST(Options, ViewNames) {

@@ -144,7 +144,7 @@ TEST(SceneFile, AKeyIsGivenOnce) {
 TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
   const SceneOptions read = parse_scene(R"({"cumulet_scene": 1})", "s.json");
   SceneOptions day;
-  day.set_daylight();
+  day.set_daylight_of_version_1();
   day.auto_density_scale = false;  // a file of version 1 means 1, for ever
   EXPECT_TRUE(same_scene(read, day));
   EXPECT_EQ(read.grid.threshold, 0.0);
