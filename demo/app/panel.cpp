@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
+#include <presets.hpp>
 #include <settings.hpp>
 
 namespace cumulet::demo {
@@ -223,6 +224,13 @@ void Panel::surfaces(Model& model) {
 void Panel::medium(Model& model, std::vector<Command>& commands) {
   using Desc = cumulet_medium_desc;
   Desc& medium = model.scene.medium;
+  std::vector<Choice> presets;
+  presets.reserve(preset_choices.size());
+  for (const settings::Choice& preset : preset_choices) presets.push_back({preset.label, preset.value, preset.tip});
+  const std::optional<Preset> now = preset_of(medium);
+  int chosen = now ? static_cast<int>(*now) : -1;
+  if (ui_.choose("Preset", "A medium: sets all of it but the density scale.", presets, chosen))
+    apply(static_cast<Preset>(chosen), medium);
   settings::for_each<Desc>([&](const auto& setting) {
     const bool of_lobes = setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_share);
     ImGui::BeginDisabled((of_lobes && medium.phase != CUMULET_PHASE_TWO_LOBE) ||

@@ -12,6 +12,7 @@
 #include <memory>
 #include <names.hpp>
 #include <ostream>
+#include <presets.hpp>
 #include <settings.hpp>
 #include <utility>
 
@@ -353,6 +354,16 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
     if (scene.auto_density_scale) scene.medium.density_scale = 0.0;
     return scene.auto_density_scale;
   };
+  add(
+      app, "Medium", "--preset", list_names(preset_choices, "|"),
+      [&](const std::string& text) {
+        const auto* found = std::find_if(preset_choices.begin(), preset_choices.end(),
+                                         [&](const settings::Choice& choice) { return text == choice.name; });
+        if (found == preset_choices.end())
+          throw UsageError(in_quotes(text) + " is none of " + list_names(preset_choices, ", "));
+        apply(static_cast<Preset>(found->value), scene.medium);
+      },
+      "A medium, but for its density scale; the other flags override what it says");
   add_settings(app, "Medium", scene.medium, take_auto);
 
   group = "Light (default: a clear day; given sun, sky or environment, the others are dark)";

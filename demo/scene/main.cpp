@@ -10,6 +10,7 @@
 #include <iostream>
 #include <optional>
 #include <options.hpp>
+#include <presets.hpp>
 #include <program.hpp>
 #include <stdexcept>
 #include <string>
@@ -101,11 +102,7 @@ void write_explosion_scene(const path& folder) {
   scene.volume = explosion_file(folder, cumulet::scene::shown_frame).string();
   look(scene.camera, {{4.0F, 2.2F, 22.0F}, {0.3F, 4.6F, 0.0F}, 33.0});
   scene.medium.density_scale = 9.0;
-  std::copy_n(std::array{0.68F, 0.70F, 0.72F}.begin(), 3, scene.medium.coalbedo);
-  scene.medium.max_bounces = 12;
-  scene.medium.blackbody = 12.0F;
-  scene.medium.flame_strength = 9.0F;
-  std::copy_n(std::array{1.0F, 0.3F, 0.05F}.begin(), 3, scene.medium.flame_color);
+  cumulet::demo::apply(cumulet::demo::Preset::explosion, scene.medium);
   scene.light.sky = CUMULET_SKY_PHYSICAL;
   scene.light.turbidity = 4.0F;
   scene.light.ground_albedo = 0.2F;

@@ -191,6 +191,17 @@ def test_glow(s):
     assert_alike(dark, look(s, "undone")[0], area)
 
 
+def test_preset(s):
+    s.play("replay", [*SETTLE, *shot("first"), 'click "Preset"', "frames 2", 'click "Preset/Explosion"', *SETTLE, *shot("explosion"),
+                      "key ctrl+z", *SETTLE, *shot("undone")], "--volume", s.explosion, "--density-scale", "9", "--spp", "4")
+    first, report, area = look(s, "first")
+    exploded, exploded_report, _ = look(s, "explosion")
+    medium, before = exploded_report["scene"]["medium"], report["scene"]["medium"]
+    assert medium["blackbody"] == 12 and medium["density_scale"] == before["density_scale"] == 9, medium
+    assert_differ(first, exploded, area)
+    assert look(s, "undone")[1]["scene"]["medium"] == before
+
+
 def test_surfaces(s):
     mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
     s.play("replay", [*SETTLE, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <presets.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -199,6 +200,27 @@ TEST(Options, WithoutAWordOfLightItIsAClearDay) {
   const RenderOptions soft = parse({"--sun-angle", "5"});
   EXPECT_EQ(soft.scene.light.sky, CUMULET_SKY_PHYSICAL);
   EXPECT_EQ(soft.scene.light.sun_angle_degrees, 5.0f);
+}
+
+TEST(Options, APresetIsAMediumThatFlagsOverride) {
+  // Whatever the order on the command line.
+  const RenderOptions preset = parse({"--flame-strength", "7", "--density-scale", "3", "--preset", "explosion"});
+  const cumulet_medium_desc& medium = preset.scene.medium;
+  EXPECT_EQ(medium.blackbody, 12.0F);
+  EXPECT_EQ(medium.flame_strength, 7.0F);
+  EXPECT_EQ(medium.density_scale, 3.0);
+  EXPECT_EQ(medium.struct_size, sizeof medium);
+  EXPECT_FALSE(preset_of(medium)) << "another flame";
+  for (const cumulet::settings::Choice& choice : preset_choices) {
+    const RenderOptions plain = parse({"--preset", choice.name});
+    EXPECT_TRUE(plain.scene.auto_density_scale);
+    EXPECT_EQ(preset_of(plain.scene.medium), static_cast<Preset>(choice.value)) << choice.name;
+    const SceneOptions again = parse_scene(scene_text(plain.scene, "a.json"), "a.json");
+    EXPECT_EQ(preset_of(again.medium), static_cast<Preset>(choice.value)) << "a scene file can say it";
+  }
+  EXPECT_FALSE(preset_of(SceneOptions().medium));
+  EXPECT_EQ(usage_error(with({"--preset", "steam"})),
+            "--preset: 'steam' is none of cumulus, smoke, fire, explosion, ground-fog");
 }
 
 TEST(Options, ViewNames) {

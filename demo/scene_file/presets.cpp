@@ -1,0 +1,59 @@
+#include "presets.hpp"
+
+#include <algorithm>
+#include <settings.hpp>
+
+namespace cumulet::demo {
+
+namespace {
+
+void set(float (&rgb)[3], float r, float g, float b) { std::copy_n(std::array{r, g, b}.begin(), 3, rgb); }
+
+}  // namespace
+
+void apply(Preset preset, cumulet_medium_desc& medium) {
+  const double density_scale = medium.density_scale;
+  medium = {};
+  medium.struct_size = sizeof medium;
+  medium.density_scale = density_scale;
+  switch (preset) {
+    case Preset::cumulus:
+      medium.phase = CUMULET_PHASE_MIE;
+      medium.droplet_diameter = 20.0F;
+      break;
+    case Preset::smoke:
+      set(medium.coalbedo, 0.35F, 0.35F, 0.34F);
+      medium.anisotropy = 0.3F;
+      break;
+    case Preset::fire:
+      set(medium.coalbedo, 0.6F, 0.62F, 0.64F);
+      medium.blackbody = 2.0F;
+      medium.flame_strength = 4.0F;
+      set(medium.flame_color, 1.0F, 0.4F, 0.1F);
+      break;
+    case Preset::explosion:
+      set(medium.coalbedo, 0.68F, 0.7F, 0.72F);
+      medium.max_bounces = 12;
+      medium.blackbody = 12.0F;
+      medium.flame_strength = 9.0F;
+      set(medium.flame_color, 1.0F, 0.3F, 0.05F);
+      break;
+    case Preset::ground_fog:
+      set(medium.coalbedo, 0.002F, 0.002F, 0.002F);
+      medium.phase = CUMULET_PHASE_MIE;
+      medium.droplet_diameter = 8.0F;
+      break;
+  }
+}
+
+std::optional<Preset> preset_of(const cumulet_medium_desc& medium) {
+  for (const settings::Choice& choice : preset_choices) {
+    const auto preset = static_cast<Preset>(choice.value);
+    cumulet_medium_desc made = medium;
+    apply(preset, made);
+    if (settings::same(made, medium)) return preset;
+  }
+  return std::nullopt;
+}
+
+}  // namespace cumulet::demo
