@@ -8,7 +8,7 @@ import re
 
 import c_header
 
-DESCRIPTORS = ["grid", "medium", "light", "environment_settings", "surface_settings", "sampling", "display", "camera",
+DESCRIPTORS = ["grid", "medium", "light", "lamp", "environment_settings", "surface_settings", "sampling", "display", "camera",
                "navigation", "frame"]
 # What C functions fill.
 FILLED = {"camera"}

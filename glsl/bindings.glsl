@@ -45,7 +45,7 @@ const int CM_UNIFORM_MATERIAL = 1;
 const int CM_STORAGE_PATHS = 0;
 const int CM_STORAGE_BLOCKS = 1;
 const int CM_STORAGE_QUEUES = 2;
-const int CM_STORAGE_LAMPS = 0;          // surface.frag
+const int CM_STORAGE_LAMPS = 3;
 const int CM_STORAGE_DEPTH_CHANGED = 0;  // host_depth.comp
 const int CM_STORAGE_SIGN = 0;           // sign.comp
 

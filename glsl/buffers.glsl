@@ -39,6 +39,12 @@ uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(cm.surfaces.wo
 vec4 cm_atlas_value(ivec3 at) { return texelFetch(cm_atlas, at, 0); }
 #endif
 
+#if CM_LAMPS
+#include "punctual.glsl"
+layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLampRecords { CmLamp cm_lamps[]; };
+CmLamp cm_lamp(uint i) { return cm_lamps[i]; }
+#endif
+
 #if CM_ENVIRONMENT
 layout(binding = CM_UNIT_ENVIRONMENT) uniform usamplerBuffer cm_environment_words;
 uvec4 cm_environment_word(uint i) { return texelFetch(cm_environment_words, int(cm.environment.words + i)); }

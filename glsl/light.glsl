@@ -17,7 +17,7 @@
 #define CM_LIGHT_SKY 0u       // everywhere: looked for in a direction that a flight might take
 #define CM_LIGHT_SUN 1u       // far away: a disc, or without extent
 #define CM_LIGHT_TRIANGLE 2u  // emissive
-#define CM_LIGHT_LAMP 3u      // punctual
+#define CM_LIGHT_LAMP 3u      // of punctual.glsl
 #define CM_LIGHT_GLOW 4u      // the medium's own: flights that leave surfaces are aimed at its box
 #define CM_LIGHT_OTHER 5u     // of CM_MORE_LIGHTS
 #define CM_LIGHT_ENVIRONMENT 6u  // a picture of all that is far away, instead of the sky
@@ -104,21 +104,31 @@ CM_FN CmLightSample cm_sun_sample(CmPath p) {
   return light;
 }
 
-#if CM_SURFACES
+#if CM_LAMPS
 
-// ---- Lamps
+// ---- Lamps; no flight meets them. The includer provides CmLamp cm_lamp(uint i)
+
+#include "punctual.glsl"
 
 // Each as likely as the others.
 CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
-  uint word = cm.surfaces.lamps +
-              CM_LAMP_WORDS * min(uint(u * float(cm.surfaces.lamp_count)), cm.surfaces.lamp_count - 1u);
-  CmLight lamp = CmLight(cm_floats(word), cm_floats(word + 1u), cm_floats(word + 2u), cm_floats(word + 3u));
+  CmLamp lamp = cm_lamp(min(uint(u * float(cm.lamps.count)), cm.lamps.count - 1u));
+  vec3 from = vec3(0.0f, 0.0f, 0.0f);
+  if (lamp.extended != 0u) {
+    float u_a = cm_random(p.random, p.stream);
+    float u_b = cm_random(p.random, p.stream);
+    from = cm_lamp_point(lamp, u_a, u_b);
+  }
   CmLightSample light;
   light.kind = CM_LIGHT_LAMP;
-  light.radiance = cm_punctual_irradiance(lamp, here, light.direction, light.distance);
-  light.density = 1.0f / float(cm.surfaces.lamp_count);
+  light.radiance = cm_lamp_irradiance(lamp, from, here, light.direction, light.distance);
+  light.density = 1.0f / float(cm.lamps.count);
   return light;
 }
+
+#endif
+
+#if CM_SURFACES
 
 // ---- Emissive triangles; their table is that of src/light/emitters.hpp
 
@@ -220,7 +230,7 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
 #define CM_NEAR_LIGHTS(LIGHT)                                                                         \
   LIGHT(CM_LIGHT_TRIANGLE, cm.lights.triangle_chance, cm_triangle_sample, cm_triangle_pdf, cm_unused) \
   LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)
-#elif CM_SURFACES
+#elif CM_LAMPS
 #define CM_NEAR_LIGHTS(LIGHT) LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)
 #else
 #define CM_NEAR_LIGHTS(LIGHT)
@@ -259,7 +269,7 @@ CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   CmLightSample light = cm_sun_sample(p);
   float before = 0.0f;
   CM_FAR_LIGHTS(CM_LOOK)
-#if CM_SURFACES
+#if CM_LAMPS
   // Many lights may share the rest: a number with all its bits for them.
   if (u >= before && cm.lights.triangle_chance + cm.lights.lamp_chance > 0.0f) {
     u = before + (1.0f - before) * cm_random(p.random, p.stream);

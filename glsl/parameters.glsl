@@ -16,6 +16,9 @@
 #ifndef CM_CHANNELS
 #define CM_CHANNELS 0
 #endif
+#ifndef CM_LAMPS
+#define CM_LAMPS CM_SURFACES
+#endif
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
 #endif
@@ -106,13 +109,17 @@ CM_BLOCK(CmSurfaceTables) {
   uint vertices;
   uint materials;
   uint textures;
-  uint lamps;
-  uint lamp_count;
   uint emitters;
   uint emitter_count;
   uint ggx_albedo;  // src/surface/ggx_albedo.hpp's cells
   uint ggx_albedo_averages;
   CM_EQUALITY(CmSurfaceTables)
+};
+
+// Lamps of the scene and the host (glsl/punctual.glsl): render::LampData, through Tracer.
+CM_BLOCK(CmLamps) {
+  uint count;  // that are looked for
+  CM_EQUALITY(CmLamps)
 };
 
 // The picture of all that is far away (glsl/environment.glsl): render::EnvironmentData.
@@ -170,6 +177,7 @@ layout(std140, binding = CM_UNIFORM_PARAMETERS) uniform CmParameters {
   CmMedium medium;
   CmLights lights;
   CmSurfaceTables surfaces;
+  CmLamps lamps;
   CmEnvironment environment;
   CmLayers layers;
   CmHostDepth host_depth;

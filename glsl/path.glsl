@@ -182,6 +182,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   if (CM_SURFACES == 0) {
     p.t = 0.0f;
     p.t_end = cm_box_range(p.o, p.d).y;
+    if (CM_LAMPS != 0) p.t_end = min(p.t_end, p.reach);
     p.cell = p.start_cell;
     p.cache = CM_NONE;
     p.stage = CM_STAGE_FLY;

@@ -31,7 +31,7 @@ layout(location = 4) in vec4 cm_vertex_color;
 layout(location = 5) in float cm_z;
 
 layout(binding = CM_UNIT_MAPS) uniform sampler2D cm_maps[CM_MAPS];
-layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLights { CmLight cm_lights[]; };  // from the eye
+layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLampRecords { CmLamp cm_lamps[]; };  // from the eye
 
 layout(location = 0) out vec4 cm_colour;
 layout(location = 1) out float cm_depth_z;
@@ -134,7 +134,7 @@ void main() {
     for (uint i = 0u; i < cm_view.counts.x; ++i) {
       vec3 wi;
       float reach;
-      vec3 irradiance = cm_punctual_irradiance(cm_lights[i], cm_from_eye, wi, reach);
+      vec3 irradiance = cm_lamp_irradiance(cm_lamps[i], vec3(0.0), cm_from_eye, wi, reach);
       if (cm_max3(irradiance) > 0.0) colour += irradiance * cm_bsdf_eval(s, wo, wi);
     }
     vec3 emission = cm_material.emission.rgb;

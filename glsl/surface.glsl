@@ -5,7 +5,6 @@
 #ifndef CM_SURFACE_GLSL
 #define CM_SURFACE_GLSL
 #include "ggx.glsl"
-#include "punctual.glsl"
 #include "surface_tables.glsl"
 
 CM_FN vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }

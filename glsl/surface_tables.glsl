@@ -44,7 +44,4 @@ const uint CM_WRAP_MASK = 3u;
 const uint CM_WRAP_T_SHIFT = 2u;
 const uint CM_TEXTURE_NEAREST = 16u;
 
-// A lamp: a CmLight (punctual.glsl).
-const uint CM_LAMP_WORDS = 4u;
-
 #endif

@@ -7,6 +7,7 @@
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
+// variants: - or CM_LAMPS=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

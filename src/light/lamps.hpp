@@ -1,11 +1,14 @@
 #pragma once
 
-// glsl/punctual.glsl as C++, and a glTF light as its record: the raster pass and the path tracer take the same.
+// Lamps, glTF's and the host's, and glsl/punctual.glsl as C++: the raster pass and the path tracer take the same
+// records.
 
-#include <algorithm>
-#include <cmath>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
 
 #include "base/shared_code.hpp"
+#include "light/scene_lights.hpp"
 #include "surface/scene.hpp"
 
 namespace cumulet::core {
@@ -14,20 +17,29 @@ namespace cumulet::core {
 
 namespace cumulet::light {
 
-/// origin: what positions count from.
-inline core::CmLight lamp_record(const surface::PunctualLight& light, const glm::dvec3& origin) {
-  using Kind = surface::PunctualLight::Kind;
-  core::CmLight result{};
-  result.position = glm::vec4(glm::dvec3(light.position) - origin, light.kind == Kind::directional ? 0.0 : 1.0);
-  result.direction = glm::vec4(light.direction, light.range);
-  result.intensity = glm::vec4(light.intensity, 0.0F);
-  result.cone = glm::vec4(0.0F, 1.0F, 0.0F, 0.0F);
-  if (light.kind == Kind::spot) {
-    const float outer = std::cos(light.outer_cone);
-    const float scale = 1.0F / std::max(0.001F, std::cos(light.inner_cone) - outer);
-    result.cone = glm::vec4(scale, -outer * scale, 0.0F, 0.0F);
-  }
-  return result;
-}
+/// A lamp of the host's. Colours are linear Rec. 709.
+struct Lamp {
+  enum class Kind : std::uint8_t { point, spot, disc, rectangle, sun };
+  Kind kind = Kind::point;
+  glm::dvec3 position{0.0};              ///< world, of its middle; not of a sun
+  glm::dvec3 direction{0.0, -1.0, 0.0};  ///< world, unit: where it shines; not of a point
+  glm::dvec3 across{1.0, 0.0, 0.0};      ///< world, unit, upright to the direction: a rectangle's width is along it
+  glm::vec3 power{0.0F};                 ///< W; of a sun W/m2 on a plane that faces it
+  double width = 1.0;                    ///< of a rectangle, or a disc's diameter; world units
+  double height = 1.0;                   ///< of a rectangle
+  double angle = 0.0;  ///< radians: the whole cone of a spot; what a sun's disc covers of the sky, less than pi
+  double blend = 0.0;  ///< of a spot: the part of the half angle over which it dims, from 0 to 1
+  bool operator==(const Lamp&) const = default;
+};
+using Lamps = std::vector<Lamp>;
+
+/// What glTF says in candela and lux is taken as radiant (surface::PunctualLight). origin: what positions count from.
+core::CmLamp lamp_record(const surface::PunctualLight& light, const glm::dvec3& origin);
+/// Power as Blender's lamps have it: a point sends out power / (4 pi) a steradian, a spot the same inside of its cone,
+/// a disc and a rectangle power / (4 x area) of radiance on the side where they shine.
+core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin);
+
+/// Counts these, too.
+void add_lamps(SceneLights& lights, const Lamps& lamps);
 
 }  // namespace cumulet::light

@@ -9,7 +9,7 @@ namespace cumulet::light {
 
 /// What there is of a scene's own lights in a pose. Flux: the luminance of all that they send out.
 struct SceneLights {
-  std::uint32_t lamps = 0;      ///< punctual
+  std::uint32_t lamps = 0;      ///< glTF's and the host's
   std::uint32_t triangles = 0;  ///< emissive
   double lamp_flux = 0.0;
   double triangle_flux = 0.0;

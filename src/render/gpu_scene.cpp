@@ -21,6 +21,7 @@ void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Dea
   if (!volume) drop_data();
   update_environment(*snapshot.surroundings, wanted, deadline);
   update_model(model, wanted, deadline);
+  update_lamps(snapshot.lamps, wanted);
   if (volume) update_data(volume, wanted, deadline);
 }
 
@@ -106,6 +107,14 @@ void GpuScene::update_environment(const light::Surroundings& surroundings, const
   if (environment_ && environment_.of() == environment) surroundings_ = surroundings;
 }
 
+void GpuScene::update_lamps(const scene::Part<light::Lamps>& of_host, const Wanted& wanted) {
+  const LampsOf of{of_host, model_ ? model_.of() : nullptr};
+  if (!lamps_.wants(of, wanted.settings)) return;
+  static const std::vector<surface::PunctualLight> none;
+  lamps_.make(of, wanted.settings,
+              [&] { return LampData::make(gl_, limits_, *of_host, of.model ? of.model->pose.lights : none); });
+}
+
 void GpuScene::drop_data() {
   if (data_) data_revision_.advance();
   data_.clear();
@@ -174,8 +183,9 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   obstacles.traced = traced || obstacles.raster == nullptr;
   if (*snapshot.view) obstacles.view = **snapshot.view;
   const light::DistantLights lights = this->lights(snapshot);
-  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance};
+  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance, *snapshot.lamps};
   obstacles.environment = environment_.get();
+  obstacles.lamps = lamps_.get();
   return obstacles;
 }
 
@@ -203,8 +213,9 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   p.medium.coloured = source.coloured() ? 1U : 0U;
   const bool glow = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
   const ModelData* met = obstacles.met();
-  const light::LightTable table(lights(snapshot), surroundings(snapshot),
-                                met != nullptr ? met->lights() : light::SceneLights{}, glow);
+  light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
+  light::add_lamps(near, *snapshot.lamps);
+  const light::LightTable table(lights(snapshot), surroundings(snapshot), near, glow);
   p.lights = table.parameters();
   if (environment_) p.environment = environment_->parameters();
   p.integrator = integrator;

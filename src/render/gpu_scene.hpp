@@ -7,6 +7,7 @@
 #include "base/revision.hpp"
 #include "base/slot.hpp"
 #include "render/environment_data.hpp"
+#include "render/lamp_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_upload.hpp"
 #include "render/tracer.hpp"
@@ -69,6 +70,7 @@ class GpuScene {
   void show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content);
   void drop_data();
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
+  void update_lamps(const scene::Part<light::Lamps>& of_host, const Wanted& wanted);
   void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
 
   gl::FunctionsPtr gl_;
@@ -109,6 +111,12 @@ class GpuScene {
   light::Surroundings surroundings_;  // by that
   std::optional<EnvironmentUnderWay> environment_upload_;
   Revision<EnvironmentData> environment_revision_;
+  struct LampsOf {
+    scene::Part<light::Lamps> host;
+    scene::ModelSourcePtr model;  // that is here
+    bool operator==(const LampsOf&) const = default;
+  };
+  Slot<LampData, LampsOf> lamps_;
 };
 
 }  // namespace cumulet::render

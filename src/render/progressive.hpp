@@ -21,6 +21,7 @@ struct PictureWish {
     scene::Part<std::optional<scene::Viewpoint>> viewpoint;
     scene::Part<light::DistantLights> lights;
     scene::Part<light::Surroundings> surroundings;
+    scene::Part<light::Lamps> lamps;
     std::vector<scene::Part<scene::Medium>> media;
     Revision<MarchData> data;
     Revision<ModelData> model;

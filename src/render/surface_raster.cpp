@@ -22,7 +22,7 @@ namespace cumulet::render {
 
 namespace {
 
-using core::CmLight;
+using core::CmLamp;
 using core::CmMaterial;
 using core::CmSurfaceView;
 using surface::AlphaMode;
@@ -202,7 +202,7 @@ std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr&
   if (input.pose->vertices.size() != input.scene->scene->attributes.size()) {
     throw Error(ErrorCode::internal, "a pose of another scene");
   }
-  if (static_cast<std::int64_t>(input.pose->lights.size() * sizeof(CmLight)) > limits.storage_block_bytes) {
+  if (static_cast<std::int64_t>(input.pose->lights.size() * sizeof(CmLamp)) > limits.storage_block_bytes) {
     throw Error(ErrorCode::unsupported, std::to_string(input.pose->lights.size()) +
                                             " lights are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
                                             std::to_string(limits.storage_block_bytes) + ", holds");
@@ -318,20 +318,21 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sky_radiance = glm::vec4(lighting.sky_radiance, 0.0F);
   const std::span<const surface::PunctualLight> lamps =
       content_ ? std::span(content_->pose_->lights) : std::span<const surface::PunctualLight>();
-  block.counts.x = static_cast<std::uint32_t>(lamps.size());
+  std::vector<CmLamp> records;
+  records.reserve(lamps.size() + lighting.lamps.size());
+  for (const surface::PunctualLight& lamp : lamps) records.push_back(light::lamp_record(lamp, view.eye));
+  for (const light::Lamp& lamp : lighting.lamps) records.push_back(light::lamp_record(lamp, view.eye));
+  block.counts.x = static_cast<std::uint32_t>(records.size());
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
-  const std::size_t bytes = std::max<std::size_t>(lamps.size(), 1) * sizeof(CmLight);
+  const std::size_t bytes = std::max<std::size_t>(records.size(), 1) * sizeof(CmLamp);
   if (!light_buffer_ || light_bytes_ < bytes) {
     light_buffer_ = gl::make_buffer(gl_, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the surfaces' lights");
     light_bytes_ = bytes;
   }
-  std::vector<CmLight> lights;
-  lights.reserve(lamps.size());
-  for (const surface::PunctualLight& lamp : lamps) lights.push_back(light::lamp_record(lamp, view.eye));
-  if (!lights.empty()) {
-    gl_->NamedBufferSubData(light_buffer_.name(), 0, static_cast<GLsizeiptr>(lights.size() * sizeof(CmLight)),
-                            lights.data());
+  if (!records.empty()) {
+    gl_->NamedBufferSubData(light_buffer_.name(), 0, static_cast<GLsizeiptr>(records.size() * sizeof(CmLamp)),
+                            records.data());
   }
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_SURFACE_VIEW, view_block_.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_LAMPS, light_buffer_.name());

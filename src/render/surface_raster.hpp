@@ -17,11 +17,12 @@ namespace cumulet::render {
 
 using SurfaceView = scene::Viewpoint;
 
-/// Beside the lights of the pose.
+/// Beside the lights of the pose. Of a disc and a rectangle all light comes from the middle.
 struct SurfaceLighting {
   glm::vec3 sun_direction{0.0F, 1.0F, 0.0F};  ///< unit, towards the sun
   glm::vec3 sun_irradiance{0.0F};             ///< on a plane that faces it
   glm::vec3 sky_radiance{0.0F};               ///< the same from everywhere
+  light::Lamps lamps;
   bool operator==(const SurfaceLighting&) const = default;
 };
 

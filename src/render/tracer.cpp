@@ -45,10 +45,13 @@ std::size_t far_step(std::size_t n) {
 // While there is nothing to do but to wait for the device: no call into GL waits.
 void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 
-// Surfaces may be others than when a picture was begun: poses and the host's depth change.
+// Surfaces may be others than when a picture was begun, and lamps: poses and the host's depth change.
 void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
   parameters.host_depth = {obstacles.size, obstacles.depth != 0 ? obstacles.layers : 0};
   if (obstacles.scene != nullptr) parameters.surfaces = obstacles.scene->tables();
+  if (obstacles.lamps != nullptr) {
+    parameters.lamps.count = obstacles.met() != nullptr ? obstacles.lamps->count() : obstacles.lamps->of_host();
+  }
 }
 
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
@@ -164,6 +167,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
   add_medium(picture, more);
   if (picture.environment_) more.emplace_back(environment_macro);
+  if (picture.lamps_) more.emplace_back("CM_LAMPS 1");
   return program(data.defines(), "trace.comp", more);
 }
 
@@ -225,6 +229,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
   picture.channels_ = parameters.medium.emits != 0U || parameters.medium.coloured != 0U;
   picture.environment_ = obstacles.environment != nullptr;
+  picture.lamps_ = obstacles.lamps != nullptr && obstacles.lamps->of_host() > 0;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
 }
@@ -401,6 +406,7 @@ void Tracer::bind(const MarchData& data, const Obstacles& obstacles) const {
   if (obstacles.depth != 0) gl_->BindTextureUnit(core::CM_UNIT_HOST_DEPTH, obstacles.depth);
   if (obstacles.scene != nullptr) obstacles.scene->bind(*gl_);
   if (obstacles.environment != nullptr) obstacles.environment->bind(*gl_);
+  if (obstacles.lamps != nullptr) obstacles.lamps->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
 }
 

@@ -12,6 +12,7 @@
 #include "gl/programs.hpp"
 #include "render/environment_data.hpp"
 #include "render/film.hpp"
+#include "render/lamp_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_data.hpp"
 #include "render/pace.hpp"
@@ -31,7 +32,8 @@ struct Totals {
   double noise = 0.0;
 };
 
-/// What paths end at beside the volume: the host's depth as render::HostDepth keeps it, triangles, and an environment.
+/// What paths end at, or find, beside the volume: the host's depth as render::HostDepth keeps it, triangles, an
+/// environment, and lamps.
 struct Obstacles {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
@@ -42,6 +44,7 @@ struct Obstacles {
   SurfaceView view;
   SurfaceLighting lighting;
   const EnvironmentData* environment = nullptr;  // of those that escape
+  const LampData* lamps = nullptr;               // of the host and of the scene
 
   /// The scene whose triangles paths meet; null: they meet none.
   [[nodiscard]] const ModelData* met() const { return traced ? scene : nullptr; }
@@ -125,6 +128,7 @@ class Picture {
   bool second_lobe_ = false;  // of the medium's phase function
   bool channels_ = false;     // its cells carry more than density
   bool environment_ = false;  // paths that escape come to one
+  bool lamps_ = false;        // paths that meet no triangles look for lamps
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   void begin_tile();

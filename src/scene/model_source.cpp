@@ -14,7 +14,6 @@
 #include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
-#include "light/lamps.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
@@ -99,16 +98,6 @@ std::uint32_t wrap_bits(surface::Wrap wrap) {
 
 std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
 
-void add_lamps(std::vector<uvec4>& words, const std::vector<surface::PunctualLight>& lamps) {
-  for (const surface::PunctualLight& lamp : lamps) {
-    const core::CmLight record = light::lamp_record(lamp, glm::dvec3(0.0));
-    words.push_back(bits(record.position));
-    words.push_back(bits(record.direction));
-    words.push_back(bits(record.intensity));
-    words.push_back(bits(record.cone));
-  }
-}
-
 void pack_words(ModelSource& source, const Progress* progress) {
   const surface::Scene& scene = *source.scene;
   std::vector<uvec4>& words = source.words;
@@ -158,10 +147,6 @@ void pack_words(ModelSource& source, const Progress* progress) {
                        wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << core::CM_WRAP_T_SHIFT |
                            (texture.sampler.magnify == surface::Filter::nearest ? core::CM_TEXTURE_NEAREST : 0U));
   }
-  source.tables.lamps = size_of(words);
-  source.tables.lamp_count = static_cast<std::uint32_t>(source.pose.lights.size());
-  add_lamps(words, source.pose.lights);
-
   check(progress);
   const light::EmitterTable table = light::emitter_table(source.emissive, scene, source.pose, progress);
   source.tables.emitters = size_of(words);

@@ -7,6 +7,7 @@
 
 #include "light/distant_lights.hpp"
 #include "light/environment.hpp"
+#include "light/lamps.hpp"
 #include "scene/march_source.hpp"
 #include "scene/model_source.hpp"
 #include "scene/part.hpp"
@@ -56,6 +57,7 @@ struct Snapshot {
   std::vector<Model> models;    ///< likewise
   Part<light::DistantLights> lights;
   Part<light::Surroundings> surroundings;
+  Part<light::Lamps> lamps;  ///< the host's; models have their own beside them
   Part<std::optional<Viewpoint>> view;  ///< none: nothing is to be seen
   /// O(volumes + models).
   bool operator==(const Snapshot&) const = default;

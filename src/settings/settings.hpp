@@ -58,6 +58,13 @@ inline constexpr std::array navigation_choices = {
 inline constexpr std::array depth_choices = {Choice{"standard", CUMULET_DEPTH_STANDARD, "", ""},
                                              Choice{"reversed", CUMULET_DEPTH_REVERSED, "", ""}};
 
+inline constexpr std::array lamp_choices = {
+    Choice{"point", CUMULET_LAMP_POINT, "Point", "The same in all directions."},
+    Choice{"spot", CUMULET_LAMP_SPOT, "Spot", "A point that shines into a cone."},
+    Choice{"disc", CUMULET_LAMP_DISC, "Disc", "A round area that shines to one side."},
+    Choice{"rectangle", CUMULET_LAMP_RECTANGLE, "Rectangle", "An area that shines to one side."},
+    Choice{"sun", CUMULET_LAMP_SUN, "Sun", "Far away: the same everywhere."}};
+
 // One setting, one row.
 // clang-format off
 
@@ -206,6 +213,54 @@ struct Table<cumulet_light_desc> {
         .row = {.label = "Sun angle",
                 .tip = "That the sun's disc takes: larger is softer.",
                 .most = 30.0, .format = "%.2f°"}})};
+};
+
+/// Of one lamp of many: keys are those of its object in a scene file's list.
+template <>
+struct Table<cumulet_lamp_desc> {
+  using Desc = cumulet_lamp_desc;
+  static constexpr const char* name = "cumulet_lamp_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::kind, {.name = "kind", .choices = lamp_choices,
+        .key = "kind",
+        .row = {.label = "Lamp", .tip = "What shape of light it is."}}),
+      Setting(&Desc::position, {.name = "position",
+        .key = "position",
+        .row = {.label = "Position", .tip = "In the world, of its middle."}}),
+      Setting(&Desc::direction, {.name = "direction",
+        .key = "direction",
+        .row = {.label = "Direction", .tip = "Where it shines."}}),
+      Setting(&Desc::across, {.name = "across",
+        .key = "across",
+        .row = {.label = "Across", .tip = "Along a rectangle's width."}}),
+      Setting(&Desc::color, {.name = "color", .range = light_range, .zero = 1.0,
+        .key = "color",
+        .row = {.label = "Lamp colour", .tip = "Times its power."}}),
+      Setting(&Desc::power, {.name = "power", .range = light_range,
+        .key = "power",
+        .row = {.label = "Power",
+                .tip = "Watts, as Blender's; of a sun W/m² on what faces it.",
+                .most = 1e6, .format = "%.4g", .logarithmic = true}}),
+      Setting(&Desc::width, {.name = "width", .range = {0.0, 1e30}, .given = above_zero, .zero = 1.0,
+        .key = "width",
+        .row = {.label = "Width",
+                .tip = "Of a rectangle; a disc's diameter.",
+                .least = 1e-3, .most = 1e4, .format = "%.4g", .logarithmic = true}}),
+      Setting(&Desc::height, {.name = "height", .range = {0.0, 1e30}, .given = above_zero, .zero = 1.0,
+        .key = "height",
+        .row = {.label = "Height",
+                .tip = "Of a rectangle.",
+                .least = 1e-3, .most = 1e4, .format = "%.4g", .logarithmic = true}}),
+      Setting(&Desc::angle_degrees, {.name = "angle_degrees", .range = {0.0, 180.0},
+        .key = "angle_degrees",
+        .row = {.label = "Angle",
+                .tip = "Of a spot's whole cone; what a sun covers of the sky.",
+                .most = 180.0, .format = "%.1f°"}}),
+      Setting(&Desc::blend, {.name = "blend", .range = {0.0, 1.0},
+        .key = "blend",
+        .row = {.label = "Blend",
+                .tip = "The part of a spot's cone in which it dims.",
+                .most = 1.0}})};
 };
 
 template <>

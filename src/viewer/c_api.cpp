@@ -1,6 +1,7 @@
 // The C ABI's viewer: checks arguments, translates descriptors, keeps exceptions in.
 
 #include "viewer/c_handles.hpp"
+#include "viewer/c_lamps.hpp"
 #include "viewer/c_settings.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/viewer.hpp"
@@ -252,6 +253,10 @@ cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_d
 
 cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
+}
+
+cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::lamps_of(lamps, count)); });
 }
 
 cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment) {

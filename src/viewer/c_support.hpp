@@ -162,4 +162,20 @@ std::span<const T> array_of(const T* values, uint64_t count, uint64_t each, cons
   return {values, static_cast<size_t>(count * each)};
 }
 
+/// Calls visit with each of a host's array of descriptors and its number. A host built against an older header passes
+/// shorter ones: the first one's size is the distance between them. what: "clouds: mesh"
+template <class Desc, class Visit>
+void for_each_desc(const Desc* first, uint64_t count, const char* name, const std::string& what, Visit&& visit) {
+  if (count == 0) return;
+  const size_t stride = read_desc(first, name).struct_size;
+  if (stride % alignof(Desc) != 0) refuse(what + ": " + name + ".struct_size is no struct's");
+  array_of(reinterpret_cast<const unsigned char*>(first), count, stride, what + "s");
+  for (uint64_t i = 0; i < count; ++i) {
+    const auto* at = reinterpret_cast<const Desc*>(reinterpret_cast<const char*>(first) + i * stride);
+    const std::string one = what + " " + std::to_string(i);
+    if (at->struct_size != stride) refuse(one + ": " + name + ".struct_size is not the first one's");
+    visit(*at, one);
+  }
+}
+
 }  // namespace cumulet::c_abi

@@ -53,20 +53,13 @@ surface::TriangleMesh mesh_of(const cumulet_mesh_desc& d, const std::string& wha
   return mesh;
 }
 
-/// A host built against an older header passes shorter meshes: the first one's size is the distance between them.
 std::vector<surface::TriangleMesh> meshes_of(const cumulet_triangles_desc& d, const std::string& name) {
   std::vector<surface::TriangleMesh> meshes;
-  if (d.mesh_count == 0) return meshes;
-  if (d.meshes == nullptr) refuse(name + ": meshes are NULL");
-  const size_t stride = read_desc(d.meshes, "cumulet_mesh_desc").struct_size;
-  if (stride % alignof(cumulet_mesh_desc) != 0) refuse(name + ": cumulet_mesh_desc.struct_size is no struct's");
-  array_of(reinterpret_cast<const unsigned char*>(d.meshes), d.mesh_count, stride, name + ": meshes");
-  for (uint64_t i = 0; i < d.mesh_count; ++i) {
-    const auto* at = reinterpret_cast<const cumulet_mesh_desc*>(reinterpret_cast<const char*>(d.meshes) + i * stride);
-    const std::string what = name + ": mesh " + std::to_string(i);
-    if (at->struct_size != stride) refuse(what + ": cumulet_mesh_desc.struct_size is not the first mesh's");
-    meshes.push_back(mesh_of(read_desc(at, "cumulet_mesh_desc"), what));
-  }
+  if (d.mesh_count != 0 && d.meshes == nullptr) refuse(name + ": meshes are NULL");
+  for_each_desc(d.meshes, d.mesh_count, "cumulet_mesh_desc", name + ": mesh",
+                [&](const cumulet_mesh_desc& mesh, const std::string& what) {
+                  meshes.push_back(mesh_of(read_desc(&mesh, "cumulet_mesh_desc"), what));
+                });
   return meshes;
 }
 

@@ -259,6 +259,11 @@ void Viewer::set_light(const Light& light) {
   touch();
 }
 
+void Viewer::set_lamps(light::Lamps lamps) {
+  scene_.lamps.set(std::move(lamps));
+  touch();
+}
+
 void Viewer::set_environment(light::EnvironmentPtr environment) {
   if (environment && environment->replaced > 0) {
     log_.warning(environment->name + ": " + std::to_string(environment->replaced) +

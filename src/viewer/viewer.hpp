@@ -86,6 +86,7 @@ class Viewer {
   void set_grid(const GridSettings& settings);
   void set_medium(const Medium& medium);
   void set_light(const Light& light);
+  void set_lamps(light::Lamps lamps);
   /// Null: the sky of the light.
   void set_environment(light::EnvironmentPtr environment);
   void set_environment_settings(const EnvironmentSettings& settings);

@@ -312,6 +312,7 @@ void Caller::call_all() {
   const auto triangles = make_desc<cumulet_triangles_desc>();
   const auto medium = make_desc<cumulet_medium_desc>();
   const auto light = make_desc<cumulet_light_desc>();
+  const auto lamp = make_desc<cumulet_lamp_desc>();
   const auto environment = make_desc<cumulet_environment_desc>();
   const auto environment_settings = make_desc<cumulet_environment_settings_desc>();
   auto environment_info = make_desc<cumulet_environment_info>();
@@ -417,6 +418,7 @@ void Caller::call_all() {
     CALL(cumulet_set_grid, v, &grid);
     CALL(cumulet_set_medium, v, &medium);
     CALL(cumulet_set_light, v, &light);
+    CALL(cumulet_set_lamps, v, &lamp, 1);
     CALL(cumulet_set_environment, v, nullptr);
     CALL(cumulet_get_environment, v, &new_environment);
     CALL(cumulet_set_environment_settings, v, &environment_settings);

@@ -121,6 +121,7 @@ TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
   expect_all_fields<cumulet_medium_desc>();
   expect_all_fields<cumulet_light_desc>();
   expect_all_fields<cumulet_environment_settings_desc>();
+  expect_all_fields<cumulet_lamp_desc>();
   expect_all_fields<cumulet_grid_desc>();
   expect_all_fields<cumulet_surface_settings_desc>();
   expect_all_fields<cumulet_sampling_desc>();

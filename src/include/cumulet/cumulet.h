@@ -815,6 +815,44 @@ CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumul
 CUMULET_API cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out);
 CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer,
                                                             const cumulet_environment_settings_desc* desc);
+/* ---- Lamps ---- */
+
+typedef enum cumulet_lamp_kind {
+  CUMULET_LAMP_POINT = 0,     /* the same in all directions */
+  CUMULET_LAMP_SPOT = 1,      /* a point that shines into a cone */
+  CUMULET_LAMP_DISC = 2,      /* of the same radiance all over, on the side where it shines */
+  CUMULET_LAMP_RECTANGLE = 3, /* likewise */
+  CUMULET_LAMP_SUN = 4        /* far away: the same everywhere */
+} cumulet_lamp_kind;
+
+/*
+ * A lamp: it lights volume and surfaces, casts shadows, and is itself not seen, neither by the camera nor in mirrors.
+ * Its strength is radiant, as Blender's lamps have it. A point of glTF's of I candela, which Cumulet takes as I W/sr,
+ * is one of 4 pi I watts; so is a spot, whose power is that of the point it is cut out of. A disc or rectangle has a
+ * radiance of power / (4 x area): it sends out pi / 4 of its power.
+ */
+typedef struct cumulet_lamp_desc {
+  size_t struct_size; /* of all lamps of an array the same: the distance between them */
+  cumulet_lamp_kind kind;
+  double position[3];   /* world, of its middle; not of a sun */
+  double direction[3];  /* world, of any length: where it shines; not of a point; zero: down, to -Y */
+  double across[3];     /* of a rectangle: along its width, as far as that is upright to the direction; zero, or along
+                           the direction: level with the ground, or +X where it shines up or down */
+  float color[3];       /* linear Rec. 709, times power; all 0: white */
+  float power;          /* watts; of a sun W/m2 on a surface that faces it; 0: dark */
+  double width;         /* of a rectangle; of a disc the diameter; world units; 0: 1 */
+  double height;        /* of a rectangle; 0: 1 */
+  double angle_degrees; /* of a spot the whole cone's, up to 180, 0: 45; of a sun what it covers of the sky, up to 90 */
+  double blend;         /* of a spot: the part of the cone, from its edge inwards, in which it dims; 0 to 1 */
+} cumulet_lamp_desc;
+
+/*
+ * The viewer's lamps from now on, instead of those before; copied. lamps may be NULL where count is 0: none. Those of
+ * its surfaces' file stay beside them. At most 4096. What previews rasterise, and CUMULET_SURFACE_LIGHT_NONE, has them
+ * without shadows, discs and rectangles from their middle. Restarts accumulation.
+ */
+CUMULET_API cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count);
+
 CUMULET_API cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc);
 CUMULET_API cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc);
 

@@ -1080,6 +1080,13 @@ class Viewer {
     return result(cumulet_use_surface_camera(handle(), index));
   }
   [[nodiscard]] Result<> set_light(const LightDesc& desc) noexcept { return set(cumulet_set_light, desc); }
+  /// None: none.
+  [[nodiscard]] Result<> set_lamps(std::span<const LampDesc> lamps) noexcept {
+    const std::unique_ptr<cumulet_lamp_desc[]> c(new (std::nothrow) cumulet_lamp_desc[lamps.size()]);
+    if (!c) return Error{StatusCode::out_of_memory, Text<512>("out of memory")};
+    std::ranges::copy(lamps, c.get());
+    return result(cumulet_set_lamps(handle(), c.get(), lamps.size()));
+  }
   /// Empty: the light's sky.
   [[nodiscard]] Result<> set_environment(const Environment& environment) noexcept {
     return result(cumulet_set_environment(handle(), environment.handle()));

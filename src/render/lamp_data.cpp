@@ -1,0 +1,34 @@
+#include "render/lamp_data.hpp"
+
+#include <string>
+
+#include "base/error.hpp"
+#include "gl/bindings.hpp"
+
+namespace cumulet::render {
+
+LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
+                        const std::vector<surface::PunctualLight>& of_scene) {
+  std::vector<core::CmLamp> records;
+  records.reserve(of_host.size() + of_scene.size());
+  for (const light::Lamp& lamp : of_host) records.push_back(light::lamp_record(lamp, glm::dvec3(0.0)));
+  for (const surface::PunctualLight& lamp : of_scene) records.push_back(light::lamp_record(lamp, glm::dvec3(0.0)));
+  LampData data;
+  data.count_ = static_cast<std::uint32_t>(records.size());
+  data.of_host_ = static_cast<std::uint32_t>(of_host.size());
+  if (records.empty()) records.emplace_back();  // what kernels are bound to, though they read none
+  const std::size_t bytes = records.size() * sizeof(core::CmLamp);
+  if (static_cast<std::int64_t>(bytes) > limits.storage_block_bytes) {
+    throw Error(ErrorCode::unsupported, std::to_string(records.size()) +
+                                            " lamps are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
+                                            std::to_string(limits.storage_block_bytes) + ", holds");
+  }
+  data.records_ = gl::make_buffer(gl, bytes, records.data(), 0, "creating the lamps");
+  return data;
+}
+
+void LampData::bind(const gl::Functions& gl) const {
+  gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_LAMPS, records_.name());
+}
+
+}  // namespace cumulet::render

@@ -1,0 +1,71 @@
+#include "viewer/c_lamps.hpp"
+
+#include <cmath>
+#include <numbers>
+
+namespace cumulet::c_abi {
+
+namespace {
+
+using glm::dvec3;
+
+constexpr uint64_t most_lamps = 4096;
+constexpr double far = 1e30;
+
+/// Unit, of a vector of any length above 0.
+dvec3 unit(const dvec3& v) {
+  const dvec3 size = glm::abs(v);
+  return glm::normalize(v / std::max({size.x, size.y, size.z}));
+}
+
+/// Along a rectangle's width: upright to where it shines.
+dvec3 across_of(const dvec3& wanted, const dvec3& direction) {
+  const dvec3 level = glm::cross(dvec3(0.0, 1.0, 0.0), direction);
+  const dvec3 otherwise = glm::length(level) > 1e-6 ? level : dvec3(1.0, 0.0, 0.0);
+  const dvec3 way = wanted == dvec3(0.0) ? otherwise : unit(wanted);
+  const dvec3 upright = way - glm::dot(way, direction) * direction;
+  return glm::normalize(glm::length(upright) > 1e-6 ? upright : otherwise);
+}
+
+light::Lamp lamp_of(const cumulet_lamp_desc& d) {
+  light::Lamp lamp;
+  lamp.kind = static_cast<light::Lamp::Kind>(d.kind);
+  lamp.position = to_dvec3(d.position);
+  if (to_dvec3(d.direction) != dvec3(0.0)) lamp.direction = unit(to_dvec3(d.direction));
+  lamp.across = across_of(to_dvec3(d.across), lamp.direction);
+  lamp.power = to_vec3(d.color) * d.power;
+  lamp.width = d.width;
+  lamp.height = d.height;
+  const double degrees = d.kind == CUMULET_LAMP_SPOT && d.angle_degrees == 0.0 ? 45.0 : d.angle_degrees;
+  lamp.angle = degrees * std::numbers::pi / 180.0;
+  lamp.blend = d.blend;
+  return lamp;
+}
+
+}  // namespace
+
+light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count) {
+  light::Lamps made;
+  if (count > most_lamps) refuse(std::to_string(count) + " lamps are more than " + std::to_string(most_lamps));
+  for_each_desc(lamps, count, "cumulet_lamp_desc", "lamp",
+                [&](const cumulet_lamp_desc& given, const std::string& what) {
+                  cumulet_lamp_desc d{};
+                  try {
+                    d = read_settings(&given);
+                  } catch (const Error& error) {
+                    refuse(what + ": " + error.what());
+                  }
+                  const auto near = [](double v) { return std::abs(v) <= far; };
+                  if (!std::ranges::all_of(d.position, near))
+                    refuse(what + ": cumulet_lamp_desc.position is beyond 1e30");
+                  if (d.kind == CUMULET_LAMP_SUN && d.angle_degrees > 90.0)
+                    refuse(what + ": cumulet_lamp_desc.angle_degrees of a sun is above 90");
+                  const light::Lamp lamp = lamp_of(d);
+                  if (!all_finite(std::array{lamp.power.x, lamp.power.y, lamp.power.z}))
+                    refuse(what + ": cumulet_lamp_desc.color times power is not finite");
+                  if (lamp.power != glm::vec3(0.0F)) made.push_back(lamp);
+                });
+  return made;
+}
+
+}  // namespace cumulet::c_abi

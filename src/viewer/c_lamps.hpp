@@ -1,0 +1,13 @@
+#pragma once
+
+// Lamps of the C ABI.
+
+#include "light/lamps.hpp"
+#include "viewer/c_settings.hpp"
+
+namespace cumulet::c_abi {
+
+/// Dark ones are left out. Throws Error(invalid_argument) that names the lamp and the field.
+light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count);
+
+}  // namespace cumulet::c_abi
