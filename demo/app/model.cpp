@@ -83,7 +83,8 @@ Model::Model() {
 }
 
 VolumeChoice volume_of(const SceneOptions& scene) {
-  return {scene.volume, scene.grid_name, scene.up, scene.temperature_grid, scene.flame_grid, scene.color_grid};
+  return {scene.volume,     scene.grid_name,  scene.up,      scene.temperature_grid,
+          scene.flame_grid, scene.color_grid, scene.to_world};
 }
 
 void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
@@ -93,6 +94,7 @@ void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
   scene.temperature_grid = volume.temperature_grid;
   scene.flame_grid = volume.flame_grid;
   scene.color_grid = volume.color_grid;
+  scene.to_world = volume.to_world;
 }
 
 void tell(Model& model, bool error, const std::string& text, double now) {
@@ -107,6 +109,7 @@ void tell(Model& model, bool error, const std::string& text, double now) {
 void spell_out_defaults(SceneOptions& scene) {
   for_each_group(scene, [](auto& group) { settings::spell_out_zeros(group); });
   settings::spell_out_zeros(scene.camera);
+  for (cumulet_lamp_desc& lamp : scene.lamps) settings::spell_out_zeros(lamp);
   if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
 }
 

@@ -76,6 +76,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   section("File", true, [&] { file(model, commands); });
   section("Display", true, [&] { display(model); });
   section("Light", true, [&] { light(model); });
+  section("Lamps", true, [&] { lamps(model); });
   section("Medium", true, [&] { medium(model, commands); });
   section("Surfaces", true, [&] { surfaces(model); });
   section("Grid", true, [&] { grid(model); });

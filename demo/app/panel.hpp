@@ -36,6 +36,7 @@ class Panel {
   void camera(Model& model, std::vector<Command>& commands);
   void display(Model& model);
   void light(Model& model);
+  void lamps(Model& model);
   void medium(Model& model, std::vector<Command>& commands);
   void surfaces(Model& model);
   void grid(Model& model);

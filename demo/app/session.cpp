@@ -118,6 +118,7 @@ void Session::follow(const Wish& wish) {
   give(&SceneOptions::light, cumulet_set_light);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
   follow_environment();
+  follow_lamps();
   give(&SceneOptions::sampling, cumulet_set_sampling);
   give(&SceneOptions::display, cumulet_set_display);
   if (!(wish_.held && status_.busy)) give(&SceneOptions::grid, cumulet_set_grid);
@@ -126,6 +127,12 @@ void Session::follow(const Wish& wish) {
   navigation_ = wish_.navigation;
   follow_surfaces();
   follow_volume();
+}
+
+void Session::follow_lamps() {
+  if (std::ranges::equal(known_->lamps, scene_.lamps, settings::same<cumulet_lamp_desc>)) return;
+  known_->lamps = scene_.lamps;
+  check(cumulet_set_lamps(viewer_.get(), scene_.lamps.data(), scene_.lamps.size()));
 }
 
 void Session::follow_environment() {

@@ -179,6 +179,14 @@ bool Ui::integer(const char* label, const char* tip, std::uint32_t& value) {
   return changed;
 }
 
+bool Ui::three(const char* label, const char* tip, double (&values)[3], float speed) {
+  begin_row(label);
+  const bool changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, values, 3, speed,
+                                          nullptr, nullptr, "%.4g");
+  remember(label, tip);
+  return changed;
+}
+
 bool Ui::choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value) {
   begin_row(label);
   const auto now = std::find_if(choices.begin(), choices.end(), [&](const Choice& c) { return c.value == value; });

@@ -44,6 +44,8 @@ class Ui {
   bool slider(const char* label, const char* tip, std::uint64_t& value, std::uint64_t least, std::uint64_t most,
               const char* format, ImGuiSliderFlags flags = 0);
   bool integer(const char* label, const char* tip, std::uint32_t& value);
+  /// Three numbers, dragged or typed; speed: a pixel.
+  bool three(const char* label, const char* tip, double (&values)[3], float speed);
   /// True once something else is chosen.
   bool choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value);
   /// A linear colour, edited as it looks.

@@ -57,7 +57,8 @@ void write_surfaces(const path& file, std::uint32_t seed) {
 }
 
 void save(const cumulet::demo::SceneOptions& scene, const path& file) {
-  cumulet::demo::save_scene(scene, file.string());
+  // Version 1: other programs read the samples, too.
+  cumulet::demo::save_scene(scene, file.string(), cumulet::demo::SceneFormat::first);
   std::printf("%s\n", file.string().c_str());
 }
 

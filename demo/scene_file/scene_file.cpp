@@ -11,10 +11,12 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <program.hpp>
 #include <set>
 #include <settings.hpp>
+#include <span>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
@@ -32,7 +34,22 @@ using settings::number_text;
 using settings::Range;
 using settings::Spelling;
 
-constexpr int format_version = 1;
+/// Where version 2 has what version 1 has under a name of its own.
+struct Moved {
+  std::string_view first;
+  std::string_view second;
+};
+constexpr std::array moved = {Moved{"volume", "volumes[0]"}, Moved{"medium", "volumes[0].medium"},
+                              Moved{"surfaces", "models[0]"}, Moved{"light", "environment"}};
+
+/// A setting's key, which is of version 1, as a version has it.
+std::string key_in(SceneFormat format, const std::string& key) {
+  const std::string section = key.substr(0, key.find('.'));
+  const auto* const found = std::ranges::find(moved, section, &Moved::first);
+  if (format == SceneFormat::first || found == moved.end()) return key;
+  return std::string(found->second) + key.substr(section.size());
+}
+
 constexpr double max_u32 = 4294967295.0;
 // JSON's numbers are exact integers up to here.
 constexpr double max_integer = 9007199254740992.0;
@@ -41,12 +58,26 @@ constexpr double max_integer = 9007199254740992.0;
   throw std::runtime_error(file + ": " + one_line(cause));  // a key may be of any text
 }
 
-/// A file's keys, each named by its path, such as "light.sun.irradiance", and taken out of it when it is read: what is
-/// left over is refused, since a misspelt key would go unnoticed.
+/// A file's keys, each named by its path, such as "environment.sun.irradiance" or "lights[0].power", and taken out of
+/// it when it is read: what is left over is refused, since a misspelt key would go unnoticed. Those that moved are
+/// asked for as version 1 has them, and told as the file does.
 class Reader {
  public:
   Reader(std::string file, Json json) : file_(std::move(file)), json_(std::move(json)) {
     if (!json_.is_object()) fail(file_, "the file is not an object");
+  }
+
+  void set_format(SceneFormat format) { format_ = format; }
+
+  /// How many objects a list has, at most that many; 0 where there is no list.
+  std::size_t list(const std::string& key, std::size_t most) {
+    const auto found = json_.find(key);
+    if (found == json_.end()) return 0;
+    if (!found->is_array()) wrong(key, "is not a list");
+    if (found->size() > most)
+      wrong(key, "are " + std::to_string(found->size()) + ": this program shows " + std::to_string(most));
+    sections_.insert(key);
+    return found->size();
   }
 
   void text(const std::string& key, std::string& out) {
@@ -107,16 +138,23 @@ class Reader {
 
   template <class Number>
   bool three(const std::string& key, Number (&out)[3], const Range& range = {}) {
+    return numbers(key, std::span<Number>(out), "three numbers", range);
+  }
+
+  template <class Number>
+  bool numbers(const std::string& key, std::span<Number> out, const char* what, const Range& range = {}) {
     const std::optional<Json> value = take(key);
     if (!value) return false;
-    if (!value->is_array() || value->size() != 3) wrong(key, "is not three numbers");
-    for (std::size_t i = 0; i < 3; ++i) out[i] = static_cast<Number>(checked(key, (*value)[i], range));
+    if (!value->is_array() || value->size() != out.size()) wrong(key, std::string("is not ") + what);
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<Number>(checked(key, (*value)[i], range));
     return true;
   }
 
   [[nodiscard]] bool has(const std::string& key) { return find(key).value != nullptr; }
 
-  [[noreturn]] void wrong(const std::string& key, const std::string& cause) const { fail(file_, key + ": " + cause); }
+  [[noreturn]] void wrong(const std::string& key, const std::string& cause) const {
+    fail(file_, key_in(format_, key) + ": " + cause);
+  }
 
   void finish() const { refuse_rest(json_, ""); }
 
@@ -127,15 +165,27 @@ class Reader {
     Json* object = nullptr;
   };
 
-  /// Remembers the objects on the way, which may be there, be it empty.
-  Place find(const std::string& key) {
+  /// Remembers the objects and lists on the way, which may be there, be it empty.
+  Place find(const std::string& wanted) {
+    const std::string key = key_in(format_, wanted);
     Json* at = &json_;
     for (std::size_t begin = 0;;) {
       const std::size_t end = key.find('.', begin);
-      const auto found = at->find(key.substr(begin, end - begin));
+      const std::size_t bracket = key.find('[', begin);
+      const bool of_list = bracket < end;
+      const std::string name = key.substr(begin, std::min(bracket, end) - begin);
+      const auto found = at->find(name);
       if (found == at->end()) return {};
-      if (end == std::string::npos) return {&*found, at};
+      if (end == std::string::npos && !of_list) return {&*found, at};
       at = &*found;
+      if (of_list) {
+        const std::string list = key.substr(0, bracket);
+        if (!at->is_array()) fail(file_, list + " is not a list");
+        sections_.insert(list);
+        const std::size_t index = std::stoul(key.substr(bracket + 1));
+        if (index >= at->size()) return {};
+        at = &(*at)[index];
+      }
       const std::string section = key.substr(0, end);
       if (!at->is_object()) fail(file_, section + " is not an object");
       sections_.insert(section);
@@ -147,15 +197,16 @@ class Reader {
     const Place place = find(key);
     if (place.value == nullptr) return std::nullopt;
     Json taken = std::move(*place.value);
-    place.object->erase(key.substr(key.rfind('.') + 1));
+    place.object->erase(key.substr(key.rfind('.') + 1));  // its last name is the same in all versions
     return taken;
   }
 
-  void refuse_rest(const Json& object, const std::string& where) const {
-    for (const auto& item : object.items()) {
-      const std::string key = where + item.key();
-      if (!sections_.contains(key)) wrong(key, "there is no such setting");
-      refuse_rest(item.value(), key + ".");
+  void refuse_rest(const Json& rest, const std::string& where) const {
+    for (const auto& item : rest.items()) {
+      const std::string key =
+          rest.is_array() ? where + "[" + item.key() + "]" : where + (where.empty() ? "" : ".") + item.key();
+      if (!sections_.contains(key)) fail(file_, key + ": there is no such setting");
+      refuse_rest(item.value(), key);
     }
   }
 
@@ -167,6 +218,7 @@ class Reader {
   }
 
   std::string file_;
+  SceneFormat format_ = SceneFormat::first;
   Json json_;
   std::set<std::string> sections_;
 };
@@ -204,40 +256,114 @@ void read_camera(Reader& reader, cumulet_camera_desc& desc) {
 }
 
 template <class Desc, class Value>
-void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting, Value& value) {
+void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting, const std::string& key, Value& value) {
   const Range range = setting.given_range();
   if constexpr (settings::Enumerated<Value>) {
-    reader.choice(setting.key, setting.choices, value);
+    reader.choice(key, setting.choices, value);
   } else if constexpr (settings::Switch<Value>) {
-    reader.flag(setting.key, value);
+    reader.flag(key, value);
   } else if constexpr (settings::Count<Value>) {
     const double most = std::min(static_cast<double>(std::numeric_limits<Value>::max()), max_integer);
-    reader.integer(setting.key, value, std::max(range.least, 0.0), most);
+    reader.integer(key, value, std::max(range.least, 0.0), most);
   } else if constexpr (settings::Real<Value>) {
-    const bool given = reader.number(setting.key, value, range);
+    const bool given = reader.number(key, value, range);
     if (given && setting.spelling == Spelling::zero_is_negative && value == 0.0) value = -1.0;
   } else if (setting.spelling == Spelling::complement) {
     double complement[3];
-    if (!reader.three(setting.key, complement, range)) return;
+    if (!reader.three(key, complement, range)) return;
     for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(1.0 - complement[i]);
-  } else if (reader.three(setting.key, value, range) && setting.zero != 0.0 && settings::all_zero(value)) {
-    reader.wrong(setting.key, "is black");
+  } else if (reader.three(key, value, range) && setting.zero != 0.0 && settings::all_zero(value)) {
+    reader.wrong(key, "is black");
   }
 }
 
+/// where: "", or of one of a list "lights[0]."
 template <class Desc>
-void read_settings(Reader& reader, Desc& desc) {
+void read_settings(Reader& reader, Desc& desc, const std::string& where = "") {
   settings::for_each<Desc>([&](const auto& setting) {
-    if (*setting.key != '\0') read_setting(reader, setting, desc.*setting.field);
+    if (*setting.key != '\0') read_setting(reader, setting, where + setting.key, desc.*setting.field);
   });
 }
 
-void read_scene(Reader& reader, SceneOptions& scene) {
+void read_lamps(Reader& reader, std::vector<cumulet_lamp_desc>& lamps) {
+  constexpr std::size_t most = 4096;
+  lamps.resize(reader.list("lights", most));
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    cumulet_lamp_desc& lamp = lamps[i];
+    lamp.struct_size = sizeof lamp;
+    const std::string where = "lights[" + std::to_string(i) + "].";
+    if (!reader.has(where + "kind")) reader.wrong(where + "kind", "is missing");
+    read_settings(reader, lamp, where);
+    if (lamp.kind == CUMULET_LAMP_SUN && lamp.angle_degrees > 90.0)
+      reader.wrong(where + "angle_degrees", "of a sun is above 90");
+  }
+}
+
+using Matrix = std::array<double, 16>;  // column by column
+
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix c{};
+  for (std::size_t column = 0; column < 4; ++column) {
+    for (std::size_t row = 0; row < 4; ++row) {
+      for (std::size_t i = 0; i < 4; ++i) c[4 * column + row] += a[4 * i + row] * b[4 * column + i];
+    }
+  }
+  return c;
+}
+
+/// About an axis, x, y or z, counter-clockwise as seen against it.
+Matrix rotation(std::size_t axis, double degrees) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const std::size_t u = (axis + 1) % 3;
+  const std::size_t v = (axis + 2) % 3;
+  Matrix m{1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0};
+  m[5 * u] = m[5 * v] = std::cos(angle);
+  m[4 * u + v] = std::sin(angle);
+  m[4 * v + u] = -std::sin(angle);
+  return m;
+}
+
+/// Where the volume stands: scaled, then turned about x, y and z, then moved.
+void read_place(Reader& reader, Matrix& to_world) {
+  const bool whole = reader.numbers("volume.to_world", std::span<double>(to_world), "16 numbers");
+  double translate[3] = {};
+  double degrees[3] = {};
+  double scale[3] = {1.0, 1.0, 1.0};
+  bool parts = reader.three("volume.translate", translate);
+  parts = reader.three("volume.rotate_degrees", degrees) || parts;
+  parts = reader.three("volume.scale", scale, settings::above_zero) || parts;
+  if (whole && parts) reader.wrong("volume.to_world", "is given beside translate, rotate_degrees or scale");
+  if (!parts) return;
+  to_world = {scale[0], 0.0, 0.0, 0.0, 0.0, scale[1], 0.0, 0.0, 0.0, 0.0, scale[2], 0.0, 0.0, 0.0, 0.0, 1.0};
+  for (std::size_t axis = 0; axis < 3; ++axis) to_world = product(rotation(axis, degrees[axis]), to_world);
+  std::copy(translate, translate + 3, &to_world[12]);
+}
+
+SceneFormat read_version(Reader& reader) {
   int version = 0;
   if (!reader.has("cumulet_scene")) reader.wrong("cumulet_scene", "is missing: not a Cumulet scene");
   reader.integer("cumulet_scene", version, 0.0, max_u32);
-  if (version != format_version)
-    reader.wrong("cumulet_scene", "version " + std::to_string(version) + " is not known: this program reads 1");
+  if (version != 1 && version != 2)
+    reader.wrong("cumulet_scene", "version " + std::to_string(version) + " is not known: this program reads 1 and 2");
+  return static_cast<SceneFormat>(version);
+}
+
+/// What the second version has and the first has not.
+void read_second(Reader& reader, SceneOptions& scene) {
+  reader.set_format(SceneFormat::second);
+  reader.list("volumes", 1);
+  reader.list("models", 1);
+  read_place(reader, scene.to_world);
+  std::int32_t visible = 1;
+  reader.flag("volume.visible", visible);
+  if (visible == 0) reader.wrong("volume.visible", "is false: this program shows its volume");
+  read_lamps(reader, scene.lamps);
+}
+
+void read_scene(Reader& reader, SceneOptions& scene) {
+  const SceneFormat format = read_version(reader);
+  const bool second = format == SceneFormat::second;
+  if (second) read_second(reader, scene);
   reader.text("volume.file", scene.volume);
   reader.text("volume.grid", scene.grid_name);
   reader.text("medium.temperature_grid", scene.temperature_grid);
@@ -250,7 +376,11 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   // Without a word, a file of this version means 1: there was no other way.
   scene.auto_density_scale = reader.word("medium.density_scale", "auto");
   reader.text("environment.file", scene.environment);
-  if (!reader.has("light") && scene.environment.empty()) scene.set_daylight_of_version_1();
+  if (second) {
+    if (!reader.has("environment") && !reader.has("lights")) scene.set_daylight();
+  } else if (!reader.has("light") && scene.environment.empty()) {
+    scene.set_daylight_of_version_1();
+  }
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
@@ -298,7 +428,11 @@ std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const
     return value != 0;
   } else if constexpr (settings::Triple<Value>) {
     if (setting.zero != 0.0 && settings::all_zero(value)) return std::nullopt;
-    const auto one = setting.spelling == Spelling::complement ? albedo_of : shortest;
+    const bool complement = setting.spelling == Spelling::complement;
+    const auto one = [&](auto component) -> double {
+      if constexpr (std::is_same_v<decltype(component), double>) return component;
+      return complement ? albedo_of(static_cast<float>(component)) : shortest(static_cast<float>(component));
+    };
     return Json{one(value[0]), one(value[1]), one(value[2])};
   } else {
     const bool negative = setting.spelling == Spelling::zero_is_negative;
@@ -313,33 +447,52 @@ std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const
   }
 }
 
-template <class Desc>
-void write_settings(Json& json, const Desc& desc) {
-  settings::for_each<Desc>([&](const auto& setting) {
-    if (*setting.key == '\0') return;
-    const std::optional<Json> value = json_of(setting, desc.*setting.field);
-    std::string path = "/" + std::string(setting.key);
-    std::ranges::replace(path, '.', '/');
-    if (value) json[Json::json_pointer(path)] = *value;
-  });
-}
+/// A file's keys, each put where its version has it.
+class Writer {
+ public:
+  explicit Writer(SceneFormat format) : format_(format) { json_["cumulet_scene"] = static_cast<int>(format); }
+
+  void put(const std::string& key, const Json& value) {
+    std::string path = "/";
+    for (const char c : key_in(format_, key)) {
+      if (c == ']') continue;
+      path += c == '.' || c == '[' ? '/' : c;
+    }
+    json_[Json::json_pointer(path)] = value;
+  }
+  void put_text(const std::string& key, const std::string& value) {
+    if (!value.empty()) put(key, value);
+  }
+  template <class Desc>
+  void put_settings(const Desc& desc, const std::string& where = "") {
+    settings::for_each<Desc>([&](const auto& setting) {
+      if (*setting.key == '\0') return;
+      const std::optional<Json> value = json_of(setting, desc.*setting.field);
+      if (value) put(where + setting.key, *value);
+    });
+  }
+  Json take() { return std::move(json_); }
+
+ private:
+  SceneFormat format_;
+  Json json_;
+};
 
 Json to_json(const SceneOptions& scene, const std::string& volume, const std::string& surfaces,
-             const std::string& environment) {
-  Json json;
-  json["cumulet_scene"] = format_version;
-  json["volume"]["file"] = volume;
-  if (!scene.grid_name.empty()) json["volume"]["grid"] = scene.grid_name;
-  if (scene.up != UpAxis::y) json["volume"]["up"] = name_of(up_names, scene.up);
-  if (!scene.temperature_grid.empty()) json["medium"]["temperature_grid"] = scene.temperature_grid;
-  if (!scene.flame_grid.empty()) json["medium"]["flame_grid"] = scene.flame_grid;
-  if (!scene.color_grid.empty()) json["medium"]["color_grid"] = scene.color_grid;
+             const std::string& environment, SceneFormat format) {
+  Writer writer(format);
+  writer.put("volume.file", volume);
+  writer.put_text("volume.grid", scene.grid_name);
+  if (scene.up != UpAxis::y) writer.put("volume.up", name_of(up_names, scene.up));
+  if (scene.to_world != Matrix{}) writer.put("volume.to_world", scene.to_world);
+  writer.put_text("medium.temperature_grid", scene.temperature_grid);
+  writer.put_text("medium.flame_grid", scene.flame_grid);
+  writer.put_text("medium.color_grid", scene.color_grid);
 
   if (!surfaces.empty()) {
-    Json& shown = json["surfaces"];
-    shown["file"] = surfaces;
-    if (scene.surface_camera >= 0) shown["camera"] = scene.surface_camera;
-    write_settings(json, scene.surface);
+    writer.put("surfaces.file", surfaces);
+    if (scene.surface_camera >= 0) writer.put("surfaces.camera", scene.surface_camera);
+    writer.put_settings(scene.surface);
   }
 
   Json camera = Json::object();
@@ -351,21 +504,23 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   if (view.up[0] != 0.0 || view.up[1] != 0.0 || view.up[2] != 0.0) camera["up"] = three(view.up);
   if (view.fovy_degrees > 0.0) camera["fovy_degrees"] = view.fovy_degrees;
   if (view.orthographic_height > 0.0) camera["orthographic_height"] = view.orthographic_height;
-  json["camera"] = camera;
+  writer.put("camera", camera);
 
-  if (scene.auto_density_scale && scene.medium.density_scale == 0.0) json["medium"]["density_scale"] = "auto";
-  write_settings(json, scene.medium);
-  write_settings(json, scene.light);
+  if (scene.auto_density_scale && scene.medium.density_scale == 0.0) writer.put("medium.density_scale", "auto");
+  writer.put_settings(scene.medium);
+  writer.put_settings(scene.light);
   if (!environment.empty()) {
-    json["environment"]["file"] = environment;
-    write_settings(json, scene.environment_settings);
+    writer.put("environment.file", environment);
+    writer.put_settings(scene.environment_settings);
   }
-  write_settings(json, scene.grid);
-  json["picture"]["width"] = scene.width;
-  json["picture"]["height"] = scene.height;
-  write_settings(json, scene.sampling);
-  write_settings(json, scene.display);
-  return json;
+  for (std::size_t i = 0; i < scene.lamps.size(); ++i)
+    writer.put_settings(scene.lamps[i], "lights[" + std::to_string(i) + "].");
+  writer.put_settings(scene.grid);
+  writer.put("picture.width", scene.width);
+  writer.put("picture.height", scene.height);
+  writer.put_settings(scene.sampling);
+  writer.put_settings(scene.display);
+  return writer.take();
 }
 
 fs::path folder_of(const std::string& path) {
@@ -401,10 +556,12 @@ cumulet_volume_file_desc volume_file(const SceneOptions& scene) {
   desc.temperature_grid = scene.temperature_grid.c_str();
   desc.flame_grid = scene.flame_grid.c_str();
   desc.color_grid = scene.color_grid.c_str();
+  Matrix to_world = scene.to_world;
   if (scene.up == UpAxis::z) {
-    constexpr std::array upright = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0};
-    std::copy(upright.begin(), upright.end(), desc.to_world);
+    constexpr Matrix upright = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0};
+    to_world = to_world == Matrix{} ? upright : product(to_world, upright);
   }
+  std::ranges::copy(to_world, desc.to_world);
   return desc;
 }
 
@@ -475,20 +632,23 @@ SceneOptions load_scene(const std::string& path) {
   return parse_scene(image::read_file(path), path);
 }
 
-std::string scene_text(const SceneOptions& scene, const std::string& path) {
+std::string scene_text(const SceneOptions& scene, const std::string& path, SceneFormat format) {
   // A file's name may be in any encoding: what is not UTF-8 is replaced, not thrown at.
   return to_json(scene, portable_file(scene.volume, path), portable_file(scene.surfaces, path),
-                 portable_file(scene.environment, path))
+                 portable_file(scene.environment, path), format)
              .dump(2, ' ', false, Json::error_handler_t::replace) +
          "\n";
 }
 
-void save_scene(const SceneOptions& scene, const std::string& path) {
-  image::replace_file(path, scene_text(scene, path));
+void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat format) {
+  image::replace_file(path, scene_text(scene, path, format));
 }
 
 bool same_scene(const SceneOptions& a, const SceneOptions& b) {
-  return to_json(a, a.volume, a.surfaces, a.environment) == to_json(b, b.volume, b.surfaces, b.environment);
+  const auto all = [](const SceneOptions& s) {
+    return to_json(s, s.volume, s.surfaces, s.environment, SceneFormat::second);
+  };
+  return all(a) == all(b);
 }
 
 }  // namespace cumulet::demo

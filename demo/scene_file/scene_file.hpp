@@ -2,8 +2,10 @@
 
 #include <cumulet/cumulet.h>
 
+#include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace cumulet::demo {
 
@@ -18,15 +20,17 @@ struct SceneOptions {
   std::string temperature_grid;  // "none": without, here and below
   std::string flame_grid;
   std::string color_grid;
-  UpAxis up = UpAxis::y;             // of the volume's file
-  std::string surfaces;              // a glTF file; "": none
-  std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
+  UpAxis up = UpAxis::y;              // of the volume's file
+  std::array<double, 16> to_world{};  // of the volume, once it is upright; column by column; all 0: as its file has it
+  std::string surfaces;               // a glTF file; "": none
+  std::int32_t surface_camera = -1;   // of the surfaces' own; below 0: camera
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
   cumulet_medium_desc medium{};
   bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
   cumulet_light_desc light{};
+  std::vector<cumulet_lamp_desc> lamps;
   std::string environment;  // a .hdr or .exr file; "": the light's sky
   cumulet_environment_settings_desc environment_settings{};
   cumulet_camera_desc camera{};
@@ -69,11 +73,15 @@ void for_each_group(Scene& scene, Visit&& visit) {
 /// Reads a file. Throws likewise.
 [[nodiscard]] SceneOptions load_scene(const std::string& path);
 
+/// Versions of the format. The first knows no lamps and no place of the volume.
+enum class SceneFormat { first = 1, second = 2 };
+
 /// The text that parse_scene reads: every setting is spelled out but those left to the library. A volume in the
 /// file's folder, or below it, is named relative to it.
-[[nodiscard]] std::string scene_text(const SceneOptions& scene, const std::string& path);
+[[nodiscard]] std::string scene_text(const SceneOptions& scene, const std::string& path,
+                                     SceneFormat format = SceneFormat::second);
 /// Writes it in one step: a failure leaves the old file. Throws likewise.
-void save_scene(const SceneOptions& scene, const std::string& path);
+void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat format = SceneFormat::second);
 
 /// Whether two scenes say the same.
 [[nodiscard]] bool same_scene(const SceneOptions& a, const SceneOptions& b);

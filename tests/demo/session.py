@@ -243,7 +243,8 @@ def test_scene_file(s):
     assert [m for m in s.report("messages")["messages"] if m["error"]] == []
     assert (s.out / "picture.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"
     scene = json.loads((s.out / "scene.json").read_text())
-    assert scene["display"]["exposure_stops"] > 0.3 and scene["medium"]["density_scale"] > 1, scene
+    medium = scene["volumes"][0]["medium"]
+    assert scene["display"]["exposure_stops"] > 0.3 and medium["density_scale"] > 1, scene
     saved, report, area = look(s, "saved")
     x, y, width, height = report["viewport"]
     assert [scene["picture"]["width"], scene["picture"]["height"]] == [width, height]
@@ -254,7 +255,7 @@ def test_scene_file(s):
                     *shot("opened"),
                     "key ctrl+z", "wait loaded", *shot("back")], "--volume", s.explosion)
     assert_alike(saved, look(s, "opened")[0], area)
-    assert s.report("opened")["scene"]["medium"] == scene["medium"]
+    assert s.report("opened")["scene"]["medium"] == medium
     assert s.report("back")["scene"]["volume"]["file"].endswith("explosion_0012.vdb"), "opening a scene can be undone"
 
 
@@ -576,7 +577,7 @@ def test_up_axis(s):
            "--volume", s.explosion)
     up = lambda name: s.report(name)["scene"]["volume"].get("up", "y")
     assert [up(name) for name in ("y", "z", "back")] == ["y", "z", "y"]
-    assert json.loads((s.out / "scene.json").read_text())["volume"]["up"] == "z"
+    assert json.loads((s.out / "scene.json").read_text())["volumes"][0]["up"] == "z"
     standing, report, area = look(s, "y")
     lying = look(s, "z")[0]
     assert_differ(standing, lying, area)

@@ -18,6 +18,8 @@ int main(int argc, char** argv) {
   scene.medium.density_scale = 4.0;
   scene.camera.eye[2] = 90.0;
   scene.camera.up[1] = 1.0;
+  folder.write("first.json", cumulet::demo::scene_text(scene, "/nowhere/full.json", cumulet::demo::SceneFormat::first));
+  scene.lamps.emplace_back().kind = CUMULET_LAMP_SPOT;
   folder.write("full.json", cumulet::demo::scene_text(scene, "/nowhere/full.json"));
   return 0;
 }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -59,6 +61,21 @@ SceneOptions full_scene() {
   scene.light.sun_elevation_degrees = -5.6f;
   for (int i = 0; i < 3; ++i) scene.light.sun_irradiance[i] = 0.7f * static_cast<float>(i);
   for (int i = 0; i < 3; ++i) scene.light.sky_radiance[i] = 1e-3f * static_cast<float>(i);
+  for (const cumulet_lamp_kind kind : {CUMULET_LAMP_RECTANGLE, CUMULET_LAMP_SUN}) {
+    cumulet_lamp_desc lamp{};
+    lamp.struct_size = sizeof lamp;
+    lamp.kind = kind;
+    lamp.position[1] = 0.1;
+    lamp.direction[2] = -1.0 / 3.0;
+    lamp.across[0] = 2.5;
+    lamp.color[2] = 0.3f;
+    lamp.power = 123.4f;
+    lamp.width = 1.5;
+    lamp.angle_degrees = 33.0;
+    lamp.blend = 0.25;
+    scene.lamps.push_back(lamp);
+  }
+  for (std::size_t i = 0; i < 16; ++i) scene.to_world[i] = 0.1 * static_cast<double>(i);
   scene.grid.march = CUMULET_MARCH_BRICK;
   scene.grid.cells = CUMULET_CELLS_CONSTANT;
   scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
@@ -91,6 +108,8 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   EXPECT_TRUE(same(read.camera, scene.camera));
   EXPECT_TRUE(same(read.medium, scene.medium));
   EXPECT_TRUE(same(read.light, scene.light));
+  EXPECT_TRUE(std::ranges::equal(read.lamps, scene.lamps, same<cumulet_lamp_desc>));
+  EXPECT_EQ(read.to_world, scene.to_world);
   EXPECT_TRUE(same(read.grid, scene.grid));
   EXPECT_TRUE(same(read.sampling, scene.sampling));
   EXPECT_TRUE(same(read.display, scene.display));
@@ -120,6 +139,9 @@ TEST(SceneFile, EveryDifferenceCounts) {
   EXPECT_TRUE(differs([](SceneOptions& s) { s.sampling.seed = 1; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.display.exposure_stops = 0.0f; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.surface.double_sided = 0; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.lamps[1].power = 1.0f; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.lamps.pop_back(); }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.to_world[3] = 5.0; }));
   EXPECT_FALSE(differs([](SceneOptions&) {}));
 }
 
@@ -236,12 +258,83 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
     const std::string error = error_of(with(c.section));
     EXPECT_EQ(error.rfind(std::string("dir/s.json: ") + c.key, 0), 0u) << c.section << " -> " << error;
   }
-  for (const char* text : {"", "{", "[]", "1", "nonsense", R"({"cumulet_scene": 1,})", R"({"cumulet_scene": 2})", "{}",
+  for (const char* text : {"", "{", "[]", "1", "nonsense", R"({"cumulet_scene": 1,})", R"({"cumulet_scene": 0})", "{}",
                            R"({"cumulet_scene": "1"})", R"({"medium": {"density_scale": 1e999}})", "\xff\xfe"})
     EXPECT_EQ(error_of(text).rfind("dir/s.json: ", 0), 0u) << text;
   EXPECT_EQ(error_of(with(R"("col\nour": {})")).find('\n'), std::string::npos);
   // A hostile depth ends in an error, not on the stack.
   EXPECT_NE(error_of(std::string(500000, '[')), "");
+}
+
+TEST(SceneFile, TheSecondVersionSaysWhatTheFirstDoes) {
+  SceneOptions scene = full_scene();
+  scene.lamps.clear();
+  scene.to_world = {};
+  const std::string first = scene_text(scene, "s.json", SceneFormat::first);
+  EXPECT_EQ(first.rfind("{\n  \"cumulet_scene\": 1,\n  \"volume\"", 0), 0u) << first;
+  EXPECT_TRUE(same_scene(parse_scene(first, "s.json"), scene));
+  const std::string second = scene_text(scene, "s.json");
+  EXPECT_EQ(second.rfind("{\n  \"cumulet_scene\": 2,\n  \"volumes\": [", 0), 0u) << second;
+  EXPECT_TRUE(same_scene(parse_scene(second, "s.json"), scene));
+}
+
+TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
+  const auto told = [](const std::string& more) { return error_of(R"({"cumulet_scene": 2, )" + more + "}"); };
+  const std::string start = "dir/s.json: ";
+  EXPECT_EQ(told(R"("volumes": [{}, {}])"), start + "volumes: are 2: this program shows 1");
+  EXPECT_EQ(told(R"("models": [{}, {}, {}])"), start + "models: are 3: this program shows 1");
+  EXPECT_EQ(told(R"("volumes": {})"), start + "volumes: is not a list");
+  EXPECT_EQ(told(R"("volumes": [3])"), start + "volumes[0] is not an object");
+  EXPECT_EQ(told(R"("volumes": [{"visible": false}])"),
+            start + "volumes[0].visible: is false: this program shows its volume");
+  EXPECT_EQ(told(R"("volumes": [{"medium": {"albedo": 1}}])"),
+            start + "volumes[0].medium.albedo: is not three numbers");
+  EXPECT_EQ(told(R"("volumes": [{"medium": {"x": 1}}])"), start + "volumes[0].medium.x: there is no such setting");
+  EXPECT_EQ(told(R"("volumes": [{"to_world": [1]}])"), start + "volumes[0].to_world: is not 16 numbers");
+  EXPECT_EQ(told(R"("volumes": [{"scale": [1, 0, 1]}])"), start + "volumes[0].scale: 0 is not above 0");
+  EXPECT_EQ(told(R"("volumes": [{"to_world": [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1], "scale": [1, 1, 1]}])"),
+            start + "volumes[0].to_world: is given beside translate, rotate_degrees or scale");
+  EXPECT_EQ(told(R"("volume": {})"), start + "volume: there is no such setting");
+  EXPECT_EQ(told(R"("light": {})"), start + "light: there is no such setting");
+  EXPECT_EQ(told(R"("models": [{"light": "x"}])").rfind(start + "models[0].light: ", 0), 0u);
+  EXPECT_EQ(told(R"("environment": {"sun": {"irradiance": 1}})"),
+            start + "environment.sun.irradiance: is not three numbers");
+  EXPECT_EQ(told(R"("lights": 1)"), start + "lights: is not a list");
+  EXPECT_EQ(told(R"("lights": [{}])"), start + "lights[0].kind: is missing");
+  EXPECT_EQ(told(R"("lights": [{"kind": "point"}, 1])"), start + "lights[1] is not an object");
+  EXPECT_EQ(told(R"("lights": [{"kind": "cube"}])"),
+            start + "lights[0].kind: 'cube' is none of point, spot, disc, rectangle, sun");
+  EXPECT_EQ(told(R"("lights": [{"kind": "point", "watts": 1}])"), start + "lights[0].watts: there is no such setting");
+  EXPECT_EQ(told(R"("lights": [{"kind": "point", "power": -1}])"), start + "lights[0].power: -1 is not from 0 to 1e30");
+  EXPECT_EQ(told(R"("lights": [{"kind": "sun", "angle_degrees": 91}])"),
+            start + "lights[0].angle_degrees: of a sun is above 90");
+  EXPECT_EQ(error_of(R"({"cumulet_scene": 3})"),
+            start + "cumulet_scene: version 3 is not known: this program reads 1 and 2");
+  EXPECT_EQ(error_of(with(R"("lights": [])")), start + "lights: there is no such setting");
+}
+
+TEST(SceneFile, AVolumeIsPlacedByItsPartsOrAsAWhole) {
+  const SceneOptions parts = parse_scene(
+      R"({"cumulet_scene": 2, "volumes": [{"translate": [5, 6, 7], "rotate_degrees": [90, 0, 90], "scale": [2, 3, 4]}]})",
+      "s.json");
+  // x, doubled, is turned about z to y; y, tripled, about x to z; z, times 4, about x to -y, and about z to x.
+  const std::array<double, 16> expected = {0, 2, 0, 0, 0, 0, 3, 0, 4, 0, 0, 0, 5, 6, 7, 1};
+  for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR(parts.to_world[i], expected[i], 1e-12) << i;
+  SceneOptions z_up = parts;
+  z_up.up = UpAxis::z;
+  const cumulet_volume_file_desc file = volume_file(z_up);
+  // What is up in the file, z, is y before it is placed.
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(file.to_world[8 + i], expected[4 + i], 1e-12) << i;
+}
+
+TEST(SceneFile, WithoutAWordOnLightItIsDay) {
+  const auto lit = [](const std::string& more) {
+    const SceneOptions scene = parse_scene(R"({"cumulet_scene": 2)" + more + "}", "s.json");
+    return scene.light.sky == CUMULET_SKY_PHYSICAL;
+  };
+  EXPECT_TRUE(lit(""));
+  EXPECT_FALSE(lit(R"(, "environment": {})"));
+  EXPECT_FALSE(lit(R"(, "lights": [])"));
 }
 
 TEST(SceneFile, FilesAreWrittenAndReadWhole) {

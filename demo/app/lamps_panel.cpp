@@ -1,0 +1,73 @@
+// The panel's lamps.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <optional>
+#include <type_traits>
+
+#include "panel.hpp"
+
+namespace cumulet::demo {
+
+namespace {
+
+using Desc = cumulet_lamp_desc;
+
+/// Above what the camera looks at, and as bright there as the sun at noon.
+Desc new_lamp(const cumulet_camera_desc& camera) {
+  const double distance =
+      std::hypot(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1], camera.eye[2] - camera.target[2]);
+  const double above = distance > 0.0 ? 0.5 * distance : 1.0;
+  Desc lamp{};
+  lamp.struct_size = sizeof lamp;
+  std::copy(camera.target, camera.target + 3, lamp.position);
+  lamp.position[1] += above;
+  lamp.direction[1] = -1.0;
+  lamp.power = static_cast<float>(std::min(1e6, 4.0 * 4.0 * std::numbers::pi * above * above));
+  settings::spell_out_zeros(lamp);
+  return lamp;
+}
+
+/// Whether a kind of lamp has it.
+template <class Setting>
+bool has(const Setting& setting, cumulet_lamp_kind kind) {
+  const bool area = kind == CUMULET_LAMP_DISC || kind == CUMULET_LAMP_RECTANGLE;
+  if (setting.is(&Desc::position)) return kind != CUMULET_LAMP_SUN;
+  if (setting.is(&Desc::direction)) return kind != CUMULET_LAMP_POINT;
+  if (setting.is(&Desc::width)) return area;
+  if (setting.is(&Desc::across) || setting.is(&Desc::height)) return kind == CUMULET_LAMP_RECTANGLE;
+  if (setting.is(&Desc::angle_degrees)) return kind == CUMULET_LAMP_SPOT || kind == CUMULET_LAMP_SUN;
+  return !setting.is(&Desc::blend) || kind == CUMULET_LAMP_SPOT;
+}
+
+}  // namespace
+
+void Panel::lamps(Model& model) {
+  std::vector<Desc>& lamps = model.scene.lamps;
+  std::optional<std::size_t> removed;
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    Desc& lamp = lamps[i];
+    const std::string number = std::string(" ").append(std::to_string(i + 1));
+    settings::for_each<Desc>([&](auto setting) {
+      if (!has(setting, lamp.kind)) return;
+      const std::string label = setting.row.label + number;
+      setting.row.label = label.c_str();
+      auto& value = lamp.*setting.field;
+      if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, double[3]>) {
+        const double length = std::hypot(value[0], value[1], value[2]);
+        ui_.three(label.c_str(), setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
+      } else {
+        rows_.draw(setting, value);
+      }
+    });
+    if (lamp.kind == CUMULET_LAMP_SUN) lamp.angle_degrees = std::min(lamp.angle_degrees, 90.0);
+    if (ui_.button(("Remove lamp" + number).c_str(), "Takes this lamp away.", {-1.0f, 0.0f})) removed = i;
+  }
+  if (removed) lamps.erase(lamps.begin() + static_cast<std::ptrdiff_t>(*removed));
+  if (ui_.button("Add lamp", "A point of light above what the camera looks at.", {-1.0f, 0.0f}))
+    lamps.push_back(new_lamp(model.scene.camera));
+}
+
+}  // namespace cumulet::demo
