@@ -135,18 +135,20 @@ struct Explosion {
       const float size = random.between(0.13F, 0.28F);
       constexpr int puffs = 70;
       for (int k = 0; k <= puffs; ++k) {
-        const float back = static_cast<float>(k) / puffs;  // 0 at the head
-        const float then = now.time * (1.0F - 0.8F * back);
-        const float along = range * (1.0F - std::exp(-3.6F * then));
-        vec3 centre = way * along + vec3(0.0F, 0.8F - 6.0F * then * then, 0.0F);
+        const float then = static_cast<float>(k) / puffs;  // when the piece left it behind
         const float age = now.time - then;
-        centre +=
-            age * 0.7F * vec3(random.between(-1.0F, 1.0F), random.between(-0.3F, 1.3F), random.between(-1.0F, 1.0F));
-        if (centre.y < 0.05F) continue;
-        const float radius = size * (0.5F + 1.6F * std::sqrt(age)) * random.between(0.75F, 1.15F);
+        const vec3 drift(random.between(-1.0F, 1.0F), random.between(-0.3F, 1.3F), random.between(-1.0F, 1.0F));
+        const float share = random.between(0.75F, 1.15F);
+        const float along = range * (1.0F - std::exp(-3.6F * then));
+        const vec3 centre = way * along + vec3(0.0F, 0.8F - 6.0F * then * then, 0.0F) + age * 0.7F * drift;
+        // What is within the fireball nobody sees.
+        const bool hidden = glm::distance(centre, vec3(0.0F, now.height, 0.0F)) < 2.2F * now.spread;
+        if (age < 0.0F || age > 0.8F * now.time || centre.y < 0.05F || hidden) continue;
+        const float radius = size * (0.5F + 1.6F * std::sqrt(age)) * share;
         const float heat = std::exp(-1.0F * now.time - 12.0F * age);
         big.add(centre, radius, heat);
-        children(random, centre, radius, heat, x, 0.0F, 1, all);
+        Random own(seed + 1000U * static_cast<std::uint32_t>(i) + static_cast<std::uint32_t>(k));
+        children(own, centre, radius, heat, x, 0.0F, 1, all);
       }
     }
   }
@@ -167,46 +169,51 @@ std::vector<openvdb::FloatGrid::Ptr> make_explosion(const Settings& settings, in
   explosion.ring(big, all);
   explosion.stem(big, all);
   explosion.debris(big, all);
-  const Lobes rough(big.spheres, 1.5F);
+  const Lobes rough(big.spheres, 1.0F);
   const Lobes fine(all.spheres, 0.8F);
 
   const auto skip = [&](const vec3& centre, float radius) {
     return fine(centre) > std::min(radius + 0.75F, fine.reach() - 0.01F) || centre.y + radius < 0.0F;
   };
   const auto values = [&](const vec3& p, float* out) {
-    const float outside = fine(p);
-    if (outside >= 0.75F || p.y < 0.0F) return;
+    if (p.y < 0.0F) return;
     // What rises takes its own detail with it, and draws it out as it expands.
     const vec3 own = (p - vec3(0.0F, now.height, 0.0F)) / (0.45F + 0.55F * now.spread) +
                      vec3(0.0F, 0.8F * now.time * std::exp(-0.2F * (p.x * p.x + p.z * p.z)), 0.0F);
     const vec3 bent =
         p + 0.22F * vec3(perlin(own * 0.8F, seed), perlin(own * 0.8F, seed + 1), perlin(own * 0.8F, seed + 2)) +
         0.09F * vec3(perlin(own * 2.3F, seed + 3), perlin(own * 2.3F, seed + 4), perlin(own * 2.3F, seed + 5));
-    float depth = -fine(bent);
-    float bump = 0.5F;
-    if (depth < 0.8F) {
-      bump = billows(own * 1.5F, finest * 1.5F, seed + 11);
-      depth += 0.62F * (bump - 0.5F);
-    }
-    const float edge = glm::smoothstep(0.0F, 0.16F, depth);
-    if (edge <= 0.0F) return;
-
     // How deep below the big lobes, their seams filled: what sticks out of them has cooled.
+    float depth = -1e9F;
     float sum = 1e-12F;
     float heat = 0.0F;
     rough.near(bent, [&](std::uint32_t i, float distance) {
+      depth = std::max(depth, -distance);
       const float weight = std::exp(-5.0F * distance);
       sum += weight;
       heat += weight * big.heats[i];
     });
     heat /= sum;
     const float below = 0.2F * std::log(sum);
+
+    float bump = 0.5F;
+    if (depth < 0.7F) {  // near the border
+      depth = -fine(bent);
+      if (depth < -0.35F) return;
+      bump = billows(own * 1.5F, finest * 1.5F, seed + 11);
+      depth += 0.62F * (bump - 0.5F);
+    }
+    const float edge = glm::smoothstep(0.0F, 0.16F, depth);
+    if (edge <= 0.0F) return;
     const float patches = fbm(own * 0.55F, std::max(finest * 0.55F, 0.1F), seed + 23);
     const float crust = -0.25F + 0.95F * now.time;
     const float hot = glm::smoothstep(-0.55F, 0.75F, below - crust + 1.1F * patches - 1.2F * (bump - 0.5F)) * heat;
-    out[1] = 1.6F * hot;
-    out[2] = glm::smoothstep(0.35F, 0.75F, hot) * edge;
-    out[0] = edge * (1.0F - 0.6F * glm::smoothstep(0.2F, 0.8F, hot)) * glm::clamp(0.85F + 0.5F * patches, 0.4F, 1.0F);
+    // In steps that nobody sees and that files keep small.
+    const auto stepped = [](float value) { return std::round(value * 128.0F) / 128.0F; };
+    out[0] = stepped(edge * (1.0F - 0.6F * glm::smoothstep(0.2F, 0.8F, hot)) *
+                     glm::clamp(0.85F + 0.5F * patches, 0.4F, 1.0F));
+    out[1] = stepped(1.6F * hot);
+    out[2] = stepped(glm::smoothstep(0.35F, 0.75F, hot) * edge);
   };
   const vec3 low = glm::max(fine.low(), vec3(-1e9F, 0.0F, -1e9F));
   return sample({{"density", 0.01F}, {"temperature", 0.02F}, {"flame", 0.01F}}, voxel_size, low, fine.high(), skip,

@@ -105,13 +105,12 @@ void write_explosion_scene(const path& folder) {
   scene.medium.density_scale = 9.0;
   cumulet::demo::apply(cumulet::demo::Preset::explosion, scene.medium);
   scene.light.sky = CUMULET_SKY_PHYSICAL;
-  scene.light.turbidity = 4.0F;
+  scene.light.turbidity = 3.0F;
   scene.light.ground_albedo = 0.2F;
-  scene.light.sun_azimuth_degrees = 75.0F;
-  scene.light.sun_elevation_degrees = 9.0F;
-  scene.display.exposure_stops = 0.5F;
+  scene.light.sun_azimuth_degrees = 62.0F;
+  scene.light.sun_elevation_degrees = 13.0F;
+  scene.display.exposure_stops = 0.3F;
   scene.display.tone_map = CUMULET_TONE_MAP_FILMIC;
-  scene.grid.threshold = 0.01;
   scene.width = 800;
   scene.height = 500;
   scene.sampling.samples = 64;
@@ -170,7 +169,7 @@ void write_all(const Wanted& options) {
     write_explosion_scene(folder);
   }
   if (wanted("explosion")) {
-    const cumulet::scene::Settings settings{voxels(6e6, 0.8e6), options.seed};
+    const cumulet::scene::Settings settings{voxels(6e6, 1e6), options.seed};
     for (int frame = 1; frame <= cumulet::scene::explosion_frames; ++frame) {
       if (options.frame > 0 && frame != options.frame) continue;
       write_grids(explosion_file(folder, frame), cumulet::scene::make_explosion(settings, frame));
