@@ -110,6 +110,7 @@ void spell_out_defaults(SceneOptions& scene) {
   for_each_group(scene, [](auto& group) { settings::spell_out_zeros(group); });
   settings::spell_out_zeros(scene.camera);
   for (cumulet_lamp_desc& lamp : scene.lamps) settings::spell_out_zeros(lamp);
+  scene.grid.criterion = settings::criterion_of(scene.grid);
   if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);
 }
 

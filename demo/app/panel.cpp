@@ -289,9 +289,9 @@ void Panel::threshold(settings::Facts facts, cumulet_grid_desc& grid) {
   if (ui_.checkbox("To the voxel", "Splits wherever the density varies at all, until the cells tile the voxels.",
                    to_voxel))
     grid.threshold = to_voxel ? -1.0 : settings::default_threshold(grid.criterion);
-  const bool deviation = grid.criterion == CUMULET_CRITERION_DEVIATION;
-  facts.row.least = deviation ? 1e-4 : 1e-2;
-  facts.row.most = deviation ? 1.0 : 100.0;
+  const bool range = grid.criterion == CUMULET_CRITERION_RANGE_MEAN;
+  facts.row.least = range ? 1e-2 : 1e-4;
+  facts.row.most = range ? 100.0 : 1.0;
   double shown = to_voxel ? 0.0 : grid.threshold;
   ImGui::BeginDisabled(to_voxel);
   if (rows_.draw(facts, shown)) grid.threshold = shown;

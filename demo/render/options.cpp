@@ -454,6 +454,7 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
     if (app.count(flag) > 0 && app.count("--sky-model") > 0)
       throw UsageError(std::string(flag) + " and --sky-model exclude each other");
   }
+  if (app.count("--criterion") > 0) settings::name_criterion(scene.grid);
   if (app.count("--sky") > 0) scene.light.sky = CUMULET_SKY_CONSTANT;
   if (app.count("--sun") > 0 && scene.light.sky == CUMULET_SKY_CONSTANT) {
     const std::string sun = app.get_option("--sun")->results().back();

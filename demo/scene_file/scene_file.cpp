@@ -383,7 +383,9 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   }
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
+  const bool names_criterion = reader.has("grid.criterion");
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
+  if (names_criterion) settings::name_criterion(scene.grid);
   reader.finish();
 }
 
@@ -520,7 +522,9 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   writer.put("picture.height", scene.height);
   writer.put_settings(scene.sampling);
   writer.put_settings(scene.display);
-  return writer.take();
+  Json json = writer.take();
+  if (settings::criterion_of(scene.grid) != scene.grid.criterion) json["grid"].erase("criterion");
+  return json;
 }
 
 fs::path folder_of(const std::string& path) {

@@ -6,11 +6,14 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "base/progress_part.hpp"
 #include "grid/cell.hpp"
+#include "grid/transmittance.hpp"
 
 namespace cumulet::grid {
 
@@ -40,38 +43,64 @@ class EdgeLengths {
   glm::dmat3 linear_;
 };
 
+// How deviations of a field count.
+struct Weights {
+  double per_depth = 0.0;      // times a deviation and its length
+  double own_hiding = 0.0;     // reduced extinction of a value: of what hides itself
+  bool there_and_back = true;  // light passes what hides a cell twice
+
+  // depth: of the mean ray.
+  static Weights of_density(double depth, const RefineSettings& settings) {
+    if (!(depth > 0.0)) return {};
+    if (settings.criterion != Criterion::transmittance) return {.per_depth = 1.0 / depth};
+    const double scale = settings.density_scale;
+    return {.per_depth = scale / -std::expm1(-scale * depth), .own_hiding = hiding(scale, settings.anisotropy)};
+  }
+  static Weights of_emission(double depth) {
+    return {.per_depth = depth > 0.0 ? 1.0 / depth : 0.0, .there_and_back = false};
+  }
+};
+
 // The criterion's squared value for a cell.
 class Measure {
  public:
-  // depth: of the mean ray; what deviations count against.
-  Measure(double depth, const RefineSettings& settings) : settings_(&settings) {
-    scale_ = depth > 0.0 ? static_cast<float>(1.0 / (depth * depth)) : 0.0F;
-  }
+  Measure(const Weights& weights, const RefineSettings& settings)
+      : settings_(&settings),
+        scale_(static_cast<float>(weights.per_depth * weights.per_depth)),
+        own_hiding_(static_cast<float>(weights.own_hiding)),
+        there_and_back_(weights.there_and_back) {}
 
   // No cell of a region whose values lie in [min, max] exceeds this: a variance is at most a quarter of the range
-  // squared.
-  [[nodiscard]] float bound(float min, float max, float edge_squared) const {
+  // squared. lit: the most of the region.
+  [[nodiscard]] float bound(float min, float max, float edge_squared, float lit) const {
     if (settings_->criterion == Criterion::range_mean) return std::numeric_limits<float>::infinity();
-    return 0.25F * (max - min) * (max - min) * edge_squared * scale_;
+    return 0.25F * (max - min) * (max - min) * edge_squared * scale_ * seen_squared(lit);
   }
 
   // covariance: of position and density in the frame, per unit. No more than floor: the exact value does not matter.
   [[nodiscard]] float squared(std::uint32_t cell_class, float mean, float variance, const vec3& covariance, float min,
-                              float max, float edge_squared, float floor) const {
+                              float max, float edge_squared, float lit, float floor) const {
     if (min >= max) return 0.0F;
     if (settings_->criterion == Criterion::range_mean) {
       const float ratio = (max - min) / mean;
       return ratio * ratio;
     }
-    const float value = variance * edge_squared * scale_;
+    const float own = 1.0F + own_hiding_ * mean * std::sqrt(edge_squared);
+    const float weight = edge_squared * scale_ * seen_squared(lit) / (own * own);
+    const float value = variance * weight;
     if (value <= floor || settings_->cells == CellKind::constant) return value;
     const float explained = fit_linear(cell_class, covariance, mean).explained;
-    return std::max(0.0F, variance - explained) * edge_squared * scale_;
+    return std::max(0.0F, variance - explained) * weight;
   }
 
  private:
+  // lit: what part of the light gets there, or back.
+  [[nodiscard]] float seen_squared(float lit) const { return there_and_back_ ? lit * lit * lit * lit : lit * lit; }
+
   const RefineSettings* settings_;
-  float scale_ = 0.0F;
+  float scale_;
+  float own_hiding_;
+  bool there_and_back_;
 };
 
 // What the camera allows: the shortest world edge worth splitting in a sphere, or none at all.
@@ -159,9 +188,12 @@ bool DiamondCursor::is_split(const ivec3& vertex) {
 // The criterion over all cells of the statistics.
 class DiamondSet::Evaluation {
  public:
-  Evaluation(const Statistics& statistics, double depth, const RefineSettings& settings)
+  // transmittance: of density; null where nothing is hidden.
+  Evaluation(const Statistics& statistics, const Weights& weights, const Transmittance* transmittance,
+             const RefineSettings& settings)
       : statistics_(&statistics),
-        measure_(depth, settings),
+        transmittance_(transmittance),
+        measure_(weights, settings),
         camera_(settings),
         edge_length_(statistics.cube().to_world) {
     // A node's bounding sphere: half its world diagonal, the longest of four.
@@ -190,10 +222,13 @@ class DiamondSet::Evaluation {
   // Calls visit(vertex, squared) for every cell of a brick whose criterion is above the floor.
   template <class Visit>
   void brick(const Statistics::Node& node, BrickSums& sums, float floor, Visit visit) const {
+    BrickTransmittance lit;
     const double shortest = shortest_edge(node);
     const auto shortest_squared = static_cast<float>(shortest * shortest);
     const ivec3 odd = (node.corner / 8) & 1;
     const auto signs = static_cast<unsigned>(odd.x + 2 * odd.y + 4 * odd.z);
+    const float* blocks = transmittance_ != nullptr ? transmittance_->blocks(node.corner) : nullptr;
+    const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_a_brick) : 1.0F;
     for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
       const Moments& whole = statistics_->kuhn(node, permutation);
       if (whole.min >= whole.max) continue;
@@ -201,9 +236,11 @@ class DiamondSet::Evaluation {
       const auto& edges = edge_squared_[signs * 6 + permutation];
       // Edges shrink from level to level: below some level nothing can exceed the floor.
       unsigned end = 1;
-      while (end < 512 && measure_.bound(whole.min, whole.max, longest_[std::bit_width(end) - 1]) > floor) end *= 2;
+      while (end < 512 && measure_.bound(whole.min, whole.max, longest_[std::bit_width(end) - 1], most) > floor)
+        end *= 2;
       if (end == 1) continue;
       sums.compute(statistics_->values(node), tree);
+      if (blocks != nullptr) lit.compute(blocks, tree);
       for (unsigned h = 1; h < end; ++h) {
         if (sums.min[h] >= sums.max[h] || edges[h] < shortest_squared) continue;
         const std::uint32_t shape = tree.shape[h];
@@ -215,7 +252,7 @@ class DiamondSet::Evaluation {
         const float squared =
             measure_.squared(core::cm_shape_class(shape), sums.reference + shifted_mean, variance,
                              core::cm_to_frame(covariance, shape) * core::cm_shape_inverse_unit(shape), sums.min[h],
-                             sums.max[h], edges[h], floor);
+                             sums.max[h], edges[h], blocks != nullptr ? lit.most[h] : 1.0F, floor);
         if (squared > floor) visit(node.corner + ivec3(tree.midpoint[h]), squared);
       }
     }
@@ -223,13 +260,13 @@ class DiamondSet::Evaluation {
 
   // Likewise for one cell above bricks.
   template <class Visit>
-  void cell(const vec3& v0, std::uint32_t shape, double shortest, float floor, Visit visit) const {
+  void cell(const vec3& v0, std::uint32_t shape, double shortest, float lit, float floor, Visit visit) const {
     const Moments m = statistics_->moments(v0, shape);
     const double edge = edge_length_(shape);
     if (edge < shortest) return;
     const float squared = measure_.squared(
         core::cm_shape_class(shape), static_cast<float>(m.mean()), static_cast<float>(m.variance()),
-        frame_covariance(m, shape, centroid_of(v0, shape)), m.min, m.max, static_cast<float>(edge * edge), floor);
+        frame_covariance(m, shape, centroid_of(v0, shape)), m.min, m.max, static_cast<float>(edge * edge), lit, floor);
     if (squared > floor) visit(midpoint(v0, shape), squared);
   }
 
@@ -238,20 +275,21 @@ class DiamondSet::Evaluation {
   void kuhn_cell(const Statistics::Node& node, std::uint32_t permutation, double shortest, float floor,
                  Visit visit) const {
     const int size = node.log2_size;
+    const float lit = transmittance_ != nullptr ? transmittance_->most(node.corner, size) : 1.0F;
     vec3 v0(node.corner);
     for (int axis = 0; axis < 3; ++axis) {
       if (((node.corner[axis] >> size) & 1) != 0) v0[axis] += static_cast<float>(1 << size);
     }
     const std::uint32_t frame = kuhn_frame(node.corner, 1 << size, permutation);
     const std::uint32_t shape = frame | (1U << 9U) | (static_cast<std::uint32_t>(size) << 11U);
-    cell(v0, shape, shortest, floor, visit);
+    cell(v0, shape, shortest, lit, floor, visit);
     for (unsigned a = 0; a < 2; ++a) {
       const std::uint32_t child = core::cm_child_shape(shape, a);
       const vec3 child_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
-      cell(child_v0, child, shortest, floor, visit);
+      cell(child_v0, child, shortest, lit, floor, visit);
       for (unsigned b = 0; b < 2; ++b) {
         cell(b == 0 ? child_v0 : core::cm_cell_vertex(child_v0, child, 1), core::cm_child_shape(child, b), shortest,
-             floor, visit);
+             lit, floor, visit);
       }
     }
   }
@@ -264,6 +302,7 @@ class DiamondSet::Evaluation {
 
  private:
   const Statistics* statistics_;
+  const Transmittance* transmittance_;
   Measure measure_;
   CameraLimit camera_;
   EdgeLengths edge_length_;
@@ -315,13 +354,19 @@ DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, c
     : log2_size_(statistics.cube().log2_size) {
   check(progress);
   Evaluations evaluations;
-  evaluations.push_back(std::make_unique<const Evaluation>(statistics, statistics.mean_optical_depth(), settings));
-  const auto add = [&](const RgbField* field, double depth) {
-    for (std::size_t i = 0; field != nullptr && i < 3; ++i)
-      evaluations.push_back(std::make_unique<const Evaluation>(field->component(i), depth, settings));
+  std::optional<const Transmittance> transmittance;
+  if (settings.criterion == Criterion::transmittance)
+    transmittance.emplace(statistics, hiding(settings.density_scale, settings.anisotropy), progress);
+  const auto add = [&](const Statistics& field, const Weights& weights) {
+    evaluations.push_back(
+        std::make_unique<const Evaluation>(field, weights, transmittance ? &*transmittance : nullptr, settings));
   };
-  add(channels.emission.get(), channels.emission ? channels.emission->mean_depth() : 0.0);
-  add(channels.scattering.get(), statistics.mean_optical_depth());
+  const Weights of_density = Weights::of_density(statistics.mean_optical_depth(), settings);
+  add(statistics, of_density);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (channels.emission) add(channels.emission->component(i), Weights::of_emission(channels.emission->mean_depth()));
+    if (channels.scattering) add(channels.scattering->component(i), of_density);
+  }
   const double threshold = std::max(settings.threshold, 0.0);
   double floor = 0.0;
   for (const auto& evaluation : evaluations)
@@ -386,7 +431,7 @@ void DiamondSet::evaluate(const Evaluation& evaluation, double floor_squared, Pr
       vec3 v0;
       std::uint32_t shape = 0;
       core::cm_root_cell(root, static_cast<std::uint32_t>(log2_size_ - 1), v0, shape);
-      evaluation.cell(v0, shape, shortest, floor,
+      evaluation.cell(v0, shape, shortest, 1.0F, floor,
                       [&](const ivec3& vertex, float squared) { raise(vertex, quantize(squared)); });
     }
   }

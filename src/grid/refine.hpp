@@ -2,6 +2,7 @@
 
 #include <tbb/concurrent_unordered_map.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -16,7 +17,18 @@
 
 namespace cumulet::grid {
 
-enum class Criterion { deviation, range_mean };
+/// What is compared with the threshold. Standard deviations are those that a cell leaves, s; its longest edge is e, and
+/// d the mean optical depth of the volume's rays.
+///
+///  - deviation: s e / d.
+///  - range_mean: (max - min) / mean, as in the paper.
+///  - transmittance: what is seen of s e, with extinctions by RefineSettings::density_scale, where m is the cell's
+///  mean,
+///    r extinctions reduced by what is scattered forward (hiding()), and T what part of the light outside gets there
+///    (Transmittance of r): T^2 s e / (1 + r m e) / (1 - exp(-d)).
+///    Light comes in and goes out; of what is itself opaque the front is seen; and what a picture shows of a volume
+///    saturates. In thin media it is the deviation. What cells give off only goes out: T s e, against the mean ray's.
+enum class Criterion { deviation = 0, range_mean = 1, transmittance = 2 };
 enum class CellKind { linear, constant };
 
 /// A pinhole camera for adaptive refinement, in world space.
@@ -30,10 +42,19 @@ struct RefineCamera {
   double pixels_per_radian = 1000.0;  ///< image height / (2 tan_half_y)
 };
 
+/// What hides: extinction reduced by what is scattered forward, of a grid value. anisotropy: the phase function's mean
+/// cosine.
+inline double hiding(double density_scale, double anisotropy) {
+  return density_scale * (1.0 - std::max(anisotropy, 0.0));
+}
+
 struct RefineSettings {
   Criterion criterion = Criterion::deviation;
   CellKind cells = CellKind::linear;
   double threshold = 0.02;  ///< negative: split whatever varies, down to the voxel
+  // Of the medium, for transmittance.
+  double density_scale = 1.0;
+  double anisotropy = 0.0;
   std::uint64_t max_cells = 5'400'000;
   std::optional<RefineCamera> camera;  ///< set: no split outside its frustum or under pixel_size
   double pixel_size = 1.0;             ///< pixels that a cell's longest edge must cover to be split

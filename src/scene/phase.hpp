@@ -16,4 +16,7 @@ struct Phase {
 /// Fog and Cloud Rendering" (2023). diameter: 5 to 50 micrometres.
 Phase mie_phase(float diameter);
 
+/// The mean cosine between the directions before and after.
+double mean_cosine(const Phase& phase);
+
 }  // namespace cumulet::scene

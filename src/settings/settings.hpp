@@ -21,6 +21,8 @@ inline constexpr std::array cells_choices = {
     Choice{"constant", CUMULET_CELLS_CONSTANT, "Constant", "The mean."},
     Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."}};
 inline constexpr std::array criterion_choices = {
+    Choice{"transmittance", CUMULET_CRITERION_TRANSMITTANCE, "Transmittance",
+           "What is seen of deviations: less where little light comes and goes."},
     Choice{"range-mean", CUMULET_CRITERION_RANGE_MEAN, "Range / mean", "(max - min) / mean, as in the paper."},
     Choice{"deviation", CUMULET_CRITERION_DEVIATION, "Deviation",
            "Standard deviation x edge length, against the mean depth."}};
@@ -333,12 +335,12 @@ struct Table<cumulet_grid_desc> {
                 .tip = "The density inside a tetrahedron."}}),
       Setting(&Desc::criterion, {.name = "criterion", .choices = criterion_choices,
         .key = "grid.criterion", .flag = "--criterion",
-        .help = "What is compared with the threshold (default: deviation)",
+        .help = "What is compared with the threshold (default: transmittance, with a threshold alone deviation)",
         .row = {.label = "Criterion",
                 .tip = "What is compared with the threshold, to decide whether a cell is split."}}),
       Setting(&Desc::threshold, {.name = "threshold", .given = not_negative, .spelling = Spelling::zero_is_negative,
         .key = "grid.threshold", .flag = "--threshold", .type = "T",
-        .help = "Split cells above it; 0: down to the voxel (default: 0.02, for range-mean 1)",
+        .help = "Split cells above it; 0: down to the voxel (default: 0.15, for deviation 0.02, for range-mean 1)",
         .row = {.label = "Threshold",
                 .tip = "Cells above it are split: smaller is finer.",
                 .format = "%.4g", .logarithmic = true}}),
@@ -449,9 +451,27 @@ struct Table<cumulet_navigation_desc> {
 
 // clang-format on
 
-/// The threshold that 0 stands for.
+/// The criterion that a grid is made by: that of all zeros is not the one that 0 names.
+[[nodiscard]] constexpr cumulet_criterion criterion_of(const cumulet_grid_desc& desc) {
+  const bool zeros = desc.criterion == CUMULET_CRITERION_DEVIATION && desc.threshold == 0.0;
+  return zeros ? CUMULET_CRITERION_TRANSMITTANCE : desc.criterion;
+}
+
+/// The threshold that 0 stands for, of criterion_of().
 [[nodiscard]] constexpr double default_threshold(cumulet_criterion criterion) {
-  return criterion == CUMULET_CRITERION_RANGE_MEAN ? 1.0 : 0.02;
+  switch (criterion) {
+    case CUMULET_CRITERION_TRANSMITTANCE:
+      return 0.15;
+    case CUMULET_CRITERION_RANGE_MEAN:
+      return 1.0;
+    default:
+      return 0.02;
+  }
+}
+
+/// Of a description whose criterion was named: then zeros are what they say.
+constexpr void name_criterion(cumulet_grid_desc& desc) {
+  if (criterion_of(desc) != desc.criterion) desc.threshold = default_threshold(desc.criterion);
 }
 
 /// The sun's angle that 0 stands for.

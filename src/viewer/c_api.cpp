@@ -127,6 +127,9 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     viewer->viewer = std::make_unique<core::Viewer>(
         std::move(log), std::move(update), d.gl_state == CUMULET_GL_STATE_RESTORE,
         cumulet::Trace(d.trace, d.trace_user), d.programs == nullptr ? nullptr : d.programs->asset);
+    cumulet_grid_desc grid{};
+    cumulet::settings::spell_out_zeros(grid);
+    viewer->viewer->set_grid(core::GridSettings::of(grid));
     if (d.get_proc != nullptr) viewer->viewer->attach(d.get_proc, d.get_proc_user);
     *out = viewer.release();
   });

@@ -20,6 +20,10 @@
 
 namespace cumulet::viewer {
 
+// As numbered in cumulet.h.
+static_assert(static_cast<int>(grid::Criterion::range_mean) == CUMULET_CRITERION_RANGE_MEAN);
+static_assert(static_cast<int>(grid::Criterion::transmittance) == CUMULET_CRITERION_TRANSMITTANCE);
+
 struct GridSettings {
   BuildSettings build;  // refine.camera is filled from the viewer's
   bool camera_adaptive = false;
@@ -29,9 +33,9 @@ struct GridSettings {
     s.build.march = static_cast<scene::March>(d.march);
     grid::RefineSettings& refine = s.build.refine;
     refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
-    const bool deviation = d.criterion == CUMULET_CRITERION_DEVIATION;
-    refine.criterion = deviation ? grid::Criterion::deviation : grid::Criterion::range_mean;
-    refine.threshold = d.threshold != 0.0 ? d.threshold : settings::default_threshold(d.criterion);
+    const cumulet_criterion criterion = settings::criterion_of(d);
+    refine.criterion = static_cast<grid::Criterion>(criterion);
+    refine.threshold = d.threshold != 0.0 ? d.threshold : settings::default_threshold(criterion);
     refine.max_cells = d.max_cells;
     refine.pixel_size = d.pixel_size;
     s.camera_adaptive = d.camera_adaptive == 1;

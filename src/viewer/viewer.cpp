@@ -17,6 +17,11 @@ namespace {
 using glm::dvec3;
 using Clock = std::chrono::steady_clock;
 
+// Grids that know of the medium's opacity serve until it differs by more.
+constexpr double most_opacity_ratio = 2.0;
+
+bool apart(double a, double b) { return a > most_opacity_ratio * b || b > most_opacity_ratio * a; }
+
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 dvec3 to_sun(const Light& light) {
@@ -103,6 +108,7 @@ void Viewer::request_build(bool for_emission) {
 
 void Viewer::load_volume(const VolumeFile& file) {
   sync();
+  take_medium();
   builder_.load(file, grid_.camera_adaptive ? std::nullopt : build_settings());
   touch();
 }
@@ -119,6 +125,7 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
   if (!volume_) {
     built_ = {};
   } else if (!grid_.camera_adaptive) {
+    take_medium();
     builder_.build(volume_, grid_.build);
   }
   touch();
@@ -130,6 +137,7 @@ VolumeAssetPtr Viewer::volume() {
 }
 
 void Viewer::rebuild() {
+  take_medium();
   request_build();
   touch();
 }
@@ -239,16 +247,30 @@ Viewer::Status Viewer::status() const {
 
 void Viewer::set_grid(const GridSettings& settings) {
   grid_ = settings;
-  grid_.build.emission = medium_.field_emission;
+  take_medium();
   request_build();
   touch();
 }
 
+void Viewer::take_medium() {
+  grid_.build.emission = medium_.field_emission;
+  grid_.build.refine.density_scale = medium_.density_scale;
+  grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
+}
+
 void Viewer::set_medium(const Medium& medium) {
-  const bool other_emission = grid_.build.emission != medium.field_emission;
   medium_ = medium;
-  grid_.build.emission = medium.field_emission;
-  if (other_emission) request_build(true);
+  const bool other_emission = grid_.build.emission != medium.field_emission;
+  const grid::RefineSettings& refine = grid_.build.refine;
+  const bool other_opacity = grid_.build.march == scene::March::tet &&
+                             refine.criterion == grid::Criterion::transmittance &&
+                             (apart(medium.density_scale, refine.density_scale) ||
+                              apart(grid::hiding(medium.density_scale, scene::mean_cosine(medium.phase)),
+                                    grid::hiding(refine.density_scale, refine.anisotropy)));
+  if (other_emission || other_opacity) {
+    take_medium();
+    request_build(!other_opacity);
+  }
   scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.phase, medium.emission});
   touch();
 }

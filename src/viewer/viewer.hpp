@@ -132,6 +132,8 @@ class Viewer {
   void with_gl(Body&& body);
   void sync();
   void request_build(bool for_emission = false);
+  // What grids to come know of the medium.
+  void take_medium();
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.

@@ -103,6 +103,7 @@ void Viewer::prepare(const Frame& frame) {
   if (grid_.camera_adaptive && view_ && volume_ && (view_ != built_view_ || frame_size_ != built_size_)) {
     const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
     if (rests) {
+      take_medium();
       builder_.build(volume_, *build_settings());
       built_view_ = view_;
       built_size_ = frame_size_;

@@ -70,14 +70,16 @@ volume::ScalarVolume noise_volume(int size) {
 
 }  // namespace
 
-Asset load_asset(const Input& input) {
+Asset load_asset(const Input& input, bool all_fields) {
   Asset asset;
   asset.name = input.name;
   if (input.noise_size > 0) {
     asset.volume = std::make_shared<const viewer::VolumeAsset>(noise_volume(input.noise_size));
   } else {
     const auto start = std::chrono::steady_clock::now();
-    asset.volume = std::make_shared<const viewer::VolumeAsset>(volume::import_volume(input.file, input.grid, Log()));
+    asset.volume =
+        all_fields ? std::make_shared<const viewer::VolumeAsset>(volume::import_frame(input.file, {input.grid}, Log()))
+                   : std::make_shared<const viewer::VolumeAsset>(volume::import_volume(input.file, input.grid, Log()));
     asset.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   asset.mean_optical_depth =

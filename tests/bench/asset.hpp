@@ -12,7 +12,7 @@ struct Asset {
   double load_seconds = 0.0;        ///< 0 for a synthetic one
 };
 
-/// Reads or makes it. Throws Error.
-Asset load_asset(const Input& input);
+/// Reads or makes it; all_fields: not density alone, and by default what makes a volume of a file. Throws Error.
+Asset load_asset(const Input& input, bool all_fields = false);
 
 }  // namespace cumulet::bench

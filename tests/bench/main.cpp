@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "defaults.hpp"
 #include "measure.hpp"
 #include "report.hpp"
 
@@ -33,13 +34,14 @@ void run(const bench::Options& options) {
   if (!options.readme.empty() && !std::ifstream(options.readme)) {
     throw std::runtime_error(options.readme.string() + ": cannot be read");
   }
-  const bool all = !(options.surfaces_threshold > 0.0);
+  const bool all = !(options.surfaces_threshold > 0.0) && !options.defaults;
   if (all) std::filesystem::create_directories(options.out);
   headless::Context context = headless::Context::create(options.backend);
   const bench::Machine machine = machine_of(context);
   bench::progress(machine.gl_renderer);
   std::vector<bench::AssetResult> results;
   std::vector<std::string> skipped;
+  if (options.defaults) std::printf("%s", bench::defaults_head().c_str());
   for (const bench::Input& input : options.inputs) {
     if (input.optional && !std::filesystem::exists(input.file)) {
       skipped.push_back(input.name + ", there is no " + input.file.string());
@@ -47,6 +49,10 @@ void run(const bench::Options& options) {
       continue;
     }
     bench::progress(input.name);
+    if (options.defaults) {
+      std::printf("%s", bench::measure_defaults(context, bench::load_asset(input, true), options).c_str());
+      continue;
+    }
     if (!all) {
       bench::measure_surfaces_alone(context, bench::load_asset(input), options);
       continue;

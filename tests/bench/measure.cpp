@@ -228,7 +228,15 @@ double SweepCurve::threshold_at(double error) const {
 }
 
 const char* name_of(grid::Criterion criterion) {
-  return criterion == grid::Criterion::deviation ? "deviation" : "range-mean";
+  switch (criterion) {
+    case grid::Criterion::deviation:
+      return "deviation";
+    case grid::Criterion::range_mean:
+      return "range-mean";
+    case grid::Criterion::transmittance:
+      break;
+  }
+  return "transmittance";
 }
 
 AssetResult measure(headless::Context& context, const Asset& asset, const Options& options) {

@@ -61,6 +61,10 @@ ParseResult parse(int argc, char** argv) {
   app.add_option("--surfaces-only", o.surfaces_threshold,
                  "Only what surfaces cost, on a linear grid of that threshold, to standard error")
       ->check(CLI::PositiveNumber);
+  app.add_flag("--defaults", o.defaults,
+               "Only how far pictures of grids by default are from the voxels', with all of a file's fields");
+  app.add_option("--threshold", o.thresholds, "With --defaults: these thresholds instead of the default one");
+  app.add_option("--deviation", o.deviations, "With --defaults: these of the deviation criterion too");
   const std::map<std::string, headless::Backend> backends{
       {"auto", headless::Backend::automatic}, {"egl", headless::Backend::egl}, {"osmesa", headless::Backend::osmesa}};
   app.add_option("--backend", backend, "auto|egl|osmesa")->check(CLI::IsMember({"auto", "egl", "osmesa"}));

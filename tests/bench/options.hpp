@@ -39,6 +39,9 @@ struct Options {
   std::uint64_t build_cells = 5'000'000;
   std::size_t tree_triangles = 1'000'000;
   bool quick = false;
+  bool defaults = false;            ///< only how good grids by default are
+  std::vector<double> thresholds;   ///< of those, by transmittance; empty: the default one
+  std::vector<double> deviations;   ///< and by deviation
   double surfaces_threshold = 0.0;  ///< above 0: only what surfaces cost is measured, on a grid of that threshold
 };
 

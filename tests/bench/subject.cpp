@@ -43,6 +43,9 @@ Subject::Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind
   still_.viewer().camera()->frame(volume->bounds(), 1.0);
   still_.set_volume(std::move(volume));
   still_.set_light(bench_light());
+  viewer::Medium medium;
+  medium.density_scale = density_scale;
+  still_.set_medium(medium);
   viewer::GridSettings settings;
   if (kind == Kind::dense) settings.build.march = render::March::dense;
   if (kind == Kind::brick) settings.build.march = render::March::brick;

@@ -413,6 +413,10 @@ TEST(Model, DefaultsAreSpelledOut) {
   scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
   spell_out_defaults(scene);
   EXPECT_EQ(scene.grid.threshold, 1.0);
+  SceneOptions zeros;
+  spell_out_defaults(zeros);
+  EXPECT_EQ(zeros.grid.criterion, CUMULET_CRITERION_TRANSMITTANCE);
+  EXPECT_EQ(zeros.grid.threshold, cumulet::settings::default_threshold(CUMULET_CRITERION_TRANSMITTANCE));
   EXPECT_GT(scene.grid.max_cells, 0u);
   EXPECT_EQ(scene.medium.density_scale, 1.0);
   EXPECT_GT(scene.camera.fovy_degrees, 0.0);

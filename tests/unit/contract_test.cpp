@@ -229,7 +229,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   check_enum("gl_state", &cumulet_create_desc::gl_state, 2, create);
   check_enum("march", &cumulet_grid_desc::march, 3, grid);
   check_enum("cells", &cumulet_grid_desc::cells, 2, grid);
-  check_enum("criterion", &cumulet_grid_desc::criterion, 2, grid);
+  check_enum("criterion", &cumulet_grid_desc::criterion, 3, grid);
   check_enum("view", &cumulet_sampling_desc::view, 5, sampling);
   check_enum("preview", &cumulet_sampling_desc::preview, 2, sampling);
   check_enum("tone_map", &cumulet_display_desc::tone_map, 3, display);

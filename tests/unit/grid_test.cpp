@@ -11,6 +11,7 @@
 #include "grid/refine.hpp"
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
+#include "grid/transmittance.hpp"
 #include "support/volumes.hpp"
 
 namespace {
@@ -292,7 +293,8 @@ TEST(LinearFit, RecoversALinearFieldAndStaysNonNegative) {
 
 TEST(Grid, ConformsForEveryCriterionAndBudget) {
   const auto volume = test::noise_volume({60, 45, 50}, ivec3(-20, 0, 9), 1);
-  for (const auto criterion : {grid::Criterion::deviation, grid::Criterion::range_mean}) {
+  for (const auto criterion :
+       {grid::Criterion::deviation, grid::Criterion::range_mean, grid::Criterion::transmittance}) {
     for (const auto cells : {grid::CellKind::linear, grid::CellKind::constant}) {
       for (const double threshold : {-1.0, 0.02, 0.2, 1.5}) {
         for (const std::uint64_t max_cells : {24ULL, 1000ULL, 20000ULL, 10000000ULL}) {
@@ -308,6 +310,72 @@ TEST(Grid, ConformsForEveryCriterionAndBudget) {
       }
     }
   }
+}
+
+TEST(Grid, TransmittanceIsOfTheSixWaysOut) {
+  auto volume = test::noise_volume({40, 24, 32}, ivec3(-8, 0, 16), 3);
+  volume.index_to_world = glm::dmat4(glm::dmat3(2.0, 0, 0, 0, 1.0, 0, 0, 0, 0.5));
+  const double extinction = 0.3;
+  const grid::Cube cube = grid::fit_cube(volume);
+  const grid::Statistics statistics(volume, cube);
+  const grid::Transmittance transmittance(statistics, extinction);
+  double worst = 0.0;
+  float most_of_all = 0.0F;
+  for (const std::uint32_t n : statistics.nodes_of_size(3)) {
+    const ivec3 corner = statistics.nodes()[n].corner;
+    const float* blocks = transmittance.blocks(corner);
+    ASSERT_NE(blocks, nullptr);
+    for (int b = 0; b < 64; ++b) {
+      most_of_all = std::max(most_of_all, blocks[b]);
+      const ivec3 low = cube.origin + corner + 2 * ivec3(b / 16, (b / 4) % 4, b % 4);
+      double sum = 0.0;
+      for (int axis = 0; axis < 3; ++axis) {
+        std::array<double, 2> depth{};
+        for (int p = cube.origin[axis]; p < cube.origin[axis] + cube.size(); ++p) {
+          if (p >= low[axis] && p < low[axis] + 2) continue;
+          for (int i = 0; i < 4; ++i) {
+            ivec3 at = low;
+            at[axis] = p;
+            at[(axis + 1) % 3] += i % 2;
+            at[(axis + 2) % 3] += i / 2;
+            depth[p < low[axis] ? 0 : 1] +=
+                0.25 * extinction * glm::length(volume.index_to_world[axis]) * double{test::value_at(volume, at)};
+          }
+        }
+        sum += 1.0 / (1.0 + depth[0]) + 1.0 / (1.0 + depth[1]);
+      }
+      worst = std::max(worst, std::abs(std::min(sum / 3.0, 1.0) - double{blocks[b]}));
+    }
+  }
+  EXPECT_LT(worst, 1e-4);
+  EXPECT_EQ(transmittance.most(ivec3(0), cube.log2_size), most_of_all);
+  EXPECT_EQ(transmittance.blocks(ivec3(cube.size() - 8)), nullptr);
+}
+
+// Noise in a ball, seen and hidden.
+TEST(Grid, TransmittanceLeavesOpaqueCoresCoarse) {
+  const auto noise = test::noise_volume({64, 64, 64}, ivec3(0), 4);
+  const auto ball = test::make_volume({64, 64, 64}, ivec3(0), [&](const ivec3& p) {
+    return glm::length(vec3(p) - 31.5F) < 31.0F ? 0.2F + test::value_at(noise, p) : 0.0F;
+  });
+  const auto cells_of = [&](grid::Criterion criterion, double scale, double threshold, float radius) {
+    grid::RefineSettings settings;
+    settings.criterion = criterion;
+    settings.density_scale = scale;
+    settings.threshold = threshold;
+    const grid::TetGrid made = build(ball, settings).grid;
+    return std::ranges::count_if(made.cells, [&](const grid::CellRecord& cell) {
+      return glm::length(core::cm_record_v0(cell.data) - 31.5F) < radius;
+    });
+  };
+  using enum grid::Criterion;
+  // Thin, it is the deviation.
+  EXPECT_EQ(cells_of(transmittance, 1e-9, 0.03, 1e9F), cells_of(deviation, 1.0, 0.03, 1e9F));
+  // What is deep in the dark is coarse, by a grid whose rest is no coarser.
+  const auto all = cells_of(transmittance, 2.0, 0.3, 1e9F);
+  const auto core = cells_of(transmittance, 2.0, 0.3, 16.0F);
+  EXPECT_GE(all, cells_of(deviation, 2.0, 0.03, 1e9F));
+  EXPECT_LT(2 * core, cells_of(deviation, 2.0, 0.03, 16.0F));
 }
 
 TEST(Grid, ConformsForASingleVoxelAnywhere) {

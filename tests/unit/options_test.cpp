@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <presets.hpp>
+#include <settings.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -383,6 +384,18 @@ TEST(Options, AovsAreListedOrAll) {
   EXPECT_TRUE(parse({}).aovs.empty());
   EXPECT_EQ(aovs_of("depth,normal,depth"), (std::vector<cumulet_aov>{CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_NORMAL}));
   EXPECT_EQ(aovs_of("albedo,all").size(), 6U);
+}
+
+TEST(Options, ACriterionThatIsNamedIsNoDefault) {
+  const auto criterion_of = [](const std::vector<std::string>& arguments) {
+    return cumulet::settings::criterion_of(parse(arguments).scene.grid);
+  };
+  EXPECT_EQ(criterion_of({}), CUMULET_CRITERION_TRANSMITTANCE);
+  EXPECT_EQ(criterion_of({"--criterion", "deviation"}), CUMULET_CRITERION_DEVIATION);
+  EXPECT_EQ(criterion_of({"--criterion", "transmittance"}), CUMULET_CRITERION_TRANSMITTANCE);
+  EXPECT_EQ(criterion_of({"--criterion", "transmittance", "--threshold", "0.1"}), CUMULET_CRITERION_TRANSMITTANCE);
+  EXPECT_EQ(criterion_of({"--threshold", "0.1"}), CUMULET_CRITERION_DEVIATION);  // as ever
+  EXPECT_EQ(parse({"--criterion", "deviation"}).scene.grid.threshold, 0.02);
 }
 
 TEST(Options, ThresholdZeroIsTheVoxel) { EXPECT_LT(parse({"--threshold", "0"}).scene.grid.threshold, 0.0); }

@@ -176,6 +176,15 @@ TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
   EXPECT_EQ(dark.light.sky_radiance[2], 0.0f);
 }
 
+TEST(SceneFile, ACriterionThatIsNamedIsNoDefault) {
+  const SceneOptions deviation = parse_scene(with(R"("grid": {"criterion": "deviation"})"), "s.json");
+  EXPECT_EQ(cumulet::settings::criterion_of(deviation.grid), CUMULET_CRITERION_DEVIATION);
+  const SceneOptions zeros = parse_scene(with(R"("grid": {})"), "s.json");
+  EXPECT_EQ(cumulet::settings::criterion_of(zeros.grid), CUMULET_CRITERION_TRANSMITTANCE);
+  EXPECT_EQ(cumulet::settings::criterion_of(parse_scene(with(R"("grid": {"threshold": 0.02})"), "s.json").grid),
+            CUMULET_CRITERION_DEVIATION);
+}
+
 TEST(SceneFile, DaylightModelsWhatADefaultCameraSees) {
   SceneOptions day;
   day.set_daylight();

@@ -136,6 +136,38 @@ TEST_P(ViewerFrames, ChangesRestartOnlyWhatDependsOnThem) {
   EXPECT_LT(viewer().stats().cells, cells);
 }
 
+TEST_P(ViewerFrames, CellsOfATransmittanceAreBuiltForIt) {
+  viewer::GridSettings grid;
+  grid.build.refine.criterion = grid::Criterion::transmittance;
+  grid.build.refine.threshold = 0.1;
+  viewer().set_grid(grid);
+  show_noise();
+  const auto cells_at = [&](double scale, float anisotropy) {
+    viewer().set_medium({scale, vec3(1.0F), {anisotropy}, 0});
+    still_->build();
+    return viewer().stats().cells;
+  };
+  const std::uint64_t before = viewer().stats().cells;
+  EXPECT_EQ(cells_at(0.79, 0.3F), before);
+  EXPECT_EQ(cells_at(0.21, 0.3F), before);
+  EXPECT_EQ(cells_at(0.4, 0.6F), before);
+  const std::uint64_t denser = cells_at(0.81, 0.3F);
+  EXPECT_NE(denser, before);
+  EXPECT_EQ(cells_at(0.41, 0.3F), denser);
+  EXPECT_NE(cells_at(0.41, 0.9F), denser);
+  // One that is made anew is of what there is now, however little it differs.
+  cells_at(0.81, 0.3F);
+  viewer().set_medium({0.5, vec3(1.0F), {0.3F}, 0});
+  viewer().rebuild();
+  still_->build();
+  EXPECT_NE(viewer().stats().cells, denser);
+  // Others do not know of it.
+  viewer().set_grid({});
+  still_->build();
+  const std::uint64_t deviation = viewer().stats().cells;
+  EXPECT_EQ(cells_at(30.0, 0.0F), deviation);
+}
+
 TEST_P(ViewerFrames, NoVolumeShowsNothingAgain) {
   show_noise();
   converge(frame(16, 16));

@@ -668,8 +668,16 @@ typedef enum cumulet_cells {
 } cumulet_cells;
 
 typedef enum cumulet_criterion {
-  CUMULET_CRITERION_DEVIATION = 0, /* standard deviation x edge length > threshold x mean optical depth */
-  CUMULET_CRITERION_RANGE_MEAN = 1 /* (max - min) / mean > threshold (the paper's) */
+  /* standard deviation x edge length > threshold x mean optical depth. With a threshold of 0, the default:
+     CUMULET_CRITERION_TRANSMITTANCE */
+  CUMULET_CRITERION_DEVIATION = 0,
+  CUMULET_CRITERION_RANGE_MEAN = 1, /* (max - min) / mean > threshold (the paper's) */
+  /* What of a deviation is seen, about the picture's relative error: with extinctions by the density scale, reduced by
+     what is scattered forward where they hide, and T the part of the light that gets there and back,
+     T^2 x deviation x edge / (1 + extinction x edge) / (1 - exp(-mean optical depth)) > threshold. Cells are built anew,
+     in the background, once density_scale, alone or times 1 - anisotropy, is more than twice or less than half of what
+     they were built for; until then they stay, and cumulet_rebuild() builds them for what it is now */
+  CUMULET_CRITERION_TRANSMITTANCE = 2
 } cumulet_criterion;
 
 /* How the cells are made. A change rebuilds them on the worker; the old ones are shown meanwhile. */
@@ -678,7 +686,7 @@ typedef struct cumulet_grid_desc {
   cumulet_march march;
   cumulet_cells cells;
   cumulet_criterion criterion;
-  double threshold;        /* split above it. 0: 0.02 for deviation, 1 for range-mean; negative: split to the voxel */
+  double threshold;        /* split above it. 0: 0.15 by transmittance, 1 for range-mean; negative: split to the voxel */
   uint64_t max_cells;      /* 0: 5,400,000. Spent where the criterion is largest */
   int32_t camera_adaptive; /* 1: do not split cells outside the frustum or under pixel_size pixels; 0: off. Needs the
                               size of a frame; built anew when the camera comes to rest elsewhere */
@@ -692,7 +700,8 @@ typedef enum cumulet_phase {
   CUMULET_PHASE_MIE = 2       /* water droplets: a fit of Mie's theory (Jendersie and d'Eon 2023) */
 } cumulet_phase;
 
-/* The participating medium. A change restarts accumulation; the cells stay. */
+/* The participating medium. A change restarts accumulation; the cells stay, unless they were made for another
+   transmittance or emission. */
 typedef struct cumulet_medium_desc {
   size_t struct_size;
   double density_scale; /* extinction = density_scale x grid value, 1 / world unit; 0: 1 */
