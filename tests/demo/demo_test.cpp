@@ -457,6 +457,10 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
     model_.status.stats.samples = model_.status.stats.steps = 1;
     model_.grids = {{"density", "float", ""}, {"velocity", "vec3s", "not a scalar"}};
     model_.preferences.recent = {"/a/cloud.vdb"};
+    for (const cumulet_lamp_kind kind : {CUMULET_LAMP_SPOT, CUMULET_LAMP_RECTANGLE}) {
+      model_.scene.lamps.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
+      model_.scene.lamps.back().kind = kind;
+    }
     spell_out_defaults(model_.scene);
   }
   ~PanelTest() override { ImGui::DestroyContext(); }
@@ -482,9 +486,9 @@ TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
   frame();
   const auto& controls = panel_.ui().controls();
   const std::set<std::string> without_tip = {
-      "File",       "Display",       "Light",    "Medium",        "Surfaces",   "Model",       "Triangles",
-      "Grid",       "Camera",        "Sampling", "Statistics",    "Live cells", "Levels",      "Build",
-      "March data", "Active voxels", "Trace",    "OpenGL memory", "Renderer",   "Steps a path"};
+      "File",      "Display",    "Light",         "Lamps",    "Medium",        "Surfaces",   "Model",
+      "Triangles", "Grid",       "Camera",        "Sampling", "Statistics",    "Live cells", "Levels",
+      "Build",     "March data", "Active voxels", "Trace",    "OpenGL memory", "Renderer",   "Steps a path"};
   EXPECT_GT(controls.size(), 50u);
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   for (const auto& [name, control] : controls) {
