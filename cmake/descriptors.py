@@ -8,8 +8,8 @@ import re
 
 import c_header
 
-DESCRIPTORS = ["grid", "medium", "light", "lamp", "environment_settings", "surface_settings", "sampling", "display", "camera",
-               "navigation", "frame"]
+DESCRIPTORS = ["grid", "medium", "light", "lamp", "environment_settings", "ground", "surface_settings", "sampling",
+               "display", "camera", "navigation", "frame"]
 # What C functions fill.
 FILLED = {"camera"}
 ENUMS_BY_HAND = {"cumulet_status", "cumulet_key"}

@@ -31,8 +31,10 @@
 // A ray's way through the box, as far as it reaches.
 CM_FN void cm_aim(CM_INOUT(CmPath) p) {
   vec2 range = cm_box_range(p.o, p.d);
+  // Without triangles a reach is kept no longer than until here, and after the ground another dispatch may come between.
+  float reach = CM_SURFACES == 0 && p.start == CM_ON_GROUND ? p.t_end : p.reach;
   p.t = range.x;
-  p.t_end = max(0.0f, min(range.y, p.reach));
+  p.t_end = max(0.0f, min(range.y, reach));
   p.cell = uvec2(CM_NONE, 0u);
   p.cache = CM_NONE;
   if (range.x < p.t_end) {
@@ -120,7 +122,8 @@ CM_FN uint cm_after_flight(CmPath p) {
 // done, or that was enough. Returns how often it marched.
 CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
   uint marches = 0u;
-  for (int j = 0; j < CM_EVENTS && (p.stage == CM_STAGE_AIM || p.stage == CM_STAGE_FLY || p.stage == CM_STAGE_EVENT);
+  for (int j = 0; j < CM_EVENTS && ((CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) || p.stage == CM_STAGE_FLY ||
+                                    p.stage == CM_STAGE_EVENT);
        ++j) {
     if (p.stage == CM_STAGE_EVENT) cm_handle(p, cm_in_medium());
     if (CM_SURFACES != 0 && p.stage == CM_STAGE_AIM) {

@@ -130,6 +130,14 @@ CM_BLOCK(CmEnvironment) {
   CM_EQUALITY(CmEnvironment)
 };
 
+// The plane that paths meet under all else (glsl/ground.glsl): render::GpuScene.
+CM_BLOCK(CmGround) {
+  CM_ALIGN(16) vec3 albedo;
+  float height;  // world
+  float reach;   // a ray meets it within that; 0: there is none
+  CM_EQUALITY(CmGround)
+};
+
 // The surface pass that camera rays end at: Tracer::begin.
 CM_BLOCK(CmLayers) {
   uint count;              // 0: none
@@ -179,6 +187,7 @@ layout(std140, binding = CM_UNIFORM_PARAMETERS) uniform CmParameters {
   CmSurfaceTables surfaces;
   CmLamps lamps;
   CmEnvironment environment;
+  CmGround ground;
   CmLayers layers;
   CmHostDepth host_depth;
   CmIntegrator integrator;

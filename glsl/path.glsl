@@ -17,6 +17,7 @@
 #define CM_PATH_GLSL
 
 #include "ray.glsl"
+#include "ground.glsl"
 #include "path_state.glsl"
 #include "light.glsl"
 #include "path_vertex.glsl"
@@ -85,6 +86,10 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint sample_number, uvec2 at) {
   // Samples go through the layers in turn, each pixel from one of its own.
   uint layer = (shift.x >> 16) + sample_number;
   p.reach = t_per_z * cm_camera_end(p, at, within, layer, cm_unit_float(h.z));
+  float ground = cm_ground_distance(p.o, p.d);
+  p.to_ground = ground < min(p.reach, CM_NO_GROUND) ? 1u : 0u;
+  if (p.to_ground != 0u) p.at_layer = 0u;
+  p.reach = min(p.reach, ground);
   p.stage = CM_STAGE_AIM;
 }
 
@@ -111,24 +116,26 @@ CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
   p.radiance += p.throughput * (glow * cm.medium.source);
 }
 
-// The path goes on from where it collided or met a triangle, unless Russian roulette or the limit ends it: returns
-// whether it does.
-CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided) {
+// The path goes on from where it collided or met a triangle or the ground, unless Russian roulette or the limit ends it:
+// returns whether it does.
+CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   if (collided && p.bounces == 0u) p.in_volume = 1u;
   p.bounces += 1u;
   if (collided) p.throughput *= cm.medium.albedo;
+  if (grounded) p.throughput *= cm.ground.albedo;
 #if CM_CHANNELS
   if (collided && cm.medium.coloured != 0u) p.throughput *= cm_march_colour(p.cell);
 #endif
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
-  float survival = strongest < 0.5f ? max(strongest, 0.05f) : 1.0f;
+  // Ground that a camera sees is large, even and dark: there roulette would be all the noise.
+  float survival = strongest < 0.5f && !(grounded && p.bounces == 1u) ? max(strongest, 0.05f) : 1.0f;
   float u = cm_random(p.random, p.stream);
   bool last = cm.integrator.max_bounces != 0u && p.bounces > cm.integrator.max_bounces;
   bool ends = !(strongest > 0.0f) || u >= survival || last;
   p.throughput = p.throughput / survival;
   p.o = p.o + p.t * p.d;
   p.start_cell = p.cell;
-  p.start = CM_IN_MEDIUM;
+  p.start = grounded ? CM_ON_GROUND : CM_IN_MEDIUM;
   return ends;
 }
 
@@ -145,6 +152,9 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   look.u_0 = cm_random(p.random, p.stream);
   look.u_1 = cm_random(p.random, p.stream);
   float u_2 = cm_random(p.random, p.stream);
+  // What a flight to the ground has left of its depth is as random as a new one, and a pixel's first ones are even: so
+  // are then its looks for the sun and for the sky.
+  if (p.start == CM_ON_GROUND && arrived) u_2 = 1.0f - exp(-max(0.0f, p.depth));
   look.looks = arrived && cm.lights.any != 0u;
   vec3 here = cm_look_from(p, vertex);
   look.light = cm_sky_sample(p, here, u_2);
@@ -178,14 +188,17 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   p.found = CM_FOUND_NOT_ASKED;
   p.depth_0 = cm_random_depth(p.random, p.stream) + (looks ? CM_SHADOW_DEPTH : 0.0f);
   p.depth = p.depth_0;
-  p.reach = light.distance;
+  float ground = cm_ground_distance(p.o, p.d);
+  p.to_ground = !looks && ground < light.distance ? 1u : 0u;
+  bool hidden = looks && ground < light.distance;
+  if (hidden) p.light = vec3(0.0f, 0.0f, 0.0f);
+  p.reach = hidden ? 0.0f : min(light.distance, ground);
   if (CM_SURFACES == 0) {
     p.t = 0.0f;
-    p.t_end = cm_box_range(p.o, p.d).y;
-    if (CM_LAMPS != 0) p.t_end = min(p.t_end, p.reach);
+    p.t_end = p.start == CM_ON_GROUND ? p.reach : min(cm_box_range(p.o, p.d).y, p.reach);
     p.cell = p.start_cell;
     p.cache = CM_NONE;
-    p.stage = CM_STAGE_FLY;
+    p.stage = p.start == CM_ON_GROUND ? CM_STAGE_AIM : CM_STAGE_FLY;
   } else {
     if (looks && !(max(p.light.x, max(p.light.y, p.light.z)) > 0.0f)) p.reach = 0.0f;  // no light to look for
     p.stage = CM_STAGE_AIM;
@@ -196,16 +209,18 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
 CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived) {
   bool flight = p.ray == CM_RAY_FLIGHT;
   bool met = vertex.on_triangle && flight;
-  bool escaped = p.event == CM_EVENT_ESCAPE && !met;
+  bool grounded = flight && p.event == CM_EVENT_ESCAPE && !met && p.to_ground != 0u;
+  bool escaped = p.event == CM_EVENT_ESCAPE && !met && !grounded;
   bool collided = flight && p.event == CM_EVENT_COLLISION && !met;
   if (escaped) cm_escape(p);
   bool finished = escaped && flight;
   if (met) cm_see(p, vertex);
-  bool dark = (met && cm_among_surfaces_dark(p)) || (collided && cm_is_dark(p));
+  bool dark = (met && cm_among_surfaces_dark(p)) || ((collided || grounded) && cm_is_dark(p));
   cm_glow(p, flight, collided && !dark);
-  arrived = collided || met;
+  arrived = collided || met || grounded;
+  if (grounded) p.t = cm_ground_distance(p.o, p.d);
   if (arrived) {
-    finished = cm_arrive(p, collided) || dark;
+    finished = cm_arrive(p, collided, grounded) || dark;
     if (met) finished = cm_stand(p, vertex) || finished;
   }
   return finished;

@@ -25,6 +25,7 @@
 #define CM_AT_CAMERA 0u
 #define CM_IN_MEDIUM 1u
 #define CM_ON_TRIANGLE 2u
+#define CM_ON_GROUND 3u
 
 // What is known of triangles before a flight marches, in media that give off light.
 #define CM_FOUND_NOT_ASKED 0u
@@ -61,6 +62,7 @@
 //   in_volume       1: this sample met the volume first
 //   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
 //   lifted          1: the ray started above the triangle that its path had met
+//   to_ground       1: a flight comes to the ground if nothing stops it
 // BITS have a number of bits of a word that they share with their neighbours.
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
@@ -70,7 +72,7 @@
   VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(light) FLOAT(density)
 #define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 1) BITS(start, 2) BITS(found, 2) BITS(behind, 1)            \
-  BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1)
+  BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1) BITS(to_ground, 1)
 
 #define CM_PATH_VEC3(name) vec3 name;
 #define CM_PATH_VEC2(name) vec2 name;

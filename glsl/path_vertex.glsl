@@ -1,4 +1,4 @@
-// Where paths scatter: in the medium, or at a triangle. What glsl/path.glsl does there in either way, with functions of
+// Where paths scatter: in the medium, on the ground, or at a triangle. What glsl/path.glsl does there in either way, with functions of
 // the same names where there are no triangles.
 #ifndef CM_PATH_VERTEX_GLSL
 #define CM_PATH_VERTEX_GLSL
@@ -35,6 +35,17 @@ CM_FN float cm_medium_cosine(float u) { return cm_phase_cosine(cm_lobes(), u); }
 CM_FN float cm_medium_phase(float cosine) { return cm_henyey_greenstein(cm.medium.anisotropy, cosine); }
 CM_FN float cm_medium_cosine(float u) { return cm_henyey_greenstein_cosine(cm.medium.anisotropy, u); }
 #endif
+
+// The share of light that goes on along a direction, in the medium or on the ground, of what is not absorbed; and the
+// density of the directions that are sampled, which is the same.
+CM_FN float cm_scattered(CmPath p, vec3 wi) {
+  return p.start == CM_ON_GROUND ? max(0.0f, wi.y) * 0.318309886f : cm_medium_phase(dot(p.w, wi));
+}
+CM_FN vec3 cm_scattered_direction(CmPath p, float u_0, float u_1) {
+  bool ground = p.start == CM_ON_GROUND;
+  return cm_around(ground ? vec3(0.0f, 1.0f, 0.0f) : p.w, ground ? sqrt(1.0f - u_0) : cm_medium_cosine(u_0),
+                   6.28318531f * u_1);
+}
 
 // Without light among surfaces: what has left one sees the sky alone, and the volume sees none.
 CM_FN bool cm_among_surfaces_dark(CmPath p) {
@@ -150,7 +161,7 @@ CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) {
 
 // A direction that a flight might take. Some that leave a triangle are aimed at the glowing medium.
 CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
-  if (!vertex.on_triangle) return cm_around(p.w, cm_medium_cosine(u_0), 6.28318531f * u_1);
+  if (!vertex.on_triangle) return cm_scattered_direction(p, u_0, u_1);
   float u_3 = cm_random(p.random, p.stream);
   float to_glow = cm.lights.glow_chance;
   bool aimed = u_3 < to_glow;
@@ -169,7 +180,7 @@ CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
                    cm_light_pdf(cm_light_hit(CM_LIGHT_GLOW, p.o, wi, turn.lobe_density));
     turn.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
   } else {
-    turn.lobe_density = cm_medium_phase(dot(p.w, wi));
+    turn.lobe_density = cm_scattered(p, wi);
     turn.density = turn.lobe_density;
     turn.share = vec3(turn.lobe_density);
   }
@@ -199,14 +210,13 @@ CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }
 CM_FN bool cm_blurs(CmTurn turn) { return false; }
 CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }
 
-// The phase function samples itself exactly.
 CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
-  return cm_around(p.w, cm_medium_cosine(u_0), 6.28318531f * u_1);
+  return cm_scattered_direction(p, u_0, u_1);
 }
 
 CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
   CmTurn turn;
-  turn.density = cm_medium_phase(dot(p.w, wi));
+  turn.density = cm_scattered(p, wi);
   turn.lobe_density = turn.density;
   turn.share = vec3(turn.density, turn.density, turn.density);
   turn.weight = vec3(1.0f, 1.0f, 1.0f);

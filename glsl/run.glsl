@@ -10,10 +10,13 @@
 CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rounds) {
   uint marches = 0u;
   for (uint i = 0u; i < rounds && p.stage != CM_STAGE_DONE; ++i) {
-    if (p.stage == CM_STAGE_CAMERA) {
-      cm_camera(p, samples, at);
+    if (p.stage == CM_STAGE_CAMERA) cm_camera(p, samples, at);
+    if (p.stage == CM_STAGE_AIM) {
       cm_aim(p);
-      if (p.cell.x == CM_NONE) p.stage = CM_STAGE_FINISH;
+      if (p.cell.x == CM_NONE) {
+        p.event = CM_EVENT_ESCAPE;
+        p.stage = p.start == CM_AT_CAMERA && p.to_ground == 0u ? CM_STAGE_FINISH : CM_STAGE_EVENT;
+      }
     }
     marches += cm_travel(p);
     if (p.stage == CM_STAGE_FINISH) {

@@ -193,6 +193,17 @@ void Panel::light(Model& model) {
     }
     ImGui::EndDisabled();
   });
+  ground(model.scene.ground);
+}
+
+void Panel::ground(cumulet_ground_desc& ground) {
+  using Desc = cumulet_ground_desc;
+  settings::for_each<Desc>([&](const auto& setting) {
+    ImGui::BeginDisabled((setting.is(&Desc::albedo) && ground.place == CUMULET_GROUND_NONE) ||
+                         (setting.is(&Desc::height) && ground.place != CUMULET_GROUND_AT_HEIGHT));
+    rows_.draw(setting, ground.*setting.field);
+    ImGui::EndDisabled();
+  });
 }
 
 void Panel::sun_angle(const settings::Facts& facts, cumulet_light_desc& light) {

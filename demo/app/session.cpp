@@ -117,6 +117,7 @@ void Session::follow(const Wish& wish) {
   give(&SceneOptions::medium, cumulet_set_medium);
   give(&SceneOptions::light, cumulet_set_light);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
+  give(&SceneOptions::ground, cumulet_set_ground);
   follow_environment();
   follow_lamps();
   give(&SceneOptions::sampling, cumulet_set_sampling);

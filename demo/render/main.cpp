@@ -324,6 +324,7 @@ void render(const RenderOptions& options) {
   check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   check(viewer, cumulet_set_light(viewer.get(), &scene.light));
   check(viewer, cumulet_set_lamps(viewer.get(), scene.lamps.data(), scene.lamps.size()));
+  check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
   set_environment(viewer, scene);
   check(viewer, cumulet_set_sampling(viewer.get(), &sampling));
   check(viewer, cumulet_set_display(viewer.get(), &scene.display));

@@ -384,6 +384,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--sky-model", "\"turbidity,ground_albedo\"",
       [&](const std::string& text) { parse_sky_model(text, scene.light); },
       "A clear day's sun and sky: from 1 (no aerosols) over 3 (clear) to 10, and what the ground sends back, 0 to 1");
+  add_settings(app, group, scene.ground);
   add_settings(app, "Grid", scene.grid);
 
   group = "Picture";
@@ -467,8 +468,11 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
     if (app.count("--sky-model") > 0) {
       scene.light.turbidity = given.turbidity;
       scene.light.ground_albedo = given.ground_albedo;
+    } else if (app.count("--ground") == 0 && scene.surfaces.empty()) {
+      scene.ground.place = CUMULET_GROUND_BELOW;
     }
   }
+  if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.place = CUMULET_GROUND_AT_HEIGHT;
 }
 
 bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {

@@ -517,6 +517,7 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   }
   for (std::size_t i = 0; i < scene.lamps.size(); ++i)
     writer.put_settings(scene.lamps[i], "lights[" + std::to_string(i) + "].");
+  writer.put_settings(scene.ground);
   writer.put_settings(scene.grid);
   writer.put("picture.width", scene.width);
   writer.put("picture.height", scene.height);

@@ -33,6 +33,7 @@ struct SceneOptions {
   std::vector<cumulet_lamp_desc> lamps;
   std::string environment;  // a .hdr or .exr file; "": the light's sky
   cumulet_environment_settings_desc environment_settings{};
+  cumulet_ground_desc ground{};
   cumulet_camera_desc camera{};
   cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
@@ -54,6 +55,7 @@ void for_each_group(Scene& scene, Visit&& visit) {
   visit(scene.medium);
   visit(scene.light);
   visit(scene.environment_settings);
+  visit(scene.ground);
   visit(scene.grid);
   visit(scene.sampling);
   visit(scene.display);

@@ -391,12 +391,14 @@ vec3 Sky::radiance(const dvec3& direction) const {
                   vec3(0.0F));
 }
 
-Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees) {
+Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone) {
   const double up = sun_elevation_degrees * pi / 180.0;
   const Sky sky(model, {0.0, std::sin(up), std::cos(up)});
   EnvironmentPixels pixels{.width = 512, .height = 256, .values = {}};
   pixels.values.resize(std::size_t{pixels.width} * pixels.height);
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, pixels.height), [&](const auto& range) {
+  // One row more: what is just above the horizon is between it and the one before.
+  const std::uint32_t rows = above_alone ? pixels.height / 2 + 1 : pixels.height;
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, rows), [&](const auto& range) {
     for (std::uint32_t y = range.begin(); y != range.end(); ++y) {
       const double elevation = pi * (0.5 - (y + 0.5) / pixels.height);
       for (std::uint32_t x = 0; x < pixels.width; ++x) {
@@ -407,7 +409,8 @@ Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees) {
       }
     }
   });
-  return {model, sun_elevation_degrees, sky.sun_irradiance(), make_environment(pixels, "the physical sky")};
+  return {model, sun_elevation_degrees, above_alone, sky.sun_irradiance(),
+          make_environment(pixels, "the physical sky")};
 }
 
 }  // namespace cumulet::light

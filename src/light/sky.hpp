@@ -60,11 +60,12 @@ class Sky {
 struct Daylight {
   SkyModel model;
   double sun_elevation_degrees = 90.0;
+  bool above_alone = false;  ///< below the horizon it is dark: something else is there, and looks go where light is
   glm::vec3 sun_irradiance{0.0F};
   EnvironmentPtr surroundings;  ///< all but the sun, 512 x 256; the sun is at azimuth 0, +Z
 };
 
 /// As Sky's constructor.
-Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees);
+Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone);
 
 }  // namespace cumulet::light

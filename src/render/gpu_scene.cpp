@@ -218,6 +218,8 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   const light::LightTable table(lights(snapshot), surroundings(snapshot), near, glow);
   p.lights = table.parameters();
   if (environment_) p.environment = environment_->parameters();
+  if (const std::optional<scene::Ground>& ground = *snapshot.ground)
+    p.ground = {ground->albedo, static_cast<float>(ground->height), static_cast<float>(ground->reach)};
   p.integrator = integrator;
   return p;
 }

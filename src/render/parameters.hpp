@@ -10,6 +10,7 @@ struct PictureParameters {
   core::CmMedium medium{};
   core::CmLights lights{};
   core::CmEnvironment environment{};
+  core::CmGround ground{};
   core::CmIntegrator integrator{};
   bool operator==(const PictureParameters&) const = default;
 };

@@ -22,6 +22,7 @@ struct PictureWish {
     scene::Part<light::DistantLights> lights;
     scene::Part<light::Surroundings> surroundings;
     scene::Part<light::Lamps> lamps;
+    scene::Part<std::optional<scene::Ground>> ground;
     std::vector<scene::Part<scene::Medium>> media;
     Revision<MarchData> data;
     Revision<ModelData> model;

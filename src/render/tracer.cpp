@@ -65,6 +65,7 @@ core::CmParameters assemble(const PictureParameters& picture, const MarchData& d
   parameters.medium = picture.medium;
   parameters.lights = picture.lights;
   parameters.environment = picture.environment;
+  parameters.ground = picture.ground;
   parameters.integrator = picture.integrator;
   describe(obstacles, parameters);
   return parameters;

@@ -37,6 +37,14 @@ struct Viewpoint {
   bool operator==(const Viewpoint&) const = default;
 };
 
+/// A level plane that scatters evenly, met from above.
+struct Ground {
+  double height = 0.0;
+  glm::vec3 albedo{0.0F};
+  double reach = 0.0;  ///< of rays that may meet it; beyond, nobody sees whether they do
+  bool operator==(const Ground&) const = default;
+};
+
 /// Its place in the world is its source's.
 struct Volume {
   MarchSourcePtr source;  ///< null: not there yet
@@ -58,6 +66,7 @@ struct Snapshot {
   Part<light::DistantLights> lights;
   Part<light::Surroundings> surroundings;
   Part<light::Lamps> lamps;  ///< the host's; models have their own beside them
+  Part<std::optional<Ground>> ground;
   Part<std::optional<Viewpoint>> view;  ///< none: nothing is to be seen
   /// O(volumes + models).
   bool operator==(const Snapshot&) const = default;

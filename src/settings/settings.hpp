@@ -38,6 +38,10 @@ inline constexpr std::array phase_choices = {
 inline constexpr std::array sky_choices = {
     Choice{"constant", CUMULET_SKY_CONSTANT, "Constant", "One colour from everywhere."},
     Choice{"physical", CUMULET_SKY_PHYSICAL, "Physical", "A clear day's, with the sun where it stands."}};
+inline constexpr std::array ground_choices = {
+    Choice{"none", CUMULET_GROUND_NONE, "None", "Nothing."},
+    Choice{"below", CUMULET_GROUND_BELOW, "Below", "At the lowest point of volume and surfaces."},
+    Choice{"at-height", CUMULET_GROUND_AT_HEIGHT, "At a height", "Where it is set to be."}};
 inline constexpr std::array view_choices = {
     Choice{"shaded", CUMULET_VIEW_SHADED, "Shaded", "The path-traced picture."},
     Choice{"cells", CUMULET_VIEW_CELLS, "Cells", "The cells on a cut through the middle, coloured by level."},
@@ -282,6 +286,26 @@ struct Table<cumulet_environment_settings_desc> {
         .row = {.label = "Environment strength",
                 .tip = "Times the environment's radiance.",
                 .least = 0.01, .most = 100.0, .format = "%.3g", .logarithmic = true}})};
+};
+
+template <>
+struct Table<cumulet_ground_desc> {
+  using Desc = cumulet_ground_desc;
+  static constexpr const char* name = "cumulet_ground_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::place, {.name = "place", .choices = ground_choices,
+        .key = "ground.place", .flag = "--ground",
+        .help = "A level plane that catches light and shadows (default: below, without a model or a word of light; "
+                "else none)",
+        .row = {.label = "Ground", .tip = "A level plane that catches light and shadows."}}),
+      Setting(&Desc::height, {.name = "height", .range = {-1e30, 1e30},
+        .key = "ground.height", .flag = "--ground-height", .type = "Y",
+        .help = "Of a ground at a height (default: 0)",
+        .row = {.label = "Ground height", .tip = "Its y in the world.", .format = "%.4g"}}),
+      Setting(&Desc::albedo, {.name = "albedo", .range = {0.0, 1.0}, .zero = 0.3,
+        .key = "ground.albedo", .flag = "--ground-albedo", .type = "R,G,B",
+        .help = "What it sends back (default: 0.3,0.3,0.3)",
+        .row = {.label = "Ground colour", .tip = "What it sends back of the light."}})};
 };
 
 template <>

@@ -282,6 +282,10 @@ cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer, const cu
       viewer, [&](core::Viewer& v) { v.set_environment_settings(core::EnvironmentSettings::of(read_settings(desc))); });
 }
 
+cumulet_status cumulet_set_ground(cumulet_viewer* viewer, const cumulet_ground_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_ground(core::GroundSettings::of(read_settings(desc))); });
+}
+
 cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(path != nullptr && *path != '\0', "path is NULL or empty");

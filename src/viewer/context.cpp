@@ -113,6 +113,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.content.lights = shot.scene->lights;
   wish.content.surroundings = shot.scene->surroundings;
   wish.content.lamps = shot.scene->lamps;
+  wish.content.ground = shot.scene->ground;
   for (const scene::Volume& volume : shot.scene->volumes) wish.content.media.push_back(volume.medium);
   wish.content.data = scene_.data_revision();
   wish.content.model = scene_.model_revision();

@@ -97,6 +97,18 @@ struct EnvironmentSettings {
   static EnvironmentSettings of(const cumulet_environment_settings_desc& d) { return {d.rotation_degrees, d.strength}; }
 };
 
+enum class GroundPlace { none = 0, below = 1, at_height = 2 };
+
+struct GroundSettings {
+  GroundPlace place = GroundPlace::none;
+  double height = 0.0;
+  glm::vec3 albedo{0.3F};
+
+  static GroundSettings of(const cumulet_ground_desc& d) {
+    return {static_cast<GroundPlace>(d.place), d.height, glm::make_vec3(d.albedo)};
+  }
+};
+
 enum class SurfaceLight { full = 0, shadows = 1, none = 2 };
 
 struct SurfaceSettings {

@@ -308,14 +308,22 @@ void Viewer::surround() {
                                    environment_settings_.strength};
   if (light_.sky) {
     const double elevation = light_.sun_elevation_degrees;
-    if (!daylight_ || daylight_->model != *light_.sky || daylight_->sun_elevation_degrees != elevation)
-      daylight_ = light::make_daylight(*light_.sky, elevation);
+    const bool ground = ground_.place != GroundPlace::none;
+    if (!daylight_ || daylight_->model != *light_.sky || daylight_->sun_elevation_degrees != elevation ||
+        daylight_->above_alone != ground)
+      daylight_ = light::make_daylight(*light_.sky, elevation, ground);
     lights.sun_irradiance = daylight_->sun_irradiance;
     if (!environment_)
       surroundings = {.environment = daylight_->surroundings, .rotation_degrees = light_.sun_azimuth_degrees};
   }
   scene_.lights.set(lights);
   scene_.surroundings.set(std::move(surroundings));
+}
+
+void Viewer::set_ground(const GroundSettings& settings) {
+  ground_ = settings;
+  surround();
+  touch();
 }
 
 void Viewer::set_sampling(const Sampling& sampling) {
@@ -360,6 +368,17 @@ std::optional<Bounds> Viewer::box() const {
     box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};
   }
   return box;
+}
+
+std::optional<scene::Ground> Viewer::ground() const {
+  const auto all = box();
+  if (ground_.place == GroundPlace::none || !all) return std::nullopt;
+  scene::Ground ground{ground_.height, ground_.albedo};
+  if (ground_.place == GroundPlace::below) ground.height = all->min.y;
+  // The horizon is then a ten-thousandth below where it is.
+  const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
+  ground.reach = 1e4 * (glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) + eye);
+  return ground;
 }
 
 std::optional<Subject> Viewer::subject() const {
@@ -440,6 +459,7 @@ scene::SnapshotPtr Viewer::snapshot() {
   scene_.models.clear();
   if (model_source_) scene_.models.push_back({model_source_});
   scene_.view.set(view_ ? std::optional<scene::Viewpoint>(*view_) : std::nullopt);
+  scene_.ground.set(ground());
   if (!snapshot_ || *snapshot_ != scene_) snapshot_ = std::make_shared<const scene::Snapshot>(scene_);
   return snapshot_;
 }

@@ -91,6 +91,7 @@ class Viewer {
   void set_environment(light::EnvironmentPtr environment);
   void set_environment_settings(const EnvironmentSettings& settings);
   [[nodiscard]] const light::EnvironmentPtr& environment() const { return environment_; }
+  void set_ground(const GroundSettings& settings);
   void set_sampling(const Sampling& sampling);
   void set_display(const DisplaySettings& display);
   void set_camera(std::shared_ptr<Camera> camera);
@@ -144,6 +145,7 @@ class Viewer {
   scene::SnapshotPtr snapshot();
   Shot shot();
   [[nodiscard]] std::optional<Bounds> box() const;
+  [[nodiscard]] std::optional<scene::Ground> ground() const;
   /// What cameras fit; good for as long as nothing changes.
   [[nodiscard]] std::optional<Subject> subject() const;
   [[nodiscard]] std::vector<double> seen_reach(const glm::dvec3& direction, std::span<const glm::dvec3> normals) const;
@@ -164,6 +166,7 @@ class Viewer {
   std::optional<light::Daylight> daylight_;  // of the physical sky last asked for
   light::EnvironmentPtr environment_;        // the host's
   EnvironmentSettings environment_settings_;
+  GroundSettings ground_;
   SurfaceSettings surface_settings_;
   SurfaceAssetPtr surface_asset_;       // newest
   scene::ModelSourcePtr model_source_;  // newest that is posed

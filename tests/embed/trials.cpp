@@ -315,6 +315,7 @@ void Caller::call_all() {
   const auto lamp = make_desc<cumulet_lamp_desc>();
   const auto environment = make_desc<cumulet_environment_desc>();
   const auto environment_settings = make_desc<cumulet_environment_settings_desc>();
+  const auto ground = make_desc<cumulet_ground_desc>();
   auto environment_info = make_desc<cumulet_environment_info>();
   const auto grid = make_desc<cumulet_grid_desc>();
   const auto sampling = make_desc<cumulet_sampling_desc>();
@@ -422,6 +423,7 @@ void Caller::call_all() {
     CALL(cumulet_set_environment, v, nullptr);
     CALL(cumulet_get_environment, v, &new_environment);
     CALL(cumulet_set_environment_settings, v, &environment_settings);
+    CALL(cumulet_set_ground, v, &ground);
     CALL(cumulet_set_sampling, v, &sampling);
     CALL(cumulet_set_display, v, &display);
     CALL(cumulet_set_camera, v, camera);

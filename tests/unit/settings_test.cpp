@@ -29,6 +29,7 @@ void for_each_descriptor(Visit&& visit) {
   visit(&SceneOptions::medium, cumulet_set_medium);
   visit(&SceneOptions::light, cumulet_set_light);
   visit(&SceneOptions::environment_settings, cumulet_set_environment_settings);
+  visit(&SceneOptions::ground, cumulet_set_ground);
   visit(&SceneOptions::grid, cumulet_set_grid);
   visit(&SceneOptions::surface, cumulet_set_surface_settings);
   visit(&SceneOptions::sampling, cumulet_set_sampling);
@@ -122,6 +123,7 @@ TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
   expect_all_fields<cumulet_light_desc>();
   expect_all_fields<cumulet_environment_settings_desc>();
   expect_all_fields<cumulet_lamp_desc>();
+  expect_all_fields<cumulet_ground_desc>();
   expect_all_fields<cumulet_grid_desc>();
   expect_all_fields<cumulet_surface_settings_desc>();
   expect_all_fields<cumulet_sampling_desc>();

@@ -769,6 +769,23 @@ typedef struct cumulet_environment_settings_desc {
   float strength;         /* times its radiance, up to 1e6; 0: 1 */
 } cumulet_environment_settings_desc;
 
+typedef enum cumulet_ground {
+  CUMULET_GROUND_NONE = 0,
+  CUMULET_GROUND_BELOW = 1, /* at the lowest point of what there is */
+  CUMULET_GROUND_AT_HEIGHT = 2
+} cumulet_ground;
+
+/*
+ * A level plane without end that scatters light evenly and catches shadows; from beneath it is not there. It is part of
+ * the picture and of its alpha, not of its depth, previews' surfaces and AOVs. Restarts accumulation.
+ */
+typedef struct cumulet_ground_desc {
+  size_t struct_size;
+  cumulet_ground place;
+  double height;   /* at a height: its y in the world */
+  float albedo[3]; /* all 0: 0.3 */
+} cumulet_ground_desc;
+
 typedef enum cumulet_view {
   CUMULET_VIEW_SHADED = 0,
   CUMULET_VIEW_CELLS = 1,    /* the cells on a cut through the middle, coloured by level, with their edges */
@@ -824,6 +841,8 @@ CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumul
 CUMULET_API cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out);
 CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer,
                                                             const cumulet_environment_settings_desc* desc);
+CUMULET_API cumulet_status cumulet_set_ground(cumulet_viewer* viewer, const cumulet_ground_desc* desc);
+
 /* ---- Lamps ---- */
 
 typedef enum cumulet_lamp_kind {

@@ -1100,6 +1100,7 @@ class Viewer {
   [[nodiscard]] Result<> set_environment_settings(const EnvironmentSettingsDesc& desc) noexcept {
     return set(cumulet_set_environment_settings, desc);
   }
+  [[nodiscard]] Result<> set_ground(const GroundDesc& desc) noexcept { return set(cumulet_set_ground, desc); }
   [[nodiscard]] Result<> set_sampling(const SamplingDesc& desc) noexcept { return set(cumulet_set_sampling, desc); }
   [[nodiscard]] Result<> set_display(const DisplayDesc& desc) noexcept { return set(cumulet_set_display, desc); }
 
