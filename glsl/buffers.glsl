@@ -50,6 +50,11 @@ layout(binding = CM_UNIT_ENVIRONMENT) uniform usamplerBuffer cm_environment_word
 uvec4 cm_environment_word(uint i) { return texelFetch(cm_environment_words, int(cm.environment.words + i)); }
 #endif
 
+#if CM_CELL_LIGHTS
+layout(binding = CM_UNIT_CHANNELS) uniform usamplerBuffer cm_channels;
+uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(cm.grid.first_glowing + i)); }
+#endif
+
 #ifdef CM_MARCH
 #if CM_MARCH == 0
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
@@ -82,7 +87,6 @@ uvec4 cm_record(uint cell, uint part) {
 }
 
 #if CM_CHANNELS
-layout(binding = CM_UNIT_CHANNELS) uniform usamplerBuffer cm_channels;
 uvec4 cm_emission_record(uint cell) { return texelFetch(cm_channels, int(cm.grid.first_emission + cell)); }
 uint cm_colour_record(uint cell) {
   uint word = cm.grid.first_colour + cell;

@@ -15,22 +15,54 @@ CM_FN float cm_emission_slope(uint word, uint axis) {
   return float(bits) * (CM_EMISSION_STEEPEST / 511.0f);
 }
 
+CM_FN vec3 cm_emission_mean(uvec4 record) {
+  return vec3(uintBitsToFloat(record.x), uintBitsToFloat(record.y), uintBitsToFloat(record.z));
+}
+CM_FN vec3 cm_emission_gradient(uvec4 record) {
+  return vec3(cm_emission_slope(record.w, 0u), cm_emission_slope(record.w, 1u), cm_emission_slope(record.w, 2u));
+}
+CM_FN float cm_emission_luminance(vec3 mean) { return dot(mean, vec3(0.2126f, 0.7152f, 0.0722f)); }
+
+// How far a cell is at least from a point, given from its centroid in its frame in units; in cube space. 0 nearby.
+CM_FN float cm_cell_distance(vec3 from_centroid, uint shape) {
+  uint cell_class = cm_shape_class(shape);
+  float farthest_vertex = cell_class == 0u ? 1.1457f : (cell_class == 1u ? 0.9355f : 1.4791f);
+  return max(0.0f, sqrt(dot(from_centroid, from_centroid)) - farthest_vertex) * cm_shape_unit(shape);
+}
+
 // The mean and, along a ray o + t d in the cell's frame, how much of it there is: at t = 0 and its slope.
 struct CmEmission {
   vec3 mean;
   float at_0;
   float slope;
+  float distance;  // cm_cell_distance from o
 };
 
 CM_FN CmEmission cm_cell_emission(uvec4 record, CmFrame f, uint shape) {
-  vec3 gradient =
-      vec3(cm_emission_slope(record.w, 0u), cm_emission_slope(record.w, 1u), cm_emission_slope(record.w, 2u));
+  vec3 gradient = cm_emission_gradient(record);
   float inverse_unit = cm_shape_inverse_unit(shape);
+  vec3 from_centroid = (f.o - f.v0) * inverse_unit - cm_frame_centroid(cm_shape_class(shape));
   CmEmission e;
-  e.mean = vec3(uintBitsToFloat(record.x), uintBitsToFloat(record.y), uintBitsToFloat(record.z));
-  e.at_0 = 1.0f + dot(gradient, (f.o - f.v0) * inverse_unit - cm_frame_centroid(cm_shape_class(shape)));
+  e.mean = cm_emission_mean(record);
+  e.at_0 = 1.0f + dot(gradient, from_centroid);
   e.slope = dot(gradient, f.d) * inverse_unit;
+  e.distance = cm_cell_distance(from_centroid, shape);
   return e;
+}
+
+// A point of a cell, each as likely, by three random numbers: in its frame, in units. The gaps between sorted numbers
+// are weights of vertices.
+CM_FN vec3 cm_cell_point(uint cell_class, vec3 u) {
+  float low = min(u.x, min(u.y, u.z));
+  float high = max(u.x, max(u.y, u.z));
+  float middle = max(min(u.x, u.y), min(max(u.x, u.y), u.z));
+  return low * cm_frame_vertex(cell_class, 1u) + (middle - low) * cm_frame_vertex(cell_class, 2u) +
+         (high - middle) * cm_frame_vertex(cell_class, 3u);
+}
+
+// What there is at such a point, over the mean.
+CM_FN float cm_emission_at(uvec4 record, uint cell_class, vec3 point) {
+  return max(0.0f, 1.0f + dot(cm_emission_gradient(record), point - cm_frame_centroid(cell_class)));
 }
 
 // What a ray takes up from t to t_1, without what the medium takes away.

@@ -13,7 +13,7 @@
 //
 // What cells give off by themselves is integrated along flights up to where they end (Simon, Hanika, Zirr and
 // Dachsbacher, "Line Integration for Rendering Heterogeneous Emissive Volumes", EGSR 2017): they get as far as t with the
-// chance that is the transmittance, so that needs no other weight.
+// chance that is the transmittance, so that needs no other weight but that of looks for the same cells (light.glsl).
 #ifndef CM_FLIGHT_GLSL
 #define CM_FLIGHT_GLSL
 
@@ -59,6 +59,9 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 #if CM_CHANNELS
   CmEmission emission;
   vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
+  // Looks might have found it as well.
+  float flights = p.bounces > 0u ? p.density : 1.0f;
+  float looks = p.bounces > 0u ? cm.lights.cell_chance : 0.0f;
 #endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
@@ -80,7 +83,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
       event = CM_EVENT_COLLISION;
     } else {
 #if CM_CHANNELS
-      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));
+      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end)) * cm_balance(flights, looks * cm_cell_pdf(emission));
 #endif
       p.depth -= used;
       p.t = t_1;
@@ -95,7 +98,8 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     float left = p.t_end - p.t;
     float way = cm_depth_distance(e_0, e_1, span, p.depth);
 #if CM_CHANNELS
-    emitted += cm_emitted(emission, p.t, p.t + min(way, left));
+    emitted +=
+        cm_emitted(emission, p.t, p.t + min(way, left)) * cm_balance(flights, looks * cm_cell_pdf(emission));
 #endif
     p.t += way;
     p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e_0, e_1, span, left));

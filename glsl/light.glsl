@@ -21,6 +21,7 @@
 #define CM_LIGHT_GLOW 4u      // the medium's own: flights that leave surfaces are aimed at its box
 #define CM_LIGHT_OTHER 5u     // of CM_MORE_LIGHTS
 #define CM_LIGHT_ENVIRONMENT 6u  // a picture of all that is far away, instead of the sky
+#define CM_LIGHT_CELL 7u  // a cell that gives off light
 
 // What a look has found.
 struct CmLightSample {
@@ -103,6 +104,65 @@ CM_FN CmLightSample cm_sun_sample(CmPath p) {
   }
   return light;
 }
+
+#if CM_CHANNELS
+
+#include "channels.glsl"
+
+// ---- Cells that give off light; their table is that of src/scene/glow.hpp
+//
+// A look picks a cell by what it gives off and a point of it; flights take up what all cells on their way give off. What
+// either brings from a cell counts by the balance heuristic, with densities that depend on the cell and on where looks
+// and flights start, never on a direction's or a point's own: those of a direction, for flights, and of a point times
+// its squared distance, at least, for looks. Points are of a volume, so glow_length makes one of the other.
+
+CM_FN float cm_glow_pdf_of(vec3 mean, float distance) {
+  float least = distance * cm.grid.least_stretch;
+  return cm_emission_luminance(mean) * cm.grid.glow_density * cm.grid.glow_length * least * least;
+}
+CM_FN float cm_cell_pdf(CmEmission emission) { return cm_glow_pdf_of(emission.mean, emission.distance); }
+
+#endif
+
+#if CM_CELL_LIGHTS
+
+// O(1).
+CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+  uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x632be5abu)));
+  float u_a = cm_random(p.random, p.stream);
+  float u_b = cm_random(p.random, p.stream);
+  float u_c = cm_random(p.random, p.stream);
+  uint i;
+  uint unused;
+  umulExtended(pick.x, cm.grid.glowing, i, unused);
+  uvec4 entry = cm_glow_word(2u * i);
+  if (pick.y > entry.x) {
+    i = entry.y;
+    entry = cm_glow_word(2u * i);
+  }
+  uvec4 record = cm_glow_word(2u * i + 1u);
+  uvec4 place = uvec4(entry.z, entry.w, 0u, 0u);
+  uint shape = cm_record_shape(place);
+  uint cell_class = cm_shape_class(shape);
+  vec3 point = cm_cell_point(cell_class, vec3(u_a, u_b, u_c));
+  // Not from `here`, which is a little above a surface: flights through the medium start at p.o as well.
+  vec3 to_v0 = cm_record_v0(place) - p.o;
+  vec3 way = cm_to_world(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
+  float length_2 = max(dot(way, way), 1e-24f);
+  vec3 mean = cm_emission_mean(record);
+  vec3 from_centroid = cm_to_frame(to_v0, shape) * -cm_shape_inverse_unit(shape) - cm_frame_centroid(cell_class);
+  float distance = cm_cell_distance(from_centroid, shape);
+  float least = distance * cm.grid.least_stretch;
+  CmLightSample light;
+  light.kind = CM_LIGHT_CELL;
+  light.direction = way * inversesqrt(length_2);
+  light.distance = sqrt(length_2);
+  light.density = cm_glow_pdf_of(mean, distance);
+  light.radiance = mean * (cm_emission_at(record, cell_class, point) * cm.grid.glow_length * least * least / length_2);
+  return light;
+}
+
+#endif
 
 #if CM_LAMPS
 
@@ -226,14 +286,23 @@ CM_FN float cm_no_pdf(CmLightHit hit) { return 0.0f; }
   LIGHT(CM_LIGHT_SKY, cm.lights.sky_chance, cm_sky_sample, cm_sky_pdf, cm_sky_radiance) CM_MORE_LIGHTS(LIGHT)
 #endif
 
+#if CM_CELL_LIGHTS
+#define CM_GLOWING_LIGHTS(LIGHT) LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance, cm_cell_sample, cm_no_pdf, cm_unused)
+#else
+#define CM_GLOWING_LIGHTS(LIGHT)
+#endif
+
 #if CM_SURFACES > 1
 #define CM_NEAR_LIGHTS(LIGHT)                                                                         \
   LIGHT(CM_LIGHT_TRIANGLE, cm.lights.triangle_chance, cm_triangle_sample, cm_triangle_pdf, cm_unused) \
-  LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)
+  LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)                   \
+  CM_GLOWING_LIGHTS(LIGHT)
 #elif CM_LAMPS
-#define CM_NEAR_LIGHTS(LIGHT) LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused)
+#define CM_NEAR_LIGHTS(LIGHT)                                                       \
+  LIGHT(CM_LIGHT_LAMP, cm.lights.lamp_chance, cm_lamp_sample, cm_no_pdf, cm_unused) \
+  CM_GLOWING_LIGHTS(LIGHT)
 #else
-#define CM_NEAR_LIGHTS(LIGHT)
+#define CM_NEAR_LIGHTS(LIGHT) CM_GLOWING_LIGHTS(LIGHT)
 #endif
 
 // The share of what one technique finds that counts, where another might have found it.

@@ -64,6 +64,7 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   e.mean = vec3(0.0f, 0.0f, 0.0f);
   e.at_0 = 0.0f;
   e.slope = 0.0f;
+  e.distance = 0.0f;
   if ((data.y & CM_RECORD_EMITS) != 0u) {
     uint shape = cm_record_shape(data);
     e = cm_cell_emission(cm_emission_record(cell.x), cm_cell_frame(cm_record_v0(data), shape, o, d), shape);

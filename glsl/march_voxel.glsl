@@ -83,6 +83,7 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   if (cm.medium.emits != 0u) e.mean = cm_emission_voxel(cm_voxel_of(cell));
   e.at_0 = 1.0f;
   e.slope = 0.0f;
+  e.distance = 0.0f;
   return e;
 }
 

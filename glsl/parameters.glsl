@@ -64,6 +64,11 @@ CM_BLOCK(CmGrid) {
   uint first_emission;  // where the records of what cells give off begin in their page
   uint first_colour;    // and their colours, in 4-byte words
   float emission_unit;  // radiance a world unit of length of what is stored as 1 for voxels
+  uint first_glowing;   // where the table of cells that give off light begins in the page of their channels
+  uint glowing;         // how many it has
+  float glow_density;   // of looks by volume, over a cell's luminance: 1 over what all of them give off
+  float glow_length;    // world: about how much of a ray is among those that give off most
+  float least_stretch;  // world: no vector of length 1 in cube space is shorter
   CM_EQUALITY(CmGrid)
 };
 
@@ -91,6 +96,7 @@ CM_BLOCK(CmLights) {
   float triangle_chance;
   float lamp_chance;  // of all lamps together; what these leave is the sun's
   float glow_chance;  // that a flight from a surface is aimed at the medium's own light
+  float cell_chance;  // of cells that give off light
   float environment_chance;
   float environment_strength;        // times the picture's radiance
   CM_ALIGN(8) vec2 environment_turn;  // cosine and sine of its angle

@@ -123,7 +123,7 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   p.bounces += 1u;
   if (collided) p.throughput *= cm.medium.albedo;
   if (grounded) p.throughput *= cm.ground.albedo;
-#if CM_CHANNELS
+#if CM_CHANNELS && defined(CM_MARCH)  // what has no march collides with nothing
   if (collided && cm.medium.coloured != 0u) p.throughput *= cm_march_colour(p.cell);
 #endif
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
@@ -159,6 +159,7 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   vec3 here = cm_look_from(p, vertex);
   look.light = cm_sky_sample(p, here, u_2);
   if (look.looks) look.light = cm_light_sample(p, here, u_2);
+  if (look.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) look.light.radiance = vec3(0.0f, 0.0f, 0.0f);
   return look;
 }
 
@@ -173,7 +174,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   p.density = turn.density;
   if (looks) {
     // What escapes weighs looks and flights with the transmittance that it finds; among triangles, without.
-    if (light.kind == CM_LIGHT_TRIANGLE && !turn.lifted) light.density += turn.density;
+    if ((light.kind == CM_LIGHT_TRIANGLE && !turn.lifted) || light.kind == CM_LIGHT_CELL) light.density += turn.density;
     float rare = 1.0f / max(light.density, 1e-30f);
     p.light = p.throughput * light.radiance * (turn.share * rare);
     p.density = cm_is_far(light) ? turn.density * rare : 0.0f;

@@ -12,7 +12,17 @@
 namespace cumulet::light {
 
 /// The kinds of glsl/light.glsl.
-enum class Kind { sky, sun, triangle, lamp, glow, environment };
+enum class Kind { sky, sun, triangle, lamp, glow, environment, cell };
+
+/// What there is of a medium's own light.
+struct MediumLight {
+  /// Flights that surfaces send off are aimed at its box: it falls on surfaces.
+  bool aimed = false;
+  /// Luminance a steradian of all that looks may find; 0: none.
+  double power = 0.0;
+  double length = 0.0;  ///< world: the cube root of the volume that would give off as much, were it even
+  double radius = 0.0;  ///< world: of the box that it is in
+};
 
 /// The sky's radiance; the mean over all directions of an environment that is there instead.
 glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings);
@@ -28,9 +38,9 @@ class LightTable {
     float chance = 0.0F;
   };
 
-  /// glow: whether the medium's own light falls on surfaces. Surroundings with an environment are there instead of the
-  /// sky.
-  LightTable(const DistantLights& distant, const Surroundings& surroundings, const SceneLights& scene, bool glow);
+  /// Surroundings with an environment are there instead of the sky.
+  LightTable(const DistantLights& distant, const Surroundings& surroundings, const SceneLights& scene,
+             const MediumLight& medium);
 
   [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
   /// 0 for a kind that is not there.

@@ -211,11 +211,16 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   const bool emits = source.emits();
   p.medium.emits = emits ? 1U : 0U;
   p.medium.coloured = source.coloured() ? 1U : 0U;
-  const bool glow = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
+  light::MediumLight own;
+  own.power = source.glow.power;
+  own.length = source.glow.length;
+  const core::CmGrid& grid = data_->grid();
+  own.radius = 0.5 * glm::length(glm::dmat3(source.cube.to_world) * glm::dvec3(grid.box_max - grid.box_min));
+  own.aimed = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
   const ModelData* met = obstacles.met();
   light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
   light::add_lamps(near, *snapshot.lamps);
-  const light::LightTable table(lights(snapshot), surroundings(snapshot), near, glow);
+  const light::LightTable table(lights(snapshot), surroundings(snapshot), near, own);
   p.lights = table.parameters();
   if (environment_) p.environment = environment_->parameters();
   if (const std::optional<scene::Ground>& ground = *snapshot.ground)

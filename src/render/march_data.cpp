@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <glm/gtc/packing.hpp>
 #include <span>
 
@@ -53,6 +54,16 @@ void fill_slab(const scene::MarchSource& source, const grid::Statistics& statist
       }
     }
   });
+}
+
+// No vector of length 1 is shorter after it: one over a bound of the inverse's norm.
+float least_stretch(const glm::dmat3& linear) {
+  const glm::dmat3 inverse = glm::inverse(linear);
+  const auto widest_column = [](const glm::dmat3& m) {
+    const auto sum = [](const glm::dvec3& v) { return glm::dot(glm::abs(v), glm::dvec3(1.0)); };
+    return std::max({sum(m[0]), sum(m[1]), sum(m[2])});
+  };
+  return static_cast<float>(1.0 / std::sqrt(widest_column(inverse) * widest_column(glm::transpose(inverse))));
 }
 
 }  // namespace
@@ -124,7 +135,10 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
         grid.cells.data() + first, bytes);
   }
   const std::size_t emission_bytes = grid.emission.size() * sizeof(grid::EmissionRecord);
-  const std::size_t channel_bytes = emission_bytes + grid.colour.size() * sizeof(std::uint32_t);
+  const scene::GlowTable& glow = source_->glow;
+  const std::size_t glow_bytes = glow.cells.size() * sizeof(scene::GlowingCell);
+  const std::size_t colour_bytes = grid.colour.size() * sizeof(std::uint32_t);
+  const std::size_t channel_bytes = emission_bytes + glow_bytes + colour_bytes;
   if (channel_bytes > 0) {
     if (static_cast<std::int64_t>(channel_bytes / 16) >= texels) {
       throw Error(ErrorCode::unsupported, "the channels of " + std::to_string(cells) +
@@ -133,22 +147,29 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
                                               std::to_string(texels) + " texels");
     }
     data_.bytes_ += channel_bytes;
-    upload_.add([this, &heap, emission_bytes, channel_bytes] {
+    upload_.add([this, &heap, emission_bytes, glow_bytes, channel_bytes] {
       data_.channels_ = heap.take(channel_bytes, "creating the cells' channels");
-      data_.grid_.first_emission = static_cast<std::uint32_t>(data_.channels_.offset() / sizeof(grid::EmissionRecord));
-      data_.grid_.first_colour =
-          static_cast<std::uint32_t>((data_.channels_.offset() + emission_bytes) / sizeof(std::uint32_t));
+      const std::size_t first = data_.channels_.offset();
+      data_.grid_.first_emission = static_cast<std::uint32_t>(first / 16);
+      data_.grid_.first_glowing = static_cast<std::uint32_t>((first + emission_bytes) / 16);
+      data_.grid_.first_colour = static_cast<std::uint32_t>((first + emission_bytes + glow_bytes) / 4);
     });
-    upload_.add_bytes(
-        [this] {
-          return Upload::Place{data_.channels_.buffer(), data_.channels_.offset()};
-        },
-        grid.emission.data(), emission_bytes);
-    upload_.add_bytes(
-        [this, emission_bytes] {
-          return Upload::Place{data_.channels_.buffer(), data_.channels_.offset() + emission_bytes};
-        },
-        grid.colour.data(), channel_bytes - emission_bytes);
+    const auto add = [this](std::size_t at, const void* bytes, std::size_t count) {
+      upload_.add_bytes(
+          [this, at] {
+            return Upload::Place{data_.channels_.buffer(), data_.channels_.offset() + at};
+          },
+          bytes, count);
+    };
+    add(0, grid.emission.data(), emission_bytes);
+    add(emission_bytes, glow.cells.data(), glow_bytes);
+    add(emission_bytes + glow_bytes, grid.colour.data(), colour_bytes);
+    if (!glow.cells.empty()) {
+      data_.grid_.glowing = static_cast<std::uint32_t>(glow.cells.size());
+      data_.grid_.glow_density = static_cast<float>(1.0 / glow.power);
+      data_.grid_.glow_length = static_cast<float>(glow.length);
+      data_.grid_.least_stretch = least_stretch(glm::dmat3(grid.cube.to_world));
+    }
   }
   const std::size_t tree_bytes = grid.tree.size() * sizeof(std::uint32_t);
   data_.bytes_ += tree_bytes;

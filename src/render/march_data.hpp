@@ -36,7 +36,7 @@ class MarchData {
   gl::Object brick_values_;
   std::vector<gl::WordHeap::Span> cells_;  // a page's records each
   std::array<gl::Object, 2> textures_;     // voxels, or values of bricks; slots of bricks
-  gl::WordHeap::Span channels_;            // of cells: what they give off, then their colours
+  gl::WordHeap::Span channels_;            // of cells: what they give off, the table of those that do, their colours
   gl::Object emission_voxels_;
   gl::Object scattering_voxels_;
   gl::WordHeap::Span tree_;

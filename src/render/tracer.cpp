@@ -54,6 +54,7 @@ void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
   }
 }
 
+constexpr const char* channels_macro = "CM_CHANNELS 1";
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
@@ -153,7 +154,7 @@ const Tracer::Program& Tracer::program(std::vector<std::string> defines, const c
 
 void Tracer::add_medium(const Picture& picture, std::vector<std::string>& defines) {
   if (picture.second_lobe_) defines.emplace_back("CM_SECOND_LOBE 1");
-  if (picture.channels_) defines.emplace_back("CM_CHANNELS 1");
+  if (picture.channels_) defines.emplace_back(channels_macro);
 }
 
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
@@ -174,6 +175,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
 
 StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& data) {
   std::vector<std::string> shade{surfaces_macro(picture.traced_)};
+  if (picture.channels_) shade.emplace_back(channels_macro);
   if (picture.environment_) shade.emplace_back(environment_macro);
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");

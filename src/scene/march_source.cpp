@@ -46,10 +46,12 @@ void pack_bricks(MarchSource& source) {
 
 }  // namespace
 
-MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value) {
+MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value,
+                            const Progress* progress) {
   MarchSource source;
   source.cube = grid->cube;
   source.max_value = max_value;
+  source.glow = glow_table(*grid, progress);
   source.grid = std::move(grid);
   source.linear = linear;
   return source;

@@ -7,6 +7,7 @@
 
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
+#include "scene/glow.hpp"
 
 namespace cumulet::scene {
 
@@ -21,6 +22,7 @@ struct MarchSource {
   // tet
   std::shared_ptr<const grid::TetGrid> grid;
   bool linear = false;
+  GlowTable glow;
   // dense: read from these; brick: as packed by make_voxel_source
   std::shared_ptr<const volume::ScalarVolume> volume;
   std::shared_ptr<const grid::Statistics> statistics;
@@ -38,7 +40,9 @@ struct MarchSource {
 };
 using MarchSourcePtr = std::shared_ptr<const MarchSource>;
 
-MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value);
+/// Throws Error(cancelled).
+MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value,
+                            const Progress* progress = nullptr);
 /// dense and brick. O(voxels of the bounds) only when uploaded; brick: O(bricks) memory.
 MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
                               std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels = {});

@@ -141,7 +141,7 @@ Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings,
               ") ended the refinement before the threshold");
   }
   built.source = std::make_shared<const scene::MarchSource>(
-      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value));
+      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress));
   return built;
 }
 

@@ -308,6 +308,7 @@ TEST_P(EmissionPicture, CellsAreSplitForWhatGlows) {
   viewer->set_light({});
   viewer::Medium medium;
   medium.density_scale = 0.01;
+  medium.albedo = vec3(0.0F);
   viewer->set_medium(medium);
   std::vector<test::Picture> pictures;
   for (const Kind& kind : {kinds[0], kinds[2]}) {
@@ -387,6 +388,51 @@ TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
       EXPECT_NEAR(x < 16.0 ? mean.x : mean.y, 0.1534, 0.02);
       EXPECT_EQ(x < 16.0 ? mean.y : mean.x, 0.0);
     }
+  }
+}
+
+// A small fire in thick smoke, seen by what it lights: flights alone come to it seldom, looks as often as they like.
+TEST_P(EmissionPicture, LooksFindAHotCore) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = field(ivec3(48), ivec3(0), 1.0F)};
+  frame.flame = test::make_volume(
+      ivec3(48), ivec3(0), [](const ivec3& p) { return glm::distance(vec3(p), vec3(23.5F)) < 3.0F ? 1.0F : 0.0F; });
+  show(*viewer, std::move(frame));
+  viewer::Medium medium;
+  medium.density_scale = 0.06;
+  medium.albedo = vec3(0.9F);
+  medium.phase.anisotropy = 0.3F;
+  viewer->set_medium(medium);
+  viewer->set_camera(test::camera_at({23.5, 23.5, 200.0}, {23.5, 23.5, 0.0}, 10.0));
+  test::StillScene floor;
+  floor.add_quad({vec3(-50, -50, -9), vec3(100, -50, -9), vec3(100, 100, -9), vec3(-50, 100, -9)},
+                 floor.add(test::diffuse(vec3(0.7F))));
+  struct Case {
+    const char* name;
+    float daylight;
+    bool floor;
+  };
+  for (const Case& of : {Case{"alone", 0.0F, false}, {"in daylight", 0.01F, false}, {"over a floor", 0.0F, true}}) {
+    SCOPED_TRACE(of.name);
+    viewer->set_light({0.3F, 0.5F, vec3(2.0F * of.daylight), vec3(of.daylight)});
+    if (of.floor) viewer->viewer().show_surfaces(test::source_of(std::make_shared<test::StillScene>(floor)));
+    std::array<double, 2> mean{};
+    std::array<double, 2> square{};  // of a pixel's noise
+    for (const std::size_t k : {0U, 1U}) {
+      set(*viewer, kinds[2 * k], 0.02);
+      const test::Picture one = test::render(*viewer, {32, 32, 64, 1, render::View::shaded});
+      const test::Picture two = test::render(*viewer, {32, 32, 64, 2, render::View::shaded});
+      for (std::size_t i = 0; i < one.pixels.size(); ++i) {
+        const glm::dvec2 from_middle(static_cast<double>(i % 32) - 15.5, static_cast<double>(i / 32) - 15.5);
+        if (glm::length(from_middle) < 6.0) continue;  // where cameras see the fire itself
+        mean[k] += 0.5 * (double{one.pixels[i].x} + double{two.pixels[i].x});
+        square[k] += 0.5 * (double{one.pixels[i].x} - two.pixels[i].x) * (double{one.pixels[i].x} - two.pixels[i].x);
+      }
+    }
+    const double error = std::sqrt(0.5 * (square[0] + square[1]));
+    EXPECT_NEAR(mean[0], mean[1], 4.0 * error + 5e-3 * mean[1]);
+    EXPECT_LT(error, 0.05 * mean[1]);
+    EXPECT_LT(square[0], (of.floor ? 0.6 : 0.3) * square[1]);
   }
 }
 

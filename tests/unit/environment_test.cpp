@@ -160,7 +160,7 @@ TEST(Environment, PixelsThatAreNoRadianceCountAsZeroAndAreTold) {
   EXPECT_NEAR(environment->mean.y, 0.5, 1e-6);
   const auto dark = made(4, 2, [](std::uint32_t, std::uint32_t) { return vec3(0.0F); });
   EXPECT_EQ(dark->density, 0.0F);
-  EXPECT_EQ(light::LightTable({}, {dark}, {}, false).parameters().any, 0U);
+  EXPECT_EQ(light::LightTable({}, {dark}, {}, {}).parameters().any, 0U);
 }
 
 TEST(Environment, KeepsEveryMagnitude) {

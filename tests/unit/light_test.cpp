@@ -75,18 +75,22 @@ TEST(Lights, SharesSumToOneOrThereIsNoLight) {
           light::DistantLights distant;
           distant.sun_irradiance = vec3(sun);
           distant.sky_radiance = vec3(sky);
-          const LightTable table(distant, {}, scene_of(lamps, triangles), true);
-          double sum = 0.0;
-          for (const LightTable::Entry& entry : table.entries()) {
-            if (entry.kind != Kind::glow) sum += entry.chance;
+          for (const double power : {0.0, 2.0}) {
+            const light::MediumLight fire{.aimed = true, .power = power, .length = 0.1, .radius = 3.0};
+            const LightTable table(distant, {}, scene_of(lamps, triangles), fire);
+            double sum = 0.0;
+            for (const LightTable::Entry& entry : table.entries()) {
+              if (entry.kind != Kind::glow) sum += entry.chance;
+            }
+            const bool any = sun + sky > 0.0F || lamps + triangles > 0 || power > 0.0;
+            EXPECT_NEAR(sum, any ? 1.0 : 0.0, 1e-6);
+            EXPECT_EQ(table.parameters().any, any ? 1U : 0U);
+            EXPECT_EQ(table.chance(Kind::sun) > 0.0F, sun > 0.0F);
+            EXPECT_EQ(table.chance(Kind::sky) > 0.0F, sky > 0.0F);
+            EXPECT_EQ(table.chance(Kind::lamp) > 0.0F, lamps > 0);
+            EXPECT_EQ(table.chance(Kind::triangle) > 0.0F, triangles > 0);
+            EXPECT_EQ(table.chance(Kind::cell) > 0.0F, power > 0.0);
           }
-          const bool any = sun + sky > 0.0F || lamps + triangles > 0;
-          EXPECT_NEAR(sum, any ? 1.0 : 0.0, 1e-6);
-          EXPECT_EQ(table.parameters().any, any ? 1U : 0U);
-          EXPECT_EQ(table.chance(Kind::sun) > 0.0F, sun > 0.0F);
-          EXPECT_EQ(table.chance(Kind::sky) > 0.0F, sky > 0.0F);
-          EXPECT_EQ(table.chance(Kind::lamp) > 0.0F, lamps > 0);
-          EXPECT_EQ(table.chance(Kind::triangle) > 0.0F, triangles > 0);
         }
       }
     }
@@ -96,10 +100,20 @@ TEST(Lights, SharesSumToOneOrThereIsNoLight) {
 TEST(Lights, TheSunAndEachLampAlike) {
   light::DistantLights distant;
   distant.sun_irradiance = vec3(2.0F);
-  const LightTable table(distant, {}, scene_of(4, 0), false);
+  const LightTable table(distant, {}, scene_of(4, 0), {});
   EXPECT_NEAR(table.chance(Kind::sun), 0.2, 1e-6);
   EXPECT_NEAR(table.chance(Kind::lamp), 0.8, 1e-6);
   EXPECT_EQ(table.chance(Kind::glow), 0.0F);
+}
+
+// One that fills its box is left to flights.
+TEST(Lights, SmallFiresAreLookedFor) {
+  const auto chance = [](double length) {
+    const light::MediumLight fire{.aimed = false, .power = 1.0, .length = length, .radius = 1.0};
+    return LightTable({}, {}, {}, fire).chance(Kind::cell);
+  };
+  EXPECT_EQ(chance(0.01), 1.0F);
+  EXPECT_EQ(chance(0.5), 0.0F);
 }
 
 class NewLight : public test::ViewerTest {};

@@ -1,0 +1,44 @@
+#include "scene/glow.hpp"
+
+#include <cmath>
+
+#include "base/luminance.hpp"
+#include "grid/cell.hpp"
+
+namespace cumulet::scene {
+
+namespace {
+
+// In the frame, in units: a sixth of the determinant of the three edges at v0.
+double frame_volume(std::uint32_t cell_class) {
+  const auto vertex = [&](std::uint32_t i) { return glm::dvec3(core::cm_frame_vertex(cell_class, i)); };
+  return std::abs(glm::dot(vertex(1), glm::cross(vertex(2), vertex(3)))) / 6.0;
+}
+
+}  // namespace
+
+GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress) {
+  GlowTable table;
+  const double unit_volume = std::abs(glm::determinant(glm::dmat3(grid.cube.to_world)));
+  std::vector<double> power;
+  double square = 0.0;
+  for (std::size_t i = 0; i < grid.emission.size(); ++i) {
+    const double bright = luminance(glm::dvec3(grid.emission[i].mean));
+    if (!(bright > 0.0)) continue;
+    if (power.size() % 65536 == 0) check(progress);
+    const glm::uvec4& data = grid.cells[i].data;
+    const std::uint32_t shape = core::cm_record_shape(data);
+    const double unit = core::cm_shape_unit(shape);
+    power.push_back(bright * frame_volume(core::cm_shape_class(shape)) * unit * unit * unit * unit_volume);
+    square += bright * power.back();
+    table.power += power.back();
+    table.cells.push_back({{}, glm::uvec2(data.x, data.y), grid.emission[i]});
+  }
+  if (!(table.power > 0.0)) return {};
+  table.length = std::cbrt(table.power / square * table.power);
+  const std::vector<light::Alias> aliases = light::alias_table(std::move(power), table.power, progress);
+  for (std::size_t i = 0; i < aliases.size(); ++i) table.cells[i].alias = aliases[i];
+  return table;
+}
+
+}  // namespace cumulet::scene
