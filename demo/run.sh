@@ -27,7 +27,7 @@ fi
 [ $# -gt 0 ] || set -- --spp 16
 for picture in sample:cumulet sample_explosion:explosion; do
   say "rendering $scene/${picture%:*}.json"
-  "$bin/cumulet-render" --scene "$scene/${picture%:*}.json" -o "${picture#*:}.png" "$@" || die "cumulet-render failed"
+  "$bin/cumulet-render" --scene "$scene/${picture%:*}.json" "$@" -o "${picture#*:}.png" || die "cumulet-render failed"
 done
 say "the pictures are cumulet.png and explosion.png in $root"
 

@@ -172,7 +172,8 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
 
 // Each as likely as the others.
 CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
-  CmLamp lamp = cm_lamp(min(uint(u * float(cm.lamps.count)), cm.lamps.count - 1u));
+  uint count = max(cm.lamps.count, 1u);
+  CmLamp lamp = cm_lamp(min(uint(u * float(count)), count - 1u));
   vec3 from = vec3(0.0f, 0.0f, 0.0f);
   if (lamp.extended != 0u) {
     float u_a = cm_random(p.random, p.stream);
@@ -182,7 +183,7 @@ CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   CmLightSample light;
   light.kind = CM_LIGHT_LAMP;
   light.radiance = cm_lamp_irradiance(lamp, from, here, light.direction, light.distance);
-  light.density = 1.0f / float(cm.lamps.count);
+  light.density = 1.0f / float(count);
   return light;
 }
 

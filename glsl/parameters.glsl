@@ -16,6 +16,14 @@
 #ifndef CM_CHANNELS
 #define CM_CHANNELS 0
 #endif
+// Whether paths look for cells that give off light: marches of voxels have none, kernels of surfaces no march.
+#define CM_CELL_LIGHTS CM_CHANNELS
+#ifdef CM_MARCH
+#if CM_MARCH != 0
+#undef CM_CELL_LIGHTS
+#define CM_CELL_LIGHTS 0
+#endif
+#endif
 #ifndef CM_LAMPS
 #define CM_LAMPS CM_SURFACES
 #endif

@@ -221,7 +221,9 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   arrived = collided || met || grounded;
   if (grounded) p.t = cm_ground_distance(p.o, p.d);
   if (arrived) {
-    finished = cm_arrive(p, collided, grounded) || dark;
+    // Where another kernel has found it by a hair.
+    bool missed = grounded && p.t >= CM_NO_GROUND;
+    finished = cm_arrive(p, collided, grounded) || dark || missed;
     if (met) finished = cm_stand(p, vertex) || finished;
   }
   return finished;

@@ -15,7 +15,9 @@ namespace {
 
 using Desc = cumulet_lamp_desc;
 
-/// Above what the camera looks at, and as bright there as the sun at noon.
+constexpr double sun_at_noon = 4.0;  // W/m²
+
+/// Above what the camera looks at, and as bright there as the sun at noon, but for very large scenes.
 Desc new_lamp(const cumulet_camera_desc& camera) {
   const double distance =
       std::hypot(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1], camera.eye[2] - camera.target[2]);
@@ -25,7 +27,7 @@ Desc new_lamp(const cumulet_camera_desc& camera) {
   std::copy(camera.target, camera.target + 3, lamp.position);
   lamp.position[1] += above;
   lamp.direction[1] = -1.0;
-  lamp.power = static_cast<float>(std::min(1e6, 4.0 * 4.0 * std::numbers::pi * above * above));
+  lamp.power = static_cast<float>(std::min(1e6, sun_at_noon * 4.0 * std::numbers::pi * above * above));
   settings::spell_out_zeros(lamp);
   return lamp;
 }
@@ -58,8 +60,10 @@ void Panel::lamps(Model& model) {
       if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, double[3]>) {
         const double length = std::hypot(value[0], value[1], value[2]);
         ui_.three(label.c_str(), setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
-      } else {
-        rows_.draw(setting, value);
+      } else if (rows_.draw(setting, value) && setting.is(&Desc::kind)) {
+        // Neither watts nor a cone of no angle are what a lamp of another kind has.
+        if (lamp.kind == CUMULET_LAMP_SUN) lamp.power = static_cast<float>(sun_at_noon);
+        if (lamp.kind == CUMULET_LAMP_SPOT && lamp.angle_degrees == 0.0) lamp.angle_degrees = 45.0;
       }
     });
     if (lamp.kind == CUMULET_LAMP_SUN) lamp.angle_degrees = std::min(lamp.angle_degrees, 90.0);

@@ -181,10 +181,13 @@ bool Ui::integer(const char* label, const char* tip, std::uint32_t& value) {
 
 bool Ui::three(const char* label, const char* tip, double (&values)[3], float speed) {
   begin_row(label);
-  const bool changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, values, 3, speed,
-                                          nullptr, nullptr, "%.4g");
+  std::array<double, 3> edited = std::to_array(values);
+  const bool changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, edited.data(), 3,
+                                          speed, nullptr, nullptr, "%.4g");
   remember(label, tip);
-  return changed;
+  if (!changed || !std::ranges::all_of(edited, [](double one) { return std::isfinite(one); })) return false;
+  std::ranges::copy(edited, values);
+  return true;
 }
 
 bool Ui::choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value) {

@@ -455,7 +455,10 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
     if (app.count(flag) > 0 && app.count("--sky-model") > 0)
       throw UsageError(std::string(flag) + " and --sky-model exclude each other");
   }
-  if (app.count("--criterion") > 0) settings::name_criterion(scene.grid);
+  if (app.count("--criterion") > 0) {
+    if (app.count("--threshold") == 0) scene.grid.threshold = 0.0;  // a scene's is that of its own criterion
+    settings::name_criterion(scene.grid);
+  }
   if (app.count("--sky") > 0) scene.light.sky = CUMULET_SKY_CONSTANT;
   if (app.count("--sun") > 0 && scene.light.sky == CUMULET_SKY_CONSTANT) {
     const std::string sun = app.get_option("--sun")->results().back();
@@ -473,6 +476,8 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
     }
   }
   if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.place = CUMULET_GROUND_AT_HEIGHT;
+  if (app.count("--ground-height") > 0 && scene.ground.place != CUMULET_GROUND_AT_HEIGHT)
+    throw UsageError("--ground-height needs a ground at a height, which it makes without --ground");
 }
 
 bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {

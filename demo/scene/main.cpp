@@ -57,7 +57,7 @@ void write_surfaces(const path& file, std::uint32_t seed) {
 }
 
 void save(const cumulet::demo::SceneOptions& scene, const path& file) {
-  // Version 1: other programs read the samples, too.
+  // Version 1: programs that read scene files of Cumulet 0.1 read the samples, too.
   cumulet::demo::save_scene(scene, file.string(), cumulet::demo::SceneFormat::first);
   std::printf("%s\n", file.string().c_str());
 }

@@ -44,14 +44,18 @@ void apply(Preset preset, cumulet_medium_desc& medium) {
       medium.droplet_diameter = 8.0F;
       break;
   }
+  settings::spell_out_zeros(medium);
+  medium.density_scale = density_scale;
 }
 
 std::optional<Preset> preset_of(const cumulet_medium_desc& medium) {
+  cumulet_medium_desc asked = medium;
+  settings::spell_out_zeros(asked);
   for (const settings::Choice& choice : preset_choices) {
     const auto preset = static_cast<Preset>(choice.value);
-    cumulet_medium_desc made = medium;
+    cumulet_medium_desc made = asked;
     apply(preset, made);
-    if (settings::same(made, medium)) return preset;
+    if (settings::same(made, asked)) return preset;
   }
   return std::nullopt;
 }

@@ -373,7 +373,6 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   reader.text("surfaces.file", scene.surfaces);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
   read_camera(reader, scene.camera);
-  // Without a word, a file of this version means 1: there was no other way.
   scene.auto_density_scale = reader.word("medium.density_scale", "auto");
   reader.text("environment.file", scene.environment);
   if (second) {

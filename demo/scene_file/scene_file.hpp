@@ -69,7 +69,8 @@ void for_each_group(Scene& scene, Visit&& visit) {
 [[nodiscard]] std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations);
 
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
-/// volume is taken from its folder. What the text does not say is as in SceneOptions(), in daylight of version 1.
+/// volume is taken from its folder. What the text does not say is as in SceneOptions(), on a clear day; of version
+/// 1 in that version's daylight.
 /// Throws std::runtime_error, one line with the path, the key and the cause.
 [[nodiscard]] SceneOptions parse_scene(const std::string& text, const std::string& path);
 /// Reads a file. Throws likewise.

@@ -12,9 +12,10 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-void set_cone(core::CmLamp& record, float inner, float outer) {
+// narrowest: of the band in which it dims, in cosine.
+void set_cone(core::CmLamp& record, float inner, float outer, float narrowest) {
   const float edge = std::cos(outer);
-  record.cone_scale = 1.0F / std::max(0.001F, std::cos(inner) - edge);
+  record.cone_scale = 1.0F / std::max(narrowest, std::cos(inner) - edge);
   record.cone_offset = -edge * record.cone_scale;
 }
 
@@ -29,7 +30,8 @@ core::CmLamp lamp_record(const surface::PunctualLight& light, const glm::dvec3& 
   record.range = light.range;
   record.intensity = light.intensity;
   record.cone_offset = 1.0F;
-  if (light.kind == Kind::spot) set_cone(record, light.inner_cone, light.outer_cone);
+  if (light.kind == Kind::spot)
+    set_cone(record, light.inner_cone, light.outer_cone, 0.001F);  // as KHR_lights_punctual has it
   return record;
 }
 
@@ -47,7 +49,10 @@ core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin) {
       record.intensity *= static_cast<float>(1.0 / (4.0 * pi));
       if (lamp.kind == Lamp::Kind::spot) {
         const double outer = 0.5 * lamp.angle;
-        set_cone(record, static_cast<float>(outer * (1.0 - lamp.blend)), static_cast<float>(outer));
+        const double sine = std::sin(0.5 * outer);
+        // A thousandth of the cone's own, or a narrow one would never be bright.
+        const float narrowest = std::max(1e-7F, static_cast<float>(2e-3 * sine * sine));
+        set_cone(record, static_cast<float>(outer * (1.0 - lamp.blend)), static_cast<float>(outer), narrowest);
       }
       break;
     case Lamp::Kind::disc:

@@ -40,7 +40,8 @@ double cell_chance(const MediumLight& medium, const SceneLights& scene, double d
   const double seen = 1.0 - medium.length * medium.length / (0.04 * square);
   if (!(seen > 0.0)) return 0.0;
   const double others = distant + (scene.lamp_flux + scene.triangle_flux) / (4.0 * std::numbers::pi * square);
-  if (!(others > 0.0)) return 1.0;
+  // A distant lamp has no flux where no surface is to catch it.
+  if (!(others > 0.0)) return scene.lamps + scene.triangles > 0 ? 0.5 : 1.0;
   const double cells = medium.power / square;
   return seen * std::clamp(cells / (cells + others), 0.2, 0.8);
 }
@@ -92,8 +93,9 @@ core::CmLights LightTable::parameters() const {
   p.sun_direction = glm::vec3(distant_.to_sun);
   p.sun_irradiance = distant_.sun_irradiance;
   p.sky_radiance = distant_.sky_radiance;
+  // Of less than a thousandth of a degree it is a direction: floats cannot tell.
   if (const double half = distant_.sun_angle_degrees * std::numbers::pi / 360.0;
-      half > 0.0 && chance(Kind::sun) > 0.0F) {
+      half > 1e-5 && chance(Kind::sun) > 0.0F) {
     // Over the disc, radiance times the cosine to its middle is the irradiance.
     p.sun_radiance = distant_.sun_irradiance / static_cast<float>(std::numbers::pi * std::pow(std::sin(half), 2.0));
     p.sun_spread = static_cast<float>(2.0 * std::pow(std::sin(0.5 * half), 2.0));

@@ -34,7 +34,7 @@ GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress) {
     table.power += power.back();
     table.cells.push_back({{}, glm::uvec2(data.x, data.y), grid.emission[i]});
   }
-  if (!(table.power > 0.0)) return {};
+  if (!(table.power > 1e-30)) return {};  // a float has its inverse
   table.length = std::cbrt(table.power / square * table.power);
   const std::vector<light::Alias> aliases = light::alias_table(std::move(power), table.power, progress);
   for (std::size_t i = 0; i < aliases.size(); ++i) table.cells[i].alias = aliases[i];

@@ -267,9 +267,12 @@ void Viewer::set_medium(const Medium& medium) {
                              (apart(medium.density_scale, refine.density_scale) ||
                               apart(grid::hiding(medium.density_scale, scene::mean_cosine(medium.phase)),
                                     grid::hiding(refine.density_scale, refine.anisotropy)));
-  if (other_emission || other_opacity) {
+  if (other_opacity) {
     take_medium();
-    request_build(!other_opacity);
+    request_build(false);
+  } else if (other_emission) {
+    grid_.build.emission = medium.field_emission;
+    request_build(true);
   }
   scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.phase, medium.emission});
   touch();
@@ -374,7 +377,10 @@ std::optional<scene::Ground> Viewer::ground() const {
   const auto all = box();
   if (ground_.place == GroundPlace::none || !all) return std::nullopt;
   scene::Ground ground{ground_.height, ground_.albedo};
-  if (ground_.place == GroundPlace::below) ground.height = all->min.y;
+  // Just below a model: many stand on a floor of their own.
+  const bool model = model_source_ && model_source_->scene->triangle_count() > 0;
+  if (ground_.place == GroundPlace::below)
+    ground.height = all->min.y - (model ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
   // The horizon is then a ten-thousandth below where it is.
   const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
   ground.reach = 1e4 * (glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) + eye);

@@ -95,6 +95,10 @@ def main():
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
+    if options.march and not options.fire:
+        parser.error("--march needs --fire")
+    if options.repeats < 2:
+        parser.error("--repeats: two pictures at least, for their noise")
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(options, pathlib.Path(folder))
         if options.march:

@@ -8,12 +8,9 @@
 #include <numbers>
 
 #include "support/gl_viewer.hpp"
+#include "support/osmesa_leaks.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
-
-// Mesa's OSMesa keeps its framebuffers for ever.
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:libOSMesa.so\n"; }
 
 namespace {
 

@@ -118,6 +118,9 @@ TEST_P(Lamps, LightAFloorByTheirFormFactors) {
   const double edge = std::cos(30.0 * pi / 180.0);
   const double share = (std::cos(25.0 * pi / 180.0) - edge) / (1.0 - edge);
   expect(spot, point * share * share, "blended");
+  auto narrow = lamp(CUMULET_LAMP_SPOT, place, 1000.0F);
+  narrow.angle_degrees = 4.0;
+  expect(narrow, point, "narrow");
 
   auto disc = lamp(CUMULET_LAMP_DISC, place, 1000.0F);
   disc.width = 30.0;

@@ -107,6 +107,15 @@ TEST(Lights, TheSunAndEachLampAlike) {
 }
 
 // One that fills its box is left to flights.
+TEST(Lights, SmallFiresLeaveLooksForDistantLamps) {
+  light::SceneLights sun;
+  sun.lamps = 1;  // no flux: there is no surface
+  const light::MediumLight fire{.aimed = false, .power = 1.0, .length = 0.01, .radius = 1.0};
+  const LightTable table({}, {}, sun, fire);
+  EXPECT_EQ(table.chance(Kind::lamp), 0.5F);
+  EXPECT_EQ(table.chance(Kind::cell), 0.5F);
+}
+
 TEST(Lights, SmallFiresAreLookedFor) {
   const auto chance = [](double length) {
     const light::MediumLight fire{.aimed = false, .power = 1.0, .length = length, .radius = 1.0};

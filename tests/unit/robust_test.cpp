@@ -766,7 +766,7 @@ TEST(UpdateCallback, IsCoalescedAndMayNotCallBackIn) {
   EXPECT_EQ(updates.count, 0) << "nothing is new";
 
   updates.viewer = viewer.get();
-  for (int i = 0; i < 5; ++i) change_medium(viewer.get(), 1.0 + i);
+  for (int i = 0; i < 5; ++i) change_medium(viewer.get(), 1.0 + 0.1 * i);
   EXPECT_EQ(updates.count, 1) << "one until the next frame";
   settle();
   EXPECT_EQ(updates.refused, 5);

@@ -332,7 +332,7 @@ class Window final : public QMainWindow {
     march->addItems({"Tetrahedra", "Dense voxels", "Bricks"});  // in the order of cumulet_march
     connect(march, &QComboBox::currentIndexChanged, this, [this] { set_grid(); });
     form->addRow("March", march);
-    threshold = add_slider(*form, "Cell threshold", -4.0, 0.0, std::log10(0.02), [this] { set_grid(); });
+    threshold = add_slider(*form, "Cell threshold", -4.0, 0.0, std::log10(0.15), [this] { set_grid(); });
     threshold->setPrefix("10 ^ ");
     one_camera = new QCheckBox("One camera for both");
     connect(one_camera, &QCheckBox::toggled, this, [this](bool one) { share_camera(one); });
@@ -389,6 +389,7 @@ class Window final : public QMainWindow {
   void set_grid() const {
     auto desc = make<cumulet_grid_desc>();
     desc.march = static_cast<cumulet_march>(march->currentIndex());
+    desc.criterion = CUMULET_CRITERION_TRANSMITTANCE;
     desc.threshold = std::pow(10.0, threshold->value());
     each(cumulet_set_grid, desc);
   }

@@ -673,10 +673,10 @@ typedef enum cumulet_criterion {
   CUMULET_CRITERION_DEVIATION = 0,
   CUMULET_CRITERION_RANGE_MEAN = 1, /* (max - min) / mean > threshold (the paper's) */
   /* What of a deviation is seen, about the picture's relative error: with extinctions by the density scale, reduced by
-     what is scattered forward where they hide, and T the part of the light that gets there and back,
-     T^2 x deviation x edge / (1 + extinction x edge) / (1 - exp(-mean optical depth)) > threshold. Cells are built anew,
-     in the background, once density_scale, alone or times 1 - anisotropy, is more than twice or less than half of what
-     they were built for; until then they stay, and cumulet_rebuild() builds them for what it is now */
+     what is scattered forward where they hide, and T the part of the light that gets there, T^2 there and back,
+     T^2 x deviation x edge / (1 + extinction x edge) / (1 - exp(-mean optical depth)) > threshold. Cells are built
+     anew, in the background, once density_scale, alone or times 1 - anisotropy, is more than twice or less than half of
+     what they were built for; until then they stay, and cumulet_rebuild() builds them for what it is now */
   CUMULET_CRITERION_TRANSMITTANCE = 2
 } cumulet_criterion;
 
@@ -686,8 +686,8 @@ typedef struct cumulet_grid_desc {
   cumulet_march march;
   cumulet_cells cells;
   cumulet_criterion criterion;
-  double threshold;        /* split above it. 0: 0.15 by transmittance, 1 for range-mean; negative: split to the voxel */
-  uint64_t max_cells;      /* 0: 5,400,000. Spent where the criterion is largest */
+  double threshold;   /* split above it. 0: 0.15 by transmittance, 1 for range-mean; negative: split to the voxel */
+  uint64_t max_cells; /* 0: 5,400,000. Spent where the criterion is largest */
   int32_t camera_adaptive; /* 1: do not split cells outside the frustum or under pixel_size pixels; 0: off. Needs the
                               size of a frame; built anew when the camera comes to rest elsewhere */
   double pixel_size;       /* pixels a cell's longest edge must cover to be split; 0: 1 */
@@ -738,9 +738,10 @@ typedef enum cumulet_sky {
   CUMULET_SKY_CONSTANT = 0, /* sun_irradiance; sky_radiance, the same from everywhere */
   /*
    * Of a clear day with the sun where it is (Hillaire 2020), seen from the ground at sea level: neither sun_irradiance
-   * nor sky_radiance. Below the horizon lies the lit ground. White and unit are the sun's light outside of the
-   * atmosphere, whose irradiance is 5 (some 27 klx to 1): about 4 on the ground at noon, next to none after sunset.
-   * cumulet_set_light then takes some 0.1 s.
+   * nor sky_radiance. Below the horizon lies the lit ground, unless there is that of cumulet_set_ground. White and unit
+   * are the sun's light outside of the atmosphere, whose irradiance is 5 (some 27 klx to 1): about 4 on the ground at
+   * noon, next to none after sunset. cumulet_set_light takes some 0.1 to 0.2 s when elevation or air change, as does
+   * cumulet_set_ground when a ground comes or goes.
    */
   CUMULET_SKY_PHYSICAL = 1
 } cumulet_sky;
@@ -777,7 +778,8 @@ typedef enum cumulet_ground {
 
 /*
  * A level plane without end that scatters light evenly and catches shadows; from beneath it is not there. It is part of
- * the picture and of its alpha, not of its depth, previews' surfaces and AOVs. Restarts accumulation.
+ * the picture and of its alpha, not of its depth, previews' surfaces and AOVs. Below the horizon a physical sky is dark
+ * where there is one. Restarts accumulation.
  */
 typedef struct cumulet_ground_desc {
   size_t struct_size;
