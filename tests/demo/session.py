@@ -145,7 +145,7 @@ def test_change(s):
                       *shot("thin"), "key ctrl+z", *SETTLE, *shot("thick"), "key n", *SETTLE, *shot("wide"), "key n",
                       'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *SETTLE, *shot("sun"), 'click "Tone map"',
                       "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), 'click "Threshold"',
-                      'drag "Threshold" to "Threshold" 0.75 0.5', *SETTLE, *shot("coarse"), "key 2", *SETTLE, *shot("cells"),
+                      'drag "Threshold" to "Threshold" 0.95 0.5', *SETTLE, *shot("coarse"), "key 2", *SETTLE, *shot("cells"),
                       "key 3", *SETTLE, *shot("steps"), "key 5", *SETTLE, *shot("wireframe"), "key 1"],
            "--volume", s.cumulus)
     first, report, area = look(s, "first")
