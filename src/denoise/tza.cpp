@@ -1,0 +1,140 @@
+#include "denoise/tza.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <glm/gtc/packing.hpp>
+
+#include "base/error.hpp"
+#include "base/one_line.hpp"
+
+namespace cumulet::denoise {
+
+namespace {
+
+constexpr std::uint32_t magic = 0x41D7;
+constexpr unsigned version = 2;
+constexpr std::size_t header_bytes = 12;
+constexpr unsigned most_dimensions = 4;
+
+class Reader {
+ public:
+  Reader(std::span<const std::uint8_t> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
+
+  TensorArchive read() {
+    if (bytes_.size() < 2 || number(2) != magic) fail("no tensor archive (.tza) of Open Image Denoise");
+    if (bytes_.size() < header_bytes) fail("is cut short in its header");
+    const std::uint64_t major = number(1);
+    number(1);  // the minor version, which changes nothing for readers
+    if (major != version) fail("is a tensor archive of version " + std::to_string(major) + ", not 2");
+    const std::uint64_t table = number(8);
+    if (table > bytes_.size()) fail("is cut short before its table");
+    at_ = static_cast<std::size_t>(table);
+    TensorArchive archive;
+    for (std::uint64_t left = number(4); left > 0; --left) add(archive);
+    return archive;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& cause) const { throw Error(ErrorCode::file, name_ + ": " + cause); }
+
+  std::span<const std::uint8_t> take(std::size_t size) {
+    if (size > bytes_.size() - at_) fail("is cut short in its table");
+    at_ += size;
+    return bytes_.subspan(at_ - size, size);
+  }
+
+  std::uint64_t number(std::size_t size) {
+    std::uint64_t value = 0;
+    unsigned shift = 0;
+    for (const std::uint8_t byte : take(size)) {
+      value |= std::uint64_t{byte} << shift;
+      shift += 8;
+    }
+    return value;
+  }
+
+  std::string text(std::size_t size) {
+    const auto letters = take(size);
+    return {letters.begin(), letters.end()};
+  }
+
+  void add(TensorArchive& archive) {
+    const std::string tensor_name = text(static_cast<std::size_t>(number(2)));
+    tensor_ = "tensor '" + one_line(tensor_name, 60) + "' ";
+    const std::uint64_t dimensions = number(1);
+    if (dimensions < 1 || dimensions > most_dimensions)
+      fail(tensor_ + "has " + std::to_string(dimensions) + " dimensions");
+    Tensor tensor;
+    std::uint64_t count = 1;
+    for (std::uint64_t i = 0; i < dimensions; ++i) {
+      tensor.shape.push_back(static_cast<std::uint32_t>(number(4)));
+      // More than the file has bytes is refused below, so that this does not go over.
+      count = std::min<std::uint64_t>(count * tensor.shape.back(), most_tza_bytes);
+    }
+    tensor.layout = text(static_cast<std::size_t>(dimensions));
+    const auto type = static_cast<char>(number(1));
+    if (type != 'h' && type != 'f') fail(tensor_ + "is neither of half ('h') nor of float ('f')");
+    const std::uint64_t offset = number(8);
+    const std::uint64_t value_bytes = type == 'h' ? 2 : 4;
+    if (count == 0) fail(tensor_ + "is empty");
+    if (offset > bytes_.size() || count > (bytes_.size() - offset) / value_bytes) {
+      fail(tensor_ + "goes beyond the file's end");
+    }
+    // Else a small file could ask for any amount of memory.
+    used_ += count * value_bytes;
+    if (used_ > bytes_.size()) fail(tensor_ + "lies over others");
+    tensor.values = values(bytes_.subspan(static_cast<std::size_t>(offset)), static_cast<std::size_t>(count), type);
+    if (!archive.emplace(tensor_name, std::move(tensor)).second) fail(tensor_ + "is there twice");
+  }
+
+  [[nodiscard]] std::vector<float> values(std::span<const std::uint8_t> from, std::size_t count, char type) const {
+    std::vector<float> result(count);
+    if (type == 'f') {
+      std::memcpy(result.data(), from.data(), count * sizeof(float));
+    } else {
+      for (std::size_t i = 0; i < count; ++i) {
+        std::uint16_t half = 0;
+        std::memcpy(&half, from.data() + i * sizeof(half), sizeof(half));
+        result[i] = glm::unpackHalf1x16(half);
+      }
+    }
+    if (!std::ranges::all_of(result, [](float value) { return std::isfinite(value); })) {
+      fail(tensor_ + "has a value that is not finite");
+    }
+    return result;
+  }
+
+  std::span<const std::uint8_t> bytes_;
+  const std::string& name_;
+  std::size_t at_ = 0;
+  std::uint64_t used_ = 0;  // bytes of values so far
+  std::string tensor_;      // the one being read, for messages
+};
+
+}  // namespace
+
+TensorArchive read_tza(std::span<const std::uint8_t> bytes, const std::string& name) {
+  return Reader(bytes, name).read();
+}
+
+TensorArchive read_tza(const std::string& path) {
+  const auto fail = [&](const std::string& cause) { throw Error(ErrorCode::file, path + ": " + cause); };
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail(std::strerror(errno));
+  std::vector<std::uint8_t> bytes;
+  constexpr std::size_t piece = std::size_t{1} << 20U;
+  while (file) {
+    const std::size_t before = bytes.size();
+    bytes.resize(before + piece);
+    file.read(reinterpret_cast<char*>(bytes.data() + before), piece);
+    bytes.resize(before + static_cast<std::size_t>(file.gcount()));
+    if (bytes.size() > most_tza_bytes) fail("is larger than 64 MiB, which no network of Open Image Denoise is");
+  }
+  if (file.bad()) fail(std::strerror(errno));
+  return read_tza(bytes, path);
+}
+
+}  // namespace cumulet::denoise

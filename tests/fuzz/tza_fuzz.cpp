@@ -1,0 +1,25 @@
+// libFuzzer over tensor archives and the networks of them: whatever the bytes, a network or one line. See README.md.
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <span>
+#include <string>
+
+#include "base/error.hpp"
+#include "denoise/network.hpp"
+#include "denoise/tza.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    const auto archive = cumulet::denoise::read_tza(std::span(data, size), "fuzzed");
+    static_cast<void>(cumulet::denoise::make_network(archive, "fuzzed"));
+  } catch (const cumulet::Error& error) {
+    const std::string line = error.what();
+    if (!line.starts_with("fuzzed: ") || line.find_first_of("\n\r") != std::string::npos) {
+      std::fprintf(stderr, "tza_fuzz: not one line: %s\n", line.c_str());
+      std::abort();
+    }
+  }
+  return 0;
+}
