@@ -18,7 +18,9 @@ layout(location = 1) uniform bool cm_flip_y;
 #if CM_DEPTH == 0
 layout(location = 2) uniform float cm_exposure;
 layout(location = 3) uniform bool cm_transparent;
+layout(location = 4) uniform vec3 cm_backdrop;  // radiance behind all, besides the background's
 #if CM_LAYERS || !CM_RESOLVED
+layout(location = 6) uniform bool cm_with_background;  // else it is left out
 layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // mean radiance
 #endif
 layout(location = 0) out vec4 cm_colour;
@@ -60,9 +62,9 @@ vec4 cm_texel(ivec2 texel) {
   return mean;
 #else
 #if !CM_RESOLVED
-  if (!cm_transparent) mean.rgb += texelFetch(cm_background, texel, 0).rgb;
+  if (cm_with_background) mean.rgb += texelFetch(cm_background, texel, 0).rgb;
 #endif
-  return cm_transparent ? mean : vec4(mean.rgb, 1.0);
+  return cm_transparent ? mean : vec4(mean.rgb + (1.0 - mean.a) * cm_backdrop, 1.0);
 #endif
 }
 #else
@@ -102,7 +104,8 @@ void main() {
   background /= sum;
   vec4 behind = cm_surfaces(pixel);
   value += (1.0 - value.a) * behind;
-  if (!cm_transparent) value = vec4(value.rgb + background * (1.0 - behind.a), 1.0);
+  if (cm_with_background) value.rgb += background * (1.0 - behind.a);
+  if (!cm_transparent) value = vec4(value.rgb + (1.0 - value.a) * cm_backdrop, 1.0);
 #else
   ivec2 p0 = clamp(ivec2(low), ivec2(0), last);
   ivec2 p1 = clamp(ivec2(low) + 1, ivec2(0), last);

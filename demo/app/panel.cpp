@@ -168,7 +168,13 @@ void Panel::file(Model& model, std::vector<Command>& commands) {
 
 void Panel::display(Model& model) {
   settings::with(&cumulet_sampling_desc::view, [&](const auto& view) { rows_.draw(view, model.scene.sampling.view); });
-  rows(model.scene.display);
+  using Desc = cumulet_display_desc;
+  Desc& display = model.scene.display;
+  settings::for_each<Desc>([&](const auto& setting) {
+    ImGui::BeginDisabled(setting.is(&Desc::background_color) && display.background != CUMULET_BACKGROUND_COLOR);
+    rows_.draw(setting, display.*setting.field);
+    ImGui::EndDisabled();
+  });
 }
 
 void Panel::light(Model& model) {

@@ -42,10 +42,6 @@ class Panel {
   void grid(Model& model);
   void sampling(Model& model);
   void statistics(const Model& model);
-  template <class Desc>
-  void rows(Desc& desc) {
-    settings::for_each<Desc>([&](const auto& setting) { rows_.draw(setting, desc.*setting.field); });
-  }
   void absorption(float (&coalbedo)[3]);
   void threshold(settings::Facts facts, cumulet_grid_desc& grid);
   void ground(cumulet_ground_desc& ground);

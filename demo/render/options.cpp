@@ -392,7 +392,11 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene); },
       "Pixels (default: 1280x720)");
   add_settings(app, group, scene.sampling);
-  add_settings(app, group, scene.display);
+  const auto choose_color = [&scene](std::string_view flag, const std::string&) {
+    if (flag == "--background-color") scene.display.background = CUMULET_BACKGROUND_COLOR;
+    return false;
+  };
+  add_settings(app, group, scene.display, choose_color);
 }
 
 namespace {

@@ -207,6 +207,9 @@ void Compositor::draw_colour(const Shown& shown, const PictureTextures& picture,
   place(gl, *shown.program, target);
   gl.ProgramUniform1f(colour, 2, exposure_of(display));
   gl.ProgramUniform1i(colour, 3, as_bool(display.transparent));
+  const glm::vec3 backdrop = display.backdrop.value_or(glm::vec3(0.0F));
+  gl.ProgramUniform3f(colour, 4, backdrop.x, backdrop.y, backdrop.z);
+  if (shown.layered || !resolved) gl.ProgramUniform1i(colour, 6, as_bool(display.shows_background()));
   if (shown.layered) {
     const SurfaceLayers& layers = *picture.beneath;
     gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOUR, layers.colour.name());
@@ -283,8 +286,8 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool layered = picture.beneath != nullptr && picture.beneath->colour;
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
-  const Background without = display.transparent ? Background::left_out : Background::added;
-  Means* const means = resolve(picture, layered ? Background::apart : without, target.wait);
+  const Background flat = display.shows_background() ? Background::added : Background::left_out;
+  Means* const means = resolve(picture, layered ? Background::apart : flat, target.wait);
   const auto begun = Clock::now();
   // Without means either there is no memory for them, or the driver is at their program still.
   const bool resolved = means != nullptr || lags_;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 
 #include "base/shared_code.hpp"
@@ -23,9 +24,13 @@ enum class ColourEncoding { srgb = 0, srgb_framebuffer = 1, linear = 2, hdr = 3 
 struct Display {
   float exposure_stops = 0.0F;
   ToneMap tone_map = ToneMap::neutral;
-  bool legend = false;       // a debug view: neither exposed nor tone-mapped
-  bool transparent = false;  // premultiplied, without the background
+  bool legend = false;                  // a debug view: neither exposed nor tone-mapped
+  bool transparent = false;             // premultiplied, without the background
+  std::optional<glm::vec3> backdrop{};  // opaque: radiance to show instead of the background
   ColourEncoding encoding = ColourEncoding::srgb;
+
+  /// Whether the background's radiance is part of what is shown.
+  [[nodiscard]] bool shows_background() const { return !transparent && !backdrop; }
 };
 
 /// The factor on radiance.

@@ -54,9 +54,11 @@ inline constexpr std::array tone_map_choices = {
     Choice{"neutral", CUMULET_TONE_MAP_NEUTRAL, "Neutral", "Khronos PBR Neutral: keeps colours, rolls off highlights."},
     Choice{"filmic", CUMULET_TONE_MAP_FILMIC, "Filmic", "A fit of the ACES curve: more contrast."},
     Choice{"clip", CUMULET_TONE_MAP_CLIP, "Clip", "What is above 1 is white."}};
-inline constexpr std::array background_choices = {Choice{"sky", CUMULET_BACKGROUND_SKY, "Sky", "The sky's radiance."},
-                                                  Choice{"transparent", CUMULET_BACKGROUND_TRANSPARENT, "Transparent",
-                                                         "Nothing: saved pictures have an alpha channel."}};
+inline constexpr std::array background_choices = {
+    Choice{"sky", CUMULET_BACKGROUND_SKY, "Sky", "The sky's radiance."},
+    Choice{"transparent", CUMULET_BACKGROUND_TRANSPARENT, "Transparent",
+           "Nothing: saved pictures have an alpha channel."},
+    Choice{"color", CUMULET_BACKGROUND_COLOR, "Colour", "One colour; what lights the scene stays."}};
 inline constexpr std::array navigation_choices = {
     Choice{"simple", CUMULET_NAVIGATION_SIMPLE, "Simple", "Left: orbit; middle or Shift+left: pan; right: dolly."},
     Choice{"blender", CUMULET_NAVIGATION_BLENDER, "Blender", "Middle: orbit; Shift: pan; Ctrl: dolly; keypad views."},
@@ -431,9 +433,15 @@ struct Table<cumulet_display_desc> {
         .row = {.label = "Tone map",
                 .tip = "How radiance becomes what the screen can show."}}),
       Setting(&Desc::background, {.name = "background", .choices = background_choices,
-        .key = "display.background",
+        .key = "display.background", .flag = "--background",
+        .help = "What is behind all (default: sky); light is the same, and mirrors show the sky",
         .row = {.label = "Background",
-                .tip = "What is behind the volume."}})};
+                .tip = "What is behind the volume."}}),
+      Setting(&Desc::background_color, {.name = "background_color", .range = light_range,
+        .key = "display.background_color", .flag = "--background-color", .type = "R,G,B",
+        .help = "One colour as the background, linear radiance (default: 0,0,0)",
+        .row = {.label = "Background colour",
+                .tip = "What is behind the volume, where that is one colour."}})};
 };
 
 template <>

@@ -217,11 +217,7 @@ void Context::composite(render::Film& film, const render::PictureTextures& pictu
 }
 
 render::Display Context::display(const Shot& shot, const Frame& frame, const render::Picture& shown) {
-  render::Display display;
-  display.exposure_stops = shot.display.exposure_stops;
-  display.tone_map = shot.display.tone_map;
-  display.legend = shown.view() != render::View::shaded;
-  display.transparent = shot.display.transparent;
+  render::Display display = shot.display.shown(shown.view() != render::View::shaded);
   display.encoding = frame.encoding;
   return display;
 }

@@ -93,7 +93,7 @@ class Context {
   [[nodiscard]] Pick pick(const Shot& shot, double x, double y);
   /// Throws Error(invalid_argument) for too few values, or what was not gathered.
   void read_aov(const Shot& shot, Aov aov, float* values, std::size_t count);
-  void read_linear(bool transparent, float* rgba, std::size_t count);
+  void read_linear(const DisplaySettings& settings, float* rgba, std::size_t count);
   [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
 
   /// Of the context's life.

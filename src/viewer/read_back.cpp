@@ -106,12 +106,18 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   }
 }
 
-void Context::read_linear(bool transparent, float* rgba, std::size_t count) {
+void Context::read_linear(const DisplaySettings& settings, float* rgba, std::size_t count) {
   render::Picture& picture = readable();
   const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
   if (rgba == nullptr || count < pixels * 4)
     throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " floats");
-  read_means(picture, !transparent, rgba);
+  const render::Display display = settings.shown(picture.view() != render::View::shaded);
+  read_means(picture, display.shows_background(), rgba);
+  if (display.transparent || !display.backdrop) return;
+  for (std::size_t i = 0; i < pixels * 4; ++i) {
+    const std::size_t c = i % 4;
+    if (c != 3) rgba[i] += (1.0F - rgba[i - c + 3]) * (*display.backdrop)[static_cast<int>(c)];
+  }
 }
 
 }  // namespace cumulet::viewer

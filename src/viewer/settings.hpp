@@ -138,9 +138,24 @@ struct DisplaySettings {
   float exposure_stops = 0.0F;
   render::ToneMap tone_map = render::ToneMap::neutral;
   bool transparent = false;
+  std::optional<glm::vec3> backdrop{};
 
   static DisplaySettings of(const cumulet_display_desc& d) {
-    return {d.exposure_stops, static_cast<render::ToneMap>(d.tone_map), d.background == CUMULET_BACKGROUND_TRANSPARENT};
+    DisplaySettings settings{
+        d.exposure_stops, static_cast<render::ToneMap>(d.tone_map), d.background == CUMULET_BACKGROUND_TRANSPARENT, {}};
+    if (d.background == CUMULET_BACKGROUND_COLOR) settings.backdrop = glm::make_vec3(d.background_color);
+    return settings;
+  }
+
+  /// legend: of a debug view, which is over black.
+  [[nodiscard]] render::Display shown(bool legend) const {
+    render::Display display;
+    display.exposure_stops = exposure_stops;
+    display.tone_map = tone_map;
+    display.legend = legend;
+    display.transparent = transparent;
+    if (!legend) display.backdrop = backdrop;
+    return display;
   }
 };
 

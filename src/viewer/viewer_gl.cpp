@@ -195,7 +195,7 @@ void Viewer::read_aov(Aov aov, float* values, std::size_t count) {
 
 void Viewer::read_linear(float* rgba, std::size_t count) {
   with_gl([&](Context& g) {
-    g.read_linear(display_.transparent, rgba, count);
+    g.read_linear(display_, rgba, count);
     totals_ = g.totals();
   });
 }
@@ -212,12 +212,7 @@ void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
     throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " bytes");
   std::vector<float> linear(pixels * 4);
   read_linear(linear.data(), linear.size());
-  render::Display display;
-  display.exposure_stops = display_.exposure_stops;
-  display.tone_map = display_.tone_map;
-  display.legend = legend;
-  display.transparent = display_.transparent;
-  render::to_display(linear, display, {rgba, pixels * 4});
+  render::to_display(linear, display_.shown(legend), {rgba, pixels * 4});
 }
 
 double Viewer::measure_noise() {

@@ -182,9 +182,11 @@ struct Picture {
   }
   [[nodiscard]] glm::dvec4 texel(glm::ivec2 p, const Display& display) const {
     const bool hole = holes && counts[index(p)].x == 0;
-    const bool all = !display.transparent;
+    const bool all = display.shows_background();
     const glm::dvec4 value = hole ? around(glm::clamp(p, glm::ivec2(0), size - 1), all) : mean(p, all);
-    return all ? glm::dvec4(glm::dvec3(value), 1.0) : value;
+    if (display.transparent) return value;
+    const glm::dvec3 behind(display.backdrop.value_or(glm::vec3(0.0F)));
+    return {glm::dvec3(value) + (1.0 - value.a) * behind, 1.0};
   }
 };
 
@@ -398,6 +400,22 @@ TEST_P(Compositing, HolesTakeAfterTheirNeighbours) {
       Display display;
       display.transparent = transparent;
       check(picture, display, target, GL_RGBA32F, 0);
+    }
+  }
+}
+
+TEST_P(Compositing, AColourIsBehindAll) {
+  Picture picture(gl_, 21, 13, false);
+  for (const bool holes : {false, true}) {
+    picture.holes = holes;
+    for (const glm::ivec4 viewport : {glm::ivec4(7, 5, 21, 13), glm::ivec4(0, 0, 40, 28)}) {
+      FrameTarget target;
+      target.viewport = viewport;
+      Display display;
+      display.backdrop = glm::vec3(0.7F, 0.2F, 3.0F);
+      display.exposure_stops = -0.5F;
+      check(picture, display, target, GL_RGBA32F, 0);
+      check(picture, display, target, GL_RGBA8, 0);
     }
   }
 }

@@ -233,7 +233,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   check_enum("view", &cumulet_sampling_desc::view, 5, sampling);
   check_enum("preview", &cumulet_sampling_desc::preview, 2, sampling);
   check_enum("tone_map", &cumulet_display_desc::tone_map, 3, display);
-  check_enum("background", &cumulet_display_desc::background, 2, display);
+  check_enum("background", &cumulet_display_desc::background, 3, display);
   check_enum("depth", &cumulet_camera_desc::depth, 2, camera);
   check_enum("style", &cumulet_navigation_desc::style, 3, navigation);
   check_enum("type", &cumulet_event::type, 7, event);

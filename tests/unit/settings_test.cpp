@@ -215,7 +215,7 @@ TEST(Settings, AFlagSetsEach) {
     });
   });
   // --sun and --sky-model set three at once.
-  EXPECT_EQ(without, (std::set<std::string>{"background", "ground_albedo", "preview", "sky", "sun_azimuth_degrees",
+  EXPECT_EQ(without, (std::set<std::string>{"ground_albedo", "preview", "sky", "sun_azimuth_degrees",
                                             "sun_elevation_degrees", "sun_irradiance", "turbidity", "volume_alone"}));
 }
 

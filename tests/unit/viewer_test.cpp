@@ -285,6 +285,38 @@ TEST_P(ViewerSlab, OrthographicAndOffAxisCamerasObeyBeerAndLambert) {
   EXPECT_NEAR(mean_alpha(read({32, 32})), 0.5 * expected, 0.02);
 }
 
+TEST_P(ViewerSlab, AColourIsSeenBehindAllAndNowhereElse) {
+  viewer().set_light({0.0F, 90.0F, vec3(0.0F), vec3(0.5F, 0.25F, 1.0F)});
+  auto scene = std::make_shared<test::StillScene>();
+  surface::Material mirror = test::diffuse(vec3(1.0F));
+  mirror.metallic = 1.0F;
+  mirror.roughness = 0.0F;
+  scene->add_sphere(vec3(31.5F, 31.5F, 20.0F), 2.0F, scene->add(mirror));
+  viewer().show_surfaces(test::source_of(scene));
+  const glm::uvec2 size(32, 32);
+  converge(frame(size.x, size.y));
+  const std::vector<float> sky = read(size);
+  viewer::DisplaySettings display;
+  display.transparent = true;
+  viewer().set_display(display);
+  const std::vector<float> transparent = read(size);
+  display.transparent = false;
+  display.backdrop = vec3(3.0F, 0.5F, 0.125F);
+  viewer().set_display(display);
+  EXPECT_TRUE(viewer().render(frame(size.x, size.y, -1.0)).converged);
+  const std::vector<float> colour = read(size);
+  std::size_t mirrored = 0;
+  for (std::size_t i = 0; i < colour.size(); ++i) {
+    const float alpha = transparent[i - i % 4 + 3];
+    const float behind = i % 4 == 3 ? 0.0F : (1.0F - alpha) * (*display.backdrop)[static_cast<int>(i % 4)];
+    ASSERT_NEAR(colour[i], transparent[i] + behind, 1e-6F);
+    if (alpha < 1.0F) continue;
+    EXPECT_EQ(colour[i], sky[i]);
+    if (i % 4 == 2 && sky[i] > 0.1F) ++mirrored;
+  }
+  EXPECT_GT(mirrored, 20U);
+}
+
 TEST_P(ViewerSlab, AnOrthographicRayBeginsAtTheNearPlane) {
   viewer::CameraPose pose = viewer().camera()->pose();
   pose.orthographic_height = 20.0;

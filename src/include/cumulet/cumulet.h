@@ -818,16 +818,21 @@ typedef enum cumulet_tone_map {
 } cumulet_tone_map;
 
 typedef enum cumulet_background {
-  CUMULET_BACKGROUND_SKY = 0,        /* the sky's radiance, or the environment, behind the volume: opaque */
-  CUMULET_BACKGROUND_TRANSPARENT = 1 /* premultiplied colour and alpha: what the framebuffer holds shows through */
+  CUMULET_BACKGROUND_SKY = 0,         /* the sky's radiance, or the environment, behind the volume: opaque */
+  CUMULET_BACKGROUND_TRANSPARENT = 1, /* premultiplied colour and alpha: what the framebuffer holds shows through */
+  CUMULET_BACKGROUND_COLOR = 2        /* background_color behind the volume: opaque */
 } cumulet_background;
 
-/* How a picture is shown. Restarts nothing. */
+/*
+ * How a picture is shown. Restarts nothing. A background is what the camera sees where neither volume nor surfaces nor
+ * the ground cover it: volume and surfaces are lit by sky or environment whatever it is, and mirrors show these.
+ */
 typedef struct cumulet_display_desc {
   size_t struct_size;
   float exposure_stops; /* radiance is multiplied by 2^stops */
   cumulet_tone_map tone_map;
   cumulet_background background;
+  float background_color[3]; /* linear Rec. 709 radiance, exposed and tone-mapped as all is; debug views are over black */
 } cumulet_display_desc;
 
 CUMULET_API cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc);
@@ -1159,12 +1164,12 @@ CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box
 
 /*
  * [GL] The picture so far: width x height (of the result) x 4 floats, first pixel top left, linear radiance in front of
- * the background (premultiplied if that is transparent), and the volume's alpha. A pixel without samples is 0. count is
+ * the background (premultiplied if that is transparent), and the part of a pixel that is not background. A pixel without samples is 0. count is
  * the number of floats at rgba.
  */
 CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count);
-/* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque in
- * front of the sky). */
+/* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque
+ * unless the background is transparent). */
 CUMULET_API cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count);
 /* Arbitrary output variables: what a compositor wants beside the picture. z is the depth along the camera's axis. */
 typedef enum cumulet_aov {
