@@ -53,7 +53,7 @@ CM_FN vec3 cm_lamp_irradiance(CmLamp lamp, vec3 from, vec3 point, CM_OUT(vec3) t
     float r2 = d2 / (lamp.range * lamp.range);
     share *= clamp(1.0f - r2 * r2, 0.0f, 1.0f);
   }
-  return lamp.intensity * share;
+  return min(lamp.intensity * share, vec3(1e30f));  // an infinite one beside a share of 0 would be no number
 }
 
 #endif

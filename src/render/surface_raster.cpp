@@ -321,7 +321,11 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   std::vector<CmLamp> records;
   records.reserve(lamps.size() + lighting.lamps.size());
   for (const surface::PunctualLight& lamp : lamps) records.push_back(light::lamp_record(lamp, view.eye));
-  for (const light::Lamp& lamp : lighting.lamps) records.push_back(light::lamp_record(lamp, view.eye));
+  for (light::Lamp lamp : lighting.lamps) {
+    // Lit from its middle alone: there a wide sun's disc is brighter than on average.
+    if (lamp.kind == light::Lamp::Kind::sun) lamp.angle = 0.0;
+    records.push_back(light::lamp_record(lamp, view.eye));
+  }
   block.counts.x = static_cast<std::uint32_t>(records.size());
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 

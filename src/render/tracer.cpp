@@ -49,9 +49,7 @@ void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
   parameters.host_depth = {obstacles.size, obstacles.depth != 0 ? obstacles.layers : 0};
   if (obstacles.scene != nullptr) parameters.surfaces = obstacles.scene->tables();
-  if (obstacles.lamps != nullptr) {
-    parameters.lamps.count = obstacles.met() != nullptr ? obstacles.lamps->count() : obstacles.lamps->of_host();
-  }
+  parameters.lamps.count = obstacles.lamps_met();
 }
 
 constexpr const char* channels_macro = "CM_CHANNELS 1";
@@ -232,7 +230,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
   picture.channels_ = parameters.medium.emits != 0U || parameters.medium.coloured != 0U;
   picture.environment_ = obstacles.environment != nullptr;
-  picture.lamps_ = obstacles.lamps != nullptr && obstacles.lamps->of_host() > 0;
+  picture.lamps_ = obstacles.lamps_met() > 0;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
 }

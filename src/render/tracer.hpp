@@ -48,6 +48,11 @@ struct Obstacles {
 
   /// The scene whose triangles paths meet; null: they meet none.
   [[nodiscard]] const ModelData* met() const { return traced ? scene : nullptr; }
+  /// How many lamps paths look for: those of a scene that they meet, too.
+  [[nodiscard]] std::uint32_t lamps_met() const {
+    if (lamps == nullptr) return 0;
+    return met() != nullptr ? lamps->count() : lamps->of_host();
+  }
 };
 
 /// What camera rays of a picture do with the surface pass.

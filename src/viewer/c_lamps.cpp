@@ -11,6 +11,7 @@ using glm::dvec3;
 
 constexpr uint64_t most_lamps = 4096;
 constexpr double far = 1e30;
+constexpr float brightest = 1e30F;
 
 /// Unit, of a vector of any length above 0.
 dvec3 unit(const dvec3& v) {
@@ -61,8 +62,9 @@ light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count) {
                   if (d.kind == CUMULET_LAMP_SUN && d.angle_degrees > 90.0)
                     refuse(what + ": cumulet_lamp_desc.angle_degrees of a sun is above 90");
                   const light::Lamp lamp = lamp_of(d);
-                  if (!all_finite(std::array{lamp.power.x, lamp.power.y, lamp.power.z}))
-                    refuse(what + ": cumulet_lamp_desc.color times power is not finite");
+                  // Times what a lamp close by counts, it shall stay finite.
+                  if (!glm::all(glm::lessThanEqual(lamp.power, glm::vec3(brightest))))
+                    refuse(what + ": cumulet_lamp_desc.color times power is above 1e30");
                   if (lamp.power != glm::vec3(0.0F)) made.push_back(lamp);
                 });
   return made;

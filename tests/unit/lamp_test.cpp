@@ -18,6 +18,7 @@ using namespace cumulet;
 using glm::dvec3;
 using glm::ivec3;
 using glm::vec3;
+using glm::vec4;
 using render::March;
 using test::StillScene;
 
@@ -186,6 +187,59 @@ TEST_P(Lamps, LightWhatIsRasterised) {
   disc.width = 0.1;
   set_lamps({disc});
   EXPECT_NEAR(irradiance(4) * 4.0 * above * above / 1000.0, 1.0, 0.01);
+  auto sun = lamp(CUMULET_LAMP_SUN, dvec3(0.0), 3.0F);
+  sun.angle_degrees = 60.0;
+  set_lamps({sun});
+  EXPECT_NEAR(irradiance(4), 3.0, 0.01) << "as bright as it says, however wide";
+}
+
+// A model's lamps light the volume of a preview as they light its picture, whether the host has one or not.
+TEST_P(Lamps, OfAModelLightTheVolumeOfPreviewsToo) {
+  still_->set_volume(test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
+  set_medium(0.1, 1.0F, 1);
+  still_->set_camera(test::camera_at({32.0, 32.0, 300.0}, {32.0, 32.0, 0.0}, 2.0));
+  surface::PunctualLight lamp_of_model;
+  lamp_of_model.intensity = vec3(1000.0F);
+  lamp_of_model.position = {32.0F, 32.0F, 40.0F};
+  auto scene = std::make_shared<StillScene>();
+  scene->add(test::diffuse(vec3(1.0F)));
+  scene->add_quad({{{-200, -200, -200}, {-100, -200, -200}, {-100, -100, -200}, {-200, -100, -200}}}, 0);
+  scene->rest.lights = {lamp_of_model};
+  still_->viewer().show_surfaces(test::source_of(scene));
+  viewer::Light faint;
+  faint.sky_radiance = vec3(1e-6F);
+  still_->set_light(faint);
+  still_->build();
+  still_->viewer().set_sampling({256, 1, render::View::shaded, true});
+  viewer::Frame frame;
+  frame.target = viewer::Target::none;
+  frame.size = {160, 160};
+  frame.viewport = {0, 0, 160, 160};
+  frame.budget_ms = 5.0;
+  viewer::FrameResult result;
+  for (int i = 0; i < 1000 && !result.preview; ++i) result = still_->viewer().render(frame);
+  ASSERT_TRUE(result.preview);
+  test::Picture preview;
+  preview.pixels.resize(std::size_t{result.size.x} * result.size.y);
+  still_->viewer().read_linear(&preview.pixels[0].x, preview.pixels.size() * 4);
+  const double final = test::render(*still_, {16, 16, 256, 1, render::View::shaded}).mean().x;
+  EXPECT_NEAR(preview.mean().x, final, 0.5 * final);
+}
+
+TEST_P(Lamps, OfAnyBrightnessLeaveNumbers) {
+  still_->set_volume(test::make_volume({16, 16, 16}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
+  set_medium(2.0, 1.0F);
+  still_->set_camera(test::camera_at({8.0, 8.0, 60.0}, {8.0, 8.0, 8.0}, 20.0));
+  // In the medium, so that paths scatter close by, and of no size.
+  auto spot = lamp(CUMULET_LAMP_SPOT, {8.0, 8.0, 8.0}, 9e29F);
+  auto disc = lamp(CUMULET_LAMP_DISC, {8.0, 8.0, 12.0}, 9e29F);
+  auto sun = lamp(CUMULET_LAMP_SUN, dvec3(0.0), 9e29F);
+  disc.width = 1e-3;
+  sun.angle_degrees = 90.0;
+  set_lamps({spot, disc, sun, lamp(CUMULET_LAMP_POINT, {7.0, 7.0, 9.0}, 9e29F)});
+  for (const vec4& pixel : test::render(*still_, {16, 16, 64, 1, render::View::shaded}).pixels) {
+    ASSERT_TRUE(std::isfinite(pixel.x)) << pixel.x;
+  }
 }
 
 // ---- in a medium ----
@@ -292,7 +346,8 @@ TEST(LampDescs, AreCheckedAndNamed) {
   EXPECT_EQ(bad([](auto& d) { d.position[2] = 1e300; }), field + "position is beyond 1e30");
   EXPECT_EQ(bad([](auto& d) { d.direction[0] = INFINITY; }), field + "direction is not finite");
   EXPECT_EQ(bad([](auto& d) { d.color[0] = -1.0F; }), field + "color is negative or not finite");
-  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 1e29F; }), field + "color times power is not finite");
+  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 1e29F; }), field + "color times power is above 1e30");
+  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 20.0F; }), field + "color times power is above 1e30");
   EXPECT_EQ(bad([](auto& d) { d.width = -1.0; }), field + "width is not from 0 to 1e30");
   EXPECT_EQ(bad([](auto& d) { d.angle_degrees = 181.0; }), field + "angle_degrees is not from 0 to 180");
   EXPECT_EQ(bad([](auto& d) { d.kind = CUMULET_LAMP_SUN, d.angle_degrees = 91.0; }),

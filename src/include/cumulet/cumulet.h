@@ -873,7 +873,7 @@ typedef struct cumulet_lamp_desc {
   double direction[3];  /* world, of any length: where it shines; not of a point; zero: down, to -Y */
   double across[3];     /* of a rectangle: along its width, as far as that is upright to the direction; zero, or along
                            the direction: level with the ground, or +X where it shines up or down */
-  float color[3];       /* linear Rec. 709, times power; all 0: white */
+  float color[3];       /* linear Rec. 709, times power, together up to 1e30; all 0: white */
   float power;          /* watts; of a sun W/m2 on a surface that faces it; 0: dark */
   double width;         /* of a rectangle; of a disc the diameter; world units; 0: 1 */
   double height;        /* of a rectangle; 0: 1 */
