@@ -97,10 +97,10 @@ path explosion_file(const path& folder, int frame) {
   return folder / name.data();
 }
 
-// The explosion in the evening, half burning, half soot, as README shows it.
-void write_explosion_scene(const path& folder) {
+// The explosion in the evening; half burning, half soot at the frame that README shows.
+void write_explosion_scene(const path& folder, int frame) {
   cumulet::demo::SceneOptions scene;
-  scene.volume = explosion_file(folder, cumulet::scene::shown_frame).string();
+  scene.volume = explosion_file(folder, frame).string();
   look(scene.camera, {{4.0F, 2.2F, 22.0F}, {0.3F, 4.6F, 0.0F}, 33.0});
   scene.medium.density_scale = 9.0;
   cumulet::demo::apply(cumulet::demo::Preset::explosion, scene.medium);
@@ -145,10 +145,13 @@ std::optional<Wanted> parse(std::vector<std::string> arguments) {
   app.add_option("--only", wanted.only, "Write one of them")
       ->check(CLI::IsMember({"cumulus", "mountains", "explosion"}).description(""))
       ->type_name("cumulus|mountains|explosion");
-  app.add_option("--frame", wanted.frame, "Write this frame of the explosion alone; the scene file shows 12")
+  app.add_option("--frame", wanted.frame,
+                 "Write this frame of the explosion alone (the scene file then shows it, else 12)")
       ->check(CLI::Range(1, cumulet::scene::explosion_frames).description(""))
       ->type_name("N");
   if (!cumulet::demo::parse_arguments(app, std::move(arguments), std::cout)) return std::nullopt;
+  if (wanted.frame > 0 && !wanted.only.empty() && wanted.only != "explosion")
+    throw cumulet::demo::UsageError("--frame is of the explosion, which --only " + wanted.only + " leaves out");
   return wanted;
 }
 
@@ -166,7 +169,7 @@ void write_all(const Wanted& options) {
   if (wanted("mountains")) write_surfaces(folder / "mountains.glb", options.seed);
   if (options.only.empty()) {
     write_scene(folder);
-    write_explosion_scene(folder);
+    write_explosion_scene(folder, options.frame > 0 ? options.frame : cumulet::scene::shown_frame);
   }
   if (wanted("explosion")) {
     const cumulet::scene::Settings settings{voxels(6e6, 1e6), options.seed};
