@@ -42,6 +42,7 @@ constexpr double picture_frame = 0.15;      // that a window may wait for a pict
 
 App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(preferences_path()) {
   model_.scene = options_.scene;
+  model_.unchosen_ground = options_.unchosen_ground;
   suggest_next_ = model_.scene.auto_density_scale && model_.scene.medium.density_scale == 0.0;
   spell_out_defaults(model_.scene);
   model_.preferences = load_preferences(preferences_path_);
@@ -366,10 +367,7 @@ void App::cancel() {
 void App::open(const std::string& path) {
   if (path.empty()) return;
   if (has_ending(path, ".gltf") || has_ending(path, ".glb")) {
-    model_.scene.surfaces = path;
-    model_.scene.surface = {};
-    model_.scene.surface.struct_size = sizeof model_.scene.surface;
-    model_.scene.surface_camera = -1;
+    open_surfaces(model_, path);
     return;
   }
   if (!has_ending(path, ".json")) {
@@ -384,6 +382,7 @@ void App::open(const std::string& path) {
     scene.width = model_.scene.width;
     scene.height = model_.scene.height;
     model_.scene = std::move(scene);
+    model_.unchosen_ground = false;
     model_.scene_path = path;
     opening_scene_ = path;
     reload_ = true;

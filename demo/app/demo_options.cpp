@@ -58,9 +58,7 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, false);
-  const bool model = has_ending(options.open, ".gltf") || has_ending(options.open, ".glb");
-  if (model && app.count("--ground") + app.count("--ground-height") == 0)
-    options.scene.ground.place = CUMULET_GROUND_NONE;
+  options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
   options.sized = app.count("--size") > 0;
   if (!options.open.empty() && (!options.scene.volume.empty() || app.count("--scene") > 0))
     throw UsageError("'" + options.open + "' is given as well as --volume or --scene");

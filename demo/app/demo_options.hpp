@@ -10,9 +10,10 @@ namespace cumulet::demo {
 
 struct DemoOptions {
   SceneOptions scene;
-  bool sized = false;     // --size was given: the window takes it, else the last run's size
-  std::string open;       // the file named without a flag: a volume or a scene
-  double ui_scale = 0.0;  // 0: as the screen asks
+  bool unchosen_ground = false;  // a ground that the scene has is the default one
+  bool sized = false;            // --size was given: the window takes it, else the last run's size
+  std::string open;              // the file named without a flag: a volume or a scene
+  double ui_scale = 0.0;         // 0: as the screen asks
   std::string replay;
   std::string record;
   std::string trace;         // empty: none

@@ -97,6 +97,15 @@ void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
   scene.to_world = volume.to_world;
 }
 
+void open_surfaces(Model& model, const std::string& path) {
+  model.scene.surfaces = path;
+  model.scene.surface = {};
+  model.scene.surface.struct_size = sizeof model.scene.surface;
+  model.scene.surface_camera = -1;
+  if (model.unchosen_ground && model.scene.ground.place == CUMULET_GROUND_BELOW)
+    model.scene.ground.place = CUMULET_GROUND_NONE;
+}
+
 void tell(Model& model, bool error, const std::string& text, double now) {
   constexpr double seconds = 5.0;
   constexpr std::size_t most = 3;

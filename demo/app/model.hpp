@@ -134,7 +134,8 @@ double device_seconds(const cumulet_stats& stats);
 
 /// All that the user interface shows and changes.
 struct Model {
-  SceneOptions scene;  // with no default left to the library but the camera's place
+  SceneOptions scene;            // with no default left to the library but the camera's place
+  bool unchosen_ground = false;  // a ground below all is the default one
   cumulet_navigation_desc navigation{};
   bool adaptive_resolution = true;
   bool panel = true;
@@ -150,6 +151,9 @@ struct Model {
 
   Model();
 };
+
+/// Shows the surfaces of a file, instead of those before and of the default ground: models bring their own.
+void open_surfaces(Model& model, const std::string& path);
 
 /// Adds a line to the message bar, in place of an equal one. Errors stay, others go after a while.
 void tell(Model& model, bool error, const std::string& text, double now);

@@ -408,6 +408,23 @@ TEST(DemoOptions, TakeTheSceneFlagsAndAFile) {
   EXPECT_EQ(parse_demo_options({"--shader-cache", "kept"}, out)->shader_cache, "kept");
 }
 
+TEST(Model, AModelTakesAwayTheGroundThatNobodyChose) {
+  const auto ground_with = [](std::vector<std::string> arguments) {
+    std::ostringstream out;
+    const auto options = parse_demo_options(std::move(arguments), out);
+    Model model;
+    model.scene = options->scene;
+    model.unchosen_ground = options->unchosen_ground;
+    EXPECT_NE(model.scene.ground.place, CUMULET_GROUND_NONE);
+    open_surfaces(model, "town.glb");
+    EXPECT_EQ(model.scene.surfaces, "town.glb");
+    return model.scene.ground.place;
+  };
+  EXPECT_EQ(ground_with({}), CUMULET_GROUND_NONE);
+  EXPECT_EQ(ground_with({"--ground", "below"}), CUMULET_GROUND_BELOW);
+  EXPECT_EQ(ground_with({"--ground-height", "2"}), CUMULET_GROUND_AT_HEIGHT);
+}
+
 TEST(Model, DefaultsAreSpelledOut) {
   SceneOptions scene;
   scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
