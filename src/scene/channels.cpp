@@ -84,10 +84,12 @@ class BrickSet {
 class Glow {
  public:
   explicit Glow(const Emission& emission)
-      : emission_(emission), flame_(glm::dvec3(emission.flame_colour) * emission.flame_strength) {}
+      : emission_(emission), flame_colour_(glm::dvec3(emission.flame_colour) * emission.flame_strength) {}
 
-  [[nodiscard]] vec3 operator()(float temperature, float flame) const {
-    glm::dvec3 light = double{flame} * flame_;
+  /// Of what the fields have there.
+  [[nodiscard]] vec3 operator()(float temperature_value, float flame_value) const {
+    const float temperature = emission_.temperature_ramp(temperature_value);
+    glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_colour_;
     if (temperature > 0.0F && emission_.blackbody > 0.0) {
       const double kelvin =
           emission_.temperature_offset + emission_.temperature_scale * static_cast<double>(temperature);
@@ -103,7 +105,7 @@ class Glow {
   // Far above all that is seen, and far enough below what floats hold for sums over a volume.
   static constexpr double most_radiance = 1e12;
   Emission emission_;
-  glm::dvec3 flame_;
+  glm::dvec3 flame_colour_;
   light::BlackBody black_body_;
 };
 
@@ -189,7 +191,8 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
   return radiance;
 }
 
-std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame, const Progress* progress) {
+std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame,
+                                                        const volume::Ramp& density_ramp, const Progress* progress) {
   if (!frame.colour || frame.density.empty()) return std::nullopt;
   BrickSet set("density");
   set.add(frame.density);
@@ -205,7 +208,7 @@ std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFram
       },
       [&](const Read& here, std::size_t v) {
         const vec3 colour(here.colour[0][v], here.colour[1][v], here.colour[2][v]);
-        return here.density[v] * glm::min(colour, vec3(1.0F));
+        return density_ramp(here.density[v]) * glm::min(colour, vec3(1.0F));
       });
 }
 

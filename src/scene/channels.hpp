@@ -6,6 +6,7 @@
 
 #include "grid/rgb_field.hpp"
 #include "volume/frame.hpp"
+#include "volume/ramp.hpp"
 
 namespace cumulet::scene {
 
@@ -17,6 +18,8 @@ struct Emission {
   double temperature_offset = 0.0;
   double blackbody = 0.0;  ///< intensity of black body light (light::BlackBody); 0: none
   glm::vec3 blackbody_tint{1.0F};
+  volume::Ramp temperature_ramp = {};  ///< of the field's values, before offset and scale
+  volume::Ramp flame_ramp = {};
   bool operator==(const Emission&) const = default;
 };
 
@@ -27,9 +30,10 @@ struct Emission {
 std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
                                                       const Progress* progress = nullptr);
 
-/// Density x colour, of which no component counts above 1, voxel by voxel: black where the frame has no colour. Nothing
-/// if it has none at all, or no density. Throws as emission_of does.
+/// The ramp of density x colour, of which no component counts above 1, voxel by voxel: black where the frame has no
+/// colour. Nothing if it has none at all, or no density. Throws as emission_of does.
 std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame,
+                                                        const volume::Ramp& density_ramp = {},
                                                         const Progress* progress = nullptr);
 
 }  // namespace cumulet::scene

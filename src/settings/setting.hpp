@@ -17,7 +17,8 @@
 namespace cumulet::settings {
 
 /// The shortest text that is read back as the number: 1e30, not 1e+30.
-inline std::string number_text(double value) {
+template <std::floating_point Number>
+std::string number_text(Number value) {
   std::array<char, 64> buffer{};
   std::string text(buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr);
   std::erase(text, '+');

@@ -112,13 +112,12 @@ void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settin
 Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress) const {
   Built built;
   built.volume = volume;
-  const auto statistics = volume->statistics(progress, built.seconds.statistics);
+  const auto [voxels, statistics] = volume->density(settings.density_ramp, progress, built.seconds.statistics);
   Stopwatch watch;
-  const grid::Channels channels = volume->channels(settings.emission, progress);
+  const grid::Channels channels = volume->channels(settings.density_ramp, settings.emission, progress);
   built.seconds.statistics += watch.lap();
   progress.begin(Progress::Stage::refining);
   if (settings.march != scene::March::tet) {
-    const std::shared_ptr<const volume::ScalarVolume> voxels(volume, &volume->volume());
     built.source = std::make_shared<const scene::MarchSource>(
         scene::make_voxel_source(settings.march, voxels, statistics, channels));
     built.seconds.records = watch.lap();
@@ -129,7 +128,7 @@ Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings,
   builder->bisect(&progress);
   built.seconds.refine = watch.lap();
   progress.begin(Progress::Stage::records);
-  const float max_value = volume->volume().max_value;
+  const float max_value = voxels->max_value;
   auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, channels, &progress));
   builder.reset();
   built.seconds.records = watch.lap();

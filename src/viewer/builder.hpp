@@ -33,6 +33,7 @@ struct VolumeFile {
 struct BuildSettings {
   scene::March march = scene::March::tet;
   grid::RefineSettings refine;
+  volume::Ramp density_ramp;
   scene::Emission emission;
 };
 

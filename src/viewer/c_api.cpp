@@ -1,5 +1,8 @@
 // The C ABI's viewer: checks arguments, translates descriptors, keeps exceptions in.
 
+#include <array>
+
+#include "settings/ramp.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_lamps.hpp"
 #include "viewer/c_settings.hpp"
@@ -25,6 +28,23 @@ cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
   // Not even the message may be touched from inside a callback: another thread may be in a call.
   if (viewer == nullptr || cumulet::CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
   return cumulet::c_abi::guarded(viewer->last_error, [&] { call(*viewer->viewer); });
+}
+
+/// what: it is, for messages.
+cumulet::volume::Ramp read_ramp(const std::string& what, const float* points, std::uint64_t count) {
+  const auto accept = [&](const std::string& why) {
+    if (!why.empty()) refuse(what + " " + why);
+  };
+  accept(cumulet::settings::ramp_count_refusal(count));
+  const std::span<const float> given = array_of(points, count, 2, "points");
+  cumulet::settings::RampPoints checked;
+  std::vector<glm::vec2> curve;
+  for (std::size_t i = 0; i < given.size(); i += 2) {
+    checked.push_back({given[i], given[i + 1]});
+    curve.emplace_back(given[i], given[i + 1]);
+  }
+  accept(cumulet::settings::ramp_refusal(checked));
+  return cumulet::volume::Ramp(std::move(curve));
 }
 
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
@@ -252,6 +272,18 @@ cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc*
 
 cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_medium(core::Medium::of(read_settings(desc))); });
+}
+
+cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points, uint64_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    constexpr std::array places = {&core::Ramps::density, &core::Ramps::temperature, &core::Ramps::flame};
+    static_assert(places.size() == cumulet::settings::ramps.size());
+    require(number(ramp) < places.size(), "ramp is unknown");
+    core::Ramps ramps = v.ramps();
+    const std::string what = std::string("the ramp of ") + cumulet::settings::ramps.at(number(ramp)).name;
+    ramps.*places.at(number(ramp)) = read_ramp(what, points, count);
+    v.set_ramps(ramps);
+  });
 }
 
 cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc) {

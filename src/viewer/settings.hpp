@@ -17,6 +17,7 @@
 #include "settings/settings.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/surface_builder.hpp"
+#include "volume/ramp.hpp"
 
 namespace cumulet::viewer {
 
@@ -70,6 +71,13 @@ struct Medium {
         return {.anisotropy = d.anisotropy};
     }
   }
+};
+
+/// Of what grids hold, before anything else is made of it.
+struct Ramps {
+  volume::Ramp density = {};
+  volume::Ramp temperature = {};
+  volume::Ramp flame = {};
 };
 
 struct Light {

@@ -253,14 +253,33 @@ void Viewer::set_grid(const GridSettings& settings) {
 }
 
 void Viewer::take_medium() {
-  grid_.build.emission = medium_.field_emission;
+  grid_.build.emission = field_emission();
+  grid_.build.density_ramp = ramps_.density;
   grid_.build.refine.density_scale = medium_.density_scale;
   grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
 }
 
+scene::Emission Viewer::field_emission() const {
+  scene::Emission emission = medium_.field_emission;
+  emission.temperature_ramp = ramps_.temperature;
+  emission.flame_ramp = ramps_.flame;
+  return emission;
+}
+
+void Viewer::set_ramps(const Ramps& ramps) {
+  const bool other_density = ramps.density != ramps_.density;
+  const bool other_emission = ramps.temperature != ramps_.temperature || ramps.flame != ramps_.flame;
+  if (!other_density && !other_emission) return;
+  ramps_ = ramps;
+  take_medium();
+  request_build(!other_density);
+  touch();
+}
+
 void Viewer::set_medium(const Medium& medium) {
   medium_ = medium;
-  const bool other_emission = grid_.build.emission != medium.field_emission;
+  const scene::Emission emission = field_emission();
+  const bool other_emission = grid_.build.emission != emission;
   const grid::RefineSettings& refine = grid_.build.refine;
   const bool other_opacity = grid_.build.march == scene::March::tet &&
                              refine.criterion == grid::Criterion::transmittance &&
@@ -271,7 +290,7 @@ void Viewer::set_medium(const Medium& medium) {
     take_medium();
     request_build(false);
   } else if (other_emission) {
-    grid_.build.emission = medium.field_emission;
+    grid_.build.emission = emission;
     request_build(true);
   }
   scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.phase, medium.emission});

@@ -85,6 +85,8 @@ class Viewer {
 
   void set_grid(const GridSettings& settings);
   void set_medium(const Medium& medium);
+  void set_ramps(const Ramps& ramps);
+  [[nodiscard]] const Ramps& ramps() const { return ramps_; }
   void set_light(const Light& light);
   void set_lamps(light::Lamps lamps);
   /// Null: the sky of the light.
@@ -135,6 +137,7 @@ class Viewer {
   void request_build(bool for_emission = false);
   // What grids to come know of the medium.
   void take_medium();
+  [[nodiscard]] scene::Emission field_emission() const;
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.
@@ -162,6 +165,7 @@ class Viewer {
 
   GridSettings grid_;
   Medium medium_;
+  Ramps ramps_;
   Light light_;
   std::optional<light::Daylight> daylight_;  // of the physical sky last asked for
   light::EnvironmentPtr environment_;        // the host's

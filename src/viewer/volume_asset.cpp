@@ -48,19 +48,31 @@ const volume::ScalarVolume& VolumeAsset::main_field() const {
   return frame_->temperature && !frame_->temperature->empty() ? *frame_->temperature : frame_->density;
 }
 
-std::shared_ptr<const grid::Statistics> VolumeAsset::statistics(Progress& progress, double& seconds) const {
+VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& progress, double& seconds) const {
+  using Clock = std::chrono::steady_clock;
   seconds = 0.0;
   progress.begin(Progress::Stage::statistics);
   const auto lock = patient_lock(mutex_, progress);
-  if (!statistics_) {
-    const auto start = std::chrono::steady_clock::now();
-    statistics_ = make_left<const grid::Statistics>(frame_->density, cube_, &progress);
-    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const auto start = Clock::now();
+  const auto statistics_of = [&](const volume::ScalarVolume& voxels) {
+    auto made = make_left<const grid::Statistics>(voxels, cube_, &progress);
+    seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    return made;
+  };
+  if (ramp.empty()) {
+    if (!statistics_) statistics_ = statistics_of(frame_->density);
+    return {{frame_, &frame_->density}, statistics_};
   }
-  return statistics_;
+  if (!ramped_ || ramped_->ramp != ramp) {
+    ramped_.reset();
+    const auto voxels = make_left<const volume::ScalarVolume>(volume::apply(ramp, frame_->density, &progress));
+    ramped_ = Ramped{ramp, {voxels, statistics_of(*voxels)}};
+  }
+  return ramped_->density;
 }
 
-grid::Channels VolumeAsset::channels(const scene::Emission& emission, Progress& progress) const {
+grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
+                                     Progress& progress) const {
   scene::Emission given = emission;
   // What has a temperature alone would be nothing.
   const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
@@ -69,10 +81,12 @@ grid::Channels VolumeAsset::channels(const scene::Emission& emission, Progress& 
     return components ? make_left<const grid::RgbField>(*std::move(components), cube_, &progress) : nullptr;
   };
   const auto lock = patient_lock(mutex_, progress);
-  if (!channels_ || channels_->emission != given) {
+  if (!channels_ || channels_->density_ramp != density_ramp || channels_->emission != given) {
     channels_.reset();
-    channels_ = Made{
-        given, {field(scene::emission_of(*frame_, given, &progress)), field(scene::scattering_of(*frame_, &progress))}};
+    channels_ = Made{density_ramp,
+                     given,
+                     {field(scene::emission_of(*frame_, given, &progress)),
+                      field(scene::scattering_of(*frame_, density_ramp, &progress))}};
   }
   return channels_->channels;
 }

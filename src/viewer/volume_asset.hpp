@@ -35,11 +35,18 @@ class VolumeAsset {
   /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such.
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return coarse_; }
-  /// The first caller computes them; others wait, and if the first is cancelled the next one computes them. seconds
-  /// receives what computing took, 0 if they were there. Throws Error(cancelled) if this caller's progress is.
-  [[nodiscard]] std::shared_ptr<const grid::Statistics> statistics(Progress& progress, double& seconds) const;
+  /// Density as marches see it; the statistics are good while the voxels are there.
+  struct Density {
+    std::shared_ptr<const volume::ScalarVolume> voxels;
+    std::shared_ptr<const grid::Statistics> statistics;
+  };
+  /// The first caller computes it; others wait, and if the first is cancelled the next one computes it. Kept are that
+  /// without a ramp and the last with one. seconds receives what computing took, 0 if it was there. Throws
+  /// Error(cancelled) if this caller's progress is.
+  [[nodiscard]] Density density(const volume::Ramp& ramp, Progress& progress, double& seconds) const;
   /// What it has beside density. The last that were asked for are kept: another threshold or camera asks for the same.
-  [[nodiscard]] grid::Channels channels(const scene::Emission& emission, Progress& progress) const;
+  [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
+                                        Progress& progress) const;
 
  private:
   std::shared_ptr<const volume::VolumeFrame> frame_;
@@ -49,7 +56,13 @@ class VolumeAsset {
   Bounds bounds_;
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const grid::Statistics> statistics_;
+  struct Ramped {
+    volume::Ramp ramp;
+    Density density;
+  };
+  mutable std::optional<Ramped> ramped_;
   struct Made {
+    volume::Ramp density_ramp;
     scene::Emission emission;
     grid::Channels channels;
   };

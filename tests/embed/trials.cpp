@@ -418,6 +418,7 @@ void Caller::call_all() {
     CALL(cumulet_rebuild, v);
     CALL(cumulet_set_grid, v, &grid);
     CALL(cumulet_set_medium, v, &medium);
+    CALL(cumulet_set_ramp, v, CUMULET_RAMP_DENSITY, nullptr, 0);
     CALL(cumulet_set_light, v, &light);
     CALL(cumulet_set_lamps, v, &lamp, 1);
     CALL(cumulet_set_environment, v, nullptr);

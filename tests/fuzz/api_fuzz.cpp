@@ -381,7 +381,7 @@ class Program {
 
   void call() {
     cumulet_viewer* viewer = viewer_.get();
-    switch (data_.ConsumeIntegralInRange(0, 23)) {
+    switch (data_.ConsumeIntegralInRange(0, 24)) {
       case 0:
         return make_dense();
       case 1:
@@ -430,6 +430,12 @@ class Program {
         return warm_up();
       case 22:
         return told(cumulet_use_surface_camera(viewer, data_.ConsumeIntegralInRange(0U, 2U)));
+      case 23: {
+        std::array<float, 8> points{};
+        for (float& one : points) one = data_.ConsumeFloatingPoint<float>();
+        const auto which = static_cast<cumulet_ramp>(data_.ConsumeIntegralInRange(0U, 3U));
+        return told(cumulet_set_ramp(viewer, which, points.data(), data_.ConsumeIntegralInRange(0U, 4U)));
+      }
       default:
         told(cumulet_detach(viewer));
         if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));

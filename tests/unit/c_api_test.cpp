@@ -95,6 +95,41 @@ TEST_F(CApi, EveryStatusHasAText) {
   }
 }
 
+TEST_F(CApi, RampsAreRefusedInOneLine) {
+  using Points = std::vector<float>;
+  const auto set = [&](int ramp, const Points& points, std::size_t count) {
+    cumulet_ramp which{};
+    std::memcpy(&which, &ramp, sizeof which);
+    return cumulet_set_ramp(viewer_, which, points.data(), count);
+  };
+  const float nan = std::nanf("");
+  const float inf = INFINITY;
+  struct Case {
+    Points points;
+    const char* cause;
+  };
+  for (const Case& c :
+       {Case{{1, 2}, "the ramp of flame has 1 point, not none or 2 to 32"},
+        Case{Points(66, 1.0F), "the ramp of flame has 33 points, not none or 2 to 32"},
+        Case{{0, 0, 0, 1}, "the ramp of flame has a point 0:1 that does not come after 0:0"},
+        Case{{1, 0, 0.7F, 1}, "the ramp of flame has a point 0.7:1 that does not come after 1:0"},
+        Case{{0, -1, 1, 0}, "the ramp of flame has a point 0:-1, but values become 0 to 1e30"},
+        Case{{0, 1, 1, nan}, "the ramp of flame has a point 1:nan, but values become 0 to 1e30"},
+        Case{{0, 1, 1, inf}, "the ramp of flame has a point 1:inf, but values become 0 to 1e30"},
+        Case{{nan, 1, 1, 1}, "the ramp of flame has a point nan:1 whose value is not from -1e30 to 1e30"},
+        Case{{0, 1, inf, 1}, "the ramp of flame has a point inf:1 whose value is not from -1e30 to 1e30"}}) {
+    EXPECT_EQ(set(CUMULET_RAMP_FLAME, c.points, c.points.size() / 2), CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(error(), c.cause);
+  }
+  EXPECT_EQ(cumulet_set_ramp(viewer_, CUMULET_RAMP_FLAME, nullptr, 2), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(error(), "points are NULL");
+  EXPECT_EQ(set(3, {0, 0, 1, 1}, 2), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(error(), "ramp is unknown");
+  EXPECT_EQ(set(0, {0, 0, 1, 1}, ~std::size_t{0}), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(set(CUMULET_RAMP_TEMPERATURE, {-1, 0, 1, 3}, 2), CUMULET_OK);
+  EXPECT_EQ(cumulet_set_ramp(viewer_, CUMULET_RAMP_TEMPERATURE, nullptr, 0), CUMULET_OK);
+}
+
 TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   auto grid = make_desc<cumulet_grid_desc>();
   EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_OK);

@@ -359,7 +359,7 @@ TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {
     // A fresh asset each time would leave nothing to compute again.
     const viewer::VolumeAsset other(test::make_volume({64, 64, 64}, {0, 0, 0}, density));
     double s = 0.0;
-    (void)other.statistics(progress, s);
+    (void)other.density({}, progress, s).statistics;
     progress.begin(Progress::Stage::statistics);
     const grid::Statistics statistics(asset.volume(), grid::fit_cube(asset.volume()), &progress);
   });
@@ -368,16 +368,16 @@ TEST(VolumeAsset, WhoIsNotCancelledGetsTheStatistics) {
     while (cancelled.fraction() < 0.2) std::this_thread::yield();
     cancelled.cancel();
   });
-  EXPECT_THROW((void)asset.statistics(cancelled, seconds), Error);
+  EXPECT_THROW((void)asset.density({}, cancelled, seconds).statistics, Error);
   canceller.join();
   EXPECT_EQ(seconds, 0.0);
 
   Progress next;
-  const auto statistics = asset.statistics(next, seconds);
+  const auto statistics = asset.density({}, next, seconds).statistics;
   EXPECT_GT(seconds, 0.0);
   EXPECT_DOUBLE_EQ(next.fraction(), 1.0);
   EXPECT_EQ(statistics->mean_optical_depth(), built().statistics.mean_optical_depth());
-  EXPECT_EQ(asset.statistics(next, seconds), statistics);
+  EXPECT_EQ(asset.density({}, next, seconds).statistics, statistics);
   EXPECT_EQ(seconds, 0.0);
 }
 
@@ -386,16 +386,16 @@ TEST(VolumeAsset, CallersWaitForOneAnotherUnlessCancelled) {
   Progress first;
   std::thread computing([&] {
     double seconds = 0.0;
-    (void)asset.statistics(first, seconds);
+    (void)asset.density({}, first, seconds).statistics;
   });
   while (first.fraction() < 0.1) std::this_thread::yield();
   Progress second;
   second.cancel();
   double seconds = 0.0;
-  EXPECT_THROW((void)asset.statistics(second, seconds), Error);
+  EXPECT_THROW((void)asset.density({}, second, seconds).statistics, Error);
   EXPECT_LT(first.fraction(), 1.0);  // it did not wait
   Progress third;
-  const auto statistics = asset.statistics(third, seconds);
+  const auto statistics = asset.density({}, third, seconds).statistics;
   EXPECT_EQ(seconds, 0.0);  // it did
   EXPECT_NE(statistics, nullptr);
   computing.join();
@@ -406,7 +406,7 @@ TEST(VolumeAsset, TheFirstOfTwoIsCancelledAndTheSecondComputes) {
   Progress first;
   std::thread computing([&] {
     double seconds = 0.0;
-    EXPECT_THROW((void)asset.statistics(first, seconds), Error);
+    EXPECT_THROW((void)asset.density({}, first, seconds).statistics, Error);
   });
   while (first.fraction() < 0.1) std::this_thread::yield();
   std::thread canceller([&] {
@@ -415,7 +415,7 @@ TEST(VolumeAsset, TheFirstOfTwoIsCancelledAndTheSecondComputes) {
   });
   Progress second;
   double seconds = 0.0;
-  EXPECT_NE(asset.statistics(second, seconds), nullptr);
+  EXPECT_NE(asset.density({}, second, seconds).statistics, nullptr);
   canceller.join();
   computing.join();
 }

@@ -396,6 +396,10 @@ TEST_F(CppViewer, ShowsAVolume) {
   viewer.set_sampling({.samples = 8, .preview = Preview::off}).value();
   viewer.set_grid({.threshold = 0.1}).value();
   viewer.set_medium({.density_scale = 2, .anisotropy = 0.3F}).value();
+  viewer.set_ramp(Ramp::density, std::to_array<std::array<float, 2>>({{0, 0}, {1, 1}})).value();
+  viewer.set_ramp(Ramp::flame, {}).value();
+  EXPECT_EQ(viewer.set_ramp(Ramp::flame, std::to_array<std::array<float, 2>>({{0, 0}})).error().status,
+            StatusCode::invalid_argument);
   viewer.set_light({.sun_elevation_degrees = 45, .sun_irradiance = {2, 2, 2}, .sky_radiance = {1, 0.5F, 0.25F}})
       .value();
   viewer.set_display({.exposure_stops = 1, .tone_map = ToneMap::clip}).value();

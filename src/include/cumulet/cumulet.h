@@ -733,6 +733,13 @@ typedef struct cumulet_medium_desc {
   float blackbody_tint[3];  /* all 0: white */
 } cumulet_medium_desc;
 
+/* The grid whose values a ramp changes. */
+typedef enum cumulet_ramp {
+  CUMULET_RAMP_DENSITY = 0,
+  CUMULET_RAMP_TEMPERATURE = 1,
+  CUMULET_RAMP_FLAME = 2
+} cumulet_ramp;
+
 /* Where sun and sky have their light from. */
 typedef enum cumulet_sky {
   CUMULET_SKY_CONSTANT = 0, /* sun_irradiance; sky_radiance, the same from everywhere */
@@ -837,6 +844,24 @@ typedef struct cumulet_display_desc {
 
 CUMULET_API cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc);
 CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc);
+/*
+ * A curve over the values of a grid, in the grid's own unit on both sides; as of Blender's Map Range and Float Curve,
+ * and of Houdini's ramps. points: count pairs of a value and what it becomes, x0, y0, x1, y1, ..., copied; 2 to 32 of
+ * them, x strictly ascending, none beyond 1e30, y not negative. Where a voxel has the value v it becomes
+ *   y_i + (y_(i+1) - y_i) (v - x_i) / (x_(i+1) - x_i), of the two points about it: x_i <= v <= x_(i+1);
+ *   y of the first point below all of them, y of the last above.
+ * 0 stays 0 whatever the points say, so that no ramp fills the space where a grid has nothing; a background that is not
+ * 0 becomes, within the grid's bounds, what other values become. count 0, the default: all values stay as they are.
+ *
+ * It comes before all else that the medium makes of values, and after the resampling onto the density's voxels:
+ *   extinction = density_scale x ramp(density), T = temperature_offset + temperature_scale x ramp(temperature),
+ *   flame_strength x flame_color x ramp(flame)
+ * It is that of the viewer for all its volumes, and unknown to what is told of a volume by itself: its info, the
+ * density scale that is suggested, what of it cameras fit. Each voxel has its own, of which cells are then made, for a
+ * mean of ramps is no ramp of a mean. Another ramp builds the grid anew, in the background.
+ */
+CUMULET_API cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points,
+                                            uint64_t count);
 CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
 /*
  * This environment is there instead of the sky of cumulet_light_desc: it lights volume and surfaces and is the

@@ -1060,6 +1060,11 @@ class Viewer {
 
   [[nodiscard]] Result<> set_grid(const GridDesc& desc) noexcept { return set(cumulet_set_grid, desc); }
   [[nodiscard]] Result<> set_medium(const MediumDesc& desc) noexcept { return set(cumulet_set_medium, desc); }
+  /// Points: values and what they become. None: values stay as they are.
+  [[nodiscard]] Result<> set_ramp(Ramp ramp, std::span<const std::array<float, 2>> points) noexcept {
+    const float* first = points.empty() ? nullptr : points.front().data();
+    return result(cumulet_set_ramp(handle(), static_cast<cumulet_ramp>(ramp), first, points.size()));
+  }
   [[nodiscard]] Result<> load_surfaces(const std::string& path) noexcept {
     return result(cumulet_load_surfaces(handle(), path.c_str()));
   }

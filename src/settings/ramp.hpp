@@ -1,0 +1,74 @@
+#pragma once
+
+// Ramps over what grids hold (cumulet_set_ramp): what people are told of each, and which points make one.
+
+#include <cumulet/cumulet.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "setting.hpp"
+
+namespace cumulet::settings {
+
+/// A grid's value, and what it becomes.
+using RampPoint = std::array<float, 2>;
+/// None: values stay as they are.
+using RampPoints = std::vector<RampPoint>;
+
+/// As cumulet_set_ramp takes them.
+inline const float* numbers_of(const RampPoints& points) { return points.empty() ? nullptr : points.front().data(); }
+
+/// All that is told of a ramp; as for Facts.
+struct RampFacts {
+  const char* name;
+  const char* key;
+  const char* flag;
+  const char* help;
+  const char* label;
+  const char* tip;
+};
+
+/// As numbered in cumulet.h.
+inline constexpr std::array ramps = {
+    RampFacts{"density", "medium.density_ramp", "--density-ramp",
+              "What densities become, straight between points: \"0:0,0.1:0,1:1\" takes thin smoke away; none (default)",
+              "Density ramp", "What the density grid's values become before the density scale."},
+    RampFacts{"temperature", "medium.temperature_ramp", "--temperature-ramp",
+              "What the temperature grid's values become, before scale and offset (default: none)", "Temperature ramp",
+              "What the temperature grid's values become before scale and offset."},
+    RampFacts{"flame", "medium.flame_ramp", "--flame-ramp",
+              "What the flame grid's values become, before the strength (default: none)", "Flame ramp",
+              "What the flame grid's values become before the flame strength."}};
+static_assert(CUMULET_RAMP_DENSITY == 0 && CUMULET_RAMP_TEMPERATURE == 1 && CUMULET_RAMP_FLAME == 2);
+
+inline constexpr std::size_t most_ramp_points = 32;
+
+/// Why there are not so many points in a ramp; "" if there may be.
+inline std::string ramp_count_refusal(std::uint64_t count) {
+  if (count == 0 || (count >= 2 && count <= most_ramp_points)) return "";
+  return "has " + std::to_string(count) + (count == 1 ? " point" : " points") + ", not none or 2 to " +
+         std::to_string(most_ramp_points);
+}
+
+/// Why they make no ramp, in words that follow its name; "" if they do.
+inline std::string ramp_refusal(std::span<const RampPoint> points) {
+  if (std::string why = ramp_count_refusal(points.size()); !why.empty()) return why;
+  constexpr float most = 1e30F;
+  const auto text = [](const RampPoint& point) { return number_text(point[0]) + ":" + number_text(point[1]); };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto [value, result] = points[i];
+    if (!(std::abs(value) <= most)) return "has a point " + text(points[i]) + " whose value is not from -1e30 to 1e30";
+    if (!(result >= 0.0F && result <= most)) return "has a point " + text(points[i]) + ", but values become 0 to 1e30";
+    if (i > 0 && !(value > points[i - 1][0]))
+      return "has a point " + text(points[i]) + " that does not come after " + text(points[i - 1]);
+  }
+  return "";
+}
+
+}  // namespace cumulet::settings
