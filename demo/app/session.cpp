@@ -115,6 +115,7 @@ void Session::follow(const Wish& wish) {
     (*known_).*group = scene_.*group;
   };
   give(&SceneOptions::medium, cumulet_set_medium);
+  follow_ramps();
   give(&SceneOptions::light, cumulet_set_light);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
   give(&SceneOptions::ground, cumulet_set_ground);
@@ -128,6 +129,15 @@ void Session::follow(const Wish& wish) {
   navigation_ = wish_.navigation;
   follow_surfaces();
   follow_volume();
+}
+
+void Session::follow_ramps() {
+  for (std::size_t i = 0; i < scene_.ramps.size(); ++i) {
+    const settings::RampPoints& points = scene_.ramps[i];
+    if (known_->ramps[i] == points) continue;
+    known_->ramps[i] = points;
+    check(cumulet_set_ramp(viewer_.get(), static_cast<cumulet_ramp>(i), settings::numbers_of(points), points.size()));
+  }
 }
 
 void Session::follow_lamps() {

@@ -143,6 +143,7 @@ class Session {
   void follow_volume();
   // One that cannot be read leaves the one before it.
   void follow_environment();
+  void follow_ramps();
   void follow_lamps();
   void follow_surfaces();
   void remove_surfaces();

@@ -322,6 +322,11 @@ void render(const RenderOptions& options) {
   if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.volume_alone = 1;
   check(viewer, cumulet_set_grid(viewer.get(), &scene.grid));
   check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
+  for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
+    const auto& points = scene.ramps[i];
+    check(viewer, cumulet_set_ramp(viewer.get(), static_cast<cumulet_ramp>(i), cumulet::settings::numbers_of(points),
+                                   points.size()));
+  }
   check(viewer, cumulet_set_light(viewer.get(), &scene.light));
   check(viewer, cumulet_set_lamps(viewer.get(), scene.lamps.data(), scene.lamps.size()));
   check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));

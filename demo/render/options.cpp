@@ -195,6 +195,19 @@ void parse_sky_model(std::string_view text, cumulet_light_desc& light) {
   light.sky = CUMULET_SKY_PHYSICAL;
 }
 
+settings::RampPoints parse_ramp(std::string_view text) {
+  settings::RampPoints points;
+  if (text == "none") return points;
+  for (const std::string_view point : split(text, ',')) {
+    const std::vector<std::string_view> pair = split(point, ':');
+    if (pair.size() != 2) throw UsageError(in_quotes(point) + " is not a value and what it becomes, such as 0.5:1");
+    points.push_back({static_cast<float>(parse_number(pair[0])), static_cast<float>(parse_number(pair[1]))});
+  }
+  const std::string why = settings::ramp_refusal(points);
+  if (!why.empty()) throw UsageError(in_quotes(text) + " " + why);
+  return points;
+}
+
 /// CLI11 takes "-.5" for a flag. Glued to the flag before it, it is a value.
 std::vector<std::string> glue_negative_fractions(std::vector<std::string> arguments) {
   std::vector<std::string> glued;
@@ -365,6 +378,11 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       },
       "A medium, but for its density scale; the other flags override what it says");
   add_settings(app, "Medium", scene.medium, take_auto);
+  for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
+    add(
+        app, "Medium", settings::ramps[i].flag, "X:Y,X:Y,...|none",
+        [&points = scene.ramps[i]](const std::string& text) { points = parse_ramp(text); }, settings::ramps[i].help);
+  }
 
   group = "Light (default: a clear day; given sun, sky or environment, the others are dark)";
   add(

@@ -150,6 +150,19 @@ class Reader {
     return true;
   }
 
+  void ramp(const std::string& key, settings::RampPoints& out) {
+    const std::optional<Json> value = take(key);
+    if (!value) return;
+    if (!value->is_array()) wrong(key, "is not a list of points");
+    out.clear();
+    for (const Json& point : *value) {
+      if (!point.is_array() || point.size() != 2) wrong(key, "has a point that is not two numbers");
+      out.push_back({static_cast<float>(checked(key, point[0], {})), static_cast<float>(checked(key, point[1], {}))});
+    }
+    const std::string why = settings::ramp_refusal(out);
+    if (!why.empty()) wrong(key, why);
+  }
+
   [[nodiscard]] bool has(const std::string& key) { return find(key).value != nullptr; }
 
   [[noreturn]] void wrong(const std::string& key, const std::string& cause) const {
@@ -382,6 +395,7 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   }
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
+  for (std::size_t i = 0; i < scene.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, scene.ramps[i]);
   const bool names_criterion = reader.has("grid.criterion");
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
   if (names_criterion) settings::name_criterion(scene.grid);
@@ -485,7 +499,8 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   writer.put("volume.file", volume);
   writer.put_text("volume.grid", scene.grid_name);
   if (scene.up != UpAxis::y) writer.put("volume.up", name_of(up_names, scene.up));
-  if (scene.to_world != Matrix{}) writer.put("volume.to_world", scene.to_world);
+  const bool second = format == SceneFormat::second;
+  if (second && scene.to_world != Matrix{}) writer.put("volume.to_world", scene.to_world);
   writer.put_text("medium.temperature_grid", scene.temperature_grid);
   writer.put_text("medium.flame_grid", scene.flame_grid);
   writer.put_text("medium.color_grid", scene.color_grid);
@@ -509,12 +524,17 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
 
   if (scene.auto_density_scale && scene.medium.density_scale == 0.0) writer.put("medium.density_scale", "auto");
   writer.put_settings(scene.medium);
+  for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
+    Json points = Json::array();
+    for (const auto& [value, result] : scene.ramps[i]) points.push_back({shortest(value), shortest(result)});
+    if (!points.empty()) writer.put(settings::ramps[i].key, points);
+  }
   writer.put_settings(scene.light);
   if (!environment.empty()) {
     writer.put("environment.file", environment);
     writer.put_settings(scene.environment_settings);
   }
-  for (std::size_t i = 0; i < scene.lamps.size(); ++i)
+  for (std::size_t i = 0; second && i < scene.lamps.size(); ++i)
     writer.put_settings(scene.lamps[i], "lights[" + std::to_string(i) + "].");
   writer.put_settings(scene.ground);
   writer.put_settings(scene.grid);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <ramp.hpp>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,7 @@ struct SceneOptions {
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
   cumulet_medium_desc medium{};
+  std::array<settings::RampPoints, settings::ramps.size()> ramps;  // as cumulet_ramp numbers them
   bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
   cumulet_light_desc light{};
   std::vector<cumulet_lamp_desc> lamps;
@@ -76,7 +78,7 @@ void for_each_group(Scene& scene, Visit&& visit) {
 /// Reads a file. Throws likewise.
 [[nodiscard]] SceneOptions load_scene(const std::string& path);
 
-/// Versions of the format. The first knows no lamps and no place of the volume.
+/// Versions of the format. The first knows no lamps and no place of the volume: what is written in it is without them.
 enum class SceneFormat { first = 1, second = 2 };
 
 /// The text that parse_scene reads: every setting is spelled out but those left to the library. A volume in the

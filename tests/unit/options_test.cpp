@@ -224,6 +224,19 @@ TEST(Options, APresetIsAMediumThatFlagsOverride) {
             "--preset: 'steam' is none of cumulus, smoke, fire, explosion, ground-fog");
 }
 
+TEST(Options, ARampIsPointsBetweenCommas) {
+  using Points = cumulet::settings::RampPoints;
+  const SceneOptions scene =
+      parse({"--density-ramp", "0:0,.25:1e-1,3:2.5", "--temperature-ramp", "-1:0,1:2", "--flame-ramp", "none"}).scene;
+  EXPECT_EQ(scene.ramps[CUMULET_RAMP_DENSITY], (Points{{0.0f, 0.0f}, {0.25f, 0.1f}, {3.0f, 2.5f}}));
+  EXPECT_EQ(scene.ramps[CUMULET_RAMP_TEMPERATURE], (Points{{-1.0f, 0.0f}, {1.0f, 2.0f}}));
+  EXPECT_TRUE(scene.ramps[CUMULET_RAMP_FLAME].empty());
+  EXPECT_NE(usage_error(with({"--flame-ramp", "0:0,1"})).find("'1' is not a value and what it becomes"),
+            std::string::npos);
+  EXPECT_NE(usage_error(with({"--flame-ramp", "1:0,0:1"})).find("has a point 0:1 that does not come after 1:0"),
+            std::string::npos);
+}
+
 TEST(Options, ViewNames) {
   EXPECT_EQ(parse({"--view", "wireframe"}).scene.sampling.view, CUMULET_VIEW_WIREFRAME);
   EXPECT_EQ(parse({"--view", "cells"}).scene.sampling.view, CUMULET_VIEW_CELLS);
@@ -459,6 +472,13 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--anisotropy", "-1"},
                                         {"--anisotropy", "0.99999999999"},
                                         {"--max-bounces", "-1"},
+                                        {"--density-ramp", ""},
+                                        {"--density-ramp", "0:0"},
+                                        {"--density-ramp", "0:0,1:nan"},
+                                        {"--density-ramp", "0:0;1:1"},
+                                        {"--temperature-ramp", "0:0,0:1"},
+                                        {"--flame-ramp", "0:0,1:-1"},
+                                        {"--flame-ramp", "0:0,1:1e39"},
                                         {"--sun", "60 1,1,1"},
                                         {"--sun", "60,91 1,1,1"},
                                         {"--sun", "60,40"},

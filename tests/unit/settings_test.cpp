@@ -189,6 +189,7 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
       if (*setting.key != '\0') keys.insert(setting.key);
     });
   });
+  for (const settings::RampFacts& ramp : settings::ramps) keys.insert(ramp.key);
   EXPECT_EQ(told, keys);
 }
 
