@@ -21,7 +21,6 @@ CM_FN vec3 cm_emission_mean(uvec4 record) {
 CM_FN vec3 cm_emission_gradient(uvec4 record) {
   return vec3(cm_emission_slope(record.w, 0u), cm_emission_slope(record.w, 1u), cm_emission_slope(record.w, 2u));
 }
-CM_FN float cm_emission_luminance(vec3 mean) { return dot(mean, vec3(0.2126f, 0.7152f, 0.0722f)); }
 
 // How far a cell is at least from a point, given from its centroid in its frame in units; in cube space. 0 nearby.
 CM_FN float cm_cell_distance(vec3 from_centroid, uint shape) {

@@ -36,10 +36,9 @@ CM_FN CmSurrounding cm_surrounding(vec3 w) {
   uint y_1 = low.y < 0.0f ? 0u : min(y_0 + 1u, size.y - 1u);
   vec3 row_0 = mix(cm_environment_texel(y_0 * size.x + x_0), cm_environment_texel(y_0 * size.x + x_1), f.x);
   vec3 row_1 = mix(cm_environment_texel(y_1 * size.x + x_0), cm_environment_texel(y_1 * size.x + x_1), f.x);
-  vec3 luminance = vec3(0.2126f, 0.7152f, 0.0722f);
   float angle = 3.14159265f / float(size.y);
-  float weight = mix(dot(row_0, luminance) * sin((float(y_0) + 0.5f) * angle),
-                     dot(row_1, luminance) * sin((float(y_1) + 0.5f) * angle), f.y);
+  float weight = mix(cm_luminance(row_0) * sin((float(y_0) + 0.5f) * angle),
+                     cm_luminance(row_1) * sin((float(y_1) + 0.5f) * angle), f.y);
   CmSurrounding found;
   found.radiance = cm.lights.environment_strength * mix(row_0, row_1, f.y);
   found.density = cm.environment.density * weight / max(across, 1e-6f);
@@ -55,9 +54,7 @@ CM_FN float cm_environment_pdf(CmLightHit hit) { return cm_surrounding(hit.w).de
 CM_FN CmLightSample cm_environment_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   uvec2 size = cm.environment.size;
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x7f4a7c15u)));
-  uint i;
-  uint unused;
-  umulExtended(pick.x, size.x * size.y, i, unused);
+  uint i = cm_below(pick.x, size.x * size.y);
   uvec4 word = cm_environment_word(i);
   if (pick.y > word.x) i = word.y;
   float x = float(i % size.x) + 0.5f + cm_tent(cm_random(p.random, p.stream));

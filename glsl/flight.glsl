@@ -71,6 +71,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     cm_march_step(cell, p.o, p.d, inv_d, p.t, t_1, r_0, r_1, next);
 #if CM_CHANNELS
     emission = cm_march_emission(cell, p.o, p.d);
+    emission.mean *= cm_balance(flights, looks * cm_cell_pdf(emission));
 #endif
     p.steps += 1u;
     e_0 = cm.medium.extinction * r_0;
@@ -83,7 +84,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
       event = CM_EVENT_COLLISION;
     } else {
 #if CM_CHANNELS
-      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end)) * cm_balance(flights, looks * cm_cell_pdf(emission));
+      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));
 #endif
       p.depth -= used;
       p.t = t_1;
@@ -98,8 +99,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     float left = p.t_end - p.t;
     float way = cm_depth_distance(e_0, e_1, span, p.depth);
 #if CM_CHANNELS
-    emitted +=
-        cm_emitted(emission, p.t, p.t + min(way, left)) * cm_balance(flights, looks * cm_cell_pdf(emission));
+    emitted += cm_emitted(emission, p.t, p.t + min(way, left));
 #endif
     p.t += way;
     p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e_0, e_1, span, left));

@@ -14,6 +14,8 @@
 #ifndef CM_LIGHT_GLSL
 #define CM_LIGHT_GLSL
 
+#include "luminance.glsl"
+
 #define CM_LIGHT_SKY 0u       // everywhere: looked for in a direction that a flight might take
 #define CM_LIGHT_SUN 1u       // far away: a disc, or without extent
 #define CM_LIGHT_TRIANGLE 2u  // emissive
@@ -118,7 +120,7 @@ CM_FN CmLightSample cm_sun_sample(CmPath p) {
 
 CM_FN float cm_glow_pdf_of(vec3 mean, float distance) {
   float least = distance * cm.grid.least_stretch;
-  return cm_emission_luminance(mean) * cm.grid.glow_density * cm.grid.glow_length * least * least;
+  return cm_luminance(mean) * cm.grid.glow_density * cm.grid.glow_length * least * least;
 }
 CM_FN float cm_cell_pdf(CmEmission emission) { return cm_glow_pdf_of(emission.mean, emission.distance); }
 
@@ -132,9 +134,7 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   float u_a = cm_random(p.random, p.stream);
   float u_b = cm_random(p.random, p.stream);
   float u_c = cm_random(p.random, p.stream);
-  uint i;
-  uint unused;
-  umulExtended(pick.x, cm.grid.glowing, i, unused);
+  uint i = cm_below(pick.x, cm.grid.glowing);
   uvec4 entry = cm_glow_word(2u * i);
   if (pick.y > entry.x) {
     i = entry.y;
@@ -221,10 +221,7 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
   float u_a = cm_random(p.random, p.stream);
   float u_b = cm_random(p.random, p.stream);
-  uint i;
-  uint unused;
-  umulExtended(pick.x, cm.surfaces.emitter_count, i, unused);
-  uvec4 entry = cm_emitter(i);
+  uvec4 entry = cm_emitter(cm_below(pick.x, cm.surfaces.emitter_count));
   if (pick.y > entry.y) entry = cm_emitter(entry.z);
   float root = sqrt(u_a);
   CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0f - u_b), root * u_b));

@@ -35,7 +35,7 @@ CM_FN void cm_finish(CM_INOUT(CmPath) p, CM_INOUT(CmPixel) pixel) {
   pixel.steps += p.steps;
   float share = 1.0f / float(pixel.samples);
   pixel.background += share * (background - pixel.background);
-  float luminance = dot(p.radiance + background, vec3(0.2126f, 0.7152f, 0.0722f));
+  float luminance = cm_luminance(p.radiance + background);
   pixel.square += share * (luminance * luminance - pixel.square);
   p.stage = pixel.samples >= cm.dispatch.samples ? CM_STAGE_DONE : CM_STAGE_CAMERA;
 }

@@ -1,5 +1,5 @@
-// Where paths scatter: in the medium, on the ground, or at a triangle. What glsl/path.glsl does there in either way, with functions of
-// the same names where there are no triangles.
+// Where paths scatter: in the medium, on the ground, or at a triangle. What glsl/path.glsl does there in either way, with
+// functions of the same names where there are no triangles.
 #ifndef CM_PATH_VERTEX_GLSL
 #define CM_PATH_VERTEX_GLSL
 

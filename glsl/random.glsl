@@ -18,6 +18,14 @@ CM_FN uvec3 cm_hash3(uvec3 v) {
 // The high 24 bits as a number in [0, 1).
 CM_FN float cm_unit_float(uint word) { return float(word >> 8) * (1.0f / 16777216.0f); }
 
+// A random word as a number below count, each as likely.
+CM_FN uint cm_below(uint word, uint count) {
+  uint number;
+  uint unused;
+  umulExtended(word, count, number, unused);
+  return number;
+}
+
 // PCG-RXS-M-XS 32 (O'Neill 2014); odd stream number selects one of 2^31 sequences. In [0, 1), 24 bits.
 CM_FN float cm_random(CM_INOUT(uint) state, uint stream) {
   uint word = ((state >> ((state >> 28) + 4u)) ^ state) * 277803737u;

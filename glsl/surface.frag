@@ -7,6 +7,7 @@
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 #include "ggx.glsl"
+#include "luminance.glsl"
 #include "punctual.glsl"
 
 layout(binding = CM_UNIT_GGX_ALBEDO) uniform sampler2D cm_albedo_table;  // surface/ggx_albedo.hpp's
@@ -121,7 +122,7 @@ void main() {
     float cosine = clamp(dot(s.normal, wo), 0.0, 1.0);
     // What is transmitted is not scattered back; thin, unrefracted, and of one colour: an approximation.
     float through = coat.z * (1.0 - s.metallic);
-    alpha *= 1.0 - through * (1.0 - cm_interface_fresnel(s, cosine)) * dot(s.base_color, vec3(0.2126, 0.7152, 0.0722));
+    alpha *= 1.0 - through * (1.0 - cm_interface_fresnel(s, cosine)) * cm_luminance(s.base_color);
     s.base_color *= 1.0 - through;
     float covered = clamp(base.a, 0.0, 1.0);
 #else

@@ -5,6 +5,7 @@
 #ifndef CM_SURFACE_GLSL
 #define CM_SURFACE_GLSL
 #include "ggx.glsl"
+#include "luminance.glsl"
 #include "surface_tables.glsl"
 
 CM_FN vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }
@@ -133,7 +134,7 @@ CM_FN float cm_coverage(CmVertexMix m) {
   if (transmission > 0.0f) {
     // Thin and clear: what passes goes straight on, in the share of the base colour's luminance.
     float passes = transmission * cm_texture(m.corner.w, CM_USE_TRANSMISSION, m, false).r;
-    solid *= 1.0f - passes * clamp(dot(vec3(base), vec3(0.2126f, 0.7152f, 0.0722f)), 0.0f, 1.0f);
+    solid *= 1.0f - passes * clamp(cm_luminance(vec3(base)), 0.0f, 1.0f);
   }
   return solid;
 }

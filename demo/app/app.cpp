@@ -366,7 +366,7 @@ void App::cancel() {
 
 void App::open(const std::string& path) {
   if (path.empty()) return;
-  if (has_ending(path, ".gltf") || has_ending(path, ".glb")) {
+  if (is_model(path)) {
     open_surfaces(model_, path);
     return;
   }

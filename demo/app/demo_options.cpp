@@ -57,7 +57,7 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
              "Take the shaders of this folder (a copy of glsl/), anew as they change: in debug builds");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  finish_scene_options(app, options.scene, false);
+  finish_scene_options(app, options.scene, {.model = is_model(options.open)});
   options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
   options.sized = app.count("--size") > 0;
   if (!options.open.empty() && (!options.scene.volume.empty() || app.count("--scene") > 0))

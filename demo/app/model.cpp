@@ -173,4 +173,6 @@ bool has_ending(const std::string& path, const std::string& ending) {
   });
 }
 
+bool is_model(const std::string& path) { return has_ending(path, ".gltf") || has_ending(path, ".glb"); }
+
 }  // namespace cumulet::demo

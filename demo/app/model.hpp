@@ -174,5 +174,7 @@ struct Work {
 
 /// Whether a name ends so, whatever its case; with the dot.
 [[nodiscard]] bool has_ending(const std::string& path, const std::string& ending);
+/// Of a glTF model, by its ending.
+[[nodiscard]] bool is_model(const std::string& path);
 
 }  // namespace cumulet::demo

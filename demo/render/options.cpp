@@ -464,7 +464,7 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
 
 }  // namespace
 
-void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
+void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedFiles& files) {
   for (const char* flag : {"--env-rotation", "--env-strength"}) {
     if (app.count(flag) > 0 && scene.environment.empty())
       throw UsageError(std::string(flag) + " needs an environment: --env, or a --scene that names one");
@@ -486,14 +486,14 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit) {
     const std::string sun = app.get_option("--sun")->results().back();
     if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " has no irradiance and no --sky-model");
   }
-  if (!lit && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
+  if (!files.scene && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
       app.count("--env") == 0) {
     const cumulet_light_desc given = scene.light;
     scene.set_daylight();
     if (app.count("--sky-model") > 0) {
       scene.light.turbidity = given.turbidity;
       scene.light.ground_albedo = given.ground_albedo;
-    } else if (app.count("--ground") == 0 && scene.surfaces.empty()) {
+    } else if (app.count("--ground") == 0 && scene.surfaces.empty() && !files.model) {
       scene.ground.place = CUMULET_GROUND_BELOW;
     }
   }
@@ -591,7 +591,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
              options.backend, "OpenGL without a display (default: auto: EGL, then OSMesa)");
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  finish_scene_options(app, options.scene, lit);
+  finish_scene_options(app, options.scene, {.scene = lit});
   if (options.scene.volume.empty() && options.scene.surfaces.empty())
     throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
   if (options.json && !options.info) throw UsageError("--json is for --info");

@@ -21,7 +21,12 @@ namespace cumulet::demo {
 void add_scene_options(CLI::App& app, SceneOptions& scene);
 /// What can be said only after the parse: a clear day by default, unless lit (a scene file was given otherwise than by
 /// --scene); and which flags exclude each other. Throws UsageError.
-void finish_scene_options(const CLI::App& app, SceneOptions& scene, bool lit);
+/// Of files that are named without a flag: what the scene does not tell yet.
+struct NamedFiles {
+  bool scene = false;  ///< whose light holds
+  bool model = false;
+};
+void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedFiles& files);
 
 /// Parses, with --help and --version (and --option-table: option_table.hpp), for which it gives false after their text
 /// went to out. Throws UsageError.

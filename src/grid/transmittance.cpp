@@ -4,9 +4,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <tuple>
 
 #include "base/progress_part.hpp"
+#include "volume/bricks.hpp"
 
 namespace cumulet::grid {
 
@@ -74,8 +74,7 @@ void Transmittance::sweep(int axis, const Progress* progress) {
     columns.push_back(statistics_->nodes()[n].corner);
     columns.back()[axis] = 0;
   }
-  std::ranges::sort(columns,
-                    [](const ivec3& a, const ivec3& b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); });
+  std::ranges::sort(columns, volume::lexicographic);
   columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
   tbb::parallel_for(std::size_t{0}, columns.size(), [&](std::size_t i) {
     check(progress);

@@ -77,6 +77,15 @@ core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin) {
   return record;
 }
 
+std::vector<core::CmLamp> lamp_records(const Lamps& of_host, std::span<const surface::PunctualLight> of_scene,
+                                       const glm::dvec3& origin) {
+  std::vector<core::CmLamp> records;
+  records.reserve(of_host.size() + of_scene.size());
+  for (const Lamp& lamp : of_host) records.push_back(lamp_record(lamp, origin));
+  for (const surface::PunctualLight& lamp : of_scene) records.push_back(lamp_record(lamp, origin));
+  return records;
+}
+
 void add_lamps(SceneLights& lights, const Lamps& lamps) {
   for (const Lamp& lamp : lamps) {
     double share = 1.0;  // of its power that it sends out

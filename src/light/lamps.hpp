@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "base/shared_code.hpp"
@@ -38,6 +39,10 @@ core::CmLamp lamp_record(const surface::PunctualLight& light, const glm::dvec3& 
 /// Power as Blender's lamps have it: a point sends out power / (4 pi) a steradian, a spot the same inside of its cone,
 /// a disc and a rectangle power / (4 x area) of radiance on the side where they shine.
 core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin);
+
+/// Of the host's, then of the scene's.
+std::vector<core::CmLamp> lamp_records(const Lamps& of_host, std::span<const surface::PunctualLight> of_scene,
+                                       const glm::dvec3& origin);
 
 /// Counts these, too.
 void add_lamps(SceneLights& lights, const Lamps& lamps);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <span>
 #include <utility>
 
 #include "base/error.hpp"
@@ -110,9 +111,10 @@ void GpuScene::update_environment(const light::Surroundings& surroundings, const
 void GpuScene::update_lamps(const scene::Part<light::Lamps>& of_host, const Wanted& wanted) {
   const LampsOf of{of_host, model_ ? model_.of() : nullptr};
   if (!lamps_.wants(of, wanted.settings)) return;
-  static const std::vector<surface::PunctualLight> none;
-  lamps_.make(of, wanted.settings,
-              [&] { return LampData::make(gl_, limits_, *of_host, of.model ? of.model->pose.lights : none); });
+  lamps_.make(of, wanted.settings, [&] {
+    const auto of_scene = of.model ? std::span(of.model->pose.lights) : std::span<const surface::PunctualLight>();
+    return LampData::make(gl_, limits_, *of_host, of_scene);
+  });
 }
 
 void GpuScene::drop_data() {

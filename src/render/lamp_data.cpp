@@ -8,11 +8,8 @@
 namespace cumulet::render {
 
 LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
-                        const std::vector<surface::PunctualLight>& of_scene) {
-  std::vector<core::CmLamp> records;
-  records.reserve(of_host.size() + of_scene.size());
-  for (const light::Lamp& lamp : of_host) records.push_back(light::lamp_record(lamp, glm::dvec3(0.0)));
-  for (const surface::PunctualLight& lamp : of_scene) records.push_back(light::lamp_record(lamp, glm::dvec3(0.0)));
+                        std::span<const surface::PunctualLight> of_scene) {
+  std::vector<core::CmLamp> records = light::lamp_records(of_host, of_scene, glm::dvec3(0.0));
   LampData data;
   data.count_ = static_cast<std::uint32_t>(records.size());
   data.of_host_ = static_cast<std::uint32_t>(of_host.size());

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <span>
 
 #include "gl/objects.hpp"
 #include "light/lamps.hpp"
@@ -13,7 +13,7 @@ class LampData {
  public:
   /// Throws Error(unsupported) for more than the driver binds.
   static LampData make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
-                       const std::vector<surface::PunctualLight>& of_scene);
+                       std::span<const surface::PunctualLight> of_scene);
 
   void bind(const gl::Functions& gl) const;
   /// Of both; the host's are first.

@@ -318,14 +318,12 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sky_radiance = glm::vec4(lighting.sky_radiance, 0.0F);
   const std::span<const surface::PunctualLight> lamps =
       content_ ? std::span(content_->pose_->lights) : std::span<const surface::PunctualLight>();
-  std::vector<CmLamp> records;
-  records.reserve(lamps.size() + lighting.lamps.size());
-  for (const surface::PunctualLight& lamp : lamps) records.push_back(light::lamp_record(lamp, view.eye));
-  for (light::Lamp lamp : lighting.lamps) {
+  light::Lamps of_host(lighting.lamps.begin(), lighting.lamps.end());
+  for (light::Lamp& lamp : of_host) {
     // Lit from its middle alone: there a wide sun's disc is brighter than on average.
     if (lamp.kind == light::Lamp::Kind::sun) lamp.angle = 0.0;
-    records.push_back(light::lamp_record(lamp, view.eye));
   }
+  const std::vector<CmLamp> records = light::lamp_records(of_host, lamps, view.eye);
   block.counts.x = static_cast<std::uint32_t>(records.size());
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 

@@ -385,21 +385,22 @@ void Viewer::frame_all() {
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
   if (volume_ && !volume_->empty()) box = volume_->bounds();
-  if (model_source_ && model_source_->scene->triangle_count() > 0) {
+  if (shows_triangles()) {
     const surface::Pose& pose = model_source_->pose;
     box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};
   }
   return box;
 }
 
+bool Viewer::shows_triangles() const { return model_source_ && model_source_->scene->triangle_count() > 0; }
+
 std::optional<scene::Ground> Viewer::ground() const {
   const auto all = box();
   if (ground_.place == GroundPlace::none || !all) return std::nullopt;
   scene::Ground ground{ground_.height, ground_.albedo};
   // Just below a model: many stand on a floor of their own.
-  const bool model = model_source_ && model_source_->scene->triangle_count() > 0;
   if (ground_.place == GroundPlace::below)
-    ground.height = all->min.y - (model ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
+    ground.height = all->min.y - (shows_triangles() ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
   // The horizon is then a ten-thousandth below where it is.
   const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
   ground.reach = 1e4 * (glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) + eye);

@@ -148,6 +148,7 @@ class Viewer {
   scene::SnapshotPtr snapshot();
   Shot shot();
   [[nodiscard]] std::optional<Bounds> box() const;
+  [[nodiscard]] bool shows_triangles() const;
   [[nodiscard]] std::optional<scene::Ground> ground() const;
   /// What cameras fit; good for as long as nothing changes.
   [[nodiscard]] std::optional<Subject> subject() const;

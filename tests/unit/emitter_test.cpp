@@ -61,10 +61,6 @@ constexpr float patch_half = 10.0F;
 constexpr double slab_low = -0.5;
 constexpr double slab_high = 7.5;
 
-volume::ScalarVolume slab() {
-  return test::make_volume({64, 8, 64}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
-}
-
 viewer::Medium medium(double density, float albedo, float anisotropy = 0.0F, std::uint32_t max_bounces = 0) {
   viewer::Medium m;
   m.density_scale = density;
@@ -78,16 +74,6 @@ viewer::SurfaceSettings surface_light(SurfaceLight light) {
   viewer::SurfaceSettings s;
   s.light = light;
   return s;
-}
-
-/// Straight down on (32, y, 32), through the backs of what hangs above.
-viewer::CameraPose looking_down() {
-  viewer::CameraPose c;
-  c.eye = {32.0, 300.0, 32.0};
-  c.target = {32.0, 0.0, 32.0};
-  c.up = {0.0, 0.0, -1.0};
-  c.fovy_degrees = 0.05;
-  return c;
 }
 
 /// The sum over the patch's points p of f(p) dA, at the centres of a fine grid.
@@ -272,10 +258,10 @@ class EmitterTrace : public test::ViewerTest {
  protected:
   std::unique_ptr<test::Still> dark(std::shared_ptr<const StillScene> scene) const {
     auto viewer = make();
-    viewer->set_volume(slab());
+    viewer->set_volume(test::slab());
     viewer->set_light({});
     viewer->set_medium(medium(1e-6, 0.0F));
-    viewer->set_camera(looking_down());
+    viewer->set_camera(test::looking_down(0.05));
     viewer->viewer().show_surfaces(test::source_of(std::move(scene)));
     return viewer;
   }

@@ -40,22 +40,12 @@ viewer::Light sun_at(float elevation_degrees, float irradiance, float sky) {
   return light;
 }
 
-volume::ScalarVolume slab() {
-  return test::make_volume({64, 8, 64}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
-}
-
-viewer::CameraPose looking_down() {
-  viewer::CameraPose c = test::camera_at({32.0, 300.0, 32.0}, {32.0, 0.0, 32.0}, 1.0);
-  c.up = {0.0, 0.0, -1.0};
-  return c;
-}
-
 // As of AFloorUnderASlabIsLitAndSeenThroughIt (surface_trace_test): albedo / pi * E cos * exp(-tau / cos) on the way
 // in, exp(-tau) out. Beneath the slab, and as far up in it as half.
 TEST_P(Ground, UnderASlabIsLitAndSeenThroughIt) {
   const auto still = make();
-  still->set_volume(slab());
-  still->set_camera(looking_down());
+  still->set_volume(test::slab());
+  still->set_camera(test::looking_down());
   const vec3 albedo(0.8F, 0.4F, 0.1F);
   for (const auto march : {scene::March::tet, scene::March::brick}) {
     viewer::GridSettings grid;
@@ -148,7 +138,7 @@ TEST_P(Ground, IsAsTwoTriangles) {
 
 TEST_P(Ground, IsMetFromAboveAlone) {
   const auto still = make();
-  still->set_volume(slab());
+  still->set_volume(test::slab());
   still->set_light(sun_at(90.0F, 3.0F, 0.0F));
   still->set_medium({1e-6, vec3(0.0F), {}, 0});
   still->viewer().set_ground({GroundPlace::at_height, -50.0, vec3(0.5F)});

@@ -62,7 +62,7 @@ class Lamps : public test::ViewerTest {
   }
   // Straight down on a white floor below a slab of next to no density.
   void set_floor(const std::vector<surface::PunctualLight>& lights = {}) {
-    still_->set_volume(test::make_volume({64, 8, 64}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
+    still_->set_volume(test::slab());
     set_medium(1e-6, 0.0F);
     viewer::CameraPose c;
     c.eye = {32.0, 300.0, 32.0};

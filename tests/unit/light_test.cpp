@@ -128,6 +128,21 @@ TEST(Lights, SmallFiresAreLookedFor) {
 class NewLight : public test::ViewerTest {};
 CUMULET_ON_BACKENDS(NewLight);
 
+// Voxels alike, marched densely, seen from its front at its middle.
+struct BoxOfVoxels {
+  static constexpr double sigma = 0.08;
+  ivec3 voxels = {40, 16, 24};
+  volume::ScalarVolume volume = test::make_volume(voxels, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
+
+  void show(test::Still& still) const {
+    still.set_volume(volume);
+    viewer::GridSettings grid;
+    grid.build.march = scene::March::dense;
+    still.set_grid(grid);
+    still.set_camera(test::camera_at({19.5, 7.5, 900.0}, {19.5, 7.5, 0.0}, 0.01));
+  }
+};
+
 // Single scattering in a homogeneous box below the disc, by quadrature.
 double single_scattering(const dvec3& size, double sigma, double g, double cosine) {
   constexpr int n = 48;
@@ -156,27 +171,21 @@ double single_scattering(const dvec3& size, double sigma, double g, double cosin
 }
 
 TEST_P(NewLight, ADiscOfFiniteAngleIsFoundByLooksAndByFlights) {
-  const ivec3 voxels(40, 16, 24);
-  const auto volume = test::make_volume(voxels, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
+  const BoxOfVoxels box;
   const auto viewer = make();
-  viewer->set_volume(volume);
-  viewer::GridSettings grid;
-  grid.build.march = scene::March::dense;
-  viewer->set_grid(grid);
-  const double sigma = 0.08;
-  viewer->set_camera(test::camera_at({19.5, 7.5, 900.0}, {19.5, 7.5, 0.0}, 0.01));
+  box.show(*viewer);
   for (const float g : {0.0F, 0.5F}) {
-    viewer->set_medium({sigma, vec3(1.0F), {g}, 1});
+    viewer->set_medium({BoxOfVoxels::sigma, vec3(1.0F), {g}, 1});
     viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.0F)});
     const test::Picture picture = test::render(*viewer, {8, 8, 1, 1, render::View::shaded});
     core::CpuDisc cpu;
     cpu.cm = viewer->viewer().trace_parameters();
     cpu.cm.dispatch.samples = 256;
     cpu.cm.lights.any = 1;
-    cpu.volume = &volume;
-    cpu.origin = ivec3(grid::fit_cube(volume).origin);
+    cpu.volume = &box.volume;
+    cpu.origin = ivec3(grid::fit_cube(box.volume).origin);
     cpu.cm_disc_cosine = static_cast<float>(std::cos(0.6));
-    const double expected = single_scattering(dvec3(voxels), sigma, g, std::cos(0.6));
+    const double expected = single_scattering(dvec3(box.voxels), BoxOfVoxels::sigma, g, std::cos(0.6));
     for (const float chance : {1.0F, 0.3F, 0.0F}) {
       cpu.cm_disc_chance = chance;
       std::array<double, 64> means{};
@@ -207,27 +216,21 @@ class Sun : public test::ViewerTest {};
 CUMULET_ON_BACKENDS(Sun);
 
 TEST_P(Sun, OfAnAngleLightsAMediumAsQuadratureHasItHoweverItIsFound) {
-  const ivec3 voxels(40, 16, 24);
-  const auto volume = test::make_volume(voxels, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; });
+  const BoxOfVoxels box;
   const auto viewer = make();
-  viewer->set_volume(volume);
-  viewer::GridSettings grid;
-  grid.build.march = scene::March::dense;
-  viewer->set_grid(grid);
-  viewer->set_camera(test::camera_at({19.5, 7.5, 900.0}, {19.5, 7.5, 0.0}, 0.01));
-  const double sigma = 0.08;
+  box.show(*viewer);
   viewer->set_light(overhead(1.2));
   for (const float g : {0.0F, 0.5F}) {
-    viewer->set_medium({sigma, vec3(1.0F), {g}, 1});
-    const double expected = single_scattering(dvec3(voxels), sigma, g, std::cos(0.6));
+    viewer->set_medium({BoxOfVoxels::sigma, vec3(1.0F), {g}, 1});
+    const double expected = single_scattering(dvec3(box.voxels), BoxOfVoxels::sigma, g, std::cos(0.6));
     const test::Picture picture = test::render(*viewer, {8, 8, 256, 1, render::View::shaded});
     EXPECT_NEAR(picture.mean().x, expected, 0.02 * expected) << g;
     // Looked for with the chance that a dark disc leaves it; without one, found by flights alone.
     core::CpuDisc cpu;
     cpu.cm = viewer->viewer().trace_parameters();
     cpu.cm.dispatch.samples = 256;
-    cpu.volume = &volume;
-    cpu.origin = ivec3(grid::fit_cube(volume).origin);
+    cpu.volume = &box.volume;
+    cpu.origin = ivec3(grid::fit_cube(box.volume).origin);
     cpu.cm_disc_radiance_in = vec3(0.0F);
     for (const float chance : {0.0F, 0.5F, 1.0F}) {
       cpu.cm_disc_chance = chance;

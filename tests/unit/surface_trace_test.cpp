@@ -34,10 +34,6 @@ viewer::GridSettings march(March kind) {
   return s;
 }
 
-volume::ScalarVolume slab(float value = 1.0F) {
-  return test::make_volume({64, 8, 64}, ivec3(0), [=](const ivec3& /*p*/) { return value; });
-}
-
 viewer::Light sun_at(float elevation_degrees, const vec3& irradiance, const vec3& sky = vec3(0.0F)) {
   viewer::Light light;
   light.sun_elevation_degrees = elevation_degrees;
@@ -58,18 +54,12 @@ std::shared_ptr<StillScene> floor_scene(const Material& material, float y = -10.
   return scene;
 }
 
-viewer::CameraPose looking_down(double fovy = 1.0) {
-  viewer::CameraPose c = test::camera_at({32.0, 300.0, 32.0}, {32.0, 0.0, 32.0}, fovy);
-  c.up = {0.0, 0.0, -1.0};
-  return c;
-}
-
 // Radiance of a white floor under an absorbing slab: albedo / pi * E cos * exp(-tau / cos) on the way in, exp(-tau)
 // out.
 TEST_P(SurfaceTrace, AFloorUnderASlabIsLitAndSeenThroughIt) {
   const auto viewer = make();
-  viewer->set_volume(slab());
-  viewer->set_camera(looking_down());
+  viewer->set_volume(test::slab());
+  viewer->set_camera(test::looking_down());
   for (const vec3 albedo : {vec3(1.0F), vec3(0.8F, 0.4F, 0.1F)}) {
     viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(albedo))));
     for (const March kind : {March::tet, March::brick, March::dense}) {
@@ -97,8 +87,8 @@ TEST_P(SurfaceTrace, AFloorUnderASlabIsLitAndSeenThroughIt) {
 
 TEST_P(SurfaceTrace, TheSkyLightsAFloorAsMuchAsItReflects) {
   const auto viewer = make();
-  viewer->set_volume(slab());
-  viewer->set_camera(looking_down());
+  viewer->set_volume(test::slab());
+  viewer->set_camera(test::looking_down());
   viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.5F)))));
   viewer::Medium medium;
   medium.density_scale = 1e-6;
@@ -258,7 +248,7 @@ Material metal(float roughness) {
 // The sun in a ball throws rare bright samples on a floor: softened, as much light, and far less noise.
 TEST_P(SurfaceTrace, IndirectRoughnessKeepsTheLightAndTakesTheSpecks) {
   const auto viewer = make();
-  viewer->set_volume(slab());
+  viewer->set_volume(test::slab());
   viewer::Medium medium;
   medium.density_scale = 1e-6;
   viewer->set_medium(medium);
@@ -313,7 +303,7 @@ TEST_P(SurfaceTrace, IndirectRoughnessLeavesWhatIsSeenInMirrors) {
 // A floor below an opaque glowing slab that scatters nothing: albedo / pi times S cos^2 / r^2 over its underside.
 TEST_P(SurfaceTrace, AFireLightsTheFloor) {
   const auto viewer = make();
-  viewer->set_volume(slab());
+  viewer->set_volume(test::slab());
   viewer->set_light({});
   viewer->set_medium({4.0, vec3(0.0F), {0.0F}, 0, {3.0F, 1.0F, 0.0F}});
   viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.8F)))));
@@ -345,9 +335,9 @@ TEST_P(SurfaceTrace, AFireLightsTheFloor) {
 // pass.
 TEST_P(SurfaceTrace, AGlowEndsAtASurface) {
   const auto viewer = make();
-  viewer->set_volume(slab());
+  viewer->set_volume(test::slab());
   viewer->set_light({});
-  viewer->set_camera(looking_down(0.5));
+  viewer->set_camera(test::looking_down(0.5));
   viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.0F)), 3.7F)));
   for (const March kind : {March::tet, March::dense}) {
     viewer->set_grid(march(kind));
@@ -367,8 +357,8 @@ TEST_P(SurfaceTrace, AGlowEndsAtASurface) {
 
 TEST_P(SurfaceTrace, LampsFallOffWithTheSquareOfTheDistance) {
   const auto viewer = make();
-  viewer->set_volume(slab());
-  viewer->set_camera(looking_down(0.1));
+  viewer->set_volume(test::slab());
+  viewer->set_camera(test::looking_down(0.1));
   viewer->set_light({});
   viewer::Medium medium;
   medium.albedo = vec3(0.0F);
@@ -395,8 +385,8 @@ TEST_P(SurfaceTrace, LampsFallOffWithTheSquareOfTheDistance) {
 
 TEST_P(SurfaceTrace, CoverageIsAShareOfTheRays) {
   const auto viewer = make();
-  viewer->set_volume(slab());
-  viewer->set_camera(looking_down());
+  viewer->set_volume(test::slab());
+  viewer->set_camera(test::looking_down());
   viewer->set_light({});
   viewer::Medium medium;
   medium.density_scale = 1e-6;
@@ -444,12 +434,12 @@ TEST_P(SurfaceTrace, SeedAndSamplesAloneDecideTheImage) {
 TEST_P(SurfaceTrace, SurfacesNeedNoVolume) {
   const auto viewer = make();
   viewer->set_light(sun_at(90.0F, vec3(1.0F), vec3(1.0F)));
-  viewer->set_camera(looking_down());
+  viewer->set_camera(test::looking_down());
   viewer->viewer().show_surfaces(test::source_of(floor_scene(test::diffuse(vec3(0.5F)))));
   const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
   EXPECT_NEAR(picture.mean().x, 0.5 * (1.0 + 1.0 / pi), 0.01);
   // As posed far from the origin, too, and with a volume that comes later.
-  viewer->set_volume(slab());
+  viewer->set_volume(test::slab());
   viewer::Medium medium;
   medium.density_scale = 100.0;
   medium.albedo = vec3(0.0F);
@@ -459,8 +449,8 @@ TEST_P(SurfaceTrace, SurfacesNeedNoVolume) {
 
 TEST_P(SurfaceTrace, CamerasSeeThroughBacksAndLightDoesNot) {
   const auto viewer = make();
-  viewer->set_volume(slab());
-  viewer->set_camera(looking_down());
+  viewer->set_volume(test::slab());
+  viewer->set_camera(test::looking_down());
   viewer->set_light(sun_at(90.0F, vec3(1.0F)));
   viewer::Medium medium;
   medium.density_scale = 1e-6;

@@ -58,6 +58,13 @@ inline viewer::CameraPose camera_at(const glm::dvec3& eye, const glm::dvec3& tar
   return c;
 }
 
+/// Straight down on (32, y, 32), the middle of slab().
+inline viewer::CameraPose looking_down(double fovy = 1.0) {
+  viewer::CameraPose c = camera_at({32.0, 300.0, 32.0}, {32.0, 0.0, 32.0}, fovy);
+  c.up = {0.0, 0.0, -1.0};
+  return c;
+}
+
 struct Picture {
   std::uint32_t width = 0;
   std::vector<glm::vec4> pixels;

@@ -97,6 +97,11 @@ volume::ScalarVolume make_volume(const glm::ivec3& size, const glm::ivec3& low, 
   return v;
 }
 
+/// 64 x 8 x 64 voxels alike.
+inline volume::ScalarVolume slab(float value = 1.0F) {
+  return make_volume({64, 8, 64}, glm::ivec3(0), [=](const glm::ivec3& /*p*/) { return value; });
+}
+
 /// A lumpy ball with empty parts, deterministic.
 inline volume::ScalarVolume noise_volume(const glm::ivec3& size, const glm::ivec3& low, int seed) {
   const glm::vec3 centre = glm::vec3(low) + 0.5F * glm::vec3(size);
