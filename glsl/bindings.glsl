@@ -31,6 +31,10 @@ const int CM_UNIT_BACKGROUND = 5;
 const int CM_UNIT_BACKGROUND_BEFORE = 6;
 // host_depth.comp:
 const int CM_UNIT_DEPTH_SOURCE = 0;
+// denoise_*.comp:
+const int CM_UNIT_DENOISE_COLOUR = 0;
+const int CM_UNIT_DENOISE_ALBEDO = 1;
+const int CM_UNIT_DENOISE_NORMAL = 2;
 // surface.frag:
 const int CM_UNIT_MAPS = 0;  // to 9, in the order of surface_parameters.glsl
 const int CM_UNIT_GGX_ALBEDO = 10;
@@ -48,6 +52,9 @@ const int CM_STORAGE_QUEUES = 2;
 const int CM_STORAGE_LAMPS = 3;
 const int CM_STORAGE_DEPTH_CHANGED = 0;  // host_depth.comp
 const int CM_STORAGE_SIGN = 0;           // sign.comp
+const int CM_STORAGE_DENOISE_BINS = 0;   // denoise_*.comp
+const int CM_STORAGE_DENOISE_CHANNELS = 1;
+const int CM_STORAGE_DENOISE_WEIGHTS = 2;
 
 // Images.
 const int CM_IMAGE_SUM = 0;
@@ -63,5 +70,6 @@ const int CM_IMAGE_SURFACE_Z = 4;
 const int CM_IMAGE_MEANS = 0;       // resolve.comp
 const int CM_IMAGE_BACKGROUND_MEANS = 1;
 const int CM_IMAGE_HOST_DEPTH = 0;  // host_depth.comp
+const int CM_IMAGE_DENOISED = 0;    // denoise_convolution.comp
 
 #endif

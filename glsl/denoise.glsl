@@ -1,0 +1,39 @@
+// What kernels of the denoiser share. Channels are halves in blocks of eight, a uvec4 a pixel, block after block.
+#ifndef CM_DENOISE_GLSL
+#define CM_DENOISE_GLSL
+
+// A luminance of which human eyes notice the same steps everywhere, 1 at 65504: the fit to Aydin et al., "Extending
+// Quality Metrics to Full Luminance Range Images" (2008), by which Open Image Denoise's networks were trained.
+const float CM_PU_SCALE = 0.318967155;
+const float CM_PU_DARKEST = 1.57945760e-06;
+const float CM_PU_DARK = 3.22087631e-02;
+
+float cm_pu(float y) {
+  float x = 1.92653254e-01 * log(y + 6.26026094e-03) + 9.98620152e-01;
+  if (y <= CM_PU_DARK) x = 1.64593172 * pow(y, 4.31384981e-01) - 2.94139609e-03;
+  if (y <= CM_PU_DARKEST) x = 1.41283765e+03 * y;
+  return x * CM_PU_SCALE;
+}
+
+float cm_pu_inverse(float encoded) {
+  float x = encoded / CM_PU_SCALE;
+  if (x <= 2.23151711e-03) return x / 1.41283765e+03;
+  if (x <= 3.70974749e-01) return pow((x + 2.94139609e-03) / 1.64593172, 1.0 / 4.31384981e-01);
+  return exp((x - 9.98620152e-01) / 1.92653254e-01) - 6.26026094e-03;
+}
+
+// By its bits: a compiler that takes no float to be NaN or infinite may turn comparisons around.
+bool cm_finite(float x) { return (floatBitsToUint(x) & 0x7fffffffu) < 0x7f800000u; }
+bool cm_finite(vec3 v) { return cm_finite(v.x) && cm_finite(v.y) && cm_finite(v.z); }
+
+// To the nearest half, even where the driver's packHalf2x16 cuts off; no larger than the largest.
+uint cm_pack(vec2 v) {
+  uvec2 bits = floatBitsToUint(min(v, vec2(65504.0)));
+  bits = (bits + 0xfffu + ((bits >> 13) & 1u)) & ~0x1fffu;
+  return packHalf2x16(uintBitsToFloat(bits));
+}
+
+// What the network sees of a radiance: none of what is no radiance.
+vec3 cm_radiance(vec3 v) { return cm_finite(v) ? max(v, vec3(0.0)) : vec3(0.0); }
+
+#endif

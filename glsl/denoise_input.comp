@@ -1,0 +1,46 @@
+#version 450
+// What a network sees of a picture: colour exposed and encoded, albedo, and normals from 0 to 1; zeros beyond it.
+// CM_GUIDES 0: colour alone.
+// variants: CM_GUIDES=0,1
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "bindings.glsl"
+#include "denoise.glsl"
+
+layout(binding = CM_UNIT_DENOISE_COLOUR) uniform sampler2D cm_colour;
+#if CM_GUIDES
+layout(binding = CM_UNIT_DENOISE_ALBEDO) uniform sampler2D cm_albedo;
+layout(binding = CM_UNIT_DENOISE_NORMAL) uniform sampler2D cm_normal;
+#endif
+layout(std430, binding = CM_STORAGE_DENOISE_BINS) readonly buffer CmBins { float cm_exposure; };
+layout(std430, binding = CM_STORAGE_DENOISE_CHANNELS) writeonly buffer CmChannels { uvec4 cm_channels[]; };
+layout(location = 0) uniform uint cm_first;   // work group of all
+layout(location = 1) uniform uint cm_width;   // of the tile
+layout(location = 2) uniform uint cm_height;
+layout(location = 3) uniform uvec2 cm_begin;  // of the tile in the picture
+layout(location = 4) uniform uint cm_to;
+
+void main() {
+  uint group = cm_first + gl_WorkGroupID.x;
+  uint groups_x = cm_width / 8u;
+  uvec2 p = uvec2(group % groups_x, group / groups_x) * 8u + gl_LocalInvocationID.xy;
+  ivec2 texel = ivec2(cm_begin + p);
+  vec3 colour = vec3(0.0);
+  vec3 albedo = vec3(0.0);
+  vec3 normal = vec3(0.0);
+  if (all(lessThan(texel, textureSize(cm_colour, 0)))) {
+    vec3 exposed = min(cm_exposure * cm_radiance(texelFetch(cm_colour, texel, 0).rgb), vec3(3e38));
+    colour = vec3(cm_pu(exposed.r), cm_pu(exposed.g), cm_pu(exposed.b));
+#if CM_GUIDES
+    vec3 a = texelFetch(cm_albedo, texel, 0).rgb;
+    vec3 n = texelFetch(cm_normal, texel, 0).rgb;
+    albedo = cm_finite(a) ? clamp(a, 0.0, 1.0) : vec3(0.0);
+    normal = 0.5 + 0.5 * (cm_finite(n) ? clamp(n, -1.0, 1.0) : vec3(0.0));
+#endif
+  }
+  uint at = cm_to + p.y * cm_width + p.x;
+  cm_channels[at] = uvec4(cm_pack(colour.rg), cm_pack(vec2(colour.b, albedo.r)), cm_pack(albedo.gb),
+                          cm_pack(normal.rg));
+#if CM_GUIDES
+  cm_channels[at + cm_width * cm_height] = uvec4(cm_pack(vec2(normal.b, 0.0)), 0u, 0u, 0u);
+#endif
+}
