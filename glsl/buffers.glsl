@@ -88,10 +88,9 @@ uvec4 cm_record(uint cell, uint part) {
 
 #if CM_CHANNELS
 uvec4 cm_emission_record(uint cell) { return texelFetch(cm_channels, int(cm.grid.first_emission + cell)); }
-uint cm_colour_record(uint cell) {
-  uint word = cm.grid.first_colour + cell;
-  return cm_link(texelFetch(cm_channels, int(word >> 2)), word & 3u);
-}
+uint cm_channel_word(uint word) { return cm_link(texelFetch(cm_channels, int(word >> 2)), word & 3u); }
+uint cm_colour_record(uint cell) { return cm_channel_word(cm.grid.first_colour + cell); }
+uint cm_anisotropy_record(uint cell) { return cm_channel_word(cm.grid.first_anisotropy + (cell >> 1)); }
 #endif
 
 uint cm_tree(uint node) {
@@ -110,6 +109,10 @@ vec3 cm_emission_voxel(ivec3 voxel) {
 layout(binding = CM_UNIT_SCATTERING_VOXELS) uniform sampler3D cm_scattering_voxels;
 vec3 cm_scattering_voxel(ivec3 voxel) {
   return texelFetch(cm_scattering_voxels, voxel - ivec3(cm.grid.box_min), 0).rgb;
+}
+layout(binding = CM_UNIT_ANISOTROPY_VOXELS) uniform sampler3D cm_anisotropy_voxels;
+float cm_anisotropy_voxel(ivec3 voxel) {
+  return texelFetch(cm_anisotropy_voxels, voxel - ivec3(cm.grid.box_min), 0).x;
 }
 #endif
 #if CM_MARCH == 1

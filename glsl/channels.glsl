@@ -70,6 +70,11 @@ CM_FN vec3 cm_emitted(CmEmission e, float t, float t_1) {
   return e.mean * (share * max(0.0f, t_1 - t));
 }
 
+// Of what scatters, its mean cosine: 16 bits a cell, two cells a word.
+CM_FN float cm_cell_anisotropy(uint word, uint cell) {
+  return float(int(word << (16u - 16u * (cell & 1u))) >> 16) * (1.0f / 32767.0f);
+}
+
 // Of what scatters, by density: 11, 11 and 10 bits of a word.
 CM_FN vec3 cm_cell_colour(uint word) {
   return vec3(float(word & 2047u) / 2047.0f, float((word >> 11) & 2047u) / 2047.0f, float(word >> 22) / 1023.0f);

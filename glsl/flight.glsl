@@ -7,6 +7,7 @@
 // With CM_CHANNELS also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
 //   vec3 cm_march_colour(uvec2 cell)              of what scatters
+//   float cm_march_anisotropy(uvec2 cell)         likewise
 //
 // Free paths are sampled exactly: an optical depth -ln(1 - u) is used up along the march; inside a cell the depth is a
 // quadratic in t, inverted in closed form. No majorant, no step size.

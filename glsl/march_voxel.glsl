@@ -7,6 +7,7 @@
 // and with CM_CHANNELS
 //   vec3 cm_emission_voxel(ivec3 voxel)           of the box; nothing in empty bricks
 //   vec3 cm_scattering_voxel(ivec3 voxel)         density x colour
+//   float cm_anisotropy_voxel(ivec3 voxel)
 #ifndef CM_MARCH_VOXEL_GLSL
 #define CM_MARCH_VOXEL_GLSL
 
@@ -96,6 +97,10 @@ CM_FN vec3 cm_march_colour(uvec2 cell) {
   float density = cm_voxel(voxel);
 #endif
   return min(cm_scattering_voxel(voxel) / max(density, 1e-30f), vec3(1.0f, 1.0f, 1.0f));
+}
+
+CM_FN float cm_march_anisotropy(uvec2 cell) {
+  return cm_anisotropy_voxel(cm_voxel_of(uvec3(cell.x, cell.y, CM_NONE)));
 }
 #endif
 

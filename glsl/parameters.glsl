@@ -71,6 +71,7 @@ CM_BLOCK(CmGrid) {
   uint tree;        // where the point-location tree begins in its page, in 4-byte words
   uint first_emission;  // where the records of what cells give off begin in their page
   uint first_colour;    // and their colours, in 4-byte words
+  uint first_anisotropy;  // and what mean cosine their scattering has, likewise
   float emission_unit;  // radiance a world unit of length of what is stored as 1 for voxels
   uint first_glowing;   // where the table of cells that give off light begins in the page of their channels
   uint glowing;         // how many it has
@@ -89,8 +90,9 @@ CM_BLOCK(CmMedium) {
   float second_anisotropy;
   float second_bend;
   float second_share;
-  uint emits;     // 1: its cells give off light; this one and the next only with CM_CHANNELS
+  uint emits;     // 1: its cells give off light; this one and the next two only with CM_CHANNELS
   uint coloured;  // 1: what scatters has a colour a cell
+  uint anisotropic;  // 1: and an anisotropy in place of this one
   CM_EQUALITY(CmMedium)
 };
 

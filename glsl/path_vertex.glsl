@@ -20,31 +20,39 @@ struct CmTurn {
 #define CM_SECOND_LOBE 0
 #endif
 
+// Of what the path has collided with.
+CM_FN float cm_anisotropy(CmPath p) {
+#if CM_CHANNELS && defined(CM_MARCH)
+  if (cm.medium.anisotropic != 0u && p.start == CM_IN_MEDIUM) return cm_march_anisotropy(p.start_cell);
+#endif
+  return cm.medium.anisotropy;
+}
+
 #if CM_SECOND_LOBE
-CM_FN CmPhase cm_lobes() {
+CM_FN CmPhase cm_lobes(float anisotropy) {
   CmPhase phase;
-  phase.anisotropy = cm.medium.anisotropy;
+  phase.anisotropy = anisotropy;
   phase.second_anisotropy = cm.medium.second_anisotropy;
   phase.second_bend = cm.medium.second_bend;
   phase.second_share = cm.medium.second_share;
   return phase;
 }
-CM_FN float cm_medium_phase(float cosine) { return cm_phase(cm_lobes(), cosine); }
-CM_FN float cm_medium_cosine(float u) { return cm_phase_cosine(cm_lobes(), u); }
+CM_FN float cm_medium_phase(float g, float cosine) { return cm_phase(cm_lobes(g), cosine); }
+CM_FN float cm_medium_cosine(float g, float u) { return cm_phase_cosine(cm_lobes(g), u); }
 #else
-CM_FN float cm_medium_phase(float cosine) { return cm_henyey_greenstein(cm.medium.anisotropy, cosine); }
-CM_FN float cm_medium_cosine(float u) { return cm_henyey_greenstein_cosine(cm.medium.anisotropy, u); }
+CM_FN float cm_medium_phase(float g, float cosine) { return cm_henyey_greenstein(g, cosine); }
+CM_FN float cm_medium_cosine(float g, float u) { return cm_henyey_greenstein_cosine(g, u); }
 #endif
 
 // The share of light that goes on along a direction, in the medium or on the ground, of what is not absorbed; and the
 // density of the directions that are sampled, which is the same.
 CM_FN float cm_scattered(CmPath p, vec3 wi) {
-  return p.start == CM_ON_GROUND ? max(0.0f, wi.y) * 0.318309886f : cm_medium_phase(dot(p.w, wi));
+  return p.start == CM_ON_GROUND ? max(0.0f, wi.y) * 0.318309886f : cm_medium_phase(cm_anisotropy(p), dot(p.w, wi));
 }
 CM_FN vec3 cm_scattered_direction(CmPath p, float u_0, float u_1) {
   bool ground = p.start == CM_ON_GROUND;
-  return cm_around(ground ? vec3(0.0f, 1.0f, 0.0f) : p.w, ground ? sqrt(1.0f - u_0) : cm_medium_cosine(u_0),
-                   6.28318531f * u_1);
+  return cm_around(ground ? vec3(0.0f, 1.0f, 0.0f) : p.w,
+                   ground ? sqrt(1.0f - u_0) : cm_medium_cosine(cm_anisotropy(p), u_0), 6.28318531f * u_1);
 }
 
 // Without light among surfaces: what has left one sees the sky alone, and the volume sees none.

@@ -83,8 +83,8 @@ Model::Model() {
 }
 
 VolumeChoice volume_of(const SceneOptions& scene) {
-  return {scene.volume,     scene.grid_name,  scene.up,      scene.temperature_grid,
-          scene.flame_grid, scene.color_grid, scene.to_world};
+  return {scene.volume,     scene.grid_name,       scene.up,      scene.temperature_grid, scene.flame_grid,
+          scene.color_grid, scene.anisotropy_grid, scene.to_world};
 }
 
 void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
@@ -94,6 +94,7 @@ void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
   scene.temperature_grid = volume.temperature_grid;
   scene.flame_grid = volume.flame_grid;
   scene.color_grid = volume.color_grid;
+  scene.anisotropy_grid = volume.anisotropy_grid;
   scene.to_world = volume.to_world;
 }
 

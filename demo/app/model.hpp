@@ -79,6 +79,7 @@ struct VolumeChoice {
   std::string temperature_grid = {};
   std::string flame_grid = {};
   std::string color_grid = {};
+  std::string anisotropy_grid = {};
   std::array<double, 16> to_world{};
 
   bool operator==(const VolumeChoice&) const = default;

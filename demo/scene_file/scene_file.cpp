@@ -382,6 +382,7 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   reader.text("medium.temperature_grid", scene.temperature_grid);
   reader.text("medium.flame_grid", scene.flame_grid);
   reader.text("medium.color_grid", scene.color_grid);
+  reader.text("medium.anisotropy_grid", scene.anisotropy_grid);
   reader.choice("volume.up", up_names, scene.up);
   reader.text("surfaces.file", scene.surfaces);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
@@ -504,6 +505,7 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   writer.put_text("medium.temperature_grid", scene.temperature_grid);
   writer.put_text("medium.flame_grid", scene.flame_grid);
   writer.put_text("medium.color_grid", scene.color_grid);
+  writer.put_text("medium.anisotropy_grid", scene.anisotropy_grid);
 
   if (!surfaces.empty()) {
     writer.put("surfaces.file", surfaces);
@@ -580,6 +582,7 @@ cumulet_volume_file_desc volume_file(const SceneOptions& scene) {
   desc.temperature_grid = scene.temperature_grid.c_str();
   desc.flame_grid = scene.flame_grid.c_str();
   desc.color_grid = scene.color_grid.c_str();
+  desc.anisotropy_grid = scene.anisotropy_grid.c_str();
   Matrix to_world = scene.to_world;
   if (scene.up == UpAxis::z) {
     constexpr Matrix upright = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0};

@@ -21,6 +21,7 @@ struct SceneOptions {
   std::string temperature_grid;  // "none": without, here and below
   std::string flame_grid;
   std::string color_grid;
+  std::string anisotropy_grid;
   UpAxis up = UpAxis::y;              // of the volume's file
   std::array<double, 16> to_world{};  // of the volume, once it is upright; column by column; all 0: as its file has it
   std::string surfaces;               // a glTF file; "": none

@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/luminance.hpp"
 #include "base/progress_part.hpp"
 #include "grid/cell.hpp"
 #include "grid/transmittance.hpp"
@@ -347,26 +348,50 @@ double estimate_floor(const Evaluation& evaluation, std::uint64_t max_cells, dou
   return threshold_squared;
 }
 
+double mass_of(const Statistics& statistics) {
+  double mass = 0.0;
+  for (unsigned root = 0; root < 24; ++root) {
+    vec3 v0;
+    std::uint32_t shape = 0;
+    core::cm_root_cell(root, static_cast<std::uint32_t>(statistics.cube().log2_size - 1), v0, shape);
+    mass += statistics.moments(v0, shape).mass;
+  }
+  return mass;
+}
+
+// Of all that scatters.
+double mean_anisotropy(const Statistics& density, const Channels& channels) {
+  double scattering = mass_of(density);
+  if (const RgbField* coloured = channels.scattering.get()) {
+    scattering = luminance(
+        dvec3(mass_of(coloured->component(0)), mass_of(coloured->component(1)), mass_of(coloured->component(2))));
+  }
+  return scattering > 0.0 ? 2.0 * mass_of(channels.forward->statistics()) / scattering - 1.0 : 0.0;
+}
+
 }  // namespace
 
 DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                        Progress* progress)
     : log2_size_(statistics.cube().log2_size) {
   check(progress);
+  RefineSettings used = settings;
+  if (channels.forward) used.anisotropy = std::max(used.anisotropy, mean_anisotropy(statistics, channels));
   Evaluations evaluations;
   std::optional<const Transmittance> transmittance;
   if (settings.criterion == Criterion::transmittance)
-    transmittance.emplace(statistics, hiding(settings.density_scale, settings.anisotropy), progress);
+    transmittance.emplace(statistics, hiding(used.density_scale, used.anisotropy), progress);
   const auto add = [&](const Statistics& field, const Weights& weights) {
     evaluations.push_back(
-        std::make_unique<const Evaluation>(field, weights, transmittance ? &*transmittance : nullptr, settings));
+        std::make_unique<const Evaluation>(field, weights, transmittance ? &*transmittance : nullptr, used));
   };
-  const Weights of_density = Weights::of_density(statistics.mean_optical_depth(), settings);
+  const Weights of_density = Weights::of_density(statistics.mean_optical_depth(), used);
   add(statistics, of_density);
   for (std::size_t i = 0; i < 3; ++i) {
     if (channels.emission) add(channels.emission->component(i), Weights::of_emission(channels.emission->mean_depth()));
     if (channels.scattering) add(channels.scattering->component(i), of_density);
   }
+  if (channels.forward) add(channels.forward->statistics(), of_density);
   const double threshold = std::max(settings.threshold, 0.0);
   double floor = 0.0;
   for (const auto& evaluation : evaluations)

@@ -73,7 +73,8 @@ class DiamondSet {
  public:
   /// Evaluates the criterion for every cell of the statistics, in parallel. O(active nodes). progress: as for
   /// Statistics; the fraction ends at progress_part, and GridBuilder::bisect goes on from there.
-  /// channels: cells are split for them as they are for density.
+  /// channels: cells are split for them as they are for density. An anisotropy of theirs counts for the medium's, where
+  /// it is larger.
   DiamondSet(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
              Progress* progress = nullptr);
   DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress = nullptr)

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <utility>
 
 #include "grid/statistics.hpp"
 
@@ -33,12 +34,29 @@ class RgbField {
   std::array<std::unique_ptr<const Statistics>, 3> statistics_;
 };
 
+/// A field of numbers, likewise.
+class ScalarField {
+ public:
+  ScalarField(volume::ScalarVolume values, const Cube& cube, Progress* progress = nullptr)
+      : values_(std::move(values)), statistics_(values_, cube, progress) {}
+  ScalarField(const ScalarField&) = delete;
+  ScalarField& operator=(const ScalarField&) = delete;
+
+  [[nodiscard]] const Statistics& statistics() const { return statistics_; }
+
+ private:
+  volume::ScalarVolume values_;  // the statistics point into it
+  Statistics statistics_;
+};
+
 /// What cells carry beside density; null: nothing.
 struct Channels {
   /// Light that the volume gives off by itself: radiance a world unit of length, linear Rec. 709. It needs no density.
   std::shared_ptr<const RgbField> emission;
   /// Density x colour: the mean of products is not the product of means.
   std::shared_ptr<const RgbField> scattering;
+  /// What scatters (luminance of density x colour) x (1 + anisotropy) / 2: the part of it that goes forward.
+  std::shared_ptr<const ScalarField> forward;
 };
 
 }  // namespace cumulet::grid

@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 
 #include "base/error.hpp"
+#include "base/luminance.hpp"
 #include "grid/cell.hpp"
 
 namespace cumulet::grid {
@@ -33,6 +35,13 @@ std::uint32_t pack_emission_gradient(const vec3& gradient) {
     word |= (static_cast<std::uint32_t>(std::lround(511.0F * part)) & 0x3ffU) << static_cast<unsigned>(10 * axis);
   }
   return word;
+}
+
+std::uint32_t pack_colour(const vec3& colour) {
+  const auto whole = [](float part, float most) {
+    return static_cast<std::uint32_t>(std::lround(most * std::clamp(part, 0.0F, 1.0F)));
+  };
+  return whole(colour.x, 2047.0F) | (whole(colour.y, 2047.0F) << 11U) | (whole(colour.z, 1023.0F) << 22U);
 }
 
 // Vertex opposite to each face (faces 0 to 3), by class: see the frame of glsl/cell.glsl.
@@ -326,25 +335,27 @@ class GridBuilder::LeafEmission {
   bool linear_;
 };
 
-// The colour of what scatters in leaves.
-class GridBuilder::LeafColour {
+// What scatters in leaves: density x colour.
+class GridBuilder::LeafScattering {
  public:
-  explicit LeafColour(const RgbField& scattering)
+  explicit LeafScattering(const RgbField& scattering)
       : component_{LeafMoments(scattering.component(0)), LeafMoments(scattering.component(1)),
                    LeafMoments(scattering.component(2))} {}
-  std::uint32_t operator()(const Node& node, const vec3& centroid, double density) {
-    vec3 colour(0.0F);
-    for (int i = 0; density > 0.0 && i < 3; ++i)
-      colour[i] = static_cast<float>(component_[static_cast<std::size_t>(i)](node, centroid).mass / density);
-    const auto whole = [](float part, float most) {
-      return static_cast<std::uint32_t>(std::lround(most * std::clamp(part, 0.0F, 1.0F)));
-    };
-    return whole(colour.x, 2047.0F) | (whole(colour.y, 2047.0F) << 11U) | (whole(colour.z, 1023.0F) << 22U);
+  dvec3 operator()(const Node& node, const vec3& centroid) {
+    return {component_[0](node, centroid).mass, component_[1](node, centroid).mass, component_[2](node, centroid).mass};
   }
 
  private:
   std::array<LeafMoments, 3> component_;
 };
+
+std::int16_t pack_anisotropy(double forward, double scattering) {
+  if (!(scattering > 0.0)) return 0;
+  // Of more, the lobe is narrower than floats tell cosines apart.
+  constexpr double most = 0.999;
+  const double mean = std::clamp(2.0 * forward / scattering - 1.0, -most, most);
+  return static_cast<std::int16_t>(std::lround(mean * std::numeric_limits<std::int16_t>::max()));
+}
 
 CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& gradient, bool emits) const {
   const Node& node = nodes_[index];
@@ -371,6 +382,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   places.resize(grid.cells, count);
   if (channels.emission) places.resize(grid.emission, count);
   if (channels.scattering) places.resize(grid.colour, count);
+  if (channels.forward) places.resize(grid.anisotropy, count);
   number_nodes(grid, places);
 
   struct Box {
@@ -384,8 +396,10 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     LeafMoments moments(*statistics_);
     std::optional<LeafEmission> emitted;
     if (channels.emission) emitted.emplace(*channels.emission, cells);
-    std::optional<LeafColour> coloured;
+    std::optional<LeafScattering> coloured;
     if (channels.scattering) coloured.emplace(*channels.scattering);
+    std::optional<LeafMoments> forward;
+    if (channels.forward) forward.emplace(channels.forward->statistics());
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -408,7 +422,13 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
         emits = glm::any(glm::greaterThan(given.mean, vec3(0.0F)));
         grid.emission[rank] = given;
       }
-      if (coloured) grid.colour[rank] = (*coloured)(node, centroid, m.mass);
+      double scattered = m.mass;
+      if (coloured) {
+        const dvec3 scattering = (*coloured)(node, centroid);
+        grid.colour[rank] = pack_colour(m.mass > 0.0 ? vec3(scattering / m.mass) : vec3(0.0F));
+        scattered = luminance(scattering);
+      }
+      if (forward) grid.anisotropy[rank] = pack_anisotropy((*forward)(node, centroid).mass, scattered);
       if (m.max > 0.0F || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);

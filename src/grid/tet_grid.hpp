@@ -25,6 +25,10 @@ struct EmissionRecord {
 };
 static_assert(sizeof(EmissionRecord) == 16);
 
+/// The mean cosine of what scatters as the shaders read it, at most 0.999 either way.
+/// forward: of what scatters, times (1 + anisotropy) / 2. 0 where nothing scatters.
+std::int16_t pack_anisotropy(double forward, double scattering);
+
 /// Where in the leaves and in the tree a root cell's part begins.
 struct RootEntry {
   std::uint32_t first_leaf = 0;
@@ -46,13 +50,15 @@ struct TetGrid {
   std::vector<EmissionRecord> emission;
   /// One a cell, glsl/channels.glsl; empty where what scatters is white.
   std::vector<std::uint32_t> colour;
+  /// One a cell, pack_anisotropy(); empty where it is the medium's.
+  std::vector<std::int16_t> anisotropy;
   glm::vec3 content_min{0.0F};  ///< cube-space box that holds every cell with density or emission
   glm::vec3 content_max{0.0F};
   bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const {
     return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + colour.size() * 4 +
-           tree.size() * 4 + 200;
+           anisotropy.size() * 2 + tree.size() * 4 + 200;
   }
 };
 
@@ -92,7 +98,7 @@ class GridBuilder {
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
   class LeafEmission;
-  class LeafColour;
+  class LeafScattering;
   // mean and gradient: in units of the grid's density_unit.
   [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient, bool emits) const;
 

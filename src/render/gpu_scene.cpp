@@ -213,6 +213,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   const bool emits = source.emits();
   p.medium.emits = emits ? 1U : 0U;
   p.medium.coloured = source.coloured() ? 1U : 0U;
+  p.medium.anisotropic = source.anisotropic() && medium.phase.may_vary() ? 1U : 0U;
   light::MediumLight own;
   own.power = source.glow.power;
   own.length = source.glow.length;

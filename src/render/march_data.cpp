@@ -9,6 +9,7 @@
 #include <span>
 
 #include "base/error.hpp"
+#include "base/luminance.hpp"
 #include "gl/bindings.hpp"
 
 namespace cumulet::render {
@@ -29,9 +30,10 @@ void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   }
 }
 
-// Slices first to last (not included) of a dense volume, as half floats: `stride` a voxel, of which this is one.
-void fill_slab(const scene::MarchSource& source, const grid::Statistics& statistics, float scale, int first, int last,
-               std::span<std::uint16_t> slab, std::size_t stride) {
+// Slices first to last (not included) of a dense volume: put(place in them, value) for each voxel.
+template <class Put>
+void for_slab(const scene::MarchSource& source, const grid::Statistics& statistics, int first, int last,
+              const Put& put) {
   const ivec3 low = source.box_low;
   const ivec3 high = low + source.box_size;
   const auto row = static_cast<std::size_t>(source.box_size.x);
@@ -48,12 +50,25 @@ void fill_slab(const scene::MarchSource& source, const grid::Statistics& statist
             const float value = values == nullptr ? node.uniform : values[(i & 7) * 64 + (j & 7) * 8 + (k & 7)];
             const std::size_t at = static_cast<std::size_t>(k - first) * slice +
                                    static_cast<std::size_t>(j - low.y) * row + static_cast<std::size_t>(i - low.x);
-            slab[at * stride] = glm::packHalf1x16(value * scale);
+            put(at, value);
           }
         }
       }
     }
   });
+}
+
+// Slices of what scatters at each voxel.
+std::vector<float> scattering_slab(const scene::MarchSource& source, std::size_t voxels, int first, int last) {
+  std::vector<float> slab(voxels);
+  const auto add = [&](const grid::Statistics& statistics, float weight) {
+    for_slab(source, statistics, first, last, [&](std::size_t at, float value) { slab[at] += weight * value; });
+  };
+  const grid::RgbField* coloured = source.channels.scattering.get();
+  if (coloured == nullptr) add(*source.statistics, 1.0F);
+  for (std::size_t i = 0; coloured != nullptr && i < 3; ++i)
+    add(coloured->component(i), luminance(vec3(glm::mat3(1.0F)[static_cast<int>(i)])));
+  return slab;
 }
 
 // No vector of length 1 is shorter after it: one over a bound of the inverse's norm.
@@ -138,7 +153,9 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
   const scene::GlowTable& glow = source_->glow;
   const std::size_t glow_bytes = glow.cells.size() * sizeof(scene::GlowingCell);
   const std::size_t colour_bytes = grid.colour.size() * sizeof(std::uint32_t);
-  const std::size_t channel_bytes = emission_bytes + glow_bytes + colour_bytes;
+  const std::size_t anisotropy_bytes = grid.anisotropy.size() * sizeof(std::int16_t);
+  const std::size_t first_anisotropy = emission_bytes + glow_bytes + colour_bytes;
+  const std::size_t channel_bytes = first_anisotropy + (anisotropy_bytes + 3) / 4 * 4;  // whole words
   if (channel_bytes > 0) {
     if (static_cast<std::int64_t>(channel_bytes / 16) >= texels) {
       throw Error(ErrorCode::unsupported, "the channels of " + std::to_string(cells) +
@@ -147,12 +164,13 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
                                               std::to_string(texels) + " texels");
     }
     data_.bytes_ += channel_bytes;
-    upload_.add([this, &heap, emission_bytes, glow_bytes, channel_bytes] {
+    upload_.add([this, &heap, emission_bytes, glow_bytes, first_anisotropy, channel_bytes] {
       data_.channels_ = heap.take(channel_bytes, "creating the cells' channels");
       const std::size_t first = data_.channels_.offset();
       data_.grid_.first_emission = static_cast<std::uint32_t>(first / 16);
       data_.grid_.first_glowing = static_cast<std::uint32_t>((first + emission_bytes) / 16);
       data_.grid_.first_colour = static_cast<std::uint32_t>((first + emission_bytes + glow_bytes) / 4);
+      data_.grid_.first_anisotropy = static_cast<std::uint32_t>((first + first_anisotropy) / 4);
     });
     const auto add = [this](std::size_t at, const void* bytes, std::size_t count) {
       upload_.add_bytes(
@@ -164,6 +182,7 @@ void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
     add(0, grid.emission.data(), emission_bytes);
     add(emission_bytes, glow.cells.data(), glow_bytes);
     add(emission_bytes + glow_bytes, grid.colour.data(), colour_bytes);
+    add(first_anisotropy, grid.anisotropy.data(), anisotropy_bytes);
     if (!glow.cells.empty()) {
       data_.grid_.glowing = static_cast<std::uint32_t>(glow.cells.size());
       data_.grid_.glow_density = static_cast<float>(1.0 / glow.power);
@@ -210,32 +229,51 @@ void MarchUpload::plan_channel_voxels() {
   // In units of density 1, so that the colour is this over the density.
   if (const grid::RgbField* scattering = source_->channels.scattering.get())
     plan(data_.scattering_voxels_, *scattering, source_->max_value, "creating what voxels scatter");
+  if (const grid::ScalarField* forward = source_->channels.forward.get()) {
+    require_3d(limits_, source_->box_size, "anisotropy a voxel");
+    plan_slabs(data_.anisotropy_voxels_, {GL_R16_SNORM, GL_RED, GL_SHORT, 1}, "creating voxels' anisotropy",
+               [this, forward](std::span<std::uint16_t> slab, int first, int last) {
+                 const std::vector<float> scattering = scattering_slab(*source_, slab.size(), first, last);
+                 for_slab(*source_, forward->statistics(), first, last, [&](std::size_t at, float value) {
+                   slab[at] = static_cast<std::uint16_t>(grid::pack_anisotropy(value, scattering[at]));
+                 });
+               });
+  }
 }
 
 void MarchUpload::plan_voxels(gl::Object& texture, const std::vector<const grid::Statistics*>& components,
                               GLenum format, GLenum channels, float scale, const char* what) {
-  const ivec3 size = source_->box_size;
   const std::size_t stride = components.size();
+  plan_slabs(texture, {format, channels, GL_HALF_FLOAT, stride}, what,
+             [this, components, scale, stride](std::span<std::uint16_t> slab, int first, int last) {
+               for (std::size_t i = 0; i < stride; ++i) {
+                 if (components[i] == nullptr) continue;
+                 for_slab(*source_, *components[i], first, last, [&](std::size_t at, float value) {
+                   slab[at * stride + i] = glm::packHalf1x16(value * scale);
+                 });
+               }
+             });
+}
+
+void MarchUpload::plan_slabs(gl::Object& texture, const Texels& texels, const char* what, const FillSlab& fill) {
+  const ivec3 size = source_->box_size;
   data_.bytes_ += static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
-                  static_cast<std::uint64_t>(size.z) * 2 * stride;
-  upload_.add([this, &texture, size, format, what] {
-    texture = gl::make_texture_3d(gl_, format, size.x, size.y, size.z, what);
+                  static_cast<std::uint64_t>(size.z) * 2 * texels.count;
+  upload_.add([this, &texture, size, texels, what] {
+    texture = gl::make_texture_3d(gl_, texels.stored, size.x, size.y, size.z, what);
   });
   // One layer of bricks at a time: bounded memory.
   const int low = source_->box_low.z;
   for (int z = low & ~7; z < low + size.z; z += volume::brick_size) {
     const int first = std::max(z, low);
     const int last = std::min(z + volume::brick_size, low + size.z);
-    upload_.add([this, &texture, components, size, channels, scale, stride, low, first, last] {
+    upload_.add([this, &texture, texels, size, fill, low, first, last] {
       std::vector<std::uint16_t> slab(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
-                                      static_cast<std::size_t>(last - first) * stride);
-      for (std::size_t i = 0; i < stride; ++i) {
-        if (components[i] != nullptr)
-          fill_slab(*source_, *components[i], scale, first, last, std::span(slab).subspan(i), stride);
-      }
+                                      static_cast<std::size_t>(last - first) * texels.count);
+      fill(slab, first, last);
       gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 2);
-      gl_->TextureSubImage3D(texture.name(), 0, 0, 0, first - low, size.x, size.y, last - first, channels,
-                             GL_HALF_FLOAT, slab.data());
+      gl_->TextureSubImage3D(texture.name(), 0, 0, 0, first - low, size.x, size.y, last - first, texels.format,
+                             texels.type, slab.data());
       gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
     });
   }
@@ -283,6 +321,7 @@ void MarchData::bind(const gl::Functions& gl) const {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
   if (scattering_voxels_) gl.BindTextureUnit(core::CM_UNIT_SCATTERING_VOXELS, scattering_voxels_.name());
+  if (anisotropy_voxels_) gl.BindTextureUnit(core::CM_UNIT_ANISOTROPY_VOXELS, anisotropy_voxels_.name());
   if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, emission_voxels_.name());
   if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
   if (tree_) gl.BindTextureUnit(core::CM_UNIT_TREE, tree_.texture());

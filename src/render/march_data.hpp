@@ -2,8 +2,10 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "gl/objects.hpp"
@@ -36,9 +38,11 @@ class MarchData {
   gl::Object brick_values_;
   std::vector<gl::WordHeap::Span> cells_;  // a page's records each
   std::array<gl::Object, 2> textures_;     // voxels, or values of bricks; slots of bricks
-  gl::WordHeap::Span channels_;            // of cells: what they give off, the table of those that do, their colours
+  gl::WordHeap::Span channels_;            // of cells: what they give off, the table of those that do, their colours,
+                                           // their anisotropies
   gl::Object emission_voxels_;
   gl::Object scattering_voxels_;
+  gl::Object anisotropy_voxels_;
   gl::WordHeap::Span tree_;
   gl::Object roots_;
   core::CmGrid grid_{};
@@ -68,6 +72,14 @@ class MarchUpload {
   // A 3D texture of half floats over the box. components: of a texel, null: 0.
   void plan_voxels(gl::Object& texture, const std::vector<const grid::Statistics*>& components, GLenum format,
                    GLenum channels, float scale, const char* what);
+  // Texels of 16 bits a component.
+  struct Texels {
+    GLenum stored, format, type;
+    std::size_t count;  // of components
+  };
+  // Receives slices of the box, the first and the one after the last.
+  using FillSlab = std::function<void(std::span<std::uint16_t> slab, int first, int last)>;
+  void plan_slabs(gl::Object& texture, const Texels& texels, const char* what, const FillSlab& fill);
 
   gl::FunctionsPtr gl_;
   gl::Limits limits_;

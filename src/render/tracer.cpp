@@ -228,7 +228,8 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, obstacles, settings);
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
-  picture.channels_ = parameters.medium.emits != 0U || parameters.medium.coloured != 0U;
+  const core::CmMedium& medium = parameters.medium;
+  picture.channels_ = medium.emits != 0U || medium.coloured != 0U || medium.anisotropic != 0U;
   picture.environment_ = obstacles.environment != nullptr;
   picture.lamps_ = obstacles.lamps_met() > 0;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;

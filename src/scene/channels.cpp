@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/luminance.hpp"
 #include "base/progress_part.hpp"
 #include "light/black_body.hpp"
 #include "volume/bricks.hpp"
@@ -109,36 +110,52 @@ class Glow {
   light::BlackBody black_body_;
 };
 
-// Three components of these bricks, without those that are black: what colour() makes of what read_brick() reads.
-template <class Read, class ReadBrick, class Colour>
-grid::RgbField::Components colours_of(const glm::dmat4& index_to_world, const std::vector<ivec3>& origins,
-                                      const std::string& name, const Progress* progress, const ReadBrick& read_brick,
-                                      const Colour& colour) {
-  std::array<std::vector<float>, 3> values;
+// What a frame has of a brick that scatters.
+struct Scatters {
+  Values density{};
+  std::array<Values, 3> colour{};
+
+  void read_brick(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp, const ivec3& origin) {
+    read(frame.density, origin, density);
+    for (float& value : density) value = density_ramp(value);
+    for (std::size_t i = 0; frame.colour && i < 3; ++i) read((*frame.colour)[i], origin, colour[i]);
+  }
+  [[nodiscard]] vec3 coloured(std::size_t v) const {
+    return density[v] * glm::min(vec3(colour[0][v], colour[1][v], colour[2][v]), vec3(1.0F));
+  }
+};
+
+// Of so many components these bricks, without those that are 0: what value() makes of what read_brick() reads.
+template <int count, class Read, class ReadBrick, class Value>
+std::array<ScalarVolume, count> fields_of(const glm::dmat4& index_to_world, const std::vector<ivec3>& origins,
+                                          const std::string& name, const Progress* progress,
+                                          const ReadBrick& read_brick, const Value& value) {
+  using vec = glm::vec<count, float>;
+  std::array<std::vector<float>, count> values;
   for (auto& component : values) component.resize(origins.size() * brick_voxels);
-  std::vector<vec3> most(origins.size(), vec3(0.0F));
+  std::vector<vec> most(origins.size(), vec(0.0F));
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 16), [&](const auto& range) {
     check(progress);
     Read here;
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
       read_brick(origins[b], here);
       for (std::size_t v = 0; v < brick_voxels; ++v) {
-        const vec3 one = colour(here, v);
+        const vec one = value(here, v);
         most[b] = glm::max(most[b], one);
-        for (int i = 0; i < 3; ++i) values[static_cast<std::size_t>(i)][b * brick_voxels + v] = one[i];
+        for (int i = 0; i < count; ++i) values[static_cast<std::size_t>(i)][b * brick_voxels + v] = one[i];
       }
     }
   });
 
-  grid::RgbField::Components components;
+  std::array<ScalarVolume, count> components;
   ScalarVolume& first = components[0];
   first.index_to_world = index_to_world;
   first.bounds_min = ivec3(std::numeric_limits<int>::max());
   first.bounds_max = ivec3(std::numeric_limits<int>::min());
   std::size_t kept = 0;
-  vec3 max_value(0.0F);
+  vec max_value(0.0F);
   for (std::size_t b = 0; b < origins.size(); ++b) {
-    if (most[b] == vec3(0.0F)) continue;
+    if (most[b] == vec(0.0F)) continue;
     max_value = glm::max(max_value, most[b]);
     first.brick_origins.push_back(origins[b]);
     first.bounds_min = glm::min(first.bounds_min, origins[b]);
@@ -152,11 +169,10 @@ grid::RgbField::Components colours_of(const glm::dmat4& index_to_world, const st
   }
   if (kept == 0) first.bounds_min = first.bounds_max = ivec3(0);
   first.active_voxels = kept * brick_voxels;
-  components[2] = components[1] = first;
-  constexpr std::array<const char*, 3> names{", red", ", green", ", blue"};
-  for (std::size_t i = 0; i < 3; ++i) {
+  std::fill(components.begin() + 1, components.end(), first);
+  for (std::size_t i = 0; i < count; ++i) {
     values[i].resize(kept * brick_voxels);
-    components[i].name = name + names[i];
+    components[i].name = name;
     components[i].brick_values = std::move(values[i]);
     components[i].max_value = max_value[static_cast<int>(i)];
   }
@@ -181,12 +197,12 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
     Values temperature{};
   };
   auto radiance =
-      colours_of<Read>((burns ? *frame.flame : *frame.temperature).index_to_world, set.take(), "emission", progress,
-                       [&](const ivec3& origin, Read& read_here) {
-                         if (burns) read(*frame.flame, origin, read_here.flame);
-                         if (hot) read(*frame.temperature, origin, read_here.temperature);
-                       },
-                       [&](const Read& here, std::size_t v) { return glow(here.temperature[v], here.flame[v]); });
+      fields_of<3, Read>((burns ? *frame.flame : *frame.temperature).index_to_world, set.take(), "emission", progress,
+                         [&](const ivec3& origin, Read& read_here) {
+                           if (burns) read(*frame.flame, origin, read_here.flame);
+                           if (hot) read(*frame.temperature, origin, read_here.temperature);
+                         },
+                         [&](const Read& here, std::size_t v) { return glow(here.temperature[v], here.flame[v]); });
   if (radiance[0].empty()) return std::nullopt;
   return radiance;
 }
@@ -196,20 +212,31 @@ std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFram
   if (!frame.colour || frame.density.empty()) return std::nullopt;
   BrickSet set("density");
   set.add(frame.density);
-  struct Read {
-    Values density{};
-    std::array<Values, 3> colour{};
-  };
-  return colours_of<Read>(
+  return fields_of<3, Scatters>(
       frame.density.index_to_world, set.take(), "scattering", progress,
+      [&](const ivec3& origin, Scatters& here) { here.read_brick(frame, density_ramp, origin); },
+      [](const Scatters& here, std::size_t v) { return here.coloured(v); });
+}
+
+std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp,
+                                       const Progress* progress) {
+  if (!frame.anisotropy || frame.density.empty()) return std::nullopt;
+  BrickSet set("density");
+  set.add(frame.density);
+  struct Read {
+    Scatters scatters;
+    std::array<Values, 2> anisotropy{};
+  };
+  return std::move(fields_of<1, Read>(
+      frame.density.index_to_world, set.take(), "anisotropy", progress,
       [&](const ivec3& origin, Read& here) {
-        read(frame.density, origin, here.density);
-        for (std::size_t i = 0; i < 3; ++i) read((*frame.colour)[i], origin, here.colour[i]);
+        here.scatters.read_brick(frame, density_ramp, origin);
+        for (std::size_t i = 0; i < 2; ++i) read((*frame.anisotropy)[i], origin, here.anisotropy[i]);
       },
       [&](const Read& here, std::size_t v) {
-        const vec3 colour(here.colour[0][v], here.colour[1][v], here.colour[2][v]);
-        return density_ramp(here.density[v]) * glm::min(colour, vec3(1.0F));
-      });
+        const float scatters = frame.colour ? luminance(here.scatters.coloured(v)) : here.scatters.density[v];
+        return glm::vec1(scatters * (0.5F + 0.5F * (here.anisotropy[0][v] - here.anisotropy[1][v])));
+      })[0]);
 }
 
 }  // namespace cumulet::scene

@@ -36,4 +36,9 @@ std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFram
                                                         const volume::Ramp& density_ramp = {},
                                                         const Progress* progress = nullptr);
 
+/// Luminance of the ramp of density x colour, of which no component counts above 1, times (1 + anisotropy) / 2, voxel
+/// by voxel. Nothing if the frame has no anisotropy, or no density. Throws as emission_of does.
+std::optional<volume::ScalarVolume> forward_of(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp = {},
+                                               const Progress* progress = nullptr);
+
 }  // namespace cumulet::scene

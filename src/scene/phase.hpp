@@ -10,6 +10,8 @@ struct Phase {
   float second_bend = 0.0F;
   float second_share = 0.0F;
   bool operator==(const Phase&) const = default;
+  /// Whether the first lobe's anisotropy may be another from place to place: not of a fit.
+  [[nodiscard]] bool may_vary() const { return second_bend == 0.0F; }
 };
 
 /// Of water droplets in visible light, by the fit of Jendersie and d'Eon, "An Approximate Mie Scattering Function for

@@ -16,6 +16,7 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
   if (frame.temperature) place(*frame.temperature);
   if (frame.flame) place(*frame.flame);
   if (frame.colour) std::ranges::for_each(*frame.colour, place);
+  if (frame.anisotropy) std::ranges::for_each(*frame.anisotropy, place);
   try {
     return std::make_shared<const VolumeAsset>(std::move(frame), progress);
   } catch (const Error& e) {

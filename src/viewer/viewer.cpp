@@ -73,6 +73,7 @@ void Viewer::sync() {
   if (auto loaded = builder_.take_loaded()) {
     volume_ = std::move(*loaded);
     built_view_.reset();
+    remark_on_anisotropy();
   }
   if (auto built = builder_.take_built()) {
     // A rebuild keeps what the load took.
@@ -122,6 +123,7 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
   sync();
   volume_ = std::move(volume);
   built_view_.reset();
+  remark_on_anisotropy();
   if (!volume_) {
     built_ = {};
   } else if (!grid_.camera_adaptive) {
@@ -276,8 +278,16 @@ void Viewer::set_ramps(const Ramps& ramps) {
   touch();
 }
 
+void Viewer::remark_on_anisotropy() const {
+  if (!volume_ || !volume_->frame().anisotropy || medium_.phase.may_vary()) return;
+  log_.info("grid \"" + (*volume_->frame().anisotropy)[0].name +
+            "\" is not shown: the Mie phase function has an anisotropy of its own");
+}
+
 void Viewer::set_medium(const Medium& medium) {
+  const bool varied = medium_.phase.may_vary();
   medium_ = medium;
+  if (varied) remark_on_anisotropy();
   const scene::Emission emission = field_emission();
   const bool other_emission = grid_.build.emission != emission;
   const grid::RefineSettings& refine = grid_.build.refine;

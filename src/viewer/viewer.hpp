@@ -138,6 +138,7 @@ class Viewer {
   // What grids to come know of the medium.
   void take_medium();
   [[nodiscard]] scene::Emission field_emission() const;
+  void remark_on_anisotropy() const;
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.

@@ -77,16 +77,19 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   // What has a temperature alone would be nothing.
   const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
   if (given.blackbody == 0.0 && alone) given.blackbody = 1.0;
-  const auto field = [&](std::optional<grid::RgbField::Components> components) {
-    return components ? make_left<const grid::RgbField>(*std::move(components), cube_, &progress) : nullptr;
+  const auto field = [&]<class Field>(std::type_identity<Field>, auto values) {
+    return values ? make_left<const Field>(*std::move(values), cube_, &progress) : nullptr;
   };
+  constexpr std::type_identity<grid::RgbField> colours;
+  constexpr std::type_identity<grid::ScalarField> numbers;
   const auto lock = patient_lock(mutex_, progress);
   if (!channels_ || channels_->density_ramp != density_ramp || channels_->emission != given) {
     channels_.reset();
     channels_ = Made{density_ramp,
                      given,
-                     {field(scene::emission_of(*frame_, given, &progress)),
-                      field(scene::scattering_of(*frame_, density_ramp, &progress))}};
+                     {field(colours, scene::emission_of(*frame_, given, &progress)),
+                      field(colours, scene::scattering_of(*frame_, density_ramp, &progress)),
+                      field(numbers, scene::forward_of(*frame_, density_ramp, &progress))}};
   }
   return channels_->channels;
 }

@@ -16,6 +16,8 @@ struct VolumeFrame {
   std::optional<ScalarVolume> temperature = {};  ///< in the file's unit: 0 to 3, as simulations have it, or kelvin
   std::optional<ScalarVolume> flame = {};        ///< how much burns there
   std::optional<std::array<ScalarVolume, 3>> colour = {};  ///< of what scatters: linear Rec. 709; red, green, blue
+  /// The mean cosine of what scatters, from -1 to 1: how far it is above 0, and how far below.
+  std::optional<std::array<ScalarVolume, 2>> anisotropy = {};
 };
 
 /// Which grids of a file are which field. "none" leaves a field out. Empty: the grid whose name, in whatever case,
@@ -31,6 +33,8 @@ struct GridNames {
   /// named, "color" for "color_r", "color_g" and "color_b": those that Mantaflow writes hold colour times density, as
   /// it advects them. They are taken as they are, as Cycles takes them.
   std::string colour = {};
+  /// anisotropy, scatter_anisotropy, phase_anisotropy, phase_g.
+  std::string anisotropy = {};
 };
 
 /// Reads the fields of a .vdb or .nvdb file, each as import_volume reads a grid.
@@ -45,9 +49,9 @@ struct GridNames {
 /// is refused, and voxels smaller than a 64th of the lattice's.
 ///
 /// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
-/// out. Warnings: import_volume's; the grids that are not shown; temperature or colour that lies nowhere over
-/// density. An info tells of colour in three grids that is not read, and of temperatures that seem to be kelvin,
-/// degrees Celsius, or from 0 to 1.
+/// out. Warnings: import_volume's; the grids that are not shown; temperature, colour or anisotropy that lies nowhere
+/// over density; anisotropy beyond -1 and 1, which counts as these. An info tells of colour in three grids that is not
+/// read, and of temperatures that seem to be kelvin, degrees Celsius, or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
 

@@ -16,16 +16,18 @@ namespace {
 constexpr std::array<std::string_view, 3> temperature_names = {"temperature", "heat", "temp"};
 constexpr std::array<std::string_view, 5> flame_names = {"flame", "flames", "fire", "burn", "fuel"};
 constexpr std::array<std::string_view, 3> colour_names = {"cd", "color", "colour"};
+constexpr std::array<std::string_view, 4> anisotropy_names = {"anisotropy", "scatter_anisotropy", "phase_anisotropy",
+                                                              "phase_g"};
 constexpr const char* no_grid = "none";
 
 /// Places in the file's list of grids.
 struct Chosen {
-  std::optional<std::size_t> density, temperature, flame;
+  std::optional<std::size_t> density, temperature, flame, anisotropy;
   std::vector<std::size_t> colour;  ///< none; one of vectors; or red, green and blue
 
   [[nodiscard]] std::vector<std::size_t> all() const {
     std::vector<std::size_t> out = colour;
-    for (const auto& field : {density, temperature, flame}) {
+    for (const auto& field : {density, temperature, flame, anisotropy}) {
       if (field) out.push_back(*field);
     }
     return out;
@@ -83,7 +85,8 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
     taken.push_back(choose_grid(grids, name));
     return taken.back();
   };
-  Chosen out{asked(names.density), asked(names.temperature), asked(names.flame), choose_colour(grids, names.colour)};
+  Chosen out{asked(names.density), asked(names.temperature), asked(names.flame), asked(names.anisotropy),
+             choose_colour(grids, names.colour)};
   const auto find = [&](std::optional<std::size_t>& field, const std::string& name,
                         std::span<const std::string_view> likely) {
     if (by_name(name)) field = first_fog(grids, likely, taken);
@@ -91,6 +94,7 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
   find(out.density, names.density, density_names);
   find(out.temperature, names.temperature, temperature_names);
   find(out.flame, names.flame, flame_names);
+  find(out.anisotropy, names.anisotropy, anisotropy_names);
   const bool nothing = !out.density && !out.temperature && !out.flame;
   if (nothing && !by_name(names.density)) fail_without(grids, "every field is left out; it has ");
   if (nothing) out.density = choose_grid(grids, {});
@@ -166,6 +170,10 @@ class FrameImport {
       remark(LogLevel::info, name_of(*out_.temperature), remark_on_temperature(*out_.temperature));
     }
     if (chosen.flame) out_.flame = field(*chosen.flame);
+    if (chosen.anisotropy) {
+      out_.anisotropy = import_signed_grid(reader, *chosen.anisotropy, file_, log_, progress_, shares.next());
+      clamp_anisotropy();
+    }
     if (chosen.colour.size() == 1) {
       out_.colour = import_vector_grid(reader, chosen.colour[0], file_, log_, progress_, shares.next());
     } else if (!chosen.colour.empty()) {
@@ -177,16 +185,37 @@ class FrameImport {
     std::vector<ScalarVolume*> fields;
     if (out_.temperature) fields.push_back(&*out_.temperature);
     if (out_.flame) fields.push_back(&*out_.flame);
-    if (out_.colour) std::ranges::transform(*out_.colour, std::back_inserter(fields), [](auto& c) { return &c; });
+    const auto pointer = [](ScalarVolume& part) { return &part; };
+    if (out_.colour) std::ranges::transform(*out_.colour, std::back_inserter(fields), pointer);
+    if (out_.anisotropy) std::ranges::transform(*out_.anisotropy, std::back_inserter(fields), pointer);
     Shares shares(portion, fields.size());
     for (ScalarVolume* field : fields) {
       const std::string name = name_of(*field);
       naming(name, [&] { put_on_lattice(*field, shares.next()); });
     }
     if (out_.temperature) warn_if_apart(*out_.temperature);
-    if (out_.colour && std::ranges::all_of(*out_.colour, [&](auto& c) { return apart(c, out_.density); })) {
-      warn_if_apart((*out_.colour)[0]);
+    const auto all_apart = [&](const auto& parts) {
+      return std::ranges::all_of(parts, [&](const ScalarVolume& part) { return apart(part, out_.density); });
+    };
+    if (out_.colour && all_apart(*out_.colour)) warn_if_apart((*out_.colour)[0]);
+    if (out_.anisotropy && all_apart(*out_.anisotropy)) warn_if_apart((*out_.anisotropy)[0]);
+  }
+
+  void clamp_anisotropy() {
+    std::uint64_t beyond = 0;
+    const auto clamp = [&](float& value, std::uint64_t voxels) {
+      if (value > 1.0F) beyond += voxels;
+      value = std::min(value, 1.0F);
+    };
+    for (ScalarVolume& part : *out_.anisotropy) {
+      for (float& value : part.brick_values) clamp(value, 1);
+      for (Tile& tile : part.tiles) clamp(tile.value, Box{tile.min, tile.max}.voxels());
+      clamp(part.background, 0);
+      clamp(part.max_value, 0);
     }
+    if (beyond == 0) return;
+    remark(LogLevel::warning, name_of((*out_.anisotropy)[0]),
+           std::to_string(beyond) + " voxels beyond -1 and 1 clamped to these");
   }
 
   void put_on_lattice(ScalarVolume& field, Portion portion) const {

@@ -471,6 +471,54 @@ std::array<ScalarVolume, 3> detail::import_vector_grid(Reader& reader, std::size
   });
 }
 
+namespace {
+
+/// What is of one sign of another source's values.
+class OneSign final : public LeafSource {
+ public:
+  OneSign(std::shared_ptr<const LeafSource> leaves, float sign) : leaves_(std::move(leaves)), sign_(sign) {}
+
+  /// What is not finite stays so.
+  [[nodiscard]] float operator()(float value) const { return sign_ * value < 0.0F ? 0.0F : sign_ * value; }
+  [[nodiscard]] std::size_t count() const override { return leaves_->count(); }
+  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return leaves_->origin(leaf); }
+  [[nodiscard]] ActiveMask active(std::size_t leaf) const override { return leaves_->active(leaf); }
+  void values(std::size_t leaf, float* out) const override {
+    leaves_->values(leaf, out);
+    std::transform(out, out + brick_voxels, out, std::ref(*this));
+  }
+
+ private:
+  std::shared_ptr<const LeafSource> leaves_;
+  float sign_;
+};
+
+}  // namespace
+
+std::array<ScalarVolume, 2> detail::import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
+                                                       const Log& log, Progress* progress, Portion portion) {
+  const GridInfo& entry = reader.grids()[grid];
+  const std::string name = one_line(file + ": grid \"" + entry.unique_name + "\"");
+  return naming(name, [&] {
+    constexpr double reading = 0.7;
+    SourceGrid whole = reader.read(grid, portion.part(0.0, reading), log, name + ": ");
+    const std::shared_ptr<const LeafSource> leaves = std::move(whole.leaves);
+    const auto part = [&](float sign, const Log& heard, Portion of_load) {
+      auto signed_leaves = std::make_unique<OneSign>(leaves, sign);
+      SourceGrid source{whole.index_to_world, (*signed_leaves)(whole.background), whole.tiles, nullptr};
+      for (SourceTile& tile : source.tiles) tile.box.value = (*signed_leaves)(tile.box.value);
+      source.leaves = std::move(signed_leaves);
+      ScalarVolume volume = assemble(std::move(source), heard, name + ": ", progress, of_load);
+      volume.name = entry.name;
+      return volume;
+    };
+    // Both have the same voxels that are no numbers, or none at all: that is said once.
+    constexpr double half = 0.5 * (1.0 + reading);
+    ScalarVolume above = part(1.0F, log, portion.part(reading, half));
+    return std::array<ScalarVolume, 2>{std::move(above), part(-1.0F, Log(), portion.part(half, 1.0))};
+  });
+}
+
 ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,
                            Progress* progress) {
   return naming(file.string(), [&] {

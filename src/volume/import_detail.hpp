@@ -151,6 +151,10 @@ ScalarVolume import_grid(Reader& reader, std::size_t grid, const std::string& fi
 std::array<ScalarVolume, 3> import_vector_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                const Log& log, Progress* progress, Portion portion);
 
+/// One scalar grid in two: by how much its values are above 0, and by how much below.
+std::array<ScalarVolume, 2> import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
+                                               const Log& log, Progress* progress, Portion portion);
+
 std::string to_string(glm::ivec3 v);
 
 /// A box of voxels, both ends inclusive.

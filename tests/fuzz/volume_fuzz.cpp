@@ -80,6 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (frame.temperature) check_volume(*frame.temperature);
     if (frame.flame) check_volume(*frame.flame);
     if (frame.colour) std::ranges::for_each(*frame.colour, check_volume);
+    if (frame.anisotropy) std::ranges::for_each(*frame.anisotropy, check_volume);
   } catch (const cumulet::Error& error) {
     check_line(error.what(), path);
   } catch (const std::bad_alloc&) {  // told by the caller

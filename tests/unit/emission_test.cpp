@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/error.hpp"
+#include "base/luminance.hpp"
 #include "grid/cell.hpp"
 #include "light/black_body.hpp"
 #include "support/gl_viewer.hpp"
@@ -156,6 +157,119 @@ TEST(Colour, OfACellIsThatOfItsDensity) {
   EXPECT_NEAR(sum.x, left + 0.25 * right, 2e-3 * left);
   EXPECT_NEAR(sum.y, 0.5 * 9.0 / 16.0 * (left + right), 2e-3 * left);
   EXPECT_NEAR(sum.z, 0.125 * (left + right), 2e-3 * left);
+}
+
+// ---- Anisotropy
+
+// The mean cosines that a function gives, above 0 and below.
+template <class Function>
+std::array<ScalarVolume, 2> anisotropy(const ivec3& size, const ivec3& low, Function of) {
+  return {test::make_volume(size, low, [=](const ivec3& p) { return std::max(of(p), 0.0F); }),
+          test::make_volume(size, low, [=](const ivec3& p) { return std::max(-of(p), 0.0F); })};
+}
+
+struct Cells {
+  explicit Cells(const VolumeFrame& frame, const grid::RefineSettings& settings)
+      : cube(grid::fit_cube(frame.density)), statistics(frame.density, cube) {
+    grid::Channels channels;
+    if (auto scattering = scene::scattering_of(frame))
+      channels.scattering = std::make_shared<const grid::RgbField>(*std::move(scattering), cube);
+    if (auto forward = scene::forward_of(frame))
+      channels.forward = std::make_shared<const grid::ScalarField>(*std::move(forward), cube);
+    const grid::DiamondSet diamonds(statistics, channels, settings);
+    grid::GridBuilder builder(statistics, diamonds);
+    builder.bisect();
+    made = builder.records(settings.cells, frame.density.max_value, channels);
+  }
+
+  grid::Cube cube;
+  grid::Statistics statistics;
+  grid::TetGrid made;
+};
+
+float stored_anisotropy(const grid::TetGrid& grid, std::size_t cell) {
+  const auto word = [&](std::size_t i) {
+    return i < grid.anisotropy.size() ? std::uint32_t{static_cast<std::uint16_t>(grid.anisotropy[i])} : 0U;
+  };
+  const std::size_t even = cell & ~std::size_t{1};
+  return core::cm_cell_anisotropy(word(even) | (word(even + 1) << 16U), static_cast<std::uint32_t>(cell));
+}
+
+// Against sums over the sixths of voxels that a cell is made of.
+TEST(Anisotropy, OfACellIsTheMeanOfWhatScattersInIt) {
+  constexpr int size = 16;
+  VolumeFrame frame{.density = test::noise_volume(ivec3(size), ivec3(0), 5)};
+  EXPECT_FALSE(scene::forward_of(frame));
+  const auto g = [](const ivec3& p) { return p.x < 5 ? 0.875F : (p.y < 9 ? -0.5F : 0.25F); };
+  frame.anisotropy = anisotropy(ivec3(size), ivec3(0), g);
+  grid::RefineSettings settings;
+  settings.threshold = 0.3;
+  for (const bool coloured : {false, true}) {
+    if (coloured) {
+      frame.colour = colours(ivec3(size), ivec3(0),
+                             [](const ivec3& p) { return vec3(p.z < 7 ? 1.0F : 0.25F, 0.5F, p.x < 3 ? 0.0F : 1.0F); });
+    }
+    const Cells cells(frame, settings);
+    const grid::TetGrid& made = cells.made;
+    ASSERT_EQ(made.anisotropy.size(), made.cells.size());
+    EXPECT_GT(made.cells.size(), 100U);
+    std::vector<double> scattering(made.cells.size());
+    std::vector<double> forward(made.cells.size());
+    for (int i = 0; i < size * size * size; ++i) {
+      const ivec3 p(i / (size * size), i / size % size, i % size);
+      double scatters = test::value_at(frame.density, p + cells.cube.origin);
+      if (coloured) {
+        vec3 colour;
+        for (int c = 0; c < 3; ++c)
+          colour[c] = test::value_at((*frame.colour)[static_cast<std::size_t>(c)], p + cells.cube.origin);
+        scatters *= luminance(colour);
+      }
+      const ivec3 odd = p & 1;
+      for (const ivec3& order :
+           {ivec3(0, 1, 2), ivec3(0, 2, 1), ivec3(1, 0, 2), ivec3(1, 2, 0), ivec3(2, 0, 1), ivec3(2, 1, 0)}) {
+        vec3 middle(p + odd);
+        for (int k = 0; k < 3; ++k) {
+          const float along = 0.25F * static_cast<float>(3 - k);
+          middle[order[k]] += odd[order[k]] != 0 ? -along : along;
+        }
+        const std::uint32_t cell = grid::locate(made, middle);
+        scattering[cell] += scatters;
+        forward[cell] += scatters * g(p + cells.cube.origin);
+      }
+    }
+    for (std::size_t cell = 0; cell < made.cells.size(); ++cell) {
+      const double mean = scattering[cell] > 0.0 ? forward[cell] / scattering[cell] : 0.0;
+      ASSERT_NEAR(stored_anisotropy(made, cell), mean, 1e-4) << cell;
+    }
+  }
+}
+
+TEST(Anisotropy, StaysShortOfOne) {
+  for (const float all : {-1.0F, 1.0F}) {
+    VolumeFrame frame{.density = field(ivec3(8), ivec3(0), 1.0F)};
+    frame.anisotropy = anisotropy(ivec3(8), ivec3(0), [=](const ivec3& /*p*/) { return all; });
+    const Cells cells(frame, {});
+    EXPECT_NEAR(stored_anisotropy(cells.made, 0), 0.999F * all, 1e-4F);
+  }
+}
+
+TEST(Anisotropy, CellsAreSplitWhereItVaries) {
+  VolumeFrame frame{.density = field(ivec3(64), ivec3(0), 1.0F)};
+  const auto count = [&](grid::Criterion criterion) {
+    grid::RefineSettings settings;
+    settings.criterion = criterion;
+    settings.threshold = 0.1;
+    settings.density_scale = 0.05;
+    return Cells(frame, settings).made.cells.size();
+  };
+  for (const auto criterion : {grid::Criterion::deviation, grid::Criterion::transmittance}) {
+    frame.anisotropy.reset();
+    const std::size_t of_density = count(criterion);
+    frame.anisotropy = anisotropy(ivec3(64), ivec3(0), [](const ivec3& /*p*/) { return 0.5F; });
+    EXPECT_EQ(count(criterion), of_density);
+    frame.anisotropy = anisotropy(ivec3(64), ivec3(0), [](const ivec3& p) { return p.x < 21 ? 0.9F : -0.5F; });
+    EXPECT_GT(count(criterion), 4 * of_density);
+  }
 }
 
 // ---- Pictures
@@ -389,6 +503,95 @@ TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
       EXPECT_EQ(x < 16.0 ? mean.y : mean.x, 0.0);
     }
   }
+}
+
+TEST_P(EmissionPicture, AnAnisotropyIsTheMediums) {
+  const auto viewer = make();
+  viewer->set_light({0.0F, 40.0F, vec3(2.0F), vec3(0.25F)});
+  viewer::Medium medium;
+  medium.density_scale = 0.3;
+  medium.albedo = vec3(0.75F);
+  const VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 2.0F)};
+  for (const float second_share : {0.0F, 0.25F}) {
+    for (const Kind& kind : kinds) {
+      set(*viewer, kind);
+      medium.phase = {.anisotropy = 0.75F, .second_anisotropy = -0.5F, .second_share = second_share};
+      viewer->set_medium(medium);
+      show(*viewer, VolumeFrame{.density = frame.density});
+      const glm::dvec4 setting = look(*viewer, 500.0, 256).mean();
+      VolumeFrame varied{.density = frame.density};
+      varied.anisotropy = anisotropy({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 0.75F; });
+      show(*viewer, std::move(varied));
+      medium.phase.anisotropy = -0.9F;
+      viewer->set_medium(medium);
+      const glm::dvec4 grid = look(*viewer, 500.0, 256).mean();
+      EXPECT_NEAR(grid.x, setting.x, 2e-3 * setting.x);
+    }
+  }
+}
+
+// Two slabs side by side, each with the light that a first scattering sends up.
+TEST_P(EmissionPicture, AnAnisotropyIsThatOfItsPlace) {
+  const auto viewer = make();
+  const double height = std::asin(0.6);
+  viewer->set_light({0.0F, static_cast<float>(glm::degrees(height)), vec3(4.0F), vec3(0.0F)});
+  VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 1.0F)};
+  frame.anisotropy = anisotropy({64, 64, 8}, ivec3(0), [](const ivec3& p) { return p.x < 32 ? 0.5F : -0.25F; });
+  show(*viewer, std::move(frame));
+  viewer::Medium medium;
+  medium.density_scale = 0.1;
+  medium.max_bounces = 1;
+  viewer->set_medium(medium);
+  for (const Kind& kind : kinds) {
+    set(*viewer, kind);
+    for (const double x : {15.5, 47.5}) {
+      const double g = x < 32.0 ? 0.5 : -0.25;
+      const double cosine = -std::cos(height);
+      const double phase = (1.0 - g * g) / (4.0 * M_PI * std::pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
+      const double ways = 1.0 + 1.0 / std::cos(height);
+      const double light = 4.0 * phase * (1.0 - std::exp(-0.1 * 8.0 * ways)) / ways;
+      viewer->set_camera(test::camera_at({x, 31.5, 500.0}, {x, 31.5, 0.0}, 0.5));
+      const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
+      EXPECT_NEAR(picture.mean().x, light, 6e-3 * light) << x;
+    }
+  }
+}
+
+// Triangles bring other kernels: their medium scatters alike.
+TEST_P(EmissionPicture, AnAnisotropyHoldsAmongSurfaces) {
+  const auto viewer = make();
+  viewer->set_light({0.0F, 40.0F, vec3(2.0F), vec3(0.25F)});
+  viewer::Medium medium;
+  medium.density_scale = 0.1;
+  test::StillScene wall;
+  wall.add_quad({vec3(-100, -100, -5), vec3(100, -100, -5), vec3(100, 100, -5), vec3(-100, 100, -5)},
+                wall.add(test::diffuse(vec3(0.5F))));
+  std::array<double, 2> means{};
+  for (const bool varied : {false, true}) {
+    VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 1.0F)};
+    if (varied) frame.anisotropy = anisotropy({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 0.75F; });
+    medium.phase.anisotropy = varied ? 0.0F : 0.75F;
+    viewer->set_medium(medium);
+    show(*viewer, std::move(frame));
+    viewer->viewer().show_surfaces(test::source_of(std::make_shared<test::StillScene>(wall)));
+    means[varied ? 1 : 0] = look(*viewer, 500.0, 256).mean().x;
+  }
+  EXPECT_NEAR(means[1], means[0], 6e-3 * means[0]);
+}
+
+TEST_P(EmissionPicture, MieKeepsItsOwnAnisotropy) {
+  const auto viewer = make();
+  viewer->set_light({0.0F, 40.0F, vec3(2.0F), vec3(0.25F)});
+  viewer::Medium medium;
+  medium.density_scale = 0.3;
+  medium.phase = scene::mie_phase(10.0F);
+  viewer->set_medium(medium);
+  VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 1.0F)};
+  show(*viewer, VolumeFrame{.density = frame.density});
+  const test::Picture without = look(*viewer, 500.0, 4);
+  frame.anisotropy = anisotropy({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return -0.5F; });
+  show(*viewer, std::move(frame));
+  EXPECT_EQ(look(*viewer, 500.0, 4).pixels, without.pixels);
 }
 
 // A small fire in thick smoke, seen by what it lights: flights alone come to it seldom, looks as often as they like.

@@ -174,6 +174,7 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
                                 "medium.temperature_grid",
                                 "medium.flame_grid",
                                 "medium.color_grid",
+                                "medium.anisotropy_grid",
                                 "surfaces.file",
                                 "surfaces.camera",
                                 "camera.eye",

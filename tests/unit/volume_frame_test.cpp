@@ -186,6 +186,82 @@ TEST_F(Frame, ColourOfVectors) {
   }
 }
 
+// A value that two volumes hold, above 0 and below.
+float anisotropy_at(const VolumeFrame& frame, const glm::ivec3& p) {
+  return value_at((*frame.anisotropy)[0], p) - value_at((*frame.anisotropy)[1], p);
+}
+
+TEST_F(Frame, AnisotropyIsFoundWithItsSign) {
+  const auto grid = fog("Anisotropy");
+  for (int i = 0; i < 100; ++i) grid->tree().setValue(Coord(i % 11, i % 7, i % 5), static_cast<float>(i - 50) / 50.0F);
+  grid->tree().addTile(1, Coord(16, 0, 0), -0.75F, true);
+  const auto expect = [&](const VolumeFrame& frame) {
+    ASSERT_TRUE(frame.anisotropy);
+    for (auto it = grid->cbeginValueOn(); it; ++it) {
+      const glm::ivec3 p(it.getCoord().x(), it.getCoord().y(), it.getCoord().z());
+      ASSERT_EQ(anisotropy_at(frame, p), *it) << it.getCoord();
+    }
+    EXPECT_EQ(anisotropy_at(frame, glm::ivec3(-3)), 0.0F);
+  };
+  const auto density = dot("density", 1.0F);
+  for (const bool half : {false, true}) {
+    grid->setSaveFloatAsHalf(half);
+    Messages messages;
+    if (half) grid->tree().voxelizeActiveTiles();
+    for (auto it = grid->beginValueOn(); half && it; ++it) it.setValue(static_cast<float>(openvdb::math::half(*it)));
+    const auto file = write({density, grid});
+    expect(import_frame(file, {}, messages.log));
+    EXPECT_TRUE(messages.warnings.empty());
+    EXPECT_FALSE(import_frame(file, naming({{&GridNames::anisotropy, "none"}}), {}).anisotropy);
+    EXPECT_HAS(refusal(file, naming({{&GridNames::anisotropy, "nope"}})), "\"nope\"");
+    EXPECT_FALSE(import_frame(file, naming({{&GridNames::temperature, "Anisotropy"}}), {}).anisotropy);
+  }
+  const fs::path nano = folder_ / "frame.nvdb";
+  std::vector<nanovdb::GridHandle<>> handles;
+  handles.push_back(nanovdb::openToNanoVDB(*density));
+  handles.push_back(nanovdb::openToNanoVDB(*grid));
+  nanovdb::io::writeGrids<nanovdb::HostBuffer, std::vector>(nano.string(), handles);
+  expect(import_frame(nano, {}, {}));
+  for (const char* name : {"scatter_anisotropy", "phase_anisotropy", "phase_g"}) {
+    grid->setName(name);
+    EXPECT_TRUE(import_frame(write({density, grid}), {}, {}).anisotropy) << name;
+  }
+}
+
+TEST_F(Frame, AnisotropyBeyondOneIsClamped) {
+  const auto grid = fog("anisotropy");
+  grid->tree().setValue(Coord(0, 0, 0), 1.5F);
+  grid->tree().setValue(Coord(0, 0, 1), -30.0F);
+  grid->tree().setValue(Coord(0, 0, 2), std::numeric_limits<float>::quiet_NaN());
+  grid->tree().setValue(Coord(0, 0, 3), 0.5F);
+  grid->tree().addTile(1, Coord(16, 0, 0), -2.0F, true);
+  Messages messages;
+  const VolumeFrame frame = import_frame(write({dot("density", 1.0F), grid}), {}, messages.log);
+  EXPECT_EQ(anisotropy_at(frame, {0, 0, 0}), 1.0F);
+  EXPECT_EQ(anisotropy_at(frame, {0, 0, 1}), -1.0F);
+  EXPECT_EQ(anisotropy_at(frame, {0, 0, 2}), 0.0F);
+  EXPECT_EQ(anisotropy_at(frame, {0, 0, 3}), 0.5F);
+  EXPECT_EQ(anisotropy_at(frame, {17, 1, 1}), -1.0F);
+  EXPECT_EQ((*frame.anisotropy)[1].max_value, 1.0F);
+  ASSERT_EQ(messages.warnings.size(), 2U);
+  EXPECT_HAS(messages.warnings[0], "1 non-finite voxel counted as 0");
+  EXPECT_HAS(messages.warnings[1], "grid \"anisotropy\": 514 voxels beyond -1 and 1 clamped to these");
+}
+
+// Grids that lie otherwise are resampled with their signs.
+TEST_F(Frame, AnisotropyIsResampled) {
+  const auto density = fog("density");
+  density->fill({{0, 0, 0}, {15, 15, 15}}, 1.0F);
+  const auto grid = fog("anisotropy");
+  grid->fill({{0, 0, 0}, {3, 7, 7}}, -0.5F);
+  grid->fill({{4, 0, 0}, {7, 7, 7}}, 0.5F);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(2.0));
+  const VolumeFrame frame = import_frame(write({density, grid}), {}, {});
+  EXPECT_NEAR(anisotropy_at(frame, {4, 8, 8}), -0.5F, 1e-6F);
+  EXPECT_NEAR(anisotropy_at(frame, {10, 8, 8}), 0.5F, 1e-6F);
+  EXPECT_NEAR(anisotropy_at(frame, {7, 8, 8}), 0.0F, 1e-6F) << "half way between";
+}
+
 TEST_F(Frame, AllBlackAndEmptyColours) {
   auto black = colours("Cd");
   black->tree().clear();

@@ -280,6 +280,12 @@ typedef struct cumulet_volume_file_desc {
   const char* temperature_grid;
   const char* flame_grid;
   const char* color_grid;
+  /*
+   * Henyey-Greenstein g from place to place, -1 to 1: where the file has it, it stands in place of
+   * cumulet_medium_desc.anisotropy, of two lobes the first one's; not of Mie. A cell has the mean of what scatters in
+   * it, at most 0.999 either way; where the grid has nothing, 0.
+   */
+  const char* anisotropy_grid;
 } cumulet_volume_file_desc;
 
 CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
@@ -706,7 +712,8 @@ typedef struct cumulet_medium_desc {
   size_t struct_size;
   double density_scale; /* extinction = density_scale x grid value, 1 / world unit; 0: 1 */
   float coalbedo[3];    /* 1 - single-scattering albedo, each in [0, 1]; 0: nothing is absorbed */
-  float anisotropy;     /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic. Not of Mie */
+  float anisotropy;     /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic. Not of Mie, nor where the
+                           volume has an anisotropy_grid */
   uint32_t max_bounces; /* scattering events a path may have; 0: no limit */
   /*
    * Source radiance: each point gives off extinction x emission per unit of length, so that a body of the medium too

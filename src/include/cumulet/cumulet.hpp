@@ -298,6 +298,7 @@ struct VolumeFileDesc {
   const char* temperature_grid = nullptr;
   const char* flame_grid = nullptr;
   const char* color_grid = nullptr;
+  const char* anisotropy_grid = nullptr;
 
   operator cumulet_volume_file_desc() const noexcept {
     cumulet_volume_file_desc c{.struct_size = sizeof c,
@@ -306,7 +307,8 @@ struct VolumeFileDesc {
                                .to_world = {},
                                .temperature_grid = temperature_grid,
                                .flame_grid = flame_grid,
-                               .color_grid = color_grid};
+                               .color_grid = color_grid,
+                               .anisotropy_grid = anisotropy_grid};
     std::ranges::copy(to_world, c.to_world);
     return c;
   }
