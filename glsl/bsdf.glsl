@@ -197,23 +197,33 @@ CM_FN vec3 cm_bend_normal(vec3 normal, vec3 geometric, vec3 wo) {
   return bent2 > 1e-12f ? bent * (1.0f / sqrt(bent2)) : geometric;
 }
 
-// What a sky of constant radiance 1 comes back as, nothing in its way: the integral of cm_bsdf_eval over wi.
-CM_FN vec3 cm_bsdf_albedo(CmSurface s, vec3 wo) {
+// What a sky of constant radiance 1 comes back as, nothing in its way: the integral of cm_bsdf_eval over wi, by lobes.
+struct CmAlbedos {
+  vec3 base;
+  vec3 coat;
+  vec3 matte;
+};
+
+CM_FN CmAlbedos cm_bsdf_albedos(CmSurface s, vec3 wo) {
   float cosine = clamp(dot(s.normal, wo), 0.0f, 1.0f);
   vec3 f0 = mix(s.f0, s.base_color, s.metallic);
   float f90 = mix(s.specular, 1.0f, s.metallic);
   vec2 base = cm_ggx_albedo(s.roughness, cosine);
   vec3 sum = f0 * base.x + vec3(f90 * base.y);
   vec3 matte = cm_matte_albedo(s, cosine);
+  vec3 coated = vec3(0.0f);
   if (s.clearcoat > 0.0f) {
     vec2 coat = cm_ggx_albedo(s.clearcoat_roughness, cosine);
     float through = cm_below_coat(s, coat);
     float through_all = cm_below_coat(s, cm_ggx_albedo_average(s.clearcoat_roughness));
     sum *= mix(through, min(through, through_all), s.roughness);  // smooth: the way out is as steep as the way in
     matte *= through;
-    sum += vec3(s.clearcoat * (CM_COAT_F0 * coat.x + coat.y));
+    coated = vec3(s.clearcoat * (CM_COAT_F0 * coat.x + coat.y));
   }
-  return sum + matte;
+  return CmAlbedos(sum, coated, matte);
 }
+
+CM_FN vec3 cm_albedo_of(CmAlbedos albedos) { return albedos.base + albedos.coat + albedos.matte; }
+CM_FN vec3 cm_bsdf_albedo(CmSurface s, vec3 wo) { return cm_albedo_of(cm_bsdf_albedos(s, wo)); }
 
 #endif

@@ -1,5 +1,5 @@
 #version 450
-// A surface as it is lit without shadows: by the sun, the scene's lights and a constant sky. Linear, premultiplied.
+// A surface as it is lit without shadows: by the sun, the scene's lights and the sky. Linear, premultiplied.
 // CM_ALPHA: 0 opaque, 1 mask, 2 blend, which transmission is drawn as too. CM_USED: a bit a map that there is; CM_COATED:
 // 1 with a coat. What a material has not is not even compiled: not every driver skips what a uniform forbids.
 // variants: CM_ALPHA=0,1,2 CM_USED=0..1023 CM_COATED=0,1
@@ -89,6 +89,17 @@ vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
   return cm_bend_normal(matte_normal, g, wo);
 }
 
+// What a lobe sees of the sky beyond its mean.
+vec3 cm_sky_beyond(vec3 w, vec2 orders) {
+  vec2 turn = cm_view.sky_turn.xy;
+  vec3 turned = vec3(turn.x * w.x - turn.y * w.z, w.y, turn.x * w.z + turn.y * w.x);
+  return max(cm_harmonics(cm_view.sky, turned, orders), -cm_view.sky_radiance.rgb);
+}
+
+vec3 cm_gloss_beyond(CmSurface s, vec3 wo, float roughness) {
+  return cm_sky_beyond(cm_gloss_middle(s.normal, wo, roughness), cm_gloss_orders(cm_alpha(roughness)));
+}
+
 void main() {
   vec4 base = cm_material.base_color * cm_vertex_color;
   if (cm_has(CM_MAP_BASE_COLOR)) base *= CM_SAMPLE(CM_MAP_BASE_COLOR);
@@ -130,7 +141,14 @@ void main() {
 #endif
     float occlusion = 1.0;
     if (cm_has(CM_MAP_OCCLUSION)) occlusion += reflection.w * (CM_SAMPLE(CM_MAP_OCCLUSION).r - 1.0);
-    colour = cm_view.sky_radiance.rgb * occlusion * cm_bsdf_albedo(s, wo);
+    CmAlbedos albedos = cm_bsdf_albedos(s, wo);
+    colour = cm_view.sky_radiance.rgb * occlusion * cm_albedo_of(albedos);
+    vec3 beyond = albedos.matte * cm_sky_beyond(s.matte_normal, CM_MATTE_ORDERS);
+    beyond += albedos.base * cm_gloss_beyond(s, wo, s.roughness);
+#if CM_COATED
+    beyond += albedos.coat * cm_gloss_beyond(s, wo, s.clearcoat_roughness);
+#endif
+    colour += occlusion * beyond;
     colour += cm_view.sun_irradiance.rgb * cm_bsdf_eval(s, wo, cm_view.sun_direction.xyz);
     for (uint i = 0u; i < cm_view.counts.x; ++i) {
       vec3 wi;

@@ -2,6 +2,7 @@
 // 16 bytes, or arrays of such).
 #ifndef CM_SURFACE_PARAMETERS_GLSL
 #define CM_SURFACE_PARAMETERS_GLSL
+#include "harmonics.glsl"
 
 // Textures of a material.
 const int CM_MAP_BASE_COLOR = 0;
@@ -30,7 +31,9 @@ layout(std140, binding = CM_UNIFORM_SURFACE_VIEW) uniform CmSurfaceView {
   vec4 forward;         // unit
   vec4 sun_direction;   // unit, towards the sun
   vec4 sun_irradiance;
-  vec4 sky_radiance;
+  vec4 sky_radiance;    // the mean
+  CmHarmonics sky;      // what there is beyond it, before it is turned
+  vec4 sky_turn;        // from +Z towards +X: cosine, sine
   uvec4 counts;         // x: lights
 #ifdef __cplusplus
 };

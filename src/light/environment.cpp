@@ -41,6 +41,41 @@ vec3 unpack(const Packed& packed) {
   return vec3(rg, b.x) * std::bit_cast<float>(packed.w & 0xFFFF0000U);
 }
 
+/// radiance: of texel i; sines: the sum of all texels'.
+template <class Radiance>
+Harmonics project(std::uint32_t width, std::uint32_t height, double sines, const glm::dvec3& mean,
+                  const Radiance& radiance) {
+  // Means of radiance times w, and times products of w's components.
+  std::array<glm::dvec3, 3> first{};
+  std::array<glm::dvec3, 5> second{};  // xy, yz, zx, xx, yy
+  std::vector<glm::dvec2> level(width);
+  for (std::uint32_t x = 0; x < width; ++x) {
+    const double azimuth = 2.0 * std::numbers::pi * (0.5 - (x + 0.5) / width);
+    level[x] = {std::sin(azimuth), std::cos(azimuth)};
+  }
+  for (std::uint32_t y = 0; y < height; ++y) {
+    const double down = std::numbers::pi * (y + 0.5) / height;
+    for (std::uint32_t x = 0; x < width; ++x) {
+      const glm::dvec3 w(std::sin(down) * level[x].x, std::cos(down), std::sin(down) * level[x].y);
+      const glm::dvec3 light = std::sin(down) / sines * glm::dvec3(radiance(std::size_t{y} * width + x));
+      for (int i = 0; i < 3; ++i) first[static_cast<std::size_t>(i)] += w[i] * light;
+      second[0] += w.x * w.y * light;
+      second[1] += w.y * w.z * light;
+      second[2] += w.z * w.x * light;
+      second[3] += w.x * w.x * light;
+      second[4] += w.y * w.y * light;
+    }
+  }
+  // 3 <L v> w, and 15/2 w (<L v v> - <L> / 3) w, whose last diagonal element is the others' less.
+  Harmonics found{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    found[i] = vec3(3.0 * first[i]);
+    found[3 + i] = vec3(15.0 * second[i]);
+  }
+  for (std::size_t i = 0; i < 2; ++i) found[6 + i] = vec3(7.5 * (second[3 + i] - mean / 3.0));
+  return found;
+}
+
 }  // namespace
 
 void check_environment_size(const std::string& name, std::int64_t width, std::int64_t height) {
@@ -88,6 +123,9 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
     }
   }
   made->mean /= sines;
+  made->harmonics = project(pixels.width, pixels.height, sines, made->mean, [&](std::size_t i) {
+    return unpack({made->words[i].z, made->words[i].w});
+  });
   if (!(sum > 0.0)) return made;
   const double unit = 2.0 * std::numbers::pi * std::numbers::pi / static_cast<double>(weights.size());
   made->density = static_cast<float>(1.0 / (sum * unit));

@@ -2,6 +2,7 @@
 
 // An equirectangular picture of all that is far away, as a light. No GL.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -19,6 +20,10 @@ struct EnvironmentPixels {
   std::vector<glm::vec3> values;
 };
 
+/// What radiance of all directions has beyond its mean: coefficients of x, y, z, xy, yz, zx, xx - zz and yy - zz, in
+/// the order of glsl/harmonics.glsl.
+using Harmonics = std::array<glm::vec3, 8>;
+
 /// The picture with what it takes to look for light in it (glsl/environment.glsl). Immutable, and shared.
 struct Environment {
   static constexpr std::uint32_t max_side = 16384;
@@ -31,6 +36,7 @@ struct Environment {
   /// red and green, blue as halves in units of the float whose upper half is w's.
   std::vector<glm::uvec4> words;
   glm::dvec3 mean{0.0};  ///< over all directions
+  Harmonics harmonics{};
   /// Of looks by solid angle, over a texel's weight by the sine: the weights' sum times a texel's solid angle by the
   /// sine, inverted. 0: there is no light.
   float density = 0.0F;

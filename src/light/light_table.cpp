@@ -58,6 +58,18 @@ glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings)
   return glm::vec3(surroundings.environment->mean * double{surroundings.strength});
 }
 
+glm::vec2 turn_of(const Surroundings& surroundings) {
+  const double angle = surroundings.rotation_degrees * std::numbers::pi / 180.0;
+  return {std::cos(angle), std::sin(angle)};
+}
+
+Harmonics harmonics_of(const Surroundings& surroundings) {
+  if (!surroundings.environment) return {};
+  Harmonics harmonics = surroundings.environment->harmonics;
+  for (glm::vec3& coefficient : harmonics) coefficient *= surroundings.strength;
+  return harmonics;
+}
+
 LightTable::LightTable(const DistantLights& distant, const Surroundings& surroundings, const SceneLights& scene,
                        const MediumLight& medium)
     : distant_(with_mean(distant, surroundings)), surroundings_(surroundings) {
@@ -108,8 +120,7 @@ core::CmLights LightTable::parameters() const {
   p.cell_chance = chance(Kind::cell);
   p.environment_chance = chance(Kind::environment);
   p.environment_strength = surroundings_.strength;
-  const double angle = surroundings_.rotation_degrees * std::numbers::pi / 180.0;
-  p.environment_turn = glm::vec2(std::cos(angle), std::sin(angle));
+  p.environment_turn = turn_of(surroundings_);
   return p;
 }
 

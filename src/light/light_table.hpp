@@ -24,6 +24,12 @@ struct MediumLight {
   double radius = 0.0;  ///< world: of the box that it is in
 };
 
+/// Cosine and sine of what an environment is turned by, from +Z towards +X.
+glm::vec2 turn_of(const Surroundings& surroundings);
+
+/// What an environment is beyond its mean, before it is turned; of a sky nothing.
+Harmonics harmonics_of(const Surroundings& surroundings);
+
 /// The sky's radiance; the mean over all directions of an environment that is there instead.
 glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings);
 

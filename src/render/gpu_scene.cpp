@@ -172,9 +172,13 @@ light::Surroundings GpuScene::surroundings(const scene::Snapshot& snapshot) cons
   return environment_.of() == snapshot.surroundings->environment ? *snapshot.surroundings : surroundings_;
 }
 
+light::Surroundings GpuScene::sky_surroundings(const scene::Snapshot& snapshot) const {
+  return environment_ ? surroundings(snapshot) : *snapshot.surroundings;
+}
+
 light::DistantLights GpuScene::lights(const scene::Snapshot& snapshot) const {
   light::DistantLights lights = *snapshot.lights;
-  lights.sky_radiance = light::sky_of(lights, environment_ ? surroundings(snapshot) : *snapshot.surroundings);
+  lights.sky_radiance = light::sky_of(lights, sky_surroundings(snapshot));
   return lights;
 }
 
@@ -185,7 +189,9 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   obstacles.traced = traced || obstacles.raster == nullptr;
   if (*snapshot.view) obstacles.view = **snapshot.view;
   const light::DistantLights lights = this->lights(snapshot);
-  obstacles.lighting = {glm::vec3(lights.to_sun), lights.sun_irradiance, lights.sky_radiance, *snapshot.lamps};
+  const light::Surroundings around = sky_surroundings(snapshot);
+  obstacles.lighting = {glm::vec3(lights.to_sun),    lights.sun_irradiance,  lights.sky_radiance,
+                        light::harmonics_of(around), light::turn_of(around), *snapshot.lamps};
   obstacles.environment = environment_.get();
   obstacles.lamps = lamps_.get();
   return obstacles;

@@ -71,6 +71,8 @@ class GpuScene {
   void drop_data();
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   void update_lamps(const scene::Part<light::Lamps>& of_host, const Wanted& wanted);
+  // By the environment that is there, or is to be.
+  [[nodiscard]] light::Surroundings sky_surroundings(const scene::Snapshot& snapshot) const;
   void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
 
   gl::FunctionsPtr gl_;

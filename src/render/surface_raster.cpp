@@ -59,6 +59,11 @@ glm::dvec2 depth_of(const SurfaceView& view, const glm::dmat3& matrix, const glm
   return {far / (far - near), -1.0 / (far - near)};
 }
 
+core::CmHarmonics block_of(const light::Harmonics& harmonics) {
+  const auto at = [&](std::size_t i) { return glm::vec4(harmonics.at(i), 0.0F); };
+  return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
+}
+
 GLint wrap_of(surface::Wrap wrap) {
   switch (wrap) {
     case surface::Wrap::mirrored:
@@ -316,6 +321,8 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sun_direction = glm::vec4(lighting.sun_direction, 0.0F);
   block.sun_irradiance = glm::vec4(lighting.sun_irradiance, 0.0F);
   block.sky_radiance = glm::vec4(lighting.sky_radiance, 0.0F);
+  block.sky = block_of(lighting.sky);
+  block.sky_turn = glm::vec4(lighting.sky_turn, 0.0F, 0.0F);
   const std::span<const surface::PunctualLight> lamps =
       content_ ? std::span(content_->pose_->lights) : std::span<const surface::PunctualLight>();
   light::Lamps of_host(lighting.lamps.begin(), lighting.lamps.end());

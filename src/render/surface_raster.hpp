@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "light/environment.hpp"
 #include "render/upload.hpp"
 #include "scene/raster_source.hpp"
 #include "scene/snapshot.hpp"
@@ -21,7 +22,9 @@ using SurfaceView = scene::Viewpoint;
 struct SurfaceLighting {
   glm::vec3 sun_direction{0.0F, 1.0F, 0.0F};  ///< unit, towards the sun
   glm::vec3 sun_irradiance{0.0F};             ///< on a plane that faces it
-  glm::vec3 sky_radiance{0.0F};               ///< the same from everywhere
+  glm::vec3 sky_radiance{0.0F};               ///< the mean over all directions
+  light::Harmonics sky{};                     ///< what there is beyond it, before it is turned
+  glm::vec2 sky_turn{1.0F, 0.0F};             ///< as light::turn_of() has it
   light::Lamps lamps;
   bool operator==(const SurfaceLighting&) const = default;
 };

@@ -17,9 +17,11 @@
 #include "grid/cell.hpp"
 #include "light/environment_file.hpp"
 #include "light/light_table.hpp"
+#include "scene/raster_source.hpp"
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/osmesa_leaks.hpp"
+#include "support/surfaces.hpp"
 #include "support/volumes.hpp"
 
 // Marches share one signature; each leaves some of it unused. So do kinds of light.
@@ -147,6 +149,49 @@ TEST(Environment, TheDensityOfLooksIntegratesToOneAndIsThatOfWhatIsDrawn) {
     EXPECT_NEAR(drawn[bin], count, 4.5 * std::sqrt(count) + 0.004 * count + 2.0) << bin;
   }
   EXPECT_NEAR(mean, 4.0 * pi * environment->mean.y, 0.02 * mean);
+}
+
+core::CmHarmonics block_of(const light::Harmonics& h) {
+  const auto at = [&](std::size_t i) { return glm::vec4(h[i], 0.0F); };
+  return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
+}
+
+// Irradiance over pi, by harmonics and by quadrature, for normals all around.
+void expect_irradiance(const light::Environment& environment, double share) {
+  core::CpuEnvironment cpu = twin(environment);
+  const core::CmHarmonics harmonics = block_of(environment.harmonics);
+  constexpr int columns = 128;
+  constexpr int rows = 64;
+  for (int k = 0; k < 40; ++k) {
+    const vec3 normal = direction(2.4 * k, std::acos(1.0 - 2.0 * (k + 0.5) / 40.0));
+    dvec3 expected(0.0);
+    for (int i = 0; i < columns * rows; ++i) {
+      const double down = pi * (std::floor(double(i) / columns) + 0.5) / rows;
+      const vec3 w = direction(2.0 * pi * (i % columns + 0.5) / columns, down);
+      const double area = 2.0 * pi * pi / (columns * rows) * std::sin(down);
+      expected += dvec3(cpu.cm_environment_radiance(w)) * (area / pi * std::max(0.0F, glm::dot(normal, w)));
+    }
+    const dvec3 got = environment.mean + dvec3(core::cm_harmonics(harmonics, normal, core::CM_MATTE_ORDERS));
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], expected[c], share * environment.mean[c]) << k << ' ' << c;
+  }
+}
+
+// Above warm, below cold, and the right half brighter than the left.
+vec3 two_colours(std::uint32_t x, std::uint32_t y) {
+  return (y < 32 ? vec3(1.0F, 0.6F, 0.2F) : vec3(0.1F, 0.3F, 0.9F)) * (x < 64 ? 1.0F : 0.5F);
+}
+
+TEST(Environment, HarmonicsHaveTheIrradiance) {
+  expect_irradiance(*made(128, 64, [](auto, auto) { return vec3(0.3F, 2.0F, 7.0F); }), 1e-3);
+  expect_irradiance(*made(128, 64, two_colours), 0.01);
+  // Smooth, of all orders up to the second: exact but for the texels.
+  const auto smooth = made(128, 64, [](std::uint32_t x, std::uint32_t y) {
+    const vec3 w = direction(2.0 * pi * (0.5 - (x + 0.5) / 128.0), pi * (y + 0.5) / 64.0);
+    return vec3(2.0F + w.x - 0.5F * w.y, 1.5F + w.x * w.z + w.z, 2.0F + w.y * w.y - w.x * w.x + w.y * w.z + w.x * w.y);
+  });
+  expect_irradiance(*smooth, 2e-3);
+  // The worst: light from one direction alone, which has 4 times its mean where it is met.
+  expect_irradiance(*made(128, 64, [](auto x, auto y) { return vec3(x == 20 && y == 25 ? 5000.0F : 0.0F); }), 0.35);
 }
 
 TEST(Environment, PixelsThatAreNoRadianceCountAsZeroAndAreTold) {
@@ -301,6 +346,53 @@ TEST_P(Surrounded, AFurnaceIsOfOneColour) {
   const Seen seen = see(*still, 64);
   EXPECT_NEAR(seen.mean.x, 1.0, 4.0 * seen.error.x + 1e-4);
   EXPECT_LT(seen.error.x, 2e-3);
+}
+
+// Shading without shadows is exact for what is convex.
+TEST_P(Surrounded, RasterisedSpheresAreLitAsTracedOnes) {
+  const auto still = make();
+  still->set_volume(test::make_volume(ivec3(4), ivec3(-2, -2, -20), [](const ivec3&) { return 1.0F; }));
+  still->set_medium({1e-6, vec3(1.0F), {0.0F}, 0});
+  viewer::CameraPose camera = test::camera_at({0, 0, 30}, {0, 0, 0});
+  camera.orthographic_height = 10.0;
+  still->set_camera(camera);
+  still->set_light({});
+  still->viewer().set_environment(made(128, 64, two_colours));
+  still->viewer().set_environment_settings({30.0F, 1.5F});
+  struct Kind {
+    surface::Material material;
+    double most;  // difference, of the brightest
+  };
+  surface::Material plastic = test::diffuse(vec3(0.5F));
+  plastic.specular = 1.0F;
+  plastic.roughness = 0.5F;
+  surface::Material metal;
+  metal.roughness = 0.6F;
+  for (const auto& [material, most] : {Kind{test::diffuse(vec3(1.0F)), 0.03}, Kind{plastic, 0.04}, Kind{metal, 0.12}}) {
+    auto scene = std::make_shared<test::StillScene>();
+    scene->add_sphere(vec3(0.0F), 4.9F, scene->add(material), 64);
+    still->viewer().show_surfaces(test::source_of(scene));
+    std::vector<test::Picture> pictures;
+    for (const auto light : {viewer::SurfaceLight::none, viewer::SurfaceLight::full}) {
+      still->viewer().set_surface_settings({{}, light});
+      pictures.push_back(test::render(*still, {40, 40, 48, 1}));
+    }
+    double worst = 0.0;
+    for (std::uint32_t block = 0; block < 25; ++block) {
+      dvec3 difference(0.0);
+      int inside = 0;
+      for (std::uint32_t i = 0; i < 64; ++i) {
+        const std::uint32_t x = block % 5 * 8 + i % 8;
+        const std::uint32_t y = block / 5 * 8 + i / 8;
+        if (std::hypot(x - 19.5, y - 19.5) > 18.0) continue;
+        difference += dvec3(pictures[0].pixels[y * 40 + x] - pictures[1].pixels[y * 40 + x]);
+        ++inside;
+      }
+      if (inside < 20) continue;
+      for (int c = 0; c < 3; ++c) worst = std::max(worst, std::abs(difference[c] / inside));
+    }
+    EXPECT_LT(worst / 1.5, most);
+  }
 }
 
 TEST_P(Surrounded, ABrightTexelIsASun) {

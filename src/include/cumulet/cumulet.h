@@ -873,7 +873,8 @@ CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumul
 /*
  * This environment is there instead of the sky of cumulet_light_desc: it lights volume and surfaces and is the
  * background, uploaded within the next frames. The sun of cumulet_light_desc stays. What previews rasterise, and
- * CUMULET_SURFACE_LIGHT_NONE, has the light of its mean from everywhere. NULL: the sky again.
+ * CUMULET_SURFACE_LIGHT_NONE, is lit by it and by a physical sky without shadows and coarsely: what is matte within a
+ * few per cent, mirrors as if they were blurred. NULL: the sky again.
  */
 CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment);
 /* The environment last set, retained for the caller, who releases it; NULL if there is none. */
