@@ -19,18 +19,6 @@ struct ReleaseInspection {
   void operator()(cumulet_inspection* inspection) const { cumulet_inspection_release(inspection); }
 };
 
-/// Of counts that differ by orders of magnitude.
-std::vector<float> heights(const std::uint64_t (&counts)[CUMULET_HISTOGRAM_BINS]) {
-  std::vector<float> result;
-  float most = 0.0f;
-  for (const std::uint64_t count : counts) {
-    result.push_back(static_cast<float>(std::log1p(static_cast<double>(count))));
-    most = std::max(most, result.back());
-  }
-  for (float& height : result) height /= std::max(most, 1e-6f);
-  return result;
-}
-
 }  // namespace
 
 GridPicker::Reader::Reader(std::string path, std::function<void()> wake)

@@ -59,7 +59,7 @@ void Panel::lamps(Model& model) {
       auto& value = lamp.*setting.field;
       if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, double[3]>) {
         const double length = std::hypot(value[0], value[1], value[2]);
-        ui_.three(label.c_str(), setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
+        ui_.numbers(label.c_str(), setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
       } else if (rows_.draw(setting, value) && setting.is(&Desc::kind)) {
         // Neither watts nor a cone of no angle are what a lamp of another kind has.
         if (lamp.kind == CUMULET_LAMP_SUN) lamp.power = static_cast<float>(sun_at_noon);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <program.hpp>
@@ -15,6 +16,17 @@
 namespace cumulet::demo {
 
 namespace fs = std::filesystem;
+
+std::vector<float> heights(const std::uint64_t (&counts)[CUMULET_HISTOGRAM_BINS]) {
+  std::vector<float> result;
+  float most = 0.0f;
+  for (const std::uint64_t count : counts) {
+    result.push_back(static_cast<float>(std::log1p(static_cast<double>(count))));
+    most = std::max(most, result.back());
+  }
+  for (float& height : result) height /= std::max(most, 1e-6f);
+  return result;
+}
 
 const std::vector<Shortcut>& shortcuts() {
   constexpr unsigned ctrl = modifier_ctrl;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <scene_file.hpp>
 #include <string>
@@ -106,6 +107,15 @@ class Series {
   std::vector<float> values_;
 };
 
+/// What a grid of the volume holds.
+struct FieldValues {
+  float most = 0.0f;           // 0: there is no such grid
+  std::vector<float> heights;  // of a histogram from 0 to that: from 0 to 1
+};
+
+/// Heights of bars, from 0 to 1, of counts that differ by orders of magnitude.
+[[nodiscard]] std::vector<float> heights(const std::uint64_t (&counts)[CUMULET_HISTOGRAM_BINS]);
+
 /// What the viewer has told last.
 struct Status {
   cumulet_frame_result frame{};
@@ -116,8 +126,9 @@ struct Status {
   std::optional<double> compiled;      // the part of the first scene's programs that is, until all are
   bool busy = false;                   // a file is read, a grid is built or programs are compiled
   bool has_volume = false;
-  std::string grid;    // of the file, that is shown
-  double noise = 0.0;  // relative standard error, 0: not known
+  std::string grid;                                        // of the file, that is shown
+  double noise = 0.0;                                      // relative standard error, 0: not known
+  std::array<FieldValues, settings::ramps.size()> fields;  // each ramp's
 };
 
 /// What of it is drawn over time.

@@ -247,7 +247,7 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
   for (const settings::Choice& preset : preset_choices) presets.push_back({preset.label, preset.value, preset.tip});
   const std::optional<Preset> now = preset_of(medium);
   int chosen = now ? static_cast<int>(*now) : -1;
-  if (ui_.choose("Preset", "A medium: sets all of it but the density scale.", presets, chosen))
+  if (ui_.choose("Preset", "A medium: sets all of it but the density scale and the ramps.", presets, chosen))
     apply(static_cast<Preset>(chosen), medium);
   settings::for_each<Desc>([&](const auto& setting) {
     const bool of_lobes = setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_share);
@@ -265,6 +265,7 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
     }
     if (setting.is(&Desc::coalbedo)) absorption(medium.coalbedo);
   });
+  ramps(model);
 }
 
 /// Absorption of a cloud is far below what a colour field can say.

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
 #include "file_dialog.hpp"
 #include "grid_picker.hpp"
 #include "model.hpp"
+#include "ramp_edit.hpp"
 #include "rows.hpp"
 #include "ui.hpp"
 
@@ -38,6 +40,7 @@ class Panel {
   void light(Model& model);
   void lamps(Model& model);
   void medium(Model& model, std::vector<Command>& commands);
+  void ramps(Model& model);
   void surfaces(Model& model);
   void grid(Model& model);
   void sampling(Model& model);
@@ -55,6 +58,7 @@ class Panel {
 
   Ui ui_;
   Rows rows_{ui_};
+  std::array<RampView, settings::ramps.size()> ramp_views_;
   FileDialog dialog_;
   GridPicker picker_;
   bool focus_ = false;

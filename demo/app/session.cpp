@@ -247,6 +247,7 @@ void Session::follow_volume() {
     shown_volume_ = {};
     grids_.clear();
     status_.has_volume = false;
+    status_.fields = {};
     waiting_ = false;
     return;
   }
@@ -422,8 +423,16 @@ void Session::finish_load() {
   status_.grid = shown_volume_.grid_name;
   cumulet_volume_info info{};
   info.struct_size = sizeof info;
-  if (const VolumePtr volume = shown(); volume && cumulet_volume_get_info(volume.get(), &info) == CUMULET_OK)
-    status_.grid = info.name;
+  const VolumePtr volume = shown();
+  if (volume && cumulet_volume_get_info(volume.get(), &info) == CUMULET_OK) status_.grid = info.name;
+  status_.fields = {};
+  for (std::size_t i = 0; volume && i < status_.fields.size(); ++i) {
+    cumulet_values_info values{};
+    values.struct_size = sizeof values;
+    if (cumulet_volume_get_values(volume.get(), static_cast<cumulet_ramp>(i), &values) == CUMULET_OK &&
+        values.max_value > 0.0f)
+      status_.fields[i] = {values.max_value, heights(values.histogram)};
+  }
   std::array<char, 512> error{};
   if (cumulet_list_grids(shown_volume_.file.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
     tell(true, error.data());

@@ -179,14 +179,14 @@ bool Ui::integer(const char* label, const char* tip, std::uint32_t& value) {
   return changed;
 }
 
-bool Ui::three(const char* label, const char* tip, double (&values)[3], float speed) {
+bool Ui::numbers(const char* label, const char* tip, std::span<double> values, float speed) {
   begin_row(label);
-  std::array<double, 3> edited = std::to_array(values);
-  const bool changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, edited.data(), 3,
-                                          speed, nullptr, nullptr, "%.4g");
+  std::vector<double> edited(values.begin(), values.end());
+  const bool changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, edited.data(),
+                                          static_cast<int>(edited.size()), speed, nullptr, nullptr, "%.4g");
   remember(label, tip);
   if (!changed || !std::ranges::all_of(edited, [](double one) { return std::isfinite(one); })) return false;
-  std::ranges::copy(edited, values);
+  std::ranges::copy(edited, values.begin());
   return true;
 }
 
@@ -332,6 +332,92 @@ bool Ui::sun_dial(const char* label, const char* tip, float& azimuth, float& ele
   draw.AddCircleFilled(disc, px(6.5f), gold, segments);
   ImGui::RenderNavHighlight(box, id);
   remember(label, tip);
+  return changed;
+}
+
+bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points, RampView& view,
+               const std::vector<float>& heights, float reach) {
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const ImVec2 size(ImGui::GetContentRegionAvail().x, px(120.0f));
+  ImGui::InvisibleButton((std::string("##") + label).c_str(), size,
+                         ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  remember(label, tip);
+  const ImVec2 end(corner.x + size.x, corner.y + size.y);
+  const float pad = px(6.0f);  // points at the rim are whole
+  const ImVec2 low(corner.x + pad, end.y - pad);
+  const ImVec2 high(end.x - pad, corner.y + pad);
+  const auto place_of = [&](const settings::RampPoint& point) {
+    return ImVec2(low.x + (high.x - low.x) * (point[0] / view.most_value),
+                  low.y + (high.y - low.y) * (point[1] / view.most_result));
+  };
+  const ImVec2 mouse = ImGui::GetIO().MousePos;
+  const auto under_mouse = [&]() -> settings::RampPoint {
+    return {std::clamp((mouse.x - low.x) / (high.x - low.x), 0.0f, 1.0f) * view.most_value,
+            std::clamp((mouse.y - low.y) / (high.y - low.y), 0.0f, 1.0f) * view.most_result};
+  };
+  std::optional<std::size_t> near;
+  float nearest = px(9.0f);
+  const bool hovered = ImGui::IsItemHovered();
+  for (std::size_t i = 0; hovered && i < points.size(); ++i) {
+    const ImVec2 at = place_of(points[i]);
+    const float distance = std::hypot(at.x - mouse.x, at.y - mouse.y);
+    if (distance > nearest) continue;
+    nearest = distance;
+    near = i;
+  }
+
+  bool changed = false;
+  if (hovered && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
+    changed = !near;
+    view.held = near ? near : add_point(points, under_mouse());
+    if (view.held) view.chosen = *view.held;
+  } else if (!ImGui::IsItemActive()) {
+    view.held.reset();
+  }
+  const ImVec2 moved = ImGui::GetIO().MouseDelta;
+  if (view.held && !ImGui::IsMouseClicked(ImGuiMouseButton_Left) && (moved.x != 0.0f || moved.y != 0.0f)) {
+    move_point(points, *view.held, under_mouse());
+    changed = true;
+  }
+  const bool removes =
+      ImGui::IsMouseClicked(ImGuiMouseButton_Right) || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Delete), false);
+  if (near && !view.held && removes && remove_point(points, *near)) {
+    view.chosen = std::min(view.chosen, points.size() - 1);
+    near.reset();
+    changed = true;
+  }
+
+  if (!ImGui::IsItemVisible()) return changed;
+  ImDrawList& draw = *ImGui::GetWindowDrawList();
+  draw.AddRectFilled(corner, end, colour_of(ImGuiCol_FrameBg), px(4.0f));
+  draw.PushClipRect(corner, end, true);
+  const float step = reach / static_cast<float>(std::max<std::size_t>(heights.size(), 1));
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    const float from = place_of({step * static_cast<float>(i), 0.0f}).x;
+    const float to = place_of({step * static_cast<float>(i + 1), 0.0f}).x;
+    draw.AddRectFilled({from, low.y + (high.y - low.y) * heights[i]}, {to, low.y},
+                       colour_of(ImGuiCol_PlotHistogram, 0.22f));
+  }
+  const ImU32 line = colour_of(ImGuiCol_PlotLines);
+  ImVec2 before(corner.x, place_of(points.front()).y);
+  for (const settings::RampPoint& point : points) {
+    const ImVec2 at = place_of(point);
+    draw.AddLine(before, at, line, px(1.5f));
+    before = at;
+  }
+  draw.AddLine(before, {end.x, before.y}, line, px(1.5f));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const bool lit = i == near || i == view.held;
+    draw.AddCircleFilled(place_of(points[i]), px(lit ? 5.5f : 4.0f),
+                         colour_of(i == view.chosen ? ImGuiCol_CheckMark : ImGuiCol_Text));
+  }
+  draw.PopClipRect();
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.most_result));
+  draw.AddText({corner.x + px(5.0f), corner.y + px(2.0f)}, colour_of(ImGuiCol_TextDisabled), text.data());
+  std::snprintf(text.data(), text.size(), "%.3g", static_cast<double>(view.most_value));
+  const ImVec2 wide = ImGui::CalcTextSize(text.data());
+  draw.AddText({end.x - px(5.0f) - wide.x, end.y - px(2.0f) - wide.y}, colour_of(ImGuiCol_TextDisabled), text.data());
   return changed;
 }
 

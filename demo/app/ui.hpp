@@ -6,10 +6,12 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "ramp_edit.hpp"
 #include "replay.hpp"
 
 namespace cumulet::demo {
@@ -44,8 +46,8 @@ class Ui {
   bool slider(const char* label, const char* tip, std::uint64_t& value, std::uint64_t least, std::uint64_t most,
               const char* format, ImGuiSliderFlags flags = 0);
   bool integer(const char* label, const char* tip, std::uint32_t& value);
-  /// Three numbers, dragged or typed; speed: a pixel.
-  bool three(const char* label, const char* tip, double (&values)[3], float speed);
+  /// Dragged or typed; speed: a pixel.
+  bool numbers(const char* label, const char* tip, std::span<double> values, float speed);
   /// True once something else is chosen.
   bool choose(const char* label, const char* tip, const std::vector<Choice>& choices, int& value);
   /// A linear colour, edited as it looks.
@@ -54,6 +56,9 @@ class Ui {
   bool text(const char* label, const char* tip, const char* hint, std::string& value, float room_right = 0.0f);
   /// The sun's direction: see sun_dial.hpp. camera_azimuth: where the camera stands, marked on the rim.
   bool sun_dial(const char* label, const char* tip, float& azimuth, float& elevation, float camera_azimuth);
+  /// A ramp's curve over a histogram, whose bars have these heights, from 0 to 1, and take equal steps from 0 to reach.
+  bool curve(const char* label, const char* tip, settings::RampPoints& points, RampView& view,
+             const std::vector<float>& heights, float reach);
   /// A line of numbers over time, the newest on the right, with the last one and the unit in words.
   void plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest);
   /// A name and a value.

@@ -32,19 +32,22 @@ struct RampFacts {
   const char* help;
   const char* label;
   const char* tip;
+  const char* point;  // in the demo: of its numbers
 };
 
 /// As numbered in cumulet.h.
 inline constexpr std::array ramps = {
     RampFacts{"density", "medium.density_ramp", "--density-ramp",
               "What densities become, straight between points: \"0:0,0.1:0,1:1\" takes thin smoke away; none (default)",
-              "Density ramp", "What the density grid's values become before the density scale."},
+              "Density ramp", "A curve: what the density grid's values become before the density scale. 0 stays 0.",
+              "Density point"},
     RampFacts{"temperature", "medium.temperature_ramp", "--temperature-ramp",
               "What the temperature grid's values become, before scale and offset (default: none)", "Temperature ramp",
-              "What the temperature grid's values become before scale and offset."},
+              "A curve: what the temperature grid's values become before scale and offset. 0 stays 0.",
+              "Temperature point"},
     RampFacts{"flame", "medium.flame_ramp", "--flame-ramp",
               "What the flame grid's values become, before the strength (default: none)", "Flame ramp",
-              "What the flame grid's values become before the flame strength."}};
+              "A curve: what the flame grid's values become before the flame strength. 0 stays 0.", "Flame point"}};
 static_assert(CUMULET_RAMP_DENSITY == 0 && CUMULET_RAMP_TEMPERATURE == 1 && CUMULET_RAMP_FLAME == 2);
 
 inline constexpr std::size_t most_ramp_points = 32;

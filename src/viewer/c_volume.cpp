@@ -1,6 +1,7 @@
 // Volumes of the C ABI.
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include "viewer/c_handles.hpp"
@@ -121,6 +122,22 @@ cumulet_status cumulet_volume_suggest_density_scale(const cumulet_volume* volume
     const std::optional<double> suggested = volume->asset->coarse().suggest_density_scale();
     require(suggested.has_value(), "the volume has no density");
     *scale = *suggested;
+  });
+}
+
+cumulet_status cumulet_volume_get_values(const cumulet_volume* volume, cumulet_ramp ramp, cumulet_values_info* info) {
+  return guarded(nullptr, 0, [&] {
+    require(volume != nullptr, "volume is NULL");
+    require(number(ramp) <= CUMULET_RAMP_FLAME, "ramp is unknown");
+    const volume::VolumeFrame& frame = volume->asset->frame();
+    const auto pointer = [](const std::optional<volume::ScalarVolume>& field) { return field ? &*field : nullptr; };
+    const std::array fields = {&frame.density, pointer(frame.temperature), pointer(frame.flame)};
+    cumulet_values_info out{};
+    if (const volume::ScalarVolume* field = fields.at(number(ramp))) {
+      out.max_value = field->max_value;
+      std::ranges::copy(volume::histogram(*field), out.histogram);
+    }
+    write_desc(info, out, "cumulet_values_info");
   });
 }
 

@@ -2,6 +2,7 @@
 
 // A ScalarVolume's values, brick by brick.
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
 
@@ -18,5 +19,9 @@ const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin);
 /// What tiles and the background give the voxels of a brick at this origin that the volume has not: 512 values.
 /// tiles: places in volume.tiles, all that meet it among them.
 void fill_brick(const ScalarVolume& volume, const glm::ivec3& origin, std::span<const std::uint32_t> tiles, float* out);
+
+std::int64_t voxels_of(const Tile& tile);
+/// How many voxels within bounds have the background value, being in no brick and no tile. O(bricks + tiles).
+std::int64_t background_voxels(const ScalarVolume& volume);
 
 }  // namespace cumulet::volume

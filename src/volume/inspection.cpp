@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "volume/bricks.hpp"
 #include "volume/import_detail.hpp"
 
 namespace cumulet::volume {
@@ -78,6 +79,19 @@ GridValues values_of(const SourceGrid& source) {
 }
 
 }  // namespace
+
+std::array<std::uint64_t, histogram_bins> histogram(const ScalarVolume& volume) {
+  std::array<std::uint64_t, histogram_bins> counts{};
+  const double bins_a_unit = volume.max_value > 0.0F ? histogram_bins / double{volume.max_value} : 0.0;
+  const auto add = [&](float value, std::int64_t voxels) {
+    if (value > 0.0F)
+      counts.at(std::min(static_cast<std::size_t>(double{value} * bins_a_unit), histogram_bins - 1)) += voxels;
+  };
+  for (const float value : volume.brick_values) add(value, 1);
+  for (const Tile& tile : volume.tiles) add(tile.value, voxels_of(tile));
+  if (volume.background > 0.0F) add(volume.background, background_voxels(volume));
+  return counts;
+}
 
 Inspection::Inspection(const std::filesystem::path& file) : file_(file) {
   naming(file.string(), [&] {

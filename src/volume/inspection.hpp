@@ -32,6 +32,9 @@ struct GridValues {
   std::array<std::uint64_t, histogram_bins> histogram{};
 };
 
+/// Counts of a volume's voxels above 0 in equal steps from 0 to max_value. O(voxels of bricks).
+std::array<std::uint64_t, histogram_bins> histogram(const ScalarVolume& volume);
+
 struct GridFacts {
   std::optional<GridValues> values;  ///< none if they cannot be read
   std::string refusal;               ///< GridInfo's, or what is wrong with the voxels

@@ -4,9 +4,9 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <cstdint>
 
 #include "base/progress_part.hpp"
+#include "volume/bricks.hpp"
 
 namespace cumulet::volume {
 
@@ -19,25 +19,6 @@ float Ramp::operator()(float value) const {
   const glm::dvec2 b = *above;
   return static_cast<float>(a.y + (b.y - a.y) * ((double{value} - a.x) / (b.x - a.x)));
 }
-
-namespace {
-
-/// Of a box, both ends inclusive.
-std::int64_t voxels(const glm::ivec3& low, const glm::ivec3& high) {
-  const glm::i64vec3 size = glm::max(glm::i64vec3(high) - glm::i64vec3(low) + std::int64_t{1}, glm::i64vec3(0));
-  return size.x * size.y * size.z;
-}
-
-/// Whether a voxel within bounds has the background value, for lack of another.
-bool shows_background(const ScalarVolume& volume) {
-  std::int64_t left = voxels(volume.bounds_min, volume.bounds_max);
-  for (const Tile& tile : volume.tiles) left -= voxels(tile.min, tile.max);
-  for (const glm::ivec3& origin : volume.brick_origins)
-    left -= voxels(glm::max(origin, volume.bounds_min), glm::min(origin + (brick_size - 1), volume.bounds_max));
-  return left > 0;
-}
-
-}  // namespace
 
 ScalarVolume apply(const Ramp& ramp, const ScalarVolume& volume, const Progress* progress) {
   ScalarVolume out;
@@ -56,7 +37,7 @@ ScalarVolume apply(const Ramp& ramp, const ScalarVolume& volume, const Progress*
   resize(out.brick_values, volume.brick_values.size(), progress);
   out.max_value = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, out.brick_values.size(), 64 * brick_voxels),
-      shows_background(volume) ? out.background : 0.0F,
+      background_voxels(volume) > 0 ? out.background : 0.0F,
       [&](const auto& range, float most) {
         check(progress);
         for (std::size_t i = range.begin(); i != range.end(); ++i) {

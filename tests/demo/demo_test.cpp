@@ -20,6 +20,7 @@
 #include "model.hpp"
 #include "panel.hpp"
 #include "preferences.hpp"
+#include "ramp_edit.hpp"
 #include "replay.hpp"
 #include "sun_dial.hpp"
 #include "support/folder.hpp"
@@ -32,6 +33,60 @@ SceneOptions scene_with(double density) {
   SceneOptions scene;
   scene.medium.density_scale = density;
   return scene;
+}
+
+using Points = cumulet::settings::RampPoints;
+
+TEST(RampEdit, AddsMovesAndTakesAway) {
+  Points points = {{0.0f, 0.0f}, {1.0f, 1.0f}};
+  EXPECT_EQ(add_point(points, {0.5f, 0.25f}), 1u);
+  EXPECT_EQ(add_point(points, {2.0f, 3.0f}), 3u);
+  EXPECT_EQ(add_point(points, {1.0f, 0.75f}), 2u) << "of a value that has a point, that is moved";
+  EXPECT_EQ(points, (Points{{0.0f, 0.0f}, {0.5f, 0.25f}, {1.0f, 0.75f}, {2.0f, 3.0f}}));
+  move_point(points, 1, {0.75f, 0.5f});
+  EXPECT_EQ(points[1], (Points::value_type{0.75f, 0.5f}));
+  EXPECT_TRUE(remove_point(points, 2));
+  EXPECT_TRUE(remove_point(points, 0));
+  EXPECT_FALSE(remove_point(points, 0)) << "a ramp has two";
+  EXPECT_EQ(points, (Points{{0.75f, 0.5f}, {2.0f, 3.0f}}));
+}
+
+// Whatever is done to it, it is a ramp.
+TEST(RampEdit, StaysARamp) {
+  Points points = {{0.0f, 0.0f}, {1.0f, 1.0f}};
+  for (int i = 0; i < 40; ++i) static_cast<void>(add_point(points, {0.01f * static_cast<float>(i * 7 % 40), 0.5f}));
+  EXPECT_EQ(points.size(), cumulet::settings::most_ramp_points);
+  for (const float to : {-1e38f, 5.0f, 0.1f, 1e38f}) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      move_point(points, i, {to, to});
+      EXPECT_EQ(cumulet::settings::ramp_refusal(points), "");
+    }
+  }
+}
+
+TEST(RampEdit, ShowsAllOfItAndRoomAbove) {
+  RampView view;
+  view.chosen = 5;
+  fit(view, {{0.0f, 0.0f}, {1.0f, 2.0f}}, 3.0f);
+  EXPECT_EQ(view.most_value, 3.0f);
+  EXPECT_EQ(view.most_result, 2.5f);
+  EXPECT_EQ(view.chosen, 1u);
+  fit(view, {{-2.0f, 0.0f}, {-1.0f, 0.0f}}, 0.0f);
+  EXPECT_EQ(view.most_value, 1.0f);
+  EXPECT_EQ(view.most_result, 1.25f);
+  view.held = 0;
+  fit(view, {{0.0f, 0.0f}, {9.0f, 9.0f}}, 3.0f);
+  EXPECT_EQ(view.most_value, 1.0f) << "not while it is dragged";
+}
+
+TEST(History, ARampIsAStep) {
+  History history(scene_with(1));
+  SceneOptions scene = scene_with(1);
+  scene.ramps[CUMULET_RAMP_DENSITY] = {{0.0f, 0.0f}, {1.0f, 2.0f}};
+  history.offer(scene, false);
+  const auto before = history.undo(scene);
+  ASSERT_TRUE(before);
+  EXPECT_TRUE(before->ramps[CUMULET_RAMP_DENSITY].empty());
 }
 
 TEST(History, OneStepADragAndBack) {

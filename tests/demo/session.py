@@ -202,6 +202,35 @@ def test_preset(s):
     assert look(s, "undone")[1]["scene"]["medium"] == before
 
 
+def test_ramps(s):
+    """A ramp as the grid has it changes nothing; points are dragged, added by clicks and taken away by right clicks."""
+    curve = '"Temperature ramp curve"'
+    s.play("replay", [*SETTLE, *shot("plain"), 'click "Temperature ramp"', *SETTLE, *shot("same"),
+                      'move "Temperature point"', f"drag {curve} 0.02 0.95 to {curve} 0.6 0.97", *SETTLE, *shot("dragged"),
+                      f"click {curve} 0.8 0.97", *SETTLE, *shot("added"), "key ctrl+z", *SETTLE, *shot("undone"), "key ctrl+shift+z", *SETTLE, 'report "redone.json"',
+                      f"click {curve} 0.8 0.97 right", *SETTLE, 'report "removed.json"', 'click "Temperature ramp"', *SETTLE,
+                      *shot("off")],
+           "--volume", s.explosion, "--preset", "explosion", "--density-scale", "9", "--spp", "4", size=["--size", "640x460"])
+    plain, report, area = look(s, "plain")
+    ramp = lambda name: s.report(name)["scene"]["medium"].get("temperature_ramp")
+    assert ramp("plain") is None
+    first, last = ramp("same")
+    assert first == [0, 0] and last[0] == last[1] > 0.5, "as far as the grid's values go"
+    assert_alike(plain, look(s, "same")[0], area)
+    (value, result), end = ramp("dragged")
+    assert end == last and 0.5 * last[0] < value < 0.7 * last[0] and result < 0.1 * last[0], ramp("dragged")
+    dragged, added = look(s, "dragged")[0], look(s, "added")[0]
+    assert len(ramp("added")) == 3 and ramp("added")[0] == ramp("dragged")[0], ramp("added")
+    x, y, width, height = area
+    fire = (x + width // 4, y + height // 3, width // 2, height // 3)
+    assert added.mean(fire) < plain.mean(fire) - 2, "what is below the new point is cold"
+    assert ramp("undone") == ramp("dragged") and ramp("redone") == ramp("added")
+    assert_alike(dragged, look(s, "undone")[0], area)
+    assert ramp("removed") == ramp("dragged")
+    assert ramp("off") is None
+    assert_alike(plain, look(s, "off")[0], area)
+
+
 def test_surfaces(s):
     mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
     s.play("replay", [*SETTLE, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,

@@ -223,6 +223,8 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   filled(make_desc<cumulet_pick>(), [&](cumulet_pick* p) { return cumulet_pick_at(v_, 1.0, 1.0, p); });
   filled(make_desc<cumulet_volume_info>(),
          [&](cumulet_volume_info* i) { return cumulet_volume_get_info(volume_.get(), i); });
+  filled(make_desc<cumulet_values_info>(),
+         [&](cumulet_values_info* i) { return cumulet_volume_get_values(volume_.get(), CUMULET_RAMP_DENSITY, i); });
   const cumulet_frame_desc whole = target_.frame();
   filled(make_desc<cumulet_frame_result>(), [&](cumulet_frame_result* r) { return cumulet_render(v_, &whole, r); });
 

@@ -280,6 +280,12 @@ TEST(CppVolume, IsSharedByCopies) {
   EXPECT_EQ(info.bounds.min, (Vector{0.5, 0.5, 0.5}));
   EXPECT_EQ(info.bounds.max, (Vector{15.5, 15.5, 15.5}));
   EXPECT_EQ(info.max_value, 1.0F);
+  const ValuesInfo density = copy.values(Ramp::density).value();
+  EXPECT_EQ(density.max_value, 1.0F);
+  EXPECT_EQ(density.histogram.back(), info.active_voxels);
+  EXPECT_EQ(density.histogram.front(), 0U);
+  EXPECT_EQ(copy.values(Ramp::flame).value().max_value, 0.0F);
+  EXPECT_EQ(copy.values(static_cast<Ramp>(7)).error().status, StatusCode::invalid_argument);
 
   cumulet_volume* raw = copy.release();
   EXPECT_FALSE(copy);

@@ -13,6 +13,7 @@
 #include "support/gl_viewer.hpp"
 #include "support/osmesa_leaks.hpp"
 #include "support/volumes.hpp"
+#include "volume/inspection.hpp"
 
 namespace {
 
@@ -75,6 +76,23 @@ TEST(Ramp, GoesOverBricksTilesAndBackgrounds) {
   v.tiles = {{{8, 0, 0}, {39, 7, 7}, 2.0F}};
   v.background = 8.0F;
   EXPECT_EQ(apply(Ramp({{7.5F, 1.0F}, {8.0F, 50.0F}}), v).max_value, 1.0F);
+}
+
+TEST(Histogram, CountsWhatIsAboveZero) {
+  ScalarVolume v =
+      test::make_volume({8, 8, 8}, ivec3(0), [](const ivec3& p) { return static_cast<float>(p.x) / 8.0F; });
+  v.bounds_max = {39, 7, 7};
+  v.tiles.push_back({{16, 0, 0}, {23, 7, 7}, 1.0F});
+  v.tiles.push_back({{24, 0, 0}, {27, 7, 7}, 0.0F});
+  v.background = 0.5F;
+  v.max_value = 1.0F;
+  const auto counts = volume::histogram(v);
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    std::uint64_t expected = i % 8 == 0 && i > 0 ? 64 : 0;
+    if (i == 32) expected += 20 * 64;
+    if (i == 63) expected = 8 * 64;
+    EXPECT_EQ(counts.at(i), expected) << i;
+  }
 }
 
 // ---- Cells

@@ -869,6 +869,17 @@ CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumu
  */
 CUMULET_API cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points,
                                             uint64_t count);
+/* What one grid of a volume holds, as its ramp is given it: for whoever draws a curve over it. */
+typedef struct cumulet_values_info {
+  size_t struct_size;
+  float max_value; /* 0: the volume has no such grid */
+  /* Counts of the voxels above 0 in equal steps from 0 to max_value. */
+  uint64_t histogram[CUMULET_HISTOGRAM_BINS];
+} cumulet_values_info;
+
+/* Some milliseconds a million voxels. */
+CUMULET_API cumulet_status cumulet_volume_get_values(const cumulet_volume* volume, cumulet_ramp ramp,
+                                                     cumulet_values_info* info);
 CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
 /*
  * This environment is there instead of the sky of cumulet_light_desc: it lights volume and surfaces and is the

@@ -291,6 +291,12 @@ struct VolumeInfo {
   std::uint64_t non_finite_voxels = 0;
 };
 
+/// What a volume has of Ramp's grid.
+struct ValuesInfo {
+  float max_value = 0.0F;
+  std::array<std::uint64_t, CUMULET_HISTOGRAM_BINS> histogram{};
+};
+
 struct VolumeFileDesc {
   const char* path = nullptr;
   const char* grid_name = nullptr;
@@ -366,6 +372,12 @@ class Volume {
                       .max_value = max_value,
                       .negative_voxels = negative,
                       .non_finite_voxels = non_finite};
+  }
+  [[nodiscard]] Result<ValuesInfo> values(Ramp ramp) const noexcept {
+    auto c = detail::sized<cumulet_values_info>();
+    const cumulet_status status = cumulet_volume_get_values(handle_, static_cast<cumulet_ramp>(ramp), &c);
+    if (auto done = detail::result(status); !done) return done.error();
+    return ValuesInfo{.max_value = c.max_value, .histogram = std::to_array(c.histogram)};
   }
   [[nodiscard]] Result<double> suggest_density_scale() const noexcept {
     double scale = 0.0;

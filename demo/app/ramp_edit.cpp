@@ -1,0 +1,55 @@
+#include "ramp_edit.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cumulet::demo {
+
+using settings::RampPoint;
+using settings::RampPoints;
+
+namespace {
+
+constexpr float farthest = 1e30f;
+
+float value_of(const RampPoint& point) { return point[0]; }
+float result_of(const RampPoint& point) { return point[1]; }
+
+}  // namespace
+
+void fit(RampView& view, const RampPoints& points, float most_value) {
+  if (view.held || points.empty()) return;
+  constexpr float room = 1.25f;  // to drag into
+  view.most_value = std::max(most_value, value_of(points.back()));
+  if (!(view.most_value > 0.0f)) view.most_value = 1.0f;
+  const float highest = result_of(*std::ranges::max_element(points, {}, result_of));
+  view.most_result = std::min(room * (highest > 0.0f ? highest : view.most_value), farthest);
+  view.chosen = std::min(view.chosen, points.size() - 1);
+}
+
+std::optional<std::size_t> add_point(RampPoints& points, RampPoint point) {
+  const auto at = std::ranges::lower_bound(points, value_of(point), {}, value_of);
+  const auto place = static_cast<std::size_t>(at - points.begin());
+  if (at != points.end() && value_of(*at) == value_of(point)) {
+    *at = point;
+  } else if (points.size() < settings::most_ramp_points) {
+    points.insert(at, point);
+  } else {
+    return std::nullopt;
+  }
+  return place;
+}
+
+void move_point(RampPoints& points, std::size_t place, RampPoint to) {
+  const float least = place > 0 ? std::nextafter(value_of(points[place - 1]), farthest) : -farthest;
+  const float most = place + 1 < points.size() ? std::nextafter(value_of(points[place + 1]), -farthest) : farthest;
+  points[place] = {std::clamp(value_of(to), least, most), std::clamp(result_of(to), 0.0f, farthest)};
+}
+
+bool remove_point(RampPoints& points, std::size_t place) {
+  if (points.size() <= 2) return false;
+  points.erase(points.begin() + static_cast<std::ptrdiff_t>(place));
+  return true;
+}
+
+}  // namespace cumulet::demo
