@@ -158,10 +158,12 @@ class Paths {
   std::vector<vec3> table_;
 };
 
-// The air, and light in it as if the sun's were white and of irradiance 1.
+}  // namespace
+
+// Light is as if the sun's were white and of irradiance 1.
 class Atmosphere {
  public:
-  explicit Atmosphere(const SkyModel& model) : ground_albedo_(static_cast<float>(model.ground_albedo)) {
+  explicit Atmosphere(const SkyModel& model) : ground_albedo_(model.ground_albedo) {
     // Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight" (1999), after Angstrom.
     const double aerosols = std::max(0.0, 0.04608 * model.turbidity - 0.04586);
     for (std::size_t band = 0; band < band_count; ++band) {
@@ -174,6 +176,8 @@ class Atmosphere {
     }
     scatter_more();
   }
+
+  [[nodiscard]] double ground_albedo() const { return ground_albedo_; }
 
   // Of the sun's light at radius r, where it stands at the cosine mu from straight up.
   [[nodiscard]] Bands sunlight(double r, double mu) const {
@@ -285,14 +289,14 @@ class Atmosphere {
           ((r + length * mu) * sun_mu + length * across * std::cos(azimuth) * sun_across) / ground;  // where it ends
       if (!(sun > 0.0)) continue;
       const Bands light = sunlight(ground, sun);
-      const float back = each * ground_albedo_ * static_cast<float>(sun / pi);
+      const float back = each * static_cast<float>(ground_albedo_) * static_cast<float>(sun / pi);
       for (std::size_t b = 0; b < band_count; ++b) second[b] += back * through[b] * light[b];
     }
     for (std::size_t b = 0; b < band_count; ++b) second[b] /= 1.0F - again[b];
     return second;
   }
 
-  float ground_albedo_;
+  double ground_albedo_;
   Paths paths_;
   // Optical depths of all that is straight above the ground.
   Bands air_{};
@@ -300,6 +304,8 @@ class Atmosphere {
   Bands ozone_{};
   std::vector<Bands> more_;
 };
+
+namespace {
 
 double air_phase(double cosine) { return 3.0 / (16.0 * pi) * (1.0 + cosine * cosine); }
 
@@ -323,9 +329,10 @@ double elevation_of_row(std::size_t row, std::size_t rows) {
 
 }  // namespace
 
-Sky::Sky(const SkyModel& model, const dvec3& to_sun) : to_sun_(to_sun), table_(rows * columns) {
+Sky::Sky(const SkyModel& model, const dvec3& to_sun) : Sky(Atmosphere(model), to_sun) {}
+
+Sky::Sky(const Atmosphere& atmosphere, const dvec3& to_sun) : to_sun_(to_sun), table_(rows * columns) {
   constexpr int steps = 40;
-  const Atmosphere atmosphere(model);
   const std::array<vec3, band_count> colours = band_colours();
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, table_.size()), [&](const auto& range) {
     for (std::size_t k = range.begin(); k != range.end(); ++k) {
@@ -365,7 +372,7 @@ Sky::Sky(const SkyModel& model, const dvec3& to_sun) : to_sun_(to_sun), table_(r
   sky_irradiance_ = vec3(sum * (pi / (rings * sectors)));
 
   const vec3 falls = sky_irradiance_ + sun_irradiance_ * static_cast<float>(std::max(0.0, to_sun.y));
-  ground_radiance_ = falls * static_cast<float>(model.ground_albedo / pi);
+  ground_radiance_ = falls * static_cast<float>(atmosphere.ground_albedo() / pi);
 }
 
 Sky::Scattered Sky::scattered(double elevation, double azimuth) const {
@@ -391,9 +398,11 @@ vec3 Sky::radiance(const dvec3& direction) const {
                   vec3(0.0F));
 }
 
-Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone) {
+Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone, const Daylight* last) {
   const double up = sun_elevation_degrees * pi / 180.0;
-  const Sky sky(model, {0.0, std::sin(up), std::cos(up)});
+  const bool kept = last != nullptr && last->model == model;
+  const AtmospherePtr atmosphere = kept ? last->atmosphere : std::make_shared<const Atmosphere>(model);
+  const Sky sky(*atmosphere, {0.0, std::sin(up), std::cos(up)});
   EnvironmentPixels pixels{.width = 512, .height = 256, .values = {}};
   pixels.values.resize(std::size_t{pixels.width} * pixels.height);
   // One row more: what is just above the horizon is between it and the one before.
@@ -409,8 +418,8 @@ Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool
       }
     }
   });
-  return {model, sun_elevation_degrees, above_alone, sky.sun_irradiance(),
-          make_environment(pixels, "the physical sky")};
+  return {model,       atmosphere,           sun_elevation_degrees,
+          above_alone, sky.sun_irradiance(), make_environment(pixels, "the physical sky")};
 }
 
 }  // namespace cumulet::light

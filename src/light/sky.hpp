@@ -4,6 +4,7 @@
 
 #include <array>
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
 
 #include "light/environment.hpp"
@@ -17,6 +18,10 @@ struct SkyModel {
   bool operator==(const SkyModel&) const = default;
 };
 
+/// The air of a model, and light in it: what of a sky does not depend on where the sun stands, and most of its time.
+class Atmosphere;
+using AtmospherePtr = std::shared_ptr<const Atmosphere>;
+
 /// A sky and its sun, seen from the ground at sea level. Light that was scattered once is exact within quadrature, in
 /// 21 bands of wavelength; the rest is by Hillaire, "A Scalable and Production Ready Sky and Atmosphere Rendering
 /// Technique" (2020). Colours are linear Rec. 709, what that cannot mix clipped. White and unit are the sun's light
@@ -28,6 +33,7 @@ class Sky {
  public:
   /// to_sun: unit, +Y up; anywhere, also below the horizon.
   Sky(const SkyModel& model, const glm::dvec3& to_sun);
+  Sky(const Atmosphere& atmosphere, const glm::dvec3& to_sun);
 
   /// From a direction (unit), without the sun's disc. Below the horizon: what the lit ground sends back.
   [[nodiscard]] glm::vec3 radiance(const glm::dvec3& direction) const;
@@ -59,13 +65,15 @@ class Sky {
 /// Of a sky what a picture is lit by, the same whatever the sun's azimuth.
 struct Daylight {
   SkyModel model;
+  AtmospherePtr atmosphere;  ///< of that
   double sun_elevation_degrees = 90.0;
   bool above_alone = false;  ///< below the horizon it is dark: something else is there, and looks go where light is
   glm::vec3 sun_irradiance{0.0F};
   EnvironmentPtr surroundings;  ///< all but the sun, 512 x 256; the sun is at azimuth 0, +Z
 };
 
-/// As Sky's constructor.
-Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone);
+/// As Sky's constructor; in less than half of the time where the last (may be null) is of the same model.
+Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone,
+                       const Daylight* last = nullptr);
 
 }  // namespace cumulet::light

@@ -343,7 +343,7 @@ void Viewer::surround() {
     const bool ground = ground_.place != GroundPlace::none;
     if (!daylight_ || daylight_->model != *light_.sky || daylight_->sun_elevation_degrees != elevation ||
         daylight_->above_alone != ground)
-      daylight_ = light::make_daylight(*light_.sky, elevation, ground);
+      daylight_ = light::make_daylight(*light_.sky, elevation, ground, daylight_ ? &*daylight_ : nullptr);
     lights.sun_irradiance = daylight_->sun_irradiance;
     if (!environment_)
       surroundings = {.environment = daylight_->surroundings, .rotation_degrees = light_.sun_azimuth_degrees};

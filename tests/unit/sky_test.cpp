@@ -84,8 +84,8 @@ TEST(Sky, MakesNoLight) {
 
 TEST(Sky, IsTheSameOnBothSidesOfTheSun) {
   const dvec3 to_sun = direction(30.0, 65.0);
-  const Sky turned({}, to_sun);
-  const Sky straight({}, direction(30.0, 0.0));
+  const Sky turned(SkyModel{}, to_sun);
+  const Sky straight(SkyModel{}, direction(30.0, 0.0));
   for (double elevation = 1.0; elevation < 90.0; elevation += 11.0) {
     for (double away = 0.0; away <= 180.0; away += 13.0) {
       const vec3 left = turned.radiance(direction(elevation, 65.0 - away));
@@ -134,6 +134,20 @@ TEST(Sky, GetsDarkAfterSunsetAndIsNeverBroken) {
     }
   }
   EXPECT_LT(before, 1.0e-9);
+}
+
+TEST(Sky, AnotherSunLeavesTheAir) {
+  const SkyModel clear{2.0, 0.3};
+  const light::Daylight morning = light::make_daylight(clear, 10.0, false);
+  const light::Daylight noon = light::make_daylight(clear, 60.0, false, &morning);
+  EXPECT_EQ(noon.atmosphere, morning.atmosphere);
+  const light::Daylight alone = light::make_daylight(clear, 60.0, false);
+  EXPECT_EQ(noon.sun_irradiance, alone.sun_irradiance);
+  EXPECT_EQ(noon.surroundings->words, alone.surroundings->words);
+  const SkyModel haze{6.0, 0.3};
+  const light::Daylight hazy = light::make_daylight(haze, 60.0, false, &noon);
+  EXPECT_NE(hazy.atmosphere, noon.atmosphere);
+  EXPECT_EQ(hazy.surroundings->words, light::make_daylight(haze, 60.0, false).surroundings->words);
 }
 
 TEST(Sky, TheSameTwice) {
