@@ -846,7 +846,7 @@ typedef struct cumulet_display_desc {
   float exposure_stops; /* radiance is multiplied by 2^stops */
   cumulet_tone_map tone_map;
   cumulet_background background;
-  float background_color[3]; /* linear Rec. 709 radiance, exposed and tone-mapped as all is; debug views are over black */
+  float background_color[3]; /* linear Rec. 709 radiance, exposed and tone-mapped as all is; debug views have black */
 } cumulet_display_desc;
 
 CUMULET_API cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc);
@@ -1208,8 +1208,8 @@ CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box
 
 /*
  * [GL] The picture so far: width x height (of the result) x 4 floats, first pixel top left, linear radiance in front of
- * the background (premultiplied if that is transparent), and the part of a pixel that is not background. A pixel without samples is 0. count is
- * the number of floats at rgba.
+ * the background (premultiplied if that is transparent), and the part of a pixel that is not background. A pixel
+ * without samples is 0. count is the number of floats at rgba.
  */
 CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count);
 /* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque
