@@ -29,7 +29,7 @@ std::string measure_defaults(headless::Context& context, const Asset& asset, con
   // Fire alone has no density.
   const double density_scale = asset.mean_optical_depth > 0.0 ? options.optical_depth / asset.mean_optical_depth : 1.0;
   Subject voxels(context, asset.volume, Kind::brick, options, density_scale);
-  const ImageReference reference(voxels, options.error_samples);
+  const ImageReference reference(voxels, options.error_samples, options.error_parts);
   progress("    reference");
   std::vector<Grid> grids;
   const double usual = settings::default_threshold(CUMULET_CRITERION_TRANSMITTANCE);

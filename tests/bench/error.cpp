@@ -7,8 +7,7 @@ namespace cumulet::bench {
 
 namespace {
 
-constexpr std::uint32_t seed_1 = 101;
-constexpr std::uint32_t seed_2 = 202;
+std::uint32_t seed_of(std::size_t part) { return static_cast<std::uint32_t>(101 * (part + 1)); }
 
 std::vector<float> luminance(const std::vector<float>& rgba) {
   std::vector<float> result(rgba.size() / 4);
@@ -20,28 +19,41 @@ std::vector<float> luminance(const std::vector<float>& rgba) {
 
 }  // namespace
 
-ImageReference::ImageReference(Subject& voxels, std::uint32_t samples) : samples_(samples) {
-  const Run a = voxels.shaded(samples, seed_1);
-  const Run b = voxels.shaded(samples, seed_2);
-  first_ = luminance(a.rgba);
-  second_ = luminance(b.rgba);
-  shows_medium_.resize(first_.size());
-  for (std::size_t i = 0; i < first_.size(); ++i) {
-    shows_medium_[i] = a.rgba[4 * i + 3] + b.rgba[4 * i + 3] > 0.0F ? 1 : 0;
-    if (shows_medium_[i] == 0) continue;
+ImageReference::ImageReference(Subject& voxels, std::uint32_t samples, std::uint32_t parts) : samples_(samples) {
+  std::vector<float> alpha;
+  for (std::uint32_t part = 0; part < parts; ++part) {
+    const Run run = voxels.shaded(samples, seed_of(part));
+    parts_.push_back(luminance(run.rgba));
+    alpha.resize(parts_[0].size());
+    for (std::size_t i = 0; i < alpha.size(); ++i) alpha[i] += run.rgba[4 * i + 3];
+  }
+  // Fire without density covers nothing, but is brighter than the even sky behind it.
+  const bool covers = *std::ranges::max_element(alpha) > 0.0F;
+  const float darkest = *std::ranges::min_element(parts_[0]);
+  for (std::size_t i = 0; i < alpha.size(); ++i) {
+    if (covers ? !(alpha[i] > 0.0F) : parts_[0][i] <= 1.0001F * darkest) continue;
     ++medium_pixels_;
-    mean_ += 0.5 * (first_[i] + second_[i]);
+    for (const std::vector<float>& part : parts_) mean_ += part[i] / static_cast<double>(parts);
   }
   mean_ /= static_cast<double>(std::max<std::size_t>(1, medium_pixels_));
 }
 
 ImageError ImageReference::error_of(Subject& subject) const {
-  const std::vector<float> a = luminance(subject.shaded(samples_, seed_1).rgba);
-  const std::vector<float> b = luminance(subject.shaded(samples_, seed_2).rgba);
+  std::vector<double> differences(parts_[0].size());
+  std::vector<double> squares(parts_[0].size());
+  for (std::size_t part = 0; part < parts_.size(); ++part) {
+    const std::vector<float> other = luminance(subject.shaded(samples_, seed_of(part)).rgba);
+    for (std::size_t i = 0; i < other.size(); ++i) {
+      const double difference = double{other[i]} - parts_[part][i];
+      differences[i] += difference;
+      squares[i] += difference * difference;
+    }
+  }
+  const double pairs = static_cast<double>(parts_.size()) * (static_cast<double>(parts_.size()) - 1.0);
   double sum = 0.0;
   double square = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double product = (double{a[i]} - first_[i]) * (double{b[i]} - second_[i]);
+  for (std::size_t i = 0; i < differences.size(); ++i) {
+    const double product = (differences[i] * differences[i] - squares[i]) / pairs;
     sum += product;
     square += product * product;
   }

@@ -13,24 +13,25 @@ struct ImageError {
   double standard_error = 0.0;
 };
 
-/// The voxels' picture in two independent halves, and the error of another march against it.
+/// The voxels' picture in independent parts, and the error of another march against it.
 ///
 /// With A1, B1 of one seed and A2, B2 of another, (A1 - B1)(A2 - B2) has the square of the true difference as its mean:
-/// Monte Carlo noise adds variance but no bias. One seed for A and B keeps their paths together, which is what makes
-/// A - B quiet: random directions do not depend on the march, and lengths do by little.
+/// Monte Carlo noise adds variance but no bias. The mean over all pairs of seeds is taken. One seed for A and B keeps
+/// their paths together, which is what makes A - B quiet: random directions do not depend on the march, and lengths do
+/// by little.
 class ImageReference {
  public:
-  ImageReference(Subject& voxels, std::uint32_t samples);
+  /// parts: at least two, each of so many samples a pixel.
+  ImageReference(Subject& voxels, std::uint32_t samples, std::uint32_t parts = 2);
   [[nodiscard]] ImageError error_of(Subject& subject) const;
   /// The part of all pixels that shows the medium.
   [[nodiscard]] double coverage() const {
-    return static_cast<double>(medium_pixels_) / static_cast<double>(first_.size());
+    return static_cast<double>(medium_pixels_) / static_cast<double>(parts_[0].size());
   }
 
  private:
   std::uint32_t samples_;
-  std::vector<float> first_, second_;
-  std::vector<char> shows_medium_;
+  std::vector<std::vector<float>> parts_;  // luminance
   std::size_t medium_pixels_ = 0;
   double mean_ = 0.0;
 };

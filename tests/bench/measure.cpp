@@ -271,7 +271,7 @@ AssetResult measure(headless::Context& context, const Asset& asset, const Option
   }
 
   progress("  the reference picture");
-  const ImageReference image_reference(*subjects[3], options.error_samples);
+  const ImageReference image_reference(*subjects[3], options.error_samples, options.error_parts);
   result.coverage = image_reference.coverage();
   const DepthReference depth_reference(dense, density_scale, options.optical_depth);
   for (const double target : options.targets) {

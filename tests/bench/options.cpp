@@ -81,8 +81,11 @@ ParseResult parse(int argc, char** argv) {
   auto* seconds =
       app.add_option("--seconds", o.seconds_a_run, "About, for one run of one march (default: 10; quick: 1)");
   auto* error_samples =
-      app.add_option("--error-samples", o.error_samples, "Samples a pixel in each half of the error's estimate");
+      app.add_option("--error-samples", o.error_samples, "Samples a pixel in each part of the error's estimate");
   error_samples->check(CLI::Range(1U, 4096U));
+  app.add_option("--error-parts", o.error_parts, "Its independent parts: more are less noise (default: 2)")
+      ->check(CLI::Range(2U, 1000U));
+  app.add_option("--max-bounces", o.max_bounces, "Events of a path at most (default: no limit)");
   auto* sweep_cells = app.add_option("--sweep-cells", o.sweep_cells, "Where a sweep of thresholds ends");
   app.add_option("--max-cells", o.max_cells, "Most cells of a matched grid (default: 5400000)");
   auto* build_cells = app.add_option("--build-cells", o.build_cells, "Cells of the timed build (default: 5000000)");

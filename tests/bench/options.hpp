@@ -32,6 +32,8 @@ struct Options {
   double seconds_a_run = 10.0;
   std::uint32_t fewest_samples = 8;  ///< a pixel, in a timed run: with fewer, waiting for the longest path weighs most
   std::uint32_t error_samples = 24;
+  std::uint32_t error_parts = 2;
+  std::uint32_t max_bounces = 0;  ///< 0: no limit
   int evaluations = 6;
   double sweep_factor = 2.0;
   std::uint64_t sweep_cells = 2'000'000;

@@ -39,7 +39,12 @@ viewer::Light bench_light() {
 
 Subject::Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
                  double density_scale)
-    : kind_(kind), size_(options.size), albedo_(options.albedo), density_scale_(density_scale), still_(context) {
+    : kind_(kind),
+      size_(options.size),
+      albedo_(options.albedo),
+      max_bounces_(options.max_bounces),
+      density_scale_(density_scale),
+      still_(context) {
   still_.viewer().camera()->frame(volume->bounds(), 1.0);
   still_.set_volume(std::move(volume));
   still_.set_light(bench_light());
@@ -81,6 +86,7 @@ Run Subject::trace(double density_scale, std::uint32_t samples, std::uint32_t se
   viewer::Medium medium;
   medium.density_scale = density_scale;
   medium.albedo = albedo_;
+  medium.max_bounces = max_bounces_;
   still_.set_medium(medium);
   still_.set_image({size_, size_, samples, seed, view});
   still_.build();

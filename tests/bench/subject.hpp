@@ -55,6 +55,7 @@ class Subject {
   Kind kind_;
   std::uint32_t size_;
   glm::vec3 albedo_;
+  std::uint32_t max_bounces_;
   double density_scale_;
   test::Still still_;
 };
