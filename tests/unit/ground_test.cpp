@@ -83,7 +83,7 @@ TEST_P(Ground, InAFurnaceIsOne) {
   EXPECT_NEAR(picture.mean().x, 1.0, 0.01);
 }
 
-// With a model and without, the same as two triangles of its albedo.
+// With a model and without, under sky and lamps, the same as two triangles of its albedo.
 TEST_P(Ground, IsAsTwoTriangles) {
   const auto cloud = test::make_volume({24, 16, 24}, ivec3(0), [](const ivec3& p) {
     return glm::length(vec3(p) - vec3(12.0F, 8.0F, 12.0F)) < 8.0F ? 1.0F : 0.0F;
@@ -112,6 +112,14 @@ TEST_P(Ground, IsAsTwoTriangles) {
       light.sun_azimuth_degrees = 70.0F;
       light.sun_angle_degrees = 8.0F;
       still->set_light(light);
+      light::Lamp point;
+      point.position = {26.0, 14.0, 20.0};
+      point.power = vec3(2000.0F, 1000.0F, 500.0F);
+      light::Lamp disc = point;
+      disc.kind = light::Lamp::Kind::disc;
+      disc.position = {4.0, 20.0, 24.0};
+      disc.width = 6.0;
+      still->viewer().set_lamps({point, disc});
       still->set_camera(test::camera_at({12.0, 40.0, 70.0}, {14.0, 0.0, 10.0}, 40.0));
       if (model || floor) still->viewer().show_surfaces(test::source_of(scene(floor)));
       if (!floor) still->viewer().set_ground({GroundPlace::at_height, height, albedo});
