@@ -10,6 +10,11 @@ struct Asset {
   viewer::VolumeAssetPtr volume;
   double mean_optical_depth = 0.0;  ///< at density scale 1
   double load_seconds = 0.0;        ///< 0 for a synthetic one
+
+  /// Of a mean optical depth; 1 for fire alone, which has no density.
+  [[nodiscard]] double density_scale(double optical_depth) const {
+    return mean_optical_depth > 0.0 ? optical_depth / mean_optical_depth : 1.0;
+  }
 };
 
 /// Reads or makes it; all_fields: not density alone, and by default what makes a volume of a file. Throws Error.

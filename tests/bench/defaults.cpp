@@ -26,8 +26,7 @@ std::string defaults_head() {
 }
 
 std::string measure_defaults(headless::Context& context, const Asset& asset, const Options& options) {
-  // Fire alone has no density.
-  const double density_scale = asset.mean_optical_depth > 0.0 ? options.optical_depth / asset.mean_optical_depth : 1.0;
+  const double density_scale = asset.density_scale(options.optical_depth);
   Subject voxels(context, asset.volume, Kind::brick, options, density_scale);
   const ImageReference reference(voxels, options.error_samples, options.error_parts);
   progress("    reference");

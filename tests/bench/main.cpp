@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "costs.hpp"
 #include "defaults.hpp"
 #include "measure.hpp"
 #include "report.hpp"
@@ -34,7 +35,7 @@ void run(const bench::Options& options) {
   if (!options.readme.empty() && !std::ifstream(options.readme)) {
     throw std::runtime_error(options.readme.string() + ": cannot be read");
   }
-  const bool all = !(options.surfaces_threshold > 0.0) && !options.defaults;
+  const bool all = !(options.surfaces_threshold > 0.0) && !options.defaults && !options.costs && !options.equal_error;
   if (all) std::filesystem::create_directories(options.out);
   headless::Context context = headless::Context::create(options.backend);
   const bench::Machine machine = machine_of(context);
@@ -51,6 +52,14 @@ void run(const bench::Options& options) {
     bench::progress(input.name);
     if (options.defaults) {
       std::printf("%s", bench::measure_defaults(context, bench::load_asset(input, true), options).c_str());
+      continue;
+    }
+    if (options.costs) {
+      bench::measure_costs(context, input, options);
+      continue;
+    }
+    if (options.equal_error) {
+      bench::measure_equal_error(context, input, options);
       continue;
     }
     if (!all) {

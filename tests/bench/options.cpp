@@ -63,7 +63,15 @@ ParseResult parse(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_flag("--defaults", o.defaults,
                "Only how far pictures of grids by default are from the voxels', with all of a file's fields");
-  app.add_option("--threshold", o.thresholds, "With --defaults: these thresholds instead of the default one");
+  app.add_flag("--costs", o.costs, "Only what each channel and each kind of light costs, and its noise");
+  app.add_option("--color-grid", o.color_grid, "With --costs: the volume's grid of colours");
+  app.add_option("--environment", o.environment, "With --costs: a .hdr or .exr");
+  app.add_flag("--equal-error", o.equal_error,
+               "Only what each march takes to --target of a fire's picture, its grid's error and its noise together");
+  auto* few = app.add_option("--samples", o.fewest_samples, "A pixel, at least, in a timed run (default: 8; quick: 4)");
+  few->check(CLI::Range(1U, 16U));
+  app.add_option("--threshold", o.thresholds,
+                 "With --defaults and --equal-error: these thresholds instead of the default one");
   app.add_option("--deviation", o.deviations, "With --defaults: these of the deviation criterion too");
   const std::map<std::string, headless::Backend> backends{
       {"auto", headless::Backend::automatic}, {"egl", headless::Backend::egl}, {"osmesa", headless::Backend::osmesa}};
@@ -108,7 +116,7 @@ ParseResult parse(int argc, char** argv) {
     if (build_cells->empty()) o.build_cells = 1'000'000;
     if (triangles->empty()) o.tree_triangles = 100'000;
     o.evaluations = 4;
-    o.fewest_samples = 4;
+    if (few->empty()) o.fewest_samples = 4;
     o.sweep_factor = 4.0;
   }
   if (inputs.empty()) {

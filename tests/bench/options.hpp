@@ -41,10 +41,14 @@ struct Options {
   std::uint64_t build_cells = 5'000'000;
   std::size_t tree_triangles = 1'000'000;
   bool quick = false;
-  bool defaults = false;            ///< only how good grids by default are
-  std::vector<double> thresholds;   ///< of those, by transmittance; empty: the default one
-  std::vector<double> deviations;   ///< and by deviation
-  double surfaces_threshold = 0.0;  ///< above 0: only what surfaces cost is measured, on a grid of that threshold
+  bool defaults = false;              ///< only how good grids by default are
+  std::vector<double> thresholds;     ///< of those, by transmittance; empty: the default one
+  std::vector<double> deviations;     ///< and by deviation
+  bool costs = false;                 ///< only what channels and lights cost
+  bool equal_error = false;           ///< only what marches take to an error of a fire's picture
+  std::string color_grid;             ///< of the volume whose channels are measured; empty: none
+  std::filesystem::path environment;  ///< to measure too; empty: none
+  double surfaces_threshold = 0.0;    ///< above 0: only what surfaces cost is measured, on a grid of that threshold
 };
 
 /// The options, or the exit status that wrong usage (or --help) means; explains itself.

@@ -1,4 +1,4 @@
-"""Runs cumulet-bench on a tiny volume and checks that what it writes exists and parses. Usage: smoke.py PROGRAM FOLDER"""
+"""Runs cumulet-bench on a tiny volume and checks that what it writes exists and parses. Usage: smoke.py PROGRAM FOLDER SCENE_PROGRAM"""
 
 import csv
 import pathlib
@@ -55,6 +55,15 @@ def main():
     assert text.startswith("before\n<!-- bench:begin -->\nPath tracing") and text.endswith("<!-- bench:end -->\nafter\n")
     assert "old" not in text.split() and "| ball | tet-linear |" in text
     assert "With surfaces, light `full`" in text and "| terrain | 0.0" in text
+
+    fire = folder / "sample/explosion_0012.vdb"
+    subprocess.run([sys.argv[3], str(fire.parent), "--only", "explosion", "--frame", "12", "--voxels", "20000"], check=True)
+    command = [program, "--input", f"fire={fire}", "--size", "16", "--repeats", "4", "--samples", "16", "--target", "0.5"]
+    for flags, first, rows in (["--costs"], "| density |", 4 + 12 + 2), (["--equal-error"], "| dense |", 3):
+        table = subprocess.run([*command, *flags], check=True, capture_output=True, text=True).stdout
+        lines = [line.split("|") for line in table.splitlines() if line.startswith("| ") and "Cells" not in line]
+        assert first in table and len(lines) == rows and len({len(line) for line in lines}) == 1, table
+        assert "nan" not in table and "inf" not in table, table
 
     for wrong in (["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--triangles", "0"], ["--nonsense"]):
         assert subprocess.run([program, *wrong], capture_output=True, check=False).returncode == 2, wrong

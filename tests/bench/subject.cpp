@@ -88,13 +88,17 @@ Run Subject::trace(double density_scale, std::uint32_t samples, std::uint32_t se
   medium.albedo = albedo_;
   medium.max_bounces = max_bounces_;
   still_.set_medium(medium);
-  still_.set_image({size_, size_, samples, seed, view});
-  still_.build();
-  while (!still_.render(500.0)) {
+  return bench::trace(still_, {size_, size_, samples, seed, view});
+}
+
+Run trace(test::Still& still, const test::Image& image) {
+  still.set_image(image);
+  still.build();
+  while (!still.render(500.0)) {
   }
   Run run;
-  run.rgba = still_.read();
-  const viewer::Stats stats = still_.viewer().stats();
+  run.rgba = still.read();
+  const viewer::Stats stats = still.viewer().stats();
   run.seconds = stats.trace_seconds;
   run.samples = stats.samples;
   run.steps = stats.steps;

@@ -60,6 +60,9 @@ class Subject {
   test::Still still_;
 };
 
+/// A picture of what the viewer has.
+Run trace(test::Still& still, const test::Image& image);
+
 /// The light of every measurement.
 viewer::Light bench_light();
 

@@ -1,0 +1,382 @@
+#include "costs.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <numbers>
+
+#include "asset.hpp"
+#include "light/environment_file.hpp"
+#include "measure.hpp"
+#include "settings/settings.hpp"
+#include "statistics.hpp"
+#include "subject.hpp"
+#include "support/surfaces.hpp"
+
+namespace cumulet::bench {
+
+namespace {
+
+using glm::dvec3;
+using glm::vec3;
+
+/// A row of a table: a scene with a viewer of its own, so that rows take turns without building anything anew.
+struct Row {
+  std::string name;
+  std::unique_ptr<test::Still> still;
+  std::vector<Run> runs = {};
+};
+
+/// Of one row's runs.
+struct Cost {
+  std::vector<double> step;                   ///< seconds
+  std::vector<double> sample;                 ///< seconds
+  double steps = 0.0;                         ///< a path
+  double variance = 0.0;                      ///< of one sample, over the mean's square, without the noisiest pixels
+  std::array<std::vector<double>, 2> halves;  ///< luminance of even runs and of odd ones
+};
+
+constexpr double noisiest = 0.005;  // part of the pixels: single paths that found a small light by chance
+
+double luminance(const Run& run, std::size_t pixel) {
+  const float* rgba = &run.rgba[4 * pixel];
+  return 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2];
+}
+
+/// The pixels that show the medium.
+std::vector<std::size_t> pixels_of(const Row& row) {
+  std::vector<std::size_t> pixels;
+  for (std::size_t i = 0; 4 * i < row.runs.front().rgba.size(); ++i) {
+    if (std::ranges::any_of(row.runs, [i](const Run& run) { return run.rgba[4 * i + 3] > 0.0F; })) pixels.push_back(i);
+  }
+  return pixels;
+}
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(std::max<std::size_t>(1, values.size()));
+}
+
+Cost cost_of(const Row& row, const std::vector<std::size_t>& pixels, std::uint32_t samples) {
+  Cost cost;
+  for (const Run& run : row.runs) {
+    cost.step.push_back(run.seconds / static_cast<double>(run.steps));
+    cost.sample.push_back(run.seconds / static_cast<double>(run.samples));
+    cost.steps += run.steps_per_sample() / static_cast<double>(row.runs.size());
+  }
+  std::vector<double> variances;
+  std::vector<double> means;
+  for (const std::size_t pixel : pixels) {
+    std::vector<double> values;
+    std::array<double, 2> half{};
+    for (std::size_t k = 0; k < row.runs.size(); ++k) {
+      values.push_back(luminance(row.runs[k], pixel));
+      half[k % 2] += values.back();
+    }
+    const double mean = mean_of(values);
+    double square = 0.0;
+    for (const double value : values) square += (value - mean) * (value - mean);
+    variances.push_back(square / static_cast<double>(values.size() - 1));
+    means.push_back(mean);
+    for (std::size_t k = 0; k < 2; ++k)
+      cost.halves[k].push_back(half[k] / static_cast<double>((values.size() + 1 - k) / 2));
+  }
+  std::ranges::sort(variances);
+  variances.resize(variances.size() - static_cast<std::size_t>(noisiest * static_cast<double>(variances.size())));
+  const double mean = mean_of(means);
+  cost.variance = samples * mean_of(variances) / (mean * mean);
+  return cost;
+}
+
+/// Renders all rows in turn, and tells of each.
+std::vector<Cost> take_turns(std::vector<Row>& rows, const Options& options) {
+  for (Row& row : rows) {
+    trace(*row.still, {options.size, options.size, 1, 999});  // compiles, builds, uploads
+    progress("  " + row.name);
+  }
+  for (int repeat = 0; repeat < options.repeats; ++repeat) {
+    for (Row& row : rows) {
+      const auto seed = static_cast<std::uint32_t>(repeat);
+      row.runs.push_back(trace(*row.still, {options.size, options.size, options.fewest_samples, seed}));
+    }
+  }
+  const std::vector<std::size_t> pixels = pixels_of(rows.front());
+  std::vector<Cost> costs;
+  for (const Row& row : rows) costs.push_back(cost_of(row, pixels, options.fewest_samples));
+  return costs;
+}
+
+void print_costs(const char* title, std::vector<Row>& rows, const Options& options) {
+  const std::vector<Cost> costs = take_turns(rows, options);
+  std::printf(
+      "\n| %s | Cells | Steps a path | A step, x | A sample, x | Noise of a sample, %% | Time to the same noise, x |\n"
+      "|---|--:|--:|--:|--:|--:|--:|\n",
+      title);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double sample = ratio_of(costs[i].sample, costs[0].sample).median;
+    std::printf("| %s | %.0fk | %.0f | %.2f | %.2f | %.0f | %.2f |\n", rows[i].name.c_str(),
+                1e-3 * static_cast<double>(rows[i].still->viewer().stats().cells), costs[i].steps,
+                ratio_of(costs[i].step, costs[0].step).median, sample, 100.0 * std::sqrt(costs[i].variance),
+                sample * costs[i].variance / costs[0].variance);
+  }
+  std::fflush(stdout);
+}
+
+enum class Burns { no, temperature, flame, both };
+
+/// As the preset "explosion" of the demo, which is for an extinction of 9 a unit.
+viewer::Medium medium_of(double density_scale, Burns burns) {
+  viewer::Medium medium;
+  medium.density_scale = density_scale;
+  medium.albedo = {0.32F, 0.3F, 0.28F};
+  medium.max_bounces = 12;
+  medium.field_emission.flame_strength = burns == Burns::flame || burns == Burns::both ? density_scale : 0.0;
+  medium.field_emission.flame_colour = {1.0F, 0.3F, 0.05F};
+  medium.field_emission.blackbody =
+      burns == Burns::temperature || burns == Burns::both ? 4.0 / 3.0 * density_scale : 0.0;
+  return medium;
+}
+
+class Rows {
+ public:
+  Rows(headless::Context& context, double density_scale) : context_(context), density_scale_(density_scale) {}
+
+  test::Still& add(std::string name, const viewer::VolumeAssetPtr& volume, Burns burns, const viewer::Light& light) {
+    Row& row = rows_.emplace_back(Row{std::move(name), std::make_unique<test::Still>(context_)});
+    row.still->viewer().camera()->frame(volume->bounds(), 1.0);
+    row.still->set_volume(volume);
+    row.still->set_medium(medium_of(density_scale_, burns));
+    row.still->set_light(light);
+    set_grid(*row.still, scene::March::tet, settings::default_threshold(CUMULET_CRITERION_TRANSMITTANCE));
+    return *row.still;
+  }
+  static void set_grid(test::Still& still, scene::March march, double threshold) {
+    viewer::GridSettings grid;
+    grid.build.march = march;
+    grid.build.refine.criterion = grid::Criterion::transmittance;
+    grid.build.refine.threshold = threshold;
+    still.set_grid(grid);
+  }
+  [[nodiscard]] std::vector<Row>& get() { return rows_; }
+
+ private:
+  headless::Context& context_;
+  double density_scale_;
+  std::vector<Row> rows_;
+};
+
+viewer::Light light_of(float sun, float sky, float angle = 0.0F) {
+  viewer::Light light = bench_light();
+  light.sun_irradiance *= sun;
+  light.sky_radiance *= sky;
+  light.sun_angle_degrees = angle;
+  return light;
+}
+
+viewer::Light clear_day() {
+  viewer::Light light = light_of(0.0F, 0.0F, settings::default_sun_angle(CUMULET_SKY_PHYSICAL));
+  light.sky = light::SkyModel{};
+  return light;
+}
+
+viewer::VolumeAssetPtr read(const Input& input, const std::string& colour) {
+  return std::make_shared<const viewer::VolumeAsset>(
+      volume::import_frame(input.file, {.density = input.grid, .colour = colour}, Log()));
+}
+
+/// Where lamps are: above and aside, facing the middle.
+struct Place {
+  dvec3 at;
+  dvec3 direction;
+  double distance;
+};
+Place beside(const viewer::Bounds& bounds) {
+  const double size = glm::length(bounds.max - bounds.min);
+  const dvec3 direction = glm::normalize(dvec3(-1.0, -1.5, -0.7));
+  return {0.5 * (bounds.min + bounds.max) - direction * size, direction, size};
+}
+
+scene::ModelSourcePtr emitter_at(const Place& place, double side, float radiance) {
+  const auto scene = std::make_shared<test::StillScene>();
+  surface::Material material = test::diffuse(vec3(0.0F));
+  material.emission = vec3(radiance);
+  const dvec3 across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), place.direction)) * (0.5 * side);
+  const dvec3 along = glm::normalize(glm::cross(place.direction, across)) * (0.5 * side);
+  const auto corner = [&](double u, double v) { return vec3(place.at + u * across + v * along); };
+  scene->add_quad({corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)}, scene->add(material));
+  return test::source_of(scene);
+}
+
+/// A hot core in a ball of smoke, which looks are for.
+viewer::VolumeAssetPtr small_fire() {
+  constexpr int side = 48;
+  const auto field = [](const std::function<float(float)>& value) {
+    volume::ScalarVolume v;
+    v.index_to_world = glm::dmat4(1.0);
+    v.bounds_min = glm::ivec3(0);
+    v.bounds_max = glm::ivec3(side - 1);
+    for (int x = 0; x < side; x += 8) {
+      for (int y = 0; y < side; y += 8) {
+        for (int z = 0; z < side; z += 8) {
+          v.brick_origins.emplace_back(x, y, z);
+          for (int i = 0; i < volume::brick_voxels; ++i) {
+            const glm::ivec3 p = glm::ivec3(x, y, z) + glm::ivec3(i / 64, (i / 8) % 8, i % 8);
+            const float here = value(glm::distance(vec3(p), vec3(0.5F * (side - 1))));
+            v.brick_values.push_back(here);
+            v.active_voxels += here > 0.0F ? 1 : 0;
+            v.max_value = std::max(v.max_value, here);
+          }
+        }
+      }
+    }
+    return v;
+  };
+  volume::VolumeFrame frame{.density = field([](float r) { return r < 23.0F ? 1.0F : 0.0F; })};
+  frame.flame = field([](float r) { return r < 3.0F ? 1.0F : 0.0F; });
+  return std::make_shared<const viewer::VolumeAsset>(std::move(frame));
+}
+
+}  // namespace
+
+void measure_costs(headless::Context& context, const Input& input, const Options& options) {
+  const Asset asset = load_asset(input, true);
+  const double density_scale = asset.density_scale(options.optical_depth);
+  const viewer::VolumeAssetPtr plain = read(input, "none");
+  const viewer::Light daylight = light_of(1.0F, 1.0F);
+  {
+    Rows rows(context, density_scale);
+    rows.add("density", plain, Burns::no, daylight);
+    rows.add("+ temperature", plain, Burns::temperature, daylight);
+    rows.add("+ flame", plain, Burns::flame, daylight);
+    rows.add("+ temperature and flame", plain, Burns::both, daylight);
+    if (!options.color_grid.empty()) {
+      const viewer::VolumeAssetPtr coloured = read(input, options.color_grid);
+      rows.add("+ colour", coloured, Burns::no, daylight);
+      rows.add("+ all", coloured, Burns::both, daylight);
+    }
+    print_costs("Channels", rows.get(), options);
+  }
+  {
+    const Place place = beside(plain->bounds());
+    const double side = 0.5 * place.distance;
+    const auto power = static_cast<float>(10.0 * place.distance * place.distance);
+    light::Lamp lamp;
+    lamp.position = place.at;
+    lamp.direction = place.direction;
+    lamp.across = glm::normalize(glm::cross(dvec3(0.0, 1.0, 0.0), place.direction));
+    lamp.power = vec3(power);
+    lamp.width = lamp.height = side;
+    lamp.angle = std::numbers::pi / 4.0;
+    const viewer::Light dark = light_of(0.0F, 0.0F);
+    Rows rows(context, density_scale);
+    const auto lit = [&](const char* name, light::Lamp::Kind kind, const dvec3& at) {
+      lamp.kind = kind;
+      lamp.position = at;
+      rows.add(name, plain, Burns::no, dark).viewer().set_lamps({lamp});
+    };
+    rows.add("constant sky", plain, Burns::no, light_of(0.0F, 1.0F));
+    rows.add("sun", plain, Burns::no, light_of(1.0F, 0.0F));
+    rows.add("sun of 5 degrees", plain, Burns::no, light_of(1.0F, 0.0F, 5.0F));
+    rows.add("sun and sky", plain, Burns::no, daylight);
+    rows.add("physical sky", plain, Burns::no, clear_day());
+    if (!options.environment.empty()) {
+      const std::string name = options.environment.string();
+      rows.add("environment", plain, Burns::no, dark)
+          .viewer()
+          .set_environment(light::make_environment(light::read_environment(name), name));
+    }
+    lit("point beside it", light::Lamp::Kind::point, place.at);
+    lit("spot", light::Lamp::Kind::spot, place.at);
+    lit("disc", light::Lamp::Kind::disc, place.at);
+    lit("rectangle", light::Lamp::Kind::rectangle, place.at);
+    lit("point in it", light::Lamp::Kind::point, place.at + place.direction * place.distance);
+    rows.add("two triangles like the rectangle", plain, Burns::no, dark)
+        .viewer()
+        .show_surfaces(emitter_at(place, side, power / static_cast<float>(4.0 * side * side)));
+    rows.add("its own fire", plain, Burns::both, dark);
+    print_costs("Light", rows.get(), options);
+  }
+  const viewer::VolumeAssetPtr small = small_fire();
+  Rows rows(context, 0.1);
+  Rows::set_grid(rows.add("bricks, without looks", small, Burns::flame, light_of(0.0F, 0.0F)), scene::March::brick, 0);
+  rows.add("cells, with looks", small, Burns::flame, light_of(0.0F, 0.0F));
+  print_costs("A small fire", rows.get(), options);
+}
+
+void measure_equal_error(headless::Context& context, const Input& input, const Options& options) {
+  const Asset asset = load_asset(input, true);
+  const double density_scale = asset.density_scale(options.optical_depth);
+  Rows rows(context, density_scale);
+  const auto add = [&](const std::string& name, scene::March march, double threshold) {
+    Rows::set_grid(rows.add(name, asset.volume, Burns::both, clear_day()), march, threshold);
+  };
+  add("dense", scene::March::dense, 0.0);
+  add("brick", scene::March::brick, 0.0);
+  for (const double threshold : options.thresholds) {
+    std::array<char, 32> name{};
+    std::snprintf(name.data(), name.size(), "tet %g", threshold);
+    add(name.data(), scene::March::tet, threshold);
+  }
+  if (options.thresholds.empty())
+    add("tet", scene::March::tet, settings::default_threshold(CUMULET_CRITERION_TRANSMITTANCE));
+  const std::vector<Cost> costs = take_turns(rows.get(), options);
+  std::printf("\n%s: %u x %u pixels, %d x %u samples, density scale %.3g\n\n", asset.name.c_str(), options.size,
+              options.size, options.repeats, options.fewest_samples, density_scale);
+  std::printf(
+      "| March | Cells | Steps a path | A step, ns | Samples/s, x dense | x brick | Noise of a sample, %% | "
+      "Grid's error, %% |");
+  for (const double target : options.targets)
+    std::printf(" To %g %%: time, x dense | x brick | steps, x dense |", 100.0 * target);
+  std::printf("\n|---|--:|--:|--:|--:|--:|--:|--:|");
+  for (std::size_t i = 0; i < options.targets.size(); ++i) std::printf("--:|--:|--:|");
+  std::printf("\n");
+  const Cost& dense = costs[0];
+  const Cost& brick = costs[1];
+  const double mean = 0.5 * (mean_of(dense.halves[0]) + mean_of(dense.halves[1]));
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    const Cost& cost = costs[i];
+    // Products of two independent halves: noise does not enter their mean.
+    std::vector<double> products;
+    std::vector<double> squares;
+    for (std::size_t k = 0; k < dense.halves[0].size(); ++k) {
+      products.push_back((cost.halves[0][k] - dense.halves[0][k]) * (cost.halves[1][k] - dense.halves[1][k]) /
+                         (mean * mean));
+      squares.push_back(products.back() * products.back());
+    }
+    const bool voxels = i < 2;
+    const double square = voxels ? 0.0 : mean_of(products);
+    const double deviation = std::sqrt(mean_of(squares) / static_cast<double>(squares.size()));
+    const double x_dense = ratio_of(dense.sample, cost.sample).median;
+    const double x_brick = ratio_of(brick.sample, cost.sample).median;
+    std::printf("| %s | %.0fk | %.1f | %.1f | %.2f | %.2f | %.0f |", rows.get()[i].name.c_str(),
+                1e-3 * static_cast<double>(rows.get()[i].still->viewer().stats().cells), cost.steps,
+                1e9 * spread_of(cost.step).median, x_dense, x_brick, 100.0 * std::sqrt(cost.variance));
+    if (voxels) {
+      std::printf(" reference |");
+    } else if (square > deviation) {
+      std::printf(" %.1f +- %.1f |", 100.0 * std::sqrt(square), 50.0 * deviation / std::sqrt(square));
+    } else {
+      std::printf(" below %.1f |", 100.0 * std::sqrt(std::max(square, 0.0) + 2.0 * deviation));
+    }
+    for (const double target : options.targets) {
+      // Samples until the variance is what the grid's error leaves of the target's square.
+      const double left = target * target - std::max(square, 0.0);
+      if (!(left > 0.0)) {
+        std::printf(" never | never | never |");
+        continue;
+      }
+      const auto gain = [&](const Cost& other, double each) {
+        return each * other.variance / cost.variance * left / (target * target);
+      };
+      std::printf(" %.2f | %.2f | %.2f |", gain(dense, x_dense), gain(brick, x_brick),
+                  gain(dense, dense.steps / cost.steps));
+    }
+    std::printf("\n");
+  }
+}
+
+}  // namespace cumulet::bench
