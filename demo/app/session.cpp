@@ -251,7 +251,8 @@ void Session::follow_volume() {
     waiting_ = false;
     return;
   }
-  const cumulet_volume_file_desc file = volume_file(scene_);
+  cumulet_volume_file_desc file = volume_file(scene_);
+  file.suggested_density_scale = suggest_ ? 1 : 0;
   waiting_ = check(cumulet_load_volume_file(viewer_.get(), &file));
   if (waiting_) return;
   files_.push_back({scene_.volume, Answer::File::Fate::failed});

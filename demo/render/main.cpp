@@ -162,16 +162,16 @@ void tell(Progress& progress, const std::string& line) {
   std::fprintf(stderr, "%s\n", one_line(line).c_str());
 }
 
-/// The scale that suits the volume, whatever it is seen from.
-void choose_density_scale(const Viewer& viewer, cumulet_medium_desc medium, Progress& progress) {
+/// The scale that suits the volume, whatever it is seen from: it was loaded with that.
+void tell_density_scale(const Viewer& viewer, Progress& progress) {
   cumulet_volume* volume = nullptr;
   check(viewer, cumulet_get_volume(viewer.get(), &volume));
-  const cumulet_status status = cumulet_volume_suggest_density_scale(volume, &medium.density_scale);
+  double scale = 0.0;
+  const cumulet_status status = cumulet_volume_suggest_density_scale(volume, &scale);
   cumulet_volume_release(volume);
   if (status != CUMULET_OK) return;  // nothing to see at any scale
-  check(viewer, cumulet_set_medium(viewer.get(), &medium));
   std::array<char, 32> digits{};
-  std::snprintf(digits.data(), digits.size(), "%g", medium.density_scale);
+  std::snprintf(digits.data(), digits.size(), "%g", scale);
   tell(progress, std::string("density scale ") + digits.data() + ", for a mean optical depth of 8 (--density-scale)");
 }
 
@@ -339,12 +339,13 @@ void render(const RenderOptions& options) {
     check(viewer, cumulet_load_surfaces(viewer.get(), scene.surfaces.c_str()));
   }
   if (!scene.volume.empty()) {
-    const cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
+    cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
+    file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
     check(viewer, cumulet_load_volume_file(viewer.get(), &file));
   }
   wait(viewer, progress);
   if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress, *hint);
-  if (!scene.volume.empty() && scene.auto_density_scale) choose_density_scale(viewer, scene.medium, progress);
+  if (!scene.volume.empty() && scene.auto_density_scale) tell_density_scale(viewer, progress);
   if (!scene.surfaces.empty()) check_animation(viewer, options);
   if (scene.surface_camera >= 0)
     check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));

@@ -32,16 +32,20 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
   worker_.replace({file.path, Progress::Stage::loading,
                    [this, file, load](Progress& progress) {
                      Stopwatch watch;
-                     const VolumeAssetPtr volume = file.read(log_, &progress);
+                     LoadedVolume loaded{file.read(log_, &progress), {}};
+                     if (file.suggested_density_scale)
+                       loaded.density_scale = loaded.volume->coarse().suggest_density_scale();
                      const double seconds = watch.lap();
                      {
                        const std::scoped_lock handing(mutex_);
                        progress.check();
-                       loaded_ = volume;
+                       loaded_ = loaded;
                        load->open = false;
                      }
                      // Closed: nobody else changes it now.
-                     if (load->settings) build_of(volume, *load->settings, seconds, progress);
+                     if (!load->settings) return;
+                     if (loaded.density_scale) load->settings->refine.density_scale = *loaded.density_scale;
+                     build_of(loaded.volume, *load->settings, seconds, progress);
                    },
                    true});
 }
@@ -84,7 +88,7 @@ bool Builder::configure_load(const std::optional<BuildSettings>& settings) {
   return true;
 }
 
-std::optional<VolumeAssetPtr> Builder::take_loaded() {
+std::optional<LoadedVolume> Builder::take_loaded() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(loaded_, std::nullopt);
 }

@@ -23,10 +23,17 @@ namespace cumulet::viewer {
 struct VolumeFile {
   std::string path;
   volume::GridNames grids;
-  glm::dmat4 to_world{1.0};  ///< affine, from the file's own world space
+  glm::dmat4 to_world{1.0};              ///< affine, from the file's own world space
+  bool suggested_density_scale = false;  ///< the medium gets the one that is suggested for it
 
   /// Throws what import_frame and VolumeAsset throw.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress) const;
+};
+
+/// What came of it.
+struct LoadedVolume {
+  VolumeAssetPtr volume;
+  std::optional<double> density_scale;  ///< of the medium, from now on
 };
 
 /// What a march is made with.
@@ -79,7 +86,7 @@ class Builder {
   void cancel_loads();
 
   /// The newest volume that was read, once.
-  std::optional<VolumeAssetPtr> take_loaded();
+  std::optional<LoadedVolume> take_loaded();
   /// The newest result, once.
   std::optional<Built> take_built();
 
@@ -101,7 +108,7 @@ class Builder {
   Log log_;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;  // held by its job
-  std::optional<VolumeAssetPtr> loaded_;
+  std::optional<LoadedVolume> loaded_;
   std::optional<Built> built_;
   Worker worker_;  // last: its thread uses all of the above
 };

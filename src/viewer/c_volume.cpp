@@ -35,11 +35,14 @@ viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
   require(all_finite(d.to_world), "to_world is not finite");
   const glm::dmat4 m = matrix_or_identity(d.to_world);
   require(m[0].w == 0.0 && m[1].w == 0.0 && m[2].w == 0.0 && m[3].w == 1.0, "to_world is not affine");
+  require(d.suggested_density_scale == 0 || d.suggested_density_scale == 1,
+          "suggested_density_scale is neither 0 nor 1");
   const auto name = [](const char* given) { return std::string(given == nullptr ? "" : given); };
   return {
       d.path,
       {name(d.grid_name), name(d.temperature_grid), name(d.flame_grid), name(d.color_grid), name(d.anisotropy_grid)},
-      m};
+      m,
+      d.suggested_density_scale == 1};
 }
 
 cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out, char* error,

@@ -71,9 +71,13 @@ void Viewer::touch() {
 
 void Viewer::sync() {
   if (auto loaded = builder_.take_loaded()) {
-    volume_ = std::move(*loaded);
+    volume_ = std::move(loaded->volume);
     built_view_.reset();
     remark_on_anisotropy();
+    if (loaded->density_scale) {
+      medium_.density_scale = grid_.build.refine.density_scale = *loaded->density_scale;
+      show_medium();
+    }
   }
   if (auto built = builder_.take_built()) {
     // A rebuild keeps what the load took.
@@ -303,8 +307,12 @@ void Viewer::set_medium(const Medium& medium) {
     grid_.build.emission = emission;
     request_build(true);
   }
-  scene_.volumes.front().medium.set({medium.density_scale, medium.albedo, medium.phase, medium.emission});
+  show_medium();
   touch();
+}
+
+void Viewer::show_medium() {
+  scene_.volumes.front().medium.set({medium_.density_scale, medium_.albedo, medium_.phase, medium_.emission});
 }
 
 void Viewer::set_light(const Light& light) {

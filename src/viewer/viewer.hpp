@@ -137,6 +137,8 @@ class Viewer {
   void request_build(bool for_emission = false);
   // What grids to come know of the medium.
   void take_medium();
+  // What pictures to come know of it.
+  void show_medium();
   [[nodiscard]] scene::Emission field_emission() const;
   void remark_on_anisotropy() const;
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;

@@ -511,6 +511,37 @@ TEST_F(CppViewer, CallsBackWhereverItIsMoved) {
   EXPECT_EQ(warnings.size(), 1U) << testing::PrintToString(warnings);
 }
 
+TEST_F(CppViewer, LoadsAVolumeWithTheDensityScaleThatSuitsIt) {
+  const BallFile file;
+  const auto loaded = [&](double density_scale, bool suggested) {
+    Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
+    viewer.set_sampling({.samples = 1, .preview = Preview::off}).value();
+    viewer.set_medium({.density_scale = density_scale, .coalbedo = {1, 1, 1}}).value();
+    const std::string path = file.path();
+    viewer.load_volume(VolumeFileDesc{.path = path.c_str(), .suggested_density_scale = suggested}).value();
+    converge(viewer, 24, 16);
+    return viewer;
+  };
+  const auto picture = [](Viewer& viewer) {
+    std::vector<float> linear(24 * 16 * 4);
+    viewer.read_linear(linear).value();
+    return linear;
+  };
+  Viewer suits = loaded(100.0, true);
+  const double scale = suits.get_volume()->suggest_density_scale().value();
+  Viewer same = loaded(scale, false);
+  Viewer denser = loaded(100.0, false);
+  EXPECT_EQ(suits.get_stats()->cells, same.get_stats()->cells);
+  EXPECT_EQ(picture(suits), picture(same));
+  EXPECT_NE(picture(suits), picture(denser));
+  // Nothing is left to build.
+  suits.set_medium({.density_scale = scale, .coalbedo = {1, 1, 1}}).value();
+  EXPECT_EQ(suits.get_progress()->stage, Stage::idle);
+  cumulet_volume_file_desc neither = VolumeFileDesc{.path = "no such cloud.vdb"};
+  neither.suggested_density_scale = 2;
+  EXPECT_EQ(cumulet_load_volume_file(suits.handle(), &neither), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
 // Its worker may be in one when the viewer is replaced.
 TEST_F(CppViewer, OutlivesNoCallback) {
   struct Captured {

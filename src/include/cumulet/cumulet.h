@@ -286,6 +286,13 @@ typedef struct cumulet_volume_file_desc {
    * it, at most 0.999 either way; where the grid has nothing, 0.
    */
   const char* anisotropy_grid;
+  /*
+   * 1: cumulet_load_volume_file gives the medium, as the volume comes, the density scale that
+   * cumulet_volume_suggest_density_scale tells of it, and builds the grid for that. Cells are built for a density scale
+   * (cumulet_grid_desc): who sets it when the volume is there may have them built twice. 0: it is left as it is, as of
+   * a volume that shows nothing, and by cumulet_volume_open_file.
+   */
+  int32_t suggested_density_scale;
 } cumulet_volume_file_desc;
 
 CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
@@ -712,8 +719,8 @@ typedef struct cumulet_medium_desc {
   size_t struct_size;
   double density_scale; /* extinction = density_scale x grid value, 1 / world unit; 0: 1 */
   float coalbedo[3];    /* 1 - single-scattering albedo, each in [0, 1]; 0: nothing is absorbed */
-  float anisotropy;     /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic. Not of Mie, nor where the
-                           volume has an anisotropy_grid */
+  float anisotropy; /* Henyey-Greenstein g in (-1, 1), of two lobes the first one's; 0: isotropic. Not of Mie, nor where
+                       the volume has an anisotropy_grid */
   uint32_t max_bounces; /* scattering events a path may have; 0: no limit */
   /*
    * Source radiance: each point gives off extinction x emission per unit of length, so that a body of the medium too

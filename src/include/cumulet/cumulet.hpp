@@ -305,6 +305,7 @@ struct VolumeFileDesc {
   const char* flame_grid = nullptr;
   const char* color_grid = nullptr;
   const char* anisotropy_grid = nullptr;
+  bool suggested_density_scale = false;
 
   operator cumulet_volume_file_desc() const noexcept {
     cumulet_volume_file_desc c{.struct_size = sizeof c,
@@ -314,7 +315,8 @@ struct VolumeFileDesc {
                                .temperature_grid = temperature_grid,
                                .flame_grid = flame_grid,
                                .color_grid = color_grid,
-                               .anisotropy_grid = anisotropy_grid};
+                               .anisotropy_grid = anisotropy_grid,
+                               .suggested_density_scale = suggested_density_scale ? 1 : 0};
     std::ranges::copy(to_world, c.to_world);
     return c;
   }
