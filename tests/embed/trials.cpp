@@ -329,6 +329,7 @@ void Caller::call_all() {
   auto stats = make_desc<cumulet_stats>();
   auto progress = make_desc<cumulet_progress>();
   auto volume_info = make_desc<cumulet_volume_info>();
+  auto values_info = make_desc<cumulet_values_info>();
   auto surfaces_info = make_desc<cumulet_surfaces_info>();
   auto animation = make_desc<cumulet_animation_info>();
   const auto volume_file = make_desc<cumulet_volume_file_desc>();
@@ -379,6 +380,7 @@ void Caller::call_all() {
   CALL(cumulet_inspection_get_grid, new_inspection, 0, &grid_info);
   CALL(cumulet_inspection_get_metadata, new_inspection, 0, 0, &metadata);
   CALL(cumulet_volume_get_info, volume, &volume_info);
+  CALL(cumulet_volume_get_values, volume, CUMULET_RAMP_DENSITY, &values_info);
   CALL(
       cumulet_list_grids, "none.vdb", [](void*, const char*, const char*, const char*) {}, nullptr, nullptr, 0);
   CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
