@@ -36,6 +36,9 @@ const int CM_UNIT_DEPTH_SOURCE = 0;
 const int CM_UNIT_DENOISE_COLOUR = 0;
 const int CM_UNIT_DENOISE_ALBEDO = 1;
 const int CM_UNIT_DENOISE_NORMAL = 2;
+const int CM_UNIT_GUIDE_ALBEDO = 6;  // denoise_guides.comp, beside what resolve.comp has
+const int CM_UNIT_GUIDE_NORMAL = 7;
+const int CM_UNIT_GUIDE_TRANSMITTANCE = 8;
 // surface.frag:
 const int CM_UNIT_MAPS = 0;  // to 9, in the order of surface_parameters.glsl
 const int CM_UNIT_GGX_ALBEDO = 10;
@@ -72,5 +75,8 @@ const int CM_IMAGE_MEANS = 0;       // resolve.comp
 const int CM_IMAGE_BACKGROUND_MEANS = 1;
 const int CM_IMAGE_HOST_DEPTH = 0;  // host_depth.comp
 const int CM_IMAGE_DENOISED = 0;    // denoise_convolution.comp
+const int CM_IMAGE_GUIDE_COLOUR = 0;  // denoise_guides.comp
+const int CM_IMAGE_GUIDE_ALBEDO = 1;
+const int CM_IMAGE_GUIDE_NORMAL = 2;
 
 #endif

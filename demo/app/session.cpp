@@ -526,7 +526,7 @@ void Session::write_exr(const std::string& path) {
   constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
                             CUMULET_AOV_NORMAL, CUMULET_AOV_ALBEDO};
   const bool shaded = scene_.sampling.view == CUMULET_VIEW_SHADED;
-  demo::write_exr(viewer_.get(), path, width, height, rgba, std::span(aovs).first(shaded ? aovs.size() : 0));
+  demo::write_exr(viewer_.get(), path, width, height, {rgba}, std::span(aovs).first(shaded ? aovs.size() : 0));
 }
 
 image::Image Session::read_display() {

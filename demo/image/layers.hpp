@@ -18,6 +18,7 @@ struct LayerName {
 /// The layers of a rendered picture, in one place; docs/aovs.md says what they hold and why they are called so.
 namespace layers {
 inline constexpr LayerName beauty{"", "RGBA"};
+inline constexpr LayerName denoised{"denoised", "RGBA"};
 inline constexpr LayerName volume{"volume", "RGBA"};
 inline constexpr LayerName transmittance{"transmittance", "Y"};
 inline constexpr LayerName depth{"depth", "Z"};

@@ -27,9 +27,10 @@ image::LayerName layer_of(cumulet_aov aov) {
 }
 
 void write_exr(cumulet_viewer* viewer, const std::string& path, std::uint32_t width, std::uint32_t height,
-               std::span<const float> beauty, std::span<const cumulet_aov> aovs) {
+               const WrittenPicture& picture, std::span<const cumulet_aov> aovs) {
   std::vector<std::vector<float>> values;
-  std::vector<image::Layer> layers{{image::layers::beauty, beauty}};
+  std::vector<image::Layer> layers{{image::layers::beauty, picture.beauty}};
+  if (!picture.denoised.empty()) layers.push_back({image::layers::denoised, picture.denoised});
   values.reserve(aovs.size());
   for (const cumulet_aov aov : aovs) {
     const image::LayerName name = layer_of(aov);

@@ -20,6 +20,7 @@
 #include <timeline.hpp>
 
 #include "aovs.hpp"
+#include "denoised.hpp"
 #include "info.hpp"
 #include "memory.hpp"
 #include "options.hpp"
@@ -241,19 +242,39 @@ void check_memory(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::check_memory(options, stats_of(viewer).gl_renderer, cumulet::demo::available_memory());
 }
 
-void write_picture(const Viewer& viewer, const RenderOptions& options) {
+/// Empty where that is not asked for, or cannot be, which is told: hours of samples are worth a picture with noise.
+std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
+  if (!options.denoise) return {};
+  progress.stage("denoising");
+  const std::string folder = options.denoiser.empty() ? cumulet::demo::denoiser_folder() : options.denoiser;
+  try {
+    return cumulet::demo::denoised(viewer.get(), folder, std::size_t{4} * options.scene.width * options.scene.height);
+  } catch (const std::runtime_error& error) {
+    tell(progress, std::string("not denoised: ") + error.what());
+    return {};
+  }
+}
+
+void write_picture(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised) {
   cumulet::image::Image image{options.scene.width, options.scene.height, {}};
   const std::size_t count = std::size_t{4} * image.width * image.height;
   if (options.format == OutputFormat::png) {
     std::vector<std::uint8_t> bytes(count);
-    check(viewer, cumulet_read_display(viewer.get(), bytes.data(), bytes.size()));
+    check(viewer, denoised.empty() ? cumulet_read_display(viewer.get(), bytes.data(), bytes.size())
+                                   : cumulet_encode_display(viewer.get(), denoised.data(), bytes.data(), bytes.size()));
     cumulet::image::write_png(options.output, image.width, image.height, bytes);
+    return;
+  }
+  if (options.format == OutputFormat::pfm && !denoised.empty()) {
+    image.rgba = denoised;
+    cumulet::image::write_pfm(options.output, image);
     return;
   }
   image.rgba.resize(count);
   check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
   if (options.format == OutputFormat::exr) {
-    cumulet::demo::write_exr(viewer.get(), options.output, image.width, image.height, image.rgba, options.aovs);
+    cumulet::demo::write_exr(viewer.get(), options.output, image.width, image.height, {image.rgba, denoised},
+                             options.aovs);
   } else {
     cumulet::image::write_pfm(options.output, image);
   }
@@ -365,8 +386,9 @@ void render(const RenderOptions& options) {
   const bool complete = (frame.flags & CUMULET_RENDER_CONVERGED) != 0;
   if (!began) check_not_interrupted();
 
+  const std::vector<float> denoised = denoise(viewer, options, progress);
   progress.stage("writing " + options.output);
-  write_picture(viewer, options);
+  write_picture(viewer, options, denoised);
   const cumulet_stats stats = stats_of(viewer);
   if (!options.stats.empty()) write_stats(options, stats, context.name());
   if (!options.trace.empty()) cumulet::image::replace_file(options.trace, timeline.json());

@@ -581,6 +581,15 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.trace = text;
       },
       "When frames, their passes and the workers' jobs ran, for chrome://tracing and Perfetto");
+  add_choice(app, group, "--denoise", std::array{Name{"off", false}, Name{"high", true}}, options.denoise,
+             "Take the noise away by a network of Open Image Denoise; an .exr gets a layer `denoised` (default: off)");
+  add(
+      app, group, "--oidn-weights", "DIR",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the folder's name is empty");
+        options.denoiser = text;
+      },
+      "Where its networks are (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below $XDG_DATA_HOME)");
   add(
       app, group, "--shader-cache", "DIR",
       [&](const std::string& text) {
@@ -604,6 +613,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
     throw UsageError("--aovs needs an .exr to write to");
   if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--aovs needs the shaded view");
+  if (options.denoise && options.scene.sampling.view != CUMULET_VIEW_SHADED)
+    throw UsageError("--denoise needs the shaded view");
+  if (options.denoise && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
+    throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
   if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
   if (!options.trace.empty() && options.trace == options.stats)

@@ -45,6 +45,8 @@ struct RenderOptions {
   std::string shader_cache;       // a folder; empty: none
   bool info = false;              // tell what is in the files, render nothing
   bool json = false;              // as JSON
+  bool denoise = false;           // the picture; of an .exr a layer beside it
+  std::string denoiser;           // a folder of networks; empty: where the script puts them
   std::vector<cumulet_aov> aovs;  // layers of an .exr beside the picture
 };
 

@@ -179,6 +179,10 @@ gl::ProgramKey Denoiser::key_of(const Stage& stage) const {
   return {"denoise_convolution.comp", {pooled ? "CM_RESULT 1" : "CM_RESULT 0"}};
 }
 
+void Denoiser::build() const {
+  for (const Stage& stage : stages_) programs_->get(key_of(stage));
+}
+
 void Denoiser::bind() const {
   const gl::Functions& gl = *gl_;
   const auto texture = [&](GLuint unit, GLuint name) {

@@ -32,6 +32,8 @@ class Denoiser {
 
   /// Begins to denoise; what was under way is given up. Throws Error(out_of_memory, gl).
   void begin(const Pictures& pictures);
+  /// Waits until the driver has compiled all that it takes. Throws Error(gl).
+  void build() const;
   /// One dispatch of about so many multiplications and additions, no more unless one work group has more. Returns
   /// whether there is none left: the result is there. While the driver still compiles a shader it does nothing. Throws
   /// Error(gl).

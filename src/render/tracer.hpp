@@ -192,6 +192,9 @@ class Tracer {
   void read(const Picture& picture, bool with_background, float* rgba) const;
   /// The same without background of samples that met the volume before any surface; alpha is their share.
   void read_volume(const Picture& picture, float* rgba) const;
+  /// Until about the deadline, the layers of PixelFact of this picture, data and obstacles being those it was made of;
+  /// whether they are there. Goes on in the next call.
+  bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
   /// A fact a pixel (PixelFact), each channels_of(fact) floats. Finds them first, if need be.
   void read_fact(Picture& picture, const MarchData& data, const Obstacles& obstacles, PixelFact fact, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
@@ -268,7 +271,6 @@ class Tracer {
   [[nodiscard]] std::vector<Texel> texels(const Picture& picture, const FilmLayer& layer, GLenum format,
                                           GLenum type) const;
   [[nodiscard]] std::vector<glm::uvec2> read_counts(const Picture& picture) const;
-  bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;

@@ -478,6 +478,23 @@ cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_
   return guarded(viewer, [&](core::Viewer& v) { v.read_display(rgba, count); });
 }
 
+cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoise_desc* desc, float* rgba,
+                                     size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_denoise_desc d = read_desc(desc, "cumulet_denoise_desc");
+    require(d.network != nullptr && *d.network != '\0', "network is NULL or empty");
+    v.read_denoised(d.network, rgba, count);
+  });
+}
+
+cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linear, uint8_t* rgba, size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(linear != nullptr && rgba != nullptr, "linear or rgba is NULL");
+    require(count % 4 == 0, "count is no multiple of 4");
+    v.encode_display({linear, count}, {rgba, count});
+  });
+}
+
 cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(number(aov) <= CUMULET_AOV_ALBEDO, "the AOV is unknown");

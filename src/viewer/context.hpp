@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/revision.hpp"
 #include "base/slot.hpp"
+#include "denoise/network.hpp"
 #include "gl/programs.hpp"
 #include "gl/share_group.hpp"
 #include "render/compositor.hpp"
@@ -94,6 +95,8 @@ class Context {
   /// Throws Error(invalid_argument) for too few values, or what was not gathered.
   void read_aov(const Shot& shot, Aov aov, float* values, std::size_t count);
   void read_linear(const DisplaySettings& settings, float* rgba, std::size_t count);
+  /// The same denoised; only of shaded pictures whose surfaces are traced. Throws Error(unsupported) of others.
+  void read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count);
   [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
 
   /// Of the context's life.
@@ -144,6 +147,8 @@ class Context {
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);
   // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
+  // Throws Error(invalid_argument) where the picture is of another scene than the one there is.
+  void find_facts(const Shot& shot, render::Picture& picture);
   void read_means(render::Picture& picture, bool with_background, float* rgba);
   // What the compositor draws of it, as linear radiance.
   void read_composite(render::Picture& picture, bool transparent, float* rgba);

@@ -1,16 +1,43 @@
 // What a context gives back of its pictures.
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/milliseconds.hpp"
 #include "gl/transient_framebuffer.hpp"
+#include "render/denoised.hpp"
 #include "viewer/context.hpp"
 
 namespace cumulet::viewer {
 
 using glm::dvec3;
+
+namespace {
+
+constexpr std::uint64_t most_denoiser_bytes = std::uint64_t{512} << 20U;
+
+// How many floats a picture of four channels has. Throws Error(invalid_argument) where there is no room for them.
+std::size_t require_room(const render::Picture& picture, const float* rgba, std::size_t count) {
+  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 4;
+  if (rgba == nullptr || count < floats) {
+    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+  }
+  return floats;
+}
+
+// Before the display's backdrop, where it has one.
+void put_before(const render::Display& display, std::span<float> rgba) {
+  if (display.transparent || !display.backdrop) return;
+  for (std::size_t i = 0; i < rgba.size(); ++i) {
+    const std::size_t c = i % 4;
+    if (c != 3) rgba[i] += (1.0F - rgba[i - c + 3]) * (*display.backdrop)[static_cast<int>(c)];
+  }
+}
+
+}  // namespace
 
 Pick Context::pick(const Shot& shot, double x, double y) {
   const auto& view = shot.view();
@@ -98,26 +125,47 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
     }
     progressive_.tracer().read_volume(picture, values);
   } else {
-    if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision())) {
-      throw Error(ErrorCode::invalid_argument,
-                  "the picture is of what was shown before: render until there is a newer");
-    }
+    find_facts(shot, picture);
     progressive_.tracer().read_fact(picture, *scene_.data(), obstacles(shot), fact, values);
   }
 }
 
+void Context::find_facts(const Shot& shot, render::Picture& picture) {
+  if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision())) {
+    throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
+  }
+  const render::Obstacles met = obstacles(shot);
+  while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0))) {
+  }
+}
+
+void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count) {
+  render::Picture& picture = readable();
+  if (picture.view() != render::View::shaded || picture.layered() == render::Layered::beneath) {
+    throw Error(ErrorCode::unsupported, "only shaded pictures whose surfaces are traced can be denoised");
+  }
+  require_room(picture, rgba, count);
+  find_facts(shot, picture);
+  const render::Display display = shot.display.shown(false);
+  const std::vector<scene::Volume>& volumes = shot.scene->volumes;
+  render::Denoising denoising;
+  denoising.network = network;
+  denoising.with_background = display.shows_background();
+  if (!volumes.empty()) denoising.medium_albedo = (*volumes.front().medium).albedo;
+  denoising.most_bytes = most_denoiser_bytes;
+  const gl::Object denoised = render::denoised(functions_, programs_, picture, denoising);
+  const glm::uvec2 size = picture.size();
+  functions_->GetTextureImage(denoised.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(size.x * size.y * 16), rgba);
+  gl::check(*functions_, "reading the denoised picture back");
+  put_before(display, {rgba, std::size_t{size.x} * size.y * 4});
+}
+
 void Context::read_linear(const DisplaySettings& settings, float* rgba, std::size_t count) {
   render::Picture& picture = readable();
-  const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
-  if (rgba == nullptr || count < pixels * 4)
-    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " floats");
+  const std::size_t floats = require_room(picture, rgba, count);
   const render::Display display = settings.shown(picture.view() != render::View::shaded);
   read_means(picture, display.shows_background(), rgba);
-  if (display.transparent || !display.backdrop) return;
-  for (std::size_t i = 0; i < pixels * 4; ++i) {
-    const std::size_t c = i % 4;
-    if (c != 3) rgba[i] += (1.0F - rgba[i - c + 3]) * (*display.backdrop)[static_cast<int>(c)];
-  }
+  put_before(display, {rgba, floats});
 }
 
 }  // namespace cumulet::viewer

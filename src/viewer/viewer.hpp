@@ -13,6 +13,7 @@
 
 #include "base/log.hpp"
 #include "base/trace.hpp"
+#include "denoise/network.hpp"
 #include "scene/snapshot.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/camera.hpp"
@@ -110,6 +111,10 @@ class Viewer {
   Bounds bounds();
   void read_linear(float* rgba, std::size_t count);
   void read_display(std::uint8_t* rgba, std::size_t count);
+  /// By the network in this file, which stays in memory. Throws Error(file) if it is none.
+  void read_denoised(const std::string& network_file, float* rgba, std::size_t count);
+  /// What read_display makes of this, as read_linear gives it.
+  void encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const;
   void read_aov(Aov aov, float* values, std::size_t count);
   double measure_noise();
   Stats stats();
@@ -180,6 +185,8 @@ class Viewer {
   scene::ModelSourcePtr model_source_;  // newest that is posed
   Sampling sampling_;
   DisplaySettings display_;
+  denoise::NetworkPtr network_;  // the last that a picture was denoised by...
+  std::string denoiser_file_;    // ...of this file
   std::shared_ptr<Camera> camera_;
   std::shared_ptr<void> camera_listener_;
   Navigation navigation_;

@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
+#include "denoise/tza.hpp"
 #include "gl/state_guard.hpp"
 #include "render/display.hpp"
 #include "viewer/viewer.hpp"
@@ -198,6 +199,18 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
     g.read_linear(display_, rgba, count);
     totals_ = g.totals();
   });
+}
+
+void Viewer::read_denoised(const std::string& network_file, float* rgba, std::size_t count) {
+  if (denoiser_file_ != network_file || network_ == nullptr) {
+    network_ = denoise::make_network(denoise::read_tza(network_file), network_file);
+    denoiser_file_ = network_file;
+  }
+  with_gl([&](Context& g) { g.read_denoised(shot(), network_, rgba, count); });
+}
+
+void Viewer::encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const {
+  render::to_display(linear, display_.shown(false), rgba);
 }
 
 void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {

@@ -428,6 +428,10 @@ TEST_F(CppViewer, ShowsAVolume) {
   viewer.read_display(display).value();
   EXPECT_EQ(display[0], 255);  // 1 x 2^1, clipped
   EXPECT_EQ(display[3], 255);
+  std::vector<std::uint8_t> encoded(linear.size());
+  viewer.encode_display(linear, encoded).value();
+  EXPECT_EQ(encoded, display);
+  EXPECT_EQ(viewer.read_denoised({.network = "none.tza"}, linear).error().status, StatusCode::file);
   EXPECT_EQ(viewer.read_display(std::span(display).first(4)).error().status, StatusCode::invalid_argument);
   EXPECT_GT(viewer.measure_noise().value(), 0.0);
 

@@ -244,6 +244,19 @@ TEST_P(Denoise, WhatIsNotFiniteStaysInItsPixel) {
   for (const vec4& texel : denoised(network, broken)) EXPECT_TRUE(std::isfinite(texel.r + texel.g + texel.b));
 }
 
+TEST_P(Denoise, LeavesTheHostsStateAsItIsAndReadsNoneOfIt) {
+  const NetworkPtr network = make_network(random_archive(small_widths, 9), "small");
+  const Scene scene({20, 20});
+  const auto expected = denoised(network, scene);
+  test::ScramblingHost host(gl_);
+  for (std::uint32_t seed = 0; seed < 4; ++seed) {
+    host.scramble(seed);
+    const test::GlState before = test::read_gl_state(*gl_);
+    EXPECT_TRUE(denoised(network, scene) == expected) << seed;
+    EXPECT_EQ(test::state_differences(before, test::read_gl_state(*gl_)), "") << seed;
+  }
+}
+
 TEST(DenoisePlan, TilesCoverThePictureOnceAndKnowWhatTheyDependOn) {
   constexpr unsigned reach = denoise::Network::reach;
   for (const uvec2 size : {uvec2(1), uvec2(16, 700), uvec2(1921, 1080), uvec2(4000, 300), uvec2(16384)}) {

@@ -1222,6 +1222,28 @@ CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rg
 /* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque
  * unless the background is transparent). */
 CUMULET_API cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count);
+/* What cumulet_read_display makes of values as cumulet_read_linear and cumulet_read_denoised give them, of any picture
+ * in the shaded view: count floats to as many bytes, a multiple of 4. */
+CUMULET_API cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linear, uint8_t* rgba,
+                                                  size_t count);
+
+/* By what a picture is denoised. */
+typedef struct cumulet_denoise_desc {
+  size_t struct_size;
+  const char* network; /* a file of Intel's Open Image Denoise: rt_hdr_calb_cnrm.tza or another whose name begins with
+                          rt_hdr. Needed. The library has none (scripts/install_oidn_weights.sh) */
+} cumulet_denoise_desc;
+
+/*
+ * [GL] cumulet_read_linear's picture so far with its noise taken away by a network that has learned what pictures look
+ * like: an estimate, not the mean of samples, and without any promise on its error. Alpha, and what of the picture is
+ * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory for the time of the call;
+ * waits for it, which takes seconds on software drivers, and for their compiler. CUMULET_ERROR_FILE for a file that is
+ * missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views and with CUMULET_SURFACE_LIGHT_NONE, and as
+ * cumulet_read_aov.
+ */
+CUMULET_API cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoise_desc* desc, float* rgba,
+                                                 size_t count);
 /* Arbitrary output variables: what a compositor wants beside the picture. z is the depth along the camera's axis. */
 typedef enum cumulet_aov {
   CUMULET_AOV_BEAUTY = 0, /* 4 floats: premultiplied linear radiance without the background, and alpha: of the volume

@@ -322,6 +322,15 @@ struct VolumeFileDesc {
   }
 };
 
+/// By what a picture is denoised: the path of a network's file.
+struct DenoiseDesc {
+  const char* network = nullptr;
+
+  operator cumulet_denoise_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_denoise_desc), .network = network};
+  }
+};
+
 /// A share in an immutable volume: a copy is one more.
 class Volume {
  public:
@@ -1180,6 +1189,14 @@ class Viewer {
   }
   [[nodiscard]] Result<> read_linear(std::span<float> rgba) noexcept {
     return result(cumulet_read_linear(handle(), rgba.data(), rgba.size()));
+  }
+  [[nodiscard]] Result<> read_denoised(const DenoiseDesc& desc, std::span<float> rgba) noexcept {
+    const cumulet_denoise_desc c = desc;
+    return result(cumulet_read_denoised(handle(), &c, rgba.data(), rgba.size()));
+  }
+  [[nodiscard]] Result<> encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) noexcept {
+    const std::size_t count = std::min(linear.size(), rgba.size());
+    return result(cumulet_encode_display(handle(), linear.data(), rgba.data(), count));
   }
   [[nodiscard]] Result<> read_display(std::span<std::uint8_t> rgba) noexcept {
     return result(cumulet_read_display(handle(), rgba.data(), rgba.size()));

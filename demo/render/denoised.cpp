@@ -1,0 +1,40 @@
+#include "denoised.hpp"
+
+#include <cstdlib>
+#include <stdexcept>
+
+namespace cumulet::demo {
+
+namespace {
+
+// Albedo and normals without noise go with the picture, as ours are.
+constexpr const char* network_name = "rt_hdr_calb_cnrm.tza";
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing sets the environment
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace
+
+std::string denoiser_folder() {
+  if (std::string named = environment("CUMULET_OIDN_WEIGHTS"); !named.empty()) return named;
+  std::string data = environment("XDG_DATA_HOME");
+  if (data.empty() && !environment("HOME").empty()) data = environment("HOME") + "/.local/share";
+  return data.empty() ? "" : data + "/cumulet/oidn";
+}
+
+std::vector<float> denoised(cumulet_viewer* viewer, const std::string& folder, std::size_t floats) {
+  if (folder.empty()) throw std::runtime_error("no folder of Open Image Denoise's networks: see --oidn-weights");
+  const std::string file = folder + "/" + network_name;
+  cumulet_denoise_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.network = file.c_str();
+  std::vector<float> rgba(floats);
+  if (cumulet_read_denoised(viewer, &desc, rgba.data(), rgba.size()) != CUMULET_OK) {
+    throw std::runtime_error(cumulet_last_error(viewer));
+  }
+  return rgba;
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,155 @@
+// Pictures that a viewer denoises, through the C API.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "support/c_host.hpp"
+#include "support/folder.hpp"
+#include "support/tza.hpp"
+
+namespace {
+
+using cumulet::headless::Backend;
+using cumulet::headless::Context;
+using cumulet::test::Folder;
+using cumulet::test::HostTarget;
+using cumulet::test::make_ball;
+using cumulet::test::make_desc;
+using cumulet::test::ViewerPtr;
+using cumulet::test::VolumeRef;
+
+constexpr int side = 40;
+constexpr std::size_t floats = std::size_t{side} * side * 4;
+
+class DenoisedPicture : public testing::Test {
+ protected:
+  DenoisedPicture() {
+    auto desc = make_desc<cumulet_create_desc>();
+    desc.get_proc = Context::get_proc;
+    desc.get_proc_user = &context_;
+    cumulet_viewer* out = nullptr;
+    std::array<char, 256> error{};
+    EXPECT_EQ(cumulet_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
+    viewer_.reset(out);
+    auto light = make_desc<cumulet_light_desc>();
+    light.sun_elevation_degrees = 40.0F;
+    std::ranges::fill(light.sun_irradiance, 3.0F);
+    std::ranges::fill(light.sky_radiance, 0.3F);
+    EXPECT_EQ(cumulet_set_light(viewer_.get(), &light), CUMULET_OK);
+    sample(4);
+    const auto bytes = cumulet::test::tza_file(cumulet::test::random_archive(cumulet::test::small_widths, 9));
+    std::ofstream(file_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  }
+
+  void sample(std::uint32_t samples, cumulet_view view = CUMULET_VIEW_SHADED) const {
+    auto sampling = make_desc<cumulet_sampling_desc>();
+    sampling.samples = samples;
+    sampling.view = view;
+    sampling.preview = CUMULET_PREVIEW_OFF;
+    EXPECT_EQ(cumulet_set_sampling(viewer_.get(), &sampling), CUMULET_OK);
+  }
+
+  [[nodiscard]] std::vector<float> picture() const {
+    cumulet::test::picture_of(viewer_.get(), volume_.get(), target_);
+    return linear();
+  }
+
+  [[nodiscard]] std::vector<float> linear() const {
+    std::vector<float> rgba(floats);
+    EXPECT_EQ(cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
+    return rgba;
+  }
+
+  cumulet_status denoise(const std::string& file, std::vector<float>& rgba) const {
+    auto desc = make_desc<cumulet_denoise_desc>();
+    desc.network = file.c_str();
+    return cumulet_read_denoised(viewer_.get(), &desc, rgba.data(), rgba.size());
+  }
+  [[nodiscard]] std::string error() const { return cumulet_last_error(viewer_.get()); }
+
+  Context context_ = Context::create(Backend::automatic);
+  GladGLContext gl_ = cumulet::test::load_gl(Context::get_proc, &context_);
+  HostTarget target_{gl_, side, side};
+  VolumeRef volume_ = make_ball(24);
+  ViewerPtr viewer_;
+  Folder folder_;
+  std::string file_ = (folder_ / "network.tza").string();
+};
+
+TEST_F(DenoisedPicture, IsTheSameEachTimeBesideTheRawOne) {
+  const std::vector<float> raw = picture();
+  std::vector<float> first(floats);
+  ASSERT_EQ(denoise(file_, first), CUMULET_OK) << error();
+  std::vector<float> second(floats);
+  ASSERT_EQ(denoise(file_, second), CUMULET_OK) << error();
+  EXPECT_EQ(first, second);
+  EXPECT_EQ(linear(), raw);
+  EXPECT_NE(first, raw);
+  for (std::size_t i = 0; i < floats; ++i) {
+    EXPECT_TRUE(std::isfinite(first[i]) && first[i] >= 0.0F) << i;
+    EXPECT_TRUE(i % 4 != 3 || first[i] == raw[i]) << i;
+  }
+  EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
+}
+
+TEST_F(DenoisedPicture, WhatCannotBeIsOneLine) {
+  std::vector<float> rgba(floats);
+  EXPECT_EQ(denoise(file_, rgba), CUMULET_ERROR_INVALID_ARGUMENT);  // nothing was rendered yet
+  static_cast<void>(picture());
+  const std::string missing = (folder_ / "none.tza").string();
+  EXPECT_EQ(denoise(missing, rgba), CUMULET_ERROR_FILE);
+  EXPECT_EQ(error(), missing + ": No such file or directory");
+  EXPECT_EQ(denoise("", rgba), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_read_denoised(viewer_.get(), nullptr, rgba.data(), rgba.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  std::vector<float> short_one(floats - 1);
+  EXPECT_EQ(denoise(file_, short_one), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(error(), "the picture needs 6400 floats");
+  std::ofstream(file_, std::ios::binary) << "none";
+  const std::string other = (folder_ / "other.tza").string();
+  std::filesystem::rename(file_, other);
+  EXPECT_EQ(denoise(other, rgba), CUMULET_ERROR_FILE);
+  EXPECT_EQ(error(), other + ": no tensor archive (.tza) of Open Image Denoise");
+}
+
+TEST_F(DenoisedPicture, DebugViewsAreNotDenoised) {
+  sample(1, CUMULET_VIEW_CELLS);
+  static_cast<void>(picture());
+  std::vector<float> rgba(floats);
+  EXPECT_EQ(denoise(file_, rgba), CUMULET_ERROR_UNSUPPORTED);
+}
+
+TEST_F(DenoisedPicture, LinearValuesAreEncodedAsThePictureIsDisplayed) {
+  const std::vector<float> raw = picture();
+  std::vector<std::uint8_t> displayed(floats);
+  std::vector<std::uint8_t> encoded(floats);
+  EXPECT_EQ(cumulet_read_display(viewer_.get(), displayed.data(), displayed.size()), CUMULET_OK);
+  EXPECT_EQ(cumulet_encode_display(viewer_.get(), raw.data(), encoded.data(), encoded.size()), CUMULET_OK);
+  EXPECT_EQ(encoded, displayed);
+  EXPECT_EQ(cumulet_encode_display(viewer_.get(), raw.data(), encoded.data(), 6), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_encode_display(viewer_.get(), nullptr, encoded.data(), 4), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(DenoisedPicture, ThePublishedNetworkBringsFewSamplesNearMany) {
+  const std::string published = CUMULET_SHARED_DATA "/oidn_weights/rt_hdr_calb_cnrm.tza";
+  if (!std::filesystem::exists(published)) GTEST_SKIP() << "no " << published;
+  const auto distance = [](const std::vector<float>& a, const std::vector<float>& b) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < floats; ++i) sum += i % 4 == 3 ? 0.0 : std::pow(double(a[i]) - double(b[i]), 2.0);
+    return sum;
+  };
+  const std::vector<float> few = picture();
+  std::vector<float> denoised(floats);
+  ASSERT_EQ(denoise(published, denoised), CUMULET_OK) << error();
+  sample(256);
+  const std::vector<float> many = picture();
+  EXPECT_LT(distance(denoised, many), 0.25 * distance(few, many));
+}
+
+}  // namespace
