@@ -60,7 +60,7 @@ void GridPicker::Reader::read() {
     info.struct_size = sizeof info;
     if (cumulet_inspection_get_grid(opened, i, &info) != CUMULET_OK) continue;
     Grid grid{info.name,
-              std::string(info.type) + ", " + info.grid_class,
+              std::string(info.type) + ", " + info.grid_class + (*info.channel != '\0' ? ": " : "") + info.channel,
               info.refusal,
               info.active_voxels,
               info.min_value,

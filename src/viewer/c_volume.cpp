@@ -195,6 +195,7 @@ cumulet_status cumulet_inspection_get_grid(cumulet_inspection* inspection, uint3
     out.grid_class = entry.grid_class.c_str();
     out.refusal = facts.refusal.c_str();
     out.metadata_count = static_cast<uint32_t>(entry.metadata.size());
+    out.channel = file.channels()[grid].c_str();
     if (facts.values) {
       const volume::GridValues& values = *facts.values;
       out.values = entry.values == volume::Values::scalars ? CUMULET_GRID_VALUES_SCALARS : CUMULET_GRID_VALUES_LENGTHS;

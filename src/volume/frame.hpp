@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "volume/volume.hpp"
 
@@ -36,6 +37,10 @@ struct GridNames {
   /// anisotropy, scatter_anisotropy, phase_anisotropy, phase_g.
   std::string anisotropy = {};
 };
+
+/// Which field each of a file's grids is where nothing is said of names: "density", "temperature", "flame", "color",
+/// "anisotropy", or "" for none; and "velocity", which is found but not rendered yet.
+std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 
 /// Reads the fields of a .vdb or .nvdb file, each as import_volume reads a grid.
 ///

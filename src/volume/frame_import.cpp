@@ -276,6 +276,26 @@ class FrameImport {
 
 }  // namespace
 
+std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids) {
+  std::vector<std::string> channels(grids.size());
+  for (const std::size_t grid : velocities(grids)) channels[grid] = "velocity";
+  Chosen chosen;
+  try {
+    chosen = choose(grids, {});
+  } catch (const std::runtime_error&) {
+    // None can be shown.
+  }
+  for (const std::size_t grid : chosen.colour) channels[grid] = "color";
+  const auto name = [&](const std::optional<std::size_t>& grid, const char* field) {
+    if (grid) channels[*grid] = field;
+  };
+  name(chosen.density, "density");
+  name(chosen.temperature, "temperature");
+  name(chosen.flame, "flame");
+  name(chosen.anisotropy, "anisotropy");
+  return channels;
+}
+
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress) {
   return naming(file.string(),

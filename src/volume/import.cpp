@@ -85,6 +85,11 @@ namespace {
 
 // What is shown as density of a file that has none, the first of these first.
 constexpr std::array<std::string_view, 5> likely_names = {"flames", "flame", "fire", "temperature", "heat"};
+constexpr std::array<std::string_view, 3> velocity_names = {"velocity", "vel", "v"};
+
+bool is_among(std::size_t grid, std::span<const std::size_t> some) {
+  return std::ranges::find(some, grid) != some.end();
+}
 
 }  // namespace
 
@@ -94,12 +99,34 @@ std::string detail::lower_case(std::string text) {
   return text;
 }
 
+std::vector<std::size_t> detail::velocities(const std::vector<GridInfo>& grids) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    const bool called = std::ranges::find(velocity_names, lower_case(grids[i].name)) != velocity_names.end();
+    if (grids[i].values == Values::lengths && (called || grids[i].grid_class == "staggered")) found.push_back(i);
+  }
+  for (const std::string_view name : velocity_names) {
+    for (const std::string_view join : {"", "_", "."}) {
+      std::vector<std::size_t> parts;
+      for (const char axis : {'x', 'y', 'z'}) {
+        const std::string part = std::string(name).append(join) + axis;
+        for (std::size_t i = 0; i < grids.size(); ++i) {
+          if (grids[i].values == Values::scalars && lower_case(grids[i].name) == part) parts.push_back(i);
+        }
+      }
+      if (parts.size() == 3) found.insert(found.end(), parts.begin(), parts.end());
+    }
+  }
+  return found;
+}
+
 std::string detail::remark_on_choice(const std::vector<GridInfo>& grids, std::size_t chosen,
                                      std::span<const std::size_t> shown) {
   std::vector<std::size_t> others;
+  const std::vector<std::size_t> motion = velocities(grids);
   bool one_density = lower_case(grids[chosen].name) == "density";
   for (std::size_t i = 0; i < grids.size(); ++i) {
-    if (!grids[i].refusal.empty() || std::ranges::find(shown, i) != shown.end()) continue;
+    if (!grids[i].refusal.empty() || is_among(i, shown) || is_among(i, motion)) continue;
     others.push_back(i);
     one_density = one_density && grids[i].name != grids[chosen].name;
   }
@@ -125,7 +152,7 @@ std::optional<std::size_t> detail::first_fog(const std::vector<GridInfo>& grids,
                                              std::span<const std::size_t> taken) {
   for (const std::string_view name : names) {
     for (std::size_t i = 0; i < grids.size(); ++i) {
-      if (!grids[i].refusal.empty() || std::ranges::find(taken, i) != taken.end()) continue;
+      if (!grids[i].refusal.empty() || is_among(i, taken)) continue;
       if (lower_case(grids[i].name) == name) return i;
     }
   }
@@ -154,8 +181,10 @@ std::size_t detail::choose_grid(const std::vector<GridInfo>& grids, const std::s
   if (!name.empty()) return choose_named(grids, name, &GridInfo::refusal);
   if (const auto density = first_fog(grids, density_names)) return *density;
   if (const auto likely = first_fog(grids, likely_names)) return *likely;
-  const auto first = std::ranges::find_if(grids, [](const GridInfo& e) { return e.refusal.empty(); });
-  if (first != grids.end()) return static_cast<std::size_t>(first - grids.begin());
+  const std::vector<std::size_t> motion = velocities(grids);
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (grids[i].refusal.empty() && !is_among(i, motion)) return i;
+  }
   if (grids.size() == 1) fail("grid \"" + grids[0].unique_name + "\" " + grids[0].refusal);
   fail_without(grids, "no scalar fog volume among its grids: ");
 }

@@ -129,6 +129,9 @@ std::vector<std::size_t> named(const std::vector<GridInfo>& grids, const std::st
 std::optional<std::size_t> first_fog(const std::vector<GridInfo>& grids, std::span<const std::string_view> names,
                                      std::span<const std::size_t> taken = {});
 inline constexpr std::array<std::string_view, 3> density_names = {"density", "smoke", "soot"};
+/// Grids that hold velocities: of vectors and called velocity, vel or v, in whatever case; staggered ones; and three of
+/// numbers that have these names with x, y and z behind them, or behind "_" or ".".
+std::vector<std::size_t> velocities(const std::vector<GridInfo>& grids);
 /// What a message says of a grid that is shown though nobody named it; empty where it needs no word. shown: all that
 /// are, of whatever field.
 std::string remark_on_choice(const std::vector<GridInfo>& grids, std::size_t chosen,

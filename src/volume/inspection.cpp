@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "volume/bricks.hpp"
+#include "volume/frame.hpp"
 #include "volume/import_detail.hpp"
 
 namespace cumulet::volume {
@@ -100,6 +101,7 @@ Inspection::Inspection(const std::filesystem::path& file) : file_(file) {
     format_ = reader->format();
     metadata_ = reader->metadata();
     grids_ = reader->grids();
+    channels_ = channels_by_name(grids_);
   });
   facts_.resize(grids_.size());
   try {

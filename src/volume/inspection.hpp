@@ -50,6 +50,8 @@ class Inspection {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] const std::vector<Metadata>& metadata() const { return metadata_; }
   [[nodiscard]] const std::vector<GridInfo>& grids() const { return grids_; }
+  /// As channels_by_name() has them.
+  [[nodiscard]] const std::vector<std::string>& channels() const { return channels_; }
   /// The grid that import_volume reads if it is given no name.
   [[nodiscard]] std::optional<std::size_t> chosen() const { return chosen_; }
   /// Reads a grid's voxels, the first time. Throws Error(out_of_memory).
@@ -61,6 +63,7 @@ class Inspection {
   std::string format_;
   std::vector<Metadata> metadata_;
   std::vector<GridInfo> grids_;
+  std::vector<std::string> channels_;
   std::optional<std::size_t> chosen_;
   std::mutex mutex_;
   std::vector<std::optional<GridFacts>> facts_;

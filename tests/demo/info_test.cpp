@@ -81,12 +81,14 @@ TEST_F(Info, OfAVdb) {
   const json& lengths = file["grids"][0];
   EXPECT_EQ(lengths["name"], "vel");
   EXPECT_EQ(lengths["values"], "lengths");
+  EXPECT_EQ(lengths["channel"], "velocity");
   EXPECT_EQ(lengths["range"], json({5.0, 5.0}));
   EXPECT_FALSE(lengths["shown_by_default"].get<bool>());
   const json& density = file["grids"][1];
   EXPECT_EQ(density["name"], "density");
   EXPECT_TRUE(density["shown_by_default"].get<bool>());
   EXPECT_EQ(density["values"], "scalars");
+  EXPECT_EQ(density["channel"], "density");
   EXPECT_EQ(density["active_voxels"], 8);
   EXPECT_EQ(density["voxel_min"], json({0, 0, 0}));
   EXPECT_EQ(density["voxel_max"], json({3, 1, 0}));

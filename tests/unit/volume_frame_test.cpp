@@ -186,6 +186,31 @@ TEST_F(Frame, ColourOfVectors) {
   }
 }
 
+// Velocities are told, in whatever form, and are no density.
+TEST_F(Frame, VelocitiesAreFoundAndNotMistaken) {
+  const auto told = [&](const openvdb::GridPtrVec& grids) {
+    return cumulet::volume::channels_by_name(cumulet::volume::list_grids(write(grids)));
+  };
+  using Channels = std::vector<std::string>;
+  for (const char* name : {"vel", "V", "velocity"})
+    EXPECT_EQ(told({colours(name), dot("density", 1.0F)}), (Channels{"velocity", "density"})) << name;
+  auto staggered = colours("motion");
+  staggered->setGridClass(openvdb::GRID_STAGGERED);
+  EXPECT_EQ(told({staggered, colours("Cd"), dot("soot", 1.0F)}), (Channels{"velocity", "color", "density"}));
+  for (const std::string name : {"vel", "vel.", "v_", "Velocity_"}) {
+    const openvdb::GridPtrVec parts{dot(name + "x", 3.0F), dot(name + "y", 3.0F), dot(name + "z", 3.0F)};
+    openvdb::GridPtrVec grids = parts;
+    grids.push_back(dot("other", 1.0F));
+    EXPECT_EQ(told(grids), (Channels{"velocity", "velocity", "velocity", "density"})) << name;
+    Messages messages;
+    EXPECT_EQ(import_frame(write(grids), {}, messages.log).density.name, "other");
+    EXPECT_TRUE(messages.warnings.empty()) << "there is nothing else to show";
+    EXPECT_EQ(told(parts), (Channels(3, "velocity")));
+    EXPECT_HAS(refusal(write(parts), {}), "no scalar fog volume");
+  }
+  EXPECT_EQ(told({dot("v", 1.0F), dot("velx", 1.0F)}), (Channels{"density", ""})) << "numbers, and one of three";
+}
+
 // A value that two volumes hold, above 0 and below.
 float anisotropy_at(const VolumeFrame& frame, const glm::ivec3& p) {
   return value_at((*frame.anisotropy)[0], p) - value_at((*frame.anisotropy)[1], p);

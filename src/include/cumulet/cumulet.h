@@ -419,6 +419,11 @@ typedef struct cumulet_grid_info {
   uint64_t memory_bytes; /* what a volume of it holds in main memory, at most */
   /* Counts of the finite active voxels in equal steps from min_value to max_value. */
   uint64_t histogram[CUMULET_HISTOGRAM_BINS];
+  /*
+   * What it is taken for by its name: "density", "temperature", "flame", "color", "anisotropy", or ""; and "velocity",
+   * of vectors or three grids of numbers, which nothing renders yet.
+   */
+  const char* channel;
 } cumulet_grid_info;
 
 /* One grid of the file, from 0. The first call for a grid reads its voxels: seconds, for a large one. */

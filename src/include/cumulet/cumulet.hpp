@@ -453,6 +453,7 @@ struct GridInfo {
   std::uint64_t non_finite_voxels = 0;
   std::uint64_t memory_bytes = 0;
   std::array<std::uint64_t, CUMULET_HISTOGRAM_BINS> histogram{};
+  std::string_view channel;
 };
 
 /// Likewise.
@@ -509,7 +510,8 @@ class Inspection {
                     .negative_voxels = c.negative_voxels,
                     .non_finite_voxels = c.non_finite_voxels,
                     .memory_bytes = c.memory_bytes,
-                    .histogram = std::to_array(c.histogram)};
+                    .histogram = std::to_array(c.histogram),
+                    .channel = c.channel != nullptr ? c.channel : ""};
   }
   /// grid -1: of the file as a whole.
   [[nodiscard]] Result<Metadata> metadata(std::int32_t grid, std::uint32_t index) const noexcept {
