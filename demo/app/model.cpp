@@ -10,6 +10,7 @@
 #include <program.hpp>
 #include <settings.hpp>
 #include <system_error>
+#include <utility>
 
 #include "input.hpp"
 
@@ -115,7 +116,7 @@ void open_surfaces(Model& model, const std::string& path) {
   model.scene.surface = {};
   model.scene.surface.struct_size = sizeof model.scene.surface;
   model.scene.surface_camera = -1;
-  if (model.unchosen_ground && model.scene.ground.place == CUMULET_GROUND_BELOW)
+  if (std::exchange(model.unchosen_ground, false) && model.scene.ground.place == CUMULET_GROUND_BELOW)
     model.scene.ground.place = CUMULET_GROUND_NONE;
 }
 

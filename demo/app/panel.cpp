@@ -199,15 +199,17 @@ void Panel::light(Model& model) {
     }
     ImGui::EndDisabled();
   });
-  ground(model.scene.ground);
+  ground(model);
 }
 
-void Panel::ground(cumulet_ground_desc& ground) {
+void Panel::ground(Model& model) {
+  cumulet_ground_desc& ground = model.scene.ground;
   using Desc = cumulet_ground_desc;
   settings::for_each<Desc>([&](const auto& setting) {
     ImGui::BeginDisabled((setting.is(&Desc::albedo) && ground.place == CUMULET_GROUND_NONE) ||
                          (setting.is(&Desc::height) && ground.place != CUMULET_GROUND_AT_HEIGHT));
-    rows_.draw(setting, ground.*setting.field);
+    const bool chosen = rows_.draw(setting, ground.*setting.field);
+    if (chosen && setting.is(&Desc::place)) model.unchosen_ground = false;
     ImGui::EndDisabled();
   });
 }

@@ -47,7 +47,7 @@ class Panel {
   void statistics(const Model& model);
   void absorption(float (&coalbedo)[3]);
   void threshold(settings::Facts facts, cumulet_grid_desc& grid);
-  void ground(cumulet_ground_desc& ground);
+  void ground(Model& model);
   void sun_angle(const settings::Facts& facts, cumulet_light_desc& light);
 
   void hint() const;

@@ -10,7 +10,7 @@ using settings::RampPoints;
 
 namespace {
 
-constexpr float farthest = 1e30f;
+constexpr float farthest = settings::most_ramp_value;
 
 float value_of(const RampPoint& point) { return point[0]; }
 float result_of(const RampPoint& point) { return point[1]; }
@@ -18,13 +18,15 @@ float result_of(const RampPoint& point) { return point[1]; }
 }  // namespace
 
 void fit(RampView& view, const RampPoints& points, float most_value) {
+  // An undo may have taken points from under the mouse.
+  if (view.held && *view.held >= points.size()) view.held.reset();
+  view.chosen = std::min(view.chosen, std::max<std::size_t>(points.size(), 1) - 1);
   if (view.held || points.empty()) return;
   constexpr float room = 1.25f;  // to drag into
   view.most_value = std::max(most_value, value_of(points.back()));
   if (!(view.most_value > 0.0f)) view.most_value = 1.0f;
   const float highest = result_of(*std::ranges::max_element(points, {}, result_of));
   view.most_result = std::min(room * (highest > 0.0f ? highest : view.most_value), farthest);
-  view.chosen = std::min(view.chosen, points.size() - 1);
 }
 
 std::optional<std::size_t> add_point(RampPoints& points, RampPoint point) {

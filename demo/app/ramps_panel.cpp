@@ -1,5 +1,6 @@
 // The panel's ramps.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -16,12 +17,12 @@ void Panel::ramps(Model& model) {
     RampView& view = ramp_views_[i];
     bool on = !points.empty();
     if (ui_.checkbox(facts.label, facts.tip, on)) {
-      const float most = field.most > 0.0f ? field.most : 1.0f;
+      const float most = field.most > 0.0f ? std::min(field.most, settings::most_ramp_value) : 1.0f;
       points.clear();
       if (on) points = {{0.0f, 0.0f}, {most, most}};
     }
-    if (points.empty()) continue;
     fit(view, points, field.most);
+    if (points.empty()) continue;
     ui_.curve((std::string(facts.label) + " curve").c_str(),
               "Drag a point. A click adds one; a right click on one, or Delete, takes it away.", points, view,
               field.heights, field.most);

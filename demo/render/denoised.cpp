@@ -1,6 +1,7 @@
 #include "denoised.hpp"
 
 #include <cstdlib>
+#include <filesystem>
 #include <stdexcept>
 
 namespace cumulet::demo {
@@ -15,6 +16,12 @@ std::string environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
+std::string network_file(std::string folder) {
+  if (folder.empty()) folder = denoiser_folder();
+  if (folder.empty()) throw std::runtime_error("no folder of Open Image Denoise's networks: see --oidn-weights");
+  return folder + "/" + network_name;
+}
+
 }  // namespace
 
 std::string denoiser_folder() {
@@ -24,9 +31,15 @@ std::string denoiser_folder() {
   return data.empty() ? "" : data + "/cumulet/oidn";
 }
 
+void check_denoiser(const std::string& folder) {
+  const std::string file = network_file(folder);
+  if (!std::filesystem::is_regular_file(file))
+    throw std::runtime_error(file +
+                             ": there is no such network: see --oidn-weights and scripts/install_oidn_weights.sh");
+}
+
 std::vector<float> denoised(cumulet_viewer* viewer, const std::string& folder, std::size_t floats) {
-  if (folder.empty()) throw std::runtime_error("no folder of Open Image Denoise's networks: see --oidn-weights");
-  const std::string file = folder + "/" + network_name;
+  const std::string file = network_file(folder);
   cumulet_denoise_desc desc{};
   desc.struct_size = sizeof desc;
   desc.network = file.c_str();

@@ -164,7 +164,7 @@ void tell(Progress& progress, const std::string& line) {
 }
 
 /// The scale that suits the volume, whatever it is seen from: it was loaded with that.
-void tell_density_scale(const Viewer& viewer, Progress& progress) {
+void tell_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
   cumulet_volume* volume = nullptr;
   check(viewer, cumulet_get_volume(viewer.get(), &volume));
   double scale = 0.0;
@@ -173,7 +173,8 @@ void tell_density_scale(const Viewer& viewer, Progress& progress) {
   if (status != CUMULET_OK) return;  // nothing to see at any scale
   std::array<char, 32> digits{};
   std::snprintf(digits.data(), digits.size(), "%g", scale);
-  tell(progress, std::string("density scale ") + digits.data() + ", for a mean optical depth of 8 (--density-scale)");
+  tell(progress, std::string("density scale ") + digits.data() + ", for a mean optical depth of 8" +
+                     (ramped ? " before the ramp" : "") + " (--density-scale)");
 }
 
 cumulet_stats stats_of(const Viewer& viewer) {
@@ -242,14 +243,15 @@ void check_memory(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::check_memory(options, stats_of(viewer).gl_renderer, cumulet::demo::available_memory());
 }
 
-/// Empty where that is not asked for, or cannot be, which is told: hours of samples are worth a picture with noise.
+/// Empty where that is not asked for, or cannot be after all, which is told: hours of samples are worth a picture with
+/// noise.
 std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
   if (!options.denoise) return {};
   progress.stage("denoising");
-  const std::string folder = options.denoiser.empty() ? cumulet::demo::denoiser_folder() : options.denoiser;
   try {
-    return cumulet::demo::denoised(viewer.get(), folder, std::size_t{4} * options.scene.width * options.scene.height);
-  } catch (const std::runtime_error& error) {
+    return cumulet::demo::denoised(viewer.get(), options.denoiser,
+                                   std::size_t{4} * options.scene.width * options.scene.height);
+  } catch (const std::exception& error) {
     tell(progress, std::string("not denoised: ") + error.what());
     return {};
   }
@@ -324,7 +326,8 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
 }
 
 void render(const RenderOptions& options) {
-  // Hours of samples should not end at a folder that is not there.
+  // Hours of samples should not end at a folder or a network that is not there.
+  if (options.denoise) cumulet::demo::check_denoiser(options.denoiser);
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
@@ -366,7 +369,8 @@ void render(const RenderOptions& options) {
   }
   wait(viewer, progress);
   if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress, *hint);
-  if (!scene.volume.empty() && scene.auto_density_scale) tell_density_scale(viewer, progress);
+  if (!scene.volume.empty() && scene.auto_density_scale)
+    tell_density_scale(viewer, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress);
   if (!scene.surfaces.empty()) check_animation(viewer, options);
   if (scene.surface_camera >= 0)
     check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));

@@ -19,13 +19,13 @@ namespace cumulet::demo {
 /// Light stays dark if none is given: see finish_scene_options. The scene must outlive the app's parse, which throws
 /// what load_scene does.
 void add_scene_options(CLI::App& app, SceneOptions& scene);
-/// What can be said only after the parse: a clear day by default, unless lit (a scene file was given otherwise than by
-/// --scene); and which flags exclude each other. Throws UsageError.
 /// Of files that are named without a flag: what the scene does not tell yet.
 struct NamedFiles {
   bool scene = false;  ///< whose light holds
   bool model = false;
 };
+/// What can be said only after the parse: a clear day by default, unless a file has light; and which flags exclude each
+/// other. Throws UsageError.
 void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedFiles& files);
 
 /// Parses, with --help and --version (and --option-table: option_table.hpp), for which it gives false after their text

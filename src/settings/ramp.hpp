@@ -51,6 +51,7 @@ inline constexpr std::array ramps = {
 static_assert(CUMULET_RAMP_DENSITY == 0 && CUMULET_RAMP_TEMPERATURE == 1 && CUMULET_RAMP_FLAME == 2);
 
 inline constexpr std::size_t most_ramp_points = 32;
+inline constexpr float most_ramp_value = 1e30F;  ///< of values and of what they become
 
 /// Why there are not so many points in a ramp; "" if there may be.
 inline std::string ramp_count_refusal(std::uint64_t count) {
@@ -62,12 +63,13 @@ inline std::string ramp_count_refusal(std::uint64_t count) {
 /// Why they make no ramp, in words that follow its name; "" if they do.
 inline std::string ramp_refusal(std::span<const RampPoint> points) {
   if (std::string why = ramp_count_refusal(points.size()); !why.empty()) return why;
-  constexpr float most = 1e30F;
   const auto text = [](const RampPoint& point) { return number_text(point[0]) + ":" + number_text(point[1]); };
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto [value, result] = points[i];
-    if (!(std::abs(value) <= most)) return "has a point " + text(points[i]) + " whose value is not from -1e30 to 1e30";
-    if (!(result >= 0.0F && result <= most)) return "has a point " + text(points[i]) + ", but values become 0 to 1e30";
+    if (!(std::abs(value) <= most_ramp_value))
+      return "has a point " + text(points[i]) + " whose value is not from -1e30 to 1e30";
+    if (!(result >= 0.0F && result <= most_ramp_value))
+      return "has a point " + text(points[i]) + ", but values become 0 to 1e30";
     if (i > 0 && !(value > points[i - 1][0]))
       return "has a point " + text(points[i]) + " that does not come after " + text(points[i - 1]);
   }

@@ -74,10 +74,8 @@ void Viewer::sync() {
     volume_ = std::move(loaded->volume);
     built_view_.reset();
     remark_on_anisotropy();
-    if (loaded->density_scale) {
-      medium_.density_scale = grid_.build.refine.density_scale = *loaded->density_scale;
-      show_medium();
-    }
+    suggested_density_scale_ = loaded->density_scale;
+    if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
   }
   if (auto built = builder_.take_built()) {
     // A rebuild keeps what the load took.
@@ -86,6 +84,10 @@ void Viewer::sync() {
       if (built->seconds.statistics == 0.0) built->seconds.statistics = built_.seconds.statistics;
     }
     built_ = std::move(*built);
+    if (suggested_density_scale_ && built_.volume == volume_) {
+      medium_.density_scale = *std::exchange(suggested_density_scale_, std::nullopt);
+      show_medium();
+    }
   }
   if (auto surfaces = surface_builder_.take()) {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
@@ -103,9 +105,9 @@ std::optional<BuildSettings> Viewer::build_settings() const {
 }
 
 void Viewer::request_build(bool for_emission) {
-  const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
-  if (builder_.configure_load(settings)) return;
+  if (builder_.configure_load(grid_.camera_adaptive ? std::nullopt : build_settings())) return;
   sync();
+  const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
   if (for_emission && volume_ && !volume_->may_emit()) return;
   built_view_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
@@ -113,6 +115,7 @@ void Viewer::request_build(bool for_emission) {
 
 void Viewer::load_volume(const VolumeFile& file) {
   sync();
+  suggested_density_scale_.reset();
   take_medium();
   builder_.load(file, grid_.camera_adaptive ? std::nullopt : build_settings());
   touch();
@@ -124,8 +127,10 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
   } else {
     builder_.cancel();
   }
+  builder_.take_loaded();  // what was read, and not shown yet, never is
   sync();
   volume_ = std::move(volume);
+  suggested_density_scale_.reset();
   built_view_.reset();
   remark_on_anisotropy();
   if (!volume_) {
@@ -261,7 +266,7 @@ void Viewer::set_grid(const GridSettings& settings) {
 void Viewer::take_medium() {
   grid_.build.emission = field_emission();
   grid_.build.density_ramp = ramps_.density;
-  grid_.build.refine.density_scale = medium_.density_scale;
+  grid_.build.refine.density_scale = density_scale_to_come();
   grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
 }
 
@@ -289,16 +294,18 @@ void Viewer::remark_on_anisotropy() const {
 }
 
 void Viewer::set_medium(const Medium& medium) {
+  sync();
   const bool varied = medium_.phase.may_vary();
   medium_ = medium;
   if (varied) remark_on_anisotropy();
   const scene::Emission emission = field_emission();
   const bool other_emission = grid_.build.emission != emission;
   const grid::RefineSettings& refine = grid_.build.refine;
+  const double density_scale = density_scale_to_come();
   const bool other_opacity = grid_.build.march == scene::March::tet &&
                              refine.criterion == grid::Criterion::transmittance &&
-                             (apart(medium.density_scale, refine.density_scale) ||
-                              apart(grid::hiding(medium.density_scale, scene::mean_cosine(medium.phase)),
+                             (apart(density_scale, refine.density_scale) ||
+                              apart(grid::hiding(density_scale, scene::mean_cosine(medium.phase)),
                                     grid::hiding(refine.density_scale, refine.anisotropy)));
   if (other_opacity) {
     take_medium();
@@ -310,6 +317,8 @@ void Viewer::set_medium(const Medium& medium) {
   show_medium();
   touch();
 }
+
+double Viewer::density_scale_to_come() const { return suggested_density_scale_.value_or(medium_.density_scale); }
 
 void Viewer::show_medium() {
   scene_.volumes.front().medium.set({medium_.density_scale, medium_.albedo, medium_.phase, medium_.emission});

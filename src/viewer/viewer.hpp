@@ -142,6 +142,7 @@ class Viewer {
   void request_build(bool for_emission = false);
   // What grids to come know of the medium.
   void take_medium();
+  [[nodiscard]] double density_scale_to_come() const;
   // What pictures to come know of it.
   void show_medium();
   [[nodiscard]] scene::Emission field_emission() const;
@@ -198,11 +199,12 @@ class Viewer {
   scene::Snapshot scene_;        // as it is now: of it snapshots are made
   scene::SnapshotPtr snapshot_;  // the newest
   std::uint64_t settings_revision_ = 1;
-  glm::uvec2 frame_size_{0U};             // of the last frame's picture
-  std::optional<ViewFrame> view_;         // of the last frame
-  std::optional<ViewFrame> traced_view_;  // of the last frame that traced
-  std::optional<ViewFrame> last_view_;    // of the one before it
-  std::optional<ViewFrame> built_view_;   // camera-adaptive: what the grid was last asked for
+  glm::uvec2 frame_size_{0U};                      // of the last frame's picture
+  std::optional<double> suggested_density_scale_;  // volume_ was loaded with it; the medium's once its grid is there
+  std::optional<ViewFrame> view_;                  // of the last frame
+  std::optional<ViewFrame> traced_view_;           // of the last frame that traced
+  std::optional<ViewFrame> last_view_;             // of the one before it
+  std::optional<ViewFrame> built_view_;            // camera-adaptive: what the grid was last asked for
   glm::uvec2 built_size_{0U};
   render::Totals totals_;
 

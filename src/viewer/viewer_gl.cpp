@@ -202,11 +202,13 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
 }
 
 void Viewer::read_denoised(const std::string& network_file, float* rgba, std::size_t count) {
-  if (denoiser_file_ != network_file || network_ == nullptr) {
-    network_ = denoise::make_network(denoise::read_tza(network_file), network_file);
-    denoiser_file_ = network_file;
-  }
-  with_gl([&](Context& g) { g.read_denoised(shot(), network_, rgba, count); });
+  with_gl([&](Context& g) {
+    if (denoiser_file_ != network_file || network_ == nullptr) {
+      network_ = denoise::make_network(denoise::read_tza(network_file), network_file);
+      denoiser_file_ = network_file;
+    }
+    g.read_denoised(shot(), network_, rgba, count);
+  });
 }
 
 void Viewer::encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const {

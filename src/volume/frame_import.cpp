@@ -97,7 +97,12 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
   find(out.anisotropy, names.anisotropy, anisotropy_names);
   const bool nothing = !out.density && !out.temperature && !out.flame;
   if (nothing && !by_name(names.density)) fail_without(grids, "every field is left out; it has ");
-  if (nothing) out.density = choose_grid(grids, {});
+  if (nothing) {
+    if (out.anisotropy) taken.push_back(*out.anisotropy);
+    const auto left = any_fog(grids, taken);
+    out.density = left ? *left : choose_grid(grids, {});
+    if (out.density == out.anisotropy) out.anisotropy.reset();
+  }
   return out;
 }
 

@@ -108,13 +108,16 @@ std::vector<std::size_t> detail::velocities(const std::vector<GridInfo>& grids) 
   for (const std::string_view name : velocity_names) {
     for (const std::string_view join : {"", "_", "."}) {
       std::vector<std::size_t> parts;
+      int axes = 0;
       for (const char axis : {'x', 'y', 'z'}) {
+        const std::size_t before = parts.size();
         const std::string part = std::string(name).append(join) + axis;
         for (std::size_t i = 0; i < grids.size(); ++i) {
           if (grids[i].values == Values::scalars && lower_case(grids[i].name) == part) parts.push_back(i);
         }
+        if (parts.size() > before) ++axes;
       }
-      if (parts.size() == 3) found.insert(found.end(), parts.begin(), parts.end());
+      if (axes == 3) found.insert(found.end(), parts.begin(), parts.end());
     }
   }
   return found;
@@ -159,6 +162,15 @@ std::optional<std::size_t> detail::first_fog(const std::vector<GridInfo>& grids,
   return std::nullopt;
 }
 
+std::optional<std::size_t> detail::any_fog(const std::vector<GridInfo>& grids, std::span<const std::size_t> taken) {
+  if (const auto likely = first_fog(grids, likely_names, taken)) return likely;
+  const std::vector<std::size_t> motion = velocities(grids);
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (grids[i].refusal.empty() && !is_among(i, motion) && !is_among(i, taken)) return i;
+  }
+  return std::nullopt;
+}
+
 void detail::fail_without(const std::vector<GridInfo>& grids, const std::string& what) {
   std::vector<std::size_t> all(grids.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
@@ -180,11 +192,7 @@ std::size_t detail::choose_grid(const std::vector<GridInfo>& grids, const std::s
   if (grids.empty()) fail("holds no grids");
   if (!name.empty()) return choose_named(grids, name, &GridInfo::refusal);
   if (const auto density = first_fog(grids, density_names)) return *density;
-  if (const auto likely = first_fog(grids, likely_names)) return *likely;
-  const std::vector<std::size_t> motion = velocities(grids);
-  for (std::size_t i = 0; i < grids.size(); ++i) {
-    if (grids[i].refusal.empty() && !is_among(i, motion)) return i;
-  }
+  if (const auto any = any_fog(grids)) return *any;
   if (grids.size() == 1) fail("grid \"" + grids[0].unique_name + "\" " + grids[0].refusal);
   fail_without(grids, "no scalar fog volume among its grids: ");
 }

@@ -128,6 +128,9 @@ std::vector<std::size_t> named(const std::vector<GridInfo>& grids, const std::st
 /// that it is not.
 std::optional<std::size_t> first_fog(const std::vector<GridInfo>& grids, std::span<const std::string_view> names,
                                      std::span<const std::size_t> taken = {});
+/// What is shown for want of a density: a flame or a temperature by its name, else the file's first that holds no
+/// velocities.
+std::optional<std::size_t> any_fog(const std::vector<GridInfo>& grids, std::span<const std::size_t> taken = {});
 inline constexpr std::array<std::string_view, 3> density_names = {"density", "smoke", "soot"};
 /// Grids that hold velocities: of vectors and called velocity, vel or v, in whatever case; staggered ones; and three of
 /// numbers that have these names with x, y and z behind them, or behind "_" or ".".

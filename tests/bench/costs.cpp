@@ -245,7 +245,8 @@ viewer::VolumeAssetPtr small_fire() {
 void measure_costs(headless::Context& context, const Input& input, const Options& options) {
   const Asset asset = load_asset(input, true);
   const double density_scale = asset.density_scale(options.optical_depth);
-  const viewer::VolumeAssetPtr plain = read(input, "none");
+  const bool made = input.file.empty();  // "@noise": without a colour
+  const viewer::VolumeAssetPtr plain = made ? asset.volume : read(input, "none");
   const viewer::Light daylight = light_of(1.0F, 1.0F);
   {
     Rows rows(context, density_scale);
@@ -253,7 +254,7 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     rows.add("+ temperature", plain, Burns::temperature, daylight);
     rows.add("+ flame", plain, Burns::flame, daylight);
     rows.add("+ temperature and flame", plain, Burns::both, daylight);
-    if (!options.color_grid.empty()) {
+    if (!options.color_grid.empty() && !made) {
       const viewer::VolumeAssetPtr coloured = read(input, options.color_grid);
       rows.add("+ colour", coloured, Burns::no, daylight);
       rows.add("+ all", coloured, Burns::both, daylight);

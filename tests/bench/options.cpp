@@ -1,6 +1,7 @@
 #include "options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <map>
 
 namespace cumulet::bench {
@@ -108,6 +109,11 @@ ParseResult parse(int argc, char** argv) {
     return result;
   }
   o.backend = backends.at(backend);
+  if ((o.costs || o.equal_error) && !repeats->empty() && o.repeats < 2) {
+    std::fprintf(stderr, "cumulet-bench: --costs and --equal-error take their noise from two --repeats or more\n");
+    result.status = 2;
+    return result;
+  }
   if (o.quick) {
     if (size->empty()) o.size = 128;
     if (repeats->empty()) o.repeats = 3;

@@ -79,6 +79,18 @@ TEST(RampEdit, ShowsAllOfItAndRoomAbove) {
   EXPECT_EQ(view.most_value, 1.0f) << "not while it is dragged";
 }
 
+TEST(RampEdit, LetsGoOfWhatAnUndoTookAway) {
+  RampView view;
+  view.held = view.chosen = 2;
+  fit(view, {{0.0f, 0.0f}, {1.0f, 1.0f}}, 1.0f);
+  EXPECT_FALSE(view.held.has_value());
+  EXPECT_EQ(view.chosen, 1u);
+  view.held = view.chosen = 1;
+  fit(view, {}, 1.0f);
+  EXPECT_FALSE(view.held.has_value());
+  EXPECT_EQ(view.chosen, 0u);
+}
+
 TEST(History, ARampIsAStep) {
   History history(scene_with(1));
   SceneOptions scene = scene_with(1);

@@ -448,7 +448,7 @@ def test_chord(s):
         s.hand("key", "--delay", "0", "ctrl+o")
 
     s.play_live("replay", ["wait loaded", "frames 5", 'report "live.json"', "idle 8", *shot("dialog"), "frames 10",
-                           *shot("later"), "key escape", "idle 3", *shot("after")],
+                           *shot("later"), "key escape", "idle 8", *shot("after")],
                 hand, *REFINING, s.cumulus)
     assert s.report("dialog")["dialog"], "the dialog is open"
     assert s.report("dialog")["samples"] == s.report("later")["samples"], "nothing is traced behind a dialog"

@@ -197,6 +197,8 @@ class NoContext : public Trial {
     std::vector<float> rgba(std::size_t{side} * side * 4);
     std::vector<std::uint8_t> bytes(rgba.size());
     double noise = 0.0;
+    auto denoise = make_desc<cumulet_denoise_desc>();
+    denoise.network = "none.tza";
     for (int round = 0; round < 2; ++round) {
       for (const auto& call : std::vector<std::function<cumulet_status()>>{
                [&] { return cumulet_render(v_, &frame, nullptr); },
@@ -204,6 +206,7 @@ class NoContext : public Trial {
                [&] { return cumulet_read_linear(v_, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_display(v_, bytes.data(), bytes.size()); },
                [&] { return cumulet_read_aov(v_, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
+               [&] { return cumulet_read_denoised(v_, &denoise, rgba.data(), rgba.size()); },
                [&] { return cumulet_measure_noise(v_, &noise); }, [&] { return cumulet_detach(v_); }}) {
         EXPECT_EQ(call(), CUMULET_ERROR_GL);
         const std::string line = cumulet_last_error(v_);
@@ -327,6 +330,8 @@ void Caller::call_all() {
   auto pose = make_desc<cumulet_camera_desc>();
   auto pick = make_desc<cumulet_pick>();
   auto stats = make_desc<cumulet_stats>();
+  auto denoise = make_desc<cumulet_denoise_desc>();
+  denoise.network = "none.tza";
   auto progress = make_desc<cumulet_progress>();
   auto volume_info = make_desc<cumulet_volume_info>();
   auto values_info = make_desc<cumulet_values_info>();
@@ -440,6 +445,8 @@ void Caller::call_all() {
     CALL(cumulet_get_bounds, v, low.data(), high.data());
     CALL(cumulet_read_linear, v, one.data(), one.size());
     CALL(cumulet_read_display, v, bytes.data(), bytes.size());
+    CALL(cumulet_encode_display, v, one.data(), bytes.data(), bytes.size());
+    CALL(cumulet_read_denoised, v, &denoise, one.data(), one.size());
     CALL(cumulet_read_aov, v, CUMULET_AOV_BEAUTY, one.data(), one.size());
     CALL(cumulet_measure_noise, v, &number);
     CALL(cumulet_get_stats, v, &stats);

@@ -541,6 +541,30 @@ TEST_F(CppViewer, LoadsAVolumeWithTheDensityScaleThatSuitsIt) {
   // Nothing is left to build.
   suits.set_medium({.density_scale = scale, .coalbedo = {1, 1, 1}}).value();
   EXPECT_EQ(suits.get_progress()->stage, Stage::idle);
+  // What is set between the load's end and the next frame is of the volume that was loaded, or of none.
+  const auto loading = [&] {
+    Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
+    viewer.set_sampling({.samples = 1, .preview = Preview::off}).value();
+    viewer.set_medium({.density_scale = 100.0, .coalbedo = {1, 1, 1}}).value();
+    const std::string path = file.path();
+    viewer.load_volume(VolumeFileDesc{.path = path.c_str(), .suggested_density_scale = true}).value();
+    while (viewer.get_progress()->stage != Stage::idle) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return viewer;
+  };
+  std::array<std::uint64_t, 2> cells{};
+  for (std::size_t waits = 0; waits < 2; ++waits) {
+    Viewer viewer = loading();
+    if (waits != 0) viewer.wait().value();
+    viewer.set_grid({.threshold = 0.05}).value();
+    converge(viewer, 24, 16);
+    cells[waits] = viewer.get_stats()->cells;
+  }
+  EXPECT_EQ(cells[0], cells[1]);
+  Viewer other = loading();
+  other.set_volume(Volume::open(file.path()).value()).value();
+  converge(other, 24, 16);
+  EXPECT_EQ(picture(other), picture(denser));
+
   cumulet_volume_file_desc neither = VolumeFileDesc{.path = "no such cloud.vdb"};
   neither.suggested_density_scale = 2;
   EXPECT_EQ(cumulet_load_volume_file(suits.handle(), &neither), CUMULET_ERROR_INVALID_ARGUMENT);

@@ -209,6 +209,7 @@ TEST_F(Frame, VelocitiesAreFoundAndNotMistaken) {
     EXPECT_HAS(refusal(write(parts), {}), "no scalar fog volume");
   }
   EXPECT_EQ(told({dot("v", 1.0F), dot("velx", 1.0F)}), (Channels{"density", ""})) << "numbers, and one of three";
+  EXPECT_EQ(told({dot("v_x", 1.0F), dot("v_x", 1.0F), dot("v_y", 1.0F)}), (Channels{"density", "", ""})) << "no z";
 }
 
 // A value that two volumes hold, above 0 and below.
@@ -251,6 +252,13 @@ TEST_F(Frame, AnisotropyIsFoundWithItsSign) {
     grid->setName(name);
     EXPECT_TRUE(import_frame(write({density, grid}), {}, {}).anisotropy) << name;
   }
+  // Nor is it what is shown for want of a density, but where there is nothing else.
+  const VolumeFrame cloud = import_frame(write({grid, dot("cloud", 1.0F)}), {}, {});
+  EXPECT_EQ(cloud.density.name, "cloud");
+  EXPECT_TRUE(cloud.anisotropy);
+  const VolumeFrame alone = import_frame(write({grid}), {}, {});
+  EXPECT_EQ(alone.density.name, "phase_g");
+  EXPECT_FALSE(alone.anisotropy);
 }
 
 TEST_F(Frame, AnisotropyBeyondOneIsClamped) {

@@ -287,10 +287,11 @@ typedef struct cumulet_volume_file_desc {
    */
   const char* anisotropy_grid;
   /*
-   * 1: cumulet_load_volume_file gives the medium, as the volume comes, the density scale that
+   * 1: cumulet_load_volume_file gives the medium, as the volume is shown, the density scale that
    * cumulet_volume_suggest_density_scale tells of it, and builds the grid for that. Cells are built for a density scale
-   * (cumulet_grid_desc): who sets it when the volume is there may have them built twice. 0: it is left as it is, as of
-   * a volume that shows nothing, and by cumulet_volume_open_file.
+   * (cumulet_grid_desc): who sets it when the volume is there may have them built twice. What cumulet_set_medium
+   * says until then does not count. 0: it is left as it is, as of a volume that shows nothing, and by
+   * cumulet_volume_open_file.
    */
   int32_t suggested_density_scale;
 } cumulet_volume_file_desc;
@@ -1221,7 +1222,7 @@ CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box
 /*
  * [GL] The picture so far: width x height (of the result) x 4 floats, first pixel top left, linear radiance in front of
  * the background (premultiplied if that is transparent), and the part of a pixel that is not background. A pixel
- * without samples is 0. count is the number of floats at rgba.
+ * without samples is 0, before a background of a colour that. count is the number of floats at rgba.
  */
 CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count);
 /* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque
@@ -1242,10 +1243,10 @@ typedef struct cumulet_denoise_desc {
 /*
  * [GL] cumulet_read_linear's picture so far with its noise taken away by a network that has learned what pictures look
  * like: an estimate, not the mean of samples, and without any promise on its error. Alpha, and what of the picture is
- * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory for the time of the call;
- * waits for it, which takes seconds on software drivers, and for their compiler. CUMULET_ERROR_FILE for a file that is
- * missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views and with CUMULET_SURFACE_LIGHT_NONE, and as
- * cumulet_read_aov.
+ * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory and 64 bytes a pixel for the
+ * time of the call; waits for it, some 90 seconds a megapixel on software drivers, and for their compiler.
+ * CUMULET_ERROR_FILE for a file that is missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views and for
+ * a preview over surfaces that are not traced, and as cumulet_read_aov.
  */
 CUMULET_API cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoise_desc* desc, float* rgba,
                                                  size_t count);
