@@ -530,6 +530,31 @@ bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ost
   return true;
 }
 
+namespace {
+
+// What flags need of each other.
+void check_together(const RenderOptions& options) {
+  if (options.scene.volume.empty() && options.scene.surfaces.empty())
+    throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
+  if (options.json && !options.info) throw UsageError("--json is for --info");
+  if (options.info) return;
+  if (options.output.empty()) throw UsageError("--output is required");
+  if (!options.aovs.empty() && options.format != OutputFormat::exr)
+    throw UsageError("--aovs needs an .exr to write to");
+  if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
+    throw UsageError("--aovs needs the shaded view");
+  if (options.denoise && options.scene.sampling.view != CUMULET_VIEW_SHADED)
+    throw UsageError("--denoise needs the shaded view");
+  if (options.denoise && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
+    throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
+  if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
+  if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
+  if (!options.trace.empty() && options.trace == options.stats)
+    throw UsageError("--trace and --stats are the same file");
+}
+
+}  // namespace
+
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
   RenderOptions options;
   CLI::App app("Path-traces a volume into a picture, without a display.", "cumulet-render");
@@ -604,23 +629,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.scene = lit});
-  if (options.scene.volume.empty() && options.scene.surfaces.empty())
-    throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
-  if (options.json && !options.info) throw UsageError("--json is for --info");
-  if (options.info) return options;
-  if (options.output.empty()) throw UsageError("--output is required");
-  if (!options.aovs.empty() && options.format != OutputFormat::exr)
-    throw UsageError("--aovs needs an .exr to write to");
-  if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
-    throw UsageError("--aovs needs the shaded view");
-  if (options.denoise && options.scene.sampling.view != CUMULET_VIEW_SHADED)
-    throw UsageError("--denoise needs the shaded view");
-  if (options.denoise && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
-    throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
-  if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
-  if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
-  if (!options.trace.empty() && options.trace == options.stats)
-    throw UsageError("--trace and --stats are the same file");
+  check_together(options);
   return options;
 }
 

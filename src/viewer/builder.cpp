@@ -26,7 +26,7 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
 }
 
 void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings) {
-  const auto load = std::make_shared<Load>(Load{settings});
+  const auto load = std::make_shared<Load>(Load{std::move(settings)});
   const std::scoped_lock lock(mutex_);
   load_ = load;
   worker_.replace({file.path, Progress::Stage::loading,
