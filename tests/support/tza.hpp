@@ -22,7 +22,7 @@ namespace cumulet::test {
 class TzaBytes {
  public:
   TzaBytes& number(std::uint64_t value, unsigned size) {
-    for (unsigned i = 0; i < size; ++i) bytes_.push_back(static_cast<std::uint8_t>(value >> (8U * i)));
+    for (unsigned i = 0; i < size; ++i, value >>= 8U) bytes_.push_back(static_cast<std::uint8_t>(value));
     return *this;
   }
   TzaBytes& text(const std::string& letters) {
