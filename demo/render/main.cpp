@@ -130,18 +130,6 @@ void set_camera(const Viewer& viewer, const cumulet_camera_desc& desc) {
   if (status != CUMULET_OK) throw std::runtime_error("the camera is not usable");
 }
 
-void set_environment(const Viewer& viewer, const cumulet::demo::SceneOptions& scene) {
-  if (scene.environment.empty()) return;
-  cumulet_environment* environment = nullptr;
-  std::array<char, 1024> error{};
-  if (cumulet_environment_open(scene.environment.c_str(), &environment, error.data(), error.size()) != CUMULET_OK)
-    throw std::runtime_error(error.data());
-  const cumulet_status status = cumulet_set_environment(viewer.get(), environment);
-  cumulet_environment_release(environment);
-  check(viewer, status);
-  check(viewer, cumulet_set_environment_settings(viewer.get(), &scene.environment_settings));
-}
-
 /// Until the library's worker is done. Throws its error.
 void wait(const Viewer& viewer, Progress& progress) {
   cumulet_progress state{};
@@ -351,10 +339,14 @@ void render(const RenderOptions& options) {
     check(viewer, cumulet_set_ramp(viewer.get(), static_cast<cumulet_ramp>(i), cumulet::settings::numbers_of(points),
                                    points.size()));
   }
+  // A sky is computed for the ground that there is.
+  check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
   check(viewer, cumulet_set_light(viewer.get(), &scene.light));
   check(viewer, cumulet_set_lamps(viewer.get(), scene.lamps.data(), scene.lamps.size()));
-  check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
-  set_environment(viewer, scene);
+  if (!scene.environment.empty()) {
+    check(viewer, cumulet_load_environment(viewer.get(), scene.environment.c_str()));
+    check(viewer, cumulet_set_environment_settings(viewer.get(), &scene.environment_settings));
+  }
   check(viewer, cumulet_set_sampling(viewer.get(), &sampling));
   check(viewer, cumulet_set_display(viewer.get(), &scene.display));
   set_camera(viewer, scene.camera);

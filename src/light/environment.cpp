@@ -1,5 +1,8 @@
 #include "light/environment.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -7,8 +10,10 @@
 #include <numbers>
 #include <utility>
 
+#include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/luminance.hpp"
+#include "base/progress_part.hpp"
 #include "light/alias_table.hpp"
 
 namespace cumulet::light {
@@ -41,39 +46,92 @@ vec3 unpack(const Packed& packed) {
   return vec3(rg, b.x) * std::bit_cast<float>(packed.w & 0xFFFF0000U);
 }
 
-/// radiance: of texel i; sines: the sum of all texels'.
-template <class Radiance>
-Harmonics project(std::uint32_t width, std::uint32_t height, double sines, const glm::dvec3& mean,
-                  const Radiance& radiance) {
-  // Means of radiance times w, and times products of w's components.
+/// What a row of texels adds to means over all directions: sums, by the sine of its angle from +Y.
+struct RowSums {
+  double weight = 0.0;  // of its luminance
+  glm::dvec3 mean{0.0};
+  // Of radiance times w, and times products of w's components.
   std::array<glm::dvec3, 3> first{};
   std::array<glm::dvec3, 5> second{};  // xy, yz, zx, xx, yy
-  std::vector<glm::dvec2> level(width);
-  for (std::uint32_t x = 0; x < width; ++x) {
-    const double azimuth = 2.0 * std::numbers::pi * (0.5 - (x + 0.5) / width);
-    level[x] = {std::sin(azimuth), std::cos(azimuth)};
+  std::uint64_t replaced = 0;
+
+  void add(const glm::dvec3& w, const glm::dvec3& light) {
+    mean += light;
+    for (int i = 0; i < 3; ++i) first[static_cast<std::size_t>(i)] += w[i] * light;
+    second[0] += w.x * w.y * light;
+    second[1] += w.y * w.z * light;
+    second[2] += w.z * w.x * light;
+    second[3] += w.x * w.x * light;
+    second[4] += w.y * w.y * light;
   }
-  for (std::uint32_t y = 0; y < height; ++y) {
-    const double down = std::numbers::pi * (y + 0.5) / height;
-    for (std::uint32_t x = 0; x < width; ++x) {
-      const glm::dvec3 w(std::sin(down) * level[x].x, std::cos(down), std::sin(down) * level[x].y);
-      const glm::dvec3 light = std::sin(down) / sines * glm::dvec3(radiance(std::size_t{y} * width + x));
-      for (int i = 0; i < 3; ++i) first[static_cast<std::size_t>(i)] += w[i] * light;
-      second[0] += w.x * w.y * light;
-      second[1] += w.y * w.z * light;
-      second[2] += w.z * w.x * light;
-      second[3] += w.x * w.x * light;
-      second[4] += w.y * w.y * light;
+  void add(const RowSums& row) {
+    weight += row.weight;
+    mean += row.mean;
+    for (std::size_t i = 0; i < first.size(); ++i) first[i] += row.first[i];
+    for (std::size_t i = 0; i < second.size(); ++i) second[i] += row.second[i];
+    replaced += row.replaced;
+  }
+  /// 3 <L v> w, and 15/2 w (<L v v> - <L> / 3) w, whose last diagonal element is the others' less. sines: all texels'.
+  [[nodiscard]] Harmonics harmonics(double sines) const {
+    Harmonics found{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      found[i] = vec3(3.0 / sines * first[i]);
+      found[3 + i] = vec3(15.0 / sines * second[i]);
+    }
+    for (std::size_t i = 0; i < 2; ++i) found[6 + i] = vec3(7.5 / sines * (second[3 + i] - mean / 3.0));
+    return found;
+  }
+};
+
+/// The row's texels, each of which stands for itself, and their weights.
+class RowMaker {
+ public:
+  RowMaker(const EnvironmentPixels& pixels, std::vector<glm::uvec4>& words, std::vector<double>& weights)
+      : pixels_(pixels), words_(words), weights_(weights) {
+    for (std::uint32_t x = 0; x < pixels.width; ++x) {
+      const double azimuth = 2.0 * std::numbers::pi * (0.5 - (x + 0.5) / pixels.width);
+      level_.emplace_back(std::sin(azimuth), std::cos(azimuth));
     }
   }
-  // 3 <L v> w, and 15/2 w (<L v v> - <L> / 3) w, whose last diagonal element is the others' less.
-  Harmonics found{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    found[i] = vec3(3.0 * first[i]);
-    found[3 + i] = vec3(15.0 * second[i]);
+
+  [[nodiscard]] RowSums make(std::uint32_t y) const {
+    RowSums sums;
+    const double down = std::numbers::pi * (y + 0.5) / pixels_.height;
+    const double sine = std::sin(down);
+    const double cosine = std::cos(down);
+    for (std::uint32_t x = 0; x < pixels_.width; ++x) {
+      const std::size_t i = std::size_t{y} * pixels_.width + x;
+      vec3 colour = pixels_.values[i];
+      bool good = true;
+      for (int c = 0; c < 3; ++c) {
+        if (colour[c] >= 0.0F && colour[c] <= brightest) continue;
+        good = false;
+        colour[c] = 0.0F;
+      }
+      if (!good) ++sums.replaced;
+      const Packed packed = pack(colour);
+      const glm::dvec3 kept(unpack(packed));
+      weights_[i] = luminance(kept) * sine;
+      sums.weight += weights_[i];
+      sums.add({sine * level_[x].x, cosine, sine * level_[x].y}, sine * kept);
+      words_[i] = {Alias::certain, static_cast<std::uint32_t>(i), packed.z, packed.w};
+    }
+    return sums;
   }
-  for (std::size_t i = 0; i < 2; ++i) found[6 + i] = vec3(7.5 * (second[3 + i] - mean / 3.0));
-  return found;
+
+ private:
+  const EnvironmentPixels& pixels_;
+  std::vector<glm::uvec4>& words_;
+  std::vector<double>& weights_;
+  std::vector<glm::dvec2> level_;  // of each column, the sine and cosine of its azimuth
+};
+
+/// Calls visit with each row, on TBB's threads.
+template <class Visit>
+void for_each_row(std::uint32_t rows, const Visit& visit) {
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, rows), [&](const auto& range) {
+    for (std::uint32_t y = range.begin(); y != range.end(); ++y) visit(y);
+  });
 }
 
 }  // namespace
@@ -86,55 +144,81 @@ void check_environment_size(const std::string& name, std::int64_t width, std::in
               name + ": an environment of " + std::to_string(width) + "x" + std::to_string(height) + " pixels" + limit);
 }
 
-EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name) {
+EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name, Progress* progress) {
   check_environment_size(name, pixels.width, pixels.height);
-  if (pixels.values.size() != std::size_t{pixels.width} * pixels.height) {
+  const std::size_t texels = std::size_t{pixels.width} * pixels.height;
+  if (pixels.values.size() != texels) {
     throw Error(ErrorCode::file, name + ": an environment of " + std::to_string(pixels.width) + "x" +
                                      std::to_string(pixels.height) + " pixels has " +
                                      std::to_string(pixels.values.size()));
   }
-  auto made = std::make_shared<Environment>();
+  const auto made = make_left<Environment>();
   made->name = name;
   made->width = pixels.width;
   made->height = pixels.height;
-  made->words.reserve(pixels.values.size());
   std::vector<double> weights;
-  weights.reserve(pixels.values.size());
+  resize(made->words, texels, progress);
+  resize(weights, texels, progress);
+  std::vector<RowSums> rows(pixels.height);
+  {
+    const RowMaker maker(pixels, made->words, weights);
+    ProgressPart part(progress, 0.5, 0.75, pixels.height);
+    for_each_row(pixels.height, [&](std::uint32_t y) {
+      rows[y] = maker.make(y);
+      part.add(1);
+    });
+  }
+  // In the order of rows, whatever thread made them.
+  RowSums all;
   double sines = 0.0;
-  double sum = 0.0;
   for (std::uint32_t y = 0; y < pixels.height; ++y) {
-    const double sine = std::sin(std::numbers::pi * (y + 0.5) / pixels.height);
-    for (std::uint32_t x = 0; x < pixels.width; ++x) {
-      vec3 colour = pixels.values[std::size_t{y} * pixels.width + x];
-      bool good = true;
-      for (int c = 0; c < 3; ++c) {
-        if (colour[c] >= 0.0F && colour[c] <= brightest) continue;
-        good = false;
-        colour[c] = 0.0F;
+    all.add(rows[y]);
+    sines += pixels.width * std::sin(std::numbers::pi * (y + 0.5) / pixels.height);
+  }
+  made->mean = all.mean / sines;
+  made->harmonics = all.harmonics(sines);
+  made->replaced = all.replaced;
+  if (all.weight > 0.0) {
+    const double unit = 2.0 * std::numbers::pi * std::numbers::pi / static_cast<double>(texels);
+    made->density = static_cast<float>(1.0 / (all.weight * unit));
+    const std::vector<Alias> aliases = apart(progress, [weights = std::move(weights), sum = all.weight]() mutable {
+      return alias_table(std::move(weights), sum);
+    });
+    ProgressPart part(progress, 0.9, 1.0, pixels.height);
+    for_each_row(pixels.height, [&](std::uint32_t y) {
+      for (std::size_t i = std::size_t{y} * pixels.width; i < std::size_t{y + 1} * pixels.width; ++i) {
+        made->words[i].x = aliases[i].stays;
+        made->words[i].y = aliases[i].other;
       }
-      if (!good) ++made->replaced;
-      const Packed packed = pack(colour);
-      const glm::dvec3 kept(unpack(packed));
-      weights.push_back(luminance(kept) * sine);
-      sum += weights.back();
-      made->mean += sine * kept;
-      sines += sine;
-      made->words.emplace_back(Alias::certain, static_cast<std::uint32_t>(made->words.size()), packed.z, packed.w);
-    }
+      part.add(1);
+    });
   }
-  made->mean /= sines;
-  made->harmonics = project(pixels.width, pixels.height, sines, made->mean, [&](std::size_t i) {
-    return unpack({made->words[i].z, made->words[i].w});
-  });
-  if (!(sum > 0.0)) return made;
-  const double unit = 2.0 * std::numbers::pi * std::numbers::pi / static_cast<double>(weights.size());
-  made->density = static_cast<float>(1.0 / (sum * unit));
-  const std::vector<Alias> aliases = alias_table(std::move(weights), sum);
-  for (std::size_t i = 0; i < aliases.size(); ++i) {
-    made->words[i].x = aliases[i].stays;
-    made->words[i].y = aliases[i].other;
-  }
+  if (progress != nullptr) progress->at(1.0);
   return made;
+}
+
+std::vector<vec3> pixels_of(const Environment& environment, std::uint32_t width, std::uint32_t height) {
+  // Of `many` in a row, those in the place of one of `few`: at least one.
+  const auto covered = [](std::uint32_t i, std::uint32_t few, std::uint32_t many) {
+    const auto edge = [&](std::uint32_t at) { return static_cast<std::uint32_t>(std::uint64_t{at} * many / few); };
+    return std::pair(edge(i), std::max(edge(i + 1), edge(i) + 1));
+  };
+  std::vector<vec3> pixels(std::size_t{width} * height);
+  for_each_row(height, [&](std::uint32_t y) {
+    const auto [top, bottom] = covered(y, height, environment.height);
+    for (std::uint32_t x = 0; x < width; ++x) {
+      const auto [left, right] = covered(x, width, environment.width);
+      glm::dvec3 sum(0.0);
+      for (std::uint32_t v = top; v < bottom; ++v) {
+        for (std::uint32_t u = left; u < right; ++u) {
+          const glm::uvec4& word = environment.words[std::size_t{v} * environment.width + u];
+          sum += glm::dvec3(unpack({word.z, word.w}));
+        }
+      }
+      pixels[std::size_t{y} * width + x] = vec3(sum / (double(bottom - top) * (right - left)));
+    }
+  });
+  return pixels;
 }
 
 }  // namespace cumulet::light

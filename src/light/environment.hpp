@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.hpp"
+
 namespace cumulet::light {
 
 /// Radiance of all directions, linear Rec. 709, rows from the top (+Y) down; the middle is at +Z and +X left of it, as
@@ -49,9 +51,13 @@ using EnvironmentPtr = std::shared_ptr<const Environment>;
 /// Throws Error(file) that begins with the name for a picture without pixels, or of a side above max_side.
 void check_environment_size(const std::string& name, std::int64_t width, std::int64_t height);
 
-/// O(texels). Throws as check_environment_size does, and Error(file) that begins with the name for
-/// another number of values than pixels.
-EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name);
+/// O(texels), on TBB's threads, the same by any number of them; the second half of a load's progress. Throws as
+/// check_environment_size does, Error(file) that begins with the name for another number of values than pixels, and
+/// Error(cancelled).
+EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name, Progress* progress = nullptr);
+
+/// It at another size, rows from the top down: each pixel the mean of the texels in its place.
+std::vector<glm::vec3> pixels_of(const Environment& environment, std::uint32_t width, std::uint32_t height);
 
 /// How a scene is surrounded by one.
 struct Surroundings {

@@ -3,6 +3,7 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfInputFile.h>
 
 #include <algorithm>
@@ -11,18 +12,27 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <new>
+#include <stdexcept>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/one_line.hpp"
+#include "base/progress_part.hpp"
 
 namespace cumulet::light {
 
 namespace {
+
+// Of a load's progress.
+constexpr double decoded_from = 0.2;
+constexpr double decoded_to = 0.5;
 
 [[noreturn]] void fail(const std::string& name, const std::string& cause) {
   throw Error(ErrorCode::file, name + ": " + cause);
@@ -34,7 +44,7 @@ class RadianceFile {
  public:
   RadianceFile(std::span<const std::uint8_t> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
-  EnvironmentPixels read() {
+  EnvironmentPixels read(Progress* progress) {
     const std::string_view first = line();
     if (first != "#?RADIANCE" && first != "#?RGBE") fail(name_, "neither a Radiance (.hdr) nor an OpenEXR file");
     double exposure = 1.0;
@@ -51,7 +61,9 @@ class RadianceFile {
     if ((bytes_.size() - at_) / least < pixels.height) cut();
     pixels.values.reserve(std::size_t{pixels.width} * pixels.height);
     std::vector<std::array<std::uint8_t, 4>> row(pixels.width);
+    ProgressPart part(progress, decoded_from, decoded_to, pixels.height);
     for (std::uint32_t y = 0; y < pixels.height; ++y) {
+      part.add(1);
       read_row(row);
       for (const auto& [r, g, b, e] : row) {
         const auto unit = static_cast<float>(e == 0 ? 0.0 : std::ldexp(1.0, e - 136) / exposure);
@@ -151,71 +163,141 @@ class RadianceFile {
   std::size_t at_ = 0;
 };
 
-EnvironmentPixels read_exr(const std::string& path) {
-  try {
-    Imf::InputFile file(path.c_str());
-    const Imath::Box2i window = file.header().dataWindow();
+/// A file's bytes, for OpenEXR.
+class ByteStream : public Imf::IStream {
+ public:
+  ByteStream(std::vector<std::uint8_t> bytes, const std::string& name)
+      : Imf::IStream(name.c_str()), bytes_(std::move(bytes)) {}
+
+  bool read(char to[], int count) override {
+    const auto wanted = static_cast<std::size_t>(count);
+    if (at_ > bytes_.size() || wanted > bytes_.size() - at_) throw std::runtime_error("the file is cut short");
+    std::memcpy(to, bytes_.data() + at_, wanted);
+    at_ += wanted;
+    return at_ < bytes_.size();
+  }
+  std::uint64_t tellg() override { return at_; }
+  void seekg(std::uint64_t to) override { at_ = to; }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+  std::uint64_t at_ = 0;
+};
+
+/// An OpenEXR picture on its way from bytes to pixels. Owns all of it: see apart().
+class ExrFile {
+ public:
+  ExrFile(std::vector<std::uint8_t> bytes, const std::string& path, Progress* progress)
+      : stream_(std::move(bytes), path), file_(stream_) {
+    const Imath::Box2i& window = file_.header().dataWindow();
     const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
     const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
     check_environment_size(path, width, height);
-    EnvironmentPixels pixels{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
-    pixels.values.resize(std::size_t{pixels.width} * pixels.height);
+    pixels_.width = static_cast<std::uint32_t>(width);
+    pixels_.height = static_cast<std::uint32_t>(height);
+    resize(pixels_.values, std::size_t{pixels_.width} * pixels_.height, progress);
     const std::int64_t stride = sizeof(glm::vec3);
     // A slice's base is where pixel (0, 0) would be, which the data window may not contain.
     char* const base =
-        reinterpret_cast<char*>(pixels.values.data()) - (std::int64_t{window.min.y} * width + window.min.x) * stride;
-    const Imf::ChannelList& channels = file.header().channels();
+        reinterpret_cast<char*>(pixels_.values.data()) - (std::int64_t{window.min.y} * width + window.min.x) * stride;
+    const Imf::ChannelList& channels = file_.header().channels();
     const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
-    const bool grey = !has("R") && !has("G") && !has("B") && has("Y");
+    grey_ = !has("R") && !has("G") && !has("B") && has("Y");
     Imf::FrameBuffer frame;
     const auto read = [&](const char* name, std::size_t c) {
       if (!has(name)) fail(path, std::string("has no channel ") + name);
-      frame.insert(name, Imf::Slice(Imf::FLOAT, base + c * sizeof(float), stride, stride * pixels.width));
+      frame.insert(name, Imf::Slice(Imf::FLOAT, base + c * sizeof(float), stride, stride * pixels_.width));
     };
-    if (grey) {
+    if (grey_) {
       read("Y", 0);
     } else {
       read("R", 0);
       read("G", 1);
       read("B", 2);
     }
-    file.setFrameBuffer(frame);
-    file.readPixels(window.min.y, window.max.y);
-    if (grey) {
-      for (glm::vec3& value : pixels.values) value = glm::vec3(value.x);
+    file_.setFrameBuffer(frame);
+  }
+
+  /// Rows from 0, as many as there are from this one on, at most so many. Returns the next.
+  std::uint32_t decode(std::uint32_t row, std::uint32_t most) {
+    const std::uint32_t end = row + std::min(most, pixels_.height - row);
+    const int top = file_.header().dataWindow().min.y;
+    file_.readPixels(top + static_cast<int>(row), top + static_cast<int>(end) - 1);
+    if (!grey_) return end;
+    const auto first = pixels_.values.begin() + std::ptrdiff_t{row} * pixels_.width;
+    std::for_each(first, pixels_.values.begin() + std::ptrdiff_t{end} * pixels_.width,
+                  [](glm::vec3& value) { value = glm::vec3(value.x); });
+    return end;
+  }
+  [[nodiscard]] std::uint32_t height() const { return pixels_.height; }
+  [[nodiscard]] EnvironmentPixels take() { return std::move(pixels_); }
+
+ private:
+  ByteStream stream_;
+  Imf::InputFile file_;
+  EnvironmentPixels pixels_;
+  bool grey_ = false;
+};
+
+EnvironmentPixels read_exr(std::vector<std::uint8_t> bytes, const std::string& path, Progress* progress) {
+  try {
+    const auto file = make_left<ExrFile>(std::move(bytes), path, progress);
+    // OpenEXR keeps the block of rows that it decoded last.
+    constexpr std::uint32_t rows = 64;
+    ProgressPart part(progress, decoded_from, decoded_to, file->height());
+    for (std::uint32_t y = 0; y < file->height();) {
+      const std::uint32_t next = apart(progress, [file, y] { return file->decode(y, rows); });
+      part.add(next - y);
+      y = next;
     }
-    return pixels;
+    return file->take();
   } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& error) {
     fail(path, "not a readable OpenEXR file: " + one_line(error.what(), 200));
   }
 }
 
-}  // namespace
-
-EnvironmentPixels read_radiance(std::span<const std::uint8_t> bytes, const std::string& name) {
-  return RadianceFile(bytes, name).read();
-}
-
-EnvironmentPixels read_environment(const std::string& path) {
+/// All of it, in pieces between which a load may be cancelled.
+std::vector<std::uint8_t> read_bytes(const std::string& path, Progress* progress) {
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(path, std::strerror(errno));
-  std::vector<std::uint8_t> bytes(4);
-  file.read(reinterpret_cast<char*>(bytes.data()), 4);
-  constexpr std::array<std::uint8_t, 4> open_exr = {0x76, 0x2F, 0x31, 0x01};
-  if (file && std::ranges::equal(bytes, open_exr)) return read_exr(path);
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  file.clear();
+  std::error_code unknown;
+  const std::uintmax_t told = std::filesystem::file_size(path, unknown);
+  const std::uintmax_t size = unknown ? 0 : told;
   constexpr std::size_t piece = std::size_t{1} << 20U;
+  ProgressPart part(progress, 0.0, decoded_from, size);
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(size + piece);
   while (file) {
     const std::size_t before = bytes.size();
     bytes.resize(before + piece);
     file.read(reinterpret_cast<char*>(bytes.data() + before), piece);
     bytes.resize(before + static_cast<std::size_t>(file.gcount()));
+    part.add(bytes.size() - before);
   }
   if (file.bad()) fail(path, std::strerror(errno));
-  return read_radiance(bytes, path);
+  return bytes;
+}
+
+}  // namespace
+
+EnvironmentPixels read_radiance(std::span<const std::uint8_t> bytes, const std::string& name, Progress* progress) {
+  return RadianceFile(bytes, name).read(progress);
+}
+
+EnvironmentPixels read_environment(const std::string& path, Progress* progress) {
+  std::vector<std::uint8_t> bytes = read_bytes(path, progress);
+  constexpr std::array<std::uint8_t, 4> open_exr = {0x76, 0x2F, 0x31, 0x01};
+  const bool exr = bytes.size() >= open_exr.size() && std::equal(open_exr.begin(), open_exr.end(), bytes.begin());
+  return exr ? read_exr(std::move(bytes), path, progress) : read_radiance(bytes, path, progress);
+}
+
+EnvironmentPtr open_environment(const std::string& path, Progress* progress) {
+  const auto pixels = make_left<const EnvironmentPixels>(read_environment(path, progress));
+  return make_environment(*pixels, path, progress);
 }
 
 }  // namespace cumulet::light

@@ -398,15 +398,15 @@ vec3 Sky::radiance(const dvec3& direction) const {
                   vec3(0.0F));
 }
 
-Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone, const Daylight* last) {
-  const double up = sun_elevation_degrees * pi / 180.0;
-  const bool kept = last != nullptr && last->model == model;
-  const AtmospherePtr atmosphere = kept ? last->atmosphere : std::make_shared<const Atmosphere>(model);
+Daylight make_daylight(const Day& day, const Daylight* last) {
+  const double up = day.sun_elevation_degrees * pi / 180.0;
+  const bool kept = last != nullptr && last->day.model == day.model;
+  const AtmospherePtr atmosphere = kept ? last->atmosphere : std::make_shared<const Atmosphere>(day.model);
   const Sky sky(*atmosphere, {0.0, std::sin(up), std::cos(up)});
   EnvironmentPixels pixels{.width = 512, .height = 256, .values = {}};
   pixels.values.resize(std::size_t{pixels.width} * pixels.height);
   // One row more: what is just above the horizon is between it and the one before.
-  const std::uint32_t rows = above_alone ? pixels.height / 2 + 1 : pixels.height;
+  const std::uint32_t rows = day.above_alone ? pixels.height / 2 + 1 : pixels.height;
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, rows), [&](const auto& range) {
     for (std::uint32_t y = range.begin(); y != range.end(); ++y) {
       const double elevation = pi * (0.5 - (y + 0.5) / pixels.height);
@@ -418,8 +418,7 @@ Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool
       }
     }
   });
-  return {model,       atmosphere,           sun_elevation_degrees,
-          above_alone, sky.sun_irradiance(), make_environment(pixels, "the physical sky")};
+  return {day, atmosphere, sky.sun_irradiance(), make_environment(pixels, "the physical sky")};
 }
 
 }  // namespace cumulet::light

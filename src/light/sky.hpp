@@ -62,18 +62,23 @@ class Sky {
   glm::vec3 ground_radiance_{0.0F};
 };
 
-/// Of a sky what a picture is lit by, the same whatever the sun's azimuth.
-struct Daylight {
+/// What a picture's physical sky depends on; its azimuth only turns it.
+struct Day {
   SkyModel model;
-  AtmospherePtr atmosphere;  ///< of that
   double sun_elevation_degrees = 90.0;
   bool above_alone = false;  ///< below the horizon it is dark: something else is there, and looks go where light is
+  bool operator==(const Day&) const = default;
+};
+
+/// Of a sky what a picture is lit by.
+struct Daylight {
+  Day day;
+  AtmospherePtr atmosphere;  ///< of its model
   glm::vec3 sun_irradiance{0.0F};
   EnvironmentPtr surroundings;  ///< all but the sun, 512 x 256; the sun is at azimuth 0, +Z
 };
 
 /// As Sky's constructor; in less than half of the time where the last (may be null) is of the same model.
-Daylight make_daylight(const SkyModel& model, double sun_elevation_degrees, bool above_alone,
-                       const Daylight* last = nullptr);
+Daylight make_daylight(const Day& day, const Daylight* last = nullptr);
 
 }  // namespace cumulet::light

@@ -246,9 +246,11 @@ cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* pr
       code = failure ? status_of(failure->code()) : CUMULET_OK;
       copy_text(failure ? failure->what() : "", message, sizeof message);
     };
-    tell(status.volume_failure ? status.volume_failure : status.surfaces_failure, p.status, p.message);
+    const auto& loaded = status.volume_failure ? status.volume_failure : status.surfaces_failure;
+    tell(loaded ? loaded : status.environment_failure, p.status, p.message);
     tell(status.volume_failure, p.volume_status, p.volume_message);
     tell(status.surfaces_failure, p.surfaces_status, p.surfaces_message);
+    tell(status.environment_failure, p.environment_status, p.environment_message);
     write_desc(progress, p, "cumulet_progress");
   });
 }
@@ -292,6 +294,13 @@ cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_des
 
 cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_lamps(cumulet::c_abi::lamps_of(lamps, count)); });
+}
+
+cumulet_status cumulet_load_environment(cumulet_viewer* viewer, const char* path) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(path != nullptr && *path != '\0', "path is NULL or empty");
+    v.load_environment(path);
+  });
 }
 
 cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment) {

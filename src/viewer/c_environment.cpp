@@ -13,7 +13,7 @@ using namespace cumulet::c_abi;
 cumulet_status cumulet_environment_open(const char* path, cumulet_environment** out, char* error, size_t error_size) {
   return make_handle(out, error, error_size, [&] {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
-    return light::make_environment(light::read_environment(path), path);
+    return light::open_environment(path);
   });
 }
 
@@ -48,5 +48,19 @@ cumulet_status cumulet_environment_get_info(const cumulet_environment* environme
     out.replaced_pixels = asset.replaced;
     for (int c = 0; c < 3; ++c) out.mean_radiance[c] = asset.mean[c];
     write_desc(info, out, "cumulet_environment_info");
+  });
+}
+
+cumulet_status cumulet_environment_get_pixels(const cumulet_environment* environment, uint32_t width, uint32_t height,
+                                              float* rgb, uint64_t count) {
+  return guarded(nullptr, 0, [&] {
+    require(environment != nullptr, "environment is NULL");
+    require(rgb != nullptr, "rgb is NULL");
+    constexpr uint32_t most = light::Environment::max_side;
+    require(width >= 1 && height >= 1 && width <= most && height <= most, "width or height is not from 1 to 16384");
+    require(count >= std::uint64_t{3} * width * height, "count is less than 3 x width x height");
+    for (const glm::vec3& pixel : light::pixels_of(*environment->asset, width, height)) {
+      for (int c = 0; c < 3; ++c) *rgb++ = pixel[c];
+    }
   });
 }

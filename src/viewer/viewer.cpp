@@ -24,9 +24,9 @@ bool apart(double a, double b) { return a > most_opacity_ratio * b || b > most_o
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
-dvec3 to_sun(const Light& light) {
-  const double azimuth = radians(light.sun_azimuth_degrees);
-  const double elevation = radians(light.sun_elevation_degrees);
+dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
+  const double azimuth = radians(azimuth_degrees);
+  const double elevation = radians(elevation_degrees);
   return {std::sin(azimuth) * std::cos(elevation), std::sin(elevation), std::cos(azimuth) * std::cos(elevation)};
 }
 
@@ -42,7 +42,8 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
       builder_(
           log_, [this] { notify(); }, trace),
       surface_builder_(
-          log_, [this] { notify(); }, trace) {
+          log_, [this] { notify(); }, trace),
+      environment_builder_([this] { notify(); }, trace) {
   scene_.volumes.resize(1);
   set_medium({});
   set_light({});
@@ -92,6 +93,13 @@ void Viewer::sync() {
   if (auto surfaces = surface_builder_.take()) {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
     model_source_ = std::move(surfaces->source);
+  }
+  if (auto read = environment_builder_.take_environment()) show_environment(std::move(*read));
+  if (auto sky = environment_builder_.take_sky()) {
+    if (asked_day_ == sky->day) asked_day_.reset();
+    // One that was asked for before is shown where the newest is not there yet.
+    if (const auto wanted = day(); wanted && !(daylight_ && daylight_->day == *wanted)) daylight_ = std::move(*sky);
+    surround();
   }
 }
 
@@ -156,7 +164,10 @@ void Viewer::rebuild() {
 void Viewer::cancel() {
   builder_.cancel();
   surface_builder_.cancel();
+  environment_builder_.cancel();
 }
+
+bool Viewer::busy() const { return builder_.busy() || surface_builder_.busy() || environment_builder_.busy(); }
 
 void Viewer::load_surfaces(const std::string& path) {
   sync();
@@ -232,20 +243,24 @@ void Viewer::use_surface_camera(std::size_t index) {
 void Viewer::wait(double timeout_ms) {
   std::optional<Clock::time_point> until;
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
-  if (!builder_.wait(until) || !surface_builder_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
+  if (!builder_.wait(until) || !surface_builder_.wait(until) || !environment_builder_.wait(until))
+    throw Error(ErrorCode::timeout, "not ready in time");
   sync();
   if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
   if (const auto failure = builder_.status().failure) throw Error(*failure);
+  if (const auto failure = environment_builder_.status().failure) throw Error(*failure);
 }
 
 Viewer::Status Viewer::status() const {
   const Worker::Status volume = builder_.status();
   const double upload = upload_progress_.load(std::memory_order_relaxed);
   const Worker::Status surfaces = surface_builder_.status();
-  Status status{volume.stage, volume.fraction, volume.failure, surfaces.failure};
-  if (status.stage == Progress::Stage::idle) {
-    status.stage = surfaces.stage;
-    status.fraction = surfaces.fraction;
+  const Worker::Status environment = environment_builder_.status();
+  Status status{volume.stage, volume.fraction, volume.failure, surfaces.failure, environment.failure};
+  for (const Worker::Status& other : {surfaces, environment}) {
+    if (status.stage != Progress::Stage::idle) break;
+    status.stage = other.stage;
+    status.fraction = other.fraction;
   }
   if (status.stage == Progress::Stage::idle && upload < 1.0) {
     status.stage = Progress::Stage::uploading;
@@ -335,14 +350,31 @@ void Viewer::set_lamps(light::Lamps lamps) {
   touch();
 }
 
+void Viewer::load_environment(const std::string& path) {
+  sync();
+  environment_builder_.load(path);
+  touch();
+}
+
 void Viewer::set_environment(light::EnvironmentPtr environment) {
+  environment_builder_.drop_loads();
+  sync();
+  show_environment(std::move(environment));
+  touch();
+}
+
+const light::EnvironmentPtr& Viewer::environment() {
+  sync();
+  return environment_;
+}
+
+void Viewer::show_environment(light::EnvironmentPtr environment) {
   if (environment && environment->replaced > 0) {
     log_.warning(environment->name + ": " + std::to_string(environment->replaced) +
                  " pixels are in part not finite, negative or above 1e30, which counts as 0");
   }
   environment_ = std::move(environment);
   surround();
-  touch();
 }
 
 void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
@@ -351,21 +383,30 @@ void Viewer::set_environment_settings(const EnvironmentSettings& settings) {
   touch();
 }
 
+std::optional<light::Day> Viewer::day() const {
+  if (!light_.sky) return std::nullopt;
+  return light::Day{*light_.sky, light_.sun_elevation_degrees, ground_.place != GroundPlace::none};
+}
+
 void Viewer::surround() {
-  light::DistantLights lights{to_sun(light_), light_.sun_irradiance, light_.sky_radiance, light_.sun_angle_degrees};
   light::Surroundings surroundings{environment_, environment_settings_.rotation_degrees,
                                    environment_settings_.strength};
-  if (light_.sky) {
-    const double elevation = light_.sun_elevation_degrees;
-    const bool ground = ground_.place != GroundPlace::none;
-    if (!daylight_ || daylight_->model != *light_.sky || daylight_->sun_elevation_degrees != elevation ||
-        daylight_->above_alone != ground)
-      daylight_ = light::make_daylight(*light_.sky, elevation, ground, daylight_ ? &*daylight_ : nullptr);
-    lights.sun_irradiance = daylight_->sun_irradiance;
+  const std::optional<light::Day> wanted = day();
+  if (!wanted) {
+    daylight_.reset();
+    scene_.lights.set({to_sun(light_.sun_azimuth_degrees, light_.sun_elevation_degrees), light_.sun_irradiance,
+                       light_.sky_radiance, light_.sun_angle_degrees});
+  } else if (!(daylight_ && daylight_->day == *wanted) && asked_day_ != wanted) {
+    environment_builder_.make_sky(*wanted);
+    asked_day_ = wanted;
+  }
+  // Until it is there sun and sky stay as they were, but for what only turns them.
+  if (daylight_) {
+    scene_.lights.set({to_sun(light_.sun_azimuth_degrees, daylight_->day.sun_elevation_degrees),
+                       daylight_->sun_irradiance, light_.sky_radiance, light_.sun_angle_degrees});
     if (!environment_)
       surroundings = {.environment = daylight_->surroundings, .rotation_degrees = light_.sun_azimuth_degrees};
   }
-  scene_.lights.set(lights);
   scene_.surroundings.set(std::move(surroundings));
 }
 

@@ -18,6 +18,7 @@
 #include "viewer/builder.hpp"
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
+#include "viewer/environment_builder.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_builder.hpp"
@@ -66,10 +67,12 @@ class Viewer {
   /// Throws how the last job ended, or Error(timeout).
   void wait(double timeout_ms);
   struct Status {
-    Progress::Stage stage = Progress::Stage::idle;  ///< of the volume's jobs, else of the surfaces', else uploading
+    /// Of the volume's jobs, else of the surfaces', else of the environment's, else uploading.
+    Progress::Stage stage = Progress::Stage::idle;
     double fraction = 0.0;
     std::optional<Error> volume_failure;  ///< how the last job of each ended, if not well
     std::optional<Error> surfaces_failure;
+    std::optional<Error> environment_failure;
   };
   [[nodiscard]] Status status() const;
 
@@ -90,10 +93,12 @@ class Viewer {
   [[nodiscard]] const Ramps& ramps() const { return ramps_; }
   void set_light(const Light& light);
   void set_lamps(light::Lamps lamps);
-  /// Null: the sky of the light.
+  void load_environment(const std::string& path);
+  /// Null: the sky of the light. Cancels a load under way.
   void set_environment(light::EnvironmentPtr environment);
   void set_environment_settings(const EnvironmentSettings& settings);
-  [[nodiscard]] const light::EnvironmentPtr& environment() const { return environment_; }
+  /// The newest; null if there is none.
+  const light::EnvironmentPtr& environment();
   void set_ground(const GroundSettings& settings);
   void set_sampling(const Sampling& sampling);
   void set_display(const DisplaySettings& display);
@@ -135,6 +140,11 @@ class Viewer {
   void touch();
   // What the light and the environment make of the scene's.
   void surround();
+  // What a physical sky is to be of.
+  [[nodiscard]] std::optional<light::Day> day() const;
+  void show_environment(light::EnvironmentPtr environment);
+  // Whether workers have anything under way, or made what nobody took.
+  [[nodiscard]] bool busy() const;
   // Runs a [GL] call's body between state guard and error handling.
   template <class Body>
   void with_gl(Body&& body);
@@ -177,8 +187,9 @@ class Viewer {
   Medium medium_;
   Ramps ramps_;
   Light light_;
-  std::optional<light::Daylight> daylight_;  // of the physical sky last asked for
-  light::EnvironmentPtr environment_;        // the host's
+  std::optional<light::Day> asked_day_;      // of a sky under way
+  std::optional<light::Daylight> daylight_;  // of the physical sky that is shown
+  light::EnvironmentPtr environment_;        // the host's, newest
   EnvironmentSettings environment_settings_;
   GroundSettings ground_;
   SurfaceSettings surface_settings_;
@@ -211,6 +222,7 @@ class Viewer {
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;
+  EnvironmentBuilder environment_builder_;
 };
 
 }  // namespace cumulet::viewer

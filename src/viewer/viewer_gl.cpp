@@ -152,14 +152,15 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    if (builder_.busy() || surface_builder_.busy()) {
+    if (busy()) {
       result.loading = true;
       result.converged = false;
     }
     const auto failed = [](const Worker::Status& status) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;
     };
-    result.failed = failed(builder_.status()) || failed(surface_builder_.status());
+    result.failed =
+        failed(builder_.status()) || failed(surface_builder_.status()) || failed(environment_builder_.status());
     const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
     result.more = result.more || navigation_.moving() || waits_to_build;
     if (failure && !g.is_news(shot, *failure)) failure.reset();
@@ -177,7 +178,7 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
     prepare(frame);
     g.upload(shot(), page_texels_, deadline);
     follow_upload(g);
-    result = g.warm_up(shot(), frame, all, builder_.busy() || surface_builder_.busy(), deadline);
+    result = g.warm_up(shot(), frame, all, busy(), deadline);
   });
   return result;
 }

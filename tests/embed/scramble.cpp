@@ -241,6 +241,71 @@ TEST_P(Scramble, EveryCallWithSurfacesToo) {
   gl_->DeleteTextures(1, &multisampled);
 }
 
+// With an environment and with a physical sky: their uploads, what previews draw of them, and taking them away.
+TEST_P(Scramble, EveryCallWithAnEnvironmentToo) {
+  ScramblingHost host(gl_);
+  const HostTarget target(*gl_, side, side);
+  const auto volume = cumulet::test::make_ball(12);
+  const auto panes = cumulet::test::make_panes(3.0F);
+  const auto small = cumulet::test::make_environment(64, 32);
+  const auto large = cumulet::test::make_environment(1024, 512);
+  ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
+  cumulet_viewer* v = viewer.get();
+  ASSERT_EQ(cumulet_set_volume(v, volume.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_surfaces(v, panes.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
+  std::uint32_t seed = 500;
+  const auto render = [&](const std::string& what) {
+    cumulet_frame_desc frame = target.frame();
+    frame.budget_ms = 1.0;
+    for (int i = 0; i < 2; ++i) {
+      expect_kept(host, ++seed, "render " + what, [&] { return cumulet_render(v, &frame, nullptr); });
+    }
+  };
+  const auto ground = [&](cumulet_ground place) {
+    auto desc = make_desc<cumulet_ground_desc>();
+    desc.place = place;
+    ASSERT_EQ(cumulet_set_ground(v, &desc), CUMULET_OK);
+  };
+  for (const cumulet_surface_light light : {CUMULET_SURFACE_LIGHT_NONE, CUMULET_SURFACE_LIGHT_FULL}) {
+    const std::string name = ", light " + std::to_string(light);
+    auto settings = make_desc<cumulet_surface_settings_desc>();
+    settings.light = light;
+    ASSERT_EQ(cumulet_set_surface_settings(v, &settings), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_environment(v, large.get()), CUMULET_OK);
+    render("a large environment" + name);
+    ASSERT_EQ(cumulet_set_environment(v, small.get()), CUMULET_OK);
+    render("another" + name);
+    auto turned = make_desc<cumulet_environment_settings_desc>();
+    turned.rotation_degrees = 30.0F;
+    turned.strength = 2.0F;
+    ASSERT_EQ(cumulet_set_environment_settings(v, &turned), CUMULET_OK);
+    render("turned" + name);
+    ground(CUMULET_GROUND_BELOW);
+    render("over a ground" + name);
+    ASSERT_EQ(cumulet_set_environment(v, nullptr), CUMULET_OK);
+    auto day = make_desc<cumulet_light_desc>();
+    day.sky = CUMULET_SKY_PHYSICAL;
+    day.sun_elevation_degrees = 40.0F;
+    ASSERT_EQ(cumulet_set_light(v, &day), CUMULET_OK);
+    render("while a sky is computed" + name);
+    ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
+    render("a sky" + name);
+    ground(CUMULET_GROUND_NONE);
+    ASSERT_EQ(cumulet_wait(v, -1.0), CUMULET_OK);
+    render("no ground" + name);
+  }
+  converge(v, target.frame());
+  expect_kept(host, ++seed, "detach", [&] { return cumulet_detach(v); });
+  ASSERT_EQ(cumulet_set_environment(v, large.get()), CUMULET_OK);
+  expect_kept(host, ++seed, "attach", [&] { return cumulet_attach(v, Context::get_proc, context_.get()); });
+  render("anew");
+  expect_kept(host, ++seed, "destroy", [&] {
+    viewer.reset();
+    return CUMULET_OK;
+  });
+}
+
 // A failing call is a call as well.
 TEST_P(Scramble, FailuresLeaveTheStateToo) {
   ScramblingHost host(gl_);

@@ -350,6 +350,7 @@ void Caller::call_all() {
   cumulet_programs* new_programs = nullptr;
   auto programs = make_desc<cumulet_programs_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
+  std::array<float, 3> rgb{};
 
   // The exceptions.
   for (cumulet_viewer* v : {viewer, other}) {
@@ -391,6 +392,7 @@ void Caller::call_all() {
   CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
   CALL(cumulet_environment_from_pixels, &environment, &new_environment, nullptr, 0);
   CALL(cumulet_environment_get_info, new_environment, &environment_info);
+  CALL(cumulet_environment_get_pixels, new_environment, 1, 1, rgb.data(), rgb.size());
   CALL(cumulet_surfaces_open, "none.glb", &new_surfaces, nullptr, 0);
   CALL(cumulet_surfaces_from_memory, bytes.data(), bytes.size(), nullptr, nullptr, &new_surfaces, nullptr, 0);
   CALL(cumulet_surfaces_from_triangles, &triangles, &new_surfaces, nullptr, 0);
@@ -428,6 +430,7 @@ void Caller::call_all() {
     CALL(cumulet_set_ramp, v, CUMULET_RAMP_DENSITY, nullptr, 0);
     CALL(cumulet_set_light, v, &light);
     CALL(cumulet_set_lamps, v, &lamp, 1);
+    CALL(cumulet_load_environment, v, "none.hdr");
     CALL(cumulet_set_environment, v, nullptr);
     CALL(cumulet_get_environment, v, &new_environment);
     CALL(cumulet_set_environment_settings, v, &environment_settings);

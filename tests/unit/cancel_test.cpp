@@ -16,14 +16,17 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <image.hpp>
 #include <limits>
 #include <thread>
 
 #include "base/progress.hpp"
 #include "grid/tet_grid.hpp"
+#include "light/environment_file.hpp"
 #include "render/model_data.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
+#include "support/radiance.hpp"
 #include "support/volumes.hpp"
 #include "surface/gltf_import.hpp"
 #include "viewer/volume_asset.hpp"
@@ -317,6 +320,30 @@ TEST_F(CancelImport, NanoVdbOfEveryCodec) {
     nanovdb::io::writeGrid(file.string(), nano, codec);
     expect_import(file);
   }
+}
+
+TEST(Cancel, Environments) {
+  const test::Folder folder;
+  const auto opens = [](const std::string& path) {
+    return [path](Progress& progress) {
+      progress.begin(Progress::Stage::loading);
+      (void)light::open_environment(path, &progress);
+    };
+  };
+  constexpr std::uint32_t width = 2048;
+  const std::string radiance = (folder / "large.hdr").string();
+  std::ofstream(radiance, std::ios::binary) << test::radiance_file(width, width / 2);
+  expect_steady_progress(opens(radiance));
+  expect_stops(opens(radiance));
+  const std::string exr = (folder / "large.exr").string();
+  image::Image picture{width, width / 2, {}};
+  test::Random random(3);
+  picture.rgba.reserve(std::size_t{width} * width * 2);
+  for (std::size_t i = 0; i < std::size_t{width} * width * 2; ++i)
+    picture.rgba.push_back(static_cast<float>(random() % 1000));
+  image::write_exr(exr, picture);
+  expect_steady_progress(opens(exr));
+  expect_stops(opens(exr));
 }
 
 TEST(Cancel, Surfaces) {

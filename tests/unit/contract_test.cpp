@@ -22,6 +22,8 @@
 #include "cumulet/cumulet.hpp"
 #include "support/c_host.hpp"
 #include "support/fake_gl.hpp"
+#include "support/folder.hpp"
+#include "support/radiance.hpp"
 #include "viewer/c_fields.hpp"
 
 namespace {
@@ -31,6 +33,7 @@ using cumulet::headless::Context;
 using cumulet::test::CameraRef;
 using cumulet::test::converge;
 using cumulet::test::difference;
+using cumulet::test::EnvironmentRef;
 using cumulet::test::FakeGl;
 using cumulet::test::HostTarget;
 using cumulet::test::make_ball;
@@ -938,6 +941,191 @@ TEST_F(Contract, Contract20AnyThreadAndLoadingIsAsynchronous) {
   EXPECT_EQ(cumulet_wait(v_, 0.0), CUMULET_ERROR_CANCELLED) << "how the last one ended";
 }
 
+TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
+  const cumulet::test::Folder folder;
+  const auto write = [&](const char* name, std::uint32_t width, std::uint32_t height) {
+    const std::string path = (folder / name).string();
+    std::ofstream(path, std::ios::binary) << cumulet::test::radiance_file(width, height);
+    return path;
+  };
+  const std::string small = write("small.hdr", 16, 8);
+  const std::string large = write("large.hdr", 4096, 2048);
+  const auto expect_shown = [&](const char* path) {
+    cumulet_environment* raw = nullptr;
+    ASSERT_EQ(cumulet_get_environment(v_, &raw), CUMULET_OK);
+    const EnvironmentRef shown(raw);
+    if (path == nullptr) {
+      EXPECT_EQ(shown, nullptr);
+      return;
+    }
+    auto info = make_desc<cumulet_environment_info>();
+    ASSERT_EQ(cumulet_environment_get_info(shown.get(), &info), CUMULET_OK);
+    EXPECT_STREQ(info.name, path);
+    ASSERT_EQ(cumulet_get_environment(v_, &raw), CUMULET_OK);
+    EXPECT_EQ(EnvironmentRef(raw), shown) << "the same handle each time";
+  };
+  // Goes on from what a load that failed left.
+  const auto pixels = [&] {
+    const ViewerPtr other = viewer();
+    cumulet_environment* raw = nullptr;
+    EXPECT_EQ(cumulet_get_environment(v_, &raw), CUMULET_OK);
+    const EnvironmentRef shown(raw);
+    EXPECT_EQ(cumulet_set_environment(other.get(), shown.get()), CUMULET_OK);
+    return picture_of(other.get(), volume_.get(), target_);
+  };
+  const auto seen = [&] {
+    auto frame = target_.frame();
+    auto result = make_desc<cumulet_frame_result>();
+    for (int i = 0; i < 20000 && (result.flags & CUMULET_RENDER_CONVERGED) == 0; ++i)
+      EXPECT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+    target_.clear({});
+    frame.budget_ms = -1.0;
+    EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
+    return target_.pixels();
+  };
+  const Picture sky = picture_of(v_, volume_.get(), target_);
+
+  EXPECT_EQ(cumulet_load_environment(v_, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_load_environment(v_, ""), CUMULET_ERROR_INVALID_ARGUMENT);
+  ASSERT_EQ(cumulet_load_environment(v_, "no such sky.hdr"), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_FILE);
+  EXPECT_STREQ(cumulet_last_error(v_), "no such sky.hdr: No such file or directory");
+  auto progress = make_desc<cumulet_progress>();
+  ASSERT_EQ(cumulet_get_progress(v_, &progress), CUMULET_OK);
+  EXPECT_EQ(progress.status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(progress.environment_status, CUMULET_ERROR_FILE);
+  EXPECT_STREQ(progress.environment_message, cumulet_last_error(v_));
+  EXPECT_EQ(progress.volume_status, CUMULET_OK);
+  EXPECT_EQ(progress.surfaces_status, CUMULET_OK);
+  const auto frame = target_.frame();
+  auto result = make_desc<cumulet_frame_result>();
+  ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+  EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
+  expect_shown(nullptr);
+  EXPECT_EQ(difference(seen(), sky), "");
+
+  // A large one on its way: what was there stays until then, and can be drawn.
+  ASSERT_EQ(cumulet_load_environment(v_, large.c_str()), CUMULET_OK);
+  ASSERT_EQ(cumulet_get_progress(v_, &progress), CUMULET_OK);
+  EXPECT_EQ(progress.stage, CUMULET_STAGE_LOADING);
+  ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+  EXPECT_NE(result.flags & CUMULET_RENDER_LOADING, 0U);
+  EXPECT_EQ(result.flags & CUMULET_RENDER_CONVERGED, 0U);
+  EXPECT_EQ(result.width, unsigned{side});
+  expect_shown(nullptr);
+  cumulet_cancel(v_);
+  EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_CANCELLED);
+  expect_shown(nullptr);
+  EXPECT_EQ(difference(seen(), sky), "");
+
+  // The newest wins, and clears how the one before it ended.
+  ASSERT_EQ(cumulet_load_environment(v_, large.c_str()), CUMULET_OK);
+  ASSERT_EQ(cumulet_load_environment(v_, small.c_str()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK) << cumulet_last_error(v_);
+  expect_shown(small.c_str());
+  const Picture lit = seen();
+  EXPECT_NE(difference(lit, sky), "");
+  EXPECT_EQ(difference(lit, pixels()), "");
+  ASSERT_EQ(cumulet_load_environment(v_, (small + ".none").c_str()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_FILE);
+  expect_shown(small.c_str());
+  EXPECT_EQ(difference(seen(), lit), "");
+
+  // What is set is there at once, and nothing comes after it.
+  ASSERT_EQ(cumulet_load_environment(v_, large.c_str()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_environment(v_, nullptr), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_CANCELLED);
+  expect_shown(nullptr);
+  EXPECT_EQ(difference(seen(), sky), "");
+}
+
+TEST_F(Contract, EnvironmentsAreSeenAtAnotherSize) {
+  const EnvironmentRef environment = cumulet::test::make_environment(64, 32);
+  std::vector<float> rgb(std::size_t{3} * 8 * 4 + 1, -1.0F);
+  const auto get = [&](std::uint32_t width, std::uint32_t height, std::uint64_t count) {
+    return cumulet_environment_get_pixels(environment.get(), width, height, rgb.data(), count);
+  };
+  ASSERT_EQ(get(8, 4, 96), CUMULET_OK);
+  EXPECT_NEAR(rgb[0], 6.0F, 0.01F);
+  EXPECT_NEAR(rgb[3], 0.09F, 0.001F);
+  EXPECT_NEAR(rgb[5], 0.3F, 0.001F);
+  EXPECT_EQ(rgb[96], -1.0F);
+  EXPECT_EQ(get(8, 4, 95), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(get(0, 4, 96), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(get(16385, 1, 96), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_environment_get_pixels(nullptr, 8, 4, rgb.data(), 96), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_environment_get_pixels(environment.get(), 8, 4, nullptr, 96), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
+  struct Told {
+    std::mutex mutex;
+    std::vector<std::thread::id> threads;
+  } told;
+  auto desc = make_desc<cumulet_create_desc>();
+  desc.trace = [](void* user, const char* name, double, double) {
+    auto& t = *static_cast<Told*>(user);
+    const std::scoped_lock lock(t.mutex);
+    if (std::string(name) == "computing the sky") t.threads.push_back(std::this_thread::get_id());
+  };
+  desc.trace_user = &told;
+  cumulet_viewer* raw = nullptr;
+  ASSERT_EQ(cumulet_create(&desc, &raw, nullptr, 0), CUMULET_OK);
+  ViewerPtr dragged(raw);
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 4;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  ASSERT_EQ(cumulet_set_sampling(raw, &sampling), CUMULET_OK);
+  cumulet_camera* camera = nullptr;
+  ASSERT_EQ(cumulet_get_camera(v_, &camera), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_camera(raw, camera), CUMULET_OK);
+  cumulet_camera_release(camera);
+  ASSERT_EQ(cumulet_attach(raw, FakeGl::get_proc, &fake_), CUMULET_OK);
+
+  auto light = make_desc<cumulet_light_desc>();
+  light.sky = CUMULET_SKY_PHYSICAL;
+  light.ground_albedo = 0.3F;
+  const auto at = [&](cumulet_viewer* v, float elevation) {
+    light.sun_elevation_degrees = elevation;
+    light.sun_azimuth_degrees = 2.0F * elevation;
+    ASSERT_EQ(cumulet_set_light(v, &light), CUMULET_OK);
+  };
+  at(v_, 45.0F);
+  const Picture alone = picture_of(v_, volume_.get(), target_);
+  at(v_, 20.0F);
+  EXPECT_NE(difference(picture_of(v_, volume_.get(), target_), alone), "");
+
+  // Dragged: the newest is what is there in the end.
+  at(raw, 15.0F);
+  ASSERT_EQ(cumulet_set_volume(raw, volume_.get()), CUMULET_OK);
+  auto frame = target_.frame();
+  frame.budget_ms = 1.0;
+  constexpr int steps = 30;
+  for (int i = 1; i <= steps; ++i) {
+    at(raw, 15.0F + static_cast<float>(i));
+    ASSERT_EQ(cumulet_render(raw, &frame, nullptr), CUMULET_OK);
+  }
+  EXPECT_EQ(difference(picture_of(raw, volume_.get(), target_), alone), "");
+  // There and back: one that was overtaken does not come last.
+  at(raw, 80.0F);
+  at(raw, 45.0F);
+  EXPECT_EQ(difference(picture_of(raw, volume_.get(), target_), alone), "");
+  // A light of one colour between two skies, and a sky that has to wait for nothing but itself.
+  auto constant = make_desc<cumulet_light_desc>();
+  constant.sky_radiance[0] = 1.0F;
+  ASSERT_EQ(cumulet_set_light(raw, &constant), CUMULET_OK);
+  EXPECT_NE(difference(picture_of(raw, volume_.get(), target_), alone), "");
+  at(raw, 45.0F);
+  cumulet_cancel(raw);
+  ASSERT_EQ(cumulet_wait(raw, -1.0), CUMULET_OK) << "a sky is no load";
+  EXPECT_EQ(difference(picture_of(raw, volume_.get(), target_), alone), "");
+
+  dragged.reset();
+  EXPECT_FALSE(told.threads.empty());
+  EXPECT_LE(told.threads.size(), std::size_t{steps} + 4);
+  EXPECT_EQ(std::ranges::count(told.threads, std::this_thread::get_id()), 0);
+}
+
 // At every call: ContextLossAt in robust_test.cpp.
 TEST_F(Contract, Contract21AContextGoesAndAnotherComes) {
   const Picture picture = picture_of(v_, volume_.get(), target_);
@@ -973,6 +1161,32 @@ TEST_F(Contract, Contract22InstancesDoNotKnowOfEachOther) {
   ASSERT_EQ(cumulet_rebuild(v_), CUMULET_OK);
   converge(v_, target_.frame());
   EXPECT_EQ(difference(target_.pixels(), alone), "");
+}
+
+TEST_F(Contract, Contract22bTwoViewersInOneEnvironment) {
+  const EnvironmentRef shared = cumulet::test::make_environment(64, 32);
+  const auto turn = [](cumulet_viewer* v, float degrees) {
+    auto settings = make_desc<cumulet_environment_settings_desc>();
+    settings.rotation_degrees = degrees;
+    ASSERT_EQ(cumulet_set_environment_settings(v, &settings), CUMULET_OK);
+  };
+  const Picture sky = picture_of(v_, volume_.get(), target_);
+  ASSERT_EQ(cumulet_set_environment(v_, shared.get()), CUMULET_OK);
+  turn(v_, 120.0F);
+  const Picture alone = picture_of(v_, volume_.get(), target_);
+  EXPECT_NE(difference(alone, sky), "");
+  const ViewerPtr second = viewer();
+  ASSERT_EQ(cumulet_set_environment(second.get(), shared.get()), CUMULET_OK);
+  EXPECT_NE(difference(picture_of(second.get(), volume_.get(), target_), alone), "") << "turned otherwise";
+  turn(second.get(), 120.0F);
+  EXPECT_EQ(difference(picture_of(second.get(), volume_.get(), target_), alone), "");
+  // What one takes away, and what it then loads, is none of the other's.
+  ASSERT_EQ(cumulet_set_environment(second.get(), nullptr), CUMULET_OK);
+  EXPECT_EQ(difference(picture_of(second.get(), volume_.get(), target_), sky), "");
+  ASSERT_EQ(cumulet_load_environment(second.get(), "none.hdr"), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(second.get(), -1.0), CUMULET_ERROR_FILE);
+  ASSERT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK);
+  EXPECT_EQ(difference(picture_of(v_, volume_.get(), target_), alone), "");
 }
 
 TEST_F(Contract, Contract23EventsMoveTheCameraAndMatricesSetIt) {

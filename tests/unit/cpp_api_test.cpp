@@ -740,6 +740,7 @@ TEST_F(CppViewer, SharesSurfaces) {
   EXPECT_EQ(one.get_bounds()->max, (Vector{2, 1, 0}));
   EXPECT_EQ(one.use_surface_camera(0).error().status, StatusCode::invalid_argument);
   EXPECT_EQ(one.load_surfaces({}).error().status, StatusCode::invalid_argument);
+  EXPECT_EQ(one.load_environment({}).error().status, StatusCode::invalid_argument);
 }
 
 }  // namespace

@@ -219,6 +219,20 @@ TEST(Environment, KeepsEveryMagnitude) {
   }
 }
 
+TEST(Environment, PixelsOfAnotherSizeAreMeansOfThoseInTheirPlace) {
+  const auto environment = made(8, 4, [](std::uint32_t x, std::uint32_t y) { return vec3(float(x), float(y), 1.0F); });
+  const std::vector<vec3> half = light::pixels_of(*environment, 4, 2);
+  ASSERT_EQ(half.size(), 8U);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    EXPECT_EQ(half[i], vec3(2.0F * float(i % 4) + 0.5F, 2.0F * float(i / 4) + 0.5F, 1.0F)) << i;
+  }
+  const std::vector<vec3> one = light::pixels_of(*environment, 1, 1);
+  EXPECT_EQ(one.at(0), vec3(3.5F, 1.5F, 1.0F));
+  const std::vector<vec3> larger = light::pixels_of(*environment, 16, 5);
+  EXPECT_EQ(larger.at(0), vec3(0.0F, 0.0F, 1.0F));
+  EXPECT_EQ(larger.at(16 * 5 - 1), vec3(7.0F, 3.0F, 1.0F));
+}
+
 std::string refusal(const std::function<void()>& call) {
   try {
     call();

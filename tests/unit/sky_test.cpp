@@ -138,16 +138,16 @@ TEST(Sky, GetsDarkAfterSunsetAndIsNeverBroken) {
 
 TEST(Sky, AnotherSunLeavesTheAir) {
   const SkyModel clear{2.0, 0.3};
-  const light::Daylight morning = light::make_daylight(clear, 10.0, false);
-  const light::Daylight noon = light::make_daylight(clear, 60.0, false, &morning);
+  const light::Daylight morning = light::make_daylight({clear, 10.0});
+  const light::Daylight noon = light::make_daylight({clear, 60.0}, &morning);
   EXPECT_EQ(noon.atmosphere, morning.atmosphere);
-  const light::Daylight alone = light::make_daylight(clear, 60.0, false);
+  const light::Daylight alone = light::make_daylight({clear, 60.0});
   EXPECT_EQ(noon.sun_irradiance, alone.sun_irradiance);
   EXPECT_EQ(noon.surroundings->words, alone.surroundings->words);
   const SkyModel haze{6.0, 0.3};
-  const light::Daylight hazy = light::make_daylight(haze, 60.0, false, &noon);
+  const light::Daylight hazy = light::make_daylight({haze, 60.0}, &noon);
   EXPECT_NE(hazy.atmosphere, noon.atmosphere);
-  EXPECT_EQ(hazy.surroundings->words, light::make_daylight(haze, 60.0, false).surroundings->words);
+  EXPECT_EQ(hazy.surroundings->words, light::make_daylight({haze, 60.0}).surroundings->words);
 }
 
 TEST(Sky, TheSameTwice) {

@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "base/error.hpp"
+#include "light/environment_file.hpp"
+#include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/osmesa_leaks.hpp"
+#include "support/radiance.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
 
@@ -166,6 +170,53 @@ TEST_P(ViewerFrames, CellsOfATransmittanceAreBuiltForIt) {
   still_->build();
   const std::uint64_t deviation = viewer().stats().cells;
   EXPECT_EQ(cells_at(30.0, 0.0F), deviation);
+}
+
+TEST_P(ViewerFrames, EnvironmentsAndSkiesComeWhileFramesGoOn) {
+  const test::Folder folder;
+  std::vector<std::string> files;
+  for (const std::uint32_t width : {16U, 128U}) {
+    files.push_back((folder / (std::to_string(width) + ".hdr")).string());
+    std::ofstream(files.back(), std::ios::binary) << test::radiance_file(width, width / 2);
+  }
+  const auto daylight = [](float elevation) {
+    viewer::Light light{40.0F, elevation};
+    light.sky = light::SkyModel{};
+    return light;
+  };
+  show_noise();
+  viewer().set_sampling({4, 3, render::View::shaded, false});
+  for (int i = 0; i < 24; ++i) {
+    viewer().set_light(daylight(10.0F + static_cast<float>(i)));
+    if (i % 3 == 0) viewer().load_environment(files.at(static_cast<std::size_t>(i) % 2));
+    if (i % 8 == 5) viewer().set_environment(nullptr);
+    viewer().set_ground({i % 4 == 0 ? viewer::GroundPlace::none : viewer::GroundPlace::below});
+    EXPECT_FALSE(viewer().render(frame(24, 24, 1.0)).failed);
+  }
+  viewer().load_environment(files[1]);
+  viewer().wait(-1.0);
+  ASSERT_NE(viewer().environment(), nullptr);
+  EXPECT_EQ(viewer().environment()->name, files[1]);
+  converge(frame(24, 24));
+  const std::vector<float> surrounded = read({24, 24});
+  viewer().set_environment(nullptr);
+  converge(frame(24, 24));
+  const std::vector<float> by_day = read({24, 24});
+  EXPECT_NE(by_day, surrounded);
+
+  // As if nothing had been there before.
+  still_ = make();
+  viewer().set_medium({0.4, vec3(1.0F), {0.3F}, 0});
+  show_noise();
+  viewer().set_sampling({4, 3, render::View::shaded, false});
+  viewer().set_ground({viewer::GroundPlace::below});
+  viewer().set_light(daylight(33.0F));
+  viewer().wait(-1.0);
+  converge(frame(24, 24));
+  EXPECT_EQ(read({24, 24}), by_day);
+  viewer().set_environment(light::open_environment(files[1]));
+  converge(frame(24, 24));
+  EXPECT_EQ(read({24, 24}), surrounded);
 }
 
 TEST_P(ViewerFrames, NoVolumeShowsNothingAgain) {

@@ -29,14 +29,14 @@
  *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
  *     objects with it, current on the calling thread: without, they are CUMULET_ERROR_GL each time and change nothing,
  *     and the next call with it goes on. No other call touches GL. Camera, volume, surfaces and programs handles may be
- *     used from any thread at any time. Files are read, grids are built and surfaces are posed on worker threads of the
- *     viewer's own; cumulet_render uploads what they made, within its time budget, and shows the last good picture
- *     until then. The newest wish wins and none starves: what changes faster than it is read, built, posed or uploaded
- *     is shown as often as it can be, and the newest last. The update callback comes from any thread, a worker's
- *     included, and not after cumulet_destroy. Neither it nor the log callback may call the library, but for the two
- *     exceptions and to retain and release handles: any other call from inside one, for whatever viewer or handle, is
- *     refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while [GL] calls of
- *     other viewers with the same programs wait for their turn: take no lock in them that is held around a [GL] call.
+ *     used from any thread at any time. Files are read, grids are built, surfaces are posed and physical skies are
+ *     computed on worker threads of the viewer's own; cumulet_render uploads what they made, within its time budget,
+ * and shows the last good picture until then. The newest wish wins and none starves: what changes faster than it is
+ * read, built, posed or uploaded is shown as often as it can be, and the newest last. The update callback comes from
+ * any thread, a worker's included, and not after cumulet_destroy. Neither it nor the log callback may call the library,
+ * but for the two exceptions and to retain and release handles: any other call from inside one, for whatever viewer or
+ * handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while [GL] calls
+ * of other viewers with the same programs wait for their turn: take no lock in them that is held around a [GL] call.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -537,7 +537,7 @@ CUMULET_API cumulet_status cumulet_surfaces_get_animation(const cumulet_surfaces
  * of it is +X. Values are linear Rec. 709 radiance, bilinear between the middles of pixels. What of a pixel is not
  * finite, negative or above 1e30 counts as 0: cumulet_environment_info tells, cumulet_set_environment logs a warning.
  * It holds 16 bytes a pixel, and as many in GL. These calls are synchronous, some 0.2 s for 2048 x 1024 pixels, for any
- * thread; error as in cumulet_create.
+ * thread; error as in cumulet_create. cumulet_load_environment is the asynchronous way.
  */
 
 /* Reads a Radiance (.hdr) or OpenEXR (.exr) file, of up to 16384 pixels a side, told apart by content. */
@@ -571,6 +571,13 @@ typedef struct cumulet_environment_info {
 
 CUMULET_API cumulet_status cumulet_environment_get_info(const cumulet_environment* environment,
                                                         cumulet_environment_info* info);
+/*
+ * What it looks like, at another size (1 to 16384 a side), for a picture of it in a panel: 3 floats a pixel, radiance,
+ * first pixel top left, each the mean of the environment's pixels in its place. count is the number of floats at rgb,
+ * 3 x width x height or more. It looks at each pixel of the environment once: some 0.1 s for 8192 x 4096.
+ */
+CUMULET_API cumulet_status cumulet_environment_get_pixels(const cumulet_environment* environment, uint32_t width,
+                                                          uint32_t height, float* rgb, uint64_t count);
 
 /* ---- What a viewer shows, and the work behind it ---------------------------------------------------------------- */
 
@@ -603,6 +610,23 @@ CUMULET_API cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const c
 CUMULET_API cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, cumulet_surfaces* surfaces);
 /* The surfaces last loaded or set, retained for the caller, who releases them; NULL if there are none. */
 CUMULET_API cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** out);
+
+/*
+ * Begins to read a file as cumulet_environment_open does, on a worker; replaces a load under way, as
+ * cumulet_load_volume does. The environment, or sky, before it stays until it is ready, for good if that fails; then it
+ * is there as by cumulet_set_environment. cumulet_wait, cumulet_get_progress and cumulet_cancel are about this work,
+ * too.
+ */
+CUMULET_API cumulet_status cumulet_load_environment(cumulet_viewer* viewer, const char* path);
+/*
+ * This environment is there instead of the sky of cumulet_light_desc: it lights volume and surfaces and is the
+ * background, uploaded within the next frames. The sun of cumulet_light_desc stays. What previews rasterise, and
+ * CUMULET_SURFACE_LIGHT_NONE, is lit by it and by a physical sky without shadows and coarsely: what is matte within a
+ * few per cent, mirrors as if they were blurred. NULL: the sky again. Cancels a load under way.
+ */
+CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment);
+/* The environment last loaded or set, retained for the caller, who releases it; NULL if there is none. */
+CUMULET_API cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out);
 
 typedef enum cumulet_surface_light {
   CUMULET_SURFACE_LIGHT_FULL = 0,    /* light goes on between surfaces, and between them and the volume */
@@ -655,12 +679,14 @@ typedef struct cumulet_progress {
   double fraction;       /* of the stage, 0 to 1 */
   cumulet_status status; /* of the last load or build that ended: CUMULET_OK, its error, or CANCELLED */
   char message[512];     /* its cause in one line, "" if it succeeded */
-  /* The same of the volume's and of the surfaces' alone: where one fails the other may be there. `status` is the
-   * volume's unless that is CUMULET_OK. */
+  /* The same of the volume's, of the surfaces' and of the environment's alone: where one fails the others may be there.
+   * `status` is the volume's unless that is CUMULET_OK, then the surfaces'. */
   cumulet_status volume_status;
   char volume_message[512];
   cumulet_status surfaces_status;
   char surfaces_message[512];
+  cumulet_status environment_status; /* a physical sky's, too */
+  char environment_message[512];
 } cumulet_progress;
 
 /* What the worker does. Any thread, any time. */
@@ -767,8 +793,10 @@ typedef enum cumulet_sky {
    * Of a clear day with the sun where it is (Hillaire 2020), seen from the ground at sea level: neither sun_irradiance
    * nor sky_radiance. Below the horizon lies the lit ground, unless there is that of cumulet_set_ground. White and unit
    * are the sun's light outside of the atmosphere, whose irradiance is 5 (some 27 klx to 1): about 4 on the ground at
-   * noon, next to none after sunset. cumulet_set_light takes some 0.1 s of a core when the air changes, 0.03 s
-   * when the elevation does, as does cumulet_set_ground when a ground comes or goes.
+   * noon, next to none after sunset. It is computed on a worker, in some 0.1 s when the air changes, 0.03 s when the
+   * elevation does or a ground comes or goes: until it is there sun and sky stay as they were, cumulet_render tells
+   * CUMULET_RENDER_LOADING, and cumulet_wait waits. Of a sun that is dragged each sky that was begun is shown, and the
+   * newest last. cumulet_cancel leaves it alone.
    */
   CUMULET_SKY_PHYSICAL = 1
 } cumulet_sky;
@@ -894,15 +922,6 @@ typedef struct cumulet_values_info {
 CUMULET_API cumulet_status cumulet_volume_get_values(const cumulet_volume* volume, cumulet_ramp ramp,
                                                      cumulet_values_info* info);
 CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
-/*
- * This environment is there instead of the sky of cumulet_light_desc: it lights volume and surfaces and is the
- * background, uploaded within the next frames. The sun of cumulet_light_desc stays. What previews rasterise, and
- * CUMULET_SURFACE_LIGHT_NONE, is lit by it and by a physical sky without shadows and coarsely: what is matte within a
- * few per cent, mirrors as if they were blurred. NULL: the sky again.
- */
-CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment);
-/* The environment last set, retained for the caller, who releases it; NULL if there is none. */
-CUMULET_API cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out);
 CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer,
                                                             const cumulet_environment_settings_desc* desc);
 CUMULET_API cumulet_status cumulet_set_ground(cumulet_viewer* viewer, const cumulet_ground_desc* desc);

@@ -725,6 +725,10 @@ class Environment {
     });
   }
 
+  /// At this size, 3 floats a pixel.
+  [[nodiscard]] Result<> get_pixels(std::uint32_t width, std::uint32_t height, std::span<float> rgb) const noexcept {
+    return detail::result(cumulet_environment_get_pixels(handle_, width, height, rgb.data(), rgb.size()));
+  }
   [[nodiscard]] Result<EnvironmentInfo> info() const noexcept {
     auto c = detail::sized<cumulet_environment_info>();
     if (auto done = detail::result(cumulet_environment_get_info(handle_, &c)); !done) return done.error();
@@ -892,6 +896,8 @@ struct Progress {
   Text<512> volume_message;
   StatusCode surfaces_status{};
   Text<512> surfaces_message;
+  StatusCode environment_status{};
+  Text<512> environment_message;
 };
 
 struct Stats {
@@ -1072,7 +1078,7 @@ class Viewer {
     // Safe at any time, which the last error is not.
     if (auto done = detail::result(cumulet_get_progress(handle(), &c)); !done) return done.error();
     const auto& [struct_size, stage, fraction, status, message, volume_status, volume_message, surfaces_status,
-                 surfaces_message] = c;
+                 surfaces_message, environment_status, environment_message] = c;
     return Progress{.stage = static_cast<Stage>(stage),
                     .fraction = fraction,
                     .status = static_cast<StatusCode>(status),
@@ -1080,7 +1086,9 @@ class Viewer {
                     .volume_status = static_cast<StatusCode>(volume_status),
                     .volume_message = Text<512>(volume_message),
                     .surfaces_status = static_cast<StatusCode>(surfaces_status),
-                    .surfaces_message = Text<512>(surfaces_message)};
+                    .surfaces_message = Text<512>(surfaces_message),
+                    .environment_status = static_cast<StatusCode>(environment_status),
+                    .environment_message = Text<512>(environment_message)};
   }
   [[nodiscard]] Result<> wait(double timeout_ms = -1.0) noexcept { return result(cumulet_wait(handle(), timeout_ms)); }
   [[nodiscard]] Result<> rebuild() noexcept { return result(cumulet_rebuild(handle())); }
@@ -1118,6 +1126,9 @@ class Viewer {
     if (!c) return Error{StatusCode::out_of_memory, Text<512>("out of memory")};
     std::ranges::copy(lamps, c.get());
     return result(cumulet_set_lamps(handle(), c.get(), lamps.size()));
+  }
+  [[nodiscard]] Result<> load_environment(const std::string& path) noexcept {
+    return result(cumulet_load_environment(handle(), path.c_str()));
   }
   /// Empty: the light's sky.
   [[nodiscard]] Result<> set_environment(const Environment& environment) noexcept {

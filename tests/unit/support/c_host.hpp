@@ -39,6 +39,10 @@ struct ReleaseSurfaces {
 };
 using SurfacesRef = std::unique_ptr<cumulet_surfaces, ReleaseSurfaces>;
 using VolumeRef = std::unique_ptr<cumulet_volume, ReleaseVolume>;
+struct ReleaseEnvironment {
+  void operator()(cumulet_environment* environment) const { cumulet_environment_release(environment); }
+};
+using EnvironmentRef = std::unique_ptr<cumulet_environment, ReleaseEnvironment>;
 struct ReleasePrograms {
   void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
 };
@@ -75,6 +79,25 @@ inline VolumeRef make_ball(int size, float density = 0.4F) {
   if (cumulet_volume_from_dense(&desc, &out, error.data(), error.size()) != CUMULET_OK)
     throw std::runtime_error(error.data());
   return VolumeRef(out);
+}
+
+/// Bright on one side, of another colour on each: turned, it lights otherwise. Throws std::runtime_error.
+inline EnvironmentRef make_environment(std::uint32_t width, std::uint32_t height, float bright = 6.0F) {
+  std::vector<float> values;
+  for (std::uint32_t i = 0; i < width * height; ++i) {
+    const bool sun = i % width < width / 8 && i / width < height / 2;
+    for (const float c : {1.0F, 0.6F, 0.3F}) values.push_back(sun ? c * bright : 0.3F * (1.3F - c));
+  }
+  auto desc = make_desc<cumulet_environment_desc>();
+  desc.values = values.data();
+  desc.value_count = values.size();
+  desc.width = width;
+  desc.height = height;
+  cumulet_environment* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_environment_from_pixels(&desc, &out, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return EnvironmentRef(out);
 }
 
 /// Throws std::runtime_error.

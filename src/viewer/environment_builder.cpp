@@ -1,0 +1,58 @@
+#include "viewer/environment_builder.hpp"
+
+#include "base/apart.hpp"
+#include "light/environment_file.hpp"
+
+namespace cumulet::viewer {
+
+void EnvironmentBuilder::load(const std::string& path) {
+  const std::scoped_lock lock(mutex_);
+  files_.replace({path, Progress::Stage::loading,
+                  [this, path](Progress& progress) {
+                    light::EnvironmentPtr made = light::open_environment(path, &progress);
+                    const std::scoped_lock handing(mutex_);
+                    progress.check();
+                    environment_ = std::move(made);
+                  },
+                  true});
+}
+
+void EnvironmentBuilder::make_sky(const light::Day& day) {
+  skies_.post({"computing the sky", Progress::Stage::idle, [this, day](Progress& progress) {
+                 last_sky_ = apart(
+                     &progress, [day, last = last_sky_] { return light::make_daylight(day, last ? &*last : nullptr); });
+                 const std::scoped_lock lock(mutex_);
+                 sky_ = last_sky_;
+               }});
+}
+
+void EnvironmentBuilder::drop_loads() {
+  files_.cancel();
+  const std::scoped_lock lock(mutex_);
+  environment_.reset();
+}
+
+std::optional<light::EnvironmentPtr> EnvironmentBuilder::take_environment() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(environment_, std::nullopt);
+}
+
+std::optional<light::Daylight> EnvironmentBuilder::take_sky() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(sky_, std::nullopt);
+}
+
+bool EnvironmentBuilder::busy() const {
+  // In this order: what a job leaves is there before it ends.
+  if (files_.busy() || skies_.busy()) return true;
+  const std::scoped_lock lock(mutex_);
+  return environment_ || sky_;
+}
+
+Worker::Status EnvironmentBuilder::status() const {
+  Worker::Status status = files_.status();
+  if (!status.failure) status.failure = skies_.status().failure;
+  return status;
+}
+
+}  // namespace cumulet::viewer
