@@ -21,6 +21,7 @@
 #include <utility>
 
 #include "renderer.hpp"
+#include "thumbnail_texture.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -133,6 +134,7 @@ void App::frame() {
   model_.can_undo = history_->can_undo(model_.scene);
   model_.can_redo = history_->can_redo();
   last_state_ = panel_.state();
+  take_thumbnail();
   std::vector<Command> commands;
   panel_.draw(model_, ui_scale_, now_, commands);
   execute(commands);
@@ -255,11 +257,18 @@ void App::execute(const Command& command) {
   auto& navigation = model_.navigation;
   switch (command.action) {
     case Action::open_dialog:
-      panel_.dialog().open("Open", Action::open, {".vdb", ".nvdb", ".gltf", ".glb", ".json"},
+      panel_.dialog().open("Open", Action::open, {".vdb", ".nvdb", ".gltf", ".glb", ".hdr", ".exr", ".json"},
                            model_.preferences.folder);
       break;
     case Action::open:
       open(command.text);
+      break;
+    case Action::environment_dialog:
+      panel_.dialog().open("Open an environment", Action::open, {".hdr", ".exr"}, model_.preferences.folder);
+      break;
+    case Action::clear_environment:
+      model_.scene.environment.clear();
+      give_daylight(model_.scene);
       break;
     case Action::save_scene:
       if (!model_.scene_path.empty()) {
@@ -370,6 +379,10 @@ void App::open(const std::string& path) {
     open_surfaces(model_, path);
     return;
   }
+  if (is_environment(path)) {
+    model_.scene.environment = opening_environment_ = path;
+    return;
+  }
   if (!has_ending(path, ".json")) {
     set_volume(model_.scene, {path});
     fit_next_ = suggest_next_ = pick_next_ = reload_ = true;
@@ -409,7 +422,8 @@ void App::save_scene(const std::string& path) {
 }
 
 bool App::waiting() const {
-  return answer_waits_ || answered_volume_ != wish_.volume_edit || answered_surfaces_ != wish_.surfaces_edit;
+  return answer_waits_ || answered_volume_ != wish_.volume_edit || answered_surfaces_ != wish_.surfaces_edit ||
+         answered_environment_ != wish_.environment_edit;
 }
 
 void App::complain(const std::string& cause) {
@@ -434,6 +448,7 @@ void App::ask() {
   wish.fit = load ? std::exchange(fit_next_, false) : wish_.fit;
   wish.suggest = load ? std::exchange(suggest_next_, false) : wish_.suggest;
   wish.surfaces_edit = wish_.surfaces_edit + (wish.scene.surfaces == wish_.scene.surfaces ? 0 : 1);
+  wish.environment_edit = wish_.environment_edit + (wish.scene.environment == wish_.scene.environment ? 0 : 1);
   wish.navigation = model_.navigation;
   wish.adaptive_resolution = model_.adaptive_resolution;
   wish.held = held_;
@@ -466,6 +481,7 @@ void App::accept(const Answer& answer) {
   answer_waits_ = answer.waiting;
   answered_volume_ = answer.volume_edit;
   answered_surfaces_ = answer.surfaces_edit;
+  answered_environment_ = answer.environment_edit;
   camera_moved_ |= answer.camera_moved;
   // What the user has changed since is newer.
   if (answer.camera_edit == wish_.camera_edit) model_.scene.camera = wish_.scene.camera = answer.camera;
@@ -474,6 +490,12 @@ void App::accept(const Answer& answer) {
     set_volume(wish_.scene, answer.volume);
   }
   if (answer.surfaces_edit == wish_.surfaces_edit) model_.scene.surfaces = wish_.scene.surfaces = answer.surfaces;
+  if (answer.environment_edit == wish_.environment_edit)
+    model_.scene.environment = wish_.scene.environment = answer.environment;
+  if (!waiting() && !opening_environment_.empty()) {
+    if (model_.scene.environment == opening_environment_) take_daylight(model_.scene);
+    opening_environment_.clear();
+  }
   if (model_.status.compiled && !answer.status.compiled) model_.charts.compiled_percent.add(100.0f);
   if (answer.status.compiled) model_.charts.compiled_percent.add(static_cast<float>(100.0 * *answer.status.compiled));
   if (answer.status.noise > 0.0 && answer.status.noise != model_.status.noise)
@@ -575,6 +597,14 @@ void App::take_frame_time(const std::vector<Event>& events, bool drawn) {
   } else if (owes_) {
     owed_since_ = begun;
   }
+}
+
+void App::take_thumbnail() {
+  if (model_.status.thumbnail == thumbnail_) return;
+  thumbnail_ = model_.status.thumbnail;
+  // Made before the last one goes: by its name the window sees that it is another.
+  thumbnail_texture_ = thumbnail_ ? std::make_unique<ThumbnailTexture>(*gl_, *thumbnail_) : nullptr;
+  model_.thumbnail_texture = thumbnail_ ? thumbnail_texture_->name() : 0;
 }
 
 void App::take_statistics() {

@@ -21,6 +21,7 @@ struct GladGLContext;
 namespace cumulet::demo {
 
 class Renderer;
+class ThumbnailTexture;
 
 /// cumulet-demo: the window, what it shows, and the loop that joins them.
 class App {
@@ -67,6 +68,7 @@ class App {
   bool draw();
   void take_frame_time(const std::vector<Event>& events, bool drawn);
   void take_statistics();
+  void take_thumbnail();
   void obey(const Player::Order& order);
   void save_window(const std::string& path);
   void write_report(const std::string& path) const;
@@ -78,6 +80,8 @@ class App {
   std::unique_ptr<Window> window_;
   Window::Context context_;
   std::unique_ptr<GladGLContext> gl_;
+  ThumbnailPtr thumbnail_;  // as it was uploaded
+  std::unique_ptr<ThumbnailTexture> thumbnail_texture_;
   Timeline timeline_;  // with --trace
   std::unique_ptr<Renderer> renderer_;
   std::optional<History> history_;
@@ -112,9 +116,11 @@ class App {
   bool answer_waits_ = false;
   std::uint64_t answered_volume_ = 0;  // edits that the last answer knew of
   std::uint64_t answered_surfaces_ = 0;
+  std::uint64_t answered_environment_ = 0;
   bool camera_moved_ = false;
-  bool starting_ = true;        // until what the command line named is there, or is not
-  std::string opening_scene_;   // a scene file whose parts are still to come
+  bool starting_ = true;       // until what the command line named is there, or is not
+  std::string opening_scene_;  // a scene file whose parts are still to come
+  std::string opening_environment_;
   std::uint64_t pictures_ = 0;  // that came to be shown
   std::uint64_t drawn_pictures_ = 0;
   double drawn_at_ = -1.0;

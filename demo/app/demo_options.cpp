@@ -17,7 +17,8 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
       "Here --size is the window's, --volume may be left out, and --spp is 256 unless said.\n"
       "Settings are kept in $XDG_CONFIG_HOME/cumulet/demo.json, or below ~/.config.\n"
       "Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.");
-  app.add_option("file", options.open, "A volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) to open")
+  app.add_option("file", options.open,
+                 "A volume (.vdb, .nvdb), surfaces (.gltf, .glb), an environment (.hdr, .exr) or a scene (.json)")
       ->type_name("FILE");
   add_scene_options(app, options.scene);
 

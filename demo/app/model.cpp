@@ -33,7 +33,7 @@ const std::vector<Shortcut>& shortcuts() {
   constexpr unsigned ctrl = modifier_ctrl;
   constexpr unsigned shift = modifier_shift;
   static const std::vector<Shortcut> all = {
-      {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume or a scene"},
+      {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, surfaces, an environment or a scene"},
       {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
       {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
       {GLFW_KEY_F12, 0, {Action::png_dialog}, "F12", "Save the picture as PNG"},
@@ -120,6 +120,30 @@ void open_surfaces(Model& model, const std::string& path) {
     model.scene.ground.place = CUMULET_GROUND_NONE;
 }
 
+namespace {
+
+cumulet_light_desc spelled_out(const SceneOptions& given) {
+  SceneOptions scene = given;
+  spell_out_defaults(scene);
+  return scene.light;
+}
+
+cumulet_light_desc daylight() {
+  SceneOptions day;
+  day.set_daylight();
+  return spelled_out(day);
+}
+
+}  // namespace
+
+void take_daylight(SceneOptions& scene) {
+  if (settings::same(scene.light, daylight())) scene.light = spelled_out({});
+}
+
+void give_daylight(SceneOptions& scene) {
+  if (settings::same(scene.light, spelled_out({}))) scene.light = daylight();
+}
+
 void tell(Model& model, bool error, const std::string& text, double now) {
   constexpr double seconds = 5.0;
   constexpr std::size_t most = 3;
@@ -188,5 +212,7 @@ bool has_ending(const std::string& path, const std::string& ending) {
 }
 
 bool is_model(const std::string& path) { return has_ending(path, ".gltf") || has_ending(path, ".glb"); }
+
+bool is_environment(const std::string& path) { return has_ending(path, ".hdr") || has_ending(path, ".exr"); }
 
 }  // namespace cumulet::demo

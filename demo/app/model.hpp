@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "environment_view.hpp"
 #include "preferences.hpp"
 #include "replay.hpp"
 
@@ -18,7 +19,9 @@ namespace cumulet::demo {
 /// What the user can ask for besides changing a setting.
 enum class Action {
   open_dialog,
-  open,  // a volume or a scene file: text
+  open,  // a file of any kind: text
+  environment_dialog,
+  clear_environment,
   save_scene,
   save_scene_dialog,
   save_scene_as,  // text
@@ -124,7 +127,9 @@ struct Status {
   cumulet_surfaces_info surfaces{};
   cumulet_animation_info animation{};  // that is set, of those
   std::optional<double> compiled;      // the part of the first scene's programs that is, until all are
-  bool busy = false;                   // a file is read, a grid is built or programs are compiled
+  bool busy = false;                   // a file is read, a grid is built, a sky computed or programs are compiled
+  std::string loading;                 // the file that is read, until what it shows is there
+  ThumbnailPtr thumbnail;              // of the environment that is shown; null: none, or not yet
   bool has_volume = false;
   std::string grid;                                        // of the file, that is shown
   double noise = 0.0;                                      // relative standard error, 0: not known
@@ -157,6 +162,7 @@ struct Model {
   std::string scene_path;  // of the scene file last opened or saved
   std::vector<GridInfo> grids;
   Status status;
+  unsigned thumbnail_texture = 0;  // of the status' thumbnail, in the window's context; 0: none
   Charts charts;
   std::vector<Message> messages;
   Preferences preferences;
@@ -166,6 +172,11 @@ struct Model {
 
 /// Shows the surfaces of a file, instead of those before and of the default ground: models bring their own.
 void open_surfaces(Model& model, const std::string& path);
+
+/// Once an environment lights the scene it needs no default daylight, whose sun would be a second one; once it is taken
+/// away it is day again where there is no other light.
+void take_daylight(SceneOptions& scene);
+void give_daylight(SceneOptions& scene);
 
 /// Adds a line to the message bar, in place of an equal one. Errors stay, others go after a while.
 void tell(Model& model, bool error, const std::string& text, double now);
@@ -188,5 +199,7 @@ struct Work {
 [[nodiscard]] bool has_ending(const std::string& path, const std::string& ending);
 /// Of a glTF model, by its ending.
 [[nodiscard]] bool is_model(const std::string& path);
+/// Of an environment's picture, by its ending.
+[[nodiscard]] bool is_environment(const std::string& path);
 
 }  // namespace cumulet::demo

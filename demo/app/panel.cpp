@@ -42,7 +42,9 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   view_ = viewport(model, static_cast<double>(screen.x), static_cast<double>(screen.y), scale);
   if (model.panel) side(model, commands);
   if (!model.status.has_volume && !model.status.busy) hint();
-  if (model.status.busy) loading(model, commands);
+  // What is computed in the blink of an eye, as skies are while the sun is dragged, needs no bar.
+  const bool works = model.status.work.stage != CUMULET_STAGE_IDLE || model.status.compiled;
+  if (model.status.busy && (works || !model.status.loading.empty())) loading(model, commands);
   state_.clear();
   if (model.status.has_volume) state_line(model);
   messages(model, commands);
@@ -76,6 +78,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   section("File", true, [&] { file(model, commands); });
   section("Display", true, [&] { display(model); });
   section("Light", true, [&] { light(model); });
+  section("Environment", true, [&] { environment(model, commands); });
   section("Lamps", true, [&] { lamps(model); });
   section("Medium", true, [&] { medium(model, commands); });
   section("Surfaces", true, [&] { surfaces(model); });
@@ -97,7 +100,8 @@ void Panel::toolbar(Model& model, std::vector<Command>& commands) {
   };
   if (focus_) ImGui::SetKeyboardFocusHere();
   focus_ = false;
-  button("Open", "Open a volume or a scene file (Ctrl+O). Files can be dropped on the window, too.",
+  button("Open",
+         "Open a volume, surfaces, an environment or a scene (Ctrl+O). Files can be dropped on the window, too.",
          Action::open_dialog, true);
   ImGui::SameLine();
   button("Save", "Save the scene: every setting and the camera (Ctrl+S; under another name: Ctrl+Shift+S).",
@@ -403,8 +407,8 @@ void Panel::hint() const {
   ImGui::SetNextWindowPos(middle, ImGuiCond_Always, {0.5f, 0.5f});
   ImGui::SetNextWindowBgAlpha(0.75f);
   ImGui::Begin("hint", nullptr, overlay | ImGuiWindowFlags_NoInputs);
-  for (const char* line : {"Drop a volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) here",
-                           "or press Ctrl+O.  F1 shows all keys."}) {
+  for (const char* line : {"Drop a volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) here,",
+                           "and an environment (.hdr, .exr) to light it,", "or press Ctrl+O.  F1 shows all keys."}) {
     const float width = ImGui::CalcTextSize(line).x;
     ImGui::SetCursorPosX(std::max(ImGui::GetCursorPosX(), (ImGui::GetWindowWidth() - width) * 0.5f));
     ImGui::TextUnformatted(line);
@@ -420,7 +424,7 @@ void Panel::loading(const Model& model, std::vector<Command>& commands) {
   ImGui::SetNextWindowBgAlpha(0.88f);
   ImGui::Begin("loading", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
   const float button = ui_.px(76.0f);
-  const std::string name = file_name(model.scene.volume);
+  const std::string name = file_name(model.status.loading.empty() ? model.scene.volume : model.status.loading);
   ImGui::TextUnformatted(work.name);
   if (!name.empty()) {
     ImGui::SameLine();

@@ -38,6 +38,7 @@ class Panel {
   void camera(Model& model, std::vector<Command>& commands);
   void display(Model& model);
   void light(Model& model);
+  void environment(Model& model, std::vector<Command>& commands);
   void lamps(Model& model);
   void medium(Model& model, std::vector<Command>& commands);
   void ramps(Model& model);

@@ -29,9 +29,9 @@ bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b) { r
 
 bool same_wish(const Wish& a, const Wish& b) {
   const auto rest = [](const Wish& wish) {
-    return std::tie(wish.camera_edit, wish.volume_edit, wish.surfaces_edit, wish.fit, wish.suggest,
-                    wish.adaptive_resolution, wish.held, wish.paused, wish.budget_ms, wish.width, wish.height,
-                    wish.scale);
+    return std::tie(wish.camera_edit, wish.volume_edit, wish.surfaces_edit, wish.environment_edit, wish.fit,
+                    wish.suggest, wish.adaptive_resolution, wish.held, wish.paused, wish.budget_ms, wish.width,
+                    wish.height, wish.scale);
   };
   return rest(a) == rest(b) && same(a.navigation, b.navigation) && same_scene(a.scene, b.scene);
 }
@@ -90,6 +90,7 @@ void Session::follow(const Wish& wish) {
   const bool load = !first && wish.volume_edit != wish_.volume_edit;
   if (!first && !load) set_volume(next.scene, volume_of(scene_));
   if (!first && wish.surfaces_edit == wish_.surfaces_edit) next.scene.surfaces = scene_.surfaces;
+  if (!first && wish.environment_edit == wish_.environment_edit) next.scene.environment = scene_.environment;
   wish_ = std::move(next);
   scene_.sampling.preview = wish_.adaptive_resolution ? CUMULET_PREVIEW_AUTO : CUMULET_PREVIEW_OFF;
   // What was given is known even if it was refused: the refusal is told once.
@@ -116,9 +117,9 @@ void Session::follow(const Wish& wish) {
   };
   give(&SceneOptions::medium, cumulet_set_medium);
   follow_ramps();
+  give(&SceneOptions::ground, cumulet_set_ground);  // before the light: a sky is computed for it
   give(&SceneOptions::light, cumulet_set_light);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
-  give(&SceneOptions::ground, cumulet_set_ground);
   follow_environment();
   follow_lamps();
   give(&SceneOptions::sampling, cumulet_set_sampling);
@@ -149,16 +150,50 @@ void Session::follow_lamps() {
 void Session::follow_environment() {
   if (known_->environment == scene_.environment) return;
   known_->environment = scene_.environment;
-  cumulet_environment* environment = nullptr;
-  if (!scene_.environment.empty()) {
-    std::array<char, 1024> error{};
-    if (cumulet_environment_open(scene_.environment.c_str(), &environment, error.data(), error.size()) != CUMULET_OK) {
-      tell(true, error.data());
-      return;
-    }
+  if (scene_.environment.empty()) {
+    check(cumulet_set_environment(viewer_.get(), nullptr));
+    shown_environment_.clear();
+    drop_thumbnail();
+    status_.thumbnail.reset();
+    waiting_for_environment_ = false;
+    return;
   }
-  check(cumulet_set_environment(viewer_.get(), environment));
-  cumulet_environment_release(environment);
+  waiting_for_environment_ = check(cumulet_load_environment(viewer_.get(), scene_.environment.c_str()));
+  if (waiting_for_environment_) return;
+  files_.push_back({scene_.environment, Answer::File::Fate::failed});
+  scene_.environment = known_->environment = shown_environment_;
+}
+
+void Session::finish_environment() {
+  waiting_for_environment_ = false;
+  if (load_failed(status_.work.environment_status, status_.work.environment_message, scene_.environment)) {
+    scene_.environment = known_->environment = shown_environment_;
+    return;
+  }
+  shown_environment_ = scene_.environment;
+  files_.push_back({shown_environment_, Answer::File::Fate::opened});
+  begin_thumbnail();
+}
+
+void Session::begin_thumbnail() {
+  drop_thumbnail();
+  cumulet_environment* shown = nullptr;
+  if (!check(cumulet_get_environment(viewer_.get(), &shown)) || shown == nullptr) return;
+  const std::shared_ptr<cumulet_environment> environment(shown, cumulet_environment_release);
+  drawing_ = std::async(std::launch::async, [environment, shared = shared_.get()] {
+    ThumbnailPtr made = make_thumbnail(environment.get());
+    {
+      const std::lock_guard lock(shared->mutex);
+      shared->thumbnail = std::move(made);
+    }
+    shared->wake();
+  });
+}
+
+void Session::drop_thumbnail() {
+  drawing_ = {};  // waits
+  const std::lock_guard lock(shared_->mutex);
+  shared_->thumbnail.reset();
 }
 
 void Session::follow_surfaces() {
@@ -289,7 +324,7 @@ void Session::draw(unsigned framebuffer) {
 }
 
 bool Session::cold() const {
-  const bool loads = waiting_ || waiting_for_surfaces_ || status_.compiled;
+  const bool loads = waits() || status_.compiled;
   return !warm_ && loads && !wish_.paused && status_.frame.width == 0;
 }
 
@@ -311,7 +346,8 @@ void Session::warm_up(unsigned framebuffer) {
   const bool early =
       waiting_ && status_.work.stage != CUMULET_STAGE_IDLE && now - *cold_since_ > patience && has_surfaces();
   if (early) status_.compiled.reset();
-  warm_ = early || (!status_.compiled && status_.work.status == CUMULET_OK);
+  const bool loaded = status_.work.volume_status == CUMULET_OK && status_.work.surfaces_status == CUMULET_OK;
+  warm_ = early || (!status_.compiled && loaded);
 }
 
 void Session::work() {
@@ -333,6 +369,10 @@ void Session::see_work() {
   status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
                  (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
   see_ends();
+  status_.loading = waiting_                   ? scene_.volume
+                    : waiting_for_surfaces_    ? scene_.surfaces
+                    : waiting_for_environment_ ? scene_.environment
+                                               : std::string();
   see_camera();
   measure_noise();
 
@@ -356,9 +396,14 @@ void Session::see_ends() {
       finish_load();
     else
       tell_news(work.volume_status, work.volume_message, told_volume_);
+    if (waiting_for_environment_)
+      finish_environment();
+    else
+      tell_news(work.environment_status, work.environment_message, told_environment_);
   }
   if (!status_.busy || work.surfaces_status == CUMULET_OK) told_surfaces_ = work.surfaces_status;
   if (!status_.busy || work.volume_status == CUMULET_OK) told_volume_ = work.volume_status;
+  if (!status_.busy || work.environment_status == CUMULET_OK) told_environment_ = work.environment_status;
 }
 
 bool Session::load_failed(cumulet_status status, const char* message, const std::string& path) {
@@ -389,17 +434,26 @@ bool Session::more() const {
 }
 
 Answer Session::answer() {
+  {
+    const std::lock_guard lock(shared_->mutex);
+    if (shared_->thumbnail) {
+      status_.thumbnail = *std::exchange(shared_->thumbnail, std::nullopt);
+      drawing_ = {};
+    }
+  }
   Answer answer;
   answer.wish = wish_.number;
   answer.status = status_;
   answer.grids = grids_;
-  answer.waiting = waiting_ || waiting_for_surfaces_;
+  answer.waiting = waits() || drawing_.valid();
   answer.camera = scene_.camera;
   answer.volume = volume_of(scene_);
   answer.surfaces = scene_.surfaces;
+  answer.environment = scene_.environment;
   answer.camera_edit = wish_.camera_edit;
   answer.volume_edit = wish_.volume_edit;
   answer.surfaces_edit = wish_.surfaces_edit;
+  answer.environment_edit = wish_.environment_edit;
   answer.camera_moved = std::exchange(camera_moved_, false);
   answer.density_scale = std::exchange(density_scale_, std::nullopt);
   answer.notices = std::exchange(notices_, {});

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <image.hpp>
 #include <memory>
 #include <mutex>
@@ -38,6 +39,7 @@ struct Wish {
   std::uint64_t camera_edit = 0;
   std::uint64_t volume_edit = 0;  // the volume, its grid or its up axis; the same file may be wished anew
   std::uint64_t surfaces_edit = 0;
+  std::uint64_t environment_edit = 0;
   bool fit = false;      // that volume is framed once it is there: its camera comes from no scene file
   bool suggest = false;  // its density scale is told, too: none comes from a scene file
   cumulet_navigation_desc navigation{};
@@ -59,9 +61,11 @@ struct Answer {
   cumulet_camera_desc camera{};
   VolumeChoice volume;  // shown, or being loaded
   std::string surfaces;
+  std::string environment;
   std::uint64_t camera_edit = 0;  // what these follow
   std::uint64_t volume_edit = 0;
   std::uint64_t surfaces_edit = 0;
+  std::uint64_t environment_edit = 0;
   // Since the last answer that was taken:
   bool drawn = false;                   // there is another picture
   bool camera_moved = false;            // by whatever
@@ -132,6 +136,7 @@ class Session {
     std::function<void()> wake;
     std::mutex mutex;
     std::vector<std::string> warnings;
+    std::optional<ThumbnailPtr> thumbnail;  // made, to be taken
   };
 
   static void on_log(void* user, cumulet_log_level level, const char* message);
@@ -141,8 +146,12 @@ class Session {
   /// Tells a failed call.
   bool check(cumulet_status status);
   void follow_volume();
-  // One that cannot be read leaves the one before it.
   void follow_environment();
+  void finish_environment();
+  // Begins a picture of the one that is shown, on a thread of its own.
+  void begin_thumbnail();
+  void drop_thumbnail();
+  [[nodiscard]] bool waits() const { return waiting_ || waiting_for_surfaces_ || waiting_for_environment_; }
   void follow_ramps();
   void follow_lamps();
   void follow_surfaces();
@@ -184,12 +193,15 @@ class Session {
   cumulet_display_desc drawn_display_{};
   VolumeChoice shown_volume_;
   std::string shown_surfaces_;
+  std::string shown_environment_;
   bool warm_ = false;                 // the first scene's programs are there
   std::optional<double> cold_since_;  // seconds, when the first of them was asked for
   bool waiting_for_surfaces_ = false;
+  bool waiting_for_environment_ = false;
   bool waiting_ = false;
   cumulet_status told_surfaces_ = CUMULET_OK;  // how the last job of each ended, as far as that was told
   cumulet_status told_volume_ = CUMULET_OK;
+  cumulet_status told_environment_ = CUMULET_OK;
   std::optional<cumulet_camera_desc> fit_;  // the camera to place when the volume is there
   bool suggest_ = false;
   std::optional<double> density_scale_;
@@ -200,6 +212,7 @@ class Session {
   std::vector<GridInfo> grids_;
   std::vector<Answer::Notice> notices_;
   std::vector<Answer::File> files_;
+  std::future<void> drawing_;  // of a thumbnail, until that is taken
 };
 
 }  // namespace cumulet::demo

@@ -2,6 +2,9 @@
 
 namespace cumulet::demo {
 
+/// The same direction, in (-180, 180].
+[[nodiscard]] double wrap_degrees(double degrees);
+
 /// The sky from below its zenith, seen from above: the centre is the zenith, the rim the horizon; -Z (into the
 /// picture of the first view) is up, +X right. x to the right, y down, in radii.
 struct DialPoint {

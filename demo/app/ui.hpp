@@ -56,6 +56,8 @@ class Ui {
   bool text(const char* label, const char* tip, const char* hint, std::string& value, float room_right = 0.0f);
   /// The sun's direction: see sun_dial.hpp. camera_azimuth: where the camera stands, marked on the rim.
   bool sun_dial(const char* label, const char* tip, float& azimuth, float& elevation, float camera_azimuth);
+  /// An environment's picture, turned by dragging: see environment_view.hpp. ahead: where the camera looks, marked.
+  bool environment(const char* label, const char* tip, unsigned texture, float& rotation_degrees, double ahead_degrees);
   /// A ramp's curve over a histogram, whose bars have these heights, from 0 to 1, and take equal steps from 0 to reach.
   bool curve(const char* label, const char* tip, settings::RampPoints& points, RampView& view,
              const std::vector<float>& heights, float reach);

@@ -279,13 +279,13 @@ struct Table<cumulet_environment_settings_desc> {
       Setting(&Desc::rotation_degrees, {.name = "rotation_degrees", .range = {-360.0, 360.0},
         .key = "environment.rotation_degrees", .flag = "--env-rotation", .type = "DEG",
         .help = "Turns the environment's middle from +Z towards +X (default: 0)",
-        .row = {.label = "Environment turn",
+        .row = {.label = "Env. turn",
                 .tip = "Turns the environment from +Z towards +X.",
                 .least = -180.0, .most = 180.0, .format = "%.1f°"}}),
       Setting(&Desc::strength, {.name = "strength", .range = {0.0, 1e6}, .given = Range{0.0, 1e6, true}, .zero = 1.0,
         .key = "environment.strength", .flag = "--env-strength", .type = "S",
         .help = "Times the environment's radiance (default: 1)",
-        .row = {.label = "Environment strength",
+        .row = {.label = "Env. strength",
                 .tip = "Times the environment's radiance.",
                 .least = 0.01, .most = 100.0, .format = "%.3g", .logarithmic = true}})};
 };

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "demo_options.hpp"
+#include "environment_view.hpp"
 #include "history.hpp"
 #include "input.hpp"
 #include "model.hpp"
@@ -428,6 +429,66 @@ TEST(SunDial, PointsAndAnglesAgree) {
   EXPECT_EQ(dial_step({0.0, 89.0}, 2.0, 2.0).elevation, 90.0);
 }
 
+TEST(EnvironmentView, FollowsThePointer) {
+  // What of the picture is under a place of the view.
+  const auto under = [](double rotation, double place) {
+    const double u = left_edge(rotation) + place;
+    return u - std::floor(u);
+  };
+  for (int rotation = -180; rotation <= 180; rotation += 30) {
+    for (const double width : {-1.7, -0.5, -0.1, 0.0, 0.3, 1.0}) {
+      const double after = dragged(rotation, width);
+      EXPECT_GT(after, -180.0);
+      EXPECT_LE(after, 180.0);
+      const double off = under(after, 0.25 + width) - under(rotation, 0.25);
+      EXPECT_NEAR(off, std::round(off), 1e-9) << rotation << " " << width;
+    }
+  }
+  // As cumulet.h has it: +Z in the middle, +X left of it; a rotation takes the picture's middle from +Z towards +X.
+  EXPECT_NEAR(place_of(0.0), 0.5, 1e-12);
+  EXPECT_NEAR(place_of(90.0), 0.25, 1e-12);
+  EXPECT_NEAR(place_of(-90.0), 0.75, 1e-12);
+  EXPECT_NEAR(place_of(180.0), 0.0, 1e-12);
+  EXPECT_NEAR(place_of(-180.0), 0.0, 1e-12);
+  EXPECT_NEAR(under(90.0, place_of(90.0)), 0.5, 1e-12);
+  EXPECT_NEAR(dragged(0.0, -0.25), 90.0, 1e-12);
+}
+
+TEST(EnvironmentView, IsNeitherBlackNorWhite) {
+  constexpr std::size_t pixels = std::size_t{Thumbnail::width} * Thumbnail::height;
+  for (const float brightness : {1e-4f, 1.0f, 1e4f}) {
+    std::vector<float> radiance(3 * pixels, brightness);
+    radiance[0] = radiance[1] = radiance[2] = 1e7f * brightness;  // a sun
+    const Thumbnail made = expose(radiance);
+    ASSERT_EQ(made.rgba.size(), 4 * pixels);
+    EXPECT_GT(made.rgba[0], 250) << brightness;
+    EXPECT_GT(made.rgba[4], 90) << brightness;
+    EXPECT_LT(made.rgba[4], 170) << brightness;
+    EXPECT_EQ(made.rgba[7], 255);
+  }
+  const Thumbnail dark = expose(std::vector<float>(3 * pixels, 0.0f));
+  EXPECT_EQ(dark.rgba[0], 0);
+}
+
+TEST(Model, AnEnvironmentTakesThePlaceOfDefaultDaylightAlone) {
+  SceneOptions scene;
+  scene.set_daylight();
+  spell_out_defaults(scene);
+  const SceneOptions day = scene;
+  take_daylight(scene);
+  EXPECT_EQ(scene.light.sky, CUMULET_SKY_CONSTANT);
+  EXPECT_EQ(scene.light.sun_irradiance[1], 0.0f);
+  EXPECT_EQ(scene.light.sky_radiance[1], 0.0f);
+  give_daylight(scene);
+  EXPECT_TRUE(same_scene(scene, day));
+  scene.light.sun_elevation_degrees = 12.0f;
+  const SceneOptions chosen = scene;
+  take_daylight(scene);
+  EXPECT_TRUE(same_scene(scene, chosen));
+  give_daylight(scene);
+  EXPECT_TRUE(same_scene(scene, chosen));
+}
+
 TEST(Preferences, AreKeptAndForgiving) {
   const cumulet::test::Folder folder;
   const std::string path = (folder / "cumulet" / "demo.json").string();
@@ -541,6 +602,8 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
     model_.status.stats.samples = model_.status.stats.steps = 1;
     model_.grids = {{"density", "float", ""}, {"velocity", "vec3s", "not a scalar"}};
     model_.preferences.recent = {"/a/cloud.vdb"};
+    model_.scene.environment = "/a/sky.hdr";
+    model_.thumbnail_texture = 1;
     for (const cumulet_lamp_kind kind : {CUMULET_LAMP_SPOT, CUMULET_LAMP_RECTANGLE}) {
       model_.scene.lamps.emplace_back().struct_size = sizeof(cumulet_lamp_desc);
       model_.scene.lamps.back().kind = kind;
@@ -570,9 +633,9 @@ TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnPlace) {
   frame();
   const auto& controls = panel_.ui().controls();
   const std::set<std::string> without_tip = {
-      "File",      "Display",    "Light",         "Lamps",    "Medium",        "Surfaces",   "Model",
-      "Triangles", "Grid",       "Camera",        "Sampling", "Statistics",    "Live cells", "Levels",
-      "Build",     "March data", "Active voxels", "Trace",    "OpenGL memory", "Renderer",   "Steps a path"};
+      "File",    "Display",    "Light",         "Lamps",  "Medium",        "Surfaces",   "Model",       "Environment",
+      "Picture", "Triangles",  "Grid",          "Camera", "Sampling",      "Statistics", "Live cells",  "Levels",
+      "Build",   "March data", "Active voxels", "Trace",  "OpenGL memory", "Renderer",   "Steps a path"};
   EXPECT_GT(controls.size(), 50u);
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   for (const auto& [name, control] : controls) {
@@ -599,6 +662,40 @@ TEST_P(PanelTest, LabelsFitBesideTheirControls) {
     EXPECT_LT(ImGui::GetFont()->CalcTextSizeA(ImGui::GetFontSize(), 1e9f, 0.0f, label).x, panel_.ui().px(126.0f))
         << label;
   }
+}
+
+TEST_P(PanelTest, AnEnvironmentIsTurnedByItsPicture) {
+  panel_.ui().bring_into_view("Environment view");
+  for (int i = 0; i < 5; ++i) frame();
+  const auto place = panel_.ui().find("Environment view");
+  ASSERT_TRUE(place);
+  EXPECT_NEAR(place->height, 0.5 * place->width, 1.0);
+  const auto at = [&](double x) {
+    return ImVec2(static_cast<float>(place->x + x * place->width), static_cast<float>(place->y + 0.5 * place->height));
+  };
+  float& rotation = model_.scene.environment_settings.rotation_degrees;
+  ImGuiIO& io = ImGui::GetIO();
+  frame(at(0.5));
+  EXPECT_EQ(rotation, 0.0f) << "nothing is turned by looking";
+  io.MouseDown[0] = true;
+  frame(at(0.5));
+  EXPECT_EQ(rotation, 0.0f);
+  frame(at(0.6));
+  EXPECT_NEAR(rotation, -36.0f, 1.0f);
+  frame(at(-0.15));  // beyond the edge, and held
+  EXPECT_NEAR(rotation, 360.0f * 0.65f - 360.0f, 1.0f);
+  io.MouseDown[0] = false;
+  frame(at(0.2));
+  const float kept = rotation;
+  for (int i = 0; i < 40; ++i) frame(at(0.3));
+  EXPECT_EQ(rotation, kept);
+  for (int i = 0; i < 2; ++i) {
+    io.MouseDown[0] = true;
+    frame(at(0.3));
+    io.MouseDown[0] = false;
+    frame(at(0.3));
+  }
+  EXPECT_EQ(rotation, 0.0f) << "a double click turns it back";
 }
 
 TEST_P(PanelTest, PathsShowTheirEnds) {

@@ -169,6 +169,70 @@ def test_change(s):
             assert_differ(a, b, area)
 
 
+def write_environment(path, bright):
+    """A Radiance picture: blue, and orange where a column of the 64 is bright."""
+    rows = b"".join(b"\xc0\x60\x20\x83" if bright(x) else b"\x20\x40\x80\x80" for _ in range(32) for x in range(64))
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n" + rows)
+
+
+def test_environment(s):
+    """Dropped, turned by its picture, turned back, lost to a bad file, undone."""
+    write_environment(s.out / "left.hdr", lambda x: x < 16)
+    write_environment(s.out / "middle.hdr", lambda x: 24 <= x < 40)
+    (s.out / "bad.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n")
+    turn = 'drag "Environment view" 0.25 0.5 to "Environment view"'
+    there = ["frames 3", "wait loaded", "frames 2"]
+    s.play("replay", [*SETTLE, *shot("day"), 'drop "left.hdr"', *there, *SETTLE, *shot("left"), f"{turn} 0.5 0.5",
+                      *SETTLE, *shot("turned"), 'drop "bad.hdr"', *SETTLE, *shot("bad"), 'drop "none.exr"', *there,
+                      *shot("none"), 'drop "middle.hdr"', *there, *SETTLE, *shot("middle"), "key ctrl+z", *there,
+                      *shot("undone"), 'click "Environment view"', 'click "Environment view"', *there, *shot("back"),
+                      "key ctrl+z", *there, f"{turn} 0.99 0.5", "frames 20", f"{turn} 0.99 0.5", *there,
+                      *shot("around"), 'click "Remove environment"', *there, *shot("removed"), "key ctrl+z", *there,
+                      *shot("again"), 'drag "Env. strength" 0.5 0.5 to "Env. strength" 0.7 0.5', *there,
+                      *shot("strong")],
+           "--volume", s.cumulus, "--spp", "4")
+    day, report, area = look(s, "day")
+    environment = lambda name: s.report(name)["scene"]["environment"]
+    assert report["scene"]["light"]["sky"]["model"] == "physical" and report["undo_steps"] == 0
+    left, report, _ = look(s, "left")
+    assert environment("left")["file"].endswith("left.hdr") and report["undo_steps"] == 1, report["undo_steps"]
+    assert max(report["scene"]["light"]["sun"]["irradiance"]) == 0.0, "no sun of the default daylight beside it"
+    assert report["recent"][0].endswith("left.hdr")
+    assert_differ(day, left, area)
+    turned, report, _ = look(s, "turned")
+    assert abs(environment("turned")["rotation_degrees"] + 90.0) < 4.0, environment("turned")
+    assert report["undo_steps"] == 2, "a drag is one step"
+    assert_differ(left, turned, area)
+    # What was there stays, in the picture and in the scene, and in the history.
+    for name, cause in (("bad", "bad.hdr: a Radiance picture that is cut short"),
+                        ("none", "none.exr: No such file or directory")):
+        bad, report, _ = look(s, name)
+        assert any(m["error"] and cause in m["text"] for m in report["messages"]), report["messages"]
+        assert environment(name) == environment("turned") and report["undo_steps"] == 2
+    assert len(s.report("none")["messages"]) == 2, "each told once"
+    assert_alike(s.picture("turned"), s.picture("bad"), (area[0], area[1], area[2], area[3] - 90))
+    assert environment("middle")["file"].endswith("middle.hdr")
+    assert_differ(turned, s.picture("middle"), (area[0], area[1], area[2], area[3] - 90))
+    assert environment("undone") == environment("turned")
+    assert environment("back")["rotation_degrees"] == 0.0 and s.report("back")["undo_steps"] == 3
+    # Two turns of most of the way around: no end is met.
+    assert abs(abs(environment("around")["rotation_degrees"]) - 98.0) < 30.0, environment("around")
+    removed = s.report("removed")["scene"]
+    assert "environment" not in removed or not removed["environment"].get("file"), removed
+    assert removed["light"]["sky"]["model"] == "physical", "it is day again"
+    again = environment("again")
+    assert again["file"].endswith("left.hdr") and again["rotation_degrees"] == environment("around")["rotation_degrees"]
+    assert environment("strong")["strength"] > 2.0
+    # Its picture is in the panel, three quarters of it blue.
+    def blue(name):
+        picture = s.picture(name)
+        n, left = picture.channels, s.report(name)["viewport"][2]
+        pixels = ((row[x * n], row[x * n + 2]) for row in picture.rows for x in range(int(left), picture.width))
+        return sum(b > r + 40 for r, b in pixels)
+
+    assert blue("turned") > 15000 > 3 * blue("day"), (blue("turned"), blue("day"))
+
+
 def test_warm_up(s):
     s.play("replay", ["wait loaded", *shot("loaded"), "wait converged", *shot("first"), "key n", *SETTLE, *shot("later")],
            "--volume", s.cumulus)
