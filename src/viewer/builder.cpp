@@ -119,7 +119,8 @@ Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings,
   built.volume = volume;
   const auto [voxels, statistics] = volume->density(settings.density_ramp, progress, built.seconds.statistics);
   Stopwatch watch;
-  const grid::Channels channels = volume->channels(settings.density_ramp, settings.emission, progress);
+  const grid::Channels channels =
+      volume->channels(settings.density_ramp, settings.emission, settings.anisotropic, progress);
   built.seconds.statistics += watch.lap();
   progress.begin(Progress::Stage::refining);
   if (settings.march != scene::March::tet) {

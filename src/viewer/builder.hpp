@@ -42,6 +42,7 @@ struct BuildSettings {
   grid::RefineSettings refine;
   volume::Ramp density_ramp;
   scene::Emission emission;
+  bool anisotropic = true;  ///< an anisotropy of the volume's stands in place of the medium's
 };
 
 struct BuildSeconds {

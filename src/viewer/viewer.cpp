@@ -22,6 +22,8 @@ constexpr double most_opacity_ratio = 2.0;
 
 bool apart(double a, double b) { return a > most_opacity_ratio * b || b > most_opacity_ratio * a; }
 
+bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
+
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
@@ -112,11 +114,11 @@ std::optional<BuildSettings> Viewer::build_settings() const {
   return settings;
 }
 
-void Viewer::request_build(bool for_emission) {
+void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   if (builder_.configure_load(grid_.camera_adaptive ? std::nullopt : build_settings())) return;
   sync();
   const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
-  if (for_emission && volume_ && !volume_->may_emit()) return;
+  if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
   built_view_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
 }
@@ -283,6 +285,7 @@ void Viewer::take_medium() {
   grid_.build.density_ramp = ramps_.density;
   grid_.build.refine.density_scale = density_scale_to_come();
   grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
+  grid_.build.anisotropic = medium_.phase.may_vary();
 }
 
 scene::Emission Viewer::field_emission() const {
@@ -298,21 +301,23 @@ void Viewer::set_ramps(const Ramps& ramps) {
   if (!other_density && !other_emission) return;
   ramps_ = ramps;
   take_medium();
-  request_build(!other_density);
+  request_build(other_density ? nullptr : glows);
   touch();
 }
 
-void Viewer::remark_on_anisotropy() const {
-  if (!volume_ || !volume_->frame().anisotropy || medium_.phase.may_vary()) return;
-  log_.info("grid \"" + (*volume_->frame().anisotropy)[0].name +
-            "\" is not shown: the Mie phase function has an anisotropy of its own");
+void Viewer::remark_on_anisotropy() {
+  if (medium_.phase.may_vary()) remarked_anisotropy_.reset();
+  if (!volume_ || !volume_->has_anisotropy() || medium_.phase.may_vary()) return;
+  const std::string& name = (*volume_->frame().anisotropy)[0].name;
+  if (remarked_anisotropy_ == name) return;
+  remarked_anisotropy_ = name;
+  log_.info("grid \"" + name + "\" is not shown: the Mie phase function has an anisotropy of its own");
 }
 
 void Viewer::set_medium(const Medium& medium) {
   sync();
-  const bool varied = medium_.phase.may_vary();
   medium_ = medium;
-  if (varied) remark_on_anisotropy();
+  remark_on_anisotropy();
   const scene::Emission emission = field_emission();
   const bool other_emission = grid_.build.emission != emission;
   const grid::RefineSettings& refine = grid_.build.refine;
@@ -324,10 +329,14 @@ void Viewer::set_medium(const Medium& medium) {
                                     grid::hiding(refine.density_scale, refine.anisotropy)));
   if (other_opacity) {
     take_medium();
-    request_build(false);
-  } else if (other_emission) {
+    request_build();
+  } else if (const bool varies = medium.phase.may_vary(); other_emission || varies != grid_.build.anisotropic) {
+    const auto varied = [](const VolumeAsset& volume) { return volume.has_anisotropy(); };
+    const auto either = [](const VolumeAsset& volume) { return volume.may_emit() || volume.has_anisotropy(); };
+    const bool other_phase = varies != grid_.build.anisotropic;
     grid_.build.emission = emission;
-    request_build(true);
+    grid_.build.anisotropic = varies;
+    request_build(!other_phase ? glows : other_emission ? +either : +varied);
   }
   show_medium();
   touch();

@@ -149,14 +149,16 @@ class Viewer {
   template <class Body>
   void with_gl(Body&& body);
   void sync();
-  void request_build(bool for_emission = false);
+  // concerned: volumes that are not, whatever they are, are left as they are.
+  void request_build(bool (*concerned)(const VolumeAsset&) = nullptr);
   // What grids to come know of the medium.
   void take_medium();
   [[nodiscard]] double density_scale_to_come() const;
   // What pictures to come know of it.
   void show_medium();
   [[nodiscard]] scene::Emission field_emission() const;
-  void remark_on_anisotropy() const;
+  // Once of a grid, however many volumes have it.
+  void remark_on_anisotropy();
   [[nodiscard]] std::optional<BuildSettings> build_settings() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.
@@ -204,11 +206,12 @@ class Viewer {
   Navigation navigation_;
   std::chrono::steady_clock::time_point last_frame_time_{};
 
-  VolumeAssetPtr volume_;        // newest
-  VolumeAssetPtr empty_volume_;  // where there are surfaces alone
-  Built built_;                  // newest, and what is uploaded again in a new context
-  scene::Snapshot scene_;        // as it is now: of it snapshots are made
-  scene::SnapshotPtr snapshot_;  // the newest
+  VolumeAssetPtr volume_;                           // newest
+  VolumeAssetPtr empty_volume_;                     // where there are surfaces alone
+  std::optional<std::string> remarked_anisotropy_;  // the grid, as long as it is not shown
+  Built built_;                                     // newest, and what is uploaded again in a new context
+  scene::Snapshot scene_;                           // as it is now: of it snapshots are made
+  scene::SnapshotPtr snapshot_;                     // the newest
   std::uint64_t settings_revision_ = 1;
   glm::uvec2 frame_size_{0U};                      // of the last frame's picture
   std::optional<double> suggested_density_scale_;  // volume_ was loaded with it; the medium's once its grid is there

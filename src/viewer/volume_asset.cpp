@@ -72,7 +72,7 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
 }
 
 grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
-                                     Progress& progress) const {
+                                     bool anisotropic, Progress& progress) const {
   scene::Emission given = emission;
   // What has a temperature alone would be nothing.
   const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
@@ -88,10 +88,15 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
     channels_ = Made{density_ramp,
                      given,
                      {field(colours, scene::emission_of(*frame_, given, &progress)),
-                      field(colours, scene::scattering_of(*frame_, density_ramp, &progress)),
-                      field(numbers, scene::forward_of(*frame_, density_ramp, &progress))}};
+                      field(colours, scene::scattering_of(*frame_, density_ramp, &progress)), nullptr},
+                     std::nullopt};
   }
-  return channels_->channels;
+  grid::Channels made = channels_->channels;
+  if (anisotropic) {
+    if (!channels_->forward) channels_->forward = field(numbers, scene::forward_of(*frame_, density_ramp, &progress));
+    made.forward = *channels_->forward;
+  }
+  return made;
 }
 
 }  // namespace cumulet::viewer

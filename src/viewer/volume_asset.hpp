@@ -30,6 +30,7 @@ class VolumeAsset {
   [[nodiscard]] bool may_emit() const {
     return (frame_->flame && !frame_->flame->empty()) || (frame_->temperature && !frame_->temperature->empty());
   }
+  [[nodiscard]] bool has_anisotropy() const { return frame_->anisotropy.has_value(); }
   /// Whether no field has an active voxel.
   [[nodiscard]] bool empty() const { return empty_; }
   /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such.
@@ -44,9 +45,10 @@ class VolumeAsset {
   /// without a ramp and the last with one. seconds receives what computing took, 0 if it was there. Throws
   /// Error(cancelled) if this caller's progress is.
   [[nodiscard]] Density density(const volume::Ramp& ramp, Progress& progress, double& seconds) const;
-  /// What it has beside density. The last that were asked for are kept: another threshold or camera asks for the same.
+  /// What it has beside density; anisotropic: its anisotropy, too. The last that were asked for are kept: another
+  /// threshold or camera asks for the same.
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
-                                        Progress& progress) const;
+                                        bool anisotropic, Progress& progress) const;
 
  private:
   std::shared_ptr<const volume::VolumeFrame> frame_;
@@ -64,7 +66,8 @@ class VolumeAsset {
   struct Made {
     volume::Ramp density_ramp;
     scene::Emission emission;
-    grid::Channels channels;
+    grid::Channels channels;  // but the next
+    std::optional<decltype(grid::Channels::forward)> forward;
   };
   mutable std::optional<Made> channels_;
 };

@@ -516,7 +516,10 @@ class OneSign final : public LeafSource {
   OneSign(std::shared_ptr<const LeafSource> leaves, float sign) : leaves_(std::move(leaves)), sign_(sign) {}
 
   /// What is not finite stays so.
-  [[nodiscard]] float operator()(float value) const { return sign_ * value < 0.0F ? 0.0F : sign_ * value; }
+  [[nodiscard]] float operator()(float value) const {
+    const float own = sign_ * value;
+    return std::isfinite(value) && own < 0.0F ? 0.0F : own;
+  }
   [[nodiscard]] std::size_t count() const override { return leaves_->count(); }
   [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return leaves_->origin(leaf); }
   [[nodiscard]] ActiveMask active(std::size_t leaf) const override { return leaves_->active(leaf); }

@@ -589,9 +589,45 @@ TEST_P(EmissionPicture, MieKeepsItsOwnAnisotropy) {
   VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 1.0F)};
   show(*viewer, VolumeFrame{.density = frame.density});
   const test::Picture without = look(*viewer, 500.0, 4);
-  frame.anisotropy = anisotropy({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return -0.5F; });
+  const viewer::Stats plain = viewer->viewer().stats();
+  frame.anisotropy = anisotropy({64, 64, 8}, ivec3(0), [](const ivec3& p) { return p.x < 21 ? -0.5F : 0.5F; });
   show(*viewer, std::move(frame));
   EXPECT_EQ(look(*viewer, 500.0, 4).pixels, without.pixels);
+  // What is not shown costs no cells, and they no bytes; what is shown again does.
+  EXPECT_EQ(viewer->viewer().stats().cells, plain.cells);
+  EXPECT_EQ(viewer->viewer().stats().cell_bytes, plain.cell_bytes);
+  viewer::Medium varied = medium;
+  varied.phase = {};
+  viewer->set_medium(varied);
+  EXPECT_NE(look(*viewer, 500.0, 4).pixels, without.pixels);
+  EXPECT_GT(viewer->viewer().stats().cells, plain.cells);
+  viewer->set_medium(medium);
+  EXPECT_EQ(look(*viewer, 500.0, 4).pixels, without.pixels);
+  EXPECT_EQ(viewer->viewer().stats().cells, plain.cells);
+}
+
+// Frames of a sequence have the same grid.
+TEST(Anisotropy, ThatIsNotShownIsToldOnce) {
+  std::vector<std::string> told;
+  viewer::Viewer viewer(Log([&](LogLevel, const char* message) { told.emplace_back(message); }), nullptr, true);
+  const auto show = [&] {
+    VolumeFrame frame{.density = field(ivec3(8), ivec3(0), 1.0F)};
+    frame.anisotropy = anisotropy(ivec3(8), ivec3(0), [](const ivec3& /*p*/) { return 0.5F; });
+    viewer.set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+  };
+  viewer::Medium mie;
+  mie.phase = scene::mie_phase(10.0F);
+  show();
+  EXPECT_TRUE(told.empty());
+  for (int i = 0; i < 3; ++i) {
+    viewer.set_medium(mie);
+    show();
+  }
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_NE(told[0].find("is not shown: the Mie phase function"), std::string::npos);
+  viewer.set_medium({});
+  viewer.set_medium(mie);
+  EXPECT_EQ(told.size(), 2U);
 }
 
 // A small fire in thick smoke, seen by what it lights: flights alone come to it seldom, looks as often as they like.

@@ -266,18 +266,20 @@ TEST_F(Frame, AnisotropyBeyondOneIsClamped) {
   grid->tree().setValue(Coord(0, 0, 0), 1.5F);
   grid->tree().setValue(Coord(0, 0, 1), -30.0F);
   grid->tree().setValue(Coord(0, 0, 2), std::numeric_limits<float>::quiet_NaN());
+  grid->tree().setValue(Coord(0, 1, 2), std::numeric_limits<float>::infinity());
+  grid->tree().setValue(Coord(0, 2, 2), -std::numeric_limits<float>::infinity());
   grid->tree().setValue(Coord(0, 0, 3), 0.5F);
   grid->tree().addTile(1, Coord(16, 0, 0), -2.0F, true);
   Messages messages;
   const VolumeFrame frame = import_frame(write({dot("density", 1.0F), grid}), {}, messages.log);
   EXPECT_EQ(anisotropy_at(frame, {0, 0, 0}), 1.0F);
   EXPECT_EQ(anisotropy_at(frame, {0, 0, 1}), -1.0F);
-  EXPECT_EQ(anisotropy_at(frame, {0, 0, 2}), 0.0F);
+  for (int y = 0; y < 3; ++y) EXPECT_EQ(anisotropy_at(frame, {0, y, 2}), 0.0F);
   EXPECT_EQ(anisotropy_at(frame, {0, 0, 3}), 0.5F);
   EXPECT_EQ(anisotropy_at(frame, {17, 1, 1}), -1.0F);
   EXPECT_EQ((*frame.anisotropy)[1].max_value, 1.0F);
   ASSERT_EQ(messages.warnings.size(), 2U);
-  EXPECT_HAS(messages.warnings[0], "1 non-finite voxel counted as 0");
+  EXPECT_HAS(messages.warnings[0], "3 non-finite voxels counted as 0");
   EXPECT_HAS(messages.warnings[1], "grid \"anisotropy\": 514 voxels beyond -1 and 1 clamped to these");
 }
 
