@@ -13,6 +13,7 @@
 #include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/luminance.hpp"
+#include "base/one_line.hpp"
 #include "base/progress_part.hpp"
 #include "light/alias_table.hpp"
 
@@ -140,15 +141,15 @@ void check_environment_size(const std::string& name, std::int64_t width, std::in
   const std::int64_t most = Environment::max_side;
   if (width >= 1 && height >= 1 && width <= most && height <= most) return;
   const std::string limit = width < 1 || height < 1 ? "" : "; at most " + std::to_string(most) + " a side";
-  throw Error(ErrorCode::file,
-              name + ": an environment of " + std::to_string(width) + "x" + std::to_string(height) + " pixels" + limit);
+  throw Error(ErrorCode::file, one_line(name) + ": an environment of " + std::to_string(width) + "x" +
+                                   std::to_string(height) + " pixels" + limit);
 }
 
 EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::string& name, Progress* progress) {
   check_environment_size(name, pixels.width, pixels.height);
   const std::size_t texels = std::size_t{pixels.width} * pixels.height;
   if (pixels.values.size() != texels) {
-    throw Error(ErrorCode::file, name + ": an environment of " + std::to_string(pixels.width) + "x" +
+    throw Error(ErrorCode::file, one_line(name) + ": an environment of " + std::to_string(pixels.width) + "x" +
                                      std::to_string(pixels.height) + " pixels has " +
                                      std::to_string(pixels.values.size()));
   }

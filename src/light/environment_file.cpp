@@ -35,7 +35,7 @@ constexpr double decoded_from = 0.2;
 constexpr double decoded_to = 0.5;
 
 [[noreturn]] void fail(const std::string& name, const std::string& cause) {
-  throw Error(ErrorCode::file, name + ": " + cause);
+  throw Error(ErrorCode::file, one_line(name) + ": " + cause);
 }
 
 /// A Radiance picture (Ward, "Real Pixels", Graphics Gems II, 1991): lines of text, then rows of shared exponents.

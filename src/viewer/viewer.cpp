@@ -9,6 +9,7 @@
 #include "base/callback_scope.hpp"
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
+#include "base/one_line.hpp"
 
 namespace cumulet::viewer {
 
@@ -379,7 +380,7 @@ const light::EnvironmentPtr& Viewer::environment() {
 
 void Viewer::show_environment(light::EnvironmentPtr environment) {
   if (environment && environment->replaced > 0) {
-    log_.warning(environment->name + ": " + std::to_string(environment->replaced) +
+    log_.warning(one_line(environment->name) + ": " + std::to_string(environment->replaced) +
                  " pixels are in part not finite, negative or above 1e30, which counts as 0");
   }
   environment_ = std::move(environment);

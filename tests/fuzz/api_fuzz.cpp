@@ -19,6 +19,7 @@ namespace {
 
 using cumulet::headless::Context;
 using cumulet::test::CameraRef;
+using cumulet::test::EnvironmentRef;
 using cumulet::test::ProgramsRef;
 using cumulet::test::SurfacesRef;
 using cumulet::test::ViewerPtr;
@@ -231,6 +232,30 @@ class Program {
     if (surfaces != nullptr) surfaces_.reset(surfaces);
   }
 
+  void make_environment() {
+    auto desc = described<cumulet_environment_desc>();
+    desc.width = data_.ConsumeIntegralInRange<std::uint32_t>(0, 9);
+    desc.height = data_.ConsumeIntegralInRange<std::uint32_t>(0, 9);
+    std::vector<float> values(std::size_t{3} * desc.width * desc.height);
+    for (float& value : values) value = bits<float>(static_cast<std::uint32_t>(number()));
+    desc.values = values.data();
+    desc.value_count = values.size();
+    desc.name = data_.ConsumeBool() ? "an environment\nof lines" : nullptr;
+    cumulet_environment* environment = nullptr;
+    made([&](char* error, std::size_t size) {
+      return cumulet_environment_from_pixels(&desc, &environment, error, size);
+    });
+    if (environment != nullptr) environment_.reset(environment);
+    std::array<float, 27> seen{};
+    const auto side = [&] { return data_.ConsumeIntegralInRange<std::uint32_t>(0, 4); };
+    const std::uint32_t width = side();
+    if (cumulet_environment_get_pixels(environment_.get(), width, side(), seen.data(), seen.size()) != CUMULET_OK)
+      return;
+    for (const float value : seen) {
+      if (!(value >= 0.0F && value <= 2e30F)) fail("an environment that is not what counts");
+    }
+  }
+
   template <class Desc, class Set>
   void set(Set function) {
     const auto desc = described<Desc>();
@@ -381,7 +406,7 @@ class Program {
 
   void call() {
     cumulet_viewer* viewer = viewer_.get();
-    switch (data_.ConsumeIntegralInRange(0, 24)) {
+    switch (data_.ConsumeIntegralInRange(0, 28)) {
       case 0:
         return make_dense();
       case 1:
@@ -436,6 +461,14 @@ class Program {
         const auto which = static_cast<cumulet_ramp>(data_.ConsumeIntegralInRange(0U, 3U));
         return told(cumulet_set_ramp(viewer, which, points.data(), data_.ConsumeIntegralInRange(0U, 4U)));
       }
+      case 24:
+        return make_environment();
+      case 25:
+        return told(cumulet_set_environment(viewer, environment_.get()));
+      case 26:
+        return told(cumulet_load_environment(viewer, data_.ConsumeBool() ? "/dev/null" : "/dev/null/nowhere.exr"));
+      case 27:
+        return set<cumulet_environment_settings_desc>(cumulet_set_environment_settings);
       default:
         told(cumulet_detach(viewer));
         if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));
@@ -447,6 +480,7 @@ class Program {
   ProgramsRef programs_;
   VolumeRef volume_;
   SurfacesRef surfaces_;
+  EnvironmentRef environment_;
   ViewerPtr viewer_;
 };
 

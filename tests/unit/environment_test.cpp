@@ -251,6 +251,11 @@ TEST(Environment, SizesThatAreNoneAreRefusedInALine) {
   EXPECT_EQ(refusal_of({0, 4, {}}), "host: an environment of 0x4 pixels");
   EXPECT_EQ(refusal_of({32768, 1, {}}), "host: an environment of 32768x1 pixels; at most 16384 a side");
   EXPECT_EQ(refusal_of({2, 2, {vec3(1.0F)}}), "host: an environment of 2x2 pixels has 1");
+  EXPECT_EQ(refusal([] {
+              light::make_environment({0, 4, {}}, "two\nlines");
+            }),
+            "two lines: an environment of 0x4 pixels");
+  EXPECT_EQ(refusal([] { light::read_environment("two\nlines.hdr"); }), "two lines.hdr: No such file or directory");
 }
 
 std::string radiance_file(const std::string& resolution, const std::string& body) {
