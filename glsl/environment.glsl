@@ -9,6 +9,8 @@
 #ifndef CM_ENVIRONMENT_GLSL
 #define CM_ENVIRONMENT_GLSL
 
+#include "frame.glsl"
+
 // Three halves, and the high half of a power of two.
 CM_FN vec3 cm_environment_texel(uint i) {
   uvec4 word = cm_environment_word(i);
@@ -23,10 +25,10 @@ struct CmSurrounding {
 };
 
 CM_FN CmSurrounding cm_surrounding(vec3 w) {
-  vec2 turn = cm.lights.environment_turn;
   uvec2 size = cm.environment.size;
   float across = sqrt(w.x * w.x + w.z * w.z);
-  float azimuth = across > 0.0f ? atan(turn.x * w.x - turn.y * w.z, turn.x * w.z + turn.y * w.x) : 0.0f;
+  vec3 there = cm_turned(w, cm.lights.environment_turn);
+  float azimuth = across > 0.0f ? atan(there.x, there.z) : 0.0f;
   vec2 at = vec2(0.5f - 0.159154943f * azimuth, 0.318309886f * atan(across, w.y)) * vec2(size) - 0.5f;
   vec2 low = floor(at);
   vec2 f = at - low;
@@ -66,7 +68,7 @@ CM_FN CmLightSample cm_environment_sample(CM_INOUT(CmPath) p, vec3 here, float u
   float down = 3.14159265f * y / height;
   vec2 level = sin(down) * vec2(sin(azimuth), cos(azimuth));
   vec2 turn = cm.lights.environment_turn;
-  vec3 w = vec3(turn.x * level.x + turn.y * level.y, cos(down), turn.x * level.y - turn.y * level.x);
+  vec3 w = cm_turned(vec3(level.x, cos(down), level.y), vec2(turn.x, -turn.y));
   CmSurrounding found = cm_surrounding(w);
   return CmLightSample(CM_LIGHT_ENVIRONMENT, found.radiance, w, 3.0e38f, found.density);
 }

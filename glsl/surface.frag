@@ -91,9 +91,7 @@ vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
 
 // What a lobe sees of the sky beyond its mean.
 vec3 cm_sky_beyond(vec3 w, vec2 orders) {
-  vec2 turn = cm_view.sky_turn.xy;
-  vec3 turned = vec3(turn.x * w.x - turn.y * w.z, w.y, turn.x * w.z + turn.y * w.x);
-  return max(cm_harmonics(cm_view.sky, turned, orders), -cm_view.sky_radiance.rgb);
+  return max(cm_harmonics(cm_view.sky, cm_turned(w, cm_view.sky_turn.xy), orders), -cm_view.sky_radiance.rgb);
 }
 
 vec3 cm_gloss_beyond(CmSurface s, vec3 wo, float roughness) {

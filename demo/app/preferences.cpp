@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <exception>
 #include <file.hpp>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <program.hpp>
 #include <settings.hpp>
 #include <stdexcept>
 #include <system_error>
@@ -27,11 +27,6 @@ std::string absolute(const std::string& path) {
   return error ? "" : there.lexically_normal().string();
 }
 
-std::string environment(const char* name) {
-  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before any thread is started
-  return value == nullptr ? "" : value;
-}
-
 }  // namespace
 
 void Preferences::remember(const std::string& path) {
@@ -46,8 +41,7 @@ void Preferences::remember(const std::string& path) {
 void Preferences::forget(const std::string& path) { std::erase(recent, absolute(path)); }
 
 std::string preferences_path() {
-  std::string folder = environment("XDG_CONFIG_HOME");
-  if (folder.empty() && !environment("HOME").empty()) folder = environment("HOME") + "/.config";
+  const std::string folder = user_folder("XDG_CONFIG_HOME", ".config");
   return folder.empty() ? "" : folder + "/cumulet/demo.json";
 }
 

@@ -1,6 +1,7 @@
 #include "program.hpp"
 
 #include <cstdio>
+#include <cstdlib>
 #include <iostream>
 #include <new>
 
@@ -12,6 +13,17 @@ std::string one_line(std::string text) {
   for (char& c : text)
     if (breaks(c)) c = ' ';
   return text;
+}
+
+std::string environment_variable(const char* name) {
+  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing sets the environment
+  return value == nullptr ? "" : value;
+}
+
+std::string user_folder(const char* variable, const std::string& in_home) {
+  if (std::string named = environment_variable(variable); !named.empty()) return named;
+  const std::string home = environment_variable("HOME");
+  return home.empty() ? "" : home + "/" + in_home;
 }
 
 int run_program(const char* name, const std::function<void()>& body) {

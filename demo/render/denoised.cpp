@@ -1,7 +1,7 @@
 #include "denoised.hpp"
 
-#include <cstdlib>
 #include <filesystem>
+#include <program.hpp>
 #include <stdexcept>
 
 namespace cumulet::demo {
@@ -10,11 +10,6 @@ namespace {
 
 // Albedo and normals without noise go with the picture, as ours are.
 constexpr const char* network_name = "rt_hdr_calb_cnrm.tza";
-
-std::string environment(const char* name) {
-  const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing sets the environment
-  return value == nullptr ? "" : value;
-}
 
 std::string network_file(std::string folder) {
   if (folder.empty()) folder = denoiser_folder();
@@ -25,9 +20,8 @@ std::string network_file(std::string folder) {
 }  // namespace
 
 std::string denoiser_folder() {
-  if (std::string named = environment("CUMULET_OIDN_WEIGHTS"); !named.empty()) return named;
-  std::string data = environment("XDG_DATA_HOME");
-  if (data.empty() && !environment("HOME").empty()) data = environment("HOME") + "/.local/share";
+  if (std::string named = environment_variable("CUMULET_OIDN_WEIGHTS"); !named.empty()) return named;
+  const std::string data = user_folder("XDG_DATA_HOME", ".local/share");
   return data.empty() ? "" : data + "/cumulet/oidn";
 }
 

@@ -21,8 +21,6 @@ constexpr std::uint32_t most_groups = 65535;  // GL's minimum
 constexpr double bin_cost = 30.0;
 constexpr double input_cost = 200.0;
 
-constexpr std::uint32_t divided_up(std::uint32_t value, std::uint32_t by) { return (value + by - 1) / by; }
-
 /// Channels of the result that a work group has, by fours: the last convolution has three of them alone.
 std::uint32_t quads_of(std::size_t convolution) {
   return convolution + 1 == Network::convolution_count ? 1 : group_channels / quad_channels;

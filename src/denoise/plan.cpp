@@ -6,7 +6,6 @@ namespace cumulet::denoise {
 
 namespace {
 
-constexpr std::uint32_t divided_up(std::uint32_t value, std::uint32_t by) { return (value + by - 1) / by; }
 constexpr std::uint32_t rounded_up(std::uint32_t value, std::uint32_t to) { return divided_up(value, to) * to; }
 
 // Less would be for surroundings almost alone.

@@ -13,6 +13,8 @@ namespace cumulet::denoise {
 inline constexpr std::uint32_t block_channels = 8;
 inline constexpr std::uint32_t group_channels = 16;
 
+constexpr std::uint32_t divided_up(std::uint32_t value, std::uint32_t by) { return (value + by - 1) / by; }
+
 /// Blocks of that many channels: the network's input is filled up to a block, results to a group.
 std::uint32_t input_blocks(const Network& network);
 std::uint32_t result_blocks(const Convolution& convolution);

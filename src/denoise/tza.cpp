@@ -9,6 +9,7 @@
 
 #include "base/error.hpp"
 #include "base/one_line.hpp"
+#include "base/read_rest.hpp"
 
 namespace cumulet::denoise {
 
@@ -125,14 +126,9 @@ TensorArchive read_tza(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(std::strerror(errno));
   std::vector<std::uint8_t> bytes;
-  constexpr std::size_t piece = std::size_t{1} << 20U;
-  while (file) {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + piece);
-    file.read(reinterpret_cast<char*>(bytes.data() + before), piece);
-    bytes.resize(before + static_cast<std::size_t>(file.gcount()));
+  read_rest(file, bytes, [&](std::size_t /*count*/) {
     if (bytes.size() > most_tza_bytes) fail("is larger than 64 MiB, which no network of Open Image Denoise is");
-  }
+  });
   if (file.bad()) fail(std::strerror(errno));
   return read_tza(bytes, path);
 }

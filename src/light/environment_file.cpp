@@ -25,6 +25,7 @@
 #include "base/error.hpp"
 #include "base/one_line.hpp"
 #include "base/progress_part.hpp"
+#include "base/read_rest.hpp"
 
 namespace cumulet::light {
 
@@ -271,13 +272,7 @@ std::vector<std::uint8_t> read_bytes(const std::string& path, Progress* progress
   ProgressPart part(progress, 0.0, decoded_from, size);
   std::vector<std::uint8_t> bytes;
   bytes.reserve(size + piece);
-  while (file) {
-    const std::size_t before = bytes.size();
-    bytes.resize(before + piece);
-    file.read(reinterpret_cast<char*>(bytes.data() + before), piece);
-    bytes.resize(before + static_cast<std::size_t>(file.gcount()));
-    part.add(bytes.size() - before);
-  }
+  read_rest(file, bytes, [&part](std::size_t count) { part.add(count); });
   if (file.bad()) fail(path, std::strerror(errno));
   return bytes;
 }

@@ -325,7 +325,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sky_turn = glm::vec4(lighting.sky_turn, 0.0F, 0.0F);
   const std::span<const surface::PunctualLight> lamps =
       content_ ? std::span(content_->pose_->lights) : std::span<const surface::PunctualLight>();
-  light::Lamps of_host(lighting.lamps.begin(), lighting.lamps.end());
+  light::Lamps of_host = lighting.lamps;
   for (light::Lamp& lamp : of_host) {
     // Lit from its middle alone: there a wide sun's disc is brighter than on average.
     if (lamp.kind == light::Lamp::Kind::sun) lamp.angle = 0.0;

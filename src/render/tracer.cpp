@@ -691,10 +691,7 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
   return run(gl_, picture.film_, pass, deadline);
 }
 
-void Tracer::read_fact(Picture& picture, const MarchData& data, const Obstacles& obstacles, PixelFact fact,
-                       float* values) {
-  while (!find_facts(picture, data, obstacles, Clock::now() + std::chrono::seconds(1))) {
-  }
+void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) const {
   const std::array<FilmLayer, 5> layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
                                         film_layers::normal, film_layers::albedo};
   const FilmLayer& layer = layers.at(static_cast<std::size_t>(fact));

@@ -195,8 +195,8 @@ class Tracer {
   /// Until about the deadline, the layers of PixelFact of this picture, data and obstacles being those it was made of;
   /// whether they are there. Goes on in the next call.
   bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
-  /// A fact a pixel (PixelFact), each channels_of(fact) floats. Finds them first, if need be.
-  void read_fact(Picture& picture, const MarchData& data, const Obstacles& obstacles, PixelFact fact, float* values);
+  /// A fact a pixel (PixelFact), each channels_of(fact) floats, once find_facts has found them.
+  void read_fact(const Picture& picture, PixelFact fact, float* values) const;
   [[nodiscard]] Totals totals(const Picture& picture) const;
   /// What this context does from now on comes after what is under way, whichever made that. Waits for nothing.
   void order() const { flights_.order(); }

@@ -146,9 +146,9 @@ class Context {
   // The last pass, as Compositor::draw: of a film, whose textures these are.
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);
-  // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
   // Throws Error(invalid_argument) where the picture is of another scene than the one there is.
   void find_facts(const Shot& shot, render::Picture& picture);
+  // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
   void read_means(render::Picture& picture, bool with_background, float* rgba);
   // What the compositor draws of it, as linear radiance.
   void read_composite(render::Picture& picture, bool transparent, float* rgba);

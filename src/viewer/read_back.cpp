@@ -126,7 +126,7 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
     progressive_.tracer().read_volume(picture, values);
   } else {
     find_facts(shot, picture);
-    progressive_.tracer().read_fact(picture, *scene_.data(), obstacles(shot), fact, values);
+    progressive_.tracer().read_fact(picture, fact, values);
   }
 }
 

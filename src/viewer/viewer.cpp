@@ -106,19 +106,21 @@ void Viewer::sync() {
   }
 }
 
-std::optional<BuildSettings> Viewer::build_settings() const {
+std::optional<BuildSettings> Viewer::settings_at_once() const {
+  if (grid_.camera_adaptive) return std::nullopt;
+  return grid_.build;
+}
+
+BuildSettings Viewer::settings_for_view() const {
   BuildSettings settings = grid_.build;
-  if (grid_.camera_adaptive) {
-    if (!view_) return std::nullopt;  // the next frame asks
-    settings.refine.camera = refine_camera();
-  }
+  settings.refine.camera = refine_camera();
   return settings;
 }
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
-  if (builder_.configure_load(grid_.camera_adaptive ? std::nullopt : build_settings())) return;
+  if (builder_.configure_load(settings_at_once())) return;
   sync();
-  const auto settings = grid_.camera_adaptive ? std::nullopt : build_settings();
+  const auto settings = settings_at_once();
   if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
   built_view_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
@@ -128,7 +130,7 @@ void Viewer::load_volume(const VolumeFile& file) {
   sync();
   suggested_density_scale_.reset();
   take_medium();
-  builder_.load(file, grid_.camera_adaptive ? std::nullopt : build_settings());
+  builder_.load(file, settings_at_once());
   touch();
 }
 

@@ -159,7 +159,9 @@ class Viewer {
   [[nodiscard]] scene::Emission field_emission() const;
   // Once of a grid, however many volumes have it.
   void remark_on_anisotropy();
-  [[nodiscard]] std::optional<BuildSettings> build_settings() const;
+  // Nothing where the grid depends on the view: the next frame asks for it.
+  [[nodiscard]] std::optional<BuildSettings> settings_at_once() const;
+  [[nodiscard]] BuildSettings settings_for_view() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.
   void prepare(const Frame& frame);

@@ -105,7 +105,7 @@ void Viewer::prepare(const Frame& frame) {
     const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
     if (rests) {
       take_medium();
-      builder_.build(volume_, *build_settings());
+      builder_.build(volume_, settings_for_view());
       built_view_ = view_;
       built_size_ = frame_size_;
     }

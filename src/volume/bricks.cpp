@@ -13,12 +13,12 @@ bool holds(const glm::ivec3& low, const glm::ivec3& high, const glm::ivec3& p) {
   return glm::all(glm::greaterThanEqual(p, low)) && glm::all(glm::lessThanEqual(p, high));
 }
 
-std::int64_t voxels(const glm::ivec3& low, const glm::ivec3& high) {
+}  // namespace
+
+std::int64_t voxels_between(const glm::ivec3& low, const glm::ivec3& high) {
   const glm::i64vec3 size = glm::max(glm::i64vec3(high) - glm::i64vec3(low) + std::int64_t{1}, glm::i64vec3(0));
   return size.x * size.y * size.z;
 }
-
-}  // namespace
 
 bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
@@ -42,13 +42,13 @@ void fill_brick(const ScalarVolume& volume, const glm::ivec3& origin, std::span<
   }
 }
 
-std::int64_t voxels_of(const Tile& tile) { return voxels(tile.min, tile.max); }
+std::int64_t voxels_of(const Tile& tile) { return voxels_between(tile.min, tile.max); }
 
 std::int64_t background_voxels(const ScalarVolume& volume) {
-  std::int64_t left = voxels(volume.bounds_min, volume.bounds_max);
+  std::int64_t left = voxels_between(volume.bounds_min, volume.bounds_max);
   for (const Tile& tile : volume.tiles) left -= voxels_of(tile);
   for (const glm::ivec3& origin : volume.brick_origins)
-    left -= voxels(glm::max(origin, volume.bounds_min), glm::min(origin + (brick_size - 1), volume.bounds_max));
+    left -= voxels_between(glm::max(origin, volume.bounds_min), glm::min(origin + (brick_size - 1), volume.bounds_max));
   return left;
 }
 

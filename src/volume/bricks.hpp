@@ -20,6 +20,8 @@ const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin);
 /// tiles: places in volume.tiles, all that meet it among them.
 void fill_brick(const ScalarVolume& volume, const glm::ivec3& origin, std::span<const std::uint32_t> tiles, float* out);
 
+/// Of a box, both ends inclusive; none where an end is below the other. No side may be longer than 2^20.
+std::int64_t voxels_between(const glm::ivec3& low, const glm::ivec3& high);
 std::int64_t voxels_of(const Tile& tile);
 /// How many voxels within bounds have the background value, being in no brick and no tile. O(bricks + tiles).
 std::int64_t background_voxels(const ScalarVolume& volume);

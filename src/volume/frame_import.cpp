@@ -4,6 +4,7 @@
 #include <sstream>
 #include <vector>
 
+#include "volume/bricks.hpp"
 #include "volume/frame.hpp"
 #include "volume/resample.hpp"
 
@@ -214,7 +215,7 @@ class FrameImport {
     };
     for (ScalarVolume& part : *out_.anisotropy) {
       for (float& value : part.brick_values) clamp(value, 1);
-      for (Tile& tile : part.tiles) clamp(tile.value, Box{tile.min, tile.max}.voxels());
+      for (Tile& tile : part.tiles) clamp(tile.value, voxels_of(tile));
       clamp(part.background, 0);
       clamp(part.max_value, 0);
     }

@@ -473,25 +473,33 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file) {
   return naming(file.string(), [&] { return open(file, nullptr)->grids(); });
 }
 
-ScalarVolume detail::import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log,
-                                 Progress* progress, Portion portion) {
+namespace {
+
+constexpr double reading = 0.7;  // of what an import takes
+
+// What f makes of one grid of an open file: its name, and what messages call it.
+template <class F>
+auto of_grid(Reader& reader, std::size_t grid, const std::string& file, F&& f) {
   const GridInfo& entry = reader.grids()[grid];
   const std::string name = one_line(file + ": grid \"" + entry.unique_name + "\"");
-  return naming(name, [&] {
-    constexpr double reading = 0.7;
+  return naming(name, [&] { return f(entry.name, name); });
+}
+
+}  // namespace
+
+ScalarVolume detail::import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log,
+                                 Progress* progress, Portion portion) {
+  return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
     SourceGrid source = reader.read(grid, portion.part(0.0, reading), log, name + ": ");
     ScalarVolume volume = assemble(std::move(source), log, name + ": ", progress, portion.part(reading, 1.0));
-    volume.name = entry.name;
+    volume.name = grid_name;
     return volume;
   });
 }
 
 std::array<ScalarVolume, 3> detail::import_vector_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                        const Log& log, Progress* progress, Portion portion) {
-  const GridInfo& entry = reader.grids()[grid];
-  const std::string name = one_line(file + ": grid \"" + entry.unique_name + "\"");
-  return naming(name, [&] {
-    constexpr double reading = 0.7;
+  return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
     std::array<SourceGrid, 3> sources = reader.read_vector(grid, portion.part(0.0, reading), log, name + ": ");
     std::array<ScalarVolume, 3> out;
     double from = reading;
@@ -501,7 +509,7 @@ std::array<ScalarVolume, 3> detail::import_vector_grid(Reader& reader, std::size
       const Log& heard = axis > 0 && out[0].empty() ? Log() : log;
       out[axis] =
           assemble(std::move(sources[axis]), heard, name + ", " + "xyz"[axis] + ": ", progress, portion.part(from, to));
-      out[axis].name = entry.name;
+      out[axis].name = grid_name;
       from = to;
     }
     return out;
@@ -537,10 +545,7 @@ class OneSign final : public LeafSource {
 
 std::array<ScalarVolume, 2> detail::import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                        const Log& log, Progress* progress, Portion portion) {
-  const GridInfo& entry = reader.grids()[grid];
-  const std::string name = one_line(file + ": grid \"" + entry.unique_name + "\"");
-  return naming(name, [&] {
-    constexpr double reading = 0.7;
+  return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
     SourceGrid whole = reader.read(grid, portion.part(0.0, reading), log, name + ": ");
     const std::shared_ptr<const LeafSource> leaves = std::move(whole.leaves);
     const auto part = [&](float sign, const Log& heard, Portion of_load) {
@@ -549,7 +554,7 @@ std::array<ScalarVolume, 2> detail::import_signed_grid(Reader& reader, std::size
       for (SourceTile& tile : source.tiles) tile.box.value = (*signed_leaves)(tile.box.value);
       source.leaves = std::move(signed_leaves);
       ScalarVolume volume = assemble(std::move(source), heard, name + ": ", progress, of_load);
-      volume.name = entry.name;
+      volume.name = grid_name;
       return volume;
     };
     // Both have the same voxels that are no numbers, or none at all: that is said once.

@@ -22,6 +22,7 @@
 #include "base/log.hpp"
 #include "base/one_line.hpp"
 #include "base/progress_part.hpp"
+#include "volume/bricks.hpp"
 #include "volume/memory.hpp"
 
 namespace cumulet::volume::detail {
@@ -177,12 +178,7 @@ struct Box {
   [[nodiscard]] bool contains(const Box& b) const {
     return glm::all(glm::lessThanEqual(min, b.min)) && glm::all(glm::greaterThanEqual(max, b.max));
   }
-  /// Only where no side is longer than 2^20.
-  [[nodiscard]] std::uint64_t voxels() const {
-    if (empty()) return 0;
-    const glm::u64vec3 size(glm::i64vec3(max) - glm::i64vec3(min) + std::int64_t{1});
-    return size.x * size.y * size.z;
-  }
+  [[nodiscard]] std::uint64_t voxels() const { return static_cast<std::uint64_t>(voxels_between(min, max)); }
 };
 
 struct ActiveRegion {

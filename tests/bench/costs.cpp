@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "asset.hpp"
+#include "base/luminance.hpp"
 #include "light/environment_file.hpp"
 #include "measure.hpp"
 #include "settings/settings.hpp"
@@ -43,7 +44,7 @@ constexpr double noisiest = 0.005;  // part of the pixels: single paths that fou
 
 double luminance(const Run& run, std::size_t pixel) {
   const float* rgba = &run.rgba[4 * pixel];
-  return 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2];
+  return luminance(glm::dvec3(rgba[0], rgba[1], rgba[2]));
 }
 
 /// The pixels that show the medium.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/luminance.hpp"
+
 namespace cumulet::bench {
 
 namespace {
@@ -12,7 +14,7 @@ std::uint32_t seed_of(std::size_t part) { return static_cast<std::uint32_t>(101 
 std::vector<float> luminance(const std::vector<float>& rgba) {
   std::vector<float> result(rgba.size() / 4);
   for (std::size_t i = 0; i < result.size(); ++i) {
-    result[i] = 0.2126F * rgba[4 * i] + 0.7152F * rgba[4 * i + 1] + 0.0722F * rgba[4 * i + 2];
+    result[i] = luminance(glm::vec3(rgba[4 * i], rgba[4 * i + 1], rgba[4 * i + 2]));
   }
   return result;
 }

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -30,13 +29,6 @@ constexpr std::size_t floats = std::size_t{side} * side * 4;
 class DenoisedPicture : public testing::Test {
  protected:
   DenoisedPicture() {
-    auto desc = make_desc<cumulet_create_desc>();
-    desc.get_proc = Context::get_proc;
-    desc.get_proc_user = &context_;
-    cumulet_viewer* out = nullptr;
-    std::array<char, 256> error{};
-    EXPECT_EQ(cumulet_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
-    viewer_.reset(out);
     auto light = make_desc<cumulet_light_desc>();
     light.sun_elevation_degrees = 40.0F;
     std::ranges::fill(light.sun_irradiance, 3.0F);
@@ -78,7 +70,7 @@ class DenoisedPicture : public testing::Test {
   GladGLContext gl_ = cumulet::test::load_gl(Context::get_proc, &context_);
   HostTarget target_{gl_, side, side};
   VolumeRef volume_ = make_ball(24);
-  ViewerPtr viewer_;
+  ViewerPtr viewer_ = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = &context_});
   Folder folder_;
   std::string file_ = (folder_ / "network.tza").string();
 };

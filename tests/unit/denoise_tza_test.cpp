@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <random>
 #include <string>
@@ -14,6 +13,7 @@
 #include "denoise/network.hpp"
 #include "denoise/tza.hpp"
 #include "support/folder.hpp"
+#include "support/refusal.hpp"
 #include "support/tza.hpp"
 
 namespace {
@@ -27,21 +27,12 @@ using cumulet::denoise::Tensor;
 using cumulet::denoise::TensorArchive;
 using cumulet::test::base_widths;
 using cumulet::test::random_archive;
+using cumulet::test::refusal;
 using cumulet::test::small_widths;
 using cumulet::test::tza_file;
 using cumulet::test::TzaBytes;
 using Bytes = std::vector<std::uint8_t>;
 namespace fs = std::filesystem;
-
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::file);
-    return error.what();
-  }
-  return "";
-}
 
 std::string refusal(const Bytes& bytes) {
   return refusal([&] { static_cast<void>(read_tza(bytes, "x.tza")); });

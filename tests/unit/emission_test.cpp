@@ -11,6 +11,7 @@
 #include "grid/cell.hpp"
 #include "light/black_body.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
@@ -274,26 +275,10 @@ TEST(Anisotropy, CellsAreSplitWhereItVaries) {
 
 // ---- Pictures
 
-struct Kind {
-  March march;
-  grid::CellKind cells;
-};
-constexpr std::array<Kind, 4> kinds{{{March::tet, grid::CellKind::linear},
-                                     {March::tet, grid::CellKind::constant},
-                                     {March::dense, grid::CellKind::constant},
-                                     {March::brick, grid::CellKind::constant}}};
-
 class EmissionPicture : public test::ViewerTest {
  protected:
   static void show(test::Still& viewer, VolumeFrame frame) {
     viewer.set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
-  }
-  static void set(test::Still& viewer, const Kind& kind, double threshold = -1.0) {
-    viewer::GridSettings s;
-    s.build.march = kind.march;
-    s.build.refine.cells = kind.cells;
-    s.build.refine.threshold = threshold;
-    viewer.set_grid(s);
   }
   // Looks down -z at the middle of a slab of 64 x 64 voxels.
   static test::Picture look(test::Still& viewer, double from = 500.0, std::uint32_t samples = 64) {
@@ -313,8 +298,8 @@ TEST_P(EmissionPicture, AFlameWithoutDensityIsExact) {
   medium.field_emission.flame_colour = {1.0F, 0.5F, 0.0F};
   viewer->set_medium(medium);
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.125F)});
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     for (const double from : {500.0, 3.5}) {
       const test::Picture picture = look(*viewer, from, 4);
       const float length = from > 100.0 ? 8.0F : 4.0F;
@@ -336,7 +321,7 @@ TEST_P(EmissionPicture, AFlameIsFramed) {
     frame.flame = field({8, 64, 8}, ivec3(0), 1.0F);
     show(*viewer, std::move(frame));
     viewer->set_light({});
-    set(*viewer, kinds[0]);
+    viewer->set_grid(test::settings_of(test::march_kinds[0]));
     viewer->set_camera(test::camera_at({4.0, 32.0, 50.0}, {4.0, 32.0, 0.0}, 30.0));
     test::render(*viewer, {64, 64, 1, 1, render::View::shaded});
     viewer->viewer().frame_all();
@@ -369,8 +354,8 @@ TEST_P(EmissionPicture, ASlabThatAbsorbsFollowsTheClosedForm) {
   frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
   show(*viewer, std::move(frame));
   viewer->set_light({});
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     for (const double sigma : {0.05, 0.4}) {
       viewer::Medium medium;
       medium.density_scale = sigma;
@@ -401,9 +386,9 @@ TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
   medium.phase.anisotropy = 0.4F;
   medium.field_emission.flame_strength = 0.5 * 0.25;
   viewer->set_medium(medium);
-  for (const Kind& kind : kinds) {
+  for (const test::MarchKind& kind : test::march_kinds) {
     // Where cells average, density and emission still go together.
-    set(*viewer, kind, kind.march == March::tet ? 0.05 : -1.0);
+    viewer->set_grid(test::settings_of(kind, kind.march == March::tet ? 0.05 : -1.0));
     const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
     double square = 0.0;
     for (const glm::vec4& p : picture.pixels) square += (p.x - 1.0) * (p.x - 1.0);
@@ -425,8 +410,8 @@ TEST_P(EmissionPicture, CellsAreSplitForWhatGlows) {
   medium.albedo = vec3(0.0F);
   viewer->set_medium(medium);
   std::vector<test::Picture> pictures;
-  for (const Kind& kind : {kinds[0], kinds[2]}) {
-    set(*viewer, kind, 0.02);
+  for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2]}) {
+    viewer->set_grid(test::settings_of(kind, 0.02));
     viewer->set_camera(test::camera_at({31.5, 31.5, 200.0}, {31.5, 31.5, 31.5}, 22.0));
     pictures.push_back(test::render(*viewer, {32, 32, 64, 1, render::View::shaded}));
     if (kind.march == March::tet) {
@@ -454,8 +439,8 @@ TEST_P(EmissionPicture, EndsAtSurfaces) {
   wall.add_quad({vec3(-100, -100, 5.25), vec3(100, -100, 5.25), vec3(100, 100, 5.25), vec3(-100, 100, 5.25)},
                 wall.add(test::diffuse(vec3(0.0F))));
   viewer->viewer().show_surfaces(test::source_of(std::make_shared<test::StillScene>(wall)));
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     const test::Picture picture = look(*viewer, 500.0, 16);
     for (const glm::vec4& pixel : picture.pixels) EXPECT_NEAR(pixel.x, 7.5F - 5.25F, 2e-3F);
   }
@@ -466,8 +451,8 @@ TEST_P(EmissionPicture, AColourIsAnAlbedo) {
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   viewer::Medium medium;
   medium.density_scale = 0.3;
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 2.0F)};
     medium.albedo = vec3(0.5F, 0.25F, 0.75F);
     viewer->set_medium(medium);
@@ -493,8 +478,8 @@ TEST_P(EmissionPicture, AColourIsThatOfItsPlace) {
   medium.density_scale = 10.0;
   medium.max_bounces = 1;
   viewer->set_medium(medium);
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     for (const double x : {7.5, 23.5}) {
       viewer->set_camera(test::camera_at({x, 15.5, 500.0}, {x, 15.5, 0.0}, 0.5));
       const glm::dvec4 mean = test::render(*viewer, {8, 8, 16, 1, render::View::shaded}).mean();
@@ -513,8 +498,8 @@ TEST_P(EmissionPicture, AnAnisotropyIsTheMediums) {
   medium.albedo = vec3(0.75F);
   const VolumeFrame frame{.density = field({64, 64, 8}, ivec3(0), 2.0F)};
   for (const float second_share : {0.0F, 0.25F}) {
-    for (const Kind& kind : kinds) {
-      set(*viewer, kind);
+    for (const test::MarchKind& kind : test::march_kinds) {
+      viewer->set_grid(test::settings_of(kind));
       medium.phase = {.anisotropy = 0.75F, .second_anisotropy = -0.5F, .second_share = second_share};
       viewer->set_medium(medium);
       show(*viewer, VolumeFrame{.density = frame.density});
@@ -542,8 +527,8 @@ TEST_P(EmissionPicture, AnAnisotropyIsThatOfItsPlace) {
   medium.density_scale = 0.1;
   medium.max_bounces = 1;
   viewer->set_medium(medium);
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     for (const double x : {15.5, 47.5}) {
       const double g = x < 32.0 ? 0.5 : -0.25;
       const double cosine = -std::cos(height);
@@ -682,7 +667,7 @@ TEST_P(EmissionPicture, LooksFindAHotCore) {
     std::array<double, 2> mean{};
     std::array<double, 2> square{};  // of a pixel's noise
     for (const std::size_t k : {0U, 1U}) {
-      set(*viewer, kinds[2 * k], 0.02);
+      viewer->set_grid(test::settings_of(test::march_kinds[2 * k], 0.02));
       const test::Picture one = test::render(*viewer, {32, 32, 64, 1, render::View::shaded});
       const test::Picture two = test::render(*viewer, {32, 32, 64, 2, render::View::shaded});
       for (std::size_t i = 0; i < one.pixels.size(); ++i) {
@@ -729,8 +714,8 @@ TEST_P(EmissionPicture, LightsAFloor) {
     }
   }
   light *= 0.5 / (steps * steps);
-  for (const Kind& kind : {kinds[0], kinds[2]}) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2]}) {
+    viewer->set_grid(test::settings_of(kind));
     viewer->set_camera(test::camera_at({31.5, 31.5, -0.6}, {31.5, 31.5, -1.0}, 30.0));
     const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
     double mean = 0.0;

@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -21,6 +20,7 @@
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/osmesa_leaks.hpp"
+#include "support/refusal.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
 
@@ -233,29 +233,20 @@ TEST(Environment, PixelsOfAnotherSizeAreMeansOfThoseInTheirPlace) {
   EXPECT_EQ(larger.at(16 * 5 - 1), vec3(7.0F, 3.0F, 1.0F));
 }
 
-std::string refusal(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::file);
-    return error.what();
-  }
-  return "";
-}
-
 std::string refusal_of(const light::EnvironmentPixels& pixels) {
-  return refusal([&] { light::make_environment(pixels, "host"); });
+  return test::refusal([&] { light::make_environment(pixels, "host"); });
 }
 
 TEST(Environment, SizesThatAreNoneAreRefusedInALine) {
   EXPECT_EQ(refusal_of({0, 4, {}}), "host: an environment of 0x4 pixels");
   EXPECT_EQ(refusal_of({32768, 1, {}}), "host: an environment of 32768x1 pixels; at most 16384 a side");
   EXPECT_EQ(refusal_of({2, 2, {vec3(1.0F)}}), "host: an environment of 2x2 pixels has 1");
-  EXPECT_EQ(refusal([] {
+  EXPECT_EQ(test::refusal([] {
               light::make_environment({0, 4, {}}, "two\nlines");
             }),
             "two lines: an environment of 0x4 pixels");
-  EXPECT_EQ(refusal([] { light::read_environment("two\nlines.hdr"); }), "two lines.hdr: No such file or directory");
+  EXPECT_EQ(test::refusal([] { light::read_environment("two\nlines.hdr"); }),
+            "two lines.hdr: No such file or directory");
 }
 
 std::string radiance_file(const std::string& resolution, const std::string& body) {
@@ -291,7 +282,7 @@ TEST(EnvironmentFile, RadianceIsReadFlatAndInRuns) {
   const light::EnvironmentPixels eight = read(radiance_file("-Y 1 +X 8", runs));
   EXPECT_EQ(eight.values.at(0), vec3(1.0F, 0.5F, 0.25F));
   EXPECT_EQ(eight.values.at(7), vec3(1.0F, 0.5F, 0.125F));
-  const auto why = [&](const std::string& text) { return refusal([&] { read(text); }); };
+  const auto why = [&](const std::string& text) { return test::refusal([&] { read(text); }); };
   EXPECT_EQ(why(""), path + ": a Radiance picture that is cut short");
   EXPECT_EQ(why("no picture\n"), path + ": neither a Radiance (.hdr) nor an OpenEXR file");
   EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs.substr(0, 8))), path + ": a Radiance picture that is cut short");
@@ -301,7 +292,7 @@ TEST(EnvironmentFile, RadianceIsReadFlatAndInRuns) {
   EXPECT_EQ(why(radiance_file("+X 8 -Y 1", runs)), path + ": a resolution of '+X 8 -Y 1', not '-Y HEIGHT +X WIDTH'");
   runs[4] = '\xff';
   EXPECT_EQ(why(radiance_file("-Y 1 +X 8", runs)), path + ": a run beyond its row");
-  EXPECT_EQ(refusal([&] { light::read_environment((folder / "none.hdr").string()); }),
+  EXPECT_EQ(test::refusal([&] { light::read_environment((folder / "none.hdr").string()); }),
             (folder / "none.hdr").string() + ": No such file or directory");
   EXPECT_NE(why(std::string("\x76\x2f\x31\x01nonsense", 12)).find(path + ": not a readable OpenEXR file: "),
             std::string::npos);

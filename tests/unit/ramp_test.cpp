@@ -11,6 +11,7 @@
 #include "grid/refine.hpp"
 #include "light/black_body.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
 #include "support/volumes.hpp"
 #include "volume/inspection.hpp"
@@ -178,24 +179,8 @@ TEST(Ramp, OfChannelsComesFirst) {
 
 // ---- Pictures
 
-struct Kind {
-  March march;
-  grid::CellKind cells;
-};
-constexpr std::array<Kind, 4> kinds{{{March::tet, grid::CellKind::linear},
-                                     {March::tet, grid::CellKind::constant},
-                                     {March::dense, grid::CellKind::constant},
-                                     {March::brick, grid::CellKind::constant}}};
-
 class RampPicture : public test::ViewerTest {
  protected:
-  static void set(test::Still& viewer, const Kind& kind) {
-    viewer::GridSettings s;
-    s.build.march = kind.march;
-    s.build.refine.cells = kind.cells;
-    s.build.refine.threshold = -1.0;
-    viewer.set_grid(s);
-  }
   // Looks down -z at the middle of a slab of 64 x 64 voxels.
   static test::Picture look(test::Still& viewer, std::uint32_t samples) {
     viewer.build();
@@ -215,8 +200,8 @@ TEST_P(RampPicture, OfDensityFollowsBeerAndLambert) {
   medium.density_scale = 0.05;
   medium.albedo = vec3(0.0F);
   viewer->set_medium(medium);
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     viewer->viewer().set_ramps({});
     const double plain = std::exp(-0.05 * 4.0 * (1.0 + 2.0 + 3.0));
     EXPECT_NEAR(look(*viewer, 64).mean().x, plain, 4.0 * std::sqrt(plain * (1.0 - plain) / (256.0 * 64.0)));
@@ -235,8 +220,8 @@ TEST_P(RampPicture, OfTemperatureFollowsTheBlackBody) {
   viewer::Medium medium;
   medium.field_emission.blackbody = 1.0;
   viewer->set_medium(medium);
-  for (const Kind& kind : kinds) {
-    set(*viewer, kind);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     viewer->viewer().set_ramps({.temperature = Ramp({{0.5F, 0.0F}, {1.0F, 1.5F}})});
     // Smoke below is dark, flames above are hotter.
     const glm::dvec4 mean = look(*viewer, 4).mean();

@@ -12,6 +12,7 @@
 
 #include "base/error.hpp"
 #include "support/gl_viewer.hpp"
+#include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
 #include "support/volumes.hpp"
 
@@ -26,23 +27,6 @@ using render::March;
 class Trace : public test::ViewerTest {};
 CUMULET_ON_BACKENDS(Trace);
 
-struct Kind {
-  March march;
-  grid::CellKind cells;
-};
-constexpr std::array<Kind, 4> kinds{{{March::tet, grid::CellKind::linear},
-                                     {March::tet, grid::CellKind::constant},
-                                     {March::dense, grid::CellKind::constant},
-                                     {March::brick, grid::CellKind::constant}}};
-
-viewer::GridSettings settings_of(const Kind& kind, double threshold) {
-  viewer::GridSettings s;
-  s.build.march = kind.march;
-  s.build.refine.cells = kind.cells;
-  s.build.refine.threshold = threshold;
-  return s;
-}
-
 volume::ScalarVolume box_volume(const ivec3& size, float value = 1.0F) {
   return test::make_volume(size, ivec3(0), [=](const ivec3& /*p*/) { return value; });
 }
@@ -53,8 +37,8 @@ TEST_P(Trace, SlabFollowsBeerLambertInEveryMarch) {
   viewer::Light light;
   light.sky_radiance = vec3(2.0F);
   viewer->set_light(light);
-  for (const Kind& kind : kinds) {
-    viewer->set_grid(settings_of(kind, -1.0));
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     for (const double sigma : {0.02, 0.1, 0.4}) {
       viewer::Medium medium;
       medium.density_scale = sigma;
@@ -84,8 +68,8 @@ TEST_P(Trace, WhiteFurnaceIsOneEverywhere) {
     medium.density_scale = 0.5;
     medium.phase.anisotropy = g;
     viewer->set_medium(medium);
-    for (const Kind& kind : {kinds[0], kinds[3]}) {
-      viewer->set_grid(settings_of(kind, 0.02));
+    for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[3]}) {
+      viewer->set_grid(test::settings_of(kind, 0.02));
       const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
       double square = 0.0;
       for (const glm::vec4& p : picture.pixels) square += (p.x - 1.0) * (p.x - 1.0);
@@ -104,8 +88,8 @@ TEST_P(Trace, AGlowingSlabInEveryMarch) {
   viewer->set_volume(box_volume({64, 64, 8}));
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.0F, 0.5F, 3.0F)});
   viewer->set_camera(test::camera_at({31.5, 31.5, 500.0}, {31.5, 31.5, 0.0}, 0.5));
-  for (const Kind& kind : kinds) {
-    viewer->set_grid(settings_of(kind, -1.0));
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     for (const double sigma : {0.02, 0.1, 2.0}) {
       viewer->set_medium({sigma, vec3(0.0F), {0.0F}, 0, {4.0F, 2.0F, 0.0F}});
       const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
@@ -125,8 +109,8 @@ TEST_P(Trace, AMediumInBalanceIsInvisible) {
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(2.0F, 1.0F, 0.5F)});
   const vec3 albedo(0.2F, 0.7F, 0.99F);
   viewer->set_medium({1.0, albedo, {0.5F}, 0, (1.0F - albedo) * vec3(2.0F, 1.0F, 0.5F)});
-  for (const Kind& kind : {kinds[0], kinds[3]}) {
-    viewer->set_grid(settings_of(kind, 0.02));
+  for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[3]}) {
+    viewer->set_grid(test::settings_of(kind, 0.02));
     const test::Picture picture = test::render(*viewer, {24, 24, 128, 7, render::View::shaded});
     for (int c = 0; c < 3; ++c) {
       const double expected = 2.0 / double(1 << c);
@@ -249,8 +233,8 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
   viewer->set_medium({0.6, vec3(albedo), {0.4F}, 0, {0.2F, 0.1F, 0.05F}});
   viewer->set_light({40.0F, 25.0F, {3.0F, 2.5F, 2.0F}, {0.3F, 0.5F, 0.8F}});
   viewer->set_camera(test::camera_at(eye, target, fovy));
-  for (const Kind& kind : kinds) {
-    viewer->set_grid(settings_of(kind, -1.0));
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     const test::Picture a = test::render(*viewer, {32, 32, 96, 3, render::View::shaded});
     const test::Picture b = test::render(*viewer, {32, 32, 96, 4, render::View::shaded});
     for (int c = 0; c < 3; ++c) {
@@ -282,8 +266,8 @@ TEST_P(Trace, SingleScatteringMatchesQuadrature) {
     const double second = lobe(g) / (1.0 + medium.second_bend * (1.0 + 2.0 * g * g) / 3.0);
     const double phase = (1.0 - medium.second_share) * lobe(medium.anisotropy) + medium.second_share * second;
     const double expected = phase * 5.0 * std::exp(-sigma * 8.0) * (1.0 - std::exp(-sigma * 16.0));
-    for (const Kind& kind : {kinds[0], kinds[2]}) {
-      viewer->set_grid(settings_of(kind, 0.02));
+    for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2]}) {
+      viewer->set_grid(test::settings_of(kind, 0.02));
       const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
       EXPECT_NEAR(picture.mean().x, 0.9 * expected, 0.02 * expected);
       EXPECT_NEAR(picture.mean().y, 0.5 * expected, 0.02 * expected);
@@ -298,8 +282,8 @@ TEST_P(Trace, MarchesAgreeOnConstantCellsAtVoxelResolution) {
   viewer->set_medium({0.4, vec3(0.98F), {0.5F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
   std::array<test::Picture, 4> pictures;
-  for (std::size_t i = 0; i < kinds.size(); ++i) {
-    viewer->set_grid(settings_of(kinds[i], i == 0 ? 0.01 : -1.0));
+  for (std::size_t i = 0; i < test::march_kinds.size(); ++i) {
+    viewer->set_grid(test::settings_of(test::march_kinds[i], i == 0 ? 0.01 : -1.0));
     pictures[i] = test::render(*viewer, {32, 32, 16, 1, render::View::shaded});
   }
   // The same seed takes the same path, but for rounding.
@@ -319,7 +303,7 @@ TEST_P(Trace, PagesChangeNothing) {
   viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(0), 2));
   viewer->set_medium({0.4, vec3(1.0F), {0.0F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
-  const viewer::GridSettings settings = settings_of(kinds[0], 0.01);
+  const viewer::GridSettings settings = test::settings_of(test::march_kinds[0], 0.01);
   viewer->set_grid(settings);
   const test::Image image{24, 24, 8, 1, render::View::shaded};
   const test::Picture whole = test::render(*viewer, image);
@@ -382,9 +366,9 @@ TEST_P(Trace, CameraInsideOnFacesEdgesAndVertices) {
     for (const dvec3& direction : {dvec3(0, 0, -1), dvec3(1, 1, 1), dvec3(0.3, -0.2, 0.9)}) {
       viewer->set_camera(test::camera_at(eye, eye + direction, 60.0));
       const test::Image image{16, 16, 32, 2, render::View::shaded};
-      viewer->set_grid(settings_of(kinds[1], -1.0));
+      viewer->set_grid(test::settings_of(test::march_kinds[1]));
       const test::Picture tet = test::render(*viewer, image);
-      viewer->set_grid(settings_of(kinds[2], -1.0));
+      viewer->set_grid(test::settings_of(test::march_kinds[2]));
       const test::Picture dense = test::render(*viewer, image);
       EXPECT_TRUE(std::isfinite(tet.mean().x));
       EXPECT_NEAR(tet.mean().x, dense.mean().x, 0.02 * dense.mean().x);
@@ -409,8 +393,8 @@ TEST_P(Trace, AnyAffineTransformKeepsWorldDistances) {
   viewer->set_medium({sigma, vec3(0.0F), {0.0F}, 0});
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   viewer->set_camera(test::camera_at(centre + 20.0 * axis, centre, 0.2));
-  for (const Kind& kind : kinds) {
-    viewer->set_grid(settings_of(kind, -1.0));
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
     const test::Picture picture = test::render(*viewer, {16, 16, 64, 1, render::View::shaded});
     EXPECT_NEAR(picture.mean().x, through, 4.0 * std::sqrt(through * (1.0 - through) / (256.0 * 64.0)));
   }
@@ -426,7 +410,7 @@ TEST_P(Trace, ARotatedVolumeSeenByARotatedCameraIsTheSamePicture) {
   viewer->set_medium({0.5, vec3(0.9F), {0.5F}, 0});
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   const test::Image image{32, 32, 8, 1, render::View::shaded};
-  viewer->set_grid(settings_of(kinds[0], 0.02));
+  viewer->set_grid(test::settings_of(test::march_kinds[0], 0.02));
   viewer->set_volume(volume);
   viewer->set_camera(test::camera_at({60, 40, 80}, {15, 13, 17}));
   const test::Picture straight = test::render(*viewer, image);
@@ -448,8 +432,8 @@ TEST_P(Trace, AFewVoxelsAreAVolume) {
     viewer->set_volume(box_volume(ivec3(size)));
     viewer->set_camera(
         test::camera_at(dvec3(0.5 * size - 0.5) + dvec3(0, 0, 100.0 + size), dvec3(0.5 * size - 0.5), 0.1));
-    for (const Kind& kind : kinds) {
-      viewer->set_grid(settings_of(kind, 0.02));
+    for (const test::MarchKind& kind : test::march_kinds) {
+      viewer->set_grid(test::settings_of(kind, 0.02));
       const test::Picture picture = test::render(*viewer, {4, 4, 1, 1, render::View::density});
       for (const glm::vec4& p : picture.pixels) EXPECT_NEAR(p.w, 1.0 - std::exp(-size), 1e-3);
     }
@@ -461,8 +445,8 @@ TEST_P(Trace, DensityViewIsTheOpacity) {
   viewer->set_volume(box_volume({64, 64, 8}));
   viewer->set_medium({0.1, vec3(1.0F), {0.0F}, 0});
   viewer->set_camera(test::camera_at({31.5, 31.5, 500.0}, {31.5, 31.5, 0.0}, 0.5));
-  for (const Kind& kind : kinds) {
-    viewer->set_grid(settings_of(kind, 0.02));
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind, 0.02));
     const test::Picture picture = test::render(*viewer, {8, 8, 1, 1, render::View::density});
     for (const glm::vec4& p : picture.pixels) EXPECT_NEAR(p.w, 1.0 - std::exp(-0.8), 1e-4);
     for (const auto view : {render::View::cells, render::View::steps}) {
@@ -478,7 +462,7 @@ TEST_P(Trace, AdaptsToTheCamera) {
   viewer->set_volume(test::noise_volume({96, 96, 96}, ivec3(0), 1));
   viewer->set_image({64, 64, 1, 0, render::View::shaded});
   viewer->set_camera(test::camera_at({48, 48, 6000}, {48, 48, 48}, 5.0));
-  viewer::GridSettings settings = settings_of(kinds[0], 0.005);
+  viewer::GridSettings settings = test::settings_of(test::march_kinds[0], 0.005);
   viewer->set_grid(settings);
   viewer->build();
   const std::uint64_t everywhere = viewer->viewer().stats().cells;
@@ -512,8 +496,8 @@ TEST_P(Trace, RefusesWhatItCannotDoAndKeepsWhatItHad) {
   empty.brick_values.clear();
   empty.max_value = 0.0F;
   viewer->set_volume(empty);
-  for (const Kind& kind : kinds) {
-    viewer->set_grid(settings_of(kind, 0.05));
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind, 0.05));
     EXPECT_EQ(test::render(*viewer, image).mean().x, 1.0);
   }
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.3F, 0.7F, 1e-3F)});
