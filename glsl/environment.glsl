@@ -53,14 +53,14 @@ CM_FN float cm_tent(float u) { return u < 0.5f ? sqrt(2.0f * u) - 1.0f : 1.0f - 
 CM_FN vec3 cm_environment_radiance(vec3 w) { return cm_surrounding(w).radiance; }
 CM_FN float cm_environment_pdf(CmLightHit hit) { return cm_surrounding(hit.w).density; }
 
-CM_FN CmLightSample cm_environment_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+CM_FN CmLightSample cm_environment_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uvec2 size = cm.environment.size;
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x7f4a7c15u)));
   uint i = cm_below(pick.x, size.x * size.y);
   uvec4 word = cm_environment_word(i);
   if (pick.y > word.x) i = word.y;
-  float x = float(i % size.x) + 0.5f + cm_tent(cm_random(p.random, p.stream));
-  float y = float(i / size.x) + 0.5f + cm_tent(cm_random(p.random, p.stream));
+  float x = float(i % size.x) + 0.5f + cm_tent(u.x);
+  float y = float(i / size.x) + 0.5f + cm_tent(u.y);
   // What is beyond a pole is as what is before it.
   float height = float(size.y);
   y = y < 0.0f ? -y : (y > height ? 2.0f * height - y : y);

@@ -8,7 +8,7 @@
 //
 // A kind is a number and a line of CM_FAR_LIGHTS or CM_NEAR_LIGHTS, which is
 //   its number, its chance, a sample, a density, and, if it is far away, a radiance, with
-//   CmLightSample sample(path, here, u)   here: world, where looks start
+//   CmLightSample sample(path, here, u)   here: world, where looks start; u.xy for a point of the light, u.z for which
 //   float density(hit)                    by solid angle; 0 of kinds without extent, which no flight comes to
 //   vec3 radiance(w)
 #ifndef CM_LIGHT_GLSL
@@ -65,7 +65,7 @@ CM_FN CmLightSample cm_sky_along(vec3 w, float flight) {
   return CmLightSample(CM_LIGHT_SKY, cm_sky_radiance(w), w, 3.0e38f, flight);
 }
 // To be had by cm_sky_along, once it is known where flights might go; the density is the chance alone until then.
-CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   return cm_sky_along(vec3(0.0f, 1.0f, 0.0f), 1.0f);
 }
 
@@ -88,19 +88,18 @@ CM_FN float cm_sun_pdf(CmLightHit hit) {
   return cm_on_sun(hit.w) ? 0.159154943f / cm.lights.sun_spread : 0.0f;
 }
 // Evenly over the disc.
-CM_FN CmLightSample cm_sun_sample(CmPath p) {
+CM_FN CmLightSample cm_sun_sample(vec3 u) {
   CmLightSample light =
       CmLightSample(CM_LIGHT_SUN, cm.lights.sun_irradiance, cm.lights.sun_direction, 3.0e38f, 1.0f);
   if (cm.lights.sun_spread > 0.0f) {
-    uvec3 h = cm_hash3(uvec3(p.random, p.stream, 0x3c6ef372u));
-    float spread = cm.lights.sun_spread * cm_unit_float(h.x);
+    float spread = cm.lights.sun_spread * u.x;
     float sine = sqrt(spread * (2.0f - spread));
-    float angle = 6.28318531f * cm_unit_float(h.y);
-    vec3 u;
-    vec3 v;
-    cm_frame(light.direction, u, v);
+    float angle = 6.28318531f * u.y;
+    vec3 across;
+    vec3 along;
+    cm_frame(light.direction, across, along);
     light.direction =
-        normalize(u * (sine * cos(angle)) + v * (sine * sin(angle)) + light.direction * (1.0f - spread));
+        normalize(across * (sine * cos(angle)) + along * (sine * sin(angle)) + light.direction * (1.0f - spread));
     light.radiance = cm.lights.sun_radiance;
     light.density = 0.159154943f / cm.lights.sun_spread;
   }
@@ -129,11 +128,8 @@ CM_FN float cm_cell_pdf(CmEmission emission) { return cm_glow_pdf_of(emission.me
 #if CM_CELL_LIGHTS
 
 // O(1).
-CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x632be5abu)));
-  float u_a = cm_random(p.random, p.stream);
-  float u_b = cm_random(p.random, p.stream);
-  float u_c = cm_random(p.random, p.stream);
   uint i = cm_below(pick.x, cm.grid.glowing);
   uvec4 entry = cm_glow_word(2u * i);
   if (pick.y > entry.x) {
@@ -144,7 +140,7 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
   uvec4 place = uvec4(entry.z, entry.w, 0u, 0u);
   uint shape = cm_record_shape(place);
   uint cell_class = cm_shape_class(shape);
-  vec3 point = cm_cell_point(cell_class, vec3(u_a, u_b, u_c));
+  vec3 point = cm_cell_point(cell_class, vec3(u.x, u.y, cm_random(p.random, p.stream)));
   // Not from `here`, which is a little above a surface: flights through the medium start at p.o as well.
   vec3 to_v0 = cm_record_v0(place) - p.o;
   vec3 way = cm_to_world(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
@@ -171,15 +167,10 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
 #include "punctual.glsl"
 
 // Each as likely as the others.
-CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uint count = max(cm.lamps.count, 1u);
-  CmLamp lamp = cm_lamp(min(uint(u * float(count)), count - 1u));
-  vec3 from = vec3(0.0f, 0.0f, 0.0f);
-  if (lamp.extended != 0u) {
-    float u_a = cm_random(p.random, p.stream);
-    float u_b = cm_random(p.random, p.stream);
-    from = cm_lamp_point(lamp, u_a, u_b);
-  }
+  CmLamp lamp = cm_lamp(min(uint(u.z * float(count)), count - 1u));
+  vec3 from = lamp.extended != 0u ? cm_lamp_point(lamp, u.x, u.y) : vec3(0.0f, 0.0f, 0.0f);
   CmLightSample light;
   light.kind = CM_LIGHT_LAMP;
   light.radiance = cm_lamp_irradiance(lamp, from, here, light.direction, light.distance);
@@ -217,14 +208,12 @@ CM_FN float cm_triangle_pdf(CmLightHit hit) {
 }
 
 // O(1). The distance is to just before it.
-CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
+CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
-  float u_a = cm_random(p.random, p.stream);
-  float u_b = cm_random(p.random, p.stream);
   uvec4 entry = cm_emitter(cm_below(pick.x, cm.surfaces.emitter_count));
   if (pick.y > entry.y) entry = cm_emitter(entry.z);
-  float root = sqrt(u_a);
-  CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0f - u_b), root * u_b));
+  float root = sqrt(u.x);
+  CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0f - u.y), root * u.y));
   vec3 a = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.x));
   vec3 b = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.y));
   vec3 c = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.z));
@@ -324,22 +313,22 @@ CM_FN float cm_light_pdf(CmLightHit hit) {
   return 0.0f;
 }
 
-#define CM_LOOK(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
-  if (u >= before && u < before + CHANCE) {            \
-    light = SAMPLE(p, here, (u - before) / CHANCE);    \
-    light.density *= CHANCE;                           \
-  }                                                    \
+#define CM_LOOK(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                 \
+  if (u.z >= before && u.z < before + CHANCE) {                        \
+    light = SAMPLE(p, here, vec3(u.x, u.y, (u.z - before) / CHANCE));  \
+    light.density *= CHANCE;                                           \
+  }                                                                    \
   before += CHANCE;
 
-// A look for light: u decides for which kind.
-CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
-  CmLightSample light = cm_sun_sample(p);
+// A look for light: u.z decides for which kind.
+CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
+  CmLightSample light = cm_sun_sample(u);
   float before = 0.0f;
   CM_FAR_LIGHTS(CM_LOOK)
 #if CM_LAMPS
   // Many lights may share the rest: a number with all its bits for them.
-  if (u >= before && cm.lights.triangle_chance + cm.lights.lamp_chance > 0.0f) {
-    u = before + (1.0f - before) * cm_random(p.random, p.stream);
+  if (u.z >= before && cm.lights.triangle_chance + cm.lights.lamp_chance > 0.0f) {
+    u.z = before + (1.0f - before) * cm_random(p.random, p.stream);
   }
 #endif
   CM_NEAR_LIGHTS(CM_LOOK)

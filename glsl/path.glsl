@@ -60,14 +60,12 @@ CM_FN float cm_camera_end(CM_INOUT(CmPath) p, uvec2 at, vec2 within, uint layer,
 // A camera ray for that sample of the pixel.
 CM_FN void cm_camera(CM_INOUT(CmPath) p, uint sample_number, uvec2 at) {
   uint number = at.y * cm.view.size.x + at.x;
-  uvec3 h = cm_hash3(uvec3(number, sample_number, cm.integrator.seed));
-  p.random = h.x;
-  p.stream = h.y | 1u;
-  // A pixel's samples spread evenly over its area and over the first free path: the three-dimensional Kronecker
-  // sequence of Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018, shifted by a random offset a pixel.
-  uvec3 shift = cm_hash3(uvec3(number, 0x5bd1e995u, cm.integrator.seed));
-  uvec3 even = shift + sample_number * uvec3(3518319155u, 2882110345u, 2360945575u);
-  vec2 within = vec2(cm_unit_float(even.x), cm_unit_float(even.y));
+  uvec3 pixel = cm_hash3(uvec3(number, 0x5bd1e995u, cm.integrator.seed));
+  p.random = cm_hash3(uvec3(number, sample_number, cm.integrator.seed)).x;
+  p.stream = pixel.x | 1u;
+  p.number = sample_number;
+  vec2 within = cm_even_pair(sample_number, p.stream, 0u);
+  vec2 along = cm_even_pair(sample_number, p.stream, 1u);
   float t_per_z = cm_camera_ray(at, within, p.o, p.w);
   p.d = cm_to_cube(p.w);
   p.throughput = vec3(1.0f, 1.0f, 1.0f);
@@ -78,14 +76,14 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint sample_number, uvec2 at) {
   p.at_layer = 0u;
   p.light = cm_background_radiance(p.w);
   p.steps = 0u;
-  p.depth_0 = -log(1.0f - cm_unit_float(even.z));
+  p.depth_0 = cm_free_depth(along.x);
   p.depth = p.depth_0;
   p.ray = CM_RAY_FLIGHT;
   p.found = CM_FOUND_NOT_ASKED;
   p.start = CM_AT_CAMERA;
   // Samples go through the layers in turn, each pixel from one of its own.
-  uint layer = (shift.x >> 16) + sample_number;
-  p.reach = t_per_z * cm_camera_end(p, at, within, layer, cm_unit_float(h.z));
+  uint layer = (pixel.y >> 16) + sample_number;
+  p.reach = t_per_z * cm_camera_end(p, at, within, layer, along.y);
   float ground = cm_ground_distance(p.o, p.d);
   p.to_ground = ground < min(p.reach, CM_NO_GROUND) ? 1u : 0u;
   if (p.to_ground != 0u) p.at_layer = 0u;
@@ -143,22 +141,19 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
 struct CmLook {
   bool looks;  // else light is where flights might find the sky
   CmLightSample light;
-  float u_0;  // for the direction of a flight
-  float u_1;
+  CmDraw draw;
 };
 
 CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   CmLook look;
-  look.u_0 = cm_random(p.random, p.stream);
-  look.u_1 = cm_random(p.random, p.stream);
-  float u_2 = cm_random(p.random, p.stream);
-  // What a flight to the ground has left of its depth is as random as a new one, and a pixel's first ones are even: so
-  // are then its looks for the sun and for the sky.
-  if (p.start == CM_ON_GROUND && arrived) u_2 = 1.0f - exp(-max(0.0f, p.depth));
   look.looks = arrived && cm.lights.any != 0u;
+  look.draw = cm_draw(p, look.looks);
   vec3 here = cm_look_from(p, vertex);
-  look.light = cm_sky_sample(p, here, u_2);
-  if (look.looks) look.light = cm_light_sample(p, here, u_2);
+  vec3 u = vec3(look.draw.turn.x, look.draw.turn.y, look.draw.choice);
+  look.light = cm_sky_sample(p, here, u);
+  if (look.looks) look.light = cm_light_sample(p, here, u);
+  // Of the choices of the sky each is as likely: for a lobe.
+  if (look.looks && look.light.kind == CM_LIGHT_SKY) look.draw.choice = min(1.0f, u.z / cm.lights.sky_chance);
   if (look.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) look.light.radiance = vec3(0.0f, 0.0f, 0.0f);
   return look;
 }
@@ -167,7 +162,7 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
 CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   bool looks = look.looks;
   CmLightSample light = look.light;
-  vec3 w = cm_turn_direction(p, vertex, look.u_0, look.u_1);
+  vec3 w = cm_turn_direction(p, vertex, look.draw);
   bool along = light.kind == CM_LIGHT_SKY;
   CmTurn turn = cm_turn(p, vertex, along ? w : light.direction);
   if (along) light = cm_sky_along(w, light.density * turn.density);
@@ -187,7 +182,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   p.d = cm_to_cube(light.direction);
   p.ray = looks ? CM_RAY_TO_LIGHT : CM_RAY_FLIGHT;
   p.found = CM_FOUND_NOT_ASKED;
-  p.depth_0 = cm_random_depth(p.random, p.stream) + (looks ? CM_SHADOW_DEPTH : 0.0f);
+  p.depth_0 = cm_free_depth(look.draw.way) + (looks ? CM_SHADOW_DEPTH : 0.0f);
   p.depth = p.depth_0;
   float ground = cm_ground_distance(p.o, p.d);
   p.to_ground = !looks && ground < light.distance ? 1u : 0u;

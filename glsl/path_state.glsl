@@ -45,6 +45,7 @@
 //   radiance        without what is behind all
 //   bounces         events of the path
 //   steps           cells marched
+//   number          the sample's, of its pixel
 // CM_PATH_FLIGHT, what goes on to the next ray:
 //   w               world direction of flight, kept during shadow rays
 //   throughput      of the path
@@ -52,7 +53,7 @@
 //                   is behind all
 //   density         of a flight: by solid angle, with which it took its direction; of a shadow ray to what flights may
 //                   come to by escaping: the flights' density there over the look's own; else 0
-//   random, stream  of its random numbers
+//   random, stream  of its random numbers; stream is the pixel's
 // CM_PATH_ENDS, what is known of the ray's ends:
 //   triangle, weights     that o is on, of its second and third vertex
 //   stage, event, ray, start, found     as above
@@ -67,7 +68,7 @@
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
-#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps)
+#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number)
 #define CM_PATH_FLIGHT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
   VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(light) FLOAT(density)
 #define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \

@@ -6,6 +6,33 @@
 // Next-event transmittance below e^-2 is estimated by Russian roulette: an opaque way out costs no more than it tells.
 #define CM_SHADOW_DEPTH 2.0f
 
+// Events of a path whose rays take numbers that are even over the pixel's samples: later ones gain next to nothing.
+#define CM_EVEN_EVENTS 4u
+
+// The numbers that a ray from an event takes.
+struct CmDraw {
+  vec2 turn;     // for its direction, or a point of the light that it looks for
+  float choice;  // of a lobe, or of that light
+  float way;     // for its free path
+};
+
+CM_FN CmDraw cm_draw(CM_INOUT(CmPath) p, bool looks) {
+  CmDraw draw;
+  if (p.bounces <= CM_EVEN_EVENTS) {
+    uint set = 4u * p.bounces + (looks ? 0u : 2u);
+    draw.turn = cm_even_pair(p.number, p.stream, set);
+    vec2 second = cm_even_pair(p.number, p.stream, set + 1u);
+    draw.choice = second.x;
+    draw.way = second.y;
+  } else {
+    draw.turn.x = cm_random(p.random, p.stream);
+    draw.turn.y = cm_random(p.random, p.stream);
+    draw.choice = cm_random(p.random, p.stream);
+    draw.way = cm_random(p.random, p.stream);
+  }
+  return draw;
+}
+
 // What a path does with light along a direction from a vertex.
 struct CmTurn {
   vec3 share;          // of light that goes on: the phase function, or the BSDF times the cosine
@@ -168,9 +195,11 @@ CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) {
 }
 
 // A direction that a flight might take. Some that leave a triangle are aimed at the glowing medium.
-CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
+CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
+  float u_0 = draw.turn.x;
+  float u_1 = draw.turn.y;
   if (!vertex.on_triangle) return cm_scattered_direction(p, u_0, u_1);
-  float u_3 = cm_random(p.random, p.stream);
+  float u_3 = draw.choice;
   float to_glow = cm.lights.glow_chance;
   bool aimed = u_3 < to_glow;
   u_3 = aimed ? u_3 / to_glow : (u_3 - to_glow) / (1.0f - to_glow);
@@ -218,8 +247,8 @@ CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }
 CM_FN bool cm_blurs(CmTurn turn) { return false; }
 CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }
 
-CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, float u_0, float u_1) {
-  return cm_scattered_direction(p, u_0, u_1);
+CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
+  return cm_scattered_direction(p, draw.turn.x, draw.turn.y);
 }
 
 CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {

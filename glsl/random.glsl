@@ -1,4 +1,4 @@
-// Random numbers: a PCG stream a path. Shared by GLSL and C++.
+// Random numbers: a PCG stream a path, and sets that are even over a pixel's samples. Shared by GLSL and C++.
 #ifndef CM_RANDOM_GLSL
 #define CM_RANDOM_GLSL
 
@@ -34,7 +34,35 @@ CM_FN float cm_random(CM_INOUT(uint) state, uint stream) {
   return cm_unit_float(word);
 }
 
-// Free path in optical depth: -ln(1 - u), u in [0, 1).
-CM_FN float cm_random_depth(CM_INOUT(uint) state, uint stream) { return -log(1.0f - cm_random(state, stream)); }
+// Laine and Karras' hash with Vegdahl's constants: Owen's scramble of a number whose digits after the point begin with
+// the lowest bit.
+CM_FN uint cm_owen_scramble(uint digits, uint seed) {
+  digits ^= digits * 0x3d20adeau;
+  digits += seed;
+  digits *= (seed >> 16) | 1u;
+  digits ^= digits * 0x05526c56u;
+  digits ^= digits * 0x53a22864u;
+  return digits;
+}
+
+// The pair that sample `number` of a pixel has of a set: Sobol's (0,2)-sequence, scrambled, and in an order scrambled so
+// that any first 2^k of it are even, each set of each pixel by itself (Burley, "Practical Hash-based Owen Scrambling",
+// JCGT 9(4), 2020). In [0, 1), 24 bits.
+CM_FN vec2 cm_even_pair(uint number, uint pixel, uint set) {
+  uvec3 seed = cm_hash3(uvec3(pixel, set, 0x2545f491u));
+  uint first = bitfieldReverse(cm_owen_scramble(bitfieldReverse(number), seed.x));
+  // Times Pascal's triangle modulo 2.
+  uint second = first;
+  second ^= (second >> 1) & 0x55555555u;
+  second ^= (second >> 2) & 0x33333333u;
+  second ^= (second >> 4) & 0x0f0f0f0fu;
+  second ^= (second >> 8) & 0x00ff00ffu;
+  second ^= second >> 16;
+  return vec2(cm_unit_float(bitfieldReverse(cm_owen_scramble(first, seed.y))),
+              cm_unit_float(bitfieldReverse(cm_owen_scramble(second, seed.z))));
+}
+
+// Free path in optical depth of u in [0, 1).
+CM_FN float cm_free_depth(float u) { return -log(1.0f - u); }
 
 #endif

@@ -42,7 +42,7 @@ struct Cost {
 
 constexpr double noisiest = 0.005;  // part of the pixels: single paths that found a small light by chance
 
-double luminance(const Run& run, std::size_t pixel) {
+double luminance_of(const Run& run, std::size_t pixel) {
   const float* rgba = &run.rgba[4 * pixel];
   return luminance(glm::dvec3(rgba[0], rgba[1], rgba[2]));
 }
@@ -75,7 +75,7 @@ Cost cost_of(const Row& row, const std::vector<std::size_t>& pixels, std::uint32
     std::vector<double> values;
     std::array<double, 2> half{};
     for (std::size_t k = 0; k < row.runs.size(); ++k) {
-      values.push_back(luminance(row.runs[k], pixel));
+      values.push_back(luminance_of(row.runs[k], pixel));
       half[k % 2] += values.back();
     }
     const double mean = mean_of(values);

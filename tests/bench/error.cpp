@@ -11,7 +11,7 @@ namespace {
 
 std::uint32_t seed_of(std::size_t part) { return static_cast<std::uint32_t>(101 * (part + 1)); }
 
-std::vector<float> luminance(const std::vector<float>& rgba) {
+std::vector<float> luminances(const std::vector<float>& rgba) {
   std::vector<float> result(rgba.size() / 4);
   for (std::size_t i = 0; i < result.size(); ++i) {
     result[i] = luminance(glm::vec3(rgba[4 * i], rgba[4 * i + 1], rgba[4 * i + 2]));
@@ -25,7 +25,7 @@ ImageReference::ImageReference(Subject& voxels, std::uint32_t samples, std::uint
   std::vector<float> alpha;
   for (std::uint32_t part = 0; part < parts; ++part) {
     const Run run = voxels.shaded(samples, seed_of(part));
-    parts_.push_back(luminance(run.rgba));
+    parts_.push_back(luminances(run.rgba));
     alpha.resize(parts_[0].size());
     for (std::size_t i = 0; i < alpha.size(); ++i) alpha[i] += run.rgba[4 * i + 3];
   }
@@ -44,7 +44,7 @@ ImageError ImageReference::error_of(Subject& subject) const {
   std::vector<double> differences(parts_[0].size());
   std::vector<double> squares(parts_[0].size());
   for (std::size_t part = 0; part < parts_.size(); ++part) {
-    const std::vector<float> other = luminance(subject.shaded(samples_, seed_of(part)).rgba);
+    const std::vector<float> other = luminances(subject.shaded(samples_, seed_of(part)).rgba);
     for (std::size_t i = 0; i < other.size(); ++i) {
       const double difference = double{other[i]} - parts_[part][i];
       differences[i] += difference;

@@ -134,7 +134,9 @@ TEST(Environment, TheDensityOfLooksIntegratesToOneAndIsThatOfWhatIsDrawn) {
   p.stream = 3;
   double mean = 0.0;
   for (int i = 0; i < draws; ++i) {
-    const auto sample = cpu.cm_environment_sample(p, vec3(0.0F), 0.5F);
+    const float u_0 = cpu.cm_random(p.random, p.stream);
+    const float u_1 = cpu.cm_random(p.random, p.stream);
+    const auto sample = cpu.cm_environment_sample(p, vec3(0.0F), vec3(u_0, u_1, 0.5F));
     EXPECT_NEAR(glm::length(sample.direction), 1.0F, 1e-4F);
     double azimuth = std::atan2(double(sample.direction.x), double(sample.direction.z)) / (2.0 * pi);
     if (azimuth < 0.0) azimuth += 1.0;

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "base/shared_code.hpp"
 #include "scene/phase.hpp"
@@ -147,9 +149,8 @@ TEST(Random, NeighbouringPixelsAndSamplesAreIndependent) {
     double serial = 0.0;
     float last = 0.5F;
     for (uint i = 0; i < n; ++i) {
-      const uvec3 h = cm_hash3(samples ? uvec3(5, i, 1) : uvec3(i, 5, 1));
-      uint state = h.x;
-      const float u = cm_random(state, h.y | 1U);
+      uint state = cm_hash3(samples ? uvec3(5, i, 1) : uvec3(i, 5, 1)).x;
+      const float u = cm_random(state, cm_hash3(samples ? uvec3(5, 7, 1) : uvec3(i, 7, 1)).x | 1U);
       sum += u;
       serial += (u - 0.5) * (last - 0.5);
       last = u;
@@ -165,7 +166,7 @@ TEST(Random, DepthIsExponential) {
   double sum = 0.0;
   double square = 0.0;
   for (int i = 0; i < n; ++i) {
-    const double depth = cm_random_depth(state, 3);
+    const double depth = cm_free_depth(cm_random(state, 3));
     ASSERT_GE(depth, 0.0);
     sum += depth;
     square += depth * depth;
@@ -175,3 +176,60 @@ TEST(Random, DepthIsExponential) {
 }
 
 }  // namespace
+
+// Each box of a 2^k-th of the unit square, of whatever shape, has one of any 2^k numbers that begin at a multiple of
+// it.
+TEST(EvenPair, AreEvenWhereverTheyBegin) {
+  for (const uint pixel : {1U, 77U, 0x9e3779b9U}) {
+    for (const uint set : {0U, 1U, 6U}) {
+      for (int k = 0; k <= 8; ++k) {
+        const uint count = 1U << k;
+        for (const uint from : {0U, count, 5U * count, 65536U}) {
+          for (int across = 0; across <= k; ++across) {
+            std::vector<int> found(count);
+            for (uint i = 0; i < count; ++i) {
+              const vec2 u = cm_even_pair(from + i, pixel, set);
+              const uint column = static_cast<uint>(u.x * static_cast<float>(1U << across));
+              const uint row = static_cast<uint>(u.y * static_cast<float>(1U << (k - across)));
+              ++found.at((row << across) + column);
+            }
+            ASSERT_TRUE(std::ranges::all_of(found, [](int n) { return n == 1; })) << count << " from " << from;
+          }
+        }
+      }
+    }
+  }
+}
+
+// As random as any numbers over pixels, and one set's tell nothing of another's.
+TEST(EvenPair, AreUniformOverPixelsAndIndependentOverSets) {
+  const uint n = 1U << 18;
+  for (const uint number : {0U, 1U, 6U, 1000U}) {
+    dvec2 sum(0.0);
+    dvec2 square(0.0);
+    double within = 0.0;
+    dvec2 between(0.0);
+    double serial = 0.0;
+    vec2 last(0.5F);
+    for (uint pixel = 0; pixel < n; ++pixel) {
+      const uint stream = cm_hash3(uvec3(pixel, 0x5bd1e995U, 1)).x | 1U;
+      const vec2 a = cm_even_pair(number, stream, 4);
+      const vec2 b = cm_even_pair(number, stream, 5);
+      ASSERT_TRUE(all(greaterThanEqual(a, vec2(0.0F))) && all(lessThan(a, vec2(1.0F))));
+      sum += a;
+      square += dvec2(a) * dvec2(a);
+      within += (a.x - 0.5) * (a.y - 0.5);
+      between += dvec2((a.x - 0.5) * (b.x - 0.5), (a.y - 0.5) * (b.x - 0.5));
+      serial += (a.x - 0.5) * (last.x - 0.5);
+      last = a;
+    }
+    const double noise = std::sqrt(1.0 / double(n));
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_NEAR(sum[i] / n, 0.5, 4.0 * noise / std::sqrt(12.0));
+      EXPECT_NEAR(square[i] / n, 1.0 / 3.0, 4.0 * noise * std::sqrt(4.0 / 45.0));
+      EXPECT_NEAR(between[i] / n, 0.0, 4.0 / 12.0 * noise);
+    }
+    EXPECT_NEAR(within / n, 0.0, 4.0 / 12.0 * noise);
+    EXPECT_NEAR(serial / n, 0.0, 4.0 / 12.0 * noise);
+  }
+}

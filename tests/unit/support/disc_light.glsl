@@ -12,9 +12,9 @@ CM_FN float cm_disc_pdf(CmLightHit hit) {
   return dot(hit.w, cm_disc_to) > cm_disc_cosine ? 1.0f / (6.28318531f * (1.0f - cm_disc_cosine)) : 0.0f;
 }
 
-CM_FN CmLightSample cm_disc_sample(CM_INOUT(CmPath) p, vec3 here, float u) {
-  float cosine = 1.0f - u * (1.0f - cm_disc_cosine);
-  vec3 w = cm_around(cm_disc_to, cosine, 6.28318531f * cm_random(p.random, p.stream));
+CM_FN CmLightSample cm_disc_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
+  float cosine = 1.0f - u.x * (1.0f - cm_disc_cosine);
+  vec3 w = cm_around(cm_disc_to, cosine, 6.28318531f * u.y);
   return CmLightSample(CM_LIGHT_OTHER, cm_disc_radiance_in, w, 3.0e38f,
                        1.0f / (6.28318531f * (1.0f - cm_disc_cosine)));
 }
