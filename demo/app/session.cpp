@@ -15,6 +15,7 @@
 
 #include "aovs.hpp"
 #include "history.hpp"
+#include "metadata.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -580,7 +581,8 @@ void Session::write_exr(const std::string& path) {
   constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
                             CUMULET_AOV_NORMAL, CUMULET_AOV_ALBEDO};
   const bool shaded = scene_.sampling.view == CUMULET_VIEW_SHADED;
-  demo::write_exr(viewer_.get(), path, width, height, {rgba}, std::span(aovs).first(shaded ? aovs.size() : 0));
+  demo::write_exr(viewer_.get(), path, width, height, {rgba}, std::span(aovs).first(shaded ? aovs.size() : 0),
+                  metadata_of(viewer_.get(), scene_, width, height));
 }
 
 image::Image Session::read_display() {

@@ -1,10 +1,15 @@
 #include <ImfChannelList.h>
+#include <ImfDoubleAttribute.h>
+#include <ImfFloatAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
+#include <ImfMatrixAttribute.h>
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+#include <ImfVecAttribute.h>
 
 #include <array>
 #include <cstring>
@@ -45,6 +50,29 @@ std::string full_name(const LayerName& layer, std::size_t channel) {
   return name += layer.channels[channel];
 }
 
+void insert(Imf::Header& header, const Attribute& attribute) {
+  constexpr std::size_t longest = 31;
+  if (attribute.name.empty() || attribute.name.size() > longest)
+    throw std::logic_error("an attribute cannot be called \"" + attribute.name + "\"");
+  struct Insert {
+    Imf::Header& header;
+    const std::string& name;
+    void operator()(const std::string& text) const { header.insert(name, Imf::StringAttribute(text)); }
+    void operator()(float number) const { header.insert(name, Imf::FloatAttribute(number)); }
+    void operator()(double number) const { header.insert(name, Imf::DoubleAttribute(number)); }
+    void operator()(const std::array<float, 2>& v) const { header.insert(name, Imf::V2fAttribute({v[0], v[1]})); }
+    void operator()(const std::array<double, 3>& v) const {
+      header.insert(name, Imf::V3dAttribute({v[0], v[1], v[2]}));
+    }
+    void operator()(const std::array<float, 16>& m) const {
+      Imath::M44f matrix;
+      std::memcpy(matrix.x, m.data(), sizeof matrix.x);
+      header.insert(name, Imf::M44fAttribute(matrix));
+    }
+  };
+  std::visit(Insert{header, attribute.name}, attribute.value);
+}
+
 /// fill: what stands for a channel that the file lacks, one each; none: it is an error.
 Pixels read_layer(const std::string& path, const LayerName& layer, std::span<const float> fill) {
   static_cast<void>(read_file(path));  // the system's own cause for a file that cannot be opened
@@ -80,11 +108,13 @@ Pixels read_layer(const std::string& path, const LayerName& layer, std::span<con
 
 }  // namespace
 
-void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers) {
+void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers,
+               std::span<const Attribute> attributes) {
   check_size(path, width, height);
   Imf::Header header(static_cast<int>(width), static_cast<int>(height));
   header.compression() = Imf::ZIP_COMPRESSION;
   Imf::addChromaticities(header, Imf::Chromaticities());  // the default is Rec. 709
+  for (const Attribute& attribute : attributes) insert(header, attribute);
   Imf::FrameBuffer frame;
   for (const Layer& layer : layers) {
     const std::size_t channels = layer.name.channels.size();

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 namespace cumulet::image {
@@ -36,10 +38,18 @@ struct Layer {
   std::span<const float> values;
 };
 
+/// What a file says of its picture beside the pixels. Matrices are as OpenEXR has them: a row vector from the left, 16
+/// numbers row by row, which are OpenGL's column by column.
+struct Attribute {
+  std::string name;  // up to 31 bytes, so that readers of OpenEXR 1 take the file
+  std::variant<std::string, float, double, std::array<float, 2>, std::array<double, 3>, std::array<float, 16>> value;
+};
+
 /// OpenEXR, one part, scanlines, ZIP, 32-bit float channels with the layers' values untouched; Rec. 709 primaries.
-/// Replaces the file and throws as write_exr(path, image) does; std::logic_error for values that do not match the size
-/// and for two channels of one name.
-void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers);
+/// Replaces the file and throws as write_exr(path, image) does; std::logic_error for values that do not match the size,
+/// for two channels of one name and for a name that no attribute may have.
+void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers,
+               std::span<const Attribute> attributes = {});
 
 /// A layer read back.
 struct Pixels {

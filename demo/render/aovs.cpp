@@ -27,7 +27,8 @@ image::LayerName layer_of(cumulet_aov aov) {
 }
 
 void write_exr(cumulet_viewer* viewer, const std::string& path, std::uint32_t width, std::uint32_t height,
-               const WrittenPicture& picture, std::span<const cumulet_aov> aovs) {
+               const WrittenPicture& picture, std::span<const cumulet_aov> aovs,
+               std::span<const image::Attribute> attributes) {
   std::vector<std::vector<float>> values;
   std::vector<image::Layer> layers{{image::layers::beauty, picture.beauty}};
   if (!picture.denoised.empty()) layers.push_back({image::layers::denoised, picture.denoised});
@@ -43,7 +44,7 @@ void write_exr(cumulet_viewer* viewer, const std::string& path, std::uint32_t wi
     }
     layers.push_back({name, pixels});
   }
-  image::write_exr(path, width, height, layers);
+  image::write_exr(path, width, height, layers, attributes);
 }
 
 }  // namespace cumulet::demo

@@ -23,6 +23,7 @@
 #include "denoised.hpp"
 #include "info.hpp"
 #include "memory.hpp"
+#include "metadata.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 
@@ -104,18 +105,6 @@ Backend backend_of(cumulet::demo::BackendChoice choice) {
       break;
   }
   return Backend::automatic;
-}
-
-const char* march_name(cumulet_march march) {
-  switch (march) {
-    case CUMULET_MARCH_DENSE:
-      return "dense";
-    case CUMULET_MARCH_BRICK:
-      return "brick";
-    case CUMULET_MARCH_TET:
-      break;
-  }
-  return "tet";
 }
 
 void check_not_interrupted() {
@@ -264,7 +253,8 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const std
   check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
   if (options.format == OutputFormat::exr) {
     cumulet::demo::write_exr(viewer.get(), options.output, image.width, image.height, {image.rgba, denoised},
-                             options.aovs);
+                             options.aovs,
+                             cumulet::demo::metadata_of(viewer.get(), options.scene, image.width, image.height));
   } else {
     cumulet::image::write_pfm(options.output, image);
   }
@@ -307,7 +297,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
     json["peak_rss_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
   json["gl"] = {{"vendor", stats.gl_vendor}, {"renderer", stats.gl_renderer}, {"version", stats.gl_version}};
   json["backend"] = backend;
-  json["march"] = march_name(options.scene.grid.march);
+  json["march"] = cumulet::demo::march_name(options.scene.grid.march);
   if (tet) json["cells_mode"] = options.scene.grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
   // A driver's name may be in any encoding: what is not UTF-8 is replaced, not thrown at.
   cumulet::image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");

@@ -678,4 +678,26 @@ bool same_scene(const SceneOptions& a, const SceneOptions& b) {
   return all(a) == all(b);
 }
 
+std::string scene_hash(const SceneOptions& scene) {
+  SceneOptions shown = scene;
+  shown.sampling.samples = 0;
+  shown.sampling.seed = 0;
+  const auto named = [](const std::string& file) {
+    if (file.empty()) return file;
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(file, error);
+    std::string name = fs::path(file).filename().string();
+    if (!error) name.append(1, ' ').append(std::to_string(size));
+    return name;
+  };
+  const std::string text =
+      to_json(shown, named(scene.volume), named(scene.surfaces), named(scene.environment), SceneFormat::second)
+          .dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  std::array<char, 17> digits{};
+  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(hash));
+  return digits.data();
+}
+
 }  // namespace cumulet::demo

@@ -1,10 +1,14 @@
 #include <ImfChannelList.h>
+#include <ImfDoubleAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
+#include <ImfVecAttribute.h>
+#include <ImfVersion.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <array>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -144,6 +148,36 @@ TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
   file.setFrameBuffer(frame);
   file.readPixels(0, static_cast<int>(Rendered::height) - 1);
   for (std::size_t i = 0; i < z.size(); ++i) EXPECT_EQ(z[i], rendered.values[5][3 * i + 2]) << i;
+}
+
+TEST_F(ImageIo, ExrAttributesAreWhatOpenExrReads) {
+  const std::vector<float> one(6);
+  const Layer depth{layers::depth, one};
+  std::array<float, 16> matrix{};
+  for (std::size_t i = 0; i < 16; ++i) matrix[i] = static_cast<float>(i);
+  const Attribute all[] = {{"comments", std::string("a cloud")},
+                           {"worldToCamera", matrix},
+                           {"screenWindowCenter", std::array{0.25f, -0.5f}},
+                           {"screenWindowWidth", 2.5f},
+                           {"cumulet:seed", 4294967295.0},
+                           {"cumulet:eye", std::array{0.1, 0.2, 1e10}}};
+  write_exr(path("a.exr"), 3, 2, {&depth, 1}, all);
+  const Imf::InputFile file(path("a.exr").c_str());
+  const Imf::Header& header = file.header();
+  ASSERT_TRUE(Imf::hasComments(header));
+  EXPECT_EQ(Imf::comments(header), "a cloud");
+  ASSERT_TRUE(Imf::hasWorldToCamera(header));
+  EXPECT_EQ(Imf::worldToCamera(header)[3][1], 13.0f);
+  EXPECT_EQ(header.screenWindowCenter(), Imath::V2f(0.25f, -0.5f));
+  EXPECT_EQ(header.screenWindowWidth(), 2.5f);
+  EXPECT_EQ(header.typedAttribute<Imf::DoubleAttribute>("cumulet:seed").value(), 4294967295.0);
+  EXPECT_EQ(header.typedAttribute<Imf::V3dAttribute>("cumulet:eye").value(), Imath::V3d(0.1, 0.2, 1e10));
+  EXPECT_EQ(file.version() & Imf::LONG_NAMES_FLAG, 0);
+  for (const std::string& name : {std::string(), std::string(32, 'n')}) {
+    const Attribute bad{name, 1.0f};
+    EXPECT_THROW(write_exr(path("b.exr"), 3, 2, {&depth, 1}, {&bad, 1}), std::logic_error);
+  }
+  EXPECT_EQ(count(), 1u);
 }
 
 TEST_F(ImageIo, ExrLayersReportWhatIsWrong) {

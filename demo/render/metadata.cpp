@@ -1,0 +1,118 @@
+#include "metadata.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <settings.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace cumulet::demo {
+
+namespace {
+
+using Matrix = std::array<double, 16>;  // column by column, as OpenGL has it
+
+struct Release {
+  void operator()(cumulet_camera* camera) const { cumulet_camera_release(camera); }
+};
+
+void check(cumulet_viewer* viewer, cumulet_status status) {
+  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+}
+
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix result{};
+  for (std::size_t column = 0; column < 4; ++column) {
+    for (std::size_t row = 0; row < 4; ++row) {
+      for (std::size_t k = 0; k < 4; ++k) result[4 * column + row] += a[4 * k + row] * b[4 * column + k];
+    }
+  }
+  return result;
+}
+
+std::array<float, 16> floats(const Matrix& matrix) {
+  std::array<float, 16> result{};
+  std::ranges::transform(matrix, result.begin(), [](double x) { return static_cast<float>(x); });
+  return result;
+}
+
+std::array<double, 3> three(const double v[3]) { return {v[0], v[1], v[2]}; }
+
+std::string version_text() {
+  const std::uint32_t version = cumulet_version();
+  return std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
+         std::to_string(version % 100);
+}
+
+}  // namespace
+
+const char* march_name(cumulet_march march) {
+  const auto* const found =
+      std::ranges::find(settings::march_choices, static_cast<int>(march), &settings::Choice::value);
+  return found == settings::march_choices.end() ? "" : found->name;
+}
+
+std::vector<image::Attribute> camera_metadata(const double view[16], const double projection[16]) {
+  Matrix eye{};
+  std::copy_n(view, 16, eye.begin());
+  Matrix clip{};
+  std::copy_n(projection, 16, clip.begin());
+  // OpenEXR's camera looks along +z, and its picture begins at the upper left.
+  constexpr Matrix forward{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1};
+  constexpr Matrix window{0.5, 0, 0, 0, 0, -0.5, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1};
+  std::vector<image::Attribute> attributes{{"worldToCamera", floats(product(forward, eye))},
+                                           {"worldToNDC", floats(product(window, product(clip, eye)))}};
+  if (clip[15] == 0.0) {
+    // Of the picture a unit before the eye.
+    attributes.push_back({"screenWindowWidth", static_cast<float>(2.0 / clip[0])});
+    attributes.push_back({"screenWindowCenter",
+                          std::array{static_cast<float>(clip[8] / clip[0]), static_cast<float>(clip[9] / clip[5])}});
+  }
+  return attributes;
+}
+
+std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOptions& scene, std::uint32_t width,
+                                          std::uint32_t height) {
+  cumulet_camera* made = nullptr;
+  check(viewer, cumulet_get_camera(viewer, &made));
+  const std::unique_ptr<cumulet_camera, Release> camera(made);
+  Matrix view{};
+  Matrix projection{};
+  check(viewer, cumulet_camera_get_matrices(camera.get(), double(width) / height, CUMULET_CLIP_NEGATIVE_ONE_TO_ONE,
+                                            view.data(), projection.data()));
+  cumulet_camera_desc stands{};
+  stands.struct_size = sizeof stands;
+  check(viewer, cumulet_camera_get(camera.get(), &stands));
+  double noise = 0.0;
+  const bool shaded = scene.sampling.view == CUMULET_VIEW_SHADED;
+  if (shaded) check(viewer, cumulet_measure_noise(viewer, &noise));
+  cumulet_stats stats{};
+  stats.struct_size = sizeof stats;
+  check(viewer, cumulet_get_stats(viewer, &stats));
+  const double samples = static_cast<double>(stats.samples) / (double(width) * height);
+
+  std::vector<image::Attribute> attributes = camera_metadata(view.data(), projection.data());
+  std::array<char, 96> comments{};
+  std::snprintf(comments.data(), comments.size(), "Cumulet %s, %g samples a pixel", version_text().c_str(), samples);
+  attributes.push_back({"comments", std::string(comments.data())});
+  attributes.push_back({"cumulet:version", version_text()});
+  attributes.push_back({"cumulet:scene", scene_hash(scene)});
+  attributes.push_back({"cumulet:march", std::string(march_name(scene.grid.march))});
+  attributes.push_back({"cumulet:samples", samples});
+  attributes.push_back({"cumulet:seed", double(scene.sampling.seed)});
+  if (shaded) attributes.push_back({"cumulet:noise", noise});
+  attributes.push_back({"cumulet:eye", three(stands.eye)});
+  attributes.push_back({"cumulet:target", three(stands.target)});
+  attributes.push_back({"cumulet:up", three(stands.up)});
+  if (stands.orthographic_height > 0.0) {
+    attributes.push_back({"cumulet:orthographic_height", stands.orthographic_height});
+  } else {
+    attributes.push_back({"cumulet:fovy_degrees", stands.fovy_degrees});
+  }
+  return attributes;
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,203 @@
+// What a picture's OpenEXR file says of it, as OpenEXR's own library reads it.
+
+#include <ImfArray.h>
+#include <ImfDoubleAttribute.h>
+#include <ImfFrameBuffer.h>
+#include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+#include <ImfVecAttribute.h>
+#include <cumulet/cumulet.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "aovs.hpp"
+#include "headless.hpp"
+#include "metadata.hpp"
+#include "support/folder.hpp"
+
+namespace {
+
+using cumulet::demo::SceneOptions;
+using cumulet::headless::Backend;
+using cumulet::headless::Context;
+
+constexpr std::uint32_t width = 96;
+constexpr std::uint32_t height = 64;
+// Where the only voxel is.
+constexpr std::array<double, 3> place{3.0, -1.0, 2.0};
+
+struct Destroy {
+  void operator()(cumulet_viewer* viewer) const { cumulet_destroy(viewer); }
+};
+
+class Exr : public testing::TestWithParam<Backend> {
+ protected:
+  Exr() : context_(Context::create(GetParam())) {
+    cumulet_create_desc desc{};
+    desc.struct_size = sizeof desc;
+    desc.get_proc = Context::get_proc;
+    desc.get_proc_user = &context_;
+    cumulet_viewer* viewer = nullptr;
+    std::array<char, 1024> error{};
+    EXPECT_EQ(cumulet_create(&desc, &viewer, error.data(), error.size()), CUMULET_OK) << error.data();
+    viewer_.reset(viewer);
+    const float value = 1.0F;
+    cumulet_dense_desc dense{};
+    dense.struct_size = sizeof dense;
+    dense.values = &value;
+    dense.value_count = 1;
+    dense.size[0] = dense.size[1] = dense.size[2] = 1;
+    const std::array<double, 16> to_world{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, place[0], place[1], place[2], 1};
+    std::copy(to_world.begin(), to_world.end(), dense.index_to_world);
+    cumulet_volume* volume = nullptr;
+    EXPECT_EQ(cumulet_volume_from_dense(&dense, &volume, error.data(), error.size()), CUMULET_OK) << error.data();
+    EXPECT_EQ(cumulet_set_volume(viewer, volume), CUMULET_OK);
+    cumulet_volume_release(volume);
+    scene_.camera.eye[0] = 1.0;
+    scene_.camera.eye[2] = 14.0;
+    scene_.camera.target[0] = 2.0;
+    scene_.camera.up[0] = 0.6;
+    scene_.camera.up[1] = 0.8;
+    scene_.camera.fovy_degrees = 35.0;
+    scene_.medium.density_scale = 8.0;
+    scene_.light.sky_radiance[0] = scene_.light.sky_radiance[1] = 1.0F;
+    scene_.sampling.samples = 4;
+    scene_.sampling.seed = 3000000000U;
+    scene_.sampling.preview = CUMULET_PREVIEW_OFF;
+  }
+
+  void render() {
+    cumulet_camera* camera = nullptr;
+    ASSERT_EQ(cumulet_get_camera(viewer_.get(), &camera), CUMULET_OK);
+    ASSERT_EQ(cumulet_camera_set(camera, &scene_.camera), CUMULET_OK);
+    cumulet_camera_release(camera);
+    ASSERT_EQ(cumulet_set_medium(viewer_.get(), &scene_.medium), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_light(viewer_.get(), &scene_.light), CUMULET_OK);
+    ASSERT_EQ(cumulet_set_sampling(viewer_.get(), &scene_.sampling), CUMULET_OK);
+    ASSERT_EQ(cumulet_wait(viewer_.get(), -1.0), CUMULET_OK);
+    cumulet_frame_desc frame{};
+    frame.struct_size = sizeof frame;
+    frame.target = CUMULET_TARGET_NONE;
+    frame.width = width;
+    frame.height = height;
+    frame.budget_ms = 100.0;
+    cumulet_frame_result result{};
+    result.struct_size = sizeof result;
+    while ((result.flags & CUMULET_RENDER_CONVERGED) == 0) {
+      ASSERT_EQ(cumulet_render(viewer_.get(), &frame, &result), CUMULET_OK) << cumulet_last_error(viewer_.get());
+    }
+  }
+
+  std::string write(const char* name) {
+    std::vector<float> rgba(std::size_t{4} * width * height);
+    EXPECT_EQ(cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
+    const std::string file = (folder_ / name).string();
+    cumulet::demo::write_exr(viewer_.get(), file, width, height, {rgba}, {},
+                             cumulet::demo::metadata_of(viewer_.get(), scene_, width, height));
+    return file;
+  }
+
+  // The mean place of alpha, as OpenEXR's NDC has it.
+  static Imath::V2d middle(Imf::InputFile& file) {
+    std::vector<float> alpha(std::size_t{width} * height);
+    Imf::FrameBuffer pixels;
+    pixels.insert("A",
+                  Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(alpha.data()), sizeof(float), sizeof(float) * width));
+    file.setFrameBuffer(pixels);
+    file.readPixels(0, static_cast<int>(height) - 1);
+    Imath::V2d sum(0.0, 0.0);
+    double all = 0.0;
+    for (std::size_t y = 0; y < height; ++y) {
+      for (std::size_t x = 0; x < width; ++x) {
+        const double a = alpha[y * width + x];
+        all += a;
+        sum += a * Imath::V2d((double(x) + 0.5) / width, (double(y) + 0.5) / height);
+      }
+    }
+    return sum / all;
+  }
+
+  SceneOptions scene_;
+  Context context_;
+  std::unique_ptr<cumulet_viewer, Destroy> viewer_;
+  cumulet::test::Folder folder_;
+};
+
+TEST_P(Exr, SaysHowThePictureWasMade) {
+  render();
+  const std::string path = write("a.exr");
+  const Imf::InputFile file(path.c_str());
+  const Imf::Header& header = file.header();
+  const auto text = [&](const char* name) { return header.typedAttribute<Imf::StringAttribute>(name).value(); };
+  const auto number = [&](const char* name) { return header.typedAttribute<Imf::DoubleAttribute>(name).value(); };
+  const auto three = [&](const char* name) { return header.typedAttribute<Imf::V3dAttribute>(name).value(); };
+  ASSERT_TRUE(Imf::hasComments(header));
+  EXPECT_EQ(Imf::comments(header), "Cumulet " + text("cumulet:version") + ", 4 samples a pixel");
+  EXPECT_EQ(text("cumulet:march"), "tet");
+  EXPECT_EQ(number("cumulet:samples"), 4.0);
+  EXPECT_EQ(number("cumulet:seed"), 3e9);
+  double noise = 0.0;
+  ASSERT_EQ(cumulet_measure_noise(viewer_.get(), &noise), CUMULET_OK);
+  EXPECT_GT(noise, 0.0);
+  EXPECT_EQ(number("cumulet:noise"), noise);
+  EXPECT_EQ(three("cumulet:eye"), Imath::V3d(1.0, 0.0, 14.0));
+  EXPECT_EQ(three("cumulet:target"), Imath::V3d(2.0, 0.0, 0.0));
+  EXPECT_EQ(number("cumulet:fovy_degrees"), 35.0);
+  EXPECT_FALSE(Imf::hasCapDate(header)) << "the same picture is the same file";
+  EXPECT_FALSE(Imf::hasOwner(header));
+
+  // Samples and seed are how well the scene is shown; the rest is what is shown.
+  const std::string hash = text("cumulet:scene");
+  EXPECT_EQ(hash.size(), 16U);
+  SceneOptions other = scene_;
+  other.sampling.samples = 7;
+  other.sampling.seed = 1;
+  EXPECT_EQ(cumulet::demo::scene_hash(other), hash);
+  other.medium.density_scale = 9.0;
+  EXPECT_NE(cumulet::demo::scene_hash(other), hash);
+}
+
+TEST_P(Exr, ItsMatricesFindTheVolumeInThePicture) {
+  for (const bool orthographic : {false, true}) {
+    if (orthographic) scene_.camera.orthographic_height = 9.0;
+    render();
+    const std::string path = write("a.exr");
+    Imf::InputFile file(path.c_str());
+    ASSERT_TRUE(Imf::hasWorldToCamera(file.header()) && Imf::hasWorldToNDC(file.header()));
+    const Imath::V3d at(place[0], place[1], place[2]);
+    const Imath::M44d to_camera(Imf::worldToCamera(file.header()));
+    const Imath::M44d to_ndc(Imf::worldToNDC(file.header()));
+    const Imath::V3d ndc = at * to_ndc;
+    const Imath::V2d seen = middle(file);
+    EXPECT_NEAR(ndc.x, seen.x, 0.02) << orthographic;
+    EXPECT_NEAR(ndc.y, seen.y, 0.02) << orthographic;
+    EXPECT_GT(std::abs(seen.x - 0.5) + std::abs(seen.y - 0.5), 0.1) << "a mirrored picture would pass";
+    // The camera's own space has the eye at its origin, the target ahead, and what is right at the right.
+    const Imath::V3d eye = Imath::V3d(1.0, 0.0, 14.0) * to_camera;
+    EXPECT_NEAR(eye.length(), 0.0, 1e-5);
+    const Imath::V3d target = Imath::V3d(2.0, 0.0, 0.0) * to_camera;
+    EXPECT_NEAR(target.z, std::sqrt(197.0), 1e-4);
+    EXPECT_NEAR(std::hypot(target.x, target.y), 0.0, 1e-5);
+    const Imath::V3d volume = at * to_camera;
+    EXPECT_EQ(volume.x > 0.0, seen.x > 0.5);
+    EXPECT_EQ(volume.y > 0.0, seen.y < 0.5);
+    if (orthographic) continue;
+    // The picture's upper right corner, a unit before the eye, is where the window says.
+    const Imath::V2f center = file.header().screenWindowCenter();
+    const double side = file.header().screenWindowWidth();
+    const Imath::V3d corner(center.x + 0.5 * side, center.y + 0.5 * side * height / width, 1.0);
+    const Imath::V3d at_corner = corner * to_camera.inverse() * to_ndc;
+    EXPECT_NEAR(at_corner.x, 1.0, 1e-5);
+    EXPECT_NEAR(at_corner.y, 0.0, 1e-5);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Gl, Exr, testing::Values(Backend::egl, Backend::osmesa),
+                         [](const auto& given) { return given.param == Backend::egl ? "egl" : "osmesa"; });
+
+}  // namespace
