@@ -20,6 +20,8 @@ image::LayerName layer_of(cumulet_aov aov) {
       return image::layers::normal;
     case CUMULET_AOV_ALBEDO:
       return image::layers::albedo;
+    case CUMULET_AOV_ERROR:
+      return image::layers::error;
     case CUMULET_AOV_BEAUTY:
       break;
   }

@@ -289,6 +289,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   passes["inspect"] = stats.pass_seconds_inspect;
   passes["display"] = stats.pass_seconds_display;
   json["samples"] = stats.samples;
+  if (options.scene.sampling.view == CUMULET_VIEW_SHADED) json["noise"] = stats.noise;
   if (stats.trace_seconds > 0.0) json["samples_per_second"] = static_cast<double>(stats.samples) / stats.trace_seconds;
   if (stats.samples > 0)
     json["mean_steps_per_path"] = static_cast<double>(stats.steps) / static_cast<double>(stats.samples);

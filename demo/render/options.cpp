@@ -591,7 +591,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
             throw UsageError(in_quotes(part) + " is none of all, " + list_names(aov_names, ", "));
         }
       },
-      "Layers that an .exr gets beside the picture: volume, transmittance, depth, volume_depth, normal, albedo");
+      "Layers that an .exr gets beside the picture: volume, transmittance, depth, volume_depth, normal, albedo, "
+      "error");
   add(
       app, group, "--stats", "FILE.json",
       [&](const std::string& text) {

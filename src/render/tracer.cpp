@@ -762,25 +762,47 @@ void Tracer::read_means(const Picture& picture, const FilmLayer& sum, float* rgb
 
 void Tracer::read_volume(const Picture& picture, float* rgba) const { read_means(picture, film_layers::volume, rgba); }
 
-Totals Tracer::totals(const Picture& picture) const {
-  if (!picture.film_.has(film_layers::counts)) return {};
+template <class Visit>
+void Tracer::for_each_error(const Picture& picture, Visit&& visit) const {
   const std::vector<glm::uvec2> counts = read_counts(picture);
   const auto background = texels<glm::vec3>(picture, film_layers::background, GL_RGB, GL_FLOAT);
   const auto squares = texels<float>(picture, film_layers::moments, GL_RED, GL_FLOAT);
   const auto sums = texels<glm::vec4>(picture, film_layers::radiance, GL_RGBA, GL_FLOAT);
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    PixelError error;
+    error.samples = counts[i].x;
+    error.steps = counts[i].y;
+    const double n = counts[i].x;
+    if (n >= 2.0) {
+      error.mean = luminance(glm::dvec3(sums[i]) / n + glm::dvec3(background[i]));
+      error.squared = std::max(0.0, double(squares[i]) - error.mean * error.mean) / (n - 1.0);
+    }
+    visit(error);
+  }
+}
+
+void Tracer::read_error(const Picture& picture, float* errors) const {
+  for_each_error(picture, [&](const PixelError& error) {
+    const bool known = error.samples >= 2;
+    *errors++ = known ? static_cast<float>(std::sqrt(error.squared)) : std::numeric_limits<float>::infinity();
+  });
+}
+
+Totals Tracer::totals(const Picture& picture) const {
+  if (!picture.film_.has(film_layers::counts)) return {};
   Totals totals;
   double error = 0.0;
   double brightness = 0.0;
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    const double n = counts[i].x;
-    totals.samples += counts[i].x;
-    totals.steps += counts[i].y;
-    if (n < 2.0) continue;
-    const double mean = luminance(glm::dvec3(sums[i]) / n + glm::dvec3(background[i]));
-    error += std::max(0.0, double(squares[i]) - mean * mean) / (n - 1.0);
-    brightness += mean;
-  }
-  if (brightness > 0.0) totals.noise = std::sqrt(error * double(counts.size())) / brightness;
+  double pixels = 0.0;
+  for_each_error(picture, [&](const PixelError& pixel) {
+    totals.samples += pixel.samples;
+    totals.steps += pixel.steps;
+    if (pixel.samples < 2) return;
+    error += pixel.squared;
+    brightness += pixel.mean;
+    pixels += 1.0;
+  });
+  if (brightness > 0.0) totals.noise = std::sqrt(error * pixels) / brightness;
   return totals;
 }
 

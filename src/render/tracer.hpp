@@ -28,7 +28,8 @@ enum class View { shaded = 0, cells = 1, steps = 2, density = 3, wireframe = 4 }
 struct Totals {
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
-  /// Root of the mean over pixels of the squared standard error of their luminance, over the mean luminance.
+  /// Root of the mean over pixels of the squared standard error of their luminance, over the mean luminance: of those
+  /// that have two samples.
   double noise = 0.0;
 };
 
@@ -192,6 +193,8 @@ class Tracer {
   void read(const Picture& picture, bool with_background, float* rgba) const;
   /// The same without background of samples that met the volume before any surface; alpha is their share.
   void read_volume(const Picture& picture, float* rgba) const;
+  /// Standard error of each pixel's luminance, with the background's; infinite where it has fewer than two samples.
+  void read_error(const Picture& picture, float* errors) const;
   /// Until about the deadline, the layers of PixelFact of this picture, data and obstacles being those it was made of;
   /// whether they are there. Goes on in the next call.
   bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
@@ -271,6 +274,15 @@ class Tracer {
   [[nodiscard]] std::vector<Texel> texels(const Picture& picture, const FilmLayer& layer, GLenum format,
                                           GLenum type) const;
   [[nodiscard]] std::vector<glm::uvec2> read_counts(const Picture& picture) const;
+  struct PixelError {
+    std::uint32_t samples = 0;
+    std::uint32_t steps = 0;
+    double mean = 0.0;     // luminance
+    double squared = 0.0;  // its standard error, squared; counts where there are two samples
+  };
+  // Calls visit with each pixel's, row by row.
+  template <class Visit>
+  void for_each_error(const Picture& picture, Visit&& visit) const;
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;

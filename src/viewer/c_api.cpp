@@ -506,7 +506,7 @@ cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linea
 
 cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    require(number(aov) <= CUMULET_AOV_ALBEDO, "the AOV is unknown");
+    require(number(aov) <= CUMULET_AOV_ERROR, "the AOV is unknown");
     v.read_aov(static_cast<core::Aov>(aov), values, count);
   });
 }
@@ -545,6 +545,7 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.pass_seconds_display = had.pass_seconds.display;
     s.samples = had.samples;
     s.steps = had.steps;
+    s.noise = had.noise;
     if (const auto volume = v.volume()) {
       for (int axis = 0; axis < 3; ++axis) {
         s.bounds_min[axis] = volume->bounds().min[axis];

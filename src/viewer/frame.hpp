@@ -62,7 +62,8 @@ enum class Aov {
   surface_depth = 3,
   volume_depth = 4,
   normal = 5,
-  albedo = 6
+  albedo = 6,
+  error = 7
 };
 
 }  // namespace cumulet::viewer

@@ -103,15 +103,12 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   }
   const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
   const bool colour = aov == Aov::beauty || aov == Aov::volume;
-  const std::array<PixelFact, 7> facts{{{},
-                                        {},
-                                        PixelFact::transmittance,
-                                        PixelFact::surface_z,
-                                        PixelFact::volume_z,
-                                        PixelFact::normal,
-                                        PixelFact::albedo}};
-  const PixelFact fact = facts.at(static_cast<std::size_t>(aov));
-  const std::size_t floats = pixels * (colour ? 4 : render::channels_of(fact));
+  const std::array<PixelFact, 5> facts{PixelFact::transmittance, PixelFact::surface_z, PixelFact::volume_z,
+                                       PixelFact::normal, PixelFact::albedo};
+  const auto is_fact = aov >= Aov::transmittance && aov <= Aov::albedo;
+  const PixelFact fact =
+      facts.at(is_fact ? static_cast<std::size_t>(aov) - static_cast<std::size_t>(Aov::transmittance) : 0);
+  const std::size_t floats = pixels * (colour ? 4 : (is_fact ? render::channels_of(fact) : 1));
   if (values == nullptr || count < floats) {
     throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
   }
@@ -124,6 +121,8 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
                   "resolution");
     }
     progressive_.tracer().read_volume(picture, values);
+  } else if (aov == Aov::error) {
+    progressive_.tracer().read_error(picture, values);
   } else {
     find_facts(shot, picture);
     progressive_.tracer().read_fact(picture, fact, values);

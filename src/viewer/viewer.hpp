@@ -37,6 +37,7 @@ struct Stats {
   render::PassSeconds pass_seconds;
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
+  double noise = 0.0;
   GlStrings strings;
 };
 

@@ -247,6 +247,7 @@ Stats Viewer::stats() {
   s.active_voxels = volume_ ? volume_->volume().active_voxels : 0;
   s.build_seconds = built_.seconds;
   s.steps = totals_.steps;
+  s.noise = totals_.noise;
   if (gl_) {
     s.cell_bytes = gl_->scene().data_bytes();
     s.gl_bytes = gl_->bytes();

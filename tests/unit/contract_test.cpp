@@ -1,10 +1,12 @@
 // The embedding contract of docs/architecture.md: one test a point, by cumulet.h and cumulet.hpp alone. What needs more
 // than a test (every state, every allocation, threads, windows) is in robust_test.cpp and tests/embed.
 #include <gtest/gtest.h>
+
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -654,10 +656,10 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   sampling.volume_alone = 1;
   ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
   picture_of(v_, volume_.get(), target_);
-  for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_ALBEDO; ++aov) {
+  for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_ERROR; ++aov) {
     EXPECT_EQ(cumulet_read_aov(v_, static_cast<cumulet_aov>(aov), values.data(), values.size()), CUMULET_OK) << aov;
   }
-  EXPECT_EQ(cumulet_read_aov(v_, static_cast<cumulet_aov>(7), values.data(), values.size()),
+  EXPECT_EQ(cumulet_read_aov(v_, std::bit_cast<cumulet_aov>(8), values.data(), values.size()),
             CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, nullptr, values.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, values.data(), 3), CUMULET_ERROR_INVALID_ARGUMENT);

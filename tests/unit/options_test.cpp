@@ -396,7 +396,8 @@ TEST(Options, AovsAreListedOrAll) {
   };
   EXPECT_TRUE(parse({}).aovs.empty());
   EXPECT_EQ(aovs_of("depth,normal,depth"), (std::vector<cumulet_aov>{CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_NORMAL}));
-  EXPECT_EQ(aovs_of("albedo,all").size(), 6U);
+  EXPECT_EQ(aovs_of("albedo,all").size(), 7U);
+  EXPECT_EQ(aovs_of("error"), std::vector<cumulet_aov>{CUMULET_AOV_ERROR});
 }
 
 TEST(Options, ACriterionThatIsNamedIsNoDefault) {

@@ -1282,19 +1282,24 @@ typedef enum cumulet_aov {
                                     not */
   CUMULET_AOV_NORMAL = 5,        /* 3 floats: mean shading normal of our surfaces in the pixel, world space, towards the
                                     eye, as if there were no volume; 0 where there is none */
-  CUMULET_AOV_ALBEDO = 6         /* 3 floats: mean linear base colour, likewise */
+  CUMULET_AOV_ALBEDO = 6,        /* 3 floats: mean linear base colour, likewise */
+  CUMULET_AOV_ERROR = 7 /* 1 float: estimated standard error of the pixel's luminance, with the sky's behind it:
+                           sqrt((<L^2> - <L>^2) / (n - 1)) of the luminances L of its n samples. Infinite where
+                           it has fewer than two */
 } cumulet_aov;
 
 /*
  * [GL] One of these, of the picture so far: width x height (of the result) pixels, first pixel top left. count is the
- * number of floats at values. All but the first two are found when first asked for, by 16 rays a pixel (the depths by
- * the one through its middle), without noise but where surfaces cover or transmit a part of the light, which is a
- * chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views, and for a picture that is
- * still of the volume before.
+ * number of floats at values. Transmittance, depths, normal and albedo are found when first asked for, by 16 rays a
+ * pixel (the depths by the one through its middle), without noise but where surfaces cover or transmit a part of the
+ * light, which is a chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views, and for a
+ * picture that is still of the volume before.
  */
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
- * their luminance, over the mean luminance. Reads the picture back: now and then, not every frame. */
+ * their luminance (CUMULET_AOV_ERROR), over the mean luminance; of the pixels that have two samples, and 0 where none
+ * has. Samples count as independent: what they spread more evenly than chance makes the true error less, by up to a
+ * tenth. Reads the picture back: now and then, not every frame. */
 CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise);
 
 /* What happened, in SI units; fields without a value are 0. */
@@ -1331,6 +1336,7 @@ typedef struct cumulet_stats {
   double pass_seconds_trace;
   double pass_seconds_inspect; /* debug views, and the volume's depth */
   double pass_seconds_display;
+  double noise; /* as cumulet_measure_noise told it, or a readback of the picture, last; 0 before the first */
 } cumulet_stats;
 
 CUMULET_API cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats);

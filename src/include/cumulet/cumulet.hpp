@@ -926,6 +926,7 @@ struct Stats {
   double pass_seconds_trace = 0.0;
   double pass_seconds_inspect = 0.0;
   double pass_seconds_display = 0.0;
+  double noise = 0.0;
 };
 
 // ---- Viewer ---------------------------------------------------------------------------------------------------------
@@ -1227,7 +1228,7 @@ class Viewer {
     if (auto done = result(cumulet_get_stats(handle(), &c)); !done) return done.error();
     const auto& [struct_size, cells, levels, cell_bytes, active_voxels, total, load, statistics, refine, records,
                  upload, trace, samples, steps, bounds_min, bounds_max, vendor, renderer, gl_version, limited, gl_bytes,
-                 pass_upload, pass_host_depth, pass_surfaces, pass_trace, pass_inspect, pass_display] = c;
+                 pass_upload, pass_host_depth, pass_surfaces, pass_trace, pass_inspect, pass_display, noise] = c;
     return Stats{.cells = cells,
                  .levels = levels,
                  .cell_bytes = cell_bytes,
@@ -1252,7 +1253,8 @@ class Viewer {
                  .pass_seconds_surfaces = pass_surfaces,
                  .pass_seconds_trace = pass_trace,
                  .pass_seconds_inspect = pass_inspect,
-                 .pass_seconds_display = pass_display};
+                 .pass_seconds_display = pass_display,
+                 .noise = noise};
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
