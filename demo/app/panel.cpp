@@ -479,7 +479,14 @@ void Panel::state_line(const Model& model) {
   const double part = std::clamp(status.frame.progress, 0.0, 1.0);
   std::string text =
       print("%.0f of %u samples", std::floor(part * model.scene.sampling.samples), model.scene.sampling.samples);
-  if ((status.frame.flags & CUMULET_RENDER_CONVERGED) != 0) text = print("%u samples", model.scene.sampling.samples);
+  const bool converged = (status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
+  if (converged) text = print("%u samples", model.scene.sampling.samples);
+  if (model.scene.sampling.noise_target_percent > 0.0f && status.frame.width > 0) {
+    // Then the samples are but the most.
+    const double pixels = double(status.frame.width) * status.frame.height;
+    text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / pixels));
+    if (!converged) text += print(" (%.0f %%)", std::floor(100.0 * part));
+  }
   const cumulet_view shown = model.scene.sampling.view;
   for (const auto& view : settings::view_choices)
     if (view.value == shown && shown != CUMULET_VIEW_SHADED) text = view.name;

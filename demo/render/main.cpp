@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <file.hpp>
@@ -13,6 +14,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <program.hpp>
 #include <shader_cache.hpp>
 #include <stdexcept>
@@ -163,6 +165,25 @@ cumulet_stats stats_of(const Viewer& viewer) {
 
 constexpr double budget_ms = 200.0;  // how often the bar moves, and how long Ctrl-C may take
 
+/// Of the time limit, from the first frame on.
+class Limit {
+ public:
+  explicit Limit(const std::optional<double>& seconds) : seconds_(seconds) {}
+  [[nodiscard]] double over() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  [[nodiscard]] bool reached() const { return seconds_ && over() >= *seconds_; }
+  /// A frame's, so that it ends in time.
+  [[nodiscard]] double budget() const {
+    return seconds_ ? std::clamp(1e3 * (*seconds_ - over()), least_ms, budget_ms) : budget_ms;
+  }
+
+ private:
+  static constexpr double least_ms = 5.0;
+  std::optional<double> seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
 cumulet_frame_desc frame_of(const RenderOptions& options) {
   cumulet_frame_desc frame{};
   frame.struct_size = sizeof frame;
@@ -180,8 +201,9 @@ void check_frame(const Viewer& viewer, const RenderOptions& options, cumulet_sta
   check(viewer, status);
 }
 
-cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& options) {
-  const cumulet_frame_desc frame = frame_of(options);
+cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& options, double within_ms) {
+  cumulet_frame_desc frame = frame_of(options);
+  frame.budget_ms = within_ms;
   cumulet_frame_result result{};
   result.struct_size = sizeof result;
   check_frame(viewer, options, cumulet_render(viewer.get(), &frame, &result));
@@ -304,6 +326,42 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   cumulet::image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
+enum class Traced { converged, late, stopped };
+
+/// Until the picture has all it shall have, its time is up, or somebody stops it.
+Traced trace(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
+  const Limit limit(options.time_limit);
+  cumulet_frame_result frame{};
+  bool began = false;
+  while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
+    // A picture with holes is none: it goes on to each pixel's first sample.
+    if (frame.width > 0 && limit.reached()) return Traced::late;
+    frame = render_frame(viewer, options, limit.budget());
+    if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
+    if (frame.width > 0 || frame.progress > 0.0) {
+      began = true;
+      progress.render(cumulet::demo::part_done(frame.progress, limit.over(), options.time_limit),
+                      static_cast<double>(stats_of(viewer).samples));
+    }
+  }
+  if (!began) check_not_interrupted();
+  return (frame.flags & CUMULET_RENDER_CONVERGED) != 0 ? Traced::converged : Traced::stopped;
+}
+
+void tell_ending(const Viewer& viewer, const RenderOptions& options, Traced traced, double samples,
+                 Progress& progress) {
+  using cumulet::demo::Ending;
+  double noise = 0.0;
+  check(viewer, cumulet_measure_noise(viewer.get(), &noise));
+  // The library's sums are in single precision.
+  const double target = 0.01 * 1.0001 * options.scene.sampling.noise_target_percent;
+  Ending ending = noise <= target ? Ending::noise : Ending::samples;
+  if (traced == Traced::late) ending = Ending::time;
+  tell(progress, options.output + ": " +
+                     cumulet::demo::ending_line(ending, noise, samples, options.scene.sampling.noise_target_percent,
+                                                options.time_limit));
+}
+
 void render(const RenderOptions& options) {
   // Hours of samples should not end at a folder or a network that is not there.
   if (options.denoise) cumulet::demo::check_denoiser(options.denoiser);
@@ -359,19 +417,7 @@ void render(const RenderOptions& options) {
     check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));
 
   warm_up(viewer, options, progress);
-  const double total = static_cast<double>(scene.width) * scene.height * sampling.samples;
-  cumulet_frame_result frame{};
-  bool began = false;
-  while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
-    frame = render_frame(viewer, options);
-    if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
-    if (frame.width > 0 || frame.progress > 0.0) {
-      began = true;
-      progress.render(frame.progress, total);
-    }
-  }
-  const bool complete = (frame.flags & CUMULET_RENDER_CONVERGED) != 0;
-  if (!began) check_not_interrupted();
+  const Traced traced = trace(viewer, options, progress);
 
   const std::vector<float> denoised = denoise(viewer, options, progress);
   progress.stage("writing " + options.output);
@@ -379,12 +425,15 @@ void render(const RenderOptions& options) {
   const cumulet_stats stats = stats_of(viewer);
   if (!options.stats.empty()) write_stats(options, stats, context.name());
   if (!options.trace.empty()) cumulet::image::replace_file(options.trace, timeline.json());
-  if (!complete) {
+  const double pixels = static_cast<double>(scene.width) * scene.height;
+  if (traced == Traced::stopped) {
     std::array<char, 128> text{};
     std::snprintf(text.data(), text.size(), "%llu of %.0f samples", static_cast<unsigned long long>(stats.samples),
-                  total);
+                  pixels * sampling.samples);
     throw std::runtime_error(options.output + ": interrupted: holds the first " + text.data());
   }
+  if (options.time_limit || sampling.noise_target_percent > 0.0f)
+    tell_ending(viewer, options, traced, static_cast<double>(stats.samples) / pixels, progress);
 }
 
 }  // namespace

@@ -532,6 +532,9 @@ bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ost
 
 namespace {
 
+// A pixel, of a picture that stops by its noise or the time.
+constexpr std::uint32_t most_samples = 65536;
+
 // What flags need of each other.
 void check_together(const RenderOptions& options) {
   if (options.scene.volume.empty() && options.scene.surfaces.empty())
@@ -607,6 +610,14 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.trace = text;
       },
       "When frames, their passes and the workers' jobs ran, for chrome://tracing and Perfetto");
+  add(
+      app, group, "--time-limit", "SECONDS",
+      [&](const std::string& text) {
+        const double seconds = parse_number(text);
+        if (!(seconds > 0.0)) throw UsageError(text + " is not above 0");
+        options.time_limit = seconds;
+      },
+      "Stop after this long, loading left out, but not before each pixel has a sample");
   add_choice(app, group, "--denoise", std::array{Name{"off", false}, Name{"high", true}}, options.denoise,
              "Take the noise away by a network of Open Image Denoise; an .exr gets a layer `denoised` (default: off)");
   add(
@@ -630,6 +641,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.scene = lit});
+  // Else the samples of a picture that stops for no other reason would stop it first.
+  const bool stops = options.time_limit || options.scene.sampling.noise_target_percent > 0.0f;
+  const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
+  if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
   check_together(options);
   return options;
 }

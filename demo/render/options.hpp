@@ -40,14 +40,15 @@ struct RenderOptions {
   BackendChoice backend = BackendChoice::automatic;
   std::string output;  // not empty, unless info
   OutputFormat format = OutputFormat::png;
-  std::string stats;              // empty: none
-  std::string trace;              // likewise
-  std::string shader_cache;       // a folder; empty: none
-  bool info = false;              // tell what is in the files, render nothing
-  bool json = false;              // as JSON
-  bool denoise = false;           // the picture; of an .exr a layer beside it
-  std::string denoiser;           // a folder of networks; empty: where the script puts them
-  std::vector<cumulet_aov> aovs;  // layers of an .exr beside the picture
+  std::string stats;                 // empty: none
+  std::string trace;                 // likewise
+  std::string shader_cache;          // a folder; empty: none
+  bool info = false;                 // tell what is in the files, render nothing
+  bool json = false;                 // as JSON
+  std::optional<double> time_limit;  // seconds from the first sample on
+  bool denoise = false;              // the picture; of an .exr a layer beside it
+  std::string denoiser;              // a folder of networks; empty: where the script puts them
+  std::vector<cumulet_aov> aovs;     // layers of an .exr beside the picture
 };
 
 /// cumulet-render's arguments, without the program's name. Nothing if they asked for --help or --version, whose text

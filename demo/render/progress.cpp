@@ -61,20 +61,41 @@ void Progress::stage(const std::string& what, double part) {
   show(what + " " + bar(part));
 }
 
-void Progress::render(double part, double total) {
+void Progress::render(double part, double samples) {
   if (!rendering_) {
     start_ = Clock::now();
     start_part_ = part;
+    start_samples_ = samples;
   }
   rendering_ = true;
-  show(rendering_line(part, part - start_part_, std::chrono::duration<double>(Clock::now() - start_).count(), total));
+  show(rendering_line(part, part - start_part_, samples - start_samples_,
+                      std::chrono::duration<double>(Clock::now() - start_).count()));
 }
 
-std::string rendering_line(double part, double gained, double seconds, double total) {
+double part_done(double part, double seconds, std::optional<double> limit) {
+  return limit ? std::clamp(std::max(part, seconds / *limit), 0.0, 1.0) : part;
+}
+
+std::string ending_line(Ending ending, double noise, double samples, double target_percent,
+                        std::optional<double> limit) {
+  const auto number = [](const char* format, double value) {
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), format, value);
+    return std::string(text.data());
+  };
+  std::string line = "noise " + number("%.3g", 100.0 * noise) + " %";
+  if (target_percent > 0.0) line += " (target " + number("%g", target_percent) + " %)";
+  line += " after " + number("%.4g", samples) + " samples a pixel";
+  if (ending == Ending::samples) line += ", the most that one may have";
+  if (ending == Ending::time && limit) line += ", at the time limit of " + number("%g", *limit) + " s";
+  return line;
+}
+
+std::string rendering_line(double part, double gained, double samples, double seconds) {
   part = std::clamp(part, 0.0, 1.0);
   std::string line = "rendering " + bar(part);
   if (gained > 0.0 && seconds >= least_seconds) {
-    line += "  " + format_count(gained * total / seconds) + "samples/s";
+    line += "  " + format_count(samples / seconds) + "samples/s";
     line += "  ETA " + format_duration(seconds * (1.0 - part) / gained);
   }
   return line;

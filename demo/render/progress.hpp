@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 namespace cumulet::demo {
@@ -18,8 +19,9 @@ class Progress {
   void stage(const std::string& what);
   /// One of which a part is done, 0 to 1.
   void stage(const std::string& what, double part);
-  /// Rendering, with part of all samples done; total is their number. Rates are of what was done since the first call.
-  void render(double part, double total);
+  /// Rendering, with part of what was asked for done, and so many samples. Rates are of what was done since the first
+  /// call.
+  void render(double part, double samples);
   /// Wipes the line, so that something else can be printed.
   void clear();
 
@@ -31,12 +33,25 @@ class Progress {
   bool shown_ = false;
   Clock::time_point start_;
   double start_part_ = 0.0;
+  double start_samples_ = 0.0;
   bool rendering_ = false;
 };
 
-/// What Progress::render shows: `part` of `total` samples are done, `gained` of it in the last `seconds`. The rates are
+/// What Progress::render shows: `part` is done, `gained` of it, and `samples`, in the last `seconds`. The rates are
 /// left out while so little was gained, or in so short a time, that they mean nothing.
-[[nodiscard]] std::string rendering_line(double part, double gained, double seconds, double total);
+[[nodiscard]] std::string rendering_line(double part, double gained, double samples, double seconds);
+
+/// What is to be shown of a picture that ends at the first of two: part of its samples, or of the noise that is asked
+/// for, is done, and seconds of the limit are over, if there is one.
+[[nodiscard]] double part_done(double part, double seconds, std::optional<double> limit);
+
+/// Why a picture ended.
+enum class Ending { samples, noise, time };
+
+/// How it went, for people: "noise 1.87 % (target 2 %) after 91 samples a pixel". noise is relative; target_percent and
+/// limit as they were asked for, if they were. samples: a pixel.
+[[nodiscard]] std::string ending_line(Ending ending, double noise, double samples, double target_percent,
+                                      std::optional<double> limit);
 
 /// "1:05", "2:01:40", "0:00".
 [[nodiscard]] std::string format_duration(double seconds);

@@ -93,7 +93,8 @@ void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat 
 [[nodiscard]] bool same_scene(const SceneOptions& a, const SceneOptions& b);
 
 /// 16 hexadecimal digits that pictures share that show the same: of all settings but how long a picture takes (samples,
-/// seed), and of the files' names, without folders, and sizes. FNV-1a, as for telling pictures apart, not for proof.
+/// noise target and how it is met, seed), and of the files' names, without folders, and sizes. FNV-1a: for telling
+/// pictures apart, not for proof.
 [[nodiscard]] std::string scene_hash(const SceneOptions& scene);
 
 }  // namespace cumulet::demo

@@ -58,10 +58,22 @@ struct Block {
 };
 using Blocks = std::vector<Block>;
 
+/// Sums over the pixels that have two samples: what the noise of all of them is made of.
+struct ErrorSums {
+  double squared = 0.0;     // standard errors of their luminances, squared
+  double brightness = 0.0;  // luminances
+  double pixels = 0.0;
+
+  ErrorSums& operator+=(const ErrorSums& other);
+  /// Root of the mean squared standard error over the mean luminance; 0 of black.
+  [[nodiscard]] double noise() const;
+};
+
 /// What was dispatched, and what it was thought to take.
 struct Dispatched {
-  std::shared_ptr<Blocks> tile;            // that it is of
-  std::shared_ptr<std::uint64_t> samples;  // of the picture
+  std::shared_ptr<Blocks> tile;                     // that it is of
+  std::shared_ptr<std::optional<ErrorSums>> error;  // of the tile, which it finds, and no samples
+  std::shared_ptr<std::uint64_t> samples;           // of the picture
   std::vector<std::uint32_t> blocks;
   std::uint32_t rounds = 1;
   double lanes = 0.0;  // that had something to do

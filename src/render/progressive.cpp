@@ -93,6 +93,7 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Obstacles& ob
   settings.view = wish_.content.view;
   settings.hasty = wish_.content.preview;
   settings.volume_alone = wish_.content.volume_alone && divisor == finest_;
+  if (divisor == finest_) settings.noise_target = wish_.noise_target;
   return settings;
 }
 
@@ -149,10 +150,13 @@ void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
     }
     schedule_.change(working_ && wish.content.preview);
   } else if (working_ && working_->divisor == finest_) {
-    if (!wish.content.preview && wish.samples < working_->picture->target_samples()) {
+    const std::optional<double> stops_at = working_->picture->noise_target();
+    const bool fewer = wish.samples < working_->picture->target_samples() ||
+                       (stops_at && wish.noise_target && *wish.noise_target > *stops_at);
+    if (!wish.content.preview && fewer) {
       schedule_.drop();
     } else {
-      working_->picture->extend(wish.samples);
+      working_->picture->extend(wish.samples, wish.noise_target);
       if (!working_->picture->done()) schedule_.extend();
     }
   }

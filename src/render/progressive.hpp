@@ -35,13 +35,15 @@ struct PictureWish {
     bool surfaces_traced = true;  // paths meet triangles
     bool preview = true;          // coarse first; else at full resolution only
     bool volume_alone = false;    // at full resolution, sum what met the volume first apart as well
+    bool stops_by_noise = false;  // there is a noise target
     bool operator==(const Content&) const = default;
   };
   Content content;
-  PictureParameters parameters;  // of the content, at full resolution
-  std::uint32_t samples = 1;     // a pixel
-  bool depth = false;            // find the volume's depth at half opacity as well
-  bool held = false;             // a hand is at what changes it: another change is likely
+  PictureParameters parameters;        // of the content, at full resolution
+  std::uint32_t samples = 1;           // a pixel
+  std::optional<double> noise_target;  // at full resolution: enough, whatever the samples
+  bool depth = false;                  // find the volume's depth at half opacity as well
+  bool held = false;                   // a hand is at what changes it: another change is likely
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time

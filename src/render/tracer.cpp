@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <thread>
 
@@ -30,6 +32,8 @@ constexpr std::uint32_t first_rounds = 4;  // while nothing is known of what the
 constexpr std::uint32_t most_rounds = 65536;
 constexpr double part_of_rest = 0.9;  // of the time left, that a dispatch may likely take
 constexpr std::uint32_t longest_pass = 64;
+constexpr std::uint32_t most_samples = 1U << 31U;
+constexpr double nearly_done = 0.99;
 constexpr std::uint32_t view_depth = 5;  // inspect.comp's
 
 using Clock = std::chrono::steady_clock;
@@ -52,6 +56,7 @@ void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
   parameters.lamps.count = obstacles.lamps_met();
 }
 
+constexpr const char* noise_kernel = "noise.comp";
 constexpr const char* channels_macro = "CM_CHANNELS 1";
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
 
@@ -75,33 +80,68 @@ core::CmParameters assemble(const PictureParameters& picture, const MarchData& d
 double Picture::progress() const {
   if (done_) return 1.0;
   if (view_ != View::shaded) return size_.y > 0 ? double(view_row_) / size_.y : 0.0;
-  const double wanted = double(target_samples_) * size_.x * size_.y;
-  return wanted > 0.0 ? static_cast<double>(samples()) / wanted : 0.0;
+  const double wanted = double(expected_samples_) * size_.x * size_.y - static_cast<double>(samples_before_);
+  const double part = wanted > 0.0 ? static_cast<double>(samples() - samples_before_) / wanted : 0.0;
+  // Of noise nobody knows when it will be low enough.
+  return progress_before_ + (1.0 - progress_before_) * std::min(noise_target_ ? nearly_done : 1.0, part);
 }
 
-void Picture::extend(std::uint32_t samples) {
-  if (samples <= target_samples_ || view_ != View::shaded) return;
+std::uint32_t Picture::pass_after(std::uint32_t samples) const {
+  std::uint32_t next = samples;
+  if (!noise_target_) {
+    // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
+    // little. One tile needs no passes.
+    next = tiles_ == glm::uvec2(1U) ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
+  } else if (samples < first_measured) {
+    next = tiles_ == glm::uvec2(1U) ? first_measured : std::max(1U, 2 * samples);
+  } else {
+    for (double count = first_measured; next <= samples; count *= std::numbers::sqrt2) {
+      next = static_cast<std::uint32_t>(std::min(std::round(count), double(most_samples)));
+      if (next == most_samples) break;
+    }
+  }
+  return std::min(next, target_samples_);
+}
+
+bool Picture::measures() const {
+  if (!noise_target_ || pass_target_ < first_measured || pass_target_ >= target_samples_) return false;
+  return pass_target_ == first_measured || pass_after(pass_target_ - 1) == pass_target_;
+}
+
+bool Picture::awaits_error() const {
+  return !done_ && view_ == View::shaded && measures() && !tile_error_ &&
+         std::ranges::all_of(*blocks_, [](const Block& block) { return block.unfinished == 0; });
+}
+
+void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) {
+  if (view_ != View::shaded) return;
+  const bool more = samples > target_samples_;
+  noise_target_ = noise_target;
+  target_samples_ = std::max(target_samples_, samples);
+  const bool reached = noise_target_ && noise_ && *noise_ <= *noise_target_;
+  if (done_ ? reached || pass_target_ >= target_samples_ : !more) return;
   // Lanes that are done for good begin again; so do the others' present samples, with the same result.
-  if (done_ || tiles_ == glm::uvec2(1U)) {
+  if (done_ || (tiles_ == glm::uvec2(1U) && !noise_target_)) {
     tile_ = 0;
-    pass_target_ = tiles_ == glm::uvec2(1U)
-                       ? samples
-                       : std::min(samples, target_samples_ + std::clamp(target_samples_, 1U, longest_pass));
+    pass_target_ = pass_after(pass_target_);
     begin_tile();
   }
-  target_samples_ = samples;
+  progress_before_ = 0.0;
+  samples_before_ = 0;
+  expected_samples_ = target_samples_;
   done_ = false;
 }
 
 void Picture::begin_tile() {
   // What is under way tells the tile it is of, and no one asks that one.
   blocks_ = std::make_shared<Blocks>();
+  tile_error_.reset();
   block_ = 0;
   const glm::uvec2 extent = tile_extent();
   for (std::uint32_t y = 0; y < extent.y; y += block_height) {
     for (std::uint32_t x = 0; x < extent.x; x += block_width) {
       const std::uint32_t lanes = std::min(block_width, extent.x - x) * std::min(block_height, extent.y - y);
-      blocks_->push_back({lanes, lanes, lanes, 0, true});
+      blocks_->push_back({lanes, lanes, pass_ == 0 ? lanes : 0, 0, true});
     }
   }
 }
@@ -123,20 +163,34 @@ void Picture::end_tile() {
   // The last few of a hasty first pass are left to the next.
   const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
-  if (++tile_ == tiles_.x * tiles_.y) {
-    tile_ = 0;
-    complete_ = true;
-    ++pass_;
-    const std::uint32_t target = target_samples_;
-    if (pass_target_ >= target) {
-      done_ = true;
-    } else {
-      // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
-      // little.
-      pass_target_ = std::min(target, pass_target_ + std::min(pass_target_, longest_pass));
-    }
+  if (measures()) {
+    if (!tile_error_ || !*tile_error_) return;
+    pass_error_ += **tile_error_;
   }
+  if (++tile_ == tiles_.x * tiles_.y) end_pass();
   if (!done_) begin_tile();
+}
+
+void Picture::end_pass() {
+  tile_ = 0;
+  complete_ = true;
+  ++pass_;
+  if (measures()) {
+    const double noise = std::exchange(pass_error_, {}).noise();
+    noise_ = noise;
+    progress_before_ = progress();
+    samples_before_ = samples();
+    // Of noise that falls with the root of the samples; a little more, for it is only likely so.
+    const double ratio = noise / *noise_target_;
+    const double needed = 1.05 * ratio * ratio * pass_target_;
+    expected_samples_ = needed < target_samples_ ? pass_after(static_cast<std::uint32_t>(needed)) : target_samples_;
+    if (noise <= *noise_target_) done_ = true;
+  }
+  if (pass_target_ >= target_samples_) {
+    done_ = true;
+  } else if (!done_) {
+    pass_target_ = pass_after(pass_target_);
+  }
 }
 
 const Tracer::Program& Tracer::program(std::vector<std::string> defines, const char* name,
@@ -210,6 +264,7 @@ void Tracer::find_programs(const Picture& picture, const MarchData& data, const 
   } else {
     inspect_program(data, obstacles, "inspect.comp");
   }
+  if (picture.noise_target_) program({}, noise_kernel);
 }
 
 unsigned Tracer::traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
@@ -234,6 +289,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.lamps_ = obstacles.lamps_met() > 0;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
+  picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
 }
 
 bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
@@ -369,7 +425,12 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.hasty_ = settings.hasty;
   picture.pass_ = 0;
   picture.holes_ = true;
-  picture.pass_target_ = picture.tiles_ == glm::uvec2(1U) ? picture.target_samples_ : 1U;
+  picture.pass_target_ = picture.pass_after(0);
+  picture.pass_error_ = {};
+  picture.noise_.reset();
+  picture.progress_before_ = 0.0;
+  picture.samples_before_ = 0;
+  picture.expected_samples_ = picture.target_samples_;
   picture.samples_ = std::make_shared<std::uint64_t>(0);
   picture.view_row_ = 0;
   picture.complete_ = false;
@@ -419,6 +480,15 @@ void Tracer::collect() {
     (landed->words.empty() ? seconds_.inspect : seconds_.trace) += 1e-3 * landed->ms.value_or(0.0);
     if (landed->words.empty()) {
       if (what.cost) what.cost->learn(what.slots, landed->ms ? ms : 0.0, ms);
+      continue;
+    }
+    if (what.error) {
+      ErrorSums sums;
+      for (std::size_t i = 1; i < landed->words.size(); ++i) {
+        const glm::uvec4& block = landed->words[i];
+        sums += {std::bit_cast<float>(block.x), std::bit_cast<float>(block.y), double(block.z)};
+      }
+      *what.error = sums;
       continue;
     }
     // What the lanes did in full rounds, of all that they could have done: lanes that end early, or meet nothing, cost
@@ -508,6 +578,14 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   bool sent = false;
   while (!picture.done_ && !(until_complete && picture.complete_)) {
     const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
+    if (!flights_.full() && picture.awaits_error()) {
+      measure(picture, obstacles);
+      (stages ? stages->travel : program.object)->use(*gl_);
+      sent = true;
+      collect();
+      picture.end_tile();
+      continue;
+    }
     if (!flights_.full()) {
       auto what = choose(picture, program.cost, std::clamp(left, 0.0, aim), false);
       if (!what && !sent && flights_.empty()) what = choose(picture, program.cost, least_ms, true);
@@ -526,6 +604,23 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
     picture.end_tile();
   }
   return picture.done_;
+}
+
+void Tracer::measure(Picture& picture, const Obstacles& obstacles) {
+  core::CmParameters parameters = picture.parameters_;
+  describe(obstacles, parameters);
+  parameters.dispatch.tile_corner = picture.tile_corner();
+  parameters.dispatch.tile_size = picture.tile_extent();
+  gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
+  program({}, noise_kernel).object->use(*gl_);
+  Dispatched what;
+  what.error = picture.tile_error_ = std::make_shared<std::optional<ErrorSums>>();
+  const std::size_t blocks = picture.blocks_->size();
+  flights_.begin(Flights::Kind::dispatch);
+  gl_->DispatchCompute(static_cast<GLuint>(blocks), 1, 1);
+  flights_.end(std::move(what), kernels_.counters(), 1 + blocks);
+  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  gl::check(*gl_, "measuring the noise");
 }
 
 std::optional<Dispatched> Tracer::choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
@@ -791,18 +886,14 @@ void Tracer::read_error(const Picture& picture, float* errors) const {
 Totals Tracer::totals(const Picture& picture) const {
   if (!picture.film_.has(film_layers::counts)) return {};
   Totals totals;
-  double error = 0.0;
-  double brightness = 0.0;
-  double pixels = 0.0;
+  ErrorSums sums;
   for_each_error(picture, [&](const PixelError& pixel) {
     totals.samples += pixel.samples;
     totals.steps += pixel.steps;
     if (pixel.samples < 2) return;
-    error += pixel.squared;
-    brightness += pixel.mean;
-    pixels += 1.0;
+    sums += {pixel.squared, pixel.mean, 1.0};
   });
-  if (brightness > 0.0) totals.noise = std::sqrt(error * pixels) / brightness;
+  totals.noise = sums.noise();
   return totals;
 }
 

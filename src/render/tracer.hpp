@@ -72,6 +72,8 @@ struct PictureSettings {
   unsigned layers = 1;
   /// Samples that meet the volume before any surface are summed apart, too.
   bool volume_alone = false;
+  /// The picture is done once its noise (Totals::noise) is no more than this; none: once it has its samples.
+  std::optional<double> noise_target;
 };
 
 /// What is known of a pixel without light: glsl/aovs.comp says of each what it is.
@@ -96,8 +98,12 @@ class Picture {
   [[nodiscard]] View view() const { return view_; }
   /// Whether every pixel (nearly every one, of a hasty picture) has a sample.
   [[nodiscard]] bool complete() const { return complete_; }
-  /// Whether every pixel has its target samples.
+  /// Whether every pixel has its target samples, or the noise is down to its target.
   [[nodiscard]] bool done() const { return done_; }
+  /// Fewest samples a pixel that the noise is looked at with. It is again at each 1.41 times as many, rounded: whatever
+  /// the time, the same picture ends with the same samples.
+  static constexpr std::uint32_t first_measured = 16;
+  [[nodiscard]] std::optional<double> noise_target() const { return noise_target_; }
   /// Whether pixels without a sample may be left.
   [[nodiscard]] bool has_holes() const { return holes_; }
   [[nodiscard]] double progress() const;
@@ -107,8 +113,9 @@ class Picture {
   [[nodiscard]] const SurfaceLayers& layers() const { return *layers_; }
   [[nodiscard]] Layered layered() const { return layered_; }
   [[nodiscard]] bool volume_alone() const { return volume_alone_; }
-  /// Asks for this many samples, if that is more: goes on where it was.
-  void extend(std::uint32_t samples);
+  /// Asks for this many samples, if that is more, and of a picture with a noise target for this noise: goes on where it
+  /// was.
+  void extend(std::uint32_t samples, std::optional<double> noise_target);
   /// What passes have made of it.
   [[nodiscard]] const Film& film() const { return film_; }
   [[nodiscard]] Film& film() { return film_; }
@@ -137,8 +144,15 @@ class Picture {
   bool lamps_ = false;        // paths that meet no triangles look for lamps
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
+  // Samples of each pixel after a pass that ends with so many.
+  [[nodiscard]] std::uint32_t pass_after(std::uint32_t samples) const;
+  // Whether the pass under way ends with a look at the noise.
+  [[nodiscard]] bool measures() const;
+  // Whether it is time to find the tile's error.
+  [[nodiscard]] bool awaits_error() const;
   void begin_tile();
   void end_tile();
+  void end_pass();
 
   glm::uvec2 tile_size_{1U};
   glm::uvec2 tiles_{1U};
@@ -149,7 +163,15 @@ class Picture {
   std::shared_ptr<std::uint64_t> samples_;  // dispatches count them, even for a picture begun anew meanwhile
   std::uint32_t view_row_ = 0;              // a debug view is made by rows
   bool hasty_ = false;
-  std::uint32_t pass_ = 0;  // the one under way
+  std::optional<double> noise_target_;
+  std::shared_ptr<std::optional<ErrorSums>> tile_error_;  // of the tile under way, once it was asked for
+  ErrorSums pass_error_;                                  // of the tiles before it
+  std::optional<double> noise_;                           // as of the last pass that was looked at
+  // Progress: what it was when it was last known how many samples it would take, and then.
+  double progress_before_ = 0.0;
+  std::uint64_t samples_before_ = 0;
+  std::uint32_t expected_samples_ = 1;  // a pixel
+  std::uint32_t pass_ = 0;              // the one under way
   bool holes_ = true;
   bool complete_ = false;
   bool done_ = false;
@@ -238,6 +260,8 @@ class Tracer {
   // stages: what paths among triangles are run by; without them the program in use is the one kernel.
   void dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
                 Dispatched what);
+  // Sends what finds the error of a tile whose samples are done.
+  void measure(Picture& picture, const Obstacles& obstacles);
   // Takes up what has ended.
   void collect();
   // Whether the surface pass is done, where a dispatch that reads it would wait for it.

@@ -127,6 +127,8 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.content.preview = shot.sampling.preview;
   wish.content.volume_alone = shot.sampling.volume_alone;
   wish.samples = std::max(1U, shot.sampling.samples);
+  wish.noise_target = shot.sampling.noise_target;
+  wish.content.stops_by_noise = shot.sampling.noise_target.has_value();
   wish.depth = frame.write_depth;
   wish.held = shot.held;
   return wish;

@@ -135,10 +135,13 @@ struct Sampling {
   render::View view = render::View::shaded;
   bool preview = true;
   bool volume_alone = false;
+  std::optional<double> noise_target = std::nullopt;  ///< relative
 
   static Sampling of(const cumulet_sampling_desc& d) {
-    return {d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
-            d.volume_alone == 1};
+    Sampling sampling{d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
+                      d.volume_alone == 1};
+    if (d.noise_target_percent > 0.0F) sampling.noise_target = 0.01 * double(d.noise_target_percent);
+    return sampling;
   }
 };
 

@@ -1,4 +1,4 @@
-"""What cumulet-render shows on a terminal: its shaders compile before the first sample.
+"""What cumulet-render shows on a terminal: its shaders compile before the first sample, and why a picture ended.
 
 Usage: render_progress.py RENDER VOLUME MODEL OUT_FOLDER
 """
@@ -36,6 +36,35 @@ def main():
     assert parts == sorted(parts) and parts[-1] == 100, lines
     assert max(places["compiling shaders"]) < min(places["rendering"]), lines
     assert (folder / "picture.png").stat().st_size > 0
+    stops_by_noise(render, volume, folder)
+    stops_by_time(render, volume, folder)
+
+
+def ending(lines):
+    """Of the last line: noise and samples a pixel."""
+    last = [line for line in lines if line][-1]
+    match = re.match(r"stopped.png: noise ([\d.]+) %.* after ([\d.]+) samples a pixel", last)
+    assert match, last
+    return float(match.group(1)), float(match.group(2)), last
+
+
+def stops_by_noise(render, volume, folder):
+    picture = [render, volume, "--size", "64x48", "-o", "stopped.png", "--noise-target", "12"]
+    lines = shown(picture, folder)
+    noise, samples, last = ending(lines)
+    assert noise <= 12.0 and 16 <= samples < 4096 and "(target 12 %)" in last, last
+    parts = [int(re.search(r"(\d+) %", line).group(1)) for line in lines if line.startswith("rendering")]
+    assert parts == sorted(parts), lines
+    # Where that takes more than it may have, it says so.
+    _, samples, last = ending(shown(picture + ["--spp", "3"], folder))
+    assert samples == 3 and last.endswith("the most that one may have"), last
+
+
+def stops_by_time(render, volume, folder):
+    lines = shown([render, volume, "--size", "64x48", "-o", "stopped.png", "--time-limit", "0.5"], folder)
+    _, samples, last = ending(lines)
+    assert samples >= 1 and last.endswith("at the time limit of 0.5 s"), last
+    assert (folder / "stopped.png").stat().st_size > 0
 
 
 main()

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "base/luminance.hpp"
@@ -92,6 +93,115 @@ TEST_P(Noise, OneSampleTellsNothingOfItsError) {
   picture(2, 0);
   for (const float error : errors()) EXPECT_TRUE(std::isfinite(error));
   EXPECT_GT(viewer().measure_noise(), 0.0);
+}
+
+// Everything but how long it goes on.
+struct Ended {
+  double samples = 0.0;  // a pixel
+  std::vector<float> pixels;
+  bool operator==(const Ended&) const = default;
+};
+
+class Stops : public Noise {
+ protected:
+  static constexpr std::uint32_t most = 4096;
+
+  // Without previews, so that the same wish is the same picture.
+  static viewer::Sampling sampling(std::optional<double> noise_target, std::uint32_t samples = most) {
+    viewer::Sampling sampling;
+    sampling.samples = samples;
+    sampling.preview = false;
+    sampling.noise_target = noise_target;
+    return sampling;
+  }
+  Ended end(const viewer::Sampling& wish, double budget_ms = 1e9, glm::uvec2 size = {side, side}) {
+    viewer().set_sampling(wish);
+    viewer().wait(-1.0);
+    double progress = 0.0;
+    viewer::FrameResult result;
+    do {
+      result = viewer().render(frame(size.x, size.y, budget_ms));
+      EXPECT_GE(result.progress, progress);
+      progress = result.progress;
+      EXPECT_EQ(result.converged, result.progress == 1.0 && !result.more);
+    } while (!result.converged);
+    Ended ended;
+    ended.samples = double(viewer().stats().samples) / (double(size.x) * size.y);
+    ended.pixels.resize(std::size_t{4} * size.x * size.y);
+    viewer().read_linear(ended.pixels.data(), ended.pixels.size());
+    return ended;
+  }
+};
+CUMULET_ON_BACKENDS(Stops);
+
+// 16, 23, 32, 45, 64, ...
+std::vector<std::uint32_t> looks() {
+  std::vector<std::uint32_t> counts;
+  for (int i = 0; i < 14; ++i) counts.push_back(static_cast<std::uint32_t>(std::lround(16.0 * std::pow(2.0, 0.5 * i))));
+  return counts;
+}
+
+TEST_P(Stops, AtTheFirstLookThatIsEnough) {
+  end(sampling(std::nullopt, 16));
+  const double first = viewer().measure_noise();
+  for (const double part : {1.01, 0.9, 0.3}) {
+    const double target = part * first;
+    const Ended stopped = end(sampling(target));
+    EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+    const std::vector<std::uint32_t> counts = looks();
+    const auto at = std::ranges::find(counts, static_cast<std::uint32_t>(stopped.samples));
+    ASSERT_NE(at, counts.end()) << stopped.samples;
+    EXPECT_EQ(stopped.samples, *at);
+    EXPECT_EQ(stopped, end(sampling(std::nullopt, *at))) << "the picture of that many samples";
+    if (at == counts.begin()) continue;
+    end(sampling(std::nullopt, at[-1]));
+    EXPECT_GT(viewer().measure_noise(), target);
+  }
+}
+
+TEST_P(Stops, AtTheSameSamplesWhateverTheBudget) {
+  const Ended at_once = end(sampling(0.05));
+  for (const double budget_ms : {1.0, 7.0}) {
+    viewer::Sampling other = sampling(0.05);
+    other.seed = 9;
+    end(other, 20.0);  // so that it begins anew
+    EXPECT_EQ(end(sampling(0.05), budget_ms), at_once) << budget_ms;
+  }
+}
+
+TEST_P(Stops, InPicturesOfSeveralTiles) {
+  const glm::uvec2 size(520, 12);
+  const Ended stopped = end(sampling(0.006), 50.0, size);
+  EXPECT_GT(stopped.samples, 16.0);
+  EXPECT_LT(stopped.samples, double(most));
+  EXPECT_LE(viewer().measure_noise(), 0.006 * 1.0001);
+  EXPECT_EQ(stopped, end(sampling(std::nullopt, static_cast<std::uint32_t>(stopped.samples)), 50.0, size));
+}
+
+TEST_P(Stops, AtItsSamplesWhereNoiseStaysAbove) {
+  for (const std::uint32_t samples : {7U, 16U, 20U, 32U}) {
+    const Ended all = end(sampling(1e-4, samples));
+    EXPECT_EQ(all.samples, samples);
+    EXPECT_EQ(all, end(sampling(std::nullopt, samples)));
+  }
+}
+
+TEST_P(Stops, GoesOnWhereLessNoiseIsAskedForAndBeginsAnewWhereMoreIs) {
+  const Ended coarse = end(sampling(0.08));
+  const Ended fine = end(sampling(0.03));
+  EXPECT_GT(fine.samples, 2.0 * coarse.samples);
+  EXPECT_EQ(end(sampling(0.08)), coarse);
+  EXPECT_EQ(end(sampling(0.03, 50)).samples, 50.0);
+  EXPECT_EQ(end(sampling(0.03, 60)).samples, 60.0);
+  EXPECT_EQ(end(sampling(0.03)), fine);
+  // Of a picture that was enough, more samples change nothing.
+  EXPECT_EQ(end(sampling(0.03, 2 * most)), fine);
+  // In a window what is there stays, and is enough.
+  viewer::Sampling kept = sampling(0.03);
+  kept.preview = true;
+  end(kept);
+  kept.noise_target = 0.08;
+  EXPECT_EQ(end(kept).samples, fine.samples);
 }
 
 }  // namespace

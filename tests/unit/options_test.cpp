@@ -353,12 +353,39 @@ TEST(Options, HelpFitsAHundredColumns) {
 
 TEST(Progress, RatesAreShownOnceTheyMeanSomething) {
   // What was done before the first line took no time that anybody measured.
-  EXPECT_EQ(rendering_line(0.5, 0.0, 0.0, 1e9), "rendering [############............] 50 %");
-  EXPECT_EQ(rendering_line(0.5, 0.01, 1e-9, 1e9), "rendering [############............] 50 %");
-  EXPECT_EQ(rendering_line(0.0, 0.0, 10.0, 1e9), "rendering [........................] 0 %");
-  EXPECT_EQ(rendering_line(0.5, 0.25, 10.0, 4e6),
+  EXPECT_EQ(rendering_line(0.5, 0.0, 1e9, 0.0), "rendering [############............] 50 %");
+  EXPECT_EQ(rendering_line(0.5, 0.01, 1e7, 1e-9), "rendering [############............] 50 %");
+  EXPECT_EQ(rendering_line(0.0, 0.0, 0.0, 10.0), "rendering [........................] 0 %");
+  EXPECT_EQ(rendering_line(0.5, 0.25, 1e6, 10.0),
             "rendering [############............] 50 %  100 ksamples/s  ETA 0:20");
-  EXPECT_NE(rendering_line(1.0, 1.0, 10.0, 5e13).find("5 Tsamples/s"), std::string::npos);
+  EXPECT_NE(rendering_line(1.0, 1.0, 5e13, 10.0).find("5 Tsamples/s"), std::string::npos);
+}
+
+TEST(Progress, CountsTowardsWhatComesFirst) {
+  EXPECT_EQ(part_done(0.3, 9.0, std::nullopt), 0.3);
+  EXPECT_EQ(part_done(0.3, 6.0, 10.0), 0.6) << "the time";
+  EXPECT_EQ(part_done(0.8, 6.0, 10.0), 0.8) << "the noise, or the samples";
+  EXPECT_EQ(part_done(0.8, 11.0, 10.0), 1.0);
+}
+
+TEST(Progress, TheLastLineSaysWhyItEnded) {
+  EXPECT_EQ(ending_line(Ending::noise, 0.01874, 91.0, 2.0, std::nullopt),
+            "noise 1.87 % (target 2 %) after 91 samples a pixel");
+  EXPECT_EQ(ending_line(Ending::samples, 0.024, 64.0, 2.0, 30.0),
+            "noise 2.4 % (target 2 %) after 64 samples a pixel, the most that one may have");
+  EXPECT_EQ(ending_line(Ending::time, 0.1, 10.26, 0.0, 30.0),
+            "noise 10 % after 10.26 samples a pixel, at the time limit of 30 s");
+}
+
+TEST(Options, WhatStopsAPictureHasRoomForSamples) {
+  EXPECT_EQ(parse({"--noise-target", "2.5"}).scene.sampling.noise_target_percent, 2.5F);
+  EXPECT_EQ(parse({"--noise-target", "2.5"}).scene.sampling.samples, 65536U);
+  EXPECT_EQ(parse({"--time-limit", "0.5"}).time_limit, 0.5);
+  EXPECT_EQ(parse({"--time-limit", "0.5"}).scene.sampling.samples, 65536U);
+  EXPECT_EQ(parse({"--noise-target", "2.5", "--time-limit", "9", "--spp", "100"}).scene.sampling.samples, 100U);
+  EXPECT_EQ(parse({"--noise-target", "0"}).scene.sampling.samples, 64U) << "which asks for nothing";
+  EXPECT_EQ(parse({}).scene.sampling.samples, 64U);
+  EXPECT_FALSE(parse({}).time_limit.has_value());
 }
 
 TEST(PictureMemory, IsToldBeforeItIsMissed) {
@@ -443,6 +470,14 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--spp", "1.5"},
                                         {"--spp", "4294967296"},
                                         {"--spp", "1 "},
+                                        {"--noise-target", "-1"},
+                                        {"--noise-target", "101"},
+                                        {"--noise-target", "little"},
+                                        {"--noise-target", "nan"},
+                                        {"--time-limit", "0"},
+                                        {"--time-limit", "-3"},
+                                        {"--time-limit", "soon"},
+                                        {"--time-limit", "inf"},
                                         {"--seed", "x"},
                                         {"--seed", "4294967296"},
                                         {"--camera", "0,0,0"},

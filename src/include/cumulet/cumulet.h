@@ -864,6 +864,14 @@ typedef struct cumulet_sampling_desc {
   cumulet_view view;
   cumulet_preview preview;
   int32_t volume_alone; /* 1: at full resolution, also keep what cumulet_read_aov gives as CUMULET_AOV_VOLUME */
+  /*
+   * Where a picture at full resolution has no more noise (cumulet_measure_noise) than this percentage it is converged;
+   * samples are then the most that it may take. Looked at with 16 samples a pixel and at each 1.41 times as many, of
+   * all pixels: the same settings end with the same picture, whatever the time. 0: it takes its samples. Which pictures
+   * stop early is a matter of their samples, so that the mean of many is a little less than that of pictures of fixed
+   * counts: by far less than the noise, docs/aovs.md.
+   */
+  float noise_target_percent;
 } cumulet_sampling_desc;
 
 typedef enum cumulet_tone_map {
