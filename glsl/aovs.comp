@@ -1,6 +1,6 @@
 #version 450
 // What is known of a pixel without light, as AOVs: no noise but that of BLEND surfaces' chance, and anti-aliased by a
-// fixed set of rays.
+// fixed set of rays, cm.dispatch.samples of them.
 //   normal        mean shading normal of the nearest surface (world space, towards the eye), 0 where there is none
 //   albedo        mean base colour of the nearest surface, likewise; both as if there were no volume
 //   transmittance of the volume up to the nearest surface, ours or the host's, or beyond the volume; mean
@@ -30,7 +30,6 @@ layout(r32f, binding = CM_IMAGE_TRANSMITTANCE) uniform writeonly image2D cm_tran
 layout(r32f, binding = CM_IMAGE_SURFACE_Z) uniform writeonly image2D cm_surface_depth;
 layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 
-#define CM_RAYS 16
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 
 void main() {
@@ -41,7 +40,8 @@ void main() {
   vec3 albedo = vec3(0.0);
   float surface_z = CM_INFINITE;
   float volume_z = CM_INFINITE;
-  for (int i = 0; i < CM_RAYS; ++i) {
+  float share = 1.0 / float(cm.dispatch.samples);
+  for (int i = 0; i < int(cm.dispatch.samples); ++i) {
     // Roberts's two-dimensional sequence; the first ray is the centre's.
     vec2 within = fract(0.5 + float(i) * vec2(0.7548776662, 0.5698402910));
     vec3 o;
@@ -87,9 +87,9 @@ void main() {
     }
     transmittance += exp(-used);
   }
-  imageStore(cm_normal, ivec2(pixel), vec4(normal / float(CM_RAYS), 0.0));
-  imageStore(cm_albedo, ivec2(pixel), vec4(albedo / float(CM_RAYS), 0.0));
-  imageStore(cm_transmittance, ivec2(pixel), vec4(transmittance / float(CM_RAYS)));
+  imageStore(cm_normal, ivec2(pixel), vec4(share * normal, 0.0));
+  imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, 0.0));
+  imageStore(cm_transmittance, ivec2(pixel), vec4(share * transmittance));
   imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));
   imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z));
 }

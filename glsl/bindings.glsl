@@ -36,9 +36,15 @@ const int CM_UNIT_DEPTH_SOURCE = 0;
 const int CM_UNIT_DENOISE_COLOUR = 0;
 const int CM_UNIT_DENOISE_ALBEDO = 1;
 const int CM_UNIT_DENOISE_NORMAL = 2;
-const int CM_UNIT_GUIDE_ALBEDO = 6;  // denoise_guides.comp, beside what resolve.comp has
-const int CM_UNIT_GUIDE_NORMAL = 7;
-const int CM_UNIT_GUIDE_TRANSMITTANCE = 8;
+const int CM_UNIT_MOMENTS = 7;       // denoise_guides.comp and wavelet_*.comp, beside what resolve.comp has
+const int CM_UNIT_GUIDE_ALBEDO = 8;
+const int CM_UNIT_GUIDE_NORMAL = 9;
+const int CM_UNIT_GUIDE_TRANSMITTANCE = 10;
+const int CM_UNIT_GUIDE_SURFACE_Z = 11;
+const int CM_UNIT_GUIDE_VOLUME_Z = 12;
+const int CM_UNIT_WAVELET_FRONT = 13;
+const int CM_UNIT_WAVELET_SPREAD = 14;
+const int CM_UNIT_WAVELET_GUIDES = 15;
 // surface.frag:
 const int CM_UNIT_MAPS = 0;  // to 9, in the order of surface_parameters.glsl
 const int CM_UNIT_GGX_ALBEDO = 10;
@@ -78,5 +84,9 @@ const int CM_IMAGE_DENOISED = 0;    // denoise_convolution.comp
 const int CM_IMAGE_GUIDE_COLOUR = 0;  // denoise_guides.comp
 const int CM_IMAGE_GUIDE_ALBEDO = 1;
 const int CM_IMAGE_GUIDE_NORMAL = 2;
+const int CM_IMAGE_WAVELET_FRONT = 2;  // wavelet_*.comp, beside resolve.comp's
+const int CM_IMAGE_WAVELET_SPREAD = 3;
+const int CM_IMAGE_WAVELET_GUIDES = 4;
+const int CM_IMAGE_WAVELET_BEHIND = 5;
 
 #endif

@@ -11,12 +11,6 @@ namespace {
 // Albedo and normals without noise go with the picture, as ours are.
 constexpr const char* network_name = "rt_hdr_calb_cnrm.tza";
 
-std::string network_file(std::string folder) {
-  if (folder.empty()) folder = denoiser_folder();
-  if (folder.empty()) throw std::runtime_error("no folder of Open Image Denoise's networks: see --oidn-weights");
-  return folder + "/" + network_name;
-}
-
 }  // namespace
 
 std::string denoiser_folder() {
@@ -25,18 +19,21 @@ std::string denoiser_folder() {
   return data.empty() ? "" : data + "/cumulet/oidn";
 }
 
-void check_denoiser(const std::string& folder) {
-  const std::string file = network_file(folder);
-  if (!std::filesystem::is_regular_file(file))
+std::string find_network(const std::string& folder) {
+  const std::string in = folder.empty() ? denoiser_folder() : folder;
+  if (in.empty()) throw std::runtime_error("no folder of Open Image Denoise's networks: see --oidn-weights");
+  std::string file = in + "/" + network_name;
+  if (!std::filesystem::is_regular_file(file)) {
     throw std::runtime_error(file +
                              ": there is no such network: see --oidn-weights and scripts/install_oidn_weights.sh");
+  }
+  return file;
 }
 
-std::vector<float> denoised(cumulet_viewer* viewer, const std::string& folder, std::size_t floats) {
-  const std::string file = network_file(folder);
+std::vector<float> denoised(cumulet_viewer* viewer, const std::string& network, std::size_t floats) {
   cumulet_denoise_desc desc{};
   desc.struct_size = sizeof desc;
-  desc.network = file.c_str();
+  if (!network.empty()) desc.network = network.c_str();
   std::vector<float> rgba(floats);
   if (cumulet_read_denoised(viewer, &desc, rgba.data(), rgba.size()) != CUMULET_OK) {
     throw std::runtime_error(cumulet_last_error(viewer));

@@ -12,11 +12,11 @@ namespace cumulet::demo {
 /// else below ~/.local/share; "" if there is none of these. scripts/install_oidn_weights.sh puts them there.
 [[nodiscard]] std::string denoiser_folder();
 
-/// Throws std::runtime_error, one line, unless the network is in that folder; "": denoiser_folder().
-void check_denoiser(const std::string& folder);
+/// The network in that folder; "": in denoiser_folder(). Throws std::runtime_error, one line, if it is not there.
+[[nodiscard]] std::string find_network(const std::string& folder);
 
-/// The viewer's picture of so many floats, denoised by the network in that folder. Throws std::runtime_error, one line,
-/// if it cannot be.
-[[nodiscard]] std::vector<float> denoised(cumulet_viewer* viewer, const std::string& folder, std::size_t floats);
+/// The viewer's picture of so many floats, denoised by that network; "": by the library's own filter. Throws
+/// std::runtime_error, one line, if it cannot be.
+[[nodiscard]] std::vector<float> denoised(cumulet_viewer* viewer, const std::string& network, std::size_t floats);
 
 }  // namespace cumulet::demo

@@ -244,12 +244,12 @@ void check_memory(const Viewer& viewer, const RenderOptions& options) {
 
 /// Empty where that is not asked for, or cannot be after all, which is told: hours of samples are worth a picture with
 /// noise.
-std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
-  if (!options.denoise) return {};
+std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, const std::string& network,
+                           Progress& progress) {
+  if (options.denoise == cumulet::demo::Denoise::off) return {};
   progress.stage("denoising");
   try {
-    return cumulet::demo::denoised(viewer.get(), options.denoiser,
-                                   std::size_t{4} * options.scene.width * options.scene.height);
+    return cumulet::demo::denoised(viewer.get(), network, std::size_t{4} * options.scene.width * options.scene.height);
   } catch (const std::exception& error) {
     tell(progress, std::string("not denoised: ") + error.what());
     return {};
@@ -362,15 +362,26 @@ void tell_ending(const Viewer& viewer, const RenderOptions& options, Traced trac
                                                 options.time_limit));
 }
 
+/// The network to denoise by; "": none is asked for, or there is none, which is told.
+std::string network_of(const RenderOptions& options, Progress& progress) {
+  if (options.denoise != cumulet::demo::Denoise::high) return "";
+  try {
+    return cumulet::demo::find_network(options.denoiser);
+  } catch (const std::exception& error) {
+    tell(progress, std::string("denoised by --denoise fast: ") + error.what());
+    return "";
+  }
+}
+
 void render(const RenderOptions& options) {
-  // Hours of samples should not end at a folder or a network that is not there.
-  if (options.denoise) cumulet::demo::check_denoiser(options.denoiser);
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
   catch_signals();
 
   Progress progress;
+  // At once, not after hours of samples.
+  const std::string network = network_of(options, progress);
   progress.stage("loading " + (options.scene.volume.empty() ? options.scene.surfaces : options.scene.volume));
   Context context = Context::create(backend_of(options.backend));
   Timeline timeline;
@@ -397,7 +408,9 @@ void render(const RenderOptions& options) {
     check(viewer, cumulet_set_environment_settings(viewer.get(), &scene.environment_settings));
   }
   check(viewer, cumulet_set_sampling(viewer.get(), &sampling));
-  check(viewer, cumulet_set_display(viewer.get(), &scene.display));
+  cumulet_display_desc display = scene.display;
+  display.denoise = CUMULET_DENOISE_OFF;  // what is read is read as it is, and denoised beside that
+  check(viewer, cumulet_set_display(viewer.get(), &display));
   set_camera(viewer, scene.camera);
   if (!scene.surfaces.empty()) {
     check(viewer, cumulet_set_surface_settings(viewer.get(), &scene.surface));
@@ -419,7 +432,7 @@ void render(const RenderOptions& options) {
   warm_up(viewer, options, progress);
   const Traced traced = trace(viewer, options, progress);
 
-  const std::vector<float> denoised = denoise(viewer, options, progress);
+  const std::vector<float> denoised = denoise(viewer, options, network, progress);
   progress.stage("writing " + options.output);
   write_picture(viewer, options, denoised);
   const cumulet_stats stats = stats_of(viewer);

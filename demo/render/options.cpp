@@ -546,9 +546,9 @@ void check_together(const RenderOptions& options) {
     throw UsageError("--aovs needs an .exr to write to");
   if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--aovs needs the shaded view");
-  if (options.denoise && options.scene.sampling.view != CUMULET_VIEW_SHADED)
+  if (options.denoise != Denoise::off && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--denoise needs the shaded view");
-  if (options.denoise && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
+  if (options.denoise != Denoise::off && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
     throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
   if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
@@ -618,8 +618,13 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.time_limit = seconds;
       },
       "Stop after this long, loading left out, but not before each pixel has a sample");
-  add_choice(app, group, "--denoise", std::array{Name{"off", false}, Name{"high", true}}, options.denoise,
-             "Take the noise away by a network of Open Image Denoise; an .exr gets a layer `denoised` (default: off)");
+  // A scene's is of what windows show.
+  app.remove_option(app.get_option("--denoise"));
+  add_choice(app, group, "--denoise",
+             std::array{Name{"off", Denoise::off}, Name{"fast", Denoise::fast}, Name{"high", Denoise::high}},
+             options.denoise,
+             "Take the noise away: fast by a filter, high by a network of Open Image Denoise, or fast without one; an "
+             ".exr gets a layer `denoised` (default: off)");
   add(
       app, group, "--oidn-weights", "DIR",
       [&](const std::string& text) {
@@ -646,6 +651,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
   check_together(options);
+  options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;
   return options;
 }
 

@@ -33,6 +33,7 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
 [[nodiscard]] bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out);
 
 enum class OutputFormat { png, exr, pfm };
+enum class Denoise { off, fast, high };
 enum class BackendChoice { automatic, egl, osmesa };
 
 struct RenderOptions {
@@ -46,7 +47,7 @@ struct RenderOptions {
   bool info = false;                 // tell what is in the files, render nothing
   bool json = false;                 // as JSON
   std::optional<double> time_limit;  // seconds from the first sample on
-  bool denoise = false;              // the picture; of an .exr a layer beside it
+  Denoise denoise = Denoise::off;    // the picture; of an .exr a layer beside it
   std::string denoiser;              // a folder of networks; empty: where the script puts them
   std::vector<cumulet_aov> aovs;     // layers of an .exr beside the picture
 };

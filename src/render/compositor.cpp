@@ -27,7 +27,15 @@ gl::ProgramKey key_of(std::vector<std::string> defines) {
 
 bool Compositor::resolves_now() const { return milliseconds(Clock::now() - resolved_) >= pause * resolve_ms_; }
 
-double Compositor::expected_ms() const { return draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0); }
+bool Compositor::filters_now() const { return milliseconds(Clock::now() - filtered_) >= pause * filter_ms_; }
+
+double Compositor::expected_ms() const {
+  double ms = draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0);
+  if (may_filter_ms_ > 0.0 && (wavelet_.of() || filters_now())) {
+    ms += std::min(may_filter_ms_, wavelet_.left_ms(filtering_.size).value_or(may_filter_ms_));
+  }
+  return ms;
+}
 
 Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool overwrite, bool newest_serves) {
   const bool waits = !overwrite && gl_->dispatches_in_call && !gl::Fence(gl_).passed();
@@ -65,12 +73,88 @@ const gl::Program& Compositor::program(const gl::ProgramKey& key, Wait wait, boo
   return program.usable() || wait == Wait::never || serves ? program : programs_->get(key);
 }
 
-Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background, Wait wait) {
+Compositor::MeansOf Compositor::means_of(const PictureTextures& picture, Background background, bool filtered) {
+  return {picture.sum,   picture.holes ? picture.sum_before : 0,
+          picture.holes, background,
+          picture.size,  picture.picture,
+          picture.wish,  picture.revision,
+          filtered};
+}
+
+Compositor::Means* Compositor::some_means(const MeansOf& wanted, bool overwrite, bool newest_serves) {
+  try {
+    return free_means(wanted.size, wanted.background == Background::apart, overwrite, newest_serves);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::out_of_memory) throw;
+    means_.clear();
+    newest_ = nullptr;
+    no_memory_for_ = wanted.size;
+    no_memory_ = error;
+    return nullptr;  // slower and with holes, but drawn
+  }
+}
+
+Compositor::Means* Compositor::filter(const PictureTextures& picture, Background background,
+                                      const FrameTarget& target) {
+  const MeansOf wanted = means_of(picture, background, true);
+  const bool alike = newest_ != nullptr && newest_->of.filtered && newest_->of.background == background;
+  if (alike && wanted.revision && newest_->of == wanted) return newest_;
+  const bool older = alike && newest_->of.picture == wanted.picture && newest_->of.size == wanted.size;
+  Means* const serves = older || (alike && newest_->of.wish == wanted.wish) ? newest_ : nullptr;
+  if (no_memory_for_ == picture.size || no_memory_to_filter_ == picture.size) return nullptr;
+  const bool always = target.wait == Wait::always;
+  if (!wavelet_.able(picture, background, always)) return serves;
+  if (wavelet_.of() != picture.picture || filtering_.background != background) {
+    wavelet_.drop();
+    if (older && picture.may_lag && !filters_now()) return newest_;
+    try {
+      wavelet_.begin(picture);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::out_of_memory) throw;
+      wavelet_.free();
+      no_memory_to_filter_ = picture.size;
+      no_memory_ = error;
+      return nullptr;
+    }
+    filtering_ = wanted;
+    filtering_ms_ = 0.0;
+  }
+  const auto begun = Clock::now();
+  // What is rehearsed is small.
+  const bool at_once = target.wait != Wait::to_show;
+  bool done = wavelet_.work(picture, deadline_after(target.filter_ms));
+  while (!done && at_once) done = wavelet_.work(picture, deadline_after(target.filter_ms));
+  filtering_ms_ += milliseconds(Clock::now() - begun);
+  if (!done) return serves;
+  Means* means = some_means(filtering_, always, serves != nullptr);
+  if (means == nullptr) return newest_ != nullptr ? serves : nullptr;
+  wavelet_.give(picture, background, means->texture.name(), means->background.name());
+  means->of = filtering_;
+  newest_ = means;
+  filtered_ = Clock::now();
+  filter_ms_ = filtering_ms_;
+  return means;
+}
+
+Compositor::Means* Compositor::means_to_draw(const PictureTextures& picture, Background background,
+                                             const Display& display, const FrameTarget& target) {
   lags_ = false;
-  const MeansOf wanted{
-      picture.sum,     picture.holes ? picture.sum_before : 0, picture.holes, background, picture.size, picture.picture,
-      picture.revision};
-  const bool alike = newest_ != nullptr && newest_->of.background == background;
+  const bool filtered = display.denoise && picture.guides;
+  may_filter_ms_ = filtered ? target.filter_ms : 0.0;
+  if (!filtered) {
+    wavelet_.free();
+    return resolve(picture, background, target.wait);
+  }
+  Means* means = filter(picture, background, target);
+  if (means == nullptr) means = resolve(picture, background, target.wait);
+  const bool can = no_memory_for_ != picture.size && no_memory_to_filter_ != picture.size;
+  if (can && !picture.may_lag && means != nullptr && !(means->of == means_of(picture, background, true))) lags_ = true;
+  return means;
+}
+
+Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background, Wait wait) {
+  const MeansOf wanted = means_of(picture, background, false);
+  const bool alike = newest_ != nullptr && newest_->of.background == background && !newest_->of.filtered;
   if (alike) {
     if (wanted.revision && newest_->of == wanted) return newest_;
     const bool older = newest_->of.picture == wanted.picture && newest_->of.size == wanted.size;
@@ -87,17 +171,8 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   }
   const gl::DebugGroup group(*gl_, "cumulet: resolve");
   const auto begun = Clock::now();
-  Means* means = nullptr;
-  try {
-    means = free_means(picture.size, background == Background::apart, wait == Wait::always, alike);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::out_of_memory) throw;
-    means_.clear();
-    newest_ = nullptr;
-    no_memory_for_ = picture.size;
-    no_memory_ = error;
-    return nullptr;  // slower and with holes, but drawn
-  }
+  Means* means = some_means(wanted, wait == Wait::always, alike);
+  if (no_memory_for_ == picture.size) return nullptr;
   lags_ = means == nullptr;
   if (lags_) return newest_;
   const auto& gl = *gl_;
@@ -261,7 +336,7 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
 }
 
 std::uint64_t Compositor::bytes() const {
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = wavelet_.bytes();
   for (const auto& means : means_) {
     bytes += std::uint64_t{means->of.size.x} * means->of.size.y * (means->background ? 32 : 16);
   }
@@ -287,7 +362,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
   const Background flat = display.shows_background() ? Background::added : Background::left_out;
-  Means* const means = resolve(picture, layered ? Background::apart : flat, target.wait);
+  Means* const means = means_to_draw(picture, layered ? Background::apart : flat, display, target);
   const auto begun = Clock::now();
   // Without means either there is no memory for them, or the driver is at their program still.
   const bool resolved = means != nullptr || lags_;

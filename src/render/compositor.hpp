@@ -10,30 +10,10 @@
 #include "base/error.hpp"
 #include "gl/programs.hpp"
 #include "render/display.hpp"
-#include "render/surface_raster.hpp"
+#include "render/picture_textures.hpp"
+#include "render/wavelet.hpp"
 
 namespace cumulet::render {
-
-/// An accumulation as a tracer made it.
-struct PictureTextures {
-  GLuint sum = 0;         // rgba32f: sums of radiance in front of the background, and of alpha; row 0 is the top
-  GLuint background = 0;  // rgb32f: means of the background's radiance, which alpha is already taken off; what there
-                          // is to show where there are no samples
-  GLuint counts = 0;      // .x is the number of samples summed
-  glm::uvec2 size{0U};
-  bool holes = false;   // some pixels may have no sample yet: they take after those around them, else show what was
-                        // there before
-  GLuint volume_z = 0;  // r32f, same size, or 0: view depth z at half opacity, 0 where the volume is not so opaque
-  const SurfaceLayers* beneath = nullptr;  // surfaces to draw beneath
-  GLuint host_z = 0;                       // as HostDepth's, that hides those behind it; 0: none
-  unsigned host_layers = 0;
-  GLuint sum_before = 0;  // what was there before, of any size; 0: nothing
-  GLuint background_before = 0;
-  GLuint counts_before = 0;
-  std::optional<std::uint64_t> revision{};  // another wherever the sums may be others; without, they always may
-  std::uint64_t picture = 0;                // another with every picture that is begun
-  bool may_lag = false;  // more samples of it are on their way: those of some frames ago may be drawn
-};
 
 /// When drawing waits for the driver's compiler.
 enum class Wait {
@@ -48,6 +28,7 @@ struct FrameTarget {
   bool flip_y = false;     // true: the picture's top row at y = 0
   bool blend_over = true;
   Wait wait = Wait::to_show;
+  double filter_ms = 0.0;  // that a denoised picture may take of this frame
   // Depth to write, where the picture has volume_z: a + b / z, or a + b z where orthographic.
   bool write_depth = false;
   bool reversed = false;
@@ -62,10 +43,13 @@ struct FrameTarget {
 /// framebuffers belong to one context of a share group: those it needs live for one call.
 class Compositor {
  public:
-  Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs) : gl_(std::move(gl)), programs_(std::move(programs)) {}
+  Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
+      : gl_(std::move(gl)), programs_(std::move(programs)), wavelet_(gl_, programs_) {}
   /// Draws nothing without a picture or into a rectangle of size 0. Writes colour to draw buffer 0 alone, whatever the
   /// depth there; alpha is premultiplied after exposure, tone map and encoding. Throws Error(invalid_argument) for a
-  /// name that is no framebuffer, or one that is not complete.
+  /// name that is no framebuffer, or one that is not complete. Denoised, where the display is and the picture has
+  /// guides: by and by, as filter_ms allow; until then as it was denoised last, if that was of the same wish, else as
+  /// it is. Throws Error(out_of_memory), once for each size, where there is no memory for that: it is drawn as it is.
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
   /// Of GL memory.
   [[nodiscard]] std::uint64_t bytes() const;
@@ -80,8 +64,7 @@ class Compositor {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// What of the radiance means hold, by CM_BACKGROUND of resolve.comp.
-  enum class Background : std::uint8_t { left_out = 0, added = 1, apart = 2 };
+  using Background = MeansBackground;
   /// What the sums were when they were turned into means.
   struct MeansOf {
     GLuint sum = 0;
@@ -90,7 +73,9 @@ class Compositor {
     Background background = Background::added;
     glm::uvec2 size{0U};
     std::uint64_t picture = 0;
+    std::uint64_t wish = 0;
     std::optional<std::uint64_t> revision;
+    bool filtered = false;
     bool operator==(const MeansOf&) const = default;
   };
   /// Means that are drawn. Where dispatches run within their call, one that writes what queued drawing reads, sums as
@@ -128,13 +113,22 @@ class Compositor {
   void draw_enlarged(const gl::Program& enlarge, const Shown& shown, const PictureTextures& picture,
                      const Display& display, const FrameTarget& target);
   void draw_depth(const PictureTextures& picture, const FrameTarget& target);
+  [[nodiscard]] static MeansOf means_of(const PictureTextures& picture, Background background, bool filtered);
   // The means to draw; null if there is no memory for them.
   Means* resolve(const PictureTextures& picture, Background background, Wait wait);
+  // The same, denoised; null where they are not there yet, nor ones of the same wish that serve.
+  Means* filter(const PictureTextures& picture, Background background, const FrameTarget& target);
+  // What is drawn of the two.
+  Means* means_to_draw(const PictureTextures& picture, Background background, const Display& display,
+                       const FrameTarget& target);
+  // As free_means, but where there is no memory keeps that to be told, once, and gives null.
+  Means* some_means(const MeansOf& wanted, bool overwrite, bool newest_serves);
   // To be written. Where as many as there may be wait to be drawn: null if the newest serves as well, else in place of
   // the oldest, whose memory the driver keeps until it is drawn. Else newest_ may be gone. overwrite: takes one that is
   // still to be drawn.
   Means* free_means(glm::uvec2 size, bool apart, bool overwrite, bool newest_serves);
   [[nodiscard]] bool resolves_now() const;
+  [[nodiscard]] bool filters_now() const;
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
@@ -150,10 +144,17 @@ class Compositor {
   std::optional<Small> no_memory_for_small_;
   const gl::Program* colour_ = nullptr;  // the last
   Kind colour_kind_;
-  std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
-  std::optional<Error> no_memory_;           // to be told
-  double resolve_ms_ = 0.0;                  // within the call
-  double draw_ms_ = 0.0;                     // the rest of it
+  std::optional<glm::uvec2> no_memory_for_;        // means of this size: tried again with another
+  std::optional<Error> no_memory_;                 // to be told
+  std::optional<glm::uvec2> no_memory_to_filter_;  // likewise
+  Wavelet wavelet_;
+  MeansOf filtering_;             // what it is at
+  double filtering_ms_ = 0.0;     // in all frames so far
+  double filter_ms_ = 0.0;        // of the last that was done...
+  Clock::time_point filtered_{};  // ...then
+  double may_filter_ms_ = 0.0;    // of a frame
+  double resolve_ms_ = 0.0;       // within the call
+  double draw_ms_ = 0.0;          // the rest of it
   bool lags_ = false;
   Clock::time_point resolved_{};
 };

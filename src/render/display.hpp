@@ -28,6 +28,7 @@ struct Display {
   bool transparent = false;             // premultiplied, without the background
   std::optional<glm::vec3> backdrop{};  // opaque: radiance to show instead of the background
   ColourEncoding encoding = ColourEncoding::srgb;
+  bool denoise = false;
 
   /// Whether the background's radiance is part of what is shown.
   [[nodiscard]] bool shows_background() const { return !transparent && !backdrop; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
@@ -20,6 +21,8 @@ constexpr double nearly_all = 0.9;
 constexpr double most_layer_bytes = 256e6;
 // Frames that the first answer to a change may take.
 constexpr double answer_frames = 2.0;
+// A pixel, for a filter: more would take longer than samples that say as much.
+constexpr std::uint32_t guide_rays = 4;
 using State = Schedule::State;
 using Clock = std::chrono::steady_clock;
 
@@ -123,7 +126,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
     }
     throw;
   }
-  working_ = Work{&picture, wish_.content.data, divisor, scene_met(obstacles), wish_.content.environment};
+  working_ = Work{&picture, wish_.content.data, divisor, scene_met(obstacles), wish_.content.environment, wishes_};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
@@ -133,12 +136,29 @@ bool Progressive::needs_depth() const {
          shown_->data == wish_.content.data;
 }
 
+bool Progressive::needs_guides(const Work& work) const {
+  return wish_.guides && wish_.content.view == View::shaded && work.data == wish_.content.data &&
+         no_memory_for_guides_ != work.picture->size() && !work.picture->has_facts();
+}
+
+void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
+  if (!needs_guides(*working_) || !tracer_.able_to_find(data, obstacles)) return;
+  try {
+    tracer_.find_facts(*working_->picture, data, obstacles, deadline, guide_rays);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::out_of_memory) throw;
+    no_memory_for_guides_ = working_->picture->size();
+    no_guides_ = error;
+  }
+}
+
 void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
   const PictureWish::Content& last = wish_.content;
   const bool resized = wish.content.size != last.size;
   const bool changed = state() == State::idle || wish.content != last;
   stillness_.see(changed, wish.held, Clock::now());
   if (changed) {
+    ++wishes_;
     const bool other_data = resized || wish.content.data != last.data;
     if (other_data) finest_ = 1;
     // Paths of the old data lead nowhere in the new.
@@ -198,12 +218,14 @@ void Progressive::advance(const PictureWish& wish, const MarchData& data, const 
     }
     throw;
   }
+  if (const auto failure = std::exchange(no_guides_, std::nullopt)) throw Error(*failure);
 }
 
 void Progressive::work(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
   Picture& picture = *working_->picture;
   const auto begun = Clock::now();
   const bool was_complete = picture.complete();
+  find_guides(data, obstacles, deadline);
   tracer_.trace(picture, data, obstacles, deadline, working_->divisor > finest_);
   const double seconds = std::chrono::duration<double>(Clock::now() - begun).count();
   trace_seconds_ += seconds;
@@ -241,13 +263,13 @@ bool Progressive::more() const {
     case State::failed:
       return false;
     case State::done:
-      return needs_depth();
+      return needs_depth() || needs_guides(*working_);
     default:
       return true;
   }
 }
 
-bool Progressive::converged() const { return state() == State::done && !needs_depth() && working_->divisor == 1; }
+bool Progressive::converged() const { return state() == State::done && !more() && working_->divisor == 1; }
 
 double Progressive::progress() const {
   if (state() != State::answering && state() != State::refining && state() != State::done) return 0.0;

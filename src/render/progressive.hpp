@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/error.hpp"
 #include "base/revision.hpp"
 #include "render/host_depth.hpp"
 #include "render/schedule.hpp"
@@ -43,6 +44,7 @@ struct PictureWish {
   std::uint32_t samples = 1;           // a pixel
   std::optional<double> noise_target;  // at full resolution: enough, whatever the samples
   bool depth = false;                  // find the volume's depth at half opacity as well
+  bool guides = false;                 // and facts of pixels, for a filter
   bool held = false;                   // a hand is at what changes it: another change is likely
 };
 
@@ -70,6 +72,8 @@ class Progressive {
 
   /// The newest whole picture; null before the first.
   [[nodiscard]] Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
+  /// The same for all pictures of what was wished when it was begun.
+  [[nodiscard]] std::uint64_t shown_wish() const { return shown_ ? shown_->wish : 0; }
   /// What was shown before, where that may have pixels without a sample; else null.
   [[nodiscard]] const Picture* before() const { return shown_ && shown_->picture->has_holes() ? before_ : nullptr; }
   /// Waits for what is under way, so that what is read back is all there is.
@@ -104,6 +108,7 @@ class Progressive {
     std::uint32_t divisor = 1;              // of the resolution
     const surface::Scene* scene = nullptr;  // whose triangles its paths meet
     Revision<EnvironmentData> environment;  // that they escape to
+    std::uint64_t wish = 0;                 // that it is of
   };
   [[nodiscard]] const std::optional<Work>& newest_work() const {
     return wish_.content.preview || !working_ ? shown_ : working_;
@@ -118,6 +123,9 @@ class Progressive {
   Picture& acquire(glm::uvec2 size);
   void start(std::uint32_t divisor, const MarchData& data, const Obstacles& obstacles, const PictureSettings& settings);
   [[nodiscard]] bool needs_depth() const;
+  [[nodiscard]] bool needs_guides(const Work& work) const;
+  // Finds them, where it is time: before samples, so that the first are filtered as soon as they are shown.
+  void find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline);
   // What of the work under way is still of use for this wish.
   void take(const PictureWish& wish, const Obstacles& obstacles);
   // Goes on with what is under way, and shows it once it is whole.
@@ -128,6 +136,9 @@ class Progressive {
   Tracer tracer_;
   std::vector<std::unique_ptr<Picture>> pictures_;
   PictureWish wish_;
+  std::uint64_t wishes_ = 0;
+  std::optional<glm::uvec2> no_memory_for_guides_;  // of this size
+  std::optional<Error> no_guides_;                  // to be told
   Schedule schedule_;
   Stillness stillness_;
   std::optional<Work> working_;

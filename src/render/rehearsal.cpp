@@ -37,6 +37,7 @@ void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarge
   picture.revision.reset();
   picture.may_lag = false;
   target.wait = Wait::never;
+  target.filter_ms = coarse_ms;
   gl_->Enablei(GL_SCISSOR_TEST, 0);
   gl_->ScissorIndexed(0, 0, 0, 0, 0);
   const glm::ivec4 whole = target.viewport;

@@ -438,7 +438,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.begin_tile();
   picture.begun_ = picture.revision_ = ++revision_;
   picture.depth_row_ = 0;
-  picture.facts_row_ = 0;
+  picture.facts_row_ = picture.facts_rays_ = 0;
   empty(picture, shaded ? parameters.lights.sky_radiance : glm::vec3(0.0F), 0);
 }
 
@@ -451,7 +451,7 @@ void Tracer::clear(Picture& picture) {
   picture.parameters_ = {};
   picture.begun_ = picture.revision_ = ++revision_;
   picture.view_ = View::shaded;
-  picture.depth_row_ = picture.facts_row_ = 0;
+  picture.depth_row_ = picture.facts_row_ = picture.facts_rays_ = 0;
   picture.complete_ = picture.done_ = true;
   picture.holes_ = false;
   empty(picture, glm::vec3(0.0F), 1);
@@ -764,9 +764,21 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacle
   return run(gl_, picture.film_, {"cumulet: depth", {}, {film_layers::depth}, work}, deadline);
 }
 
-bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
+bool Tracer::able_to_find(const MarchData& data, const Obstacles& obstacles) {
+  return asked([&] { inspect_program(data, obstacles, "aovs.comp"); });
+}
+
+bool Picture::has_facts() const { return film_.has(film_layers::normal); }
+
+bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+                        std::uint32_t rays) {
   using namespace film_layers;
-  if (picture.film_.has(normal)) return true;
+  if (picture.facts_rays_ < rays) {
+    picture.facts_rays_ = rays;
+    picture.facts_row_ = 0;
+  } else if (picture.facts_row_ >= picture.size_.y && picture.film_.has(normal)) {
+    return true;
+  }
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
     flights_.order();
@@ -780,6 +792,7 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_WRITE_ONLY);
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
+    parameters.dispatch.samples = picture.facts_rays_;
     return inspect(picture, parameters, program, picture.facts_row_, until);
   };
   const Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z}, work};

@@ -82,6 +82,9 @@ constexpr std::size_t channels_of(PixelFact fact) {
   return fact == PixelFact::normal || fact == PixelFact::albedo ? 3 : 1;
 }
 
+/// Rays a pixel that facts are means of, where they are read; a filter does with few.
+constexpr std::uint32_t fact_rays = 16;
+
 /// One accumulation under way.
 ///
 /// A tile is what paths are stored for; a dispatch covers some of its blocks, those that have something to do, and in
@@ -113,6 +116,8 @@ class Picture {
   [[nodiscard]] const SurfaceLayers& layers() const { return *layers_; }
   [[nodiscard]] Layered layered() const { return layered_; }
   [[nodiscard]] bool volume_alone() const { return volume_alone_; }
+  /// Whether facts are there that a filter can do with (Tracer::find_facts).
+  [[nodiscard]] bool has_facts() const;
   /// Asks for this many samples, if that is more, and of a picture with a noise target for this noise: goes on where it
   /// was.
   void extend(std::uint32_t samples, std::optional<double> noise_target);
@@ -178,6 +183,7 @@ class Picture {
   // Rows that the depth and facts passes have come to.
   std::uint32_t depth_row_ = 0;
   std::uint32_t facts_row_ = 0;
+  std::uint32_t facts_rays_ = 0;  // those that are there or under way are of
 };
 
 /// Traces pictures by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
@@ -218,8 +224,11 @@ class Tracer {
   /// Standard error of each pixel's luminance, with the background's; infinite where it has fewer than two samples.
   void read_error(const Picture& picture, float* errors) const;
   /// Until about the deadline, the layers of PixelFact of this picture, data and obstacles being those it was made of;
-  /// whether they are there. Goes on in the next call.
-  bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
+  /// whether they are there, of at least so many rays a pixel. Goes on in the next call.
+  bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
+                  std::uint32_t rays = fact_rays);
+  /// As able(), for find_facts().
+  bool able_to_find(const MarchData& data, const Obstacles& obstacles);
   /// A fact a pixel (PixelFact), each channels_of(fact) floats, once find_facts has found them.
   void read_fact(const Picture& picture, PixelFact fact, float* values) const;
   [[nodiscard]] Totals totals(const Picture& picture) const;

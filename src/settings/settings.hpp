@@ -59,6 +59,9 @@ inline constexpr std::array background_choices = {
     Choice{"transparent", CUMULET_BACKGROUND_TRANSPARENT, "Transparent",
            "Nothing: saved pictures have an alpha channel."},
     Choice{"color", CUMULET_BACKGROUND_COLOR, "Colour", "One colour; what lights the scene stays."}};
+inline constexpr std::array denoise_choices = {
+    Choice{"off", CUMULET_DENOISE_OFF, "Off", "Samples as they are."},
+    Choice{"fast", CUMULET_DENOISE_FAST, "Fast", "Neighbours help, the less the more samples there are."}};
 inline constexpr std::array navigation_choices = {
     Choice{"simple", CUMULET_NAVIGATION_SIMPLE, "Simple", "Left: orbit; middle or Shift+left: pan; right: dolly."},
     Choice{"blender", CUMULET_NAVIGATION_BLENDER, "Blender", "Middle: orbit; Shift: pan; Ctrl: dolly; keypad views."},
@@ -447,7 +450,12 @@ struct Table<cumulet_display_desc> {
         .key = "display.background_color", .flag = "--background-color", .type = "R,G,B",
         .help = "One colour as the background, linear radiance (default: 0,0,0)",
         .row = {.label = "Background colour",
-                .tip = "What is behind the volume, where that is one colour."}})};
+                .tip = "What is behind the volume, where that is one colour."}}),
+      Setting(&Desc::denoise, {.name = "denoise", .choices = denoise_choices,
+        .key = "display.denoise", .flag = "--denoise",
+        .help = "Take the noise away: `fast` by a filter (default: fast)",
+        .row = {.label = "Denoise",
+                .tip = "What the screen shows of few samples. Files with linear values have them as they are."}})};
 };
 
 template <>

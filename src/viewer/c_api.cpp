@@ -491,7 +491,7 @@ cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoi
                                      size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     const cumulet_denoise_desc d = read_desc(desc, "cumulet_denoise_desc");
-    require(d.network != nullptr && *d.network != '\0', "network is NULL or empty");
+    require(d.network == nullptr || *d.network != '\0', "network is empty");
     v.read_denoised(d.network, rgba, count);
   });
 }

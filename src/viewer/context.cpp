@@ -14,6 +14,7 @@ namespace {
 
 // Of a frame's budget.
 constexpr double most_of_drawing = 0.5;
+constexpr double part_to_filter = 0.4;
 
 }  // namespace
 
@@ -130,6 +131,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.noise_target = shot.sampling.noise_target;
   wish.content.stops_by_noise = shot.sampling.noise_target.has_value();
   wish.depth = frame.write_depth;
+  wish.guides = shot.display.denoise && draws(shot, frame);
   wish.held = shot.held;
   return wish;
 }
@@ -182,6 +184,24 @@ void Context::draw_surfaces_alone(const Shot& shot, const Frame& frame) {
   alone_failed_.reset();
 }
 
+render::PictureGuides Context::guides_of(const render::Picture& picture) {
+  const render::Film& film = picture.film();
+  const core::CmParameters& parameters = picture.parameters();
+  render::PictureGuides guides;
+  guides.albedo = film.texture(render::film_layers::albedo);
+  guides.normal = film.texture(render::film_layers::normal);
+  guides.transmittance = film.texture(render::film_layers::transmittance);
+  guides.surface_z = film.texture(render::film_layers::surface_z);
+  guides.volume_z = film.texture(render::film_layers::volume_z);
+  guides.surfaces = picture.layered() != render::Layered::beneath;
+  // The ground is no surface of those that are known.
+  guides.clear =
+      parameters.medium.emits == 0U && parameters.medium.source == glm::vec3(0.0F) && parameters.ground.reach == 0.0F;
+  const float pixel = 2.0F * glm::length(parameters.view.up) / static_cast<float>(picture.size().y);
+  guides.footprint = parameters.view.orthographic != 0U ? glm::vec2(pixel, 0.0F) : glm::vec2(0.0F, pixel);
+  return guides;
+}
+
 render::PictureTextures Context::textures_of(const render::Picture& picture, const render::Picture* before) const {
   render::PictureTextures textures;
   const render::Film& film = picture.film();
@@ -192,7 +212,10 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   textures.holes = picture.has_holes();
   if (film.has(render::film_layers::depth)) textures.volume_z = film.texture(render::film_layers::depth);
   textures.picture = picture.begun();
+  textures.wish = &picture == progressive_.shown() ? progressive_.shown_wish() : 0;
   textures.revision = picture.revision();
+  textures.moments = film.texture(render::film_layers::moments);
+  if (picture.view() == render::View::shaded && picture.has_facts()) textures.guides = guides_of(picture);
   if (before != nullptr) {
     textures.sum_before = before->film().texture(render::film_layers::radiance);
     textures.background_before = before->film().texture(render::film_layers::background);
@@ -230,6 +253,7 @@ render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const 
   target.viewport = frame.viewport;
   target.flip_y = frame.flip_y;
   target.blend_over = frame.blend_over;
+  target.filter_ms = part_to_filter * std::max(0.0, frame.budget_ms);
   target.write_depth = frame.write_depth && shown.film().has(render::film_layers::depth);
   if (shot.view()) {
     target.orthographic = shot.view()->orthographic;

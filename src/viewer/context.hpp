@@ -95,7 +95,10 @@ class Context {
   /// Throws Error(invalid_argument) for too few values, or what was not gathered.
   void read_aov(const Shot& shot, Aov aov, float* values, std::size_t count);
   void read_linear(const DisplaySettings& settings, float* rgba, std::size_t count);
+  /// Whether read_denoised can give this picture.
+  [[nodiscard]] bool can_denoise(const render::Picture& picture) const;
   /// The same denoised; only of shaded pictures whose surfaces are traced. Throws Error(unsupported) of others.
+  /// Without a network by the filter of frames.
   void read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count);
   [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
 
@@ -148,10 +151,14 @@ class Context {
                  const render::FrameTarget& target);
   // Throws Error(invalid_argument) where the picture is of another scene than the one there is.
   void find_facts(const Shot& shot, render::Picture& picture);
+  // The picture denoised, which has its facts: row 0 the top.
+  gl::Object by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network);
+  gl::Object filtered(const render::Picture& picture, bool with_background);
   // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
   void read_means(render::Picture& picture, bool with_background, float* rgba);
   // What the compositor draws of it, as linear radiance.
   void read_composite(render::Picture& picture, bool transparent, float* rgba);
+  [[nodiscard]] static render::PictureGuides guides_of(const render::Picture& picture);
   [[nodiscard]] render::PictureTextures textures_of(const render::Picture& picture,
                                                     const render::Picture* before) const;
 

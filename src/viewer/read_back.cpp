@@ -9,6 +9,7 @@
 #include "base/milliseconds.hpp"
 #include "gl/transient_framebuffer.hpp"
 #include "render/denoised.hpp"
+#include "render/wavelet.hpp"
 #include "viewer/context.hpp"
 
 namespace cumulet::viewer {
@@ -138,6 +139,11 @@ void Context::find_facts(const Shot& shot, render::Picture& picture) {
   }
 }
 
+bool Context::can_denoise(const render::Picture& picture) const {
+  return picture.view() == render::View::shaded && picture.layered() != render::Layered::beneath &&
+         scene_.data() != nullptr && progressive_.newest_is_of(scene_.data_revision());
+}
+
 void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count) {
   render::Picture& picture = readable();
   if (picture.view() != render::View::shaded || picture.layered() == render::Layered::beneath) {
@@ -146,17 +152,36 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
   require_room(picture, rgba, count);
   find_facts(shot, picture);
   const render::Display display = shot.display.shown(false);
-  const std::vector<scene::Volume>& volumes = shot.scene->volumes;
-  render::Denoising denoising;
-  denoising.network = network;
-  denoising.with_background = display.shows_background();
-  if (!volumes.empty()) denoising.medium_albedo = (*volumes.front().medium).albedo;
-  denoising.most_bytes = most_denoiser_bytes;
-  const gl::Object denoised = render::denoised(functions_, programs_, picture, denoising);
+  const gl::Object denoised =
+      network != nullptr ? by_network(shot, picture, network) : filtered(picture, display.shows_background());
   const glm::uvec2 size = picture.size();
   functions_->GetTextureImage(denoised.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(size.x * size.y * 16), rgba);
   gl::check(*functions_, "reading the denoised picture back");
   put_before(display, {rgba, std::size_t{size.x} * size.y * 4});
+}
+
+gl::Object Context::by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network) {
+  const std::vector<scene::Volume>& volumes = shot.scene->volumes;
+  render::Denoising denoising;
+  denoising.network = network;
+  denoising.with_background = shot.display.shown(false).shows_background();
+  if (!volumes.empty()) denoising.medium_albedo = (*volumes.front().medium).albedo;
+  denoising.most_bytes = most_denoiser_bytes;
+  return render::denoised(functions_, programs_, picture, denoising);
+}
+
+gl::Object Context::filtered(const render::Picture& picture, bool with_background) {
+  const auto background = with_background ? render::MeansBackground::added : render::MeansBackground::left_out;
+  const render::PictureTextures textures = textures_of(picture, nullptr);
+  const glm::ivec2 size(picture.size());
+  gl::Object means = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the denoised picture");
+  render::Wavelet wavelet(functions_, programs_);
+  wavelet.able(textures, background, true);
+  wavelet.begin(textures);
+  while (!wavelet.work(textures, render::Deadline::max())) {
+  }
+  wavelet.give(textures, background, means.name(), 0);
+  return means;
 }
 
 void Context::read_linear(const DisplaySettings& settings, float* rgba, std::size_t count) {

@@ -150,11 +150,13 @@ struct DisplaySettings {
   render::ToneMap tone_map = render::ToneMap::neutral;
   bool transparent = false;
   std::optional<glm::vec3> backdrop{};
+  bool denoise = false;
 
   static DisplaySettings of(const cumulet_display_desc& d) {
     DisplaySettings settings{
         d.exposure_stops, static_cast<render::ToneMap>(d.tone_map), d.background == CUMULET_BACKGROUND_TRANSPARENT, {}};
     if (d.background == CUMULET_BACKGROUND_COLOR) settings.backdrop = glm::make_vec3(d.background_color);
+    settings.denoise = d.denoise == CUMULET_DENOISE_FAST;
     return settings;
   }
 
@@ -166,6 +168,7 @@ struct DisplaySettings {
     display.legend = legend;
     display.transparent = transparent;
     if (!legend) display.backdrop = backdrop;
+    display.denoise = denoise && !legend;
     return display;
   }
 };

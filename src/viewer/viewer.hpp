@@ -118,7 +118,7 @@ class Viewer {
   void read_linear(float* rgba, std::size_t count);
   void read_display(std::uint8_t* rgba, std::size_t count);
   /// By the network in this file, which stays in memory. Throws Error(file) if it is none.
-  void read_denoised(const std::string& network_file, float* rgba, std::size_t count);
+  void read_denoised(const char* network_file, float* rgba, std::size_t count);
   /// What read_display makes of this, as read_linear gives it.
   void encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const;
   void read_aov(Aov aov, float* values, std::size_t count);

@@ -202,8 +202,12 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
   });
 }
 
-void Viewer::read_denoised(const std::string& network_file, float* rgba, std::size_t count) {
+void Viewer::read_denoised(const char* network_file, float* rgba, std::size_t count) {
   with_gl([&](Context& g) {
+    if (network_file == nullptr) {
+      g.read_denoised(shot(), nullptr, rgba, count);
+      return;
+    }
     if (denoiser_file_ != network_file || network_ == nullptr) {
       network_ = denoise::make_network(denoise::read_tza(network_file), network_file);
       denoiser_file_ = network_file;
@@ -219,15 +223,21 @@ void Viewer::encode_display(std::span<const float> linear, std::span<std::uint8_
 void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
   std::size_t pixels = 0;
   bool legend = false;
+  bool filtered = false;
   with_gl([&](Context& g) {
     const render::Picture& picture = g.readable();
     pixels = std::size_t{picture.size().x} * picture.size().y;
     legend = picture.view() != render::View::shaded;
+    filtered = display_.denoise && g.can_denoise(picture);
   });
   if (rgba == nullptr || count < pixels * 4)
     throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(pixels * 4) + " bytes");
   std::vector<float> linear(pixels * 4);
-  read_linear(linear.data(), linear.size());
+  if (filtered) {
+    read_denoised(nullptr, linear.data(), linear.size());
+  } else {
+    read_linear(linear.data(), linear.size());
+  }
   render::to_display(linear, display_.shown(legend), {rgba, pixels * 4});
 }
 

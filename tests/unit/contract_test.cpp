@@ -241,6 +241,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   check_enum("preview", &cumulet_sampling_desc::preview, 2, sampling);
   check_enum("tone_map", &cumulet_display_desc::tone_map, 3, display);
   check_enum("background", &cumulet_display_desc::background, 3, display);
+  check_enum("denoise", &cumulet_display_desc::denoise, 2, display);
   check_enum("depth", &cumulet_camera_desc::depth, 2, camera);
   check_enum("style", &cumulet_navigation_desc::style, 3, navigation);
   check_enum("type", &cumulet_event::type, 7, event);
@@ -1372,6 +1373,10 @@ TEST_F(Contract, Contract26bFramesDoNotWaitForADriverThatCompilesInParallel) {
   display.tone_map = CUMULET_TONE_MAP_CLIP;
   ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
   stalls("a tone map");
+  converge(own.get(), frame);
+  display.denoise = CUMULET_DENOISE_FAST;
+  ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
+  stalls("the filter");
   // Another encoding is for another target: nothing serves but its own, which is waited for.
   converge(own.get(), frame);
   target_.clear({0.2F, 0.4F, 0.6F, 1.0F});

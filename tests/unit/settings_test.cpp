@@ -40,8 +40,9 @@ void for_each_descriptor(Visit&& visit) {
 template <class Desc, class Value>
 void set_sample(const Setting<Desc, Value>& setting, Value& value) {
   if constexpr (settings::Enumerated<Value>) {
+    const Value before = value;
     for (const settings::Choice& choice : setting.choices)
-      if (choice.value != 0) value = static_cast<Value>(choice.value);
+      if (static_cast<Value>(choice.value) != before) value = static_cast<Value>(choice.value);
   } else if constexpr (settings::Triple<Value>) {
     value[0] = 0.25f;
     value[1] = 0.5f;

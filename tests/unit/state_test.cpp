@@ -164,6 +164,12 @@ struct Frame {
     picture.counts = counts.name();
     picture.size = {8U, 8U};
     picture.volume_z = z.name();
+    if (denoise) {
+      display.denoise = true;
+      to.filter_ms = 1e6;
+      picture.moments = z.name();
+      picture.guides = render::PictureGuides{sum.name(), sum.name(), z.name(), z.name(), z.name()};
+    }
     compositor.draw(picture, display, to);
   }
   /// Colours, then depths.
@@ -179,6 +185,7 @@ struct Frame {
   render::Compositor compositor;
   render::HostDepth depth;
   Object sum, counts, z, colour, depth_texture, target;
+  bool denoise = false;
 };
 
 TEST_P(State, TheReaderSeesWhatIsScrambled) {
@@ -216,6 +223,25 @@ TEST_P(State, EverythingComesBack) {
     }
     ASSERT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR}) << seed;
     ASSERT_EQ(state_differences(before, read_gl_state(*gl_)), "") << seed;
+  }
+}
+
+TEST_P(State, ADenoisedFrameLeavesNothingAndReadsNothing) {
+  Frame frame(gl_, programs_);
+  frame.draw();
+  EXPECT_EQ(frame.compositor.bytes(), 64U * 16U);
+  frame.denoise = true;
+  frame.draw();
+  EXPECT_EQ(frame.compositor.bytes(), 64U * (16U + 96U));
+  const std::vector<float> expected = frame.read();
+  ScramblingHost host(gl_);
+  for (std::uint32_t seed = 200; seed < 216; ++seed) {
+    host.scramble(seed);
+    const GlState before = read_gl_state(*gl_);
+    frame.draw();
+    ASSERT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR}) << seed;
+    ASSERT_EQ(state_differences(before, read_gl_state(*gl_)), "") << seed;
+    ASSERT_EQ(frame.read(), expected) << seed;
   }
 }
 

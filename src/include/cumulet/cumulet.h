@@ -886,6 +886,11 @@ typedef enum cumulet_background {
   CUMULET_BACKGROUND_COLOR = 2        /* background_color behind the volume: opaque */
 } cumulet_background;
 
+typedef enum cumulet_denoise {
+  CUMULET_DENOISE_OFF = 0,
+  CUMULET_DENOISE_FAST = 1 /* by a filter: see cumulet_display_desc */
+} cumulet_denoise;
+
 /*
  * How a picture is shown. Restarts nothing. A background is what the camera sees where neither volume nor surfaces nor
  * the ground cover it: volume and surfaces are lit by sky or environment whatever it is, and mirrors show these.
@@ -896,6 +901,17 @@ typedef struct cumulet_display_desc {
   cumulet_tone_map tone_map;
   cumulet_background background;
   float background_color[3]; /* linear Rec. 709 radiance, exposed and tone-mapped as all is; debug views have black */
+  /*
+   * Whether what frames draw is filtered: neighbours tell what a pixel's own samples do not yet (an edge-avoiding
+   * a-trous wavelet, Dammertz et al. 2010, guided by the noise's variance as of Schied et al. 2017, by depths and
+   * normals of surfaces, and by the volume's transmittance and depth). The less noise there is the less it does, so
+   * that pictures converge to what they are without. cumulet_read_linear and cumulet_read_aov stay without it. It takes
+   * some of each frame's budget (at most four tenths, and in the long run a fifth), some 140 bytes a pixel of GL
+   * memory, and four rays a pixel, unlit, before the samples of a picture. Until a picture is filtered, frames draw the
+   * last one of the same scene and camera, coarser or of fewer samples, else this one as it is. Without memory for it
+   * pictures are drawn as they are, and CUMULET_ERROR_OUT_OF_MEMORY says so once. Debug views are not filtered.
+   */
+  cumulet_denoise denoise;
 } cumulet_display_desc;
 
 CUMULET_API cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc);
@@ -1252,8 +1268,8 @@ CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box
  * without samples is 0, before a background of a colour that. count is the number of floats at rgba.
  */
 CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rgba, size_t count);
-/* [GL] The same as it is displayed: exposed, tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque
- * unless the background is transparent). */
+/* [GL] The same as it is displayed: denoised where cumulet_display_desc says so and cumulet_read_denoised can, exposed,
+ * tone-mapped, sRGB-encoded, 4 bytes a pixel (straight alpha, opaque unless the background is transparent). */
 CUMULET_API cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t* rgba, size_t count);
 /* What cumulet_read_display makes of values as cumulet_read_linear and cumulet_read_denoised give them, of any picture
  * in the shaded view: count floats to as many bytes, a multiple of 4. */
@@ -1264,7 +1280,8 @@ CUMULET_API cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const 
 typedef struct cumulet_denoise_desc {
   size_t struct_size;
   const char* network; /* a file of Intel's Open Image Denoise: rt_hdr_calb_cnrm.tza or another whose name begins with
-                          rt_hdr. Needed. The library has none (scripts/install_oidn_weights.sh) */
+                          rt_hdr. The library has none (scripts/install_oidn_weights.sh). NULL: by the filter of
+                          CUMULET_DENOISE_FAST, which needs none */
 } cumulet_denoise_desc;
 
 /*
@@ -1272,8 +1289,9 @@ typedef struct cumulet_denoise_desc {
  * like: an estimate, not the mean of samples, and without any promise on its error. Alpha, and what of the picture is
  * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory and 64 bytes a pixel for the
  * time of the call; waits for it, some 90 seconds a megapixel on software drivers, and for their compiler.
- * CUMULET_ERROR_FILE for a file that is missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views and for
- * a preview over surfaces that are not traced, and as cumulet_read_aov.
+ * Without a network: by the filter, alpha as well, with 96 bytes a pixel, a second or two a megapixel on software
+ * drivers. CUMULET_ERROR_FILE for a file that is missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views
+ * and for a preview over surfaces that are not traced, and as cumulet_read_aov.
  */
 CUMULET_API cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoise_desc* desc, float* rgba,
                                                  size_t count);

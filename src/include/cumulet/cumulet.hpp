@@ -322,7 +322,7 @@ struct VolumeFileDesc {
   }
 };
 
-/// By what a picture is denoised: the path of a network's file.
+/// By what a picture is denoised: the path of a network's file, or by the filter of Denoise::fast.
 struct DenoiseDesc {
   const char* network = nullptr;
 

@@ -1,0 +1,96 @@
+// What the passes of the wavelet filter (render::Wavelet says how they go together) have in common. A pixel has
+//   front    radiance in front of the background, over the surface's albedo, and the part that nothing covers
+//   spread   that part as rays without noise found it, the variances of the radiance's and of the part's means; before
+//            wavelet_variance.comp the second is a sample's second moment and the third the number of samples
+//   guides   what is known of it without noise
+#ifndef CM_WAVELET_GLSL
+#define CM_WAVELET_GLSL
+#include "shared.glsl"
+#include "luminance.glsl"
+
+layout(location = 0) uniform ivec2 cm_rows;  // of this dispatch: the first, and the one after the last
+
+struct CmGuides {
+  vec3 normal;          // of what is seen of the surface: as long as that share
+  float transmittance;  // of the volume in front of it
+  float surface_z;      // view depths; beyond CM_NOTHING_Z there is none
+  float volume_z;
+  bool finite;  // else the pixel is no number, and none of another's business
+};
+
+#define CM_NOTHING_Z 1e37
+
+uvec4 cm_packed(CmGuides g) {
+  return uvec4(packHalf2x16(g.normal.xy), packHalf2x16(vec2(g.normal.z, g.finite ? g.transmittance : -1.0)),
+               floatBitsToUint(min(g.surface_z, 2.0 * CM_NOTHING_Z)), floatBitsToUint(min(g.volume_z, 2.0 * CM_NOTHING_Z)));
+}
+
+CmGuides cm_unpacked(uvec4 words) {
+  vec2 low = unpackHalf2x16(words.x);
+  vec2 high = unpackHalf2x16(words.y);
+  return CmGuides(vec3(low, high.x), high.y, uintBitsToFloat(words.z), uintBitsToFloat(words.w), high.y >= 0.0);
+}
+
+#ifdef CM_WAVELET_READS
+layout(binding = CM_UNIT_WAVELET_FRONT) uniform sampler2D cm_front;
+layout(binding = CM_UNIT_WAVELET_SPREAD) uniform sampler2D cm_spread;
+layout(binding = CM_UNIT_WAVELET_GUIDES) uniform usampler2D cm_guides;
+layout(location = 1) uniform float cm_clear;      // 1: what is clear gives off no light in front of the background
+layout(location = 2) uniform vec2 cm_footprint;   // of a pixel at depth z, in the world: x + y z
+
+CmGuides cm_guides_at(ivec2 texel) { return cm_unpacked(texelFetch(cm_guides, texel, 0)); }
+
+// What a pixel's radiance is in proportion to, if what scatters there looks the same: how much of it there is.
+float cm_cover(float open) { return 1.0 - 0.98 * cm_clear * open; }
+
+// The smaller step to either side: the larger may be over an edge.
+float cm_smaller(float a, float b) { return abs(a) < abs(b) ? a : b; }
+
+// By how much a depth changes from pixel to pixel, to the right and down: surfaces', volume's.
+vec4 cm_slopes(ivec2 texel, CmGuides here) {
+  ivec2 last = textureSize(cm_guides, 0) - 1;
+  vec2 z = vec2(here.surface_z, here.volume_z);
+  vec4 slopes;
+  for (int axis = 0; axis < 2; ++axis) {
+    ivec2 by = ivec2(1 - axis, axis);
+    uvec4 before = texelFetch(cm_guides, max(texel - by, ivec2(0)), 0);
+    uvec4 after = texelFetch(cm_guides, min(texel + by, last), 0);
+    vec2 from = z - uintBitsToFloat(before.zw);
+    vec2 to = uintBitsToFloat(after.zw) - z;
+    slopes[axis] = cm_smaller(from.x, to.x);
+    slopes[2 + axis] = cm_smaller(from.y, to.y);
+  }
+  return mix(slopes, vec4(0.0), greaterThan(abs(slopes), vec4(0.1 * CM_NOTHING_Z)));
+}
+
+// How far a depth is from the plane through another, in what a slope of pixels like these allows.
+float cm_off_plane(float here, float there, vec2 slope, vec2 offset) {
+  if (max(here, there) > CM_NOTHING_Z) return min(here, there) > CM_NOTHING_Z ? 0.0 : 10.0;
+  float expected = dot(slope, offset);
+  float footprint = cm_footprint.x + cm_footprint.y * here;
+  return min(10.0, abs(there - here - expected) / (0.5 * abs(expected) + 2.0 * footprint * length(offset)));
+}
+
+// Of two pixels, how likely they are to show the same thing, 0 to 1. Surfaces count as far as they are seen.
+float cm_alike(CmGuides here, CmGuides there, vec4 slopes, vec2 offset) {
+  vec3 bend = here.normal - there.normal;
+  float far = 20.0 * dot(bend, bend) + 2.0 * abs(here.transmittance - there.transmittance);
+  float seen = max(here.transmittance, there.transmittance);
+  far += seen * cm_off_plane(here.surface_z, there.surface_z, slopes.xy, offset);
+  if (max(here.volume_z, there.volume_z) < CM_NOTHING_Z) {
+    far += 0.25 * (1.0 - seen) * cm_off_plane(here.volume_z, there.volume_z, slopes.zw, offset);
+  }
+  return exp(-far);
+}
+#endif
+
+// A surface's albedo, as far as it is seen: what its light is divided by, to be smooth where only its colour is not.
+vec3 cm_tint(vec3 albedo, vec3 normal, float transmittance) {
+  float cover = min(1.0, length(normal));
+  return max(vec3(0.05), 1.0 + transmittance * (albedo - cover));
+}
+
+// The part of a pixel that neither surfaces nor the volume cover.
+float cm_open(vec3 normal, float transmittance) { return transmittance * (1.0 - min(1.0, length(normal))); }
+
+#endif

@@ -1,0 +1,59 @@
+#version 450
+// What the wavelet filter begins with, of an accumulation as it is now. CM_HOLES as resolve.comp's.
+// variants: CM_HOLES=0,1
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "bindings.glsl"
+#include "means.glsl"
+#include "wavelet.glsl"
+layout(binding = CM_UNIT_MOMENTS) uniform sampler2D cm_moments;  // means of squared luminance
+layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;
+layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
+layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;
+layout(binding = CM_UNIT_GUIDE_SURFACE_Z) uniform sampler2D cm_surface_z;
+layout(binding = CM_UNIT_GUIDE_VOLUME_Z) uniform sampler2D cm_volume_z;
+layout(location = 3) uniform float cm_surfaces;  // 0: surfaces are drawn beneath, by another
+layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
+layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
+layout(rgba32ui, binding = CM_IMAGE_WAVELET_GUIDES) uniform writeonly uimage2D cm_guides_out;
+layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform writeonly image2D cm_behind_out;
+
+// Of a size that can be squared. By its bits: compilers may take comparisons for those of numbers.
+bool cm_is_number(float x) { return (floatBitsToUint(x) & 0x7fffffffu) < floatBitsToUint(1e15); }
+bool cm_are_numbers(vec3 v) { return cm_is_number(v.x) && cm_is_number(v.y) && cm_is_number(v.z); }
+
+void main() {
+  ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
+  if (texel.x >= textureSize(cm_sum, 0).x || texel.y >= cm_rows.y) return;
+  CmMean mean = cm_mean(texel);
+  float samples = float(texelFetch(cm_counts, texel, 0).x);
+  float square = texelFetch(cm_moments, texel, 0).x;
+  CmGuides guides;
+  guides.transmittance = texelFetch(cm_transmittance, texel, 0).x;
+  vec3 normal = cm_surfaces * texelFetch(cm_normal, texel, 0).xyz;
+  guides.normal = guides.transmittance * normal;
+  guides.surface_z = texelFetch(cm_surface_z, texel, 0).x;
+  guides.volume_z = texelFetch(cm_volume_z, texel, 0).x;
+  vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, normal, guides.transmittance);
+  float open = cm_open(normal, guides.transmittance);
+  vec3 front = mean.front.rgb / tint;
+  float part = clamp(1.0 - mean.front.a, 0.0, 1.0);
+  guides.finite = cm_are_numbers(mean.front.rgb) && cm_are_numbers(mean.background) && cm_is_number(mean.front.a) &&
+                  cm_is_number(1e-15 * square);
+  // A sample is covered or it is not: of its square, what is behind can be taken off.
+  float behind = cm_luminance(mean.background);
+  float luminance = cm_luminance(front);
+  float apart = cm_luminance(mean.front.rgb);
+  float own = max(square - (part > 0.0 ? behind * behind / part : 0.0), apart * apart);
+  float scale = apart > 0.0 ? luminance / apart : 1.0;
+  float moment = samples > 0.0 ? scale * scale * own : luminance * luminance;
+  if (!guides.finite) {
+    front = vec3(0.0);
+    part = samples = moment = 0.0;
+    mean.background = vec3(0.0);
+  }
+  imageStore(cm_front_out, texel, vec4(front, part));
+  imageStore(cm_spread_out, texel, vec4(open, moment, samples, 0.0));
+  imageStore(cm_guides_out, texel, cm_packed(guides));
+  // The mean of those samples that nothing covers; alpha says whether there were any.
+  imageStore(cm_behind_out, texel, part > 0.0 ? vec4(mean.background / part, 1.0) : vec4(0.0));
+}

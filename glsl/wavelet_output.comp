@@ -1,0 +1,44 @@
+#version 450
+// What the wavelet filter found, as means. CM_BACKGROUND as resolve.comp's.
+// variants: CM_BACKGROUND=0,1,2
+layout(local_size_x = 8, local_size_y = 8) in;
+#define CM_HOLES 0
+#include "bindings.glsl"
+#include "means.glsl"
+#define CM_WAVELET_READS
+#include "wavelet.glsl"
+layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;
+layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
+layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;
+layout(location = 3) uniform float cm_surfaces;
+layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform readonly image2D cm_behind;
+layout(rgba32f, binding = CM_IMAGE_MEANS) uniform writeonly image2D cm_means;
+#if CM_BACKGROUND == 2
+layout(rgba32f, binding = CM_IMAGE_BACKGROUND_MEANS) uniform writeonly image2D cm_background_means;
+#endif
+
+void main() {
+  ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
+  if (texel.x >= textureSize(cm_guides, 0).x || texel.y >= cm_rows.y) return;
+  CmMean mean;
+  if (cm_guides_at(texel).finite) {
+    vec4 front = texelFetch(cm_front, texel, 0);
+    float open = texelFetch(cm_spread, texel, 0).x;
+    float transmittance = texelFetch(cm_transmittance, texel, 0).x;
+    vec3 normal = cm_surfaces * texelFetch(cm_normal, texel, 0).xyz;
+    vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, normal, transmittance);
+    float own = cm_open(normal, transmittance);
+    // Where only its own samples count, these are what they are.
+    float part = clamp(front.a + own - open, 0.0, 1.0);
+    mean.front = vec4(tint * front.rgb * (cm_cover(own) / cm_cover(open)), 1.0 - part);
+    mean.background = part * imageLoad(cm_behind, texel).rgb;
+  } else {
+    mean = cm_mean(texel);
+  }
+#if CM_BACKGROUND == 1
+  mean.front.rgb += mean.background;
+#elif CM_BACKGROUND == 2
+  imageStore(cm_background_means, texel, vec4(mean.background, 0.0));
+#endif
+  imageStore(cm_means, texel, mean.front);
+}

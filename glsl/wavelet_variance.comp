@@ -1,0 +1,86 @@
+#version 450
+// How much noise there is: a pixel's few samples tell little of that (at one, nothing), so that those around tell with
+// it. What they differ by among each other counts only where none has two samples.
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "bindings.glsl"
+#define CM_WAVELET_READS
+#include "wavelet.glsl"
+layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
+layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform image2D cm_behind;
+
+#define CM_RADIUS 2
+// Fewer degrees of freedom tell less than the pixels' differences do.
+#define CM_ENOUGH 3.0
+#define CM_FEW 2.0
+
+// Where nothing escaped, what others saw behind: of those about it, then of some farther away.
+vec3 cm_behind_near(ivec2 texel) {
+  ivec2 last = textureSize(cm_guides, 0) - 1;
+  for (int stride = 1; stride <= 5; stride += 4) {
+    vec4 sum = vec4(0.0);
+    for (int y = -2; y <= 2; ++y) {
+      for (int x = -2; x <= 2; ++x) {
+        vec4 there = imageLoad(cm_behind, clamp(texel + stride * ivec2(x, y), ivec2(0), last));
+        if (there.a == 1.0) sum += there;  // those filled in here are not marked
+      }
+    }
+    if (sum.a > 0.0) return sum.rgb / sum.a;
+  }
+  return vec3(0.0);
+}
+
+void main() {
+  ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
+  ivec2 size = textureSize(cm_guides, 0);
+  if (texel.x >= size.x || texel.y >= cm_rows.y) return;
+  CmGuides here = cm_guides_at(texel);
+  vec4 spread = texelFetch(cm_spread, texel, 0);
+  vec4 slopes = cm_slopes(texel, here);
+  float own_samples = spread.z;
+  vec4 front = vec4(0.0);   // and cover, of all samples, for their means
+  float square = 0.0;
+  float open = 0.0;
+  float count = 0.0;
+  float deviation = 0.0;    // sum of squared ones from pixels' own means
+  float freedom = 0.0;      // its degrees, times cover
+  float degrees = 0.0;
+  for (int y = -CM_RADIUS; y <= CM_RADIUS; ++y) {
+    for (int x = -CM_RADIUS; x <= CM_RADIUS; ++x) {
+      ivec2 at = texel + ivec2(x, y);
+      if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
+      CmGuides there = cm_guides_at(at);
+      vec4 other = texelFetch(cm_spread, at, 0);
+      if (!there.finite || other.z == 0.0) continue;
+      vec4 colour = texelFetch(cm_front, at, 0);
+      float weight = cm_alike(here, there, slopes, vec2(x, y));
+      float cover = cm_cover(other.x);
+      float luminance = cm_luminance(colour.rgb);
+      float samples = weight * other.z;
+      front += samples * vec4(colour.rgb, cover);
+      open += samples * colour.a;
+      square += samples * other.y;
+      count += samples;
+      deviation += samples * max(0.0, other.y - luminance * luminance);
+      freedom += weight * (other.z - 1.0) * cover;
+      degrees += weight * (other.z - 1.0);
+    }
+  }
+  vec2 variance = vec2(0.0);
+  if (count > 0.0) {
+    float cover = cm_cover(spread.x);
+    float mean = cover * cm_luminance(front.rgb) / front.a;
+    float sample_variance =
+        degrees >= CM_ENOUGH ? cover * deviation / freedom : max(0.0, cover * square / front.a - mean * mean);
+    // As of a channel, where colours differ by all of them.
+    float luminance = cm_luminance(front.rgb);
+    float channels = dot(front.rgb, front.rgb) / 3.0;
+    if (luminance > 0.0) sample_variance *= channels / (luminance * luminance);
+    // None of few samples is not never (Krichevsky and Trofimov 1981).
+    open = (open + 0.5) / (count + 1.0);
+    // Means of few are skewed, and what is known of their noise is noise.
+    float samples = max(own_samples, 0.5);
+    variance = (1.0 + CM_FEW / samples) / samples * vec2(sample_variance, open * (1.0 - open));
+  }
+  imageStore(cm_spread_out, texel, vec4(spread.x, variance, 0.0));
+  if (imageLoad(cm_behind, texel).a == 0.0) imageStore(cm_behind, texel, vec4(cm_behind_near(texel), 0.0));
+}
