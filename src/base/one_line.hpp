@@ -16,7 +16,7 @@ inline std::string one_line(std::string_view text, std::size_t longest = std::nu
     if (blank && (line.empty() || line.back() == ' ')) continue;
     line += blank ? ' ' : c;
     if (line.size() >= longest) {
-      line += "...";
+      line.append(3, '.');  // gcc 12 warns of += where it is inlined
       break;
     }
   }
