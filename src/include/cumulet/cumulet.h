@@ -1324,8 +1324,8 @@ typedef enum cumulet_aov {
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
  * their luminance (CUMULET_AOV_ERROR), over the mean luminance; of the pixels that have two samples, and 0 where none
- * has. Samples count as independent: what they spread more evenly than chance makes the true error less, by up to a
- * tenth. Reads the picture back: now and then, not every frame. */
+ * has. Samples count as independent: what they spread more evenly than chance makes the true error less. Reads the
+ * picture back: now and then, not every frame. */
 CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise);
 
 /* What happened, in SI units; fields without a value are 0. */
