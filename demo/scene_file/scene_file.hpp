@@ -14,7 +14,7 @@ namespace cumulet::demo {
 enum class UpAxis { y, z };
 
 /// What every demo program can show, as the library's own descriptors with struct_size set. Zero is the library's
-/// default, as there; by default what is looked at is denoised.
+/// default, as there.
 struct SceneOptions {
   std::string volume;
   std::string grid_name;         // of density; "", here and below: by name
