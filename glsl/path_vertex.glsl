@@ -126,7 +126,7 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
     // Shadow rays end where they would from the point itself: at a lamp.
     if (!flight) d -= shift / p.reach;
   }
-  cm_hit_seed = p.random;
+  cm_hit_seed = p.random + p.ray;  // a look and the flight after it
   cm_hit_camera = p.bounces == 0u;
   CmHit hit;
   float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;

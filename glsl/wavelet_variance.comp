@@ -72,8 +72,9 @@ void main() {
     float sample_variance =
         degrees >= CM_ENOUGH ? cover * deviation / freedom : max(0.0, cover * square / front.a - mean * mean);
     // As of a channel, where colours differ by all of them.
-    float luminance = cm_luminance(front.rgb);
-    float channels = dot(front.rgb, front.rgb) / 3.0;
+    vec3 colour = front.rgb / count;
+    float luminance = cm_luminance(colour);
+    float channels = dot(colour, colour) / 3.0;
     if (luminance > 0.0) sample_variance *= channels / (luminance * luminance);
     // None of few samples is not never (Krichevsky and Trofimov 1981).
     open = (open + 0.5) / (count + 1.0);

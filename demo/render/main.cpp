@@ -348,14 +348,11 @@ Traced trace(const Viewer& viewer, const RenderOptions& options, Progress& progr
   return (frame.flags & CUMULET_RENDER_CONVERGED) != 0 ? Traced::converged : Traced::stopped;
 }
 
-void tell_ending(const Viewer& viewer, const RenderOptions& options, Traced traced, double samples,
-                 Progress& progress) {
+void tell_ending(const RenderOptions& options, Traced traced, double noise, double samples, Progress& progress) {
   using cumulet::demo::Ending;
-  double noise = 0.0;
-  check(viewer, cumulet_measure_noise(viewer.get(), &noise));
-  // The library's sums are in single precision.
+  // The library's sums are in single precision. Of one sample a pixel no noise is known.
   const double target = 0.01 * 1.0001 * options.scene.sampling.noise_target_percent;
-  Ending ending = noise <= target ? Ending::noise : Ending::samples;
+  Ending ending = target > 0.0 && samples >= 2.0 && noise <= target ? Ending::noise : Ending::samples;
   if (traced == Traced::late) ending = Ending::time;
   tell(progress, options.output + ": " +
                      cumulet::demo::ending_line(ending, noise, samples, options.scene.sampling.noise_target_percent,
@@ -435,6 +432,8 @@ void render(const RenderOptions& options) {
   const std::vector<float> denoised = denoise(viewer, options, network, progress);
   progress.stage("writing " + options.output);
   write_picture(viewer, options, denoised);
+  double noise = 0.0;
+  check(viewer, cumulet_measure_noise(viewer.get(), &noise));  // which the statistics have from then on
   const cumulet_stats stats = stats_of(viewer);
   if (!options.stats.empty()) write_stats(options, stats, context.name());
   if (!options.trace.empty()) cumulet::image::replace_file(options.trace, timeline.json());
@@ -446,7 +445,7 @@ void render(const RenderOptions& options) {
     throw std::runtime_error(options.output + ": interrupted: holds the first " + text.data());
   }
   if (options.time_limit || sampling.noise_target_percent > 0.0f)
-    tell_ending(viewer, options, traced, static_cast<double>(stats.samples) / pixels, progress);
+    tell_ending(options, traced, noise, static_cast<double>(stats.samples) / pixels, progress);
 }
 
 }  // namespace

@@ -103,6 +103,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   Means* const serves = older || (alike && newest_->of.wish == wanted.wish) ? newest_ : nullptr;
   if (no_memory_for_ == picture.size || no_memory_to_filter_ == picture.size) return nullptr;
   const bool always = target.wait == Wait::always;
+  if (wavelet_.of() != picture.picture) wavelet_.drop();  // of which it might ask for another variant
   if (!wavelet_.able(picture, background, always)) return serves;
   if (wavelet_.of() != picture.picture || filtering_.background != background) {
     wavelet_.drop();
@@ -127,7 +128,14 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   filtering_ms_ += milliseconds(Clock::now() - begun);
   if (!done) return serves;
   Means* means = some_means(filtering_, always, serves != nullptr);
-  if (means == nullptr) return newest_ != nullptr ? serves : nullptr;
+  if (means == nullptr) {
+    // Without the filter there is memory for the means perhaps.
+    if (no_memory_for_ == filtering_.size) {
+      wavelet_.free();
+      no_memory_to_filter_ = std::exchange(no_memory_for_, std::nullopt);
+    }
+    return newest_ != nullptr ? serves : nullptr;
+  }
   wavelet_.give(picture, background, means->texture.name(), means->background.name());
   means->of = filtering_;
   newest_ = means;

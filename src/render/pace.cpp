@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "base/milliseconds.hpp"
@@ -84,7 +85,11 @@ ErrorSums& ErrorSums::operator+=(const ErrorSums& other) {
   return *this;
 }
 
-double ErrorSums::noise() const { return brightness > 0.0 ? std::sqrt(squared * pixels) / brightness : 0.0; }
+double ErrorSums::noise() const {
+  // What is no number is no picture without noise.
+  if (!std::isfinite(squared) || !std::isfinite(brightness)) return std::numeric_limits<double>::infinity();
+  return brightness > 0.0 ? std::sqrt(squared * pixels) / brightness : 0.0;
+}
 
 void Flights::leave(Mark mark) {
   gl_->ClearNamedBufferSubData(ring_.name(), GL_R32UI, static_cast<GLintptr>(mark_at(next_, mark)), 4, GL_RED_INTEGER,

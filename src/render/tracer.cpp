@@ -86,6 +86,17 @@ double Picture::progress() const {
   return progress_before_ + (1.0 - progress_before_) * std::min(noise_target_ ? nearly_done : 1.0, part);
 }
 
+namespace {
+
+// The next count of samples a pixel at which a picture with a noise target is looked at.
+std::uint32_t look_after(std::uint32_t samples) {
+  double count = Picture::first_measured;
+  while (std::round(count) <= double(samples) && count < double(most_samples)) count *= std::numbers::sqrt2;
+  return static_cast<std::uint32_t>(std::min(std::round(count), double(most_samples)));
+}
+
+}  // namespace
+
 std::uint32_t Picture::pass_after(std::uint32_t samples) const {
   std::uint32_t next = samples;
   if (!noise_target_) {
@@ -95,17 +106,14 @@ std::uint32_t Picture::pass_after(std::uint32_t samples) const {
   } else if (samples < first_measured) {
     next = tiles_ == glm::uvec2(1U) ? first_measured : std::max(1U, 2 * samples);
   } else {
-    for (double count = first_measured; next <= samples; count *= std::numbers::sqrt2) {
-      next = static_cast<std::uint32_t>(std::min(std::round(count), double(most_samples)));
-      if (next == most_samples) break;
-    }
+    next = look_after(samples);
   }
   return std::min(next, target_samples_);
 }
 
 bool Picture::measures() const {
-  if (!noise_target_ || pass_target_ < first_measured || pass_target_ >= target_samples_) return false;
-  return pass_target_ == first_measured || pass_after(pass_target_ - 1) == pass_target_;
+  // The last pass as well: whether more samples would have been enough must not depend on when they are asked for.
+  return noise_target_ && pass_target_ >= first_measured && look_after(pass_target_ - 1) == pass_target_;
 }
 
 bool Picture::awaits_error() const {
@@ -175,8 +183,10 @@ void Picture::end_pass() {
   tile_ = 0;
   complete_ = true;
   ++pass_;
-  if (measures()) {
-    const double noise = std::exchange(pass_error_, {}).noise();
+  const ErrorSums error = std::exchange(pass_error_, {});
+  // Not where a noise target came in the middle of the pass: of some tiles only.
+  if (measures() && error.pixels == double(size_.x) * size_.y) {
+    const double noise = error.noise();
     noise_ = noise;
     progress_before_ = progress();
     samples_before_ = samples();

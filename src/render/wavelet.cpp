@@ -229,7 +229,7 @@ void Wavelet::give(const PictureTextures& picture, MeansBackground background, G
   gl.ProgramUniform1f(program.name(), own_at, guides.surfaces ? 1.0F : 0.0F);
   program.use(gl);
   gl.DispatchCompute((size_.x + 7) / 8, (size_.y + 7) / 8, 1);
-  gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT);
+  gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT);
   gl::check(gl, "writing the denoised picture");
   of_.reset();
 }
