@@ -140,7 +140,8 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   means->of = filtering_;
   newest_ = means;
   filtered_ = Clock::now();
-  filter_ms_ = filtering_ms_;
+  // On a GPU calls return before the work is done.
+  filter_ms_ = std::max(filtering_ms_, wavelet_.left_ms(filtering_.size).value_or(0.0));
   return means;
 }
 

@@ -60,6 +60,11 @@ void Worker::end_jobs(bool loads_only) {
   changed_.notify_all();
 }
 
+void Worker::forget_failure() {
+  const std::scoped_lock lock(mutex_);
+  failure_.reset();
+}
+
 bool Worker::busy() const {
   const std::scoped_lock lock(mutex_);
   return next_ || current_.has_value();

@@ -53,6 +53,9 @@ class Worker {
   /// The same of those that read a file.
   void cancel_loads() { end_jobs(true); }
 
+  /// How the last job ended is told no more.
+  void forget_failure();
+
   /// Whether a job waits or is under way.
   [[nodiscard]] bool busy() const;
   [[nodiscard]] Status status() const;

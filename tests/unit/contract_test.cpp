@@ -1040,6 +1040,14 @@ TEST_F(Contract, Contract20bEnvironmentsAreReadWithoutWaiting) {
   EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_CANCELLED);
   expect_shown(nullptr);
   EXPECT_EQ(difference(seen(), sky), "");
+
+  // A load that failed is forgotten with what is set in its place.
+  ASSERT_EQ(cumulet_load_environment(v_, "no such sky.hdr"), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_ERROR_FILE);
+  ASSERT_EQ(cumulet_set_environment(v_, nullptr), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(v_, -1.0), CUMULET_OK) << cumulet_last_error(v_);
+  ASSERT_EQ(cumulet_render(v_, &frame, &result), CUMULET_OK);
+  EXPECT_EQ(result.flags & CUMULET_RENDER_FAILED, 0U);
 }
 
 TEST_F(Contract, EnvironmentsAreSeenAtAnotherSize) {

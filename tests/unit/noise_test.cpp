@@ -198,6 +198,11 @@ TEST_P(Stops, GoesOnWhereLessNoiseIsAskedForAndBeginsAnewWhereMoreIs) {
   EXPECT_EQ(end(sampling(0.03)), fine);
   // Of a picture that was enough, more samples change nothing.
   EXPECT_EQ(end(sampling(0.03, 2 * most)), fine);
+  // Nor where its last samples were those of the look that was enough.
+  end(sampling(std::nullopt, 3));
+  EXPECT_EQ(end(sampling(0.08, static_cast<std::uint32_t>(coarse.samples))), coarse);
+  EXPECT_EQ(end(sampling(0.08)), coarse);
+  EXPECT_EQ(end(sampling(0.03)), fine);
   // In a window what is there stays, and is enough.
   viewer::Sampling kept = sampling(0.03);
   kept.preview = true;

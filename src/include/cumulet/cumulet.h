@@ -1289,7 +1289,7 @@ typedef struct cumulet_denoise_desc {
  * like: an estimate, not the mean of samples, and without any promise on its error. Alpha, and what of the picture is
  * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory and 64 bytes a pixel for the
  * time of the call; waits for it, some 90 seconds a megapixel on software drivers, and for their compiler.
- * Without a network: by the filter, alpha as well, with 96 bytes a pixel, a second or two a megapixel on software
+ * Without a network: by the filter, alpha as well, with 112 bytes a pixel, a second or two a megapixel on software
  * drivers. CUMULET_ERROR_FILE for a file that is missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views
  * and for a preview over surfaces that are not traced, and as cumulet_read_aov.
  */
