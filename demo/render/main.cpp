@@ -165,7 +165,7 @@ cumulet_stats stats_of(const Viewer& viewer) {
 
 constexpr double budget_ms = 200.0;  // how often the bar moves, and how long Ctrl-C may take
 
-/// Of the time limit, from the first frame on.
+/// Of the time limit, from when it is made on.
 class Limit {
  public:
   explicit Limit(const std::optional<double>& seconds) : seconds_(seconds) {}
@@ -432,9 +432,7 @@ void render(const RenderOptions& options) {
   const std::vector<float> denoised = denoise(viewer, options, network, progress);
   progress.stage("writing " + options.output);
   write_picture(viewer, options, denoised);
-  double noise = 0.0;
-  check(viewer, cumulet_measure_noise(viewer.get(), &noise));  // which the statistics have from then on
-  const cumulet_stats stats = stats_of(viewer);
+  const cumulet_stats stats = stats_of(viewer);  // of the picture that was read back
   if (!options.stats.empty()) write_stats(options, stats, context.name());
   if (!options.trace.empty()) cumulet::image::replace_file(options.trace, timeline.json());
   const double pixels = static_cast<double>(scene.width) * scene.height;
@@ -445,7 +443,7 @@ void render(const RenderOptions& options) {
     throw std::runtime_error(options.output + ": interrupted: holds the first " + text.data());
   }
   if (options.time_limit || sampling.noise_target_percent > 0.0f)
-    tell_ending(options, traced, noise, static_cast<double>(stats.samples) / pixels, progress);
+    tell_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, progress);
 }
 
 }  // namespace

@@ -86,9 +86,6 @@ std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOpt
   cumulet_camera_desc stands{};
   stands.struct_size = sizeof stands;
   check(viewer, cumulet_camera_get(camera.get(), &stands));
-  double noise = 0.0;
-  const bool shaded = scene.sampling.view == CUMULET_VIEW_SHADED;
-  if (shaded) check(viewer, cumulet_measure_noise(viewer, &noise));
   cumulet_stats stats{};
   stats.struct_size = sizeof stats;
   check(viewer, cumulet_get_stats(viewer, &stats));
@@ -103,7 +100,7 @@ std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOpt
   attributes.push_back({"cumulet:march", std::string(march_name(scene.grid.march))});
   attributes.push_back({"cumulet:samples", samples});
   attributes.push_back({"cumulet:seed", double(scene.sampling.seed)});
-  if (shaded) attributes.push_back({"cumulet:noise", noise});
+  if (scene.sampling.view == CUMULET_VIEW_SHADED) attributes.push_back({"cumulet:noise", stats.noise});
   attributes.push_back({"cumulet:eye", three(stands.eye)});
   attributes.push_back({"cumulet:target", three(stands.target)});
   attributes.push_back({"cumulet:up", three(stands.up)});

@@ -11,7 +11,8 @@ namespace cumulet::demo {
 
 /// What an OpenEXR file says of the picture that the viewer has of this scene, width x height: how it was made, by
 /// which camera, and how much noise it has. docs/aovs.md names each. No date and no name of a machine: the same picture
-/// is the same file. Reads the picture back. Throws std::runtime_error, one line, for what the viewer refuses.
+/// is the same file. Of a picture that was read back: the noise is as of then. Throws std::runtime_error, one line, for
+/// what the viewer refuses.
 [[nodiscard]] std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOptions& scene,
                                                         std::uint32_t width, std::uint32_t height);
 

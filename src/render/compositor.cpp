@@ -185,13 +185,7 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
   lags_ = means == nullptr;
   if (lags_) return newest_;
   const auto& gl = *gl_;
-  const bool before = picture.sum_before != 0;
-  gl.BindTextureUnit(core::CM_UNIT_SUM, picture.sum);
-  gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
-  gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, picture.background);
-  gl.BindTextureUnit(core::CM_UNIT_SUM_BEFORE, before ? picture.sum_before : picture.sum);
-  gl.BindTextureUnit(core::CM_UNIT_COUNTS_BEFORE, before ? picture.counts_before : picture.counts);
-  gl.BindTextureUnit(core::CM_UNIT_BACKGROUND_BEFORE, before ? picture.background_before : picture.background);
+  bind_sums(gl, picture);
   gl.BindImageTexture(core::CM_IMAGE_MEANS, means->texture.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   if (means->background) {
     gl.BindImageTexture(core::CM_IMAGE_BACKGROUND_MEANS, means->background.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY,

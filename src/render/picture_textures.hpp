@@ -45,6 +45,9 @@ struct PictureTextures {
   std::optional<PictureGuides> guides{};  // without, it is not filtered
 };
 
+/// What means.glsl reads of it, to the units that it names.
+void bind_sums(const gl::Functions& gl, const PictureTextures& picture);
+
 /// What of the radiance means hold, by CM_BACKGROUND of resolve.comp.
 enum class MeansBackground : std::uint8_t { left_out = 0, added = 1, apart = 2 };
 

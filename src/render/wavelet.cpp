@@ -125,13 +125,7 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     gl.BindImageTexture(static_cast<GLuint>(unit), texture.name(), 0, GL_FALSE, 0, access, format);
   };
   if (stage_ == Stage::input) {
-    const bool before = picture.sum_before != 0;
-    gl.BindTextureUnit(core::CM_UNIT_SUM, picture.sum);
-    gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
-    gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, picture.background);
-    gl.BindTextureUnit(core::CM_UNIT_SUM_BEFORE, before ? picture.sum_before : picture.sum);
-    gl.BindTextureUnit(core::CM_UNIT_COUNTS_BEFORE, before ? picture.counts_before : picture.counts);
-    gl.BindTextureUnit(core::CM_UNIT_BACKGROUND_BEFORE, before ? picture.background_before : picture.background);
+    bind_sums(gl, picture);
     gl.BindTextureUnit(core::CM_UNIT_MOMENTS, picture.moments);
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_ALBEDO, guides.albedo);
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_NORMAL, guides.normal);

@@ -20,6 +20,11 @@ namespace {
 
 constexpr std::uint64_t most_denoiser_bytes = std::uint64_t{512} << 20U;
 
+// Whether all of it, surfaces too, is of samples of light.
+bool is_traced(const render::Picture& picture) {
+  return picture.view() == render::View::shaded && picture.layered() != render::Layered::beneath;
+}
+
 // How many floats a picture of four channels has. Throws Error(invalid_argument) where there is no room for them.
 std::size_t require_room(const render::Picture& picture, const float* rgba, std::size_t count) {
   const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 4;
@@ -140,13 +145,12 @@ void Context::find_facts(const Shot& shot, render::Picture& picture) {
 }
 
 bool Context::can_denoise(const render::Picture& picture) const {
-  return picture.view() == render::View::shaded && picture.layered() != render::Layered::beneath &&
-         scene_.data() != nullptr && progressive_.newest_is_of(scene_.data_revision());
+  return is_traced(picture) && scene_.data() != nullptr && progressive_.newest_is_of(scene_.data_revision());
 }
 
 void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count) {
   render::Picture& picture = readable();
-  if (picture.view() != render::View::shaded || picture.layered() == render::Layered::beneath) {
+  if (!is_traced(picture)) {
     throw Error(ErrorCode::unsupported, "only shaded pictures whose surfaces are traced can be denoised");
   }
   require_room(picture, rgba, count);

@@ -333,12 +333,12 @@ void Viewer::set_medium(const Medium& medium) {
   if (other_opacity) {
     take_medium();
     request_build();
-  } else if (const bool varies = medium.phase.may_vary(); other_emission || varies != grid_.build.anisotropic) {
+  } else if (const bool other_phase = medium.phase.may_vary() != grid_.build.anisotropic;
+             other_emission || other_phase) {
     const auto varied = [](const VolumeAsset& volume) { return volume.has_anisotropy(); };
     const auto either = [](const VolumeAsset& volume) { return volume.may_emit() || volume.has_anisotropy(); };
-    const bool other_phase = varies != grid_.build.anisotropic;
     grid_.build.emission = emission;
-    grid_.build.anisotropic = varies;
+    grid_.build.anisotropic = medium.phase.may_vary();
     request_build(!other_phase ? glows : other_emission ? +either : +varied);
   }
   show_medium();
