@@ -9,6 +9,7 @@
 
 #include "costs.hpp"
 #include "defaults.hpp"
+#include "denoise.hpp"
 #include "measure.hpp"
 #include "report.hpp"
 
@@ -40,6 +41,12 @@ void run(const bench::Options& options) {
   headless::Context context = headless::Context::create(options.backend);
   const bench::Machine machine = machine_of(context);
   bench::progress(machine.gl_renderer);
+  if (options.denoise || options.settle) {
+    std::filesystem::create_directories(options.out);
+    if (options.denoise) bench::measure_denoise(context, options);
+    if (options.settle) bench::measure_settle(context, options);
+    return;
+  }
   std::vector<bench::AssetResult> results;
   std::vector<std::string> skipped;
   if (options.defaults) std::printf("%s", bench::defaults_head().c_str());

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <map>
 
+#include "judged.hpp"
+
 namespace cumulet::bench {
 
 namespace {
@@ -52,10 +54,13 @@ ParseResult parse(int argc, char** argv) {
   std::vector<std::string> inputs;
   std::string shared_data = "../shared/data";
   std::string samples = "build/sample-full";
+  o.usual_dir = "build/sample";
   std::string backend = "auto";
   app.add_option("--input", inputs,
                  "NAME=FILE[:GRID] or NAME=@noise:SIZE, again and again (default: disney, cumulus, explosion)");
   app.add_option("--sample-dir", samples, "What cumulet-scene --full wrote (default: build/sample-full)");
+  app.add_option("--usual-dir", o.usual_dir,
+                 "With --denoise and --settle: what cumulet-scene wrote without (default: build/sample)");
   app.add_option("--data-dir", shared_data, "Holds vdb/wdas/wdas_cloud_sixteenth.vdb (default: ../shared/data)");
   app.add_option("--out", o.out, "Folder for what is written (default: bench-out)");
   app.add_option("--update-readme", o.readme, "Put the main table between this file's bench:begin and bench:end");
@@ -74,6 +79,28 @@ ParseResult parse(int argc, char** argv) {
   app.add_option("--threshold", o.thresholds,
                  "With --defaults and --equal-error: these thresholds instead of the default one");
   app.add_option("--deviation", o.deviations, "With --defaults: these of the deviation criterion too");
+  app.add_flag(
+      "--denoise", o.denoise,
+      "Only how good pictures of 1 to 64 samples are, raw and denoised, on eight scenes, how they flicker, and "
+      "what it takes; --input NAME=FILE puts a file into a scene");
+  app.add_flag("--settle", o.settle,
+               "Only how far what is drawn is from the converged picture after a change, by time; --seconds of it");
+  app.add_option("--scene", o.scenes, "With these: cloud, full, fire, explosion, model, terrain, fog, lamp")
+      ->check(CLI::IsMember(judged_names()));
+  app.add_option("--oidn-weights", o.oidn_weights, "Folder of Open Image Denoise's networks (as of cumulet-render)");
+  app.add_option("--reference-samples", o.reference_samples, "Of the pictures to come near (default: 8192)")
+      ->check(CLI::Range(2U, 1U << 20U));
+  app.add_option("--raw-samples", o.raw_samples, "Up to which raw pictures are judged (default: 256)")
+      ->check(CLI::Range(64U, 1U << 16U));
+  app.add_option("--frames", o.frames, "Of the orbit whose flicker is measured (default: 30; 0: none)")
+      ->check(CLI::Range(0U, 1000U));
+  app.add_option("--flicker-samples", o.flicker_samples, "A pixel, in each of these (default: 4)")
+      ->check(CLI::Range(1U, 1024U));
+  app.add_option("--flicker-reference-samples", o.flicker_reference_samples,
+                 "A pixel, in each of those that they are held against (default: 256)")
+      ->check(CLI::Range(2U, 1U << 16U));
+  app.add_option("--budget", o.budget_ms, "With --settle: milliseconds a frame (default: 10)")
+      ->check(CLI::PositiveNumber);
   const std::map<std::string, headless::Backend> backends{
       {"auto", headless::Backend::automatic}, {"egl", headless::Backend::egl}, {"osmesa", headless::Backend::osmesa}};
   app.add_option("--backend", backend, "auto|egl|osmesa")->check(CLI::IsMember({"auto", "egl", "osmesa"}));
@@ -125,7 +152,8 @@ ParseResult parse(int argc, char** argv) {
     if (few->empty()) o.fewest_samples = 4;
     o.sweep_factor = 4.0;
   }
-  if (inputs.empty()) {
+  o.sample_dir = samples;
+  if (inputs.empty() && !o.denoise && !o.settle) {
     const std::filesystem::path sample_dir(samples);
     o.inputs = {
         {"disney", std::filesystem::path(shared_data) / "vdb/wdas/wdas_cloud_sixteenth.vdb", "density", 0, true},

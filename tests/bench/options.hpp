@@ -48,7 +48,19 @@ struct Options {
   bool equal_error = false;           ///< only what marches take to an error of a fire's picture
   std::string color_grid;             ///< of the volume whose channels are measured; empty: none
   std::filesystem::path environment;  ///< to measure too; empty: none
-  double surfaces_threshold = 0.0;    ///< above 0: only what surfaces cost is measured, on a grid of that threshold
+  bool denoise = false;               ///< only how good pictures of few samples are, raw and denoised
+  bool settle = false;                ///< only how soon what is drawn is good after a change
+  std::vector<std::string> scenes;    ///< of those that these are judged on; empty: all
+  std::filesystem::path sample_dir;   ///< what cumulet-scene --full wrote
+  std::filesystem::path usual_dir;    ///< what it wrote without
+  std::string oidn_weights;           ///< folder of networks; empty: where cumulet-render looks for them
+  std::uint32_t reference_samples = 8192;
+  std::uint32_t raw_samples = 256;    ///< up to which the raw picture is judged, at least 64
+  std::uint32_t frames = 30;          ///< of an orbit; 0: none
+  std::uint32_t flicker_samples = 4;  ///< of each of them
+  std::uint32_t flicker_reference_samples = 256;
+  double budget_ms = 10.0;          ///< a frame's, where what is drawn settles
+  double surfaces_threshold = 0.0;  ///< above 0: only what surfaces cost is measured, on a grid of that threshold
 };
 
 /// The options, or the exit status that wrong usage (or --help) means; explains itself.

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
 namespace cumulet::bench {
+
+/// Throws std::runtime_error that names the file.
+void write_file(const std::filesystem::path& path, const std::string& text);
 
 struct Series {
   std::string label;

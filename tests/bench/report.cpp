@@ -238,13 +238,6 @@ std::string build_line(const std::vector<AssetResult>& assets) {
              b.total(), b.load, b.statistics, b.refine, b.records, b.upload, b.peak_bytes / (1024.0 * 1024.0 * 1024.0));
 }
 
-void write_file(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
-}
-
 std::string csv(const Machine& machine, const std::vector<AssetResult>& assets, const std::vector<TreeTimes>& trees) {
   std::string text = "asset,march,target,quantity,value,min,max\n";
   const auto line = [&text](const std::string& asset, const std::string& march, double target, const char* quantity,

@@ -65,7 +65,31 @@ def main():
         assert first in table and len(lines) == rows and len({len(line) for line in lines}) == 1, table
         assert "nan" not in table and "inf" not in table, table
 
-    for wrong in (["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--triangles", "0"], ["--nonsense"]):
+    weightless = folder / "weightless"
+    weightless.mkdir()
+    command = [program, "--denoise", "--settle", "--scene", "fog", "fire", "full", "lamp", "--size", "16", "--oidn-weights", str(weightless)]
+    command += ["--usual-dir", str(folder / "usual"), "--sample-dir", str(folder / "nothing"), "--input", f"fire={fire}"]
+    command += ["--reference-samples", "8", "--raw-samples", "64", "--frames", "3", "--flicker-samples", "1", "--flicker-reference-samples", "4"]
+    command += ["--seconds", "0.1", "--repeats", "1", "--out", str(folder / "judged")]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    tables = [[line.split("|") for line in table.splitlines() if line.startswith("|")] for table in done.stdout.split("\n\n")]
+    stills, passes, settled = [table for table in tables if table]
+    for table, rows in (stills, 3 * 3), (passes, 3), (settled, 3 * 2):  # of three scenes whose sun cannot be turned
+        assert len(table) == 2 + rows and len({len(line) for line in table}) == 1, done.stdout
+    assert "nan" not in done.stdout and "inf" not in done.stdout, done.stdout
+    assert "Skipped: full, there is no " in done.stdout and "no network: " in done.stderr, done
+    for row in stills[2:]:
+        if row[2].strip() == "high":
+            assert row[3].strip() == "no network", row
+        else:
+            assert 0.0 < float(row[9]) < 1.0 and float(row[-2]) > 0.0, row  # FLIP of one sample; flicker
+    names = {plot.name for plot in (folder / "judged").glob("*.svg")}
+    assert "denoise.svg" in names and "denoise-fog-flip.svg" in names and "settle-lamp.svg" in names, names
+    for name in names:
+        xml.etree.ElementTree.parse(folder / "judged" / name)
+    assert (folder / "judged/denoise-fire.png").read_bytes().startswith(b"\x89PNG")
+
+    for wrong in (["--denoise", "--scene", "moon"], ["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--triangles", "0"], ["--nonsense"]):
         assert subprocess.run([program, *wrong], capture_output=True, check=False).returncode == 2, wrong
     missing = subprocess.run([program, "--input", "x=missing.vdb", "--out", str(folder / "no")], capture_output=True,
                              text=True, check=False)
