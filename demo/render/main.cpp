@@ -1,4 +1,4 @@
-// cumulet-render: one volume, one picture.
+// cumulet-render: a volume's picture, or those of a sequence of volumes.
 
 #include <cumulet/cumulet.h>
 #include <sys/resource.h>
@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <file.hpp>
@@ -20,9 +21,12 @@
 #include <stdexcept>
 #include <string>
 #include <timeline.hpp>
+#include <utility>
+#include <vector>
 
 #include "aovs.hpp"
 #include "denoised.hpp"
+#include "frame_plan.hpp"
 #include "info.hpp"
 #include "memory.hpp"
 #include "metadata.hpp"
@@ -31,10 +35,14 @@
 
 namespace {
 
+using cumulet::demo::Frame;
+using cumulet::demo::FramePlan;
+using cumulet::demo::FrameState;
 using cumulet::demo::one_line;
 using cumulet::demo::OutputFormat;
 using cumulet::demo::Progress;
 using cumulet::demo::RenderOptions;
+using cumulet::demo::SceneOptions;
 using cumulet::demo::Timeline;
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
@@ -163,7 +171,8 @@ cumulet_stats stats_of(const Viewer& viewer) {
   return stats;
 }
 
-constexpr double budget_ms = 200.0;  // how often the bar moves, and how long Ctrl-C may take
+constexpr double draw_only_ms = -1.0;  // a frame's that traces nothing
+constexpr double budget_ms = 200.0;    // how often the bar moves, and how long Ctrl-C may take
 
 /// Of the time limit, from when it is made on.
 class Limit {
@@ -370,80 +379,283 @@ std::string network_of(const RenderOptions& options, Progress& progress) {
   }
 }
 
+/// What pictures have in common: all of the scene but its volume, in a viewer.
+class Studio {
+ public:
+  explicit Studio(const RenderOptions& options)
+      : network_(network_of(options, progress_)),
+        context_(
+            (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
+        viewer_(
+            create_viewer(context_, progress_, options.trace.empty() ? nullptr : &timeline_, options.shader_cache)) {
+    check_memory(viewer_, options);
+    set_scene(options);
+  }
+
+  [[nodiscard]] Progress& progress() { return progress_; }
+  [[nodiscard]] const Viewer& viewer() const { return viewer_; }
+
+  /// Until the scene's volume, and all else, is there. Throws why it cannot be.
+  void load(const SceneOptions& scene) {
+    if (!scene.volume.empty()) {
+      progress_.stage("loading " + scene.volume);
+      cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
+      file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
+      check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
+    }
+    wait(viewer_, progress_);
+  }
+
+  /// What is to be said once, of a volume that is loaded.
+  void remark(const SceneOptions& scene) {
+    if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress_, *hint);
+    if (!scene.volume.empty() && scene.auto_density_scale)
+      tell_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
+  }
+
+  /// What can be asked for only of surfaces that are loaded.
+  void choose_in_surfaces(const RenderOptions& options) {
+    const auto& scene = options.scene;
+    if (!scene.surfaces.empty()) check_animation(viewer_, options);
+    if (scene.surface_camera >= 0)
+      check(viewer_, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
+  }
+
+  Traced trace(const RenderOptions& options) {
+    warm_up(viewer_, options, progress_);
+    return ::trace(viewer_, options, progress_);
+  }
+
+  void write(const RenderOptions& options) {
+    const std::vector<float> denoised = denoise(viewer_, options, network_, progress_);
+    progress_.stage("writing " + options.output);
+    write_picture(viewer_, options, denoised);
+    if (!options.stats.empty()) write_stats(options, stats_of(viewer_), context_.name());
+  }
+
+  /// How the picture that is written ended. Throws if somebody stopped it.
+  void tell_end(const RenderOptions& options, Traced traced) {
+    const cumulet_stats stats = stats_of(viewer_);
+    const double pixels = static_cast<double>(options.scene.width) * options.scene.height;
+    const cumulet_sampling_desc& sampling = options.scene.sampling;
+    if (traced == Traced::stopped) {
+      std::array<char, 128> text{};
+      std::snprintf(text.data(), text.size(), "%llu of %.0f samples", static_cast<unsigned long long>(stats.samples),
+                    pixels * sampling.samples);
+      throw std::runtime_error(options.output + ": interrupted: holds the first " + text.data());
+    }
+    if (options.time_limit || sampling.noise_target_percent > 0.0f)
+      tell_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, progress_);
+  }
+
+  void write_trace(const RenderOptions& options) const {
+    if (!options.trace.empty()) cumulet::image::replace_file(options.trace, timeline_.json());
+  }
+
+ private:
+  static const std::string& first_file(const SceneOptions& scene) {
+    return scene.volume.empty() ? scene.surfaces : scene.volume;
+  }
+
+  void set_scene(const RenderOptions& options) {
+    const auto& scene = options.scene;
+    cumulet_sampling_desc sampling = scene.sampling;
+    sampling.preview = CUMULET_PREVIEW_OFF;
+    if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.volume_alone = 1;
+    check(viewer_, cumulet_set_grid(viewer_.get(), &scene.grid));
+    check(viewer_, cumulet_set_medium(viewer_.get(), &scene.medium));
+    for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
+      const auto& points = scene.ramps[i];
+      check(viewer_, cumulet_set_ramp(viewer_.get(), static_cast<cumulet_ramp>(i),
+                                      cumulet::settings::numbers_of(points), points.size()));
+    }
+    // A sky is computed for the ground that there is.
+    check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
+    check(viewer_, cumulet_set_light(viewer_.get(), &scene.light));
+    check(viewer_, cumulet_set_lamps(viewer_.get(), scene.lamps.data(), scene.lamps.size()));
+    if (!scene.environment.empty()) {
+      check(viewer_, cumulet_load_environment(viewer_.get(), scene.environment.c_str()));
+      check(viewer_, cumulet_set_environment_settings(viewer_.get(), &scene.environment_settings));
+    }
+    check(viewer_, cumulet_set_sampling(viewer_.get(), &sampling));
+    cumulet_display_desc display = scene.display;
+    display.denoise = CUMULET_DENOISE_OFF;  // what is read is read as it is, and denoised beside that
+    check(viewer_, cumulet_set_display(viewer_.get(), &display));
+    set_camera(viewer_, scene.camera);
+    if (!scene.surfaces.empty()) {
+      check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
+      check(viewer_, cumulet_load_surfaces(viewer_.get(), scene.surfaces.c_str()));
+    }
+  }
+
+  Progress progress_;
+  Timeline timeline_;
+  // At once, not after hours of samples.
+  std::string network_;
+  Context context_;
+  Viewer viewer_;
+};
+
 void render(const RenderOptions& options) {
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
   catch_signals();
+  Studio studio(options);
+  studio.load(options.scene);
+  studio.remark(options.scene);
+  studio.choose_in_surfaces(options);
+  const Traced traced = studio.trace(options);
+  studio.write(options);
+  studio.write_trace(options);
+  studio.tell_end(options, traced);
+}
 
-  Progress progress;
-  // At once, not after hours of samples.
-  const std::string network = network_of(options, progress);
-  progress.stage("loading " + (options.scene.volume.empty() ? options.scene.surfaces : options.scene.volume));
-  Context context = Context::create(backend_of(options.backend));
-  Timeline timeline;
-  const Viewer viewer =
-      create_viewer(context, progress, options.trace.empty() ? nullptr : &timeline, options.shader_cache);
-  check_memory(viewer, options);
-  const auto& scene = options.scene;
-  cumulet_sampling_desc sampling = scene.sampling;
-  sampling.preview = CUMULET_PREVIEW_OFF;
-  if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.volume_alone = 1;
-  check(viewer, cumulet_set_grid(viewer.get(), &scene.grid));
-  check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
-  for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
-    const auto& points = scene.ramps[i];
-    check(viewer, cumulet_set_ramp(viewer.get(), static_cast<cumulet_ramp>(i), cumulet::settings::numbers_of(points),
-                                   points.size()));
-  }
-  // A sky is computed for the ground that there is.
-  check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
-  check(viewer, cumulet_set_light(viewer.get(), &scene.light));
-  check(viewer, cumulet_set_lamps(viewer.get(), scene.lamps.data(), scene.lamps.size()));
-  if (!scene.environment.empty()) {
-    check(viewer, cumulet_load_environment(viewer.get(), scene.environment.c_str()));
-    check(viewer, cumulet_set_environment_settings(viewer.get(), &scene.environment_settings));
-  }
-  check(viewer, cumulet_set_sampling(viewer.get(), &sampling));
-  cumulet_display_desc display = scene.display;
-  display.denoise = CUMULET_DENOISE_OFF;  // what is read is read as it is, and denoised beside that
-  check(viewer, cumulet_set_display(viewer.get(), &display));
-  set_camera(viewer, scene.camera);
-  if (!scene.surfaces.empty()) {
-    check(viewer, cumulet_set_surface_settings(viewer.get(), &scene.surface));
-    check(viewer, cumulet_load_surfaces(viewer.get(), scene.surfaces.c_str()));
-  }
-  if (!scene.volume.empty()) {
-    cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
-    file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
-    check(viewer, cumulet_load_volume_file(viewer.get(), &file));
-  }
-  wait(viewer, progress);
-  if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress, *hint);
-  if (!scene.volume.empty() && scene.auto_density_scale)
-    tell_density_scale(viewer, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress);
-  if (!scene.surfaces.empty()) check_animation(viewer, options);
-  if (scene.surface_camera >= 0)
-    check(viewer, cumulet_use_surface_camera(viewer.get(), static_cast<std::uint32_t>(scene.surface_camera)));
+bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
 
-  warm_up(viewer, options, progress);
-  const Traced traced = trace(viewer, options, progress);
+/// Whether nothing that is the same for all frames of a sequence depends on a volume.
+bool is_settled(const SceneOptions& scene) {
+  const bool placed = scene.surface_camera >= 0 || !fits(scene.camera);
+  return placed && !scene.auto_density_scale && scene.ground.place != CUMULET_GROUND_BELOW;
+}
 
-  const std::vector<float> denoised = denoise(viewer, options, network, progress);
-  progress.stage("writing " + options.output);
-  write_picture(viewer, options, denoised);
-  const cumulet_stats stats = stats_of(viewer);  // of the picture that was read back
-  if (!options.stats.empty()) write_stats(options, stats, context.name());
-  if (!options.trace.empty()) cumulet::image::replace_file(options.trace, timeline.json());
-  const double pixels = static_cast<double>(scene.width) * scene.height;
-  if (traced == Traced::stopped) {
-    std::array<char, 128> text{};
-    std::snprintf(text.data(), text.size(), "%llu of %.0f samples", static_cast<unsigned long long>(stats.samples),
-                  pixels * sampling.samples);
-    throw std::runtime_error(options.output + ": interrupted: holds the first " + text.data());
+/// A ground below all that is there: just below a model, for many stand on a floor of their own. Throws where there is
+/// nothing.
+double ground_below(const Viewer& viewer, const SceneOptions& scene) {
+  std::array<double, 3> least{};
+  std::array<double, 3> most{};
+  check(viewer, cumulet_get_bounds(viewer.get(), least.data(), most.data()));
+  const double size = std::hypot(most[0] - least[0], most[1] - least[1], most[2] - least[2]);
+  return least[1] - (scene.surfaces.empty() ? 0.0 : 1e-4 * size);
+}
+
+/// Takes that from the volume that is there: the density scale, how low the ground is, where the camera stands.
+void settle(const Viewer& viewer, RenderOptions& options) {
+  SceneOptions& scene = options.scene;
+  if (std::exchange(scene.auto_density_scale, false)) {
+    cumulet_volume* volume = nullptr;
+    check(viewer, cumulet_get_volume(viewer.get(), &volume));
+    const cumulet_status status = cumulet_volume_suggest_density_scale(volume, &scene.medium.density_scale);
+    cumulet_volume_release(volume);
+    if (status != CUMULET_OK) scene.medium.density_scale = 0.0;  // a fire alone
+    check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   }
-  if (options.time_limit || sampling.noise_target_percent > 0.0f)
-    tell_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, progress);
+  if (scene.ground.place == CUMULET_GROUND_BELOW) {
+    scene.ground.place = CUMULET_GROUND_AT_HEIGHT;
+    scene.ground.height = ground_below(viewer, scene);
+    check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
+  }
+  // A camera is placed by the first frame that is drawn.
+  static_cast<void>(render_frame(viewer, options, draw_only_ms));
+  cumulet_camera* camera = nullptr;
+  check(viewer, cumulet_get_camera(viewer.get(), &camera));
+  const cumulet_status status = cumulet_camera_get(camera, &scene.camera);
+  cumulet_camera_release(camera);
+  check(viewer, status);
+}
+
+/// A studio for the whole sequence; options become what it has in common.
+std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& plan) {
+  auto studio = std::make_unique<Studio>(options);
+  wait(studio->viewer(), studio->progress());
+  studio->choose_in_surfaces(options);
+  if (is_settled(options.scene)) return studio;
+  for (const std::string& volume : plan.judged_by) {
+    SceneOptions judged = options.scene;
+    judged.volume = volume;
+    try {
+      studio->load(judged);
+      static_cast<void>(ground_below(studio->viewer(), judged));  // an empty one tells nothing
+    } catch (const std::runtime_error&) {
+      check_not_interrupted();
+      continue;  // it is told where it is a frame's turn
+    }
+    studio->remark(judged);
+    settle(studio->viewer(), options);
+    break;
+  }
+  return studio;
+}
+
+/// Says in a line what became of a frame.
+class Report {
+ public:
+  explicit Report(const FramePlan& plan) : plan_(plan) {}
+  void say(std::size_t place, FrameState state, const std::string& what, Progress* progress) {
+    const Frame number = plan_.frames[place].number;
+    if (progress != nullptr) progress->clear();
+    std::cout << cumulet::demo::frame_line(number, place + 1, plan_.frames.size(), state, what) << std::endl;
+    if (state == FrameState::failed) failed_.push_back(number);
+  }
+  /// From that one on.
+  [[nodiscard]] std::string not_made(std::size_t place) const {
+    std::vector<Frame> rest;
+    for (std::size_t i = place; i < plan_.frames.size(); ++i) rest.push_back(plan_.frames[i].number);
+    return (rest.size() > 1 ? "frames " : "frame ") + cumulet::demo::frames_text(rest) + " not made";
+  }
+  /// Throws if some failed.
+  void end() const {
+    if (failed_.empty()) return;
+    throw std::runtime_error(std::to_string(failed_.size()) + " of " + std::to_string(plan_.frames.size()) +
+                             " frames failed: " + cumulet::demo::frames_text(failed_));
+  }
+
+ private:
+  const FramePlan& plan_;
+  std::vector<Frame> failed_;
+};
+
+/// Makes a frame: loads its volume, traces, writes.
+void render_frame_of(Studio& studio, const RenderOptions& picture, Report& report, std::size_t place) {
+  const auto start = std::chrono::steady_clock::now();
+  Traced traced = Traced::stopped;
+  try {
+    studio.load(picture.scene);
+    traced = studio.trace(picture);
+  } catch (const std::runtime_error& error) {
+    if (!interrupted) return report.say(place, FrameState::failed, error.what(), &studio.progress());
+  }
+  // A picture of fewer samples would be kept as if it had all of them.
+  if (traced == Traced::stopped) throw std::runtime_error("interrupted: " + report.not_made(place));
+  try {
+    studio.write(picture);
+    studio.tell_end(picture, traced);
+  } catch (const std::runtime_error& error) {
+    report.say(place, FrameState::failed, error.what(), &studio.progress());
+    throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(place));
+  }
+  std::array<char, 32> seconds{};
+  std::snprintf(seconds.data(), seconds.size(), " in %.2f s",
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  report.say(place, FrameState::done, picture.output + seconds.data(), &studio.progress());
+}
+
+/// The frames that are not there yet, one after the other. One whose volume is missing or corrupt does not keep the
+/// others; one that cannot be written does, for the next could not be, either.
+void render_frames(RenderOptions options, const FramePlan& plan) {
+  if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
+  catch_signals();
+  std::signal(SIGPIPE, SIG_IGN);  // whoever reads the lines may go: the frames are made
+  std::unique_ptr<Studio> studio;
+  Report report(plan);
+  for (std::size_t i = 0; i < plan.frames.size(); ++i) {
+    const cumulet::demo::PlannedFrame& frame = plan.frames[i];
+    if (!options.overwrite && cumulet::demo::is_made(frame.output)) {
+      report.say(i, FrameState::kept, frame.output, studio ? &studio->progress() : nullptr);
+      continue;
+    }
+    cumulet::image::check_writable(frame.output);
+    if (!frame.stats.empty()) cumulet::image::check_writable(frame.stats);
+    if (!studio) studio = open_studio(options, plan);
+    studio->progress().of("frame " + std::to_string(frame.number));
+    RenderOptions picture = options;
+    picture.scene.volume = frame.volume;
+    picture.output = frame.output;
+    picture.stats = frame.stats;
+    render_frame_of(*studio, picture, report, i);
+  }
+  if (studio) studio->write_trace(options);
+  report.end();
 }
 
 }  // namespace
@@ -452,7 +664,10 @@ int main(int argc, char** argv) {
   return cumulet::demo::run_program("cumulet-render", [&] {
     const auto options = cumulet::demo::parse_render_options({argv + std::min(argc, 1), argv + argc}, std::cout);
     if (!options) return;
-    if (options->info) {
+    const auto plan = cumulet::demo::plan_frames(*options);
+    if (plan) {
+      render_frames(*options, *plan);
+    } else if (options->info) {
       cumulet::demo::write_info(options->scene, options->json, std::cout);
     } else {
       render(*options);

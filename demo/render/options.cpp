@@ -328,7 +328,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         if (text.empty()) throw UsageError("the file's name is empty");
         scene.volume = text;
       },
-      "OpenVDB or NanoVDB file (.vdb, .nvdb)");
+      "OpenVDB or NanoVDB file (.vdb, .nvdb); cumulet-render: or a sequence of them, name.####.vdb");
   add(
       app, group, "--grid-name", "NAME", [&](const std::string& text) { scene.grid_name = text; },
       "Grid to show (default: density, else the likeliest)");
@@ -563,7 +563,9 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   CLI::App app("Path-traces a volume into a picture, without a display.", "cumulet-render");
   app.footer(
       "Exit status: 0 done; 1 failed, one line on standard error says why; 2 wrong usage.\n"
-      "Ctrl-C writes the samples so far and exits 1; a second one stops at once.");
+      "Ctrl-C writes the samples so far and exits 1; a second one stops at once.\n"
+      "Of a sequence each frame is told in a line: frame 12 (3 of 20) done|kept|failed FILE...; those that\n"
+      "cannot be read fail, the others are made, and it exits 1. Ctrl-C leaves the one under way unwritten.");
   // Before the flags, which override what a scene says.
   bool lit = false;
   add_files(app, options.scene, lit);
@@ -576,7 +578,13 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.format = format_of(text);
         options.output = text;
       },
-      ".png is exposed and tone-mapped; .exr and .pfm hold linear radiance");
+      ".png is exposed and tone-mapped; .exr and .pfm hold linear radiance; of a sequence name.####.exr");
+  add(
+      app, group, "--frames", "A-BxS,...", [&](const std::string& text) { options.frames = parse_frames(text); },
+      "Frames of the sequence that the volume's name stands for, by ####, %04d, $F4 or <frame04>, or is a file of: "
+      "such as 5, 1-100, 1-100x2 or 1-3,7 (default: all that are there)");
+  app.add_flag("--overwrite", options.overwrite, "Make frames anew that are there already, which are kept else")
+      ->group(group);
   app.add_flag("--info", options.info, "Tell what is in the files, and render nothing")->group(group);
   app.add_flag("--json", options.json, "The same as JSON")->group(group);
   add(

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <frames.hpp>
 #include <iosfwd>
 #include <optional>
 #include <program.hpp>
@@ -44,6 +45,8 @@ struct RenderOptions {
   std::string stats;                 // empty: none
   std::string trace;                 // likewise
   std::string shader_cache;          // a folder; empty: none
+  std::vector<Frame> frames;         // of the volume's sequence; empty: all, where its name is a sequence's
+  bool overwrite = false;            // frames that are there already
   bool info = false;                 // tell what is in the files, render nothing
   bool json = false;                 // as JSON
   std::optional<double> time_limit;  // seconds from the first sample on

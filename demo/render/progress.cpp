@@ -51,6 +51,8 @@ Progress::Progress() : terminal_(isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() { clear(); }
 
+void Progress::of(const std::string& what) { before_ = what.empty() ? "" : what + ": "; }
+
 void Progress::stage(const std::string& what) {
   rendering_ = false;
   show(what + " ...");
@@ -108,7 +110,7 @@ void Progress::clear() {
 
 void Progress::show(const std::string& line) {
   if (!terminal_) return;
-  std::fprintf(stderr, "\r%s\033[K", line.c_str());
+  std::fprintf(stderr, "\r%s%s\033[K", before_.c_str(), line.c_str());
   std::fflush(stderr);
   shown_ = true;
 }

@@ -15,6 +15,8 @@ class Progress {
   /// Wipes the line.
   ~Progress();
 
+  /// What comes is of this: it stands before every line. Empty: nothing does.
+  void of(const std::string& what);
   /// A stage whose length is not known.
   void stage(const std::string& what);
   /// One of which a part is done, 0 to 1.
@@ -30,6 +32,7 @@ class Progress {
   void show(const std::string& line);
 
   bool terminal_;
+  std::string before_;
   bool shown_ = false;
   Clock::time_point start_;
   double start_part_ = 0.0;

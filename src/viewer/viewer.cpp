@@ -476,14 +476,16 @@ bool Viewer::shows_triangles() const { return model_source_ && model_source_->sc
 
 std::optional<scene::Ground> Viewer::ground() const {
   const auto all = box();
-  if (ground_.place == GroundPlace::none || !all) return std::nullopt;
+  // One at a height is there whatever else is: a sequence's frame may be empty.
+  if (ground_.place == GroundPlace::none || (ground_.place == GroundPlace::below && !all)) return std::nullopt;
   scene::Ground ground{ground_.height, ground_.albedo};
   // Just below a model: many stand on a floor of their own.
   if (ground_.place == GroundPlace::below)
     ground.height = all->min.y - (shows_triangles() ? 1e-4 * glm::distance(all->min, all->max) : 0.0);
   // The horizon is then a ten-thousandth below where it is.
   const double eye = view_ ? std::abs(view_->eye.y - ground.height) : 0.0;
-  ground.reach = 1e4 * (glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) + eye);
+  const double scene = all ? glm::distance(all->min, all->max) + std::abs(all->min.y - ground.height) : 0.0;
+  ground.reach = 1e4 * (scene + eye);
   return ground;
 }
 

@@ -71,6 +71,23 @@ TEST_P(Ground, UnderASlabIsLitAndSeenThroughIt) {
   }
 }
 
+// Of a sequence whose smoke has not begun: albedo / pi * E cos.
+TEST_P(Ground, AtAHeightIsThereWhereAVolumeIsEmpty) {
+  const auto still = make();
+  still->set_volume(test::make_volume({8, 8, 8}, ivec3(0), [](const ivec3&) { return 0.0F; }));
+  still->set_camera(test::looking_down());
+  still->set_light(sun_at(30.0F, 3.0F, 0.0F));
+  for (const auto march : {scene::March::tet, scene::March::brick}) {
+    viewer::GridSettings grid;
+    grid.build.march = march;
+    still->set_grid(grid);
+    still->viewer().set_ground({GroundPlace::at_height, -2.0, vec3(0.8F)});
+    const test::Picture picture = test::render(*still, {16, 16, 16, 1, render::View::shaded});
+    EXPECT_NEAR(picture.mean().x, 0.8 * 3.0 * 0.5 / pi, 1e-4);
+    EXPECT_NEAR(picture.mean().w, 1.0, 1e-6);
+  }
+}
+
 // Nothing absorbs: all is as bright as the sky.
 TEST_P(Ground, InAFurnaceIsOne) {
   const auto still = make();

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "frames.hpp"
+
+namespace cumulet::demo {
+
+/// A file's name with a place for a frame's number.
+class FramePattern {
+ public:
+  /// The name's place is written as
+  ///   ####     as many digits at least, filled up with zeros; so are
+  ///   %04d     (%d: as they come)
+  ///   $F4      ($F likewise)
+  ///   <frame04>  (<frame> likewise).
+  /// Nothing for a name without. It is looked for in the file's own name: a folder's may hold anything. Throws
+  /// UsageError for two of them, and for more than 9 digits.
+  [[nodiscard]] static std::optional<FramePattern> parse(const std::string& path);
+
+  /// That of which this file, which need not be there, is one: the number is the last digits before the name's ending.
+  /// It has zeros in front where this file's has, or one of as many digits that is beside it. Nothing for a name
+  /// without.
+  [[nodiscard]] static std::optional<FramePattern> of_file(const std::string& path);
+
+  [[nodiscard]] std::string file(Frame frame) const;
+
+  /// The frames that the folder has files of, ascending; none where the folder cannot be read.
+  [[nodiscard]] std::vector<Frame> frames_there() const;
+
+  /// "fire.####.vdb", whatever it was written as: for messages.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  FramePattern(std::string head, std::string tail, std::size_t digits)
+      : head_(std::move(head)), tail_(std::move(tail)), digits_(digits) {}
+  // Of the whole path of a file that is this one's: its frame.
+  [[nodiscard]] std::optional<Frame> frame_of(std::string_view path) const;
+
+  std::string head_;  // the folder with it
+  std::string tail_;
+  std::size_t digits_;  // at least
+};
+
+}  // namespace cumulet::demo

@@ -1,0 +1,158 @@
+"""cumulet-render over the frames of a sequence: what it says, what it keeps, and what is there when it is killed.
+
+Usage: sequence.py RENDER SCENE OUT_FOLDER
+"""
+
+import pathlib
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+LINE = re.compile(r"frame (\d+) \((\d+) of (\d+)\) (done|kept|failed) (.+)")
+LOOK = ["--size", "32x24", "--spp", "2"]
+
+
+class Sequence:
+    def __init__(self, render, folder):
+        self.render, self.folder = render, folder
+
+    def command(self, output, *more):
+        return [self.render, str(self.folder / "explosion_####.vdb"), *LOOK, "-o", str(output), *more]
+
+    def run(self, output, *more):
+        """Its exit status, its frames' (number, state, rest), and what it says on standard error."""
+        done = subprocess.run(self.command(output, *more), capture_output=True, text=True, timeout=600)
+        matches = [LINE.fullmatch(line) for line in done.stdout.splitlines()]
+        assert all(matches), done.stdout
+        places = [(int(m[2]), int(m[3])) for m in matches]
+        assert places == [(i + 1, places[0][1]) for i in range(len(places))], done.stdout
+        return done.returncode, [(int(m[1]), m[4], m[5]) for m in matches], done.stderr
+
+
+def files(folder):
+    """Name and bytes of all that is there."""
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def empty(folder):
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
+
+
+def bad_frames(sequence, out):
+    """Missing, cut off, without bytes: each is named, and the others are made."""
+    broken = Sequence(sequence.render, empty(out / "broken"))
+    for path in sequence.folder.glob("explosion_*.vdb"):
+        shutil.copy(path, broken.folder)
+    frame = lambda n: broken.folder / f"explosion_{n:04}.vdb"
+    frame(13).unlink()
+    frame(14).write_bytes(frame(14).read_bytes()[:3000])
+    frame(15).write_bytes(b"")
+    pictures = empty(out / "bad")
+    status, frames, error = broken.run(pictures / "p.$F4.exr", "--frames", "12-16")
+    states = {number: state for number, state, _ in frames}
+    assert states == {12: "done", 13: "failed", 14: "failed", 15: "failed", 16: "done"}, frames
+    for number, state, rest in frames:
+        assert state == "done" or frame(number).name in rest, rest
+        assert state == "failed" or re.fullmatch(rf"\S*p\.{number:04}\.exr in [\d.]+ s", rest), rest
+    assert status == 1 and error.splitlines()[-1] == "cumulet-render: 3 of 5 frames failed: 13-15", (status, error)
+    assert sorted(files(pictures)) == ["p.0012.exr", "p.0016.exr"]
+    # What is mended is made, what was there is kept.
+    shutil.copy(sequence.folder / "explosion_0014.vdb", broken.folder)
+    before = files(pictures)
+    status, frames, _ = broken.run(pictures / "p.####.exr", "--frames", "12,14,16")
+    assert status == 0 and [state for _, state, _ in frames] == ["kept", "done", "kept"], frames
+    after = files(pictures)
+    assert {name: after[name] for name in before} == before and "p.0014.exr" in after
+
+
+def alone_as_among_others(sequence, out):
+    """A frame's picture does not depend on which others are made: the density scale, the camera and the ground are the
+    sequence's."""
+    all_of_them, one = empty(out / "all"), empty(out / "one")
+    status, frames, error = sequence.run(all_of_them / "p.####.exr", "--frames", "12-16x2")
+    assert status == 0 and [n for n, _, _ in frames] == [12, 14, 16], (frames, error)
+    assert "density scale" in error, error
+    status, _, _ = sequence.run(one / "p.####.exr", "--frames", "14")
+    assert status == 0
+    assert files(one)["p.0014.exr"] == files(all_of_them)["p.0014.exr"]
+    # And it is not the same picture over and over.
+    assert len(set(files(all_of_them).values())) == 3
+    # One that is there is made again where that is asked for: other samples, another file.
+    status, frames, _ = sequence.run(one / "p.####.exr", "--frames", "14", "--overwrite", "--seed", "5")
+    assert status == 0 and frames[0][1] == "done"
+    assert files(one)["p.0014.exr"] != files(all_of_them)["p.0014.exr"]
+
+
+def refused(sequence, out):
+    """Before anything is made."""
+    def said(output, *more):
+        done = subprocess.run(sequence.command(output, *more), capture_output=True, text=True, timeout=60)
+        assert done.stdout == "" and done.stderr.count("\n") == 1, (done.stdout, done.stderr)
+        return done.returncode, done.stderr
+    for arguments in (["p.exr"], ["p.##.##.exr"], ["p.####.exr", "--frames", "9-1"], ["p.####.exr", "--frames", "a"],
+                      ["p.####.exr", "--stats", "s.json"], ["p.####.exr", "--info"]):
+        status, line = said(*arguments)
+        assert status == 2, (arguments, status, line)
+    status, line = said(out / "none" / "p.####.exr")
+    assert status == 1 and "none/p.0001.exr: No such file or directory" in line, line
+
+
+def interrupted(sequence, out):
+    """Ctrl-C: no picture of fewer samples takes the place of one that has all."""
+    pictures = empty(out / "interrupted")
+    process = subprocess.Popen(sequence.command(pictures / "p.####.exr", "--frames", "12-14", "--spp", "1000000"),
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(4)  # among the samples, or before them on a busy machine
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 1, error
+    assert error.splitlines()[-1] == "cumulet-render: interrupted: frames 12-14 not made", error
+    assert files(pictures) == {}, files(pictures)
+
+
+def killed(sequence, out, runs):
+    """kill -9 at random moments: no frame that is lost, none that is torn, none of another picture."""
+    whole = empty(out / "whole")
+    began = time.monotonic()
+    status, _, _ = sequence.run(whole / "p.####.exr", "--frames", "10-17")
+    length = time.monotonic() - began
+    assert status == 0
+    wanted = files(whole)
+    assert len(wanted) == 8
+    dice = random.Random(7)
+    pictures = empty(out / "killed")
+    for run in range(runs):
+        if run % 5 == 0:
+            empty(pictures)
+        process = subprocess.Popen(sequence.command(pictures / "p.####.exr", "--frames", "10-17"),
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(dice.uniform(0.0, 0.5 * length))
+        process.kill()
+        process.wait()
+        for name, content in files(pictures).items():
+            assert ".tmp" in name or content == wanted[name], f"{name} is torn"
+    made = [name for name in files(pictures) if name in wanted]
+    status, frames, _ = sequence.run(pictures / "p.####.exr", "--frames", "10-17")
+    assert status == 0 and [state for _, state, _ in frames].count("kept") == len(made), (frames, made)
+    assert {name: content for name, content in files(pictures).items() if name in wanted} == wanted
+
+
+def main():
+    render, scene, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    volumes = empty(out / "volumes")
+    subprocess.run([scene, str(volumes), "--only", "explosion", "--voxels", "3000"], check=True, timeout=300)
+    sequence = Sequence(render, volumes)
+    refused(sequence, out)
+    bad_frames(sequence, out)
+    alone_as_among_others(sequence, out)
+    interrupted(sequence, out)
+    killed(sequence, out, 10)
+
+
+main()

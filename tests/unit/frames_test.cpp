@@ -1,0 +1,241 @@
+// Sequences: frames by their ranges and by the names of files.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "frame_pattern.hpp"
+#include "frame_plan.hpp"
+#include "support/folder.hpp"
+
+namespace {
+
+using namespace cumulet::demo;
+using Frames = std::vector<Frame>;
+using cumulet::test::Folder;
+
+/// What is said of something that is refused; "" where it is not.
+template <class Call>
+std::string refusal(Call&& call) {
+  try {
+    static_cast<void>(call());
+    return "";
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+}
+
+std::string file(const std::string& pattern, Frame frame) {
+  const auto parsed = FramePattern::parse(pattern);
+  return parsed ? parsed->file(frame) : "none";
+}
+
+std::string neighbour(const std::string& path, Frame frame) {
+  const auto found = FramePattern::of_file(path);
+  return found ? found->file(frame) : "none";
+}
+
+void write(const std::filesystem::path& path, const std::string& text) { std::ofstream(path) << text; }
+
+TEST(Frames, RangesAreReadInTheirOrder) {
+  EXPECT_EQ(parse_frames("5"), (Frames{5}));
+  EXPECT_EQ(parse_frames("0"), (Frames{0}));
+  EXPECT_EQ(parse_frames("0012"), (Frames{12}));
+  EXPECT_EQ(parse_frames("1-4"), (Frames{1, 2, 3, 4}));
+  EXPECT_EQ(parse_frames("3-3"), (Frames{3}));
+  EXPECT_EQ(parse_frames("1-10x3"), (Frames{1, 4, 7, 10}));
+  EXPECT_EQ(parse_frames("1-9x3"), (Frames{1, 4, 7}));
+  EXPECT_EQ(parse_frames("1-3,7"), (Frames{1, 2, 3, 7}));
+  EXPECT_EQ(parse_frames("7,1-3"), (Frames{7, 1, 2, 3}));
+  EXPECT_EQ(parse_frames("1-20x10,1-3"), (Frames{1, 11, 2, 3})) << "each once";
+  EXPECT_EQ(parse_frames("9999998-9999999"), (Frames{9999998, 9999999}));
+}
+
+TEST(Frames, WhatIsNoRangeIsRefusedByItsOwnName) {
+  EXPECT_EQ(refusal([] { return parse_frames("10-1"); }), "'10-1' runs backwards");
+  EXPECT_EQ(refusal([] { return parse_frames("1-3,9-8"); }), "'9-8' runs backwards");
+  EXPECT_EQ(refusal([] { return parse_frames("1-9x0"); }), "'1-9x0' has a step of 0");
+  EXPECT_EQ(refusal([] { return parse_frames("5x2"); }), "'5x2' has a step, but is no range");
+  EXPECT_EQ(refusal([] { return parse_frames("1-10000000"); }), "'1-10000000' goes beyond frame 9999999");
+  EXPECT_EQ(refusal([] { return parse_frames("99999999999999999999"); }),
+            "'99999999999999999999' goes beyond frame 9999999");
+  for (const char* text :
+       {"", "a", "1-", "-5", "1--3", "1,", ",1", "1-2-3", "1-3x", "1-3x2x2", "1.5", " 1", "1:5", "+1"})
+    EXPECT_NE(refusal([&] { return parse_frames(text); }), "") << text;
+}
+
+TEST(Frames, AreToldInFewWords) {
+  EXPECT_EQ(frames_text({}), "");
+  EXPECT_EQ(frames_text({4}), "4");
+  EXPECT_EQ(frames_text({5, 4}), "4, 5");
+  EXPECT_EQ(frames_text({20, 1, 2, 3, 7, 21, 22, 23}), "1-3, 7, 20-23");
+}
+
+TEST(FramePattern, ManyWaysToWriteOnePlace) {
+  for (const char* pattern : {"a/fire.####.vdb", "a/fire.%04d.vdb", "a/fire.$F4.vdb", "a/fire.<frame04>.vdb",
+                              "a/fire.<frame4>.vdb", "a/fire.%4d.vdb"}) {
+    EXPECT_EQ(file(pattern, 12), "a/fire.0012.vdb") << pattern;
+    EXPECT_EQ(file(pattern, 12345), "a/fire.12345.vdb") << pattern;
+    EXPECT_EQ(FramePattern::parse(pattern)->text(), "a/fire.####.vdb");
+  }
+  for (const char* pattern : {"fire#.vdb", "fire%d.vdb", "fire$F.vdb", "fire<frame>.vdb"}) {
+    EXPECT_EQ(file(pattern, 7), "fire7.vdb") << pattern;
+    EXPECT_EQ(file(pattern, 107), "fire107.vdb") << pattern;
+  }
+  EXPECT_EQ(file("##", 3), "03");
+}
+
+TEST(FramePattern, NamesWithoutOrWithTooMuch) {
+  for (const char* name : {"cloud.vdb", "cloud_0012.vdb", "100%.vdb", "%s.vdb", "a%04x.vdb", "<frames>.vdb", "$G4.vdb",
+                           "####/cloud.vdb", "a %d/$F4/cloud.vdb", ""})
+    EXPECT_FALSE(FramePattern::parse(name)) << name;
+  EXPECT_EQ(refusal([] { return FramePattern::parse("a.##.b.##.vdb"); }),
+            "'a.##.b.##.vdb' has two places for a frame's number");
+  EXPECT_NE(refusal([] { return FramePattern::parse("a.##.%d.vdb"); }), "");
+  EXPECT_EQ(refusal([] { return FramePattern::parse("a.%10d.vdb"); }),
+            "'a.%10d.vdb' has a number of more than 9 digits");
+  EXPECT_NE(refusal([] { return FramePattern::parse("a.$F99999999999999999999999"); }), "");
+}
+
+TEST(FramePattern, AFileKnowsItsNeighbours) {
+  EXPECT_EQ(neighbour("a/fluid_data_0010.vdb", 9), "a/fluid_data_0009.vdb");
+  EXPECT_EQ(neighbour("fire7.vdb", 10), "fire10.vdb");
+  EXPECT_EQ(neighbour("shot2_fire.0010.nvdb", 3), "shot2_fire.0003.nvdb") << "the last number counts";
+  EXPECT_EQ(neighbour("fire.0010.v2a.vdb", 3), "fire.0010.v3a.vdb");
+  EXPECT_EQ(neighbour("12/cloud.vdb", 3), "none") << "a folder's number is none";
+  EXPECT_EQ(neighbour("cloud.vdb", 3), "none");
+  EXPECT_EQ(neighbour("cloud.1234567890.vdb", 3), "none");
+  EXPECT_EQ(neighbour("0012", 3), "0003");
+}
+
+TEST(FramePattern, ZerosInFrontAreThoseOfTheFolder) {
+  const Folder folder;
+  EXPECT_EQ(neighbour(folder / "a.100.vdb", 9), folder / "a.9.vdb");
+  write(folder / "a.099.vdb", "");
+  EXPECT_EQ(neighbour(folder / "a.100.vdb", 9), folder / "a.009.vdb");
+}
+
+TEST(FramePattern, FindsItsFramesAndNoOthers) {
+  const Folder folder;
+  for (const char* name : {"f.0010.vdb", "f.0002.vdb", "f.12345.vdb", "f.3.vdb", "f.00004.vdb", "f.0005.vdb.tmp",
+                           "f..vdb", "g.0006.vdb", "f.-001.vdb", "f.00a7.vdb", "f.vdb"})
+    write(folder / name, "x");
+  EXPECT_EQ(FramePattern::parse(folder / "f.####.vdb")->frames_there(), (Frames{2, 10, 12345}));
+  EXPECT_EQ(FramePattern::parse(folder / "f.#.vdb")->frames_there(), (Frames{3, 12345}));
+  EXPECT_EQ(FramePattern::parse(folder / "none/f.####.vdb")->frames_there(), Frames{});
+}
+
+/// A plan of a folder's files.
+class Plan : public ::testing::Test {
+ protected:
+  Plan() { options.output = "out.####.exr"; }
+  void there(const char* name, std::size_t bytes) const { write(folder / name, std::string(bytes, 'x')); }
+  std::string said() {
+    try {
+      plan = plan_frames(options);
+      return "";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  }
+
+  Folder folder;
+  RenderOptions options;
+  std::optional<FramePlan> plan;
+};
+
+TEST_F(Plan, APatternIsAllThatIsThere) {
+  there("f.0003.vdb", 10);
+  there("f.0001.vdb", 30);
+  there("f.0002.vdb", 30);
+  options.scene.volume = folder / "f.%04d.vdb";
+  options.stats = "s.$F.json";
+  ASSERT_EQ(said(), "");
+  ASSERT_TRUE(plan);
+  ASSERT_EQ(plan->frames.size(), 3u);
+  EXPECT_EQ(plan->frames[2].number, 3u);
+  EXPECT_EQ(plan->frames[2].volume, folder / "f.0003.vdb");
+  EXPECT_EQ(plan->frames[2].output, "out.0003.exr");
+  EXPECT_EQ(plan->frames[2].stats, "s.3.json");
+  // The largest, of equals the first: whatever is asked for.
+  const std::vector<std::string> judged{folder / "f.0001.vdb", folder / "f.0002.vdb", folder / "f.0003.vdb"};
+  EXPECT_EQ(plan->judged_by, judged);
+  options.frames = {3, 9};
+  ASSERT_EQ(said(), "");
+  EXPECT_EQ(plan->judged_by, judged);
+  ASSERT_EQ(plan->frames.size(), 2u);
+  EXPECT_EQ(plan->frames[1].volume, folder / "f.0009.vdb") << "missing, which its turn tells";
+}
+
+TEST_F(Plan, AFileIsOneOfItsNeighboursWhereFramesAreAskedFor) {
+  there("f_0003.vdb", 10);
+  options.scene.volume = folder / "f_0003.vdb";
+  ASSERT_EQ(said(), "");
+  EXPECT_FALSE(plan);
+  options.frames = {2};
+  ASSERT_EQ(said(), "");
+  EXPECT_EQ(plan->frames.at(0).volume, folder / "f_0002.vdb");
+  EXPECT_EQ(plan->frames.at(0).output, "out.0002.exr");
+}
+
+TEST_F(Plan, AFileMayBeCalledAsAPatternIs) {
+  there("cloud#1.vdb", 10);
+  options.scene.volume = folder / "cloud#1.vdb";
+  ASSERT_EQ(said(), "");
+  EXPECT_FALSE(plan);
+}
+
+TEST_F(Plan, OneFrameNeedsNoPlaceForItsNumberAndTwoDo) {
+  there("f.1.vdb", 10);
+  there("f.2.vdb", 10);
+  options.scene.volume = folder / "f.#.vdb";
+  options.output = "out/pic.exr";
+  EXPECT_EQ(said(),
+            "--output: the name 'out/pic.exr' is that of 2 frames, and needs a place for their numbers, such as "
+            "pic.####.exr");
+  options.frames = {2};
+  ASSERT_EQ(said(), "");
+  EXPECT_EQ(plan->frames.at(0).output, "out/pic.exr");
+  options.frames = {};
+  options.output = "a.##.##.exr";
+  EXPECT_EQ(said(), "--output: 'a.##.##.exr' has two places for a frame's number");
+  options.output = "a.##.exr";
+  options.stats = "s.json";
+  EXPECT_NE(said().find("--stats: the name 's.json'"), std::string::npos);
+}
+
+TEST_F(Plan, WhatIsNoSequenceIsRefused) {
+  options.scene.volume = folder / "f.####.vdb";
+  EXPECT_EQ(said(), options.scene.volume + ": no file of such a name is there");
+  options.scene.volume = folder / "cloud.vdb";
+  options.frames = {1};
+  EXPECT_NE(said().find("cloud.vdb' has neither a number nor a place for one"), std::string::npos);
+  options.scene.volume = "";
+  EXPECT_EQ(said(), "--frames counts volumes, and the scene has none");
+  options.frames = {};
+  ASSERT_EQ(said(), "");
+  EXPECT_FALSE(plan);
+  options.overwrite = true;
+  EXPECT_NE(said().find("--overwrite"), std::string::npos);
+}
+
+TEST(FrameLine, OneOfEachState) {
+  EXPECT_EQ(frame_line(12, 3, 20, FrameState::done, "out.0012.exr in 8.21 s"),
+            "frame 12 (3 of 20) done out.0012.exr in 8.21 s");
+  EXPECT_EQ(frame_line(1, 1, 1, FrameState::kept, "a.exr"), "frame 1 (1 of 1) kept a.exr");
+  EXPECT_EQ(frame_line(1, 1, 1, FrameState::failed, "a\nb.vdb: no"), "frame 1 (1 of 1) failed a b.vdb: no");
+}
+
+TEST(FrameMade, AnEmptyFileIsNone) {
+  const Folder folder;
+  EXPECT_FALSE(is_made(folder / "a.exr"));
+  write(folder / "a.exr", "");
+  EXPECT_FALSE(is_made(folder / "a.exr"));
+  write(folder / "a.exr", "x");
+  EXPECT_TRUE(is_made(folder / "a.exr"));
+  EXPECT_FALSE(is_made(folder.path()));
+}
+
+}  // namespace
