@@ -37,7 +37,6 @@ void set(float (&rgb)[3], float r, float g, float b) { std::copy_n(std::array{r,
 // As cumulet-scene's sample.json.
 Looks cumulus_looks() {
   Looks looks;
-  demo::apply(demo::Preset::cumulus, looks.medium);
   looks.medium.density_scale = 0.7;
   looks.medium.max_bounces = 16;
   looks.light.sun_azimuth_degrees = -68.0F;
@@ -58,6 +57,7 @@ Looks explosion_looks() {
   looks.light.sun_azimuth_degrees = 62.0F;
   looks.light.sun_elevation_degrees = 13.0F;
   looks.display.exposure_stops = 0.3F;
+  looks.view = View{{4.0, 2.2, 22.0}, {0.3, 4.6, 0.0}, 33.0};
   looks.display.tone_map = CUMULET_TONE_MAP_FILMIC;
   return looks;
 }
@@ -67,8 +67,10 @@ Looks fire_looks() {
   Looks looks;
   looks.medium.density_scale = 3.0;
   demo::apply(demo::Preset::fire, looks.medium);
-  set(looks.light.sky_radiance, 0.01F, 0.012F, 0.02F);
+  set(looks.light.sky_radiance, 0.02F, 0.025F, 0.04F);
+  looks.display.exposure_stops = -1.5F;
   looks.display.tone_map = CUMULET_TONE_MAP_FILMIC;
+  looks.view = View{{2.5, 2.5, 11.0}, {0.2, 1.6, 0.0}, 33.0};
   return looks;
 }
 

@@ -51,6 +51,26 @@ TEST(Flip, EvenColoursDifferByTheirDistanceAlone) {
   EXPECT_NEAR(mean(filled(128, 128, 128), filled(129, 129, 129)), 0.02988, 2e-4);
 }
 
+// What a program of its own makes of the same definitions, in Python, with two-dimensional kernels and the rounded
+// matrices of the authors' documentation.
+TEST(Flip, APictureWithDetailDiffersAsAnotherProgramSays) {
+  constexpr int width = 24;
+  constexpr int height = 20;
+  Bytes a;
+  Bytes b;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < 4; ++c) {
+        const auto value = static_cast<std::uint8_t>((x * 7 + y * 13 + c * 50) % 256);
+        const bool other = (x / 6 + y / 5) % 2 == 1;
+        a.push_back(value);
+        b.push_back(other ? static_cast<std::uint8_t>((x * 11 + y * 5 + c * 80 + 40) % 256) : value);
+      }
+    }
+  }
+  EXPECT_NEAR(Flip(width, height).mean(a, b), 0.599686, 2e-5);
+}
+
 TEST(Flip, ItIsTheSameBothWays) {
   EXPECT_NEAR(mean(noise(1), noise(2)), mean(noise(2), noise(1)), 1e-12);
   EXPECT_NEAR(mean(noise(1), filled(90, 90, 90)), mean(filled(90, 90, 90), noise(1)), 1e-12);
