@@ -1,6 +1,6 @@
 #include <cstdio>
 #include <functional>
-#include <map>
+#include <memory>
 
 #include "denoise.hpp"
 #include "judged.hpp"
@@ -93,25 +93,43 @@ Goal goal_of(Stage& stage, std::uint32_t samples) {
           stage.displayed(mean_of(halves))};
 }
 
-Course course_of(Stage& stage, const Change& change, const Goal& goal, const Options& options) {
-  Course course;
-  course.at = moments(options.seconds_a_run);
+void look(Stage& stage, const Change& change, const Goal& goal, const Options& options, std::uint32_t seed,
+          Course& course) {
   const auto side = static_cast<int>(options.size);
   const test::Flip flip(side, side);
-  for (int repeat = 0; repeat < options.repeats; ++repeat) {
-    stage.sample(options.reference_samples, static_cast<std::uint32_t>(repeat), CUMULET_PREVIEW_AUTO);
-    const Watched watched = watch(stage, change, course.at, options.budget_ms);
-    std::vector<double> root;
-    std::vector<double> flips;
-    for (const Bytes& picture : watched.pictures) {
-      root.push_back(root_error(display_luminances(picture), goal.halves[0], goal.halves[1]));
-      flips.push_back(flip.mean(goal.picture, picture));
-    }
-    course.root.push_back(std::move(root));
-    course.flip.push_back(std::move(flips));
-    course.frames.insert(course.frames.end(), watched.frames.begin(), watched.frames.end());
+  stage.sample(options.reference_samples, seed, CUMULET_PREVIEW_AUTO);
+  const Watched watched = watch(stage, change, course.at, options.budget_ms);
+  std::vector<double> root;
+  std::vector<double> flips;
+  for (const Bytes& picture : watched.pictures) {
+    root.push_back(root_error(display_luminances(picture), goal.halves[0], goal.halves[1]));
+    flips.push_back(flip.mean(goal.picture, picture));
   }
-  return course;
+  course.root.push_back(std::move(root));
+  course.flip.push_back(std::move(flips));
+  course.frames.insert(course.frames.end(), watched.frames.begin(), watched.frames.end());
+}
+
+/// One without and one with the filter, in turn, so that both see the same machine.
+std::vector<Course> courses_of(headless::Context& context, const JudgedScene& scene, const Change& change,
+                               const Goal& goal, const Options& options) {
+  std::vector<Course> courses;
+  std::vector<std::unique_ptr<Stage>> stages;
+  for (const bool filtered : {false, true}) {
+    Stage& stage = *stages.emplace_back(std::make_unique<Stage>(context, scene, options.size));
+    stage.filter(filtered ? CUMULET_DENOISE_FAST : CUMULET_DENOISE_OFF);
+    if (!change.turn(stage, 0.0)) return {};
+    Course& course = courses.emplace_back();
+    course.scene = scene.name;
+    course.change = change.name;
+    course.denoise = filtered ? "fast" : "off";
+    course.at = moments(options.seconds_a_run);
+  }
+  for (int repeat = 0; repeat < options.repeats; ++repeat) {
+    for (std::size_t i = 0; i < stages.size(); ++i)
+      look(*stages[i], change, goal, options, static_cast<std::uint32_t>(repeat), courses[i]);
+  }
+  return courses;
 }
 
 double median_at(const std::vector<std::vector<double>>& repeats, std::size_t moment) {
@@ -178,16 +196,7 @@ void measure_settle(headless::Context& context, const Options& options) {
     const Goal goal = goal_of(still, options.reference_samples);
     progress("    reference");
     for (const Change& change : changes()) {
-      for (const bool filtered : {false, true}) {
-        Stage stage(context, scene, options.size);
-        stage.filter(filtered ? CUMULET_DENOISE_FAST : CUMULET_DENOISE_OFF);
-        if (!change.turn(stage, 0.0)) continue;
-        Course course = course_of(stage, change, goal, options);
-        course.scene = scene.name;
-        course.change = change.name;
-        course.denoise = filtered ? "fast" : "off";
-        courses.push_back(std::move(course));
-      }
+      for (Course& course : courses_of(context, scene, change, goal, options)) courses.push_back(std::move(course));
       progress(std::string("    ") + change.name);
     }
     plot(scene.name, courses, options);
