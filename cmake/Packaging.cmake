@@ -22,7 +22,7 @@ function(cumulet_rpath target lib)
 endfunction()
 
 set(programs)
-foreach(program cumulet-render cumulet-scene cumulet-demo)
+foreach(program cumulet-render cumulet-merge cumulet-scene cumulet-demo)
   if(TARGET ${program})
     cumulet_rpath(${program} $ORIGIN/${bin_to_lib})
     list(APPEND programs ${program})
@@ -144,7 +144,8 @@ and a pkg-config file.")
   set(CPACK_DEBIAN_PROGRAMS_DESCRIPTION "path-traced volumes - viewer and command line renderer
 cumulet-demo shows OpenVDB and NanoVDB volumes and glTF models in a window,
 path-traced as they are turned and changed. cumulet-render makes pictures of
-them without a display. cumulet-scene writes a sample scene.")
+them without a display, cumulet-merge one of parts. cumulet-scene writes a
+sample scene.")
   set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # or it would come before those
   include(CPack)
 endif()

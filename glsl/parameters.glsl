@@ -176,6 +176,7 @@ CM_BLOCK(CmIntegrator) {
   uint max_bounces;         // 0: no limit
   float blurred_roughness;  // least roughness of surfaces that blurred paths meet
   uint light_among_surfaces;  // 1: surfaces pass light on to each other and to the volume
+  uint first_sample;          // the number of each pixel's first
   CM_EQUALITY(CmIntegrator)
 };
 

@@ -57,8 +57,9 @@ CM_FN float cm_camera_end(CM_INOUT(CmPath) p, uvec2 at, vec2 within, uint layer,
   return host_z;
 }
 
-// A camera ray for that sample of the pixel.
-CM_FN void cm_camera(CM_INOUT(CmPath) p, uint sample_number, uvec2 at) {
+// A camera ray for the next sample of the pixel, which has so many.
+CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
+  uint sample_number = cm.integrator.first_sample + samples;
   uint number = at.y * cm.view.size.x + at.x;
   uvec3 pixel = cm_hash3(uvec3(number, 0x5bd1e995u, cm.integrator.seed));
   p.random = cm_hash3(uvec3(number, sample_number, cm.integrator.seed)).x;

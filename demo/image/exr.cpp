@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include "checks.hpp"
@@ -50,9 +51,10 @@ std::string full_name(const LayerName& layer, std::size_t channel) {
   return name += layer.channels[channel];
 }
 
+constexpr std::size_t longest_name = 31;  // of an attribute
+
 void insert(Imf::Header& header, const Attribute& attribute) {
-  constexpr std::size_t longest = 31;
-  if (attribute.name.empty() || attribute.name.size() > longest)
+  if (attribute.name.empty() || attribute.name.size() > longest_name)
     throw std::logic_error("an attribute cannot be called \"" + attribute.name + "\"");
   struct Insert {
     Imf::Header& header;
@@ -73,18 +75,54 @@ void insert(Imf::Header& header, const Attribute& attribute) {
   std::visit(Insert{header, attribute.name}, attribute.value);
 }
 
-/// fill: what stands for a channel that the file lacks, one each; none: it is an error.
-Pixels read_layer(const std::string& path, const LayerName& layer, std::span<const float> fill) {
+/// What there is of an attribute that write_exr could have written; nothing of another.
+std::optional<Attribute> read_attribute(const char* name, const Imf::Attribute& attribute) {
+  if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute)) return Attribute{name, text->value()};
+  if (const auto* number = dynamic_cast<const Imf::FloatAttribute*>(&attribute))
+    return Attribute{name, number->value()};
+  if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&attribute))
+    return Attribute{name, number->value()};
+  if (const auto* v = dynamic_cast<const Imf::V2fAttribute*>(&attribute))
+    return Attribute{name, std::array{v->value().x, v->value().y}};
+  if (const auto* v = dynamic_cast<const Imf::V3dAttribute*>(&attribute))
+    return Attribute{name, std::array{v->value().x, v->value().y, v->value().z}};
+  if (const auto* m = dynamic_cast<const Imf::M44fAttribute*>(&attribute)) {
+    std::array<float, 16> matrix{};
+    std::memcpy(matrix.data(), m->value().x, sizeof matrix);
+    return Attribute{name, matrix};
+  }
+  return std::nullopt;
+}
+
+/// Width and height of a file's picture. Throws where they are none of ours.
+std::array<std::uint32_t, 2> size_of(const Imf::Header& header) {
+  const Imath::Box2i& window = header.dataWindow();
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
+  const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+  if (width < 1 || height < 1 || width > max_side || height > max_side)
+    throw std::runtime_error("unsupported size " + std::to_string(width) + "x" + std::to_string(height));
+  return {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
+}
+
+/// Calls read with the open file; gives what it gives. Throws, one line with the path.
+template <class Read>
+auto read_exr_file(const std::string& path, const Read& read) {
   static_cast<void>(read_file(path));  // the system's own cause for a file that cannot be opened
   try {
     Imf::InputFile file(path.c_str());
-    const Imath::Box2i window = file.header().dataWindow();
-    const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
-    const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-    if (width < 1 || height < 1 || width > max_side || height > max_side)
-      throw std::runtime_error("unsupported size " + std::to_string(width) + "x" + std::to_string(height));
+    return read(file);
+  } catch (const std::exception& error) {
+    fail(path, "not a readable OpenEXR file: " + demo::one_line(error.what()));
+  }
+}
+
+/// fill: what stands for a channel that the file lacks, one each; none: it is an error.
+Pixels read_layer(const std::string& path, const LayerName& layer, std::span<const float> fill) {
+  return read_exr_file(path, [&](Imf::InputFile& file) {
+    const auto [width, height] = size_of(file.header());
+    const Imath::Box2i& window = file.header().dataWindow();
     const std::size_t channels = layer.channels.size();
-    Pixels pixels{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
+    Pixels pixels{width, height, {}};
     pixels.values.resize(channels * pixels.width * pixels.height);
     const std::size_t stride = channels * sizeof(float);
     // A slice's base is where pixel (0, 0) would be, which the data window may not contain.
@@ -101,9 +139,7 @@ Pixels read_layer(const std::string& path, const LayerName& layer, std::span<con
     file.setFrameBuffer(frame);
     file.readPixels(window.min.y, window.max.y);
     return pixels;
-  } catch (const std::exception& error) {
-    fail(path, "not a readable OpenEXR file: " + demo::one_line(error.what()));
-  }
+  });
 }
 
 }  // namespace
@@ -146,6 +182,21 @@ void write_exr(const std::string& path, std::uint32_t width, std::uint32_t heigh
 void write_exr(const std::string& path, const Image& image) {
   const Layer beauty{layers::beauty, image.rgba};
   write_exr(path, image.width, image.height, {&beauty, 1});
+}
+
+Contents read_contents(const std::string& path) {
+  return read_exr_file(path, [](const Imf::InputFile& file) {
+    const auto [width, height] = size_of(file.header());
+    Contents contents{width, height, {}, {}};
+    const Imf::ChannelList& channels = file.header().channels();
+    for (auto channel = channels.begin(); channel != channels.end(); ++channel)
+      contents.channels.emplace_back(channel.name());
+    for (auto attribute = file.header().begin(); attribute != file.header().end(); ++attribute) {
+      auto read = read_attribute(attribute.name(), attribute.attribute());
+      if (read && read->name.size() <= longest_name) contents.attributes.push_back(std::move(*read));
+    }
+    return contents;
+  });
 }
 
 Pixels read_exr(const std::string& path, const LayerName& layer) { return read_layer(path, layer, {}); }

@@ -52,6 +52,16 @@ struct Attribute {
 void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers,
                std::span<const Attribute> attributes = {});
 
+/// What a file says of its picture beside the pixels.
+struct Contents {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::string> channels;  // full names, in the order of their letters
+  std::vector<Attribute> attributes;  // of the types that Attribute has; not those that OpenEXR itself needs
+};
+/// Of the header alone. Throws std::runtime_error, one line with the path and the cause.
+[[nodiscard]] Contents read_contents(const std::string& path);
+
 /// A layer read back.
 struct Pixels {
   std::uint32_t width = 0;

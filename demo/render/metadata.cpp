@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <attributes.hpp>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <settings.hpp>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 
 namespace cumulet::demo {
 
@@ -47,13 +49,16 @@ std::string version_text() {
          std::to_string(version % 100);
 }
 
+/// As flags and scene files call it.
+template <class Choices, class Value>
+const char* name_of(const Choices& choices, Value value) {
+  const auto* const found = std::ranges::find(choices, static_cast<int>(value), &settings::Choice::value);
+  return found == choices.end() ? "" : found->name;
+}
+
 }  // namespace
 
-const char* march_name(cumulet_march march) {
-  const auto* const found =
-      std::ranges::find(settings::march_choices, static_cast<int>(march), &settings::Choice::value);
-  return found == settings::march_choices.end() ? "" : found->name;
-}
+const char* march_name(cumulet_march march) { return name_of(settings::march_choices, march); }
 
 std::vector<image::Attribute> camera_metadata(const double view[16], const double projection[16]) {
   Matrix eye{};
@@ -92,15 +97,22 @@ std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOpt
   const double samples = static_cast<double>(stats.samples) / (double(width) * height);
 
   std::vector<image::Attribute> attributes = camera_metadata(view.data(), projection.data());
-  std::array<char, 96> comments{};
-  std::snprintf(comments.data(), comments.size(), "Cumulet %s, %g samples a pixel", version_text().c_str(), samples);
-  attributes.push_back({"comments", std::string(comments.data())});
-  attributes.push_back({"cumulet:version", version_text()});
-  attributes.push_back({"cumulet:scene", scene_hash(scene)});
-  attributes.push_back({"cumulet:march", std::string(march_name(scene.grid.march))});
-  attributes.push_back({"cumulet:samples", samples});
-  attributes.push_back({"cumulet:seed", double(scene.sampling.seed)});
-  if (scene.sampling.view == CUMULET_VIEW_SHADED) attributes.push_back({"cumulet:noise", stats.noise});
+  const auto add = [&attributes](std::string_view name, auto value) {
+    attributes.push_back({std::string(name), std::move(value)});
+  };
+  namespace names = image::attributes;
+  const cumulet_sampling_desc& sampling = scene.sampling;
+  const bool shaded = sampling.view == CUMULET_VIEW_SHADED;
+  add(names::comments, names::comments_text(version_text(), samples));
+  add(names::version, version_text());
+  add(names::scene, scene_hash(scene));
+  add(names::march, std::string(march_name(scene.grid.march)));
+  add(names::background, std::string(name_of(settings::background_choices, scene.display.background)));
+  add(names::samples, samples);
+  // No pixel has more than are asked for.
+  if (shaded && samples == double(sampling.samples)) add(names::first_sample, double(sampling.first_sample));
+  add(names::seed, double(sampling.seed));
+  if (shaded) add(names::noise, stats.noise);
   attributes.push_back({"cumulet:eye", three(stands.eye)});
   attributes.push_back({"cumulet:target", three(stands.target)});
   attributes.push_back({"cumulet:up", three(stands.up)});

@@ -535,8 +535,20 @@ namespace {
 // A pixel, of a picture that stops by its noise or the time.
 constexpr std::uint32_t most_samples = 65536;
 
-// What flags need of each other.
-void check_together(const RenderOptions& options) {
+// A part of a picture is what others can be merged with.
+void check_part(const RenderOptions& options, bool part) {
+  if (!part) return;
+  if (options.format != OutputFormat::exr) throw UsageError("--first-sample needs an .exr to write to");
+  if (options.scene.sampling.view != CUMULET_VIEW_SHADED) throw UsageError("--first-sample needs the shaded view");
+  if (options.denoise != Denoise::off) throw UsageError("--first-sample makes a part, which --denoise is not of");
+  if (options.time_limit || options.scene.sampling.noise_target_percent > 0.0f)
+    throw UsageError("--first-sample needs as many samples as --spp says: no time limit, no noise target");
+  const auto last = std::uint64_t{options.scene.sampling.first_sample} + options.scene.sampling.samples;
+  if (last > std::uint64_t{1} << 32U) throw UsageError("--first-sample: the samples go beyond number 4294967295");
+}
+
+// What flags need of each other; part: of a picture.
+void check_together(const RenderOptions& options, bool part) {
   if (options.scene.volume.empty() && options.scene.surfaces.empty())
     throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
   if (options.json && !options.info) throw UsageError("--json is for --info");
@@ -550,6 +562,7 @@ void check_together(const RenderOptions& options) {
     throw UsageError("--denoise needs the shaded view");
   if (options.denoise != Denoise::off && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
     throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
+  check_part(options, part);
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
   if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
   if (!options.trace.empty() && options.trace == options.stats)
@@ -626,6 +639,14 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.time_limit = seconds;
       },
       "Stop after this long, loading left out, but not before each pixel has a sample");
+  add(
+      app, group, "--first-sample", "N",
+      [&](const std::string& text) {
+        options.scene.sampling.first_sample =
+            static_cast<std::uint32_t>(parse_integer(text, 0, std::numeric_limits<std::uint32_t>::max()));
+      },
+      "Make a part of a picture: of each pixel the --spp samples from number N on, from 0; cumulet-merge puts the .exr "
+      "files of parts together");
   // A scene's is of what windows show.
   app.remove_option(app.get_option("--denoise"));
   add_choice(app, group, "--denoise",
@@ -658,7 +679,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   const bool stops = options.time_limit || options.scene.sampling.noise_target_percent > 0.0f;
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
-  check_together(options);
+  check_together(options, app.count("--first-sample") > 0);
   return options;
 }
 

@@ -422,7 +422,8 @@ struct Table<cumulet_sampling_desc> {
         .row = {.label = "View",
                 .tip = "The picture, or a look at the grid that makes it (keys 1 to 5)."}}),
       Setting(&Desc::preview, {.name = "preview", .choices = preview_choices}),
-      Setting(&Desc::volume_alone, {.name = "volume_alone"})};
+      Setting(&Desc::volume_alone, {.name = "volume_alone"}),
+      Setting(&Desc::first_sample, {.name = "first_sample"})};
 };
 
 template <>

@@ -80,6 +80,7 @@ render::Obstacles Context::obstacles(const Shot& shot) {
 render::PictureParameters Context::parameters(const Shot& shot, const render::Obstacles& obstacles) const {
   core::CmIntegrator integrator{};
   integrator.seed = shot.sampling.seed;
+  integrator.first_sample = shot.sampling.first_sample;
   integrator.max_bounces = shot.max_bounces;
   integrator.blurred_roughness = shot.surfaces.indirect_roughness;
   integrator.light_among_surfaces = shot.surfaces.light == SurfaceLight::full ? 1U : 0U;

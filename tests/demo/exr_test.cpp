@@ -11,12 +11,16 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <layers.hpp>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "aovs.hpp"
 #include "headless.hpp"
+#include "merge.hpp"
 #include "metadata.hpp"
 #include "support/folder.hpp"
 
@@ -97,7 +101,7 @@ class Exr : public testing::TestWithParam<Backend> {
     std::vector<float> rgba(std::size_t{4} * width * height);
     EXPECT_EQ(cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
     const std::string file = (folder_ / name).string();
-    cumulet::demo::write_exr(viewer_.get(), file, width, height, {rgba}, {},
+    cumulet::demo::write_exr(viewer_.get(), file, width, height, {rgba}, aovs_,
                              cumulet::demo::metadata_of(viewer_.get(), scene_, width, height));
     return file;
   }
@@ -123,6 +127,7 @@ class Exr : public testing::TestWithParam<Backend> {
   }
 
   SceneOptions scene_;
+  std::vector<cumulet_aov> aovs_;
   Context context_;
   std::unique_ptr<cumulet_viewer, Destroy> viewer_;
   cumulet::test::Folder folder_;
@@ -160,6 +165,63 @@ TEST_P(Exr, SaysHowThePictureWasMade) {
   EXPECT_EQ(cumulet::demo::scene_hash(other), hash);
   other.medium.density_scale = 9.0;
   EXPECT_NE(cumulet::demo::scene_hash(other), hash);
+}
+
+// Against the renderer itself, as merge_test is against samples.
+TEST_P(Exr, SevenMergedPartsAreTheWhole) {
+  scene_.sampling.volume_alone = 1;
+  aovs_ = {CUMULET_AOV_VOLUME, CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_VOLUME_DEPTH, CUMULET_AOV_ERROR};
+  std::vector<std::string> parts;
+  for (const std::uint32_t samples : {5U, 1U, 8U, 2U, 1U, 4U, 3U}) {
+    scene_.sampling.samples = samples;
+    render();
+    parts.push_back(write(("part" + std::to_string(parts.size()) + ".exr").c_str()));
+    scene_.sampling.first_sample += samples;
+  }
+  scene_.sampling.first_sample = 0;
+  scene_.sampling.samples = 24;
+  render();
+  const std::string whole = write("whole.exr");
+  const std::string merged = (folder_ / "merged.exr").string();
+  EXPECT_EQ(cumulet::demo::merge(parts, merged).samples, 24u);
+
+  namespace layers = cumulet::image::layers;
+  const auto expect_alike = [&](const cumulet::image::LayerName& layer, double tolerance) {
+    const std::vector<float> wanted = cumulet::image::read_exr(whole, layer).values;
+    const std::vector<float> made = cumulet::image::read_exr(merged, layer).values;
+    ASSERT_EQ(made.size(), wanted.size());
+    for (std::size_t i = 0; i < made.size(); ++i)
+      EXPECT_NEAR(made[i], wanted[i], tolerance * (1.0 + std::abs(wanted[i]))) << layer.name << " " << i;
+  };
+  expect_alike(layers::beauty, 1e-6);
+  expect_alike(layers::volume, 1e-6);
+  expect_alike(layers::transmittance, 0.0);
+  expect_alike(layers::volume_depth, 0.0);
+  // The renderer's own is by differences of moments in single precision.
+  expect_alike(layers::error, 1e-3);
+  const auto said = [](const std::string& file) { return cumulet::image::read_contents(file); };
+  EXPECT_EQ(said(merged).channels, said(whole).channels);
+  const auto ours = said(merged).attributes;
+  const auto its = said(whole).attributes;
+  ASSERT_EQ(ours.size(), its.size());
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    EXPECT_EQ(ours[i].name, its[i].name);
+    if (ours[i].name == "cumulet:noise") {
+      EXPECT_NEAR(std::get<double>(ours[i].value), std::get<double>(its[i].value), 1e-4);
+    } else {
+      EXPECT_EQ(ours[i].value, its[i].value) << ours[i].name;
+    }
+  }
+  // Other samples than 0 to 4 of another scene.
+  scene_.sampling = SceneOptions().sampling;
+  scene_.sampling.preview = CUMULET_PREVIEW_OFF;
+  scene_.sampling.samples = 3;
+  scene_.sampling.first_sample = 24;
+  scene_.sampling.seed = 3000000000U;
+  scene_.medium.density_scale = 3.0;
+  aovs_ = {};
+  render();
+  EXPECT_THROW(cumulet::demo::merge({parts[0], write("other.exr")}, merged), std::runtime_error);
 }
 
 TEST_P(Exr, ItsMatricesFindTheVolumeInThePicture) {

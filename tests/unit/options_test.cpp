@@ -338,6 +338,33 @@ TEST(Options, WhatIsOfAModelNeedsOne) {
   }
 }
 
+TEST(Options, APartHasItsSamplesAndIsAnExr) {
+  const RenderOptions part = parse({"-o", "a.exr", "--spp", "32", "--first-sample", "96"});
+  EXPECT_EQ(part.scene.sampling.first_sample, 96u);
+  EXPECT_EQ(part.scene.sampling.samples, 32u);
+  EXPECT_EQ(parse({"-o", "a.exr"}).scene.sampling.first_sample, 0u);
+  const auto refused = [](Arguments more) {
+    more.insert(more.end(), {"--first-sample", "0"});
+    return usage_error(with(more));
+  };
+  EXPECT_EQ(refused({"-o", "a.png"}), "--first-sample needs an .exr to write to");
+  EXPECT_EQ(refused({"-o", "a.exr"}), "");
+  for (const Arguments& more :
+       {Arguments{"--view", "cells"}, {"--denoise", "fast"}, {"--noise-target", "2"}, {"--time-limit", "2"}})
+    EXPECT_NE(refused({"-o", "a.exr", more[0], more[1]}), "") << more[0];
+  EXPECT_EQ(usage_error(with({"-o", "a.exr", "--spp", "6", "--first-sample", "4294967290"})), "");
+  EXPECT_NE(usage_error(with({"-o", "a.exr", "--spp", "7", "--first-sample", "4294967290"})), "");
+  EXPECT_NE(usage_error(with({"-o", "a.exr", "--first-sample", "-1"})), "");
+}
+
+TEST(Options, FramesOfASequence) {
+  const RenderOptions options = parse({"--frames", "1-5x2", "--overwrite"});
+  EXPECT_EQ(options.frames, (std::vector<Frame>{1, 3, 5}));
+  EXPECT_TRUE(options.overwrite);
+  EXPECT_TRUE(parse({}).frames.empty());
+  EXPECT_EQ(usage_error(with({"--frames", "9-1"})), "--frames: '9-1' runs backwards");
+}
+
 TEST(Options, HelpFitsAHundredColumns) {
   std::ostringstream out;
   EXPECT_FALSE(parse_render_options({"--help"}, out).has_value());

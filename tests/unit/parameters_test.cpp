@@ -111,6 +111,7 @@ const std::array fields{
     CM_FIELD(integrator, max_bounces),
     CM_FIELD(integrator, blurred_roughness),
     CM_FIELD(integrator, light_among_surfaces),
+    CM_FIELD(integrator, first_sample),
     CM_FIELD(dispatch, tile_corner),
     CM_FIELD(dispatch, tile_size),
     CM_FIELD(dispatch, rounds),

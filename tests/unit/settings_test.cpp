@@ -156,7 +156,7 @@ TEST(Settings, SceneFilesKeepEach) {
     });
   });
   // What a picture's file has no say in.
-  EXPECT_EQ(without, (std::set<std::string>{"preview", "volume_alone"}));
+  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "preview", "volume_alone"}));
 }
 
 TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
@@ -218,7 +218,7 @@ TEST(Settings, AFlagSetsEach) {
     });
   });
   // --sun and --sky-model set three at once.
-  EXPECT_EQ(without, (std::set<std::string>{"ground_albedo", "preview", "sky", "sun_azimuth_degrees",
+  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "ground_albedo", "preview", "sky", "sun_azimuth_degrees",
                                             "sun_elevation_degrees", "sun_irradiance", "turbidity", "volume_alone"}));
 }
 

@@ -872,6 +872,13 @@ typedef struct cumulet_sampling_desc {
    * counts: by far less than the noise, docs/aovs.md.
    */
   float noise_target_percent;
+  /*
+   * A pixel's samples are those of the numbers first_sample to first_sample + samples - 1. A sample depends on its
+   * number, the seed and the scene alone, and any 2^k in a row from a multiple of 2^k on are even (Owen-scrambled): so
+   * parts of a picture are made apart, and their means, each weighed by its samples, are together that of the whole but
+   * for rounding. Numbers beyond 2^32 - 1 begin again at 0.
+   */
+  uint32_t first_sample;
 } cumulet_sampling_desc;
 
 typedef enum cumulet_tone_map {

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+/// What attributes of a rendered picture's OpenEXR file are called that a program looks for; docs/aovs.md says what
+/// they hold.
+namespace cumulet::image::attributes {
+
+inline constexpr std::string_view comments = "comments";
+inline constexpr std::string_view version = "cumulet:version";
+inline constexpr std::string_view scene = "cumulet:scene";
+inline constexpr std::string_view march = "cumulet:march";
+inline constexpr std::string_view background = "cumulet:background";
+inline constexpr std::string_view samples = "cumulet:samples";
+inline constexpr std::string_view first_sample = "cumulet:first_sample";
+inline constexpr std::string_view seed = "cumulet:seed";
+inline constexpr std::string_view noise = "cumulet:noise";
+
+/// Of the background attribute: what the pictures' luminance is of when errors count it.
+inline constexpr std::string_view sky_background = "sky";
+
+/// For people.
+[[nodiscard]] inline std::string comments_text(const std::string& of_version, double a_pixel) {
+  std::array<char, 96> text{};
+  std::snprintf(text.data(), text.size(), "Cumulet %s, %g samples a pixel", of_version.c_str(), a_pixel);
+  return text.data();
+}
+
+}  // namespace cumulet::image::attributes

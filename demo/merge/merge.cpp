@@ -1,0 +1,228 @@
+#include "merge.hpp"
+
+#include <algorithm>
+#include <array>
+#include <attributes.hpp>
+#include <cmath>
+#include <layers.hpp>
+#include <limits>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string_view>
+#include <variant>
+
+namespace cumulet::demo {
+namespace {
+
+namespace attributes = image::attributes;
+namespace layers = image::layers;
+
+[[noreturn]] void refuse(const std::string& path, const std::string& cause) {
+  throw std::runtime_error(path + ": " + cause);
+}
+
+template <class Value>
+std::optional<Value> find(const image::Contents& contents, std::string_view name) {
+  const auto found = std::ranges::find(contents.attributes, name, &image::Attribute::name);
+  if (found == contents.attributes.end()) return std::nullopt;
+  const auto* value = std::get_if<Value>(&found->value);
+  return value != nullptr ? std::optional(*value) : std::nullopt;
+}
+
+/// A file and the samples of each pixel that it has.
+struct Part {
+  std::string path;
+  image::Contents contents;
+  std::uint64_t first = 0;
+  std::uint64_t samples = 0;
+  [[nodiscard]] std::uint64_t end() const { return first + samples; }
+};
+
+std::string range_text(std::uint64_t first, std::uint64_t end) {
+  if (end - first == 1) return "sample " + std::to_string(first);
+  return "samples " + std::to_string(first) + " to " + std::to_string(end - 1);
+}
+
+std::uint64_t whole(const Part& part, std::string_view name) {
+  const auto number = find<double>(part.contents, name);
+  constexpr double most = 4294967296.0;
+  if (!number || !(*number >= 0.0) || *number > most || *number != std::floor(*number)) {
+    refuse(part.path, "is no part of a picture: it does not say which samples all its pixels have (" +
+                          std::string(name) + "), as when it was stopped before its end");
+  }
+  return static_cast<std::uint64_t>(*number);
+}
+
+Part open(const std::string& path) {
+  Part part{path, image::read_contents(path)};
+  for (const std::string_view name : {attributes::version, attributes::scene})
+    if (!find<std::string>(part.contents, name))
+      refuse(path, "is no picture of cumulet-render: no " + std::string(name));
+  part.first = whole(part, attributes::first_sample);
+  part.samples = whole(part, attributes::samples);
+  if (part.samples == 0) refuse(path, "is no part of a picture: it has no samples");
+  return part;
+}
+
+template <class Value>
+void check_same(const Part& a, const Part& b, std::string_view name, const char* what) {
+  if (find<Value>(a.contents, name) != find<Value>(b.contents, name))
+    refuse(b.path, std::string("is of ") + what + " than " + a.path);
+}
+
+void check_together(const Part& a, const Part& b) {
+  const auto size = [](const Part& part) {
+    return std::to_string(part.contents.width) + "x" + std::to_string(part.contents.height);
+  };
+  if (size(a) != size(b)) refuse(b.path, "is of " + size(b) + " pixels, and " + a.path + " of " + size(a));
+  check_same<std::string>(a, b, attributes::version, "another version of Cumulet");
+  check_same<double>(a, b, attributes::seed, "another seed");
+  check_same<std::string>(a, b, attributes::march, "another march");
+  check_same<std::string>(a, b, attributes::scene, "another scene");
+  if (a.contents.channels != b.contents.channels) refuse(b.path, "has other layers than " + a.path);
+}
+
+/// In the order of their samples.
+std::vector<Part> open_all(const std::vector<std::string>& paths) {
+  if (paths.empty()) throw std::runtime_error("there is no part to merge");
+  std::vector<Part> parts;
+  parts.reserve(paths.size());
+  for (const std::string& path : paths) {
+    parts.push_back(open(path));
+    check_together(parts.front(), parts.back());
+  }
+  std::ranges::stable_sort(parts, {}, &Part::first);
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const Part& before = parts[i - 1];
+    const Part& after = parts[i];
+    if (after.first < before.end()) {
+      refuse(after.path, "has " + range_text(after.first, after.end()) + ", some of which " + before.path +
+                             " has as well: " + range_text(before.first, before.end()));
+    }
+    if (after.first > before.end()) {
+      throw std::runtime_error("between " + before.path + " and " + after.path + " no part has " +
+                               range_text(before.end(), after.first));
+    }
+  }
+  return parts;
+}
+
+bool has(const image::Contents& contents, const image::LayerName& layer) {
+  return std::ranges::any_of(layer.channels, [&](char letter) {
+    std::string name(layer.name);
+    if (!name.empty()) name += '.';
+    return std::ranges::find(contents.channels, name + letter) != contents.channels.end();
+  });
+}
+
+std::size_t pixels_of(const Part& part) { return std::size_t{part.contents.width} * part.contents.height; }
+
+/// Means over all samples: those of the parts, weighed.
+std::vector<float> mean(const std::vector<Part>& parts, const image::LayerName& layer) {
+  std::vector<double> sums;
+  double samples = 0.0;
+  for (const Part& part : parts) {
+    const image::Pixels pixels = image::read_exr(part.path, layer);
+    sums.resize(pixels.values.size());
+    const auto weight = static_cast<double>(part.samples);
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += weight * double{pixels.values[i]};
+    samples += weight;
+  }
+  std::vector<float> means(sums.size());
+  std::ranges::transform(sums, means.begin(), [&](double sum) { return static_cast<float>(sum / samples); });
+  return means;
+}
+
+double luminance(std::span<const float> rgba) { return 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]; }
+
+/// The standard error of all samples' mean luminance, by the parts' means and squared deviations from them (Chan, Golub
+/// and LeVeque, "Updating formulae and a pairwise algorithm for computing sample variances", 1979).
+std::vector<float> error_of(const std::vector<Part>& parts) {
+  struct Moments {
+    double samples = 0.0;
+    double mean = 0.0;
+    double squares = 0.0;
+  };
+  std::vector<Moments> all(pixels_of(parts.front()));
+  for (const Part& part : parts) {
+    const std::vector<float> rgba = image::read_exr(part.path, layers::beauty).values;
+    const std::vector<float> errors = image::read_exr(part.path, layers::error).values;
+    const auto n = static_cast<double>(part.samples);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      Moments& pixel = all[i];
+      const double away = luminance(std::span(rgba).subspan(4 * i, 4)) - pixel.mean;
+      const double together = pixel.samples + n;
+      if (part.samples > 1) pixel.squares += n * (n - 1.0) * double{errors[i]} * double{errors[i]};
+      pixel.squares += away * away * pixel.samples * n / together;
+      pixel.mean += away * n / together;
+      pixel.samples = together;
+    }
+  }
+  std::vector<float> errors(all.size(), std::numeric_limits<float>::infinity());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double n = all[i].samples;
+    if (n >= 2.0) errors[i] = static_cast<float>(std::sqrt(all[i].squares / (n * (n - 1.0))));
+  }
+  return errors;
+}
+
+/// As of docs/aovs.md.
+double noise_of(std::span<const float> rgba, std::span<const float> errors) {
+  double squares = 0.0;
+  double bright = 0.0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    squares += double{errors[i]} * double{errors[i]};
+    bright += luminance(rgba.subspan(4 * i, 4));
+  }
+  const auto pixels = static_cast<double>(errors.size());
+  return bright > 0.0 ? std::sqrt(squares / pixels) / (bright / pixels) : 0.0;
+}
+
+void set(std::vector<image::Attribute>& all, image::Attribute attribute) {
+  const auto found = std::ranges::find(all, attribute.name, &image::Attribute::name);
+  if (found != all.end()) {
+    *found = std::move(attribute);
+  } else {
+    all.push_back(std::move(attribute));
+  }
+}
+
+}  // namespace
+
+Merged merge(const std::vector<std::string>& paths, const std::string& output) {
+  const std::vector<Part> parts = open_all(paths);
+  const image::Contents& first = parts.front().contents;
+  Merged merged{parts.front().first, parts.back().end() - parts.front().first};
+  merged.without_denoised = has(first, layers::denoised);
+  const auto background = find<std::string>(first, attributes::background);
+  const bool sky = background && *background == attributes::sky_background;
+  const bool with_error = has(first, layers::error);
+  merged.without_error = with_error && !sky;
+
+  std::vector<std::pair<image::LayerName, std::vector<float>>> made;
+  for (const image::LayerName& layer : {layers::beauty, layers::volume})
+    if (has(first, layer)) made.emplace_back(layer, mean(parts, layer));
+  for (const image::LayerName& layer :
+       {layers::transmittance, layers::depth, layers::volume_depth, layers::normal, layers::albedo})
+    if (has(first, layer)) made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
+
+  std::vector<image::Attribute> said = first.attributes;
+  const auto samples = static_cast<double>(merged.samples);
+  std::erase_if(said, [](const image::Attribute& a) { return a.name == attributes::noise; });
+  set(said, {std::string(attributes::samples), samples});
+  set(said, {std::string(attributes::comments),
+                   attributes::comments_text(*find<std::string>(first, attributes::version), samples)});
+  if (with_error && sky) {
+    made.emplace_back(layers::error, error_of(parts));
+    if (merged.samples > 1)
+      set(said, {std::string(attributes::noise), noise_of(made[0].second, made.back().second)});
+  }
+  std::vector<image::Layer> written;
+  written.reserve(made.size());
+  for (const auto& [name, values] : made) written.push_back({name, values});
+  image::write_exr(output, first.width, first.height, written, said);
+  return merged;
+}
+
+}  // namespace cumulet::demo
