@@ -21,6 +21,33 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform writeonly image2D cm_
 bool cm_is_number(float x) { return (floatBitsToUint(x) & 0x7fffffffu) < floatBitsToUint(1e15); }
 bool cm_are_numbers(vec3 v) { return cm_is_number(v.x) && cm_is_number(v.y) && cm_is_number(v.z); }
 
+// A single path that found a light by chance stands out from all about it by more than its pixel's own samples tell
+// for certain: it is dimmed, or the filter would take it for an edge, or spread it out as dots.
+#define CM_SPECK 1.5
+#define CM_CERTAIN 2.0  // standard errors
+float cm_speck(ivec2 texel, float luminance, float square, float samples) {
+  float brightest = 0.0;
+  float sum = 0.0;
+  float count = 0.0;
+  ivec2 last = textureSize(cm_sum, 0) - 1;
+  for (int y = -2; y <= 2; ++y) {
+    for (int x = -2; x <= 2; ++x) {
+      ivec2 at = texel + ivec2(x, y);
+      if (any(lessThan(at, ivec2(0))) || any(greaterThan(at, last))) continue;
+      float n = float(texelFetch(cm_counts, at, 0).x);
+      float there = n > 0.0 ? cm_luminance(texelFetch(cm_sum, at, 0).rgb) / n : 0.0;
+      if (n == 0.0 || !cm_is_number(there)) continue;
+      if (at != texel) brightest = max(brightest, there);
+      sum += there;
+      count += 1.0;
+    }
+  }
+  float most = CM_SPECK * max(brightest, sum / max(count, 1.0));
+  float deviation = sqrt(max(0.0, square - luminance * luminance) / max(samples - 1.0, 1.0));
+  if (samples >= 2.0) most = max(most, luminance - CM_CERTAIN * deviation);
+  return luminance > most ? most / luminance : 1.0;
+}
+
 void main() {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
   if (texel.x >= textureSize(cm_sum, 0).x || texel.y >= cm_rows.y) return;
@@ -41,9 +68,11 @@ void main() {
                   cm_is_number(1e-15 * square);
   // A sample is covered or it is not: of its square, what is behind can be taken off.
   float behind = cm_luminance(mean.background);
-  float luminance = cm_luminance(front);
   float apart = cm_luminance(mean.front.rgb);
   float own = max(square - (part > 0.0 ? behind * behind / part : 0.0), apart * apart);
+  float dimmed = guides.finite ? cm_speck(texel, apart, own, samples) : 1.0;
+  front *= dimmed;
+  float luminance = cm_luminance(front);
   float scale = apart > 0.0 ? luminance / apart : 1.0;
   float moment = samples > 0.0 ? scale * scale * own : luminance * luminance;
   if (!guides.finite) {

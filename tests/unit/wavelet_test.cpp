@@ -78,6 +78,12 @@ class Samples {
   }
 
   std::vector<glm::vec4>& sums() { return sum_; }
+  /// Makes one of a pixel's samples that bright.
+  void add_speck(glm::ivec2 at, float light) {
+    const auto i = static_cast<std::size_t>(at.y * size_.x + at.x);
+    sum_[i] += glm::vec4(glm::vec3(light), 0.0F);
+    squares_[i] += light * light / static_cast<float>(counts_[i].x);
+  }
   [[nodiscard]] const std::vector<glm::vec4>& truth() const { return truth_; }
   /// In front of the background, before the filter and after it.
   [[nodiscard]] std::vector<glm::vec4> raw() const {
@@ -272,6 +278,25 @@ TEST_P(Wavelets, WhatIsNoNumberStaysInItsPixel) {
       }
     }
   }
+}
+
+// One of 16 samples found a light: an estimate of its pixel as good as any, and nothing to show.
+TEST_P(Wavelets, ASpeckDoesNotStayNorSpreadAsDots) {
+  constexpr glm::ivec2 size(48, 48);
+  Samples samples(gl_, size, 16, [](int, int) { return Pixel{.z = 5.0F}; });
+  const auto without = samples.filtered(programs_);
+  samples.add_speck({24, 24}, 400.0F);
+  const auto clean = samples.filtered(programs_);
+  for (std::size_t i = 0; i < clean.size(); ++i) EXPECT_NEAR(clean[i].x, without[i].x, 0.25) << i % 48 << " " << i / 48;
+}
+
+// But where a pixel's own samples are sure of what they see it stays, however dark all around it is.
+TEST_P(Wavelets, ABrightPixelStays) {
+  const auto scene = [](int x, int y) {
+    return Pixel{.front = glm::vec3(x == 20 && y == 20 ? 20.0F : 1.0F), .spread = 0.1F, .z = 5.0F};
+  };
+  const Samples samples(gl_, {41, 41}, 64, scene);
+  EXPECT_NEAR(samples.filtered(programs_)[41 * 20 + 20].x, 20.0, 0.7);
 }
 
 TEST_P(Wavelets, AnySizeWillDo) {
