@@ -6,6 +6,10 @@
 //   transmittance of the volume up to the nearest surface, ours or the host's, or beyond the volume; mean
 //   surface z     view depth of that surface at the pixel's centre, infinity where there is none
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
+// and, as a filter that follows what moves asks for them, beside the normal the view depth of what is solid at the
+// pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
+// for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
+// volume's depth the share that the ground covers.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -23,12 +27,13 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "surface.glsl"
 #endif
 #include "ray.glsl"
+#include "ground.glsl"
 
 layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform writeonly image2D cm_normal;
 layout(rgba32f, binding = CM_IMAGE_ALBEDO) uniform writeonly image2D cm_albedo;
-layout(r32f, binding = CM_IMAGE_TRANSMITTANCE) uniform writeonly image2D cm_transmittance;
+layout(rg32f, binding = CM_IMAGE_TRANSMITTANCE) uniform writeonly image2D cm_transmittance;
 layout(r32f, binding = CM_IMAGE_SURFACE_Z) uniform writeonly image2D cm_surface_depth;
-layout(r32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
+layout(rg32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 
@@ -40,6 +45,10 @@ void main() {
   vec3 albedo = vec3(0.0);
   float surface_z = CM_INFINITE;
   float volume_z = CM_INFINITE;
+  float solid_z = CM_INFINITE;
+  float scattered_z = 0.0;  // sum, and of the chances
+  float scattered = 0.0;
+  vec2 covered = vec2(0.0);  // by surfaces, by the ground
   float share = 1.0 / float(cm.dispatch.samples);
   for (int i = 0; i < int(cm.dispatch.samples); ++i) {
     // Roberts's two-dimensional sequence; the first ray is the centre's.
@@ -58,12 +67,18 @@ void main() {
       CmSurfacePoint point = cm_surface_point(hit.triangle, hit.barycentrics, w, !hit.front);
       normal += point.material.normal;
       albedo += point.material.base_color;
+      covered.x += 1.0;
     }
 #endif
     if (i == 0 && surface_t < 1e37) surface_z = surface_t / t_per_z;
+    float ground_t = cm_ground_distance(o, d);
+    float solid_t = min(surface_t, ground_t);
+    if (ground_t < min(surface_t, CM_NO_GROUND)) covered.y += 1.0;
+    if (i == 0 && solid_t < 1e37) solid_z = solid_t / t_per_z;
     vec2 range = cm_box_range(o, d);
     range.y = min(range.y, surface_t);
     float used = 0.0;
+    float clear = 1.0;
     if (range.x < range.y) {
       float t = range.x;
       uvec3 cell = cm_march_enter(clamp(o + t * d, cm.grid.box_min, cm.grid.box_max));
@@ -81,15 +96,21 @@ void main() {
           volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
         }
         used += depth;
+        // Of what scatters in this part of the ray: its chance, and where in it, as if it were even.
+        float chance = 1.0 - exp(-depth);
+        float within_part = depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
+        scattered_z += clear * chance * (t + within_part * min(span, range.y - t)) / t_per_z;
+        scattered += clear * chance;
+        clear -= clear * chance;
         t = t_1;
         cell = next;
       }
     }
     transmittance += exp(-used);
   }
-  imageStore(cm_normal, ivec2(pixel), vec4(share * normal, 0.0));
-  imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, 0.0));
-  imageStore(cm_transmittance, ivec2(pixel), vec4(share * transmittance));
+  imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));
+  imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, scattered > 0.0 ? scattered_z / scattered : CM_INFINITE));
+  imageStore(cm_transmittance, ivec2(pixel), share * vec4(transmittance, covered.x, 0.0, 0.0));
   imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));
-  imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z));
+  imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z, share * covered.y, 0.0, 0.0));
 }

@@ -85,12 +85,14 @@ float cm_alike(CmGuides here, CmGuides there, vec4 slopes, vec2 offset) {
 #endif
 
 // A surface's albedo, as far as it is seen: what its light is divided by, to be smooth where only its colour is not.
-vec3 cm_tint(vec3 albedo, vec3 normal, float transmittance) {
-  float cover = min(1.0, length(normal));
-  return max(vec3(0.05), 1.0 + transmittance * (albedo - cover));
+// covered: the share of the pixel that surfaces cover.
+vec3 cm_tint(vec3 albedo, float covered, float transmittance) {
+  return max(vec3(0.05), 1.0 + transmittance * (albedo - covered));
 }
 
-// The part of a pixel that neither surfaces nor the volume cover.
-float cm_open(vec3 normal, float transmittance) { return transmittance * (1.0 - min(1.0, length(normal))); }
+// The part of a pixel that neither surfaces, the ground nor the volume cover.
+float cm_open(float covered, float grounded, float transmittance) {
+  return transmittance * max(0.0, 1.0 - covered - grounded);
+}
 
 #endif

@@ -55,13 +55,16 @@ void main() {
   float samples = float(texelFetch(cm_counts, texel, 0).x);
   float square = texelFetch(cm_moments, texel, 0).x;
   CmGuides guides;
-  guides.transmittance = texelFetch(cm_transmittance, texel, 0).x;
+  vec2 through = texelFetch(cm_transmittance, texel, 0).xy;
+  vec2 volume = texelFetch(cm_volume_z, texel, 0).xy;
+  guides.transmittance = through.x;
   vec3 normal = cm_surfaces * texelFetch(cm_normal, texel, 0).xyz;
   guides.normal = guides.transmittance * normal;
   guides.surface_z = texelFetch(cm_surface_z, texel, 0).x;
-  guides.volume_z = texelFetch(cm_volume_z, texel, 0).x;
-  vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, normal, guides.transmittance);
-  float open = cm_open(normal, guides.transmittance);
+  guides.volume_z = volume.x;
+  float covered = cm_surfaces * through.y;
+  vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, guides.transmittance);
+  float open = cm_open(covered, volume.y, guides.transmittance);
   vec3 front = mean.front.rgb / tint;
   float part = clamp(1.0 - mean.front.a, 0.0, 1.0);
   guides.finite = cm_are_numbers(mean.front.rgb) && cm_are_numbers(mean.background) && cm_is_number(mean.front.a) &&

@@ -8,8 +8,8 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #define CM_WAVELET_READS
 #include "wavelet.glsl"
 layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;
-layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
 layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;
+layout(binding = CM_UNIT_GUIDE_VOLUME_Z) uniform sampler2D cm_volume_z;
 layout(location = 3) uniform float cm_surfaces;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform readonly image2D cm_behind;
 layout(rgba32f, binding = CM_IMAGE_MEANS) uniform writeonly image2D cm_means;
@@ -24,10 +24,10 @@ void main() {
   if (cm_guides_at(texel).finite) {
     vec4 front = texelFetch(cm_front, texel, 0);
     float open = texelFetch(cm_spread, texel, 0).x;
-    float transmittance = texelFetch(cm_transmittance, texel, 0).x;
-    vec3 normal = cm_surfaces * texelFetch(cm_normal, texel, 0).xyz;
-    vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, normal, transmittance);
-    float own = cm_open(normal, transmittance);
+    vec2 through = texelFetch(cm_transmittance, texel, 0).xy;
+    float covered = cm_surfaces * through.y;
+    vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, through.x);
+    float own = cm_open(covered, texelFetch(cm_volume_z, texel, 0).y, through.x);
     // Where only its own samples count, these are what they are.
     float part = clamp(front.a + own - open, 0.0, 1.0);
     mean.front = vec4(tint * front.rgb * (cm_cover(own) / cm_cover(open)), 1.0 - part);

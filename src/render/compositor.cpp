@@ -109,7 +109,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
     wavelet_.drop();
     if (older && picture.may_lag && !filters_now()) return newest_;
     try {
-      wavelet_.begin(picture);
+      if (auto forgets = wavelet_.begin(picture)) no_memory_ = std::move(forgets);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::out_of_memory) throw;
       wavelet_.free();

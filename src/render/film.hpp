@@ -35,9 +35,11 @@ inline constexpr FilmLayer volume{"volume", GL_RGBA32F, 16};
 inline constexpr FilmLayer depth{"depth", GL_R32F, 4};
 inline constexpr FilmLayer normal{"normal", GL_RGBA32F, 16};
 inline constexpr FilmLayer albedo{"albedo", GL_RGBA32F, 16};
-inline constexpr FilmLayer transmittance{"transmittance", GL_R32F, 4};
+/// Of the volume; the share of a pixel that surfaces cover.
+inline constexpr FilmLayer transmittance{"transmittance", GL_RG32F, 8};
 inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
-inline constexpr FilmLayer volume_z{"volume z", GL_R32F, 4};
+/// Of half opacity; the share of a pixel that the ground covers.
+inline constexpr FilmLayer volume_z{"volume z", GL_RG32F, 8};
 }  // namespace film_layers
 
 /// What passes leave for each other, of one picture. Layers are there from the first pass that writes them on.

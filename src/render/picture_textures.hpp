@@ -21,6 +21,16 @@ struct PictureGuides {
   glm::vec2 footprint{0.0F};  // of a pixel at view depth z, in the world: x + y z
 };
 
+/// From where a picture is seen, as scene::Viewpoint, and what. Eye and axes are in the world.
+struct PictureView {
+  glm::dvec3 eye{0.0};
+  glm::dvec3 forward{0.0, 0.0, -1.0};
+  glm::dvec3 right{1.0, 0.0, 0.0};
+  glm::dvec3 up{0.0, 1.0, 0.0};
+  bool orthographic = false;
+  std::uint64_t scene = 0;  // another where more than the view is another
+};
+
 /// An accumulation as a tracer made it.
 struct PictureTextures {
   GLuint sum = 0;         // rgba32f: sums of radiance in front of the background, and of alpha; row 0 is the top
@@ -43,6 +53,7 @@ struct PictureTextures {
   bool may_lag = false;                   // more samples of it are on their way: those of some frames ago may be drawn
   GLuint moments = 0;                     // r32f: means of samples' squared luminance, background included
   std::optional<PictureGuides> guides{};  // without, it is not filtered
+  std::optional<PictureView> view{};      // without, what pictures before it knew is neither used nor replaced
 };
 
 /// What means.glsl reads of it, to the units that it names.

@@ -26,12 +26,37 @@ constexpr std::uint32_t guide_rays = 4;
 using State = Schedule::State;
 using Clock = std::chrono::steady_clock;
 
+// What is known of pictures before a filtered one helps where its samples are others: in each view they are.
+std::uint32_t seed_of(const PictureParameters& parameters) {
+  const core::CmView& view = parameters.view;
+  std::uint32_t hash = parameters.integrator.seed;
+  for (const glm::vec3& vector : {view.eye, view.forward, view.right, view.up}) {
+    for (int i = 0; i < 3; ++i) {
+      hash = (hash ^ std::bit_cast<std::uint32_t>(vector[i])) * 0x9E3779B1U;
+      hash ^= hash >> 15U;
+    }
+  }
+  return hash;
+}
+
 const surface::Scene* scene_met(const Obstacles& obstacles) {
   const ModelData* met = obstacles.met();
   return met != nullptr ? met->scene() : nullptr;
 }
 
 }  // namespace
+
+bool PictureWish::Content::shows_same(const Content& other) const {
+  Content seen = other;
+  seen.viewpoint = viewpoint;
+  seen.host_depth = host_depth;
+  seen.programs = programs;
+  seen.size = size;
+  seen.preview = preview;
+  seen.volume_alone = volume_alone;
+  seen.stops_by_noise = stops_by_noise;
+  return seen == *this;
+}
 
 std::uint32_t Progressive::enough(std::uint32_t divisor) const {
   const std::uint32_t wanted = wish_.content.view == View::shaded ? wish_.samples : 1;
@@ -113,6 +138,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
                         const PictureSettings& settings) {
   PictureParameters parameters = wish_.parameters;
   parameters.view.size = size_of(divisor);
+  if (wish_.guides) parameters.integrator.seed = seed_of(parameters);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();
   try {
@@ -126,7 +152,8 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
     }
     throw;
   }
-  working_ = Work{&picture, wish_.content.data, divisor, scene_met(obstacles), wish_.content.environment, wishes_};
+  working_ =
+      Work{&picture, wish_.content.data, divisor, scene_met(obstacles), wish_.content.environment, wishes_, scenes_};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
@@ -159,6 +186,7 @@ void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
   stillness_.see(changed, wish.held, Clock::now());
   if (changed) {
     ++wishes_;
+    if (!wish.content.shows_same(last)) ++scenes_;
     const bool other_data = resized || wish.content.data != last.data;
     if (other_data) finest_ = 1;
     // Paths of the old data lead nowhere in the new.

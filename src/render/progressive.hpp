@@ -38,6 +38,8 @@ struct PictureWish {
     bool volume_alone = false;    // at full resolution, sum what met the volume first apart as well
     bool stops_by_noise = false;  // there is a noise target
     bool operator==(const Content&) const = default;
+    /// Whether but the view, the host's depth and how pictures are made are the same.
+    [[nodiscard]] bool shows_same(const Content& other) const;
   };
   Content content;
   PictureParameters parameters;        // of the content, at full resolution
@@ -74,6 +76,8 @@ class Progressive {
   [[nodiscard]] Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
   /// The same for all pictures of what was wished when it was begun.
   [[nodiscard]] std::uint64_t shown_wish() const { return shown_ ? shown_->wish : 0; }
+  /// The same for all pictures of the same scene, from wherever.
+  [[nodiscard]] std::uint64_t shown_scene() const { return shown_ ? shown_->scenes : 0; }
   /// What was shown before, where that may have pixels without a sample; else null.
   [[nodiscard]] const Picture* before() const { return shown_ && shown_->picture->has_holes() ? before_ : nullptr; }
   /// Waits for what is under way, so that what is read back is all there is.
@@ -109,6 +113,7 @@ class Progressive {
     const surface::Scene* scene = nullptr;  // whose triangles its paths meet
     Revision<EnvironmentData> environment;  // that they escape to
     std::uint64_t wish = 0;                 // that it is of
+    std::uint64_t scenes = 0;               // that there had been
   };
   [[nodiscard]] const std::optional<Work>& newest_work() const {
     return wish_.content.preview || !working_ ? shown_ : working_;
@@ -137,6 +142,7 @@ class Progressive {
   std::vector<std::unique_ptr<Picture>> pictures_;
   PictureWish wish_;
   std::uint64_t wishes_ = 0;
+  std::uint64_t scenes_ = 0;
   std::optional<glm::uvec2> no_memory_for_guides_;  // of this size
   std::optional<Error> no_guides_;                  // to be told
   Schedule schedule_;

@@ -44,6 +44,7 @@ void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarge
   const glm::ivec4 same(0, 0, glm::ivec2(picture.size));
   for (const bool holes : {false, true}) {
     picture.holes = holes;
+    if (holes) ++picture.picture;  // one that follows, where a filter remembers
     for (const glm::ivec4& viewport : {whole, same}) {
       target.viewport = viewport;
       compositor_.draw(picture, display, target);

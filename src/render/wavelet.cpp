@@ -21,7 +21,33 @@ constexpr std::uint64_t bytes_a_pixel = 96;
 constexpr GLint rows_at = 0;
 constexpr GLint clear_at = 1;
 constexpr GLint footprint_at = 2;
-constexpr GLint own_at = 3;  // surfaces, or the level's stride
+constexpr GLint own_at = 3;        // surfaces, or the level's stride
+constexpr GLint most_at = 3;       // wavelet_merge.comp
+constexpr GLint to_before_at = 3;  // wavelet_reproject.comp
+constexpr GLint moved_at = 4;
+constexpr GLint orthographic_at = 5;
+constexpr GLint footprint_before_at = 6;
+constexpr GLint surfaces_at = 7;
+constexpr GLint most_recalled_at = 8;
+// More would blur, for each picture is found in the one before it between its pixels, and hide what changes.
+constexpr float most_samples = 32.0F;
+// Pictures of other wishes that a finer one outlasts.
+constexpr std::uint64_t most_wishes = 16;
+constexpr std::uint64_t history_bytes_a_pixel = 32;
+constexpr std::uint64_t recalled_bytes_a_pixel = 16;
+
+std::uint64_t area(glm::uvec2 size) { return std::uint64_t{size.x} * size.y; }
+
+// Takes points of a view, as the shader has them, to another's.
+struct Motion {
+  glm::mat3 turn{1.0F};
+  glm::vec3 shift{0.0F};
+};
+
+Motion motion(const PictureView& from, const PictureView& to) {
+  const glm::dmat3 back = glm::inverse(glm::dmat3(to.right, to.up, to.forward));
+  return {glm::mat3(back * glm::dmat3(from.right, from.up, from.forward)), glm::vec3(back * (from.eye - to.eye))};
+}
 
 double slots_of(glm::uvec2 size, std::uint32_t rows) { return double(rows) * size.x / 8.0; }
 
@@ -42,6 +68,10 @@ gl::ProgramKey Wavelet::key(Stage stage, const PictureTextures& picture) const {
   switch (stage) {
     case Stage::input:
       return {"wavelet_input.comp", {(of_ ? holes_ : picture.holes) ? "CM_HOLES 1" : "CM_HOLES 0"}};
+    case Stage::reproject:
+      return {"wavelet_reproject.comp", {}};
+    case Stage::merge:
+      return {"wavelet_merge.comp", {recalls_ ? "CM_HISTORY 1" : "CM_HISTORY 0"}};
     case Stage::variance:
       return {"wavelet_variance.comp", {}};
     case Stage::level:
@@ -56,14 +86,69 @@ bool Wavelet::able(const PictureTextures& picture, MeansBackground background, b
     usable = (wait ? programs_->get(wanted) : programs_->ask(wanted)).usable() && usable;
   };
   for (const Stage stage : {Stage::input, Stage::variance, Stage::level}) ask(key(stage, picture));
+  if (picture.view) {
+    ask(key(Stage::reproject, picture));
+    for (const char* history : {"CM_HISTORY 0", "CM_HISTORY 1"}) ask({"wavelet_merge.comp", {history}});
+  }
   ask(output_key(background));
   return usable;
 }
 
-void Wavelet::begin(const PictureTextures& picture) {
+bool Wavelet::has(Stage stage) const {
+  if (stage == Stage::reproject) return recalls_;
+  return stage != Stage::merge || keeps_;
+}
+
+void Wavelet::forget() {
+  before_ = {};
+  kept_ = {};
+  recalled_ = {};
+  keeps_ = recalls_ = false;
+}
+
+void Wavelet::make_history(glm::uvec2 size) {
+  const auto make = [&](const char* what) {
+    return gl::make_texture_2d(gl_, GL_RGBA32UI, static_cast<int>(size.x), static_cast<int>(size.y), what);
+  };
+  constexpr const char* doing = "creating what the denoiser remembers of pictures, so that each begins anew";
+  if (kept_.size != size) {
+    kept_ = {};
+    kept_.light = make(doing);
+    kept_.guides = make(doing);
+    kept_.size = size;
+  }
+  if (!recalled_) recalled_ = make(doing);
+}
+
+void Wavelet::remember(const PictureTextures& picture) {
+  const PictureView& view = *picture.view;
+  if (kept_.filled && kept_.picture != picture.picture) {
+    const bool coarser = before_.filled && area(kept_.size) < area(before_.size);
+    const bool lasts = before_.view.scene == view.scene && picture.wish - before_.wish <= most_wishes;
+    if (!coarser || !lasts) std::swap(before_, kept_);
+    kept_.filled = false;
+  }
+  make_history(picture.size);
+  kept_.picture = picture.picture;
+  kept_.wish = picture.wish;
+  kept_.view = view;
+  kept_.surfaces = picture.guides->surfaces;
+  kept_.clear = picture.guides->clear;
+  kept_.footprint = picture.guides->footprint;
+  keeps_ = true;
+  recalls_ = before_.filled && before_.view.scene == view.scene && before_.surfaces == kept_.surfaces &&
+             before_.clear == kept_.clear;
+}
+
+std::optional<Error> Wavelet::begin(const PictureTextures& picture) {
   of_.reset();
   if (size_ != picture.size) {
-    free();
+    front_ = {};
+    spread_ = {};
+    guides_ = {};
+    behind_ = {};
+    recalled_ = {};
+    size_ = glm::uvec2(0U);
     const auto make = [&](GLenum format) {
       return gl::make_texture_2d(gl_, format, static_cast<int>(picture.size.x), static_cast<int>(picture.size.y),
                                  "creating the denoiser's textures, so that the picture is shown with its noise");
@@ -81,6 +166,17 @@ void Wavelet::begin(const PictureTextures& picture) {
   stage_ = Stage::input;
   level_ = row_ = 0;
   done_ = false;
+  keeps_ = recalls_ = false;
+  if (!picture.view || no_memory_to_keep_ == picture.size) return std::nullopt;
+  try {
+    remember(picture);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::out_of_memory) throw;
+    forget();
+    no_memory_to_keep_ = picture.size;
+    return error;
+  }
+  return std::nullopt;
 }
 
 void Wavelet::free() {
@@ -90,9 +186,13 @@ void Wavelet::free() {
   behind_ = {};
   size_ = glm::uvec2(0U);
   of_.reset();
+  forget();
 }
 
-std::uint64_t Wavelet::bytes() const { return std::uint64_t{size_.x} * size_.y * bytes_a_pixel; }
+std::uint64_t Wavelet::bytes() const {
+  return area(size_) * (bytes_a_pixel + (recalled_ ? recalled_bytes_a_pixel : 0U)) +
+         (area(before_.size) + area(kept_.size)) * history_bytes_a_pixel;
+}
 
 void Wavelet::collect() {
   while (const auto landed = flights_.land()) {
@@ -109,8 +209,8 @@ std::optional<double> Wavelet::left_ms(glm::uvec2 size) const {
   double sum = 0.0;
   const bool begun = of_ && size == size_;
   if (begun && done_) return 0.0;
-  for (const Stage stage : {Stage::input, Stage::variance, Stage::level}) {
-    if (begun && stage < stage_) continue;
+  for (const Stage stage : {Stage::input, Stage::reproject, Stage::merge, Stage::variance, Stage::level}) {
+    if ((begun && stage < stage_) || !has(stage)) continue;
     const auto ms = costs_.at(static_cast<std::size_t>(stage))->most(slots_of(size, size.y));
     if (!ms) return std::nullopt;
     sum += *ms * (stage == Stage::level ? most_levels - (begun ? level_ : 0U) : 1U);
@@ -135,6 +235,7 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     gl.ProgramUniform1f(program.name(), own_at, guides.surfaces ? 1.0F : 0.0F);
     write(core::CM_IMAGE_WAVELET_GUIDES, guides_, GL_RGBA32UI);
   } else {
+    if (stage_ == Stage::reproject || stage_ == Stage::merge) bind_history(picture, program);
     gl.BindTextureUnit(core::CM_UNIT_WAVELET_FRONT, front_[0].name());
     gl.BindTextureUnit(core::CM_UNIT_WAVELET_SPREAD, spread_[0].name());
     gl.BindTextureUnit(core::CM_UNIT_WAVELET_GUIDES, guides_.name());
@@ -143,8 +244,37 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     if (stage_ == Stage::level) gl.ProgramUniform1i(program.name(), own_at, 1 << level_);
   }
   if (stage_ != Stage::variance) write(core::CM_IMAGE_WAVELET_FRONT, front_[1], GL_RGBA32F);
-  if (stage_ != Stage::level) write(core::CM_IMAGE_WAVELET_BEHIND, behind_, GL_RGBA32F, GL_READ_WRITE);
+  if (stage_ == Stage::input || stage_ == Stage::variance) {
+    write(core::CM_IMAGE_WAVELET_BEHIND, behind_, GL_RGBA32F, GL_READ_WRITE);
+  }
   write(core::CM_IMAGE_WAVELET_SPREAD, spread_[1], GL_RGBA32F);
+}
+
+void Wavelet::bind_history(const PictureTextures& picture, const gl::Program& program) {
+  const auto& gl = *gl_;
+  const auto write = [&](GLint unit, const gl::Object& texture) {
+    gl.BindImageTexture(static_cast<GLuint>(unit), texture.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32UI);
+  };
+  gl.BindTextureUnit(core::CM_UNIT_GUIDE_ALBEDO, picture.guides->albedo);
+  gl.BindTextureUnit(core::CM_UNIT_GUIDE_NORMAL, picture.guides->normal);
+  if (stage_ == Stage::merge) {
+    gl.BindTextureUnit(core::CM_UNIT_HISTORY_LIGHT, recalled_.name());
+    write(core::CM_IMAGE_HISTORY_LIGHT, kept_.light);
+    write(core::CM_IMAGE_HISTORY_GUIDES, kept_.guides);
+    gl.ProgramUniform1f(program.name(), most_at, most_samples);
+    return;
+  }
+  gl.BindTextureUnit(core::CM_UNIT_HISTORY_LIGHT, before_.light.name());
+  gl.BindTextureUnit(core::CM_UNIT_HISTORY_GUIDES, before_.guides.name());
+  write(core::CM_IMAGE_HISTORY_LIGHT, recalled_);
+  const Motion moved = motion(kept_.view, before_.view);
+  gl.ProgramUniformMatrix3fv(program.name(), to_before_at, 1, GL_FALSE, &moved.turn[0][0]);
+  gl.ProgramUniform3f(program.name(), moved_at, moved.shift.x, moved.shift.y, moved.shift.z);
+  gl.ProgramUniform2i(program.name(), orthographic_at, kept_.view.orthographic ? 1 : 0,
+                      before_.view.orthographic ? 1 : 0);
+  gl.ProgramUniform2f(program.name(), footprint_before_at, before_.footprint.x, before_.footprint.y);
+  gl.ProgramUniform1f(program.name(), surfaces_at, kept_.surfaces ? 1.0F : 0.0F);
+  gl.ProgramUniform1f(program.name(), most_recalled_at, most_samples);
 }
 
 void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool measured) {
@@ -161,13 +291,19 @@ void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool meas
   if (row_ < size_.y) return;
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
   row_ = 0;
-  if (stage_ != Stage::variance) std::swap(front_[0], front_[1]);
-  std::swap(spread_[0], spread_[1]);
+  const bool merges = stage_ == Stage::merge && recalls_;
+  if (stage_ == Stage::input || stage_ == Stage::level || merges) std::swap(front_[0], front_[1]);
+  if (stage_ == Stage::input || stage_ == Stage::level || merges || stage_ == Stage::variance) {
+    std::swap(spread_[0], spread_[1]);
+  }
+  if (stage_ == Stage::merge) kept_.filled = true;
   if (stage_ == Stage::level) {
     done_ = ++level_ == levels();
-  } else {
-    stage_ = stage_ == Stage::input ? Stage::variance : Stage::level;
+    return;
   }
+  do {
+    stage_ = static_cast<Stage>(static_cast<unsigned>(stage_) + 1U);
+  } while (!has(stage_));
 }
 
 bool Wavelet::work(const PictureTextures& picture, Deadline deadline) {
@@ -208,8 +344,8 @@ void Wavelet::give(const PictureTextures& picture, MeansBackground background, G
   gl.BindTextureUnit(core::CM_UNIT_COUNTS, picture.counts);
   gl.BindTextureUnit(core::CM_UNIT_BACKGROUND, picture.background);
   gl.BindTextureUnit(core::CM_UNIT_GUIDE_ALBEDO, guides.albedo);
-  gl.BindTextureUnit(core::CM_UNIT_GUIDE_NORMAL, guides.normal);
   gl.BindTextureUnit(core::CM_UNIT_GUIDE_TRANSMITTANCE, guides.transmittance);
+  gl.BindTextureUnit(core::CM_UNIT_GUIDE_VOLUME_Z, guides.volume_z);
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_FRONT, front_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_SPREAD, spread_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_GUIDES, guides_.name());

@@ -195,12 +195,24 @@ render::PictureGuides Context::guides_of(const render::Picture& picture) {
   guides.surface_z = film.texture(render::film_layers::surface_z);
   guides.volume_z = film.texture(render::film_layers::volume_z);
   guides.surfaces = picture.layered() != render::Layered::beneath;
-  // The ground is no surface of those that are known.
-  guides.clear =
-      parameters.medium.emits == 0U && parameters.medium.source == glm::vec3(0.0F) && parameters.ground.reach == 0.0F;
+  guides.clear = parameters.medium.emits == 0U && parameters.medium.source == glm::vec3(0.0F);
   const float pixel = 2.0F * glm::length(parameters.view.up) / static_cast<float>(picture.size().y);
   guides.footprint = parameters.view.orthographic != 0U ? glm::vec2(pixel, 0.0F) : glm::vec2(0.0F, pixel);
   return guides;
+}
+
+render::PictureView Context::view_of(const render::Picture& picture) const {
+  const core::CmView& view = picture.parameters().view;
+  const core::CmGrid& grid = picture.parameters().grid;
+  const glm::dmat3 to_world(grid.from_cube_x, grid.from_cube_y, grid.from_cube_z);
+  render::PictureView seen;
+  seen.eye = to_world * glm::dvec3(view.eye) + glm::dvec3(grid.cube_origin);
+  seen.forward = view.forward;
+  seen.right = view.right;
+  seen.up = view.up;
+  seen.orthographic = view.orthographic != 0U;
+  if (&picture == progressive_.shown()) seen.scene = progressive_.shown_scene();  // else a rehearsal's
+  return seen;
 }
 
 render::PictureTextures Context::textures_of(const render::Picture& picture, const render::Picture* before) const {
@@ -217,6 +229,7 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   textures.revision = picture.revision();
   textures.moments = film.texture(render::film_layers::moments);
   if (picture.view() == render::View::shaded && picture.has_facts()) textures.guides = guides_of(picture);
+  if (textures.guides) textures.view = view_of(picture);
   if (before != nullptr) {
     textures.sum_before = before->film().texture(render::film_layers::radiance);
     textures.background_before = before->film().texture(render::film_layers::background);

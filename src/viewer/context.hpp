@@ -159,6 +159,7 @@ class Context {
   // What the compositor draws of it, as linear radiance.
   void read_composite(render::Picture& picture, bool transparent, float* rgba);
   [[nodiscard]] static render::PictureGuides guides_of(const render::Picture& picture);
+  [[nodiscard]] render::PictureView view_of(const render::Picture& picture) const;
   [[nodiscard]] render::PictureTextures textures_of(const render::Picture& picture,
                                                     const render::Picture* before) const;
 

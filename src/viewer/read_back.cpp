@@ -176,7 +176,8 @@ gl::Object Context::by_network(const Shot& shot, const render::Picture& picture,
 
 gl::Object Context::filtered(const render::Picture& picture, bool with_background) {
   const auto background = with_background ? render::MeansBackground::added : render::MeansBackground::left_out;
-  const render::PictureTextures textures = textures_of(picture, nullptr);
+  render::PictureTextures textures = textures_of(picture, nullptr);
+  textures.view.reset();  // what is read does not depend on what was shown before
   const glm::ivec2 size(picture.size());
   gl::Object means = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the denoised picture");
   render::Wavelet wavelet(functions_, programs_);

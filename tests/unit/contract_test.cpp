@@ -1294,12 +1294,19 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
     cumulet_preview preview;
     bool surfaces;
     bool texture;
+    cumulet_denoise denoise;
   };
-  for (const auto& [preview, surfaces, texture] :
-       {Case{CUMULET_PREVIEW_AUTO, false, false}, Case{CUMULET_PREVIEW_AUTO, true, true},
-        Case{CUMULET_PREVIEW_OFF, true, false}}) {
-    SCOPED_TRACE(std::to_string(preview) + (surfaces ? " surfaces" : "") + (texture ? " texture" : ""));
+  for (const auto& [preview, surfaces, texture, denoise] :
+       {Case{CUMULET_PREVIEW_AUTO, false, false, CUMULET_DENOISE_OFF},
+        Case{CUMULET_PREVIEW_AUTO, true, true, CUMULET_DENOISE_OFF},
+        Case{CUMULET_PREVIEW_OFF, true, false, CUMULET_DENOISE_OFF},
+        Case{CUMULET_PREVIEW_OFF, false, false, CUMULET_DENOISE_FAST}}) {
+    SCOPED_TRACE(std::to_string(preview) + (surfaces ? " surfaces" : "") + (texture ? " texture" : "") +
+                 (denoise == CUMULET_DENOISE_FAST ? " denoised" : ""));
     const ViewerPtr own = viewer();
+    auto display = make_desc<cumulet_display_desc>();
+    display.denoise = denoise;
+    ASSERT_EQ(cumulet_set_display(own.get(), &display), CUMULET_OK);
     ASSERT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
     if (surfaces) {
       ASSERT_EQ(cumulet_set_surfaces(own.get(), panes.get()), CUMULET_OK);
@@ -1328,6 +1335,11 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
     EXPECT_GT(stats.build_seconds_upload, 0.0);
     const auto programs = compiled();
     const auto uses = fake_.first_uses();
+    converge(own.get(), frame);
+    cumulet_camera* camera = nullptr;
+    ASSERT_EQ(cumulet_get_camera(own.get(), &camera), CUMULET_OK);
+    const cumulet::test::CameraRef owner(camera);
+    ASSERT_EQ(cumulet_camera_orbit(camera, 0.1, 0.0), CUMULET_OK);
     converge(own.get(), frame);
     auto pick = make_desc<cumulet_pick>();
     ASSERT_EQ(cumulet_pick_at(own.get(), 16.0, 16.0, &pick), CUMULET_OK);

@@ -1,4 +1,5 @@
-// Pictures of known noise, filtered: what is known of them is still so, and there is less of it.
+// Pictures of known noise, filtered: what is known of them is still so, and there is less of it. Pictures that follow
+// one another, too: what the last one knew is found again, and nothing else is.
 
 #include "render/wavelet.hpp"
 
@@ -8,11 +9,15 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <memory>
+#include <optional>
 #include <random>
 #include <vector>
 
+#include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "gl/state_guard.hpp"
+#include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"
 
 namespace {
@@ -21,6 +26,7 @@ using cumulet::gl::Object;
 using cumulet::gl::StateGuard;
 using cumulet::render::MeansBackground;
 using cumulet::render::PictureTextures;
+using cumulet::render::PictureView;
 using cumulet::render::Wavelet;
 namespace gl = cumulet::gl;
 
@@ -38,6 +44,18 @@ struct Pixel {
 };
 
 using Scene = std::function<Pixel(int x, int y)>;
+
+// A pixel's side at depth 1.
+constexpr float pixel_at_1 = 0.01F;
+
+/// Of a picture of that size, from the world's (x, 0, 0) along -z.
+PictureView view_at(double x, glm::ivec2 size) {
+  PictureView view;
+  view.eye = {x, 0.0, 0.0};
+  view.right = {0.5 * pixel_at_1 * size.x, 0.0, 0.0};
+  view.up = {0.0, 0.5 * pixel_at_1 * size.y, 0.0};
+  return view;
+}
 
 /// Samples of a scene, as a film has them, and what is known of it without noise.
 class Samples {
@@ -68,11 +86,11 @@ class Samples {
       background_.emplace_back(behind, 0.0F);
       squares_.push_back(square);
       counts_.emplace_back(count, 0U);
-      albedo_.emplace_back(pixel.albedo, 0.0F);
-      normal_.emplace_back(pixel.normal, 0.0F);
-      transmittance_.push_back(surface ? 1.0F : 1.0F - pixel.cover);
+      albedo_.emplace_back(pixel.albedo, surface ? infinite : pixel.z);
+      normal_.emplace_back(pixel.normal, surface ? pixel.z : infinite);
+      transmittance_.emplace_back(surface ? 1.0F : 1.0F - pixel.cover, surface ? pixel.cover : 0.0F);
       surface_z_.push_back(surface ? pixel.z : infinite);
-      volume_z_.push_back(surface ? infinite : pixel.z);
+      volume_z_.emplace_back(surface ? infinite : pixel.z, 0.0F);
       truth_.emplace_back(pixel.cover * pixel.front, pixel.cover);
     }
   }
@@ -94,6 +112,16 @@ class Samples {
   std::vector<glm::vec4> filtered(const gl::ProgramsPtr& programs,
                                   MeansBackground background = MeansBackground::left_out) const {
     const StateGuard guard(*gl_);
+    Wavelet wavelet(gl_, programs);
+    std::vector<glm::vec4> values = filtered_by(wavelet, std::nullopt, background);
+    EXPECT_EQ(wavelet.bytes(), 96U * static_cast<unsigned>(size_.x * size_.y));
+    return values;
+  }
+  /// By one that may know pictures before it; with a view, what this one tells is kept. An error: that of begin().
+  std::vector<glm::vec4> filtered_by(Wavelet& wavelet, const std::optional<PictureView>& view,
+                                     MeansBackground background = MeansBackground::left_out,
+                                     std::optional<cumulet::Error>* error = nullptr) const {
+    const StateGuard guard(*gl_);
     const std::vector<Object> textures = upload();
     PictureTextures picture;
     picture.sum = textures[0].name();
@@ -101,6 +129,8 @@ class Samples {
     picture.counts = textures[2].name();
     picture.moments = textures[3].name();
     picture.size = glm::uvec2(size_);
+    picture.picture = picture.wish = number_;
+    picture.view = view;
     picture.guides = cumulet::render::PictureGuides{textures[4].name(),
                                                     textures[5].name(),
                                                     textures[6].name(),
@@ -108,13 +138,12 @@ class Samples {
                                                     textures[8].name(),
                                                     true,
                                                     true,
-                                                    glm::vec2(0.0F, 0.01F)};
+                                                    glm::vec2(0.0F, pixel_at_1)};
     const Object means = gl::make_texture_2d(gl_, GL_RGBA32F, size_.x, size_.y, "means");
     const Object behind = gl::make_texture_2d(gl_, GL_RGBA32F, size_.x, size_.y, "background");
-    Wavelet wavelet(gl_, programs);
     EXPECT_TRUE(wavelet.able(picture, background, true));
-    wavelet.begin(picture);
-    EXPECT_EQ(wavelet.bytes(), 96U * static_cast<unsigned>(size_.x * size_.y));
+    auto why = wavelet.begin(picture);
+    if (error != nullptr) *error = std::move(why);
     // By steps as small as there are.
     while (!wavelet.work(picture, std::chrono::steady_clock::now())) {
     }
@@ -132,6 +161,10 @@ class Samples {
     gl_->TextureSubImage2D(made.name(), 0, 0, 0, size_.x, size_.y, format, type, texels.data());
     return made;
   }
+  static std::uint64_t next_number() {
+    static std::uint64_t last = 0;
+    return ++last;
+  }
   [[nodiscard]] std::vector<Object> upload() const {
     std::vector<Object> textures;
     textures.push_back(texture(GL_RGBA32F, GL_RGBA, GL_FLOAT, sum_));
@@ -140,9 +173,9 @@ class Samples {
     textures.push_back(texture(GL_R32F, GL_RED, GL_FLOAT, squares_));
     textures.push_back(texture(GL_RGBA32F, GL_RGBA, GL_FLOAT, albedo_));
     textures.push_back(texture(GL_RGBA32F, GL_RGBA, GL_FLOAT, normal_));
-    textures.push_back(texture(GL_R32F, GL_RED, GL_FLOAT, transmittance_));
+    textures.push_back(texture(GL_RG32F, GL_RG, GL_FLOAT, transmittance_));
     textures.push_back(texture(GL_R32F, GL_RED, GL_FLOAT, surface_z_));
-    textures.push_back(texture(GL_R32F, GL_RED, GL_FLOAT, volume_z_));
+    textures.push_back(texture(GL_RG32F, GL_RG, GL_FLOAT, volume_z_));
     return textures;
   }
 
@@ -150,7 +183,9 @@ class Samples {
   glm::ivec2 size_;
   std::vector<glm::vec4> sum_, background_, albedo_, normal_, truth_;
   std::vector<glm::uvec2> counts_;
-  std::vector<float> squares_, transmittance_, surface_z_, volume_z_;
+  std::vector<glm::vec2> transmittance_, volume_z_;
+  std::vector<float> squares_, surface_z_;
+  std::uint64_t number_ = next_number();
 };
 
 struct Moments {
@@ -217,6 +252,23 @@ TEST_P(Wavelets, ASurfacesSilhouetteStays) {
   EXPECT_NEAR(near, 1.0, 0.03);
   EXPECT_NEAR(far, 0.2, 0.03);
   EXPECT_LT(error_of(clean, samples.truth()), 0.05 * error_of(samples.raw(), samples.truth()));
+}
+
+// As of leaves: mean normals are short, but all is covered; what shows through would be the background.
+TEST_P(Wavelets, WhatIsCoveredStaysSoWhateverItsMeanNormal) {
+  const auto scene = [](int x, int y) {
+    return Pixel{.front = glm::vec3(0.4F),
+                 .behind = glm::vec3(9.0F),
+                 .normal = {0.0F, 0.0F, (x + y) % 2 == 0 ? 0.3F : 0.8F},
+                 .albedo = glm::vec3(0.5F),
+                 .z = 3.0F};
+  };
+  const Samples samples(gl_, {32, 32}, 1, scene);
+  const auto clean = samples.filtered(programs_);
+  for (std::size_t i = 0; i < clean.size(); ++i) {
+    EXPECT_EQ(clean[i].w, 1.0F) << i;
+    EXPECT_NEAR(clean[i].x, 0.4F, 0.21F) << i;
+  }
 }
 
 // The volume covers more and more of the pixels over a few of them, up to all.
@@ -310,6 +362,237 @@ TEST_P(Wavelets, AnySizeWillDo) {
   }
 }
 
+// ---- Pictures that follow one another ----
+
+// Light that only samples know of: a number for each place of a wall, which lies at depth 5, a pixel of it 0.05 wide.
+float painted(int x, int y) {
+  const auto hash = static_cast<unsigned>((x + 1000) * 7919 + (y + 1000) * 104729);
+  return 0.3F + 0.1F * static_cast<float>((hash ^ (hash >> 7U)) % 14U);
+}
+constexpr double wall_z = 5.0;
+constexpr double wall_pixel = wall_z * pixel_at_1;
+
+// The wall from an eye that is so many of its pixels to the right.
+Scene wall_from(int moved) {
+  return [moved](int x, int y) {
+    return Pixel{.front = glm::vec3(painted(x + moved, y)),
+                 .normal = {0.0F, 0.0F, 1.0F},
+                 .albedo = glm::vec3(0.5F),
+                 .z = static_cast<float>(wall_z)};
+  };
+}
+
+class History : public cumulet::test::GlTest {
+ protected:
+  void SetUp() override {
+    GlTest::SetUp();
+    if (gl_) wavelet_ = std::make_unique<Wavelet>(gl_, programs_);
+  }
+  void TearDown() override {
+    wavelet_.reset();
+    GlTest::TearDown();
+  }
+  // Pictures of a wall of one sample each, from eyes that are a step apart.
+  std::vector<glm::vec4> after(int pictures, int step, std::vector<glm::vec4>* truth = nullptr) {
+    std::vector<glm::vec4> last;
+    for (int i = 0; i < pictures; ++i) {
+      const Samples samples(gl_, size_, 1, wall_from(step * i), static_cast<unsigned>(i + 1));
+      last = samples.filtered_by(*wavelet_, view_at(step * i * wall_pixel, size_));
+      if (truth != nullptr) *truth = samples.truth();
+    }
+    return last;
+  }
+
+  glm::ivec2 size_{48, 40};
+  std::unique_ptr<Wavelet> wavelet_;
+};
+
+TEST_P(History, SamplesOfTheSameViewAddUp) {
+  std::vector<glm::vec4> truth;
+  const double one = error_of(after(1, 0, &truth), truth);
+  const double many = error_of(after(12, 0, &truth), truth);
+  EXPECT_LT(many, 0.5 * one);
+}
+
+TEST_P(History, WhatMovesIsFoundAgain) {
+  std::vector<glm::vec4> truth;
+  const double one = error_of(after(1, 0, &truth), truth);
+  for (const int step : {2, -3}) EXPECT_LT(error_of(after(12, step, &truth), truth), 0.65 * one) << step;
+}
+
+TEST_P(History, TheMediumIsFoundByItsMeanDepth) {
+  const auto scene = [](int moved) {
+    return [moved](int x, int y) { return Pixel{.front = glm::vec3(painted(x + moved, y)), .z = float(wall_z)}; };
+  };
+  double one = 0.0;
+  double many = 0.0;
+  for (int i = 0; i < 12; ++i) {
+    const Samples samples(gl_, size_, 1, scene(3 * i), static_cast<unsigned>(i + 1));
+    many = error_of(samples.filtered_by(*wavelet_, view_at(3 * i * wall_pixel, size_)), samples.truth());
+    if (i == 0) one = many;
+  }
+  EXPECT_LT(many, 0.65 * one);
+}
+
+TEST_P(History, OrthographicAndTurnedViewsAreFollowed) {
+  double one = 0.0;
+  double many = 0.0;
+  for (int i = 0; i < 12; ++i) {
+    const Samples samples(gl_, size_, 1, wall_from(2 * i), static_cast<unsigned>(i + 1));
+    PictureView view = view_at(2 * i * wall_pixel, size_);
+    view.orthographic = true;
+    view.right *= wall_z;  // where perspective pixels are as large as these
+    view.up *= wall_z;
+    // One that is turned, eyes apart by as much along its own axis.
+    const glm::dmat3 turn(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+    view = {
+        turn * view.eye + glm::dvec3(7.0, 8.0, 9.0), turn * view.forward, turn * view.right, turn * view.up, true, 0};
+    many = error_of(samples.filtered_by(*wavelet_, view), samples.truth());
+    if (i == 0) one = many;
+  }
+  EXPECT_LT(many, 0.65 * one);
+}
+
+// A card at depth 2 in front of a wall that is a little darker, by less than noise tells: as the eye moves it uncovers
+// ever more of it.
+TEST_P(History, WhatWasHiddenHasNoTrail) {
+  constexpr int first = 30;
+  constexpr int step = 5;  // pixels of the card's; two of the wall's
+  constexpr int views = 5;
+  const auto scene = [](int i) {
+    return [i](int x, int) {
+      const bool card = x < first - step * i;
+      return Pixel{.front = glm::vec3(card ? 0.13F : 0.1F),
+                   .spread = 0.9F,
+                   .normal = {0.0F, 0.0F, 1.0F},
+                   .albedo = glm::vec3(0.5F),
+                   .z = card ? 2.0F : float(wall_z)};
+    };
+  };
+  std::vector<glm::vec4> last;
+  for (int i = 0; i < views; ++i) {
+    const Samples samples(gl_, size_, 2, scene(i), static_cast<unsigned>(i + 1));
+    last = samples.filtered_by(*wavelet_, view_at(2 * i * wall_pixel, size_));
+  }
+  // What the last step uncovered: where the card was as long as there was any other view.
+  double mean = 0.0;
+  for (int y = 0; y < size_.y; ++y) {
+    for (int x = first - step * (views - 1); x < first - step * (views - 2); ++x) {
+      mean += last[static_cast<std::size_t>(y * size_.x + x)].x / double(step * size_.y);
+    }
+  }
+  EXPECT_NEAR(mean, 0.1, 0.008);
+}
+
+// Light that changed and that nobody was told of.
+TEST_P(History, WhatIsWrongFadesAndIsGoneWithManySamples) {
+  const auto lit = [](float light) {
+    return [light](int, int) { return Pixel{.front = glm::vec3(light), .z = 5.0F}; };
+  };
+  const PictureView view = view_at(0.0, size_);
+  for (const unsigned count : {1U, 4U, 64U}) {
+    wavelet_->free();
+    for (unsigned i = 0; i < 8; ++i) {
+      static_cast<void>(Samples(gl_, size_, 4, lit(4.0F), i + 1).filtered_by(*wavelet_, view));
+    }
+    const Samples now(gl_, size_, count, lit(1.0F), 9);
+    const auto with = now.filtered_by(*wavelet_, view);
+    EXPECT_NEAR(moments_of(with).mean, 1.0, count == 1 ? 0.3 : 0.1) << count;
+    if (count == 64) {
+      EXPECT_EQ(with, now.filtered(programs_));
+    }
+  }
+}
+
+TEST_P(History, AnotherSceneAndAnotherViewerKnowNothing) {
+  static_cast<void>(after(8, 0));
+  PictureView other = view_at(0.0, size_);
+  other.scene = 7;
+  const Samples samples(gl_, size_, 1, wall_from(0), 20);
+  const auto alone = samples.filtered(programs_);
+  EXPECT_EQ(samples.filtered_by(*wavelet_, other), alone);
+  static_cast<void>(after(8, 0));
+  EXPECT_NE(samples.filtered_by(*wavelet_, view_at(0.0, size_)), alone);
+  // Without a view nothing is asked for, and nothing is kept.
+  EXPECT_EQ(samples.filtered_by(*wavelet_, std::nullopt), alone);
+  wavelet_->free();
+  EXPECT_EQ(samples.filtered_by(*wavelet_, view_at(0.0, size_)), alone);
+  EXPECT_EQ(wavelet_->bytes(), (96U + 16U + 32U) * static_cast<unsigned>(size_.x * size_.y));
+}
+
+// One that is filtered again, as samples come, does not count them twice.
+TEST_P(History, APictureIsNotItsOwn) {
+  const Samples samples(gl_, size_, 1, wall_from(0), 3);
+  const auto alone = samples.filtered(programs_);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(samples.filtered_by(*wavelet_, view_at(0.0, size_)), alone) << i;
+}
+
+TEST_P(History, WhatWasNoNumberIsForgotten) {
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), infinite, -infinite}) {
+    wavelet_->free();
+    Samples before(gl_, size_, 2, wall_from(0), 1);
+    for (std::size_t i = 0; i < before.sums().size(); i += 3) before.sums()[i].y = bad;
+    static_cast<void>(before.filtered_by(*wavelet_, view_at(0.0, size_)));
+    const Samples now(gl_, size_, 2, wall_from(1), 2);
+    const auto clean = now.filtered_by(*wavelet_, view_at(wall_pixel, size_));
+    for (std::size_t i = 0; i < clean.size(); ++i) ASSERT_NEAR(clean[i].y, now.truth()[i].y, 2.0) << i;
+  }
+}
+
+TEST_P(History, AnySizeMayFollowAnyOther) {
+  unsigned seed = 1;
+  for (const glm::ivec2 size : {glm::ivec2(1, 1), {40, 1}, {65, 33}, {7, 9}, {1, 40}, {64, 64}, {2, 3}, {1, 1}}) {
+    const Samples samples(
+        gl_, size, 4, [](int, int) { return Pixel{.z = 5.0F}; }, ++seed);
+    const auto clean = samples.filtered_by(*wavelet_, view_at(0.02 * seed, size));
+    for (const glm::vec4& v : clean) EXPECT_NEAR(v.x, 1.0, 0.5) << size.x << " x " << size.y;
+  }
+}
+
+// A coarse picture, as previews are, tells the finer one that follows, and does not take the place of a finer one.
+TEST_P(History, CoarsePicturesDoNotReplaceFineOnes) {
+  std::vector<glm::vec4> truth;
+  const double one = error_of(after(1, 0, &truth), truth);
+  static_cast<void>(after(12, 0));
+  const glm::ivec2 coarse(size_ / 4);
+  const Samples rough(gl_, coarse, 1, [](int, int) {
+    return Pixel{
+        .front = glm::vec3(0.95F), .normal = {0.0F, 0.0F, 1.0F}, .albedo = glm::vec3(0.5F), .z = float(wall_z)};
+  });
+  PictureView wide = view_at(0.0, size_);
+  static_cast<void>(rough.filtered_by(*wavelet_, wide));
+  const Samples fine(gl_, size_, 1, wall_from(0), 30);
+  EXPECT_LT(error_of(fine.filtered_by(*wavelet_, wide), truth), 0.5 * one);
+}
+
+TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
+  const Samples samples(gl_, size_, 1, wall_from(0), 20);
+  const auto alone = samples.filtered(programs_);
+  cumulet::test::FakeGl fake(cumulet::headless::Context::get_proc, context_.get());
+  const gl::FunctionsPtr functions = gl::load_functions(cumulet::test::FakeGl::get_proc, &fake);
+  // Textures that are made, by two calls each.
+  constexpr std::int64_t filter = 2 * 6;
+  constexpr std::int64_t history = 2 * 3;
+  for (std::int64_t n = 0; n < filter + history; ++n) {
+    Wavelet wavelet(functions, programs_);
+    std::optional<cumulet::Error> error;
+    fake.fail_allocation(n);
+    if (n < filter) {
+      EXPECT_THROW(samples.filtered_by(wavelet, view_at(0.0, size_)), cumulet::Error) << n;
+      continue;
+    }
+    EXPECT_EQ(samples.filtered_by(wavelet, view_at(0.0, size_), MeansBackground::left_out, &error), alone) << n;
+    fake.fail_allocation(-1);
+    ASSERT_TRUE(error) << n;
+    EXPECT_EQ(error->code(), cumulet::ErrorCode::out_of_memory);
+    EXPECT_EQ(wavelet.bytes(), 96U * static_cast<unsigned>(size_.x * size_.y));
+    // Told once.
+    EXPECT_EQ(samples.filtered_by(wavelet, view_at(0.0, size_), MeansBackground::left_out, &error), alone) << n;
+    EXPECT_FALSE(error) << n;
+  }
+}
+
 CUMULET_GL_ON_BACKENDS(Wavelets);
+CUMULET_GL_ON_BACKENDS(History);
 
 }  // namespace

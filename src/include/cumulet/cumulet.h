@@ -910,13 +910,13 @@ typedef struct cumulet_display_desc {
   float background_color[3]; /* linear Rec. 709 radiance, exposed and tone-mapped as all is; debug views have black */
   /*
    * Whether what frames draw is filtered: neighbours tell what a pixel's own samples do not yet (an edge-avoiding
-   * a-trous wavelet, Dammertz et al. 2010, guided by the noise's variance as of Schied et al. 2017, by depths and
-   * normals of surfaces, and by the volume's transmittance and depth). The less noise there is the less it does, so
-   * that pictures converge to what they are without. cumulet_read_linear and cumulet_read_aov stay without it. It takes
-   * some of each frame's budget (at most four tenths, and in the long run a fifth), some 140 bytes a pixel of GL
-   * memory, and four rays a pixel, unlit, before the samples of a picture. Until a picture is filtered, frames draw the
-   * last one of the same scene and camera, coarser or of fewer samples, else this one as it is. Without memory for it
-   * pictures are drawn as they are, and CUMULET_ERROR_OUT_OF_MEMORY says so once. Debug views are not filtered.
+   * a-trous wavelet, Dammertz et al. 2010, by variance as of Schied et al. 2017), and so do frames of other views,
+   * found again by depth, as up to 32 samples that fade as the pixel gets 64: pictures converge to what they are
+   * without. Each view has random numbers of its own then. cumulet_read_linear and cumulet_read_aov are not filtered,
+   * and cumulet_read_denoised knows no other frames. It takes at most four tenths of a frame's budget (in the long run
+   * a fifth), 220 bytes a pixel of GL memory and four unlit rays a pixel. Until it is done frames draw the last picture
+   * of the same scene and camera, else this as it is. Without memory for it, or for other frames, they are drawn
+   * without, which CUMULET_ERROR_OUT_OF_MEMORY says once. Debug views are not filtered.
    */
   cumulet_denoise denoise;
 } cumulet_display_desc;

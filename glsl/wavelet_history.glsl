@@ -1,0 +1,59 @@
+// What is kept of a picture for those that follow it, two texels of words: its light (as wavelet.glsl's front, with the
+// samples that tell of it), and where it is.
+#ifndef CM_WAVELET_HISTORY_GLSL
+#define CM_WAVELET_HISTORY_GLSL
+#include "wavelet.glsl"
+
+struct CmLit {
+  vec4 front;
+  float moment;   // a sample's mean squared luminance
+  float samples;  // 0: nothing is known
+};
+
+struct CmPlace {
+  vec3 normal;  // as CmGuides'
+  float transmittance;
+  float open;        // what nothing covers
+  float solid_z;     // view depths; beyond CM_NOTHING_Z there is none
+  float scattered_z;
+};
+
+// As parts of the largest, so that halves will do for any unit of light.
+uvec4 cm_packed_light(CmLit lit) {
+  float deviation = sqrt(lit.moment);
+  float most = max(max(lit.front.r, lit.front.g), max(lit.front.b, deviation));
+  float scale = most > 0.0 ? 1.0 / most : 0.0;
+  return uvec4(floatBitsToUint(most), packHalf2x16(scale * lit.front.rg),
+               packHalf2x16(scale * vec2(lit.front.b, deviation)), packHalf2x16(vec2(lit.front.a, lit.samples)));
+}
+
+CmLit cm_unpacked_light(uvec4 words) {
+  float most = uintBitsToFloat(words.x);
+  vec2 low = unpackHalf2x16(words.y);
+  vec2 high = unpackHalf2x16(words.z);
+  vec2 rest = unpackHalf2x16(words.w);
+  return CmLit(vec4(most * vec3(low, high.x), rest.x), most * high.y * most * high.y, rest.y);
+}
+
+uvec4 cm_packed_place(CmPlace place) {
+  return uvec4(packSnorm4x8(vec4(place.normal, 0.0)), packHalf2x16(vec2(place.transmittance, place.open)),
+               floatBitsToUint(min(place.solid_z, 2.0 * CM_NOTHING_Z)),
+               floatBitsToUint(min(place.scattered_z, 2.0 * CM_NOTHING_Z)));
+}
+
+CmPlace cm_unpacked_place(uvec4 words) {
+  vec2 halves = unpackHalf2x16(words.y);
+  return CmPlace(unpackSnorm4x8(words.x).xyz, halves.x, halves.y, uintBitsToFloat(words.z), uintBitsToFloat(words.w));
+}
+
+layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;
+layout(binding = CM_UNIT_GUIDE_NORMAL) uniform sampler2D cm_normal;
+
+// Of the picture that is filtered: aovs.comp has depths beside normals and albedos.
+CmPlace cm_place_at(ivec2 texel) {
+  CmGuides guides = cm_guides_at(texel);
+  return CmPlace(guides.normal, guides.transmittance, texelFetch(cm_spread, texel, 0).x,
+                 texelFetch(cm_normal, texel, 0).w, texelFetch(cm_albedo, texel, 0).w);
+}
+
+#endif

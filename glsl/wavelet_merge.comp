@@ -1,0 +1,122 @@
+#version 450
+// A picture's samples, and those that pictures before it had of the same (CM_HISTORY 1), as if they were its own; and
+// what is kept of both for the pictures that follow. What is remembered counts for less where it is off from the new
+// samples about it by more than their noise, and for nothing once there are CM_ENOUGH of them.
+// variants: CM_HISTORY=0,1
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "bindings.glsl"
+#define CM_WAVELET_READS
+#include "wavelet_history.glsl"
+layout(location = 3) uniform float cm_most;  // samples that are kept
+layout(rgba32ui, binding = CM_IMAGE_HISTORY_LIGHT) uniform writeonly uimage2D cm_light_out;
+layout(rgba32ui, binding = CM_IMAGE_HISTORY_GUIDES) uniform writeonly uimage2D cm_guides_out;
+#if CM_HISTORY
+layout(binding = CM_UNIT_HISTORY_LIGHT) uniform usampler2D cm_recalled;
+layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
+layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
+
+#define CM_RADIUS 2
+#define CM_ENOUGH 64.0
+// Deviations of samples that what is remembered may be off.
+#define CM_CLAMP 2.0
+// Of the noise's variance, what a difference is not taken for more than.
+#define CM_BY_CHANCE 2.0
+// Fewer new samples tell less of their noise than those that are remembered do.
+#define CM_FEW 4.0
+
+// Of a pixel and those about it.
+struct CmAround {
+  vec3 now;  // means, over cover
+  vec3 then;
+  vec3 deviation;   // of pixels' means
+  float variance;   // of a sample's luminance
+  float samples_now;
+  float samples_then;
+};
+
+CmAround cm_around(ivec2 texel, CmGuides here, vec4 slopes) {
+  ivec2 size = textureSize(cm_guides, 0);
+  vec3 now = vec3(0.0);
+  vec3 then = vec3(0.0);
+  vec3 squares = vec3(0.0);
+  vec2 moments = vec2(0.0);  // now, then
+  float n_now = 0.0;
+  float n_then = 0.0;
+  for (int y = -CM_RADIUS; y <= CM_RADIUS; ++y) {
+    for (int x = -CM_RADIUS; x <= CM_RADIUS; ++x) {
+      ivec2 at = texel + ivec2(x, y);
+      if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
+      CmGuides there = cm_guides_at(at);
+      vec4 spread = texelFetch(cm_spread, at, 0);
+      if (!there.finite || spread.z == 0.0) continue;
+      float over = 1.0 / cm_cover(spread.x);
+      vec3 front = over * texelFetch(cm_front, at, 0).rgb;
+      CmLit lit = cm_unpacked_light(texelFetch(cm_recalled, at, 0));
+      float weight = cm_alike(here, there, slopes, vec2(x, y));
+      now += weight * spread.z * front;
+      squares += weight * spread.z * front * front;
+      moments += weight * over * over * vec2(spread.z * spread.y, lit.samples * lit.moment);
+      n_now += weight * spread.z;
+      then += weight * lit.samples * over * lit.front.rgb;
+      n_then += weight * lit.samples;
+    }
+  }
+  CmAround around;
+  around.samples_now = n_now;
+  around.samples_then = n_then;
+  around.now = n_now > 0.0 ? now / n_now : vec3(0.0);
+  around.then = n_then > 0.0 ? then / n_then : vec3(0.0);
+  around.deviation = n_now > 0.0 ? sqrt(max(vec3(0.0), squares / n_now - around.now * around.now)) : vec3(0.0);
+  vec2 n = vec2(n_now, n_then);
+  vec2 means = vec2(cm_luminance(around.now), cm_luminance(around.then));
+  vec2 variances = max(vec2(0.0), moments / max(n, vec2(1e-30)) - means * means);
+  vec2 say = min(n, vec2(n_now, CM_FEW));
+  around.variance = dot(say, variances) / max(say.x + say.y, 1e-30);
+  return around;
+}
+
+// What is remembered of the pixel, as far as it agrees with what is new.
+CmLit cm_believed(CmLit lit, CmAround around, float cover, float samples) {
+  if (around.samples_now == 0.0 || lit.samples == 0.0) return lit;
+  float off = cm_luminance(around.then - around.now);
+  float noise = around.variance * (1.0 / around.samples_now + 1.0 / around.samples_then);
+  float bias = max(0.0, off * off - CM_BY_CHANCE * noise);
+  // As good as so many samples: their variance is bias^2 + variance / lit.samples.
+  lit.samples *= around.variance > 0.0 ? around.variance / (around.variance + lit.samples * bias)
+                                       : (bias > 0.0 ? 0.0 : 1.0);
+  lit.samples *= max(0.0, 1.0 - samples / CM_ENOUGH);
+  float unknown = around.variance * CM_FEW / around.samples_now;
+  vec3 room = CM_CLAMP * sqrt(around.deviation * around.deviation + unknown);
+  vec3 clamped = cover * clamp(lit.front.rgb / cover, around.now - room, around.now + room);
+  float before = cm_luminance(lit.front.rgb);
+  float after = cm_luminance(clamped);
+  if (before > 0.0) lit.moment *= after * after / (before * before);
+  lit.front.rgb = clamped;
+  return lit;
+}
+#endif
+
+void main() {
+  ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
+  if (texel.x >= textureSize(cm_guides, 0).x || texel.y >= cm_rows.y) return;
+  CmGuides here = cm_guides_at(texel);
+  vec4 front = texelFetch(cm_front, texel, 0);
+  vec4 spread = texelFetch(cm_spread, texel, 0);
+#if CM_HISTORY
+  if (here.finite) {
+    CmAround around = cm_around(texel, here, cm_slopes(texel, here));
+    CmLit lit = cm_unpacked_light(texelFetch(cm_recalled, texel, 0));
+    lit = cm_believed(lit, around, cm_cover(spread.x), spread.z);
+    if (lit.samples > 0.0) {
+      float all = spread.z + lit.samples;
+      front += (lit.samples / all) * (lit.front - front);
+      spread.y += (lit.samples / all) * (lit.moment - spread.y);
+      spread.z = all;
+    }
+  }
+  imageStore(cm_front_out, texel, front);
+  imageStore(cm_spread_out, texel, spread);
+#endif
+  imageStore(cm_light_out, texel, cm_packed_light(CmLit(front, spread.y, min(spread.z, cm_most))));
+  imageStore(cm_guides_out, texel, cm_packed_place(cm_place_at(texel)));
+}
