@@ -212,11 +212,10 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
   std::erase_if(said, [](const image::Attribute& a) { return a.name == attributes::noise; });
   set(said, {std::string(attributes::samples), samples});
   set(said, {std::string(attributes::comments),
-                   attributes::comments_text(*find<std::string>(first, attributes::version), samples)});
+             attributes::comments_text(*find<std::string>(first, attributes::version), samples)});
   if (with_error && sky) {
     made.emplace_back(layers::error, error_of(parts));
-    if (merged.samples > 1)
-      set(said, {std::string(attributes::noise), noise_of(made[0].second, made.back().second)});
+    if (merged.samples > 1) set(said, {std::string(attributes::noise), noise_of(made[0].second, made.back().second)});
   }
   std::vector<image::Layer> written;
   written.reserve(made.size());

@@ -64,10 +64,11 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   const std::vector<Frame>& frames = options.frames.empty() ? there : options.frames;
   const Written output("--output", options.output, frames.size());
   const Written stats("--stats", options.stats, frames.size());
+  const Written checkpoint("--checkpoint", options.checkpoint, frames.size());
 
   FramePlan plan;
   for (const Frame frame : frames)
-    plan.frames.push_back({frame, volume->file(frame), output.of(frame), stats.of(frame)});
+    plan.frames.push_back({frame, volume->file(frame), output.of(frame), stats.of(frame), checkpoint.of(frame)});
   std::vector<std::pair<std::uintmax_t, std::string>> sized;
   for (const Frame frame : there) {
     std::string file = volume->file(frame);

@@ -14,7 +14,8 @@ struct PlannedFrame {
   Frame number = 0;
   std::string volume;
   std::string output;
-  std::string stats;  ///< empty: none
+  std::string stats;       ///< empty: none
+  std::string checkpoint;  ///< likewise
 };
 
 struct FramePlan {

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstdio>
 #include <file.hpp>
+#include <filesystem>
 #include <headless.hpp>
 #include <image.hpp>
 #include <iostream>
@@ -20,11 +21,13 @@
 #include <shader_cache.hpp>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <timeline.hpp>
 #include <utility>
 #include <vector>
 
 #include "aovs.hpp"
+#include "checkpoint.hpp"
 #include "denoised.hpp"
 #include "frame_plan.hpp"
 #include "info.hpp"
@@ -35,6 +38,7 @@
 
 namespace {
 
+using cumulet::demo::Checkpoint;
 using cumulet::demo::Frame;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
@@ -337,11 +341,53 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
 
 enum class Traced { converged, late, stopped };
 
+using Clock = std::chrono::steady_clock;
+
+/// Keeps what the samples have come to.
+void keep(const Viewer& viewer, const RenderOptions& options) {
+  cumulet::demo::Checkpoint checkpoint{cumulet::demo::checkpoint_of(options), stats_of(viewer).gl_renderer, {}};
+  std::size_t size = 0;
+  check(viewer, cumulet_read_accumulation(viewer.get(), nullptr, &size));
+  checkpoint.accumulation.resize(size);
+  check(viewer, cumulet_read_accumulation(viewer.get(), checkpoint.accumulation.data(), &size));
+  cumulet::demo::write_checkpoint(options.checkpoint, checkpoint);
+}
+
+/// Where it cannot, the picture goes on: there may be room the next time.
+void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
+  try {
+    keep(viewer, options);
+  } catch (const std::runtime_error& error) {
+    tell(progress, std::string("warning: no checkpoint now: ") + error.what());
+  }
+}
+
+/// Begins the picture with the samples of the checkpoint.
+void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint& from, Progress& progress) {
+  constexpr double least_ms = 1.0;
+  cumulet_frame_result frame{};
+  while (frame.width == 0 && !(frame.progress > 0.0)) {
+    check_not_interrupted();
+    frame = render_frame(viewer, options, least_ms);
+    if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
+  }
+  if (cumulet_restore_accumulation(viewer.get(), from.accumulation.data(), from.accumulation.size()) != CUMULET_OK)
+    throw std::runtime_error(options.checkpoint + ": " + cumulet_last_error(viewer.get()));
+  const std::string driver = stats_of(viewer).gl_renderer;
+  tell(progress, options.output + ": goes on from " + options.checkpoint +
+                     (driver == from.driver ? ""
+                                            : ", which another driver made (" + from.driver +
+                                                  "): it will not be the same bits as of one alone"));
+}
+
 /// Until the picture has all it shall have, its time is up, or somebody stops it.
-Traced trace(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
+Traced trace(const Viewer& viewer, const RenderOptions& options, const std::optional<Checkpoint>& from,
+             Progress& progress) {
+  if (from) resume(viewer, options, *from, progress);
   const Limit limit(options.time_limit);
   cumulet_frame_result frame{};
-  bool began = false;
+  bool began = from.has_value();
+  auto kept = Clock::now();
   while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
     // A picture with holes is none: it goes on to each pixel's first sample.
     if (frame.width > 0 && limit.reached()) return Traced::late;
@@ -352,9 +398,16 @@ Traced trace(const Viewer& viewer, const RenderOptions& options, Progress& progr
       progress.render(cumulet::demo::part_done(frame.progress, limit.over(), options.time_limit),
                       static_cast<double>(stats_of(viewer).samples));
     }
+    const double since = std::chrono::duration<double>(Clock::now() - kept).count();
+    if (!options.checkpoint.empty() && began && since >= options.checkpoint_every) {
+      try_to_keep(viewer, options, progress);
+      kept = Clock::now();
+    }
   }
   if (!began) check_not_interrupted();
-  return (frame.flags & CUMULET_RENDER_CONVERGED) != 0 ? Traced::converged : Traced::stopped;
+  if ((frame.flags & CUMULET_RENDER_CONVERGED) != 0) return Traced::converged;
+  if (!options.checkpoint.empty()) keep(viewer, options);
+  return Traced::stopped;
 }
 
 void tell_ending(const RenderOptions& options, Traced traced, double noise, double samples, Progress& progress) {
@@ -421,9 +474,10 @@ class Studio {
       check(viewer_, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
   }
 
-  Traced trace(const RenderOptions& options) {
+  /// From a checkpoint on, if there is one.
+  Traced trace(const RenderOptions& options, const std::optional<Checkpoint>& from) {
     warm_up(viewer_, options, progress_);
-    return ::trace(viewer_, options, progress_);
+    return ::trace(viewer_, options, from, progress_);
   }
 
   void write(const RenderOptions& options) {
@@ -431,6 +485,8 @@ class Studio {
     progress_.stage("writing " + options.output);
     write_picture(viewer_, options, denoised);
     if (!options.stats.empty()) write_stats(options, stats_of(viewer_), context_.name());
+    std::error_code ignored;  // it is in nobody's way
+    if (!options.checkpoint.empty()) std::filesystem::remove(options.checkpoint, ignored);
   }
 
   /// How the picture that is written ended. Throws if somebody stopped it.
@@ -496,16 +552,26 @@ class Studio {
   Viewer viewer_;
 };
 
+/// That the picture goes on from. Throws where it is another's, or there could be none.
+std::optional<Checkpoint> checkpoint_for(const RenderOptions& options) {
+  if (options.checkpoint.empty()) return std::nullopt;
+  cumulet::image::check_writable(options.checkpoint);
+  return cumulet::demo::read_checkpoint(options.checkpoint, cumulet::demo::checkpoint_of(options));
+}
+
 void render(const RenderOptions& options) {
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
+  const std::optional<Checkpoint> from = checkpoint_for(options);
   catch_signals();
   Studio studio(options);
   studio.load(options.scene);
   studio.remark(options.scene);
   studio.choose_in_surfaces(options);
-  const Traced traced = studio.trace(options);
+  const Traced traced = studio.trace(options, from);
+  if (traced == Traced::stopped && !options.checkpoint.empty())
+    throw std::runtime_error(options.output + ": interrupted: the same command goes on from " + options.checkpoint);
   studio.write(options);
   studio.write_trace(options);
   studio.tell_end(options, traced);
@@ -607,13 +673,15 @@ class Report {
 
 /// Makes a frame: loads its volume, traces, writes.
 void render_frame_of(Studio& studio, const RenderOptions& picture, Report& report, std::size_t place) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
+  const std::optional<Checkpoint> from = checkpoint_for(picture);
   Traced traced = Traced::stopped;
   try {
     studio.load(picture.scene);
-    traced = studio.trace(picture);
+    traced = studio.trace(picture, from);
   } catch (const std::runtime_error& error) {
-    if (!interrupted) return report.say(place, FrameState::failed, error.what(), &studio.progress());
+    if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(place));
+    return report.say(place, FrameState::failed, error.what(), &studio.progress());
   }
   // A picture of fewer samples would be kept as if it had all of them.
   if (traced == Traced::stopped) throw std::runtime_error("interrupted: " + report.not_made(place));
@@ -626,7 +694,7 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, Report& repor
   }
   std::array<char, 32> seconds{};
   std::snprintf(seconds.data(), seconds.size(), " in %.2f s",
-                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+                std::chrono::duration<double>(Clock::now() - start).count());
   report.say(place, FrameState::done, picture.output + seconds.data(), &studio.progress());
 }
 
@@ -652,6 +720,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
     picture.scene.volume = frame.volume;
     picture.output = frame.output;
     picture.stats = frame.stats;
+    picture.checkpoint = frame.checkpoint;
     render_frame_of(*studio, picture, report, i);
   }
   if (studio) studio->write_trace(options);

@@ -563,6 +563,13 @@ void check_together(const RenderOptions& options, bool part) {
   if (options.denoise != Denoise::off && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
     throw UsageError("--denoise needs surfaces that paths meet, not --surface-light none");
   check_part(options, part);
+  if (!options.checkpoint.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
+    throw UsageError("--checkpoint needs the shaded view");
+  for (const auto& [flag, file] :
+       {std::pair("--output", options.output), {"--stats", options.stats}, {"--trace", options.trace}}) {
+    if (!options.checkpoint.empty() && options.checkpoint == file)
+      throw UsageError("--checkpoint and " + std::string(flag) + " are the same file");
+  }
   if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
   if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
   if (!options.trace.empty() && options.trace == options.stats)
@@ -647,6 +654,22 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       },
       "Make a part of a picture: of each pixel the --spp samples from number N on, from 0; cumulet-merge puts the .exr "
       "files of parts together");
+  add(
+      app, group, "--checkpoint", "FILE",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        options.checkpoint = text;
+      },
+      "Keep what samples have come to in this file, when stopped and now and then: the same command goes on from "
+      "there, "
+      "and removes it when the picture is written; of a sequence name.####");
+  add(
+      app, group, "--checkpoint-every", "SECONDS",
+      [&](const std::string& text) {
+        options.checkpoint_every = parse_number(text);
+        if (!(options.checkpoint_every > 0.0)) throw UsageError(text + " is not above 0");
+      },
+      "How often (default: 300)");
   // A scene's is of what windows show.
   app.remove_option(app.get_option("--denoise"));
   add_choice(app, group, "--denoise",

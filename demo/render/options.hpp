@@ -49,6 +49,8 @@ struct RenderOptions {
   bool overwrite = false;            // frames that are there already
   bool info = false;                 // tell what is in the files, render nothing
   bool json = false;                 // as JSON
+  std::string checkpoint;            // empty: none
+  double checkpoint_every = 300.0;   // seconds
   std::optional<double> time_limit;  // seconds from the first sample on
   Denoise denoise = Denoise::off;    // the picture; of an .exr a layer beside it
   std::string denoiser;              // a folder of networks; empty: where the script puts them

@@ -318,6 +318,20 @@ void Progressive::settle() {
   follow();
 }
 
+Picture& Progressive::accumulating() {
+  if (!working_ || wish_.content.preview || working_->divisor != 1 || working_->picture->view() != View::shaded) {
+    throw Error(ErrorCode::invalid_argument,
+                "there is no shaded picture under way without previews: set CUMULET_PREVIEW_OFF, and render");
+  }
+  return *working_->picture;
+}
+
+void Progressive::restore(std::span<const std::byte> saved) {
+  Picture& picture = accumulating();
+  tracer_.restore(picture, saved);
+  follow();
+}
+
 std::uint64_t Progressive::bytes() const {
   std::uint64_t bytes = tracer_.bytes();
   for (const auto& picture : pictures_) bytes += picture->bytes();

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/error.hpp"
@@ -84,6 +86,11 @@ class Progressive {
   void settle();
   /// What is to be read back: without preview the picture under way.
   [[nodiscard]] Picture* newest() { return newest_work() ? newest_work()->picture : nullptr; }
+  /// The picture under way where nothing but its samples makes it: a shaded one at full resolution, without previews.
+  /// Throws Error(invalid_argument) where there is none.
+  [[nodiscard]] Picture& accumulating();
+  /// That goes on from what Tracer::save gave. Throws Error(invalid_argument) likewise, and for what is not of it.
+  void restore(std::span<const std::byte> saved);
   /// Whether that is of these data.
   [[nodiscard]] bool newest_is_of(Revision<MarchData> data) const {
     return newest_work() && newest_work()->data == data;

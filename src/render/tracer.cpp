@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -138,6 +139,29 @@ void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) 
   samples_before_ = 0;
   expected_samples_ = target_samples_;
   done_ = false;
+}
+
+void Picture::go_on_from(const Accumulated& told) {
+  tile_ = 0;
+  tile_error_.reset();
+  pass_error_ = {};
+  noise_.reset();
+  samples_ = std::make_shared<std::uint64_t>(told.all);
+  progress_before_ = 0.0;
+  samples_before_ = 0;
+  expected_samples_ = target_samples_;
+  // The pass that was under way, for its end is where the noise is looked at: the first that ends with no fewer samples
+  // than the pixel with the fewest has. Where all have as many as it ends with, its end may not have been looked at.
+  pass_target_ = pass_after(0);
+  const auto is_over = [&] {
+    return pass_target_ < told.least || (pass_target_ == told.least && told.most > told.least);
+  };
+  while (is_over() && pass_target_ < target_samples_) pass_target_ = pass_after(pass_target_);
+  const bool whole = told.least > 0;
+  pass_ = whole ? 2 : 0;
+  complete_ = whole;
+  holes_ = !whole;
+  begin_tile();
 }
 
 void Picture::begin_tile() {
@@ -879,6 +903,98 @@ void Tracer::read_means(const Picture& picture, const FilmLayer& sum, float* rgb
 }
 
 void Tracer::read_volume(const Picture& picture, float* rgba) const { read_means(picture, film_layers::volume, rgba); }
+
+namespace {
+
+/// What stands before the layers that were saved.
+struct SavedHeader {
+  std::uint32_t what = 0x41434d43;  // "CMCA"
+  std::uint32_t format = 1;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t layers = 0;
+  std::array<std::uint32_t, 3> spare{};
+  bool operator==(const SavedHeader&) const = default;
+};
+static_assert(sizeof(SavedHeader) == 32);
+
+struct Transfer {
+  GLenum format;
+  GLenum type;
+};
+
+Transfer transfer_of(const FilmLayer& layer) {
+  if (layer.format == GL_RGBA32F) return {GL_RGBA, GL_FLOAT};
+  if (layer.format == GL_RG32UI) return {GL_RG_INTEGER, GL_UNSIGNED_INT};
+  return {GL_RED, GL_FLOAT};
+}
+
+}  // namespace
+
+template <class Visit>
+void Tracer::for_each_saved(const Picture& picture, Visit&& visit) {
+  std::size_t at = sizeof(SavedHeader);
+  for (const FilmLayer& layer : accumulated(picture)) {
+    const std::size_t size = std::size_t{picture.size_.x} * picture.size_.y * layer.pixel_bytes;
+    visit(layer, at, size);
+    at += size;
+  }
+}
+
+std::size_t Tracer::saved_bytes(const Picture& picture) {
+  std::size_t bytes = sizeof(SavedHeader);
+  for_each_saved(picture, [&](const FilmLayer&, std::size_t, std::size_t size) { bytes += size; });
+  return bytes;
+}
+
+void Tracer::save(const Picture& picture, std::span<std::byte> bytes) const {
+  SavedHeader header;
+  header.width = picture.size_.x;
+  header.height = picture.size_.y;
+  header.layers = static_cast<std::uint32_t>(accumulated(picture).size());
+  std::memcpy(bytes.data(), &header, sizeof header);
+  for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t size) {
+    const Transfer transfer = transfer_of(layer);
+    gl_->GetTextureImage(picture.film_.texture(layer), 0, transfer.format, transfer.type, static_cast<GLsizei>(size),
+                         bytes.data() + at);
+  });
+  gl::check(*gl_, "reading the accumulation");
+}
+
+void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
+  SavedHeader wanted;
+  wanted.width = picture.size_.x;
+  wanted.height = picture.size_.y;
+  wanted.layers = static_cast<std::uint32_t>(accumulated(picture).size());
+  SavedHeader header;
+  if (saved.size() >= sizeof header) std::memcpy(&header, saved.data(), sizeof header);
+  if (saved.size() != saved_bytes(picture) || header != wanted)
+    throw Error(ErrorCode::invalid_argument, "these bytes are no accumulation of a picture of this size");
+  std::vector<glm::uvec2> counts(std::size_t{picture.size_.x} * picture.size_.y);
+  for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t size) {
+    if (layer == film_layers::counts) std::memcpy(counts.data(), saved.data() + at, size);
+  });
+  Accumulated told;
+  for (const glm::uvec2& count : counts) {
+    told.least = std::min(told.least, count.x);
+    told.most = std::max(told.most, count.x);
+    told.all += count.x;
+  }
+  if (told.most > picture.target_samples_) {
+    throw Error(ErrorCode::invalid_argument, "the accumulation has pixels of " + std::to_string(told.most) +
+                                                 " samples, and the picture shall have " +
+                                                 std::to_string(picture.target_samples_));
+  }
+  if (picture.done_) return;
+  for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t) {
+    const Transfer transfer = transfer_of(layer);
+    gl_->TextureSubImage2D(picture.film_.texture(layer), 0, 0, 0, static_cast<GLsizei>(picture.size_.x),
+                           static_cast<GLsizei>(picture.size_.y), transfer.format, transfer.type, saved.data() + at);
+  });
+  gl::check(*gl_, "restoring the accumulation");
+  picture.revision_ = ++revision_;
+  picture.go_on_from(told);
+}
 
 template <class Visit>
 void Tracer::for_each_error(const Picture& picture, Visit&& visit) const {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -85,6 +87,13 @@ constexpr std::size_t channels_of(PixelFact fact) {
 /// Rays a pixel that facts are means of, where they are read; a filter does with few.
 constexpr std::uint32_t fact_rays = 16;
 
+/// Samples that pixels have.
+struct Accumulated {
+  std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t most = 0;
+  std::uint64_t all = 0;
+};
+
 /// One accumulation under way.
 ///
 /// A tile is what paths are stored for; a dispatch covers some of its blocks, those that have something to do, and in
@@ -155,6 +164,8 @@ class Picture {
   [[nodiscard]] bool measures() const;
   // Whether it is time to find the tile's error.
   [[nodiscard]] bool awaits_error() const;
+  // It has these samples; what was under way is none of it.
+  void go_on_from(const Accumulated& told);
   void begin_tile();
   void end_tile();
   void end_pass();
@@ -221,6 +232,13 @@ class Tracer {
   void read(const Picture& picture, bool with_background, float* rgba) const;
   /// The same without background of samples that met the volume before any surface; alpha is their share.
   void read_volume(const Picture& picture, float* rgba) const;
+  /// How many bytes save writes.
+  [[nodiscard]] static std::size_t saved_bytes(const Picture& picture);
+  /// All that a shaded picture's samples have come to, for restore. Nothing of it may be under way.
+  void save(const Picture& picture, std::span<std::byte> bytes) const;
+  /// A picture that was begun as the saved one was has its samples from now on, and will end as that. One that is done
+  /// is left so. Throws Error(invalid_argument), with the picture as it was, for what was not saved of such a one.
+  void restore(Picture& picture, std::span<const std::byte> saved);
   /// Standard error of each pixel's luminance, with the background's; infinite where it has fewer than two samples.
   void read_error(const Picture& picture, float* errors) const;
   /// Until about the deadline, the layers of PixelFact of this picture, data and obstacles being those it was made of;
@@ -299,6 +317,9 @@ class Tracer {
   // The pass that empties what samples are added to, and what all is that.
   void empty(Picture& picture, const glm::vec3& background, std::uint32_t samples);
   static std::vector<FilmLayer> accumulated(const Picture& picture);
+  // Calls visit with each of these, where it stands in what is saved, and its bytes there.
+  template <class Visit>
+  static void for_each_saved(const Picture& picture, Visit&& visit);
   bool accumulate(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                   bool until_complete);
   void bind(const MarchData& data, const Obstacles& obstacles) const;

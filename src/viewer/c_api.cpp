@@ -518,6 +518,22 @@ cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {
   });
 }
 
+cumulet_status cumulet_read_accumulation(cumulet_viewer* viewer, void* bytes, size_t* size) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(size != nullptr, "size is NULL");
+    const std::size_t room = bytes == nullptr ? 0 : *size;
+    *size = v.accumulation_bytes();
+    if (bytes != nullptr) v.read_accumulation({static_cast<std::byte*>(bytes), room});
+  });
+}
+
+cumulet_status cumulet_restore_accumulation(cumulet_viewer* viewer, const void* bytes, size_t size) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(bytes != nullptr, "bytes is NULL");
+    v.restore_accumulation({static_cast<const std::byte*>(bytes), size});
+  });
+}
+
 cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
   return guarded(viewer, [&](core::Viewer& v) {
     read_desc(stats, "cumulet_stats");

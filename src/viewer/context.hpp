@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -100,6 +102,11 @@ class Context {
   /// The same denoised; only of shaded pictures whose surfaces are traced. Throws Error(unsupported) of others.
   /// Without a network by the filter of frames.
   void read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count);
+  /// Of what samples have come to. Throw Error(invalid_argument) of pictures with previews, and of debug views.
+  [[nodiscard]] std::size_t accumulation_bytes();
+  void read_accumulation(std::span<std::byte> bytes);
+  /// The picture goes on from there. Throws Error(invalid_argument), with the picture as it was, for what is not of it.
+  void restore_accumulation(std::span<const std::byte> bytes);
   [[nodiscard]] render::Totals totals() { return progressive_.tracer().totals(readable()); }
 
   /// Of the context's life.

@@ -197,4 +197,23 @@ void Context::read_linear(const DisplaySettings& settings, float* rgba, std::siz
   put_before(display, {rgba, floats});
 }
 
+std::size_t Context::accumulation_bytes() {
+  static_cast<void>(readable());
+  return render::Tracer::saved_bytes(progressive_.accumulating());
+}
+
+void Context::read_accumulation(std::span<std::byte> bytes) {
+  static_cast<void>(readable());
+  const render::Picture& picture = progressive_.accumulating();
+  const std::size_t size = render::Tracer::saved_bytes(picture);
+  if (bytes.size() < size)
+    throw Error(ErrorCode::invalid_argument, "the accumulation needs " + std::to_string(size) + " bytes");
+  progressive_.tracer().save(picture, bytes);
+}
+
+void Context::restore_accumulation(std::span<const std::byte> bytes) {
+  static_cast<void>(readable());
+  progressive_.restore(bytes);
+}
+
 }  // namespace cumulet::viewer

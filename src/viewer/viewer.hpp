@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -123,6 +124,11 @@ class Viewer {
   void encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const;
   void read_aov(Aov aov, float* values, std::size_t count);
   double measure_noise();
+  /// Of what read_accumulation gives. Both throw Error(invalid_argument) of what is no picture of samples alone.
+  std::size_t accumulation_bytes();
+  void read_accumulation(std::span<std::byte> bytes);
+  /// Throws Error(invalid_argument), with the picture as it was, for what is not of such a picture.
+  void restore_accumulation(std::span<const std::byte> bytes);
   Stats stats();
 
   /// Tells the host that there is something new. Coalesced; any thread.

@@ -243,6 +243,20 @@ double Viewer::measure_noise() {
   return totals_.noise;
 }
 
+std::size_t Viewer::accumulation_bytes() {
+  std::size_t bytes = 0;
+  with_gl([&](Context& g) { bytes = g.accumulation_bytes(); });
+  return bytes;
+}
+
+void Viewer::read_accumulation(std::span<std::byte> bytes) {
+  with_gl([&](Context& g) { g.read_accumulation(bytes); });
+}
+
+void Viewer::restore_accumulation(std::span<const std::byte> bytes) {
+  with_gl([&](Context& g) { g.restore_accumulation(bytes); });
+}
+
 const core::CmParameters& Viewer::trace_parameters() { return gl().readable().parameters(); }
 
 Stats Viewer::stats() {

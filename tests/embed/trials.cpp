@@ -207,7 +207,13 @@ class NoContext : public Trial {
                [&] { return cumulet_read_display(v_, bytes.data(), bytes.size()); },
                [&] { return cumulet_read_aov(v_, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_denoised(v_, &denoise, rgba.data(), rgba.size()); },
-               [&] { return cumulet_measure_noise(v_, &noise); }, [&] { return cumulet_detach(v_); }}) {
+               [&] { return cumulet_measure_noise(v_, &noise); },
+               [&] {
+                 std::size_t room = bytes.size();
+                 return cumulet_read_accumulation(v_, bytes.data(), &room);
+               },
+               [&] { return cumulet_restore_accumulation(v_, bytes.data(), bytes.size()); },
+               [&] { return cumulet_detach(v_); }}) {
         EXPECT_EQ(call(), CUMULET_ERROR_GL);
         const std::string line = cumulet_last_error(v_);
         EXPECT_NE(line.find("no OpenGL context is current"), std::string::npos) << line;
@@ -307,6 +313,7 @@ void Caller::call_all() {
   std::array<double, 3> low{}, high{1.0, 1.0, 1.0};
   std::array<float, 4> one{};
   std::array<std::uint8_t, 4> bytes{};
+  std::size_t room = bytes.size();
   double number = 0.0;
   std::int32_t handled = 0;
   const auto create = make_desc<cumulet_create_desc>();
@@ -452,6 +459,8 @@ void Caller::call_all() {
     CALL(cumulet_read_denoised, v, &denoise, one.data(), one.size());
     CALL(cumulet_read_aov, v, CUMULET_AOV_BEAUTY, one.data(), one.size());
     CALL(cumulet_measure_noise, v, &number);
+    CALL(cumulet_read_accumulation, v, bytes.data(), &room);
+    CALL(cumulet_restore_accumulation, v, bytes.data(), bytes.size());
     CALL(cumulet_get_stats, v, &stats);
   }
   if (new_viewer != nullptr || new_camera != nullptr || new_volume != nullptr || new_surfaces != nullptr ||

@@ -298,7 +298,12 @@ class Program {
     double noise = 0.0;
     std::array<cumulet_pick, 2> pick{};
     pick[0] = described<cumulet_pick>();
-    switch (data_.ConsumeIntegralInRange(0, 4)) {
+    std::size_t room = bytes.size();
+    switch (data_.ConsumeIntegralInRange(0, 6)) {
+      case 5:
+        return told(cumulet_read_accumulation(viewer_.get(), bytes.data(), &room));
+      case 6:
+        return told(cumulet_restore_accumulation(viewer_.get(), bytes.data(), bytes.size()));
       case 0:
         return told(cumulet_read_linear(viewer_.get(), values.data(), values.size()));
       case 1:

@@ -693,6 +693,52 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_TRANSMITTANCE, passes.data(), passes.size()), CUMULET_ERROR_DETACHED);
 }
 
+TEST_F(Contract, AnAccumulationGoesOnInAnotherViewer) {
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 40;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  const auto begun = [&](double budget_ms) {
+    ViewerPtr own = viewer();
+    show(own.get(), CUMULET_BACKGROUND_TRANSPARENT);
+    EXPECT_EQ(cumulet_set_sampling(own.get(), &sampling), CUMULET_OK);
+    EXPECT_EQ(cumulet_set_volume(own.get(), volume_.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
+    auto frame = target_.frame();
+    frame.budget_ms = budget_ms;
+    EXPECT_EQ(cumulet_render(own.get(), &frame, nullptr), CUMULET_OK);
+    return own;
+  };
+  const auto whole = [&](cumulet_viewer* v) {
+    converge(v, target_.frame());
+    std::vector<float> rgba(std::size_t{4} * side * side);
+    EXPECT_EQ(cumulet_read_linear(v, rgba.data(), rgba.size()), CUMULET_OK);
+    return rgba;
+  };
+  std::size_t size = 7;
+  EXPECT_EQ(cumulet_read_accumulation(v_, nullptr, &size), CUMULET_ERROR_INVALID_ARGUMENT) << "nothing was rendered";
+  EXPECT_EQ(size, 7u);
+  std::vector<std::byte> bytes;
+  {
+    const ViewerPtr first = begun(3.0);
+    EXPECT_EQ(cumulet_read_accumulation(first.get(), nullptr, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+    ASSERT_EQ(cumulet_read_accumulation(first.get(), nullptr, &size), CUMULET_OK);
+    EXPECT_EQ(size, 32U + 44U * side * side);
+    bytes.resize(size);
+    size -= 1;
+    EXPECT_EQ(cumulet_read_accumulation(first.get(), bytes.data(), &size), CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(size, bytes.size()) << "what it takes is told";
+    ASSERT_EQ(cumulet_read_accumulation(first.get(), bytes.data(), &size), CUMULET_OK);
+  }
+  const ViewerPtr second = begun(1.0);
+  EXPECT_EQ(cumulet_restore_accumulation(second.get(), nullptr, size), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_restore_accumulation(second.get(), bytes.data(), size - 1), CUMULET_ERROR_INVALID_ARGUMENT);
+  ASSERT_EQ(cumulet_restore_accumulation(second.get(), bytes.data(), size), CUMULET_OK);
+  EXPECT_EQ(whole(second.get()), whole(begun(5.0).get()));
+  ASSERT_EQ(cumulet_detach(second.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_read_accumulation(second.get(), bytes.data(), &size), CUMULET_ERROR_DETACHED);
+  EXPECT_EQ(cumulet_restore_accumulation(second.get(), bytes.data(), size), CUMULET_ERROR_DETACHED);
+}
+
 // Conventions, multisampling and real geometry: tests/embed/reversed_z.cpp.
 TEST_F(Contract, Contract13HostDepthHidesWhatIsBehindIt) {
   show(v_, CUMULET_BACKGROUND_TRANSPARENT);

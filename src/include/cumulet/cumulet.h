@@ -1335,6 +1335,22 @@ CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov 
  * picture back: now and then, not every frame. */
 CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise);
 
+/*
+ * [GL] All that the samples of the picture under way have come to, for another process to go on with. size: in, the
+ * bytes that there is room for; out, those that there are: 32 + 44 a pixel, 60 with volume_alone. bytes NULL: these
+ * alone. Their order is the library's own, and of its version; they say nothing of the scene. Of shaded pictures
+ * without previews. CUMULET_ERROR_INVALID_ARGUMENT for others, for too little room and before the first cumulet_render.
+ */
+CUMULET_API cumulet_status cumulet_read_accumulation(cumulet_viewer* viewer, void* bytes, size_t* size);
+/*
+ * [GL] The picture under way has these samples, in place of its own. Call it after a cumulet_render that began the
+ * picture (with CUMULET_PREVIEW_OFF), with the settings, files, size and driver that it was read with: then it ends as
+ * the other would have, bit for bit, with a noise target as well. Of a picture that has all its samples already nothing
+ * changes. CUMULET_ERROR_INVALID_ARGUMENT, with everything as it was, for bytes that are not of such a picture of this
+ * size and version, or of more samples than it shall have; whether the scene is the same is the host's to know.
+ */
+CUMULET_API cumulet_status cumulet_restore_accumulation(cumulet_viewer* viewer, const void* bytes, size_t size);
+
 /* What happened, in SI units; fields without a value are 0. */
 typedef struct cumulet_stats {
   size_t struct_size;

@@ -1223,6 +1223,21 @@ class Viewer {
     if (auto done = result(cumulet_measure_noise(handle(), &noise)); !done) return done.error();
     return noise;
   }
+  /// How many bytes cumulet_read_accumulation gives.
+  [[nodiscard]] Result<std::size_t> accumulation_size() noexcept {
+    std::size_t size = 0;
+    if (auto done = result(cumulet_read_accumulation(handle(), nullptr, &size)); !done) return done.error();
+    return size;
+  }
+  /// Into so much room; how much of it there is.
+  [[nodiscard]] Result<std::size_t> read_accumulation(std::span<std::byte> bytes) noexcept {
+    std::size_t size = bytes.size();
+    if (auto done = result(cumulet_read_accumulation(handle(), bytes.data(), &size)); !done) return done.error();
+    return size;
+  }
+  [[nodiscard]] Result<> restore_accumulation(std::span<const std::byte> bytes) noexcept {
+    return result(cumulet_restore_accumulation(handle(), bytes.data(), bytes.size()));
+  }
   [[nodiscard]] Result<Stats> get_stats() const noexcept {
     auto c = detail::sized<cumulet_stats>();
     if (auto done = result(cumulet_get_stats(handle(), &c)); !done) return done.error();

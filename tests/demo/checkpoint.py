@@ -1,0 +1,101 @@
+"""A picture that is stopped, or killed, and goes on from its checkpoint: the same file as of one that is left alone.
+
+Usage: checkpoint.py RENDER VOLUME OUT_FOLDER
+"""
+
+import pathlib
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+
+class Picture:
+    def __init__(self, render, volume, folder, *more):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        self.output, self.checkpoint = folder / "picture.exr", folder / "picture.ck"
+        self.command = [render, volume, "--size", "64x48", "--seed", "3", "-o", str(self.output), *more]
+        self.kept = self.command + ["--checkpoint", str(self.checkpoint)]
+
+    def run(self, command):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+        return done.returncode, done.stderr
+
+    def stop(self, seconds, number):
+        """Its exit status and what it says when the signal comes after so long."""
+        process = subprocess.Popen(self.kept, stderr=subprocess.PIPE, text=True)
+        time.sleep(seconds)
+        process.send_signal(number)
+        return process, process.communicate(timeout=120)[1]
+
+
+def stopped(render, volume, out):
+    """SIGTERM: no picture, a checkpoint, and the same picture in the end."""
+    whole = Picture(render, volume, out / "whole", "--spp", "300", "--aovs", "volume,error")
+    status, error = whole.run(whole.command)
+    assert status == 0, error
+    part = Picture(render, volume, out / "part", "--spp", "300", "--aovs", "volume,error")
+    seconds, times = 0.5, 0
+    while not part.output.exists():
+        had = part.checkpoint.exists()
+        process, error = part.stop(seconds, signal.SIGTERM)
+        seconds += 0.3  # a busy machine takes longer until the first sample
+        if process.returncode == 0:
+            break
+        assert process.returncode == 1 and "interrupted" in error, error
+        assert not part.output.exists()
+        if part.checkpoint.exists() and had:
+            times += 1
+            assert f"goes on from {part.checkpoint}" in error, error
+    assert part.output.read_bytes() == whole.output.read_bytes(), "not the same file"
+    assert not part.checkpoint.exists()
+    return times
+
+
+def killed(render, volume, out):
+    """kill -9: the last checkpoint is whole, and the picture the same."""
+    whole = Picture(render, volume, out / "alone", "--spp", "200")
+    began = time.monotonic()
+    assert whole.run(whole.command)[0] == 0
+    length = time.monotonic() - began
+    part = Picture(render, volume, out / "killed", "--spp", "200")
+    part.kept += ["--checkpoint-every", "0.05"]
+    dice = random.Random(11)
+    for _ in range(5):
+        part.stop(dice.uniform(0.2, 1.0) * length, signal.SIGKILL)
+        if part.output.exists():
+            break
+    status, error = part.run(part.kept)
+    assert status == 0, error
+    assert part.output.read_bytes() == whole.output.read_bytes(), "not the same file"
+    assert not part.checkpoint.exists()
+
+
+def refused(render, volume, out):
+    """A checkpoint of another picture, or none at all, in a line."""
+    picture = Picture(render, volume, out / "refused", "--spp", "1000000")
+    for seconds in (1.0, 3.0, 10.0, 30.0):
+        picture.stop(seconds, signal.SIGINT)
+        if picture.checkpoint.exists():
+            break
+    kept = picture.checkpoint.read_bytes()
+    for more in (["--seed", "4"], ["--size", "32x32"], ["--density-scale", "2"], ["--spp", "4"]):
+        status, error = picture.run(picture.kept + more)
+        assert status == 1 and error.count("\n") == 1 and "is the checkpoint of another picture" in error, error
+    assert picture.checkpoint.read_bytes() == kept and not picture.output.exists()
+    picture.checkpoint.write_bytes(kept[: len(kept) // 2])
+    status, error = picture.run(picture.kept)
+    assert status == 1 and error.count("\n") == 1 and "damaged" in error, error
+
+
+def main():
+    render, volume, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    stopped(render, volume, out)
+    killed(render, volume, out)
+    refused(render, volume, out)
+
+
+main()
