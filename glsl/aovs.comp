@@ -6,12 +6,15 @@
 //   transmittance of the volume up to the nearest surface, ours or the host's, or beyond the volume; mean
 //   surface z     view depth of that surface at the pixel's centre, infinity where there is none
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
+//   emission      what reaches the eye straight from what gives it off, unscattered: the volume along the ray, and through
+//                 it the nearest surface's front; mean
 // and, as a filter that follows what moves asks for them, beside the normal the view depth of what is solid at the
 // pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
 // for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
 // volume's depth the share that the ground covers.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
 // variants: - or CM_SURFACES=1
+// variants: - or CM_CHANNELS=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"
@@ -34,6 +37,7 @@ layout(rgba32f, binding = CM_IMAGE_ALBEDO) uniform writeonly image2D cm_albedo;
 layout(rg32f, binding = CM_IMAGE_TRANSMITTANCE) uniform writeonly image2D cm_transmittance;
 layout(r32f, binding = CM_IMAGE_SURFACE_Z) uniform writeonly image2D cm_surface_depth;
 layout(rg32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
+layout(rgba32f, binding = CM_IMAGE_EMISSION) uniform writeonly image2D cm_emission_out;
 
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 
@@ -49,6 +53,7 @@ void main() {
   float scattered_z = 0.0;  // sum, and of the chances
   float scattered = 0.0;
   vec2 covered = vec2(0.0);  // by surfaces, by the ground
+  vec3 emission = vec3(0.0);
   float share = 1.0 / float(cm.dispatch.samples);
   for (int i = 0; i < int(cm.dispatch.samples); ++i) {
     // Roberts's two-dimensional sequence; the first ray is the centre's.
@@ -59,6 +64,7 @@ void main() {
     vec3 d = cm_to_cube(w);
     float surface_t = t_per_z * cm_surface_z(pixel, within, uint(i));
 #if CM_SURFACES
+    vec3 of_surface = vec3(0.0);
     CmHit hit;
     cm_hit_seed = cm_hash3(uvec3(pixel.y * cm.view.size.x + pixel.x, uint(i), cm.integrator.seed)).x;
     cm_hit_camera = true;
@@ -68,6 +74,7 @@ void main() {
       normal += point.material.normal;
       albedo += point.material.base_color;
       covered.x += 1.0;
+      if (hit.front) of_surface = cm_emission(cm_vertex_mix(hit.triangle, hit.barycentrics));
     }
 #endif
     if (i == 0 && surface_t < 1e37) surface_z = surface_t / t_per_z;
@@ -99,6 +106,11 @@ void main() {
         // Of what scatters in this part of the ray: its chance, and where in it, as if it were even.
         float chance = 1.0 - exp(-depth);
         float within_part = depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
+#if CM_CHANNELS
+        // As if it were dimmed evenly within this part.
+        float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
+        emission += dimmed * cm_emitted(cm_march_emission(cell, o, d), t, min(t_1, range.y));
+#endif
         scattered_z += clear * chance * (t + within_part * min(span, range.y - t)) / t_per_z;
         scattered += clear * chance;
         clear -= clear * chance;
@@ -107,9 +119,15 @@ void main() {
       }
     }
     transmittance += exp(-used);
+    emission += (1.0 - exp(-used)) * cm.medium.source;
+#if CM_SURFACES
+    // Where another draws the surfaces beneath, their light is none of the picture's.
+    if (cm.layers.count == 0u || cm.layers.coloured != 0u) emission += exp(-used) * of_surface;
+#endif
   }
   imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));
   imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, scattered > 0.0 ? scattered_z / scattered : CM_INFINITE));
+  imageStore(cm_emission_out, ivec2(pixel), vec4(share * emission, 0.0));
   imageStore(cm_transmittance, ivec2(pixel), share * vec4(transmittance, covered.x, 0.0, 0.0));
   imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));
   imageStore(cm_volume_z, ivec2(pixel), vec4(volume_z, share * covered.y, 0.0, 0.0));

@@ -35,13 +35,12 @@ CmGuides cm_unpacked(uvec4 words) {
 layout(binding = CM_UNIT_WAVELET_FRONT) uniform sampler2D cm_front;
 layout(binding = CM_UNIT_WAVELET_SPREAD) uniform sampler2D cm_spread;
 layout(binding = CM_UNIT_WAVELET_GUIDES) uniform usampler2D cm_guides;
-layout(location = 1) uniform float cm_clear;      // 1: what is clear gives off no light in front of the background
 layout(location = 2) uniform vec2 cm_footprint;   // of a pixel at depth z, in the world: x + y z
 
 CmGuides cm_guides_at(ivec2 texel) { return cm_unpacked(texelFetch(cm_guides, texel, 0)); }
 
 // What a pixel's radiance is in proportion to, if what scatters there looks the same: how much of it there is.
-float cm_cover(float open) { return 1.0 - 0.98 * cm_clear * open; }
+float cm_cover(float open) { return 1.0 - 0.98 * open; }
 
 // The smaller step to either side: the larger may be over an edge.
 float cm_smaller(float a, float b) { return abs(a) < abs(b) ? a : b; }

@@ -10,6 +10,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = CM_UNIT_GUIDE_ALBEDO) uniform sampler2D cm_albedo;
 layout(binding = CM_UNIT_GUIDE_TRANSMITTANCE) uniform sampler2D cm_transmittance;
 layout(binding = CM_UNIT_GUIDE_VOLUME_Z) uniform sampler2D cm_volume_z;
+layout(binding = CM_UNIT_GUIDE_EMISSION) uniform sampler2D cm_emission;
 layout(location = 3) uniform float cm_surfaces;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform readonly image2D cm_behind;
 layout(rgba32f, binding = CM_IMAGE_MEANS) uniform writeonly image2D cm_means;
@@ -30,7 +31,8 @@ void main() {
     float own = cm_open(covered, texelFetch(cm_volume_z, texel, 0).y, through.x);
     // Where only its own samples count, these are what they are.
     float part = clamp(front.a + own - open, 0.0, 1.0);
-    mean.front = vec4(tint * front.rgb * (cm_cover(own) / cm_cover(open)), 1.0 - part);
+    vec3 lit = tint * front.rgb * (cm_cover(own) / cm_cover(open));
+    mean.front = vec4(max(vec3(0.0), lit + texelFetch(cm_emission, texel, 0).rgb), 1.0 - part);
     mean.background = part * imageLoad(cm_behind, texel).rgb;
   } else {
     mean = cm_mean(texel);

@@ -1,10 +1,15 @@
 #version 450
 // How much noise there is: a pixel's few samples tell little of that (at one, nothing), so that those around tell with
 // it. What they differ by among each other counts only where none has two samples.
+//
+// A speck, a pixel far brighter than any like it nearby and than its own samples tell for certain, is dimmed to little
+// more than the next before it tells anything: it would be spread over many, as dots, or be taken for an edge and stay.
+// Not where few have found any light: there it may be all that is known.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #define CM_WAVELET_READS
 #include "wavelet.glsl"
+layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform image2D cm_behind;
 
@@ -12,6 +17,13 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform image2D cm_behind;
 // Fewer degrees of freedom tell less than the pixels' differences do.
 #define CM_ENOUGH 3.0
 #define CM_FEW 2.0
+// How much brighter than the next a pixel may be.
+#define CM_BRIGHTER 1.5
+// Standard errors.
+#define CM_CERTAIN 2.0
+// Pixels less alike are no measure, nor are fewer.
+#define CM_ALIKE 0.1
+#define CM_LIT 6u
 
 // Where nothing escaped, what others saw behind: of those about it, then of some farther away.
 vec3 cm_behind_near(ivec2 texel) {
@@ -29,6 +41,44 @@ vec3 cm_behind_near(ivec2 texel) {
   return vec3(0.0);
 }
 
+// Luminance over cover.
+struct CmBrightest {
+  float most;  // of those about a pixel, itself among them
+  float next;
+  uint lit;    // how many have any
+};
+
+CmBrightest cm_brightest(ivec2 texel, CmGuides here, vec4 slopes) {
+  ivec2 size = textureSize(cm_guides, 0);
+  CmBrightest about = CmBrightest(0.0, 0.0, 0u);
+  for (int y = -CM_RADIUS; y <= CM_RADIUS; ++y) {
+    for (int x = -CM_RADIUS; x <= CM_RADIUS; ++x) {
+      ivec2 at = texel + ivec2(x, y);
+      if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
+      CmGuides there = cm_guides_at(at);
+      if (!there.finite || cm_alike(here, there, slopes, vec2(x, y)) < CM_ALIKE) continue;
+      float luminance = cm_luminance(texelFetch(cm_front, at, 0).rgb) / cm_cover(texelFetch(cm_spread, at, 0).x);
+      about.next = max(about.next, min(about.most, luminance));
+      about.most = max(about.most, luminance);
+      if (luminance > 0.0) about.lit += 1u;
+    }
+  }
+  return about;
+}
+
+// What is left of a pixel that is a speck; spread as before this pass.
+float cm_dimmed(vec3 front, vec4 spread, CmBrightest about) {
+  float cover = cm_cover(spread.x);
+  float luminance = cm_luminance(front);
+  if (about.lit < CM_LIT || luminance < cover * about.most) return 1.0;
+  float room = CM_BRIGHTER * cover * about.next;
+  if (spread.z >= 2.0) {
+    float deviation = sqrt(max(0.0, spread.y - luminance * luminance) / (spread.z - 1.0));
+    room = max(room, luminance - CM_CERTAIN * deviation);
+  }
+  return luminance > room ? room / luminance : 1.0;
+}
+
 void main() {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
   ivec2 size = textureSize(cm_guides, 0);
@@ -36,6 +86,7 @@ void main() {
   CmGuides here = cm_guides_at(texel);
   vec4 spread = texelFetch(cm_spread, texel, 0);
   vec4 slopes = cm_slopes(texel, here);
+  CmBrightest about = cm_brightest(texel, here, slopes);
   float own_samples = spread.z;
   vec4 front = vec4(0.0);   // and cover, of all samples, for their means
   float square = 0.0;
@@ -54,6 +105,9 @@ void main() {
       vec4 colour = texelFetch(cm_front, at, 0);
       float weight = cm_alike(here, there, slopes, vec2(x, y));
       float cover = cm_cover(other.x);
+      float dimmed = cm_dimmed(colour.rgb, other, about);
+      colour.rgb *= dimmed;
+      other.y *= dimmed * dimmed;
       float luminance = cm_luminance(colour.rgb);
       float samples = weight * other.z;
       front += samples * vec4(colour.rgb, cover);
@@ -82,6 +136,9 @@ void main() {
     float samples = max(own_samples, 0.5);
     variance = (1.0 + CM_FEW / samples) / samples * vec2(sample_variance, open * (1.0 - open));
   }
+  vec4 own = texelFetch(cm_front, texel, 0);
+  if (here.finite) own.rgb *= cm_dimmed(own.rgb, spread, about);
+  imageStore(cm_front_out, texel, own);
   imageStore(cm_spread_out, texel, vec4(spread.x, variance, 0.0));
   if (imageLoad(cm_behind, texel).a == 0.0) imageStore(cm_behind, texel, vec4(cm_behind_near(texel), 0.0));
 }

@@ -16,8 +16,8 @@ struct PictureGuides {
   GLuint transmittance = 0;
   GLuint surface_z = 0;
   GLuint volume_z = 0;
+  GLuint emission = 0;
   bool surfaces = true;       // they are part of the radiance
-  bool clear = true;          // what covers nothing gives off no light
   glm::vec2 footprint{0.0F};  // of a pixel at view depth z, in the world: x + y z
 };
 

@@ -169,7 +169,7 @@ bool Progressive::needs_guides(const Work& work) const {
 }
 
 void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
-  if (!needs_guides(*working_) || !tracer_.able_to_find(data, obstacles)) return;
+  if (!needs_guides(*working_) || !tracer_.able_to_find(*working_->picture, data, obstacles)) return;
   try {
     tracer_.find_facts(*working_->picture, data, obstacles, deadline, guide_rays);
   } catch (const Error& error) {

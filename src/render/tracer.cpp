@@ -338,6 +338,14 @@ const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obst
   return program(data.defines(), name, std::span(more).first(obstacles.scene != nullptr ? 1 : 0));
 }
 
+const Tracer::Program& Tracer::facts_program(const Picture& picture, const MarchData& data,
+                                             const Obstacles& obstacles) {
+  std::vector<std::string> more;
+  if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
+  if (picture.parameters_.medium.emits != 0U) more.emplace_back(channels_macro);
+  return program(data.defines(), "aovs.comp", more);
+}
+
 void Tracer::make_shared_objects() {
   if (!uniforms_)
     uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
@@ -798,8 +806,8 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacle
   return run(gl_, picture.film_, {"cumulet: depth", {}, {film_layers::depth}, work}, deadline);
 }
 
-bool Tracer::able_to_find(const MarchData& data, const Obstacles& obstacles) {
-  return asked([&] { inspect_program(data, obstacles, "aovs.comp"); });
+bool Tracer::able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles) {
+  return asked([&] { facts_program(picture, data, obstacles); });
 }
 
 bool Picture::has_facts() const { return film_.has(film_layers::normal); }
@@ -816,7 +824,7 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
     flights_.order();
-    const Program& program = inspect_program(data, obstacles, "aovs.comp");
+    const Program& program = facts_program(picture, data, obstacles);
     program.object->use(*gl_);
     bind(data, obstacles);
     film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_WRITE_ONLY);
@@ -824,12 +832,13 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
     film.bind(*gl_, core::CM_IMAGE_TRANSMITTANCE, transmittance, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_WRITE_ONLY);
+    film.bind(*gl_, core::CM_IMAGE_EMISSION, emission, GL_WRITE_ONLY);
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
     parameters.dispatch.samples = picture.facts_rays_;
     return inspect(picture, parameters, program, picture.facts_row_, until);
   };
-  const Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z}, work};
+  const Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z, emission}, work};
   return run(gl_, picture.film_, pass, deadline);
 }
 

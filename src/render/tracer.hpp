@@ -246,7 +246,7 @@ class Tracer {
   bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                   std::uint32_t rays = fact_rays);
   /// As able(), for find_facts().
-  bool able_to_find(const MarchData& data, const Obstacles& obstacles);
+  bool able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   /// A fact a pixel (PixelFact), each channels_of(fact) floats, once find_facts has found them.
   void read_fact(const Picture& picture, PixelFact fact, float* values) const;
   [[nodiscard]] Totals totals(const Picture& picture) const;
@@ -310,6 +310,7 @@ class Tracer {
   const Program& trace_program(const Picture& picture, const MarchData& data);
   StagePrograms stage_programs(const Picture& picture, const MarchData& data);
   const Program& inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name);
+  const Program& facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);

@@ -19,7 +19,6 @@ constexpr std::uint32_t least_rows = 8;
 constexpr std::uint64_t bytes_a_pixel = 96;
 // Locations of the shaders' uniforms.
 constexpr GLint rows_at = 0;
-constexpr GLint clear_at = 1;
 constexpr GLint footprint_at = 2;
 constexpr GLint own_at = 3;        // surfaces, or the level's stride
 constexpr GLint most_at = 3;       // wavelet_merge.comp
@@ -133,11 +132,9 @@ void Wavelet::remember(const PictureTextures& picture) {
   kept_.wish = picture.wish;
   kept_.view = view;
   kept_.surfaces = picture.guides->surfaces;
-  kept_.clear = picture.guides->clear;
   kept_.footprint = picture.guides->footprint;
   keeps_ = true;
-  recalls_ = before_.filled && before_.view.scene == view.scene && before_.surfaces == kept_.surfaces &&
-             before_.clear == kept_.clear;
+  recalls_ = before_.filled && before_.view.scene == view.scene && before_.surfaces == kept_.surfaces;
 }
 
 std::optional<Error> Wavelet::begin(const PictureTextures& picture) {
@@ -232,6 +229,7 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_TRANSMITTANCE, guides.transmittance);
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_SURFACE_Z, guides.surface_z);
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_VOLUME_Z, guides.volume_z);
+    gl.BindTextureUnit(core::CM_UNIT_GUIDE_EMISSION, guides.emission);
     gl.ProgramUniform1f(program.name(), own_at, guides.surfaces ? 1.0F : 0.0F);
     write(core::CM_IMAGE_WAVELET_GUIDES, guides_, GL_RGBA32UI);
   } else {
@@ -239,11 +237,10 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     gl.BindTextureUnit(core::CM_UNIT_WAVELET_FRONT, front_[0].name());
     gl.BindTextureUnit(core::CM_UNIT_WAVELET_SPREAD, spread_[0].name());
     gl.BindTextureUnit(core::CM_UNIT_WAVELET_GUIDES, guides_.name());
-    gl.ProgramUniform1f(program.name(), clear_at, guides.clear ? 1.0F : 0.0F);
     gl.ProgramUniform2f(program.name(), footprint_at, guides.footprint.x, guides.footprint.y);
     if (stage_ == Stage::level) gl.ProgramUniform1i(program.name(), own_at, 1 << level_);
   }
-  if (stage_ != Stage::variance) write(core::CM_IMAGE_WAVELET_FRONT, front_[1], GL_RGBA32F);
+  write(core::CM_IMAGE_WAVELET_FRONT, front_[1], GL_RGBA32F);
   if (stage_ == Stage::input || stage_ == Stage::variance) {
     write(core::CM_IMAGE_WAVELET_BEHIND, behind_, GL_RGBA32F, GL_READ_WRITE);
   }
@@ -291,9 +288,8 @@ void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool meas
   if (row_ < size_.y) return;
   gl::memory_barrier(gl, GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
   row_ = 0;
-  const bool merges = stage_ == Stage::merge && recalls_;
-  if (stage_ == Stage::input || stage_ == Stage::level || merges) std::swap(front_[0], front_[1]);
-  if (stage_ == Stage::input || stage_ == Stage::level || merges || stage_ == Stage::variance) {
+  if (stage_ != Stage::reproject && (stage_ != Stage::merge || recalls_)) {
+    std::swap(front_[0], front_[1]);
     std::swap(spread_[0], spread_[1]);
   }
   if (stage_ == Stage::merge) kept_.filled = true;
@@ -346,6 +342,7 @@ void Wavelet::give(const PictureTextures& picture, MeansBackground background, G
   gl.BindTextureUnit(core::CM_UNIT_GUIDE_ALBEDO, guides.albedo);
   gl.BindTextureUnit(core::CM_UNIT_GUIDE_TRANSMITTANCE, guides.transmittance);
   gl.BindTextureUnit(core::CM_UNIT_GUIDE_VOLUME_Z, guides.volume_z);
+  gl.BindTextureUnit(core::CM_UNIT_GUIDE_EMISSION, guides.emission);
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_FRONT, front_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_SPREAD, spread_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_GUIDES, guides_.name());
@@ -355,7 +352,6 @@ void Wavelet::give(const PictureTextures& picture, MeansBackground background, G
     gl.BindImageTexture(core::CM_IMAGE_BACKGROUND_MEANS, background_means, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   }
   gl.ProgramUniform2i(program.name(), rows_at, 0, static_cast<GLint>(size_.y));
-  gl.ProgramUniform1f(program.name(), clear_at, guides.clear ? 1.0F : 0.0F);
   gl.ProgramUniform1f(program.name(), own_at, guides.surfaces ? 1.0F : 0.0F);
   program.use(gl);
   gl.DispatchCompute((size_.x + 7) / 8, (size_.y + 7) / 8, 1);

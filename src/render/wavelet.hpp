@@ -69,7 +69,6 @@ class Wavelet {
     std::uint64_t wish = 0;
     PictureView view;
     bool surfaces = true;  // as its guides have them
-    bool clear = true;
     glm::vec2 footprint{0.0F};
   };
   [[nodiscard]] std::uint32_t levels() const;

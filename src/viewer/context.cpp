@@ -194,8 +194,8 @@ render::PictureGuides Context::guides_of(const render::Picture& picture) {
   guides.transmittance = film.texture(render::film_layers::transmittance);
   guides.surface_z = film.texture(render::film_layers::surface_z);
   guides.volume_z = film.texture(render::film_layers::volume_z);
+  guides.emission = film.texture(render::film_layers::emission);
   guides.surfaces = picture.layered() != render::Layered::beneath;
-  guides.clear = parameters.medium.emits == 0U && parameters.medium.source == glm::vec3(0.0F);
   const float pixel = 2.0F * glm::length(parameters.view.up) / static_cast<float>(picture.size().y);
   guides.footprint = parameters.view.orthographic != 0U ? glm::vec2(pixel, 0.0F) : glm::vec2(0.0F, pixel);
   return guides;
