@@ -37,10 +37,10 @@ void main() {
   guides.surface_z = texelFetch(cm_surface_z, texel, 0).x;
   guides.volume_z = volume.x;
   float covered = cm_surfaces * through.y;
-  vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, guides.transmittance);
-  float open = cm_open(covered, volume.y, guides.transmittance);
   // What is known without noise is not filtered: it comes back at the end.
   vec3 emission = texelFetch(cm_emission, texel, 0).rgb;
+  vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, guides.transmittance, emission);
+  float open = cm_open(covered, volume.y, guides.transmittance);
   vec3 lit = mean.front.rgb - emission;
   vec3 front = lit / tint;
   float part = clamp(1.0 - mean.front.a, 0.0, 1.0);

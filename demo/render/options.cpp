@@ -703,6 +703,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
   check_together(options, app.count("--first-sample") > 0);
+  // As all flags of the scene's: files of pictures that differ in it have another scene's hash.
+  options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;
   return options;
 }
 

@@ -572,6 +572,7 @@ SceneOptions::SceneOptions() {
   for_each_group(*this, [](auto& group) { group.struct_size = sizeof group; });
   camera.struct_size = sizeof camera;
   sampling.samples = 64;
+  display.denoise = CUMULET_DENOISE_FAST;
 }
 
 cumulet_volume_file_desc volume_file(const SceneOptions& scene) {

@@ -30,11 +30,12 @@ bool Compositor::resolves_now() const { return milliseconds(Clock::now() - resol
 bool Compositor::filters_now() const { return milliseconds(Clock::now() - filtered_) >= pause * filter_ms_; }
 
 double Compositor::expected_ms() const {
-  double ms = draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0);
-  if (may_filter_ms_ > 0.0 && (wavelet_.of() || filters_now())) {
-    ms += std::min(may_filter_ms_, wavelet_.left_ms(filtering_.size).value_or(may_filter_ms_));
-  }
-  return ms;
+  return draw_ms_ + (resolves_now() ? resolve_ms_ : 0.0) + expected_filter_ms();
+}
+
+double Compositor::expected_filter_ms() const {
+  if (may_filter_ms_ <= 0.0 || (!wavelet_.of() && !filters_now())) return 0.0;
+  return std::min(may_filter_ms_, wavelet_.left_ms(filtering_.size).value_or(may_filter_ms_));
 }
 
 Compositor::Means* Compositor::free_means(glm::uvec2 size, bool apart, bool overwrite, bool newest_serves) {
@@ -139,6 +140,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   wavelet_.give(picture, background, means->texture.name(), means->background.name());
   means->of = filtering_;
   newest_ = means;
+  ++denoised_;
   filtered_ = Clock::now();
   // On a GPU calls return before the work is done.
   filter_ms_ = std::max(filtering_ms_, wavelet_.left_ms(filtering_.size).value_or(0.0));
@@ -147,18 +149,39 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
 
 Compositor::Means* Compositor::means_to_draw(const PictureTextures& picture, Background background,
                                              const Display& display, const FrameTarget& target) {
-  lags_ = false;
-  const bool filtered = display.denoise && picture.guides;
-  may_filter_ms_ = filtered ? target.filter_ms : 0.0;
-  if (!filtered) {
+  lags_ = denoising_ = false;
+  if (!display.denoise || !picture.guides) {
+    may_filter_ms_ = 0.0;
     wavelet_.free();
     return resolve(picture, background, target.wait);
   }
-  Means* means = filter(picture, background, target);
-  if (means == nullptr) means = resolve(picture, background, target.wait);
+  Means* means = go_on_filtering(picture, background, target);
+  return means != nullptr ? means : resolve(picture, background, target.wait);
+}
+
+Compositor::Means* Compositor::go_on_filtering(const PictureTextures& picture, Background background,
+                                               const FrameTarget& target) {
+  // A frame without a budget says nothing of those that have one.
+  if (target.filter_ms > 0.0) may_filter_ms_ = target.filter_ms;
+  Means* const means = filter(picture, background, target);
   const bool can = no_memory_for_ != picture.size && no_memory_to_filter_ != picture.size;
-  if (can && !picture.may_lag && means != nullptr && !(means->of == means_of(picture, background, true))) lags_ = true;
+  denoising_ = can && !picture.may_lag && (means == nullptr || !(means->of == means_of(picture, background, true)));
   return means;
+}
+
+void Compositor::denoise(const PictureTextures& picture, const Display& display, double filter_ms) {
+  lags_ = denoising_ = false;
+  if (!display.denoise || !picture.guides || picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0) return;
+  FrameTarget target;
+  target.filter_ms = filter_ms;
+  go_on_filtering(picture, background_of(picture, display), target);
+  gl::check(*gl_, "denoising the picture");
+  if (const auto failure = std::exchange(no_memory_, std::nullopt)) throw Error(*failure);
+}
+
+Compositor::Background Compositor::background_of(const PictureTextures& picture, const Display& display) {
+  if (picture.beneath != nullptr && picture.beneath->colour) return Background::apart;
+  return display.shows_background() ? Background::added : Background::left_out;
 }
 
 Compositor::Means* Compositor::resolve(const PictureTextures& picture, Background background, Wait wait) {
@@ -364,8 +387,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool layered = picture.beneath != nullptr && picture.beneath->colour;
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
-  const Background flat = display.shows_background() ? Background::added : Background::left_out;
-  Means* const means = means_to_draw(picture, layered ? Background::apart : flat, display, target);
+  Means* const means = means_to_draw(picture, background_of(picture, display), display, target);
   const auto begun = Clock::now();
   // Without means either there is no memory for them, or the driver is at their program still.
   const bool resolved = means != nullptr || lags_;

@@ -51,16 +51,24 @@ class Compositor {
   /// guides: by and by, as filter_ms allow; until then as it was denoised last, if that was of the same wish, else as
   /// it is. Throws Error(out_of_memory), once for each size, where there is no memory for that: it is drawn as it is.
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
+  /// For frames that do not draw: goes on with denoising what draw() would draw so, for that long. Errors as draw().
+  void denoise(const PictureTextures& picture, const Display& display, double filter_ms);
   /// Of GL memory.
   [[nodiscard]] std::uint64_t bytes() const;
   /// Milliseconds that the next call of draw will take, as far as is known.
   [[nodiscard]] double expected_ms() const;
+  /// Of that, for denoising.
+  [[nodiscard]] double expected_filter_ms() const;
   /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
   [[nodiscard]] bool drawn() const { return newest_ == nullptr || newest_->drawn.passed(); }
   /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
   /// that the device has not come to, or as it was drawn then, or nothing (Wait::never), its programs not being there
   /// yet: to be drawn again.
   [[nodiscard]] bool lags() const { return lags_; }
+  /// Whether a picture that has all its samples is still to be denoised.
+  [[nodiscard]] bool denoising() const { return denoising_; }
+  /// Another with every picture that was denoised: what draw() draws is another then.
+  [[nodiscard]] std::uint64_t denoised() const { return denoised_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -121,6 +129,9 @@ class Compositor {
   // What is drawn of the two.
   Means* means_to_draw(const PictureTextures& picture, Background background, const Display& display,
                        const FrameTarget& target);
+  // As far as it is denoised; null: not at all yet.
+  Means* go_on_filtering(const PictureTextures& picture, Background background, const FrameTarget& target);
+  static Background background_of(const PictureTextures& picture, const Display& display);
   // As free_means, but where there is no memory keeps that to be told, once, and gives null.
   Means* some_means(const MeansOf& wanted, bool overwrite, bool newest_serves);
   // To be written. Where as many as there may be wait to be drawn: null if the newest serves as well, else in place of
@@ -156,6 +167,8 @@ class Compositor {
   double resolve_ms_ = 0.0;       // within the call
   double draw_ms_ = 0.0;          // the rest of it
   bool lags_ = false;
+  bool denoising_ = false;
+  std::uint64_t denoised_ = 0;
   Clock::time_point resolved_{};
 };
 

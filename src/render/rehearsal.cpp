@@ -48,7 +48,7 @@ void Rehearsal::draw(PictureTextures picture, const Display& display, FrameTarge
     for (const glm::ivec4& viewport : {whole, same}) {
       target.viewport = viewport;
       compositor_.draw(picture, display, target);
-      lags_ = lags_ || compositor_.lags();
+      lags_ = lags_ || compositor_.lags() || compositor_.denoising();
     }
   }
   gl_->Disablei(GL_SCISSOR_TEST, 0);

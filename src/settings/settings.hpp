@@ -454,7 +454,7 @@ struct Table<cumulet_display_desc> {
                 .tip = "What is behind the volume, where that is one colour."}}),
       Setting(&Desc::denoise, {.name = "denoise", .choices = denoise_choices,
         .key = "display.denoise", .flag = "--denoise",
-        .help = "Take the noise away: `fast` by a filter (default: off)",
+        .help = "Take the noise away: `fast` by a filter (default: fast)",
         .row = {.label = "Denoise",
                 .tip = "What the screen shows of few samples. Files with linear values have them as they are."}})};
 };

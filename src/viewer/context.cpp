@@ -48,7 +48,8 @@ bool Context::shares_cores() const {
 render::Deadline Context::deadline_of(const Frame& frame, render::Deadline begun, bool shares) const {
   const double keep = shares ? reserve_.of(frame.budget_ms) : 0.0;
   const double drawing =
-      frame.target == Target::none ? 0.0 : std::min(compositor_.expected_ms(), most_of_drawing * frame.budget_ms);
+      std::min(frame.target == Target::none ? compositor_.expected_filter_ms() : compositor_.expected_ms(),
+               most_of_drawing * frame.budget_ms);
   return deadline_after(frame.budget_ms - keep - drawing + milliseconds_until(begun));
 }
 
@@ -132,7 +133,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.noise_target = shot.sampling.noise_target;
   wish.content.stops_by_noise = shot.sampling.noise_target.has_value();
   wish.depth = frame.write_depth;
-  wish.guides = shot.display.denoise && draws(shot, frame);
+  wish.guides = shot.display.denoise;
   wish.held = shot.held;
   return wish;
 }
@@ -281,7 +282,10 @@ render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const 
 void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   render::Picture* shown = progressive_.shown();
   if (shown != nullptr) result.size = shown->size();
-  if (!draws(shot, frame)) return;
+  if (!draws(shot, frame)) {
+    if (shown != nullptr && shot.display.denoise) denoise_undrawn(shot, frame, *shown);
+    return;
+  }
   if (shown == nullptr) shown = &empty_;
   const render::Display display = Context::display(shot, frame, *shown);
   render::FrameTarget target = Context::target(shot, frame, *shown);
@@ -310,15 +314,21 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   result.texture = target_->colour.name();
 }
 
+void Context::denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown) {
+  render::PictureTextures picture = textures_of(shown, progressive_.before());
+  picture.may_lag = !shown.done();
+  compositor_.denoise(picture, display(shot, frame, shown), target(shot, frame, shown).filter_ms);
+}
+
 void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
   const bool drawing = draws(shot, frame);
   if (const render::Picture* shown = progressive_.shown()) {
     const DrawnAs now{shown->revision(), shown->done(), shown->has_holes(),
-                      shown->film().has(render::film_layers::depth)};
+                      shown->film().has(render::film_layers::depth), compositor_.denoised()};
     if (drawing) drawn_ = compositor_.lags() ? std::nullopt : std::optional(now);
     result.undrawn = !drawing && drawn_ != now;
   }
-  const bool lags = drawing && compositor_.lags();
+  const bool lags = (drawing && compositor_.lags()) || compositor_.denoising();
   const bool pending = host_depth_.pending() || lags;
   const bool pictures = scene_.data() != nullptr && shot.view();
   result.loading = scene_.uploading();

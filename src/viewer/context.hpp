@@ -76,6 +76,8 @@ class Context {
   /// The surfaces need not wait for the volume.
   void draw_surfaces_alone(const Shot& shot, const Frame& frame);
   void draw(const Shot& shot, const Frame& frame, FrameResult& result);
+  /// Goes on with what a frame that draws will show.
+  void denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown);
   /// What is known after the frame.
   void tell(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Whether the frame's failure is to be told: what does not build fails in each until a setting changes.
@@ -121,6 +123,7 @@ class Context {
     bool done = false;
     bool holes = false;
     bool depth = false;
+    std::uint64_t denoised = 0;
     bool operator==(const DrawnAs&) const = default;
   };
   struct TargetKind {

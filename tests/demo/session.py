@@ -50,6 +50,8 @@ class Session:
     def play(self, name, replay, *arguments, size=SIZE):
         (self.out / f"{name}.replay").write_text("\n".join(replay) + "\n")
         samples = [] if "--spp" in arguments else ["--spp", "6"]
+        # Samples are judged, not what is made of them.
+        samples += [] if "--denoise" in arguments else ["--denoise", "off"]
         # What the pictures were judged by, before there was a scale that follows the volume.
         scale = [] if "--scene" in arguments or "--density-scale" in arguments else ["--density-scale", "1"]
         done = self.start([*size, *samples, *scale, *arguments, "--replay", f"{name}.replay"])
@@ -58,7 +60,8 @@ class Session:
     def play_live(self, name, replay, hand, *arguments, size=SIZE):
         """Plays a replay that idles, with hand() at mouse and keyboard as soon as it has written live.json."""
         (self.out / f"{name}.replay").write_text("\n".join(replay) + "\n")
-        demo = subprocess.Popen([self.demo, *size, *arguments, "--replay", f"{name}.replay"], cwd=self.out,
+        denoise = [] if "--denoise" in arguments else ["--denoise", "off"]
+        demo = subprocess.Popen([self.demo, *size, *arguments, *denoise, "--replay", f"{name}.replay"], cwd=self.out,
                                 env=self.environment, stderr=subprocess.PIPE, text=True)
         try:
             while not (self.out / "live.json").exists():

@@ -159,6 +159,32 @@ TEST_F(DenoisedPicture, FramesAreFilteredWhereThatIsSetAndWhatIsReadIsNot) {
   EXPECT_EQ(target_.pixels(), raw);
 }
 
+// Hosts may work in frames that draw nothing, and draw in others, without a budget, what there is.
+TEST_F(DenoisedPicture, FramesThatDrawNothingFilterToo) {
+  const std::vector<std::uint8_t> raw = cumulet::test::picture_of(viewer_.get(), volume_.get(), target_);
+  auto display = make_desc<cumulet_display_desc>();
+  display.denoise = CUMULET_DENOISE_FAST;
+  ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
+  auto undrawn = target_.frame();
+  undrawn.target = CUMULET_TARGET_NONE;
+  const auto is_news = [&] {
+    auto result = make_desc<cumulet_frame_result>();
+    EXPECT_EQ(cumulet_render(viewer_.get(), &undrawn, &result), CUMULET_OK) << error();
+    return (result.flags & CUMULET_RENDER_UNDRAWN) != 0;
+  };
+  cumulet::test::converge(viewer_.get(), undrawn);
+  EXPECT_TRUE(is_news());
+  auto drawn = target_.frame();
+  drawn.budget_ms = -1.0;
+  ASSERT_EQ(cumulet_render(viewer_.get(), &drawn, nullptr), CUMULET_OK) << error();
+  const std::vector<std::uint8_t> filtered = target_.pixels();
+  EXPECT_NE(filtered, raw);
+  EXPECT_FALSE(is_news());
+  auto frame = target_.frame();
+  cumulet::test::converge(viewer_.get(), frame);
+  EXPECT_EQ(target_.pixels(), filtered);
+}
+
 TEST_F(DenoisedPicture, DebugViewsAreNotDenoised) {
   sample(1, CUMULET_VIEW_CELLS);
   auto display = make_desc<cumulet_display_desc>();

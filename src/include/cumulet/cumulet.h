@@ -914,9 +914,10 @@ typedef struct cumulet_display_desc {
    * found again by depth, as up to 32 samples that fade as the pixel gets 64: pictures converge to what they are
    * without. Each view has random numbers of its own then. cumulet_read_linear and cumulet_read_aov are not filtered,
    * and cumulet_read_denoised knows no other frames. It takes at most four tenths of a frame's budget (in the long run
-   * a fifth), 220 bytes a pixel of GL memory and four unlit rays a pixel. Until it is done frames draw the last picture
-   * of the same scene and camera, else this as it is. Without memory for it, or for other frames, they are drawn
-   * without, which CUMULET_ERROR_OUT_OF_MEMORY says once. Debug views are not filtered.
+   * a fifth), 240 bytes a pixel of GL memory and four unlit rays a pixel. Until it is done frames draw the last picture
+   * of the same scene and camera, else this as it is; those that draw nothing go on with it, too, and say by
+   * CUMULET_RENDER_UNDRAWN when there is another. Without memory for it, or for other frames, they are drawn without,
+   * which CUMULET_ERROR_OUT_OF_MEMORY says once. Debug views are not filtered.
    */
   cumulet_denoise denoise;
 } cumulet_display_desc;
