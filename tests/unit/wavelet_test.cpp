@@ -308,7 +308,8 @@ TEST_P(Wavelets, ALampDoesNotLeak) {
   const auto clean = samples.filtered(programs_);
   for (int i = 0; i < 48 * 48; ++i) {
     const bool lamp = is_lamp(i % 48, i / 48);
-    EXPECT_NEAR(clean[static_cast<std::size_t>(i)].x, lamp ? 35.01F : 0.7F, lamp ? 1.2F : 0.35F) << i % 48 << ", " << i / 48;
+    EXPECT_NEAR(clean[static_cast<std::size_t>(i)].x, lamp ? 35.01F : 0.7F, lamp ? 1.2F : 0.35F)
+        << i % 48 << ", " << i / 48;
   }
   EXPECT_LT(error_of(clean, samples.truth()), 0.1 * error_of(samples.raw(), samples.truth()));
 }
