@@ -7,7 +7,7 @@
 //   surface z     view depth of that surface at the pixel's centre, infinity where there is none
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
 //   emission      what reaches the eye straight from what gives it off, unscattered: the volume along the ray, and through
-//                 it the nearest surface's front; mean
+//                 it the nearest surface, none behind the ground; mean
 // and, as a filter that follows what moves asks for them, beside the normal the view depth of what is solid at the
 // pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
 // for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
@@ -74,7 +74,7 @@ void main() {
       normal += point.material.normal;
       albedo += point.material.base_color;
       covered.x += 1.0;
-      if (hit.front) of_surface = cm_emission(cm_vertex_mix(hit.triangle, hit.barycentrics));
+      of_surface = point.emission;
     }
 #endif
     if (i == 0 && surface_t < 1e37) surface_z = surface_t / t_per_z;
@@ -109,8 +109,9 @@ void main() {
 #if CM_CHANNELS
         // As if it were dimmed evenly within this part.
         float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
-        emission += dimmed * cm_emitted(cm_march_emission(cell, o, d), t, min(t_1, range.y));
+        emission += dimmed * cm_emitted(cm_march_emission(cell, o, d), t, min(t_1, solid_t));
 #endif
+        if (t < solid_t) emission += clear * chance * cm.medium.source;
         scattered_z += clear * chance * (t + within_part * min(span, range.y - t)) / t_per_z;
         scattered += clear * chance;
         clear -= clear * chance;
@@ -119,10 +120,10 @@ void main() {
       }
     }
     transmittance += exp(-used);
-    emission += (1.0 - exp(-used)) * cm.medium.source;
 #if CM_SURFACES
     // Where another draws the surfaces beneath, their light is none of the picture's.
-    if (cm.layers.count == 0u || cm.layers.coloured != 0u) emission += exp(-used) * of_surface;
+    bool drawn_here = cm.layers.count == 0u || cm.layers.coloured != 0u;
+    if (drawn_here && surface_t <= ground_t) emission += exp(-used) * of_surface;
 #endif
   }
   imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));

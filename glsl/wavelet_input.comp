@@ -45,8 +45,7 @@ void main() {
   vec3 front = lit / tint;
   float part = clamp(1.0 - mean.front.a, 0.0, 1.0);
   guides.finite = cm_are_numbers(mean.front.rgb) && cm_are_numbers(mean.background) && cm_is_number(mean.front.a) &&
-                  cm_are_numbers(emission) &&
-                  cm_is_number(1e-15 * square);
+                  cm_are_numbers(emission) && cm_is_number(1e-15 * square);
   // A sample is covered or it is not: of its square, what is behind can be taken off.
   float behind = cm_luminance(mean.background);
   float luminance = cm_luminance(front);
@@ -54,7 +53,7 @@ void main() {
   float known = cm_luminance(emission);
   float of_front = square - (part > 0.0 ? behind * behind / part : 0.0);
   float own = max(of_front - known * (2.0 * apart + known), apart * apart);
-  float scale = apart != 0.0 ? luminance / apart : 1.0;
+  float scale = apart != 0.0 ? clamp(luminance / apart, 1.0, 20.0) : 1.0;
   float moment = samples > 0.0 ? scale * scale * own : luminance * luminance;
   if (!guides.finite) {
     front = vec3(0.0);

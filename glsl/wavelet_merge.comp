@@ -90,7 +90,7 @@ CmLit cm_believed(CmLit lit, CmAround around, float cover, float samples) {
   vec3 clamped = cover * clamp(lit.front.rgb / cover, around.now - room, around.now + room);
   float before = cm_luminance(lit.front.rgb);
   float after = cm_luminance(clamped);
-  if (before > 0.0) lit.moment *= after * after / (before * before);
+  if (before != 0.0) lit.moment *= min(1.0, after * after / (before * before));
   lit.front.rgb = clamped;
   return lit;
 }

@@ -129,7 +129,8 @@ void main() {
     vec3 colour = front.rgb / count;
     float luminance = cm_luminance(colour);
     float channels = dot(colour, colour) / 3.0;
-    if (luminance > 0.0) sample_variance *= channels / (luminance * luminance);
+    // At most as of light that is all blue: what is left of emission has either sign.
+    if (channels > 0.0) sample_variance *= min(64.0, channels / max(luminance * luminance, 1e-30));
     // None of few samples is not never (Krichevsky and Trofimov 1981).
     open = (open + 0.5) / (count + 1.0);
     // Means of few are skewed, and what is known of their noise is noise.

@@ -96,6 +96,7 @@ void write_checkpoint(const std::string& path, const Checkpoint& checkpoint) {
   for (const auto& [name, value] : checkpoint.of) add(name, value);
   add(driver_name, checkpoint.driver);
   text += '\n';
+  text.reserve(text.size() + checkpoint.accumulation.size() + std::size_t{64});
   text.append(reinterpret_cast<const char*>(checkpoint.accumulation.data()), checkpoint.accumulation.size());
   text += checksum(text);
   image::replace_file(path, text);

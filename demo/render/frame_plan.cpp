@@ -67,8 +67,15 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   const Written checkpoint("--checkpoint", options.checkpoint, frames.size());
 
   FramePlan plan;
-  for (const Frame frame : frames)
+  for (const Frame frame : frames) {
     plan.frames.push_back({frame, volume->file(frame), output.of(frame), stats.of(frame), checkpoint.of(frame)});
+    const PlannedFrame& planned = plan.frames.back();
+    if (same_file(planned.checkpoint, planned.output) || same_file(planned.checkpoint, planned.stats) ||
+        same_file(planned.stats, planned.output)) {
+      throw UsageError("frame " + std::to_string(frame) +
+                       ": --output, --stats and --checkpoint shall be files of their own");
+    }
+  }
   std::vector<std::pair<std::uintmax_t, std::string>> sized;
   for (const Frame frame : there) {
     std::string file = volume->file(frame);

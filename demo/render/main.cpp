@@ -343,9 +343,15 @@ enum class Traced { converged, late, stopped };
 
 using Clock = std::chrono::steady_clock;
 
+/// With its version: another's pictures may be of other bits.
+std::string driver_of(const Viewer& viewer) {
+  const cumulet_stats stats = stats_of(viewer);
+  return std::string(stats.gl_vendor) + ", " + stats.gl_renderer + ", " + stats.gl_version;
+}
+
 /// Keeps what the samples have come to.
 void keep(const Viewer& viewer, const RenderOptions& options) {
-  cumulet::demo::Checkpoint checkpoint{cumulet::demo::checkpoint_of(options), stats_of(viewer).gl_renderer, {}};
+  cumulet::demo::Checkpoint checkpoint{cumulet::demo::checkpoint_of(options), driver_of(viewer), {}};
   std::size_t size = 0;
   check(viewer, cumulet_read_accumulation(viewer.get(), nullptr, &size));
   checkpoint.accumulation.resize(size);
@@ -353,11 +359,17 @@ void keep(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::write_checkpoint(options.checkpoint, checkpoint);
 }
 
+/// Of a picture that is written.
+void forget_checkpoint(const std::string& file) {
+  std::error_code ignored;  // it is in nobody's way
+  if (!file.empty()) std::filesystem::remove(file, ignored);
+}
+
 /// Where it cannot, the picture goes on: there may be room the next time.
 void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
   try {
     keep(viewer, options);
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
     tell(progress, std::string("warning: no checkpoint now: ") + error.what());
   }
 }
@@ -373,7 +385,7 @@ void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint
   }
   if (cumulet_restore_accumulation(viewer.get(), from.accumulation.data(), from.accumulation.size()) != CUMULET_OK)
     throw std::runtime_error(options.checkpoint + ": " + cumulet_last_error(viewer.get()));
-  const std::string driver = stats_of(viewer).gl_renderer;
+  const std::string driver = driver_of(viewer);
   tell(progress, options.output + ": goes on from " + options.checkpoint +
                      (driver == from.driver ? ""
                                             : ", which another driver made (" + from.driver +
@@ -483,11 +495,13 @@ class Studio {
   void write(const RenderOptions& options) {
     const std::vector<float> denoised = denoise(viewer_, options, network_, progress_);
     progress_.stage("writing " + options.output);
-    write_picture(viewer_, options, denoised);
+    // The picture last: where it is, all is.
     if (!options.stats.empty()) write_stats(options, stats_of(viewer_), context_.name());
-    std::error_code ignored;  // it is in nobody's way
-    if (!options.checkpoint.empty()) std::filesystem::remove(options.checkpoint, ignored);
+    write_picture(viewer_, options, denoised);
   }
+
+  /// For another run with a time limit.
+  void keep_samples(const RenderOptions& options) { try_to_keep(viewer_, options, progress_); }
 
   /// How the picture that is written ended. Throws if somebody stopped it.
   void tell_end(const RenderOptions& options, Traced traced) {
@@ -573,6 +587,11 @@ void render(const RenderOptions& options) {
   if (traced == Traced::stopped && !options.checkpoint.empty())
     throw std::runtime_error(options.output + ": interrupted: the same command goes on from " + options.checkpoint);
   studio.write(options);
+  if (traced == Traced::late && !options.checkpoint.empty()) {
+    studio.keep_samples(options);
+  } else {
+    forget_checkpoint(options.checkpoint);
+  }
   studio.write_trace(options);
   studio.tell_end(options, traced);
 }
@@ -674,9 +693,9 @@ class Report {
 /// Makes a frame: loads its volume, traces, writes.
 void render_frame_of(Studio& studio, const RenderOptions& picture, Report& report, std::size_t place) {
   const auto start = Clock::now();
-  const std::optional<Checkpoint> from = checkpoint_for(picture);
   Traced traced = Traced::stopped;
   try {
+    const std::optional<Checkpoint> from = checkpoint_for(picture);
     studio.load(picture.scene);
     traced = studio.trace(picture, from);
   } catch (const std::runtime_error& error) {
@@ -687,6 +706,7 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, Report& repor
   if (traced == Traced::stopped) throw std::runtime_error("interrupted: " + report.not_made(place));
   try {
     studio.write(picture);
+    forget_checkpoint(picture.checkpoint);
     studio.tell_end(picture, traced);
   } catch (const std::runtime_error& error) {
     report.say(place, FrameState::failed, error.what(), &studio.progress());
@@ -709,6 +729,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
   for (std::size_t i = 0; i < plan.frames.size(); ++i) {
     const cumulet::demo::PlannedFrame& frame = plan.frames[i];
     if (!options.overwrite && cumulet::demo::is_made(frame.output)) {
+      forget_checkpoint(frame.checkpoint);  // of a run that was killed before it could
       report.say(i, FrameState::kept, frame.output, studio ? &studio->progress() : nullptr);
       continue;
     }

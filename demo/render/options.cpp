@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -567,16 +568,24 @@ void check_together(const RenderOptions& options, bool part) {
     throw UsageError("--checkpoint needs the shaded view");
   for (const auto& [flag, file] :
        {std::pair("--output", options.output), {"--stats", options.stats}, {"--trace", options.trace}}) {
-    if (!options.checkpoint.empty() && options.checkpoint == file)
+    if (same_file(options.checkpoint, file))
       throw UsageError("--checkpoint and " + std::string(flag) + " are the same file");
   }
-  if (options.stats == options.output) throw UsageError("--stats and --output are the same file");
-  if (options.trace == options.output) throw UsageError("--trace and --output are the same file");
-  if (!options.trace.empty() && options.trace == options.stats)
-    throw UsageError("--trace and --stats are the same file");
+  if (same_file(options.stats, options.output)) throw UsageError("--stats and --output are the same file");
+  if (same_file(options.trace, options.output)) throw UsageError("--trace and --output are the same file");
+  if (same_file(options.trace, options.stats)) throw UsageError("--trace and --stats are the same file");
 }
 
 }  // namespace
+
+bool same_file(const std::string& a, const std::string& b) {
+  if (a.empty() || b.empty()) return false;
+  std::error_code of_a;
+  std::error_code of_b;
+  const auto path_a = std::filesystem::weakly_canonical(a, of_a);
+  const auto path_b = std::filesystem::weakly_canonical(b, of_b);
+  return of_a || of_b ? a == b : path_a == path_b;
+}
 
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
   RenderOptions options;

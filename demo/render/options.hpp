@@ -57,6 +57,9 @@ struct RenderOptions {
   std::vector<cumulet_aov> aovs;     // layers of an .exr beside the picture
 };
 
+/// Whether both names are of one file, there or not, however they are written; none is of none.
+[[nodiscard]] bool same_file(const std::string& a, const std::string& b);
+
 /// cumulet-render's arguments, without the program's name. Nothing if they asked for --help or --version, whose text
 /// goes to out. Throws UsageError.
 [[nodiscard]] std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out);

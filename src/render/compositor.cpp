@@ -105,7 +105,14 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   if (no_memory_for_ == picture.size || no_memory_to_filter_ == picture.size) return nullptr;
   const bool always = target.wait == Wait::always;
   if (wavelet_.of() != picture.picture) wavelet_.drop();  // of which it might ask for another variant
-  if (!wavelet_.able(picture, background, always)) return serves;
+  try {
+    if (!wavelet_.able(picture, background, always)) return serves;
+  } catch (const Error& error) {
+    // A driver that does not build them shows pictures as they are.
+    no_memory_to_filter_ = picture.size;
+    no_memory_ = error;
+    return nullptr;
+  }
   if (wavelet_.of() != picture.picture || filtering_.background != background) {
     wavelet_.drop();
     if (older && picture.may_lag && !filters_now()) return newest_;
@@ -150,11 +157,9 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
 Compositor::Means* Compositor::means_to_draw(const PictureTextures& picture, Background background,
                                              const Display& display, const FrameTarget& target) {
   lags_ = denoising_ = false;
-  if (!display.denoise || !picture.guides) {
-    may_filter_ms_ = 0.0;
-    wavelet_.free();
-    return resolve(picture, background, target.wait);
-  }
+  if (!display.denoise) rest();
+  // Where guides are only late, what is remembered is of use later.
+  if (!display.denoise || !picture.guides) return resolve(picture, background, target.wait);
   Means* means = go_on_filtering(picture, background, target);
   return means != nullptr ? means : resolve(picture, background, target.wait);
 }
@@ -169,8 +174,15 @@ Compositor::Means* Compositor::go_on_filtering(const PictureTextures& picture, B
   return means;
 }
 
+void Compositor::rest() {
+  denoising_ = false;
+  may_filter_ms_ = 0.0;
+  wavelet_.free();
+}
+
 void Compositor::denoise(const PictureTextures& picture, const Display& display, double filter_ms) {
   lags_ = denoising_ = false;
+  if (!display.denoise) rest();
   if (!display.denoise || !picture.guides || picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0) return;
   FrameTarget target;
   target.filter_ms = filter_ms;

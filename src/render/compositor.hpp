@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -53,6 +54,10 @@ class Compositor {
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
   /// For frames that do not draw: goes on with denoising what draw() would draw so, for that long. Errors as draw().
   void denoise(const PictureTextures& picture, const Display& display, double filter_ms);
+  /// There is nothing to denoise any more: forgets all that it has for that.
+  void rest();
+  /// Begins anew with the picture that it is denoising: what is known of it without noise is another.
+  void begin_denoising_anew() { wavelet_.drop(); }
   /// Of GL memory.
   [[nodiscard]] std::uint64_t bytes() const;
   /// Milliseconds that the next call of draw will take, as far as is known.
@@ -60,7 +65,9 @@ class Compositor {
   /// Of that, for denoising.
   [[nodiscard]] double expected_filter_ms() const;
   /// Whether the device has come to all that was drawn, where dispatches run within their call. Never waits.
-  [[nodiscard]] bool drawn() const { return newest_ == nullptr || newest_->drawn.passed(); }
+  [[nodiscard]] bool drawn() const {
+    return std::ranges::all_of(means_, [](const auto& means) { return means->drawn.passed(); });
+  }
   /// Whether the last draw drew what there was some frames ago, all memory for what is newer being in use by drawing
   /// that the device has not come to, or as it was drawn then, or nothing (Wait::never), its programs not being there
   /// yet: to be drawn again.

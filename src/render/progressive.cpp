@@ -138,7 +138,8 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
                         const PictureSettings& settings) {
   PictureParameters parameters = wish_.parameters;
   parameters.view.size = size_of(divisor);
-  if (wish_.guides) parameters.integrator.seed = seed_of(parameters);
+  // Without previews all depends on the settings alone.
+  if (wish_.guides && wish_.content.preview) parameters.integrator.seed = seed_of(parameters);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();
   try {
@@ -165,16 +166,18 @@ bool Progressive::needs_depth() const {
 
 bool Progressive::needs_guides(const Work& work) const {
   return wish_.guides && wish_.content.view == View::shaded && work.data == wish_.content.data &&
-         no_memory_for_guides_ != work.picture->size() && !work.picture->has_facts();
+         no_guides_for_ != work.picture->size() && !work.picture->has_facts();
 }
 
 void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
-  if (!needs_guides(*working_) || !tracer_.able_to_find(*working_->picture, data, obstacles)) return;
+  if (!needs_guides(*working_)) return;
   try {
+    if (!tracer_.able_to_find(*working_->picture, data, obstacles)) return;
     tracer_.find_facts(*working_->picture, data, obstacles, deadline, guide_rays);
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::out_of_memory) throw;
-    no_memory_for_guides_ = working_->picture->size();
+    // Nor where a driver does not build their program.
+    if (error.code() != ErrorCode::out_of_memory && error.code() != ErrorCode::gl) throw;
+    no_guides_for_ = working_->picture->size();
     no_guides_ = error;
   }
 }

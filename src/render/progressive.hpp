@@ -96,6 +96,8 @@ class Progressive {
     return newest_work() && newest_work()->data == data;
   }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
+  /// Whether pictures come coarse first.
+  [[nodiscard]] bool previews() const { return wish_.content.preview; }
   [[nodiscard]] bool converged() const;
   /// Whether advance has anything left to do.
   [[nodiscard]] bool more() const;
@@ -150,8 +152,8 @@ class Progressive {
   PictureWish wish_;
   std::uint64_t wishes_ = 0;
   std::uint64_t scenes_ = 0;
-  std::optional<glm::uvec2> no_memory_for_guides_;  // of this size
-  std::optional<Error> no_guides_;                  // to be told
+  std::optional<glm::uvec2> no_guides_for_;  // of this size
+  std::optional<Error> no_guides_;           // to be told
   Schedule schedule_;
   Stillness stillness_;
   std::optional<Work> working_;

@@ -230,7 +230,7 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   textures.revision = picture.revision();
   textures.moments = film.texture(render::film_layers::moments);
   if (picture.view() == render::View::shaded && picture.has_facts()) textures.guides = guides_of(picture);
-  if (textures.guides) textures.view = view_of(picture);
+  if (textures.guides && progressive_.previews()) textures.view = view_of(picture);
   if (before != nullptr) {
     textures.sum_before = before->film().texture(render::film_layers::radiance);
     textures.background_before = before->film().texture(render::film_layers::background);
@@ -283,7 +283,11 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   render::Picture* shown = progressive_.shown();
   if (shown != nullptr) result.size = shown->size();
   if (!draws(shot, frame)) {
-    if (shown != nullptr && shot.display.denoise) denoise_undrawn(shot, frame, *shown);
+    if (shown != nullptr) {
+      denoise_undrawn(shot, frame, *shown);
+    } else {
+      compositor_.rest();
+    }
     return;
   }
   if (shown == nullptr) shown = &empty_;
@@ -317,7 +321,8 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
 void Context::denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown) {
   render::PictureTextures picture = textures_of(shown, progressive_.before());
   picture.may_lag = !shown.done();
-  compositor_.denoise(picture, display(shot, frame, shown), target(shot, frame, shown).filter_ms);
+  display_timer_.run(
+      [&] { compositor_.denoise(picture, display(shot, frame, shown), target(shot, frame, shown).filter_ms); });
 }
 
 void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {

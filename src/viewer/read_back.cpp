@@ -140,6 +140,7 @@ void Context::find_facts(const Shot& shot, render::Picture& picture) {
     throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
   }
   const render::Obstacles met = obstacles(shot);
+  compositor_.begin_denoising_anew();
   while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0))) {
   }
 }

@@ -24,6 +24,20 @@ class Picture:
         done = subprocess.run(command, capture_output=True, text=True, timeout=600)
         return done.returncode, done.stderr
 
+    def stop_once_kept(self, number):
+        """As stop(), when it has written a checkpoint, or another than there was."""
+        before = self.checkpoint.stat().st_mtime_ns if self.checkpoint.exists() else 0
+        process = subprocess.Popen(self.kept + ["--checkpoint-every", "0.05"], stderr=subprocess.PIPE, text=True)
+        while process.poll() is None:
+            try:
+                if self.checkpoint.stat().st_mtime_ns != before:
+                    break
+            except FileNotFoundError:
+                pass
+            time.sleep(0.005)
+        process.send_signal(number)
+        return process, process.communicate(timeout=120)[1]
+
     def stop(self, seconds, number):
         """Its exit status and what it says when the signal comes after so long."""
         process = subprocess.Popen(self.kept, stderr=subprocess.PIPE, text=True)
@@ -38,11 +52,10 @@ def stopped(render, volume, out):
     status, error = whole.run(whole.command)
     assert status == 0, error
     part = Picture(render, volume, out / "part", "--spp", "300", "--aovs", "volume,error")
-    seconds, times = 0.5, 0
-    while not part.output.exists():
+    times = 0
+    for _ in range(4):
         had = part.checkpoint.exists()
-        process, error = part.stop(seconds, signal.SIGTERM)
-        seconds += 0.3  # a busy machine takes longer until the first sample
+        process, error = part.stop_once_kept(signal.SIGTERM)
         if process.returncode == 0:
             break
         assert process.returncode == 1 and "interrupted" in error, error
@@ -50,9 +63,13 @@ def stopped(render, volume, out):
         if part.checkpoint.exists() and had:
             times += 1
             assert f"goes on from {part.checkpoint}" in error, error
+    if not part.output.exists():
+        status, error = part.run(part.kept)
+        assert status == 0 and "goes on from" in error, error
+        times += 1
+    assert times > 0, "it was never stopped"
     assert part.output.read_bytes() == whole.output.read_bytes(), "not the same file"
     assert not part.checkpoint.exists()
-    return times
 
 
 def killed(render, volume, out):

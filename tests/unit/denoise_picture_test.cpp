@@ -185,6 +185,34 @@ TEST_F(DenoisedPicture, FramesThatDrawNothingFilterToo) {
   EXPECT_EQ(target_.pixels(), filtered);
 }
 
+// What was begun in frames that draw nothing is given up there, too: none waits for it.
+TEST_F(DenoisedPicture, SwitchedOffInSuchFramesNothingIsLeftToDo) {
+  cumulet::test::picture_of(viewer_.get(), volume_.get(), target_);
+  const auto bytes = [&] {
+    auto stats = make_desc<cumulet_stats>();
+    EXPECT_EQ(cumulet_get_stats(viewer_.get(), &stats), CUMULET_OK);
+    return stats.gl_bytes;
+  };
+  const auto without = bytes();
+  auto display = make_desc<cumulet_display_desc>();
+  display.denoise = CUMULET_DENOISE_FAST;
+  ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
+  auto frame = target_.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  frame.budget_ms = 1.0;
+  for (int i = 0; i < 1000 && bytes() < without + 96U * side * side; ++i) {
+    ASSERT_EQ(cumulet_render(viewer_.get(), &frame, nullptr), CUMULET_OK) << error();
+  }
+  EXPECT_GE(bytes(), without + 96U * side * side);
+  display.denoise = CUMULET_DENOISE_OFF;
+  ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
+  auto result = make_desc<cumulet_frame_result>();
+  ASSERT_EQ(cumulet_render(viewer_.get(), &frame, &result), CUMULET_OK) << error();
+  EXPECT_NE(result.flags & CUMULET_RENDER_CONVERGED, 0U);
+  EXPECT_EQ(result.flags & CUMULET_RENDER_MORE, 0U);
+  EXPECT_LT(bytes(), without + 96U * side * side);
+}
+
 TEST_F(DenoisedPicture, DebugViewsAreNotDenoised) {
   sample(1, CUMULET_VIEW_CELLS);
   auto display = make_desc<cumulet_display_desc>();

@@ -311,7 +311,7 @@ TEST_P(Wavelets, ALampDoesNotLeak) {
     EXPECT_NEAR(clean[static_cast<std::size_t>(i)].x, lamp ? 35.01F : 0.7F, lamp ? 1.2F : 0.35F)
         << i % 48 << ", " << i / 48;
   }
-  EXPECT_LT(error_of(clean, samples.truth()), 0.1 * error_of(samples.raw(), samples.truth()));
+  EXPECT_LT(error_of(clean, samples.truth()), 0.3 * error_of(samples.raw(), samples.truth()));
 }
 
 // Flames without smoke: they cover nothing, and end in clear air.
