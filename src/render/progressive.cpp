@@ -138,7 +138,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
                         const PictureSettings& settings) {
   PictureParameters parameters = wish_.parameters;
   parameters.view.size = size_of(divisor);
-  // Without previews all depends on the settings alone.
+  // Without previews what is read depends on the settings alone.
   if (wish_.guides && wish_.content.preview) parameters.integrator.seed = seed_of(parameters);
   Picture& picture = acquire(parameters.view.size);
   working_.reset();

@@ -96,7 +96,7 @@ class Progressive {
     return newest_work() && newest_work()->data == data;
   }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
-  /// Whether pictures come coarse first.
+  /// Whether pictures may come coarse first, and need not be the same whatever was before.
   [[nodiscard]] bool previews() const { return wish_.content.preview; }
   [[nodiscard]] bool converged() const;
   /// Whether advance has anything left to do.

@@ -49,11 +49,12 @@ class DenoisedPicture : public testing::Test {
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
 
-  void sample(std::uint32_t samples, cumulet_view view = CUMULET_VIEW_SHADED) const {
+  void sample(std::uint32_t samples, cumulet_view view = CUMULET_VIEW_SHADED,
+              cumulet_preview preview = CUMULET_PREVIEW_OFF) const {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = samples;
     sampling.view = view;
-    sampling.preview = CUMULET_PREVIEW_OFF;
+    sampling.preview = preview;
     EXPECT_EQ(cumulet_set_sampling(viewer_.get(), &sampling), CUMULET_OK);
   }
 
@@ -281,6 +282,10 @@ class MovingPicture : public DenoisedPicture {
     EXPECT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces_.get()), CUMULET_OK);
   }
 
+  // Frames follow each other where there are previews.
+  void sample(std::uint32_t samples) const {
+    DenoisedPicture::sample(samples, CUMULET_VIEW_SHADED, CUMULET_PREVIEW_AUTO);
+  }
   void look_from(int step) const {
     const double angle = 0.03 * step;
     auto stand = make_desc<cumulet_camera_desc>();
@@ -301,6 +306,7 @@ class MovingPicture : public DenoisedPicture {
   [[nodiscard]] std::vector<float> frame() const {
     auto desc = hdr_.frame();
     desc.colour = CUMULET_COLOUR_HDR;
+    desc.budget_ms = 1000.0;  // there is time for all of it at once, none of it coarse
     cumulet::test::converge(viewer_.get(), desc);
     return hdr_.floats();
   }

@@ -910,9 +910,10 @@ typedef struct cumulet_display_desc {
   float background_color[3]; /* linear Rec. 709 radiance, exposed and tone-mapped as all is; debug views have black */
   /*
    * Whether what frames draw is filtered: neighbours tell what a pixel's own samples do not yet (an edge-avoiding
-   * a-trous wavelet, Dammertz et al. 2010, by variance as of Schied et al. 2017), and so do frames of other views,
-   * found again by depth, as up to 32 samples that fade as the pixel gets 64: pictures converge to what they are
-   * without. Each view has random numbers of its own then. cumulet_read_linear and cumulet_read_aov are not filtered,
+   * a-trous wavelet, Dammertz et al. 2010, by variance as of Schied et al. 2017), and so, where previews are on, do
+   * frames of other views, found again by depth, as up to 32 samples that fade as the pixel gets 64: pictures converge
+   * to what they are without. Each view has random numbers of its own then, beside the seed: what is read back is as
+   * right, not the same. cumulet_read_linear and cumulet_read_aov are not filtered,
    * and cumulet_read_denoised knows no other frames. It takes at most four tenths of a frame's budget (in the long run
    * a fifth), 240 bytes a pixel of GL memory and four unlit rays a pixel. Until it is done frames draw the last picture
    * of the same scene and camera, else this as it is; those that draw nothing go on with it, too, and say by
