@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace cumulet::demo {
 
@@ -14,6 +16,9 @@ class UsageError : public std::runtime_error {
 
 /// Line breaks become blanks, but for those at the end, which go.
 [[nodiscard]] std::string one_line(std::string text);
+
+/// Fowler, Noll and Vo's hash 1a of 64 bits.
+[[nodiscard]] std::uint64_t fnv1a(std::string_view bytes);
 
 /// A variable of the environment; empty if it is not set.
 [[nodiscard]] std::string environment_variable(const char* name);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <file.hpp>
 #include <filesystem>
+#include <program.hpp>
 #include <stdexcept>
 #include <string_view>
 
@@ -20,10 +21,9 @@ constexpr std::string_view driver_name = "driver";
   throw std::runtime_error(path + ": " + cause);
 }
 
-/// FNV-1a: against what is cut off or damaged, not against malice.
+/// Against what is cut off or damaged, not against malice.
 std::string checksum(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  const std::uint64_t hash = fnv1a(bytes);
   std::string text(sizeof hash, '\0');
   std::memcpy(text.data(), &hash, sizeof hash);
   return text;
@@ -76,8 +76,7 @@ std::string number_text(double value) {
 CheckpointOf checkpoint_of(const RenderOptions& options) {
   const cumulet_sampling_desc& sampling = options.scene.sampling;
   const bool volume = std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end();
-  return {{"version", std::to_string(CUMULET_VERSION_MAJOR) + "." + std::to_string(CUMULET_VERSION_MINOR) + "." +
-                          std::to_string(CUMULET_VERSION_PATCH)},
+  return {{"version", version_text()},
           {"size", std::to_string(options.scene.width) + "x" + std::to_string(options.scene.height)},
           {"seed", std::to_string(sampling.seed)},
           {"first sample", std::to_string(sampling.first_sample)},

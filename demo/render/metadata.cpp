@@ -43,12 +43,6 @@ std::array<float, 16> floats(const Matrix& matrix) {
 
 std::array<double, 3> three(const double v[3]) { return {v[0], v[1], v[2]}; }
 
-std::string version_text() {
-  const std::uint32_t version = cumulet_version();
-  return std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
-         std::to_string(version % 100);
-}
-
 /// As flags and scene files call it.
 template <class Choices, class Value>
 const char* name_of(const Choices& choices, Value value) {

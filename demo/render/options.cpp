@@ -281,11 +281,6 @@ class HelpFormatter final : public CLI::Formatter {
   }
 };
 
-std::string version_text(const std::string& program) {
-  return program + " " + std::to_string(CUMULET_VERSION_MAJOR) + "." + std::to_string(CUMULET_VERSION_MINOR) + "." +
-         std::to_string(CUMULET_VERSION_PATCH);
-}
-
 }  // namespace
 
 double parse_number(std::string_view text) {
@@ -507,7 +502,7 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
 }
 
 bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {
-  const std::string version = version_text(app.get_name());
+  const std::string version = app.get_name() + " " + version_text();
   app.set_help_flag("-h,--help", "Show this and exit");
   app.set_version_flag("--version", version, "Show the version and exit");
   app.formatter(std::make_shared<HelpFormatter>());
@@ -670,8 +665,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.checkpoint = text;
       },
       "Keep what samples have come to in this file, when stopped and now and then: the same command goes on from "
-      "there, "
-      "and removes it when the picture is written; of a sequence name.####");
+      "there, and removes it when the picture is written; of a sequence name.####");
   add(
       app, group, "--checkpoint-every", "SECONDS",
       [&](const std::string& text) {

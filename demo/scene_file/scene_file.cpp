@@ -679,6 +679,11 @@ bool same_scene(const SceneOptions& a, const SceneOptions& b) {
   return all(a) == all(b);
 }
 
+std::string version_text() {
+  return std::to_string(CUMULET_VERSION_MAJOR) + "." + std::to_string(CUMULET_VERSION_MINOR) + "." +
+         std::to_string(CUMULET_VERSION_PATCH);
+}
+
 std::string scene_hash(const SceneOptions& scene) {
   SceneOptions shown = scene;
   shown.sampling.samples = 0;
@@ -695,10 +700,8 @@ std::string scene_hash(const SceneOptions& scene) {
   const std::string text =
       to_json(shown, named(scene.volume), named(scene.surfaces), named(scene.environment), SceneFormat::second)
           .dump(-1, ' ', false, Json::error_handler_t::replace);
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
   std::array<char, 17> digits{};
-  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(hash));
+  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(fnv1a(text)));
   return digits.data();
 }
 

@@ -92,6 +92,9 @@ void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat 
 /// Whether two scenes say the same.
 [[nodiscard]] bool same_scene(const SceneOptions& a, const SceneOptions& b);
 
+/// The version of cumulet.h: major.minor.patch.
+[[nodiscard]] std::string version_text();
+
 /// 16 hexadecimal digits that pictures share that show the same: of all settings but how long a picture takes (samples,
 /// noise target and how it is met, seed), and of the files' names, without folders, and sizes. FNV-1a: for telling
 /// pictures apart, not for proof.

@@ -90,7 +90,7 @@ Compositor::Means* Compositor::some_means(const MeansOf& wanted, bool overwrite,
     means_.clear();
     newest_ = nullptr;
     no_memory_for_ = wanted.size;
-    no_memory_ = error;
+    untold_ = error;
     return nullptr;  // slower and with holes, but drawn
   }
 }
@@ -102,27 +102,27 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
   if (alike && wanted.revision && newest_->of == wanted) return newest_;
   const bool older = alike && newest_->of.picture == wanted.picture && newest_->of.size == wanted.size;
   Means* const serves = older || (alike && newest_->of.wish == wanted.wish) ? newest_ : nullptr;
-  if (no_memory_for_ == picture.size || no_memory_to_filter_ == picture.size) return nullptr;
+  if (no_memory_for_ == picture.size || cannot_filter_ == picture.size) return nullptr;
   const bool always = target.wait == Wait::always;
   if (wavelet_.of() != picture.picture) wavelet_.drop();  // of which it might ask for another variant
   try {
     if (!wavelet_.able(picture, background, always)) return serves;
   } catch (const Error& error) {
     // A driver that does not build them shows pictures as they are.
-    no_memory_to_filter_ = picture.size;
-    no_memory_ = error;
+    cannot_filter_ = picture.size;
+    untold_ = error;
     return nullptr;
   }
   if (wavelet_.of() != picture.picture || filtering_.background != background) {
     wavelet_.drop();
     if (older && picture.may_lag && !filters_now()) return newest_;
     try {
-      if (auto forgets = wavelet_.begin(picture)) no_memory_ = std::move(forgets);
+      if (auto forgets = wavelet_.begin(picture)) untold_ = std::move(forgets);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::out_of_memory) throw;
       wavelet_.free();
-      no_memory_to_filter_ = picture.size;
-      no_memory_ = error;
+      cannot_filter_ = picture.size;
+      untold_ = error;
       return nullptr;
     }
     filtering_ = wanted;
@@ -140,7 +140,7 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
     // Without the filter there is memory for the means perhaps.
     if (no_memory_for_ == filtering_.size) {
       wavelet_.free();
-      no_memory_to_filter_ = std::exchange(no_memory_for_, std::nullopt);
+      cannot_filter_ = std::exchange(no_memory_for_, std::nullopt);
     }
     return newest_ != nullptr ? serves : nullptr;
   }
@@ -156,20 +156,21 @@ Compositor::Means* Compositor::filter(const PictureTextures& picture, Background
 
 Compositor::Means* Compositor::means_to_draw(const PictureTextures& picture, Background background,
                                              const Display& display, const FrameTarget& target) {
-  lags_ = denoising_ = false;
-  if (!display.denoise) rest();
-  // Where guides are only late, what is remembered is of use later.
-  if (!display.denoise || !picture.guides) return resolve(picture, background, target.wait);
-  Means* means = go_on_filtering(picture, background, target);
+  lags_ = false;
+  Means* const means = go_on_filtering(picture, background, display, target);
   return means != nullptr ? means : resolve(picture, background, target.wait);
 }
 
 Compositor::Means* Compositor::go_on_filtering(const PictureTextures& picture, Background background,
-                                               const FrameTarget& target) {
+                                               const Display& display, const FrameTarget& target) {
+  denoising_ = false;
+  if (!display.denoise) rest();
+  // Where guides are only late, what is remembered is of use later.
+  if (!display.denoise || !picture.guides) return nullptr;
   // A frame without a budget says nothing of those that have one.
   if (target.filter_ms > 0.0) may_filter_ms_ = target.filter_ms;
   Means* const means = filter(picture, background, target);
-  const bool can = no_memory_for_ != picture.size && no_memory_to_filter_ != picture.size;
+  const bool can = no_memory_for_ != picture.size && cannot_filter_ != picture.size;
   denoising_ = can && !picture.may_lag && (means == nullptr || !(means->of == means_of(picture, background, true)));
   return means;
 }
@@ -181,14 +182,12 @@ void Compositor::rest() {
 }
 
 void Compositor::denoise(const PictureTextures& picture, const Display& display, double filter_ms) {
-  lags_ = denoising_ = false;
-  if (!display.denoise) rest();
-  if (!display.denoise || !picture.guides || picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0) return;
+  if (picture.sum == 0 || picture.size.x == 0 || picture.size.y == 0) return;
   FrameTarget target;
   target.filter_ms = filter_ms;
-  go_on_filtering(picture, background_of(picture, display), target);
+  go_on_filtering(picture, background_of(picture, display), display, target);
   gl::check(*gl_, "denoising the picture");
-  if (const auto failure = std::exchange(no_memory_, std::nullopt)) throw Error(*failure);
+  if (const auto failure = std::exchange(untold_, std::nullopt)) throw Error(*failure);
 }
 
 Compositor::Background Compositor::background_of(const PictureTextures& picture, const Display& display) {
@@ -396,10 +395,11 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     throw Error(ErrorCode::invalid_argument,
                 "the target, framebuffer " + std::to_string(target.framebuffer) + ", is not complete");
   }
-  const bool layered = picture.beneath != nullptr && picture.beneath->colour;
+  const Background background = background_of(picture, display);
+  const bool layered = background == Background::apart;
   const gl::Object vertex_array = gl::make_vertex_array(gl_);
   gl.BindVertexArray(vertex_array.name());
-  Means* const means = means_to_draw(picture, background_of(picture, display), display, target);
+  Means* const means = means_to_draw(picture, background, display, target);
   const auto begun = Clock::now();
   // Without means either there is no memory for them, or the driver is at their program still.
   const bool resolved = means != nullptr || lags_;
@@ -423,7 +423,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   if (resolved && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
   draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);
   gl::check(gl, "drawing the picture");
-  if (const auto failure = std::exchange(no_memory_, std::nullopt)) throw Error(*failure);
+  if (const auto failure = std::exchange(untold_, std::nullopt)) throw Error(*failure);
 }
 
 }  // namespace cumulet::render

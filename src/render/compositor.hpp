@@ -50,7 +50,8 @@ class Compositor {
   /// depth there; alpha is premultiplied after exposure, tone map and encoding. Throws Error(invalid_argument) for a
   /// name that is no framebuffer, or one that is not complete. Denoised, where the display is and the picture has
   /// guides: by and by, as filter_ms allow; until then as it was denoised last, if that was of the same wish, else as
-  /// it is. Throws Error(out_of_memory), once for each size, where there is no memory for that: it is drawn as it is.
+  /// it is. Throws Error(out_of_memory, gl), once for each size, where there is no memory for that, or the driver does
+  /// not build it: it is drawn as it is.
   void draw(const PictureTextures& picture, const Display& display, const FrameTarget& target);
   /// For frames that do not draw: goes on with denoising what draw() would draw so, for that long. Errors as draw().
   void denoise(const PictureTextures& picture, const Display& display, double filter_ms);
@@ -136,8 +137,9 @@ class Compositor {
   // What is drawn of the two.
   Means* means_to_draw(const PictureTextures& picture, Background background, const Display& display,
                        const FrameTarget& target);
-  // As far as it is denoised; null: not at all yet.
-  Means* go_on_filtering(const PictureTextures& picture, Background background, const FrameTarget& target);
+  // As far as it is denoised; null: not at all yet, or it shall not be.
+  Means* go_on_filtering(const PictureTextures& picture, Background background, const Display& display,
+                         const FrameTarget& target);
   static Background background_of(const PictureTextures& picture, const Display& display);
   // As free_means, but where there is no memory keeps that to be told, once, and gives null.
   Means* some_means(const MeansOf& wanted, bool overwrite, bool newest_serves);
@@ -162,9 +164,9 @@ class Compositor {
   std::optional<Small> no_memory_for_small_;
   const gl::Program* colour_ = nullptr;  // the last
   Kind colour_kind_;
-  std::optional<glm::uvec2> no_memory_for_;        // means of this size: tried again with another
-  std::optional<Error> no_memory_;                 // to be told
-  std::optional<glm::uvec2> no_memory_to_filter_;  // likewise
+  std::optional<glm::uvec2> no_memory_for_;  // means of this size: tried again with another
+  std::optional<Error> untold_;              // why something is not there, to be told
+  std::optional<glm::uvec2> cannot_filter_;  // pictures of this size: likewise
   Wavelet wavelet_;
   MeansOf filtering_;             // what it is at
   double filtering_ms_ = 0.0;     // in all frames so far

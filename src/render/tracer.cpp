@@ -333,17 +333,17 @@ bool Tracer::able(const MarchData& data, const PictureParameters& parameters, co
   return asked([&] { find_programs(like, data, obstacles); });
 }
 
-const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name) {
-  const std::array<std::string, 1> more{"CM_SURFACES 1"};
-  return program(data.defines(), name, std::span(more).first(obstacles.scene != nullptr ? 1 : 0));
+const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name,
+                                               bool channels) {
+  std::vector<std::string> more;
+  if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
+  if (channels) more.emplace_back(channels_macro);
+  return program(data.defines(), name, more);
 }
 
 const Tracer::Program& Tracer::facts_program(const Picture& picture, const MarchData& data,
                                              const Obstacles& obstacles) {
-  std::vector<std::string> more;
-  if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
-  if (picture.parameters_.medium.emits != 0U) more.emplace_back(channels_macro);
-  return program(data.defines(), "aovs.comp", more);
+  return inspect_program(data, obstacles, "aovs.comp", picture.parameters_.medium.emits != 0U);
 }
 
 void Tracer::make_shared_objects() {

@@ -309,7 +309,8 @@ class Tracer {
   static void add_medium(const Picture& picture, std::vector<std::string>& defines);
   const Program& trace_program(const Picture& picture, const MarchData& data);
   StagePrograms stage_programs(const Picture& picture, const MarchData& data);
-  const Program& inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name);
+  const Program& inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name,
+                                 bool channels = false);
   const Program& facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,

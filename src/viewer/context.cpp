@@ -244,6 +244,12 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   return textures;
 }
 
+render::PictureTextures Context::textures_to_draw(const render::Picture& picture) const {
+  render::PictureTextures textures = textures_of(picture, &picture == &empty_ ? nullptr : progressive_.before());
+  textures.may_lag = !picture.done();
+  return textures;
+}
+
 void Context::composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                         const render::FrameTarget& target) {
   using namespace render::film_layers;
@@ -293,8 +299,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
   if (shown == nullptr) shown = &empty_;
   const render::Display display = Context::display(shot, frame, *shown);
   render::FrameTarget target = Context::target(shot, frame, *shown);
-  render::PictureTextures picture = textures_of(*shown, shown == &empty_ ? nullptr : progressive_.before());
-  picture.may_lag = !shown->done();
+  const render::PictureTextures picture = textures_to_draw(*shown);
   if (frame.target == Target::framebuffer) {
     display_timer_.run([&] { composite(shown->film(), picture, display, target); });
     return;
@@ -319,8 +324,7 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
 }
 
 void Context::denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown) {
-  render::PictureTextures picture = textures_of(shown, progressive_.before());
-  picture.may_lag = !shown.done();
+  const render::PictureTextures picture = textures_to_draw(shown);
   display_timer_.run(
       [&] { compositor_.denoise(picture, display(shot, frame, shown), target(shot, frame, shown).filter_ms); });
 }

@@ -166,12 +166,16 @@ class Context {
   gl::Object filtered(const render::Picture& picture, bool with_background);
   // Mean radiance, with the background's or without, and alpha, with the surfaces that lie beneath a preview.
   void read_means(render::Picture& picture, bool with_background, float* rgba);
+  // The picture that its samples alone make; all that was sent off for it is there. Throws where there is none.
+  render::Picture& accumulating();
   // What the compositor draws of it, as linear radiance.
   void read_composite(render::Picture& picture, bool transparent, float* rgba);
   [[nodiscard]] static render::PictureGuides guides_of(const render::Picture& picture);
   [[nodiscard]] render::PictureView view_of(const render::Picture& picture) const;
   [[nodiscard]] render::PictureTextures textures_of(const render::Picture& picture,
                                                     const render::Picture* before) const;
+  // Of the picture that is shown, or of the empty one.
+  [[nodiscard]] render::PictureTextures textures_to_draw(const render::Picture& picture) const;
 
   gl::FunctionsPtr functions_;
   gl::ShareGroup group_;

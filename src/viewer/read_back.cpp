@@ -198,14 +198,15 @@ void Context::read_linear(const DisplaySettings& settings, float* rgba, std::siz
   put_before(display, {rgba, floats});
 }
 
-std::size_t Context::accumulation_bytes() {
+render::Picture& Context::accumulating() {
   static_cast<void>(readable());
-  return render::Tracer::saved_bytes(progressive_.accumulating());
+  return progressive_.accumulating();
 }
 
+std::size_t Context::accumulation_bytes() { return render::Tracer::saved_bytes(accumulating()); }
+
 void Context::read_accumulation(std::span<std::byte> bytes) {
-  static_cast<void>(readable());
-  const render::Picture& picture = progressive_.accumulating();
+  const render::Picture& picture = accumulating();
   const std::size_t size = render::Tracer::saved_bytes(picture);
   if (bytes.size() < size)
     throw Error(ErrorCode::invalid_argument, "the accumulation needs " + std::to_string(size) + " bytes");
@@ -213,7 +214,7 @@ void Context::read_accumulation(std::span<std::byte> bytes) {
 }
 
 void Context::restore_accumulation(std::span<const std::byte> bytes) {
-  static_cast<void>(readable());
+  static_cast<void>(accumulating());
   progressive_.restore(bytes);
 }
 

@@ -9,6 +9,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "format.hpp"
 #include "judged.hpp"
 #include "judging.hpp"
 #include "measure.hpp"
@@ -42,13 +43,6 @@ struct Judgement {
   std::array<std::optional<double>, 3> flicker;
   std::array<std::vector<double>, 3> seconds;  // of a sample a pixel; of a pass
 };
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 256> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), pattern, values...);
-  return buffer.data();
-}
 
 std::vector<std::uint32_t> counts_of(const Options& options) {
   std::vector<std::uint32_t> counts;

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "format.hpp"
+
 namespace cumulet::bench {
 
 namespace {
@@ -15,13 +17,6 @@ constexpr double width = 720.0;
 constexpr double left = 110.0;
 constexpr double right = 20.0;
 constexpr double top = 44.0;
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 512> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), pattern, values...);
-  return buffer.data();
-}
 
 std::string escaped(const std::string& text) {
   std::string result;

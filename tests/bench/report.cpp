@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "format.hpp"
 #include "plot.hpp"
 
 namespace cumulet::bench {
@@ -19,13 +20,6 @@ constexpr double aim_dense = 5.0;
 constexpr double aim_brick = 1.5;
 constexpr double aim_memory = 0.25;
 constexpr std::uint64_t full_cloud_voxels = 20'000'000;
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  std::array<char, 1024> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), pattern, values...);
-  return buffer.data();
-}
 
 std::string percent(double part) { return format("%.3g %%", 100.0 * part); }
 

@@ -9,27 +9,17 @@
 #include <vector>
 
 #include "base/luminance.hpp"
-#include "support/gl_viewer.hpp"
-#include "support/volumes.hpp"
+#include "support/still_cloud.hpp"
 
 namespace {
 
 using namespace cumulet;
-using glm::ivec3;
-using glm::vec3;
 
 constexpr std::uint32_t side = 20;
 constexpr std::size_t pixels = std::size_t{side} * side;
 
-class Noise : public test::StillTest {
+class Noise : public test::StillCloudTest {
  protected:
-  void SetUp() override {
-    StillTest::SetUp();
-    if (IsSkipped()) return;
-    still_->set_volume(test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3));
-    viewer().set_medium({0.3, vec3(0.95F), {0.4F}, 0});
-    still_->set_camera(test::camera_at({8.0, 12.0, 90.0}, {8.0, 12.0, 15.0}, 24.0));
-  }
   [[nodiscard]] std::vector<float> errors() const {
     std::vector<float> errors(pixels);
     viewer().read_aov(viewer::Aov::error, errors.data(), errors.size());

@@ -9,27 +9,18 @@
 #include <span>
 #include <vector>
 
-#include "support/gl_viewer.hpp"
+#include "support/still_cloud.hpp"
 #include "support/surfaces.hpp"
-#include "support/volumes.hpp"
 
 namespace {
 
 using namespace cumulet;
-using glm::ivec3;
 using glm::vec3;
 
 constexpr std::uint32_t side = 12;
 
-class Parts : public test::StillTest {
+class Parts : public test::StillCloudTest {
  protected:
-  void SetUp() override {
-    StillTest::SetUp();
-    if (IsSkipped()) return;
-    still_->set_volume(test::noise_volume({24, 20, 22}, ivec3(-3, 2, 5), 3));
-    viewer().set_medium({0.3, vec3(0.95F), {0.4F}, 0});
-    still_->set_camera(test::camera_at({8.0, 12.0, 90.0}, {8.0, 12.0, 15.0}, 24.0));
-  }
   std::vector<float> picture(std::uint32_t first, std::uint32_t samples) {
     viewer::Sampling sampling;
     sampling.samples = samples;
