@@ -192,7 +192,9 @@ def zsh_completion(program, options):
             continue
         help_ = "[" + option.help.replace("\\", "\\\\").replace("[", "\\[").replace("]", "\\]") + "]"
         spellings = [s + ("=" if value and s.startswith("--") else "") for s in option.spellings]
-        if len(spellings) > 1:
+        if option.repeats:
+            specs.append(quoted(["*" + spellings[0] + help_ + value]))
+        elif len(spellings) > 1:
             specs.append(quoted([f"({' '.join(option.spellings)})"]) + "{" + ",".join(spellings) + "}"
                          + quoted([help_ + value]))
         else:

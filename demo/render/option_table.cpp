@@ -30,7 +30,8 @@ std::string option_table(const CLI::App& app) {
     for (const std::string& name : option->get_lnames()) add("--" + name);
     if (option->get_positional()) add(option->get_name(true));
     const int values = option->get_items_expected_max();
-    const std::string type = values > 0 ? option->get_type_name() + (values > 1 ? "..." : "") : "";
+    const bool repeats = values > 1 || option->get_multi_option_policy() == CLI::MultiOptionPolicy::TakeAll;
+    const std::string type = values > 0 ? option->get_type_name() + (repeats ? "..." : "") : "";
     table << (option->get_positional() ? "argument" : "option") << '\t' << field(option->get_group()) << '\t'
           << field(spellings) << '\t' << field(type) << '\t' << (option->get_required() ? "required" : "") << '\t'
           << field(option->get_description()) << '\n';

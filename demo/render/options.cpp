@@ -14,7 +14,9 @@
 #include <names.hpp>
 #include <ostream>
 #include <presets.hpp>
+#include <set>
 #include <settings.hpp>
+#include <type_traits>
 #include <utility>
 
 #include "option_table.hpp"
@@ -43,18 +45,19 @@ std::vector<std::string_view> words(std::string_view text) {
   return parts;
 }
 
-/// Three numbers that are not negative and that a float can hold.
-std::array<double, 3> parse_rgb(std::string_view text, double most) {
+/// Three numbers of a range.
+std::array<double, 3> parse_three(std::string_view text, const settings::Range& range) {
   const std::vector<double> values = parse_numbers(text, 3);
   for (const double value : values) {
-    if (value < 0.0) throw UsageError(in_quotes(text) + " has a negative number");
-    if (value > most) throw UsageError(in_quotes(text) + " has a number that is too large");
+    if (range.holds(value)) continue;
+    const bool negative = range.least == 0.0 && value < 0.0;
+    throw UsageError(in_quotes(text) + (negative ? " has a negative number" : " has a number that is too large"));
   }
   return {values[0], values[1], values[2]};
 }
 
 void parse_light(std::string_view text, float (&rgb)[3]) {
-  const std::array<double, 3> values = parse_rgb(text, 1e30);
+  const std::array<double, 3> values = parse_three(text, settings::light_range);
   for (std::size_t i = 0; i < 3; ++i) rgb[i] = static_cast<float>(values[i]);
 }
 
@@ -103,6 +106,16 @@ Value parse_real(const settings::Setting<Desc, Value>& setting, const std::strin
   return negative ? Value{-1} : value;
 }
 
+/// Three numbers that the field can hold and that people may give.
+template <class Desc, class Value>
+void parse_triple(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
+  const std::array<double, 3> given = parse_three(text, setting.given_range());
+  if (setting.zero != 0.0 && settings::all_zero(given)) throw UsageError(in_quotes(text) + " is black");
+  const bool complement = setting.spelling == settings::Spelling::complement;
+  for (std::size_t i = 0; i < 3; ++i)
+    value[i] = static_cast<std::remove_extent_t<Value>>(complement ? 1.0 - given[i] : given[i]);
+}
+
 template <class Desc, class Value>
 void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc, Value>& setting, Value& value,
                  const TakeWord& take_word) {
@@ -130,12 +143,7 @@ void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc,
   } else if constexpr (settings::Real<Value>) {
     add_parsed([&value, setting](const std::string& text) { value = parse_real(setting, text); });
   } else {
-    add_parsed([&value, setting](const std::string& text) {
-      const std::array<double, 3> rgb = parse_rgb(text, setting.range.most);
-      if (setting.zero != 0.0 && settings::all_zero(rgb)) throw UsageError(in_quotes(text) + " is black");
-      const bool complement = setting.spelling == settings::Spelling::complement;
-      for (std::size_t i = 0; i < 3; ++i) value[i] = static_cast<float>(complement ? 1.0 - rgb[i] : rgb[i]);
-    });
+    add_parsed([&value, setting](const std::string& text) { parse_triple(setting, text, value); });
   }
 }
 
@@ -207,6 +215,83 @@ settings::RampPoints parse_ramp(std::string_view text) {
   const std::string why = settings::ramp_refusal(points);
   if (!why.empty()) throw UsageError(in_quotes(text) + " " + why);
   return points;
+}
+
+/// One key of a lamp, as scene files have it.
+template <class Value>
+void parse_lamp_key(const settings::Setting<cumulet_lamp_desc, Value>& setting, const std::string& text, Value& value) {
+  if constexpr (settings::Real<Value>) {
+    value = parse_real(setting, text);
+  } else if constexpr (settings::Triple<Value>) {
+    parse_triple(setting, text, value);
+  }
+}
+
+/// "point position=0,1,2 power=100": a kind, then keys of a scene file's lamps.
+cumulet_lamp_desc parse_lamp(std::string_view text) {
+  using Kind = settings::Setting<cumulet_lamp_desc, cumulet_lamp_kind>;
+  const std::vector<std::string_view> parts = words(text);
+  cumulet_lamp_desc lamp{};
+  lamp.struct_size = sizeof lamp;
+  const std::string_view kind = parts.empty() ? std::string_view{} : parts.front();
+  const auto* const named =
+      std::ranges::find_if(settings::lamp_choices, [&](const auto& choice) { return kind == choice.name; });
+  if (named == settings::lamp_choices.end())
+    throw UsageError(in_quotes(kind) + " is none of " + list_names(settings::lamp_choices, ", "));
+  lamp.kind = static_cast<cumulet_lamp_kind>(named->value);
+  std::set<std::string_view> given;
+  for (std::size_t i = 1; i < parts.size(); ++i) {
+    const std::size_t equals = parts[i].find('=');
+    if (equals == std::string_view::npos)
+      throw UsageError(in_quotes(parts[i]) + " is not a key and its value, such as power=100");
+    const std::string_view key = parts[i].substr(0, equals);
+    const std::string value(parts[i].substr(equals + 1));
+    if (!given.insert(key).second) throw UsageError(std::string(key) + " is given twice");
+    bool known = false;
+    settings::for_each<cumulet_lamp_desc>([&](const auto& setting) {
+      if constexpr (!std::is_same_v<std::decay_t<decltype(setting)>, Kind>) {
+        if (key != setting.key) return;
+        known = true;
+        try {
+          parse_lamp_key(setting, value, lamp.*setting.field);
+        } catch (const UsageError& error) {
+          throw UsageError(std::string(key) + ": " + error.what());
+        }
+      }
+    });
+    if (!known) throw UsageError("lamps have no " + in_quotes(key));
+  }
+  if (const auto refusal = lamp_refusal(lamp)) throw UsageError(std::string(refusal->key) + " " + refusal->cause);
+  return lamp;
+}
+
+/// Beside those that a scene file has; "none" takes away those before it.
+void add_lamps(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>& lamps) {
+  const auto take = [&lamps](const std::vector<std::string>& texts) {
+    try {
+      for (const std::string& text : texts) {
+        if (text == "none")
+          lamps.clear();
+        else
+          lamps.push_back(parse_lamp(text));
+      }
+      if (lamps.size() > most_lamps)
+        throw UsageError(std::to_string(lamps.size()) + " lamps are more than " + std::to_string(most_lamps));
+    } catch (const UsageError& error) {
+      throw CLI::ValidationError("--lamp", error.what());
+    }
+  };
+  app.add_option_function<std::vector<std::string>>(
+         "--lamp", take,
+         "A lamp, as often as there are lamps: a point, spot, disc, rectangle or sun, such as \"disc position=0,30,10 "
+         "power=20000 width=4\"; the keys are those of a scene file's lights: position, direction, across, color, "
+         "power "
+         "(watts; of a sun W/m2), width, height, angle_degrees, blend. Beside a scene's own; none: without those "
+         "before")
+      ->type_name("\"KIND KEY=VALUE ...\"|none")
+      ->group(group)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 /// CLI11 takes "-.5" for a flag. Glued to the flag before it, it is a value.
@@ -383,7 +468,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
         [&points = scene.ramps[i]](const std::string& text) { points = parse_ramp(text); }, settings::ramps[i].help);
   }
 
-  group = "Light (default: a clear day; given sun, sky or environment, the others are dark)";
+  group = "Light (default: a clear day; given sun, sky, environment or lamps, the others are dark)";
   add(
       app, group, "--sun", "\"azimuth,elevation r,g,b\"",
       [&](const std::string& text) { parse_sun(text, scene.light); },
@@ -401,6 +486,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--sky-model", "\"turbidity,ground_albedo\"",
       [&](const std::string& text) { parse_sky_model(text, scene.light); },
       "A clear day's sun and sky: from 1 (no aerosols) over 3 (clear) to 10, and what the ground sends back, 0 to 1");
+  add_lamps(app, group, scene.lamps);
   add_settings(app, group, scene.ground);
   add_settings(app, "Grid", scene.grid);
 
@@ -485,8 +571,9 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
     const std::string sun = app.get_option("--sun")->results().back();
     if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " has no irradiance and no --sky-model");
   }
+  const bool lamps_alone = !scene.lamps.empty() && app.count("--sky-model") == 0;
   if (!files.scene && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
-      app.count("--env") == 0) {
+      app.count("--env") == 0 && !lamps_alone) {
     const cumulet_light_desc given = scene.light;
     scene.set_daylight();
     if (app.count("--sky-model") > 0) {

@@ -87,6 +87,7 @@ expect " " "$(complete_bash cumulet-render --spp "")" "bash: --spp"
 expect "cumulet-render --march dense" "$(complete_zsh "cumulet-render --march d")" "zsh: --march d"
 expect "cumulet-render --volume cloud.vdb" "$(complete_zsh "cumulet-render --volume c")" "zsh: --volume c"
 expect "cumulet-demo --replay=" "$(complete_zsh "cumulet-demo --rep")" "zsh: --rep"
+expect "cumulet-render --lamp point --lamp=" "$(complete_zsh "cumulet-render --lamp point --la")" "zsh: --lamp again"
 expect "cumulet-scene folder/" "$(complete_zsh "cumulet-scene f")" "zsh: cumulet-scene f"
 
 # --- the desktop ----------------------------------------------------------------------------------------------------------

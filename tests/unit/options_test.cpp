@@ -237,6 +237,72 @@ TEST(Options, ARampIsPointsBetweenCommas) {
             std::string::npos);
 }
 
+// Each key, and what a scene file makes of the same words.
+TEST(Options, ALampIsThatOfASceneFile) {
+  const SceneOptions scene = parse({"--lamp",
+                                    "rectangle  position=-1,.5,2e1 direction=0,-.5,1 across=1,0,0 color=1,0.5,.25 "
+                                    "power=+300 width=2 height=.5 angle_degrees=90 blend=0.25",
+                                    "--lamp", "point", "--lamp", "sun power=3 angle_degrees=0.53"})
+                                 .scene;
+  const SceneOptions file = parse_scene(R"({"cumulet_scene": 2, "lights": [
+      {"kind": "rectangle", "position": [-1, 0.5, 20], "direction": [0, -0.5, 1], "across": [1, 0, 0],
+       "color": [1, 0.5, 0.25], "power": 300, "width": 2, "height": 0.5, "angle_degrees": 90, "blend": 0.25},
+      {"kind": "point"}, {"kind": "sun", "power": 3, "angle_degrees": 0.53}]})",
+                                        "a.json");
+  const auto same_lamps = [&](const SceneOptions& other) {
+    ASSERT_EQ(scene.lamps.size(), other.lamps.size());
+    for (std::size_t i = 0; i < scene.lamps.size(); ++i)
+      EXPECT_TRUE(cumulet::settings::same(scene.lamps[i], other.lamps[i])) << i;
+  };
+  same_lamps(file);
+  EXPECT_EQ(scene.lamps[0].struct_size, sizeof(cumulet_lamp_desc));
+  same_lamps(parse_scene(scene_text(scene, "a.json"), "a.json"));
+  EXPECT_EQ(scene.light.sun_irradiance[0], 0.0f) << "no light but theirs";
+  EXPECT_EQ(scene.light.sky, CUMULET_SKY_CONSTANT);
+  EXPECT_EQ(scene.ground.place, CUMULET_GROUND_NONE);
+  EXPECT_EQ(parse({"--lamp", "point", "--sky-model", "3,0.3"}).scene.light.sky, CUMULET_SKY_PHYSICAL);
+  EXPECT_EQ(parse({"--lamp", "point", "--lamp", "none"}).scene.light.sky, CUMULET_SKY_PHYSICAL) << "a day without";
+}
+
+TEST(Options, LampsAreBesideThoseOfAScene) {
+  const cumulet::test::Folder folder;
+  const std::string scene = (folder.path() / "scene.json").string();
+  std::ofstream(scene) << R"({"cumulet_scene": 2, "lights": [{"kind": "spot", "power": 7}]})";
+  const auto lamps = [&](const Arguments& more) {
+    Arguments all = {"--scene", scene};
+    all.insert(all.end(), more.begin(), more.end());
+    return parse(all).scene.lamps;
+  };
+  ASSERT_EQ(lamps({}).size(), 1u);
+  const auto two = lamps({"--lamp", "disc power=3"});
+  ASSERT_EQ(two.size(), 2u);
+  EXPECT_EQ(two[0].power, 7.0f);
+  EXPECT_EQ(two[1].kind, CUMULET_LAMP_DISC);
+  const auto other = lamps({"--lamp", "none", "--lamp", "disc power=3"});
+  ASSERT_EQ(other.size(), 1u);
+  EXPECT_EQ(other[0].power, 3.0f);
+}
+
+TEST(Options, ALampThatIsNoneIsToldInALine) {
+  const auto told = [](const char* lamp) { return usage_error(with({"--lamp", lamp})); };
+  EXPECT_EQ(told(""), "--lamp: '' is none of point, spot, disc, rectangle, sun");
+  EXPECT_EQ(told("bulb power=1"), "--lamp: 'bulb' is none of point, spot, disc, rectangle, sun");
+  EXPECT_EQ(told("point power 1"), "--lamp: 'power' is not a key and its value, such as power=100");
+  EXPECT_EQ(told("point watts=1"), "--lamp: lamps have no 'watts'");
+  EXPECT_EQ(told("point kind=spot"), "--lamp: lamps have no 'kind'");
+  EXPECT_EQ(told("point power=1 power=2"), "--lamp: power is given twice");
+  EXPECT_EQ(told("point power=-1"), "--lamp: power: '-1' is not from 0 to 1e30");
+  EXPECT_EQ(told("point power="), "--lamp: power: '' is not a finite number");
+  EXPECT_EQ(told("point position=1,2"), "--lamp: position: '1,2' is not 3 numbers between commas");
+  EXPECT_EQ(told("point position=1,2,1e31"), "--lamp: position is beyond 1e30");
+  EXPECT_EQ(told("point color=0,0,0"), "--lamp: color: '0,0,0' is black");
+  EXPECT_EQ(told("point color=1,-1,0"), "--lamp: color: '1,-1,0' has a negative number");
+  EXPECT_EQ(told("point color=1e20,1,0 power=1e20"), "--lamp: power times color is above 1e30");
+  EXPECT_EQ(told("disc width=0"), "--lamp: width: '0' is not above 0");
+  EXPECT_EQ(told("sun angle_degrees=100"), "--lamp: angle_degrees of a sun is above 90");
+  EXPECT_EQ(told("spot blend=2"), "--lamp: blend: '2' is not from 0 to 1");
+}
+
 TEST(Options, ViewNames) {
   EXPECT_EQ(parse({"--view", "wireframe"}).scene.sampling.view, CUMULET_VIEW_WIREFRAME);
   EXPECT_EQ(parse({"--view", "cells"}).scene.sampling.view, CUMULET_VIEW_CELLS);

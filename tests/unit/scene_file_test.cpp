@@ -341,6 +341,10 @@ TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
   EXPECT_EQ(told(R"("lights": [{"kind": "point", "power": -1}])"), start + "lights[0].power: -1 is not from 0 to 1e30");
   EXPECT_EQ(told(R"("lights": [{"kind": "sun", "angle_degrees": 91}])"),
             start + "lights[0].angle_degrees: of a sun is above 90");
+  EXPECT_EQ(told(R"("lights": [{"kind": "point", "position": [0, 1e31, 0]}])"),
+            start + "lights[0].position: is beyond 1e30");
+  EXPECT_EQ(told(R"("lights": [{"kind": "point", "color": [1e20, 1, 1], "power": 1e20}])"),
+            start + "lights[0].power: times color is above 1e30");
   EXPECT_EQ(error_of(R"({"cumulet_scene": 3})"),
             start + "cumulet_scene: version 3 is not known: this program reads 1 and 2");
   EXPECT_EQ(error_of(with(R"("lights": [])")), start + "lights: there is no such setting");
