@@ -89,6 +89,27 @@ def alone_as_among_others(sequence, out):
     assert files(one)["p.0014.exr"] != files(all_of_them)["p.0014.exr"]
 
 
+def begins_empty(sequence, out):
+    """Before a fire is lit there is nothing: what all frames have in common is taken from one that shows something, though
+    the empty one is the first, and the largest file."""
+    begun = Sequence(sequence.render, empty(out / "begun"))
+    wanted, pictures = empty(out / "without_empty"), empty(out / "with_empty")
+    for path in sequence.folder.glob("explosion_001[2-6].vdb"):
+        shutil.copy(path, begun.folder)
+    largest = max(path.stat().st_size for path in begun.folder.iterdir())
+    look = ["--density-scale", "auto"]
+    status, _, _ = begun.run(wanted / "p.####.exr", "--frames", "12,14", *look)
+    assert status == 0
+    nothing = (sequence.folder / "explosion_0001.vdb").read_bytes()
+    (begun.folder / "explosion_0001.vdb").write_bytes(nothing + bytes(largest))
+    status, frames, error = begun.run(pictures / "p.####.exr", "--frames", "1,12,14", *look)
+    assert status == 0 and [state for _, state, _ in frames] == ["done"] * 3, (frames, error)
+    assert "explosion_0001.vdb" in error and "density scale" in error, error
+    made = files(pictures)
+    assert made.pop("p.0001.exr") not in made.values()
+    assert made == files(wanted)
+
+
 def refused(sequence, out):
     """Before anything is made."""
     def said(output, *more):
@@ -152,6 +173,7 @@ def main():
     refused(sequence, out)
     bad_frames(sequence, out)
     alone_as_among_others(sequence, out)
+    begins_empty(sequence, out)
     interrupted(sequence, out)
     killed(sequence, out, 10)
 

@@ -1,0 +1,17 @@
+#!/bin/bash
+# What cumulet-render can refuse only once a model is loaded: one line that names file and cause, and no picture.
+# Usage: refused_test.sh RENDER MODEL
+set -euo pipefail
+render=$1 model=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() { echo "refused_test: $*" >&2; exit 1; }
+
+status=0
+"$render" --gltf "$model" --gltf-animation 99 --size 32x24 --spp 1 -o "$work/picture.png" >"$work/out" 2>"$work/error" ||
+  status=$?
+[ "$status" = 1 ] || fail "exit status $status: $(cat "$work/error")"
+[ ! -s "$work/out" ] || fail "said $(cat "$work/out")"
+[ "$(wc -l <"$work/error")" = 1 ] || fail "not one line: $(cat "$work/error")"
+grep -qF "$model: there is no animation 99: the file has 1" "$work/error" || fail "said $(cat "$work/error")"
+[ ! -e "$work/picture.png" ] || fail "there is a picture"
