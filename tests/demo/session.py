@@ -664,6 +664,27 @@ def test_grids(s):
     assert scale("back") == scale("opened") and grid("back") == "", "undo takes grid and scale back together"
 
 
+def test_unnamed_grids(s):
+    """A file of several grids, none of them called density, asks which: one is shown until another is chosen."""
+    bytes_of = pathlib.Path(s.explosion).read_bytes()
+    unknown = bytes_of.replace(b"density", b"mystery").replace(b"temperature", b"warmthiness").replace(b"flame", b"other")
+    (s.out / "unknown.vdb").write_bytes(unknown)
+    (s.out / "fire.vdb").write_bytes(bytes_of.replace(b"density", b"mystery"))
+    # What is at first, and what is chosen instead of it.
+    for file, first, second in (("unknown", "mystery", "warmthiness"), ("fire", "flame", "mystery")):
+        s.play(file, ["frames 3", f'drop "{s.out}/{file}.vdb"', "frames 3", "wait loaded", "frames 2", "idle 3",
+                      *shot("asked"), f'click "Grids/{second}"', "frames 3", "wait loaded", *shot("chosen"), "key ctrl+z",
+                      "frames 3", "wait loaded", *shot("back")])
+        asked, chosen, back = (s.report(name) for name in ("asked", "chosen", "back"))
+        assert asked["dialog"] and asked["has_volume"] and asked["grid"] == first, (asked["dialog"], asked["grid"])
+        assert not chosen["dialog"] and chosen["grid"] == second, (chosen["dialog"], chosen["grid"])
+        assert chosen["scene"]["volume"]["grid"] == second
+        assert back["grid"] == first and "grid" not in back["scene"]["volume"], back["scene"]["volume"]
+    # One that has a density does not ask.
+    s.play("named", ["frames 3", f'drop "{s.explosion}"', "frames 3", "wait loaded", "frames 2", "idle 1", *shot("named")])
+    assert not s.report("named")["dialog"] and s.report("named")["grid"] == "density"
+
+
 def test_up_axis(s):
     """Chosen, seen, saved, undone; as cumulet-render shows it."""
     s.play("replay", ["wait loaded", "wait converged", *shot("y"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', "frames 3",
