@@ -1,0 +1,45 @@
+"""The first picture that cumulet-render makes of a cloud, with nothing set: neither black nor burnt, thin or thick.
+
+Usage: first_picture.py RENDER VOLUME OUT_FOLDER
+"""
+
+import pathlib
+import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from png import Picture
+
+
+def luminances(picture):
+    """As they are displayed, from 0 to 1."""
+    n = picture.channels
+    return [(0.2126 * row[x] + 0.7152 * row[x + 1] + 0.0722 * row[x + 2]) / 255
+            for row in picture.rows for x in range(0, n * picture.width, n)]
+
+
+def main():
+    render, volume, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    out.mkdir(parents=True, exist_ok=True)
+
+    def shown(name, *more):
+        subprocess.run([render, volume, "--size", "64x40", "--spp", "16", "-o", f"{out}/{name}.png", *more], check=True,
+                       timeout=300)
+        return luminances(Picture(out / f"{name}.png"))
+
+    # As the file is, and as others write theirs: a mist, and stone.
+    looks = {"default": [], "thin": ["--density-scale", "0.04"], "thick": ["--density-scale", "8"]}
+    for name, more in looks.items():
+        values = shown(name, *more)
+        mean = sum(values) / len(values)
+        clipped, black = (sum(map(test, values)) / len(values) for test in (lambda v: v > 0.985, lambda v: v < 0.02))
+        print(f"{name}: mean {mean:.3f}, clipped {100 * clipped:.2f} %, black {100 * black:.2f} %")
+        assert 0.35 < mean < 0.7, (name, mean)
+        assert clipped < 0.02 and black < 0.02, (name, clipped, black)
+        # The cloud itself stands in the middle: it, too, has light and shade.
+        middle = [v for y in range(14, 28) for v in values[64 * y + 22:64 * y + 42]]
+        assert 0.35 < sum(middle) / len(middle) < 0.95, (name, sum(middle) / len(middle))
+        assert max(values) - min(values) > 0.3, (name, min(values), max(values))
+
+
+main()
