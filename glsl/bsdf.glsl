@@ -205,7 +205,7 @@ struct CmAlbedos {
 };
 
 CM_FN CmAlbedos cm_bsdf_albedos(CmSurface s, vec3 wo) {
-  float cosine = clamp(dot(s.normal, wo), 0.0f, 1.0f);
+  float cosine = dot(s.normal, wo);  // as cm_bsdf_eval has it: drivers look it up once
   vec3 f0 = mix(s.f0, s.base_color, s.metallic);
   float f90 = mix(s.specular, 1.0f, s.metallic);
   vec2 base = cm_ggx_albedo(s.roughness, cosine);

@@ -141,12 +141,14 @@ void main() {
     if (cm_has(CM_MAP_OCCLUSION)) occlusion += reflection.w * (CM_SAMPLE(CM_MAP_OCCLUSION).r - 1.0);
     CmAlbedos albedos = cm_bsdf_albedos(s, wo);
     colour = cm_view.sky_radiance.rgb * occlusion * cm_albedo_of(albedos);
-    vec3 beyond = albedos.matte * cm_sky_beyond(s.matte_normal, CM_MATTE_ORDERS);
-    beyond += albedos.base * cm_gloss_beyond(s, wo, s.roughness);
+    if (cm_view.counts.y > 0u) {
+      vec3 beyond = albedos.matte * cm_sky_beyond(s.matte_normal, CM_MATTE_ORDERS);
+      beyond += albedos.base * cm_gloss_beyond(s, wo, s.roughness);
 #if CM_COATED
-    beyond += albedos.coat * cm_gloss_beyond(s, wo, s.clearcoat_roughness);
+      beyond += albedos.coat * cm_gloss_beyond(s, wo, s.clearcoat_roughness);
 #endif
-    colour += occlusion * beyond;
+      colour += occlusion * beyond;
+    }
     colour += cm_view.sun_irradiance.rgb * cm_bsdf_eval(s, wo, cm_view.sun_direction.xyz);
     for (uint i = 0u; i < cm_view.counts.x; ++i) {
       vec3 wi;

@@ -34,7 +34,7 @@ layout(std140, binding = CM_UNIFORM_SURFACE_VIEW) uniform CmSurfaceView {
   vec4 sky_radiance;    // the mean
   CmHarmonics sky;      // what there is beyond it, before it is turned
   vec4 sky_turn;        // from +Z towards +X: cosine, sine
-  uvec4 counts;         // x: lights
+  uvec4 counts;         // x: lamps; y: orders of `sky`, none where there is nothing beyond the mean
 #ifdef __cplusplus
 };
 #else

@@ -332,6 +332,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   }
   const std::vector<CmLamp> records = light::lamp_records(of_host, lamps, view.eye);
   block.counts.x = static_cast<std::uint32_t>(records.size());
+  block.counts.y = lighting.sky == light::Harmonics{} ? 0U : 2U;
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
   const std::size_t bytes = std::max<std::size_t>(records.size(), 1) * sizeof(CmLamp);

@@ -102,8 +102,10 @@ std::uint32_t Picture::pass_after(std::uint32_t samples) const {
   std::uint32_t next = samples;
   if (!noise_target_) {
     // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
-    // little. One tile needs no passes.
-    next = tiles_ == glm::uvec2(1U) ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
+    // little. One tile needs none but a hasty first: lanes go on with their next samples while others are at their
+    // first.
+    const bool one_tile = tiles_ == glm::uvec2(1U) && (samples > 0 || !hasty_);
+    next = one_tile ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
   } else if (samples < first_measured) {
     next = tiles_ == glm::uvec2(1U) ? first_measured : std::max(1U, 2 * samples);
   } else {

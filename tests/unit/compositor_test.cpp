@@ -608,14 +608,19 @@ TEST_P(Compositing, OtherBackgroundsAreDrawnWhileTheDeviceIsBusy) {
     check(picture, {.transparent = transparent}, target, GL_RGBA32F, 0);
   }
   const std::size_t programs = programs_->counts().asked;
-  const cumulet::test::BusyHost host(*gl_, 500.0);
-  host.queue();
-  const gl::Fence queued(gl_);
-  for (int i = 0; i < 8; ++i) {
-    draw(i % 2 == 1);
-    EXPECT_FALSE(compositor_->lags());
+  bool busy = false;
+  // A machine with more to do than this may be through with it by then.
+  for (double ms = 500.0; !busy && ms <= 8000.0; ms *= 4.0) {
+    const cumulet::test::BusyHost host(*gl_, ms);
+    host.queue();
+    const gl::Fence queued(gl_);
+    for (int i = 0; i < 8; ++i) {
+      draw(i % 2 == 1);
+      EXPECT_FALSE(compositor_->lags());
+    }
+    busy = !queued.passed();
   }
-  EXPECT_FALSE(queued.passed()) << "the device was not busy";
+  EXPECT_TRUE(busy);
   EXPECT_EQ(programs_->counts().asked, programs);
   const std::vector<glm::vec4> got = read(made, GL_RGBA32F, 0);
   check(picture, {.transparent = true}, target, GL_RGBA32F, 0);

@@ -76,6 +76,16 @@ TEST_P(ViewerFrames, PreviewsEndInThePictureThatThereIsWithoutThem) {
   }
 }
 
+// Nobody waits for second samples of pixels that are quick.
+TEST_P(ViewerFrames, APreviewIsShownWithItsFirstSamples) {
+  show_noise();
+  viewer().set_sampling({1000, 3, render::View::shaded, true});
+  viewer::FrameResult result;
+  for (int i = 0; i < 20000 && !result.preview; ++i) result = viewer().render(frame(320, 320, 0.01));
+  ASSERT_TRUE(result.preview);
+  EXPECT_LT(viewer().stats().samples, 3U * result.size.x * result.size.y);
+}
+
 TEST_P(ViewerFrames, ShowsSomethingWhileTheCameraNeverRests) {
   show_noise();
   viewer().render(frame(256, 256, 0.01));
