@@ -372,6 +372,82 @@ TEST_P(EmissionPicture, ASlabThatAbsorbsFollowsTheClosedForm) {
   }
 }
 
+// How much of a voxel is within a sphere.
+float share_within(const ivec3& p, const glm::dvec3& middle, double radius) {
+  constexpr int n = 6;
+  int within = 0;
+  for (int i = 0; i < n * n * n; ++i) {
+    const glm::dvec3 at(i / (n * n), i / n % n, i % n);
+    within += glm::length(glm::dvec3(p) + (at + 0.5) / double(n) - 0.5 - middle) < radius ? 1 : 0;
+  }
+  return static_cast<float>(within) / (n * n * n);
+}
+
+// All that a sphere sends one way, and what comes along chords of it.
+TEST_P(EmissionPicture, ASphereThatAbsorbsFollowsTheClosedForm) {
+  constexpr double radius = 27.0;
+  constexpr double strength = 0.5;
+  const auto viewer = make();
+  const ScalarVolume sphere =
+      test::make_volume(ivec3(64), ivec3(0), [](const ivec3& p) { return share_within(p, glm::dvec3(31.5), radius); });
+  VolumeFrame frame{.density = sphere};
+  frame.flame = sphere;
+  show(*viewer, std::move(frame));
+  viewer->set_light({});
+  viewer::CameraPose camera = test::camera_at({31.5, 31.5, 200.0}, {31.5, 31.5, 31.5});
+  camera.orthographic_height = 64.0;
+  viewer->set_camera(camera);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    viewer->set_grid(test::settings_of(kind));
+    // Its rim is a voxel wide, and shines more the less is seen through it.
+    for (const auto& [sigma, rim] : {std::pair(0.01, 2e-3), std::pair(0.1, 5e-3), std::pair(0.5, 2e-2)}) {
+      SCOPED_TRACE(testing::Message() << "march " << static_cast<int>(kind.march) << ", extinction " << sigma);
+      viewer::Medium medium;
+      medium.density_scale = sigma;
+      medium.albedo = vec3(0.0F);
+      medium.field_emission.flame_strength = strength;
+      viewer->set_medium(medium);
+      const test::Picture one = test::render(*viewer, {32, 32, 64, 1, render::View::shaded});
+      const test::Picture two = test::render(*viewer, {32, 32, 64, 2, render::View::shaded});
+      // Sums over pixels of 2 x 2 units: of all, and of rings of chords within 0.9 of the radius.
+      constexpr int rings = 3;
+      std::array<double, rings + 1> sum{};
+      std::array<double, rings + 1> square{};  // of the error
+      std::array<double, rings + 1> expected{};
+      for (int i = 0; i < 1024; ++i) {
+        const glm::dvec2 middle = 2.0 * (glm::dvec2(i % 32, i / 32) - 15.5);
+        const double difference = one.pixels[static_cast<std::size_t>(i)].x - two.pixels[static_cast<std::size_t>(i)].x;
+        const double mean =
+            0.5 * (one.pixels[static_cast<std::size_t>(i)].x + two.pixels[static_cast<std::size_t>(i)].x);
+        const auto add = [&](std::size_t to) {
+          sum.at(to) += 4.0 * mean;
+          square.at(to) += 4.0 * difference * difference;
+        };
+        add(rings);
+        const auto ring = static_cast<std::size_t>(glm::length(middle) / radius * rings / 0.9);
+        if (ring >= rings) continue;
+        add(ring);
+        constexpr int n = 8;
+        for (int j = 0; j < n * n; ++j) {
+          const glm::dvec2 at = middle + 2.0 * ((glm::dvec2(j % n, j / n) + 0.5) / double(n) - 0.5);
+          const double chord = 2.0 * std::sqrt(radius * radius - glm::dot(at, at));
+          expected.at(ring) += 4.0 / (n * n) * strength * (1.0 - std::exp(-sigma * chord)) / sigma;
+        }
+      }
+      // The integral of strength / sigma (1 - exp(-sigma chord)) over the disc.
+      const double through = 2.0 * sigma * radius;
+      expected[rings] = M_PI * radius * radius * strength / sigma *
+                        (1.0 - 2.0 / (through * through) * (1.0 - (1.0 + through) * std::exp(-through)));
+      for (std::size_t ring = 0; ring <= rings; ++ring) {
+        const double allowed = ring < rings ? 1e-3 : rim;
+        EXPECT_NEAR(sum.at(ring), expected.at(ring), 4.0 * std::sqrt(square.at(ring)) + allowed * expected.at(ring))
+            << ring;
+        EXPECT_LT(std::sqrt(square.at(ring)), 4e-3 * expected.at(ring)) << ring;
+      }
+    }
+  }
+}
+
 // What gives off as much as it takes from a sky of radiance 1 cannot be told from it.
 TEST_P(EmissionPicture, InBalanceWithItsSkyItIsInvisible) {
   const auto viewer = make();

@@ -428,4 +428,122 @@ TEST_P(Surrounded, ABrightTexelIsASun) {
   EXPECT_LT(texel.error.x, 3.0 * sun.error.x);  // no fireflies
 }
 
+// A patch as bright as a low sun behind haze beside a sky: flights find it, too.
+vec3 patch(std::uint32_t x, std::uint32_t y) {
+  if (x >= 40 && x < 46 && y >= 14 && y < 18) return {60.0F, 50.0F, 30.0F};
+  return y < 32 ? vec3(0.4F, 0.6F, 1.0F) : vec3(0.2F, 0.15F, 0.1F);
+}
+
+// By looks and flights, by fewer looks, and by flights alone: in a medium, of one event and of many, and on a matte
+// ground.
+TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
+  const light::EnvironmentPtr environment = made(128, 64, patch);
+  const volume::ScalarVolume volume = test::make_volume(ivec3(20), ivec3(0), [](const ivec3&) { return 1.0F; });
+  struct Case {
+    const char* name;
+    float g;
+    std::uint32_t bounces;  // 0: all
+    bool ground;
+  };
+  for (const Case& of : {Case{"one event", 0.0F, 1, false}, Case{"one event, forward", 0.6F, 1, false},
+                         Case{"many", 0.6F, 0, false}, Case{"a matte ground below", 0.3F, 0, true}}) {
+    SCOPED_TRACE(of.name);
+    const auto still = make();
+    still->set_volume(volume);
+    viewer::GridSettings grid;
+    grid.build.march = scene::March::dense;
+    still->set_grid(grid);
+    still->set_medium({of.ground ? 0.05 : 0.15, vec3(0.9F), {of.g}, of.bounces});
+    still->viewer().set_ground({of.ground ? viewer::GroundPlace::at_height : viewer::GroundPlace::none, -2.0});
+    // All pixels see the same: the box's middle, or the ground's before it.
+    still->set_camera(of.ground ? test::camera_at({9.5, 30.0, 60.0}, {9.5, -2.0, 24.0}, 0.01)
+                                : test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 0.01));
+    still->set_light({});
+    still->viewer().set_environment(environment);
+    still->viewer().set_environment_settings({30.0F, 1.0F});
+    const test::Picture picture = test::render(*still, {16, 16, 256, 1, render::View::shaded});
+    core::CpuEnvironment cpu = twin(*environment);
+    cpu.cm = still->viewer().trace_parameters();
+    cpu.cm.dispatch.samples = 256;
+    cpu.volume = &volume;
+    cpu.origin = ivec3(grid::fit_cube(volume).origin);
+    const auto of_pixels = [](const auto& pixel) {
+      Seen seen;
+      dvec3 squares(0.0);
+      for (std::uint32_t i = 0; i < 256; ++i) {
+        const dvec3 value(pixel(i));
+        seen.mean += value / 256.0;
+        squares += value * value / 256.0;
+      }
+      seen.error = glm::sqrt(glm::max(squares - seen.mean * seen.mean, dvec3(0.0)) / 256.0);
+      return seen;
+    };
+    const Seen kernels = of_pixels([&](std::uint32_t i) { return picture.pixels[i]; });
+    std::array<Seen, 3> seen;
+    constexpr std::array chances = {1.0F, 0.5F, 0.0F};
+    for (std::size_t k = 0; k < chances.size(); ++k) {
+      cpu.cm.lights.environment_chance = chances.at(k);
+      seen.at(k) = of_pixels([&](std::uint32_t i) {
+        const auto pixel = cpu.traced({i % 16, i / 16});
+        return vec3(pixel.sum) / 256.0F + pixel.background;
+      });
+      expect_same(seen.at(k), kernels, 1e-3);
+      EXPECT_LT(seen.at(k).error.x, 0.05 * kernels.mean.x) << chances.at(k);
+    }
+    expect_same(seen[2], seen[0], 1e-3);
+    EXPECT_GT(seen[2].error.x, 1.3 * seen[0].error.x) << "looks are of use";
+  }
+}
+
+// A sun as spiaggia_di_mondello_1k.hdr has it, 72,704 in a texel or two of a sky of 0.5: what pixels differ by between
+// seeds is noise as of their neighbours, never one sample's stray.
+TEST_P(Surrounded, ASunInAPictureLeavesNoFireflies) {
+  const light::EnvironmentPtr environment = made(1024, 512, [](std::uint32_t x, std::uint32_t y) {
+    if (x == 300 && (y == 120 || y == 121)) return vec3(72704.0F, 68000.0F, 60000.0F);
+    return y < 256 ? vec3(0.4F, 0.5F, 0.7F) : vec3(0.2F, 0.18F, 0.15F);
+  });
+  struct Case {
+    const char* name;
+    bool cloud;
+    bool floor;
+  };
+  for (const Case& of : {Case{"a cloud", true, false}, Case{"a matte floor", false, true},
+                         Case{"a cloud and what it does to a floor", true, true}}) {
+    SCOPED_TRACE(of.name);
+    const auto still = ball(0.5F, vec3(1.0F));
+    if (!of.cloud) still->set_medium({1e-6, vec3(1.0F), {0.5F}, 0});
+    if (of.floor) {
+      auto scene = std::make_shared<test::StillScene>();
+      scene->add_quad({{{-90, -1, 90}, {90, -1, 90}, {90, -1, -90}, {-90, -1, -90}}},
+                      scene->add(test::diffuse(vec3(0.7F))));
+      still->viewer().show_surfaces(test::source_of(scene));
+    }
+    still->set_camera(of.floor ? test::camera_at({9.5, 60.0, 50.0}, {9.5, -1.0, 9.5}, 25.0)
+                               : test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 10.0));
+    still->set_light({});
+    still->viewer().set_environment(environment);
+    constexpr std::uint32_t side = 48;
+    constexpr std::uint32_t seeds = 6;
+    std::vector<test::Picture> pictures;
+    for (std::uint32_t seed = 0; seed < seeds; ++seed) pictures.push_back(test::render(*still, {side, side, 4, seed}));
+    double worst = 0.0;
+    for (std::uint32_t block = 0; block < side * side / 64; ++block) {
+      std::vector<double> strays;
+      for (std::uint32_t i = 0; i < 64; ++i) {
+        const std::uint32_t at = (block / (side / 8) * 8 + i / 8) * side + block % (side / 8) * 8 + i % 8;
+        double mean = 0.0;
+        for (const test::Picture& picture : pictures) mean += picture.pixels[at].y / seeds;
+        for (const test::Picture& picture : pictures) strays.push_back(std::abs(picture.pixels[at].y - mean));
+      }
+      std::ranges::sort(strays);
+      // Of a normal distribution the median stray is 0.674 of the deviation.
+      const double deviation = strays[strays.size() / 2] / 0.674;
+      if (deviation > 0.0) worst = std::max(worst, strays.back() / deviation);
+    }
+    RecordProperty(of.name, std::to_string(worst));
+    EXPECT_LT(worst, 12.0);
+    EXPECT_GT(worst, 2.0) << "there is noise";
+  }
+}
+
 }  // namespace
