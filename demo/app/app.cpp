@@ -688,6 +688,7 @@ void App::write_report(const std::string& path) const {
   json["turntable"] = model_.navigation.turntable_degrees_per_second;
   json["fly"] = model_.navigation.fly != 0;
   json["scene"] = Json::parse(scene_text(model_.scene, path, SceneFormat::first));
+  json["lights"] = Json::parse(scene_text(model_.scene, path)).value("lights", Json::array());  // not of that version
   image::replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

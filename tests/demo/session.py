@@ -236,6 +236,77 @@ def test_environment(s):
     assert blue("turned") > 15000 > 3 * blue("day"), (blue("turned"), blue("day"))
 
 
+def test_lamps(s):
+    """A lamp is added, made a spot, dimmed and taken away; each is a step, undone and done again."""
+    there = ["frames 3", "wait loaded", "frames 2"]
+    s.play("replay", [*SETTLE, *shot("day"), 'click "Add lamp"', *SETTLE, *shot("point"), 'click "Lamp 1"', "frames 2",
+                      'click "Lamp 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.7 0.5', *SETTLE,
+                      *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
+                      'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), 'click "Remove lamp 1"',
+                      *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"'],
+           "--volume", s.cumulus, "--sky", "0.05,0.05,0.05", "--spp", "4")
+    day, report, area = look(s, "day")
+    lights = lambda name: s.report(name)["lights"]
+    steps = lambda name: s.report(name)["undo_steps"]
+    assert lights("day") == [] and steps("day") == 0
+    (point,) = lights("point")
+    assert point["kind"] == "point" and point["power"] > 0.0 and steps("point") == 1, point
+    camera = report["scene"]["camera"]
+    assert point["position"][1] > camera["target"][1] and point["position"][0] == camera["target"][0], (point, camera)
+    shone = look(s, "point")[0]
+    assert_differ(day, shone, area)
+    (spot,) = lights("spot")
+    assert spot == dict(point, kind="spot", angle_degrees=45.0) and steps("spot") == 2, spot
+    (dim,) = lights("dim")
+    assert 0.0 < dim["power"] < 0.1 * spot["power"] and dim == dict(spot, power=dim["power"]), dim
+    assert steps("dim") == 3, "a drag is one step"
+    assert_differ(shone, look(s, "dim")[0], area)
+    assert lights("bright") == [spot] and steps("bright") == 2
+    assert lights("undone") == [] and steps("undone") == 0
+    assert lights("redone") == [point] and steps("redone") == 1
+    assert_alike(shone, look(s, "redone")[0], area)
+    assert lights("removed") == [] and steps("removed") == 2
+    assert_alike(day, look(s, "removed")[0], area)
+    assert lights("again") == [point]
+
+
+def test_sky_and_ground(s):
+    """The physical sky's haze and the sky of one colour, the ground's colour, height and none: by the panel, undone, redone."""
+    drag = lambda row, x: f'drag "{row}" 0.5 0.5 to "{row}" {x} 0.5'
+    choose = lambda row, entry: [f'click "{row}"', "frames 2", f'click "{row}/{entry}"']
+    there = ["frames 3", "wait loaded", "frames 2"]
+    tell = lambda name: [*there, f'report "{name}.json"']
+    s.play("replay", [*SETTLE, *shot("day"), drag("Turbidity", 0.95), *SETTLE, *shot("haze"), *choose("Sky", "Constant"), *SETTLE,
+                      *shot("constant"), "key ctrl+z", *tell("hazy"), "key ctrl+z", *SETTLE, *shot("undone"),
+                      "key ctrl+shift+z", "key ctrl+shift+z", *tell("redone"), *choose("Sky", "Physical"), *tell("physical"),
+                      *choose("Ground", "At a height"), *SETTLE, *shot("at_0"), drag("Ground height", 0.4), *tell("lower"),
+                      "key ctrl+z", *SETTLE, *shot("raised"), *choose("Ground", "None"), *SETTLE, *shot("none"), "key ctrl+z",
+                      *tell("there"), "key ctrl+shift+z", *tell("gone")],
+           "--volume", s.cumulus, "--spp", "4")
+    day, report, area = look(s, "day")
+    sky = lambda name: s.report(name)["scene"]["light"]["sky"]
+    sun = lambda name: s.report(name)["scene"]["light"]["sun"]
+    ground = lambda name: s.report(name)["scene"]["ground"]
+    steps = lambda name: s.report(name)["undo_steps"]
+    assert sky("day")["model"] == "physical" and sky("day")["turbidity"] == 2.5 and ground("day")["place"] == "below"
+    assert 8.0 < sky("haze")["turbidity"] <= 10.0 and steps("haze") == 1, sky("haze")
+    assert_differ(day, look(s, "haze")[0], area)
+    assert sky("constant") == dict(sky("haze"), model="constant") and sun("constant") == sun("day"), "nothing else"
+    assert steps("constant") == 2
+    assert_differ(look(s, "haze")[0], look(s, "constant")[0], area)
+    assert sky("hazy") == sky("haze") and sky("undone") == sky("day") and steps("undone") == 0
+    assert_alike(day, look(s, "undone")[0], area)
+    assert sky("redone") == sky("constant") and steps("redone") == 2
+    assert sky("physical") == sky("haze")
+    assert ground("at_0") == dict(ground("day"), place="at-height") and ground("at_0")["height"] == 0.0, ground("at_0")
+    assert ground("lower")["height"] < -10.0 and steps("lower") == steps("at_0") + 1, ground("lower")
+    assert ground("raised") == ground("at_0")
+    assert_alike(look(s, "at_0")[0], look(s, "raised")[0], area)
+    assert ground("none")["place"] == "none"
+    assert_differ(look(s, "at_0")[0], look(s, "none")[0], area)
+    assert ground("there") == ground("at_0") and ground("gone") == ground("none")
+
+
 def test_warm_up(s):
     s.play("replay", ["wait loaded", *shot("loaded"), "wait converged", *shot("first"), "key n", *SETTLE, *shot("later")],
            "--volume", s.cumulus)
