@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <sstream>
 #include <vector>
 
@@ -199,12 +200,9 @@ class FrameImport {
       const std::string name = name_of(*field);
       naming(name, [&] { put_on_lattice(*field, shares.next()); });
     }
-    if (out_.temperature) warn_if_apart(*out_.temperature);
-    const auto all_apart = [&](const auto& parts) {
-      return std::ranges::all_of(parts, [&](const ScalarVolume& part) { return apart(part, out_.density); });
-    };
-    if (out_.colour && all_apart(*out_.colour)) warn_if_apart((*out_.colour)[0]);
-    if (out_.anisotropy && all_apart(*out_.anisotropy)) warn_if_apart((*out_.anisotropy)[0]);
+    if (out_.temperature) warn_if_apart({&*out_.temperature, 1});
+    if (out_.colour) warn_if_apart(*out_.colour);
+    if (out_.anisotropy) warn_if_apart(*out_.anisotropy);
   }
 
   void clamp_anisotropy() {
@@ -248,9 +246,12 @@ class FrameImport {
     }
   }
 
-  void warn_if_apart(const ScalarVolume& field) const {
-    if (field.empty() || out_.density.empty() || !apart(field, out_.density)) return;
-    remark(LogLevel::warning, name_of(field), "lies nowhere over \"" + out_.density.name + "\"");
+  /// Of a field's parts those that are empty say nothing, such as what is below 0 of an anisotropy that nowhere is.
+  void warn_if_apart(std::span<const ScalarVolume> parts) const {
+    const auto empty = [](const ScalarVolume& part) { return part.empty(); };
+    const auto elsewhere = [&](const ScalarVolume& part) { return part.empty() || apart(part, out_.density); };
+    if (out_.density.empty() || std::ranges::all_of(parts, empty) || !std::ranges::all_of(parts, elsewhere)) return;
+    remark(LogLevel::warning, name_of(parts[0]), "lies nowhere over \"" + out_.density.name + "\"");
   }
 
   [[nodiscard]] std::string name_of(const ScalarVolume& field) const { return file_ + ": grid \"" + field.name + "\""; }

@@ -526,15 +526,21 @@ TEST_F(Frame, WithoutDensityTheFinestFieldGivesTheLattice) {
 
 TEST_F(Frame, FieldsBesideDensityAreKeptAndTold) {
   const auto ones = [](const Vec3d&) { return 1.0F; };
+  auto colour = colours("Cd");
+  colour->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1.0, Vec3d(100.0))));
   const openvdb::GridPtrVec grids = {box("density", scaled(1.0), 10, ones),
                                      box("flame", scaled(1.0, Vec3d(100.0)), 10, ones),
-                                     box("temperature", scaled(0.9, Vec3d(100.0)), 10, ones)};
+                                     box("temperature", scaled(0.9, Vec3d(100.0)), 10, ones), colour,
+                                     box("anisotropy", scaled(1.0, Vec3d(100.0)), 10, ones)};
   Messages messages;
   const VolumeFrame frame = import_frame(write(grids), {}, messages.log);
   EXPECT_EQ(frame.flame->bounds_min, glm::ivec3(100));
   EXPECT_EQ(frame.temperature->bounds_min, glm::ivec3(100));
-  ASSERT_EQ(messages.warnings.size(), 1U);
-  EXPECT_HAS(messages.warnings[0], path().string() + ": grid \"temperature\": lies nowhere over \"density\"");
+  ASSERT_EQ(messages.warnings.size(), 3U);
+  const std::string where = path().string() + ": grid ";
+  EXPECT_EQ(messages.warnings[0], where + "\"temperature\": lies nowhere over \"density\"");
+  EXPECT_EQ(messages.warnings[1], where + "\"Cd\": lies nowhere over \"density\"");
+  EXPECT_EQ(messages.warnings[2], where + "\"anisotropy\": lies nowhere over \"density\"");
 }
 
 TEST_F(Frame, ALatticeOutOfReachIsRefused) {
