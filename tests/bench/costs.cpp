@@ -10,6 +10,7 @@
 
 #include "asset.hpp"
 #include "base/luminance.hpp"
+#include "edited_shaders.hpp"
 #include "light/environment_file.hpp"
 #include "measure.hpp"
 #include "settings/settings.hpp"
@@ -146,8 +147,10 @@ class Rows {
  public:
   Rows(headless::Context& context, double density_scale) : context_(context), density_scale_(density_scale) {}
 
-  test::Still& add(std::string name, const viewer::VolumeAssetPtr& volume, Burns burns, const viewer::Light& light) {
-    Row& row = rows_.emplace_back(Row{std::move(name), std::make_unique<test::Still>(context_)});
+  test::Still& add(std::string name, const viewer::VolumeAssetPtr& volume, Burns burns, const viewer::Light& light,
+                   std::shared_ptr<gl::ProgramPool> programs = nullptr) {
+    Row& row = rows_.emplace_back(Row{
+        std::move(name), std::make_unique<test::Still>(context_, headless::Context::get_proc, std::move(programs))});
     row.still->viewer().camera()->frame(volume->bounds(), 1.0);
     row.still->set_volume(volume);
     row.still->set_medium(medium_of(density_scale_, burns));
@@ -211,6 +214,19 @@ scene::ModelSourcePtr emitter_at(const Place& place, double side, float radiance
   scene->add_quad({corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)}, scene->add(material));
   return test::source_of(scene);
 }
+
+// What flights take up on their way, and where they collide alone: as much as is given off there, by the extinction.
+constexpr Edit no_way = {"flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n", ""};
+constexpr Edit where_they_collide = {
+    "flight.glsl", "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
+    "    float there = max(0.0f, emission.at_0 + emission.slope * (p.t + way));\n"
+    "    if (way < left) emitted += emission.mean * (there / max(mix(e_0, e_1, way / max(span, 1e-30f)), 1e-30f));\n"};
+// Looks for cells: none where there is no other light, and none among others.
+constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
+                                 "arrived && cm.lights.any != 0u && cm.lights.cell_chance < 1.0f;"};
+constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance,",
+                           "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_chance),"};
+constexpr Edit flights_have_all = {"flight.glsl", "p.bounces > 0u ? cm.lights.cell_chance : 0.0f", "0.0f"};
 
 /// A hot core in a ball of smoke, which looks are for.
 viewer::VolumeAssetPtr small_fire() {
@@ -302,11 +318,21 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     rows.add("its own fire", plain, Burns::both, dark);
     print_costs("Light", rows.get(), options);
   }
+  const EditedShaders without_looks(std::array{no_looks_alone, no_looks, flights_have_all});
+  const EditedShaders at_collisions(std::array{no_way, where_they_collide});
+  const EditedShaders neither(std::array{no_looks_alone, no_looks, flights_have_all, no_way, where_they_collide});
   const viewer::VolumeAssetPtr small = small_fire();
-  Rows rows(context, 0.1);
-  Rows::set_grid(rows.add("bricks, without looks", small, Burns::flame, light_of(0.0F, 0.0F)), scene::March::brick, 0);
-  rows.add("cells, with looks", small, Burns::flame, light_of(0.0F, 0.0F));
-  print_costs("A small fire", rows.get(), options);
+  const viewer::Light dark = light_of(0.0F, 0.0F);
+  for (const auto& [title, scale] :
+       {std::pair("A small fire in thick smoke", 0.1), {"A small fire in thin smoke", 0.01}}) {
+    Rows rows(context, scale);
+    rows.add("along flights, and looks", small, Burns::flame, dark);
+    rows.add("along flights, no looks", small, Burns::flame, dark, without_looks.programs());
+    rows.add("where flights collide, and looks", small, Burns::flame, dark, at_collisions.programs());
+    rows.add("where flights collide, no looks", small, Burns::flame, dark, neither.programs());
+    Rows::set_grid(rows.add("along flights through bricks", small, Burns::flame, dark), scene::March::brick, 0);
+    print_costs(title, rows.get(), options);
+  }
 }
 
 void measure_equal_error(headless::Context& context, const Input& input, const Options& options) {

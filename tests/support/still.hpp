@@ -22,8 +22,9 @@ struct Image {
 /// A viewer that makes still pictures in memory, waiting for each step: for tests and benchmarks.
 class Still {
  public:
-  explicit Still(headless::Context& context, viewer::Viewer::GetProc get_proc = headless::Context::get_proc)
-      : viewer_(std::make_unique<viewer::Viewer>(Log(), nullptr, true)) {
+  explicit Still(headless::Context& context, viewer::Viewer::GetProc get_proc = headless::Context::get_proc,
+                 std::shared_ptr<gl::ProgramPool> programs = nullptr)
+      : viewer_(std::make_unique<viewer::Viewer>(Log(), nullptr, true, Trace(), std::move(programs))) {
     viewer_->attach(get_proc, &context);
   }
 

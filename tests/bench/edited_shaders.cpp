@@ -1,0 +1,35 @@
+#include "edited_shaders.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+
+namespace cumulet::bench {
+
+namespace {
+
+std::string text_of(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+EditedShaders::EditedShaders(std::span<const Edit> edits) {
+  std::filesystem::copy(CUMULET_GLSL_DIR, folder_.path());
+  for (const Edit& edit : edits) {
+    const std::filesystem::path path = folder_ / edit.file;
+    std::string text = text_of(path);
+    const std::string wanted = edit.text;
+    const std::size_t at = text.find(wanted);
+    if (at == std::string::npos || text.find(wanted, at + 1) != std::string::npos)
+      throw std::runtime_error(std::string(edit.file) + ": is not once there: " + wanted);
+    text.replace(at, wanted.size(), edit.instead);
+    std::ofstream(path) << text;
+  }
+  programs_ = std::make_shared<gl::ProgramPool>(nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
+}
+
+}  // namespace cumulet::bench

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "gl/programs.hpp"
+#include "support/folder.hpp"
+
+namespace cumulet::bench {
+
+/// A text of a shader, and what stands there instead.
+struct Edit {
+  const char* file;
+  const char* text;
+  const char* instead;
+};
+
+/// Programs of glsl/ with a few texts changed: so are techniques measured that the library has no switch for. For as
+/// long as programs are made.
+class EditedShaders {
+ public:
+  /// Throws std::runtime_error where a text is not there, or more than once.
+  explicit EditedShaders(std::span<const Edit> edits);
+
+  [[nodiscard]] std::shared_ptr<gl::ProgramPool> programs() const { return programs_; }
+
+ private:
+  test::Folder folder_;
+  std::shared_ptr<gl::ProgramPool> programs_;
+};
+
+}  // namespace cumulet::bench
