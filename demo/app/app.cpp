@@ -147,6 +147,7 @@ void App::frame() {
     take();
   }
   follow_history();
+  const bool picture = drawn_pictures_ != pictures_;
   const bool drawn = draw();
   obey(order_);
   if (recorder_) recorder_->frame(events, model_.status.busy || waiting());
@@ -154,7 +155,7 @@ void App::frame() {
     window_->swap();
     ++drawn_frames_;
   }
-  take_frame_time(events, drawn);
+  take_frame_time(events, drawn, picture);
   take_statistics();
   ++frames_;
 
@@ -586,17 +587,14 @@ bool App::draw() {
   return true;
 }
 
-void App::take_frame_time(const std::vector<Event>& events, bool drawn) {
-  // From the first that a hand did of what this frame shows.
-  double begun = owed_since_.value_or(now_);
+void App::take_frame_time(const std::vector<Event>& events, bool drawn, bool picture) {
   for (const Event& event : events)
-    if (event.time > 0.0) begun = std::min(begun, event.time);
-  owed_since_.reset();
-  if (drawn) {
-    model_.charts.frame_ms.add(static_cast<float>(1000.0 * (glfwGetTime() - begun)));
-  } else if (owes_) {
-    owed_since_ = begun;
-  }
+    if (event.time > 0.0) frame_times_.hand(event.time);
+  if (!drawn) return;
+  const bool refines = (model_.status.frame.flags & CUMULET_RENDER_MORE) != 0;
+  const bool due = !wish_.paused && (refines || !settled());
+  if (const auto seconds = frame_times_.shown(glfwGetTime(), picture, due))
+    model_.charts.frame_ms.add(static_cast<float>(1000.0 * *seconds));
 }
 
 void App::take_thumbnail() {

@@ -66,7 +66,7 @@ class App {
   void complain(const std::string& cause);
   /// Whether there was anything to draw that the window does not show already.
   bool draw();
-  void take_frame_time(const std::vector<Event>& events, bool drawn);
+  void take_frame_time(const std::vector<Event>& events, bool drawn, bool picture);
   void take_statistics();
   void take_thumbnail();
   void obey(const Player::Order& order);
@@ -124,9 +124,9 @@ class App {
   std::uint64_t pictures_ = 0;  // that came to be shown
   std::uint64_t drawn_pictures_ = 0;
   double drawn_at_ = -1.0;
-  bool owes_ = false;                 // a frame of what changed, as one that would have shown it was not drawn
-  std::optional<double> owed_since_;  // when a hand first did what that shows
-  std::string last_state_;            // the state line of the frame before this
+  bool owes_ = false;  // a frame of what changed, as one that would have shown it was not drawn
+  FrameTimes frame_times_;
+  std::string last_state_;  // the state line of the frame before this
   std::uint64_t frames_ = 0;
   std::uint64_t drawn_frames_ = 0;  // the others would have looked as the one before
 };

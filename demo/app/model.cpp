@@ -82,6 +82,22 @@ void Series::add(float value) {
   values_.push_back(value);
 }
 
+void FrameTimes::hand(double at) {
+  if (!since_) since_ = at;
+}
+
+std::optional<double> FrameTimes::shown(double at, bool picture, bool due) {
+  if (due && !picture) {
+    hand(at);
+    return std::nullopt;
+  }
+  std::optional<double> waited;
+  if (since_) waited = at - *since_;
+  since_.reset();
+  if (due) since_ = at;
+  return waited;
+}
+
 double device_seconds(const cumulet_stats& stats) {
   return stats.pass_seconds_upload + stats.pass_seconds_host_depth + stats.pass_seconds_surfaces +
          stats.pass_seconds_trace + stats.pass_seconds_inspect + stats.pass_seconds_display;

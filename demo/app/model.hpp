@@ -110,6 +110,20 @@ class Series {
   std::vector<float> values_;
 };
 
+/// How long whoever watches a window waits: from one picture to the next while more are due, however often the window
+/// is drawn beside them; where none is, from what a hand did to the window that shows it. In seconds of one clock.
+class FrameTimes {
+ public:
+  /// A hand did something then.
+  void hand(double at);
+  /// The window was drawn then; picture: with a new one; due: another is to come. Returns how long that was waited for,
+  /// if it was.
+  std::optional<double> shown(double at, bool picture, bool due);
+
+ private:
+  std::optional<double> since_;
+};
+
 /// What a grid of the volume holds.
 struct FieldValues {
   float most = 0.0f;           // 0: there is no such grid
@@ -138,7 +152,7 @@ struct Status {
 
 /// What of it is drawn over time.
 struct Charts {
-  Series frame_ms;    // of the window's frames that were drawn, whatever is traced meanwhile
+  Series frame_ms;    // FrameTimes
   Series picture_ms;  // from a change to the window with the picture that was drawn next
   Series samples_per_second;
   Series noise_percent;

@@ -373,7 +373,7 @@ void Panel::statistics(const Model& model) {
   const Status& status = model.status;
   const cumulet_stats& stats = status.stats;
   const Charts& charts = model.charts;
-  ui_.plot("Frame time", "Milliseconds from an event, or a new picture, to the window that shows it.",
+  ui_.plot("Frame time", "Milliseconds from a picture to the next; at rest from an event to the window that shows it.",
            charts.frame_ms.values(), print("%.1f ms", static_cast<double>(charts.frame_ms.latest())));
   ui_.plot("Picture latency", "Milliseconds from a change to the picture that was drawn next, on the window.",
            charts.picture_ms.values(), print("%.0f ms", static_cast<double>(charts.picture_ms.latest())));

@@ -315,6 +315,35 @@ TEST(Replay, ErrorsNameTheLine) {
         << line << ": " << replay_error("frames 1\n" + std::string(line));
 }
 
+TEST(FrameTimes, AreThoseBetweenPicturesNotTheWindows) {
+  FrameTimes times;
+  std::vector<double> waited;
+  // A hand drags for two seconds, the window is drawn every 1/64 s, and every 16th time with a picture.
+  constexpr double frame = 1.0 / 64.0;
+  constexpr int pictures = 8;
+  for (int i = 0; i <= 16 * pictures; ++i) {
+    times.hand(i * frame);
+    if (const auto seconds = times.shown(i * frame, i > 0 && i % 16 == 0, i < 16 * pictures))
+      waited.push_back(*seconds);
+  }
+  EXPECT_EQ(waited, std::vector<double>(pictures, 16 * frame));
+}
+
+TEST(FrameTimes, AtRestAreFromAnEventToTheWindow) {
+  FrameTimes times;
+  EXPECT_FALSE(times.shown(1.0, true, false)) << "nobody waited";
+  EXPECT_FALSE(times.shown(2.0, false, false));
+  times.hand(3.0);
+  times.hand(3.5);  // of the same frame
+  EXPECT_EQ(times.shown(3.75, false, false), 0.75);
+  EXPECT_FALSE(times.shown(4.0, false, false)) << "a rest is no frame";
+  // A change that a picture answers, the window being drawn before it.
+  times.hand(5.0);
+  EXPECT_FALSE(times.shown(5.25, false, true));
+  EXPECT_EQ(times.shown(6.0, true, true), 1.0);
+  EXPECT_EQ(times.shown(6.5, true, false), 0.5);
+}
+
 /// The events that a file comes to, all frames' together.
 std::vector<Event> play(const std::string& text, const ReplayHost& host, std::vector<Player::Order>* orders = nullptr) {
   Player player(parse_replay(text, "r"), "r");
