@@ -51,6 +51,7 @@ const int CM_UNIT_HISTORY_GUIDES = 2;
 // surface.frag:
 const int CM_UNIT_MAPS = 0;  // to 9, in the order of surface_parameters.glsl
 const int CM_UNIT_GGX_ALBEDO = 10;
+const int CM_UNIT_GLOSS = 11;
 
 // Uniform buffers.
 const int CM_UNIFORM_PARAMETERS = 0;

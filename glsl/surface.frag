@@ -7,6 +7,7 @@
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 #include "ggx.glsl"
+#include "gloss.glsl"
 #include "luminance.glsl"
 #include "punctual.glsl"
 
@@ -31,6 +32,7 @@ layout(location = 3) in vec4 cm_texture_uv;
 layout(location = 4) in vec4 cm_vertex_color;
 layout(location = 5) in float cm_z;
 
+layout(binding = CM_UNIT_GLOSS) uniform sampler2DArray cm_gloss;  // light/gloss.hpp's
 layout(binding = CM_UNIT_MAPS) uniform sampler2D cm_maps[CM_MAPS];
 layout(std430, binding = CM_STORAGE_LAMPS) readonly buffer CmLampRecords { CmLamp cm_lamps[]; };  // from the eye
 
@@ -89,13 +91,19 @@ vec3 cm_normal_here(vec3 wo, out vec3 matte_normal, out vec3 smooth_normal) {
   return cm_bend_normal(matte_normal, g, wo);
 }
 
-// What a lobe sees of the sky beyond its mean.
-vec3 cm_sky_beyond(vec3 w, vec2 orders) {
-  return max(cm_harmonics(cm_view.sky, cm_turned(w, cm_view.sky_turn.xy), orders), -cm_view.sky_radiance.rgb);
+// What lobes see of the sky beyond its mean.
+vec3 cm_matte_beyond(vec3 normal) {
+  vec3 seen = cm_harmonics(cm_view.sky, cm_turned(normal, cm_view.sky_turn.xy), CM_MATTE_ORDERS);
+  return max(seen, -cm_view.sky_radiance.rgb);
 }
 
 vec3 cm_gloss_beyond(CmSurface s, vec3 wo, float roughness) {
-  return cm_sky_beyond(cm_gloss_middle(s.normal, wo, roughness), cm_gloss_orders(cm_alpha(roughness)));
+  vec2 place = cm_gloss_place(cm_turned(cm_gloss_middle(s.normal, wo, roughness), cm_view.sky_turn.xy));
+  float level = cm_gloss_level(roughness);
+  float low = floor(level);
+  vec3 smoother = textureLod(cm_gloss, vec3(place, low), 0.0).rgb;
+  vec3 rougher = textureLod(cm_gloss, vec3(place, low + 1.0), 0.0).rgb;
+  return cm_view.sky_turn.z * mix(smoother, rougher, level - low);
 }
 
 void main() {
@@ -142,7 +150,7 @@ void main() {
     CmAlbedos albedos = cm_bsdf_albedos(s, wo);
     colour = cm_view.sky_radiance.rgb * occlusion * cm_albedo_of(albedos);
     if (cm_view.counts.y > 0u) {
-      vec3 beyond = albedos.matte * cm_sky_beyond(s.matte_normal, CM_MATTE_ORDERS);
+      vec3 beyond = albedos.matte * cm_matte_beyond(s.matte_normal);
       beyond += albedos.base * cm_gloss_beyond(s, wo, s.roughness);
 #if CM_COATED
       beyond += albedos.coat * cm_gloss_beyond(s, wo, s.clearcoat_roughness);

@@ -33,8 +33,8 @@ layout(std140, binding = CM_UNIFORM_SURFACE_VIEW) uniform CmSurfaceView {
   vec4 sun_irradiance;
   vec4 sky_radiance;    // the mean
   CmHarmonics sky;      // what there is beyond it, before it is turned
-  vec4 sky_turn;        // from +Z towards +X: cosine, sine
-  uvec4 counts;         // x: lamps; y: orders of `sky`, none where there is nothing beyond the mean
+  vec4 sky_turn;        // from +Z towards +X: cosine, sine; z: times what glossy lobes see of it
+  uvec4 counts;         // x: lamps; y: 1 where there is a sky beyond the mean
 #ifdef __cplusplus
 };
 #else

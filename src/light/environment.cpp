@@ -194,6 +194,8 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
       part.add(1);
     });
   }
+  made->gloss = make_gloss(
+      [&made](std::uint32_t width, std::uint32_t height) { return pixels_of(*made, width, height); }, made->mean);
   if (progress != nullptr) progress->at(1.0);
   return made;
 }

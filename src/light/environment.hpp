@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/progress.hpp"
+#include "light/gloss.hpp"
 
 namespace cumulet::light {
 
@@ -39,6 +40,7 @@ struct Environment {
   std::vector<glm::uvec4> words;
   glm::dvec3 mean{0.0};  ///< over all directions
   Harmonics harmonics{};
+  GlossPtr gloss;
   /// Of looks by solid angle, over a texel's weight by the sine: the weights' sum times a texel's solid angle by the
   /// sine, inverted. 0: there is no light.
   float density = 0.0F;

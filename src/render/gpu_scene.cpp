@@ -190,8 +190,14 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   if (*snapshot.view) obstacles.view = **snapshot.view;
   const light::DistantLights lights = this->lights(snapshot);
   const light::Surroundings around = sky_surroundings(snapshot);
-  obstacles.lighting = {glm::vec3(lights.to_sun),    lights.sun_irradiance,  lights.sky_radiance,
-                        light::harmonics_of(around), light::turn_of(around), *snapshot.lamps};
+  obstacles.lighting = {.sun_direction = glm::vec3(lights.to_sun),
+                        .sun_irradiance = lights.sun_irradiance,
+                        .sky_radiance = lights.sky_radiance,
+                        .sky = light::harmonics_of(around),
+                        .gloss = around.environment ? around.environment->gloss : nullptr,
+                        .gloss_strength = around.strength,
+                        .sky_turn = light::turn_of(around),
+                        .lamps = *snapshot.lamps};
   obstacles.environment = environment_.get();
   obstacles.lamps = lamps_.get();
   return obstacles;

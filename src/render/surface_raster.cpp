@@ -15,6 +15,7 @@
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
+#include "gloss.glsl"
 #include "jitter.glsl"
 }  // namespace cumulet::core
 
@@ -302,7 +303,25 @@ void SurfaceRaster::make_fixtures() {
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   gl_->SamplerParameteri(table_sampler_.name(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  // Around the horizon, and not beyond the poles.
+  gloss_sampler_ = gl::make_sampler(gl_);
+  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_WRAP_S, GL_REPEAT);
+  gl_->SamplerParameteri(gloss_sampler_.name(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   view_block_ = gl::make_buffer(gl_, sizeof(CmSurfaceView), nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+}
+
+void SurfaceRaster::upload_gloss(const light::GlossPtr& gloss) {
+  if (gloss_ && uploaded_gloss_ == gloss) return;
+  constexpr int width = core::CM_GLOSS_WIDTH;
+  constexpr int height = core::CM_GLOSS_HEIGHT;
+  constexpr int levels = core::CM_GLOSS_LEVELS;
+  if (!gloss_)
+    gloss_ = gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating what glossy surfaces see");
+  const light::Gloss& texels = gloss ? *gloss : light::Gloss(std::size_t{width} * height * levels, glm::vec4(0.0F));
+  gl_->TextureSubImage3D(gloss_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT, texels.data());
+  uploaded_gloss_ = gloss;
 }
 
 void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& lighting) {
@@ -322,7 +341,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sun_irradiance = glm::vec4(lighting.sun_irradiance, 0.0F);
   block.sky_radiance = glm::vec4(lighting.sky_radiance, 0.0F);
   block.sky = block_of(lighting.sky);
-  block.sky_turn = glm::vec4(lighting.sky_turn, 0.0F, 0.0F);
+  block.sky_turn = glm::vec4(lighting.sky_turn, lighting.gloss_strength, 0.0F);
   const std::span<const surface::PunctualLight> lamps =
       content_ ? std::span(content_->pose_->lights) : std::span<const surface::PunctualLight>();
   light::Lamps of_host = lighting.lamps;
@@ -332,7 +351,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   }
   const std::vector<CmLamp> records = light::lamp_records(of_host, lamps, view.eye);
   block.counts.x = static_cast<std::uint32_t>(records.size());
-  block.counts.y = lighting.sky == light::Harmonics{} ? 0U : 2U;
+  block.counts.y = lighting.gloss ? 1U : 0U;
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
   const std::size_t bytes = std::max<std::size_t>(records.size(), 1) * sizeof(CmLamp);
@@ -419,6 +438,9 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     gl.BindVertexArray(array);
     gl.BindTextureUnit(core::CM_UNIT_GGX_ALBEDO, albedo_table_.name());
     gl.BindSampler(core::CM_UNIT_GGX_ALBEDO, table_sampler_.name());
+    upload_gloss(lighting.gloss);
+    gl.BindTextureUnit(core::CM_UNIT_GLOSS, gloss_.name());
+    gl.BindSampler(core::CM_UNIT_GLOSS, gloss_sampler_.name());
   }
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target);
   gl.ViewportIndexedf(0, 0.0F, 0.0F, static_cast<GLfloat>(size.x), static_cast<GLfloat>(size.y));

@@ -24,6 +24,8 @@ struct SurfaceLighting {
   glm::vec3 sun_irradiance{0.0F};             ///< on a plane that faces it
   glm::vec3 sky_radiance{0.0F};               ///< the mean over all directions
   light::Harmonics sky{};                     ///< what there is beyond it, before it is turned
+  light::GlossPtr gloss;                      ///< likewise, as glossy lobes see it; null: nothing
+  float gloss_strength = 1.0F;                ///< times that
   glm::vec2 sky_turn{1.0F, 0.0F};             ///< as light::turn_of() has it
   light::Lamps lamps;
   bool operator==(const SurfaceLighting&) const = default;
@@ -125,6 +127,7 @@ class SurfaceRaster {
   void sort_blended(const SurfaceView& view);
   void make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into);
   void make_fixtures();
+  void upload_gloss(const light::GlossPtr& gloss);
   void upload_view(const SurfaceView& view, const SurfaceLighting& lighting);
   void draw_batches(std::span<const Batch> batches, bool mirrored) const;
 
@@ -137,6 +140,9 @@ class SurfaceRaster {
   gl::Object white_;
   gl::Object albedo_table_;
   gl::Object table_sampler_;
+  gl::Object gloss_;
+  light::GlossPtr uploaded_gloss_;  // null: a black one
+  gl::Object gloss_sampler_;
   gl::Object view_block_;
   gl::Object light_buffer_;
   std::size_t light_bytes_ = 0;
