@@ -24,8 +24,70 @@ constexpr double most_growth = 4.0;
 constexpr double spread = 4.0;
 constexpr double free_spread = 1.5;
 constexpr double forgetting = 1.005;  // the scene may have become dearer
+// Loading and storing paths shall cost little beside running them.
+constexpr double worthwhile_rounds = 8.0;
+constexpr std::uint32_t first_rounds = 4;  // while nothing is known of what they cost
+
+// Blocks of which so many dispatches are under way, until those chosen are likely to take longer than the aim. Returns
+// what a round of them takes, if that is known.
+std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std::uint32_t under_way, bool free,
+                                    Dispatched& what) {
+  std::optional<double> round_ms;
+  double all_lanes = 0.0;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const std::size_t index = (from + i) % blocks.size();
+    const Block& block = blocks[index];
+    if (block.unfinished == 0 || block.under_way != under_way) continue;
+    const double lanes = what.lanes + block.unfinished;
+    const double slots = std::min(lanes, (all_lanes + block.lanes) / lanes_a_slot);
+    const auto ms = what.cost->most(slots, free);
+    if (!what.blocks.empty() && (!ms || *ms * worthwhile_rounds > what.aim_ms)) break;
+    what.blocks.push_back(static_cast<std::uint32_t>(index));
+    what.lanes = lanes;
+    what.slots = slots;
+    all_lanes += block.lanes;
+    round_ms = ms;
+  }
+  return round_ms;
+}
+
+std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
+                                 double aim_ms, std::uint32_t most_rounds, bool least) {
+  Dispatched what;
+  what.cost = cost;
+  what.aim_ms = aim_ms;
+  // Those of which nothing is under way; if there are none, those of which it may be too little.
+  auto round_ms = choose_blocks(blocks, from, 0, least, what);
+  if (what.blocks.empty()) round_ms = choose_blocks(blocks, from, 1, least, what);
+  if (what.blocks.empty() || (!least && round_ms.value_or(least_ms) > aim_ms)) return std::nullopt;
+  what.rounds = first_rounds;
+  if (round_ms) {
+    what.rounds = static_cast<std::uint32_t>(std::clamp(aim_ms / *round_ms, 1.0, double(most_rounds)));
+    what.most_ms = *round_ms * what.rounds;
+  }
+  return what;
+}
 
 }  // namespace
+
+std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
+                                 double aim_ms, std::uint32_t most_rounds) {
+  return choose(blocks, from, cost, aim_ms, most_rounds, false);
+}
+
+std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
+                                       std::uint32_t most_rounds) {
+  return choose(blocks, from, cost, least_ms, most_rounds, true);
+}
+
+void learn(const Dispatched& what, std::optional<double> ms, double at_most_ms, double full_rounds) {
+  if (!what.cost) return;
+  // What the lanes did in full rounds, of all that they could have done: lanes that end early, or meet nothing, cost
+  // less and tell little of others.
+  const double high =
+      full_rounds > 0.0 ? ms.value_or(at_most_ms) * what.lanes / full_rounds : std::numeric_limits<double>::infinity();
+  what.cost->learn(what.slots, ms ? *ms / what.rounds : 0.0, high);
+}
 
 std::optional<double> RoundCost::most(double slots, bool free) const {
   std::optional<double> most;

@@ -83,6 +83,23 @@ struct Dispatched {
   double most_ms = 0.0;
 };
 
+/// Lanes that cost what one of them costs, at least: a slot.
+constexpr double lanes_a_slot = 8.0;
+/// What a frame may take of the device whatever its budget, so that there is progress.
+constexpr double least_ms = 1.0;
+
+/// What to dispatch of a tile's blocks, from that one on: as many as are worth a dispatch of aim_ms, and as many rounds
+/// of them, but no more than most_rounds. Nothing if it is likely to take longer.
+[[nodiscard]] std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from,
+                                               const std::shared_ptr<RoundCost>& cost, double aim_ms,
+                                               std::uint32_t most_rounds);
+/// The same for an aim of least_ms, and at least a round of a block, whatever that takes.
+[[nodiscard]] std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from,
+                                                     const std::shared_ptr<RoundCost>& cost, std::uint32_t most_rounds);
+/// What a dispatch that is over tells of its cost. ms: on the device, if that is known; full_rounds: how often its
+/// lanes marched, all of them together.
+void learn(const Dispatched& what, std::optional<double> ms, double at_most_ms, double full_rounds);
+
 /// A dispatch that is over, for tests and tuning.
 struct DispatchRecord {
   double aim_ms = 0.0;

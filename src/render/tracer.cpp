@@ -25,11 +25,6 @@ constexpr std::uint32_t block_width = PathKernels::block_width;
 constexpr std::uint32_t block_height = PathKernels::block_height;
 constexpr double hasty_rest = 0.03;    // of a tile's pixels
 constexpr double dispatch_ms = 500.0;  // well under any driver's watchdog, well over the cost of a dispatch
-constexpr double least_ms = 1.0;       // whatever the budget, so that there is progress
-constexpr double vector = 8.0;         // lanes that cost what one of them costs, at least
-// Loading and storing paths shall cost little beside running them.
-constexpr double worthwhile_rounds = 8.0;
-constexpr std::uint32_t first_rounds = 4;  // while nothing is known of what they cost
 constexpr std::uint32_t most_rounds = 65536;
 constexpr double part_of_rest = 0.9;  // of the time left, that a dispatch may likely take
 constexpr std::uint32_t longest_pass = 64;
@@ -535,11 +530,7 @@ void Tracer::collect() {
       *what.error = sums;
       continue;
     }
-    // What the lanes did in full rounds, of all that they could have done: lanes that end early, or meet nothing, cost
-    // less and tell little of others.
-    const double full = landed->words[0].x;
-    const double high = full > 0.0 ? ms * what.lanes / full : std::numeric_limits<double>::infinity();
-    if (what.cost) what.cost->learn(what.slots, landed->ms ? ms / what.rounds : 0.0, high);
+    learn(what, landed->ms, landed->at_most_ms, landed->words[0].x);
     for (const std::uint32_t block : what.blocks) *what.samples += landed->words[1 + block].w;
     if (log_ != nullptr) {
       const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_width * block_height;
@@ -619,6 +610,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   if (picture.traced_ > 0) stages = stage_programs(picture, data);
   until_complete = until_complete && !picture.complete_;
   const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
+  const std::uint32_t rounds = stages ? PathKernels::most_rounds() : most_rounds;
   bool sent = false;
   while (!picture.done_ && !(until_complete && picture.complete_)) {
     const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
@@ -631,8 +623,9 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
       continue;
     }
     if (!flights_.full()) {
-      auto what = choose(picture, program.cost, std::clamp(left, 0.0, aim), false);
-      if (!what && !sent && flights_.empty()) what = choose(picture, program.cost, least_ms, true);
+      const Blocks& blocks = *picture.blocks_;
+      auto what = choose(blocks, picture.block_, program.cost, std::clamp(left, 0.0, aim), rounds);
+      if (!what && !sent && flights_.empty()) what = choose_least(blocks, picture.block_, program.cost, rounds);
       if (what) {
         dispatch(picture, obstacles, stages, std::move(*what));
         sent = true;
@@ -665,41 +658,6 @@ void Tracer::measure(Picture& picture, const Obstacles& obstacles) {
   flights_.end(std::move(what), kernels_.counters(), 1 + blocks);
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   gl::check(*gl_, "measuring the noise");
-}
-
-std::optional<Dispatched> Tracer::choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
-                                         bool anyway) {
-  Dispatched what;
-  what.cost = cost;
-  what.aim_ms = aim_ms;
-  const std::size_t count = picture.blocks_->size();
-  std::optional<double> cost_ms;
-  double all_lanes = 0.0;
-  // Those of which nothing is under way; if there are none, those of which it may be too little.
-  for (std::uint32_t under_way = 0; under_way < 2 && what.blocks.empty(); ++under_way) {
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t index = (picture.block_ + i) % count;
-      const Block& block = (*picture.blocks_)[index];
-      if (block.unfinished == 0 || block.under_way != under_way) continue;
-      const double lanes = what.lanes + block.unfinished;
-      const double slots = std::min(lanes, (all_lanes + block.lanes) / vector);
-      const auto ms = cost->most(slots, anyway);
-      if (!what.blocks.empty() && (!ms || *ms * worthwhile_rounds > aim_ms)) break;
-      what.blocks.push_back(static_cast<std::uint32_t>(index));
-      what.lanes = lanes;
-      what.slots = slots;
-      all_lanes += block.lanes;
-      cost_ms = ms;
-    }
-  }
-  if (what.blocks.empty() || (cost_ms.value_or(least_ms) > aim_ms && !anyway)) return std::nullopt;
-  what.rounds = first_rounds;
-  if (cost_ms) {
-    const std::uint32_t most = picture.traced_ > 0 ? PathKernels::most_rounds() : most_rounds;
-    what.rounds = static_cast<std::uint32_t>(std::clamp(aim_ms / *cost_ms, 1.0, double(most)));
-    what.most_ms = *cost_ms * what.rounds;
-  }
-  return what;
 }
 
 void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
@@ -754,7 +712,7 @@ bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameter
     const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
     const bool anyway = !sent && flights_.empty();
     const double most_ms = std::clamp(left, anyway ? least_ms : 0.0, aim);
-    const auto slots = [&](std::uint32_t rows) { return double(rows) * picture.size_.x / vector; };
+    const auto slots = [&](std::uint32_t rows) { return double(rows) * picture.size_.x / lanes_a_slot; };
     const auto fits = [&](std::uint32_t rows) {
       const auto ms = program.cost->most(slots(rows));
       return ms && *ms <= most_ms;

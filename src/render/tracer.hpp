@@ -281,9 +281,6 @@ class Tracer {
     const gl::Program* object = nullptr;
     std::shared_ptr<RoundCost> cost = std::make_shared<RoundCost>();
   };
-  // What to dispatch: nothing if it is likely to take longer than the aim. anyway: the least, then.
-  static std::optional<Dispatched> choose(Picture& picture, const std::shared_ptr<RoundCost>& cost, double aim_ms,
-                                          bool anyway);
   // stages: what paths among triangles are run by; without them the program in use is the one kernel.
   void dispatch(Picture& picture, const Obstacles& obstacles, const std::optional<StagePrograms>& stages,
                 Dispatched what);
