@@ -24,6 +24,7 @@
 #include "grid/tet_grid.hpp"
 #include "light/environment_file.hpp"
 #include "render/model_data.hpp"
+#include "support/c_host.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"
 #include "support/radiance.hpp"
@@ -320,6 +321,38 @@ TEST_F(CancelImport, NanoVdbOfEveryCodec) {
     nanovdb::io::writeGrid(file.string(), nano, codec);
     expect_import(file);
   }
+}
+
+TEST_F(CancelImport, ADestroyedViewerTakesASmallPartOfItsLoad) {
+  // In processor time of all threads, and beside that of a whole load in the same run: a busy machine changes neither.
+  const std::string file = write(openvdb::io::COMPRESS_ZIP, {grid_}).string();
+  const auto loading = [&] {
+    test::ViewerPtr viewer = test::make_viewer({});
+    EXPECT_EQ(cumulet_load_volume(viewer.get(), file.c_str(), "density"), CUMULET_OK);
+    return viewer;
+  };
+  const auto begun = std::chrono::steady_clock::now();
+  const double before = processor_milliseconds();
+  EXPECT_EQ(cumulet_wait(loading().get(), -1.0), CUMULET_OK);
+  const double whole = processor_milliseconds() - before;
+  const auto time = std::chrono::steady_clock::now() - begun;
+  constexpr int moments = 12;
+  std::vector<double> delays;
+  for (int i = 0; i < moments; ++i) {
+    test::ViewerPtr viewer = loading();
+    std::this_thread::sleep_for(time * i / moments);
+    auto work = test::make_desc<cumulet_progress>();
+    cumulet_get_progress(viewer.get(), &work);
+    const double asked = processor_milliseconds();
+    viewer.reset();
+    if (work.stage != CUMULET_STAGE_IDLE) delays.push_back(processor_milliseconds() - asked);
+  }
+  ASSERT_GE(delays.size(), moments / 4U);
+  std::ranges::sort(delays);
+  RecordProperty("milliseconds_of_a_load", std::to_string(whole));
+  RecordProperty("longest_to_destroy", std::to_string(delays.back()));
+  EXPECT_LT(delays[delays.size() / 2], 0.1 * whole);
+  EXPECT_LT(delays.back(), 0.25 * whole);
 }
 
 TEST(Cancel, Environments) {
