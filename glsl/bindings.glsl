@@ -46,6 +46,7 @@ const int CM_UNIT_GUIDE_VOLUME_Z = 12;
 const int CM_UNIT_WAVELET_FRONT = 13;
 const int CM_UNIT_WAVELET_SPREAD = 14;
 const int CM_UNIT_WAVELET_GUIDES = 15;
+const int CM_UNIT_WAVELET_UNFILTERED = 7;  // wavelet_output.comp
 const int CM_UNIT_HISTORY_LIGHT = 1;   // wavelet_reproject.comp, wavelet_merge.comp
 const int CM_UNIT_HISTORY_GUIDES = 2;
 // surface.frag:
@@ -92,6 +93,7 @@ const int CM_IMAGE_GUIDE_NORMAL = 2;
 const int CM_IMAGE_WAVELET_FRONT = 2;  // wavelet_*.comp, beside resolve.comp's
 const int CM_IMAGE_WAVELET_SPREAD = 3;
 const int CM_IMAGE_WAVELET_GUIDES = 4;
+const int CM_IMAGE_WAVELET_UNFILTERED = 4;  // wavelet_variance.comp
 const int CM_IMAGE_WAVELET_BEHIND = 5;
 const int CM_IMAGE_HISTORY_LIGHT = 6;
 const int CM_IMAGE_HISTORY_GUIDES = 7;

@@ -13,7 +13,7 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_
 #define CM_RADIUS 2
 const float cm_kernel[3] = float[3](0.375, 0.25, 0.0625);
 // Of the deviation of two pixels' difference.
-#define CM_TOLERANCE 1.5
+#define CM_TOLERANCE 1.2
 
 void main() {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);

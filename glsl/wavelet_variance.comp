@@ -11,6 +11,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "wavelet.glsl"
 layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
+layout(rgba32f, binding = CM_IMAGE_WAVELET_UNFILTERED) uniform writeonly image2D cm_unfiltered_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform image2D cm_behind;
 
 #define CM_RADIUS 2
@@ -141,5 +142,7 @@ void main() {
   if (here.finite) own.rgb *= cm_dimmed(own.rgb, spread, about);
   imageStore(cm_front_out, texel, own);
   imageStore(cm_spread_out, texel, vec4(spread.x, variance, 0.0));
+  float own_cover = cm_cover(spread.x);
+  imageStore(cm_unfiltered_out, texel, vec4(own.rgb / own_cover, variance.x / (own_cover * own_cover)));
   if (imageLoad(cm_behind, texel).a == 0.0) imageStore(cm_behind, texel, vec4(cm_behind_near(texel), 0.0));
 }

@@ -16,7 +16,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::uint32_t most_levels = 5;
 // Of rows, the least that is sent.
 constexpr std::uint32_t least_rows = 8;
-constexpr std::uint64_t bytes_a_pixel = 96;
+constexpr std::uint64_t bytes_a_pixel = 112;
 // Locations of the shaders' uniforms.
 constexpr GLint rows_at = 0;
 constexpr GLint footprint_at = 2;
@@ -144,6 +144,7 @@ std::optional<Error> Wavelet::begin(const PictureTextures& picture) {
     spread_ = {};
     guides_ = {};
     behind_ = {};
+    unfiltered_ = {};
     recalled_ = {};
     size_ = glm::uvec2(0U);
     const auto make = [&](GLenum format) {
@@ -154,6 +155,7 @@ std::optional<Error> Wavelet::begin(const PictureTextures& picture) {
     std::array<gl::Object, 2> spread{make(GL_RGBA32F), make(GL_RGBA32F)};
     guides_ = make(GL_RGBA32UI);
     behind_ = make(GL_RGBA32F);
+    unfiltered_ = make(GL_RGBA32F);
     front_ = std::move(front);
     spread_ = std::move(spread);
     size_ = picture.size;
@@ -181,6 +183,7 @@ void Wavelet::free() {
   spread_ = {};
   guides_ = {};
   behind_ = {};
+  unfiltered_ = {};
   size_ = glm::uvec2(0U);
   of_.reset();
   forget();
@@ -244,6 +247,7 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
   if (stage_ == Stage::input || stage_ == Stage::variance) {
     write(core::CM_IMAGE_WAVELET_BEHIND, behind_, GL_RGBA32F, GL_READ_WRITE);
   }
+  if (stage_ == Stage::variance) write(core::CM_IMAGE_WAVELET_UNFILTERED, unfiltered_, GL_RGBA32F);
   write(core::CM_IMAGE_WAVELET_SPREAD, spread_[1], GL_RGBA32F);
 }
 
@@ -346,6 +350,7 @@ void Wavelet::give(const PictureTextures& picture, MeansBackground background, G
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_FRONT, front_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_SPREAD, spread_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_GUIDES, guides_.name());
+  gl.BindTextureUnit(core::CM_UNIT_WAVELET_UNFILTERED, unfiltered_.name());
   gl.BindImageTexture(core::CM_IMAGE_WAVELET_BEHIND, behind_.name(), 0, GL_FALSE, 0, GL_READ_ONLY, GL_RGBA32F);
   gl.BindImageTexture(core::CM_IMAGE_MEANS, means, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   if (background == MeansBackground::apart) {

@@ -18,7 +18,8 @@ namespace cumulet::render {
 /// its half opacity. What is filtered is light over what it is in proportion to, which is known without noise: a
 /// surface's albedo, and how much of a pixel the volume covers (sums of both, so that no small number divides). What is
 /// behind all is that of the pixel's own samples, in the filtered part that nothing covers. As samples come the noise's
-/// deviation goes to 0, and with it all that is filtered: the result becomes the mean of samples.
+/// deviation goes to 0, and with it all that is filtered: the result becomes the mean of samples. Sooner where the filter
+/// is off by more than the noise, as what it took away about a pixel tells: there most is given unfiltered.
 ///
 /// Of pictures that have a view, what one knows is kept for the next: samples, their own and those that were kept
 /// before them, at most 32 a pixel, found again by depths (of what is solid; of the medium the mean one at which it
@@ -26,8 +27,8 @@ namespace cumulet::render {
 /// less where these are off from them by more than their noise. They count as a pixel's own, and fade as it gets 64 of
 /// these.
 ///
-/// Takes 96 bytes a pixel while under way, and 80 more of pictures that have a view. All calls but those that tell need
-/// the context current and a StateGuard around.
+/// Takes 112 bytes a pixel while under way, and 80 more of pictures that have a view. All calls but those that tell
+/// need the context current and a StateGuard around.
 class Wavelet {
  public:
   using Deadline = std::chrono::steady_clock::time_point;
@@ -98,6 +99,7 @@ class Wavelet {
   std::array<gl::Object, 2> spread_;
   gl::Object guides_;
   gl::Object behind_;
+  gl::Object unfiltered_;
   History before_;  // of another picture
   History kept_;    // of the one that is filtered, or was last
   gl::Object recalled_;

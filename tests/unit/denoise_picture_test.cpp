@@ -201,17 +201,17 @@ TEST_F(DenoisedPicture, SwitchedOffInSuchFramesNothingIsLeftToDo) {
   auto frame = target_.frame();
   frame.target = CUMULET_TARGET_NONE;
   frame.budget_ms = 1.0;
-  for (int i = 0; i < 1000 && bytes() < without + 96U * side * side; ++i) {
+  for (int i = 0; i < 1000 && bytes() < without + 112U * side * side; ++i) {
     ASSERT_EQ(cumulet_render(viewer_.get(), &frame, nullptr), CUMULET_OK) << error();
   }
-  EXPECT_GE(bytes(), without + 96U * side * side);
+  EXPECT_GE(bytes(), without + 112U * side * side);
   display.denoise = CUMULET_DENOISE_OFF;
   ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
   auto result = make_desc<cumulet_frame_result>();
   ASSERT_EQ(cumulet_render(viewer_.get(), &frame, &result), CUMULET_OK) << error();
   EXPECT_NE(result.flags & CUMULET_RENDER_CONVERGED, 0U);
   EXPECT_EQ(result.flags & CUMULET_RENDER_MORE, 0U);
-  EXPECT_LT(bytes(), without + 96U * side * side);
+  EXPECT_LT(bytes(), without + 112U * side * side);
 }
 
 TEST_F(DenoisedPicture, DebugViewsAreNotDenoised) {

@@ -248,7 +248,7 @@ TEST_P(State, ADenoisedFrameLeavesNothingAndReadsNothing) {
   EXPECT_EQ(frame.compositor.bytes(), 64U * 16U);
   frame.denoise = true;
   frame.draw();
-  EXPECT_EQ(frame.compositor.bytes(), 64U * (16U + 96U));
+  EXPECT_EQ(frame.compositor.bytes(), 64U * (16U + 112U));
   const std::vector<float> expected = frame.read();
   expect_untouched(gl_, frame, expected, {200, 216});
 }

@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "base/error.hpp"
@@ -117,7 +118,7 @@ class Samples {
     const StateGuard guard(*gl_);
     Wavelet wavelet(gl_, programs);
     std::vector<glm::vec4> values = filtered_by(wavelet, std::nullopt, background);
-    EXPECT_EQ(wavelet.bytes(), 96U * static_cast<unsigned>(size_.x * size_.y));
+    EXPECT_EQ(wavelet.bytes(), 112U * static_cast<unsigned>(size_.x * size_.y));
     return values;
   }
   /// By one that may know pictures before it; with a view, what this one tells is kept. An error: that of begin().
@@ -308,7 +309,7 @@ TEST_P(Wavelets, ALampDoesNotLeak) {
   const auto clean = samples.filtered(programs_);
   for (int i = 0; i < 48 * 48; ++i) {
     const bool lamp = is_lamp(i % 48, i / 48);
-    EXPECT_NEAR(clean[static_cast<std::size_t>(i)].x, lamp ? 35.01F : 0.7F, lamp ? 1.2F : 0.35F)
+    EXPECT_NEAR(clean[static_cast<std::size_t>(i)].x, lamp ? 35.01F : 0.7F, lamp ? 1.2F : 0.4F)
         << i % 48 << ", " << i / 48;
   }
   EXPECT_LT(error_of(clean, samples.truth()), 0.3 * error_of(samples.raw(), samples.truth()));
@@ -341,6 +342,25 @@ TEST_P(Wavelets, ConvergesToTheMeanOfSamples) {
     last = moved;
   }
   EXPECT_LT(last, 1e-4);
+}
+
+// What no guide tells of and the noise nearly hides: better left with its noise than blurred.
+TEST_P(Wavelets, WhatIsBlurredByMoreThanTheNoiseIsTakenAsItIs) {
+  constexpr unsigned count = 64;
+  const double noise = 0.5 / std::sqrt(3.0 * count);
+  // Of the raw picture's error; the filter alone leaves 0.76, 1.28 and 1.55.
+  for (const auto& [contrast, most] : {std::pair(1.0, 0.7), std::pair(2.0, 1.2), std::pair(4.0, 1.47)}) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    const double amplitude = std::sqrt(3.0) * contrast * noise;
+    const auto scene = [&](int, int) {
+      const double light = 1.0 + amplitude * unit(random);
+      return Pixel{.front = glm::vec3(static_cast<float>(light)), .z = 5.0F};
+    };
+    const Samples samples(gl_, {48, 48}, count, scene);
+    const double raw = error_of(samples.raw(), samples.truth());
+    EXPECT_LT(error_of(samples.filtered(programs_), samples.truth()), most * raw) << contrast;
+  }
 }
 
 TEST_P(Wavelets, WithoutNoiseNothingIsFiltered) {
@@ -556,7 +576,7 @@ TEST_P(History, AnotherSceneAndAnotherViewerKnowNothing) {
   EXPECT_EQ(samples.filtered_by(*wavelet_, std::nullopt), alone);
   wavelet_->free();
   EXPECT_EQ(samples.filtered_by(*wavelet_, view_at(0.0, size_)), alone);
-  EXPECT_EQ(wavelet_->bytes(), (96U + 16U + 32U) * static_cast<unsigned>(size_.x * size_.y));
+  EXPECT_EQ(wavelet_->bytes(), (112U + 16U + 32U) * static_cast<unsigned>(size_.x * size_.y));
 }
 
 // One that is filtered again, as samples come, does not count them twice.
@@ -610,7 +630,7 @@ TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
   cumulet::test::FakeGl fake(cumulet::headless::Context::get_proc, context_.get());
   const gl::FunctionsPtr functions = gl::load_functions(cumulet::test::FakeGl::get_proc, &fake);
   // Textures that are made, by two calls each.
-  constexpr std::int64_t filter = 2 * 6;
+  constexpr std::int64_t filter = 2 * 7;
   constexpr std::int64_t history = 2 * 3;
   for (std::int64_t n = 0; n < filter + history; ++n) {
     Wavelet wavelet(functions, programs_);
@@ -624,7 +644,7 @@ TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
     fake.fail_allocation(-1);
     ASSERT_TRUE(error) << n;
     EXPECT_EQ(error->code(), cumulet::ErrorCode::out_of_memory);
-    EXPECT_EQ(wavelet.bytes(), 96U * static_cast<unsigned>(size_.x * size_.y));
+    EXPECT_EQ(wavelet.bytes(), 112U * static_cast<unsigned>(size_.x * size_.y));
     // Told once.
     EXPECT_EQ(samples.filtered_by(wavelet, view_at(0.0, size_), MeansBackground::left_out, &error), alone) << n;
     EXPECT_FALSE(error) << n;
