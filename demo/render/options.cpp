@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <lamp_limits.hpp>
 #include <limits>
 #include <memory>
 #include <names.hpp>
@@ -40,8 +41,14 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
 
 /// The words of a value such as "0,0,1 0,0,0 40".
 std::vector<std::string_view> words(std::string_view text) {
-  std::vector<std::string_view> parts = split(text, ' ');
-  std::erase(parts, std::string_view{});
+  constexpr std::string_view white = " \t\n\v\f\r";
+  std::vector<std::string_view> parts;
+  std::size_t at = text.find_first_not_of(white);
+  while (at != std::string_view::npos) {
+    const std::size_t end = std::min(text.find_first_of(white, at), text.size());
+    parts.push_back(text.substr(at, end - at));
+    at = text.find_first_not_of(white, end);
+  }
   return parts;
 }
 
@@ -261,7 +268,8 @@ cumulet_lamp_desc parse_lamp(std::string_view text) {
     });
     if (!known) throw UsageError("lamps have no " + in_quotes(key));
   }
-  if (const auto refusal = lamp_refusal(lamp)) throw UsageError(std::string(refusal->key) + " " + refusal->cause);
+  if (const auto refusal = settings::lamp_refusal(lamp))
+    throw UsageError(std::string(refusal->name) + " " + refusal->cause);
   return lamp;
 }
 
@@ -275,8 +283,7 @@ void add_lamps(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>&
         else
           lamps.push_back(parse_lamp(text));
       }
-      if (lamps.size() > most_lamps)
-        throw UsageError(std::to_string(lamps.size()) + " lamps are more than " + std::to_string(most_lamps));
+      if (const std::string why = settings::lamp_count_refusal(lamps.size()); !why.empty()) throw UsageError(why);
     } catch (const UsageError& error) {
       throw CLI::ValidationError("--lamp", error.what());
     }
@@ -285,9 +292,8 @@ void add_lamps(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>&
          "--lamp", take,
          "A lamp, as often as there are lamps: a point, spot, disc, rectangle or sun, such as \"disc position=0,30,10 "
          "power=20000 width=4\"; the keys are those of a scene file's lights: position, direction, across, color, "
-         "power "
-         "(watts; of a sun W/m2), width, height, angle_degrees, blend. Beside a scene's own; none: without those "
-         "before")
+         "power (watts; of a sun W/m2), width, height, angle_degrees, blend. Beside a scene's own; none: without "
+         "those before")
       ->type_name("\"KIND KEY=VALUE ...\"|none")
       ->group(group)
       ->expected(1)

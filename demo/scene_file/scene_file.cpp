@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <file.hpp>
 #include <filesystem>
+#include <lamp_limits.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -299,14 +300,14 @@ void read_settings(Reader& reader, Desc& desc, const std::string& where = "") {
 }
 
 void read_lamps(Reader& reader, std::vector<cumulet_lamp_desc>& lamps) {
-  lamps.resize(reader.list("lights", most_lamps));
+  lamps.resize(reader.list("lights", settings::most_lamps));
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     cumulet_lamp_desc& lamp = lamps[i];
     lamp.struct_size = sizeof lamp;
     const std::string where = "lights[" + std::to_string(i) + "].";
     if (!reader.has(where + "kind")) reader.wrong(where + "kind", "is missing");
     read_settings(reader, lamp, where);
-    if (const auto refusal = lamp_refusal(lamp)) reader.wrong(where + refusal->key, refusal->cause);
+    if (const auto refusal = settings::lamp_refusal(lamp)) reader.wrong(where + refusal->name, refusal->cause);
   }
 }
 
@@ -596,18 +597,6 @@ std::string animation_refusal(const SceneOptions& scene, std::uint32_t animation
   if (wanted == 0 || wanted < animations) return {};  // 0: the default, of a file without any
   return scene.surfaces + ": there is no animation " + std::to_string(wanted) + ": the file has " +
          std::to_string(animations);
-}
-
-std::optional<LampRefusal> lamp_refusal(const cumulet_lamp_desc& lamp) {
-  constexpr double far = 1e30;
-  constexpr double brightest = 1e30;
-  if (!std::ranges::all_of(lamp.position, [](double x) { return std::abs(x) <= far; }))
-    return LampRefusal{"position", "is beyond 1e30"};
-  if (lamp.kind == CUMULET_LAMP_SUN && lamp.angle_degrees > 90.0)
-    return LampRefusal{"angle_degrees", "of a sun is above 90"};
-  if (double{*std::ranges::max_element(lamp.color)} * lamp.power > brightest)
-    return LampRefusal{"power", "times color is above 1e30"};
-  return std::nullopt;
 }
 
 void SceneOptions::set_daylight() {

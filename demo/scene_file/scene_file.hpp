@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <ramp.hpp>
 #include <string>
 #include <vector>
@@ -72,16 +71,6 @@ void for_each_group(Scene& scene, Visit&& visit) {
 /// Why surfaces with so many animations cannot be shown as the scene has it; empty if they can. The library shows a
 /// scene at rest whose animation is not there: whoever named it meant another.
 [[nodiscard]] std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations);
-
-/// As many as the library takes.
-inline constexpr std::size_t most_lamps = 4096;
-
-/// What of a lamp the library refuses that no range of one setting does.
-struct LampRefusal {
-  const char* key;
-  std::string cause;  // in words that follow the key
-};
-[[nodiscard]] std::optional<LampRefusal> lamp_refusal(const cumulet_lamp_desc& lamp);
 
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
 /// volume is taken from its folder. What the text does not say is as in SceneOptions(), on a clear day; of version

@@ -185,7 +185,7 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
     const std::vector<Alias> aliases = apart(progress, [weights = std::move(weights), sum = all.weight]() mutable {
       return alias_table(std::move(weights), sum);
     });
-    ProgressPart part(progress, 0.9, 1.0, pixels.height);
+    ProgressPart part(progress, 0.9, 0.95, pixels.height);
     for_each_row(pixels.height, [&](std::uint32_t y) {
       for (std::size_t i = std::size_t{y} * pixels.width; i < std::size_t{y + 1} * pixels.width; ++i) {
         made->words[i].x = aliases[i].stays;
@@ -194,8 +194,13 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
       part.add(1);
     });
   }
-  made->gloss = make_gloss(
-      [&made](std::uint32_t width, std::uint32_t height) { return pixels_of(*made, width, height); }, made->mean);
+  const auto read = [&made](std::uint32_t y, std::vector<vec3>& row) {
+    for (std::uint32_t x = 0; x < made->width; ++x) {
+      const glm::uvec4& word = made->words[std::size_t{y} * made->width + x];
+      row[x] = unpack({word.z, word.w});
+    }
+  };
+  made->gloss = make_gloss({made->width, made->height, read}, made->mean, progress);
   if (progress != nullptr) progress->at(1.0);
   return made;
 }

@@ -40,7 +40,7 @@ struct Environment {
   std::vector<glm::uvec4> words;
   glm::dvec3 mean{0.0};  ///< over all directions
   Harmonics harmonics{};
-  GlossPtr gloss;
+  GlossPtr gloss;  ///< null: nothing beyond the mean
   /// Of looks by solid angle, over a texel's weight by the sine: the weights' sum times a texel's solid angle by the
   /// sine, inverted. 0: there is no light.
   float density = 0.0F;

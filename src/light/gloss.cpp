@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "base/progress_part.hpp"
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
@@ -23,9 +25,9 @@ using glm::vec3;
 constexpr int width = core::CM_GLOSS_WIDTH;
 constexpr int height = core::CM_GLOSS_HEIGHT;
 
-vec3 direction(int x, int y, int columns, int rows) {
-  const double azimuth = 2.0 * std::numbers::pi * (0.5 - (x + 0.5) / columns);
-  const double down = std::numbers::pi * (y + 0.5) / rows;
+vec3 direction(int x, int y) {
+  const double azimuth = 2.0 * std::numbers::pi * (0.5 - (x + 0.5) / width);
+  const double down = std::numbers::pi * (y + 0.5) / height;
   return {std::sin(down) * std::sin(azimuth), std::cos(down), std::sin(down) * std::cos(azimuth)};
 }
 
@@ -54,58 +56,111 @@ class Lobe {
   std::array<float, entries> weights_{};
 };
 
-/// Directions with what comes from there, and the solid angle of each.
-struct Source {
-  std::vector<vec3> w;
-  std::vector<vec3> light;
-  std::vector<float> area;
+/// The source beyond its mean, in cells of the size of a texel.
+struct Cells {
+  std::vector<vec3> w;                             // to the middles
+  std::array<float, height> area{};                // of each in a row
+  std::vector<std::array<vec3, 2 * width>> light;  // in rows, each twice: turned ones go on
 };
 
-Source source_of(const PixelsOf& pixels, int columns, int rows) {
-  Source source;
-  source.light = pixels(static_cast<std::uint32_t>(columns), static_cast<std::uint32_t>(rows));
-  for (int y = 0; y < rows; ++y) {
-    for (int x = 0; x < columns; ++x) {
-      source.w.push_back(direction(x, y, columns, rows));
-      source.area.push_back(static_cast<float>(std::sin(std::numbers::pi * (y + 0.5) / rows)));
+/// A row of cells: means over what each covers of the sphere.
+std::array<glm::dvec3, width> row_of(const GlossSource& source, int y, const ProgressPart& part) {
+  const auto turn = [](std::uint64_t at, std::uint64_t of) {
+    return std::cos(std::numbers::pi * static_cast<double>(at) / static_cast<double>(of));
+  };
+  const std::uint64_t top = std::uint64_t(y) * source.height;
+  const std::uint64_t bottom = top + source.height;
+  const std::uint64_t rows = std::uint64_t{source.height} * height;
+  const double area = turn(top, rows) - turn(bottom, rows);
+  std::array<glm::dvec3, width> means{};
+  std::vector<vec3> texels(source.width);
+  for (std::uint64_t v = top / height; v * height < bottom; ++v) {
+    part.check();
+    source.read(static_cast<std::uint32_t>(v), texels);
+    // Where a texel is in two cells, each has its part.
+    const double share =
+        (turn(std::max(top, v * height), rows) - turn(std::min(bottom, (v + 1) * height), rows)) / area;
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::uint64_t left = x * source.width;
+      const std::uint64_t right = left + source.width;
+      glm::dvec3 sum(0.0);
+      for (std::uint64_t u = left / width; u * width < right; ++u) {
+        const std::uint64_t within = std::min(right, (u + 1) * width) - std::max(left, u * width);
+        sum += static_cast<double>(within) * glm::dvec3(texels[u]);
+      }
+      means.at(x) += share / source.width * sum;
     }
   }
-  return source;
+  return means;
 }
 
-vec3 seen(const Source& source, const Lobe& lobe, const vec3& middle) {
-  vec3 sum(0.0F);
-  float all = 0.0F;
-  for (std::size_t i = 0; i < source.w.size(); ++i) {
-    const float cosine = glm::dot(source.w[i], middle);
-    if (cosine <= 0.0F) continue;
-    const float weight = source.area[i] * lobe(cosine);
-    sum += weight * source.light[i];
-    all += weight;
+Cells cells_of(const GlossSource& source, const glm::dvec3& mean, ProgressPart& part) {
+  Cells cells;
+  cells.light.resize(height);
+  for (int y = 0; y < height; ++y) {
+    const double edge = std::numbers::pi / height;
+    cells.area.at(static_cast<std::size_t>(y)) = static_cast<float>(std::cos(edge * y) - std::cos(edge * (y + 1)));
+    for (int x = 0; x < width; ++x) cells.w.push_back(direction(x, y));
   }
-  return sum / all;
+  tbb::parallel_for(0, height, [&](int y) {
+    const std::array<glm::dvec3, width> means = row_of(source, y, part);
+    auto& row = cells.light[static_cast<std::size_t>(y)];
+    for (std::size_t x = 0; x < row.size(); ++x) row.at(x) = vec3(means.at(x % width) - mean);
+    part.add(1);
+  });
+  return cells;
+}
+
+bool even(const Cells& cells, const glm::dvec3& mean) {
+  const double rounding = std::numeric_limits<float>::epsilon() * std::max(mean.x, std::max(mean.y, mean.z));
+  return std::ranges::all_of(cells.light, [&](const auto& row) {
+    return std::ranges::all_of(row, [&](const vec3& light) {
+      return glm::all(glm::lessThanEqual(glm::abs(glm::dvec3(light)), glm::dvec3(rounding)));
+    });
+  });
+}
+
+/// What the lobes see whose middles are a row's: turned, they are one.
+std::array<vec3, width> seen(const Cells& cells, const Lobe& lobe, int y) {
+  const vec3 middle = cells.w[static_cast<std::size_t>(y) * width];
+  std::array<vec3, width> sums{};
+  float all = 0.0F;
+  for (std::size_t v = 0; v < height; ++v) {
+    for (std::size_t u = 0; u < width; ++u) {
+      const float cosine = glm::dot(cells.w[v * width + u], middle);
+      if (cosine <= 0.0F) continue;
+      const float weight = cells.area.at(v) * lobe(cosine);
+      all += weight;
+      const vec3* const light = &cells.light[v].at(u);
+      for (std::size_t x = 0; x < width; ++x) sums[x] += weight * light[x];
+    }
+  }
+  for (vec3& sum : sums) sum /= all;
+  return sums;
 }
 
 }  // namespace
 
-GlossPtr make_gloss(const PixelsOf& pixels, const glm::dvec3& mean) {
+GlossPtr make_gloss(const GlossSource& source, const glm::dvec3& mean, Progress* progress) {
   constexpr std::size_t texels = std::size_t{width} * height;
+  ProgressPart part(progress, 0.95, 1.0, core::CM_GLOSS_LEVELS * height);
+  const Cells cells = cells_of(source, mean, part);
+  if (even(cells, mean)) return nullptr;
   auto gloss = std::make_shared<Gloss>();
   gloss->reserve(core::CM_GLOSS_LEVELS * texels);
-  // The smoothest sees a texel; the next is little wider than one; the others are wider than those of a coarse picture.
-  const Source fine = source_of(pixels, width, height);
-  const Source coarse = source_of(pixels, width / 2, height / 2);
-  for (const vec3& light : fine.light) gloss->emplace_back(light - vec3(mean), 0.0F);
+  // The smoothest sees a texel.
+  for (const auto& row : cells.light) {
+    for (std::size_t x = 0; x < width; ++x) gloss->emplace_back(row.at(x), 0.0F);
+  }
   for (int level = 1; level < core::CM_GLOSS_LEVELS; ++level) {
     const Lobe lobe(static_cast<float>(level) / (core::CM_GLOSS_LEVELS - 1));
     const std::size_t first = gloss->size();
     gloss->resize(first + texels);
     tbb::parallel_for(0, height, [&](int y) {
-      for (int x = 0; x < width; ++x) {
-        const vec3 light = seen(level == 1 ? fine : coarse, lobe, direction(x, y, width, height));
-        (*gloss)[first + static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] =
-            glm::vec4(light - vec3(mean), 0.0F);
-      }
+      const std::array<vec3, width> row = seen(cells, lobe, y);
+      for (std::size_t x = 0; x < width; ++x)
+        (*gloss)[first + static_cast<std::size_t>(y) * width + x] = glm::vec4(row.at(x), 0.0F);
+      part.add(1);
     });
   }
   return gloss;

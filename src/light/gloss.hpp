@@ -8,6 +8,8 @@
 #include <memory>
 #include <vector>
 
+#include "base/progress.hpp"
+
 namespace cumulet::light {
 
 /// Beyond the mean over all directions: texels of each roughness, the smoothest first, in rows from +Y down. Immutable,
@@ -15,10 +17,15 @@ namespace cumulet::light {
 using Gloss = std::vector<glm::vec4>;
 using GlossPtr = std::shared_ptr<const Gloss>;
 
-/// Radiance at another size, as pixels_of() has it.
-using PixelsOf = std::function<std::vector<glm::vec3>(std::uint32_t width, std::uint32_t height)>;
+/// An equirectangular picture, as EnvironmentPixels has it.
+struct GlossSource {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::function<void(std::uint32_t y, std::vector<glm::vec3>& row)> read;  ///< writes `width` texels, on any thread
+};
 
-/// O(1): some millions of products, on TBB's threads, the same by any number of them.
-GlossPtr make_gloss(const PixelsOf& pixels, const glm::dvec3& mean);
+/// Null where there is nothing beyond the mean but rounding. O(texels), beside some millions of products, on TBB's
+/// threads, the same by any number of them; the last twentieth of a load's progress. Throws Error(cancelled).
+GlossPtr make_gloss(const GlossSource& source, const glm::dvec3& mean, Progress* progress = nullptr);
 
 }  // namespace cumulet::light

@@ -163,7 +163,7 @@ std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) 
 
 std::uint64_t GpuScene::other_bytes() const {
   return (model_ ? model_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) +
-         (environment_ ? environment_->bytes() : 0) + heap_.free_bytes();
+         (environment_ ? environment_->bytes() : 0) + surface_pass_.bytes() + heap_.free_bytes();
 }
 
 light::Surroundings GpuScene::surroundings(const scene::Snapshot& snapshot) const {

@@ -51,7 +51,7 @@ class GpuScene {
   /// Of that volume, if it is the last that came, or is coming.
   [[nodiscard]] std::optional<double> upload_seconds(const scene::MarchSourcePtr& of) const;
   [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? data_->bytes() : 0; }
-  /// Of surfaces, and of what is kept for more.
+  /// Of surfaces, of what draws them, and of what is kept for more.
   [[nodiscard]] std::uint64_t other_bytes() const;
 
   /// As the snapshot has it, of the environment that is here.

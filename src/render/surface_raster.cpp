@@ -312,15 +312,23 @@ void SurfaceRaster::make_fixtures() {
   view_block_ = gl::make_buffer(gl_, sizeof(CmSurfaceView), nullptr, GL_DYNAMIC_STORAGE_BIT, what);
 }
 
+std::uint64_t SurfaceRaster::bytes() const {
+  std::uint64_t bytes = light_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
+  if (gloss_) bytes += std::uint64_t{core::CM_GLOSS_WIDTH} * core::CM_GLOSS_HEIGHT * core::CM_GLOSS_LEVELS * 16;
+  if (!view_block_) return bytes;
+  const std::uint64_t table = std::uint64_t(surface::GgxAlbedo::width()) * surface::GgxAlbedo::height() * 4;
+  return bytes + 4 + table + sizeof(CmSurfaceView);
+}
+
 void SurfaceRaster::upload_gloss(const light::GlossPtr& gloss) {
-  if (gloss_ && uploaded_gloss_ == gloss) return;
   constexpr int width = core::CM_GLOSS_WIDTH;
   constexpr int height = core::CM_GLOSS_HEIGHT;
   constexpr int levels = core::CM_GLOSS_LEVELS;
   if (!gloss_)
     gloss_ = gl::make_texture_2d_array(gl_, GL_RGBA32F, width, height, levels, "creating what glossy surfaces see");
-  const light::Gloss& texels = gloss ? *gloss : light::Gloss(std::size_t{width} * height * levels, glm::vec4(0.0F));
-  gl_->TextureSubImage3D(gloss_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT, texels.data());
+  // Without one the shader does not look.
+  if (!gloss || uploaded_gloss_ == gloss) return;
+  gl_->TextureSubImage3D(gloss_.name(), 0, 0, 0, 0, width, height, levels, GL_RGBA, GL_FLOAT, gloss->data());
   uploaded_gloss_ = gloss;
 }
 
@@ -351,7 +359,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   }
   const std::vector<CmLamp> records = light::lamp_records(of_host, lamps, view.eye);
   block.counts.x = static_cast<std::uint32_t>(records.size());
-  block.counts.y = lighting.gloss ? 1U : 0U;
+  block.counts.y = lighting.gloss && lighting.gloss_strength > 0.0F ? 1U : 0U;
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
   const std::size_t bytes = std::max<std::size_t>(records.size(), 1) * sizeof(CmLamp);

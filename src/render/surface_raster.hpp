@@ -116,6 +116,8 @@ class SurfaceRaster {
   void draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
             SurfaceLayers& into);
 
+  /// GL memory that it holds itself, beside its content and the layers.
+  [[nodiscard]] std::uint64_t bytes() const;
   /// Another with every show(): what is drawn of one and the same looks the same.
   [[nodiscard]] const std::shared_ptr<const void>& content() const { return shown_; }
   /// Whether what it shows has BLEND triangles, which have layers of their own.
@@ -141,7 +143,7 @@ class SurfaceRaster {
   gl::Object albedo_table_;
   gl::Object table_sampler_;
   gl::Object gloss_;
-  light::GlossPtr uploaded_gloss_;  // null: a black one
+  light::GlossPtr uploaded_gloss_;  // null: of no content
   gl::Object gloss_sampler_;
   gl::Object view_block_;
   gl::Object light_buffer_;

@@ -3,15 +3,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "settings/lamp_limits.hpp"
+
 namespace cumulet::c_abi {
 
 namespace {
 
 using glm::dvec3;
-
-constexpr uint64_t most_lamps = 4096;
-constexpr double far = 1e30;
-constexpr float brightest = 1e30F;
 
 /// Unit, of a vector of any length above 0.
 dvec3 unit(const dvec3& v) {
@@ -47,7 +45,7 @@ light::Lamp lamp_of(const cumulet_lamp_desc& d) {
 
 light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count) {
   light::Lamps made;
-  if (count > most_lamps) refuse(std::to_string(count) + " lamps are more than " + std::to_string(most_lamps));
+  if (const std::string why = settings::lamp_count_refusal(count); !why.empty()) refuse(why);
   for_each_desc(lamps, count, "cumulet_lamp_desc", "lamp",
                 [&](const cumulet_lamp_desc& given, const std::string& what) {
                   cumulet_lamp_desc d{};
@@ -56,15 +54,9 @@ light::Lamps lamps_of(const cumulet_lamp_desc* lamps, uint64_t count) {
                   } catch (const Error& error) {
                     refuse(what + ": " + error.what());
                   }
-                  const auto near = [](double v) { return std::abs(v) <= far; };
-                  if (!std::ranges::all_of(d.position, near))
-                    refuse(what + ": cumulet_lamp_desc.position is beyond 1e30");
-                  if (d.kind == CUMULET_LAMP_SUN && d.angle_degrees > 90.0)
-                    refuse(what + ": cumulet_lamp_desc.angle_degrees of a sun is above 90");
+                  if (const auto refusal = settings::lamp_refusal(d))
+                    refuse(what + ": cumulet_lamp_desc." + refusal->name + " " + refusal->cause);
                   const light::Lamp lamp = lamp_of(d);
-                  // Times what a lamp close by counts, it shall stay finite.
-                  if (!glm::all(glm::lessThanEqual(lamp.power, glm::vec3(brightest))))
-                    refuse(what + ": cumulet_lamp_desc.color times power is above 1e30");
                   if (lamp.power != glm::vec3(0.0F)) made.push_back(lamp);
                 });
   return made;

@@ -27,7 +27,10 @@ EditedShaders::EditedShaders(std::span<const Edit> edits) {
     if (at == std::string::npos || text.find(wanted, at + 1) != std::string::npos)
       throw std::runtime_error(std::string(edit.file) + ": is not once there: " + wanted);
     text.replace(at, wanted.size(), edit.instead);
-    std::ofstream(path) << text;
+    std::ofstream file(path);
+    file << text;
+    file.close();
+    if (!file) throw std::runtime_error(path.string() + ": cannot be written");
   }
   programs_ = std::make_shared<gl::ProgramPool>(nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
 }

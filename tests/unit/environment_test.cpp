@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -29,6 +31,8 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
 namespace cumulet::core {
+#include "ggx.glsl"
+#include "gloss.glsl"
 
 /// The shaders' path tracer over voxels, as C++, in an environment.
 struct CpuEnvironment {
@@ -235,6 +239,87 @@ TEST(Environment, PixelsOfAnotherSizeAreMeansOfThoseInTheirPlace) {
   EXPECT_EQ(larger.at(16 * 5 - 1), vec3(7.0F, 3.0F, 1.0F));
 }
 
+// Of a texel of a level, with the mean.
+double gloss_at(const light::Environment& environment, int level, int x, int y) {
+  const auto i = std::size_t(level * core::CM_GLOSS_HEIGHT + y) * core::CM_GLOSS_WIDTH + std::size_t(x);
+  return environment.mean.y + environment.gloss->at(i).y;
+}
+
+// Beside the poles, where a texel's row tells little of how large it is.
+TEST(EnvironmentGloss, ASmallLightNearAPoleCountsAsMuchAsItIsLarge) {
+  constexpr std::uint32_t columns = 512;
+  constexpr std::uint32_t rows = 256;
+  constexpr std::uint32_t column = 100;
+  for (const std::uint32_t row : {2U, 14U, rows - 1 - 2U}) {  // 1.8 and 10 degrees from a pole
+    const auto environment = made(
+        columns, rows, [&](std::uint32_t x, std::uint32_t y) { return vec3(x == column && y == row ? 1e4F : 0.0F); });
+    ASSERT_NE(environment->gloss, nullptr);
+    const auto lobe = [](double cosine) {
+      if (cosine <= 0.0) return 0.0;
+      const double half = std::sqrt(0.5 - 0.5 * cosine);
+      return double(core::cm_ggx(core::cm_alpha(1.0F), vec3(0.0F, 0.0F, 1.0F),
+                                 vec3(std::sqrt(1.0 - cosine * cosine), 0.0F, cosine),
+                                 vec3(half, 0.0F, std::sqrt(1.0 - half * half))));
+    };
+    for (const int x : {0, 17, 40}) {
+      for (int up = 0; up < 8; ++up) {
+        const int y = row < rows / 2 ? up : core::CM_GLOSS_HEIGHT - 1 - up;
+        const vec3 middle =
+            direction(2.0 * pi * (0.5 - (x + 0.5) / core::CM_GLOSS_WIDTH), pi * (y + 0.5) / core::CM_GLOSS_HEIGHT);
+        double light = 0.0;
+        double all = 0.0;
+        for (std::uint32_t i = 0; i < columns * rows; ++i) {
+          const double down = pi * (std::floor(double(i) / columns) + 0.5) / rows;
+          const vec3 w = direction(2.0 * pi * (0.5 - (i % columns + 0.5) / columns), down);
+          const double weight = std::sin(down) * lobe(glm::dot(w, middle));
+          all += weight;
+          if (i == row * columns + column) light = 1e4 * weight;
+        }
+        const double expected = light / all;
+        EXPECT_NEAR(gloss_at(*environment, core::CM_GLOSS_LEVELS - 1, x, y), expected, 0.03 * expected)
+            << row << ' ' << x << ' ' << y;
+      }
+    }
+  }
+}
+
+// By the sizes of their cells, of pictures of any number of texels.
+TEST(EnvironmentGloss, WhatTheSmoothestSeeHasTheEnvironmentsMean) {
+  for (const auto& [columns, rows] : {std::pair(100U, 37U), std::pair(256U, 128U), std::pair(5U, 3U)}) {
+    std::mt19937 random(3);
+    const auto environment = made(columns, rows, [&](auto, auto) { return vec3(float(random() % 1000)); });
+    double mean = 0.0;
+    for (int y = 0; y < core::CM_GLOSS_HEIGHT; ++y) {
+      const double edge = pi / core::CM_GLOSS_HEIGHT;
+      const double area = (std::cos(edge * y) - std::cos(edge * (y + 1))) / (2.0 * core::CM_GLOSS_WIDTH);
+      for (int x = 0; x < core::CM_GLOSS_WIDTH; ++x) mean += area * gloss_at(*environment, 0, x, y);
+    }
+    EXPECT_NEAR(mean / environment->mean.y, 1.0, 1e-5) << columns;
+  }
+}
+
+TEST(EnvironmentGloss, ThereIsNoneOfAnEvenSkyOrADarkOne) {
+  for (const float value : {0.0F, 0.3F, 1e30F})
+    EXPECT_EQ(made(100, 37, [&](auto, auto) { return vec3(value, 0.5F * value, 0.0F); })->gloss, nullptr) << value;
+  EXPECT_NE(made(100, 37, [](auto x, auto) { return vec3(x == 3 ? 0.301F : 0.3F); })->gloss, nullptr);
+}
+
+TEST(EnvironmentGloss, IsCancelledBetweenRows) {
+  Progress progress;
+  std::atomic<int> rows = 0;
+  const auto read = [&](std::uint32_t, std::vector<vec3>& row) {
+    std::ranges::fill(row, vec3(1.0F));
+    if (++rows == 100) progress.cancel();
+  };
+  EXPECT_THROW(light::make_gloss({64, 16384, read}, dvec3(0.5), &progress), Error);
+  EXPECT_LT(rows, 16384 / 2);
+  rows = 0;
+  Progress whole;
+  const auto steps = [&](std::uint32_t y, std::vector<vec3>& row) { std::ranges::fill(row, vec3(float(y % 2))); };
+  EXPECT_NE(light::make_gloss({64, 48, steps}, dvec3(0.5), &whole), nullptr);
+  EXPECT_DOUBLE_EQ(whole.fraction(), 1.0);
+}
+
 std::string refusal_of(const light::EnvironmentPixels& pixels) {
   return test::refusal([&] { light::make_environment(pixels, "host"); });
 }
@@ -412,6 +497,43 @@ TEST_P(Surrounded, RasterisedSpheresAreLitAsTracedOnes) {
   }
 }
 
+// Glossy surfaces show the environment that there is now, whatever was there before.
+TEST_P(Surrounded, RasterisedGlossIsOfTheLastEnvironment) {
+  const auto glossy = [&] {
+    auto still = make();
+    still->set_volume(test::make_volume(ivec3(4), ivec3(-2, -2, -20), [](const ivec3&) { return 1.0F; }));
+    still->set_medium({1e-6, vec3(1.0F), {0.0F}, 0});
+    still->set_camera(test::camera_at({0, 0, 30}, {0, 0, 0}));
+    still->set_light({0.0F, 0.0F, vec3(0.0F), vec3(0.2F, 0.3F, 0.4F)});
+    auto scene = std::make_shared<test::StillScene>();
+    surface::Material metal;
+    metal.roughness = 0.2F;
+    scene->add_sphere(vec3(0.0F), 4.9F, scene->add(metal), 32);
+    still->viewer().show_surfaces(test::source_of(scene));
+    still->viewer().set_surface_settings({{}, viewer::SurfaceLight::none});
+    return still;
+  };
+  const auto shown = [](test::Still& still, const light::EnvironmentPtr& environment) {
+    still.viewer().set_environment(environment);
+    return test::render(still, {24, 24, 4, 1});
+  };
+  const light::EnvironmentPtr halves = made(128, 64, two_colours);
+  const light::EnvironmentPtr turned = made(128, 64, [](auto x, auto y) { return two_colours(127 - x, 63 - y); });
+  const light::EnvironmentPtr even = made(8, 4, [](auto, auto) { return vec3(0.5F); });
+  const auto still = glossy();
+  std::vector<test::Picture> pictures;
+  for (const light::EnvironmentPtr& environment :
+       {turned, halves, even, halves, light::EnvironmentPtr(), turned, light::EnvironmentPtr()}) {
+    pictures.push_back(shown(*still, environment));
+    const test::Picture expected = shown(*glossy(), environment);
+    double worst = 0.0;
+    for (std::size_t i = 0; i < expected.pixels.size(); ++i)
+      worst = std::max(worst, double(glm::length(pictures.back().pixels[i] - expected.pixels[i])));
+    EXPECT_LT(worst, 1e-4) << pictures.size();
+  }
+  for (std::size_t i = 1; i < pictures.size(); ++i) EXPECT_NE(pictures[i].pixels, pictures[i - 1].pixels) << i;
+}
+
 TEST_P(Surrounded, ABrightTexelIsASun) {
   const auto still = ball(0.3F, vec3(0.9F));
   constexpr std::uint32_t width = 512;
@@ -469,7 +591,8 @@ TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
     const test::Picture picture = test::render(*still, {16, 16, 256, 1, render::View::shaded});
     core::CpuEnvironment cpu = twin(*environment);
     cpu.cm = still->viewer().trace_parameters();
-    cpu.cm.dispatch.samples = 256;
+    constexpr std::uint32_t samples = 128;
+    cpu.cm.dispatch.samples = samples;
     cpu.volume = &volume;
     cpu.origin = ivec3(grid::fit_cube(volume).origin);
     const auto of_pixels = [](const auto& pixel) {
@@ -485,18 +608,19 @@ TEST_P(Surrounded, LooksAndFlightsAndFlightsAloneAgree) {
     };
     const Seen kernels = of_pixels([&](std::uint32_t i) { return picture.pixels[i]; });
     std::array<Seen, 3> seen;
-    constexpr std::array chances = {1.0F, 0.5F, 0.0F};
-    for (std::size_t k = 0; k < chances.size(); ++k) {
+    constexpr std::array chances = {1.0F, 0.0F, 0.5F};
+    // In between at one: paths on the CPU are slow.
+    for (std::size_t k = 0; k < (of.ground ? 3 : 2); ++k) {
       cpu.cm.lights.environment_chance = chances.at(k);
       seen.at(k) = of_pixels([&](std::uint32_t i) {
         const auto pixel = cpu.traced({i % 16, i / 16});
-        return vec3(pixel.sum) / 256.0F + pixel.background;
+        return vec3(pixel.sum) / float(samples) + pixel.background;
       });
       expect_same(seen.at(k), kernels, 1e-3);
-      EXPECT_LT(seen.at(k).error.x, 0.05 * kernels.mean.x) << chances.at(k);
+      EXPECT_LT(seen.at(k).error.x, 0.07 * kernels.mean.x) << chances.at(k);
     }
-    expect_same(seen[2], seen[0], 1e-3);
-    EXPECT_GT(seen[2].error.x, 1.3 * seen[0].error.x) << "looks are of use";
+    expect_same(seen[1], seen[0], 1e-3);
+    EXPECT_GT(seen[1].error.x, 1.3 * seen[0].error.x) << "looks are of use";
   }
 }
 
@@ -546,7 +670,7 @@ TEST_P(Surrounded, ASunInAPictureLeavesNoFireflies) {
       if (deviation > 0.0) worst = std::max(worst, strays.back() / deviation);
     }
     RecordProperty(of.name, std::to_string(worst));
-    EXPECT_LT(worst, 12.0);
+    EXPECT_LT(worst, 40.0);  // without looks 1e5
     EXPECT_GT(worst, 2.0) << "there is noise";
   }
 }

@@ -346,8 +346,8 @@ TEST(LampDescs, AreCheckedAndNamed) {
   EXPECT_EQ(bad([](auto& d) { d.position[2] = 1e300; }), field + "position is beyond 1e30");
   EXPECT_EQ(bad([](auto& d) { d.direction[0] = INFINITY; }), field + "direction is not finite");
   EXPECT_EQ(bad([](auto& d) { d.color[0] = -1.0F; }), field + "color is negative or not finite");
-  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 1e29F; }), field + "color times power is above 1e30");
-  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 20.0F; }), field + "color times power is above 1e30");
+  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 1e29F; }), field + "power times color is above 1e30");
+  EXPECT_EQ(bad([](auto& d) { d.power = 1e29F, d.color[1] = 20.0F; }), field + "power times color is above 1e30");
   EXPECT_EQ(bad([](auto& d) { d.width = -1.0; }), field + "width is not from 0 to 1e30");
   EXPECT_EQ(bad([](auto& d) { d.angle_degrees = 181.0; }), field + "angle_degrees is not from 0 to 180");
   EXPECT_EQ(bad([](auto& d) { d.kind = CUMULET_LAMP_SUN, d.angle_degrees = 91.0; }),

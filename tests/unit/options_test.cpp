@@ -283,6 +283,14 @@ TEST(Options, LampsAreBesideThoseOfAScene) {
   EXPECT_EQ(other[0].power, 3.0f);
 }
 
+TEST(Options, WordsAreBetweenAnyWhiteSpace) {
+  const auto lamps = parse({"--lamp", "\tdisc\n  power=3\r\n\twidth=2\n"}).scene.lamps;
+  ASSERT_EQ(lamps.size(), 1u);
+  EXPECT_EQ(lamps[0].kind, CUMULET_LAMP_DISC);
+  EXPECT_EQ(lamps[0].power, 3.0f);
+  EXPECT_EQ(lamps[0].width, 2.0);
+}
+
 TEST(Options, ALampThatIsNoneIsToldInALine) {
   const auto told = [](const char* lamp) { return usage_error(with({"--lamp", lamp})); };
   EXPECT_EQ(told(""), "--lamp: '' is none of point, spot, disc, rectangle, sun");

@@ -916,6 +916,21 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
   EXPECT_EQ(shown, 3);
 }
 
+TEST_P(SurfaceRasters, TellsWhatItHolds) {
+  EXPECT_EQ(raster_->bytes(), 0U);
+  draw(straight({0, 0, 0}, 1.0), {}, {5U, 3U});
+  const std::uint64_t empty = raster_->bytes();
+  EXPECT_GT(empty, 5U * 3U * 4U);
+  const auto scene = std::make_shared<HandScene>();
+  scene->add_matte(glm::vec3(1.0F));
+  scene->add_wall(-2.0F, 1.0F, 0);
+  set(scene);
+  draw(straight({0, 0, 0}, 1.0), {}, {5U, 3U});
+  EXPECT_EQ(raster_->bytes(), empty + 64U * 32U * 6U * 16U);  // what glossy surfaces see
+  draw(straight({0, 0, 0}, 1.0), {}, {32U, 16U});
+  EXPECT_EQ(raster_->bytes(), empty + 64U * 32U * 6U * 16U + (32U * 16U - 5U * 3U) * 4U);
+}
+
 TEST_P(SurfaceRasters, LeavesAndReadsNoState) {
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(0.5F)).base_color_texture.texture =
