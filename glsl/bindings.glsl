@@ -46,7 +46,7 @@ const int CM_UNIT_GUIDE_VOLUME_Z = 12;
 const int CM_UNIT_WAVELET_FRONT = 13;
 const int CM_UNIT_WAVELET_SPREAD = 14;
 const int CM_UNIT_WAVELET_GUIDES = 15;
-const int CM_UNIT_WAVELET_UNFILTERED = 7;  // wavelet_output.comp
+const int CM_UNIT_WAVELET_UNFILTERED = 7;  // wavelet_blend.comp
 const int CM_UNIT_HISTORY_LIGHT = 1;   // wavelet_reproject.comp, wavelet_merge.comp
 const int CM_UNIT_HISTORY_GUIDES = 2;
 // surface.frag:

@@ -590,9 +590,12 @@ bool App::draw() {
 void App::take_frame_time(const std::vector<Event>& events, bool drawn, bool picture) {
   for (const Event& event : events)
     if (event.time > 0.0) frame_times_.hand(event.time);
-  if (!drawn) return;
   const bool refines = (model_.status.frame.flags & CUMULET_RENDER_MORE) != 0;
   const bool due = !wish_.paused && (refines || !settled());
+  if (!drawn) {
+    if (!owes_ && !due) frame_times_.rest();
+    return;
+  }
   if (const auto seconds = frame_times_.shown(glfwGetTime(), picture, due))
     model_.charts.frame_ms.add(static_cast<float>(1000.0 * *seconds));
 }

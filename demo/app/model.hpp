@@ -119,6 +119,8 @@ class FrameTimes {
   /// The window was drawn then; picture: with a new one; due: another is to come. Returns how long that was waited for,
   /// if it was.
   std::optional<double> shown(double at, bool picture, bool due);
+  /// Nothing was drawn, and nothing is to come: what a hand did changes nothing.
+  void rest() { since_.reset(); }
 
  private:
   std::optional<double> since_;

@@ -51,8 +51,8 @@ std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std:
   return round_ms;
 }
 
-std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
-                                 double aim_ms, std::uint32_t most_rounds, bool least) {
+std::optional<Dispatched> choose_for(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
+                                     double aim_ms, std::uint32_t most_rounds, bool least) {
   Dispatched what;
   what.cost = cost;
   what.aim_ms = aim_ms;
@@ -72,12 +72,12 @@ std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from, const s
 
 std::optional<Dispatched> choose(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
                                  double aim_ms, std::uint32_t most_rounds) {
-  return choose(blocks, from, cost, aim_ms, most_rounds, false);
+  return choose_for(blocks, from, cost, aim_ms, most_rounds, false);
 }
 
 std::optional<Dispatched> choose_least(const Blocks& blocks, std::size_t from, const std::shared_ptr<RoundCost>& cost,
                                        std::uint32_t most_rounds) {
-  return choose(blocks, from, cost, least_ms, most_rounds, true);
+  return choose_for(blocks, from, cost, least_ms, most_rounds, true);
 }
 
 void learn(const Dispatched& what, std::optional<double> ms, double at_most_ms, double full_rounds) {

@@ -95,12 +95,12 @@ std::uint32_t look_after(std::uint32_t samples) {
 
 std::uint32_t Picture::pass_after(std::uint32_t samples) const {
   std::uint32_t next = samples;
-  if (!noise_target_) {
-    // Twice as many each time: the first picture comes at once, and waiting for slow pixels at a pass's end costs
-    // little. One tile needs none but a hasty first: lanes go on with their next samples while others are at their
-    // first.
-    const bool one_tile = tiles_ == glm::uvec2(1U) && (samples > 0 || !hasty_);
-    next = one_tile ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
+  if (samples == 0 && hasty_) {
+    next = 1;  // the first picture comes at once
+  } else if (!noise_target_) {
+    // Twice as many each time: waiting for slow pixels at a pass's end costs little. One tile needs no passes, lanes go
+    // on with their next samples while others are at their first.
+    next = tiles_ == glm::uvec2(1U) ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
   } else if (samples < first_measured) {
     next = tiles_ == glm::uvec2(1U) ? first_measured : std::max(1U, 2 * samples);
   } else {
@@ -170,7 +170,8 @@ void Picture::begin_tile() {
   for (std::uint32_t y = 0; y < extent.y; y += block_height) {
     for (std::uint32_t x = 0; x < extent.x; x += block_width) {
       const std::uint32_t lanes = std::min(block_width, extent.x - x) * std::min(block_height, extent.y - y);
-      blocks_->push_back({lanes, lanes, pass_ == 0 ? lanes : 0, 0, true});
+      // Not known of a pass that begins with holes until its blocks tell.
+      blocks_->push_back({lanes, lanes, holes_ ? lanes : 0, 0, true});
     }
   }
 }

@@ -48,7 +48,7 @@ Motion motion(const PictureView& from, const PictureView& to) {
   return {glm::mat3(back * glm::dmat3(from.right, from.up, from.forward)), glm::vec3(back * (from.eye - to.eye))};
 }
 
-double slots_of(glm::uvec2 size, std::uint32_t rows) { return double(rows) * size.x / 8.0; }
+double slots_of(glm::uvec2 size, std::uint32_t rows) { return double(rows) * size.x / lanes_a_slot; }
 
 gl::ProgramKey output_key(MeansBackground background) {
   return {"wavelet_output.comp", {"CM_BACKGROUND " + std::to_string(static_cast<int>(background))}};
@@ -74,9 +74,11 @@ gl::ProgramKey Wavelet::key(Stage stage, const PictureTextures& picture) const {
     case Stage::variance:
       return {"wavelet_variance.comp", {}};
     case Stage::level:
+      return {"wavelet_level.comp", {}};
+    case Stage::blend:
       break;
   }
-  return {"wavelet_level.comp", {}};
+  return {"wavelet_blend.comp", {}};
 }
 
 bool Wavelet::able(const PictureTextures& picture, MeansBackground background, bool wait) {
@@ -84,7 +86,7 @@ bool Wavelet::able(const PictureTextures& picture, MeansBackground background, b
   const auto ask = [&](const gl::ProgramKey& wanted) {
     usable = (wait ? programs_->get(wanted) : programs_->ask(wanted)).usable() && usable;
   };
-  for (const Stage stage : {Stage::input, Stage::variance, Stage::level}) ask(key(stage, picture));
+  for (const Stage stage : {Stage::input, Stage::variance, Stage::level, Stage::blend}) ask(key(stage, picture));
   if (picture.view) {
     ask(key(Stage::reproject, picture));
     for (const char* history : {"CM_HISTORY 0", "CM_HISTORY 1"}) ask({"wavelet_merge.comp", {history}});
@@ -209,7 +211,8 @@ std::optional<double> Wavelet::left_ms(glm::uvec2 size) const {
   double sum = 0.0;
   const bool begun = of_ && size == size_;
   if (begun && done_) return 0.0;
-  for (const Stage stage : {Stage::input, Stage::reproject, Stage::merge, Stage::variance, Stage::level}) {
+  for (const Stage stage :
+       {Stage::input, Stage::reproject, Stage::merge, Stage::variance, Stage::level, Stage::blend}) {
     if ((begun && stage < stage_) || !has(stage)) continue;
     const auto ms = costs_.at(static_cast<std::size_t>(stage))->most(slots_of(size, size.y));
     if (!ms) return std::nullopt;
@@ -242,6 +245,7 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     gl.BindTextureUnit(core::CM_UNIT_WAVELET_GUIDES, guides_.name());
     gl.ProgramUniform2f(program.name(), footprint_at, guides.footprint.x, guides.footprint.y);
     if (stage_ == Stage::level) gl.ProgramUniform1i(program.name(), own_at, 1 << level_);
+    if (stage_ == Stage::blend) gl.BindTextureUnit(core::CM_UNIT_WAVELET_UNFILTERED, unfiltered_.name());
   }
   write(core::CM_IMAGE_WAVELET_FRONT, front_[1], GL_RGBA32F);
   if (stage_ == Stage::input || stage_ == Stage::variance) {
@@ -297,10 +301,11 @@ void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool meas
     std::swap(spread_[0], spread_[1]);
   }
   if (stage_ == Stage::merge) kept_.filled = true;
-  if (stage_ == Stage::level) {
-    done_ = ++level_ == levels();
+  if (stage_ == Stage::blend) {
+    done_ = true;
     return;
   }
+  if (stage_ == Stage::level && ++level_ < levels()) return;
   do {
     stage_ = static_cast<Stage>(static_cast<unsigned>(stage_) + 1U);
   } while (!has(stage_));
@@ -350,7 +355,6 @@ void Wavelet::give(const PictureTextures& picture, MeansBackground background, G
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_FRONT, front_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_SPREAD, spread_[0].name());
   gl.BindTextureUnit(core::CM_UNIT_WAVELET_GUIDES, guides_.name());
-  gl.BindTextureUnit(core::CM_UNIT_WAVELET_UNFILTERED, unfiltered_.name());
   gl.BindImageTexture(core::CM_IMAGE_WAVELET_BEHIND, behind_.name(), 0, GL_FALSE, 0, GL_READ_ONLY, GL_RGBA32F);
   gl.BindImageTexture(core::CM_IMAGE_MEANS, means, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
   if (background == MeansBackground::apart) {

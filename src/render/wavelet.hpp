@@ -18,8 +18,8 @@ namespace cumulet::render {
 /// its half opacity. What is filtered is light over what it is in proportion to, which is known without noise: a
 /// surface's albedo, and how much of a pixel the volume covers (sums of both, so that no small number divides). What is
 /// behind all is that of the pixel's own samples, in the filtered part that nothing covers. As samples come the noise's
-/// deviation goes to 0, and with it all that is filtered: the result becomes the mean of samples. Sooner where the filter
-/// is off by more than the noise, as what it took away about a pixel tells: there most is given unfiltered.
+/// deviation goes to 0, and with it all that is filtered: the result becomes the mean of samples. Sooner where the
+/// filter is off by more than the noise, as what it took away about a pixel tells: there most is given unfiltered.
 ///
 /// Of pictures that have a view, what one knows is kept for the next: samples, their own and those that were kept
 /// before them, at most 32 a pixel, found again by depths (of what is solid; of the medium the mean one at which it
@@ -58,8 +58,8 @@ class Wavelet {
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  enum class Stage : std::uint8_t { input, reproject, merge, variance, level };
-  static constexpr std::size_t stages = 5;
+  enum class Stage : std::uint8_t { input, reproject, merge, variance, level, blend };
+  static constexpr std::size_t stages = 6;
   /// What is kept of a picture: glsl/wavelet_history.glsl.
   struct History {
     gl::Object light;
@@ -92,7 +92,7 @@ class Wavelet {
   Flights flights_;
   std::array<std::shared_ptr<RoundCost>, stages> costs_{std::make_shared<RoundCost>(), std::make_shared<RoundCost>(),
                                                         std::make_shared<RoundCost>(), std::make_shared<RoundCost>(),
-                                                        std::make_shared<RoundCost>()};
+                                                        std::make_shared<RoundCost>(), std::make_shared<RoundCost>()};
   glm::uvec2 size_{0U};
   // Of each two the first is read and the second written.
   std::array<gl::Object, 2> front_;

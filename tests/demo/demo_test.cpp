@@ -342,6 +342,11 @@ TEST(FrameTimes, AtRestAreFromAnEventToTheWindow) {
   EXPECT_FALSE(times.shown(5.25, false, true));
   EXPECT_EQ(times.shown(6.0, true, true), 1.0);
   EXPECT_EQ(times.shown(6.5, true, false), 0.5);
+  // A hand that moves over nothing, and half a minute later comes to a button.
+  times.hand(7.0);
+  times.rest();
+  times.hand(37.0);
+  EXPECT_EQ(times.shown(37.25, false, false), 0.25);
 }
 
 /// The events that a file comes to, all frames' together.

@@ -24,7 +24,7 @@ def main():
 
     def shown(name, *more):
         subprocess.run([render, volume, "--size", "64x40", "--spp", "16", "-o", f"{out}/{name}.png", *more], check=True,
-                       timeout=300)
+                       timeout=90)
         return luminances(Picture(out / f"{name}.png"))
 
     # As the file is, and as others write theirs: a mist, and stone.

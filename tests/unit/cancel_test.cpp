@@ -351,8 +351,10 @@ TEST_F(CancelImport, ADestroyedViewerTakesASmallPartOfItsLoad) {
   std::ranges::sort(delays);
   RecordProperty("milliseconds_of_a_load", std::to_string(whole));
   RecordProperty("longest_to_destroy", std::to_string(delays.back()));
+#if !defined(__SANITIZE_ADDRESS__)  // which slows what is freed more than what is read
   EXPECT_LT(delays[delays.size() / 2], 0.1 * whole);
   EXPECT_LT(delays.back(), 0.25 * whole);
+#endif
 }
 
 TEST(Cancel, Environments) {

@@ -915,7 +915,7 @@ typedef struct cumulet_display_desc {
    * to what they are without. Each view has random numbers of its own then, beside the seed: what is read back is as
    * right, not the same. cumulet_read_linear and cumulet_read_aov are not filtered,
    * and cumulet_read_denoised knows no other frames. It takes at most four tenths of a frame's budget (in the long run
-   * a fifth), 240 bytes a pixel of GL memory and four unlit rays a pixel. Until it is done frames draw the last picture
+   * a fifth), 256 bytes a pixel of GL memory and four unlit rays a pixel. Until it is done frames draw the last picture
    * of the same scene and camera, else this as it is; those that draw nothing go on with it, too, and say by
    * CUMULET_RENDER_UNDRAWN when there is another. Without memory for it, or for other frames, they are drawn without,
    * which CUMULET_ERROR_OUT_OF_MEMORY says once. Debug views are not filtered.
@@ -1298,7 +1298,7 @@ typedef struct cumulet_denoise_desc {
  * like: an estimate, not the mean of samples, and without any promise on its error. Alpha, and what of the picture is
  * not finite, stays. Computed by shaders in this context, with up to 512 MiB of its memory and 64 bytes a pixel for the
  * time of the call; waits for it, some 90 seconds a megapixel on software drivers, and for their compiler.
- * Without a network: by the filter, alpha as well, with 112 bytes a pixel, a second or two a megapixel on software
+ * Without a network: by the filter, alpha as well, with 128 bytes a pixel, a second or two a megapixel on software
  * drivers. CUMULET_ERROR_FILE for a file that is missing or no such network, CUMULET_ERROR_UNSUPPORTED for debug views
  * and for a preview over surfaces that are not traced, and as cumulet_read_aov.
  */
