@@ -74,7 +74,7 @@ for program in "$tree"/bin/*; do
   expect "$(tr '\n' ' ' <<<"$flags")" "$(complete_bash "$program" -)" "bash: $program -"
   zsh -n "$share/zsh/site-functions/_$program"
   for flag in $flags; do
-    grep -qE -- "['{,]${flag}[]=[},]" "$share/zsh/site-functions/_$program" || fail "zsh: _$program lacks $flag"
+    grep -qE -- "['{,*]${flag}[]=[},]" "$share/zsh/site-functions/_$program" || fail "zsh: _$program lacks $flag"
   done
 done
 expect "brick dense tet " "$(complete_bash cumulet-render --march "")" "bash: --march"
