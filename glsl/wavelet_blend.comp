@@ -6,7 +6,6 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "wavelet.glsl"
 layout(binding = CM_UNIT_WAVELET_UNFILTERED) uniform sampler2D cm_unfiltered;  // over cover, and its variance
 layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
-layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
 
 #define CM_RADIUS 2
 // Times the noise: what filtered and unfiltered light differ by for certain.
@@ -49,11 +48,9 @@ void main() {
   if (texel.x >= textureSize(cm_guides, 0).x || texel.y >= cm_rows.y) return;
   CmGuides here = cm_guides_at(texel);
   vec4 front = texelFetch(cm_front, texel, 0);
-  vec4 spread = texelFetch(cm_spread, texel, 0);
   if (here.finite) {
-    vec3 unfiltered = cm_cover(spread.x) * texelFetch(cm_unfiltered, texel, 0).rgb;
+    vec3 unfiltered = cm_cover(texelFetch(cm_spread, texel, 0).x) * texelFetch(cm_unfiltered, texel, 0).rgb;
     front.rgb = mix(front.rgb, unfiltered, cm_unfiltered_share(texel, here));
   }
   imageStore(cm_front_out, texel, front);
-  imageStore(cm_spread_out, texel, spread);
 }

@@ -224,19 +224,26 @@ settings::RampPoints parse_ramp(std::string_view text) {
   return points;
 }
 
-/// One key of a lamp, as scene files have it.
-template <class Value>
-void parse_lamp_key(const settings::Setting<cumulet_lamp_desc, Value>& setting, const std::string& text, Value& value) {
-  if constexpr (settings::Real<Value>) {
-    value = parse_real(setting, text);
-  } else if constexpr (settings::Triple<Value>) {
-    parse_triple(setting, text, value);
-  }
+/// One key of a lamp, as scene files have it; returns whether there is such.
+bool take_lamp_key(cumulet_lamp_desc& lamp, std::string_view key, const std::string& text) {
+  bool known = false;
+  settings::for_each<cumulet_lamp_desc>([&](const auto& setting) {
+    auto& value = lamp.*setting.field;
+    using Value = std::remove_reference_t<decltype(value)>;
+    if (key != setting.key) return;
+    if constexpr (settings::Real<Value>) {
+      value = parse_real(setting, text);
+      known = true;
+    } else if constexpr (settings::Triple<Value>) {
+      parse_triple(setting, text, value);
+      known = true;
+    }
+  });
+  return known;
 }
 
 /// "point position=0,1,2 power=100": a kind, then keys of a scene file's lamps.
 cumulet_lamp_desc parse_lamp(std::string_view text) {
-  using Kind = settings::Setting<cumulet_lamp_desc, cumulet_lamp_kind>;
   const std::vector<std::string_view> parts = words(text);
   cumulet_lamp_desc lamp{};
   lamp.struct_size = sizeof lamp;
@@ -255,17 +262,11 @@ cumulet_lamp_desc parse_lamp(std::string_view text) {
     const std::string value(parts[i].substr(equals + 1));
     if (!given.insert(key).second) throw UsageError(std::string(key) + " is given twice");
     bool known = false;
-    settings::for_each<cumulet_lamp_desc>([&](const auto& setting) {
-      if constexpr (!std::is_same_v<std::decay_t<decltype(setting)>, Kind>) {
-        if (key != setting.key) return;
-        known = true;
-        try {
-          parse_lamp_key(setting, value, lamp.*setting.field);
-        } catch (const UsageError& error) {
-          throw UsageError(std::string(key) + ": " + error.what());
-        }
-      }
-    });
+    try {
+      known = take_lamp_key(lamp, key, value);
+    } catch (const UsageError& error) {
+      throw UsageError(std::string(key) + ": " + error.what());
+    }
     if (!known) throw UsageError("lamps have no " + in_quotes(key));
   }
   if (const auto refusal = settings::lamp_refusal(lamp))

@@ -211,10 +211,10 @@ std::optional<double> Wavelet::left_ms(glm::uvec2 size) const {
   double sum = 0.0;
   const bool begun = of_ && size == size_;
   if (begun && done_) return 0.0;
-  for (const Stage stage :
-       {Stage::input, Stage::reproject, Stage::merge, Stage::variance, Stage::level, Stage::blend}) {
+  for (std::size_t i = 0; i < stages; ++i) {
+    const auto stage = static_cast<Stage>(i);
     if ((begun && stage < stage_) || !has(stage)) continue;
-    const auto ms = costs_.at(static_cast<std::size_t>(stage))->most(slots_of(size, size.y));
+    const auto ms = costs_.at(i)->most(slots_of(size, size.y));
     if (!ms) return std::nullopt;
     sum += *ms * (stage == Stage::level ? most_levels - (begun ? level_ : 0U) : 1U);
   }
@@ -298,7 +298,7 @@ void Wavelet::dispatch(const gl::Program& program, std::uint32_t rows, bool meas
   row_ = 0;
   if (stage_ != Stage::reproject && (stage_ != Stage::merge || recalls_)) {
     std::swap(front_[0], front_[1]);
-    std::swap(spread_[0], spread_[1]);
+    if (stage_ != Stage::blend) std::swap(spread_[0], spread_[1]);
   }
   if (stage_ == Stage::merge) kept_.filled = true;
   if (stage_ == Stage::blend) {
