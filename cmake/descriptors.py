@@ -1,7 +1,7 @@
-"""Writes what of cumulet.hpp follows from cumulet.h: enum classes, and descriptors that convert to C's.
+"""Writes what of cumulet.hpp follows from cumulet.h: enum classes, descriptors that convert to C's, and what C tells.
 
-A descriptor here is a struct of settings or of a frame: numbers, enums, and arrays of numbers. Its int32_t are switches.
-Names, order and meaning are the header's.
+A descriptor here is a struct of settings, of a frame or of a file: numbers, enums, strings, and arrays of numbers. Its
+int32_t are switches. Names, order and meaning are the header's.
 """
 import argparse
 import re
@@ -9,18 +9,24 @@ import re
 import c_header
 
 DESCRIPTORS = ["grid", "medium", "light", "lamp", "environment_settings", "ground", "surface_settings", "sampling",
-               "display", "camera", "navigation", "frame"]
-# What C functions fill.
+               "display", "camera", "navigation", "frame", "volume_file", "denoise"]
+# Descriptors that C functions fill as well.
 FILLED = {"camera"}
+# What C functions fill alone.
+TOLD = ["volume_info", "values_info", "volume_file_info", "grid_info", "metadata", "surfaces_info", "animation_info",
+        "environment_info", "progress", "warm_up_result", "pick", "stats"]
+COUNTED = {"default_grid"}  # int32_t that is no switch: a number, or -1
 ENUMS_BY_HAND = {"cumulet_status", "cumulet_key"}
 RENAMED = {"auto": "automatic"}  # a keyword
 
 NUMBERS = {"double": ("double", "0.0"), "float": ("float", "0.0F"), "uint32_t": ("std::uint32_t", "0"),
            "uint64_t": ("std::uint64_t", "0")}
-ARRAYS = {("float", 3): "Rgb", ("double", 3): "Vector"}
+ARRAYS = {("float", 3): "Rgb", ("double", 3): "Vector", ("double", 16): "Matrix"}
 
 
 def camel(name):
+    if name == "cumulet_status":
+        return "StatusCode"
     return "".join(part.capitalize() for part in name.removeprefix("cumulet_").split("_"))
 
 
@@ -37,19 +43,24 @@ def enum_class(name, body):
 
 
 def fields(body):
-    """Type, name and number of elements (0: no array) of each."""
+    """Type, name and length (None: no array) of each."""
     for declaration in body.split(";"):
-        match = re.fullmatch(r"\s*(\w+)\s+(\w+)(?:\[(\d+)\])?\s*", declaration)
+        match = re.fullmatch(r"\s*(const char\*|\w+)\s+(\w+)(?:\[(\w+)\])?\s*", declaration)
         if match and match[2] != "struct_size":
-            yield match[1], match[2], int(match[3] or 0)
+            length = match[3]
+            yield match[1], match[2], int(length) if length and length.isdigit() else length
 
 
-def member(c_type, name, count):
+def member(c_type, name, length):
     """The member, how it becomes C's, and how it is made of C's."""
-    if count:
-        cpp = ARRAYS.get((c_type, count), f"std::array<std::{c_type}, {count}>")
-        elements = ", ".join(f"{name}[{i}]" for i in range(count))
+    if c_type == "char":
+        return f"Text<{length}> {name};", None, f"Text<{length}>(c.{name})"
+    if length:
+        cpp = ARRAYS.get((c_type, length), f"std::array<{NUMBERS.get(c_type, ('std::' + c_type,))[0]}, {length}>")
+        elements = ", ".join(f"{name}[{i}]" for i in range(length)) if isinstance(length, int) else None
         return f"{cpp} {name}{{}};", f"{{{elements}}}", f"std::to_array(c.{name})"
+    if c_type == "const char*":
+        return f"const char* {name} = nullptr;", name, None
     if c_type in NUMBERS:
         cpp, zero = NUMBERS[c_type]
         return f"{cpp} {name} = {zero};", name, f"c.{name}"
@@ -58,8 +69,30 @@ def member(c_type, name, count):
     return f"{camel(c_type)} {name}{{}};", f"static_cast<{c_type}>({name})", f"static_cast<{camel(c_type)}>(c.{name})"
 
 
+def told(name, body):
+    """A struct that C fills, and how it is made of C's. Strings live as long as C says."""
+    members = []
+    for c_type, field, length in fields(body):
+        declaration, _, of = member(c_type, field, length)
+        if field == "bounds_min":
+            field, declaration = "bounds", "Bounds bounds;"
+            of = "{std::to_array(c.bounds_min), std::to_array(c.bounds_max)}"
+        elif field == "bounds_max":
+            continue
+        elif c_type == "const char*":
+            declaration, of = f"std::string_view {field};", f'c.{field} != nullptr ? c.{field} : ""'
+        elif field in COUNTED:
+            declaration, of = f"std::int32_t {field} = -1;", f"c.{field}"
+        members.append((field, declaration, of))
+    lines = [f"struct {camel(name)} {{"]
+    lines += [f"  {declaration}" for _, declaration, _ in members]
+    values = ",\n            ".join(f".{field} = {of}" for field, _, of in members)
+    lines += ["", f"  [[nodiscard]] static {camel(name)} of(const {name}& c) noexcept {{", f"    return {{{values}}};", "  }"]
+    return "\n".join(lines + ["};"]) + "\n"
+
+
 def descriptor(name, body, filled):
-    members = [(field, *member(c_type, field, count)) for c_type, field, count in fields(body)]
+    members = [(field, *member(c_type, field, length)) for c_type, field, length in fields(body)]
     lines = [f"struct {camel(name)} {{"]
     lines += [f"  {declaration}" for _, declaration, _, _ in members]
     lines += ["", f"  operator {name}() const noexcept {{", f"    return {{.struct_size = sizeof({name}),"]
@@ -83,11 +116,11 @@ def main():
     structs = dict(c_header.types("struct", text))
     parts = ["/*\n * The part of cumulet.hpp that follows from cumulet.h: include that. Made by cmake/descriptors.py.\n */",
              "#ifndef CUMULET_CUMULET_DESCRIPTORS_HPP\n#define CUMULET_CUMULET_DESCRIPTORS_HPP\n",
-             "#include <cumulet/cumulet.h>\n\n#include <array>\n#include <cstdint>\n",
-             f"namespace cumulet {{\ninline namespace v{version[0]}_{version[1]} {{\n",
-             "using Vector = std::array<double, 3>;\nusing Rgb = std::array<float, 3>;\n"]
+             "#include <cumulet/cumulet.h>\n\n#include <array>\n#include <cstdint>\n#include <string_view>\n",
+             f"namespace cumulet {{\ninline namespace v{version[0]}_{version[1]} {{\n"]
     parts += [enum_class(name, body) for name, body in enums if name not in ENUMS_BY_HAND]
     parts += [descriptor(f"cumulet_{name}_desc", structs[f"cumulet_{name}_desc"], name in FILLED) for name in DESCRIPTORS]
+    parts += [told(f"cumulet_{name}", structs[f"cumulet_{name}"]) for name in TOLD]
     parts += ["}\n}\n\n#endif"]
     with open(arguments.out, "w", encoding="utf-8") as file:
         file.write("\n".join(parts) + "\n")

@@ -12,7 +12,7 @@
 // pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
 // for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
 // volume's depth the share that the ground covers.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_SURFACES=1
 // variants: - or CM_CHANNELS=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -30,6 +30,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "surface.glsl"
 #endif
 #include "ray.glsl"
+#include "walk.glsl"
 #include "ground.glsl"
 
 layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform writeonly image2D cm_normal;
@@ -82,42 +83,33 @@ void main() {
     float solid_t = min(surface_t, ground_t);
     if (ground_t < min(surface_t, CM_NO_GROUND)) covered.y += 1.0;
     if (i == 0 && solid_t < 1e37) solid_z = solid_t / t_per_z;
-    vec2 range = cm_box_range(o, d);
-    range.y = min(range.y, surface_t);
     float used = 0.0;
     float clear = 1.0;
-    if (range.x < range.y) {
-      float t = range.x;
-      uvec3 cell = cm_march_enter(clamp(o + t * d, cm.grid.box_min, cm.grid.box_max));
-      vec3 inv_d = 1.0 / d;
-      // Beyond e^-40 nothing is left to know.
-      for (int j = 0; j < 100000 && cell.x != CM_NONE && t < range.y && used < 40.0; ++j) {
-        float t_1, r_0, r_1;
-        uvec3 next;
-        cm_march_step(cell, o, d, inv_d, t, t_1, r_0, r_1, next);
-        float e_0 = cm.medium.extinction * r_0;
-        float e_1 = cm.medium.extinction * r_1;
-        float span = t_1 - t;
-        float depth = cm_depth_of(e_0, e_1, span, range.y - t);
-        if (i == 0 && volume_z == CM_INFINITE && used + depth >= 0.69314718) {
-          volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
-        }
-        used += depth;
-        // Of what scatters in this part of the ray: its chance, and where in it, as if it were even.
-        float chance = 1.0 - exp(-depth);
-        float within_part = depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
-#if CM_CHANNELS
-        // As if it were dimmed evenly within this part.
-        float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
-        emission += dimmed * cm_emitted(cm_march_emission(cell, o, d), t, min(t_1, solid_t));
-#endif
-        if (t < solid_t) emission += clear * chance * cm.medium.source;
-        scattered_z += clear * chance * (t + within_part * min(span, range.y - t)) / t_per_z;
-        scattered += clear * chance;
-        clear -= clear * chance;
-        t = t_1;
-        cell = next;
+    CmWalk walk = cm_walk(o, d, surface_t);
+    // Beyond e^-40 nothing is left to know.
+    for (int j = 0; j < 100000 && used < 40.0; ++j) {
+      float t_1, e_0, e_1;
+      if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+      float t = walk.t;
+      float span = t_1 - t;
+      float depth = cm_depth_of(e_0, e_1, span, walk.t_end - t);
+      if (i == 0 && volume_z == CM_INFINITE && used + depth >= 0.69314718) {
+        volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
       }
+      used += depth;
+      // Of what scatters in this part of the ray: its chance, and where in it, as if it were even.
+      float chance = 1.0 - exp(-depth);
+      float within_part = depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
+#if CM_CHANNELS
+      // As if it were dimmed evenly within this part.
+      float dimmed = depth > 1e-3 ? clear * chance / depth : clear;
+      emission += dimmed * cm_walk_emitted(walk, min(t_1, solid_t));
+#endif
+      if (t < solid_t) emission += clear * chance * cm_walk_source(walk);
+      scattered_z += clear * chance * (t + within_part * min(span, walk.t_end - t)) / t_per_z;
+      scattered += clear * chance;
+      clear -= clear * chance;
+      cm_walk_on(walk, t_1);
     }
     transmittance += exp(-used);
 #if CM_SURFACES

@@ -56,7 +56,6 @@ const int CM_UNIT_GLOSS = 11;
 
 // Uniform buffers.
 const int CM_UNIFORM_PARAMETERS = 0;
-const int CM_UNIFORM_ROOTS = 1;
 const int CM_UNIFORM_SURFACE_VIEW = 0;
 const int CM_UNIFORM_MATERIAL = 1;
 
@@ -65,6 +64,8 @@ const int CM_STORAGE_PATHS = 0;
 const int CM_STORAGE_BLOCKS = 1;
 const int CM_STORAGE_QUEUES = 2;
 const int CM_STORAGE_LAMPS = 3;
+const int CM_STORAGE_INSTANCES = 4;
+const int CM_STORAGE_INSTANCE_NODES = 5;
 const int CM_STORAGE_DEPTH_CHANGED = 0;  // host_depth.comp
 const int CM_STORAGE_SIGN = 0;           // sign.comp
 const int CM_STORAGE_DENOISE_BINS = 0;   // denoise_*.comp

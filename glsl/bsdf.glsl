@@ -20,6 +20,7 @@
 #define CM_BSDF_GLSL
 #include "frame.glsl"
 #include "ggx.glsl"
+#include "numbers.glsl"
 
 struct CmSurface {
   vec3 base_color;            // linear, 0 to 1
@@ -85,7 +86,7 @@ CM_FN vec3 cm_lobe_weights(CmSurface s, float cosine) {
 
 // The lobes' sum times |cos|; the Lambertian one, which sees wi at matte_cosine, weighed by `terminator`.
 CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine, vec3 wo, vec3 wi) {
-  if (!(wo.z > 0.0f)) return vec3(0.0f);
+  if (!cm_is_positive(wo.z)) return vec3(0.0f);
   float cosine = 1.0f;
   vec3 h = vec3(0.0f);
   vec3 f = vec3(0.0f);
@@ -115,12 +116,12 @@ CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine,
 }
 
 CM_FN float cm_bsdf_pdf_local(CmSurface s, float matte_cosine, vec3 wo, vec3 wi) {
-  if (!(wo.z > 0.0f)) return 0.0f;
+  if (!cm_is_positive(wo.z)) return 0.0f;
   vec3 lobes = cm_lobe_weights(s, wo.z);
   float pdf = lobes.z * max(matte_cosine, 0.0f) * CM_INV_PI;
   // Lobes that mirror throw some of their samples below the surface, where the Lambertian one may still see them.
   vec3 h = normalize(wo + wi);
-  if (!(h.z > 0.0f)) return pdf;
+  if (!cm_is_positive(h.z)) return pdf;
   if (lobes.y > 0.0f) pdf += lobes.y * cm_ggx_pdf(cm_alpha(s.roughness), wo, h);
   if (lobes.x > 0.0f) pdf += lobes.x * cm_ggx_pdf(cm_alpha(s.clearcoat_roughness), wo, h);
   return pdf;
@@ -164,7 +165,7 @@ CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   vec3 v;
   cm_frame(s.normal, u, v);
   vec3 o = cm_into_frame(u, v, s.normal, wo);
-  if (!(o.z > 0.0f)) return s.normal;
+  if (!cm_is_positive(o.z)) return s.normal;
   vec3 lobes = cm_lobe_weights(s, o.z);
   vec3 i;
   vec3 n = s.normal;

@@ -1,4 +1,6 @@
 // Bindings of the marches' data, of surfaces' and of the host's depth.
+#include "here.glsl"
+
 layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_surface;
 
 float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
@@ -52,7 +54,7 @@ uvec4 cm_environment_word(uint i) { return texelFetch(cm_environment_words, int(
 
 #if CM_CELL_LIGHTS
 layout(binding = CM_UNIT_CHANNELS) uniform usamplerBuffer cm_channels;
-uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(cm.grid.first_glowing + i)); }
+uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(CM_GRID.first_glowing + i)); }
 #endif
 
 #ifdef CM_MARCH
@@ -60,14 +62,14 @@ uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(cm.grid.first_gl
 // Texture buffers, not storage buffers: two 16-byte fetches a cell, up to 2^27 texels on today's drivers.
 layout(binding = CM_UNIT_CELLS) uniform usamplerBuffer cm_cells[CM_PAGES];
 layout(binding = CM_UNIT_TREE) uniform usamplerBuffer cm_tree_words;
-layout(std140, binding = CM_UNIFORM_ROOTS) uniform CmRoots { uvec4 cm_roots[13]; };  // 25 pairs: first leaf, first tree node
 
 uvec4 cm_record(uint cell, uint part) {
 #if CM_PAGES == 1
-  return texelFetch(cm_cells[0], int((cm.grid.first_cell + cell) * 2u + part));
+  return texelFetch(cm_cells[0], int((CM_GRID.first_cell + cell) * 2u + part));
 #else
-  uint page = cell >> cm.grid.page_shift;
-  int texel = int((cell & ((1u << cm.grid.page_shift) - 1u)) * 2u + part);
+  uint number = CM_GRID.first_cell + cell;
+  uint page = number >> CM_GRID.page_shift;
+  int texel = int((number & ((1u << CM_GRID.page_shift) - 1u)) * 2u + part);
   // Samplers may only be indexed by constants here: lanes differ in their page.
   if (page == 0u) return texelFetch(cm_cells[0], texel);
 #if CM_PAGES > 2
@@ -87,42 +89,40 @@ uvec4 cm_record(uint cell, uint part) {
 }
 
 #if CM_CHANNELS
-uvec4 cm_emission_record(uint cell) { return texelFetch(cm_channels, int(cm.grid.first_emission + cell)); }
+uvec4 cm_emission_record(uint cell) { return texelFetch(cm_channels, int(CM_GRID.first_emission + cell)); }
 uint cm_channel_word(uint word) { return cm_link(texelFetch(cm_channels, int(word >> 2)), word & 3u); }
-uint cm_colour_record(uint cell) { return cm_channel_word(cm.grid.first_colour + cell); }
-uint cm_anisotropy_record(uint cell) { return cm_channel_word(cm.grid.first_anisotropy + (cell >> 1)); }
+uint cm_colour_record(uint cell) { return cm_channel_word(CM_GRID.first_colour + cell); }
+uint cm_anisotropy_record(uint cell) { return cm_channel_word(CM_GRID.first_anisotropy + (cell >> 1)); }
 #endif
 
-uint cm_tree(uint node) {
-  uint word = cm.grid.tree + node;
-  return cm_link(texelFetch(cm_tree_words, int(word >> 2)), word & 3u);
-}
-
-uint cm_root_leaf(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].x : cm_roots[root >> 1].z; }
-uint cm_root_node(uint root) { return (root & 1u) == 0u ? cm_roots[root >> 1].y : cm_roots[root >> 1].w; }
+uint cm_tree_word(uint word) { return cm_link(texelFetch(cm_tree_words, int(word >> 2)), word & 3u); }
+uint cm_tree(uint node) { return cm_tree_word(CM_GRID.tree + node); }
+// Before the tree 25 pairs, and room for one: first leaf, first tree node.
+uint cm_root_leaf(uint root) { return cm_tree_word(CM_GRID.tree - 52u + 2u * root); }
+uint cm_root_node(uint root) { return cm_tree_word(CM_GRID.tree - 51u + 2u * root); }
 #else
 #if CM_CHANNELS
 layout(binding = CM_UNIT_CHANNELS) uniform sampler3D cm_emission_voxels;
 vec3 cm_emission_voxel(ivec3 voxel) {
-  return cm.grid.emission_unit * texelFetch(cm_emission_voxels, voxel - ivec3(cm.grid.box_min), 0).rgb;
+  return CM_GRID.emission_unit * texelFetch(cm_emission_voxels, voxel - ivec3(CM_GRID.box_min), 0).rgb;
 }
 layout(binding = CM_UNIT_SCATTERING_VOXELS) uniform sampler3D cm_scattering_voxels;
 vec3 cm_scattering_voxel(ivec3 voxel) {
-  return texelFetch(cm_scattering_voxels, voxel - ivec3(cm.grid.box_min), 0).rgb;
+  return texelFetch(cm_scattering_voxels, voxel - ivec3(CM_GRID.box_min), 0).rgb;
 }
 layout(binding = CM_UNIT_ANISOTROPY_VOXELS) uniform sampler3D cm_anisotropy_voxels;
 float cm_anisotropy_voxel(ivec3 voxel) {
-  return texelFetch(cm_anisotropy_voxels, voxel - ivec3(cm.grid.box_min), 0).x;
+  return texelFetch(cm_anisotropy_voxels, voxel - ivec3(CM_GRID.box_min), 0).x;
 }
 #endif
 #if CM_MARCH == 1
 layout(binding = CM_UNIT_VOXELS) uniform sampler3D cm_voxels;
-float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(cm.grid.box_min), 0).x; }
+float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(CM_GRID.box_min), 0).x; }
 #else
 layout(binding = CM_UNIT_VOXELS) uniform samplerBuffer cm_brick_values;
 layout(binding = CM_UNIT_BRICK_SLOTS) uniform usampler3D cm_brick_slots;
 uint cm_brick_slot(ivec3 brick) {
-  return texelFetch(cm_brick_slots, brick - (ivec3(cm.grid.box_min) >> 3), 0).x;
+  return texelFetch(cm_brick_slots, brick - (ivec3(CM_GRID.box_min) >> 3), 0).x;
 }
 float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * 512u + index)).x; }
 #endif

@@ -15,6 +15,7 @@
 // A record, 48 bytes: {v0, triangle} {v1, flags} {v2, 0}.
 #ifndef CM_BVH_GLSL
 #define CM_BVH_GLSL
+#include "numbers.glsl"
 
 #define CM_BVH_LEAF 0x80000000u
 #define CM_BVH_NONE 0xffffffffu
@@ -95,8 +96,7 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
   hit.front = true;
   vec3 size = abs(d);
   float longest = max(max(size.x, size.y), size.z);
-  bool sound = longest >= 1.0e-12f && size.x <= 1.0e12f && size.y <= 1.0e12f && size.z <= 1.0e12f &&
-               abs(o.x) <= 1.0e12f && abs(o.y) <= 1.0e12f && abs(o.z) <= 1.0e12f;
+  bool sound = longest >= 1.0e-12f && cm_is_within(d, 1.0e12f) && cm_is_within(o, 1.0e12f);
   float t_first = max(t_min, 0.0f);
   vec3 slack;
   vec3 inverse = cm_bvh_inverse(d, slack);

@@ -115,12 +115,12 @@ void main() {
 #else
   vec4 value = cm_texel(pixel);
 #endif
-  float alpha = clamp(value.a, 0.0, 1.0);
+  float alpha = min(cm_displayable(value.a), 1.0);
   vec3 straight = alpha > 0.0 ? value.rgb / alpha : vec3(0.0);
   cm_colour = vec4(cm_display(straight, cm_exposure, CM_TONE_MAP, CM_ENCODE) * alpha, alpha);
 #else
   float z = texelFetch(cm_volume_z, min(ivec2(at), size - 1), 0).x;
-  if (!(z > 0.0)) discard;
+  if (!cm_is_positive(z)) discard;
   gl_FragDepth = clamp(cm_depth.x + (cm_orthographic ? cm_depth.y * z : cm_depth.y / z), 0.0, 1.0);
 #endif
 }

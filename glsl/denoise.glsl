@@ -1,6 +1,7 @@
 // What kernels of the denoiser share. Channels are halves in blocks of eight, a uvec4 a pixel, block after block.
 #ifndef CM_DENOISE_GLSL
 #define CM_DENOISE_GLSL
+#include "numbers.glsl"
 
 // A luminance of which human eyes notice the same steps everywhere, 1 at 65504: the fit to Aydin et al., "Extending
 // Quality Metrics to Full Luminance Range Images" (2008), by which Open Image Denoise's networks were trained.
@@ -22,10 +23,6 @@ float cm_pu_inverse(float encoded) {
   return exp((x - 9.98620152e-01) / 1.92653254e-01) - 6.26026094e-03;
 }
 
-// By its bits: a compiler that takes no float to be NaN or infinite may turn comparisons around.
-bool cm_finite(float x) { return (floatBitsToUint(x) & 0x7fffffffu) < 0x7f800000u; }
-bool cm_finite(vec3 v) { return cm_finite(v.x) && cm_finite(v.y) && cm_finite(v.z); }
-
 // To the nearest half, even where the driver's packHalf2x16 cuts off; no larger than the largest.
 uint cm_pack(vec2 v) {
   uvec2 bits = floatBitsToUint(min(v, vec2(65504.0)));
@@ -34,6 +31,6 @@ uint cm_pack(vec2 v) {
 }
 
 // What the network sees of a radiance: none of what is no radiance.
-vec3 cm_radiance(vec3 v) { return cm_finite(v) ? max(v, vec3(0.0)) : vec3(0.0); }
+vec3 cm_radiance(vec3 v) { return cm_is_finite(v) ? max(v, vec3(0.0)) : vec3(0.0); }
 
 #endif

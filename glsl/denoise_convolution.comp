@@ -68,7 +68,7 @@ void cm_keep(uvec2 p, vec3 encoded) {
   if (any(lessThan(texel, cm_keep_begin)) || any(greaterThanEqual(texel, cm_keep_end))) return;
   vec4 before = texelFetch(cm_colour, ivec2(texel), 0);
   vec3 after = vec3(cm_pu_inverse(encoded.r), cm_pu_inverse(encoded.g), cm_pu_inverse(encoded.b)) / cm_exposure;
-  bool better = cm_finite(before.rgb) && cm_finite(after);
+  bool better = cm_is_finite(before.rgb) && cm_is_finite(after);
   imageStore(cm_denoised, ivec2(texel), better ? vec4(after, before.a) : before);
 }
 #endif

@@ -46,7 +46,7 @@ void main() {
     sum += dot(cm_radiance(colour), vec3(0.212671, 0.715160, 0.072169));
   }
   float luminance = cm_sum(vec2(sum, 0.0)).x / float(count);
-  bool lit = luminance > 1e-8 && cm_finite(luminance);
+  bool lit = luminance > 1e-8 && cm_is_finite(luminance);
   if (lane == 0u) cm_bins[group] = lit ? vec2(log2(luminance), 1.0) : vec2(0.0);
 #else
   vec2 sum = vec2(0.0);

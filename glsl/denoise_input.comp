@@ -33,8 +33,8 @@ void main() {
 #if CM_GUIDES
     vec3 a = texelFetch(cm_albedo, texel, 0).rgb;
     vec3 n = texelFetch(cm_normal, texel, 0).rgb;
-    albedo = cm_finite(a) ? clamp(a, 0.0, 1.0) : vec3(0.0);
-    normal = 0.5 + 0.5 * (cm_finite(n) ? clamp(n, -1.0, 1.0) : vec3(0.0));
+    albedo = cm_is_finite(a) ? clamp(a, 0.0, 1.0) : vec3(0.0);
+    normal = 0.5 + 0.5 * (cm_is_finite(n) ? clamp(n, -1.0, 1.0) : vec3(0.0));
 #endif
   }
   uint at = cm_to + p.y * cm_width + p.x;

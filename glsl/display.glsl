@@ -1,6 +1,7 @@
 // How linear radiance becomes displayed colour. Shared by GLSL and C++.
 #ifndef CM_DISPLAY_GLSL
 #define CM_DISPLAY_GLSL
+#include "numbers.glsl"
 
 #define CM_TONE_MAP_NEUTRAL 0u
 #define CM_TONE_MAP_FILMIC 1u
@@ -8,7 +9,7 @@
 #define CM_TONE_MAP_NONE 3u
 
 // Not negative, not NaN, finite.
-CM_FN float cm_displayable(float x) { return x > 0.0f ? min(x, 1e30f) : 0.0f; }
+CM_FN float cm_displayable(float x) { return cm_is_positive(x) ? min(x, 1e30f) : 0.0f; }
 
 // Khronos PBR Neutral: https://github.com/KhronosGroup/ToneMapping. To [0, 1].
 CM_FN vec3 cm_tone_map_neutral(vec3 c) {

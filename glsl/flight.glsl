@@ -15,6 +15,11 @@
 // What cells give off by themselves is integrated along flights up to where they end (Simon, Hanika, Zirr and
 // Dachsbacher, "Line Integration for Rendering Heterogeneous Emissive Volumes", EGSR 2017): they get as far as t with the
 // chance that is the transmittance, so that needs no other weight but that of looks for the same cells (light.glsl).
+//
+// With CM_INSTANCES volumes are marched through one by one, in the order in which the ray enters their boxes, as far as
+// t_end. Extinctions add up where they overlap, so the nearest of independent free paths is one through all of them;
+// and as they have no memory, what is left of an optical depth behind one volume is as good as a new one for the next.
+// Only after a collision, where the ray then ends, another depth is drawn. Looks use up one depth through all.
 #ifndef CM_FLIGHT_GLSL
 #define CM_FLIGHT_GLSL
 
@@ -29,6 +34,66 @@
 #define CM_EVENTS 8
 #endif
 
+// The cell where the ray enters, at p.t.
+CM_FN void cm_enter(CM_INOUT(CmPath) p) {
+  uvec3 cell = cm_march_enter_at(p.o, p.d, p.t);
+  p.cell = uvec2(cell.x, cell.y);
+  p.cache = cell.z;
+}
+
+#if CM_INSTANCES
+
+CM_FN void cm_aim(CM_INOUT(CmPath) p) { cm_begin_march(p); }
+
+// The volume that the ray comes to next, and its cell there; whether there is one before its end.
+CM_FN bool cm_seek(CM_INOUT(CmPath) p) {
+  uint own = p.start == CM_IN_MEDIUM ? p.start_instance : CM_INSTANCE_NONE;
+  uint flags = p.start == CM_AT_CAMERA ? CM_INSTANCE_SEEN : 0u;
+  if (p.gathers != 0u) flags |= CM_INSTANCE_EMITS | CM_INSTANCE_OVERLAPS;
+  bool found = false;
+  // Once more where it finds the one that it started in, through which it went first.
+  for (int i = 0; i < 2 && (i == 0 || (found && p.instance == own)); ++i) {
+    found = cm_next_instance(p.o, p.d, p.t_end, flags, p.entry, p.instance);
+  }
+  if (found) {
+    cm_here = p.instance;
+    p.t = p.entry;
+    cm_enter(p);
+  }
+  return found;
+}
+
+// What an event in one volume, or the end of all of them, is for the ray.
+CM_FN uint cm_leave(CM_INOUT(CmPath) p, uint event, bool over) {
+  uint what = event;
+  if (over) {
+    bool met = p.met != CM_INSTANCE_NONE;
+    what = met ? CM_EVENT_COLLISION : CM_EVENT_ESCAPE;
+    if (CM_CHANNELS != 0 && cm.medium.emits != 0u && p.ray == CM_RAY_FLIGHT && p.gathers == 0u) {
+      what = CM_EVENT_NONE;
+      p.gathers = 1u;
+      cm_begin_visits(p);
+    } else if (met) {
+      p.t = p.t_end;
+      p.cell = p.met_cell;
+      p.cache = CM_NONE;
+      p.instance = p.met;
+    }
+  } else if (event == CM_EVENT_COLLISION && p.ray == CM_RAY_FLIGHT) {
+    p.met = p.instance;
+    p.met_cell = p.cell;
+    p.t_end = p.t;
+    p.depth = cm_free_depth(cm_random(p.random, p.stream));
+    what = CM_EVENT_NONE;
+  } else if (event == CM_EVENT_ESCAPE) {
+    what = CM_EVENT_NONE;
+  }
+  if (!over && event != CM_EVENT_NONE) p.cell = uvec2(CM_NONE, 0u);
+  return what;
+}
+
+#else
+
 // A ray's way through the box, as far as it reaches.
 CM_FN void cm_aim(CM_INOUT(CmPath) p) {
   vec2 range = cm_box_range(p.o, p.d);
@@ -40,19 +105,27 @@ CM_FN void cm_aim(CM_INOUT(CmPath) p) {
   p.cache = CM_NONE;
   if (range.x < p.t_end) {
     p.cell = p.start_cell;
-    if (p.start != CM_IN_MEDIUM) {
-      uvec3 cell = cm_march_enter(clamp(p.o + range.x * p.d, cm.grid.box_min, cm.grid.box_max));
-      p.cell = uvec2(cell.x, cell.y);
-      p.cache = cell.z;
-    }
+    if (p.start != CM_IN_MEDIUM) cm_enter(p);
   }
   p.stage = CM_STAGE_FLY;
 }
 
+#endif
+
 // Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or where it got.
 CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
-  vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / p.d;
-  uint event = CM_SURFACES != 0 && p.cell.x == CM_NONE ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
+#if CM_INSTANCES
+  cm_here = p.cell.x == CM_NONE ? 0u : p.instance;
+#endif
+  vec3 o = cm_in_volume_point(p.o);
+  vec3 d = cm_in_volume(p.d);
+  float extinction = CM_MEDIUM.extinction;
+#if CM_INSTANCES
+  if (p.gathers != 0u) extinction = 0.0f;
+#endif
+  vec3 inv_d = vec3(1.0f, 1.0f, 1.0f) / d;
+  bool nowhere = (CM_SURFACES != 0 || CM_INSTANCES != 0) && p.cell.x == CM_NONE;
+  uint event = nowhere ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
   float e_0 = 0.0f;
   float e_1 = 0.0f;
@@ -69,14 +142,14 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     float r_0 = 0.0f;
     float r_1 = 0.0f;
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
-    cm_march_step(cell, p.o, p.d, inv_d, p.t, t_1, r_0, r_1, next);
+    cm_march_step(cell, o, d, inv_d, p.t, t_1, r_0, r_1, next);
 #if CM_CHANNELS
-    emission = cm_march_emission(cell, p.o, p.d);
+    emission = cm_march_emission(cell, o, d);
     emission.mean *= cm_balance(flights, looks * cm_cell_pdf(emission));
 #endif
     p.steps += 1u;
-    e_0 = cm.medium.extinction * r_0;
-    e_1 = cm.medium.extinction * r_1;
+    e_0 = extinction * r_0;
+    e_1 = extinction * r_1;
     span = t_1 - p.t;
     float used = 0.5f * (e_0 + e_1) * span;
     // To a surface or a lamp inside the cell, not beyond.
@@ -109,7 +182,12 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     p.depth += cm_depth_of(e_1, e_0, span, p.t - p.t_end);
   }
 #if CM_CHANNELS
-  if (p.ray == CM_RAY_FLIGHT && !cm_is_dark(p)) p.radiance += p.throughput * emitted;
+  bool takes = p.ray == CM_RAY_FLIGHT && !cm_is_dark(p);
+#if CM_INSTANCES
+  // Where another volume may yet end the ray before here, once that is known.
+  takes = takes && (p.gathers != 0u || (cm_instances[cm_here].flags & CM_INSTANCE_OVERLAPS) == 0u);
+#endif
+  if (takes) p.radiance += p.throughput * emitted;
 #endif
   return event;
 }
@@ -139,7 +217,13 @@ CM_FN uint cm_travel(CM_INOUT(CmPath) p) {
       }
     }
     if (p.stage == CM_STAGE_FLY) {
+#if CM_INSTANCES
+      bool over = p.cell.x == CM_NONE && !cm_seek(p);
+      uint event = cm_fly(p);
+      p.event = cm_leave(p, event, over);
+#else
       p.event = cm_fly(p);
+#endif
       marches += 1u;
       if (p.event != CM_EVENT_NONE) p.stage = cm_after_flight(p);
     }

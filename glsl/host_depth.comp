@@ -3,6 +3,7 @@
 // variants: CM_MULTISAMPLE=0,1
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
+#include "numbers.glsl"
 
 #if CM_MULTISAMPLE
 layout(binding = CM_UNIT_DEPTH_SOURCE) uniform sampler2DMS cm_source;
@@ -20,9 +21,7 @@ layout(location = 3) uniform vec3 cm_depth;  // a, what a lacks of its double, b
 float cm_view_depth(float d) {
   float infinite = uintBitsToFloat(0x7f800000u);
   bool rising = (cm_depth.z > 0.0) == cm_orthographic;
-  // By its bits: a compiler that takes no float to be NaN may turn comparisons around.
-  bool is_nan = (floatBitsToUint(d) & 0x7fffffffu) > 0x7f800000u;
-  if (is_nan || (rising ? d >= 1.0 : d <= 0.0)) return infinite;
+  if (cm_is_nan(d) || (rising ? d >= 1.0 : d <= 0.0)) return infinite;
   // d is often within rounding of a: its difference to the float nearest a is exact, the rest comes after.
   precise float difference = d - cm_depth.x;
   precise float rest = difference - cm_depth.y;

@@ -1,7 +1,7 @@
 #version 450
 // What one deterministic ray a pixel, through its centre, tells: views that show the grid rather than light, and the
 // depth at half opacity.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -18,6 +18,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "surface.glsl"
 #endif
 #include "ray.glsl"
+#include "walk.glsl"
 
 layout(rgba32f, binding = CM_IMAGE_SUM) uniform writeonly image2D cm_sum;
 layout(rg32ui, binding = CM_IMAGE_COUNTS) uniform writeonly uimage2D cm_counts;
@@ -73,9 +74,9 @@ CmFaces cm_faces(uvec3 cell, vec3 p) {
     faces.c[i] = (i == 3 ? (cell_class == 1u ? unit : 2.0 * unit) : 0.0) + dot(faces.normal[i], v0);
   }
   faces.count = 4;
-  float depth = 3.0 * float(cm.grid.root_exponent - cm_shape_exponent(shape)) +
+  float depth = 3.0 * float(CM_GRID.root_exponent - cm_shape_exponent(shape)) +
                 (cell_class == 0u ? 0.0 : (cell_class == 1u ? 1.0 : -1.0));
-  faces.level = depth / max(1.0, float(cm.grid.levels));
+  faces.level = depth / max(1.0, float(CM_GRID.levels));
   faces.size = unit;
 #else
   // The four nearest of a voxel's six faces: those that matter.
@@ -103,15 +104,18 @@ float cm_density_at(uvec3 cell, vec3 p) {
   return r_0;
 }
 
-// Colour of the cell at p, darkened towards its edges.
-vec3 cm_show_cell(vec3 p, uint axis, float pixel_size) {
-  uvec3 cell = cm_march_enter(p);
-  CmFaces faces = cm_faces(cell, p);
+// Colour of the cell that the ray is in at t, darkened towards its edges. pixel_size: in world space.
+vec3 cm_show_cell(inout CmWalk walk, float t, uint axis, float pixel_size) {
+  CmFront front = walk.front[0];
+  cm_stand_at(front);
+  vec3 d = cm_in_volume(walk.d);
+  vec3 p = cm_in_volume_point(walk.o) + t * d;
+  CmFaces faces = cm_faces(front.cell, p);
   float edge = 3.0e38;
   for (int i = 0; i < faces.count; ++i) edge = min(edge, cm_edge(faces.normal[i], faces.c[i], p, axis));
-  float density = cm_density_at(cell, p);
+  float density = cm_density_at(front.cell, p);
   vec3 colour = cm_ramp(faces.level) * (density > 0.0 ? 1.0 : 0.35) + 0.35 * density;
-  return mix(vec3(0.0), colour, clamp(0.35 + 0.65 * edge / pixel_size, 0.35, 1.0));
+  return mix(vec3(0.0), colour, clamp(0.35 + 0.65 * edge / (pixel_size * length(d)), 0.35, 1.0));
 }
 
 // How far p, on one of the cell's faces, is from that face's nearest edge.
@@ -148,7 +152,7 @@ void main() {
   vec3 colour = vec3(0.02);
   float alpha = 0.0;
   float half_t = 0.0;
-  vec2 range = cm_box_range(o, d);
+  uint densest = 0u;
   float surface_t = t_per_z * cm_surface_z(pixel, vec2(0.5), 0u);
 #if CM_SURFACES
   CmHit triangle;
@@ -156,51 +160,59 @@ void main() {
   bool solid = cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, triangle);
   if (solid) surface_t = triangle.t;
 #endif
-  range.y = min(range.y, surface_t);
-  bool hit = range.x < range.y;
-  // Width of a pixel in cube space, over t where perspective.
-  float footprint = length(d) * 2.0 * length(cm.view.up) / float(cm.view.size.y);
+  // Width of a pixel in world space, over t where perspective.
+  float footprint = 2.0 * length(cm.view.up) / float(cm.view.size.y);
+  CmWalk walk = cm_walk(o, d, surface_t);
+  bool hit = walk.entry < 3.0e38;
   if (view == CM_VIEW_CELLS) {
     vec3 f = abs(cm_to_cube(cm.view.forward));
     uint axis = f.x >= f.y && f.x >= f.z ? 0u : (f.y >= f.z ? 1u : 2u);
-    float middle = cm_pick(0.5 * (cm.grid.box_min + cm.grid.box_max), axis) + 0.217;  // off the lattice
+    float middle = cm_pick(0.5 * (cm.space.box_min + cm.space.box_max), axis) + 0.217;  // off the lattice
     float t = (middle - cm_pick(o, axis)) / cm_pick(d, axis);
-    if (hit && t > range.x && t < range.y) {
-      colour = cm_show_cell(o + t * d, axis, footprint * (cm.view.orthographic != 0u ? 1.0 : t));
+    if (hit && t > walk.entry && t < walk.t_end && cm_walk_to(walk, t)) {
+      float pixel_size = footprint * (cm.view.orthographic != 0u ? 1.0 : t);
+      colour = cm_show_cell(walk, t, axis, pixel_size);
       alpha = 1.0;
     }
   } else if (hit) {
     float used = 0.0;
-    float t = range.x;
-    uvec3 cell = cm_march_enter(clamp(o + t * d, cm.grid.box_min, cm.grid.box_max));
-    vec3 inv_d = 1.0 / d;
     vec3 lines = vec3(0.0);
     float clear = 1.0;
-    for (int i = 0; i < 100000 && cell.x != CM_NONE && t < range.y && clear > 0.02; ++i) {
-      float t_1, r_0, r_1;
-      uvec3 next;
-      cm_march_step(cell, o, d, inv_d, t, t_1, r_0, r_1, next);
-      float e_0 = cm.medium.extinction * r_0;
-      float e_1 = cm.medium.extinction * r_1;
+    for (int i = 0; i < 100000 && clear > 0.02; ++i) {
+      float t_1, e_0, e_1;
+      if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+      float t = walk.t;
       float span = t_1 - t;
       float depth = 0.5 * (e_0 + e_1) * span;
       if (view == CM_VIEW_DEPTH && used + depth >= 0.69314718) {
         half_t = t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used);
-        if (half_t >= range.y) half_t = 0.0;
+        if (half_t >= walk.t_end) half_t = 0.0;
+        densest = cm_walk_densest(walk, half_t);
         break;
       }
-      if (view == CM_VIEW_WIREFRAME && (r_0 > 0.0 || r_1 > 0.0)) {
-        vec3 at = o + t * d;
-        CmFaces faces = cm_faces(cell, at);
+      if (view == CM_VIEW_WIREFRAME) {
+        float line = 0.0;
+        float level = 0.0;
         float size = max(footprint * (cm.view.orthographic != 0u ? 1.0 : t), 1e-20);
-        // Edges of cells that are a few pixels wide would cover all.
-        float line = clamp(1.2 - cm_face_edge(faces, at) / size, 0.0, 1.0) * smoothstep(0.0, 12.0, faces.size / size);
-        lines += clear * 0.8 * line * cm_ramp(faces.level);
+        for (int k = 0; k < walk.count; ++k) {
+          CmFront front = walk.front[k];
+          if (front.t_0 != t || !(front.e_0 > 0.0 || front.e_1 > 0.0)) continue;
+          cm_stand_at(front);
+          vec3 along = cm_in_volume(walk.d);
+          vec3 at = cm_in_volume_point(walk.o) + t * along;
+          CmFaces faces = cm_faces(front.cell, at);
+          float here = size * length(along);
+          // Edges of cells that are a few pixels wide would cover all.
+          float of_front =
+              clamp(1.2 - cm_face_edge(faces, at) / here, 0.0, 1.0) * smoothstep(0.0, 12.0, faces.size / here);
+          if (of_front > line) level = faces.level;
+          line = max(line, of_front);
+        }
+        lines += clear * 0.8 * line * cm_ramp(level);
         clear *= (1.0 - 0.8 * line) * exp(-depth);
       }
       used += depth;
-      t = t_1;
-      cell = next;
+      cm_walk_on(walk, t_1);
       steps += 1u;
     }
     alpha = 1.0 - exp(-used);
@@ -209,9 +221,11 @@ void main() {
     if (view == CM_VIEW_WIREFRAME) colour = lines + clear * vec3(0.02) + 0.04 * alpha;
   }
   if (view == CM_VIEW_DEPTH) {
+    bool met_volume = half_t > 0.0;
 #if CM_SURFACES
-    if (solid && half_t == 0.0) half_t = triangle.t;
+    if (solid && !met_volume) half_t = triangle.t;
 #endif
+    if (cm.dispatch.picks != 0u) imageStore(cm_counts, ivec2(local), uvec4(met_volume ? 1u : 0u, densest, 0u, 0u));
     imageStore(cm_volume_z, ivec2(cm.dispatch.picks != 0u ? local : pixel), vec4(half_t / t_per_z));
     return;
   }

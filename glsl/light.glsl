@@ -115,11 +115,11 @@ CM_FN CmLightSample cm_sun_sample(vec3 u) {
 // A look picks a cell by what it gives off and a point of it; flights take up what all cells on their way give off. What
 // either brings from a cell counts by the balance heuristic, with densities that depend on the cell and on where looks
 // and flights start, never on a direction's or a point's own: those of a direction, for flights, and of a point times
-// its squared distance, at least, for looks. Points are of a volume, so glow_length makes one of the other.
+// its squared distance, at least, for looks. Points are of a volume, so CmGlow.extent makes one of the other.
 
 CM_FN float cm_glow_pdf_of(vec3 mean, float distance) {
-  float least = distance * cm.grid.least_stretch;
-  return cm_luminance(mean) * cm.grid.glow_density * cm.grid.glow_length * least * least;
+  float least = distance * CM_GLOW.least_stretch;
+  return cm_luminance(mean) * CM_GLOW.density * CM_GLOW.extent * least * least;
 }
 CM_FN float cm_cell_pdf(CmEmission emission) { return cm_glow_pdf_of(emission.mean, emission.distance); }
 
@@ -129,8 +129,13 @@ CM_FN float cm_cell_pdf(CmEmission emission) { return cm_glow_pdf_of(emission.me
 
 // O(1).
 CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
+#if CM_INSTANCES
+  uint stood = cm_here;
+  uvec2 which = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x7f4a7c15u)));
+  cm_here = cm_glowing_instance(cm_below(which.x, cm.space.volumes), which.y);
+#endif
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x632be5abu)));
-  uint i = cm_below(pick.x, cm.grid.glowing);
+  uint i = cm_below(pick.x, CM_GRID.glowing);
   uvec4 entry = cm_glow_word(2u * i);
   if (pick.y > entry.x) {
     i = entry.y;
@@ -142,19 +147,22 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uint cell_class = cm_shape_class(shape);
   vec3 point = cm_cell_point(cell_class, vec3(u.x, u.y, cm_random(p.random, p.stream)));
   // Not from `here`, which is a little above a surface: flights through the medium start at p.o as well.
-  vec3 to_v0 = cm_record_v0(place) - p.o;
-  vec3 way = cm_to_world(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
+  vec3 to_v0 = cm_record_v0(place) - cm_in_volume_point(p.o);
+  vec3 way = cm_out_of_volume(to_v0 + cm_from_frame(point * cm_shape_unit(shape), shape));
   float length_2 = max(dot(way, way), 1e-24f);
   vec3 mean = cm_emission_mean(record);
   vec3 from_centroid = cm_to_frame(to_v0, shape) * -cm_shape_inverse_unit(shape) - cm_frame_centroid(cell_class);
   float distance = cm_cell_distance(from_centroid, shape);
-  float least = distance * cm.grid.least_stretch;
+  float least = distance * CM_GLOW.least_stretch;
   CmLightSample light;
   light.kind = CM_LIGHT_CELL;
   light.direction = way * inversesqrt(length_2);
   light.distance = sqrt(length_2);
   light.density = cm_glow_pdf_of(mean, distance);
-  light.radiance = mean * (cm_emission_at(record, cell_class, point) * cm.grid.glow_length * least * least / length_2);
+  light.radiance = mean * (cm_emission_at(record, cell_class, point) * CM_GLOW.extent * least * least / length_2);
+#if CM_INSTANCES
+  cm_here = stood;
+#endif
   return light;
 }
 
@@ -166,15 +174,17 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 #include "punctual.glsl"
 
-// Each as likely as the others.
+// By light::share_looks. O(1).
 CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
-  uint count = max(cm.lamps.count, 1u);
-  CmLamp lamp = cm_lamp(min(uint(u.z * float(count)), count - 1u));
+  uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x2c1b3c6du)));
+  uint i = cm_below(pick.x, max(cm.lamps.count, 1u));
+  if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;
+  CmLamp lamp = cm_lamp(i);
   vec3 from = lamp.extended != 0u ? cm_lamp_point(lamp, u.x, u.y) : vec3(0.0f, 0.0f, 0.0f);
   CmLightSample light;
   light.kind = CM_LIGHT_LAMP;
   light.radiance = cm_lamp_irradiance(lamp, from, here, light.direction, light.distance);
-  light.density = 1.0f / float(count);
+  light.density = lamp.chance;
   return light;
 }
 
@@ -241,16 +251,16 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 // ---- The glowing medium: points of its box, each as likely
 
 CM_FN vec3 cm_glow_direction(vec3 o, vec3 u, vec3 otherwise) {
-  vec3 way = cm_to_world(mix(cm.grid.box_min, cm.grid.box_max, u) - o);
+  vec3 way = cm_to_world(mix(cm.space.box_min, cm.space.box_max, u) - o);
   return dot(way, way) > 0.0f ? normalize(way) : otherwise;
 }
 
 // The integral of t^2 over the ray's part inside, over the box's volume.
 CM_FN float cm_glow_pdf(CmLightHit hit) {
   vec2 range = cm_box_range(hit.o, cm_to_cube(hit.w));
-  vec3 box = cm.grid.box_max - cm.grid.box_min;
+  vec3 box = cm.space.box_max - cm.space.box_min;
   float cubes = max(0.0f, range.y - range.x) * (dot(range, range) + range.x * range.y);
-  return cubes / max(3.0f * cm.grid.unit_volume * box.x * box.y * box.z, 1e-30f);
+  return cubes / max(3.0f * cm.space.unit_volume * box.x * box.y * box.z, 1e-30f);
 }
 
 #endif
@@ -326,7 +336,7 @@ CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   float before = 0.0f;
   CM_FAR_LIGHTS(CM_LOOK)
 #if CM_LAMPS
-  // Many lights may share the rest: a number with all its bits for them.
+  // A number of its own for the kinds that share the rest: which of many lights is drawn by the state behind it.
   if (u.z >= before && cm.lights.triangle_chance + cm.lights.lamp_chance > 0.0f) {
     u.z = before + (1.0f - before) * cm_random(p.random, p.stream);
   }

@@ -7,3 +7,8 @@
 #else
 #include "march_voxel.glsl"
 #endif
+
+// Where a ray, o + t d in the space that rays are in, enters the volume at t: there, however that rounds.
+CM_FN uvec3 cm_march_enter_at(vec3 o, vec3 d, float t) {
+  return cm_march_enter(clamp(cm_in_volume_point(o) + t * cm_in_volume(d), CM_GRID.box_min, CM_GRID.box_max));
+}

@@ -11,11 +11,11 @@
 
 // Point location: descends the bisection, O(level).
 CM_FN uvec3 cm_march_enter(vec3 p) {
-  float half_size = uintBitsToFloat((127u + cm.grid.root_exponent) << 23);
+  float half_size = uintBitsToFloat((127u + CM_GRID.root_exponent) << 23);
   uint root = cm_root_of(p, half_size);
   vec3 v0;
   uint shape;
-  cm_root_cell(root, cm.grid.root_exponent, v0, shape);
+  cm_root_cell(root, CM_GRID.root_exponent, v0, shape);
   uint leaf = cm_root_leaf(root);
   uint node = cm_root_node(root);
   uint inside = cm_root_node(root + 1u) - node;

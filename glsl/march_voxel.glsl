@@ -18,8 +18,8 @@ CM_FN ivec3 cm_voxel_of(uvec3 cell) { return ivec3(int(cell.x & 0xffffu), int(ce
 CM_FN uvec3 cm_voxel_cell(ivec3 v, uint slot) { return uvec3(uint(v.x) | (uint(v.y) << 16), uint(v.z), slot); }
 
 CM_FN uvec3 cm_march_enter(vec3 p) {
-  ivec3 low = ivec3(cm.grid.box_min);
-  ivec3 high = ivec3(cm.grid.box_max) - ivec3(1, 1, 1);
+  ivec3 low = ivec3(CM_GRID.box_min);
+  ivec3 high = ivec3(CM_GRID.box_max) - ivec3(1, 1, 1);
   return cm_voxel_cell(clamp(ivec3(floor(p)), low, high), CM_NONE);
 }
 
@@ -64,8 +64,8 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
   } else {
     v.z = d.z > 0.0f ? low.z + size : low.z - 1;
   }
-  ivec3 box_low = ivec3(cm.grid.box_min);
-  ivec3 box_high = ivec3(cm.grid.box_max);
+  ivec3 box_low = ivec3(CM_GRID.box_min);
+  ivec3 box_high = ivec3(CM_GRID.box_max);
   bool outside = v.x < box_low.x || v.y < box_low.y || v.z < box_low.z || v.x >= box_high.x || v.y >= box_high.y ||
                  v.z >= box_high.z;
 #if CM_MARCH == 2
@@ -81,7 +81,7 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
 CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   CmEmission e;
   e.mean = vec3(0.0f, 0.0f, 0.0f);
-  if (cm.medium.emits != 0u) e.mean = cm_emission_voxel(cm_voxel_of(cell));
+  if (CM_MEDIUM.emits != 0u) e.mean = cm_emission_voxel(cm_voxel_of(cell));
   e.at_0 = 1.0f;
   e.slope = 0.0f;
   e.distance = 0.0f;

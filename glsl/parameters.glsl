@@ -30,6 +30,10 @@
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
 #endif
+// Whether there are several volumes (glsl/instance.glsl).
+#ifndef CM_INSTANCES
+#define CM_INSTANCES 0
+#endif
 
 #ifdef __cplusplus
 #define CM_ALIGN(bytes) alignas(bytes)
@@ -52,8 +56,8 @@ CM_BLOCK(CmView) {
   CM_EQUALITY(CmView)
 };
 
-// Cube space (glsl/cell.glsl) and what of it holds data: render::MarchData.
-CM_BLOCK(CmGrid) {
+// Cube space, in which rays are, and the box of all that they march through: scene::space_of.
+CM_BLOCK(CmSpace) {
   CM_ALIGN(16) vec3 to_cube_x;  // columns of the linear part of world to cube space
   CM_ALIGN(16) vec3 to_cube_y;
   CM_ALIGN(16) vec3 to_cube_z;
@@ -63,25 +67,38 @@ CM_BLOCK(CmGrid) {
   CM_ALIGN(16) vec3 cube_origin;  // world
   float unit_volume;              // of a unit of cube space, in the world
   CM_ALIGN(16) vec3 box_min;      // cube space: no density outside
-  uint root_exponent;             // the root cells' cube has edges of 2 to this power
+  uint volumes;                   // of the table of glsl/instance.glsl; without one 0
   CM_ALIGN(16) vec3 box_max;
-  uint levels;      // of bisection
-  uint page_shift;  // log2 of cells a page
-  uint first_cell;  // where the records begin in their page; of several pages 0
-  uint tree;        // where the point-location tree begins in its page, in 4-byte words
-  uint first_emission;  // where the records of what cells give off begin in their page
-  uint first_colour;    // and their colours, in 4-byte words
+  CM_EQUALITY(CmSpace)
+};
+
+// A volume's data (glsl/cell.glsl), wherever it stands: render::MarchData.
+CM_BLOCK(CmGrid) {
+  CM_ALIGN(16) vec3 box_min;  // cube space: no density outside
+  uint root_exponent;         // the root cells' cube has edges of 2 to this power
+  CM_ALIGN(16) vec3 box_max;
+  uint levels;            // of bisection
+  uint page_shift;        // log2 of cells a page
+  uint first_cell;        // where the records begin in their page, or, of several, in all of them together
+  uint tree;              // where the point-location tree begins in its page, in 4-byte words; before it its roots
+  uint first_emission;    // where the records of what cells give off begin in their page
+  uint first_colour;      // and their colours, in 4-byte words
   uint first_anisotropy;  // and what mean cosine their scattering has, likewise
-  float emission_unit;  // radiance a world unit of length of what is stored as 1 for voxels
-  uint first_glowing;   // where the table of cells that give off light begins in the page of their channels
-  uint glowing;         // how many it has
-  float glow_density;   // of looks by volume, over a cell's luminance: 1 over what all of them give off
-  float glow_length;    // world: about how much of a ray is among those that give off most
-  float least_stretch;  // world: no vector of length 1 in cube space is shorter
+  float emission_unit;    // radiance a world unit of length of what is stored as 1 for voxels
+  uint first_glowing;     // where the table of cells that give off light begins in the page of their channels
+  uint glowing;           // how many it has
   CM_EQUALITY(CmGrid)
 };
 
-// The participating medium: Viewer.
+// Looks for its cells that give off light, where it stands: scene::glow_of.
+CM_BLOCK(CmGlow) {
+  float density;        // of looks by volume, over a cell's luminance: 1 over what all of them give off
+  float extent;         // world: about how much of a ray is among those that give off most
+  float least_stretch;  // world: no vector of length 1 in cube space is shorter
+  CM_EQUALITY(CmGlow)
+};
+
+// The participating medium; of several, whether any has what its last three tell: render::GpuScene.
 CM_BLOCK(CmMedium) {
   CM_ALIGN(16) vec3 albedo;  // of single scattering
   float extinction;          // of stored density 1, 1 / world unit
@@ -198,7 +215,9 @@ CM_BLOCK(CmParameters) {
 layout(std140, binding = CM_UNIFORM_PARAMETERS) uniform CmParameters {
 #endif
   CmView view;
+  CmSpace space;
   CmGrid grid;
+  CmGlow glow;
   CmMedium medium;
   CmLights lights;
   CmSurfaceTables surfaces;

@@ -16,6 +16,7 @@
 #ifndef CM_PATH_GLSL
 #define CM_PATH_GLSL
 
+#include "numbers.glsl"
 #include "ray.glsl"
 #include "ground.glsl"
 #include "path_state.glsl"
@@ -108,11 +109,11 @@ CM_FN void cm_escape(CM_INOUT(CmPath) p) {
 // The medium's own light: S e^-x dx over the flight. A collision tells of S (its chance is 1 - e^-x), but seldom in a
 // thin flame. Where the depth x that a flight came through is known, 2 S (1 - e^-x) where it collides and S (1 - e^-x)
 // where it does not have the same mean, and next to no noise in thin flames. Among triangles it is not: one may be
-// nearer than the march has been.
+// nearer than the march has been; nor is there one S where there are several volumes.
 CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
   float glow = collided ? 1.0f : 0.0f;
-  if (CM_SURFACES == 0) glow = (collided ? 2.0f : (ended ? 1.0f : 0.0f)) * (1.0f - exp(max(0.0f, p.depth) - p.depth_0));
-  p.radiance += p.throughput * (glow * cm.medium.source);
+  if (CM_SURFACES == 0 && CM_INSTANCES == 0) glow = (collided ? 2.0f : (ended ? 1.0f : 0.0f)) * (1.0f - exp(max(0.0f, p.depth) - p.depth_0));
+  p.radiance += p.throughput * (glow * CM_MEDIUM.source);
 }
 
 // The path goes on from where it collided or met a triangle or the ground, unless Russian roulette or the limit ends it:
@@ -120,20 +121,23 @@ CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
 CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   if (collided && p.bounces == 0u) p.in_volume = 1u;
   p.bounces += 1u;
-  if (collided) p.throughput *= cm.medium.albedo;
+  if (collided) p.throughput *= CM_MEDIUM.albedo;
   if (grounded) p.throughput *= cm.ground.albedo;
 #if CM_CHANNELS && defined(CM_MARCH)  // what has no march collides with nothing
-  if (collided && cm.medium.coloured != 0u) p.throughput *= cm_march_colour(p.cell);
+  if (collided && CM_MEDIUM.coloured != 0u) p.throughput *= cm_march_colour(p.cell);
 #endif
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
   // Ground that a camera sees is large, even and dark: there roulette would be all the noise.
   float survival = strongest < 0.5f && !(grounded && p.bounces == 1u) ? max(strongest, 0.05f) : 1.0f;
   float u = cm_random(p.random, p.stream);
   bool last = cm.integrator.max_bounces != 0u && p.bounces > cm.integrator.max_bounces;
-  bool ends = !(strongest > 0.0f) || u >= survival || last;
+  bool ends = !cm_is_positive(strongest) || u >= survival || last;
   p.throughput = p.throughput / survival;
   p.o = p.o + p.t * p.d;
   p.start_cell = p.cell;
+#if CM_INSTANCES
+  if (collided) p.start_instance = p.instance;
+#endif
   p.start = grounded ? CM_ON_GROUND : CM_IN_MEDIUM;
   return ends;
 }
@@ -158,6 +162,29 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   if (look.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) look.light.radiance = vec3(0.0f, 0.0f, 0.0f);
   return look;
 }
+
+#if CM_INSTANCES
+// Through all volumes, or through some once more; first through the one that it starts in.
+CM_FN void cm_begin_visits(CM_INOUT(CmPath) p) {
+  uint again = CM_INSTANCE_EMITS | CM_INSTANCE_OVERLAPS;
+  bool inside = p.start == CM_IN_MEDIUM &&
+                (p.gathers == 0u || (cm_instances[p.start_instance].flags & again) == again);
+  p.t = 0.0f;
+  p.entry = -1.0f;
+  p.instance = inside ? p.start_instance : CM_INSTANCE_NONE;
+  p.cell = inside ? p.start_cell : uvec2(CM_NONE, 0u);
+  p.cache = CM_NONE;
+  p.stage = CM_STAGE_FLY;
+}
+
+CM_FN void cm_begin_march(CM_INOUT(CmPath) p) {
+  p.t_end = p.reach;
+  p.met = CM_INSTANCE_NONE;
+  p.gathers = 0u;
+  if (p.start != CM_IN_MEDIUM) p.start_instance = 0u;  // what no kernel has kept is nothing to look up by
+  cm_begin_visits(p);
+}
+#endif
 
 // The look's ray, or a new flight after it.
 CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
@@ -190,6 +217,12 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
   bool hidden = looks && ground < light.distance;
   if (hidden) p.light = vec3(0.0f, 0.0f, 0.0f);
   p.reach = hidden ? 0.0f : min(light.distance, ground);
+#if CM_INSTANCES
+  if (CM_SURFACES == 0) {
+    cm_begin_march(p);
+    return;
+  }
+#endif
   if (CM_SURFACES == 0) {
     p.t = 0.0f;
     p.t_end = p.start == CM_ON_GROUND ? p.reach : min(cm_box_range(p.o, p.d).y, p.reach);
@@ -197,7 +230,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
     p.cache = CM_NONE;
     p.stage = p.start == CM_ON_GROUND ? CM_STAGE_AIM : CM_STAGE_FLY;
   } else {
-    if (looks && !(max(p.light.x, max(p.light.y, p.light.z)) > 0.0f)) p.reach = 0.0f;  // no light to look for
+    if (looks && !cm_is_positive(max(p.light.x, max(p.light.y, p.light.z)))) p.reach = 0.0f;  // no light to look for
     p.stage = CM_STAGE_AIM;
   }
 }
@@ -209,6 +242,9 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   bool grounded = flight && p.event == CM_EVENT_ESCAPE && !met && p.to_ground != 0u;
   bool escaped = p.event == CM_EVENT_ESCAPE && !met && !grounded;
   bool collided = flight && p.event == CM_EVENT_COLLISION && !met;
+#if CM_INSTANCES
+  cm_here = collided ? p.instance : p.start_instance;
+#endif
   if (escaped) cm_escape(p);
   bool finished = escaped && flight;
   if (met) cm_see(p, vertex);

@@ -64,6 +64,12 @@
 //   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
 //   lifted          1: the ray started above the triangle that its path had met
 //   to_ground       1: a flight comes to the ground if nothing stops it
+// CM_PATH_VISIT, only with CM_INSTANCES, and only for kernels that march:
+//   instance        that the ray marches through, or has entered last; of a collision the one that it is with
+//   entry           where it entered that; -1 of the one that it started in
+//   start_instance  that o is in, in the medium; then start_cell is a cell of that
+//   met, met_cell   of a flight: where the nearest collision is that it knows, which is at t_end; CM_NONE: none
+//   gathers         1: all is known of its end, and it goes through what glows and overlaps once more
 // BITS have a number of bits of a word that they share with their neighbours.
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
@@ -74,6 +80,9 @@
 #define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 1) BITS(start, 2) BITS(found, 2) BITS(behind, 1)            \
   BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1) BITS(to_ground, 1)
+
+#define CM_PATH_VISIT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                          \
+  UINT(instance) FLOAT(entry) UINT(start_instance) UINT(met) UVEC2(met_cell) BITS(gathers, 1)
 
 #define CM_PATH_VEC3(name) vec3 name;
 #define CM_PATH_VEC2(name) vec2 name;
@@ -96,6 +105,7 @@
 #define CM_SUM_QUADS ((CM_PATH_WORDS(CM_PATH_SUM) + 3) / 4)
 #define CM_FLIGHT_QUADS ((CM_PATH_WORDS(CM_PATH_FLIGHT) + 3) / 4)
 #define CM_ENDS_QUADS ((CM_PATH_WORDS(CM_PATH_ENDS) + 3) / 4)
+#define CM_VISIT_QUADS ((CM_PATH_WORDS(CM_PATH_VISIT) + 3) / 4)
 #define CM_PATH_QUADS (CM_RAY_QUADS + CM_SUM_QUADS + CM_FLIGHT_QUADS + CM_ENDS_QUADS)
 
 struct CmPath {
@@ -103,6 +113,9 @@ struct CmPath {
   CM_PATH_SUM(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
   CM_PATH_FLIGHT(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
   CM_PATH_ENDS(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+#if CM_INSTANCES
+  CM_PATH_VISIT(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+#endif
 };
 
 // A pixel's samples so far.

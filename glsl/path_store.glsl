@@ -72,12 +72,23 @@ void cm_store_flight(CmPath p, uint lane) { CM_STORE(CM_PATH_FLIGHT, CM_FLIGHT_Q
 void cm_load_ends(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_ENDS, CM_ENDS_QUADS, CM_FIRST_ENDS) }
 void cm_store_ends(CmPath p, uint lane) { CM_STORE(CM_PATH_ENDS, CM_ENDS_QUADS, CM_FIRST_ENDS) }
 
+#if CM_INSTANCES
+void cm_load_visit(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_VISIT, CM_VISIT_QUADS, CM_PATH_QUADS) }
+void cm_store_visit(CmPath p, uint lane) { CM_STORE(CM_PATH_VISIT, CM_VISIT_QUADS, CM_PATH_QUADS) }
+#else
+void cm_load_visit(inout CmPath p, uint lane) {}
+void cm_store_visit(CmPath p, uint lane) {}
+#endif
+
 CmPath cm_begin_path() {
   CmPath p;
   CM_PATH_RAY(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
   CM_PATH_SUM(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
   CM_PATH_FLIGHT(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
   CM_PATH_ENDS(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+#if CM_INSTANCES
+  CM_PATH_VISIT(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+#endif
   p.stage = CM_STAGE_CAMERA;
   return p;
 }

@@ -50,18 +50,18 @@ struct CmTurn {
 // Of what the path has collided with.
 CM_FN float cm_anisotropy(CmPath p) {
 #if CM_CHANNELS && defined(CM_MARCH)
-  if (cm.medium.anisotropic != 0u && p.start == CM_IN_MEDIUM) return cm_march_anisotropy(p.start_cell);
+  if (CM_MEDIUM.anisotropic != 0u && p.start == CM_IN_MEDIUM) return cm_march_anisotropy(p.start_cell);
 #endif
-  return cm.medium.anisotropy;
+  return CM_MEDIUM.anisotropy;
 }
 
 #if CM_SECOND_LOBE
 CM_FN CmPhase cm_lobes(float anisotropy) {
   CmPhase phase;
   phase.anisotropy = anisotropy;
-  phase.second_anisotropy = cm.medium.second_anisotropy;
-  phase.second_bend = cm.medium.second_bend;
-  phase.second_share = cm.medium.second_share;
+  phase.second_anisotropy = CM_MEDIUM.second_anisotropy;
+  phase.second_bend = CM_MEDIUM.second_bend;
+  phase.second_share = CM_MEDIUM.second_share;
   return phase;
 }
 CM_FN float cm_medium_phase(float g, float cosine) { return cm_phase(cm_lobes(g), cosine); }

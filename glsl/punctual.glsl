@@ -18,6 +18,10 @@ struct CmLamp {
   float cone_scale;  // the cone's share is clamp(scale cosine + offset, 0, 1)^2
   vec3 along;        // likewise, upright to it
   float cone_offset;
+  float chance;  // to be the one that is looked for
+  uint stays;    // drawn evenly, it is looked for where a random word is at most this, else the other
+  uint other;
+  uint unused_0;
 };
 
 // From its middle to a point of it, each as likely by area.

@@ -4,13 +4,22 @@
 #ifndef CM_RAY_GLSL
 #define CM_RAY_GLSL
 
-CM_FN vec3 cm_to_cube(vec3 v) { return cm.grid.to_cube_x * v.x + cm.grid.to_cube_y * v.y + cm.grid.to_cube_z * v.z; }
+CM_FN vec3 cm_to_cube(vec3 v) { return cm.space.to_cube_x * v.x + cm.space.to_cube_y * v.y + cm.space.to_cube_z * v.z; }
 
 CM_FN vec3 cm_to_world(vec3 v) {
-  return cm.grid.from_cube_x * v.x + cm.grid.from_cube_y * v.y + cm.grid.from_cube_z * v.z;
+  return cm.space.from_cube_x * v.x + cm.space.from_cube_y * v.y + cm.space.from_cube_z * v.z;
 }
-CM_FN vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm.grid.cube_origin; }
-CM_FN vec3 cm_to_cube_point(vec3 p) { return cm_to_cube(p - cm.grid.cube_origin); }
+// A vector of the cube space that glsl/here.glsl tells of, in the world.
+CM_FN vec3 cm_out_of_volume(vec3 v) {
+#if CM_INSTANCES
+  return cm_instances[cm_here].space.from_cube_x * v.x + cm_instances[cm_here].space.from_cube_y * v.y +
+         cm_instances[cm_here].space.from_cube_z * v.z;
+#else
+  return cm_to_world(v);
+#endif
+}
+CM_FN vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm.space.cube_origin; }
+CM_FN vec3 cm_to_cube_point(vec3 p) { return cm_to_cube(p - cm.space.cube_origin); }
 
 // Where a ray is inside the box: t.x to t.y, empty if t.x > t.y.
 CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
@@ -18,11 +27,11 @@ CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
   float t_out = 3.0e38f;
   for (int axis = 0; axis < 3; ++axis) {
     if (d[axis] != 0.0f) {
-      float a = (cm.grid.box_min[axis] - o[axis]) / d[axis];
-      float b = (cm.grid.box_max[axis] - o[axis]) / d[axis];
+      float a = (cm.space.box_min[axis] - o[axis]) / d[axis];
+      float b = (cm.space.box_max[axis] - o[axis]) / d[axis];
       t_in = max(t_in, min(a, b));
       t_out = min(t_out, max(a, b));
-    } else if (o[axis] < cm.grid.box_min[axis] || o[axis] > cm.grid.box_max[axis]) {
+    } else if (o[axis] < cm.space.box_min[axis] || o[axis] > cm.space.box_max[axis]) {
       t_out = -1.0f;
     }
   }

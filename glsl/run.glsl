@@ -13,7 +13,7 @@ CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rou
     if (p.stage == CM_STAGE_CAMERA) cm_camera(p, samples, at);
     if (p.stage == CM_STAGE_AIM) {
       cm_aim(p);
-      if (p.cell.x == CM_NONE) {
+      if (CM_INSTANCES == 0 && p.cell.x == CM_NONE) {
         p.event = CM_EVENT_ESCAPE;
         p.stage = p.start == CM_AT_CAMERA && p.to_ground == 0u ? CM_STAGE_FINISH : CM_STAGE_EVENT;
       }

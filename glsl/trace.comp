@@ -1,7 +1,7 @@
 #version 450
 // The path tracer as one kernel, where paths meet no triangles. One lane a pixel of some blocks of the tile: loads its
 // path, runs it for a bounded number of rounds, stores it.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_LAYERS=1
 // variants: - or CM_AOVS=1
 // variants: - or CM_SECOND_LOBE=1
@@ -42,12 +42,16 @@ void main() {
   if (before >= cm.dispatch.samples) return;
   uint lane = cm_lane_of(local);
   CmPath p = cm_begin_path();
-  if (!cm_block_begins()) p = cm_load_path(lane);
+  if (!cm_block_begins()) {
+    p = cm_load_path(lane);
+    cm_load_visit(p, lane);
+  }
   cm_forget_triangles(p);
   uint samples = before;
   uint marches = cm_run(p, samples, at, cm.dispatch.rounds);
   cm_forget_triangles(p);
   cm_store_path(p, lane);
+  cm_store_visit(p, lane);
   uint block = cm_block_of(local);
   if (p.stage != CM_STAGE_DONE) atomicAdd(cm_blocks[block].y, 1u);
   if (samples == 0u) atomicAdd(cm_blocks[block].z, 1u);

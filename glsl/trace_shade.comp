@@ -1,7 +1,7 @@
 #version 450
 // What happens on the triangles that paths have met, or whose shadow rays have ended: glsl/path_queue.glsl.
 // variants: CM_SURFACES=1,2
-// variants: - or CM_CHANNELS=1
+// variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1
 // variants: - or CM_ENVIRONMENT=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -1,6 +1,6 @@
 #version 450
 // The medium's part of paths among triangles: glsl/path_queue.glsl.
-// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1..6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: CM_SURFACES=1,2
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
@@ -30,7 +30,9 @@ void main() {
   if (cm_queue_place() == 0u) atomicAdd(cm_total.x, count);
   uint lane = cm_queue_lane(CM_QUEUE_TRAVEL);
   CmPath p = cm_load_path(lane);
+  cm_load_visit(p, lane);
   cm_travel(p);
   cm_store_path(p, lane);
+  cm_store_visit(p, lane);
   cm_send_on(p, lane);
 }

@@ -7,6 +7,7 @@
 #define CM_WAVELET_GLSL
 #include "shared.glsl"
 #include "luminance.glsl"
+#include "numbers.glsl"
 
 layout(location = 0) uniform ivec2 cm_rows;  // of this dispatch: the first, and the one after the last
 

@@ -35,7 +35,7 @@ float cm_unfiltered_share(ivec2 texel, CmGuides here) {
       noise += weight * vec2(unfiltered.a, spread.y / (cover * cover));
     }
   }
-  if (!(noise.x > 0.0)) return 1.0;
+  if (!cm_is_positive(noise.x)) return 1.0;
   float kept = min(1.0, sqrt(noise.y / noise.x));
   float differ = (1.0 - kept) * (1.0 - kept) * noise.x;
   float bias = max(0.0, off - CM_CERTAIN * differ);

@@ -18,9 +18,7 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_
 layout(rgba32ui, binding = CM_IMAGE_WAVELET_GUIDES) uniform writeonly uimage2D cm_guides_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform writeonly image2D cm_behind_out;
 
-// Of a size that can be squared. By its bits: compilers may take comparisons for those of numbers.
-bool cm_is_number(float x) { return (floatBitsToUint(x) & 0x7fffffffu) < floatBitsToUint(1e15); }
-bool cm_are_numbers(vec3 v) { return cm_is_number(v.x) && cm_is_number(v.y) && cm_is_number(v.z); }
+#define CM_SQUARABLE 1e15  // what can be squared is less
 
 void main() {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
@@ -44,8 +42,9 @@ void main() {
   vec3 lit = mean.front.rgb - emission;
   vec3 front = lit / tint;
   float part = clamp(1.0 - mean.front.a, 0.0, 1.0);
-  guides.finite = cm_are_numbers(mean.front.rgb) && cm_are_numbers(mean.background) && cm_is_number(mean.front.a) &&
-                  cm_are_numbers(emission) && cm_is_number(1e-15 * square);
+  guides.finite = cm_is_within(mean.front.rgb, CM_SQUARABLE) && cm_is_within(mean.background, CM_SQUARABLE) &&
+                  cm_is_within(mean.front.a, CM_SQUARABLE) && cm_is_within(emission, CM_SQUARABLE) &&
+                  cm_is_within(1e-15 * square, CM_SQUARABLE);
   // A sample is covered or it is not: of its square, what is behind can be taken off.
   float behind = cm_luminance(mean.background);
   float luminance = cm_luminance(front);

@@ -71,7 +71,7 @@ void cm_recall(inout CmLit sum, CmPlace here, float cover, vec4 before, bool sol
     ivec2 at = ivec2(low) + offset;
     if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
     CmLit lit = cm_unpacked_light(texelFetch(cm_history_light, at, 0));
-    if (!(lit.samples > 0.0)) continue;
+    if (!cm_is_positive(lit.samples)) continue;
     CmPlace there = cm_unpacked_place(texelFetch(cm_history_guides, at, 0));
     float z = solid ? there.solid_z : there.scattered_z;
     bool none = before.z > CM_NOTHING_Z;

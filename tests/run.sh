@@ -3,7 +3,7 @@
 # AddressSanitizer and UndefinedBehaviorSanitizer, and the checks of format, scripts and (clang-tidy) code.
 # The last line is "N passed, N failed" (", N skipped"); the exit status is 0 if none failed.
 # --quick: the release build's tests alone, without those labelled slow. --long: everything, then the tests of threads
-# under ThreadSanitizer and a minute of each fuzzer (an hour more).
+# under ThreadSanitizer, the soak, all drivers' pictures and a minute of each fuzzer (an hour more).
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
 
@@ -14,7 +14,7 @@ for argument in "$@"; do
     --long) tier=long ;;
     -h | --help)
       echo "usage: tests/run.sh [--quick | --long]"
-      echo "  --quick: the release build's tests, but for slow ones; --long: ThreadSanitizer and fuzzers, too"
+      echo "  --quick: the release build's tests, but for slow ones; --long: soak, ThreadSanitizer and fuzzers, too"
       exit 0
       ;;
     *)
@@ -180,8 +180,10 @@ tidy
 export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_get_addr=0
 export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
-build_and_test sanitize tests/unit/all tests/unit
+# What is ours is the same behind both of Mesa's doors.
+build_and_test sanitize tests/unit/all tests/unit --exclude-regex /osmesa
 if [ "$tier" = long ]; then
+  run_ctest release-long build/release --label-regex long
   # What TSan cannot see into is left out. TBB has one thread (of one core), or its own ways of waiting would count as
   # races; the library's threads stay many.
   export TSAN_OPTIONS=ignore_noninstrumented_modules=1:history_size=7 LP_NUM_THREADS=0

@@ -16,10 +16,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <program.hpp>
+#include <settings.hpp>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 
+#include "fire.hpp"
 #include "renderer.hpp"
 #include "thumbnail_texture.hpp"
 
@@ -427,6 +429,14 @@ bool App::waiting() const {
          answered_environment_ != wish_.environment_edit;
 }
 
+bool App::is_unsaid() const {
+  cumulet_medium_desc medium = model_.scene.medium;
+  if (demo::is_unsaid(medium)) return true;
+  if (!look_) return false;
+  medium.density_scale = look_->density_scale;
+  return settings::same(medium, *look_);
+}
+
 void App::complain(const std::string& cause) {
   if (starting_) std::cerr << "cumulet-demo: " << one_line(cause) << std::endl;
   tell(model_, true, cause, now_);
@@ -448,6 +458,7 @@ void App::ask() {
   wish.volume_edit = wish_.volume_edit + (load ? 1 : 0);
   wish.fit = load ? std::exchange(fit_next_, false) : wish_.fit;
   wish.suggest = load ? std::exchange(suggest_next_, false) : wish_.suggest;
+  wish.unsaid = load ? is_unsaid() : wish_.unsaid;
   wish.surfaces_edit = wish_.surfaces_edit + (wish.scene.surfaces == wish_.scene.surfaces ? 0 : 1);
   wish.environment_edit = wish_.environment_edit + (wish.scene.environment == wish_.scene.environment ? 0 : 1);
   wish.navigation = model_.navigation;
@@ -501,11 +512,13 @@ void App::accept(const Answer& answer) {
   if (answer.status.compiled) model_.charts.compiled_percent.add(static_cast<float>(100.0 * *answer.status.compiled));
   if (answer.status.noise > 0.0 && answer.status.noise != model_.status.noise)
     model_.charts.noise_percent.add(static_cast<float>(100.0 * answer.status.noise));
-  if (answer.density_scale) {
-    model_.scene.medium.density_scale = *answer.density_scale;
-    // What the program begins with is no change of the user's.
-    if (starting_) history_.emplace(model_.scene);
+  if (answer.density_scale) model_.scene.medium.density_scale = *answer.density_scale;
+  if (answer.look && is_unsaid()) {
+    look_ = answer.look;
+    model_.scene.medium = *look_;
   }
+  // What the program begins with is no change of the user's.
+  if (starting_ && (answer.density_scale || answer.look)) history_.emplace(model_.scene);
   model_.status = answer.status;
   model_.grids = answer.grids;
   for (const Answer::Notice& notice : answer.notices) {
@@ -678,6 +691,11 @@ void App::write_report(const std::string& path) const {
   json["frame_ms"] = model_.charts.frame_ms.values();
   json["picture_ms"] = model_.charts.picture_ms.values();
   json["compiled_percent"] = model_.charts.compiled_percent.values();
+  json["device_ms"] = model_.charts.device_ms.values();
+  json["pass_seconds"] = {
+      {"upload", status.stats.pass_seconds_upload},     {"host_depth", status.stats.pass_seconds_host_depth},
+      {"surfaces", status.stats.pass_seconds_surfaces}, {"trace", status.stats.pass_seconds_trace},
+      {"inspect", status.stats.pass_seconds_inspect},   {"display", status.stats.pass_seconds_display}};
   json["pictures"] = pictures_;
   json["grid"] = status.grid;
   json["state"] = last_state_;

@@ -63,6 +63,8 @@ class App {
   [[nodiscard]] bool settled() const { return answered_ >= wish_.number; }
   /// Whether a load is still to end, be it that the viewer has not heard of it yet.
   [[nodiscard]] bool waiting() const;
+  /// Whether what the medium is came of no hand, no flag and no scene file.
+  [[nodiscard]] bool is_unsaid() const;
   void complain(const std::string& cause);
   /// Whether there was anything to draw that the window does not show already.
   bool draw();
@@ -102,6 +104,7 @@ class App {
   std::uint64_t rate_samples_ = 0;
 
   Wish wish_;  // sent last; its camera, volume and surfaces as they are known to the viewer
+  std::optional<cumulet_medium_desc> look_;  // that a volume got, nothing being said of its medium
   std::vector<ViewerInput> inputs_;
   std::vector<Request> requests_;
   bool reload_ = false;  // the volume, though it is the same

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "aovs.hpp"
+#include "fire.hpp"
 #include "history.hpp"
 #include "metadata.hpp"
 
@@ -31,8 +32,8 @@ bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b) { r
 bool same_wish(const Wish& a, const Wish& b) {
   const auto rest = [](const Wish& wish) {
     return std::tie(wish.camera_edit, wish.volume_edit, wish.surfaces_edit, wish.environment_edit, wish.fit,
-                    wish.suggest, wish.adaptive_resolution, wish.held, wish.paused, wish.budget_ms, wish.width,
-                    wish.height, wish.scale);
+                    wish.suggest, wish.unsaid, wish.adaptive_resolution, wish.held, wish.paused, wish.budget_ms,
+                    wish.width, wish.height, wish.scale);
   };
   return rest(a) == rest(b) && same(a.navigation, b.navigation) && same_scene(a.scene, b.scene);
 }
@@ -88,6 +89,7 @@ void Session::follow(const Wish& wish) {
   Wish next = wish;
   // What the user has not changed since is the viewer's.
   if (!first && wish.camera_edit == wish_.camera_edit) next.scene.camera = scene_.camera;
+  if (!first && wish.number == wish_.number) next.scene.medium = scene_.medium;
   const bool load = !first && wish.volume_edit != wish_.volume_edit;
   if (!first && !load) set_volume(next.scene, volume_of(scene_));
   if (!first && wish.surfaces_edit == wish_.surfaces_edit) next.scene.surfaces = scene_.surfaces;
@@ -130,7 +132,14 @@ void Session::follow(const Wish& wish) {
   if (!same(navigation_, wish_.navigation)) check(cumulet_set_navigation(viewer_.get(), &wish_.navigation));
   navigation_ = wish_.navigation;
   follow_surfaces();
+  follow_places();
   follow_volume();
+}
+
+void Session::follow_places() {
+  if (known_->places == scene_.places) return;
+  known_->places = scene_.places;
+  check(set_places(viewer_.get(), scene_));
 }
 
 void Session::follow_ramps() {
@@ -457,6 +466,7 @@ Answer Session::answer() {
   answer.environment_edit = wish_.environment_edit;
   answer.camera_moved = std::exchange(camera_moved_, false);
   answer.density_scale = std::exchange(density_scale_, std::nullopt);
+  answer.look = std::exchange(look_, std::nullopt);
   answer.notices = std::exchange(notices_, {});
   answer.files = std::exchange(files_, {});
   return answer;
@@ -493,7 +503,7 @@ void Session::finish_load() {
   if (cumulet_list_grids(shown_volume_.file.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
     tell(true, error.data());
   files_.push_back({shown_volume_.file, Answer::File::Fate::opened});
-  if (std::exchange(suggest_, false)) suggest_density();
+  if (std::exchange(suggest_, false)) suggest_look();
   if (!fit_) return;
   scene_.camera = *std::exchange(fit_, std::nullopt);
   set_camera();
@@ -519,7 +529,19 @@ void Session::suggest_density() {
   if (!volume || cumulet_volume_suggest_density_scale(volume.get(), &scale) != CUMULET_OK) return;
   density_scale_ = scale;
   // At once: what is fitted next depends on it.
-  known_->medium.density_scale = scale;
+  known_->medium.density_scale = scene_.medium.density_scale = scale;
+  check(cumulet_set_medium(viewer_.get(), &known_->medium));
+}
+
+void Session::suggest_look() {
+  suggest_density();
+  const VolumePtr volume = shown();
+  if (!volume || !wish_.unsaid) return;
+  cumulet_medium_desc look = SceneOptions().medium;
+  look.density_scale = known_->medium.density_scale;
+  look = medium_of_fire(volume.get(), look).value_or(look);
+  settings::spell_out_zeros(look);
+  look_ = known_->medium = scene_.medium = look;
   check(cumulet_set_medium(viewer_.get(), &known_->medium));
 }
 

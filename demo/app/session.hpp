@@ -42,6 +42,7 @@ struct Wish {
   std::uint64_t environment_edit = 0;
   bool fit = false;      // that volume is framed once it is there: its camera comes from no scene file
   bool suggest = false;  // its density scale is told, too: none comes from a scene file
+  bool unsaid = false;   // nor is anything said of its medium: one that burns gets a look of fire
   cumulet_navigation_desc navigation{};
   bool adaptive_resolution = true;
   bool held = false;    // a control or the camera is: the grid's settings may wait for the worker
@@ -67,9 +68,10 @@ struct Answer {
   std::uint64_t surfaces_edit = 0;
   std::uint64_t environment_edit = 0;
   // Since the last answer that was taken:
-  bool drawn = false;                   // there is another picture
-  bool camera_moved = false;            // by whatever
-  std::optional<double> density_scale;  // that suits the volume
+  bool drawn = false;                       // there is another picture
+  bool camera_moved = false;                // by whatever
+  std::optional<double> density_scale;      // that suits the volume
+  std::optional<cumulet_medium_desc> look;  // a volume's that was wished with nothing said of its medium
   struct Notice {
     bool error = false;
     std::string text;
@@ -154,6 +156,7 @@ class Session {
   [[nodiscard]] bool waits() const { return waiting_ || waiting_for_surfaces_ || waiting_for_environment_; }
   void follow_ramps();
   void follow_lamps();
+  void follow_places();
   void follow_surfaces();
   void remove_surfaces();
   void finish_surfaces();
@@ -175,6 +178,8 @@ class Session {
   /// The viewer's volume, or none.
   VolumePtr shown();
   void suggest_density();
+  // With it the medium, where nothing is said of that.
+  void suggest_look();
   /// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
   [[nodiscard]] image::Image read_display();
   /// The picture in linear radiance with its layers, as docs/aovs.md says; debug views have none.
@@ -205,6 +210,7 @@ class Session {
   std::optional<cumulet_camera_desc> fit_;  // the camera to place when the volume is there
   bool suggest_ = false;
   std::optional<double> density_scale_;
+  std::optional<cumulet_medium_desc> look_;
   bool camera_moved_ = false;
   double last_noise_ = 0.0;
   std::uint64_t noise_samples_ = 0;

@@ -29,6 +29,7 @@
 #include "aovs.hpp"
 #include "checkpoint.hpp"
 #include "denoised.hpp"
+#include "fire.hpp"
 #include "frame_plan.hpp"
 #include "info.hpp"
 #include "memory.hpp"
@@ -154,18 +155,37 @@ void tell(Progress& progress, const std::string& line) {
   std::fprintf(stderr, "%s\n", one_line(line).c_str());
 }
 
-/// The scale that suits the volume, whatever it is seen from: it was loaded with that.
-void tell_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
+/// The volume that is there, for as long as this lives.
+std::shared_ptr<cumulet_volume> volume_of(const Viewer& viewer) {
   cumulet_volume* volume = nullptr;
   check(viewer, cumulet_get_volume(viewer.get(), &volume));
+  return {volume, cumulet_volume_release};
+}
+
+/// The medium that a volume that burns is first shown with, where nothing is said of it; nothing if it does not burn.
+std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
+  if (scene.volume.empty() || !scene.auto_density_scale || !cumulet::demo::is_unsaid(scene.medium)) return std::nullopt;
+  return cumulet::demo::medium_of_fire(volume_of(viewer).get(), scene.medium);
+}
+
+/// The scale that suits the volume, whatever it is seen from: it was loaded with that.
+void tell_density_scale(const Viewer& viewer, bool ramped, Progress& progress) {
   double scale = 0.0;
-  const cumulet_status status = cumulet_volume_suggest_density_scale(volume, &scale);
-  cumulet_volume_release(volume);
-  if (status != CUMULET_OK) return;  // nothing to see at any scale
+  if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) return;  // nothing to see
   std::array<char, 32> digits{};
   std::snprintf(digits.data(), digits.size(), "%g", scale);
   tell(progress, std::string("density scale ") + digits.data() + ", for a mean optical depth of 8" +
                      (ramped ? " before the ramp" : "") + " (--density-scale)");
+}
+
+void tell_fire(const cumulet_medium_desc& medium, Progress& progress) {
+  std::array<char, 160> line{};
+  std::snprintf(line.data(), line.size(),
+                "it burns: shown as --preset %s with --flame-strength %g --blackbody %g (a medium that is not the "
+                "default ends that)",
+                medium.density_scale > 0.0 ? "explosion" : "fire", double{medium.flame_strength},
+                double{medium.blackbody});
+  tell(progress, line.data());
 }
 
 cumulet_stats stats_of(const Viewer& viewer) {
@@ -469,6 +489,10 @@ class Studio {
       check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
     }
     wait(viewer_, progress_);
+    fire_ = medium_of_fire(viewer_, scene);
+    if (!fire_) return;
+    check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
+    wait(viewer_, progress_);
   }
 
   /// What is to be said once, of a volume that is loaded.
@@ -476,6 +500,7 @@ class Studio {
     if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress_, *hint);
     if (!scene.volume.empty() && scene.auto_density_scale)
       tell_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
+    if (fire_) tell_fire(*fire_, progress_);
   }
 
   /// What can be asked for only of surfaces that are loaded.
@@ -543,6 +568,7 @@ class Studio {
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_light(viewer_.get(), &scene.light));
     check(viewer_, cumulet_set_lamps(viewer_.get(), scene.lamps.data(), scene.lamps.size()));
+    check(viewer_, set_places(viewer_.get(), scene));
     if (!scene.environment.empty()) {
       check(viewer_, cumulet_load_environment(viewer_.get(), scene.environment.c_str()));
       check(viewer_, cumulet_set_environment_settings(viewer_.get(), &scene.environment_settings));
@@ -562,6 +588,7 @@ class Studio {
   Timeline timeline_;
   // At once, not after hours of samples.
   std::string network_;
+  std::optional<cumulet_medium_desc> fire_;  // what was loaded burns, and nothing was said of that
   Context context_;
   Viewer viewer_;
 };
@@ -617,12 +644,14 @@ double ground_below(const Viewer& viewer, const SceneOptions& scene) {
 /// Takes that from the volume that is there: the density scale, how low the ground is, where the camera stands.
 void settle(const Viewer& viewer, RenderOptions& options) {
   SceneOptions& scene = options.scene;
+  const std::optional<cumulet_medium_desc> fire = medium_of_fire(viewer, scene);
   if (std::exchange(scene.auto_density_scale, false)) {
-    cumulet_volume* volume = nullptr;
-    check(viewer, cumulet_get_volume(viewer.get(), &volume));
-    const cumulet_status status = cumulet_volume_suggest_density_scale(volume, &scene.medium.density_scale);
-    cumulet_volume_release(volume);
-    if (status != CUMULET_OK) scene.medium.density_scale = 0.0;  // a fire alone
+    double& scale = scene.medium.density_scale;
+    if (fire) {
+      scene.medium = *fire;
+    } else if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) {
+      scale = 0.0;  // nothing to see at any
+    }
     check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   }
   if (scene.ground.place == CUMULET_GROUND_BELOW) {

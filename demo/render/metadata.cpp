@@ -4,6 +4,7 @@
 #include <array>
 #include <attributes.hpp>
 #include <cmath>
+#include <matrix.hpp>
 #include <memory>
 #include <settings.hpp>
 #include <stdexcept>
@@ -15,24 +16,12 @@ namespace cumulet::demo {
 
 namespace {
 
-using Matrix = std::array<double, 16>;  // column by column, as OpenGL has it
-
 struct Release {
   void operator()(cumulet_camera* camera) const { cumulet_camera_release(camera); }
 };
 
 void check(cumulet_viewer* viewer, cumulet_status status) {
   if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
-}
-
-Matrix product(const Matrix& a, const Matrix& b) {
-  Matrix result{};
-  for (std::size_t column = 0; column < 4; ++column) {
-    for (std::size_t row = 0; row < 4; ++row) {
-      for (std::size_t k = 0; k < 4; ++k) result[4 * column + row] += a[4 * k + row] * b[4 * column + k];
-    }
-  }
-  return result;
 }
 
 std::array<float, 16> floats(const Matrix& matrix) {

@@ -1,6 +1,8 @@
 #include "presets.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <settings.hpp>
 
 namespace cumulet::demo {
@@ -46,6 +48,19 @@ void apply(Preset preset, cumulet_medium_desc& medium) {
   }
   settings::spell_out_zeros(medium);
   medium.density_scale = density_scale;
+}
+
+void apply(const Burning& burning, cumulet_medium_desc& medium) {
+  const bool smoke = medium.density_scale > 0.0;
+  apply(smoke ? Preset::explosion : Preset::fire, medium);
+  // Light a unit of length, over what a unit of length hides: the brightness of what is opaque.
+  const double hides = smoke ? medium.density_scale : 16.0 / burning.size;
+  const auto strength = [](double value) { return static_cast<float>(std::clamp(value, 0.0, 1e6)); };
+  medium.flame_strength = burning.flame > 0.0 ? strength(hides / burning.flame) : 1.0F;
+  // Radiance of a black body in Blender's unit, 1e-6 sigma / pi T^4.
+  const double kelvin = double{medium.temperature_scale} * burning.temperature;
+  constexpr double hottest = 0.26;
+  medium.blackbody = kelvin > 0.0 ? strength(hottest * hides / (1.805e-14 * std::pow(kelvin, 4.0))) : 0.0F;
 }
 
 std::optional<Preset> preset_of(const cumulet_medium_desc& medium) {

@@ -24,6 +24,18 @@ inline constexpr std::array preset_choices = {
 /// world units.
 void apply(Preset preset, cumulet_medium_desc& medium);
 
+/// What of a volume gives off light.
+struct Burning {
+  double flame = 0.0;        ///< the most of its flame; 0: it has none
+  double temperature = 0.0;  ///< likewise
+  double size = 1.0;         ///< of its box, world
+};
+
+/// Where nothing was said of the medium of a volume that burns: the preset "explosion" for the medium's density scale;
+/// with none, of fire alone, "fire". Its light is such that what burns most is as bright in its smoke as the preset's
+/// is in the sample explosion, however dense or large the volume is.
+void apply(const Burning& burning, cumulet_medium_desc& medium);
+
 /// The preset that the medium is, whatever its density scale.
 [[nodiscard]] std::optional<Preset> preset_of(const cumulet_medium_desc& medium);
 

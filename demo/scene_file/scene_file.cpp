@@ -24,6 +24,7 @@
 #include <utility>
 #include <vector>
 
+#include "matrix.hpp"
 #include "names.hpp"
 
 namespace cumulet::demo {
@@ -58,6 +59,34 @@ constexpr double max_integer = 9007199254740992.0;
 [[noreturn]] void fail(const std::string& file, const std::string& cause) {
   throw std::runtime_error(file + ": " + one_line(cause));  // a key may be of any text
 }
+
+/// About an axis, x, y or z, counter-clockwise as seen against it.
+Matrix rotation(std::size_t axis, double degrees) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const std::size_t u = (axis + 1) % 3;
+  const std::size_t v = (axis + 2) % 3;
+  Matrix m{1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0};
+  m[5 * u] = m[5 * v] = std::cos(angle);
+  m[4 * u + v] = std::sin(angle);
+  m[4 * v + u] = -std::sin(angle);
+  return m;
+}
+
+constexpr std::size_t most_places = 100'000;
+
+/// Scaled, then turned about x, y and z, then moved.
+struct PlaceParts {
+  double translate[3] = {};
+  double degrees[3] = {};
+  double scale[3] = {1.0, 1.0, 1.0};
+
+  [[nodiscard]] Matrix matrix() const {
+    Matrix m{scale[0], 0.0, 0.0, 0.0, 0.0, scale[1], 0.0, 0.0, 0.0, 0.0, scale[2], 0.0, 0.0, 0.0, 0.0, 1.0};
+    for (std::size_t axis = 0; axis < 3; ++axis) m = product(rotation(axis, degrees[axis]), m);
+    std::copy(translate, translate + 3, &m[12]);
+    return m;
+  }
+};
 
 /// A file's keys, each named by its path, such as "environment.sun.irradiance" or "lights[0].power", and taken out of
 /// it when it is read: what is left over is refused, since a misspelt key would go unnoticed. Those that moved are
@@ -146,9 +175,42 @@ class Reader {
   bool numbers(const std::string& key, std::span<Number> out, const char* what, const Range& range = {}) {
     const std::optional<Json> value = take(key);
     if (!value) return false;
-    if (!value->is_array() || value->size() != out.size()) wrong(key, std::string("is not ") + what);
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<Number>(checked(key, (*value)[i], range));
+    take_numbers(key, *value, out, what, range);
     return true;
+  }
+
+  /// A list of places, each 16 numbers, or an object of the parts of one.
+  void places(const std::string& key, std::vector<Matrix>& out) {
+    const std::optional<Json> value = take(key);
+    if (!value) return;
+    if (!value->is_array()) wrong(key, "is not a list");
+    if (value->empty()) wrong(key, "is empty: without it the volume stands once");
+    if (value->size() > most_places)
+      wrong(key, "are " + std::to_string(value->size()) + ": this program shows " + std::to_string(most_places));
+    for (std::size_t i = 0; i < value->size(); ++i) {
+      const Json& one = (*value)[i];
+      const std::string where = key + "[" + std::to_string(i) + "]";
+      Matrix& matrix = out.emplace_back();
+      if (one.is_array()) {
+        take_numbers(where, one, std::span<double>(matrix), "16 numbers", {});
+        continue;
+      }
+      if (!one.is_object()) wrong(where, "is neither 16 numbers nor an object");
+      PlaceParts parts;
+      for (const auto& item : one.items()) {
+        const std::string part = where + "." + item.key();
+        if (item.key() == "translate") {
+          take_numbers(part, item.value(), std::span<double>(parts.translate), "three numbers", {});
+        } else if (item.key() == "rotate_degrees") {
+          take_numbers(part, item.value(), std::span<double>(parts.degrees), "three numbers", {});
+        } else if (item.key() == "scale") {
+          take_numbers(part, item.value(), std::span<double>(parts.scale), "three numbers", settings::above_zero);
+        } else {
+          wrong(part, "there is no such setting");
+        }
+      }
+      matrix = parts.matrix();
+    }
   }
 
   void ramp(const std::string& key, settings::RampPoints& out) {
@@ -173,6 +235,13 @@ class Reader {
   void finish() const { refuse_rest(json_, ""); }
 
  private:
+  template <class Number>
+  void take_numbers(const std::string& key, const Json& value, std::span<Number> out, const char* what,
+                    const Range& range) const {
+    if (!value.is_array() || value.size() != out.size()) wrong(key, std::string("is not ") + what);
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<Number>(checked(key, value[i], range));
+  }
+
   /// A value and the object that it is in; null where there is none.
   struct Place {
     Json* value = nullptr;
@@ -311,44 +380,15 @@ void read_lamps(Reader& reader, std::vector<cumulet_lamp_desc>& lamps) {
   }
 }
 
-using Matrix = std::array<double, 16>;  // column by column
-
-Matrix product(const Matrix& a, const Matrix& b) {
-  Matrix c{};
-  for (std::size_t column = 0; column < 4; ++column) {
-    for (std::size_t row = 0; row < 4; ++row) {
-      for (std::size_t i = 0; i < 4; ++i) c[4 * column + row] += a[4 * i + row] * b[4 * column + i];
-    }
-  }
-  return c;
-}
-
-/// About an axis, x, y or z, counter-clockwise as seen against it.
-Matrix rotation(std::size_t axis, double degrees) {
-  const double angle = degrees * std::numbers::pi / 180.0;
-  const std::size_t u = (axis + 1) % 3;
-  const std::size_t v = (axis + 2) % 3;
-  Matrix m{1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0};
-  m[5 * u] = m[5 * v] = std::cos(angle);
-  m[4 * u + v] = std::sin(angle);
-  m[4 * v + u] = -std::sin(angle);
-  return m;
-}
-
-/// Where the volume stands: scaled, then turned about x, y and z, then moved.
+/// Where the volume stands.
 void read_place(Reader& reader, Matrix& to_world) {
   const bool whole = reader.numbers("volume.to_world", std::span<double>(to_world), "16 numbers");
-  double translate[3] = {};
-  double degrees[3] = {};
-  double scale[3] = {1.0, 1.0, 1.0};
-  bool parts = reader.three("volume.translate", translate);
-  parts = reader.three("volume.rotate_degrees", degrees) || parts;
-  parts = reader.three("volume.scale", scale, settings::above_zero) || parts;
+  PlaceParts place;
+  bool parts = reader.three("volume.translate", place.translate);
+  parts = reader.three("volume.rotate_degrees", place.degrees) || parts;
+  parts = reader.three("volume.scale", place.scale, settings::above_zero) || parts;
   if (whole && parts) reader.wrong("volume.to_world", "is given beside translate, rotate_degrees or scale");
-  if (!parts) return;
-  to_world = {scale[0], 0.0, 0.0, 0.0, 0.0, scale[1], 0.0, 0.0, 0.0, 0.0, scale[2], 0.0, 0.0, 0.0, 0.0, 1.0};
-  for (std::size_t axis = 0; axis < 3; ++axis) to_world = product(rotation(axis, degrees[axis]), to_world);
-  std::copy(translate, translate + 3, &to_world[12]);
+  if (parts) to_world = place.matrix();
 }
 
 SceneFormat read_version(Reader& reader) {
@@ -366,6 +406,7 @@ void read_second(Reader& reader, SceneOptions& scene) {
   reader.list("volumes", 1);
   reader.list("models", 1);
   read_place(reader, scene.to_world);
+  reader.places("volume.places", scene.places);
   std::int32_t visible = 1;
   reader.flag("volume.visible", visible);
   if (visible == 0) reader.wrong("volume.visible", "is false: this program shows its volume");
@@ -501,6 +542,7 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   if (scene.up != UpAxis::y) writer.put("volume.up", name_of(up_names, scene.up));
   const bool second = format == SceneFormat::second;
   if (second && scene.to_world != Matrix{}) writer.put("volume.to_world", scene.to_world);
+  if (second && !scene.places.empty()) writer.put("volume.places", scene.places);
   writer.put_text("medium.temperature_grid", scene.temperature_grid);
   writer.put_text("medium.flame_grid", scene.flame_grid);
   writer.put_text("medium.color_grid", scene.color_grid);

@@ -25,8 +25,9 @@ struct SceneOptions {
   std::string anisotropy_grid;
   UpAxis up = UpAxis::y;              // of the volume's file
   std::array<double, 16> to_world{};  // of the volume, once it is upright; column by column; all 0: as its file has it
-  std::string surfaces;               // a glTF file; "": none
-  std::int32_t surface_camera = -1;   // of the surfaces' own; below 0: camera
+  std::vector<std::array<double, 16>> places;  // where it then stands, once in each; none: there alone
+  std::string surfaces;                        // a glTF file; "": none
+  std::int32_t surface_camera = -1;            // of the surfaces' own; below 0: camera
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
@@ -67,6 +68,11 @@ void for_each_group(Scene& scene, Visit&& visit) {
 
 /// The scene's volume as the library takes it; the scene must outlive it.
 [[nodiscard]] cumulet_volume_file_desc volume_file(const SceneOptions& scene);
+/// Where it stands, in that viewer.
+[[nodiscard]] inline cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
+  const double* first = scene.places.empty() ? nullptr : scene.places.front().data();
+  return cumulet_set_volume_places(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
+}
 
 /// Why surfaces with so many animations cannot be shown as the scene has it; empty if they can. The library shows a
 /// scene at rest whose animation is not there: whoever named it meant another.

@@ -57,8 +57,16 @@ struct Weights {
     const double scale = settings.density_scale;
     return {.per_depth = scale / -std::expm1(-scale * depth), .own_hiding = hiding(scale, settings.anisotropy)};
   }
-  static Weights of_emission(double depth) {
-    return {.per_depth = depth > 0.0 ? 1.0 / depth : 0.0, .there_and_back = false};
+  // depth: of each component. A deviation counts by the strongest, or by what it does to the luminance where that is
+  // more: most of a red fire's is green. And by a fifth more than density's, which scattering blurs: fires are so
+  // within the image error that clouds are (tests/bench/README.md, Grids by default).
+  static Weights of_emission(const dvec3& depth, int component, const RefineSettings& settings) {
+    const double most = std::max({depth.r, depth.g, depth.b});
+    if (!(most > 0.0)) return {};
+    dvec3 only(0.0);
+    only[component] = 1.0;
+    const double sharp = settings.criterion == Criterion::transmittance ? 1.2 : 1.0;
+    return {.per_depth = sharp * std::max(1.0 / most, luminance(only) / luminance(depth)), .there_and_back = false};
   }
 };
 
@@ -104,12 +112,21 @@ class Measure {
   bool there_and_back_;
 };
 
-// What the camera allows: the shortest world edge worth splitting in a sphere, or none at all.
+// The largest singular value, by power iteration: where that converges slowly others are as large.
+double largest_stretch(const glm::dmat3& linear) {
+  const glm::dmat3 square = glm::transpose(linear) * linear;
+  dvec3 v = glm::normalize(dvec3(1.0, 0.9, 0.8));
+  for (int i = 0; i < 64; ++i) v = glm::normalize(square * v);
+  return glm::length(linear * v);
+}
+
+// What the camera allows: the shortest edge worth splitting in a sphere, or none at all, all in the volume's world.
 class CameraLimit {
  public:
   explicit CameraLimit(const RefineSettings& settings) : settings_(&settings) {
     if (!settings.camera) return;
     const RefineCamera& c = *settings.camera;
+    for (const glm::dmat4& place : c.places) placed_.push_back({place, largest_stretch(glm::dmat3(place))});
     const auto side = [&](const dvec3& axis, double tangent) {
       planes_.push_back(glm::normalize(c.forward * tangent - axis));
     };
@@ -122,16 +139,33 @@ class CameraLimit {
   // Infinity: no split. 0: no limit.
   [[nodiscard]] double shortest_edge(const dvec3& centre, double radius) const {
     if (!settings_->camera) return 0.0;
-    const dvec3 to = centre - settings_->camera->eye;
+    double shortest = std::numeric_limits<double>::infinity();
+    for (const Placed& placed : placed_) {
+      shortest = std::min(shortest, shortest_edge(placed, centre, radius));
+      if (shortest <= 0.0) break;
+    }
+    return shortest;
+  }
+
+ private:
+  struct Placed {
+    glm::dmat4 place{1.0};
+    double stretch = 1.0;  // the most that a length grows on its way into the camera's world
+  };
+
+  [[nodiscard]] double shortest_edge(const Placed& placed, const dvec3& centre, double radius) const {
+    const RefineCamera& camera = *settings_->camera;
+    const dvec3 to = dvec3(placed.place * glm::dvec4(centre, 1.0)) - camera.eye;
+    radius *= placed.stretch;
     for (const dvec3& plane : planes_) {
       if (glm::dot(plane, to) < -radius) return std::numeric_limits<double>::infinity();
     }
     const double distance = std::max(0.0, glm::length(to) - radius);
-    return settings_->pixel_size * distance / settings_->camera->pixels_per_radian;
+    return settings_->pixel_size * distance / (camera.pixels_per_radian * placed.stretch);
   }
 
- private:
   const RefineSettings* settings_;
+  std::vector<Placed> placed_;
   std::vector<dvec3> planes_;
 };
 
@@ -230,6 +264,8 @@ class DiamondSet::Evaluation {
     const auto signs = static_cast<unsigned>(odd.x + 2 * odd.y + 4 * odd.z);
     const float* blocks = transmittance_ != nullptr ? transmittance_->blocks(node.corner) : nullptr;
     const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_a_brick) : 1.0F;
+    const float* values = nullptr;
+    volume::BrickValues::Brick room;
     for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
       const Moments& whole = statistics_->kuhn(node, permutation);
       if (whole.min >= whole.max) continue;
@@ -240,7 +276,8 @@ class DiamondSet::Evaluation {
       while (end < 512 && measure_.bound(whole.min, whole.max, longest_[std::bit_width(end) - 1], most) > floor)
         end *= 2;
       if (end == 1) continue;
-      sums.compute(statistics_->values(node), tree);
+      if (values == nullptr) values = statistics_->values(node, room);
+      sums.compute(values, tree);
       if (blocks != nullptr) lit.compute(blocks, tree);
       for (unsigned h = 1; h < end; ++h) {
         if (sums.min[h] >= sums.max[h] || edges[h] < shortest_squared) continue;
@@ -388,7 +425,9 @@ DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, c
   const Weights of_density = Weights::of_density(statistics.mean_optical_depth(), used);
   add(statistics, of_density);
   for (std::size_t i = 0; i < 3; ++i) {
-    if (channels.emission) add(channels.emission->component(i), Weights::of_emission(channels.emission->mean_depth()));
+    if (channels.emission)
+      add(channels.emission->component(i),
+          Weights::of_emission(channels.emission->mean_depth(), static_cast<int>(i), used));
     if (channels.scattering) add(channels.scattering->component(i), of_density);
   }
   if (channels.forward) add(channels.forward->statistics(), of_density);

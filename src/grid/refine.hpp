@@ -27,7 +27,8 @@ namespace cumulet::grid {
 ///    r extinctions reduced by what is scattered forward (hiding()), and T what part of the light outside gets there
 ///    (Transmittance of r): T^2 s e / (1 + r m e) / (1 - exp(-d)).
 ///    Light comes in and goes out; of what is itself opaque the front is seen; and what a picture shows of a volume
-///    saturates. In thin media it is the deviation. What cells give off only goes out: T s e, against the mean ray's.
+///    saturates. In thin media it is the deviation. What cells give off only goes out: 1.2 T s e,
+///    against the mean ray's of the strongest component, or of luminance.
 enum class Criterion { deviation = 0, range_mean = 1, transmittance = 2 };
 enum class CellKind { linear, constant };
 
@@ -40,6 +41,9 @@ struct RefineCamera {
   double tan_half_x = 0.5;
   double tan_half_y = 0.5;
   double pixels_per_radian = 1000.0;  ///< image height / (2 tan_half_y)
+  /// Affine: of the volume's world in the camera's. It is fitted to where it is seen best.
+  std::vector<glm::dmat4> places{glm::dmat4(1.0)};
+  bool operator==(const RefineCamera&) const = default;
 };
 
 /// What hides: extinction reduced by what is scattered forward, of a grid value. anisotropy: the phase function's mean
@@ -58,6 +62,7 @@ struct RefineSettings {
   std::uint64_t max_cells = 5'400'000;
   std::optional<RefineCamera> camera;  ///< set: no split outside its frustum or under pixel_size
   double pixel_size = 1.0;             ///< pixels that a cell's longest edge must cover to be split
+  bool operator==(const RefineSettings&) const = default;
 };
 
 /// The set of diamonds to split, each named by the vertex that its split makes.

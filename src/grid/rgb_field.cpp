@@ -10,10 +10,9 @@ RgbField::RgbField(Components components, const Cube& cube, Progress* progress) 
     statistics_[i] = std::make_unique<const Statistics>(components_[i], cube, progress);
 }
 
-double RgbField::mean_depth() const {
-  double most = 0.0;
-  for (const auto& statistics : statistics_) most = std::max(most, statistics->mean_optical_depth());
-  return most;
+glm::dvec3 RgbField::mean_depth() const {
+  return {statistics_[0]->mean_optical_depth(), statistics_[1]->mean_optical_depth(),
+          statistics_[2]->mean_optical_depth()};
 }
 
 float RgbField::max_value() const {

@@ -20,8 +20,8 @@ class RgbField {
   RgbField& operator=(const RgbField&) = delete;
 
   [[nodiscard]] const Statistics& component(std::size_t i) const { return *statistics_[i]; }
-  /// Of the strongest component the integral along the mean ray that meets any, along an axis.
-  [[nodiscard]] double mean_depth() const;
+  /// Of each component the integral along the mean ray that meets any, along an axis.
+  [[nodiscard]] glm::dvec3 mean_depth() const;
   [[nodiscard]] float max_value() const;
   /// Of what is not black: voxels, inclusive.
   [[nodiscard]] const glm::ivec3& bounds_min() const { return components_[0].bounds_min; }

@@ -229,9 +229,9 @@ Statistics::Statistics(const volume::ScalarVolume& volume, const Cube& cube, Pro
   compute_moments(progress);
 }
 
-const float* Statistics::values(const Node& node) const {
+const float* Statistics::values(const Node& node, volume::BrickValues::Brick& room) const {
   const auto count = static_cast<std::int32_t>(brick_values_->size() / volume::brick_voxels);
-  return node.values < count ? brick_values_->data() + std::size_t(node.values) * volume::brick_voxels
+  return node.values < count ? brick_values_->brick(std::size_t(node.values), room)
                              : extra_values_.data() + std::size_t(node.values - count) * volume::brick_voxels;
 }
 
@@ -379,11 +379,13 @@ void Statistics::compute_moments(Progress* progress) {
   part.resize(moments_, count);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 16), [&](const auto& range) {
     const auto sums = std::make_unique<BrickSums>();
+    volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Node& node = nodes_[bricks[i]];
+      const float* brick = values(node, room);
       for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
         const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
-        sums->compute(values(node), tree);
+        sums->compute(brick, tree);
         moments_[node.moments + permutation] = sums->moments(1, node.corner, tree);
       }
     }
@@ -434,8 +436,9 @@ void Statistics::compute_mean_optical_depth(const volume::ScalarVolume& volume, 
   for (const Node& node : nodes_) total += static_cast<std::uint64_t>(bricks_along(node)) * bricks_along(node);
   ProgressPart part(progress, 0.1, 0.3, total);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 64), [&](const auto& range) {
+    volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const float* data = values(nodes_[bricks[i]]);
+      const float* data = values(nodes_[bricks[i]], room);
       Projection& p = projections[i];
       for (unsigned v = 0; v < volume::brick_voxels; ++v) {
         if (!(data[v] > 0.0F)) continue;

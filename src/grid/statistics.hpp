@@ -89,8 +89,8 @@ class Statistics {
 
   [[nodiscard]] const Cube& cube() const { return cube_; }
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
-  /// The 512 values of a brick node.
-  [[nodiscard]] const float* values(const Node& node) const;
+  /// The 512 values of a brick node, which may be in `room`.
+  const float* values(const Node& node, volume::BrickValues::Brick& room) const;
   /// Exact moments of any cell no smaller than a brick's Kuhn tetrahedron, or in a uniform part.
   [[nodiscard]] Moments moments(const glm::vec3& v0, std::uint32_t shape) const;
   /// The smallest node that holds voxel p of the cube.
@@ -115,7 +115,7 @@ class Statistics {
   std::vector<Node> nodes_;
   std::vector<std::vector<std::uint32_t>> by_size_;
   std::vector<Moments> moments_;
-  const std::vector<float>* brick_values_;
+  const volume::BrickValues* brick_values_;
   std::vector<float> extra_values_;  // payloads made here: where a tile or the background ends inside a brick
   double mean_optical_depth_ = 0.0;
 };

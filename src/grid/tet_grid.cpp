@@ -294,7 +294,7 @@ class GridBuilder::LeafMoments {
       brick_ = &holder;
       permutation_ = node.permutation;
       tree_ = &brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation));
-      sums_->compute(statistics_->values(holder), *tree_);
+      sums_->compute(statistics_->values(holder, room_), *tree_);
     }
     return sums_->moments(node.heap, holder.corner, *tree_);
   }
@@ -302,6 +302,7 @@ class GridBuilder::LeafMoments {
  private:
   const Statistics* statistics_;
   std::unique_ptr<BrickSums> sums_ = std::make_unique<BrickSums>();
+  volume::BrickValues::Brick room_{};
   const Statistics::Node* brick_ = nullptr;  // what the sums are of
   unsigned permutation_ = 0;
   const BrickTree* tree_ = nullptr;

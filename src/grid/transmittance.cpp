@@ -60,8 +60,9 @@ void Transmittance::sum_blocks(const Progress* progress) {
   resize(sums_, bricks.size() * blocks_a_brick, progress, 0.0F);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 64), [&](const auto& range) {
     check(progress);
+    volume::BrickValues::Brick room;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const float* values = statistics_->values(statistics_->nodes()[bricks[i]]);
+      const float* values = statistics_->values(statistics_->nodes()[bricks[i]], room);
       float* sums = sums_.data() + i * blocks_a_brick;
       for (unsigned v = 0; v < volume::brick_voxels; ++v) sums[block_of_voxel(v)] += values[v];
     }

@@ -2,15 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 
 #include "base/luminance.hpp"
+#include "light/alias_table.hpp"
 
 namespace cumulet::light {
 
 namespace {
 
 constexpr double pi = std::numbers::pi;
+constexpr double alike = 0.2;  // part of the looks that all lamps share evenly
+
+// By luminance.
+double arriving(const core::CmLamp& lamp, const Lit& at) {
+  const double intensity = luminance(glm::dvec3(lamp.intensity));
+  if (lamp.kind == core::CM_LAMP_DISTANT) return intensity;
+  const double distance = glm::distance(glm::dvec3(lamp.position), at.centre);
+  if (lamp.range > 0.0F && distance > double{lamp.range} + at.radius) return 0.0;
+  const double way = std::max(distance, at.radius);
+  return intensity / (way * way);
+}
 
 // narrowest: of the band in which it dims, in cosine.
 void set_cone(core::CmLamp& record, float inner, float outer, float narrowest) {
@@ -84,6 +97,35 @@ std::vector<core::CmLamp> lamp_records(const Lamps& of_host, std::span<const sur
   for (const Lamp& lamp : of_host) records.push_back(lamp_record(lamp, origin));
   for (const surface::PunctualLight& lamp : of_scene) records.push_back(lamp_record(lamp, origin));
   return records;
+}
+
+double share_looks(std::span<core::CmLamp> records, std::span<const Lit> lit) {
+  const std::size_t count = records.size();
+  std::vector<double> shares(count, 0.0);
+  double all = 0.0;
+  double shared = 0.0;
+  for (const Lit& one : lit) {
+    if (!(one.radius > 0.0)) continue;
+    std::vector<double> arrives;
+    double sum = 0.0;
+    for (const core::CmLamp& lamp : records) {
+      arrives.push_back(arriving(lamp, one));
+      sum += arrives.back();
+    }
+    all = std::max(all, sum);
+    if (!(sum > 0.0) || !std::isfinite(sum)) continue;
+    for (std::size_t i = 0; i < count; ++i) shares[i] += arrives[i] / sum;
+    shared += 1.0;
+  }
+  const double even = 1.0 / static_cast<double>(std::max<std::size_t>(1, count));
+  for (double& share : shares) share = shared > 0.0 ? (1.0 - alike) * share / shared + alike * even : even;
+  const std::vector<Alias> table = count > 0 ? alias_table(shares, 1.0) : std::vector<Alias>();
+  for (std::size_t i = 0; i < count; ++i) {
+    records[i].chance = static_cast<float>(shares[i]);
+    records[i].stays = table[i].stays;
+    records[i].other = table[i].other;
+  }
+  return all;
 }
 
 void add_lamps(SceneLights& lights, const Lamps& lamps) {

@@ -44,6 +44,18 @@ core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin);
 std::vector<core::CmLamp> lamp_records(const Lamps& of_host, std::span<const surface::PunctualLight> of_scene,
                                        const glm::dvec3& origin);
 
+/// A ball of what lamps may light.
+struct Lit {
+  glm::dvec3 centre{0.0};
+  double radius = 0.0;
+  bool operator==(const Lit&) const = default;
+};
+
+/// How likely paths look for each: by the luminance of what arrives on a plane that faces it, at the middle of what is
+/// lit or, of one within, at its rim; of several the mean of their shares. A fifth of the looks goes to all alike, for
+/// places where the bright ones are in shadow. Returns what arrives of all. lit: those of no radius do not count.
+double share_looks(std::span<core::CmLamp> records, std::span<const Lit> lit);
+
 /// Counts these, too.
 void add_lamps(SceneLights& lights, const Lamps& lamps);
 

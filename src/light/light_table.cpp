@@ -31,6 +31,12 @@ double triangle_share(const SceneLights& scene, double sun) {
   return others > 0.0 ? std::clamp(scene.triangle_flux / (scene.triangle_flux + others), 0.2, 0.8) : 1.0;
 }
 
+// Of what the sun and lamps have: by what arrives, but 0.2 to 0.8.
+double sun_share(const SceneLights& scene, double sun) {
+  if (!(sun > 0.0)) return 0.0;
+  return scene.lamps > 0 ? std::clamp(sun / (sun + scene.lamps_arrive), 0.2, 0.8) : 1.0;
+}
+
 // What the medium gives off by what there is beside it, as they are about its box: at its rim.
 double cell_chance(const MediumLight& medium, const SceneLights& scene, double distant) {
   if (!(medium.power > 0.0)) return 0.0;
@@ -84,13 +90,12 @@ LightTable::LightTable(const DistantLights& distant, const Surroundings& surroun
   const double rest = 1.0 - to_cells;
   const double to_far = surrounded ? environment_chance(sun, sky, near) : sky_chance(sun, sky, near);
   const double to_triangles = (1.0 - to_far) * triangle_share(scene, sun);
-  // The sun and each lamp alike.
-  const double alike = scene.lamps + (sun > 0.0 ? 1.0 : 0.0);
-  const double to_one = alike > 0.0 ? (1.0 - to_far - to_triangles) / alike : 0.0;
+  const double to_sun = sun_share(scene, sun) * (1.0 - to_far - to_triangles);
+  const double to_lamps = scene.lamps > 0 ? 1.0 - to_far - to_triangles - to_sun : 0.0;
   add(surrounded ? Kind::environment : Kind::sky, rest * to_far);
   add(Kind::triangle, rest * to_triangles);
-  add(Kind::lamp, rest * scene.lamps * to_one);
-  if (sun > 0.0) add(Kind::sun, rest * to_one);
+  add(Kind::lamp, rest * to_lamps);
+  add(Kind::sun, rest * to_sun);
   add(Kind::cell, to_cells);
   if (medium.aimed) add(Kind::glow, 0.5);
 }

@@ -12,6 +12,7 @@ struct SceneLights {
   std::uint32_t lamps = 0;      ///< glTF's and the host's
   std::uint32_t triangles = 0;  ///< emissive
   double lamp_flux = 0.0;
+  double lamps_arrive = 0.0;  ///< luminance of what arrives of them where they light (light::share_looks)
   double triangle_flux = 0.0;
   double cross_section = 0.0;  ///< of the scene's bounding sphere: what it takes of a distant light
 };

@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "light/light_table.hpp"
+#include "scene/space.hpp"
 
 namespace cumulet::render {
 
@@ -14,16 +15,99 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& source) {
+  core::CmMedium m{};
+  m.albedo = medium.albedo;
+  m.extinction = static_cast<float>(std::min(1e30, medium.density_scale * std::max(source.max_value, 1e-30F)));
+  m.source = medium.emission;
+  m.anisotropy = medium.phase.anisotropy;
+  m.second_anisotropy = medium.phase.second_anisotropy;
+  m.second_bend = medium.phase.second_bend;
+  m.second_share = medium.phase.second_share;
+  m.emits = source.emits() ? 1U : 0U;
+  m.coloured = source.coloured() ? 1U : 0U;
+  m.anisotropic = source.anisotropic() && medium.phase.may_vary() ? 1U : 0U;
+  return m;
+}
+
+// Each once.
+MarchUpload::Sources sources_of(const std::vector<scene::Volume>& volumes) {
+  MarchUpload::Sources sources;
+  for (const scene::Volume& volume : volumes) {
+    // Most often that of the volume before it.
+    if (!sources.empty() && sources.back() == volume.source) continue;
+    if (std::ranges::find(sources, volume.source) == sources.end()) sources.push_back(volume.source);
+  }
+  return sources;
+}
+
 }  // namespace
 
 void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline) {
-  const scene::MarchSourcePtr volume = snapshot.volumes.empty() ? nullptr : snapshot.volumes.front().source;
+  const MarchUpload::Sources sources = sources_of(snapshot.volumes);
   const scene::ModelSourcePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
-  if (!volume) drop_data();
+  if (sources.empty()) drop_data();
   update_environment(*snapshot.surroundings, wanted, deadline);
   update_model(model, wanted, deadline);
-  update_lamps(snapshot.lamps, wanted);
-  if (volume) update_data(volume, wanted, deadline);
+  if (!sources.empty()) update_data(sources, snapshot.volumes, wanted, deadline);
+  find_present(snapshot);
+  update_instances(wanted);
+  update_lamps(snapshot, wanted);
+}
+
+void GpuScene::find_present(const scene::Snapshot& snapshot) {
+  present_.clear();
+  if (!data_) return;
+  for (const scene::Volume& volume : snapshot.volumes) {
+    scene::Volume& present = present_.emplace_back(volume);
+    if (data_->grid(*volume.source) != nullptr) continue;
+    const auto was = std::ranges::find(data_of_, volume.id, &scene::Volume::id);
+    if (was == data_of_.end()) {
+      present_.pop_back();
+    } else {
+      present.source = was->source;
+    }
+  }
+  if (present_.empty()) present_ = data_of_;
+}
+
+void GpuScene::update_instances(const Wanted& wanted) {
+  if (present_.size() < 2) {
+    if (instances_) {
+      data_revision_.advance();
+      instances_revision_.advance();
+    }
+    instances_.clear();
+    return;
+  }
+  InstancesOf of{present_, data_revision_};
+  if (!instances_.wants(of, wanted.settings)) return;
+  std::vector<scene::Instance> instances;
+  for (const scene::Volume& volume : present_) {
+    const core::CmGrid& grid = *data_->grid(*volume.source);
+    instances.push_back({volume.source, volume.place.to_world, grid, medium_of(*volume.medium, *volume.source)});
+  }
+  const bool of_other_data = instances_ && instances_.of().data != data_revision_;
+  const auto same = [](const scene::Volume& a, const scene::Volume& b) { return a.id == b.id && a.source == b.source; };
+  const bool same_list = instances_ && !of_other_data && std::ranges::equal(instances_.of().volumes, present_, same);
+  try {
+    // Rays count from where the frame begins: what is under way goes on where it stays.
+    const glm::dvec3 origin = scene::origin_of(instances);
+    const bool keeps = same_list && instances_->origin() == origin;
+    InstanceData made = InstanceData::make(gl_, limits_, instances, origin);
+    if (!keeps) data_revision_.advance();
+    of.data = data_revision_;
+    instances_revision_.advance();
+    instances_.put(of, std::move(made));
+  } catch (const Error&) {
+    instances_.fail(of, wanted.settings);
+    // What there is knows where the data were that it is of.
+    if (of_other_data) {
+      static_cast<void>(instances_.take());
+      instances_revision_.advance();
+    }
+    throw;
+  }
 }
 
 void GpuScene::update_model(const scene::ModelSourcePtr& source, const Wanted& wanted, Deadline deadline) {
@@ -108,38 +192,72 @@ void GpuScene::update_environment(const light::Surroundings& surroundings, const
   if (environment_ && environment_.of() == environment) surroundings_ = surroundings;
 }
 
-void GpuScene::update_lamps(const scene::Part<light::Lamps>& of_host, const Wanted& wanted) {
-  const LampsOf of{of_host, model_ ? model_.of() : nullptr};
-  if (!lamps_.wants(of, wanted.settings)) return;
-  lamps_.make(of, wanted.settings, [&] {
-    const auto of_scene = of.model ? std::span(of.model->pose.lights) : std::span<const surface::PunctualLight>();
-    return LampData::make(gl_, limits_, *of_host, of_scene);
-  });
+std::array<light::Lit, 2> GpuScene::lit() const {
+  std::array<light::Lit, 2> lit;
+  if (instances_) {
+    const glm::dvec3 low(instances_->space().box_min);
+    const glm::dvec3 high(instances_->space().box_max);
+    lit[0] = {instances_->origin() + 0.5 * (low + high), 0.5 * glm::length(high - low)};
+  } else if (!present_.empty()) {
+    const scene::Volume& volume = present_.front();
+    const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
+    const core::CmGrid& grid = *data_->grid(*volume.source);
+    lit[0] = {glm::dvec3(to_world * glm::dvec4(0.5 * glm::dvec3(grid.box_min + grid.box_max), 1.0)),
+              0.5 * glm::length(glm::dmat3(to_world) * glm::dvec3(grid.box_max - grid.box_min))};
+  }
+  if (model_) {
+    const surface::Pose& pose = model_.of()->pose;
+    lit[1] = {0.5 * (pose.low + pose.high), 0.5 * glm::length(pose.high - pose.low)};
+  }
+  return lit;
+}
+
+void GpuScene::update_lamps(const scene::Snapshot& snapshot, const Wanted& wanted) {
+  const auto make = [&](Slot<LampData, LampsOf>& lamps, const scene::ModelSourcePtr& model) {
+    const auto of_scene = model ? std::span(model->pose.lights) : std::span<const surface::PunctualLight>();
+    LampsOf of{snapshot.lamps, model, {}};
+    // What no lamp shines on makes no other table.
+    if (!of_scene.empty() || !snapshot.lamps->empty()) of.lit = lit();
+    if (!lamps.wants(of, wanted.settings)) return;
+    lamps.make(of, wanted.settings, [&] { return LampData::make(gl_, limits_, *snapshot.lamps, of_scene, of.lit); });
+  };
+  if (model_) {
+    make(host_lamps_, nullptr);
+  } else {
+    host_lamps_.clear();
+  }
+  make(lamps_, model_ ? model_.of() : nullptr);
 }
 
 void GpuScene::drop_data() {
   if (data_) data_revision_.advance();
   data_.clear();
+  data_of_.clear();
   upload_.reset();
   took_ = {};  // and what it holds in main memory
 }
 
-void GpuScene::update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline) {
+void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vector<scene::Volume>& volumes,
+                           const Wanted& wanted, Deadline deadline) {
   // What is under way goes on to its end, though there may be something newer by now: that is next. Begun anew with
   // each, an upload that takes longer than a build would never end.
-  while (upload_ || data_.wants(source, wanted.settings)) {
+  while (upload_ || data_.wants(sources, wanted.settings)) {
     const auto begun = Clock::now();
     if (!upload_) {
-      upload_ = VolumeUnderWay{source, wanted.settings, nullptr};
-      took_ = {source, 0.0};
+      upload_ = VolumeUnderWay{sources, volumes, wanted.settings, nullptr};
+      took_ = {sources, 0.0};
     }
-    const scene::MarchSourcePtr of = upload_->of;
+    const MarchUpload::Sources of = upload_->of;
     try {
-      if (!upload_->work) upload_->work = std::make_unique<MarchUpload>(gl_, limits_, heap_, of, wanted.page_texels);
+      if (!upload_->work) {
+        upload_->work = std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels);
+      }
       const bool done = upload_->work->advance(deadline);
       took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
       if (!done) break;
       data_.put(of, upload_->work->take());
+      data_of_ = std::move(upload_->volumes);
+      present_ = data_of_;  // should what follows fail
       upload_.reset();
       data_revision_.advance();
     } catch (const Error&) {
@@ -157,13 +275,14 @@ double GpuScene::progress() const {
 }
 
 std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) const {
-  if (took_.of == nullptr || took_.of != of) return std::nullopt;
+  if (std::ranges::find(took_.of, of) == took_.of.end()) return std::nullopt;
   return took_.seconds;
 }
 
 std::uint64_t GpuScene::other_bytes() const {
   return (model_ ? model_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) +
-         (environment_ ? environment_->bytes() : 0) + surface_pass_.bytes() + heap_.free_bytes();
+         (environment_ ? environment_->bytes() : 0) + (instances_ ? instances_->bytes() : 0) + surface_pass_.bytes() +
+         heap_.free_bytes();
 }
 
 light::Surroundings GpuScene::surroundings(const scene::Snapshot& snapshot) const {
@@ -199,42 +318,48 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
                         .sky_turn = light::turn_of(around),
                         .lamps = *snapshot.lamps};
   obstacles.environment = environment_.get();
-  obstacles.lamps = lamps_.get();
+  // Chances are of a table as a whole.
+  obstacles.lamps = !model_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
+  obstacles.instances = instances_.get();
   return obstacles;
 }
 
 PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Obstacles& obstacles,
                                        const core::CmIntegrator& integrator, glm::uvec2 size) const {
   const scene::Viewpoint& view = **snapshot.view;
-  const scene::MarchSource& source = *data_.of();
-  const scene::Medium& medium = *snapshot.volumes.front().medium;
   PictureParameters p;
-  p.view.eye = glm::vec3(glm::inverse(source.cube.to_world) * glm::dvec4(view.eye, 1.0));
   p.view.orthographic = view.orthographic ? 1U : 0U;
   p.view.forward = glm::vec3(view.forward);
   p.view.right = glm::vec3(view.right);
   p.view.up = glm::vec3(view.up);
   p.view.size = size;
-  p.medium.albedo = medium.albedo;
-  p.medium.extinction = static_cast<float>(std::min(1e30, medium.density_scale * std::max(source.max_value, 1e-30F)));
-  p.medium.source = medium.emission;
-  p.medium.anisotropy = medium.phase.anisotropy;
-  p.medium.second_anisotropy = medium.phase.second_anisotropy;
-  p.medium.second_bend = medium.phase.second_bend;
-  p.medium.second_share = medium.phase.second_share;
-  const bool emits = source.emits();
-  p.medium.emits = emits ? 1U : 0U;
-  p.medium.coloured = source.coloured() ? 1U : 0U;
-  p.medium.anisotropic = source.anisotropic() && medium.phase.may_vary() ? 1U : 0U;
   light::MediumLight own;
-  own.power = source.glow.power;
-  own.length = source.glow.length;
-  const core::CmGrid& grid = data_->grid();
-  own.radius = 0.5 * glm::length(glm::dmat3(source.cube.to_world) * glm::dvec3(grid.box_max - grid.box_min));
-  own.aimed = integrator.light_among_surfaces != 0U && (emits || medium.emission != glm::vec3(0.0F));
+  if (instances_) {
+    p.space = instances_->space();
+    p.view.eye = glm::vec3(view.eye - instances_->origin());
+    own.power = instances_->glow_power();
+    own.length = instances_->glow_length();
+    p.medium = instances_->medium();
+  } else {
+    const scene::Volume& volume = present_.front();
+    const scene::MarchSource& source = *volume.source;
+    p.grid = *data_->grid(source);
+    p.medium = medium_of(*volume.medium, source);
+    const glm::dmat4& place = volume.place.to_world;
+    const glm::dmat4 to_world = place * source.cube.to_world;
+    p.space = scene::space_of(to_world, p.grid.box_min, p.grid.box_max);
+    p.view.eye = glm::vec3(glm::inverse(to_world) * glm::dvec4(view.eye, 1.0));
+    const scene::PlacedGlow glow = scene::glow_of(source.glow, source.cube.to_world, place);
+    p.glow = glow.looks;
+    own.power = glow.power;
+    own.length = glow.length;
+  }
+  own.radius = lit()[0].radius;
+  own.aimed = integrator.light_among_surfaces != 0U && (p.medium.emits != 0U || p.medium.source != glm::vec3(0.0F));
   const ModelData* met = obstacles.met();
   light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
   light::add_lamps(near, *snapshot.lamps);
+  near.lamps_arrive = obstacles.lamps != nullptr ? obstacles.lamps->arrives() : 0.0;
   const light::LightTable table(lights(snapshot), surroundings(snapshot), near, own);
   p.lights = table.parameters();
   if (environment_) p.environment = environment_->parameters();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -7,6 +8,7 @@
 #include "base/revision.hpp"
 #include "base/slot.hpp"
 #include "render/environment_data.hpp"
+#include "render/instance_data.hpp"
 #include "render/lamp_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_upload.hpp"
@@ -36,10 +38,14 @@ class GpuScene {
   /// Where surfaces can be met but not drawn, they are met alone.
   void update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline);
 
+  /// In the order of what Picked::place counts.
+  [[nodiscard]] const std::vector<scene::Volume>& volumes() const { return present_; }
   /// Null: no volume, and no picture.
   [[nodiscard]] const MarchData* data() const { return data_.get(); }
-  /// Another with other data.
+  /// Another with other data, or with more volumes of it, or fewer.
   [[nodiscard]] Revision<MarchData> data_revision() const { return data_revision_; }
+  /// Another where volumes stand elsewhere, of which there are several.
+  [[nodiscard]] Revision<InstanceData> instances_revision() const { return instances_revision_; }
   /// Another where paths meet other triangles, or other surfaces are drawn.
   [[nodiscard]] Revision<ModelData> model_revision() const { return model_revision_; }
   /// Another with another environment, or none.
@@ -70,10 +76,16 @@ class GpuScene {
   void show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content);
   void drop_data();
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
-  void update_lamps(const scene::Part<light::Lamps>& of_host, const Wanted& wanted);
+  // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.
+  void find_present(const scene::Snapshot& snapshot);
+  void update_instances(const Wanted& wanted);
+  // Of the volumes and the model that are here, or of nothing.
+  [[nodiscard]] std::array<light::Lit, 2> lit() const;
+  void update_lamps(const scene::Snapshot& snapshot, const Wanted& wanted);
   // By the environment that is there, or is to be.
   [[nodiscard]] light::Surroundings sky_surroundings(const scene::Snapshot& snapshot) const;
-  void update_data(const scene::MarchSourcePtr& source, const Wanted& wanted, Deadline deadline);
+  void update_data(const MarchUpload::Sources& sources, const std::vector<scene::Volume>& volumes, const Wanted& wanted,
+                   Deadline deadline);
 
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
@@ -81,29 +93,32 @@ class GpuScene {
   gl::WordHeap heap_;
   // Under way, and with which settings it was begun.
   struct VolumeUnderWay {
-    scene::MarchSourcePtr of;
+    MarchUpload::Sources of;
+    std::vector<scene::Volume> volumes;  // with those
     std::uint64_t settings = 0;
     std::unique_ptr<MarchUpload> work;
   };
-  Slot<MarchData, scene::MarchSourcePtr> data_;
+  Slot<MarchData, MarchUpload::Sources> data_;
+  std::vector<scene::Volume> data_of_;  // that it came with
   Revision<MarchData> data_revision_;
   std::optional<VolumeUnderWay> upload_;  // of what data will be
   struct Took {
-    scene::MarchSourcePtr of;
+    MarchUpload::Sources of;
     double seconds = 0.0;
   };
-  Took took_;  // the newest upload
+  Took took_;                           // the newest upload
+  std::vector<scene::Volume> present_;  // what of the snapshot's is in data
   struct ModelUnderWay {
     scene::ModelSourcePtr of;
     std::uint64_t settings = 0;
     ModelParts parts = ModelParts::both;
     std::unique_ptr<ModelUpload> work;
   };
+  Revision<ModelData> model_revision_;
   Slot<ModelData, scene::ModelSourcePtr> model_;
   Slot<RasterContentPtr, scene::ModelSourcePtr> raster_;  // where it is of use
   SurfaceRaster surface_pass_;                            // shows that
   std::optional<ModelUnderWay> model_upload_;             // of what both will be
-  Revision<ModelData> model_revision_;
   struct EnvironmentUnderWay {
     light::EnvironmentPtr of;
     std::uint64_t settings = 0;
@@ -113,12 +128,21 @@ class GpuScene {
   light::Surroundings surroundings_;  // by that
   std::optional<EnvironmentUnderWay> environment_upload_;
   Revision<EnvironmentData> environment_revision_;
+  struct InstancesOf {
+    std::vector<scene::Volume> volumes;
+    Revision<MarchData> data;
+    bool operator==(const InstancesOf&) const = default;
+  };
+  Slot<InstanceData, InstancesOf> instances_;  // where there are several volumes
+  Revision<InstanceData> instances_revision_;
   struct LampsOf {
     scene::Part<light::Lamps> host;
     scene::ModelSourcePtr model;  // that is here
+    std::array<light::Lit, 2> lit;
     bool operator==(const LampsOf&) const = default;
   };
-  Slot<LampData, LampsOf> lamps_;
+  Slot<LampData, LampsOf> lamps_;       // of paths that meet the model, if there is one...
+  Slot<LampData, LampsOf> host_lamps_;  // ...and of those that do not, only then
 };
 
 }  // namespace cumulet::render

@@ -8,11 +8,11 @@
 namespace cumulet::render {
 
 LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
-                        std::span<const surface::PunctualLight> of_scene) {
+                        std::span<const surface::PunctualLight> of_scene, std::span<const light::Lit> lit) {
   std::vector<core::CmLamp> records = light::lamp_records(of_host, of_scene, glm::dvec3(0.0));
   LampData data;
+  data.arrives_ = light::share_looks(records, lit);
   data.count_ = static_cast<std::uint32_t>(records.size());
-  data.of_host_ = static_cast<std::uint32_t>(of_host.size());
   if (records.empty()) records.emplace_back();  // what kernels are bound to, though they read none
   const std::size_t bytes = records.size() * sizeof(core::CmLamp);
   if (static_cast<std::int64_t>(bytes) > limits.storage_block_bytes) {

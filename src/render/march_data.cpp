@@ -19,7 +19,7 @@ namespace {
 using glm::ivec3;
 using glm::vec3;
 
-constexpr std::int64_t max_pages = 6;
+constexpr std::size_t max_pages = 6;
 
 void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   const int widest = std::max({size.x, size.y, size.z});
@@ -39,9 +39,10 @@ void for_slab(const scene::MarchSource& source, const grid::Statistics& statisti
   const auto row = static_cast<std::size_t>(source.box_size.x);
   const std::size_t slice = row * static_cast<std::size_t>(source.box_size.y);
   tbb::parallel_for(low.y >> 3, (high.y + 7) >> 3, [&](int by) {
+    volume::BrickValues::Brick room;
     for (int x = low.x & ~7; x < high.x; x += volume::brick_size) {
       const grid::Statistics::Node& node = statistics.node_at({x, by * 8, first & ~7});
-      const float* values = node.is_uniform() ? nullptr : statistics.values(node);
+      const float* values = node.is_uniform() ? nullptr : statistics.values(node, room);
       const ivec3 from = glm::max(ivec3(x, by * 8, first), low);
       const ivec3 to = glm::min(ivec3(x + 8, by * 8 + 8, last), high);
       for (int k = from.z; k < to.z; ++k) {
@@ -71,142 +72,250 @@ std::vector<float> scattering_slab(const scene::MarchSource& source, std::size_t
   return slab;
 }
 
-// No vector of length 1 is shorter after it: one over a bound of the inverse's norm.
-float least_stretch(const glm::dmat3& linear) {
-  const glm::dmat3 inverse = glm::inverse(linear);
-  const auto widest_column = [](const glm::dmat3& m) {
-    const auto sum = [](const glm::dvec3& v) { return glm::dot(glm::abs(v), glm::dvec3(1.0)); };
-    return std::max({sum(m[0]), sum(m[1]), sum(m[2])});
-  };
-  return static_cast<float>(1.0 / std::sqrt(widest_column(inverse) * widest_column(glm::transpose(inverse))));
-}
-
-}  // namespace
-
-core::CmGrid grid_parameters(const grid::Cube& cube, const vec3& low, const vec3& high) {
-  const glm::dmat3 from_cube(cube.to_world);
-  const glm::dmat3 to_cube(glm::inverse(cube.to_world));
+core::CmGrid grid_of(const scene::MarchSource& source) {
   core::CmGrid grid{};
-  grid.to_cube_x = vec3(to_cube[0]);
-  grid.to_cube_y = vec3(to_cube[1]);
-  grid.to_cube_z = vec3(to_cube[2]);
-  grid.from_cube_x = vec3(from_cube[0]);
-  grid.from_cube_y = vec3(from_cube[1]);
-  grid.from_cube_z = vec3(from_cube[2]);
-  grid.cube_origin = vec3(cube.to_world[3]);
-  grid.unit_volume = static_cast<float>(std::abs(glm::determinant(from_cube)));
-  grid.box_min = low;
-  grid.box_max = high;
-  grid.root_exponent = static_cast<std::uint32_t>(cube.log2_size - 1);
+  if (source.grid) {
+    grid.box_min = source.grid->content_min;
+    grid.box_max = source.grid->content_max;
+    grid.levels = source.grid->levels;
+  } else {
+    grid.box_min = vec3(source.box_low);
+    grid.box_max = vec3(source.box_low + source.box_size);
+  }
+  grid.root_exponent = static_cast<std::uint32_t>(source.cube.log2_size - 1);
   return grid;
 }
 
-MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap,
-                         scene::MarchSourcePtr source, std::int64_t page_texels)
-    : gl_(std::move(gl)), limits_(limits), source_(std::move(source)), upload_(gl_, "uploading the volume") {
-  data_.march_ = source_->march;
-  if (source_->march == March::tet) {
-    plan_tet(heap, page_texels);
-  } else {
-    data_.grid_ = grid_parameters(source_->cube, vec3(source_->box_low), vec3(source_->box_low + source_->box_size));
-    source_->march == March::dense ? plan_dense() : plan_brick();
-    plan_channel_voxels();
-  }
+// Before each tree: 25 pairs, and room.
+using Roots = std::array<grid::RootEntry, 26>;
+static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
+
+// What a grid's cells have in channels, one after another.
+struct ChannelBytes {
+  explicit ChannelBytes(const scene::MarchSource& source)
+      : emission(source.grid->emission.size() * sizeof(grid::EmissionRecord)),
+        glow(source.glow.cells.size() * sizeof(scene::GlowingCell)),
+        colour(source.grid->colour.size() * sizeof(std::uint32_t)),
+        anisotropy(source.grid->anisotropy.size() * sizeof(std::int16_t)) {}
+  std::size_t emission, glow, colour, anisotropy;
+  [[nodiscard]] std::size_t glow_at() const { return emission; }
+  [[nodiscard]] std::size_t colour_at() const { return glow_at() + glow; }
+  [[nodiscard]] std::size_t anisotropy_at() const { return colour_at() + colour; }
+  // Whole texels.
+  [[nodiscard]] std::size_t all() const { return (anisotropy_at() + anisotropy + 15) / 16 * 16; }
+};
+
+}  // namespace
+
+const core::CmGrid* MarchData::grid(const scene::MarchSource& source) const {
+  const Part* part = part_of(source);
+  return part == nullptr ? nullptr : &part->grid;
 }
 
-void MarchUpload::plan_tet(gl::WordHeap& heap, std::int64_t page_texels) {
-  const grid::TetGrid& grid = *source_->grid;
+const MarchData::Part* MarchData::part_of(const scene::MarchSource& source) const {
+  const auto found = std::ranges::find_if(parts_, [&](const Part& part) { return part.source.get() == &source; });
+  return found == parts_.end() ? nullptr : &*found;
+}
+
+MarchData::Run MarchData::run(std::size_t cell, std::size_t count) const {
+  if (cells_.size() == 1) return {0, cell, count};
+  const std::size_t page_cells = std::size_t{1} << page_shift_;
+  return {cell / page_cells, cell % page_cells, std::min(count, page_cells - cell % page_cells)};
+}
+
+Upload::Place MarchData::place_of(const Run& run) const {
+  const gl::WordHeap::Span& page = cells_[run.page];
+  return {page.buffer(), page.offset() + run.cell * sizeof(grid::CellRecord)};
+}
+
+MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap, const Sources& sources,
+                         const MarchData* before, std::int64_t page_texels)
+    : gl_(std::move(gl)),
+      limits_(limits),
+      before_(before),
+      source_(sources.at(0)),
+      upload_(gl_, "uploading the volume") {
+  data_.march_ = source_->march;
   data_.linear_ = source_->linear;
-  data_.grid_ = grid_parameters(grid.cube, grid.content_min, grid.content_max);
-  data_.grid_.levels = grid.levels;
-  const auto cells = static_cast<std::int64_t>(grid.cells.size());
+  for (const scene::MarchSourcePtr& source : sources) {
+    if (!source->goes_with(*source_)) {
+      throw Error(ErrorCode::unsupported, "grids of different marches are not shown together");
+    }
+    MarchData::Part& part = data_.parts_.emplace_back();
+    part.source = source;
+    part.grid = grid_of(*source);
+  }
+  if (source_->march == March::tet) {
+    plan_tets(heap, page_texels);
+    return;
+  }
+  if (sources.size() > 1) {
+    throw Error(ErrorCode::unsupported, std::string("the ") + (source_->march == March::dense ? "dense" : "brick") +
+                                            " march shows one grid, not " + std::to_string(sources.size()) +
+                                            ": only that of tetrahedra shows several");
+  }
+  source_->march == March::dense ? plan_dense() : plan_brick();
+  plan_channel_voxels();
+}
+
+void MarchUpload::add_copy(const PlaceOf& to, const PlaceOf& from, std::size_t bytes) {
+  upload_.add_pieces(bytes, [this, to, from](std::size_t first, std::size_t count) {
+    const Upload::Place place = to();
+    const Upload::Place old = from();
+    gl_->CopyNamedBufferSubData(old.buffer, place.buffer, static_cast<GLintptr>(old.offset + first),
+                                static_cast<GLintptr>(place.offset + first), static_cast<GLsizeiptr>(count));
+  });
+}
+
+void MarchUpload::plan_tets(gl::WordHeap& heap, std::int64_t page_texels) {
   const std::int64_t texels = page_texels > 0 ? page_texels : limits_.texture_buffer_texels;
+  plan_cells(heap, texels);
+  plan_channels(heap, texels);
+  plan_trees(heap);
+}
+
+void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
+  std::size_t all = 0;
+  for (MarchData::Part& part : data_.parts_) {
+    part.cell = all;
+    all += part.source->grid->cells.size();
+  }
+  const auto cells = static_cast<std::int64_t>(all);
   std::int64_t page_cells = texels / 2;
   if (page_cells < cells)
     page_cells = static_cast<std::int64_t>(std::bit_floor(static_cast<std::uint64_t>(page_cells)));
-  data_.grid_.page_shift = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
-  if (cells > page_cells * max_pages) {
+  data_.page_shift_ = static_cast<std::uint32_t>(std::bit_width(static_cast<std::uint64_t>(page_cells))) - 1;
+  if (cells > page_cells * static_cast<std::int64_t>(max_pages)) {
     throw Error(ErrorCode::unsupported, std::to_string(cells) + " cells need more than " + std::to_string(max_pages) +
                                             " texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, " +
                                             std::to_string(texels) + " texels");
   }
+  data_.bytes_ += all * sizeof(grid::CellRecord);
   for (std::int64_t first = 0; first < cells; first += page_cells) {
-    const std::int64_t count = std::min(page_cells, cells - first);
-    const std::size_t bytes = static_cast<std::size_t>(count) * sizeof(grid::CellRecord);
+    const std::size_t bytes = static_cast<std::size_t>(std::min(page_cells, cells - first)) * sizeof(grid::CellRecord);
     const std::size_t index = data_.cells_.size();
     data_.cells_.emplace_back();
-    data_.bytes_ += bytes;
     // Of several pages each is whole: shaders find a record's by its number alone.
     const bool alone = cells > page_cells;
     upload_.add([this, &heap, index, bytes, alone] {
       const char* what = "creating the pages of cell records";
-      gl::WordHeap::Span& span = data_.cells_[index] = alone ? heap.take_page(bytes, what) : heap.take(bytes, what);
-      data_.grid_.first_cell = static_cast<std::uint32_t>(span.offset() / sizeof(grid::CellRecord));
+      data_.cells_[index] = alone ? heap.take_page(bytes, what) : heap.take(bytes, what);
     });
-    upload_.add_bytes(
-        [this, index] {
-          return Upload::Place{data_.cells_[index].buffer(), data_.cells_[index].offset()};
-        },
-        grid.cells.data() + first, bytes);
   }
-  const std::size_t emission_bytes = grid.emission.size() * sizeof(grid::EmissionRecord);
-  const scene::GlowTable& glow = source_->glow;
-  const std::size_t glow_bytes = glow.cells.size() * sizeof(scene::GlowingCell);
-  const std::size_t colour_bytes = grid.colour.size() * sizeof(std::uint32_t);
-  const std::size_t anisotropy_bytes = grid.anisotropy.size() * sizeof(std::int16_t);
-  const std::size_t first_anisotropy = emission_bytes + glow_bytes + colour_bytes;
-  const std::size_t channel_bytes = first_anisotropy + (anisotropy_bytes + 3) / 4 * 4;  // whole words
-  if (channel_bytes > 0) {
-    if (static_cast<std::int64_t>(channel_bytes / 16) >= texels) {
-      throw Error(ErrorCode::unsupported, "the channels of " + std::to_string(cells) +
-                                              " cells need more than one texture buffer of this driver's "
-                                              "GL_MAX_TEXTURE_BUFFER_SIZE, " +
-                                              std::to_string(texels) + " texels");
-    }
-    data_.bytes_ += channel_bytes;
-    upload_.add([this, &heap, emission_bytes, glow_bytes, first_anisotropy, channel_bytes] {
-      data_.channels_ = heap.take(channel_bytes, "creating the cells' channels");
-      const std::size_t first = data_.channels_.offset();
-      data_.grid_.first_emission = static_cast<std::uint32_t>(first / 16);
-      data_.grid_.first_glowing = static_cast<std::uint32_t>((first + emission_bytes) / 16);
-      data_.grid_.first_colour = static_cast<std::uint32_t>((first + emission_bytes + glow_bytes) / 4);
-      data_.grid_.first_anisotropy = static_cast<std::uint32_t>((first + first_anisotropy) / 4);
-    });
-    const auto add = [this](std::size_t at, const void* bytes, std::size_t count) {
-      upload_.add_bytes(
-          [this, at] {
-            return Upload::Place{data_.channels_.buffer(), data_.channels_.offset() + at};
-          },
-          bytes, count);
-    };
-    add(0, grid.emission.data(), emission_bytes);
-    add(emission_bytes, glow.cells.data(), glow_bytes);
-    add(emission_bytes + glow_bytes, grid.colour.data(), colour_bytes);
-    add(first_anisotropy, grid.anisotropy.data(), anisotropy_bytes);
-    if (!glow.cells.empty()) {
-      data_.grid_.glowing = static_cast<std::uint32_t>(glow.cells.size());
-      data_.grid_.glow_density = static_cast<float>(1.0 / glow.power);
-      data_.grid_.glow_length = static_cast<float>(glow.length);
-      data_.grid_.least_stretch = least_stretch(glm::dmat3(grid.cube.to_world));
-    }
-  }
-  const std::size_t tree_bytes = grid.tree.size() * sizeof(std::uint32_t);
-  data_.bytes_ += tree_bytes;
-  upload_.add([this, &heap, tree_bytes] {
-    data_.tree_ = heap.take(tree_bytes, "creating the point-location tree");
-    data_.grid_.tree = static_cast<std::uint32_t>(data_.tree_.offset() / sizeof(std::uint32_t));
-  });
-  upload_.add_bytes(
-      [this] {
-        return Upload::Place{data_.tree_.buffer(), data_.tree_.offset()};
-      },
-      grid.tree.data(), tree_bytes);
-  data_.bytes_ += 26 * sizeof(grid::RootEntry);
   upload_.add([this] {
-    std::array<grid::RootEntry, 26> roots{};
-    std::copy(source_->grid->roots.begin(), source_->grid->roots.end(), roots.begin());
-    data_.roots_ = gl::make_buffer(gl_, sizeof(roots), roots.data(), 0, "uploading the root cells");
+    const std::size_t first = data_.cells_.size() == 1 ? data_.cells_[0].offset() / sizeof(grid::CellRecord) : 0;
+    for (MarchData::Part& part : data_.parts_) {
+      part.grid.page_shift = data_.page_shift_;
+      part.grid.first_cell = static_cast<std::uint32_t>(first + part.cell);
+    }
   });
+  for (const MarchData::Part& part : data_.parts_) {
+    const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
+    const std::vector<grid::CellRecord>& records = part.source->grid->cells;
+    for (std::size_t done = 0; done < records.size();) {
+      MarchData::Run to = data_.run(part.cell + done, records.size() - done);
+      const PlaceOf place = [this, to] { return data_.place_of(to); };
+      if (old == nullptr) {
+        upload_.add_bytes(place, &records[done], to.count * sizeof(grid::CellRecord));
+      } else {
+        const MarchData::Run from = before_->run(old->cell + done, to.count);
+        to.count = from.count;
+        add_copy(
+            place, [this, from] { return before_->place_of(from); }, to.count * sizeof(grid::CellRecord));
+      }
+      done += to.count;
+    }
+  }
+}
+
+void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
+  std::size_t bytes = 0;
+  for (MarchData::Part& part : data_.parts_) {
+    part.channels = bytes;
+    bytes += ChannelBytes(*part.source).all();
+  }
+  if (bytes == 0) return;
+  if (static_cast<std::int64_t>(bytes / 16) >= texels) {
+    std::size_t cells = 0;
+    for (const MarchData::Part& part : data_.parts_) cells += part.source->grid->cells.size();
+    throw Error(ErrorCode::unsupported, "the channels of " + std::to_string(cells) +
+                                            " cells need more than one texture buffer of this driver's "
+                                            "GL_MAX_TEXTURE_BUFFER_SIZE, " +
+                                            std::to_string(texels) + " texels");
+  }
+  data_.bytes_ += bytes;
+  upload_.add([this, &heap, bytes] {
+    data_.channels_ = heap.take(bytes, "creating the cells' channels");
+    for (MarchData::Part& part : data_.parts_) {
+      const ChannelBytes channels(*part.source);
+      const std::size_t first = data_.channels_.offset() + part.channels;
+      part.grid.first_emission = static_cast<std::uint32_t>(first / 16);
+      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.glow_at()) / 16);
+      part.grid.first_colour = static_cast<std::uint32_t>((first + channels.colour_at()) / 4);
+      part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.anisotropy_at()) / 4);
+      part.grid.glowing = static_cast<std::uint32_t>(part.source->glow.cells.size());
+    }
+  });
+  for (const MarchData::Part& part : data_.parts_) {
+    const ChannelBytes channels(*part.source);
+    const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
+    const auto place_at = [this, first = part.channels](std::size_t at) {
+      return [this, place = first + at] {
+        return Upload::Place{data_.channels_.buffer(), data_.channels_.offset() + place};
+      };
+    };
+    if (old != nullptr) {
+      const auto from = [this, first = old->channels] {
+        return Upload::Place{before_->channels_.buffer(), before_->channels_.offset() + first};
+      };
+      add_copy(place_at(0), from, channels.all());
+      continue;
+    }
+    const grid::TetGrid& grid = *part.source->grid;
+    upload_.add_bytes(place_at(0), grid.emission.data(), channels.emission);
+    upload_.add_bytes(place_at(channels.glow_at()), part.source->glow.cells.data(), channels.glow);
+    upload_.add_bytes(place_at(channels.colour_at()), grid.colour.data(), channels.colour);
+    upload_.add_bytes(place_at(channels.anisotropy_at()), grid.anisotropy.data(), channels.anisotropy);
+  }
+}
+
+void MarchUpload::plan_trees(gl::WordHeap& heap) {
+  const auto bytes_of = [](const MarchData::Part& part) {
+    return sizeof(Roots) + part.source->grid->tree.size() * sizeof(std::uint32_t);
+  };
+  std::size_t bytes = 0;
+  for (MarchData::Part& part : data_.parts_) {
+    part.tree = bytes;
+    bytes += bytes_of(part);
+  }
+  data_.bytes_ += bytes;
+  upload_.add([this, &heap, bytes] {
+    data_.trees_ = heap.take(bytes, "creating the point-location tree");
+    for (MarchData::Part& part : data_.parts_) {
+      part.grid.tree = static_cast<std::uint32_t>((data_.trees_.offset() + part.tree + sizeof(Roots)) / 4);
+    }
+  });
+  for (const MarchData::Part& part : data_.parts_) {
+    const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
+    const auto place_at = [this, first = part.tree](std::size_t at) {
+      return [this, place = first + at] { return Upload::Place{data_.trees_.buffer(), data_.trees_.offset() + place}; };
+    };
+    if (old != nullptr) {
+      const auto from = [this, first = old->tree] {
+        return Upload::Place{before_->trees_.buffer(), before_->trees_.offset() + first};
+      };
+      add_copy(place_at(0), from, bytes_of(part));
+      continue;
+    }
+    const grid::TetGrid& grid = *part.source->grid;
+    Roots roots{};
+    std::ranges::copy(grid.roots, roots.begin());
+    upload_.add([this, place = place_at(0), roots] {
+      const Upload::Place to = place();
+      gl_->NamedBufferSubData(to.buffer, static_cast<GLintptr>(to.offset), sizeof roots, roots.data());
+    });
+    upload_.add_bytes(place_at(sizeof roots), grid.tree.data(), grid.tree.size() * sizeof(std::uint32_t));
+  }
 }
 
 void MarchUpload::plan_dense() {
@@ -223,8 +332,8 @@ void MarchUpload::plan_channel_voxels() {
                 1.0F / unit, what);
   };
   if (const grid::RgbField* emission = source_->channels.emission.get()) {
-    data_.grid_.emission_unit = emission->max_value();
-    plan(data_.emission_voxels_, *emission, data_.grid_.emission_unit, "creating what voxels give off");
+    data_.parts_[0].grid.emission_unit = emission->max_value();
+    plan(data_.emission_voxels_, *emission, data_.parts_[0].grid.emission_unit, "creating what voxels give off");
   }
   // In units of density 1, so that the colour is this over the density.
   if (const grid::RgbField* scattering = source_->channels.scattering.get())
@@ -308,14 +417,21 @@ void MarchUpload::plan_brick() {
   });
 }
 
-std::vector<std::string> MarchData::defines() const {
-  return {"CM_MARCH " + std::to_string(static_cast<int>(march_)), std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
-          "CM_PAGES " + std::to_string(std::max<std::size_t>(cells_.size(), 1))};
+std::vector<std::string> MarchData::defines(bool several) const {
+  // One, two or as many as there can be: fewer programs.
+  std::size_t pages = std::max<std::size_t>(cells_.size(), 1);
+  if (pages > 2 || (several && march_ == March::tet)) pages = max_pages;
+  std::vector<std::string> defines{"CM_MARCH " + std::to_string(static_cast<int>(march_)),
+                                   std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
+                                   "CM_PAGES " + std::to_string(pages)};
+  if (several) defines.emplace_back("CM_INSTANCES 1");
+  return defines;
 }
 
 void MarchData::bind(const gl::Functions& gl) const {
-  for (std::size_t i = 0; i < cells_.size(); ++i)
-    gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), cells_[i].texture());
+  // Every page that a program may have: no cell is in those that only stand there.
+  for (std::size_t i = 0; !cells_.empty() && i < max_pages; ++i)
+    gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), cells_[std::min(i, cells_.size() - 1)].texture());
   constexpr std::array<GLuint, 2> units{core::CM_UNIT_VOXELS, core::CM_UNIT_BRICK_SLOTS};
   for (std::size_t i = 0; i < textures_.size(); ++i) {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
@@ -324,7 +440,6 @@ void MarchData::bind(const gl::Functions& gl) const {
   if (anisotropy_voxels_) gl.BindTextureUnit(core::CM_UNIT_ANISOTROPY_VOXELS, anisotropy_voxels_.name());
   if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, emission_voxels_.name());
   if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
-  if (tree_) gl.BindTextureUnit(core::CM_UNIT_TREE, tree_.texture());
-  if (roots_) gl.BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_ROOTS, roots_.name());
+  if (trees_) gl.BindTextureUnit(core::CM_UNIT_TREE, trees_.texture());
 }
 }  // namespace cumulet::render

@@ -18,44 +18,68 @@ namespace cumulet::render {
 
 using scene::March;
 
-/// Of a volume in this cube, whose data are inside low to high (cube space).
-core::CmGrid grid_parameters(const grid::Cube& cube, const glm::vec3& low, const glm::vec3& high);
-
-/// What one march reads on the GPU, and the box that holds all density.
+/// What one march reads on the GPU of the grids of a set of volumes, and the boxes that hold their density: wherever
+/// those stand.
 class MarchData {
  public:
   [[nodiscard]] March march() const { return march_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  /// The macros that select this march in a shader.
-  [[nodiscard]] std::vector<std::string> defines() const;
+  /// The macros that select this march in a shader, of one volume or of several (InstanceData).
+  [[nodiscard]] std::vector<std::string> defines(bool several) const;
   void bind(const gl::Functions& gl) const;
-  [[nodiscard]] const core::CmGrid& grid() const { return grid_; }
+  /// How many grids there are.
+  [[nodiscard]] std::size_t size() const { return parts_.size(); }
+  /// In the order in which their sources were given.
+  [[nodiscard]] const core::CmGrid& grid(std::size_t i = 0) const { return parts_.at(i).grid; }
+  /// Null: it is not here. O(grids).
+  [[nodiscard]] const core::CmGrid* grid(const scene::MarchSource& source) const;
 
  private:
   friend class MarchUpload;
+  // A grid of the set, and where it begins.
+  struct Part {
+    scene::MarchSourcePtr source;
+    core::CmGrid grid{};
+    std::size_t cell = 0;      // among those of all
+    std::size_t tree = 0;      // bytes into the trees: its roots, then its own
+    std::size_t channels = 0;  // bytes into those
+  };
+  [[nodiscard]] const Part* part_of(const scene::MarchSource& source) const;
+  // Of these cells, the first ones that are in one page.
+  struct Run {
+    std::size_t page = 0;
+    std::size_t cell = 0;  // in it
+    std::size_t count = 0;
+  };
+  [[nodiscard]] Run run(std::size_t cell, std::size_t count) const;
+  [[nodiscard]] Upload::Place place_of(const Run& run) const;
+
   March march_ = March::tet;
   bool linear_ = false;
+  std::vector<Part> parts_;
   gl::Object brick_values_;
   std::vector<gl::WordHeap::Span> cells_;  // a page's records each
-  std::array<gl::Object, 2> textures_;     // voxels, or values of bricks; slots of bricks
-  gl::WordHeap::Span channels_;            // of cells: what they give off, the table of those that do, their colours,
-                                           // their anisotropies
+  std::uint32_t page_shift_ = 0;
+  std::array<gl::Object, 2> textures_;  // voxels, or values of bricks; slots of bricks
+  gl::WordHeap::Span channels_;         // of cells: what they give off, the table of those that do, their colours,
+                                        // their anisotropies; grid by grid
   gl::Object emission_voxels_;
   gl::Object scattering_voxels_;
   gl::Object anisotropy_voxels_;
-  gl::WordHeap::Span tree_;
-  gl::Object roots_;
-  core::CmGrid grid_{};
+  gl::WordHeap::Span trees_;
   std::uint64_t bytes_ = 0;
 };
 
-/// Brings a source to GL piece by piece. All calls need the context current and a StateGuard around.
+/// Brings sources to GL piece by piece. All calls need the context current and a StateGuard around.
 class MarchUpload {
  public:
+  using Sources = std::vector<scene::MarchSourcePtr>;
+  /// sources: one at least, each another, of one march; of tetrahedra there may be several. before: what was here,
+  /// whose grids are copied from there where they are among these, or null; it has to live until the last step is made.
   /// page_texels: where a page of records ends; 0: where the driver's limit is. Throws Error(unsupported) that names
   /// the limit that does not suffice; allocates nothing yet.
-  MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap, scene::MarchSourcePtr source,
-              std::int64_t page_texels = 0);
+  MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap, const Sources& sources,
+              const MarchData* before = nullptr, std::int64_t page_texels = 0);
   MarchUpload(const MarchUpload&) = delete;
   MarchUpload& operator=(const MarchUpload&) = delete;
   /// As Upload has them.
@@ -65,7 +89,13 @@ class MarchUpload {
   MarchData take() { return std::move(data_); }
 
  private:
-  void plan_tet(gl::WordHeap& heap, std::int64_t page_texels);
+  void plan_tets(gl::WordHeap& heap, std::int64_t page_texels);
+  void plan_cells(gl::WordHeap& heap, std::int64_t texels);
+  void plan_channels(gl::WordHeap& heap, std::int64_t texels);
+  void plan_trees(gl::WordHeap& heap);
+  // A piece of a buffer by pieces, from another.
+  using PlaceOf = std::function<Upload::Place()>;
+  void add_copy(const PlaceOf& to, const PlaceOf& from, std::size_t bytes);
   void plan_dense();
   void plan_brick();
   void plan_channel_voxels();
@@ -83,7 +113,8 @@ class MarchUpload {
 
   gl::FunctionsPtr gl_;
   gl::Limits limits_;
-  scene::MarchSourcePtr source_;
+  const MarchData* before_;
+  scene::MarchSourcePtr source_;  // the first; of voxels the only one
   MarchData data_;
   Upload upload_;  // its steps use the above
 };

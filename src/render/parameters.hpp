@@ -7,6 +7,9 @@ namespace cumulet::render {
 /// What a picture shall show, of the block: the rest follows from what it is made of, and from how.
 struct PictureParameters {
   core::CmView view{};
+  core::CmSpace space{};
+  core::CmGrid grid{};
+  core::CmGlow glow{};
   core::CmMedium medium{};
   core::CmLights lights{};
   core::CmEnvironment environment{};

@@ -17,7 +17,10 @@ namespace cumulet::render {
 
 namespace {
 
-constexpr std::size_t lane_bytes = std::size_t{16} * CM_PATH_QUADS;
+// visits: of paths among several volumes.
+constexpr std::size_t lane_bytes(bool visits) {
+  return std::size_t{16} * (CM_PATH_QUADS + (visits ? CM_VISIT_QUADS : 0));
+}
 
 // A head is what glDispatchComputeIndirect reads, and how many paths wait.
 constexpr std::size_t head_bytes = sizeof(glm::uvec4);
@@ -30,16 +33,17 @@ std::uint32_t groups_across(std::uint32_t tile_width) {
 
 }  // namespace
 
-void PathKernels::reserve(std::size_t lanes, bool stages) {
+void PathKernels::reserve(std::size_t lanes, bool stages, bool visits) {
   if (!blocks_) {
     blocks_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
                               "creating the counters");
   }
-  if (lanes > paths_lanes_) {
+  const std::size_t path_bytes = lanes * lane_bytes(visits);
+  if (path_bytes > path_bytes_) {
     paths_ = {};
-    paths_lanes_ = 0;
-    paths_ = gl::make_buffer(gl_, lanes * lane_bytes, nullptr, 0, "creating the path buffer");
-    paths_lanes_ = lanes;
+    path_bytes_ = 0;
+    paths_ = gl::make_buffer(gl_, path_bytes, nullptr, 0, "creating the path buffer");
+    path_bytes_ = path_bytes;
   }
   if (stages && lanes > queues_lanes_) {
     queues_ = {};
@@ -91,7 +95,7 @@ void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t tile_w
 std::uint32_t PathKernels::most_rounds() { return CM_MOST_ROUNDS; }
 
 std::uint64_t PathKernels::bytes() const {
-  return paths_lanes_ * lane_bytes + (queues_ ? heads_bytes + queues_lanes_ * queue_bytes : 0);
+  return path_bytes_ + (queues_ ? heads_bytes + queues_lanes_ * queue_bytes : 0);
 }
 
 }  // namespace cumulet::render

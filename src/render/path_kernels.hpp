@@ -28,8 +28,9 @@ class PathKernels {
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// Makes room for the paths of a tile, with queues if they are to be run by stages. Throws on a GL error.
-  void reserve(std::size_t lanes, bool stages);
+  /// Makes room for the paths of a tile, with queues if they are to be run by stages, and with what paths among several
+  /// volumes keep of their visits. Throws on a GL error.
+  void reserve(std::size_t lanes, bool stages, bool visits);
   /// Binds all that reserve made.
   void bind() const;
   /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).
@@ -47,7 +48,7 @@ class PathKernels {
  private:
   gl::FunctionsPtr gl_;
   gl::Object paths_;
-  std::size_t paths_lanes_ = 0;
+  std::size_t path_bytes_ = 0;
   gl::Object queues_;
   std::size_t queues_lanes_ = 0;
   gl::Object blocks_;

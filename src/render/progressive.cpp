@@ -153,20 +153,27 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
     }
     throw;
   }
-  working_ =
-      Work{&picture, wish_.content.data, divisor, scene_met(obstacles), wish_.content.environment, wishes_, scenes_};
+  working_ = Work{&picture,
+                  wish_.content.data,
+                  wish_.content.instances,
+                  divisor,
+                  scene_met(obstacles),
+                  wish_.content.environment,
+                  wishes_,
+                  scenes_};
   answer_seconds_ = 0.0;
   if (divisor == finest_) trace_seconds_ = 0.0;
 }
 
 bool Progressive::needs_depth() const {
   return wish_.depth && shown_ && !shown_->picture->film().has(film_layers::depth) &&
-         shown_->data == wish_.content.data;
+         shown_->data == wish_.content.data && shown_->instances == wish_.content.instances;
 }
 
 bool Progressive::needs_guides(const Work& work) const {
   return wish_.guides && wish_.content.view == View::shaded && work.data == wish_.content.data &&
-         no_guides_for_ != work.picture->size() && !work.picture->has_facts();
+         work.instances == wish_.content.instances && no_guides_for_ != work.picture->size() &&
+         !work.picture->has_facts();
 }
 
 void Progressive::find_guides(const MarchData& data, const Obstacles& obstacles, Deadline deadline) {

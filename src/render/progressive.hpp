@@ -26,8 +26,9 @@ struct PictureWish {
     scene::Part<light::Surroundings> surroundings;
     scene::Part<light::Lamps> lamps;
     scene::Part<std::optional<scene::Ground>> ground;
-    std::vector<scene::Part<scene::Medium>> media;
+    std::vector<scene::Volume> volumes;  // without their sources: what is there of them is data
     Revision<MarchData> data;
+    Revision<InstanceData> instances;
     Revision<ModelData> model;
     Revision<EnvironmentData> environment;
     Revision<HostDepth> host_depth;
@@ -91,9 +92,9 @@ class Progressive {
   [[nodiscard]] Picture& accumulating();
   /// That goes on from what Tracer::save gave. Throws Error(invalid_argument) likewise, and for what is not of it.
   void restore(std::span<const std::byte> saved);
-  /// Whether that is of these data.
-  [[nodiscard]] bool newest_is_of(Revision<MarchData> data) const {
-    return newest_work() && newest_work()->data == data;
+  /// Whether that is of these data, where they stand now.
+  [[nodiscard]] bool newest_is_of(Revision<MarchData> data, Revision<InstanceData> instances) const {
+    return newest_work() && newest_work()->data == data && newest_work()->instances == instances;
   }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
   /// Whether pictures may come coarse first, and need not be the same whatever was before.
@@ -118,6 +119,7 @@ class Progressive {
   struct Work {
     Picture* picture = nullptr;
     Revision<MarchData> data;
+    Revision<InstanceData> instances;
     std::uint32_t divisor = 1;              // of the resolution
     const surface::Scene* scene = nullptr;  // whose triangles its paths meet
     Revision<EnvironmentData> environment;  // that they escape to

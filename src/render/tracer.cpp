@@ -58,10 +58,12 @@ constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
-core::CmParameters assemble(const PictureParameters& picture, const MarchData& data, const Obstacles& obstacles) {
+core::CmParameters assemble(const PictureParameters& picture, const Obstacles& obstacles) {
   core::CmParameters parameters{};
   parameters.view = picture.view;
-  parameters.grid = data.grid();
+  parameters.space = picture.space;
+  parameters.grid = picture.grid;
+  parameters.glow = picture.glow;
   parameters.medium = picture.medium;
   parameters.lights = picture.lights;
   parameters.environment = picture.environment;
@@ -246,7 +248,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
     std::vector<std::string> more{surfaces_macro(picture.traced_)};
     add_medium(picture, more);
     if (picture.environment_) more.emplace_back(environment_macro);
-    return program(data.defines(), "trace_travel.comp", more);
+    return program(data.defines(picture.several_), "trace_travel.comp", more);
   }
   std::vector<std::string> more;
   if (picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
@@ -254,12 +256,15 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   add_medium(picture, more);
   if (picture.environment_) more.emplace_back(environment_macro);
   if (picture.lamps_) more.emplace_back("CM_LAMPS 1");
-  return program(data.defines(), "trace.comp", more);
+  return program(data.defines(picture.several_), "trace.comp", more);
 }
 
 StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& data) {
   std::vector<std::string> shade{surfaces_macro(picture.traced_)};
-  if (picture.channels_) shade.emplace_back(channels_macro);
+  if (picture.channels_) {
+    shade.emplace_back(channels_macro);
+    if (picture.several_) shade.emplace_back("CM_INSTANCES 1");
+  }
   if (picture.environment_) shade.emplace_back(environment_macro);
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
@@ -319,6 +324,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.channels_ = medium.emits != 0U || medium.coloured != 0U || medium.anisotropic != 0U;
   picture.environment_ = obstacles.environment != nullptr;
   picture.lamps_ = obstacles.lamps_met() > 0;
+  picture.several_ = obstacles.instances != nullptr;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
@@ -336,7 +342,7 @@ const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obst
   std::vector<std::string> more;
   if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
   if (channels) more.emplace_back(channels_macro);
-  return program(data.defines(), name, more);
+  return program(data.defines(obstacles.instances != nullptr), name, more);
 }
 
 const Tracer::Program& Tracer::facts_program(const Picture& picture, const MarchData& data,
@@ -449,9 +455,9 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   }
   if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
-  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0);
+  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0, picture.several_);
   find_programs(picture, data, obstacles);
-  picture.parameters_ = assemble(parameters, data, obstacles);
+  picture.parameters_ = assemble(parameters, obstacles);
   picture.target_samples_ = samples;
   if (picture.layered_ != Layered::no) {
     const SurfaceLayers& layers = *picture.layers_;
@@ -510,6 +516,7 @@ void Tracer::bind(const MarchData& data, const Obstacles& obstacles) const {
   if (obstacles.scene != nullptr) obstacles.scene->bind(*gl_);
   if (obstacles.environment != nullptr) obstacles.environment->bind(*gl_);
   if (obstacles.lamps != nullptr) obstacles.lamps->bind(*gl_);
+  if (obstacles.instances != nullptr) obstacles.instances->bind(*gl_);
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms_.name());
 }
 
@@ -814,12 +821,13 @@ void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) co
   gl::check(*gl_, "reading what is known of pixels");
 }
 
-float Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
-                   glm::uvec2 pixel) {
+Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
+                            glm::uvec2 pixel) {
   make_shared_objects();
   flights_.order();
   if (!pick_) pick_ = gl::make_texture_2d(gl_, GL_R32F, 1, 1, "creating the texture to pick by");
-  core::CmParameters p = assemble(parameters, data, obstacles);
+  if (!pick_place_) pick_place_ = gl::make_texture_2d(gl_, GL_RG32UI, 1, 1, "creating the texture of what is picked");
+  core::CmParameters p = assemble(parameters, obstacles);
   p.dispatch.tile_corner = pixel;
   p.dispatch.tile_size = glm::uvec2(1U);
   p.dispatch.view = view_depth;
@@ -828,15 +836,19 @@ float Tracer::pick(const MarchData& data, const PictureParameters& parameters, c
   inspect_program(data, obstacles, "inspect.comp").object->use(*gl_);
   bind(data, obstacles);
   gl_->BindImageTexture(core::CM_IMAGE_SUM, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, 0, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
+  gl_->BindImageTexture(core::CM_IMAGE_COUNTS, pick_place_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RG32UI);
   gl_->BindImageTexture(core::CM_IMAGE_VOLUME_Z, pick_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
   gl_->DispatchCompute(1, 1, 1);
   gl::memory_barrier(*gl_, GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  float z = 0.0F;
-  gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(z), &z);
+  Picked picked;
+  glm::uvec2 met(0U);
+  gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(picked.z), &picked.z);
+  gl_->GetTextureImage(pick_place_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(met), &met);
   gl::check(*gl_, "picking");
-  return z;
+  picked.met_volume = met.x != 0U;
+  picked.place = met.y;
+  return picked;
 }
 
 template <class Texel>

@@ -14,6 +14,7 @@
 #include "gl/programs.hpp"
 #include "render/environment_data.hpp"
 #include "render/film.hpp"
+#include "render/instance_data.hpp"
 #include "render/lamp_data.hpp"
 #include "render/march_data.hpp"
 #include "render/model_data.hpp"
@@ -35,8 +36,8 @@ struct Totals {
   double noise = 0.0;
 };
 
-/// What paths end at, or find, beside the volume: the host's depth as render::HostDepth keeps it, triangles, an
-/// environment, and lamps.
+/// What paths end at, or find, beside the volume's data: the host's depth as render::HostDepth keeps it, triangles, an
+/// environment, lamps, and where it stands, if that is in several places.
 struct Obstacles {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
@@ -47,15 +48,12 @@ struct Obstacles {
   SurfaceView view;
   SurfaceLighting lighting;
   const EnvironmentData* environment = nullptr;  // of those that escape
-  const LampData* lamps = nullptr;               // of the host and of the scene
+  const LampData* lamps = nullptr;               // that paths look for: a scene's where they meet it, and the host's
+  const InstanceData* instances = nullptr;       // where the volume is several; else it is the only one
 
   /// The scene whose triangles paths meet; null: they meet none.
   [[nodiscard]] const ModelData* met() const { return traced ? scene : nullptr; }
-  /// How many lamps paths look for: those of a scene that they meet, too.
-  [[nodiscard]] std::uint32_t lamps_met() const {
-    if (lamps == nullptr) return 0;
-    return met() != nullptr ? lamps->count() : lamps->of_host();
-  }
+  [[nodiscard]] std::uint32_t lamps_met() const { return lamps == nullptr ? 0 : lamps->count(); }
 };
 
 /// What camera rays of a picture do with the surface pass.
@@ -156,6 +154,7 @@ class Picture {
   bool channels_ = false;     // its cells carry more than density
   bool environment_ = false;  // paths that escape come to one
   bool lamps_ = false;        // paths that meet no triangles look for lamps
+  bool several_ = false;      // volumes
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   // Samples of each pixel after a pass that ends with so many.
@@ -218,8 +217,13 @@ class Tracer {
              bool until_complete = false);
   /// Finds the depth at half opacity until about the deadline; returns whether it is there.
   bool trace_depth(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
-  /// View depth z at half opacity of one pixel of a picture with these parameters; 0: not so opaque.
-  float pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles, glm::uvec2 pixel);
+  /// One pixel of a picture with these parameters.
+  struct Picked {
+    float z = 0.0F;           ///< view depth at half opacity, or of a triangle; 0: neither is there
+    bool met_volume = false;  ///< it is the first; then
+    std::uint32_t place = 0;  ///< of which volume there is most
+  };
+  Picked pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles, glm::uvec2 pixel);
   /// A picture of one transparent pixel, before a black background: what there is before the first.
   void clear(Picture& picture);
   /// Of clear's picture.
@@ -345,7 +349,8 @@ class Tracer {
   std::vector<std::shared_ptr<DrawnLayers>> drawn_layers_;  // pictures share them
   PathKernels kernels_;
   gl::Object uniforms_;
-  gl::Object pick_;
+  gl::Object pick_;        // its depth...
+  gl::Object pick_place_;  // ...and what has been met
   Flights flights_;
   Flights rasters_;
   std::vector<DispatchRecord>* log_ = nullptr;

@@ -25,12 +25,12 @@ using volume::brick_size;
 using volume::brick_voxels;
 using volume::ScalarVolume;
 
-using Values = std::array<float, brick_voxels>;
+using Values = volume::BrickValues::Brick;
 
 // Of the brick at this origin.
 void read(const ScalarVolume& field, const ivec3& origin, Values& values) {
-  if (const float* brick = volume::find_brick(field, origin)) {
-    std::copy(brick, brick + brick_voxels, values.begin());
+  if (const float* brick = volume::find_brick(field, origin, values)) {
+    if (brick != values.data()) std::copy(brick, brick + brick_voxels, values.begin());
     return;
   }
   std::vector<std::uint32_t> tiles;

@@ -17,6 +17,7 @@ void pack_bricks(MarchSource& source) {
   std::unordered_map<float, std::uint32_t> uniform_slots;
   const float scale = source.density_a_value();
   std::uint32_t count = 0;
+  volume::BrickValues::Brick room;
   for (int z = 0; z < source.brick_count.z; ++z) {
     for (int y = 0; y < source.brick_count.y; ++y) {
       for (int x = 0; x < source.brick_count.x; ++x) {
@@ -34,7 +35,7 @@ void pack_bricks(MarchSource& source) {
           source.brick_slots.push_back(count);
         }
         ++count;
-        const float* values = node.is_uniform() ? nullptr : statistics.values(node);
+        const float* values = node.is_uniform() ? nullptr : statistics.values(node, room);
         for (int i = 0; i < volume::brick_voxels; ++i) {
           source.brick_values.push_back(glm::packHalf1x16((values == nullptr ? node.uniform : values[i]) * scale));
         }

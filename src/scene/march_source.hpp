@@ -33,6 +33,10 @@ struct MarchSource {
   glm::ivec3 brick_count{0};
   grid::Channels channels;
 
+  /// Whether both can be shown together.
+  [[nodiscard]] bool goes_with(const MarchSource& other) const {
+    return march == other.march && linear == other.linear;
+  }
   [[nodiscard]] bool emits() const { return channels.emission || (grid && !grid->emission.empty()); }
   [[nodiscard]] bool coloured() const { return channels.scattering || (grid && !grid->colour.empty()); }
   [[nodiscard]] bool anisotropic() const { return channels.forward || (grid && !grid->anisotropy.empty()); }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
@@ -45,10 +46,19 @@ struct Ground {
   bool operator==(const Ground&) const = default;
 };
 
-/// Its place in the world is its source's.
+/// Where something stands.
+struct Place {
+  glm::dmat4 to_world{1.0};  ///< affine, from the world that it was made in
+  bool operator==(const Place&) const = default;
+};
+
+/// A lattice in the world that its source has, which stands at its place. Units of length are those of the scene,
+/// whatever a place stretches: extinction and emission are a unit there.
 struct Volume {
-  MarchSourcePtr source;  ///< null: not there yet
+  std::uint64_t id = 0;   ///< of those that change together: places of one volume share theirs
+  MarchSourcePtr source;  ///< not null; all are of one march
   Part<Medium> medium;
+  Place place;
   bool operator==(const Volume&) const = default;
 };
 
@@ -61,8 +71,8 @@ struct Model {
 /// All that a picture can show, as it is at one moment. Sources are values that never change: another one is another
 /// pointer. What changes in place is parts.
 struct Snapshot {
-  std::vector<Volume> volumes;  ///< at most one yet
-  std::vector<Model> models;    ///< likewise
+  std::vector<Volume> volumes;
+  std::vector<Model> models;  ///< likewise
   Part<light::DistantLights> lights;
   Part<light::Surroundings> surroundings;
   Part<light::Lamps> lamps;  ///< the host's; models have their own beside them

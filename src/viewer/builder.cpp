@@ -9,6 +9,63 @@
 
 namespace cumulet::viewer {
 
+namespace {
+
+// Grids that know of the medium's opacity serve until it differs by more.
+constexpr double most_opacity_ratio = 2.0;
+
+bool apart(double a, double b) { return a > most_opacity_ratio * b || b > most_opacity_ratio * a; }
+
+}  // namespace
+
+bool suits(const BuildSettings& made, const BuildSettings& wanted) {
+  BuildSettings alike = made;
+  alike.refine.density_scale = wanted.refine.density_scale;
+  alike.refine.anisotropy = wanted.refine.anisotropy;
+  if (alike != wanted) return false;
+  const grid::RefineSettings& a = made.refine;
+  const grid::RefineSettings& b = wanted.refine;
+  if (wanted.march != scene::March::tet || b.criterion != grid::Criterion::transmittance) return true;
+  return !apart(a.density_scale, b.density_scale) &&
+         !apart(grid::hiding(a.density_scale, a.anisotropy), grid::hiding(b.density_scale, b.anisotropy));
+}
+
+Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress) {
+  Built built;
+  built.volume = volume;
+  built.settings = settings;
+  const auto [voxels, statistics] = volume->density(settings.density_ramp, progress, built.seconds.statistics);
+  Stopwatch watch;
+  const grid::Channels channels =
+      volume->channels(settings.density_ramp, settings.emission, settings.anisotropic, progress);
+  built.seconds.statistics += watch.lap();
+  progress.begin(Progress::Stage::refining);
+  if (settings.march != scene::March::tet) {
+    built.source = std::make_shared<const scene::MarchSource>(
+        scene::make_voxel_source(settings.march, voxels, statistics, channels));
+    built.seconds.records = watch.lap();
+    return built;
+  }
+  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, settings.refine, &progress);
+  auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
+  builder->bisect(&progress);
+  built.seconds.refine = watch.lap();
+  progress.begin(Progress::Stage::records);
+  const float max_value = voxels->max_value;
+  auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, channels, &progress));
+  builder.reset();
+  built.seconds.records = watch.lap();
+  built.cells = grid->cells.size();
+  built.levels = grid->levels;
+  built.limited = grid->limited;
+  if (grid->limited) {
+    log.info("max_cells (" + std::to_string(settings.refine.max_cells) + ") ended the refinement before the threshold");
+  }
+  built.source = std::make_shared<const scene::MarchSource>(
+      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress));
+  return built;
+}
+
 VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
   volume::VolumeFrame frame = volume::import_frame(path, grids, log, progress);
   const auto place = [&](volume::ScalarVolume& field) { field.index_to_world = to_world * field.index_to_world; };
@@ -59,11 +116,6 @@ void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings) {
                 }});
 }
 
-Built Builder::build_now(const VolumeAssetPtr& volume, const BuildSettings& settings) const {
-  Progress progress;
-  return make(volume, settings, progress);
-}
-
 void Builder::cancel() {
   {
     const std::scoped_lock lock(mutex_);
@@ -107,47 +159,11 @@ bool Builder::busy() const {
 
 void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds,
                        Progress& progress) {
-  Built built = make(volume, settings, progress);
+  Built built = build_grid(log_, volume, settings, progress);
   built.seconds.load = load_seconds;
   const std::scoped_lock lock(mutex_);
   progress.check();
   built_ = std::move(built);
-}
-
-Built Builder::make(const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress) const {
-  Built built;
-  built.volume = volume;
-  const auto [voxels, statistics] = volume->density(settings.density_ramp, progress, built.seconds.statistics);
-  Stopwatch watch;
-  const grid::Channels channels =
-      volume->channels(settings.density_ramp, settings.emission, settings.anisotropic, progress);
-  built.seconds.statistics += watch.lap();
-  progress.begin(Progress::Stage::refining);
-  if (settings.march != scene::March::tet) {
-    built.source = std::make_shared<const scene::MarchSource>(
-        scene::make_voxel_source(settings.march, voxels, statistics, channels));
-    built.seconds.records = watch.lap();
-    return built;
-  }
-  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, settings.refine, &progress);
-  auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
-  builder->bisect(&progress);
-  built.seconds.refine = watch.lap();
-  progress.begin(Progress::Stage::records);
-  const float max_value = voxels->max_value;
-  auto grid = make_left<const grid::TetGrid>(builder->records(settings.refine.cells, max_value, channels, &progress));
-  builder.reset();
-  built.seconds.records = watch.lap();
-  built.cells = grid->cells.size();
-  built.levels = grid->levels;
-  built.limited = grid->limited;
-  if (grid->limited) {
-    log_.info("max_cells (" + std::to_string(settings.refine.max_cells) +
-              ") ended the refinement before the threshold");
-  }
-  built.source = std::make_shared<const scene::MarchSource>(
-      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress));
-  return built;
 }
 
 }  // namespace cumulet::viewer

@@ -43,7 +43,11 @@ struct BuildSettings {
   volume::Ramp density_ramp;
   scene::Emission emission;
   bool anisotropic = true;  ///< an anisotropy of the volume's stands in place of the medium's
+  bool operator==(const BuildSettings&) const = default;
 };
+
+/// Whether grids made with these suit a medium of those: of a factor of opacity between them.
+[[nodiscard]] bool suits(const BuildSettings& made, const BuildSettings& wanted);
 
 struct BuildSeconds {
   double load = 0.0;
@@ -57,11 +61,16 @@ struct BuildSeconds {
 struct Built {
   VolumeAssetPtr volume;
   scene::MarchSourcePtr source;
+  BuildSettings settings;
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
   bool limited = false;
   BuildSeconds seconds;
 };
+
+/// Of a volume, on this thread. Throws Error(cancelled), and what its parts throw.
+[[nodiscard]] Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings,
+                               Progress& progress);
 
 /// Loads volumes and builds what marches need on a thread of its own, one job at a time. The newest wish wins, and none
 /// starves: a build under way is finished first, and of loads under way at least every second, so that volumes and
@@ -78,8 +87,6 @@ class Builder {
   void load(const VolumeFile& file, std::optional<BuildSettings> settings);
   /// Builds of this volume, after what is under way.
   void build(VolumeAssetPtr volume, const BuildSettings& settings);
-  /// Here, and by no job.
-  [[nodiscard]] Built build_now(const VolumeAssetPtr& volume, const BuildSettings& settings) const;
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
   void cancel();
@@ -104,7 +111,6 @@ class Builder {
     bool open = true;
   };
   void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress);
-  Built make(const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress) const;
 
   Log log_;
   mutable std::mutex mutex_;

@@ -5,6 +5,7 @@
 #include "settings/ramp.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_lamps.hpp"
+#include "viewer/c_ramp.hpp"
 #include "viewer/c_settings.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/viewer.hpp"
@@ -28,23 +29,6 @@ cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
   // Not even the message may be touched from inside a callback: another thread may be in a call.
   if (viewer == nullptr || cumulet::CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
   return cumulet::c_abi::guarded(viewer->last_error, [&] { call(*viewer->viewer); });
-}
-
-/// what: it is, for messages.
-cumulet::volume::Ramp read_ramp(const std::string& what, const float* points, std::uint64_t count) {
-  const auto accept = [&](const std::string& why) {
-    if (!why.empty()) refuse(what + " " + why);
-  };
-  accept(cumulet::settings::ramp_count_refusal(count));
-  const std::span<const float> given = array_of(points, count, 2, "points");
-  cumulet::settings::RampPoints checked;
-  std::vector<glm::vec2> curve;
-  for (std::size_t i = 0; i < given.size(); i += 2) {
-    checked.push_back({given[i], given[i + 1]});
-    curve.emplace_back(given[i], given[i + 1]);
-  }
-  accept(cumulet::settings::ramp_refusal(checked));
-  return cumulet::volume::Ramp(std::move(curve));
 }
 
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
@@ -222,11 +206,37 @@ cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume
   });
 }
 
+cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const std::span<const double> values = array_of(to_world, count, 16, "places");
+    std::vector<cumulet::scene::Place> places(std::max(count, 1U));
+    for (size_t i = 0; i < count; ++i) {
+      places[i].to_world = matrix_or_identity(values.subspan(16 * i).first<16>());
+      require_place(places[i].to_world, "place " + std::to_string(i) + ": ");
+    }
+    v.set_places(places);
+  });
+}
+
 cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
     *out = viewer->volume.of(v.volume());
+  });
+}
+
+cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_instance* instance) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(instance != nullptr, "the instance is NULL");
+    v.add_instance(instance->asset);
+  });
+}
+
+cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumulet_instance* instance) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(instance != nullptr, "the instance is NULL");
+    v.remove_instance(*instance->asset);
   });
 }
 
@@ -278,12 +288,9 @@ cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_d
 
 cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points, uint64_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    constexpr std::array places = {&core::Ramps::density, &core::Ramps::temperature, &core::Ramps::flame};
-    static_assert(places.size() == cumulet::settings::ramps.size());
-    require(number(ramp) < places.size(), "ramp is unknown");
+    PlacedRamp read = read_ramp(ramp, points, count);
     core::Ramps ramps = v.ramps();
-    const std::string what = std::string("the ramp of ") + cumulet::settings::ramps.at(number(ramp)).name;
-    ramps.*places.at(number(ramp)) = read_ramp(what, points, count);
+    ramps.*read.place = std::move(read.ramp);
     v.set_ramps(ramps);
   });
 }
@@ -371,7 +378,7 @@ cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display
 cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_camera* camera) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(camera != nullptr, "camera is NULL");
-    v.set_camera(camera->camera);
+    v.set_camera(camera->asset);
   });
 }
 
@@ -464,6 +471,9 @@ cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumul
     out.hit = p.hit ? 1 : 0;
     for (int axis = 0; axis < 3; ++axis) out.position[axis] = p.position[axis];
     out.distance = p.distance;
+    out.met_volume = p.place ? 1 : 0;
+    out.place = p.place.value_or(0);
+    out.tag = p.tag;
     write_desc(pick, out, "cumulet_pick");
   });
 }
@@ -563,9 +573,10 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.steps = had.steps;
     s.noise = had.noise;
     if (const auto volume = v.volume()) {
+      const core::Bounds bounds = v.bounds_of(*volume);
       for (int axis = 0; axis < 3; ++axis) {
-        s.bounds_min[axis] = volume->bounds().min[axis];
-        s.bounds_max[axis] = volume->bounds().max[axis];
+        s.bounds_min[axis] = bounds.min[axis];
+        s.bounds_max[axis] = bounds.max[axis];
       }
     }
     copy_text(had.strings.vendor, s.gl_vendor, sizeof s.gl_vendor);

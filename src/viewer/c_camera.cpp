@@ -62,16 +62,6 @@ void copy(const glm::dvec3& from, std::span<double, 3> to) {
   for (int i = 0; i < 3; ++i) to[static_cast<size_t>(i)] = from[i];
 }
 
-/// Runs a call on a camera.
-template <class Handle, class Call>
-cumulet_status on(Handle* camera, Call&& call) noexcept {
-  return guarded(nullptr, 0, [&] {
-    require(camera != nullptr, "the camera is NULL");
-    const auto kept = camera->camera;  // the callbacks of this call may release the handle
-    call(*kept);
-  });
-}
-
 }  // namespace
 
 cumulet_status cumulet_camera_create(const cumulet_camera_desc* desc, cumulet_camera** out) {
@@ -79,7 +69,7 @@ cumulet_status cumulet_camera_create(const cumulet_camera_desc* desc, cumulet_ca
   return guarded(nullptr, 0, [&] {
     require(out != nullptr, "out is NULL");
     auto handle = std::make_unique<cumulet_camera>();
-    handle->camera = std::make_shared<Camera>(pose_of(desc));
+    handle->asset = std::make_shared<Camera>(pose_of(desc));
     *out = handle.release();
   });
 }
@@ -87,11 +77,11 @@ cumulet_status cumulet_camera_create(const cumulet_camera_desc* desc, cumulet_ca
 void cumulet_camera_release(cumulet_camera* camera) { delete camera; }
 
 cumulet_status cumulet_camera_set(cumulet_camera* camera, const cumulet_camera_desc* desc) {
-  return on(camera, [&](Camera& c) { c.set(pose_of(desc)); });
+  return on(camera, "camera", [&](Camera& c) { c.set(pose_of(desc)); });
 }
 
 cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_desc* desc) {
-  return on(camera, [&](const Camera& c) {
+  return on(camera, "camera", [&](const Camera& c) {
     const CameraPose pose = c.pose();
     cumulet_camera_desc d{};
     copy(pose.eye, d.eye);
@@ -108,7 +98,7 @@ cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_d
 
 cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, const double view[16], const double projection[16],
                                            cumulet_clip clip) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(view != nullptr && projection != nullptr, "view or projection is NULL");
     c.set_matrices(glm::make_mat4(view), glm::make_mat4(projection), clip_of(clip));
   });
@@ -116,7 +106,7 @@ cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, const double 
 
 cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double aspect, cumulet_clip clip,
                                            double view[16], double projection[16]) {
-  return on(camera, [&](const Camera& c) {
+  return on(camera, "camera", [&](const Camera& c) {
     require(view != nullptr && projection != nullptr, "view or projection is NULL");
     require(in_range(aspect, 1e-6, 1e6), "the aspect ratio is not from 1e-6 to 1e6");
     glm::dmat4 v;
@@ -128,42 +118,42 @@ cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double 
 }
 
 cumulet_status cumulet_camera_orbit(cumulet_camera* camera, double yaw, double pitch) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(std::isfinite(yaw) && std::isfinite(pitch), "yaw or pitch is not finite");
     c.orbit(yaw, pitch);
   });
 }
 
 cumulet_status cumulet_camera_look(cumulet_camera* camera, double yaw, double pitch) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(std::isfinite(yaw) && std::isfinite(pitch), "yaw or pitch is not finite");
     c.look(yaw, pitch);
   });
 }
 
 cumulet_status cumulet_camera_roll(cumulet_camera* camera, double angle) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(std::isfinite(angle), "the angle is not finite");
     c.roll(angle);
   });
 }
 
 cumulet_status cumulet_camera_pan(cumulet_camera* camera, double right, double up) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(std::isfinite(right) && std::isfinite(up), "right or up is not finite");
     c.pan(right, up);
   });
 }
 
 cumulet_status cumulet_camera_dolly(cumulet_camera* camera, double factor) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(std::isfinite(factor) && factor > 0.0, "the factor is not greater than 0");
     c.dolly(factor);
   });
 }
 
 cumulet_status cumulet_camera_fly(cumulet_camera* camera, double right, double up, double forward) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(std::isfinite(right) && std::isfinite(up) && std::isfinite(forward), "right, up or forward is not finite");
     c.fly(right, up, forward);
   });
@@ -171,7 +161,7 @@ cumulet_status cumulet_camera_fly(cumulet_camera* camera, double right, double u
 
 cumulet_status cumulet_camera_frame(cumulet_camera* camera, const double box_min[3], const double box_max[3],
                                     double aspect) {
-  return on(camera, [&](Camera& c) {
+  return on(camera, "camera", [&](Camera& c) {
     require(box_min != nullptr && box_max != nullptr, "box_min or box_max is NULL");
     require(in_range(aspect, 1e-6, 1e6), "the aspect ratio is not from 1e-6 to 1e6");
     const std::span<const double, 3> low(box_min, 3);

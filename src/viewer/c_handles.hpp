@@ -9,6 +9,7 @@
 #include "light/environment.hpp"
 #include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
+#include "viewer/instance.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
 
@@ -27,6 +28,11 @@ struct cumulet_environment {
   std::atomic<int> references = 1;
 };
 
+struct cumulet_instance {
+  std::shared_ptr<cumulet::viewer::Instance> asset;
+  std::atomic<int> references = 1;
+};
+
 struct cumulet_programs {
   std::shared_ptr<cumulet::gl::ProgramPool> asset;
   std::atomic<int> references = 1;
@@ -37,13 +43,23 @@ class Camera;
 }
 
 struct cumulet_camera {
-  std::shared_ptr<cumulet::viewer::Camera> camera;
+  std::shared_ptr<cumulet::viewer::Camera> asset;
 };
 
 namespace cumulet::c_abi {
 
 /// A host's descriptor, checked.
 viewer::VolumeFile to_volume_file(const cumulet_volume_file_desc* desc);
+
+/// Runs a call on what a handle is of; what: that, for messages.
+template <class Handle, class Call>
+cumulet_status on(Handle* handle, const char* what, Call&& call) noexcept {
+  return guarded(nullptr, 0, [&] {
+    if (handle == nullptr) refuse(std::string("the ") + what + " is NULL");
+    const auto kept = handle->asset;  // the callbacks of this call may release the handle
+    call(*kept);
+  });
+}
 
 // Counted handles, of an asset each.
 

@@ -147,11 +147,28 @@ inline std::string name_or(const char* name, const char* otherwise) {
   return name == nullptr || *name == '\0' ? otherwise : name;
 }
 
-inline glm::dmat4 matrix_or_identity(const double (&m)[16]) {
+inline glm::dmat4 matrix_or_identity(std::span<const double, 16> m) {
   if (std::ranges::all_of(m, [](double value) { return value == 0.0; })) return glm::dmat4(1.0);
   glm::dmat4 matrix;
-  for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[i];
+  for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[static_cast<std::size_t>(i)];
   return matrix;
+}
+
+/// Throws for one that is not affine, finite and invertible, as far as floats are. what: before the cause.
+inline void require_place(const glm::dmat4& m, const std::string& what = "") {
+  constexpr double most = 1e15;
+  const auto all = [](const glm::dmat4& matrix, auto holds) {
+    for (int i = 0; i < 16; ++i) {
+      if (!holds(matrix[i / 4][i % 4])) return false;
+    }
+    return true;
+  };
+  if (!all(m, [](double x) { return std::isfinite(x); })) refuse(what + "to_world is not finite");
+  if (m[0].w != 0.0 || m[1].w != 0.0 || m[2].w != 0.0 || m[3].w != 1.0) refuse(what + "to_world is not affine");
+  if (!std::isnormal(glm::determinant(glm::dmat3(m)))) refuse(what + "to_world flattens space");
+  const auto moderate = [](double x) { return std::abs(x) <= most; };
+  if (!all(m, moderate) || !all(glm::inverse(m), moderate))
+    refuse(what + "to_world, or its inverse, has numbers above 1e15");
 }
 
 /// A host's array of count x each values.

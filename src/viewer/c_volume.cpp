@@ -32,9 +32,8 @@ viewer::VolumeAssetPtr asset_of(const std::string& name, volume::ScalarVolume vo
 viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
   const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
   require(d.path != nullptr && *d.path != '\0', "path is NULL or empty");
-  require(all_finite(d.to_world), "to_world is not finite");
   const glm::dmat4 m = matrix_or_identity(d.to_world);
-  require(m[0].w == 0.0 && m[1].w == 0.0 && m[2].w == 0.0 && m[3].w == 1.0, "to_world is not affine");
+  require_place(m);
   require(d.suggested_density_scale == 0 || d.suggested_density_scale == 1,
           "suggested_density_scale is neither 0 nor 1");
   const auto name = [](const char* given) { return std::string(given == nullptr ? "" : given); };

@@ -555,17 +555,7 @@ Camera::Edit::~Edit() {
   const bool changed = camera_.revision_ != before_;
   lock_.unlock();
   if (!changed) return;
-  const std::scoped_lock lock(camera_.listeners_->mutex);
-  for (const auto& call : camera_.listeners_->calls) call();
-}
-
-std::shared_ptr<void> Camera::listen(std::function<void()> changed) {
-  const std::scoped_lock lock(listeners_->mutex);
-  const auto place = listeners_->calls.insert(listeners_->calls.end(), std::move(changed));
-  return {nullptr, [listeners = listeners_, place](void*) {
-            const std::scoped_lock deleting(listeners->mutex);
-            listeners->calls.erase(place);
-          }};
+  camera_.listeners_.tell();
 }
 
 }  // namespace cumulet::viewer

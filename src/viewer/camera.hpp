@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
-#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
 
+#include "base/listeners.hpp"
 #include "scene/snapshot.hpp"
 #include "viewer/subject.hpp"
 
@@ -85,7 +85,9 @@ class Camera {
   [[nodiscard]] std::uint64_t revision() const;
   /// Calls changed after every change, on the thread that made it, until the token is gone; then no call is under way
   /// any more. It must not change a camera, nor throw.
-  [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed);
+  [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
+    return listeners_.listen(std::move(changed));
+  }
 
  private:
   /// Locks; on its end unlocks, and tells the listeners of a change.
@@ -100,10 +102,6 @@ class Camera {
     Camera& camera_;
     std::unique_lock<std::mutex> lock_;
     std::uint64_t before_;
-  };
-  struct Listeners {
-    std::mutex mutex;
-    std::list<std::function<void()>> calls;
   };
   struct Matrices {
     glm::dmat4 view{1.0};
@@ -123,7 +121,7 @@ class Camera {
   ViewFrame matrices_frame_;          // theirs
   CameraPose own_;                    // the last pose that is not theirs: it knows the target
   std::uint64_t revision_ = 1;
-  std::shared_ptr<Listeners> listeners_ = std::make_shared<Listeners>();
+  Listeners listeners_;
 };
 
 }  // namespace cumulet::viewer

@@ -57,8 +57,7 @@ void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadlin
   if (std::exchange(tried_, shot.settings) != shot.settings) programs_->try_again();
   // What another context of the group has under way may read memory that is written now.
   progressive_.tracer().order();
-  const std::vector<scene::Volume>& volumes = shot.scene->volumes;
-  if (scene_.data() != nullptr && (volumes.empty() || volumes.front().source == nullptr)) progressive_.reset();
+  if (scene_.data() != nullptr && shot.scene->volumes.empty()) progressive_.reset();
   const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
   const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, page_texels}, deadline); };
   if (scene_.uploading()) {
@@ -117,8 +116,10 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.content.surroundings = shot.scene->surroundings;
   wish.content.lamps = shot.scene->lamps;
   wish.content.ground = shot.scene->ground;
-  for (const scene::Volume& volume : shot.scene->volumes) wish.content.media.push_back(volume.medium);
+  wish.content.volumes = shot.scene->volumes;
+  for (scene::Volume& volume : wish.content.volumes) volume.source = nullptr;
   wish.content.data = scene_.data_revision();
+  wish.content.instances = scene_.instances_revision();
   wish.content.model = scene_.model_revision();
   wish.content.environment = scene_.environment_revision();
   wish.content.host_depth = host_depth_revision_;
@@ -204,10 +205,10 @@ render::PictureGuides Context::guides_of(const render::Picture& picture) {
 
 render::PictureView Context::view_of(const render::Picture& picture) const {
   const core::CmView& view = picture.parameters().view;
-  const core::CmGrid& grid = picture.parameters().grid;
-  const glm::dmat3 to_world(grid.from_cube_x, grid.from_cube_y, grid.from_cube_z);
+  const core::CmSpace& space = picture.parameters().space;
+  const glm::dmat3 to_world(space.from_cube_x, space.from_cube_y, space.from_cube_z);
   render::PictureView seen;
-  seen.eye = to_world * glm::dvec3(view.eye) + glm::dvec3(grid.cube_origin);
+  seen.eye = to_world * glm::dvec3(view.eye) + glm::dvec3(space.cube_origin);
   seen.forward = view.forward;
   seen.right = view.right;
   seen.up = view.up;
@@ -250,16 +251,29 @@ render::PictureTextures Context::textures_to_draw(const render::Picture& picture
   return textures;
 }
 
+render::Pass Context::display_pass(const char* name, const render::PictureTextures& picture,
+                                   const render::Display& display) {
+  using namespace render::film_layers;
+  render::Pass pass{name, {radiance, background, counts}, {}, {}};
+  if (display.denoise && picture.guides) {
+    for (const render::FilmLayer& layer : {moments, albedo, normal, transmittance, surface_z, volume_z, emission}) {
+      pass.reads.push_back(layer);
+    }
+  }
+  return pass;
+}
+
 void Context::composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                         const render::FrameTarget& target) {
-  using namespace render::film_layers;
-  render::Pass pass{"cumulet: composite", {radiance, background, counts}, {}, {}};
-  if (target.write_depth) pass.reads.push_back(depth);
-  pass.work = [&](const render::Film&, render::Deadline) {
-    compositor_.draw(picture, display, target);
+  render::Pass pass = display_pass("cumulet: composite", picture, display);
+  if (target.write_depth) pass.reads.push_back(render::film_layers::depth);
+  pass.work = [&](const render::Film&, render::Deadline until) {
+    render::FrameTarget within = target;
+    within.filter_ms = std::max(0.0, milliseconds_until(until));
+    compositor_.draw(picture, display, within);
     return true;
   };
-  render::run(functions_, film, pass, render::Deadline::max());
+  render::run(functions_, film, pass, deadline_after(target.filter_ms));
 }
 
 render::Display Context::display(const Shot& shot, const Frame& frame, const render::Picture& shown) {
@@ -325,8 +339,14 @@ void Context::draw(const Shot& shot, const Frame& frame, FrameResult& result) {
 
 void Context::denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown) {
   const render::PictureTextures picture = textures_to_draw(shown);
-  display_timer_.run(
-      [&] { compositor_.denoise(picture, display(shot, frame, shown), target(shot, frame, shown).filter_ms); });
+  const render::Display display = Context::display(shot, frame, shown);
+  render::Pass pass = display_pass("cumulet: denoise", picture, display);
+  pass.work = [&](const render::Film&, render::Deadline until) {
+    compositor_.denoise(picture, display, std::max(0.0, milliseconds_until(until)));
+    return !compositor_.denoising();
+  };
+  const double filter_ms = target(shot, frame, shown).filter_ms;
+  display_timer_.run([&] { render::run(functions_, shown.film(), pass, deadline_after(filter_ms)); });
 }
 
 void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {

@@ -156,6 +156,9 @@ class Context {
   bool done_or_failed(Part&& part);
   void rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown);
   void make_target_textures(const Shot& shot, const Frame& frame);
+  // What of a picture's film is drawn, and filtered where that is asked for.
+  static render::Pass display_pass(const char* name, const render::PictureTextures& picture,
+                                   const render::Display& display);
   // The last pass, as Compositor::draw: of a film, whose textures these are.
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);

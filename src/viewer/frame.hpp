@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 
 #include "gl/api.hpp"
 #include "render/display.hpp"
@@ -52,6 +53,9 @@ struct Pick {
   bool hit = false;
   glm::dvec3 position{0.0};
   double distance = 0.0;
+  std::optional<std::uint32_t> place;  // of a volume, where one is met
+  std::uint64_t volume = 0;            // that one's scene::Volume::id
+  std::uint64_t tag = 0;               // of an instance
 };
 
 /// cumulet_aov.

@@ -50,14 +50,22 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   if (scene_.data() == nullptr || !view || !(x >= 0.0 && y >= 0.0 && x < shot.size.x && y < shot.size.y)) return {};
   const glm::uvec2 pixel(static_cast<unsigned>(x), static_cast<unsigned>(y));
   const render::Obstacles met = obstacles(shot);
-  const float z = progressive_.tracer().pick(*scene_.data(), parameters(shot, met), met, pixel);
-  if (!(z > 0.0F)) return {};
+  const render::Tracer::Picked picked = progressive_.tracer().pick(*scene_.data(), parameters(shot, met), met, pixel);
+  const double z = picked.z;
+  if (!(z > 0.0)) return {};
   const double right = 2.0 * (pixel.x + 0.5) / shot.size.x - 1.0;
   const double up = 1.0 - 2.0 * (pixel.y + 0.5) / shot.size.y;
   const dvec3 aside = right * view->right + up * view->up;
   const dvec3 origin = view->orthographic ? view->eye + aside : view->eye;
   const dvec3 ray = view->orthographic ? view->forward : view->forward + aside;
-  return {true, origin + double(z) * ray, double(z) * glm::length(ray)};
+  Pick pick{true, origin + z * ray, z * glm::length(ray), {}};
+  if (!picked.met_volume) return pick;
+  // The places of one volume lie together.
+  const std::vector<scene::Volume>& volumes = scene_.volumes();
+  pick.volume = volumes.at(picked.place).id;
+  const auto first = std::ranges::find_if(volumes, [&](const scene::Volume& v) { return v.id == pick.volume; });
+  pick.place = picked.place - static_cast<std::uint32_t>(first - volumes.begin());
+  return pick;
 }
 
 render::Picture& Context::readable() {
@@ -136,7 +144,7 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
 }
 
 void Context::find_facts(const Shot& shot, render::Picture& picture) {
-  if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision())) {
+  if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
     throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
   }
   const render::Obstacles met = obstacles(shot);
@@ -146,7 +154,8 @@ void Context::find_facts(const Shot& shot, render::Picture& picture) {
 }
 
 bool Context::can_denoise(const render::Picture& picture) const {
-  return is_traced(picture) && scene_.data() != nullptr && progressive_.newest_is_of(scene_.data_revision());
+  return is_traced(picture) && scene_.data() != nullptr &&
+         progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision());
 }
 
 void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count) {

@@ -10,6 +10,7 @@
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
+#include "scene/space.hpp"
 
 namespace cumulet::viewer {
 
@@ -18,12 +19,40 @@ namespace {
 using glm::dvec3;
 using Clock = std::chrono::steady_clock;
 
-// Grids that know of the medium's opacity serve until it differs by more.
-constexpr double most_opacity_ratio = 2.0;
-
-bool apart(double a, double b) { return a > most_opacity_ratio * b || b > most_opacity_ratio * a; }
+// Volumes that cameras are fitted to by how they look, not by their boxes.
+constexpr std::size_t most_looked_at = 8;
 
 bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
+
+Bounds both(const Bounds& a, const Bounds& b) { return {glm::min(a.min, b.min), glm::max(a.max, b.max)}; }
+
+scene::Emission emission_of(const Medium& medium, const Ramps& ramps) {
+  scene::Emission emission = medium.field_emission;
+  emission.temperature_ramp = ramps.temperature;
+  emission.flame_ramp = ramps.flame;
+  return emission;
+}
+
+scene::Medium shown_medium(const Medium& medium) {
+  return {medium.density_scale, medium.albedo, medium.phase, medium.emission};
+}
+
+// Whether but for how much hides and from where it is seen the same is made.
+bool same_but_view(BuildSettings a, const BuildSettings& b) {
+  a.refine.density_scale = b.refine.density_scale;
+  a.refine.anisotropy = b.refine.anisotropy;
+  if (a.refine.camera && b.refine.camera) a.refine.camera->places = b.refine.camera->places;
+  return a == b;
+}
+
+// As fine as either.
+void join(BuildSettings& a, const BuildSettings& b) {
+  a.refine.density_scale = std::max(a.refine.density_scale, b.refine.density_scale);
+  a.refine.anisotropy = std::min(a.refine.anisotropy, b.refine.anisotropy);
+  if (a.refine.camera && b.refine.camera)
+    a.refine.camera->places.insert(a.refine.camera->places.end(), b.refine.camera->places.begin(),
+                                   b.refine.camera->places.end());
+}
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
@@ -46,8 +75,9 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
           log_, [this] { notify(); }, trace),
       surface_builder_(
           log_, [this] { notify(); }, trace),
-      environment_builder_([this] { notify(); }, trace) {
-  scene_.volumes.resize(1);
+      environment_builder_([this] { notify(); }, trace),
+      shelf_(
+          log_, [this] { notify(); }, trace) {
   set_medium({});
   set_light({});
   set_camera(std::make_shared<Camera>());
@@ -76,7 +106,8 @@ void Viewer::touch() {
 void Viewer::sync() {
   if (auto loaded = builder_.take_loaded()) {
     volume_ = std::move(loaded->volume);
-    built_view_.reset();
+    wishes_due_ = true;
+    built_for_.reset();
     remark_on_anisotropy();
     suggested_density_scale_ = loaded->density_scale;
     if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
@@ -88,11 +119,13 @@ void Viewer::sync() {
       if (built->seconds.statistics == 0.0) built->seconds.statistics = built_.seconds.statistics;
     }
     built_ = std::move(*built);
+    wishes_due_ = true;
     if (suggested_density_scale_ && built_.volume == volume_) {
-      medium_.density_scale = *std::exchange(suggested_density_scale_, std::nullopt);
+      medium_.density_scale = *std::exchange(suggested_density_scale_, std::nullopt) / stretch();
       show_medium();
     }
   }
+  follow_instances();
   if (auto surfaces = surface_builder_.take()) {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
     model_source_ = std::move(surfaces->source);
@@ -114,15 +147,19 @@ std::optional<BuildSettings> Viewer::settings_at_once() const {
 BuildSettings Viewer::settings_for_view() const {
   BuildSettings settings = grid_.build;
   settings.refine.camera = refine_camera();
+  settings.refine.camera->places.clear();
+  for (const scene::Place& place : places_) settings.refine.camera->places.push_back(place.to_world);
   return settings;
 }
+
+bool Viewer::built_for_another() const { return grid_.camera_adaptive && view_ && built_for_ != build_view(); }
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   if (builder_.configure_load(settings_at_once())) return;
   sync();
   const auto settings = settings_at_once();
   if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
-  built_view_.reset();
+  built_for_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
 }
 
@@ -144,8 +181,9 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
   sync();
   volume_ = std::move(volume);
   suggested_density_scale_.reset();
-  built_view_.reset();
+  built_for_.reset();
   remark_on_anisotropy();
+  wishes_due_ = true;  // of it, or no longer
   if (!volume_) {
     built_ = {};
   } else if (!grid_.camera_adaptive) {
@@ -160,7 +198,167 @@ VolumeAssetPtr Viewer::volume() {
   return volume_;
 }
 
+void Viewer::set_places(const std::vector<scene::Place>& places) {
+  sync();
+  places_ = places;
+  places_changed_ = true;
+  show_medium();
+  if (other_opacity()) {
+    take_medium();
+    request_build();
+  }
+  touch();
+}
+
+void Viewer::add_instance(std::shared_ptr<Instance> instance) {
+  sync();
+  if (find(*instance) != shown_.end())
+    throw Error(ErrorCode::invalid_argument, "the viewer shows the instance already");
+  Shown shown;
+  shown.id = ++last_id_;
+  shown.listener = instance->listen([this] { notify(); });
+  shown.instance = std::move(instance);
+  shown_.push_back(std::move(shown));
+  touch();
+}
+
+void Viewer::remove_instance(const Instance& instance) {
+  sync();
+  const auto place = find(instance);
+  if (place == shown_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the instance");
+  shown_.erase(place);
+  wishes_due_ = true;
+  touch();
+}
+
+std::vector<Viewer::Shown>::iterator Viewer::find(const Instance& instance) {
+  return std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.instance.get() == &instance; });
+}
+
+void Viewer::follow_instances() {
+  for (Shown& shown : shown_) {
+    const std::uint64_t revision = shown.instance->revision();
+    if (revision == shown.revision) continue;
+    shown.settings = shown.instance->get();
+    shown.revision = revision;
+    shown.medium.set(shown_medium(shown.settings.medium));
+    if (!shown.settings.volume) shown.forget();
+    wishes_due_ = true;
+    ++settings_revision_;
+  }
+  const std::uint64_t built = shelf_.revision();
+  if (built != shelved_) take_grids();
+  shelved_ = built;
+  // One that was to serve for others may have failed.
+  if (waits_for_own_ && !builder_.busy()) wishes_due_ = true;
+  if (!wishes_due_ || (grid_.camera_adaptive && !view_)) return;
+  wishes_due_ = false;
+  wish_for_grids();
+  take_grids();
+}
+
+std::optional<Built> Viewer::grid_of(const GridShelf::Wish& wish) const {
+  const auto is = [&](const Built& built) { return built.volume == wish.volume && built.settings == wish.settings; };
+  if (built_.source && is(built_)) return built_;
+  for (const Shown& shown : shown_) {
+    if (shown.built && is(*shown.built)) return shown.built;
+  }
+  return shelf_.built(wish);
+}
+
+void Viewer::take_grids() {
+  for (Shown& shown : shown_) {
+    if (!shown.wish) continue;
+    auto built = grid_of(*shown.wish);
+    // Of wishes that change faster than they are built, one that was begun.
+    if (!built && shown.begun) built = shelf_.built(*shown.begun);
+    if (built) shown.built = std::move(built);
+  }
+}
+
+BuildSettings Viewer::settings_of(const Shown& shown) const {
+  const Medium& medium = shown.settings.medium;
+  BuildSettings settings = grid_.build;
+  settings.density_ramp = shown.settings.ramps.density;
+  settings.emission = emission_of(medium, shown.settings.ramps);
+  settings.refine.density_scale = medium.density_scale * scene::mean_stretch(shown.settings.to_world);
+  settings.refine.anisotropy = scene::mean_cosine(medium.phase);
+  settings.anisotropic = medium.phase.may_vary();
+  if (grid_.camera_adaptive) {
+    settings.refine.camera = refine_camera();
+    settings.refine.camera->places = {shown.settings.to_world};
+  }
+  return settings;
+}
+
+void Viewer::reuse_grid(GridShelf::Wish& wish) const {
+  const auto serves = [&](const VolumeAssetPtr& volume, const BuildSettings& made) {
+    return volume == wish.volume && suits(made, wish.settings);
+  };
+  if (built_.source && serves(built_.volume, built_.settings)) {
+    wish.settings = built_.settings;
+    return;
+  }
+  for (const Shown& shown : shown_) {
+    if (shown.built && serves(shown.built->volume, shown.built->settings)) {
+      wish.settings = shown.built->settings;
+      return;
+    }
+  }
+  for (const Shown& shown : shown_) {
+    if (shown.wish && serves(shown.wish->volume, shown.wish->settings)) {
+      wish.settings = shown.wish->settings;
+      return;
+    }
+  }
+}
+
+void Viewer::wish_for_grids() {
+  // One for all that can share it, as fine as the finest of them needs.
+  std::vector<GridShelf::Wish> wishes;
+  std::vector<std::optional<std::size_t>> wish_of(shown_.size());
+  for (std::size_t i = 0; i < shown_.size(); ++i) {
+    const Shown& shown = shown_[i];
+    if (!shown.is_seen()) continue;
+    const BuildSettings settings = settings_of(shown);
+    const auto same = std::ranges::find_if(wishes, [&](const GridShelf::Wish& wish) {
+      return wish.volume == shown.settings.volume && same_but_view(wish.settings, settings);
+    });
+    wish_of[i] = static_cast<std::size_t>(same - wishes.begin());
+    if (same == wishes.end()) {
+      wishes.push_back({shown.settings.volume, settings});
+    } else {
+      join(same->settings, settings);
+    }
+  }
+  waits_for_own_ = false;
+  std::vector<GridShelf::Wish> to_build;
+  for (GridShelf::Wish& wish : wishes) {
+    reuse_grid(wish);
+    if (grid_of(wish)) continue;
+    const bool comes = builder_.busy() && !grid_.camera_adaptive && wish.volume == volume_;
+    if (comes && suits(grid_.build, wish.settings)) {
+      waits_for_own_ = true;
+    } else {
+      to_build.push_back(wish);
+    }
+  }
+  for (std::size_t i = 0; i < shown_.size(); ++i) {
+    Shown& shown = shown_[i];
+    if (!wish_of[i] || shown.wish == wishes[*wish_of[i]]) continue;
+    if (shown.wish && shelf_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
+    shown.wish = wishes[*wish_of[i]];
+  }
+  shelf_.wish(std::move(to_build));
+}
+
 void Viewer::rebuild() {
+  for (Shown& shown : shown_) {
+    shown.wish.reset();
+    if (shown.built) shown.built->volume = nullptr;  // shown until then, but serves no wish
+  }
+  shelf_.forget_failures();
+  wishes_due_ = true;
   take_medium();
   request_build();
   touch();
@@ -170,9 +368,12 @@ void Viewer::cancel() {
   builder_.cancel();
   surface_builder_.cancel();
   environment_builder_.cancel();
+  shelf_.cancel();
 }
 
-bool Viewer::busy() const { return builder_.busy() || surface_builder_.busy() || environment_builder_.busy(); }
+bool Viewer::busy() const { return builds() || surface_builder_.busy() || environment_builder_.busy(); }
+
+bool Viewer::builds() const { return builder_.busy() || shelf_.busy() || shelf_.revision() != shelved_; }
 
 void Viewer::load_surfaces(const std::string& path) {
   sync();
@@ -248,12 +449,20 @@ void Viewer::use_surface_camera(std::size_t index) {
 void Viewer::wait(double timeout_ms) {
   std::optional<Clock::time_point> until;
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
-  if (!builder_.wait(until) || !surface_builder_.wait(until) || !environment_builder_.wait(until))
-    throw Error(ErrorCode::timeout, "not ready in time");
-  sync();
+  const auto idle = [&] {
+    return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
+           shelf_.wait(until);
+  };
+  // What comes of one may be work for another.
+  do {
+    sync();
+    if (!idle()) throw Error(ErrorCode::timeout, "not ready in time");
+    sync();
+  } while (busy());
   if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
   if (const auto failure = builder_.status().failure) throw Error(*failure);
   if (const auto failure = environment_builder_.status().failure) throw Error(*failure);
+  if (const auto failure = shelf_.status().failure) throw Error(*failure);
 }
 
 Viewer::Status Viewer::status() const {
@@ -261,8 +470,10 @@ Viewer::Status Viewer::status() const {
   const double upload = upload_progress_.load(std::memory_order_relaxed);
   const Worker::Status surfaces = surface_builder_.status();
   const Worker::Status environment = environment_builder_.status();
-  Status status{volume.stage, volume.fraction, volume.failure, surfaces.failure, environment.failure};
-  for (const Worker::Status& other : {surfaces, environment}) {
+  const Worker::Status grids = shelf_.status();
+  Status status{volume.stage, volume.fraction, volume.failure ? volume.failure : grids.failure, surfaces.failure,
+                environment.failure};
+  for (const Worker::Status& other : {grids, surfaces, environment}) {
     if (status.stage != Progress::Stage::idle) break;
     status.stage = other.stage;
     status.fraction = other.fraction;
@@ -278,6 +489,7 @@ Viewer::Status Viewer::status() const {
 
 void Viewer::set_grid(const GridSettings& settings) {
   grid_ = settings;
+  wishes_due_ = true;
   take_medium();
   request_build();
   touch();
@@ -291,12 +503,7 @@ void Viewer::take_medium() {
   grid_.build.anisotropic = medium_.phase.may_vary();
 }
 
-scene::Emission Viewer::field_emission() const {
-  scene::Emission emission = medium_.field_emission;
-  emission.temperature_ramp = ramps_.temperature;
-  emission.flame_ramp = ramps_.flame;
-  return emission;
-}
+scene::Emission Viewer::field_emission() const { return emission_of(medium_, ramps_); }
 
 void Viewer::set_ramps(const Ramps& ramps) {
   const bool other_density = ramps.density != ramps_.density;
@@ -323,14 +530,7 @@ void Viewer::set_medium(const Medium& medium) {
   remark_on_anisotropy();
   const scene::Emission emission = field_emission();
   const bool other_emission = grid_.build.emission != emission;
-  const grid::RefineSettings& refine = grid_.build.refine;
-  const double density_scale = density_scale_to_come();
-  const bool other_opacity = grid_.build.march == scene::March::tet &&
-                             refine.criterion == grid::Criterion::transmittance &&
-                             (apart(density_scale, refine.density_scale) ||
-                              apart(grid::hiding(density_scale, scene::mean_cosine(medium.phase)),
-                                    grid::hiding(refine.density_scale, refine.anisotropy)));
-  if (other_opacity) {
+  if (other_opacity()) {
     take_medium();
     request_build();
   } else if (const bool other_phase = medium.phase.may_vary() != grid_.build.anisotropic;
@@ -345,11 +545,18 @@ void Viewer::set_medium(const Medium& medium) {
   touch();
 }
 
-double Viewer::density_scale_to_come() const { return suggested_density_scale_.value_or(medium_.density_scale); }
-
-void Viewer::show_medium() {
-  scene_.volumes.front().medium.set({medium_.density_scale, medium_.albedo, medium_.phase, medium_.emission});
+double Viewer::density_scale_to_come() const {
+  return suggested_density_scale_ ? *suggested_density_scale_ : medium_.density_scale * stretch();
 }
+
+bool Viewer::other_opacity() const {
+  BuildSettings wanted = grid_.build;
+  wanted.refine.density_scale = density_scale_to_come();
+  wanted.refine.anisotropy = scene::mean_cosine(medium_.phase);
+  return !suits(grid_.build, wanted);
+}
+
+void Viewer::show_medium() { shown_medium_.set(shown_medium(medium_)); }
 
 void Viewer::set_light(const Light& light) {
   light_ = light;
@@ -462,13 +669,26 @@ void Viewer::frame_all() {
   camera_->fit(*subject(), frame_size_.y > 0 ? double(frame_size_.x) / frame_size_.y : 1.0);
 }
 
+double Viewer::stretch() const {
+  double most = 0.0;
+  for (const scene::Place& place : places_) most = std::max(most, scene::mean_stretch(place.to_world));
+  return most;
+}
+
+Bounds Viewer::bounds_of(const VolumeAsset& volume) const {
+  Bounds all = volume.bounds(places_.front().to_world);
+  for (std::size_t i = 1; i < places_.size(); ++i) all = both(all, volume.bounds(places_[i].to_world));
+  return all;
+}
+
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
-  if (volume_ && !volume_->empty()) box = volume_->bounds();
-  if (shows_triangles()) {
-    const surface::Pose& pose = model_source_->pose;
-    box = box ? Bounds{glm::min(box->min, pose.low), glm::max(box->max, pose.high)} : Bounds{pose.low, pose.high};
+  if (volume_ && !volume_->empty()) box = bounds_of(*volume_);
+  const auto add = [&](const Bounds& other) { box = box ? both(*box, other) : other; };
+  for (const Shown& shown : shown_) {
+    if (shown.is_seen() && !shown.settings.volume->empty()) add(shown.settings.volume->bounds(shown.settings.to_world));
   }
+  if (shows_triangles()) add({model_source_->pose.low, model_source_->pose.high});
   return box;
 }
 
@@ -505,15 +725,31 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     reach.resize(normals.size(), std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < normals.size(); ++i) reach[i] = std::max(reach[i], glm::dot(p, normals[i]));
   };
-  if (volume_) {
-    for (const dvec3& p : volume_->coarse().visible(direction, medium_.density_scale)) add(p);
-    // What glows shows at any density.
-    if (volume_->may_emit()) {
-      const Bounds& box = volume_->bounds();
+  const std::size_t count = (volume_ ? places_.size() : 0) + shown_.size();
+  const auto add_volume = [&](const VolumeAsset& volume, const glm::dmat4& to_world, const Medium& medium) {
+    const Bounds box = volume.bounds(to_world);
+    const auto add_box = [&] {
       for (int i = 0; i < 8; ++i)
         add({(i & 1) != 0 ? box.max.x : box.min.x, (i & 2) != 0 ? box.max.y : box.min.y,
              (i & 4) != 0 ? box.max.z : box.min.z});
+    };
+    // Of many one does not stick out of the picture by much.
+    if (count > most_looked_at) {
+      add_box();
+      return;
     }
+    const dvec3 along = glm::inverse(glm::dmat3(to_world)) * direction;
+    const double density_scale = medium.density_scale / glm::length(along);
+    for (const dvec3& p : volume.coarse().visible(glm::normalize(along), density_scale))
+      add(dvec3(to_world * glm::dvec4(p, 1.0)));
+    // What glows shows at any density.
+    if (volume.may_emit()) add_box();
+  };
+  for (const scene::Place& place : places_) {
+    if (volume_) add_volume(*volume_, place.to_world, medium_);
+  }
+  for (const Shown& shown : shown_) {
+    if (shown.is_seen()) add_volume(*shown.settings.volume, shown.settings.to_world, shown.settings.medium);
   }
   if (model_source_) {
     for (const surface::PosedVertex& vertex : model_source_->pose.vertices) add(vertex.position);
@@ -562,8 +798,48 @@ VolumeAssetPtr Viewer::empty_volume() {
   return empty_volume_;
 }
 
+bool Viewer::shows_instances() const {
+  return std::ranges::any_of(shown_, [](const Shown& shown) { return shown.is_seen() && shown.built; });
+}
+
+void Viewer::show_volumes() {
+  std::vector<scene::Volume> volumes;
+  // What surfaces alone are in stands aside.
+  if (built_.source && (volume_ || !shows_instances())) {
+    for (const scene::Place& place : places_) volumes.push_back({0, built_.source, shown_medium_, place});
+  }
+  for (const Shown& shown : shown_) {
+    if (shown.is_seen() && shown.built)
+      volumes.push_back({shown.id, shown.built->source, shown.medium, {shown.settings.to_world}});
+  }
+  const auto differs = [&](const scene::Volume& volume) {
+    const scene::MarchSource& first = *volumes.front().source;
+    return !volume.source->goes_with(first);
+  };
+  if (std::ranges::any_of(volumes, differs)) keep_to_one_march(volumes);
+  scene_.volumes = std::move(volumes);
+}
+
+void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
+  const bool building = builds();
+  // Until all are there, what there was; then what is asked for.
+  const auto fits = [&](const scene::Volume& volume) {
+    if (building && !scene_.volumes.empty()) return volume.source->goes_with(*scene_.volumes.front().source);
+    return volume.source->march == grid_.build.march &&
+           (volume.source->march != scene::March::tet ||
+            volume.source->linear == (grid_.build.refine.cells == grid::CellKind::linear));
+  };
+  for (scene::Volume& volume : volumes) {
+    if (fits(volume)) continue;
+    const auto was = std::ranges::find_if(
+        scene_.volumes, [&](const scene::Volume& other) { return other.id == volume.id && fits(other); });
+    if (was != scene_.volumes.end()) volume.source = was->source;
+  }
+  std::erase_if(volumes, [&](const scene::Volume& volume) { return !fits(volume); });
+}
+
 scene::SnapshotPtr Viewer::snapshot() {
-  scene_.volumes.front().source = built_.source;
+  show_volumes();
   scene_.models.clear();
   if (model_source_) scene_.models.push_back({model_source_});
   scene_.view.set(view_ ? std::optional<scene::Viewpoint>(*view_) : std::nullopt);

@@ -20,6 +20,8 @@
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
 #include "viewer/environment_builder.hpp"
+#include "viewer/grid_shelf.hpp"
+#include "viewer/instance.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_builder.hpp"
@@ -64,6 +66,15 @@ class Viewer {
   void set_volume(VolumeAssetPtr volume);
   /// The newest volume; null if there is none.
   VolumeAssetPtr volume();
+  /// Where the volume stands, whichever it is: affine, from its own world, and once in each of these places, which are
+  /// one at least. Moves what is there; a grid that suits a volume of that size no longer is built anew.
+  void set_places(const std::vector<scene::Place>& places);
+  /// World bounds of a volume there.
+  [[nodiscard]] Bounds bounds_of(const VolumeAsset& volume) const;
+  /// Shows it beside the volume from now on, as it is at any time. Throws Error(invalid_argument) where it does.
+  void add_instance(std::shared_ptr<Instance> instance);
+  /// Throws Error(invalid_argument) where the viewer does not show it.
+  void remove_instance(const Instance& instance);
   void rebuild();
   void cancel();
   /// Throws how the last job ended, or Error(timeout).
@@ -152,6 +163,8 @@ class Viewer {
   void show_environment(light::EnvironmentPtr environment);
   // Whether workers have anything under way, or made what nobody took.
   [[nodiscard]] bool busy() const;
+  // The same of those that make grids.
+  [[nodiscard]] bool builds() const;
   // Runs a [GL] call's body between state guard and error handling.
   template <class Body>
   void with_gl(Body&& body);
@@ -160,7 +173,12 @@ class Viewer {
   void request_build(bool (*concerned)(const VolumeAsset&) = nullptr);
   // What grids to come know of the medium.
   void take_medium();
+  // How much a length of the volume's own grows where it stands largest.
+  [[nodiscard]] double stretch() const;
+  // Of a unit of length in the volume's own world.
   [[nodiscard]] double density_scale_to_come() const;
+  // Whether grids are fitted to what is hidden, and more of it is now, or less.
+  [[nodiscard]] bool other_opacity() const;
   // What pictures to come know of it.
   void show_medium();
   [[nodiscard]] scene::Emission field_emission() const;
@@ -169,11 +187,47 @@ class Viewer {
   // Nothing where the grid depends on the view: the next frame asks for it.
   [[nodiscard]] std::optional<BuildSettings> settings_at_once() const;
   [[nodiscard]] BuildSettings settings_for_view() const;
+  // Whether a grid for another view than the last frame's is what there is, or comes.
+  [[nodiscard]] bool built_for_another() const;
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // What a frame needs before anything is uploaded.
   void prepare(const Frame& frame);
   // What status() and stats() tell of it.
   void follow_upload(const Context& g);
+  // An instance that is shown, as it was when it was last looked at.
+  struct Shown {
+    std::shared_ptr<Instance> instance;
+    std::uint64_t id = 0;
+    std::shared_ptr<void> listener;
+    std::uint64_t revision = 0;
+    InstanceSettings settings;
+    scene::Part<scene::Medium> medium;
+    std::optional<GridShelf::Wish> wish;
+    std::optional<GridShelf::Wish> begun;  // the last before it that was being built
+    std::optional<Built> built;            // the newest
+    void forget() {
+      wish.reset();
+      begun.reset();
+      built.reset();
+    }
+    [[nodiscard]] bool is_seen() const { return settings.volume && !settings.hidden; }
+  };
+  std::vector<Shown>::iterator find(const Instance& instance);
+  void follow_instances();
+  // Where grids depend on the view, there has to be one.
+  [[nodiscard]] BuildSettings settings_of(const Shown& shown) const;
+  void wish_for_grids();
+  // A wish that a grid serves that is there, or is wished for, becomes that one's.
+  void reuse_grid(GridShelf::Wish& wish) const;
+  // Of all that there are.
+  [[nodiscard]] std::optional<Built> grid_of(const GridShelf::Wish& wish) const;
+  void take_grids();
+  // Whether a grid of one is there.
+  [[nodiscard]] bool shows_instances() const;
+  // Grids of one march and kind of cells are shown together.
+  void keep_to_one_march(std::vector<scene::Volume>& volumes) const;
+  // The snapshot's volumes.
+  void show_volumes();
   // The scene as it is now: the last snapshot, if nothing changed.
   scene::SnapshotPtr snapshot();
   Shot shot();
@@ -221,20 +275,36 @@ class Viewer {
   Built built_;                                     // newest, and what is uploaded again in a new context
   scene::Snapshot scene_;                           // as it is now: of it snapshots are made
   scene::SnapshotPtr snapshot_;                     // the newest
+  std::vector<scene::Place> places_{1};             // of the volume; one at least
+  scene::Part<scene::Medium> shown_medium_;         // its own
+  std::vector<Shown> shown_;                        // in the order in which they were added
+  std::uint64_t last_id_ = 0;
+  std::uint64_t shelved_ = 0;   // of shelf_, when it was last looked at
+  bool wishes_due_ = false;     // what is wished of it is to be told anew
+  bool waits_for_own_ = false;  // the volume's own grid, which is being built, may serve for others
   std::uint64_t settings_revision_ = 1;
-  glm::uvec2 frame_size_{0U};                      // of the last frame's picture
-  std::optional<double> suggested_density_scale_;  // volume_ was loaded with it; the medium's once its grid is there
-  std::optional<ViewFrame> view_;                  // of the last frame
-  std::optional<ViewFrame> traced_view_;           // of the last frame that traced
-  std::optional<ViewFrame> last_view_;             // of the one before it
-  std::optional<ViewFrame> built_view_;            // camera-adaptive: what the grid was last asked for
-  glm::uvec2 built_size_{0U};
+  glm::uvec2 frame_size_{0U};  // of the last frame's picture
+  // Of its own world; volume_ was loaded with it; the medium's once its grid is there.
+  std::optional<double> suggested_density_scale_;
+  std::optional<ViewFrame> view_;         // of the last frame
+  std::optional<ViewFrame> traced_view_;  // of the last frame that traced
+  bool places_changed_ = false;           // since the last frame that traced
+  std::optional<ViewFrame> last_view_;    // of the one before it
+  struct BuildView {
+    ViewFrame view;
+    glm::uvec2 size{0U};
+    std::vector<scene::Place> places;
+    bool operator==(const BuildView&) const = default;
+  };
+  [[nodiscard]] BuildView build_view() const { return {*view_, frame_size_, places_}; }
+  std::optional<BuildView> built_for_;  // camera-adaptive: what the grid was last asked for
   render::Totals totals_;
 
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;
   EnvironmentBuilder environment_builder_;
+  GridShelf shelf_;
 };
 
 }  // namespace cumulet::viewer

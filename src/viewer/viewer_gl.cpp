@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -88,26 +89,33 @@ void Viewer::prepare(const Frame& frame) {
   navigation_.advance(std::min(since, 0.25), *camera_, box);
 
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
-  const bool scene = volume_ || model_source_;
+  const bool others = std::ranges::any_of(shown_, &Shown::is_seen);
+  const bool scene = volume_ || model_source_ || others;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
-  if (!volume_ && scene && !built_.source && !builder_.busy()) built_ = builder_.build_now(empty_volume(), grid_.build);
+  if (!volume_ && model_source_ && !shows_instances() && !built_.source && !builder_.busy()) {
+    Progress progress;
+    built_ = build_grid(log_, empty_volume(), grid_.build, progress);
+  }
 
   frame_size_ = {static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3])};
   view_.reset();
   // Without a scene the camera may wait for its bounds.
   if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
     view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
+  if (wishes_due_) follow_instances();  // they waited for a view
   if (frame.budget_ms < 0.0) return;
 
   last_view_ = std::exchange(traced_view_, view_);
-  if (grid_.camera_adaptive && view_ && volume_ && (view_ != built_view_ || frame_size_ != built_size_)) {
-    const bool rests = !sampling_.preview || !built_view_ || view_ == last_view_;
+  const bool places_rest = !std::exchange(places_changed_, false);
+  if ((volume_ || others) && built_for_another()) {
+    const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
     if (rests) {
       take_medium();
-      builder_.build(volume_, settings_for_view());
-      built_view_ = view_;
-      built_size_ = frame_size_;
+      if (volume_) builder_.build(volume_, settings_for_view());
+      wishes_due_ = true;
+      follow_instances();
+      built_for_ = build_view();
     }
   }
 }
@@ -159,10 +167,9 @@ FrameResult Viewer::render(const Frame& frame) {
     const auto failed = [](const Worker::Status& status) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;
     };
-    result.failed =
-        failed(builder_.status()) || failed(surface_builder_.status()) || failed(environment_builder_.status());
-    const bool waits_to_build = grid_.camera_adaptive && view_ && view_ != built_view_;
-    result.more = result.more || navigation_.moving() || waits_to_build;
+    result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
+                    failed(environment_builder_.status()) || failed(shelf_.status());
+    result.more = result.more || navigation_.moving() || built_for_another();
     if (failure && !g.is_news(shot, *failure)) failure.reset();
   });
   if (failure) throw Error(*failure);
@@ -188,6 +195,8 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
 Pick Viewer::pick(double x, double y) {
   Pick pick;
   with_gl([&](Context& g) { pick = g.pick(shot(), x, y); });
+  const auto met = std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.id == pick.volume; });
+  if (pick.volume != 0 && met != shown_.end()) pick.tag = met->settings.tag;
   return pick;
 }
 
@@ -266,6 +275,16 @@ Stats Viewer::stats() {
   s.levels = built_.levels;
   s.limited = built_.limited;
   s.active_voxels = volume_ ? volume_->volume().active_voxels : 0;
+  std::set<scene::MarchSourcePtr> grids{built_.source};
+  std::set<VolumeAssetPtr> volumes{volume_};
+  for (const Shown& shown : shown_) {
+    if (!shown.is_seen()) continue;
+    if (volumes.insert(shown.settings.volume).second) s.active_voxels += shown.settings.volume->volume().active_voxels;
+    if (!shown.built || !grids.insert(shown.built->source).second) continue;
+    s.cells += shown.built->cells;
+    s.levels = std::max(s.levels, shown.built->levels);
+    s.limited = s.limited || shown.built->limited;
+  }
   s.build_seconds = built_.seconds;
   s.steps = totals_.steps;
   s.noise = totals_.noise;

@@ -39,7 +39,12 @@ VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
   empty_ = all.empty();
   if (empty_) shown = all = {density.bounds_min, density.bounds_max};
   cube_ = grid::fit_cube(density, all.low, all.high);
-  bounds_ = world_bounds(shown.low, shown.high, density.index_to_world);
+  low_ = shown.low;
+  high_ = shown.high;
+}
+
+Bounds VolumeAsset::bounds(const glm::dmat4& place) const {
+  return world_bounds(low_, high_, place * frame_->density.index_to_world);
 }
 
 const volume::ScalarVolume& VolumeAsset::main_field() const {

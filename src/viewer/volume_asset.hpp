@@ -33,8 +33,9 @@ class VolumeAsset {
   [[nodiscard]] bool has_anisotropy() const { return frame_->anisotropy.has_value(); }
   /// Whether no field has an active voxel.
   [[nodiscard]] bool empty() const { return empty_; }
-  /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such.
-  [[nodiscard]] const Bounds& bounds() const { return bounds_; }
+  /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such. place: where
+  /// it stands there.
+  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const;
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return coarse_; }
   /// Density as marches see it; the statistics are good while the voxels are there.
   struct Density {
@@ -55,7 +56,8 @@ class VolumeAsset {
   bool empty_ = true;
   grid::Cube cube_;
   volume::CoarseVolume coarse_;
-  Bounds bounds_;
+  glm::ivec3 low_{0};  // of what bounds() is of
+  glm::ivec3 high_{0};
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const grid::Statistics> statistics_;
   struct Ramped {

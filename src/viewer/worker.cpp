@@ -11,16 +11,24 @@ std::optional<Error> failure_of(const Worker::Job& job, Progress& progress) {
   try {
     job.work(progress);
     return std::nullopt;
-  } catch (const Error& error) {
-    return error;
-  } catch (const std::bad_alloc&) {
-    return Error(ErrorCode::out_of_memory, job.what + ": out of memory");
-  } catch (const std::exception& error) {
-    return Error(ErrorCode::internal, std::string("internal error: ") + error.what());
+  } catch (...) {
+    return caught(job.what);
   }
 }
 
 }  // namespace
+
+Error caught(const std::string& what) {
+  try {
+    throw;
+  } catch (const Error& error) {
+    return error;
+  } catch (const std::bad_alloc&) {
+    return {ErrorCode::out_of_memory, what + ": out of memory"};
+  } catch (const std::exception& error) {
+    return {ErrorCode::internal, std::string("internal error: ") + error.what()};
+  }
+}
 
 Worker::~Worker() {
   {

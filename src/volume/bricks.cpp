@@ -24,10 +24,10 @@ bool lexicographic(const glm::ivec3& a, const glm::ivec3& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
-const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin) {
+const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin, BrickValues::Brick& room) {
   const auto found = std::ranges::lower_bound(volume.brick_origins, origin, lexicographic);
   if (found == volume.brick_origins.end() || *found != origin) return nullptr;
-  return volume.brick_values.data() + (found - volume.brick_origins.begin()) * brick_voxels;
+  return volume.brick_values.brick(static_cast<std::size_t>(found - volume.brick_origins.begin()), room);
 }
 
 void fill_brick(const ScalarVolume& volume, const glm::ivec3& origin, std::span<const std::uint32_t> tiles,

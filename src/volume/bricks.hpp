@@ -13,8 +13,8 @@ namespace cumulet::volume {
 /// The order of brick_origins: by x, then y, then z.
 bool lexicographic(const glm::ivec3& a, const glm::ivec3& b);
 
-/// The 512 values of the brick at this origin; null where the volume has none. O(log bricks).
-const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin);
+/// The 512 values of the brick at this origin, which may be in `room`; null where the volume has none. O(log bricks).
+const float* find_brick(const ScalarVolume& volume, const glm::ivec3& origin, BrickValues::Brick& room);
 
 /// What tiles and the background give the voxels of a brick at this origin that the volume has not: 512 values.
 /// tiles: places in volume.tiles, all that meet it among them.

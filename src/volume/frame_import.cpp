@@ -212,7 +212,9 @@ class FrameImport {
       value = std::min(value, 1.0F);
     };
     for (ScalarVolume& part : *out_.anisotropy) {
-      for (float& value : part.brick_values) clamp(value, 1);
+      if (part.max_value > 1.0F) {
+        for (float& value : part.brick_values.as_floats()) clamp(value, 1);
+      }
       for (Tile& tile : part.tiles) clamp(tile.value, voxels_of(tile));
       clamp(part.background, 0);
       clamp(part.max_value, 0);

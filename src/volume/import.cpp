@@ -255,6 +255,8 @@ struct CleanBrick {
 /// A voxel's value as the volume keeps it.
 float counted(float value) { return std::isfinite(value) && value > 0.0F ? value : 0.0F; }  // turns -0 into 0 too
 
+bool is_half(float value) { return exact_half(value).has_value(); }
+
 void clean(const LeafSource& leaves, std::size_t leaf, const Box& bounds, CleanBrick& brick) {
   leaves.values(leaf, brick.values.data());
   brick.negative = 0;
@@ -293,12 +295,14 @@ struct BrickTotals {
   std::uint64_t non_finite = 0;
   std::uint64_t covered = 0;
   float max = 0.0F;
+  bool halves = true;  ///< their values, but of bricks of one
 
   void add(const BrickTotals& b) {
     negative += b.negative;
     non_finite += b.non_finite;
     covered += b.covered;
     max = std::max(max, b.max);
+    halves = halves && b.halves;
   }
 };
 
@@ -395,6 +399,7 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
           one.covered = leaf_box(order[i]).voxels();
           one.non_finite = brick.non_finite;
           one.max = brick.max;
+          one.halves = brick.constant || !sum.halves || std::ranges::all_of(brick.values, is_half);
           sum.add(one);
           constant[i] = brick.constant ? 1 : 0;
           constant_value[i] = brick.first;
@@ -447,17 +452,25 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   }
   out.brick_origins.resize(kept.size());
   ProgressPart copying(progress, portion.at(0.6), portion.to, kept.size());
-  copying.resize(out.brick_values, kept.size() * brick_voxels);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kept.size(), 64),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      CleanBrick brick;
-                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                        clean(leaves, kept[i], bounds, brick);
-                        out.brick_origins[i] = leaves.origin(kept[i]);
-                        std::copy(brick.values.begin(), brick.values.end(), out.brick_values.data() + i * brick_voxels);
-                      }
-                      copying.add(range.size());
-                    });
+  const auto copy = [&]<class T>(std::vector<T> values, const auto& as_kept) {
+    copying.resize(values, kept.size() * brick_voxels);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kept.size(), 64),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                        CleanBrick brick;
+                        for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                          clean(leaves, kept[i], bounds, brick);
+                          out.brick_origins[i] = leaves.origin(kept[i]);
+                          std::ranges::transform(brick.values, values.data() + i * brick_voxels, as_kept);
+                        }
+                        copying.add(range.size());
+                      });
+    out.brick_values = std::move(values);
+  };
+  if (bricks.halves) {
+    copy(std::vector<std::uint16_t>(), [](float value) { return *exact_half(value); });
+  } else {
+    copy(std::vector<float>(), [](float value) { return value; });
+  }
   tbb::parallel_sort(out.tiles.begin(), out.tiles.end(),
                      [](const Tile& a, const Tile& b) { return lexicographic(a.min, b.min); });
   const auto warn = [&](std::uint64_t voxels, const char* what, const char* how) {

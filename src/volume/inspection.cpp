@@ -88,7 +88,7 @@ std::array<std::uint64_t, histogram_bins> histogram(const ScalarVolume& volume) 
     if (value > 0.0F)
       counts.at(std::min(static_cast<std::size_t>(double{value} * bins_a_unit), histogram_bins - 1)) += voxels;
   };
-  for (const float value : volume.brick_values) add(value, 1);
+  for (std::size_t i = 0; i < volume.brick_values.size(); ++i) add(volume.brick_values[i], 1);
   for (const Tile& tile : volume.tiles) add(tile.value, voxels_of(tile));
   if (volume.background > 0.0F) add(volume.background, background_voxels(volume));
   return counts;

@@ -59,6 +59,7 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
     const int x1 = std::min(x0 + block - 1, volume.bounds_max.x);
     std::vector<double> sums(in_slab);
     std::vector<double> covered(in_slab);
+    BrickValues::Brick room;
     const auto at = [&](int y, int z) {
       return static_cast<std::size_t>((z - low.z) / block) * static_cast<std::size_t>(size_.y) +
              static_cast<std::size_t>((y - low.y) / block);
@@ -67,7 +68,7 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
                                   [](const glm::ivec3& origin, int x) { return origin.x < x; });
     for (; first != origins.end() && first->x <= x1; ++first) {
       const glm::ivec3 origin = *first;
-      const float* values = &volume.brick_values[static_cast<std::size_t>(first - origins.begin()) * brick_voxels];
+      const float* values = volume.brick_values.brick(static_cast<std::size_t>(first - origins.begin()), room);
       const glm::ivec3 from = glm::max(origin, glm::ivec3(x0, low.y, low.z));
       const glm::ivec3 to =
           glm::min(origin + (brick_size - 1), glm::ivec3(x1, volume.bounds_max.y, volume.bounds_max.z));

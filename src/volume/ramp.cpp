@@ -4,6 +4,8 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "base/progress_part.hpp"
 #include "volume/bricks.hpp"
@@ -34,19 +36,21 @@ ScalarVolume apply(const Ramp& ramp, const ScalarVolume& volume, const Progress*
   out.non_finite_voxels = volume.non_finite_voxels;
   for (Tile& tile : out.tiles) tile.value = ramp(tile.value);
 
-  resize(out.brick_values, volume.brick_values.size(), progress);
+  std::vector<float> values;
+  resize(values, volume.brick_values.size(), progress);
   out.max_value = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, out.brick_values.size(), 64 * brick_voxels),
+      tbb::blocked_range<std::size_t>(0, values.size(), 64 * brick_voxels),
       background_voxels(volume) > 0 ? out.background : 0.0F,
       [&](const auto& range, float most) {
         check(progress);
         for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          out.brick_values[i] = ramp(volume.brick_values[i]);
-          most = std::max(most, out.brick_values[i]);
+          values[i] = ramp(volume.brick_values[i]);
+          most = std::max(most, values[i]);
         }
         return most;
       },
       [](float a, float b) { return std::max(a, b); });
+  out.brick_values = std::move(values);
   for (const Tile& tile : out.tiles) out.max_value = std::max(out.max_value, tile.value);
   std::erase_if(out.tiles, [&](const Tile& tile) { return tile.value == out.background; });
   return out;

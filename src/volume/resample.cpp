@@ -57,11 +57,11 @@ class Window {
  public:
   Window(const ScalarVolume& field, const Box& box, const Items& items)
       : field_(&field), low_(box.min >> 3), size_((box.max >> 3) - low_ + 1) {
-    cells_.assign(place(size_ - 1) + 1, {nullptr, field.background});
+    cells_.assign(place(size_ - 1) + 1, {std::nullopt, field.background});
     for (const std::uint32_t item : items) {
       if (item < field.brick_origins.size()) {
         const glm::ivec3 cell = (field.brick_origins[item] >> 3) - low_;
-        cells_[place(cell)].values = &field.brick_values[std::size_t{item} * brick_voxels];
+        cells_[place(cell)].first = std::size_t{item} * brick_voxels;
         continue;
       }
       // Within bounds a cell has one tile, or none.
@@ -79,8 +79,9 @@ class Window {
   [[nodiscard]] double voxel(glm::ivec3 p) const {
     if (glm::any(glm::lessThan(p, field_->bounds_min)) || glm::any(glm::greaterThan(p, field_->bounds_max))) return 0.0;
     const Cell& cell = cells_[place((p >> 3) - low_)];
-    if (cell.values == nullptr) return cell.constant;
-    return cell.values[((p.x & 7) * brick_size + (p.y & 7)) * brick_size + (p.z & 7)];
+    if (!cell.first) return cell.constant;
+    const auto within = static_cast<std::size_t>(((p.x & 7) * brick_size + (p.y & 7)) * brick_size + (p.z & 7));
+    return field_->brick_values[*cell.first + within];
   }
 
   /// The value all over a box within the window's, if cells alone tell it.
@@ -93,7 +94,7 @@ class Window {
       for (c.y = min.y; c.y <= max.y; ++c.y) {
         for (c.z = min.z; c.z <= max.z; ++c.z) {
           const Cell& cell = cells_[place(c)];
-          if (cell.values != nullptr || cell.constant != value) return std::nullopt;
+          if (cell.first || cell.constant != value) return std::nullopt;
         }
       }
     }
@@ -121,7 +122,7 @@ class Window {
 
  private:
   struct Cell {
-    const float* values;
+    std::optional<std::size_t> first;  // place of its brick's values
     float constant;
   };
 

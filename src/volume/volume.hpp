@@ -9,11 +9,9 @@
 
 #include "base/log.hpp"
 #include "base/progress.hpp"
+#include "volume/brick_values.hpp"
 
 namespace cumulet::volume {
-
-inline constexpr int brick_size = 8;
-inline constexpr int brick_voxels = brick_size * brick_size * brick_size;
 
 /// A box of voxels [min, max], both inclusive, of one value.
 struct Tile {
@@ -37,9 +35,9 @@ struct ScalarVolume {
   std::uint64_t active_voxels = 0;  ///< active tiles count with all their voxels
   /// Brick origins: multiples of 8, unique, sorted by (x, y, z) lexicographically.
   std::vector<glm::ivec3> brick_origins;
-  /// 512 floats a brick, z fastest: index ((x & 7) * 8 + (y & 7)) * 8 + (z & 7), OpenVDB's leaf
-  /// order. Voxels outside bounds hold zero.
-  std::vector<float> brick_values;
+  /// 512 a brick, z fastest: index ((x & 7) * 8 + (y & 7)) * 8 + (z & 7), OpenVDB's leaf order. Voxels outside bounds
+  /// hold zero.
+  BrickValues brick_values;
   /// Disjoint, not overlapping any brick, clipped to bounds; only tiles whose value differs from
   /// the background.
   std::vector<Tile> tiles;

@@ -55,10 +55,11 @@ volume::ScalarVolume noise_volume(int size) {
       if (any) columns[column].push_back(brick);
     }
   });
+  std::vector<float>& values = v.brick_values.as_floats();
   for (const std::vector<Brick>& column : columns) {
     for (const Brick& brick : column) {
       v.brick_origins.push_back(brick.origin);
-      v.brick_values.insert(v.brick_values.end(), brick.values.begin(), brick.values.end());
+      values.insert(values.end(), brick.values.begin(), brick.values.end());
       for (const float value : brick.values) {
         v.active_voxels += value > 0.0F ? 1 : 0;
         v.max_value = std::max(v.max_value, value);

@@ -228,6 +228,30 @@ constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_ch
                            "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_chance),"};
 constexpr Edit flights_have_all = {"flight.glsl", "p.bounces > 0u ? cm.lights.cell_chance : 0.0f", "0.0f"};
 
+// Lamps, each as likely as the others.
+constexpr Edit any_lamp = {"light.glsl", "  if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;\n", ""};
+constexpr Edit all_alike = {"light.glsl", "  light.density = lamp.chance;\n",
+                            "  light.density = 1.0f / float(max(cm.lamps.count, 1u));\n"};
+
+/// As a set has them: a key lamp beside it, one of a tenth opposite, and fourteen like the key far away.
+light::Lamps sixteen_lamps(const viewer::Bounds& bounds, const Place& place, float power) {
+  light::Lamps lamps;
+  const auto add = [&](const dvec3& at, float share) {
+    light::Lamp lamp;
+    lamp.position = at;
+    lamp.power = vec3(share * power);
+    lamps.push_back(lamp);
+  };
+  const dvec3 middle = 0.5 * (bounds.min + bounds.max);
+  add(place.at, 1.0F);
+  add(2.0 * middle - place.at, 0.1F);
+  for (int i = 0; i < 14; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / 14.0;
+    add(middle + 10.0 * place.distance * dvec3(std::cos(angle), 0.3, std::sin(angle)), 1.0F);
+  }
+  return lamps;
+}
+
 /// A hot core in a ball of smoke, which looks are for.
 viewer::VolumeAssetPtr small_fire() {
   constexpr int side = 48;
@@ -243,7 +267,7 @@ viewer::VolumeAssetPtr small_fire() {
           for (int i = 0; i < volume::brick_voxels; ++i) {
             const glm::ivec3 p = glm::ivec3(x, y, z) + glm::ivec3(i / 64, (i / 8) % 8, i % 8);
             const float here = value(glm::distance(vec3(p), vec3(0.5F * (side - 1))));
-            v.brick_values.push_back(here);
+            v.brick_values.as_floats().push_back(here);
             v.active_voxels += here > 0.0F ? 1 : 0;
             v.max_value = std::max(v.max_value, here);
           }
@@ -262,15 +286,17 @@ viewer::VolumeAssetPtr small_fire() {
 void measure_costs(headless::Context& context, const Input& input, const Options& options) {
   const Asset asset = load_asset(input, true);
   const double density_scale = asset.density_scale(options.optical_depth);
-  const bool made = input.file.empty();  // "@noise": without a colour
+  const bool made = input.file.empty();  // "@noise": of density alone
   const viewer::VolumeAssetPtr plain = made ? asset.volume : read(input, "none");
   const viewer::Light daylight = light_of(1.0F, 1.0F);
   {
     Rows rows(context, density_scale);
     rows.add("density", plain, Burns::no, daylight);
-    rows.add("+ temperature", plain, Burns::temperature, daylight);
-    rows.add("+ flame", plain, Burns::flame, daylight);
-    rows.add("+ temperature and flame", plain, Burns::both, daylight);
+    if (plain->may_emit()) {
+      rows.add("+ temperature", plain, Burns::temperature, daylight);
+      rows.add("+ flame", plain, Burns::flame, daylight);
+      rows.add("+ temperature and flame", plain, Burns::both, daylight);
+    }
     if (!options.color_grid.empty() && !made) {
       const viewer::VolumeAssetPtr coloured = read(input, options.color_grid);
       rows.add("+ colour", coloured, Burns::no, daylight);
@@ -315,8 +341,15 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     rows.add("two triangles like the rectangle", plain, Burns::no, dark)
         .viewer()
         .show_surfaces(emitter_at(place, side, power / static_cast<float>(4.0 * side * side)));
-    rows.add("its own fire", plain, Burns::both, dark);
+    if (plain->may_emit()) rows.add("its own fire", plain, Burns::both, dark);
     print_costs("Light", rows.get(), options);
+
+    const EditedShaders alike(std::array{any_lamp, all_alike});
+    const light::Lamps sixteen = sixteen_lamps(plain->bounds(), place, power);
+    Rows many(context, density_scale);
+    many.add("by what arrives", plain, Burns::no, dark).viewer().set_lamps(sixteen);
+    many.add("each alike", plain, Burns::no, dark, alike.programs()).viewer().set_lamps(sixteen);
+    print_costs("Sixteen lamps", many.get(), options);
   }
   const EditedShaders without_looks(std::array{no_looks_alone, no_looks, flights_have_all});
   const EditedShaders at_collisions(std::array{no_way, where_they_collide});

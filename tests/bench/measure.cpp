@@ -60,8 +60,7 @@ BuildRow measure_build(headless::Context& context, const Asset& asset, const Opt
   row.records = seconds.records;
   row.upload = seconds.upload;
   // The asset's own copy of the voxels is the benchmark's, not the viewer's.
-  row.peak_bytes =
-      std::max(0.0, peak_bytes() - static_cast<double>(asset.volume->volume().brick_values.size() * sizeof(float)));
+  row.peak_bytes = std::max(0.0, peak_bytes() - static_cast<double>(asset.volume->volume().brick_values.bytes()));
   return row;
 }
 

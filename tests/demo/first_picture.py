@@ -1,6 +1,7 @@
-"""The first picture that cumulet-render makes of a cloud, with nothing set: neither black nor burnt, thin or thick.
+"""The first picture that cumulet-render makes of a cloud, with nothing set: neither black nor burnt, thin or thick. And
+of an explosion: flames in dark smoke.
 
-Usage: first_picture.py RENDER VOLUME OUT_FOLDER
+Usage: first_picture.py RENDER CLOUD EXPLOSION OUT_FOLDER
 """
 
 import pathlib
@@ -19,7 +20,7 @@ def luminances(picture):
 
 
 def main():
-    render, volume, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    render, volume, explosion, out = *sys.argv[1:4], pathlib.Path(sys.argv[4])
     out.mkdir(parents=True, exist_ok=True)
 
     def shown(name, *more):
@@ -40,6 +41,15 @@ def main():
         middle = [v for y in range(14, 28) for v in values[64 * y + 22:64 * y + 42]]
         assert 0.35 < sum(middle) / len(middle) < 0.95, (name, sum(middle) / len(middle))
         assert max(values) - min(values) > 0.3, (name, min(values), max(values))
+
+    subprocess.run([render, explosion, "--size", "64x40", "--spp", "32", "-o", f"{out}/fire.png"], check=True, timeout=90)
+    picture = Picture(out / "fire.png")
+    n = picture.channels
+    pixels = [row[x:x + 3] for row in picture.rows for x in range(0, n * picture.width, n)]
+    burnt, orange, dark = (sum(map(test, pixels)) / len(pixels) for test in (
+        lambda p: min(p) > 250, lambda p: p[0] > 150 and p[0] > 1.4 * p[2] and p[0] > 1.15 * p[1], lambda p: max(p) < 70))
+    print(f"fire: burnt {100 * burnt:.2f} %, orange {100 * orange:.2f} %, dark {100 * dark:.2f} %")
+    assert burnt < 0.002 and orange > 0.03 and dark > 0.01, (burnt, orange, dark)
 
 
 main()

@@ -16,6 +16,7 @@ import threading
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import spans
 from png import Picture, difference
 
 ALIKE = (3.0, 16.0)  # mean and largest difference of blocks that noise alone makes, of 255
@@ -340,6 +341,36 @@ def test_preset(s):
     assert look(s, "undone")[1]["scene"]["medium"] == before
 
 
+def test_fire(s):
+    """What burns looks like fire with nothing said, opened by hand or by the command line, as in cumulet-render."""
+    plain, dropped = ["--density-scale", "auto"], f'drop "{s.explosion}"'
+    s.play("replay", [*SETTLE, *shot("cloud"), dropped, *SETTLE, *shot("dropped"), "key ctrl+z", *SETTLE, *shot("undone"),
+                      "key ctrl+shift+z", *SETTLE, *shot("redone"), f'drop "{s.cumulus}"', *SETTLE, *shot("cloud_again")],
+           *plain, "--volume", s.cumulus)
+    s.play("named", ["wait loaded", *SETTLE, *shot("named")], *plain, "--volume", s.explosion)
+    s.play("said", [*SETTLE, dropped, *SETTLE, *shot("said")], *plain, "--anisotropy", "0.5", "--volume", s.cumulus)
+    cloud, report, area = look(s, "cloud")
+    medium = lambda name: s.report(name)["scene"]["medium"]
+    assert medium("cloud")["blackbody"] == 0, medium("cloud")
+    burning, burning_report, _ = look(s, "dropped")
+    assert medium("dropped")["blackbody"] > 0 and medium("dropped")["albedo"][0] < 0.5, medium("dropped")
+    assert burning_report["undo_steps"] == report["undo_steps"] + 1, "the look comes with the file, in one step"
+    warmest = max(b[0] - b[2] for b in burning.blocks(area))
+    assert warmest > 60, f"fire, no white smoke: {warmest}"
+    undone, undone_report, _ = look(s, "undone")
+    assert medium("undone") == medium("cloud") and undone_report["undo_steps"] == report["undo_steps"]
+    assert_alike(cloud, undone, area)
+    assert medium("redone") == medium("dropped")
+    assert_alike(burning, look(s, "redone")[0], area)
+    assert medium("cloud_again") == medium("cloud"), "a look that nobody chose goes with its file"
+    assert s.report("named")["undo_steps"] == 0 and medium("named") == medium("dropped"), medium("named")
+    assert medium("said")["blackbody"] == 0 and medium("said")["anisotropy"] == 0.5, medium("said")
+    done = subprocess.run([s.renderer, s.explosion, "--size", "32x32", "--spp", "1", "-o", "rendered.png"], cwd=s.out,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 0, done.stderr
+    assert f'--flame-strength {medium("named")["flame_strength"]:g}' in done.stderr, (done.stderr, medium("named"))
+
+
 def test_ramps(s):
     """A ramp as the grid has it changes nothing; points are dragged, added by clicks and taken away by right clicks."""
     curve = '"Temperature ramp curve"'
@@ -545,6 +576,29 @@ def test_status(s):
     assert done.returncode == 1 and len(done.stderr.splitlines()) == 1, done
     done = s.start(["--help"])
     assert done.returncode == 0 and "--replay" in done.stdout and "--scene" in done.stdout, done
+
+
+def test_timers(s):
+    """The graph of the device's time is what the statistics grow by; and --trace tells of the same session."""
+    # So few frames that the graph has all of them.
+    s.play("replay", ["wait loaded", "frames 20", *shot("early"), "key 2", "frames 20", *shot("late")],
+           "--volume", s.cumulus, "--trace", "trace.json")
+    for name in ("early", "late"):
+        report = s.report(name)
+        graph, passes = report["device_ms"], report["pass_seconds"]
+        assert 0 < len(graph) < 160, "the graph forgets what is older"
+        assert all(ms > 0 for ms in graph), graph
+        assert sum(graph) < 1.0001 * 1000 * sum(passes.values()), (sum(graph), passes)
+        assert passes["trace"] > 0 and passes["display"] > 0, passes
+    early, late = s.report("early"), s.report("late")
+    # A frame that is reported comes into the graph with the next.
+    known, total = len(early["device_ms"]), 1000 * sum(early["pass_seconds"].values())
+    assert late["device_ms"][:known] == early["device_ms"], "what is drawn stays"
+    sums = [sum(late["device_ms"][:count]) for count in (known, known + 1)]
+    assert min(abs(ms - total) for ms in sums) < 1e-4 * total, (sums, total)
+    assert all(late["pass_seconds"][name] >= seconds for name, seconds in early["pass_seconds"].items())
+    assert late["pass_seconds"]["inspect"] > early["pass_seconds"]["inspect"] == 0, "views of the grid take time"
+    spans.check(s.out / "trace.json", ["computing the sky", "cumulus.vdb"], 4)
 
 
 REFINING = ["--spp", "60000", "--volume"]  # never at rest

@@ -355,6 +355,8 @@ void Caller::call_all() {
   cumulet_surfaces* new_surfaces = nullptr;
   cumulet_environment* new_environment = nullptr;
   cumulet_programs* new_programs = nullptr;
+  cumulet_instance* new_instance = nullptr;
+  auto instance = make_desc<cumulet_instance_desc>();
   auto programs = make_desc<cumulet_programs_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
   std::array<float, 3> rgb{};
@@ -367,14 +369,15 @@ void Caller::call_all() {
   names.insert({"cumulet_cancel", "cumulet_status_text", "cumulet_version", "cumulet_volume_retain",
                 "cumulet_volume_release", "cumulet_surfaces_retain", "cumulet_surfaces_release",
                 "cumulet_programs_retain", "cumulet_programs_release", "cumulet_camera_release",
-                "cumulet_environment_retain", "cumulet_environment_release", "cumulet_inspection_release",
-                "cumulet_destroy", "cumulet_last_error"});
+                "cumulet_environment_retain", "cumulet_environment_release", "cumulet_instance_retain",
+                "cumulet_instance_release", "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
   cumulet_camera_release(nullptr);
   cumulet_environment_release(cumulet_environment_retain(nullptr));
   cumulet_inspection_release(nullptr);
+  cumulet_instance_release(cumulet_instance_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
   // Refused without a status.
   cumulet_destroy(viewer);
@@ -405,6 +408,10 @@ void Caller::call_all() {
   CALL(cumulet_surfaces_from_triangles, &triangles, &new_surfaces, nullptr, 0);
   CALL(cumulet_surfaces_get_info, surfaces, &surfaces_info);
   CALL(cumulet_surfaces_get_animation, surfaces, 0, &animation);
+  CALL(cumulet_instance_create, &instance, &new_instance, nullptr, 0);
+  CALL(cumulet_instance_set, new_instance, &instance);
+  CALL(cumulet_instance_set_to_world, new_instance, m.data());
+  CALL(cumulet_instance_set_ramp, new_instance, CUMULET_RAMP_DENSITY, nullptr, 0);
   CALL(cumulet_camera_create, &pose, &new_camera);
   CALL(cumulet_camera_set, camera, &pose);
   CALL(cumulet_camera_get, camera, &pose);
@@ -424,7 +431,10 @@ void Caller::call_all() {
     CALL(cumulet_load_volume, v, "none.vdb", nullptr);
     CALL(cumulet_load_volume_file, v, &volume_file);
     CALL(cumulet_set_volume, v, nullptr);
+    CALL(cumulet_set_volume_places, v, nullptr, 0);
     CALL(cumulet_get_volume, v, &new_volume);
+    CALL(cumulet_add_instance, v, new_instance);
+    CALL(cumulet_remove_instance, v, new_instance);
     CALL(cumulet_load_surfaces, v, "none.glb");
     CALL(cumulet_set_surfaces, v, nullptr);
     CALL(cumulet_get_surfaces, v, &new_surfaces);

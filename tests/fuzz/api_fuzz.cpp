@@ -20,6 +20,7 @@ namespace {
 using cumulet::headless::Context;
 using cumulet::test::CameraRef;
 using cumulet::test::EnvironmentRef;
+using cumulet::test::InstanceRef;
 using cumulet::test::ProgramsRef;
 using cumulet::test::SurfacesRef;
 using cumulet::test::ViewerPtr;
@@ -232,6 +233,34 @@ class Program {
     if (surfaces != nullptr) surfaces_.reset(surfaces);
   }
 
+  void change_instances() {
+    auto medium = described<cumulet_medium_desc>();
+    std::array<cumulet_instance_desc, 2> desc{};
+    desc[0] = described<cumulet_instance_desc>();
+    desc[0].volume = volume_.get();
+    desc[0].medium = data_.ConsumeBool() ? &medium : nullptr;
+    if (medium.struct_size > sizeof medium) medium.struct_size = sizeof medium;
+    switch (data_.ConsumeIntegralInRange(0, 4)) {
+      case 0:
+        cumulet_instance_set(instance_.get(), desc.data());
+        return;
+      case 1:
+        cumulet_instance_set_to_world(instance_.get(), desc[0].to_world);
+        return;
+      case 2:
+        return told(cumulet_add_instance(viewer_.get(), instance_.get()));
+      case 3:
+        return told(cumulet_remove_instance(viewer_.get(), instance_.get()));
+      default: {
+        cumulet_instance* instance = nullptr;
+        made([&](char* error, std::size_t size) {
+          return cumulet_instance_create(desc.data(), &instance, error, size);
+        });
+        if (instance != nullptr) instance_.reset(instance);
+      }
+    }
+  }
+
   void make_environment() {
     auto desc = described<cumulet_environment_desc>();
     desc.width = data_.ConsumeIntegralInRange<std::uint32_t>(0, 9);
@@ -411,7 +440,7 @@ class Program {
 
   void call() {
     cumulet_viewer* viewer = viewer_.get();
-    switch (data_.ConsumeIntegralInRange(0, 28)) {
+    switch (data_.ConsumeIntegralInRange(0, 29)) {
       case 0:
         return make_dense();
       case 1:
@@ -474,6 +503,8 @@ class Program {
         return told(cumulet_load_environment(viewer, data_.ConsumeBool() ? "/dev/null" : "/dev/null/nowhere.exr"));
       case 27:
         return set<cumulet_environment_settings_desc>(cumulet_set_environment_settings);
+      case 28:
+        return change_instances();
       default:
         told(cumulet_detach(viewer));
         if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));
@@ -486,6 +517,7 @@ class Program {
   VolumeRef volume_;
   SurfacesRef surfaces_;
   EnvironmentRef environment_;
+  InstanceRef instance_;
   ViewerPtr viewer_;
 };
 

@@ -1,5 +1,5 @@
 #!/bin/bash
-# Runs a fuzzer for CUMULET_FUZZ_SECONDS (60) from its seeds and what it found before. What breaks it stays in
+# Runs a fuzzer for CUMULET_FUZZ_SECONDS (60) from its seeds, corpus/ and what it found before. What breaks it stays in
 # FUZZER.found/. Usage: fuzz.sh FUZZER SEEDS_PROGRAM DICTIONARY|"" [LIBFUZZER_OPTION...]
 set -euo pipefail
 fuzzer=$1 seeds=$2 dictionary=$3
@@ -13,4 +13,5 @@ leaks=1
 [[ " $* " != *" -detect_leaks=0 "* ]] || leaks=0
 export ASAN_OPTIONS=detect_leaks=$leaks:detect_odr_violation=0:alloc_dealloc_mismatch=0:allocator_may_return_null=1
 exec "$fuzzer" -max_total_time="${CUMULET_FUZZ_SECONDS:-60}" -timeout=20 -rss_limit_mb=4096 -print_final_stats=1 \
-  -artifact_prefix="$fuzzer.found/" ${dictionary:+-dict="$dictionary"} "$@" "$fuzzer.corpus" "$fuzzer.seeds"
+  -artifact_prefix="$fuzzer.found/" ${dictionary:+-dict="$dictionary"} "$@" "$fuzzer.corpus" "$fuzzer.seeds" \
+  "$here/corpus/$(basename "$fuzzer" _fuzz)"

@@ -44,7 +44,8 @@ void check_line(const std::string& line, const std::string& path) {
 
 void check_volume(const cumulet::volume::ScalarVolume& volume) {
   if (volume.brick_values.size() != volume.brick_origins.size() * cumulet::volume::brick_voxels) fail("bricks");
-  for (const float value : volume.brick_values) {
+  for (std::size_t i = 0; i < volume.brick_values.size(); ++i) {
+    const float value = volume.brick_values[i];
     if (!(value >= 0.0F) || !std::isfinite(value) || value > volume.max_value) fail("a value out of its range");
   }
 }

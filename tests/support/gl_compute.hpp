@@ -2,20 +2,24 @@
 
 #include <array>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "gl/objects.hpp"
 
 namespace cumulet::test {
 
-/// The text of glsl/NAME, for shaders that tests write around it.
+/// The text of glsl/NAME and what it includes, for shaders that tests write around it.
 inline std::string glsl_file(const std::string& name) {
+  constexpr std::string_view include = "#include \"";
   std::ifstream in(std::string(CUMULET_GLSL_DIR) + "/" + name);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
+  std::string text;
+  for (std::string line; std::getline(in, line);) {
+    text += line.starts_with(include) ? glsl_file(line.substr(include.size(), line.rfind('"') - include.size())) : line;
+    text += '\n';
+  }
+  return text;
 }
 
 /// A compute program of this text. Throws the driver's log.

@@ -22,6 +22,7 @@
 
 // The same source with a cm_hit_accept.
 #undef CM_BVH_GLSL
+#undef CM_NUMBERS_GLSL
 #define CM_HIT_ACCEPT
 namespace cumulet::test {
 using namespace glm;

@@ -241,8 +241,9 @@ TEST(Cancel, SparseVoxels) {
   const volume::ScalarVolume& large = large_volume();
   std::vector<std::int32_t> origins;
   for (const glm::ivec3& o : large.brick_origins) origins.insert(origins.end(), {o.x, o.y, o.z});
+  volume::BrickValues values = large.brick_values;
   volume::SparseVoxels voxels{.brick_origins = origins,
-                              .brick_values = large.brick_values,
+                              .brick_values = values.as_floats(),
                               .brick_active = {},
                               .tiles = {},
                               .background = 0.0F,

@@ -293,6 +293,24 @@ TEST(CppVolume, IsSharedByCopies) {
   EXPECT_EQ(Volume().info().error().status, StatusCode::invalid_argument);
 }
 
+TEST(CppInstance, IsSharedByCopies) {
+  const std::vector<float> values = ball();
+  const Volume volume = Volume::from_dense({.values = values, .size = {16, 16, 16}}).value();
+  std::array<double, 16> place{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 2, 1, 1};
+  auto made = Instance::create({.volume = volume, .to_world = place, .tag = 5});
+  ASSERT_TRUE(made.has_value());
+  const Instance instance = made.value();
+  place[0] = 0.0;
+  EXPECT_FALSE(instance.set_to_world(place).has_value());
+  EXPECT_FALSE(Instance::create({.volume = volume, .to_world = place}).has_value());
+  place[0] = 2.0;
+  EXPECT_TRUE(instance.set_to_world(place).has_value());
+  constexpr std::array<std::array<float, 2>, 2> same{{{0.0F, 0.0F}, {1.0F, 1.0F}}};
+  EXPECT_TRUE(instance.set_ramp(Ramp::density, same).has_value());
+  EXPECT_TRUE(instance.set({.volume = volume, .medium = {.density_scale = 2.0}, .hidden = true}).has_value());
+  EXPECT_FALSE(Instance().set({}).has_value());
+}
+
 TEST(CppVolume, OfBricksAndTiles) {
   const std::array<std::int32_t, 3> origin{8, 0, 0};
   const std::vector<float> values(512, 2.0F);

@@ -46,6 +46,17 @@ class Lamps : public test::ViewerTest {
     still_ = make();
     still_->set_light({});
   }
+  // Of the lamp and of a quad that is far from it.
+  void show_model_with_lamp(const vec3& position, float intensity) {
+    surface::PunctualLight of_model;
+    of_model.intensity = vec3(intensity);
+    of_model.position = position;
+    auto scene = std::make_shared<StillScene>();
+    scene->add(test::diffuse(vec3(1.0F)));
+    scene->add_quad({{{-200, -200, -200}, {-100, -200, -200}, {-100, -100, -200}, {-200, -100, -200}}}, 0);
+    scene->rest.lights = {of_model};
+    still_->viewer().show_surfaces(test::source_of(scene));
+  }
   void set_lamps(const std::vector<cumulet_lamp_desc>& descs) { still_->viewer().set_lamps(lamps_of(descs)); }
   void set_medium(double sigma, float albedo, std::uint32_t max_bounces = 0) {
     viewer::Medium medium;
@@ -158,6 +169,22 @@ TEST_P(Lamps, LightAFloorByTheirFormFactors) {
   }
 }
 
+// Looks go by what arrives; nothing is lost of those that send little.
+TEST_P(Lamps, CountHoweverDimBesideBrighterOnes) {
+  set_floor();
+  std::vector<cumulet_lamp_desc> lamps{lamp(CUMULET_LAMP_POINT, place, 1.0F)};
+  auto away = lamp(CUMULET_LAMP_SPOT, place, 1e6F);  // shines up
+  away.direction[1] = 1.0;
+  lamps.push_back(away);
+  set_lamps(lamps);
+  const double dim = 1.0 / (4.0 * pi) / (above * above);
+  EXPECT_NEAR(irradiance(1024), dim, 0.03 * dim);
+  for (const float power : {10.0F, 3.0F, 100.0F}) lamps.push_back(lamp(CUMULET_LAMP_POINT, place, power));
+  lamps.erase(lamps.begin() + 1);
+  set_lamps(lamps);
+  EXPECT_NEAR(irradiance(256), 114.0 * dim, 0.01 * 114.0 * dim);
+}
+
 TEST_P(Lamps, StandBesideThoseOfAModelAndHaveColours) {
   surface::PunctualLight of_scene;
   of_scene.intensity = vec3(100.0F);
@@ -193,19 +220,30 @@ TEST_P(Lamps, LightWhatIsRasterised) {
   EXPECT_NEAR(irradiance(4), 3.0, 0.01) << "as bright as it says, however wide";
 }
 
+// Where paths do not meet the model its lamps are not looked for, and the host's are as they would be without it.
+TEST_P(Lamps, OfAModelThatIsNotMetChangeNothing) {
+  still_->set_volume(test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
+  set_medium(0.1, 1.0F, 1);
+  viewer::SurfaceSettings none;
+  none.light = viewer::SurfaceLight::none;
+  still_->viewer().set_surface_settings(none);
+  set_lamps({lamp(CUMULET_LAMP_POINT, {32.0, 32.0, 60.0}, 4e5F)});
+  const auto mean = [&] {
+    still_->set_camera(test::camera_at({32.0, 32.0, 300.0}, {32.0, 32.0, 0.0}, 2.0));
+    return test::render(*still_, {16, 16, 256, 1, render::View::shaded}).mean().x;
+  };
+  const double alone = mean();
+  ASSERT_GT(alone, 0.01);
+  show_model_with_lamp({10.0F, 50.0F, 40.0F}, 3e4F);
+  EXPECT_NEAR(mean(), alone, 0.01 * alone);
+}
+
 // A model's lamps light the volume of a preview as they light its picture, whether the host has one or not.
 TEST_P(Lamps, OfAModelLightTheVolumeOfPreviewsToo) {
   still_->set_volume(test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1.0F; }));
   set_medium(0.1, 1.0F, 1);
   still_->set_camera(test::camera_at({32.0, 32.0, 300.0}, {32.0, 32.0, 0.0}, 2.0));
-  surface::PunctualLight lamp_of_model;
-  lamp_of_model.intensity = vec3(1000.0F);
-  lamp_of_model.position = {32.0F, 32.0F, 40.0F};
-  auto scene = std::make_shared<StillScene>();
-  scene->add(test::diffuse(vec3(1.0F)));
-  scene->add_quad({{{-200, -200, -200}, {-100, -200, -200}, {-100, -100, -200}, {-200, -100, -200}}}, 0);
-  scene->rest.lights = {lamp_of_model};
-  still_->viewer().show_surfaces(test::source_of(scene));
+  show_model_with_lamp({32.0F, 32.0F, 40.0F}, 1000.0F);
   viewer::Light faint;
   faint.sky_radiance = vec3(1e-6F);
   still_->set_light(faint);

@@ -9,6 +9,8 @@
 
 #include "gl/shader_sources.hpp"
 #include "grid/cell.hpp"
+#include "light/alias_table.hpp"
+#include "light/lamps.hpp"
 #include "light/light_table.hpp"
 #include "support/gl_compute.hpp"
 #include "support/gl_state.hpp"
@@ -39,6 +41,32 @@ struct CpuDisc {
 #include "support/traced.inc"
 
 #include "support/disc_light.glsl"
+#undef CM_MARCH
+#undef CM_MORE_LIGHTS
+};
+
+/// And with so many lamps that a float has few bits beside their numbers: even ones are looked for at 0.3 of each two.
+struct CpuManyLamps {
+  static constexpr uint pairs = 1U << 21U;
+  CmParameters cm{};
+  float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
+  float cm_voxel(ivec3 voxel) const { return 0.0F; }
+  CmLamp cm_lamp(uint i) const {
+    const bool even = i % 2 == 0;
+    CmLamp lamp{};
+    lamp.kind = CM_LAMP_DISTANT;
+    lamp.intensity = vec3(even ? 1.0F : 0.0F, static_cast<float>(i) / (2.0F * pairs), 0.0F);
+    lamp.chance = (even ? 0.3F : 0.7F) / pairs;
+    lamp.stays = even ? static_cast<uint>(0.6 * light::Alias::certain) : light::Alias::certain;
+    lamp.other = i + 1;
+    return lamp;
+  }
+#define CM_MARCH 1
+#undef CM_LAMPS
+#define CM_LAMPS 1
+#include "support/traced.inc"
+#undef CM_LAMPS
+#define CM_LAMPS CM_SURFACES
 #undef CM_MARCH
 };
 
@@ -97,13 +125,88 @@ TEST(Lights, SharesSumToOneOrThereIsNoLight) {
   }
 }
 
-TEST(Lights, TheSunAndEachLampAlike) {
+TEST(Lights, TheSunAndLampsByWhatArrives) {
   light::DistantLights distant;
   distant.sun_irradiance = vec3(2.0F);
-  const LightTable table(distant, {}, scene_of(4, 0), {});
-  EXPECT_NEAR(table.chance(Kind::sun), 0.2, 1e-6);
-  EXPECT_NEAR(table.chance(Kind::lamp), 0.8, 1e-6);
-  EXPECT_EQ(table.chance(Kind::glow), 0.0F);
+  light::SceneLights lamps = scene_of(4, 0);
+  const auto sun = [&](double arrives) {
+    lamps.lamps_arrive = arrives;
+    const LightTable table(distant, {}, lamps, {});
+    EXPECT_NEAR(table.chance(Kind::lamp), 1.0F - table.chance(Kind::sun), 1e-6);
+    EXPECT_EQ(table.chance(Kind::glow), 0.0F);
+    return table.chance(Kind::sun);
+  };
+  EXPECT_NEAR(sun(3.0), 0.4, 1e-6);
+  EXPECT_NEAR(sun(0.0), 0.8, 1e-6);
+  EXPECT_NEAR(sun(1e30), 0.2, 1e-6);
+}
+
+core::CmLamp point_lamp(const glm::dvec3& at, float power) {
+  light::Lamp lamp;
+  lamp.position = at;
+  lamp.power = vec3(power);
+  return light::lamp_record(lamp, glm::dvec3(0.0));
+}
+
+// Each lamp's chance is what its entries of the alias table give it.
+void expect_chances(const std::vector<core::CmLamp>& records, const std::vector<double>& expected) {
+  std::vector<double> drawn(records.size(), 0.0);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const double part = 1.0 / static_cast<double>(records.size());
+    const double stays = static_cast<double>(records[i].stays) / light::Alias::certain;
+    drawn[i] += part * stays;
+    drawn.at(records[i].other) += part * (1.0 - stays);
+  }
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    EXPECT_NEAR(records[i].chance, expected[i], 1e-6) << i;
+    EXPECT_NEAR(drawn[i], expected[i], 1e-6) << i;
+  }
+}
+
+TEST(Lamps, AreLookedForByWhatArrivesOfThem) {
+  const std::vector<light::Lit> ball{{glm::dvec3(0.0), 1.0}};
+  // As much of one twice as far as of one of a quarter of its power; those within count from the rim.
+  std::vector<core::CmLamp> records{point_lamp({10, 0, 0}, 1.0F), point_lamp({0, 20, 0}, 4.0F),
+                                    point_lamp({0, 0, 5}, 0.5F), point_lamp({0, 0.1, 0}, 0.01F)};
+  const double arrives = light::share_looks(records, ball);
+  EXPECT_NEAR(arrives, 0.05 / (4.0 * std::numbers::pi), 1e-6);
+  expect_chances(records, {0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.2, 0.05 + 0.8 * 0.4, 0.05 + 0.8 * 0.2});
+
+  // Where there are two, the mean of shares: near the second ball is the first lamp alone.
+  records.resize(2);
+  light::share_looks(records, std::vector<light::Lit>{ball[0], {glm::dvec3(10, 0, 0), 1e-3}});
+  expect_chances(records, {0.1 + 0.8 * 0.75, 0.1 + 0.8 * 0.25});
+
+  // A lamp whose range ends before is not left out: its light may be asked for where nothing is said to be.
+  records[0].range = 3.0F;
+  light::share_looks(records, ball);
+  expect_chances(records, {0.1, 0.9});
+}
+
+TEST(Lamps, AreDrawnByTheirChancesHoweverManyThereAre) {
+  core::CpuManyLamps tracer;
+  tracer.cm.lamps.count = 2 * core::CpuManyLamps::pairs;
+  constexpr int n = 200'000;
+  glm::dvec3 sum(0.0);
+  for (int i = 0; i < n; ++i) {
+    core::CpuManyLamps::CmPath path{};
+    path.random = tracer.cm_hash3(glm::uvec3(i, 0, 7)).x;
+    path.stream = 1;
+    const float u = tracer.cm_random(path.random, path.stream);
+    sum += glm::dvec3(tracer.cm_lamp_sample(path, vec3(0.0F), vec3(0.5F, 0.5F, u)).radiance);
+  }
+  EXPECT_NEAR(sum.x / n, 0.3, 5.0 * std::sqrt(0.3 * 0.7 / n));
+  EXPECT_NEAR(sum.y / n, 0.5, 5.0 * std::sqrt(1.0 / 12.0 / n)) << "all along the table";
+}
+
+TEST(Lamps, WithoutLightOrAnythingLitAreLookedForAlike) {
+  std::vector<core::CmLamp> records{point_lamp({10, 0, 0}, 1.0F), point_lamp({0, 2, 0}, 4.0F)};
+  EXPECT_EQ(light::share_looks(records, std::vector<light::Lit>{{glm::dvec3(0.0), 0.0}}), 0.0);
+  expect_chances(records, {0.5, 0.5});
+  std::vector<core::CmLamp> dark{point_lamp({10, 0, 0}, 0.0F), point_lamp({0, 2, 0}, 0.0F)};
+  EXPECT_EQ(light::share_looks(dark, std::vector<light::Lit>{{glm::dvec3(0.0), 1.0}}), 0.0);
+  expect_chances(dark, {0.5, 0.5});
+  EXPECT_EQ(light::share_looks({}, {}), 0.0);
 }
 
 // One that fills its box is left to flights.

@@ -220,6 +220,21 @@ TEST(Options, APresetIsAMediumThatFlagsOverride) {
     EXPECT_EQ(preset_of(again.medium), static_cast<Preset>(choice.value)) << "a scene file can say it";
   }
   EXPECT_FALSE(preset_of(SceneOptions().medium));
+
+  // Of a volume that burns: as bright in its smoke, however dense it is and whatever its simulation's numbers are.
+  const auto burns = [](double scale, double flame, double temperature) {
+    cumulet_medium_desc made = SceneOptions().medium;
+    made.density_scale = scale;
+    apply({.flame = flame, .temperature = temperature, .size = 10.0}, made);
+    return made;
+  };
+  EXPECT_FLOAT_EQ(burns(9.0, 1.0, 1.2).flame_strength, 9.0F);
+  EXPECT_FLOAT_EQ(burns(18.0, 2.0, 1.2).flame_strength, 9.0F);
+  EXPECT_NEAR(burns(9.0, 1.0, 1.21).blackbody, 12.0F, 0.2F) << "the preset's own, on the sample";
+  EXPECT_NEAR(burns(9.0, 1.0, 2.42).blackbody, 12.0F / 16.0F, 0.02F);
+  EXPECT_EQ(burns(9.0, 1.0, 0.0).blackbody, 0.0F);
+  EXPECT_EQ(burns(0.0, 2.0, 0.0).flame_strength, 0.8F) << "alone: by its size";
+  EXPECT_EQ(burns(0.0, 2.0, 0.0).density_scale, 0.0);
   EXPECT_EQ(usage_error(with({"--preset", "steam"})),
             "--preset: 'steam' is none of cumulus, smoke, fire, explosion, ground-fog");
 }

@@ -29,6 +29,7 @@ using cumulet::test::Folder;
 using cumulet::test::HostTarget;
 using cumulet::test::make_ball;
 using cumulet::test::make_desc;
+using cumulet::test::make_plain_viewer;
 using cumulet::test::picture_of;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
@@ -66,10 +67,7 @@ class ProgramsTest : public testing::Test {
     desc.get_proc = FakeGl::get_proc;
     desc.get_proc_user = &fake_;
     desc.programs = programs;
-    cumulet_viewer* out = nullptr;
-    std::array<char, 256> error{};
-    EXPECT_EQ(cumulet_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
-    return ViewerPtr(out);
+    return make_plain_viewer(desc);
   }
 
   Folder folder_;

@@ -309,8 +309,16 @@ TEST_F(OutOfMemory, SurfacesThatDoNotFitLeaveTheVolume) {
 }
 
 TEST_F(OutOfMemory, WhileThereIsNoStorageTheOldVolumeStays) {
+  // Voxels: cells would find room in what is left of other volumes.
+  auto dense = make_desc<cumulet_grid_desc>();
+  dense.march = CUMULET_MARCH_DENSE;
+  const ViewerPtr other = host_.viewer();
+  ASSERT_EQ(cumulet_set_grid(other.get(), &dense), CUMULET_OK);
+  const Picture picture_dense = picture_of(other.get(), b_.get(), host_.target);
+  ASSERT_NE(picture_dense, picture_a_);
   host_.fake.fail_storage(true);
   ASSERT_EQ(cumulet_set_volume(viewer_.get(), b_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_grid(viewer_.get(), &dense), CUMULET_OK);
   EXPECT_EQ(render_all(viewer_.get(), host_.target.frame()), std::vector<cumulet_status>{CUMULET_ERROR_OUT_OF_MEMORY});
   for (int i = 0; i < 5; ++i) {
     cumulet_status status = CUMULET_OK;
@@ -322,6 +330,13 @@ TEST_F(OutOfMemory, WhileThereIsNoStorageTheOldVolumeStays) {
   shown(host_, viewer_.get(), nullptr, 5.0);
   change_medium(viewer_.get(), 1.0);
   ASSERT_TRUE(converges(viewer_.get(), host_.target));
+  EXPECT_EQ(difference(host_.target.pixels(), picture_dense), "");
+}
+
+TEST_F(OutOfMemory, AVolumeThatFitsIntoWhatIsThereNeedsNoStorage) {
+  host_.fake.fail_storage(true);
+  ASSERT_EQ(cumulet_set_volume(viewer_.get(), b_.get()), CUMULET_OK);
+  EXPECT_TRUE(render_all(viewer_.get(), host_.target.frame()).empty());
   EXPECT_EQ(difference(host_.target.pixels(), picture_b_), "");
 }
 

@@ -78,6 +78,8 @@ SceneOptions full_scene() {
     scene.lamps.push_back(lamp);
   }
   for (std::size_t i = 0; i < 16; ++i) scene.to_world[i] = 0.1 * static_cast<double>(i);
+  scene.places.assign(2, scene.to_world);
+  scene.places[1][12] = -7.5;
   scene.grid.march = CUMULET_MARCH_BRICK;
   scene.grid.cells = CUMULET_CELLS_CONSTANT;
   scene.grid.criterion = CUMULET_CRITERION_RANGE_MEAN;
@@ -113,6 +115,7 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   EXPECT_TRUE(same(read.light, scene.light));
   EXPECT_TRUE(std::ranges::equal(read.lamps, scene.lamps, same<cumulet_lamp_desc>));
   EXPECT_EQ(read.to_world, scene.to_world);
+  EXPECT_EQ(read.places, scene.places);
   EXPECT_TRUE(same(read.grid, scene.grid));
   EXPECT_TRUE(same(read.sampling, scene.sampling));
   EXPECT_TRUE(same(read.display, scene.display));
@@ -145,6 +148,8 @@ TEST(SceneFile, EveryDifferenceCounts) {
   EXPECT_TRUE(differs([](SceneOptions& s) { s.lamps[1].power = 1.0f; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.lamps.pop_back(); }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.to_world[3] = 5.0; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.places[1][3] = 5.0; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.places.pop_back(); }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.ramps[CUMULET_RAMP_DENSITY][1][0] = 0.2f; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.ramps[CUMULET_RAMP_FLAME].clear(); }));
   EXPECT_TRUE(
@@ -302,6 +307,7 @@ TEST(SceneFile, TheSecondVersionSaysWhatTheFirstDoes) {
   EXPECT_FALSE(same_scene(parse_scene(first, "s.json"), scene));
   scene.lamps.clear();
   scene.to_world = {};
+  scene.places.clear();
   EXPECT_EQ(first.rfind("{\n  \"cumulet_scene\": 1,\n  \"volume\"", 0), 0u) << first;
   EXPECT_TRUE(same_scene(parse_scene(first, "s.json"), scene));
   const std::string second = scene_text(scene, "s.json");
@@ -327,6 +333,16 @@ TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
   EXPECT_EQ(told(R"("volumes": [{"scale": [1, 0, 1]}])"), start + "volumes[0].scale: 0 is not above 0");
   EXPECT_EQ(told(R"("volumes": [{"to_world": [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1], "scale": [1, 1, 1]}])"),
             start + "volumes[0].to_world: is given beside translate, rotate_degrees or scale");
+  EXPECT_EQ(told(R"("volumes": [{"places": {}}])"), start + "volumes[0].places: is not a list");
+  EXPECT_EQ(told(R"("volumes": [{"places": []}])"),
+            start + "volumes[0].places: is empty: without it the volume stands once");
+  EXPECT_EQ(told(R"("volumes": [{"places": [{}, [1]]}])"), start + "volumes[0].places[1]: is not 16 numbers");
+  EXPECT_EQ(told(R"("volumes": [{"places": [7]}])"),
+            start + "volumes[0].places[0]: is neither 16 numbers nor an object");
+  EXPECT_EQ(told(R"("volumes": [{"places": [{"scale": [1, 0, 1]}]}])"),
+            start + "volumes[0].places[0].scale: 0 is not above 0");
+  EXPECT_EQ(told(R"("volumes": [{"places": [{"move": 1}]}])"),
+            start + "volumes[0].places[0].move: there is no such setting");
   EXPECT_EQ(told(R"("volume": {})"), start + "volume: there is no such setting");
   EXPECT_EQ(told(R"("light": {})"), start + "light: there is no such setting");
   EXPECT_EQ(told(R"("models": [{"light": "x"}])").rfind(start + "models[0].light: ", 0), 0u);
@@ -357,6 +373,13 @@ TEST(SceneFile, AVolumeIsPlacedByItsPartsOrAsAWhole) {
   // x, doubled, is turned about z to y; y, tripled, about x to z; z, times 4, about x to -y, and about z to x.
   const std::array<double, 16> expected = {0, 2, 0, 0, 0, 0, 3, 0, 4, 0, 0, 0, 5, 6, 7, 1};
   for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR(parts.to_world[i], expected[i], 1e-12) << i;
+  const SceneOptions places = parse_scene(
+      R"({"cumulet_scene": 2, "volumes": [{"places": [
+          {"translate": [5, 6, 7], "rotate_degrees": [90, 0, 90], "scale": [2, 3, 4]}, {},
+          [0, 2, 0, 0, 0, 0, 3, 0, 4, 0, 0, 0, 5, 6, 7, 1]]}]})",
+      "s.json");
+  EXPECT_EQ(places.places, (std::vector<std::array<double, 16>>{
+                               parts.to_world, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, expected}));
   SceneOptions z_up = parts;
   z_up.up = UpAxis::z;
   const cumulet_volume_file_desc file = volume_file(z_up);

@@ -25,7 +25,7 @@ TEST(Snapshot, APartIsAnotherWhereItsValueIs) {
 
 TEST(Snapshot, TakenDoesNotChangeWithTheDraft) {
   Snapshot draft;
-  draft.volumes.emplace_back(Volume{std::make_shared<const MarchSource>(), {}});
+  draft.volumes.emplace_back().source = std::make_shared<const MarchSource>();
   const SnapshotPtr taken = std::make_shared<const Snapshot>(draft);
   Medium medium;
   medium.density_scale = 7.0;

@@ -493,7 +493,7 @@ TEST_P(Trace, RefusesWhatItCannotDoAndKeepsWhatItHad) {
   // An empty medium shows the sky, and nothing else: without rounding after many samples, and without noise.
   auto empty = test::noise_volume({16, 16, 16}, ivec3(0), 1);
   empty.brick_origins.clear();
-  empty.brick_values.clear();
+  empty.brick_values = {};
   empty.max_value = 0.0F;
   viewer->set_volume(empty);
   for (const test::MarchKind& kind : test::march_kinds) {

@@ -5,12 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/milliseconds.hpp"
 #include "gl/state_guard.hpp"
 #include "headless.hpp"
 #include "support/fake_gl.hpp"
@@ -162,11 +165,22 @@ TEST_F(SurfaceUploads, AFrameCopiesNoMoreThanItsTimeAllows) {
     const std::uint64_t before = fake_->uploaded();
     std::uint64_t most = 0;
     int frames = 0;
+    double longest_ms = 0.0;
+    double sum_ms = 0.0;
     for (bool loading = true; loading && frames < 200; ++frames) {
       const std::uint64_t begun = fake_->uploaded();
+      const auto since = std::chrono::steady_clock::now();
       loading = render(1e-6).loading;
+      const double ms = milliseconds(std::chrono::steady_clock::now() - since);
+      // The last of them traces as well.
+      if (loading) longest_ms = std::max(longest_ms, ms);
+      if (loading) sum_ms += ms;
       most = std::max(most, fake_->uploaded() - begun);
     }
+    // For tests/bench/README.md.
+    std::printf("%s: %.1f MB in %d frames, all but the last %.1f ms, the longest %.1f ms\n",
+                time > 0.0 ? "a pose" : "a model", static_cast<double>(fake_->uploaded() - before) / 1048576.0, frames,
+                sum_ms, longest_ms);
     EXPECT_LE(most, 2 * Upload::piece_bytes + small);
     EXPECT_LT(frames, 60);
     const std::uint64_t all = fake_->uploaded() - before;

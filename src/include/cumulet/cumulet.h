@@ -592,6 +592,20 @@ CUMULET_API cumulet_status cumulet_load_volume_file(cumulet_viewer* viewer, cons
 /* Begins to build this volume's grid, after the build under way, which is shown first. NULL: shows nothing, at once.
  * Cancels a load under way. */
 CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume);
+/*
+ * Where the volume stands from now on, whichever it is by then: once in each of count places, which share its grid and
+ * its memory and may overlap, where extinctions add up. to_world: of each a column-major 4x4 matrix, affine and
+ * invertible, from the world space that the volume itself has; zeros: the identity. count 0, and at first: there alone.
+ * Any such matrix, sheared or mirrored, too; extinction and emission stay those of a unit of length of the scene.
+ * Uploads a table of some 600 bytes a place (of one place nothing) and costs what moving the camera does, except that a
+ * size that changes how much the medium hides by more than a factor of 2 rebuilds the grid, as cumulet_set_medium does,
+ * and that a grid that follows the camera is fitted anew once they rest. Where more than four overlap at one point,
+ * pictures are right, but what is known without samples (AOVs, picks, views, a denoiser's guides) may leave some of
+ * them out. CUMULET_ERROR_INVALID_ARGUMENT for a matrix that is not affine, flattens space, or has numbers, or an
+ * inverse with numbers, above 1e15; CUMULET_ERROR_UNSUPPORTED, from cumulet_render, for more than the driver holds
+ * (200,000 at least) or a place 1e12 away from the others: then the places before stay.
+ */
+CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count);
 /* The volume last loaded or set, retained for the caller, who releases it; NULL if there is none. */
 CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out);
 /* Stops loading and building, within some 20 ms (see cumulet_destroy); what was shown stays, with the settings it was
@@ -937,9 +951,9 @@ CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumu
  * It comes before all else that the medium makes of values, and after the resampling onto the density's voxels:
  *   extinction = density_scale x ramp(density), T = temperature_offset + temperature_scale x ramp(temperature),
  *   flame_strength x flame_color x ramp(flame)
- * It is that of the viewer for all its volumes, and unknown to what is told of a volume by itself: its info, the
- * density scale that is suggested, what of it cameras fit. Each voxel has its own, of which cells are then made, for a
- * mean of ramps is no ramp of a mean. Another ramp builds the grid anew, in the background.
+ * It is that of the viewer for every volume that it is given, and unknown to what is told of a volume by itself: its
+ * info, the density scale that is suggested, what of it cameras fit. Each voxel has its own, of which cells are then
+ * made, for a mean of ramps is no ramp of a mean. Another ramp builds the grid anew, in the background.
  */
 CUMULET_API cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points,
                                             uint64_t count);
@@ -954,6 +968,51 @@ typedef struct cumulet_values_info {
 /* Some milliseconds a million voxels. */
 CUMULET_API cumulet_status cumulet_volume_get_values(const cumulet_volume* volume, cumulet_ramp ramp,
                                                      cumulet_values_info* info);
+
+/* ---- Instances: volumes beside the viewer's own -------------------------------------------------------------------
+ */
+
+/*
+ * A volume in a scene: where it stands and what it is made of. Counted, free of GL, and any number of viewers may show
+ * it, each beside its own volume (cumulet_set_volume) and other instances. They may overlap: extinctions add up, and
+ * what scatters is of whichever is met. Calls on an instance are for any thread, at any time; what they change is seen
+ * from the next frame on, and viewers that show it call their update callback, on that thread.
+ *
+ * Instances of one cumulet_volume whose media build the same share one grid, made for the one that needs the finest,
+ * and with the viewer's own volume, where it is that. Their grids are made as cumulet_set_grid says, one after another
+ * in the background; each is shown as soon as it is there. Moving one uploads a table of some 600 bytes an instance,
+ * not a grid, except that a grid that follows the camera is made anew. What cumulet_set_volume_places says of units, of
+ * the depth of overlaps and of limits holds for them. With CUMULET_MARCH_DENSE and CUMULET_MARCH_BRICK all that is
+ * shown has to be of one grid: else CUMULET_ERROR_UNSUPPORTED from cumulet_render, and what was shown before stays.
+ */
+typedef struct cumulet_instance cumulet_instance;
+
+typedef struct cumulet_instance_desc {
+  size_t struct_size;
+  cumulet_volume* volume; /* shared; NULL: none, and nothing is shown */
+  double to_world[16];    /* as a place of cumulet_set_volume_places; zeros: where the volume itself is */
+  const cumulet_medium_desc*
+      medium;     /* read in the call; NULL: its defaults. max_bounces is the viewer's own medium's */
+  int32_t hidden; /* 1: it is as if it were not there */
+  uint64_t tag;   /* the host's own, which cumulet_pick tells */
+} cumulet_instance_desc;
+
+/* error as in cumulet_create. */
+CUMULET_API cumulet_status cumulet_instance_create(const cumulet_instance_desc* desc, cumulet_instance** out,
+                                                   char* error, size_t error_size);
+CUMULET_API cumulet_instance* cumulet_instance_retain(cumulet_instance* instance); /* returns it; NULL is allowed */
+CUMULET_API void cumulet_instance_release(cumulet_instance* instance);             /* NULL is allowed */
+/* All of it but its ramps. CUMULET_ERROR_INVALID_ARGUMENT, and it stays as it was, for what is refused on creation. */
+CUMULET_API cumulet_status cumulet_instance_set(cumulet_instance* instance, const cumulet_instance_desc* desc);
+CUMULET_API cumulet_status cumulet_instance_set_to_world(cumulet_instance* instance, const double to_world[16]);
+/* cumulet_set_ramp, of the instance alone. */
+CUMULET_API cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ramp ramp, const float* points,
+                                                     uint64_t count);
+/* Retains it. CUMULET_ERROR_INVALID_ARGUMENT if the viewer shows it already. */
+CUMULET_API cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_instance* instance);
+/* CUMULET_ERROR_INVALID_ARGUMENT if it does not. */
+CUMULET_API cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumulet_instance* instance);
+
 CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
 CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer,
                                                             const cumulet_environment_settings_desc* desc);
@@ -1264,11 +1323,15 @@ typedef struct cumulet_pick {
   int32_t hit;        /* 1: a surface is met, or the volume reaches half opacity, along the pixel's ray */
   double position[3]; /* world space, where it does */
   double distance;    /* from the ray's origin */
+  int32_t met_volume; /* 1: it is the volume, 0: a surface, or nothing */
+  uint32_t place;     /* then: of cumulet_set_volume_places, the one with the most extinction there; of one 0 */
+  uint64_t tag;       /* cumulet_instance_desc.tag, if it is one that has the most; of the viewer's own volume 0 */
 } cumulet_pick;
 
 /* [GL] What is at the position x, y of the picture last rendered, in pixels of its frame. */
 CUMULET_API cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick);
-/* World bounds of the viewer's volume and triangles. CUMULET_ERROR_INVALID_ARGUMENT if it has neither. */
+/* World bounds of the viewer's volume, its instances and triangles. CUMULET_ERROR_INVALID_ARGUMENT if it has neither.
+ */
 CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], double box_max[3]);
 
 /*
@@ -1369,7 +1432,7 @@ typedef struct cumulet_stats {
   double trace_seconds; /* of the picture under way */
   uint64_t samples;     /* camera paths finished in it, as of the last cumulet_render */
   uint64_t steps;       /* cells or voxels entered by all rays of those paths, as of the last readback */
-  double bounds_min[3]; /* world bounds of the volume */
+  double bounds_min[3]; /* world bounds of the volume, wherever it stands */
   double bounds_max[3];
   char gl_vendor[128];
   char gl_renderer[128];

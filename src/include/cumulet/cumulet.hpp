@@ -9,7 +9,8 @@
  *
  *         viewer.set_medium({.density_scale = 4, .anisotropy = 0.7F}).value();
  *
- *     Enums and descriptors that are cumulet.h's field for field are in cumulet_descriptors.hpp, which the build makes.
+ *     Enums, descriptors and what calls tell are cumulet.h's field for field where they are in cumulet_descriptors.hpp,
+ *     which the build makes.
  *
  * Errors
  *     Nothing here throws, so that it also serves where exceptions are off. What can fail returns a Result, which the
@@ -37,8 +38,6 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
-
-#include <cumulet/cumulet_descriptors.hpp>
 
 #include "cumulet.h"
 
@@ -108,7 +107,18 @@ enum class RenderFlags : std::uint32_t {
   return RenderFlags{static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b)};
 }
 
-// ---- Results --------------------------------------------------------------------------------------------------------
+// ---- What the made part is of ---------------------------------------------------------------------------------------
+
+using Rgb = std::array<float, 3>;
+using Vector = std::array<double, 3>;
+/// Column-major.
+using Matrix = std::array<double, 16>;
+
+/// World space.
+struct Bounds {
+  Vector min{};
+  Vector max{};
+};
 
 /// Zero-terminated text in an array of its own, cut to fit.
 template <std::size_t Size>
@@ -125,6 +135,16 @@ class Text {
  private:
   std::array<char, Size> chars_{};
 };
+
+}  // namespace v0_2
+}  // namespace cumulet
+
+#include <cumulet/cumulet_descriptors.hpp>
+
+namespace cumulet {
+inline namespace v0_2 {
+
+// ---- Results --------------------------------------------------------------------------------------------------------
 
 /// Why a call failed: a status, and one line that names the file, where there is one, and the cause.
 struct Error {
@@ -228,15 +248,6 @@ template <class Desc>
 
 // ---- Volumes --------------------------------------------------------------------------------------------------------
 
-/// Column-major.
-using Matrix = std::array<double, 16>;
-
-/// World space.
-struct Bounds {
-  Vector min{};
-  Vector max{};
-};
-
 struct DenseDesc {
   std::span<const float> values{};
   std::array<std::int32_t, 3> size{};
@@ -279,55 +290,6 @@ struct SparseDesc {
                           .name = name};
     std::ranges::copy(index_to_world, c.index_to_world);
     return c;
-  }
-};
-
-struct VolumeInfo {
-  Text<128> name;
-  std::uint64_t active_voxels = 0;
-  Bounds bounds;
-  float max_value = 0.0F;
-  std::uint64_t negative_voxels = 0;
-  std::uint64_t non_finite_voxels = 0;
-};
-
-/// What a volume has of Ramp's grid.
-struct ValuesInfo {
-  float max_value = 0.0F;
-  std::array<std::uint64_t, CUMULET_HISTOGRAM_BINS> histogram{};
-};
-
-struct VolumeFileDesc {
-  const char* path = nullptr;
-  const char* grid_name = nullptr;
-  Matrix to_world{};
-  const char* temperature_grid = nullptr;
-  const char* flame_grid = nullptr;
-  const char* color_grid = nullptr;
-  const char* anisotropy_grid = nullptr;
-  bool suggested_density_scale = false;
-
-  operator cumulet_volume_file_desc() const noexcept {
-    cumulet_volume_file_desc c{.struct_size = sizeof c,
-                               .path = path,
-                               .grid_name = grid_name,
-                               .to_world = {},
-                               .temperature_grid = temperature_grid,
-                               .flame_grid = flame_grid,
-                               .color_grid = color_grid,
-                               .anisotropy_grid = anisotropy_grid,
-                               .suggested_density_scale = suggested_density_scale ? 1 : 0};
-    std::ranges::copy(to_world, c.to_world);
-    return c;
-  }
-};
-
-/// By what a picture is denoised: the path of a network's file, or by the filter of Denoise::fast.
-struct DenoiseDesc {
-  const char* network = nullptr;
-
-  operator cumulet_denoise_desc() const noexcept {
-    return {.struct_size = sizeof(cumulet_denoise_desc), .network = network};
   }
 };
 
@@ -376,19 +338,13 @@ class Volume {
   [[nodiscard]] Result<VolumeInfo> info() const noexcept {
     auto c = detail::sized<cumulet_volume_info>();
     if (auto done = detail::result(cumulet_volume_get_info(handle_, &c)); !done) return done.error();
-    const auto& [struct_size, name, active_voxels, bounds_min, bounds_max, max_value, negative, non_finite] = c;
-    return VolumeInfo{.name = Text<128>(name),
-                      .active_voxels = active_voxels,
-                      .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)},
-                      .max_value = max_value,
-                      .negative_voxels = negative,
-                      .non_finite_voxels = non_finite};
+    return VolumeInfo::of(c);
   }
   [[nodiscard]] Result<ValuesInfo> values(Ramp ramp) const noexcept {
     auto c = detail::sized<cumulet_values_info>();
     const cumulet_status status = cumulet_volume_get_values(handle_, static_cast<cumulet_ramp>(ramp), &c);
     if (auto done = detail::result(status); !done) return done.error();
-    return ValuesInfo{.max_value = c.max_value, .histogram = std::to_array(c.histogram)};
+    return ValuesInfo::of(c);
   }
   [[nodiscard]] Result<double> suggest_density_scale() const noexcept {
     double scale = 0.0;
@@ -424,46 +380,7 @@ template <class Visit>
   return detail::result(status, cause.data());
 }
 
-/// Texts live as long as the Inspection.
-struct VolumeFileInfo {
-  std::string_view format;
-  std::uint64_t bytes = 0;
-  std::uint32_t grid_count = 0;
-  std::uint32_t metadata_count = 0;
-  std::int32_t default_grid = -1;
-};
-
-/// Likewise.
-struct GridInfo {
-  std::string_view name;
-  std::string_view type;
-  std::string_view grid_class;
-  std::string_view refusal;
-  std::uint32_t metadata_count = 0;
-  GridValues values = GridValues::none;
-  Matrix index_to_world{};
-  std::uint64_t active_voxels = 0;
-  std::array<std::int32_t, 3> voxel_min{};
-  std::array<std::int32_t, 3> voxel_max{};
-  Bounds bounds;
-  float min_value = 0.0F;
-  float max_value = 0.0F;
-  double mean_value = 0.0;
-  std::uint64_t negative_voxels = 0;
-  std::uint64_t non_finite_voxels = 0;
-  std::uint64_t memory_bytes = 0;
-  std::array<std::uint64_t, CUMULET_HISTOGRAM_BINS> histogram{};
-  std::string_view channel;
-};
-
-/// Likewise.
-struct Metadata {
-  std::string_view name;
-  std::string_view type;
-  std::string_view value;
-};
-
-/// What is in a volume's file.
+/// What is in a volume's file. Texts of what it tells live as long as it does.
 class Inspection {
  public:
   Inspection() noexcept = default;
@@ -484,41 +401,19 @@ class Inspection {
   [[nodiscard]] Result<VolumeFileInfo> file() const noexcept {
     auto c = detail::sized<cumulet_volume_file_info>();
     if (auto done = detail::result(cumulet_inspection_get_file(handle_, &c)); !done) return done.error();
-    return VolumeFileInfo{.format = c.format,
-                          .bytes = c.bytes,
-                          .grid_count = c.grid_count,
-                          .metadata_count = c.metadata_count,
-                          .default_grid = c.default_grid};
+    return VolumeFileInfo::of(c);
   }
   [[nodiscard]] Result<GridInfo> grid(std::uint32_t index) const noexcept {
     auto c = detail::sized<cumulet_grid_info>();
     if (auto done = detail::result(cumulet_inspection_get_grid(handle_, index, &c)); !done) return done.error();
-    return GridInfo{.name = c.name,
-                    .type = c.type,
-                    .grid_class = c.grid_class,
-                    .refusal = c.refusal,
-                    .metadata_count = c.metadata_count,
-                    .values = static_cast<GridValues>(c.values),
-                    .index_to_world = std::to_array(c.index_to_world),
-                    .active_voxels = c.active_voxels,
-                    .voxel_min = std::to_array(c.voxel_min),
-                    .voxel_max = std::to_array(c.voxel_max),
-                    .bounds = {std::to_array(c.bounds_min), std::to_array(c.bounds_max)},
-                    .min_value = c.min_value,
-                    .max_value = c.max_value,
-                    .mean_value = c.mean_value,
-                    .negative_voxels = c.negative_voxels,
-                    .non_finite_voxels = c.non_finite_voxels,
-                    .memory_bytes = c.memory_bytes,
-                    .histogram = std::to_array(c.histogram),
-                    .channel = c.channel != nullptr ? c.channel : ""};
+    return GridInfo::of(c);
   }
   /// grid -1: of the file as a whole.
   [[nodiscard]] Result<Metadata> metadata(std::int32_t grid, std::uint32_t index) const noexcept {
     auto c = detail::sized<cumulet_metadata>();
     if (auto done = detail::result(cumulet_inspection_get_metadata(handle_, grid, index, &c)); !done)
       return done.error();
-    return Metadata{.name = c.name, .type = c.type, .value = c.value};
+    return Metadata::of(c);
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
@@ -577,24 +472,6 @@ struct TrianglesDesc {
   const char* name = nullptr;
 };
 
-struct SurfacesInfo {
-  Text<128> name;
-  std::uint64_t triangles = 0;
-  std::uint32_t materials = 0;
-  std::uint32_t lights = 0;
-  std::uint32_t cameras = 0;
-  std::uint32_t animations = 0;
-  Bounds bounds;
-  std::uint32_t meshes = 0;
-  std::uint32_t primitives = 0;
-  std::uint32_t textures = 0;
-};
-
-struct AnimationInfo {
-  Text<128> name;
-  double duration = 0.0;
-};
-
 /// A share in immutable surfaces: a copy is one more.
 class Surfaces {
  public:
@@ -643,24 +520,12 @@ class Surfaces {
   [[nodiscard]] Result<SurfacesInfo> info() const noexcept {
     auto c = detail::sized<cumulet_surfaces_info>();
     if (auto done = detail::result(cumulet_surfaces_get_info(handle_, &c)); !done) return done.error();
-    const auto& [struct_size, name, triangles, materials, lights, cameras, animations, bounds_min, bounds_max, meshes,
-                 primitives, textures] = c;
-    return SurfacesInfo{.name = Text<128>(name),
-                        .triangles = triangles,
-                        .materials = materials,
-                        .lights = lights,
-                        .cameras = cameras,
-                        .animations = animations,
-                        .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)},
-                        .meshes = meshes,
-                        .primitives = primitives,
-                        .textures = textures};
+    return SurfacesInfo::of(c);
   }
   [[nodiscard]] Result<AnimationInfo> animation(std::uint32_t index) const noexcept {
     auto c = detail::sized<cumulet_animation_info>();
     if (auto done = detail::result(cumulet_surfaces_get_animation(handle_, index, &c)); !done) return done.error();
-    const auto& [struct_size, name, duration] = c;
-    return AnimationInfo{.name = Text<128>(name), .duration = duration};
+    return AnimationInfo::of(c);
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
@@ -686,14 +551,6 @@ struct EnvironmentDesc {
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   const char* name = nullptr;
-};
-
-struct EnvironmentInfo {
-  Text<128> name;
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
-  std::uint64_t replaced_pixels = 0;
-  Vector mean_radiance{};
 };
 
 /// A share in an immutable environment: a copy is one more.
@@ -732,12 +589,7 @@ class Environment {
   [[nodiscard]] Result<EnvironmentInfo> info() const noexcept {
     auto c = detail::sized<cumulet_environment_info>();
     if (auto done = detail::result(cumulet_environment_get_info(handle_, &c)); !done) return done.error();
-    const auto& [struct_size, name, width, height, replaced_pixels, mean_radiance] = c;
-    return EnvironmentInfo{.name = Text<128>(name),
-                           .width = width,
-                           .height = height,
-                           .replaced_pixels = replaced_pixels,
-                           .mean_radiance = std::to_array(mean_radiance)};
+    return EnvironmentInfo::of(c);
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
@@ -754,6 +606,75 @@ class Environment {
 
  private:
   cumulet_environment* handle_ = nullptr;
+};
+
+// ---- Instances ------------------------------------------------------------------------------------------------------
+
+/// What an instance is made of: shares the volume.
+struct InstanceDesc {
+  Volume volume;
+  std::array<double, 16> to_world{};
+  MediumDesc medium = {};
+  bool hidden = false;
+  std::uint64_t tag = 0;
+};
+
+/// A share in a volume of scenes: a copy is one more of the same. Any thread.
+class Instance {
+ public:
+  Instance() noexcept = default;
+  Instance(const Instance& other) noexcept : handle_(cumulet_instance_retain(other.handle_)) {}
+  Instance(Instance&& other) noexcept : handle_(other.release()) {}
+  Instance& operator=(Instance other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Instance() { cumulet_instance_release(handle_); }
+
+  [[nodiscard]] static Result<Instance> create(const InstanceDesc& desc) noexcept {
+    const cumulet_medium_desc medium = desc.medium;
+    const cumulet_instance_desc c = described(desc, medium);
+    return detail::made<Instance>([&](cumulet_instance** out, char* error, std::size_t size) {
+      return cumulet_instance_create(&c, out, error, size);
+    });
+  }
+  [[nodiscard]] Result<> set(const InstanceDesc& desc) const noexcept {
+    const cumulet_medium_desc medium = desc.medium;
+    const cumulet_instance_desc c = described(desc, medium);
+    return detail::result(cumulet_instance_set(handle_, &c));
+  }
+  [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
+    return detail::result(cumulet_instance_set_to_world(handle_, to_world.data()));
+  }
+  [[nodiscard]] Result<> set_ramp(Ramp ramp, std::span<const std::array<float, 2>> points) const noexcept {
+    const float* first = points.empty() ? nullptr : points.front().data();
+    return detail::result(cumulet_instance_set_ramp(handle_, static_cast<cumulet_ramp>(ramp), first, points.size()));
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_instance* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_instance* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Instance adopt(cumulet_instance* handle) noexcept {
+    Instance instance;
+    instance.handle_ = handle;
+    return instance;
+  }
+
+ private:
+  static cumulet_instance_desc described(const InstanceDesc& desc, const cumulet_medium_desc& medium) noexcept {
+    cumulet_instance_desc c{.struct_size = sizeof c,
+                            .volume = desc.volume.handle(),
+                            .to_world = {},
+                            .medium = &medium,
+                            .hidden = desc.hidden ? 1 : 0,
+                            .tag = desc.tag};
+    std::ranges::copy(desc.to_world, c.to_world);
+    return c;
+  }
+  cumulet_instance* handle_ = nullptr;
 };
 
 // ---- Camera and input -----------------------------------------------------------------------------------------------
@@ -874,59 +795,6 @@ struct FrameResult {
   [[nodiscard]] constexpr bool has(RenderFlags any) const noexcept {
     return (static_cast<std::uint32_t>(flags) & static_cast<std::uint32_t>(any)) != 0;
   }
-};
-
-struct WarmUpResult {
-  bool more = false;
-  double progress = 0.0;
-};
-
-struct Pick {
-  bool hit = false;
-  Vector position{};
-  double distance = 0.0;
-};
-
-struct Progress {
-  Stage stage{};
-  double fraction = 0.0;
-  StatusCode status{};
-  Text<512> message;
-  StatusCode volume_status{};
-  Text<512> volume_message;
-  StatusCode surfaces_status{};
-  Text<512> surfaces_message;
-  StatusCode environment_status{};
-  Text<512> environment_message;
-};
-
-struct Stats {
-  std::uint64_t cells = 0;
-  std::uint32_t levels = 0;
-  std::uint64_t cell_bytes = 0;
-  std::uint64_t active_voxels = 0;
-  double build_seconds_total = 0.0;
-  double build_seconds_load = 0.0;
-  double build_seconds_statistics = 0.0;
-  double build_seconds_refine = 0.0;
-  double build_seconds_records = 0.0;
-  double build_seconds_upload = 0.0;
-  double trace_seconds = 0.0;
-  std::uint64_t samples = 0;
-  std::uint64_t steps = 0;
-  Bounds bounds;
-  Text<128> gl_vendor;
-  Text<128> gl_renderer;
-  Text<128> gl_version;
-  bool limited = false;
-  std::uint64_t gl_bytes = 0;
-  double pass_seconds_upload = 0.0;
-  double pass_seconds_host_depth = 0.0;
-  double pass_seconds_surfaces = 0.0;
-  double pass_seconds_trace = 0.0;
-  double pass_seconds_inspect = 0.0;
-  double pass_seconds_display = 0.0;
-  double noise = 0.0;
 };
 
 // ---- Viewer ---------------------------------------------------------------------------------------------------------
@@ -1067,6 +935,17 @@ class Viewer {
   [[nodiscard]] Result<> set_volume(const Volume& volume) noexcept {
     return result(cumulet_set_volume(handle(), volume.handle()));
   }
+  /// Column-major, affine: where the volume stands; none: where it is.
+  [[nodiscard]] Result<> set_volume_places(std::span<const std::array<double, 16>> to_world) noexcept {
+    const double* first = to_world.empty() ? nullptr : to_world.front().data();
+    return result(cumulet_set_volume_places(handle(), first, static_cast<uint32_t>(to_world.size())));
+  }
+  [[nodiscard]] Result<> add_instance(const Instance& instance) noexcept {
+    return result(cumulet_add_instance(handle(), instance.handle()));
+  }
+  [[nodiscard]] Result<> remove_instance(const Instance& instance) noexcept {
+    return result(cumulet_remove_instance(handle(), instance.handle()));
+  }
   /// Empty if there is none.
   [[nodiscard]] Result<Volume> get_volume() noexcept {
     cumulet_volume* out = nullptr;
@@ -1078,18 +957,7 @@ class Viewer {
     auto c = detail::sized<cumulet_progress>();
     // Safe at any time, which the last error is not.
     if (auto done = detail::result(cumulet_get_progress(handle(), &c)); !done) return done.error();
-    const auto& [struct_size, stage, fraction, status, message, volume_status, volume_message, surfaces_status,
-                 surfaces_message, environment_status, environment_message] = c;
-    return Progress{.stage = static_cast<Stage>(stage),
-                    .fraction = fraction,
-                    .status = static_cast<StatusCode>(status),
-                    .message = Text<512>(message),
-                    .volume_status = static_cast<StatusCode>(volume_status),
-                    .volume_message = Text<512>(volume_message),
-                    .surfaces_status = static_cast<StatusCode>(surfaces_status),
-                    .surfaces_message = Text<512>(surfaces_message),
-                    .environment_status = static_cast<StatusCode>(environment_status),
-                    .environment_message = Text<512>(environment_message)};
+    return Progress::of(c);
   }
   [[nodiscard]] Result<> wait(double timeout_ms = -1.0) noexcept { return result(cumulet_wait(handle(), timeout_ms)); }
   [[nodiscard]] Result<> rebuild() noexcept { return result(cumulet_rebuild(handle())); }
@@ -1186,13 +1054,12 @@ class Viewer {
     if (auto done = result(cumulet_warm_up(handle(), &desc, static_cast<cumulet_warm_up_scope>(scope), &c)); !done) {
       return done.error();
     }
-    return WarmUpResult{.more = c.more != 0, .progress = c.progress};
+    return WarmUpResult::of(c);
   }
   [[nodiscard]] Result<Pick> pick_at(double x, double y) noexcept {
     auto c = detail::sized<cumulet_pick>();
     if (auto done = result(cumulet_pick_at(handle(), x, y, &c)); !done) return done.error();
-    const auto& [struct_size, hit, position, distance] = c;
-    return Pick{.hit = hit != 0, .position = std::to_array(position), .distance = distance};
+    return Pick::of(c);
   }
   [[nodiscard]] Result<Bounds> get_bounds() noexcept {
     Bounds bounds;
@@ -1241,35 +1108,7 @@ class Viewer {
   [[nodiscard]] Result<Stats> get_stats() const noexcept {
     auto c = detail::sized<cumulet_stats>();
     if (auto done = result(cumulet_get_stats(handle(), &c)); !done) return done.error();
-    const auto& [struct_size, cells, levels, cell_bytes, active_voxels, total, load, statistics, refine, records,
-                 upload, trace, samples, steps, bounds_min, bounds_max, vendor, renderer, gl_version, limited, gl_bytes,
-                 pass_upload, pass_host_depth, pass_surfaces, pass_trace, pass_inspect, pass_display, noise] = c;
-    return Stats{.cells = cells,
-                 .levels = levels,
-                 .cell_bytes = cell_bytes,
-                 .active_voxels = active_voxels,
-                 .build_seconds_total = total,
-                 .build_seconds_load = load,
-                 .build_seconds_statistics = statistics,
-                 .build_seconds_refine = refine,
-                 .build_seconds_records = records,
-                 .build_seconds_upload = upload,
-                 .trace_seconds = trace,
-                 .samples = samples,
-                 .steps = steps,
-                 .bounds = {std::to_array(bounds_min), std::to_array(bounds_max)},
-                 .gl_vendor = Text<128>(vendor),
-                 .gl_renderer = Text<128>(renderer),
-                 .gl_version = Text<128>(gl_version),
-                 .limited = limited != 0,
-                 .gl_bytes = gl_bytes,
-                 .pass_seconds_upload = pass_upload,
-                 .pass_seconds_host_depth = pass_host_depth,
-                 .pass_seconds_surfaces = pass_surfaces,
-                 .pass_seconds_trace = pass_trace,
-                 .pass_seconds_inspect = pass_inspect,
-                 .pass_seconds_display = pass_display,
-                 .noise = noise};
+    return Stats::of(c);
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }

@@ -43,6 +43,10 @@ struct ReleaseEnvironment {
   void operator()(cumulet_environment* environment) const { cumulet_environment_release(environment); }
 };
 using EnvironmentRef = std::unique_ptr<cumulet_environment, ReleaseEnvironment>;
+struct ReleaseInstance {
+  void operator()(cumulet_instance* instance) const { cumulet_instance_release(instance); }
+};
+using InstanceRef = std::unique_ptr<cumulet_instance, ReleaseInstance>;
 struct ReleasePrograms {
   void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
 };
@@ -214,6 +218,14 @@ struct ViewerOptions {
   std::uint32_t samples = 4;
 };
 
+/// As the library makes one. Throws std::runtime_error.
+inline ViewerPtr make_plain_viewer(const cumulet_create_desc& desc) {
+  std::array<char, 256> error{};
+  cumulet_viewer* out = nullptr;
+  if (cumulet_create(&desc, &out, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
+  return ViewerPtr(out);
+}
+
 /// A viewer with light, a camera before make_ball, few samples a pixel and no preview. Throws std::runtime_error.
 inline ViewerPtr make_viewer(const ViewerOptions& options) {
   auto create = make_desc<cumulet_create_desc>();
@@ -224,10 +236,8 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   create.log = options.log;
   create.log_user = options.log_user;
   create.gl_state = options.gl_state;
-  std::array<char, 256> error{};
-  cumulet_viewer* out = nullptr;
-  if (cumulet_create(&create, &out, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
-  ViewerPtr viewer(out);
+  ViewerPtr viewer = make_plain_viewer(create);
+  cumulet_viewer* const out = viewer.get();
   auto light = make_desc<cumulet_light_desc>();
   light.sun_azimuth_degrees = 60.0F;
   light.sun_elevation_degrees = 40.0F;

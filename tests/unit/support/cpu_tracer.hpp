@@ -4,6 +4,7 @@
 
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
+#include "light/alias_table.hpp"
 #include "light/lamps.hpp"
 #include "render/parameters.hpp"
 #include "scene/model_source.hpp"
@@ -36,7 +37,12 @@ struct CpuTet : CpuTetData {
 struct CpuSurfaceData {
   const scene::ModelSource* model = nullptr;
   uvec4 cm_words(uint word) const { return model->words.at(word); }
-  CmLamp cm_lamp(uint i) const { return light::lamp_record(model->pose.lights.at(i), dvec3(0.0)); }
+  CmLamp cm_lamp(uint i) const {
+    CmLamp lamp = light::lamp_record(model->pose.lights.at(i), dvec3(0.0));
+    lamp.chance = 1.0F / static_cast<float>(model->pose.lights.size());
+    lamp.stays = light::Alias::certain;
+    return lamp;
+  }
   vec4 cm_atlas_value(ivec3 at) const {
     const scene::TextureAtlas& atlas = *model->atlas;
     for (std::size_t i = 0; i < atlas.places.size(); ++i) {

@@ -90,7 +90,8 @@ volume::ScalarVolume make_volume(const glm::ivec3& size, const glm::ivec3& low, 
         }
         if (!any) continue;
         v.brick_origins.emplace_back(x, y, z);
-        v.brick_values.insert(v.brick_values.end(), values.begin(), values.end());
+        std::vector<float>& all = v.brick_values.as_floats();
+        all.insert(all.end(), values.begin(), values.end());
       }
     }
   }

@@ -1,0 +1,57 @@
+#include "fire.hpp"
+
+#include <cmath>
+#include <presets.hpp>
+#include <scene_file.hpp>
+#include <settings.hpp>
+
+namespace cumulet::demo {
+
+namespace {
+
+// Of flames, in kelvin: temperatures of anything else are no reason to show a fire.
+constexpr double coldest_fire = 800.0;
+constexpr double hottest_fire = 6000.0;
+
+double most_of(const cumulet_volume* volume, cumulet_ramp ramp) {
+  cumulet_values_info info{};
+  info.struct_size = sizeof info;
+  return cumulet_volume_get_values(volume, ramp, &info) == CUMULET_OK ? double{info.max_value} : 0.0;
+}
+
+double size_of(const cumulet_volume* volume) {
+  cumulet_volume_info info{};
+  info.struct_size = sizeof info;
+  if (cumulet_volume_get_info(volume, &info) != CUMULET_OK) return 0.0;
+  const auto edge = [&](int axis) { return info.bounds_max[axis] - info.bounds_min[axis]; };
+  return std::hypot(edge(0), edge(1), edge(2));
+}
+
+}  // namespace
+
+bool is_unsaid(const cumulet_medium_desc& medium) {
+  cumulet_medium_desc said = medium;
+  cumulet_medium_desc plain = SceneOptions().medium;
+  plain.density_scale = said.density_scale;
+  settings::spell_out_zeros(said);
+  settings::spell_out_zeros(plain);
+  return settings::same(said, plain);
+}
+
+std::optional<cumulet_medium_desc> medium_of_fire(const cumulet_volume* volume, const cumulet_medium_desc& plain) {
+  cumulet_medium_desc medium = plain;
+  settings::spell_out_zeros(medium);
+  Burning burning{.flame = most_of(volume, CUMULET_RAMP_FLAME),
+                  .temperature = most_of(volume, CUMULET_RAMP_TEMPERATURE),
+                  .size = size_of(volume)};
+  // Smoke may be warm, and a cloud has its kelvin.
+  const double kelvin = double{medium.temperature_scale} * burning.temperature;
+  if (!(kelvin >= coldest_fire && kelvin <= hottest_fire)) burning.temperature = 0.0;
+  if (!(burning.flame + burning.temperature > 0.0) || !(burning.size > 0.0)) return std::nullopt;
+  if (cumulet_volume_suggest_density_scale(volume, &medium.density_scale) != CUMULET_OK)
+    medium.density_scale = 0.0;  // a fire alone
+  apply(burning, medium);
+  return medium;
+}
+
+}  // namespace cumulet::demo

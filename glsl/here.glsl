@@ -1,0 +1,35 @@
+// The volume that a path marches through, or has come to an event in: CM_GRID, its data; CM_MEDIUM; CM_GLOW. With
+// CM_INSTANCES one of a table, whose number is in cm_here; then cube space is the scene's frame to all else, and that
+// volume has its own. Shared by GLSL and C++; the includer has parameters.glsl before this, and with CM_INSTANCES
+//   uint cm_here   where functions may change it
+#ifndef CM_HERE_GLSL
+#define CM_HERE_GLSL
+
+#include "numbers.glsl"
+
+#undef CM_GRID
+#undef CM_MEDIUM
+#undef CM_GLOW
+#if CM_INSTANCES
+#define CM_GRID cm_instances[cm_here].grid
+#define CM_MEDIUM cm_instances[cm_here].medium
+#define CM_GLOW cm_instances[cm_here].glow
+#ifndef __cplusplus
+#include "instance_table.glsl"
+uint cm_here = 0u;
+#endif
+#include "instance.glsl"
+
+// A vector and a point of the space that rays are in, in the cube space of that volume.
+CM_FN vec3 cm_in_volume(vec3 v) { return cm_in_instance(cm_here, v); }
+CM_FN vec3 cm_in_volume_point(vec3 p) { return cm_in_instance_point(cm_here, p); }
+#else
+#define CM_GRID cm.grid
+#define CM_MEDIUM cm.medium
+#define CM_GLOW cm.glow
+
+CM_FN vec3 cm_in_volume(vec3 v) { return v; }
+CM_FN vec3 cm_in_volume_point(vec3 p) { return p; }
+#endif
+
+#endif

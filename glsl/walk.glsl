@@ -1,0 +1,191 @@
+// A ray's way through the volume, or through all of them together, part by part: over a part extinction is linear. For
+// what is known without chance; paths go through volumes one by one (flight.glsl). The includer has march.glsl and
+// ray.glsl before this.
+#ifndef CM_WALK_GLSL
+#define CM_WALK_GLSL
+
+// That a ray may be in at once. With more of them at one place those that it enters last are taken up when others end.
+#if CM_INSTANCES
+#define CM_MOST_FRONTS 4
+#else
+#define CM_MOST_FRONTS 1
+#endif
+
+// A volume that the ray is in: its cell, from t_0 to t_1, with the extinctions there.
+struct CmFront {
+  uvec3 cell;
+  uvec3 next;
+  float t_0;
+  float t_1;
+  float e_0;
+  float e_1;
+  uint volume;
+};
+
+struct CmWalk {
+  vec3 o;
+  vec3 d;
+  float t;  // where the part begins
+  float t_end;
+  int count;
+  CmFront front[CM_MOST_FRONTS];
+  float entry;   // where it enters the volume that comes next, 3e38: none does
+  uint volume;   // that one
+};
+
+void cm_stand_at(CmFront front) {
+#if CM_INSTANCES
+  cm_here = front.volume;
+#endif
+}
+
+// Into front.next, from t on.
+void cm_front_step(vec3 o, vec3 d, float t, inout CmFront front) {
+  cm_stand_at(front);
+  vec3 along = cm_in_volume(d);
+  front.cell = front.next;
+  front.t_0 = t;
+  float r_0;
+  float r_1;
+  cm_march_step(front.cell, cm_in_volume_point(o), along, 1.0 / along, t, front.t_1, r_0, r_1, front.next);
+  front.e_0 = CM_MEDIUM.extinction * r_0;
+  front.e_1 = CM_MEDIUM.extinction * r_1;
+}
+
+float cm_front_extinction(CmFront front, float t) {
+  if (t >= front.t_1) return front.e_1;
+  return front.e_0 + (front.e_1 - front.e_0) * ((t - front.t_0) / (front.t_1 - front.t_0));
+}
+
+// The volume that comes next.
+void cm_walk_seek(inout CmWalk walk) {
+#if CM_INSTANCES
+  if (!cm_next_instance(walk.o, walk.d, walk.t_end, CM_INSTANCE_SEEN, walk.entry, walk.volume)) walk.entry = 3.0e38;
+#else
+  walk.entry = 3.0e38;
+#endif
+}
+
+CmWalk cm_walk(vec3 o, vec3 d, float t_end) {
+  CmWalk walk;
+  walk.o = o;
+  walk.d = d;
+  walk.t = 0.0;
+  walk.t_end = t_end;
+  walk.count = 0;
+#if CM_INSTANCES
+  walk.entry = -1.0;
+  walk.volume = CM_INSTANCE_NONE;
+  cm_walk_seek(walk);
+#else
+  vec2 range = cm_box_range(o, d);
+  walk.t_end = min(range.y, t_end);
+  walk.entry = range.x < walk.t_end ? range.x : 3.0e38;
+  walk.volume = 0u;
+#endif
+  return walk;
+}
+
+// The part from walk.t on: where it ends, perhaps behind t_end, and the extinctions at its ends. False: there is none.
+bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1) {
+  t_1 = 3.0e38;
+  e_0 = 0.0;
+  e_1 = 0.0;
+  while (walk.count < CM_MOST_FRONTS && walk.entry < 3.0e38 && (walk.count == 0 || walk.entry <= walk.t)) {
+    walk.t = max(walk.t, walk.entry);
+    CmFront front;
+    front.volume = walk.volume;
+    cm_stand_at(front);
+    front.next = cm_march_enter_at(walk.o, walk.d, walk.t);
+    cm_front_step(walk.o, walk.d, walk.t, front);
+    walk.front[walk.count] = front;
+    walk.count += 1;
+    cm_walk_seek(walk);
+  }
+  if (walk.count == 0 || walk.t >= walk.t_end) return false;
+  if (walk.count < CM_MOST_FRONTS) t_1 = walk.entry;
+  for (int k = 0; k < walk.count; ++k) t_1 = min(t_1, walk.front[k].t_1);
+  for (int k = 0; k < walk.count; ++k) {
+    e_0 += walk.t == walk.front[k].t_0 ? walk.front[k].e_0 : cm_front_extinction(walk.front[k], walk.t);
+    e_1 += cm_front_extinction(walk.front[k], t_1);
+  }
+  return true;
+}
+
+// Goes on to the next part, behind t_1.
+void cm_walk_on(inout CmWalk walk, float t_1) {
+  walk.t = t_1;
+  int kept = 0;
+  for (int k = 0; k < walk.count; ++k) {
+    CmFront front = walk.front[k];
+    bool leaves = front.t_1 <= t_1;
+    if (leaves && front.next.x == CM_NONE) continue;
+    if (leaves) cm_front_step(walk.o, walk.d, walk.t, front);
+    walk.front[kept] = front;
+    kept += 1;
+  }
+  walk.count = kept;
+}
+
+// Of a volume that the ray is in at t, if any: where, as the first front.
+bool cm_walk_to(inout CmWalk walk, float t) {
+  while (walk.entry < t) {
+    CmFront front;
+    front.volume = walk.volume;
+    cm_stand_at(front);
+    vec3 p = cm_in_volume_point(walk.o) + t * cm_in_volume(walk.d);
+    if (p == clamp(p, CM_GRID.box_min, CM_GRID.box_max)) {
+      front.cell = cm_march_enter(p);
+      walk.front[0] = front;
+      return true;
+    }
+    cm_walk_seek(walk);
+  }
+  return false;
+}
+
+// Of those that the ray is in, the one with the most extinction at t.
+uint cm_walk_densest(inout CmWalk walk, float t) {
+  uint densest = walk.front[0].volume;
+  float most = -1.0;
+  for (int k = 0; k < walk.count; ++k) {
+    float extinction = cm_front_extinction(walk.front[k], t);
+    if (extinction > most) densest = walk.front[k].volume;
+    most = max(most, extinction);
+  }
+  return densest;
+}
+
+// Of the part, per extinction: what their media give off.
+vec3 cm_walk_source(inout CmWalk walk) {
+#if CM_INSTANCES
+  vec3 source = vec3(0.0);
+  float sum = 0.0;
+  for (int k = 0; k < walk.count; ++k) {
+    cm_stand_at(walk.front[k]);
+    float extinction = walk.front[k].e_0 + walk.front[k].e_1;
+    source += extinction * CM_MEDIUM.source;
+    sum += extinction;
+  }
+  return sum > 0.0 ? source / sum : vec3(0.0);
+#else
+  return cm.medium.source;
+#endif
+}
+
+#if CM_CHANNELS
+// What their cells give off from the part's beginning to t_1.
+vec3 cm_walk_emitted(inout CmWalk walk, float t_1) {
+  vec3 emitted = vec3(0.0);
+  for (int k = 0; k < walk.count; ++k) {
+    CmFront front = walk.front[k];
+    cm_stand_at(front);
+    CmEmission emission =
+        cm_march_emission(front.cell, cm_in_volume_point(walk.o), cm_in_volume(walk.d));
+    emitted += cm_emitted(emission, walk.t, t_1);
+  }
+  return emitted;
+}
+#endif
+
+#endif

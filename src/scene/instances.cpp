@@ -1,0 +1,240 @@
+#include "scene/instances.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <glm/gtc/matrix_transform.hpp>
+#include <limits>
+#include <string>
+
+#include "base/error.hpp"
+#include "light/alias_table.hpp"
+#include "scene/space.hpp"
+#include "surface/bvh.hpp"
+
+namespace cumulet::scene {
+
+namespace {
+
+using core::CmInstance;
+using core::CmInstanceNode;
+using glm::dvec3;
+using glm::vec3;
+using surface::Bvh;
+
+constexpr double farthest = 1e12;  // what surface::Bvh takes
+
+// Of which shaders' products are finite.
+bool is_sound(const vec3& v) { return core::cm_is_within(v, 1e15F); }
+
+bool is_sound(const core::CmSpace& s) {
+  return is_sound(s.to_cube_x) && is_sound(s.to_cube_y) && is_sound(s.to_cube_z) && is_sound(s.from_cube_x) &&
+         is_sound(s.from_cube_y) && is_sound(s.from_cube_z) && is_sound(s.cube_origin);
+}
+
+// An instance's box in the scene's frame: middle + the edges' halves, each times -1 to 1.
+struct Block {
+  dvec3 middle{0.0};
+  std::array<dvec3, 3> half{};
+
+  // Along an axis, how far it reaches from its middle.
+  [[nodiscard]] double reach(const dvec3& axis) const {
+    return std::abs(glm::dot(axis, half[0])) + std::abs(glm::dot(axis, half[1])) + std::abs(glm::dot(axis, half[2]));
+  }
+};
+
+dvec3 reach_of(const Block& block) {
+  return {block.reach({1.0, 0.0, 0.0}), block.reach({0.0, 1.0, 0.0}), block.reach({0.0, 0.0, 1.0})};
+}
+
+bool is_solid(const core::CmGrid& grid) { return glm::all(glm::lessThan(grid.box_min, grid.box_max)); }
+
+Block block_of(const glm::dmat4& to_scene, const core::CmGrid& grid) {
+  const dvec3 low(grid.box_min);
+  const dvec3 high(grid.box_max);
+  Block block;
+  block.middle = dvec3(to_scene * glm::dvec4(0.5 * (low + high), 1.0));
+  for (int axis = 0; axis < 3; ++axis)
+    block.half[static_cast<std::size_t>(axis)] = 0.5 * (high[axis] - low[axis]) * dvec3(to_scene[axis]);
+  return block;
+}
+
+// Whether there is an axis along which they lie apart: those upright to two edges, of one or of both, suffice. Blocks
+// that touch are apart.
+bool overlap(const Block& a, const Block& b) {
+  constexpr double inside = 1.0 - 1e-6;  // as far as floats tell
+  const dvec3 between = b.middle - a.middle;
+  const auto apart = [&](const dvec3& axis) {
+    const double reach = a.reach(axis) + b.reach(axis);
+    return reach > 0.0 && std::abs(glm::dot(axis, between)) >= inside * reach;
+  };
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (apart(glm::cross(a.half[i], a.half[(i + 1) % 3])) || apart(glm::cross(b.half[i], b.half[(i + 1) % 3])))
+      return false;
+    for (std::size_t j = 0; j < 3; ++j) {
+      if (apart(glm::cross(a.half[i], b.half[j]))) return false;
+    }
+  }
+  return true;
+}
+
+// The tree of boxes that triangles have, in the order that needs no stack.
+class Threaded {
+ public:
+  // Two corners each, in the order of the instances; left_out: of those that are empty.
+  static std::vector<CmInstanceNode> nodes_of(const std::vector<surface::PosedVertex>& corners,
+                                              const std::vector<std::uint32_t>& left_out) {
+    // Of two corners a triangle has the same box.
+    std::vector<std::uint32_t> indices;
+    indices.reserve(corners.size() / 2 * 3);
+    for (std::uint32_t i = 0; i < corners.size(); i += 2) indices.insert(indices.end(), {i, i + 1, i});
+    const Bvh tree = Bvh::build(corners, indices, left_out);
+    Threaded threaded(tree);
+    const auto& root = tree.nodes()[0].child;
+    const bool both = threaded.is_there(root[1]);
+    threaded.add_inner(both ? glm::min(root[0].low, root[1].low) : root[0].low,
+                       both ? glm::max(root[0].high, root[1].high) : root[0].high, [&] {
+                         for (const Bvh::Node::Child& child : root) threaded.add(child);
+                       });
+    return std::move(threaded.nodes_);
+  }
+
+ private:
+  explicit Threaded(const Bvh& tree) : tree_(tree) {}
+
+  static std::size_t first_of(const Bvh::Node::Child& leaf) { return leaf.link & 0x1fffffffU; }
+  // A tree of one leaf has no second child, one of nothing has none.
+  [[nodiscard]] bool is_there(const Bvh::Node::Child& child) const {
+    return child.link < Bvh::leaf_bit || first_of(child) < tree_.records().size();
+  }
+
+  template <class Children>
+  void add_inner(const vec3& low, const vec3& high, const Children& add_children) {
+    const std::size_t at = nodes_.size();
+    nodes_.push_back({low, 0, high, core::CM_INSTANCE_NONE});
+    add_children();
+    nodes_[at].skip = static_cast<std::uint32_t>(nodes_.size());
+  }
+
+  // No deeper than Bvh::max_depth.
+  void add(const Bvh::Node::Child& child) {  // NOLINT(misc-no-recursion)
+    if (child.link < Bvh::leaf_bit) {
+      add_inner(child.low, child.high, [&] {
+        for (const Bvh::Node::Child& next : tree_.nodes()[child.link].child) add(next);
+      });
+      return;
+    }
+    if (!is_there(child)) return;
+    const std::size_t count = ((child.link >> 29U) & 3U) + 1;
+    const auto add_leaves = [&] {
+      for (const Bvh::Record& record : tree_.records().subspan(first_of(child), count)) {
+        nodes_.push_back({record.v0, static_cast<std::uint32_t>(nodes_.size() + 1), record.v1, record.triangle});
+      }
+    };
+    count == 1 ? add_leaves() : add_inner(child.low, child.high, add_leaves);
+  }
+
+  const Bvh& tree_;
+  std::vector<CmInstanceNode> nodes_;
+};
+
+// Whether any other's box has points of this one's.
+bool overlaps_another(const InstanceTable& table, const std::vector<Block>& blocks, const CmInstanceNode& leaf) {
+  for (std::size_t i = 0; i < table.nodes.size();) {
+    const CmInstanceNode& node = table.nodes[i];
+    const bool near =
+        glm::all(glm::lessThanEqual(node.low, leaf.high)) && glm::all(glm::lessThanEqual(leaf.low, node.high));
+    if (near && node.instance != core::CM_INSTANCE_NONE && node.instance != leaf.instance &&
+        overlap(blocks[node.instance], blocks[leaf.instance]))
+      return true;
+    i = near ? i + 1 : node.skip;
+  }
+  return false;
+}
+
+// How likely looks are for the cells of each.
+void set_glow(InstanceTable& table, const std::vector<PlacedGlow>& glow) {
+  double square = 0.0;  // the integral of its square, as each has it: length^3 = power^2 / square
+  std::vector<double> power;
+  for (const PlacedGlow& of : glow) {
+    power.push_back(of.power);
+    table.glow_power += of.power;
+    if (of.power > 0.0) square += of.power / of.length * (of.power / of.length) / of.length;
+  }
+  if (!(table.glow_power > 1e-30)) {  // a float has no inverse of it
+    table.glow_power = 0.0;
+    return;
+  }
+  table.glow_length = std::cbrt(table.glow_power / square * table.glow_power);
+  const std::vector<light::Alias> aliases = light::alias_table(std::move(power), table.glow_power);
+  for (std::size_t i = 0; i < aliases.size(); ++i) {
+    CmInstance& record = table.records[i];
+    record.alias = aliases[i].stays;
+    record.alias_other = aliases[i].other;
+    record.glow = glow[i].looks;
+    if (glow[i].power > 0.0) record.glow.density = static_cast<float>(1.0 / table.glow_power);
+  }
+}
+
+}  // namespace
+
+dvec3 origin_of(std::span<const Instance> instances) {
+  dvec3 low(std::numeric_limits<double>::infinity());
+  dvec3 high(-low);
+  for (const Instance& instance : instances) {
+    if (!is_solid(instance.grid)) continue;
+    const Block block = block_of(instance.place * instance.source->cube.to_world, instance.grid);
+    const dvec3 reach = reach_of(block);
+    low = glm::min(low, block.middle - reach);
+    high = glm::max(high, block.middle + reach);
+  }
+  if (!(low.x <= high.x)) return dvec3(0.0);  // of nothing
+  // A lattice as wide as the scene.
+  const double step = std::exp2(std::ceil(std::log2(glm::distance(low, high))));
+  return glm::round(0.5 * (low + high) / step) * step + 0.0;  // no -0
+}
+
+InstanceTable make_instances(std::span<const Instance> instances, const dvec3& origin) {
+  InstanceTable table;
+  std::vector<Block> blocks;
+  std::vector<PlacedGlow> glow;
+  std::vector<surface::PosedVertex> corners;
+  std::vector<std::uint32_t> left_out;
+  const auto refuse = [&](ErrorCode code, const char* cause) {
+    throw Error(code, "instance " + std::to_string(table.records.size()) + ": " + cause);
+  };
+  for (const Instance& instance : instances) {
+    const grid::Cube& cube = instance.source->cube;
+    const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * instance.place * cube.to_world;
+    CmInstance record{};
+    record.space = space_of(to_scene, instance.grid.box_min, instance.grid.box_max);
+    if (!is_sound(record.space))
+      refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
+    record.grid = instance.grid;
+    record.medium = instance.medium;
+    record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
+                   (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U);
+    glow.push_back(glow_of(instance.source->glow, cube.to_world, instance.place));
+    const Block& block = blocks.emplace_back(block_of(to_scene, instance.grid));
+    const dvec3 reach = reach_of(block);
+    const dvec3 most = glm::abs(block.middle) + reach;
+    const double size = std::max({most.x, most.y, most.z});
+    if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the scene");
+    // A ray that its own box takes for inside is here, but for what rounding may be.
+    const dvec3 room = reach + 2e-6 * size;
+    corners.push_back({vec3(block.middle - room), vec3(0.0F)});
+    corners.push_back({vec3(block.middle + room), vec3(0.0F)});
+    left_out.push_back(is_solid(instance.grid) ? 0U : surface::TriangleFlags::left_out);
+    table.records.push_back(record);
+  }
+  table.nodes = Threaded::nodes_of(corners, left_out);
+  for (const CmInstanceNode& node : table.nodes) {
+    if (node.instance != core::CM_INSTANCE_NONE && overlaps_another(table, blocks, node))
+      table.records[node.instance].flags |= core::CM_INSTANCE_OVERLAPS;
+  }
+  set_glow(table, glow);
+  return table;
+}
+
+}  // namespace cumulet::scene

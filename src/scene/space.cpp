@@ -1,0 +1,53 @@
+#include "scene/space.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cumulet::scene {
+
+namespace {
+
+using glm::vec3;
+
+// No vector of length 1 is shorter after it: one over a bound of the inverse's norm.
+double least_stretch(const glm::dmat3& linear) {
+  const glm::dmat3 inverse = glm::inverse(linear);
+  const auto widest_column = [](const glm::dmat3& m) {
+    const auto sum = [](const glm::dvec3& v) { return glm::dot(glm::abs(v), glm::dvec3(1.0)); };
+    return std::max({sum(m[0]), sum(m[1]), sum(m[2])});
+  };
+  return 1.0 / std::sqrt(widest_column(inverse) * widest_column(glm::transpose(inverse)));
+}
+
+}  // namespace
+
+core::CmSpace space_of(const glm::dmat4& cube_to_world, const vec3& low, const vec3& high) {
+  const glm::dmat3 from_cube(cube_to_world);
+  const glm::dmat3 to_cube(glm::inverse(cube_to_world));
+  core::CmSpace space{};
+  space.to_cube_x = vec3(to_cube[0]);
+  space.to_cube_y = vec3(to_cube[1]);
+  space.to_cube_z = vec3(to_cube[2]);
+  space.from_cube_x = vec3(from_cube[0]);
+  space.from_cube_y = vec3(from_cube[1]);
+  space.from_cube_z = vec3(from_cube[2]);
+  space.cube_origin = vec3(cube_to_world[3]);
+  space.unit_volume = static_cast<float>(std::abs(glm::determinant(from_cube)));
+  space.box_min = low;
+  space.box_max = high;
+  return space;
+}
+
+double mean_stretch(const glm::dmat4& place) { return std::cbrt(std::abs(glm::determinant(glm::dmat3(place)))); }
+
+PlacedGlow glow_of(const GlowTable& table, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
+  if (table.cells.empty()) return {};
+  PlacedGlow glow{.power = table.power * std::abs(glm::determinant(glm::dmat3(place))),
+                  .length = table.length * mean_stretch(place)};
+  glow.looks.density = static_cast<float>(1.0 / glow.power);
+  glow.looks.extent = static_cast<float>(glow.length);
+  glow.looks.least_stretch = static_cast<float>(least_stretch(glm::dmat3(place * cube_to_world)));
+  return glow;
+}
+
+}  // namespace cumulet::scene

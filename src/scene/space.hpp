@@ -1,0 +1,26 @@
+#pragma once
+
+// Where a volume stands, as shaders are told. No GL.
+
+#include <glm/glm.hpp>
+
+#include "base/parameters.hpp"
+#include "scene/glow.hpp"
+
+namespace cumulet::scene {
+
+/// Of a cube of this place in the world, in which all there is to march through is inside low to high (cube space).
+core::CmSpace space_of(const glm::dmat4& cube_to_world, const glm::vec3& low, const glm::vec3& high);
+
+/// How much a length grows by it, on average: the cube root of how much a volume does.
+double mean_stretch(const glm::dmat4& place);
+
+/// A volume's own table, of it as it stands at that place: what it gives off, and how much of a ray that takes.
+struct PlacedGlow {
+  double power = 0.0;  ///< as GlowTable has both
+  double length = 0.0;
+  core::CmGlow looks{};
+};
+PlacedGlow glow_of(const GlowTable& table, const glm::dmat4& cube_to_world, const glm::dmat4& place);
+
+}  // namespace cumulet::scene

@@ -1,0 +1,70 @@
+// The C ABI's instances. What each call does is in cumulet.h.
+
+#include <array>
+#include <memory>
+
+#include "viewer/c_handles.hpp"
+#include "viewer/c_ramp.hpp"
+#include "viewer/c_settings.hpp"
+#include "viewer/c_support.hpp"
+
+namespace {
+
+using namespace cumulet::c_abi;
+using cumulet::viewer::Instance;
+using cumulet::viewer::InstanceSettings;
+using cumulet::viewer::Medium;
+
+// All but the ramps.
+InstanceSettings settings_of(const cumulet_instance_desc* desc) {
+  const cumulet_instance_desc d = read_desc(desc, "cumulet_instance_desc");
+  require(d.hidden == 0 || d.hidden == 1, "cumulet_instance_desc.hidden is not 0 or 1");
+  InstanceSettings settings;
+  if (d.volume != nullptr) settings.volume = d.volume->asset;
+  settings.to_world = matrix_or_identity(d.to_world);
+  require_place(settings.to_world, "cumulet_instance_desc.");
+  cumulet_medium_desc medium{};
+  medium.struct_size = sizeof medium;
+  settings.medium = Medium::of(read_settings(d.medium == nullptr ? &medium : d.medium));
+  settings.hidden = d.hidden != 0;
+  settings.tag = d.tag;
+  return settings;
+}
+
+}  // namespace
+
+cumulet_status cumulet_instance_create(const cumulet_instance_desc* desc, cumulet_instance** out, char* error,
+                                       size_t error_size) {
+  return make_handle(out, error, error_size, [&] { return std::make_shared<Instance>(settings_of(desc)); });
+}
+
+cumulet_instance* cumulet_instance_retain(cumulet_instance* instance) { return retain(instance); }
+
+void cumulet_instance_release(cumulet_instance* instance) { release(instance); }
+
+cumulet_status cumulet_instance_set(cumulet_instance* instance, const cumulet_instance_desc* desc) {
+  return on(instance, "instance", [&](Instance& i) {
+    InstanceSettings settings = settings_of(desc);
+    i.edit([&](InstanceSettings& old) {
+      settings.ramps = std::move(old.ramps);
+      std::swap(old, settings);  // what the old one held ends after the lock
+    });
+  });
+}
+
+cumulet_status cumulet_instance_set_to_world(cumulet_instance* instance, const double to_world[16]) {
+  return on(instance, "instance", [&](Instance& i) {
+    require(to_world != nullptr, "to_world is NULL");
+    const glm::dmat4 place = matrix_or_identity(std::span<const double, 16>(to_world, 16));
+    require_place(place);
+    i.edit([&](InstanceSettings& settings) { settings.to_world = place; });
+  });
+}
+
+cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ramp ramp, const float* points,
+                                         uint64_t count) {
+  return on(instance, "instance", [&](Instance& i) {
+    auto read = read_ramp(ramp, points, count);
+    i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.place, read.ramp); });
+  });
+}

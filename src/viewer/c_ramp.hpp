@@ -1,0 +1,42 @@
+#pragma once
+
+// A host's ramp.
+
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "settings/ramp.hpp"
+#include "viewer/c_support.hpp"
+#include "viewer/settings.hpp"
+#include "volume/ramp.hpp"
+
+namespace cumulet::c_abi {
+
+struct PlacedRamp {
+  volume::Ramp viewer::Ramps::*place;
+  volume::Ramp ramp;
+};
+
+/// Refuses what is none.
+inline PlacedRamp read_ramp(cumulet_ramp of, const float* points, std::uint64_t count) {
+  constexpr std::array places = {&viewer::Ramps::density, &viewer::Ramps::temperature, &viewer::Ramps::flame};
+  static_assert(places.size() == settings::ramps.size());
+  require(number(of) < places.size(), "ramp is unknown");
+  const auto accept = [&](const std::string& why) {
+    if (!why.empty()) refuse(std::string("the ramp of ") + settings::ramps.at(number(of)).name + " " + why);
+  };
+  accept(settings::ramp_count_refusal(count));
+  const std::span<const float> given = array_of(points, count, 2, "points");
+  settings::RampPoints checked;
+  std::vector<glm::vec2> curve;
+  for (std::size_t i = 0; i < given.size(); i += 2) {
+    checked.push_back({given[i], given[i + 1]});
+    curve.emplace_back(given[i], given[i + 1]);
+  }
+  accept(settings::ramp_refusal(checked));
+  return {places.at(number(of)), volume::Ramp(std::move(curve))};
+}
+
+}  // namespace cumulet::c_abi

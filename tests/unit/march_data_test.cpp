@@ -1,0 +1,269 @@
+// Grids of a set share buffers: whatever stands beside it, in however many pages, shaders find what each has, and one
+// that was there before is not brought again.
+
+#include "render/march_data.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <random>
+#include <string>
+
+#include "base/error.hpp"
+#include "gl/bindings.hpp"
+#include "support/fake_gl.hpp"
+#include "support/gl_compute.hpp"
+#include "support/gl_state.hpp"
+
+namespace {
+
+using namespace cumulet;
+using glm::uvec4;
+using render::Deadline;
+using render::MarchData;
+using render::MarchUpload;
+using scene::MarchSourcePtr;
+using Sources = MarchUpload::Sources;
+using Words = std::vector<uvec4>;
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : engine_(seed) {}
+  std::uint32_t operator()() { return static_cast<std::uint32_t>(engine_()); }
+  // Of what there is in a record, whose bits shaders take as they are.
+  template <class T>
+  std::vector<T> records(std::size_t count) {
+    std::vector<T> all(count);
+    for (T& record : all) {
+      std::array<std::uint32_t, (sizeof(T) + 3) / 4> words{};
+      for (std::uint32_t& word : words) word = (*this)() & 0xbfffffffU;  // floats that are no NaN, or drivers turn bits
+      std::memcpy(static_cast<void*>(&record), words.data(), sizeof record);
+    }
+    return all;
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+struct Sizes {
+  std::size_t cells = 0, emission = 0, glowing = 0, colour = 0, anisotropy = 0, tree = 1;
+};
+
+MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
+  Random random(seed);
+  auto grid = std::make_shared<grid::TetGrid>();
+  grid->cells = random.records<grid::CellRecord>(sizes.cells);
+  grid->emission = random.records<grid::EmissionRecord>(sizes.emission);
+  grid->colour = random.records<std::uint32_t>(sizes.colour);
+  grid->anisotropy = random.records<std::int16_t>(sizes.anisotropy);
+  grid->tree = random.records<std::uint32_t>(sizes.tree);
+  for (grid::RootEntry& root : grid->roots) root = {random(), random()};
+  grid->levels = seed;
+  grid->content_min = glm::vec3(static_cast<float>(seed));
+  grid->content_max = grid->content_min + 5.0F;
+  auto source = std::make_shared<scene::MarchSource>();
+  source->glow.cells = random.records<scene::GlowingCell>(sizes.glowing);
+  source->grid = std::move(grid);
+  source->linear = true;
+  return source;
+}
+
+// What is in a grid's cells, channels, tree and roots, as shaders have it: in the order of `kinds`.
+constexpr std::array kinds{"records", "emission", "glow", "colour", "anisotropy", "tree", "roots"};
+std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
+  const grid::TetGrid& grid = *source->grid;
+  std::array<Words, kinds.size()> words;
+  for (const grid::CellRecord& cell : grid.cells) words[0].insert(words[0].end(), {cell.links, cell.data});
+  words[1].resize(grid.emission.size());
+  std::memcpy(words[1].data(), grid.emission.data(), words[1].size() * 16);
+  words[2].resize(source->glow.cells.size() * 2);
+  std::memcpy(words[2].data(), source->glow.cells.data(), words[2].size() * 16);
+  for (const std::uint32_t word : grid.colour) words[3].emplace_back(word, 0, 0, 0);
+  for (const std::int16_t half : grid.anisotropy) words[4].emplace_back(static_cast<std::uint16_t>(half), 0, 0, 0);
+  for (const std::uint32_t word : grid.tree) words[5].emplace_back(word, 0, 0, 0);
+  for (const grid::RootEntry& root : grid.roots) words[6].emplace_back(root.first_leaf, root.first_internal, 0, 0);
+  return words;
+}
+
+class GridSets : public test::GlTest {
+ protected:
+  void SetUp() override {
+    GlTest::SetUp();
+    if (IsSkipped()) return;
+    fake_ = std::make_unique<test::FakeGl>(headless::Context::get_proc, context_.get());
+    gl_ = gl::load_functions(test::FakeGl::get_proc, fake_.get());
+    heap_ = std::make_unique<gl::WordHeap>(gl_, gl::WordHeap::Sizes{});
+  }
+  void TearDown() override {
+    heap_.reset();
+    GlTest::TearDown();
+    gl_.reset();
+  }
+
+  MarchData upload(const Sources& sources, std::int64_t page_texels, const MarchData* before = nullptr) {
+    MarchUpload work(gl_, gl::query_limits(*gl_), *heap_, sources, before, page_texels);
+    while (!work.advance(Deadline::min())) {
+    }
+    return work.take();
+  }
+
+  // By kernels, which know the grid and what is bound.
+  Words read(const MarchData& data, const core::CmGrid& grid, std::size_t kind, std::size_t count) {
+    std::string text = "#version 450\nlayout(local_size_x = 64) in;\n#define CM_CHANNELS 1\n";
+    for (const std::string& define : data.defines(false)) text += "#define " + define + "\n";
+    for (const char* file : {"shared.glsl", "bindings.glsl", "parameters.glsl", "cell.glsl", "buffers.glsl"})
+      text += test::glsl_file(file);
+    const std::array<const char*, kinds.size()> values{
+        "cm_record(i >> 1, i & 1u)",
+        "cm_emission_record(i)",
+        "cm_glow_word(i)",
+        "uvec4(cm_colour_record(i), 0u, 0u, 0u)",
+        "uvec4((cm_anisotropy_record(i) >> (16u * (i & 1u))) & 65535u, 0u, 0u, 0u)",
+        "uvec4(cm_tree(i), 0u, 0u, 0u)",
+        "uvec4(cm_root_leaf(i), cm_root_node(i), 0u, 0u)"};
+    text += "layout(std430, binding = 0) buffer Words { uvec4 words[]; };\nvoid main() {\n";
+    text += "  uint i = gl_GlobalInvocationID.x;\n  if (i < uint(words.length())) words[i] = ";
+    text += std::string(values[kind]) + ";\n}\n";
+    const gl::Object program = test::compute_program(gl_, text);
+    core::CmParameters parameters{};
+    parameters.grid = grid;
+    Words words(count);
+    const gl::Object uniforms = gl::make_buffer(gl_, sizeof parameters, &parameters, 0, "parameters");
+    const gl::Object out = gl::make_buffer(gl_, count * sizeof(uvec4), words.data(), 0, "words");
+    gl_->UseProgram(program.name());
+    data.bind(*gl_);
+    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_PARAMETERS, uniforms.name());
+    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, out.name());
+    gl_->DispatchCompute(static_cast<GLuint>((count + 63) / 64), 1, 1);
+    gl_->MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    gl_->GetNamedBufferSubData(out.name(), 0, static_cast<GLsizeiptr>(count * sizeof(uvec4)), words.data());
+    return words;
+  }
+
+  void expect_whole(const MarchData& data, const Sources& sources, const std::string& what) {
+    ASSERT_EQ(data.size(), sources.size());
+    for (std::size_t s = 0; s < sources.size(); ++s) {
+      const core::CmGrid* grid = data.grid(*sources[s]);
+      ASSERT_EQ(grid, &data.grid(s));
+      EXPECT_EQ(grid->levels, sources[s]->grid->levels);
+      EXPECT_EQ(grid->box_min, sources[s]->grid->content_min);
+      EXPECT_EQ(grid->box_max, sources[s]->grid->content_max);
+      EXPECT_EQ(grid->glowing, sources[s]->glow.cells.size());
+      const auto expected = expected_of(sources[s]);
+      for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
+        if (expected[kind].empty()) continue;
+        const Words found = read(data, *grid, kind, expected[kind].size());
+        const auto wrong = std::ranges::mismatch(found, expected[kind]);
+        EXPECT_EQ(wrong.in1 - found.begin(), static_cast<std::ptrdiff_t>(found.size()))
+            << what << ", grid " << s << ": " << kinds[kind];
+      }
+    }
+  }
+
+  std::uint64_t bytes_of(const MarchSourcePtr& source) { return upload({source}, 0).bytes(); }
+
+  std::unique_ptr<test::FakeGl> fake_;
+  std::unique_ptr<gl::WordHeap> heap_;
+  // Of odd sizes, as parts of one page, of two, and at the end of the last.
+  const MarchSourcePtr plain_ = source_of({.cells = 1900, .tree = 301}, 1);
+  const MarchSourcePtr coloured_ =
+      source_of({.cells = 301, .emission = 301, .glowing = 31, .colour = 301, .anisotropy = 301, .tree = 99}, 2);
+  const MarchSourcePtr glowing_ = source_of({.cells = 399, .emission = 250, .glowing = 3, .tree = 1}, 3);
+  const MarchSourcePtr other_ = source_of({.cells = 333, .colour = 333, .tree = 55}, 4);
+  const Sources three_{plain_, coloured_, glowing_};
+};
+CUMULET_GL_ON_BACKENDS(GridSets);
+
+constexpr std::int64_t one_page = 0;
+constexpr std::int64_t three_pages = 2048;  // of 1024 cells
+constexpr std::int64_t six_pages = 1024;
+
+std::string pages_of(const MarchData& data) { return data.defines(false).at(2); }
+
+TEST_P(GridSets, EachGridIsReadFromWhereItLies) {
+  for (const auto& [texels, pages] :
+       {std::pair(one_page, "CM_PAGES 1"), std::pair(three_pages, "CM_PAGES 6"), std::pair(six_pages, "CM_PAGES 6")}) {
+    const MarchData data = upload(three_, texels);
+    EXPECT_EQ(pages_of(data), pages);
+    expect_whole(data, three_, pages);
+    const MarchData reversed = upload({glowing_, coloured_, plain_}, texels);
+    expect_whole(reversed, {glowing_, coloured_, plain_}, std::string(pages) + " reversed");
+    EXPECT_EQ(data.bytes(), bytes_of(plain_) + bytes_of(coloured_) + bytes_of(glowing_));
+    EXPECT_EQ(data.grid(*other_), nullptr);
+  }
+}
+
+TEST_P(GridSets, AnExchangeBringsOnlyWhatIsNew) {
+  for (const std::int64_t from : {one_page, three_pages, six_pages}) {
+    for (const std::int64_t to : {one_page, three_pages, six_pages}) {
+      const std::string what = std::to_string(from) + " to " + std::to_string(to);
+      const MarchData before = upload(three_, from);
+      const Sources sources{glowing_, other_, plain_};
+      const std::uint64_t uploaded = fake_->uploaded();
+      const MarchData after = upload(sources, to, &before);
+      const std::uint64_t brought = fake_->uploaded() - uploaded;
+      EXPECT_GE(brought, bytes_of(other_) - 15) << what;  // whole texels
+      EXPECT_LE(brought, bytes_of(other_)) << what;
+      expect_whole(after, sources, what);
+      expect_whole(before, three_, what + ", what was before");
+      const std::uint64_t copied = fake_->uploaded();
+      const MarchData moved = upload({plain_, glowing_, other_}, to, &after);
+      EXPECT_EQ(fake_->uploaded(), copied) << what;
+      expect_whole(moved, {plain_, glowing_, other_}, what + ", moved");
+    }
+  }
+}
+
+// A set of one, as it was when there were no sets: nothing is before it but its roots.
+TEST_P(GridSets, WhatIsLargeGoesInPieces) {
+  const MarchSourcePtr large = source_of({.cells = 200000, .tree = 200000}, 5);  // 6.4 MB and 0.8 MB
+  MarchUpload work(gl_, gl::query_limits(*gl_), *heap_, {plain_, large});
+  std::uint64_t most = 0;
+  for (bool done = false; !done;) {
+    const std::uint64_t before = fake_->uploaded();
+    done = work.advance(Deadline::min());
+    most = std::max(most, fake_->uploaded() - before);
+  }
+  EXPECT_EQ(most, render::Upload::piece_bytes);
+  const MarchData data = work.take();
+  expect_whole(data, {plain_, large}, "large");
+  MarchUpload copy(gl_, gl::query_limits(*gl_), *heap_, {large, plain_}, &data);
+  int steps = 1;
+  while (!copy.advance(Deadline::min())) ++steps;
+  EXPECT_GE(steps, 4 + 2 + 3) << "of 2 MiB";
+  expect_whole(copy.take(), {large, plain_}, "copied");
+}
+
+TEST_P(GridSets, WhatDoesNotFitIsRefusedByName) {
+  const auto refused = [&](const Sources& sources, std::int64_t page_texels) -> std::string {
+    try {
+      const MarchUpload work(gl_, gl::query_limits(*gl_), *heap_, sources, nullptr, page_texels);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::unsupported);
+      return error.what();
+    }
+    return "taken";
+  };
+  EXPECT_EQ(refused(three_, 900),
+            "2600 cells need more than 6 texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, 900 texels");
+  EXPECT_EQ(refused({coloured_}, 900), "taken");
+  EXPECT_EQ(refused({coloured_, glowing_}, 600),
+            "the channels of 700 cells need more than one texture buffer of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, "
+            "600 texels");
+  auto constant = std::make_shared<scene::MarchSource>(*plain_);
+  constant->linear = false;
+  EXPECT_EQ(refused({plain_, constant}, 0), "grids of different marches are not shown together");
+  for (const scene::March march : {scene::March::dense, scene::March::brick}) {
+    auto voxels = std::make_shared<scene::MarchSource>();
+    voxels->march = march;
+    const std::string name = march == scene::March::dense ? "dense" : "brick";
+    EXPECT_EQ(refused({voxels, std::make_shared<scene::MarchSource>(*voxels)}, 0),
+              "the " + name + " march shows one grid, not 2: only that of tetrahedra shows several");
+    EXPECT_EQ(refused({plain_, voxels}, 0), "grids of different marches are not shown together");
+  }
+}
+
+}  // namespace
