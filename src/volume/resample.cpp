@@ -80,8 +80,8 @@ class Window {
     if (glm::any(glm::lessThan(p, field_->bounds_min)) || glm::any(glm::greaterThan(p, field_->bounds_max))) return 0.0;
     const Cell& cell = cells_[place((p >> 3) - low_)];
     if (!cell.first) return cell.constant;
-    const auto within = static_cast<std::size_t>(((p.x & 7) * brick_size + (p.y & 7)) * brick_size + (p.z & 7));
-    return field_->brick_values[*cell.first + within];
+    const int within = ((p.x & 7) * brick_size + (p.y & 7)) * brick_size + (p.z & 7);
+    return field_->brick_values[*cell.first + static_cast<std::size_t>(within)];
   }
 
   /// The value all over a box within the window's, if cells alone tell it.
