@@ -77,10 +77,13 @@ std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
   const grid::TetGrid& grid = *source->grid;
   std::array<Words, kinds.size()> words;
   for (const grid::CellRecord& cell : grid.cells) words[0].insert(words[0].end(), {cell.links, cell.data});
-  words[1].resize(grid.emission.size());
-  std::memcpy(words[1].data(), grid.emission.data(), words[1].size() * 16);
-  words[2].resize(source->glow.cells.size() * 2);
-  std::memcpy(words[2].data(), source->glow.cells.data(), words[2].size() * 16);
+  // Of a grid that has none, data() may be null, which memcpy must not be given.
+  const auto copy_words = [](Words& to, const void* from, std::size_t count) {
+    to.resize(count);
+    if (count > 0) std::memcpy(to.data(), from, count * sizeof to.front());
+  };
+  copy_words(words[1], grid.emission.data(), grid.emission.size());
+  copy_words(words[2], source->glow.cells.data(), source->glow.cells.size() * 2);
   for (const std::uint32_t word : grid.colour) words[3].emplace_back(word, 0, 0, 0);
   for (const std::int16_t half : grid.anisotropy) words[4].emplace_back(static_cast<std::uint16_t>(half), 0, 0, 0);
   for (const std::uint32_t word : grid.tree) words[5].emplace_back(word, 0, 0, 0);
