@@ -266,6 +266,13 @@ void App::execute(const Command& command) {
     case Action::open:
       open(command.text);
       break;
+    case Action::add_volume_dialog:
+      panel_.dialog().open("Add a volume", Action::add_volume, {".vdb", ".nvdb"}, model_.preferences.folder);
+      break;
+    case Action::add_volume:
+      model_.scene.others.emplace_back().volume = command.text;
+      spell_out_defaults(model_.scene);
+      break;
     case Action::environment_dialog:
       panel_.dialog().open("Open an environment", Action::open, {".hdr", ".exr"}, model_.preferences.folder);
       break;
@@ -387,7 +394,8 @@ void App::open(const std::string& path) {
     return;
   }
   if (!has_ending(path, ".json")) {
-    set_volume(model_.scene, {path});
+    set_volume(model_.scene, {.volume = path});
+    model_.scene.visible = true;
     fit_next_ = suggest_next_ = pick_next_ = reload_ = true;
     return;
   }

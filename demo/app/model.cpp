@@ -111,22 +111,6 @@ Model::Model() {
   status.stats.struct_size = sizeof status.stats;
 }
 
-VolumeChoice volume_of(const SceneOptions& scene) {
-  return {scene.volume,     scene.grid_name,       scene.up,      scene.temperature_grid, scene.flame_grid,
-          scene.color_grid, scene.anisotropy_grid, scene.to_world};
-}
-
-void set_volume(SceneOptions& scene, const VolumeChoice& volume) {
-  scene.volume = volume.file;
-  scene.grid_name = volume.grid_name;
-  scene.up = volume.up;
-  scene.temperature_grid = volume.temperature_grid;
-  scene.flame_grid = volume.flame_grid;
-  scene.color_grid = volume.color_grid;
-  scene.anisotropy_grid = volume.anisotropy_grid;
-  scene.to_world = volume.to_world;
-}
-
 void open_surfaces(Model& model, const std::string& path) {
   model.scene.surfaces = path;
   model.scene.surface = {};
@@ -172,6 +156,11 @@ void tell(Model& model, bool error, const std::string& text, double now) {
 void spell_out_defaults(SceneOptions& scene) {
   for_each_group(scene, [](auto& group) { settings::spell_out_zeros(group); });
   settings::spell_out_zeros(scene.camera);
+  for (SceneVolume& other : scene.others) {
+    const double scale = other.medium.density_scale;
+    settings::spell_out_zeros(other.medium);
+    if (other.auto_density_scale) other.medium.density_scale = scale;
+  }
   for (cumulet_lamp_desc& lamp : scene.lamps) settings::spell_out_zeros(lamp);
   scene.grid.criterion = settings::criterion_of(scene.grid);
   if (scene.grid.threshold == 0.0) scene.grid.threshold = settings::default_threshold(scene.grid.criterion);

@@ -20,6 +20,8 @@ namespace cumulet::demo {
 enum class Action {
   open_dialog,
   open,  // a file of any kind: text
+  add_volume_dialog,
+  add_volume,  // text
   environment_dialog,
   clear_environment,
   save_scene,
@@ -75,21 +77,9 @@ struct GridInfo {
   std::string refusal;  // "": can be shown
 };
 
-/// Which volume a scene shows, and how it lies: one load.
-struct VolumeChoice {
-  std::string file;
-  std::string grid_name = {};
-  UpAxis up = UpAxis::y;
-  std::string temperature_grid = {};
-  std::string flame_grid = {};
-  std::string color_grid = {};
-  std::string anisotropy_grid = {};
-  std::array<double, 16> to_world{};
-
-  bool operator==(const VolumeChoice&) const = default;
-};
-[[nodiscard]] VolumeChoice volume_of(const SceneOptions& scene);
-void set_volume(SceneOptions& scene, const VolumeChoice& volume);
+/// Of a scene, the first one's.
+[[nodiscard]] inline const VolumeFile& volume_of(const SceneVolume& scene) { return scene; }
+inline void set_volume(SceneOptions& scene, const VolumeFile& volume) { static_cast<VolumeFile&>(scene) = volume; }
 
 struct Message {
   bool error = false;

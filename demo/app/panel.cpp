@@ -81,6 +81,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   section("Environment", true, [&] { environment(model, commands); });
   section("Lamps", true, [&] { lamps(model); });
   section("Medium", true, [&] { medium(model, commands); });
+  section("Volumes", true, [&] { volumes(model, commands); });
   section("Surfaces", true, [&] { surfaces(model); });
   section("Grid", true, [&] { grid(model); });
   section("Camera", true, [&] { camera(model, commands); });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,9 @@ class Panel {
   void display(Model& model);
   void light(Model& model);
   void environment(Model& model, std::vector<Command>& commands);
+  void volumes(Model& model, std::vector<Command>& commands);
+  /// Where a volume stands; number: what its controls' labels end with.
+  void stand(SceneVolume& volume, const std::string& number);
   void lamps(Model& model);
   void medium(Model& model, std::vector<Command>& commands);
   void ramps(Model& model);
@@ -67,7 +71,8 @@ class Panel {
   double time_ = 0.0;
   Rectangle view_;
   std::string state_;
-  std::string path_;  // as typed
+  std::map<std::size_t, std::string> names_;  // of volumes, as typed
+  std::string path_;                          // likewise
   std::string path_of_;
 };
 

@@ -25,6 +25,13 @@ using settings::same;
 
 constexpr double patience = 1.0;  // seconds without a picture, where there could be part of one
 
+bool same_volume(const SceneVolume& a, const SceneVolume& b) {
+  const auto rest = [](const SceneVolume& volume) {
+    return std::tie(volume.name, volume.visible, volume.places, volume.ramps, volume.auto_density_scale);
+  };
+  return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
+}
+
 }  // namespace
 
 bool same_camera(const cumulet_camera_desc& a, const cumulet_camera_desc& b) { return same(a, b); }
@@ -134,6 +141,68 @@ void Session::follow(const Wish& wish) {
   follow_surfaces();
   follow_places();
   follow_volume();
+  follow_visible();
+  if (!std::ranges::equal(known_->others, scene_.others, same_volume)) follow_others();
+}
+
+void Session::follow_visible() {
+  if (waiting_ || known_->visible == scene_.visible) return;
+  known_->visible = scene_.visible;
+  if (scene_.visible) {
+    if (hidden_) check(cumulet_set_volume(viewer_.get(), hidden_.get()));
+    hidden_.reset();
+  } else {
+    hidden_ = shown();
+    check(cumulet_set_volume(viewer_.get(), nullptr));
+  }
+}
+
+void Session::follow_others() {
+  known_->others = scene_.others;
+  try {
+    others_.show(viewer_.get(), scene_.others);
+  } catch (const std::runtime_error& error) {
+    tell(true, error.what());
+  }
+  if (opening_.made.valid() || waiting_) return;  // what waits may be the same file
+  const std::vector<VolumeFile> missing = others_.missing(scene_.others);
+  if (missing.empty()) return;
+  opening_.file = missing.front();
+  std::shared_ptr<cumulet_volume> own;
+  if (opening_.file == shown_volume_)
+    own = hidden_ ? std::shared_ptr<cumulet_volume>(cumulet_volume_retain(hidden_.get()), cumulet_volume_release)
+                  : std::shared_ptr<cumulet_volume>(shown());
+  opening_.made = std::async(std::launch::async, [file = opening_.file, own, shared = shared_.get()] {
+    struct Tell {  // also where it throws
+      Shared* shared;
+      ~Tell() {
+        {
+          const std::lock_guard lock(shared->mutex);
+          shared->opened = true;
+        }
+        shared->wake();
+      }
+    };
+    const Tell tell{shared};
+    return own ? look_into(own) : open_volume(file);
+  });
+}
+
+void Session::finish_others() {
+  {
+    const std::lock_guard lock(shared_->mutex);
+    if (!std::exchange(shared_->opened, false)) return;
+  }
+  OpenVolume volume;
+  try {
+    volume = opening_.made.get();
+    files_.push_back({opening_.file.volume, Answer::File::Fate::opened});
+  } catch (const std::runtime_error& error) {
+    tell(true, error.what());
+    files_.push_back({opening_.file.volume, Answer::File::Fate::failed});
+  }
+  others_.give(opening_.file, std::move(volume));
+  follow_others();
 }
 
 void Session::follow_places() {
@@ -290,6 +359,7 @@ void Session::follow_volume() {
   if (scene_.volume.empty()) {
     check(cumulet_set_volume(viewer_.get(), nullptr));
     shown_volume_ = {};
+    hidden_.reset();
     grids_.clear();
     status_.has_volume = false;
     status_.fields = {};
@@ -379,9 +449,11 @@ void Session::see_work() {
   status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
                  (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
   see_ends();
+  finish_others();
   status_.loading = waiting_                   ? scene_.volume
                     : waiting_for_surfaces_    ? scene_.surfaces
                     : waiting_for_environment_ ? scene_.environment
+                    : opening_.made.valid()    ? opening_.file.volume
                                                : std::string();
   see_camera();
   measure_noise();
@@ -402,10 +474,12 @@ void Session::see_ends() {
       finish_surfaces();
     else
       tell_news(work.surfaces_status, work.surfaces_message, told_surfaces_);
-    if (waiting_)
+    if (waiting_) {
       finish_load();
-    else
+      follow_others();
+    } else {
       tell_news(work.volume_status, work.volume_message, told_volume_);
+    }
     if (waiting_for_environment_)
       finish_environment();
     else
@@ -481,6 +555,8 @@ void Session::finish_load() {
     return;
   }
   shown_volume_ = volume_of(scene_);
+  hidden_.reset();
+  known_->visible = true;
   status_.has_volume = true;
   grids_.clear();
   const auto add = [](void* user, const char* name, const char* type, const char* refusal) {
@@ -500,10 +576,11 @@ void Session::finish_load() {
       status_.fields[i] = {values.max_value, heights(values.histogram)};
   }
   std::array<char, 512> error{};
-  if (cumulet_list_grids(shown_volume_.file.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
+  if (cumulet_list_grids(shown_volume_.volume.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
     tell(true, error.data());
-  files_.push_back({shown_volume_.file, Answer::File::Fate::opened});
+  files_.push_back({shown_volume_.volume, Answer::File::Fate::opened});
   if (std::exchange(suggest_, false)) suggest_look();
+  follow_visible();
   if (!fit_) return;
   scene_.camera = *std::exchange(fit_, std::nullopt);
   set_camera();
@@ -573,7 +650,8 @@ void Session::move_by_keys(int key) {
 void Session::execute(const Request& request) {
   if (request.type == Request::Type::suggest_density) return suggest_density();
   if (request.type == Request::Type::frame_all) {
-    if (status_.has_volume || !shown_surfaces_.empty()) check(cumulet_frame_all(viewer_.get()));
+    if (status_.has_volume || !scene_.others.empty() || !shown_surfaces_.empty())
+      check(cumulet_frame_all(viewer_.get()));
     return;
   }
   try {

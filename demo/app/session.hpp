@@ -6,6 +6,7 @@
 #include <functional>
 #include <future>
 #include <image.hpp>
+#include <instances.hpp>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -60,7 +61,7 @@ struct Answer {
   std::vector<GridInfo> grids;
   bool waiting = false;  // something is still to come of itself: a load, or the camera's first place
   cumulet_camera_desc camera{};
-  VolumeChoice volume;  // shown, or being loaded
+  VolumeFile volume;  // shown, or being loaded
   std::string surfaces;
   std::string environment;
   std::uint64_t camera_edit = 0;  // what these follow
@@ -139,6 +140,7 @@ class Session {
     std::mutex mutex;
     std::vector<std::string> warnings;
     std::optional<ThumbnailPtr> thumbnail;  // made, to be taken
+    bool opened = false;                    // one of the other volumes is, or is known not to
   };
 
   static void on_log(void* user, cumulet_log_level level, const char* message);
@@ -148,12 +150,19 @@ class Session {
   /// Tells a failed call.
   bool check(cumulet_status status);
   void follow_volume();
+  // Hides the volume, or shows it again.
+  void follow_visible();
+  // Shows the others that are there, and begins to open the next that is not.
+  void follow_others();
+  void finish_others();
   void follow_environment();
   void finish_environment();
   // Begins a picture of the one that is shown, on a thread of its own.
   void begin_thumbnail();
   void drop_thumbnail();
-  [[nodiscard]] bool waits() const { return waiting_ || waiting_for_surfaces_ || waiting_for_environment_; }
+  [[nodiscard]] bool waits() const {
+    return waiting_ || waiting_for_surfaces_ || waiting_for_environment_ || opening_.made.valid();
+  }
   void follow_ramps();
   void follow_lamps();
   void follow_places();
@@ -196,7 +205,7 @@ class Session {
   std::uint32_t drawn_width_ = 0;
   std::uint32_t drawn_height_ = 0;
   cumulet_display_desc drawn_display_{};
-  VolumeChoice shown_volume_;
+  VolumeFile shown_volume_;
   std::string shown_surfaces_;
   std::string shown_environment_;
   bool warm_ = false;                 // the first scene's programs are there
@@ -215,6 +224,12 @@ class Session {
   double last_noise_ = 0.0;
   std::uint64_t noise_samples_ = 0;
   Status status_;
+  VolumePtr hidden_;  // the viewer's volume, while it is not to be seen
+  Instances others_;
+  struct Opening {
+    VolumeFile file;
+    std::future<OpenVolume> made;  // while one is opened
+  } opening_;
   std::vector<GridInfo> grids_;
   std::vector<Answer::Notice> notices_;
   std::vector<Answer::File> files_;

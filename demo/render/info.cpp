@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <ostream>
@@ -15,6 +16,7 @@ namespace cumulet::demo {
 namespace {
 
 using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
 
 struct Release {
   void operator()(cumulet_inspection* inspection) const { cumulet_inspection_release(inspection); }
@@ -170,18 +172,26 @@ bool is_z_up(const std::string& volume_file) {
 void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
   Json json;
   if (!scene.volume.empty()) json["volume"] = volume_info(scene.volume);
+  for (const SceneVolume& other : scene.others) {
+    Json info = {{"name", other.name.empty() ? fs::path(other.volume).filename().string() : other.name}};
+    info.update(volume_info(other.volume));
+    json["other_volumes"].push_back(info);
+  }
   if (!scene.surfaces.empty()) json["surfaces"] = surfaces_info(scene.surfaces);
   if (as_json) {
     // Names may be in any encoding: what is not UTF-8 is replaced. What is not finite is null.
     out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
     return;
   }
+  const Json others = json.contains("other_volumes") ? json["other_volumes"] : Json::array();
+  json.erase("other_volumes");
   for (const auto& [what, facts] : json.items()) write_lines(facts, "", out);
+  for (const Json& other : others) write_lines(other, "", out);
 }
 
-std::optional<std::string> up_hint(const SceneOptions& scene) {
-  if (scene.volume.empty() || scene.up != UpAxis::y || !is_z_up(scene.volume)) return std::nullopt;
-  return scene.volume + ": its metadata says Blender or Mantaflow, whose up axis is Z: try --up z";
+std::optional<std::string> up_hint(const SceneVolume& volume) {
+  if (!volume.is_shown() || volume.up != UpAxis::y || !is_z_up(volume.volume)) return std::nullopt;
+  return volume.volume + ": its metadata says Blender or Mantaflow, whose up axis is Z: try --up z";
 }
 
 }  // namespace cumulet::demo

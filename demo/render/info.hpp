@@ -11,6 +11,6 @@ namespace cumulet::demo {
 void write_info(const SceneOptions& scene, bool as_json, std::ostream& out);
 
 /// A line for who shows with Y up what its metadata says is Blender's or Mantaflow's, whose up axis is Z.
-[[nodiscard]] std::optional<std::string> up_hint(const SceneOptions& scene);
+[[nodiscard]] std::optional<std::string> up_hint(const SceneVolume& volume);
 
 }  // namespace cumulet::demo

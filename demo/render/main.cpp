@@ -32,6 +32,7 @@
 #include "fire.hpp"
 #include "frame_plan.hpp"
 #include "info.hpp"
+#include "instances.hpp"
 #include "memory.hpp"
 #include "metadata.hpp"
 #include "options.hpp"
@@ -164,7 +165,7 @@ std::shared_ptr<cumulet_volume> volume_of(const Viewer& viewer) {
 
 /// The medium that a volume that burns is first shown with, where nothing is said of it; nothing if it does not burn.
 std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
-  if (scene.volume.empty() || !scene.auto_density_scale || !cumulet::demo::is_unsaid(scene.medium)) return std::nullopt;
+  if (!scene.is_shown() || !scene.auto_density_scale || !cumulet::demo::is_unsaid(scene.medium)) return std::nullopt;
   return cumulet::demo::medium_of_fire(volume_of(viewer).get(), scene.medium);
 }
 
@@ -482,23 +483,25 @@ class Studio {
 
   /// Until the scene's volume, and all else, is there. Throws why it cannot be.
   void load(const SceneOptions& scene) {
-    if (!scene.volume.empty()) {
+    if (scene.is_shown()) {
       progress_.stage("loading " + scene.volume);
       cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
       file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
       check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
     }
     wait(viewer_, progress_);
+    open_others(scene);
     fire_ = medium_of_fire(viewer_, scene);
-    if (!fire_) return;
-    check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
+    if (fire_) check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
     wait(viewer_, progress_);
   }
 
   /// What is to be said once, of a volume that is loaded.
   void remark(const SceneOptions& scene) {
     if (const auto hint = cumulet::demo::up_hint(scene)) tell(progress_, *hint);
-    if (!scene.volume.empty() && scene.auto_density_scale)
+    for (const cumulet::demo::SceneVolume& other : scene.others)
+      if (const auto hint = cumulet::demo::up_hint(other)) tell(progress_, *hint);
+    if (scene.is_shown() && scene.auto_density_scale)
       tell_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
     if (fire_) tell_fire(*fire_, progress_);
   }
@@ -549,7 +552,18 @@ class Studio {
 
  private:
   static const std::string& first_file(const SceneOptions& scene) {
-    return scene.volume.empty() ? scene.surfaces : scene.volume;
+    if (!scene.volume.empty()) return scene.volume;
+    return scene.others.empty() ? scene.surfaces : scene.others.front().volume;
+  }
+
+  void open_others(const SceneOptions& scene) {
+    for (const cumulet::demo::VolumeFile& file : others_.missing(scene.others)) {
+      progress_.stage("loading " + file.volume);
+      const bool shown = scene.is_shown() && file == static_cast<const cumulet::demo::VolumeFile&>(scene);
+      others_.give(file, shown ? cumulet::demo::look_into(volume_of(viewer_)) : cumulet::demo::open_volume(file));
+      check_not_interrupted();
+    }
+    others_.show(viewer_.get(), scene.others);
   }
 
   void set_scene(const RenderOptions& options) {
@@ -591,6 +605,7 @@ class Studio {
   std::optional<cumulet_medium_desc> fire_;  // what was loaded burns, and nothing was said of that
   Context context_;
   Viewer viewer_;
+  cumulet::demo::Instances others_;
 };
 
 /// That the picture goes on from. Throws where it is another's, or there could be none.

@@ -41,15 +41,18 @@ struct Moved {
   std::string_view first;
   std::string_view second;
 };
-constexpr std::array moved = {Moved{"volume", "volumes[0]"}, Moved{"medium", "volumes[0].medium"},
+constexpr std::array moved = {Moved{"volume", "volumes[]"}, Moved{"medium", "volumes[].medium"},
                               Moved{"surfaces", "models[0]"}, Moved{"light", "environment"}};
 
-/// A setting's key, which is of version 1, as a version has it.
-std::string key_in(SceneFormat format, const std::string& key) {
+/// A setting's key, which is of version 1, as a version has it; what is a volume's, of that one.
+std::string key_in(SceneFormat format, const std::string& key, std::size_t volume) {
   const std::string section = key.substr(0, key.find('.'));
   const auto* const found = std::ranges::find(moved, section, &Moved::first);
   if (format == SceneFormat::first || found == moved.end()) return key;
-  return std::string(found->second) + key.substr(section.size());
+  std::string path(found->second);
+  if (const auto bracket = path.find("[]"); bracket != std::string::npos)
+    path.insert(bracket + 1, std::to_string(volume));
+  return path + key.substr(section.size());
 }
 
 constexpr double max_u32 = 4294967295.0;
@@ -73,6 +76,7 @@ Matrix rotation(std::size_t axis, double degrees) {
 }
 
 constexpr std::size_t most_places = 100'000;
+constexpr std::size_t most_volumes = 10'000;
 
 /// Scaled, then turned about x, y and z, then moved.
 struct PlaceParts {
@@ -98,6 +102,8 @@ class Reader {
   }
 
   void set_format(SceneFormat format) { format_ = format; }
+  /// Which volume's keys are meant from now on.
+  void of_volume(std::size_t volume) { volume_ = volume; }
 
   /// How many objects a list has, at most that many; 0 where there is no list.
   std::size_t list(const std::string& key, std::size_t most) {
@@ -229,7 +235,7 @@ class Reader {
   [[nodiscard]] bool has(const std::string& key) { return find(key).value != nullptr; }
 
   [[noreturn]] void wrong(const std::string& key, const std::string& cause) const {
-    fail(file_, key_in(format_, key) + ": " + cause);
+    fail(file_, key_in(format_, key, volume_) + ": " + cause);
   }
 
   void finish() const { refuse_rest(json_, ""); }
@@ -250,7 +256,7 @@ class Reader {
 
   /// Remembers the objects and lists on the way, which may be there, be it empty.
   Place find(const std::string& wanted) {
-    const std::string key = key_in(format_, wanted);
+    const std::string key = key_in(format_, wanted, volume_);
     Json* at = &json_;
     for (std::size_t begin = 0;;) {
       const std::size_t end = key.find('.', begin);
@@ -302,6 +308,7 @@ class Reader {
 
   std::string file_;
   SceneFormat format_ = SceneFormat::first;
+  std::size_t volume_ = 0;
   Json json_;
   std::set<std::string> sections_;
 };
@@ -380,7 +387,7 @@ void read_lamps(Reader& reader, std::vector<cumulet_lamp_desc>& lamps) {
   }
 }
 
-/// Where the volume stands.
+/// Where a volume stands.
 void read_place(Reader& reader, Matrix& to_world) {
   const bool whole = reader.numbers("volume.to_world", std::span<double>(to_world), "16 numbers");
   PlaceParts place;
@@ -400,34 +407,52 @@ SceneFormat read_version(Reader& reader) {
   return static_cast<SceneFormat>(version);
 }
 
+/// All of a volume but the settings of its medium.
+void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
+  reader.text("volume.file", volume.volume);
+  reader.text("volume.grid", volume.grid_name);
+  reader.text("medium.temperature_grid", volume.temperature_grid);
+  reader.text("medium.flame_grid", volume.flame_grid);
+  reader.text("medium.color_grid", volume.color_grid);
+  reader.text("medium.anisotropy_grid", volume.anisotropy_grid);
+  reader.choice("volume.up", up_names, volume.up);
+  volume.auto_density_scale = reader.word("medium.density_scale", "auto");
+  for (std::size_t i = 0; i < volume.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, volume.ramps[i]);
+  if (format == SceneFormat::first) return;
+  read_place(reader, volume.to_world);
+  reader.places("volume.places", volume.places);
+  reader.text("volume.name", volume.name);
+  std::int32_t visible = 1;
+  reader.flag("volume.visible", visible);
+  volume.visible = visible != 0;
+}
+
 /// What the second version has and the first has not.
 void read_second(Reader& reader, SceneOptions& scene) {
   reader.set_format(SceneFormat::second);
-  reader.list("volumes", 1);
+  const std::size_t volumes = reader.list("volumes", most_volumes);
   reader.list("models", 1);
-  read_place(reader, scene.to_world);
-  reader.places("volume.places", scene.places);
-  std::int32_t visible = 1;
-  reader.flag("volume.visible", visible);
-  if (visible == 0) reader.wrong("volume.visible", "is false: this program shows its volume");
   read_lamps(reader, scene.lamps);
+  for (std::size_t i = 1; i < volumes; ++i) {
+    SceneVolume& volume = scene.others.emplace_back();
+    reader.of_volume(i);
+    if (!reader.has("volume.file")) reader.wrong("volume.file", "is missing");
+    read_volume(reader, SceneFormat::second, volume);
+    if (volume.volume.empty()) reader.wrong("volume.file", "is empty");
+    read_settings(reader, volume.medium);
+    if (volume.medium.max_bounces != 0) reader.wrong("medium.max_bounces", "is the first volume's, for all of them");
+  }
+  reader.of_volume(0);
 }
 
 void read_scene(Reader& reader, SceneOptions& scene) {
   const SceneFormat format = read_version(reader);
   const bool second = format == SceneFormat::second;
   if (second) read_second(reader, scene);
-  reader.text("volume.file", scene.volume);
-  reader.text("volume.grid", scene.grid_name);
-  reader.text("medium.temperature_grid", scene.temperature_grid);
-  reader.text("medium.flame_grid", scene.flame_grid);
-  reader.text("medium.color_grid", scene.color_grid);
-  reader.text("medium.anisotropy_grid", scene.anisotropy_grid);
-  reader.choice("volume.up", up_names, scene.up);
+  read_volume(reader, format, scene);
   reader.text("surfaces.file", scene.surfaces);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
   read_camera(reader, scene.camera);
-  scene.auto_density_scale = reader.word("medium.density_scale", "auto");
   reader.text("environment.file", scene.environment);
   if (second) {
     if (!reader.has("environment") && !reader.has("lights")) scene.set_daylight();
@@ -436,7 +461,6 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   }
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
-  for (std::size_t i = 0; i < scene.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, scene.ramps[i]);
   const bool names_criterion = reader.has("grid.criterion");
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
   if (names_criterion) settings::name_criterion(scene.grid);
@@ -508,9 +532,11 @@ class Writer {
  public:
   explicit Writer(SceneFormat format) : format_(format) { json_["cumulet_scene"] = static_cast<int>(format); }
 
+  /// Which volume's keys are meant from now on.
+  void of_volume(std::size_t volume) { volume_ = volume; }
   void put(const std::string& key, const Json& value) {
     std::string path = "/";
-    for (const char c : key_in(format_, key)) {
+    for (const char c : key_in(format_, key, volume_)) {
       if (c == ']') continue;
       path += c == '.' || c == '[' ? '/' : c;
     }
@@ -531,25 +557,49 @@ class Writer {
 
  private:
   SceneFormat format_;
+  std::size_t volume_ = 0;
   Json json_;
 };
 
-Json to_json(const SceneOptions& scene, const std::string& volume, const std::string& surfaces,
-             const std::string& environment, SceneFormat format) {
-  Writer writer(format);
-  writer.put("volume.file", volume);
-  writer.put_text("volume.grid", scene.grid_name);
-  if (scene.up != UpAxis::y) writer.put("volume.up", name_of(up_names, scene.up));
-  const bool second = format == SceneFormat::second;
-  if (second && scene.to_world != Matrix{}) writer.put("volume.to_world", scene.to_world);
-  if (second && !scene.places.empty()) writer.put("volume.places", scene.places);
-  writer.put_text("medium.temperature_grid", scene.temperature_grid);
-  writer.put_text("medium.flame_grid", scene.flame_grid);
-  writer.put_text("medium.color_grid", scene.color_grid);
-  writer.put_text("medium.anisotropy_grid", scene.anisotropy_grid);
+void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, const std::string& file) {
+  if (format == SceneFormat::second) writer.put_text("volume.name", volume.name);
+  writer.put("volume.file", file);
+  writer.put_text("volume.grid", volume.grid_name);
+  if (volume.up != UpAxis::y) writer.put("volume.up", name_of(up_names, volume.up));
+  if (format == SceneFormat::second) {
+    if (volume.to_world != Matrix{}) writer.put("volume.to_world", volume.to_world);
+    if (!volume.places.empty()) writer.put("volume.places", volume.places);
+    if (!volume.visible) writer.put("volume.visible", false);
+  }
+  writer.put_text("medium.temperature_grid", volume.temperature_grid);
+  writer.put_text("medium.flame_grid", volume.flame_grid);
+  writer.put_text("medium.color_grid", volume.color_grid);
+  writer.put_text("medium.anisotropy_grid", volume.anisotropy_grid);
+  if (volume.auto_density_scale && volume.medium.density_scale == 0.0) writer.put("medium.density_scale", "auto");
+  writer.put_settings(volume.medium);
+  for (std::size_t i = 0; i < volume.ramps.size(); ++i) {
+    Json points = Json::array();
+    for (const auto& [value, result] : volume.ramps[i]) points.push_back({shortest(value), shortest(result)});
+    if (!points.empty()) writer.put(settings::ramps[i].key, points);
+  }
+}
 
-  if (!surfaces.empty()) {
-    writer.put("surfaces.file", surfaces);
+/// named: a file's name as it is to be written.
+template <class Named>
+Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) {
+  Writer writer(format);
+  const bool second = format == SceneFormat::second;
+  put_volume(writer, format, scene, named(scene.volume));
+  for (std::size_t i = 0; second && i < scene.others.size(); ++i) {
+    SceneVolume other = scene.others[i];
+    other.medium.max_bounces = 0;  // the first one's
+    writer.of_volume(i + 1);
+    put_volume(writer, format, other, named(other.volume));
+  }
+  writer.of_volume(0);
+
+  if (!scene.surfaces.empty()) {
+    writer.put("surfaces.file", named(scene.surfaces));
     if (scene.surface_camera >= 0) writer.put("surfaces.camera", scene.surface_camera);
     writer.put_settings(scene.surface);
   }
@@ -565,16 +615,9 @@ Json to_json(const SceneOptions& scene, const std::string& volume, const std::st
   if (view.orthographic_height > 0.0) camera["orthographic_height"] = view.orthographic_height;
   writer.put("camera", camera);
 
-  if (scene.auto_density_scale && scene.medium.density_scale == 0.0) writer.put("medium.density_scale", "auto");
-  writer.put_settings(scene.medium);
-  for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
-    Json points = Json::array();
-    for (const auto& [value, result] : scene.ramps[i]) points.push_back({shortest(value), shortest(result)});
-    if (!points.empty()) writer.put(settings::ramps[i].key, points);
-  }
   writer.put_settings(scene.light);
-  if (!environment.empty()) {
-    writer.put("environment.file", environment);
+  if (!scene.environment.empty()) {
+    writer.put("environment.file", named(scene.environment));
     writer.put_settings(scene.environment_settings);
   }
   for (std::size_t i = 0; second && i < scene.lamps.size(); ++i)
@@ -609,6 +652,8 @@ std::string portable_file(const std::string& file, const std::string& path) {
 
 }  // namespace
 
+SceneVolume::SceneVolume() { medium.struct_size = sizeof medium; }
+
 SceneOptions::SceneOptions() {
   for_each_group(*this, [](auto& group) { group.struct_size = sizeof group; });
   camera.struct_size = sizeof camera;
@@ -616,17 +661,17 @@ SceneOptions::SceneOptions() {
   display.denoise = CUMULET_DENOISE_FAST;
 }
 
-cumulet_volume_file_desc volume_file(const SceneOptions& scene) {
+cumulet_volume_file_desc volume_file(const VolumeFile& file) {
   cumulet_volume_file_desc desc{};
   desc.struct_size = sizeof desc;
-  desc.path = scene.volume.c_str();
-  desc.grid_name = scene.grid_name.c_str();
-  desc.temperature_grid = scene.temperature_grid.c_str();
-  desc.flame_grid = scene.flame_grid.c_str();
-  desc.color_grid = scene.color_grid.c_str();
-  desc.anisotropy_grid = scene.anisotropy_grid.c_str();
-  Matrix to_world = scene.to_world;
-  if (scene.up == UpAxis::z) {
+  desc.path = file.volume.c_str();
+  desc.grid_name = file.grid_name.c_str();
+  desc.temperature_grid = file.temperature_grid.c_str();
+  desc.flame_grid = file.flame_grid.c_str();
+  desc.color_grid = file.color_grid.c_str();
+  desc.anisotropy_grid = file.anisotropy_grid.c_str();
+  Matrix to_world = file.to_world;
+  if (file.up == UpAxis::z) {
     constexpr Matrix upright = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0};
     to_world = to_world == Matrix{} ? upright : product(to_world, upright);
   }
@@ -688,8 +733,13 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
   Reader reader(path, std::move(json));
   read_scene(reader, scene);
   const fs::path folder = fs::path(path).parent_path();
-  for (std::string* file : {&scene.volume, &scene.surfaces, &scene.environment})
-    if (!file->empty() && fs::path(*file).is_relative()) *file = (folder / *file).string();
+  const auto find = [&](std::string& file) {
+    if (!file.empty() && fs::path(file).is_relative()) file = (folder / file).string();
+  };
+  find(scene.volume);
+  for (SceneVolume& other : scene.others) find(other.volume);
+  find(scene.surfaces);
+  find(scene.environment);
   return scene;
 }
 
@@ -703,8 +753,7 @@ SceneOptions load_scene(const std::string& path) {
 
 std::string scene_text(const SceneOptions& scene, const std::string& path, SceneFormat format) {
   // A file's name may be in any encoding: what is not UTF-8 is replaced, not thrown at.
-  return to_json(scene, portable_file(scene.volume, path), portable_file(scene.surfaces, path),
-                 portable_file(scene.environment, path), format)
+  return to_json(scene, format, [&](const std::string& file) { return portable_file(file, path); })
              .dump(2, ' ', false, Json::error_handler_t::replace) +
          "\n";
 }
@@ -715,7 +764,7 @@ void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat 
 
 bool same_scene(const SceneOptions& a, const SceneOptions& b) {
   const auto all = [](const SceneOptions& s) {
-    return to_json(s, s.volume, s.surfaces, s.environment, SceneFormat::second);
+    return to_json(s, SceneFormat::second, [](const std::string& file) { return file; });
   };
   return all(a) == all(b);
 }
@@ -738,9 +787,10 @@ std::string scene_hash(const SceneOptions& scene) {
     if (!error) name.append(1, ' ').append(std::to_string(size));
     return name;
   };
+  shown.name.clear();
+  for (SceneVolume& other : shown.others) other.name.clear();
   const std::string text =
-      to_json(shown, named(scene.volume), named(scene.surfaces), named(scene.environment), SceneFormat::second)
-          .dump(-1, ' ', false, Json::error_handler_t::replace);
+      to_json(shown, SceneFormat::second, named).dump(-1, ' ', false, Json::error_handler_t::replace);
   std::array<char, 17> digits{};
   std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(fnv1a(text)));
   return digits.data();

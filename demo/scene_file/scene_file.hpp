@@ -14,26 +14,41 @@ namespace cumulet::demo {
 /// Which way is up in a volume's file. Blender's and Mantaflow's is Z; pictures' is Y.
 enum class UpAxis { y, z };
 
-/// What every demo program can show, as the library's own descriptors with struct_size set. Zero is the library's
-/// default, as there.
-struct SceneOptions {
+/// Which volume is shown, and how it lies: one load.
+struct VolumeFile {
   std::string volume;
-  std::string grid_name;         // of density; "", here and below: by name
-  std::string temperature_grid;  // "none": without, here and below
-  std::string flame_grid;
-  std::string color_grid;
-  std::string anisotropy_grid;
-  UpAxis up = UpAxis::y;              // of the volume's file
-  std::array<double, 16> to_world{};  // of the volume, once it is upright; column by column; all 0: as its file has it
+  std::string grid_name = {};         // of density; "", here and below: by name
+  std::string temperature_grid = {};  // "none": without, here and below
+  std::string flame_grid = {};
+  std::string color_grid = {};
+  std::string anisotropy_grid = {};
+  UpAxis up = UpAxis::y;              // of the file
+  std::array<double, 16> to_world{};  // once it is upright; column by column; all 0: as its file has it
+
+  bool operator==(const VolumeFile&) const = default;
+};
+
+/// A volume in a scene, as the library's own descriptors with struct_size set. Zero is the library's default, as there.
+struct SceneVolume : VolumeFile {
+  std::string name;  // "": its file's
+  bool visible = true;
   std::vector<std::array<double, 16>> places;  // where it then stands, once in each; none: there alone
-  std::string surfaces;                        // a glTF file; "": none
-  std::int32_t surface_camera = -1;            // of the surfaces' own; below 0: camera
-  std::uint32_t width = 1280;
-  std::uint32_t height = 720;
-  cumulet_grid_desc grid{};
   cumulet_medium_desc medium{};
   std::array<settings::RampPoints, settings::ramps.size()> ramps;  // as cumulet_ramp numbers them
   bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
+
+  SceneVolume();
+  [[nodiscard]] bool is_shown() const { return visible && !volume.empty(); }
+};
+
+/// What every demo program can show. Its first volume is what flags and the demo's panel set, and may be none.
+struct SceneOptions : SceneVolume {
+  std::vector<SceneVolume> others;   // beside the first; their max_bounces are the first one's
+  std::string surfaces;              // a glTF file; "": none
+  std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
+  std::uint32_t width = 1280;
+  std::uint32_t height = 720;
+  cumulet_grid_desc grid{};
   cumulet_light_desc light{};
   std::vector<cumulet_lamp_desc> lamps;
   std::string environment;  // a .hdr or .exr file; "": the light's sky
@@ -66,9 +81,9 @@ void for_each_group(Scene& scene, Visit&& visit) {
   visit(scene.display);
 }
 
-/// The scene's volume as the library takes it; the scene must outlive it.
-[[nodiscard]] cumulet_volume_file_desc volume_file(const SceneOptions& scene);
-/// Where it stands, in that viewer.
+/// As the library takes it; the file must outlive it.
+[[nodiscard]] cumulet_volume_file_desc volume_file(const VolumeFile& file);
+/// Where the first volume stands, in that viewer.
 [[nodiscard]] inline cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
   const double* first = scene.places.empty() ? nullptr : scene.places.front().data();
   return cumulet_set_volume_places(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
@@ -86,7 +101,8 @@ void for_each_group(Scene& scene, Visit&& visit) {
 /// Reads a file. Throws likewise.
 [[nodiscard]] SceneOptions load_scene(const std::string& path);
 
-/// Versions of the format. The first knows no lamps and no place of the volume: what is written in it is without them.
+/// Versions of the format. The first knows one volume, without a place, and no lamps: what is written in it is without
+/// the rest.
 enum class SceneFormat { first = 1, second = 2 };
 
 /// The text that parse_scene reads: every setting is spelled out but those left to the library. A volume in the

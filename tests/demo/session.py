@@ -179,6 +179,34 @@ def write_environment(path, bright):
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n" + rows)
 
 
+def test_volumes(s):
+    """Volumes beside the first come and go, and what is done to them is undone."""
+    far = {"places": [{"translate": [60, 0, 0]}]}
+    medium = {"medium": {"density_scale": 1, "albedo": [0.8, 0.8, 0.8]}}  # dark, so that paths are short
+    camera = {"eye": [20, 30, 170], "target": [20, 20, 0]}
+    volumes = [{"file": s.cumulus, **medium}, {"file": s.cumulus, **medium, **far}]
+    (s.out / "two.json").write_text(json.dumps({"cumulet_scene": 2, "volumes": volumes, "camera": camera}))
+    there = ["wait loaded", "wait converged"]
+    s.play("volumes",
+           [*there, *shot("both"),
+            'click "Visible 2"', *there, *shot("first"),
+            "key ctrl+z", *there, *shot("again"),
+            'click "Visible 1"', *there, *shot("second"),
+            "key ctrl+z", 'click "Remove volume 2"', *there, *shot("removed"),
+            "key ctrl+z", 'click "Copy volume 2"', *there,
+            'drag "Scale 3" to "Scale 3" 0.55 0.5', *there, 'click "Add volume"', "frames 2", "key escape", *there,
+            *shot("copied")],
+           "--scene", "two.json")
+    both, _, area = look(s, "both")
+    first, second, copied = (look(s, name)[0] for name in ("first", "second", "copied"))
+    assert_drawn(both, area)
+    assert_alike(both, look(s, "again")[0], area)
+    assert_alike(first, look(s, "removed")[0], area)
+    for other in (first, second, copied):
+        assert_differ(both, other, area)
+    assert_differ(first, second, area)
+
+
 def test_environment(s):
     """Dropped, turned by its picture, turned back, lost to a bad file, undone."""
     write_environment(s.out / "left.hdr", lambda x: x < 16)

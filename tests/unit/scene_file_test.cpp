@@ -121,6 +121,61 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   EXPECT_TRUE(same(read.display, scene.display));
 }
 
+TEST(SceneFile, AnyNumberOfVolumes) {
+  SceneOptions scene = full_scene();
+  scene.name = "the large one";
+  scene.visible = false;
+  SceneVolume& smoke = scene.others.emplace_back();
+  smoke.volume = "/data/smoke.vdb";
+  smoke.grid_name = "soot";
+  smoke.up = UpAxis::z;
+  smoke.name = "smoke";
+  smoke.medium.anisotropy = 0.3f;
+  smoke.places.assign(3, scene.to_world);
+  smoke.ramps[CUMULET_RAMP_DENSITY] = {{0.0f, 0.0f}, {1.0f, 2.0f}};
+  SceneVolume& fire = scene.others.emplace_back();
+  fire.volume = "/elsewhere/fire.vdb";
+  fire.flame_grid = "none";
+  fire.medium.density_scale = 2.5;
+  fire.auto_density_scale = false;
+  fire.visible = false;
+  fire.to_world = scene.to_world;
+  const std::string text = scene_text(scene, "/data/s.json");
+  EXPECT_NE(text.find("\"smoke.vdb\""), std::string::npos) << text;
+  const SceneOptions read = parse_scene(text, "/data/s.json");
+  EXPECT_TRUE(same_scene(scene, read)) << text;
+  EXPECT_EQ(read.name, "the large one");
+  EXPECT_FALSE(read.visible);
+  EXPECT_TRUE(cumulet::settings::same(read.medium, scene.medium)) << "the first one's is its own";
+  ASSERT_EQ(read.others.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const SceneVolume& a = scene.others[i];
+    const SceneVolume& b = read.others[i];
+    EXPECT_EQ(static_cast<const VolumeFile&>(a), static_cast<const VolumeFile&>(b)) << i;
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.visible, b.visible);
+    EXPECT_EQ(a.places, b.places);
+    EXPECT_EQ(a.ramps, b.ramps);
+    EXPECT_EQ(a.auto_density_scale, b.auto_density_scale);
+    EXPECT_EQ(a.medium.density_scale, b.medium.density_scale);
+    EXPECT_EQ(a.medium.anisotropy, b.medium.anisotropy);
+  }
+  const auto differs = [&](auto change) {
+    SceneOptions other = scene;
+    change(other);
+    return !same_scene(scene, other) && scene_hash(scene) != scene_hash(other);
+  };
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.others.pop_back(); }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.others[1].visible = true; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.others[0].volume = "/data/other.vdb"; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { std::swap(s.others[0], s.others[1]); }));
+  SceneOptions renamed = scene;
+  renamed.others[0].name = "soot";
+  EXPECT_FALSE(same_scene(scene, renamed));
+  EXPECT_EQ(scene_hash(scene), scene_hash(renamed)) << "shows the same";
+  EXPECT_EQ(parse_scene(scene_text(scene, "s.json", SceneFormat::first), "s.json").others.size(), 0u);
+}
+
 TEST(SceneFile, NumbersAreWrittenAsOneWouldTypeThem) {
   SceneOptions scene;
   scene.medium.coalbedo[0] = 0.01f;
@@ -318,12 +373,21 @@ TEST(SceneFile, TheSecondVersionSaysWhatTheFirstDoes) {
 TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
   const auto told = [](const std::string& more) { return error_of(R"({"cumulet_scene": 2, )" + more + "}"); };
   const std::string start = "dir/s.json: ";
-  EXPECT_EQ(told(R"("volumes": [{}, {}])"), start + "volumes: are 2: this program shows 1");
+  EXPECT_EQ(told(R"("volumes": [{}, {}])"), start + "volumes[1].file: is missing");
+  EXPECT_EQ(told(R"("volumes": [{}, {"file": ""}])"), start + "volumes[1].file: is empty");
+  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb"}, 7])"), start + "volumes[2] is not an object");
+  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"albedo": 1}}])"),
+            start + "volumes[1].medium.albedo: is not three numbers");
+  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"x": 1}}])"),
+            start + "volumes[1].medium.x: there is no such setting");
+  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"max_bounces": 3}}])"),
+            start + "volumes[1].medium.max_bounces: is the first volume's, for all of them");
+  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "places": [7]}])"),
+            start + "volumes[1].places[0]: is neither 16 numbers nor an object");
   EXPECT_EQ(told(R"("models": [{}, {}, {}])"), start + "models: are 3: this program shows 1");
   EXPECT_EQ(told(R"("volumes": {})"), start + "volumes: is not a list");
   EXPECT_EQ(told(R"("volumes": [3])"), start + "volumes[0] is not an object");
-  EXPECT_EQ(told(R"("volumes": [{"visible": false}])"),
-            start + "volumes[0].visible: is false: this program shows its volume");
+  EXPECT_EQ(told(R"("volumes": [{"visible": 0}])"), start + "volumes[0].visible: is neither true nor false");
   EXPECT_EQ(told(R"("volumes": [{"medium": {"albedo": 1}}])"),
             start + "volumes[0].medium.albedo: is not three numbers");
   EXPECT_EQ(told(R"("volumes": [{"medium": {"density_ramp": [[1, 0], [0, 1]]}}])"),

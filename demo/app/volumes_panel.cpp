@@ -1,0 +1,115 @@
+// The panel's volumes: the scene's first, which the rest of the panel is about, and those beside it.
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "panel.hpp"
+
+namespace cumulet::demo {
+
+namespace {
+
+using Matrix = std::array<double, 16>;
+
+/// What of a place the panel can show: scaled alike in all directions, turned about the vertical, then moved.
+struct Stand {
+  std::array<double, 3> position{};
+  double turn_degrees = 0.0;
+  double scale = 1.0;
+};
+
+Matrix matrix_of(const Stand& stand) {
+  const double angle = stand.turn_degrees * std::numbers::pi / 180.0;
+  const double s = stand.scale * std::sin(angle);
+  const double c = stand.scale * std::cos(angle);
+  const auto& p = stand.position;
+  return {c, 0.0, -s, 0.0, 0.0, stand.scale, 0.0, 0.0, s, 0.0, c, 0.0, p[0], p[1], p[2], 1.0};
+}
+
+/// Nothing for places that are sheared, tilted or stretched.
+std::optional<Stand> stand_of(const Matrix& m) {
+  Stand stand{{m[12], m[13], m[14]}, std::atan2(-m[2], m[0]) * 180.0 / std::numbers::pi, m[5]};
+  if (!(stand.scale > 0.0)) return std::nullopt;
+  const Matrix same = matrix_of(stand);
+  for (std::size_t i = 0; i < same.size(); ++i)
+    if (!(std::abs(same[i] - m[i]) <= 1e-9 * stand.scale)) return std::nullopt;
+  return stand;
+}
+
+std::string name_of(const SceneVolume& volume) {
+  if (!volume.name.empty()) return volume.name;
+  return volume.volume.empty() ? "none" : std::filesystem::path(volume.volume).filename().string();
+}
+
+}  // namespace
+
+void Panel::stand(SceneVolume& volume, const std::string& number) {
+  if (volume.places.size() > 1) {
+    ui_.fact(("Places" + number).c_str(), std::to_string(volume.places.size()));
+    return;
+  }
+  std::optional<Stand> now = volume.places.empty() ? Stand{} : stand_of(volume.places.front());
+  ImGui::BeginDisabled(!now);
+  Stand stand = now.value_or(Stand{});
+  const double far = std::hypot(stand.position[0], stand.position[1], stand.position[2]);
+  bool moved = ui_.numbers(("Position" + number).c_str(), "How far it stands from where its file has it.",
+                           stand.position, static_cast<float>(0.01 * std::max(1.0, far)));
+  moved |=
+      ui_.slider(("Turn" + number).c_str(), "Degrees about the vertical.", stand.turn_degrees, -180.0, 180.0, "%.1f");
+  moved |= ui_.slider(("Scale" + number).c_str(), "How many times as large as its file has it.", stand.scale, 0.01,
+                      100.0, "%.3g", ImGuiSliderFlags_Logarithmic);
+  ImGui::EndDisabled();
+  if (moved) volume.places.assign(1, matrix_of(stand));
+}
+
+void Panel::volumes(Model& model, std::vector<Command>& commands) {
+  const auto row = [this](SceneVolume& volume, std::size_t i) {
+    const std::string number = std::string(" ").append(std::to_string(i));
+    if (i > 1) ImGui::Separator();
+    ui_.fact(("Volume" + number).c_str(), name_of(volume));
+    std::string& typed = names_[i];
+    if (!ImGui::IsAnyItemActive()) typed = volume.name;
+    if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))
+      volume.name = typed;
+    ui_.checkbox(("Visible" + number).c_str(), "Whether it is there at all: its shadow goes with it.", volume.visible);
+    stand(volume, number);
+  };
+  if (!model.scene.volume.empty()) row(model.scene, 1);
+
+  std::vector<SceneVolume>& others = model.scene.others;
+  std::optional<std::size_t> removed;
+  std::optional<std::size_t> copied;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    SceneVolume& other = others[i];
+    const std::string number = std::string(" ").append(std::to_string(i + 2));
+    row(other, i + 2);
+    using Desc = cumulet_medium_desc;
+    settings::for_each<Desc>([&](auto setting) {
+      if (!setting.is(&Desc::density_scale) && !setting.is(&Desc::coalbedo)) return;
+      const std::string label = setting.row.label + number;
+      setting.row.label = label.c_str();
+      if (rows_.draw(setting, other.medium.*setting.field) && setting.is(&Desc::density_scale))
+        other.auto_density_scale = false;
+    });
+    const float spacing = ImGui::GetStyle().ItemSpacing.x;
+    const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
+    if (ui_.button(("Copy volume" + number).c_str(), "Another of it beside it, of the same grid.", {width, 0.0f}))
+      copied = i;
+    ImGui::SameLine();
+    if (ui_.button(("Remove volume" + number).c_str(), "Takes it away.", {width, 0.0f})) removed = i;
+  }
+  if (copied) others.insert(others.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneVolume(others[*copied]));
+  if (removed) others.erase(others.begin() + static_cast<std::ptrdiff_t>(*removed));
+  if (ui_.button("Add volume", "Opens another volume beside those that are there.", {-1.0f, 0.0f}))
+    commands.push_back({Action::add_volume_dialog});
+}
+
+}  // namespace cumulet::demo

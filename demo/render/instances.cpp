@@ -1,0 +1,119 @@
+#include "instances.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <settings.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "fire.hpp"
+
+namespace cumulet::demo {
+namespace {
+
+void check(cumulet_status status, const char* cause) {
+  if (status != CUMULET_OK) throw std::runtime_error(*cause != '\0' ? cause : cumulet_status_text(status));
+}
+
+/// What the scene says of it, and where it leaves that to the volume, what suits that.
+cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open) {
+  cumulet_medium_desc medium = scene.medium;
+  if (!scene.auto_density_scale || medium.density_scale > 0.0) return medium;
+  if (open.fire && is_unsaid(medium)) return *open.fire;
+  medium.density_scale = open.density_scale;
+  return medium;
+}
+
+bool same_place(const cumulet_instance_desc& a, const cumulet_instance_desc& b) {
+  return std::equal(a.to_world, a.to_world + 16, b.to_world) && a.hidden == b.hidden && a.tag == b.tag;
+}
+
+}  // namespace
+
+OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
+  OpenVolume open{std::move(volume), 0.0, std::nullopt};
+  open.fire = medium_of_fire(open.volume.get(), SceneVolume().medium);
+  if (cumulet_volume_suggest_density_scale(open.volume.get(), &open.density_scale) != CUMULET_OK)
+    open.density_scale = 0.0;
+  return open;
+}
+
+OpenVolume open_volume(const VolumeFile& file) {
+  const cumulet_volume_file_desc desc = volume_file(file);
+  cumulet_volume* opened = nullptr;
+  std::array<char, 1024> error{};
+  check(cumulet_volume_open_file(&desc, &opened, error.data(), error.size()), error.data());
+  return look_into({opened, cumulet_volume_release});
+}
+
+const Instances::Given* Instances::find(const VolumeFile& file) const {
+  const auto found = std::ranges::find(given_, file, &Given::file);
+  return found == given_.end() ? nullptr : &*found;
+}
+
+std::vector<VolumeFile> Instances::missing(const std::vector<SceneVolume>& volumes) const {
+  std::vector<VolumeFile> files;
+  for (const SceneVolume& volume : volumes) {
+    const VolumeFile& file = volume;
+    if (volume.is_shown() && find(file) == nullptr && std::ranges::find(files, file) == files.end())
+      files.push_back(file);
+  }
+  return files;
+}
+
+void Instances::give(const VolumeFile& file, OpenVolume volume) { given_.push_back({file, std::move(volume)}); }
+
+void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& volumes) {
+  std::erase_if(given_, [&](const Given& given) {
+    return std::ranges::none_of(volumes, [&](const VolumeFile& file) { return file == given.file; });
+  });
+  std::size_t count = 0;
+  const auto place = [&](const SceneVolume& scene, const OpenVolume& open, const cumulet_instance_desc& desc) {
+    if (count == shown_.size()) {
+      cumulet_instance* made = nullptr;
+      std::array<char, 1024> error{};
+      check(cumulet_instance_create(&desc, &made, error.data(), error.size()), error.data());
+      std::shared_ptr<cumulet_instance> instance(made, cumulet_instance_release);
+      check(cumulet_add_instance(viewer, made), cumulet_last_error(viewer));
+      shown_.push_back({std::move(instance), desc, open.volume, *desc.medium, {}});
+    }
+    Shown& shown = shown_[count++];
+    if (shown.volume != open.volume || !settings::same(shown.medium, *desc.medium) || !same_place(shown.desc, desc))
+      check(cumulet_instance_set(shown.instance.get(), &desc), "");
+    shown.desc = desc;
+    shown.volume = open.volume;
+    shown.medium = *desc.medium;
+    for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
+      if (shown.ramps[i] == scene.ramps[i]) continue;
+      check(cumulet_instance_set_ramp(shown.instance.get(), static_cast<cumulet_ramp>(i),
+                                      settings::numbers_of(scene.ramps[i]), scene.ramps[i].size()),
+            "");
+      shown.ramps[i] = scene.ramps[i];
+    }
+  };
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const SceneVolume& scene = volumes[i];
+    const Given* given = find(scene);
+    if (given == nullptr || !given->volume.volume) continue;
+    const cumulet_medium_desc medium = medium_of(scene, given->volume);
+    cumulet_instance_desc desc{};
+    desc.struct_size = sizeof desc;
+    desc.volume = given->volume.volume.get();
+    desc.medium = &medium;
+    desc.hidden = scene.visible ? 0 : 1;
+    desc.tag = i + 1;
+    if (scene.places.empty()) place(scene, given->volume, desc);
+    for (const auto& to_world : scene.places) {
+      std::ranges::copy(to_world, desc.to_world);
+      place(scene, given->volume, desc);
+    }
+  }
+  while (shown_.size() > count) {
+    check(cumulet_remove_instance(viewer, shown_.back().instance.get()), cumulet_last_error(viewer));
+    shown_.pop_back();
+  }
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cumulet/cumulet.h>
+
+#include <memory>
+#include <optional>
+#include <scene_file.hpp>
+#include <vector>
+
+namespace cumulet::demo {
+
+/// A file's volume, and what it is shown with where a scene leaves that to it.
+struct OpenVolume {
+  std::shared_ptr<cumulet_volume> volume;
+  double density_scale = 0.0;               // that suits it; 0: it shows nothing at any
+  std::optional<cumulet_medium_desc> fire;  // of one that burns
+};
+
+/// In any thread, some milliseconds a million voxels.
+[[nodiscard]] OpenVolume look_into(std::shared_ptr<cumulet_volume> volume);
+/// Likewise. Throws std::runtime_error with the library's cause.
+[[nodiscard]] OpenVolume open_volume(const VolumeFile& file);
+
+/// A scene's further volumes (SceneOptions::others) in a viewer: an instance for each of their places. In the thread
+/// that has the viewer.
+class Instances {
+ public:
+  /// The files of those to be shown that were not given yet, each once. One that the viewer shows itself is best given
+  /// that volume: they share a grid.
+  [[nodiscard]] std::vector<VolumeFile> missing(const std::vector<SceneVolume>& volumes) const;
+  /// Without a volume: it cannot be had, and is not asked for again while a scene names it.
+  void give(const VolumeFile& file, OpenVolume volume);
+  /// Shows those that were given, and forgets the files that are named no more. An instance's tag is its volume's
+  /// number from 1 on. Throws std::runtime_error with the library's cause.
+  void show(cumulet_viewer* viewer, const std::vector<SceneVolume>& volumes);
+
+ private:
+  struct Given {
+    VolumeFile file;
+    OpenVolume volume;
+  };
+  struct Shown {
+    std::shared_ptr<cumulet_instance> instance;
+    cumulet_instance_desc desc{};
+    std::shared_ptr<cumulet_volume> volume;  // the descriptor's
+    cumulet_medium_desc medium{};            // likewise
+    decltype(SceneVolume::ramps) ramps;
+  };
+
+  [[nodiscard]] const Given* find(const VolumeFile& file) const;
+
+  std::vector<Given> given_;
+  std::vector<Shown> shown_;
+};
+
+}  // namespace cumulet::demo
