@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -44,11 +43,6 @@ std::optional<Stand> stand_of(const Matrix& m) {
   return stand;
 }
 
-std::string name_of(const SceneVolume& volume) {
-  if (!volume.name.empty()) return volume.name;
-  return volume.volume.empty() ? "none" : std::filesystem::path(volume.volume).filename().string();
-}
-
 }  // namespace
 
 void Panel::stand(SceneVolume& volume, const std::string& number) {
@@ -74,7 +68,7 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
   const auto row = [this](SceneVolume& volume, std::size_t i) {
     const std::string number = std::string(" ").append(std::to_string(i));
     if (i > 1) ImGui::Separator();
-    ui_.fact(("Volume" + number).c_str(), name_of(volume));
+    ui_.fact(("Volume" + number).c_str(), volume.label());
     std::string& typed = names_[i];
     if (!ImGui::IsAnyItemActive()) typed = volume.name;
     if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))
@@ -101,7 +95,7 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     });
     const float spacing = ImGui::GetStyle().ItemSpacing.x;
     const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
-    if (ui_.button(("Copy volume" + number).c_str(), "Another of it beside it, of the same grid.", {width, 0.0f}))
+    if (ui_.button(("Copy volume" + number).c_str(), "Another of it in its place, of the same grid.", {width, 0.0f}))
       copied = i;
     ImGui::SameLine();
     if (ui_.button(("Remove volume" + number).c_str(), "Takes it away.", {width, 0.0f})) removed = i;

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <ostream>
@@ -16,7 +15,6 @@ namespace cumulet::demo {
 namespace {
 
 using Json = nlohmann::ordered_json;
-namespace fs = std::filesystem;
 
 struct Release {
   void operator()(cumulet_inspection* inspection) const { cumulet_inspection_release(inspection); }
@@ -173,7 +171,7 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
   Json json;
   if (!scene.volume.empty()) json["volume"] = volume_info(scene.volume);
   for (const SceneVolume& other : scene.others) {
-    Json info = {{"name", other.name.empty() ? fs::path(other.volume).filename().string() : other.name}};
+    Json info = {{"name", other.label()}};
     info.update(volume_info(other.volume));
     json["other_volumes"].push_back(info);
   }
@@ -183,10 +181,9 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
     out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
     return;
   }
-  const Json others = json.contains("other_volumes") ? json["other_volumes"] : Json::array();
-  json.erase("other_volumes");
-  for (const auto& [what, facts] : json.items()) write_lines(facts, "", out);
-  for (const Json& other : others) write_lines(other, "", out);
+  for (const auto& [what, facts] : json.items()) {
+    for (const Json& file : facts.is_array() ? facts : Json::array({facts})) write_lines(file, "", out);
+  }
 }
 
 std::optional<std::string> up_hint(const SceneVolume& volume) {

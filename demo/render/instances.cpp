@@ -83,6 +83,7 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     if (shown.volume != open.volume || !settings::same(shown.medium, *desc.medium) || !same_place(shown.desc, desc))
       check(cumulet_instance_set(shown.instance.get(), &desc), "");
     shown.desc = desc;
+    shown.desc.medium = nullptr;  // it lives as long as the call; below is what it said
     shown.volume = open.volume;
     shown.medium = *desc.medium;
     for (std::size_t i = 0; i < scene.ramps.size(); ++i) {

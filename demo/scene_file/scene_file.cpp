@@ -591,10 +591,8 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   const bool second = format == SceneFormat::second;
   put_volume(writer, format, scene, named(scene.volume));
   for (std::size_t i = 0; second && i < scene.others.size(); ++i) {
-    SceneVolume other = scene.others[i];
-    other.medium.max_bounces = 0;  // the first one's
     writer.of_volume(i + 1);
-    put_volume(writer, format, other, named(other.volume));
+    put_volume(writer, format, scene.others[i], named(scene.others[i].volume));
   }
   writer.of_volume(0);
 
@@ -653,6 +651,8 @@ std::string portable_file(const std::string& file, const std::string& path) {
 }  // namespace
 
 SceneVolume::SceneVolume() { medium.struct_size = sizeof medium; }
+
+std::string SceneVolume::label() const { return name.empty() ? fs::path(volume).filename().string() : name; }
 
 SceneOptions::SceneOptions() {
   for_each_group(*this, [](auto& group) { group.struct_size = sizeof group; });

@@ -38,12 +38,14 @@ struct SceneVolume : VolumeFile {
   bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
 
   SceneVolume();
+  /// Its name, or its file's.
+  [[nodiscard]] std::string label() const;
   [[nodiscard]] bool is_shown() const { return visible && !volume.empty(); }
 };
 
 /// What every demo program can show. Its first volume is what flags and the demo's panel set, and may be none.
 struct SceneOptions : SceneVolume {
-  std::vector<SceneVolume> others;   // beside the first; their max_bounces are the first one's
+  std::vector<SceneVolume> others;   // beside the first; their max_bounces are 0: the first one's counts
   std::string surfaces;              // a glTF file; "": none
   std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
   std::uint32_t width = 1280;
