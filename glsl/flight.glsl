@@ -23,6 +23,10 @@
 #ifndef CM_FLIGHT_GLSL
 #define CM_FLIGHT_GLSL
 
+#include "path_state.glsl"
+#if CM_EQUIANGULAR
+#include "extinction_at.glsl"
+#endif
 #include "path.glsl"
 
 // Cells marched before events are looked at: keeps neighbouring lanes together.
@@ -41,14 +45,44 @@ CM_FN void cm_enter(CM_INOUT(CmPath) p) {
   p.cache = cell.z;
 }
 
+#if CM_EQUIANGULAR
+// What is scattered towards the path where such a ray starts; where there is nothing it ends.
+CM_FN void cm_weigh(CM_INOUT(CmPath) p) {
+  CmExtinction there = cm_extinction_at(p, p.cell, p.seen != 0u);
+#if CM_INSTANCES
+  cm_here = there.instance;
+#endif
+  vec3 to_light = cm_to_world(p.d);
+  float density = cm_passing_density(p.o, p.w, to_light, p.reach);
+  vec3 share = CM_MEDIUM.albedo;
+  float anisotropy = CM_MEDIUM.anisotropy;
+#if CM_CHANNELS
+  if (CM_MEDIUM.coloured != 0u) share *= cm_march_colour(there.cell);
+  if (CM_MEDIUM.anisotropic != 0u) anisotropy = cm_march_anisotropy(there.cell);
+#endif
+  p.light *= share * (there.extinction * cm_passing_share(density, there.extinction) *
+                      cm_medium_phase(anisotropy, dot(p.w, to_light)));
+  if (!(there.extinction > 0.0f)) {
+    p.reach = 0.0f;
+    p.t_end = 0.0f;
+    p.cell = uvec2(CM_NONE, 0u);
+  }
+}
+#endif
+
 #if CM_INSTANCES
 
-CM_FN void cm_aim(CM_INOUT(CmPath) p) { cm_begin_march(p); }
+CM_FN void cm_aim(CM_INOUT(CmPath) p) {
+  cm_begin_march(p);
+#if CM_EQUIANGULAR
+  if (p.ray == CM_RAY_EQUIANGULAR) cm_weigh(p);
+#endif
+}
 
 // The volume that the ray comes to next, and its cell there; whether there is one before its end.
 CM_FN bool cm_seek(CM_INOUT(CmPath) p) {
-  uint own = p.start == CM_IN_MEDIUM ? p.start_instance : CM_INSTANCE_NONE;
-  uint flags = p.start == CM_AT_CAMERA ? CM_INSTANCE_SEEN : 0u;
+  uint own = cm_starts_inside(p) ? p.start_instance : CM_INSTANCE_NONE;
+  uint flags = p.start == CM_AT_CAMERA && !cm_is_equiangular(p) ? CM_INSTANCE_SEEN : 0u;
   if (p.gathers != 0u) flags |= CM_INSTANCE_EMITS | CM_INSTANCE_OVERLAPS;
   bool found = false;
   // Once more where it finds the one that it started in, through which it went first.
@@ -98,16 +132,19 @@ CM_FN uint cm_leave(CM_INOUT(CmPath) p, uint event, bool over) {
 CM_FN void cm_aim(CM_INOUT(CmPath) p) {
   vec2 range = cm_box_range(p.o, p.d);
   // Without triangles a reach is kept no longer than until here, and after the ground another dispatch may come between.
-  float reach = CM_SURFACES == 0 && p.start == CM_ON_GROUND ? p.t_end : p.reach;
+  float reach = CM_SURFACES == 0 && p.start == CM_ON_GROUND && !cm_is_equiangular(p) ? p.t_end : p.reach;
   p.t = range.x;
   p.t_end = max(0.0f, min(range.y, reach));
   p.cell = uvec2(CM_NONE, 0u);
   p.cache = CM_NONE;
   if (range.x < p.t_end) {
     p.cell = p.start_cell;
-    if (p.start != CM_IN_MEDIUM) cm_enter(p);
+    if (!cm_starts_inside(p)) cm_enter(p);
   }
   p.stage = CM_STAGE_FLY;
+#if CM_EQUIANGULAR
+  if (p.ray == CM_RAY_EQUIANGULAR) cm_weigh(p);
+#endif
 }
 
 #endif

@@ -175,11 +175,15 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 #include "punctual.glsl"
 
 // By light::share_looks. O(1).
-CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
-  uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x2c1b3c6du)));
+CM_FN CmLamp cm_pick_lamp(CmPath p, uint salt) {
+  uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, salt)));
   uint i = cm_below(pick.x, max(cm.lamps.count, 1u));
   if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;
-  CmLamp lamp = cm_lamp(i);
+  return cm_lamp(i);
+}
+
+CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
+  CmLamp lamp = cm_pick_lamp(p, 0x2c1b3c6du);
   vec3 from = lamp.extended != 0u ? cm_lamp_point(lamp, u.x, u.y) : vec3(0.0f, 0.0f, 0.0f);
   CmLightSample light;
   light.kind = CM_LIGHT_LAMP;
@@ -258,9 +262,10 @@ CM_FN vec3 cm_glow_direction(vec3 o, vec3 u, vec3 otherwise) {
 // The integral of t^2 over the ray's part inside, over the box's volume.
 CM_FN float cm_glow_pdf(CmLightHit hit) {
   vec2 range = cm_box_range(hit.o, cm_to_cube(hit.w));
+  if (!(range.x < range.y)) return 0.0f;
   vec3 box = cm.space.box_max - cm.space.box_min;
-  float cubes = max(0.0f, range.y - range.x) * (dot(range, range) + range.x * range.y);
-  return cubes / max(3.0f * cm.space.unit_volume * box.x * box.y * box.z, 1e-30f);
+  float cubes = (range.y - range.x) * (dot(range, range) + range.x * range.y);
+  return min(1e30f, cubes / max(3.0f * cm.space.unit_volume * box.x * box.y * box.z, 1e-30f));
 }
 
 #endif

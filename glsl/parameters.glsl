@@ -27,6 +27,9 @@
 #ifndef CM_LAMPS
 #define CM_LAMPS CM_SURFACES
 #endif
+#ifndef CM_EQUIANGULAR
+#define CM_EQUIANGULAR 0
+#endif
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
 #endif

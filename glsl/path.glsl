@@ -22,6 +22,9 @@
 #include "path_state.glsl"
 #include "light.glsl"
 #include "path_vertex.glsl"
+#if CM_EQUIANGULAR
+#include "equiangular.glsl"
+#endif
 
 // A sample is done: what is in front of the background, and the background itself, apart, for pictures over what a host
 // has drawn.
@@ -160,6 +163,14 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   // Of the choices of the sky each is as likely: for a lobe.
   if (look.looks && look.light.kind == CM_LIGHT_SKY) look.draw.choice = min(1.0f, u.z / cm.lights.sky_chance);
   if (look.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) look.light.radiance = vec3(0.0f, 0.0f, 0.0f);
+#if CM_EQUIANGULAR && defined(CM_MARCH)
+  bool lamp = look.looks && look.light.kind == CM_LIGHT_LAMP && look.light.distance < 3.0e38f;
+  if (lamp && p.start == CM_IN_MEDIUM && cm_is_passed(p, p.bounces - 1u)) {
+    float extinction = cm_extinction_at(p, p.start_cell, p.bounces == 1u).extinction;
+    float density = cm_passing_density(p.o, p.w, look.light.direction, look.light.distance);
+    look.light.radiance *= 1.0f - cm_passing_share(density, extinction);
+  }
+#endif
   return look;
 }
 
@@ -167,7 +178,7 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
 // Through all volumes, or through some once more; first through the one that it starts in.
 CM_FN void cm_begin_visits(CM_INOUT(CmPath) p) {
   uint again = CM_INSTANCE_EMITS | CM_INSTANCE_OVERLAPS;
-  bool inside = p.start == CM_IN_MEDIUM &&
+  bool inside = cm_starts_inside(p) &&
                 (p.gathers == 0u || (cm_instances[p.start_instance].flags & again) == again);
   p.t = 0.0f;
   p.entry = -1.0f;
@@ -258,14 +269,31 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
     finished = cm_arrive(p, collided, grounded) || dark || missed;
     if (met) finished = cm_stand(p, vertex) || finished;
   }
+#if CM_EQUIANGULAR
+  if (p.ray == CM_RAY_EQUIANGULAR) {
+    finished = p.finishes != 0u;
+    arrived = !finished;
+    p.o = p.o + p.ahead * cm_to_cube(p.w);
+    if (p.bounces == 0u) p.light = cm_background_radiance(p.w);
+  }
+#endif
   return finished;
 }
 
 // What follows an event. Software drivers run both sides of every branch, so each costly step stands here once.
 // In stage CM_STAGE_VERTEX it is on a triangle, else, in CM_STAGE_EVENT, in the medium.
 CM_FN void cm_handle(CM_INOUT(CmPath) p, CmVertex vertex) {
+#if CM_EQUIANGULAR
+  CmPassed passed = cm_pass(p, vertex);
+#endif
   bool arrived;
   bool finished = cm_end_ray(p, vertex, arrived);
+#if CM_EQUIANGULAR
+  if (passed.looks) {
+    cm_look_back(p, passed, finished);
+    return;
+  }
+#endif
   if (!finished) {
     // Not in one call: of p, which both change, the outer one may have a copy of before.
     CmLook look = cm_look(p, vertex, arrived);

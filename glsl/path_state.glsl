@@ -20,6 +20,7 @@
 // What its ray is.
 #define CM_RAY_FLIGHT 0u
 #define CM_RAY_TO_LIGHT 1u  // a next-event estimate: a shadow ray
+#define CM_RAY_EQUIANGULAR 2u  // one from a point of the flight's way, after the flight (glsl/equiangular.glsl)
 
 // Where its ray starts.
 #define CM_AT_CAMERA 0u
@@ -46,6 +47,7 @@
 //   bounces         events of the path
 //   steps           cells marched
 //   number          the sample's, of its pixel
+//   ahead           with CM_EQUIANGULAR, of such a ray: how far ahead of o, along w, the path goes on
 // CM_PATH_FLIGHT, what goes on to the next ray:
 //   w               world direction of flight, kept during shadow rays
 //   throughput      of the path
@@ -64,6 +66,8 @@
 //   at_layer        1: it is the surface pass's colour, not the background, that waits at the camera ray's end
 //   lifted          1: the ray started above the triangle that its path had met
 //   to_ground       1: a flight comes to the ground if nothing stops it
+//   finishes        with CM_EQUIANGULAR, of such a ray, 1: the path ends with it
+//   seen            likewise, 1: the flight was a camera ray
 // CM_PATH_VISIT, only with CM_INSTANCES, and only for kernels that march:
 //   instance        that the ray marches through, or has entered last; of a collision the one that it is with
 //   entry           where it entered that; -1 of the one that it started in
@@ -74,12 +78,23 @@
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
-#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number)
+#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) CM_PATH_AHEAD(FLOAT)
+#if CM_EQUIANGULAR
+#define CM_PATH_AHEAD(FLOAT) FLOAT(ahead)
+#else
+#define CM_PATH_AHEAD(FLOAT)
+#endif
 #define CM_PATH_FLIGHT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
   VEC3(w) UINT(random) VEC3(throughput) UINT(stream) VEC3(light) FLOAT(density)
 #define CM_PATH_ENDS(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
-  UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 1) BITS(start, 2) BITS(found, 2) BITS(behind, 1)            \
-  BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1) BITS(to_ground, 1)
+  UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 2) BITS(start, 2) BITS(found, 2) BITS(behind, 1)            \
+  BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1) BITS(to_ground, 1) CM_PATH_PASSED(BITS)
+
+#if CM_EQUIANGULAR || defined(CM_KEEPS_EQUIANGULAR)
+#define CM_PATH_PASSED(BITS) BITS(finishes, 1) BITS(seen, 1)
+#else
+#define CM_PATH_PASSED(BITS)
+#endif
 
 #define CM_PATH_VISIT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                          \
   UINT(instance) FLOAT(entry) UINT(start_instance) UINT(met) UVEC2(met_cell) BITS(gathers, 1)

@@ -82,6 +82,11 @@ CM_FN vec3 cm_scattered_direction(CmPath p, float u_0, float u_1) {
                    ground ? sqrt(1.0f - u_0) : cm_medium_cosine(cm_anisotropy(p), u_0), 6.28318531f * u_1);
 }
 
+CM_FN bool cm_is_equiangular(CmPath p) { return CM_EQUIANGULAR != 0 && p.ray == CM_RAY_EQUIANGULAR; }
+
+// Whether the ray starts where the path has collided, in that cell.
+CM_FN bool cm_starts_inside(CmPath p) { return p.start == CM_IN_MEDIUM && !cm_is_equiangular(p); }
+
 // Without light among surfaces: what has left one sees the sky alone, and the volume sees none.
 CM_FN bool cm_among_surfaces_dark(CmPath p) {
   return CM_SURFACES != 0 && cm.integrator.light_among_surfaces == 0u && p.bounces > 0u;
@@ -101,8 +106,8 @@ struct CmVertex {
 CM_FN bool cm_asks(CmPath p) {
   bool flight = p.ray == CM_RAY_FLIGHT;
   if (p.event == CM_EVENT_COLLISION && !flight) return false;
-  if (p.bounces == 0u && cm.layers.count != 0u) return false;
-  if (p.start == CM_ON_TRIANGLE) return flight || p.reach > 0.0f;  // from a little above it
+  if (flight && p.bounces == 0u && cm.layers.count != 0u) return false;
+  if (p.start == CM_ON_TRIANGLE && !cm_is_equiangular(p)) return flight || p.reach > 0.0f;  // from a little above it
   float reach = p.event == CM_EVENT_COLLISION ? p.t : p.reach;
   return cm_bvh_near(cm_from_cube_point(p.o), cm_to_world(p.d), 0.0f, reach);
 }
@@ -120,14 +125,14 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   bool first = flight && cm.medium.emits != 0u;
   vec3 d = cm_to_world(p.d);
   vec3 o = cm_from_cube_point(p.o);
-  if (p.start == CM_ON_TRIANGLE) {
+  if (p.start == CM_ON_TRIANGLE && p.ray != CM_RAY_EQUIANGULAR) {
     vec3 shift;
     o = cm_surface_origin(p.triangle, p.weights, p.behind != 0u, d, shift);
     // Shadow rays end where they would from the point itself: at a lamp.
     if (!flight) d -= shift / p.reach;
   }
   cm_hit_seed = p.random + p.ray;  // a look and the flight after it
-  cm_hit_camera = p.bounces == 0u;
+  cm_hit_camera = flight && p.bounces == 0u;
   CmHit hit;
   float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;
   bool met = cm_bvh_trace(o, d, 0.0f, reach, !flight, hit);
@@ -188,6 +193,12 @@ CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
   return vertex.surface.unlit;
 }
 
+// How far a flight has come that has ended.
+CM_FN float cm_flight_end(CmPath p, CmVertex vertex) {
+  if (vertex.on_triangle) return dot(vertex.surface.position - cm_from_cube_point(p.o), p.w);
+  return p.event == CM_EVENT_COLLISION ? p.t : p.t_end;
+}
+
 // Where looks for light start, in the world.
 CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) {
   if (vertex.on_triangle) return cm_offset_origin(vertex.surface.position, vertex.surface.geometric);
@@ -245,6 +256,7 @@ CM_FN CmVertex cm_in_medium() { return CmVertex(false); }
 CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {}
 CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) { return false; }
 CM_FN bool cm_blurs(CmTurn turn) { return false; }
+CM_FN float cm_flight_end(CmPath p, CmVertex vertex) { return p.event == CM_EVENT_COLLISION ? p.t : p.t_end; }
 CM_FN vec3 cm_look_from(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }
 
 CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {

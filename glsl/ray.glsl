@@ -21,9 +21,9 @@ CM_FN vec3 cm_out_of_volume(vec3 v) {
 CM_FN vec3 cm_from_cube_point(vec3 p) { return cm_to_world(p) + cm.space.cube_origin; }
 CM_FN vec3 cm_to_cube_point(vec3 p) { return cm_to_cube(p - cm.space.cube_origin); }
 
-// Where a ray is inside the box: t.x to t.y, empty if t.x > t.y.
-CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
-  float t_in = 0.0f;
+// Where a line, o + t d of any t, is inside the box: t.x to t.y, empty if t.x > t.y.
+CM_FN vec2 cm_box_line(vec3 o, vec3 d) {
+  float t_in = -3.0e38f;
   float t_out = 3.0e38f;
   for (int axis = 0; axis < 3; ++axis) {
     if (d[axis] != 0.0f) {
@@ -32,10 +32,16 @@ CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
       t_in = max(t_in, min(a, b));
       t_out = min(t_out, max(a, b));
     } else if (o[axis] < cm.space.box_min[axis] || o[axis] > cm.space.box_max[axis]) {
+      t_in = 1.0f;
       t_out = -1.0f;
     }
   }
   return vec2(t_in, t_out);
+}
+// Of a ray, whose t is not negative.
+CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
+  vec2 line = cm_box_line(o, d);
+  return vec2(max(0.0f, line.x), line.y);
 }
 
 // The ray through a point of a pixel: o in cube space, w a unit vector in world space. Returns the distance along it per

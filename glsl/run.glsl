@@ -15,7 +15,8 @@ CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rou
       cm_aim(p);
       if (CM_INSTANCES == 0 && p.cell.x == CM_NONE) {
         p.event = CM_EVENT_ESCAPE;
-        p.stage = p.start == CM_AT_CAMERA && p.to_ground == 0u ? CM_STAGE_FINISH : CM_STAGE_EVENT;
+        bool ends = !cm_is_equiangular(p) && p.start == CM_AT_CAMERA && p.to_ground == 0u;
+        p.stage = ends ? CM_STAGE_FINISH : CM_STAGE_EVENT;
       }
     }
     marches += cm_travel(p);

@@ -7,7 +7,7 @@
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
-// variants: - or CM_LAMPS=1
+// variants: - or CM_LAMPS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"
@@ -25,7 +25,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 // What paths have of triangles takes no registers where there are none.
 void cm_forget_triangles(inout CmPath p) {
+#if !CM_EQUIANGULAR
   p.reach = 0.0;
+#endif
   p.triangle = 0u;
   p.weights = vec2(0.0);
   p.behind = 0u;

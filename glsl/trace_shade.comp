@@ -3,6 +3,7 @@
 // variants: CM_SURFACES=1,2
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1
 // variants: - or CM_ENVIRONMENT=1
+// variants: - or CM_EQUIANGULAR=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"
@@ -43,8 +44,19 @@ void main() {
   cm_load_ends(p, lane);
   CmVertex vertex = cm_on_triangle(p);
   p = cm_load_path(lane);
+#if CM_EQUIANGULAR
+  CmPassed passed = cm_pass(p, vertex);
+#endif
   bool arrived;
   bool finished = cm_end_ray(p, vertex, arrived);
+#if CM_EQUIANGULAR
+  if (passed.looks) {
+    cm_look_back(p, passed, finished);
+    cm_store_path(p, lane);
+    cm_send_on(p, lane);
+    return;
+  }
+#endif
   cm_store_sum(p, lane);
   cm_forget_ray(p);
   CmPath kept = cm_begin_path();

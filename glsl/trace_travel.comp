@@ -5,6 +5,7 @@
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
+// variants: - or CM_EQUIANGULAR=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 // A path that waits leaves its lane to the next one in the queue: few events a visit, and longer marches.

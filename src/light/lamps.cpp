@@ -128,6 +128,24 @@ double share_looks(std::span<core::CmLamp> records, std::span<const Lit> lit) {
   return all;
 }
 
+std::optional<double> nearest_lamp(std::span<const core::CmLamp> records, const Lit& ball) {
+  std::optional<double> nearest;
+  if (!(ball.radius > 0.0)) return nearest;
+  for (const core::CmLamp& lamp : records) {
+    if (lamp.kind == core::CM_LAMP_DISTANT) continue;
+    const double distance = glm::distance(glm::dvec3(lamp.position), ball.centre) / ball.radius;
+    nearest = std::min(nearest.value_or(distance), distance);
+  }
+  return nearest;
+}
+
+bool suits_equiangular(std::optional<double> nearest, double optical_depth) {
+  // Of one outside, light is even over a flight's way, and it is only that few flights collide.
+  constexpr double most_within = 3.0;
+  constexpr double most_outside = 0.25;
+  return nearest && optical_depth < (*nearest <= 1.0 ? most_within : most_outside);
+}
+
 void add_lamps(SceneLights& lights, const Lamps& lamps) {
   for (const Lamp& lamp : lamps) {
     double share = 1.0;  // of its power that it sends out

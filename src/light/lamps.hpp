@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -55,6 +56,14 @@ struct Lit {
 /// lit or, of one within, at its rim; of several the mean of their shares. A fifth of the looks goes to all alike, for
 /// places where the bright ones are in shadow. Returns what arrives of all. lit: those of no radius do not count.
 double share_looks(std::span<core::CmLamp> records, std::span<const Lit> lit);
+
+/// How far the nearest lamp that stands somewhere is from the middle of a ball, over its radius. Nothing where there is
+/// none, or no ball.
+std::optional<double> nearest_lamp(std::span<const core::CmLamp> records, const Lit& ball);
+
+/// Whether looks for lamps from points that flights have passed (glsl/equiangular.glsl) are worth their time in a
+/// medium of this mean optical depth. Measured: docs/architecture.md.
+bool suits_equiangular(std::optional<double> nearest, double optical_depth);
 
 /// Counts these, too.
 void add_lamps(SceneLights& lights, const Lamps& lamps);

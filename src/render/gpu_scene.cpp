@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -192,6 +193,24 @@ void GpuScene::update_environment(const light::Surroundings& surroundings, const
   if (environment_ && environment_.of() == environment) surroundings_ = surroundings;
 }
 
+light::Lit GpuScene::ball_of(const scene::Volume& volume) const {
+  const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
+  const core::CmGrid& grid = *data_->grid(*volume.source);
+  return {glm::dvec3(to_world * glm::dvec4(0.5 * glm::dvec3(grid.box_min + grid.box_max), 1.0)),
+          0.5 * glm::length(glm::dmat3(to_world) * glm::dvec3(grid.box_max - grid.box_min))};
+}
+
+double GpuScene::optical_depth() const {
+  const double radius = lit()[0].radius;
+  double depth = 0.0;
+  for (const scene::Volume& volume : present_) {
+    const double own =
+        volume.medium->density_scale * volume.source->optical_depth * scene::mean_stretch(volume.place.to_world);
+    depth += own * std::pow(ball_of(volume).radius / radius, 2.0);
+  }
+  return depth;
+}
+
 std::array<light::Lit, 2> GpuScene::lit() const {
   std::array<light::Lit, 2> lit;
   if (instances_) {
@@ -199,11 +218,7 @@ std::array<light::Lit, 2> GpuScene::lit() const {
     const glm::dvec3 high(instances_->space().box_max);
     lit[0] = {instances_->origin() + 0.5 * (low + high), 0.5 * glm::length(high - low)};
   } else if (!present_.empty()) {
-    const scene::Volume& volume = present_.front();
-    const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
-    const core::CmGrid& grid = *data_->grid(*volume.source);
-    lit[0] = {glm::dvec3(to_world * glm::dvec4(0.5 * glm::dvec3(grid.box_min + grid.box_max), 1.0)),
-              0.5 * glm::length(glm::dmat3(to_world) * glm::dvec3(grid.box_max - grid.box_min))};
+    lit[0] = ball_of(present_.front());
   }
   if (model_) {
     const surface::Pose& pose = model_.of()->pose;
@@ -360,6 +375,8 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
   light::add_lamps(near, *snapshot.lamps);
   near.lamps_arrive = obstacles.lamps != nullptr ? obstacles.lamps->arrives() : 0.0;
+  const std::optional<double> nearest = obstacles.lamps != nullptr ? obstacles.lamps->nearest() : std::nullopt;
+  p.equiangular = nearest && light::suits_equiangular(nearest, optical_depth());
   const light::LightTable table(lights(snapshot), surroundings(snapshot), near, own);
   p.lights = table.parameters();
   if (environment_) p.environment = environment_->parameters();

@@ -79,6 +79,9 @@ class GpuScene {
   // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.
   void find_present(const scene::Snapshot& snapshot);
   void update_instances(const Wanted& wanted);
+  [[nodiscard]] light::Lit ball_of(const scene::Volume& volume) const;
+  // The mean over rays through the ball of all volumes that are here: of each, by how much of that it takes.
+  [[nodiscard]] double optical_depth() const;
   // Of the volumes and the model that are here, or of nothing.
   [[nodiscard]] std::array<light::Lit, 2> lit() const;
   void update_lamps(const scene::Snapshot& snapshot, const Wanted& wanted);

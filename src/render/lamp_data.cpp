@@ -12,6 +12,7 @@ LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, co
   std::vector<core::CmLamp> records = light::lamp_records(of_host, of_scene, glm::dvec3(0.0));
   LampData data;
   data.arrives_ = light::share_looks(records, lit);
+  if (!lit.empty()) data.nearest_ = light::nearest_lamp(records, lit.front());
   data.count_ = static_cast<std::uint32_t>(records.size());
   if (records.empty()) records.emplace_back();  // what kernels are bound to, though they read none
   const std::size_t bytes = records.size() * sizeof(core::CmLamp);

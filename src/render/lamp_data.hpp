@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "gl/objects.hpp"
@@ -20,11 +21,14 @@ class LampData {
   [[nodiscard]] std::uint32_t count() const { return count_; }
   /// Of all of them, by luminance (light::share_looks).
   [[nodiscard]] double arrives() const { return arrives_; }
+  /// light::nearest_lamp, to the first of what they may light: the medium.
+  [[nodiscard]] std::optional<double> nearest() const { return nearest_; }
 
  private:
   gl::Object records_;
   std::uint32_t count_ = 0;
   double arrives_ = 0.0;
+  std::optional<double> nearest_;
 };
 
 }  // namespace cumulet::render

@@ -55,6 +55,7 @@ void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
 constexpr const char* noise_kernel = "noise.comp";
 constexpr const char* channels_macro = "CM_CHANNELS 1";
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
+constexpr const char* equiangular_macro = "CM_EQUIANGULAR 1";
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
@@ -248,6 +249,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
     std::vector<std::string> more{surfaces_macro(picture.traced_)};
     add_medium(picture, more);
     if (picture.environment_) more.emplace_back(environment_macro);
+    if (picture.equiangular_) more.emplace_back(equiangular_macro);
     return program(data.defines(picture.several_), "trace_travel.comp", more);
   }
   std::vector<std::string> more;
@@ -256,6 +258,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   add_medium(picture, more);
   if (picture.environment_) more.emplace_back(environment_macro);
   if (picture.lamps_) more.emplace_back("CM_LAMPS 1");
+  if (picture.equiangular_) more.emplace_back(equiangular_macro);
   return program(data.defines(picture.several_), "trace.comp", more);
 }
 
@@ -266,6 +269,7 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
     if (picture.several_) shade.emplace_back("CM_INSTANCES 1");
   }
   if (picture.environment_) shade.emplace_back(environment_macro);
+  if (picture.equiangular_) shade.emplace_back(equiangular_macro);
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
   if (picture.environment_) camera.emplace_back(environment_macro);
@@ -324,6 +328,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.channels_ = medium.emits != 0U || medium.coloured != 0U || medium.anisotropic != 0U;
   picture.environment_ = obstacles.environment != nullptr;
   picture.lamps_ = obstacles.lamps_met() > 0;
+  picture.equiangular_ = picture.lamps_ && parameters.equiangular;
   picture.several_ = obstacles.instances != nullptr;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;

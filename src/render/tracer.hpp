@@ -154,6 +154,7 @@ class Picture {
   bool channels_ = false;     // its cells carry more than density
   bool environment_ = false;  // paths that escape come to one
   bool lamps_ = false;        // paths that meet no triangles look for lamps
+  bool equiangular_ = false;  // and from points of flights
   bool several_ = false;      // volumes
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }

@@ -17,7 +17,8 @@ enum class March { tet = 0, dense = 1, brick = 2 };
 struct MarchSource {
   March march = March::tet;
   grid::Cube cube;
-  float max_value = 0.0F;  // grid value of density 1
+  float max_value = 0.0F;      // grid value of density 1
+  double optical_depth = 0.0;  // a unit of density scale, as grid::Statistics has the mean
 
   // tet
   std::shared_ptr<const grid::TetGrid> grid;

@@ -41,8 +41,9 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.seconds.statistics += watch.lap();
   progress.begin(Progress::Stage::refining);
   if (settings.march != scene::March::tet) {
-    built.source = std::make_shared<const scene::MarchSource>(
-        scene::make_voxel_source(settings.march, voxels, statistics, channels));
+    scene::MarchSource source = scene::make_voxel_source(settings.march, voxels, statistics, channels);
+    source.optical_depth = statistics->mean_optical_depth();
+    built.source = std::make_shared<const scene::MarchSource>(std::move(source));
     built.seconds.records = watch.lap();
     return built;
   }
@@ -61,8 +62,10 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   if (grid->limited) {
     log.info("max_cells (" + std::to_string(settings.refine.max_cells) + ") ended the refinement before the threshold");
   }
-  built.source = std::make_shared<const scene::MarchSource>(
-      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress));
+  scene::MarchSource source =
+      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress);
+  source.optical_depth = statistics->mean_optical_depth();
+  built.source = std::make_shared<const scene::MarchSource>(std::move(source));
   return built;
 }
 

@@ -120,6 +120,28 @@ std::shared_ptr<StillScene> room_with_emitters() {
   return scene;
 }
 
+// A chance of 0 times a density that is no number would be none.
+TEST(GlowingBox, HasADensityFromAnywhere) {
+  core::CpuTetSurfaces twin;
+  core::CmSpace& space = twin.cm.space;
+  space.to_cube_x = space.from_cube_x = vec3(1.0F, 0.0F, 0.0F);
+  space.to_cube_y = space.from_cube_y = vec3(0.0F, 1.0F, 0.0F);
+  space.to_cube_z = space.from_cube_z = vec3(0.0F, 0.0F, 1.0F);
+  space.unit_volume = 1.0F;
+  space.box_max = vec3(8.0F);
+  const auto density = [&](const vec3& o, const vec3& w) {
+    return twin.cm_glow_pdf(twin.cm_light_hit(CM_LIGHT_GLOW, o, w, 1.0F));
+  };
+  const vec3 up(0.0F, 1.0F, 0.0F);
+  EXPECT_GT(density(vec3(4.0F, -5.0F, 4.0F), up), 0.0F);
+  EXPECT_EQ(density(vec3(9.0F, -5.0F, 4.0F), up), 0.0F) << "beside it";
+  EXPECT_EQ(density(vec3(4.0F, 9.0F, 4.0F), up), 0.0F) << "behind";
+  for (const float x : {-1e30F, 1e30F}) {
+    EXPECT_TRUE(std::isfinite(density(vec3(x, 4.0F, 4.0F), vec3(1.0F, 0.0F, 0.0F)))) << x;
+    EXPECT_TRUE(std::isfinite(density(vec3(9.0F, x, 4.0F), glm::normalize(vec3(-1e-30F, 1.0F, 0.0F))))) << x;
+  }
+}
+
 class CpuTracerSurfaces : public CpuTracer {
  protected:
   void SetUp() override {

@@ -1,0 +1,131 @@
+// Equi-angular sampling (Kulla and Fajardo, "Importance Sampling Techniques for Path Tracing in Participating Media", EGSR
+// 2012): looks for lamps from points that a flight has passed. In a thin medium few flights collide, and those that do
+// seldom near the lamp. Shared by GLSL and C++; the includer has light.glsl and path_vertex.glsl before this, and kernels
+// that march march.glsl.
+//
+// What is scattered towards a path on its flight's way is transmittance x extinction x what is lit there. A flight gets as
+// far as t with the chance that is the transmittance, so a point drawn from its way, up to where it ended, needs no other
+// weight (as for emission: flight.glsl). A look after a collision might have found the same, of which the density is
+// extinction x transmittance x the chance of looks for lamps. The share of either is a function of the line, the point and
+// the lamp alone, without the transmittance, which both have: a look from a point that was passed counts by
+// cm_passing_share, one after a collision by the rest.
+#ifndef CM_EQUIANGULAR_GLSL
+#define CM_EQUIANGULAR_GLSL
+
+// A point of a flight's way, and the light of a lamp that it looks for.
+struct CmPassed {
+  bool looks;
+  vec3 o;           // cube space
+  bool seen;        // by a camera ray
+  vec3 light;       // what the look brings if nothing stops it, times scattering coefficient and phase function there
+  vec3 direction;   // world, unit: to the lamp
+  float distance;
+  float way;        // of its free path
+};
+
+// The angle at which a point sees a part of a line, `across` away from it, from `before` to `behind`, both counted from
+// where the line is nearest.
+CM_FN float cm_angle_of(float across, float before, float behind) {
+  return atan(across * (behind - before), across * across + before * behind);
+}
+
+// Density by distance with which equi-angular sampling of a line's whole part in the box takes a point o of it, for a
+// point of a lamp at that distance.
+CM_FN float cm_passing_density(vec3 o, vec3 w, vec3 to_light, float distance) {
+  float along = dot(w, to_light) * distance;
+  float across = max(length(cross(w, to_light)), 1e-4f) * distance;
+  vec2 line = cm_box_line(o, cm_to_cube(w));
+  float angle = cm_angle_of(across, min(line.x, 0.0f) - along, max(line.y, 0.0f) - along);
+  return across / max(angle * distance * distance, 1e-30f);
+}
+
+// The share of what a look from there brings that counts, where the extinction is that: by the power heuristic.
+CM_FN float cm_passing_share(float density, float extinction) {
+  float collided = cm.lights.lamp_chance * extinction;
+  return cm_balance(density * density, collided * collided);
+}
+
+// Whether looks from points on it are for the flight that ended before the path had so many events. A layer's colour waits in
+// the place of such a look's light.
+CM_FN bool cm_is_passed(CmPath p, uint events) {
+  bool limited = cm.integrator.max_bounces != 0u && events >= cm.integrator.max_bounces;
+  return !limited && !(events == 0u && p.at_layer != 0u);
+}
+
+// Before the flight's end is dealt with.
+CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
+  CmPassed passed;
+  passed.looks = false;
+  passed.o = p.o;
+  passed.seen = p.start == CM_AT_CAMERA;
+  passed.light = vec3(0.0f, 0.0f, 0.0f);
+  passed.direction = p.w;
+  passed.distance = 0.0f;
+  passed.way = 0.0f;
+  if (p.ray != CM_RAY_FLIGHT || cm_is_dark(p) || !cm_is_passed(p, p.bounces)) return passed;
+  vec2 range = cm_box_range(p.o, p.d);
+  range.y = min(range.y, cm_flight_end(p, vertex));
+  CmLamp lamp = cm_pick_lamp(p, 0x51ed270bu);
+  if (!(range.x < range.y) || lamp.kind == CM_LAMP_DISTANT) return passed;
+  vec2 u;
+  vec2 on_lamp;
+  if (p.bounces <= CM_EVEN_EVENTS) {
+    uint set = 4u * (CM_EVEN_EVENTS + 1u) + 2u * p.bounces;
+    u = cm_even_pair(p.number, p.stream, set);
+    on_lamp = cm_even_pair(p.number, p.stream, set + 1u);
+  } else {
+    u.x = cm_random(p.random, p.stream);
+    u.y = cm_random(p.random, p.stream);
+    on_lamp.x = cm_random(p.random, p.stream);
+    on_lamp.y = cm_random(p.random, p.stream);
+  }
+  vec3 from = lamp.extended != 0u ? cm_lamp_point(lamp, on_lamp.x, on_lamp.y) : vec3(0.0f, 0.0f, 0.0f);
+  vec3 o = cm_from_cube_point(p.o);
+  vec3 way = lamp.position + from - o;
+  float along = dot(way, p.w);
+  float across = max(length(cross(way, p.w)), 1e-4f * length(way));
+  float before = range.x - along;
+  float behind = range.y - along;
+  float angle = cm_angle_of(across, before, behind);
+  passed.way = u.y;
+  float cosine = cos(u.x * angle);
+  float sine = sin(u.x * angle);
+  float t = along + across * (before * cosine + across * sine) / (across * cosine - before * sine);
+  t = clamp(t, range.x, range.y);
+  float density = across / (angle * (across * across + (t - along) * (t - along)));
+  vec3 light = cm_lamp_irradiance(lamp, from, o + t * p.w, passed.direction, passed.distance);
+  passed.light = p.throughput * light / (lamp.chance * density);
+  passed.o = p.o + t * p.d;
+  // A way of no length, or a lamp on it, gives no number.
+  bool hidden = cm_ground_distance(passed.o, cm_to_cube(passed.direction)) < passed.distance;
+  float strongest = max(passed.light.x, max(passed.light.y, passed.light.z));
+  passed.looks = !hidden && angle > 0.0f && cm_is_positive(strongest) && strongest < 3.0e38f;
+  // In a dense medium, by what the flight has met of it, collisions find the lamp as well; and lamps that are a small part
+  // of the light are not worth a ray each.
+  float met = p.depth_0 - max(p.depth, 0.0f);
+  float share = cm_passing_share(cm_passing_density(passed.o, p.w, passed.direction, passed.distance),
+                                 met / (range.y - range.x));
+  float chance = clamp(2.0f * cm.lights.lamp_chance, 0.0f, 1.0f) * min(1.0f, 2.0f * share);
+  passed.looks = passed.looks && cm_random(p.random, p.stream) < chance;
+  passed.light /= max(chance, 1e-30f);
+  return passed;
+}
+
+// After it: the look, before the path goes on from there.
+CM_FN void cm_look_back(CM_INOUT(CmPath) p, CmPassed passed, bool finished) {
+  p.seen = passed.seen ? 1u : 0u;
+  p.finishes = finished ? 1u : 0u;
+  p.ahead = dot(cm_to_world(p.o - passed.o), p.w);
+  p.o = passed.o;
+  p.d = cm_to_cube(passed.direction);
+  p.light = passed.light;
+  p.reach = passed.distance;
+  p.ray = CM_RAY_EQUIANGULAR;
+  p.density = 0.0f;
+  p.found = CM_FOUND_NOT_ASKED;
+  p.depth_0 = cm_free_depth(passed.way) + CM_SHADOW_DEPTH;
+  p.depth = p.depth_0;
+  p.stage = CM_STAGE_AIM;
+}
+
+#endif

@@ -1,0 +1,52 @@
+// The extinction at a point of the medium. Shared by GLSL and C++; the includer has march.glsl and path_state.glsl
+// before this.
+#ifndef CM_EXTINCTION_AT_GLSL
+#define CM_EXTINCTION_AT_GLSL
+
+struct CmExtinction {
+  float extinction;
+  uvec2 cell;  // of what scatters there
+#if CM_INSTANCES
+  uint instance;  // likewise: one of those that are there, by their extinctions
+#endif
+};
+
+// The part of the volume glsl/here.glsl tells of.
+CM_FN float cm_extinction_here(vec3 o, vec3 d, uvec3 cell) {
+  vec3 along = cm_in_volume(d);
+  float t_1;
+  float r_0;
+  float r_1;
+  uvec3 next;
+  cm_march_step(cell, cm_in_volume_point(o), along, vec3(1.0f, 1.0f, 1.0f) / along, 0.0f, t_1, r_0, r_1, next);
+  return CM_MEDIUM.extinction * r_0;
+}
+
+// At p.o, which without CM_INSTANCES is in that cell; CM_NONE: nowhere. seen: of what camera rays meet.
+CM_FN CmExtinction cm_extinction_at(CM_INOUT(CmPath) p, uvec2 cell, bool seen) {
+  CmExtinction there;
+  there.extinction = 0.0f;
+  there.cell = cell;
+#if CM_INSTANCES
+  uint stood = cm_here;
+  there.instance = 0u;
+  float entry = -1.0f;
+  uint instance = CM_INSTANCE_NONE;
+  while (cm_next_instance(p.o, p.d, 1e-30f, seen ? CM_INSTANCE_SEEN : 0u, entry, instance)) {
+    cm_here = instance;
+    uvec3 at = cm_march_enter_at(p.o, p.d, 0.0f);
+    float extinction = cm_extinction_here(p.o, p.d, at);
+    there.extinction += extinction;
+    if (cm_random(p.random, p.stream) * there.extinction < extinction) {
+      there.cell = uvec2(at.x, at.y);
+      there.instance = instance;
+    }
+  }
+  cm_here = stood;
+#else
+  if (cell.x != CM_NONE) there.extinction = cm_extinction_here(p.o, p.d, uvec3(cell.x, cell.y, CM_NONE));
+#endif
+  return there;
+}
+
+#endif

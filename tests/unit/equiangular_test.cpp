@@ -1,0 +1,213 @@
+// Looks for lamps from points that flights have passed (glsl/equiangular.glsl): the same light as without, of whatever
+// else there is, and less noise. lamp_test has closed forms.
+//
+// Whether kernels make such looks follows from the lamps and the medium's depth: beside a lamp outside of a medium that
+// is not thin they do as soon as there is another within, which here is so faint that it changes nothing.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <glm/gtc/matrix_transform.hpp>
+#include <memory>
+
+#include "support/gl_viewer.hpp"
+#include "support/osmesa_leaks.hpp"
+#include "support/surfaces.hpp"
+#include "support/volumes.hpp"
+
+namespace {
+
+using namespace cumulet;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+using render::March;
+
+core::CmLamp record(std::uint32_t kind, const vec3& position) {
+  core::CmLamp lamp{};
+  lamp.kind = kind;
+  lamp.position = position;
+  return lamp;
+}
+
+TEST(NearestLamp, IsTheNearestThatStandsSomewhere) {
+  const light::Lit ball{dvec3(1.0, 0.0, 0.0), 2.0};
+  EXPECT_FALSE(light::nearest_lamp({}, ball));
+  std::vector<core::CmLamp> lamps{record(core::CM_LAMP_DISTANT, vec3(1.0F, 0.0F, 0.0F))};
+  EXPECT_FALSE(light::nearest_lamp(lamps, ball)) << "a sun stands nowhere";
+  lamps.push_back(record(core::CM_LAMP_DISC, vec3(9.0F, 0.0F, 0.0F)));
+  EXPECT_DOUBLE_EQ(light::nearest_lamp(lamps, ball).value(), 4.0);
+  lamps.push_back(record(core::CM_LAMP_POINT, vec3(1.0F, 3.0F, 0.0F)));
+  EXPECT_DOUBLE_EQ(light::nearest_lamp(lamps, ball).value(), 1.5);
+  EXPECT_FALSE(light::nearest_lamp(lamps, light::Lit{})) << "no medium";
+}
+
+TEST(NearestLamp, InAThinMediumIsWorthLooksFromFlights) {
+  EXPECT_TRUE(light::suits_equiangular(0.5, 1.0));
+  EXPECT_FALSE(light::suits_equiangular(0.5, 10.0)) << "collisions find it";
+  EXPECT_FALSE(light::suits_equiangular(2.0, 1.0)) << "its light is even";
+  EXPECT_TRUE(light::suits_equiangular(2.0, 0.1));
+  EXPECT_FALSE(light::suits_equiangular(std::nullopt, 0.0));
+  EXPECT_FALSE(light::suits_equiangular(0.5, NAN));
+}
+
+light::Lamp lamp_at(const dvec3& position, float power) {
+  light::Lamp lamp;
+  lamp.position = position;
+  lamp.power = vec3(power);
+  return lamp;
+}
+
+constexpr ivec3 size(32, 24, 32);
+const dvec3 outside(40.0, 40.0, 30.0);
+const dvec3 inside(12.0, 10.0, 15.0);
+
+class Equiangular : public test::ViewerTest {
+ protected:
+  struct Seen {
+    dvec3 mean{0.0};
+    dvec3 error{0.0};       // of the mean
+    double variance = 0.0;  // of a pixel's first component
+  };
+
+  void SetUp() override {
+    ViewerTest::SetUp();
+    if (IsSkipped()) return;
+    still_ = make();
+    still_->set_light({});
+    still_->set_camera(test::camera_at({20.0, 30.0, 90.0}, {16.0, 12.0, 16.0}, 26.0));
+    still_->set_volume(std::make_shared<const viewer::VolumeAsset>(frame()));
+    set_medium(0.06);
+  }
+
+  // Of densities, colours and anisotropies from place to place.
+  static volume::VolumeFrame frame() {
+    volume::VolumeFrame made{.density = test::make_volume(size, ivec3(0), [](const ivec3& p) {
+                               return 0.25F + float((p.x / 8 + p.y / 8 + p.z / 8) % 2);
+                             })};
+    const auto component = [](float low, float high) {
+      return test::make_volume(size, ivec3(0), [=](const ivec3& p) { return p.y < 12 ? low : high; });
+    };
+    made.colour = {component(1.0F, 0.5F), component(0.5F, 1.0F), component(0.75F, 0.75F)};
+    made.anisotropy = {component(0.5F, 0.0F), component(0.0F, 0.25F)};
+    return made;
+  }
+  void set_medium(double scale, std::uint32_t max_bounces = 0) {
+    viewer::Medium medium;
+    medium.density_scale = scale;
+    medium.albedo = vec3(0.9F);
+    medium.max_bounces = max_bounces;
+    still_->set_medium(medium);
+  }
+  void set_march(March march, grid::CellKind cells = grid::CellKind::linear) {
+    viewer::GridSettings grid;
+    grid.build.march = march;
+    grid.build.refine.threshold = -1.0;
+    grid.build.refine.cells = cells;
+    still_->set_grid(grid);
+  }
+
+  // extra: lamps beside the one outside.
+  Seen see(const light::Lamps& extra, std::uint32_t samples = 128) {
+    light::Lamps lamps{lamp_at(outside, 1e5F)};
+    lamps.insert(lamps.end(), extra.begin(), extra.end());
+    still_->viewer().set_lamps(lamps);
+    Seen seen;
+    const test::Picture a = test::render(*still_, {32, 32, samples, 1, render::View::shaded});
+    const test::Picture b = test::render(*still_, {32, 32, samples, 2, render::View::shaded});
+    seen.mean = 0.5 * (dvec3(a.mean()) + dvec3(b.mean()));
+    dvec3 variance(0.0);
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+      const dvec3 apart = dvec3(a.pixels[i]) - dvec3(b.pixels[i]);
+      variance += 0.5 * apart * apart / double(a.pixels.size());
+    }
+    seen.variance = variance.x;
+    seen.error = glm::sqrt(0.5 * variance / double(a.pixels.size()));
+    return seen;
+  }
+  // The same with such looks and without.
+  void expect_the_same(const char* what) {
+    const Seen without = see({});
+    const Seen with = see({lamp_at(inside, 1e-4F)});
+    for (int i = 0; i < 3; ++i) {
+      const double error = std::hypot(without.error[i], with.error[i]);
+      ASSERT_GT(without.mean[i], 20.0 * error) << what << ": too much noise to tell";
+      EXPECT_NEAR(with.mean[i], without.mean[i], 4.0 * error) << what << " " << i;
+    }
+    EXPECT_NE(with.variance, without.variance) << what;
+  }
+
+  std::unique_ptr<test::Still> still_;
+};
+CUMULET_ON_BACKENDS(Equiangular);
+
+TEST_P(Equiangular, LooksBringTheSameLightInAnyMarch) {
+  for (const grid::CellKind cells : {grid::CellKind::linear, grid::CellKind::constant}) {
+    set_march(March::tet, cells);
+    expect_the_same("tet");
+  }
+  set_march(March::dense);
+  expect_the_same("dense");
+  set_march(March::brick);
+  expect_the_same("brick");
+}
+
+TEST_P(Equiangular, LooksEndWithTheBouncesThatAreLeft) {
+  for (const std::uint32_t bounces : {1U, 2U, 3U}) {
+    set_medium(0.06, bounces);
+    expect_the_same(("bounces: " + std::to_string(bounces)).c_str());
+  }
+}
+
+TEST_P(Equiangular, LooksBringTheSameLightBesideSunSkyAndGround) {
+  still_->set_light({30.0F, 40.0F, vec3(1.0F), vec3(0.2F, 0.3F, 0.4F)});
+  expect_the_same("sun and sky");
+  still_->viewer().set_ground({viewer::GroundPlace::at_height, -2.0, vec3(0.6F)});
+  expect_the_same("ground below");
+  still_->viewer().set_ground({viewer::GroundPlace::at_height, 8.0, vec3(0.6F)});
+  expect_the_same("ground within");
+}
+
+TEST_P(Equiangular, LooksBringTheSameLightAmongSurfaces) {
+  auto scene = std::make_shared<test::StillScene>();
+  scene->add(test::diffuse(vec3(0.7F)));
+  scene->add_quad({{{-20, 6, 50}, {50, 6, 50}, {50, 6, -20}, {-20, 6, -20}}}, 0);  // through the medium
+  scene->add_quad({{{22, 0, 34}, {22, 24, 34}, {22, 24, 10}, {22, 0, 10}}}, 0);    // in the lamp's way
+  still_->viewer().show_surfaces(test::source_of(scene));
+  set_march(March::tet);
+  expect_the_same("surfaces");
+  still_->set_light({30.0F, 40.0F, vec3(1.0F), vec3(0.2F, 0.3F, 0.4F)});
+  expect_the_same("surfaces in daylight");
+  viewer::SurfaceSettings shadows;
+  shadows.light = viewer::SurfaceLight::shadows;
+  still_->viewer().set_surface_settings(shadows);
+  expect_the_same("shadows");
+}
+
+TEST_P(Equiangular, LooksBringTheSameLightInSeveralVolumesThatOverlap) {
+  const glm::dmat4 aside = glm::translate(glm::dmat4(1.0), dvec3(10.0, 4.0, -6.0));
+  still_->viewer().set_places({{glm::dmat4(1.0)}, {aside}});
+  set_medium(0.03);
+  set_march(March::tet);
+  expect_the_same("two places");
+  auto scene = std::make_shared<test::StillScene>();
+  scene->add(test::diffuse(vec3(0.7F)));
+  scene->add_quad({{{-20, 6, 50}, {50, 6, 50}, {50, 6, -20}, {-20, 6, -20}}}, 0);
+  still_->viewer().show_surfaces(test::source_of(scene));
+  expect_the_same("two places and surfaces");
+}
+
+TEST_P(Equiangular, LooksHaveLessNoiseInThinSmoke) {
+  set_march(March::tet);
+  // As thin as that a lamp outside is enough, and a little less thin.
+  set_medium(0.006);
+  const Seen with = see({});
+  set_medium(0.015);
+  const Seen without = see({});
+  const double noise_with = with.variance / (with.mean.x * with.mean.x);
+  const double noise_without = without.variance / (without.mean.x * without.mean.x);
+  EXPECT_LT(2.0 * noise_with, noise_without);
+}
+
+}  // namespace
