@@ -8,13 +8,15 @@
 //   volume z      view depth at which the volume before it reaches half opacity, there too; infinity where it does not
 //   emission      what reaches the eye straight from what gives it off, unscattered: the volume along the ray, and through
 //                 it the nearest surface, none behind the ground; mean
+//   velocity      of the volume where it scatters light for the first time, world units a second; mean, 0 where nothing
+//                 scatters
 // and, as a filter that follows what moves asks for them, beside the normal the view depth of what is solid at the
 // pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
 // for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
 // volume's depth the share that the ground covers.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 // variants: - or CM_SURFACES=1
-// variants: - or CM_CHANNELS=1
+// variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_VELOCITY=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"
@@ -39,6 +41,9 @@ layout(rg32f, binding = CM_IMAGE_TRANSMITTANCE) uniform writeonly image2D cm_tra
 layout(r32f, binding = CM_IMAGE_SURFACE_Z) uniform writeonly image2D cm_surface_depth;
 layout(rg32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z;
 layout(rgba32f, binding = CM_IMAGE_EMISSION) uniform writeonly image2D cm_emission_out;
+#if CM_VELOCITY
+layout(rgba32f, binding = CM_IMAGE_VELOCITY) uniform writeonly image2D cm_velocity;
+#endif
 
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 
@@ -55,6 +60,9 @@ void main() {
   float scattered = 0.0;
   vec2 covered = vec2(0.0);  // by surfaces, by the ground
   vec3 emission = vec3(0.0);
+#if CM_VELOCITY
+  vec3 velocity = vec3(0.0);  // sum
+#endif
   float share = 1.0 / float(cm.dispatch.samples);
   for (int i = 0; i < int(cm.dispatch.samples); ++i) {
     // Roberts's two-dimensional sequence; the first ray is the centre's.
@@ -108,6 +116,9 @@ void main() {
       if (t < solid_t) emission += clear * chance * cm_walk_source(walk);
       scattered_z += clear * chance * (t + within_part * min(span, walk.t_end - t)) / t_per_z;
       scattered += clear * chance;
+#if CM_VELOCITY
+      velocity += clear * chance * cm_walk_velocity(walk, t_1);
+#endif
       clear -= clear * chance;
       cm_walk_on(walk, t_1);
     }
@@ -120,6 +131,9 @@ void main() {
   }
   imageStore(cm_normal, ivec2(pixel), vec4(share * normal, solid_z));
   imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, scattered > 0.0 ? scattered_z / scattered : CM_INFINITE));
+#if CM_VELOCITY
+  imageStore(cm_velocity, ivec2(pixel), vec4(scattered > 0.0 ? velocity / scattered : vec3(0.0), 0.0));
+#endif
   imageStore(cm_emission_out, ivec2(pixel), vec4(share * emission, 0.0));
   imageStore(cm_transmittance, ivec2(pixel), share * vec4(transmittance, covered.x, 0.0, 0.0));
   imageStore(cm_surface_depth, ivec2(pixel), vec4(surface_z));

@@ -94,6 +94,13 @@ uint cm_channel_word(uint word) { return cm_link(texelFetch(cm_channels, int(wor
 uint cm_colour_record(uint cell) { return cm_channel_word(CM_GRID.first_colour + cell); }
 uint cm_anisotropy_record(uint cell) { return cm_channel_word(CM_GRID.first_anisotropy + (cell >> 1)); }
 #endif
+#if CM_VELOCITY
+uvec2 cm_velocity_record(uint cell) {
+  uint word = CM_GRID.first_velocity + 2u * cell;
+  uvec4 texel = texelFetch(cm_channels, int(word >> 2));
+  return (word & 2u) == 0u ? texel.xy : texel.zw;
+}
+#endif
 
 uint cm_tree_word(uint word) { return cm_link(texelFetch(cm_tree_words, int(word >> 2)), word & 3u); }
 uint cm_tree(uint node) { return cm_tree_word(CM_GRID.tree + node); }
@@ -113,6 +120,12 @@ vec3 cm_scattering_voxel(ivec3 voxel) {
 layout(binding = CM_UNIT_ANISOTROPY_VOXELS) uniform sampler3D cm_anisotropy_voxels;
 float cm_anisotropy_voxel(ivec3 voxel) {
   return texelFetch(cm_anisotropy_voxels, voxel - ivec3(CM_GRID.box_min), 0).x;
+}
+#endif
+#if CM_VELOCITY
+layout(binding = CM_UNIT_VELOCITY_VOXELS) uniform sampler3D cm_velocity_voxels;
+vec3 cm_velocity_voxel(ivec3 voxel) {
+  return texelFetch(cm_velocity_voxels, voxel - ivec3(CM_GRID.box_min), 0).xyz;
 }
 #endif
 #if CM_MARCH == 1

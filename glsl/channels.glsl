@@ -1,4 +1,5 @@
-// What cells carry beside density: light that they give off, and the colour of what scatters. Shared by GLSL and C++.
+// What cells carry beside density: light that they give off, and the colour, the mean cosine and the velocity of what
+// scatters. Shared by GLSL and C++.
 //
 // Light is radiance a world unit of length. A record of 16 bytes beside the cell's: the mean, three floats, linear Rec.
 // 709; and how the whole varies over the cell, a gradient over the mean along the frame's axes per unit, 10 bits an axis
@@ -74,6 +75,9 @@ CM_FN vec3 cm_emitted(CmEmission e, float t, float t_1) {
 CM_FN float cm_cell_anisotropy(uint word, uint cell) {
   return float(int(word << (16u - 16u * (cell & 1u))) >> 16) * (1.0f / 32767.0f);
 }
+
+// Its velocity, by density, along the axes of cube space, voxels a second: 3 half floats, and room for one.
+CM_FN vec3 cm_cell_velocity(uvec2 words) { return vec3(unpackHalf2x16(words.x), unpackHalf2x16(words.y).x); }
 
 // Of what scatters, by density: 11, 11 and 10 bits of a word.
 CM_FN vec3 cm_cell_colour(uint word) {

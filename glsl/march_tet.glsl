@@ -6,6 +6,8 @@
 //   uvec4 cm_emission_record(uint cell)     glsl/channels.glsl
 //   uint cm_colour_record(uint cell)        likewise
 //   uint cm_anisotropy_record(uint cell)    likewise
+// and with CM_VELOCITY
+//   uvec2 cm_velocity_record(uint cell)     likewise
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
@@ -75,6 +77,10 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
 
 CM_FN vec3 cm_march_colour(uvec2 cell) { return cm_cell_colour(cm_colour_record(cell.x)); }
 CM_FN float cm_march_anisotropy(uvec2 cell) { return cm_cell_anisotropy(cm_anisotropy_record(cell.x), cell.x); }
+#endif
+
+#if CM_VELOCITY
+CM_FN vec3 cm_march_velocity(uvec2 cell) { return cm_cell_velocity(cm_velocity_record(cell.x)); }
 #endif
 
 #endif

@@ -8,6 +8,8 @@
 //   vec3 cm_emission_voxel(ivec3 voxel)           of the box; nothing in empty bricks
 //   vec3 cm_scattering_voxel(ivec3 voxel)         density x colour
 //   float cm_anisotropy_voxel(ivec3 voxel)
+// and with CM_VELOCITY
+//   vec3 cm_velocity_voxel(ivec3 voxel)           voxels a second
 #ifndef CM_MARCH_VOXEL_GLSL
 #define CM_MARCH_VOXEL_GLSL
 
@@ -102,6 +104,10 @@ CM_FN vec3 cm_march_colour(uvec2 cell) {
 CM_FN float cm_march_anisotropy(uvec2 cell) {
   return cm_anisotropy_voxel(cm_voxel_of(uvec3(cell.x, cell.y, CM_NONE)));
 }
+#endif
+
+#if CM_VELOCITY
+CM_FN vec3 cm_march_velocity(uvec2 cell) { return cm_velocity_voxel(cm_voxel_of(uvec3(cell.x, cell.y, CM_NONE))); }
 #endif
 
 #endif

@@ -16,6 +16,9 @@
 #ifndef CM_CHANNELS
 #define CM_CHANNELS 0
 #endif
+#ifndef CM_VELOCITY
+#define CM_VELOCITY 0
+#endif
 // Whether paths look for cells that give off light: marches of voxels have none, kernels of surfaces no march.
 #define CM_CELL_LIGHTS CM_CHANNELS
 #ifdef CM_MARCH
@@ -90,6 +93,8 @@ CM_BLOCK(CmGrid) {
   float emission_unit;    // radiance a world unit of length of what is stored as 1 for voxels
   uint first_glowing;     // where the table of cells that give off light begins in the page of their channels
   uint glowing;           // how many it has
+  uint first_velocity;    // where the velocities of its cells begin in that page, in 4-byte words
+  uint moves;             // 1: it has some
   CM_EQUALITY(CmGrid)
 };
 

@@ -173,6 +173,23 @@ vec3 cm_walk_source(inout CmWalk walk) {
 #endif
 }
 
+#if CM_VELOCITY
+// Of the part up to t_1: the mean velocity of what scatters, world units a second.
+vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
+  vec3 velocity = vec3(0.0);
+  float sum = 0.0;
+  for (int k = 0; k < walk.count; ++k) {
+    CmFront front = walk.front[k];
+    cm_stand_at(front);
+    float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
+    if (extinction > 0.0 && CM_GRID.moves != 0u)
+      velocity += extinction * cm_out_of_volume(cm_march_velocity(front.cell.xy));
+    sum += extinction;
+  }
+  return sum > 0.0 ? velocity / sum : vec3(0.0);
+}
+#endif
+
 #if CM_CHANNELS
 // What their cells give off from the part's beginning to t_1.
 vec3 cm_walk_emitted(inout CmWalk walk, float t_1) {

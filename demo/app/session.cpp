@@ -679,7 +679,8 @@ void Session::write_exr(const std::string& path) {
     throw std::runtime_error(cumulet_last_error(viewer_.get()));
   // All but the volume alone, which would cost every frame something.
   constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
-                            CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR};
+                            CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
+                            CUMULET_AOV_VELOCITY};
   const bool shaded = scene_.sampling.view == CUMULET_VIEW_SHADED;
   demo::write_exr(viewer_.get(), path, width, height, {rgba}, std::span(aovs).first(shaded ? aovs.size() : 0),
                   metadata_of(viewer_.get(), scene_, width, height));

@@ -28,6 +28,7 @@ inline constexpr LayerName volume_depth{"volume_depth", "Z"};
 inline constexpr LayerName normal{"normal", "XYZ"};
 inline constexpr LayerName albedo{"albedo", "RGB"};
 inline constexpr LayerName error{"error", "Y"};
+inline constexpr LayerName velocity{"velocity", "XYZ"};
 }  // namespace layers
 
 /// In a depth layer: nothing there. Blender's own; finite, so that filters of a compositor make no NaN of it.

@@ -22,6 +22,8 @@ image::LayerName layer_of(cumulet_aov aov) {
       return image::layers::albedo;
     case CUMULET_AOV_ERROR:
       return image::layers::error;
+    case CUMULET_AOV_VELOCITY:
+      return image::layers::velocity;
     case CUMULET_AOV_BEAUTY:
       break;
   }

@@ -415,6 +415,7 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   reader.text("medium.flame_grid", volume.flame_grid);
   reader.text("medium.color_grid", volume.color_grid);
   reader.text("medium.anisotropy_grid", volume.anisotropy_grid);
+  reader.text("medium.velocity_grid", volume.velocity_grid);
   reader.choice("volume.up", up_names, volume.up);
   volume.auto_density_scale = reader.word("medium.density_scale", "auto");
   for (std::size_t i = 0; i < volume.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, volume.ramps[i]);
@@ -575,6 +576,7 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
   writer.put_text("medium.flame_grid", volume.flame_grid);
   writer.put_text("medium.color_grid", volume.color_grid);
   writer.put_text("medium.anisotropy_grid", volume.anisotropy_grid);
+  writer.put_text("medium.velocity_grid", volume.velocity_grid);
   if (volume.auto_density_scale && volume.medium.density_scale == 0.0) writer.put("medium.density_scale", "auto");
   writer.put_settings(volume.medium);
   for (std::size_t i = 0; i < volume.ramps.size(); ++i) {
@@ -670,6 +672,7 @@ cumulet_volume_file_desc volume_file(const VolumeFile& file) {
   desc.flame_grid = file.flame_grid.c_str();
   desc.color_grid = file.color_grid.c_str();
   desc.anisotropy_grid = file.anisotropy_grid.c_str();
+  desc.velocity_grid = file.velocity_grid.c_str();
   Matrix to_world = file.to_world;
   if (file.up == UpAxis::z) {
     constexpr Matrix upright = {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0};

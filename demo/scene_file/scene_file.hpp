@@ -22,6 +22,7 @@ struct VolumeFile {
   std::string flame_grid = {};
   std::string color_grid = {};
   std::string anisotropy_grid = {};
+  std::string velocity_grid = {};
   UpAxis up = UpAxis::y;              // of the file
   std::array<double, 16> to_world{};  // once it is upright; column by column; all 0: as its file has it
 

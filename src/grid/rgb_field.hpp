@@ -49,6 +49,26 @@ class ScalarField {
   Statistics statistics_;
 };
 
+/// How what scatters moves, of which with the density a mean velocity is had.
+class MomentumField {
+ public:
+  /// Of each axis of the cube density x (velocity / fastest + 1) / 2, so that none is negative.
+  struct Values {
+    RgbField::Components components;
+    float fastest;  ///< voxels a second: no velocity is more along an axis
+  };
+
+  MomentumField(Values values, const Cube& cube, Progress* progress = nullptr)
+      : components_(std::move(values.components), cube, progress), fastest_(values.fastest) {}
+
+  [[nodiscard]] const Statistics& component(std::size_t i) const { return components_.component(i); }
+  [[nodiscard]] float fastest() const { return fastest_; }
+
+ private:
+  RgbField components_;
+  float fastest_;
+};
+
 /// What cells carry beside density; null: nothing.
 struct Channels {
   /// Light that the volume gives off by itself: radiance a world unit of length, linear Rec. 709. It needs no density.
@@ -57,6 +77,8 @@ struct Channels {
   std::shared_ptr<const RgbField> scattering;
   /// What scatters (luminance of density x colour) x (1 + anisotropy) / 2: the part of it that goes forward.
   std::shared_ptr<const ScalarField> forward;
+  /// Light knows nothing of it: no cell is split for it.
+  std::shared_ptr<const MomentumField> momentum;
 };
 
 }  // namespace cumulet::grid

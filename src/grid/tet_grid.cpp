@@ -336,12 +336,12 @@ class GridBuilder::LeafEmission {
   bool linear_;
 };
 
-// What scatters in leaves: density x colour.
-class GridBuilder::LeafScattering {
+// What leaves hold of a field of three components.
+class GridBuilder::LeafVectors {
  public:
-  explicit LeafScattering(const RgbField& scattering)
-      : component_{LeafMoments(scattering.component(0)), LeafMoments(scattering.component(1)),
-                   LeafMoments(scattering.component(2))} {}
+  template <class Field>
+  explicit LeafVectors(const Field& field)
+      : component_{LeafMoments(field.component(0)), LeafMoments(field.component(1)), LeafMoments(field.component(2))} {}
   dvec3 operator()(const Node& node, const vec3& centroid) {
     return {component_[0](node, centroid).mass, component_[1](node, centroid).mass, component_[2](node, centroid).mass};
   }
@@ -356,6 +356,12 @@ std::int16_t pack_anisotropy(double forward, double scattering) {
   constexpr double most = 0.999;
   const double mean = std::clamp(2.0 * forward / scattering - 1.0, -most, most);
   return static_cast<std::int16_t>(std::lround(mean * std::numeric_limits<std::int16_t>::max()));
+}
+
+glm::uvec2 pack_velocity(const dvec3& momentum, double mass, float fastest) {
+  if (!(mass > 0.0)) return glm::uvec2(0U);
+  const vec3 mean(double{fastest} * glm::clamp(2.0 * momentum / mass - 1.0, -1.0, 1.0));
+  return {glm::packHalf2x16({mean.x, mean.y}), glm::packHalf2x16({mean.z, 0.0F})};
 }
 
 CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& gradient, bool emits) const {
@@ -384,6 +390,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   if (channels.emission) places.resize(grid.emission, count);
   if (channels.scattering) places.resize(grid.colour, count);
   if (channels.forward) places.resize(grid.anisotropy, count);
+  if (channels.momentum) places.resize(grid.velocity, count);
   number_nodes(grid, places);
 
   struct Box {
@@ -397,10 +404,12 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     LeafMoments moments(*statistics_);
     std::optional<LeafEmission> emitted;
     if (channels.emission) emitted.emplace(*channels.emission, cells);
-    std::optional<LeafScattering> coloured;
+    std::optional<LeafVectors> coloured;
     if (channels.scattering) coloured.emplace(*channels.scattering);
     std::optional<LeafMoments> forward;
     if (channels.forward) forward.emplace(channels.forward->statistics());
+    std::optional<LeafVectors> momentum;
+    if (channels.momentum) momentum.emplace(*channels.momentum);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -430,6 +439,8 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
         scattered = luminance(scattering);
       }
       if (forward) grid.anisotropy[rank] = pack_anisotropy((*forward)(node, centroid).mass, scattered);
+      if (momentum)
+        grid.velocity[rank] = pack_velocity((*momentum)(node, centroid), m.mass, channels.momentum->fastest());
       if (m.max > 0.0F || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);

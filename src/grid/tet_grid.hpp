@@ -29,6 +29,10 @@ static_assert(sizeof(EmissionRecord) == 16);
 /// forward: of what scatters, times (1 + anisotropy) / 2. 0 where nothing scatters.
 std::int16_t pack_anisotropy(double forward, double scattering);
 
+/// The mean velocity along the cube's axes as the shaders read it, voxels a second: glsl/channels.glsl has the layout.
+/// momentum: as MomentumField has it, of what has this mass of density. 0 where that is none.
+glm::uvec2 pack_velocity(const glm::dvec3& momentum, double mass, float fastest);
+
 /// Where in the leaves and in the tree a root cell's part begins.
 struct RootEntry {
   std::uint32_t first_leaf = 0;
@@ -52,13 +56,15 @@ struct TetGrid {
   std::vector<std::uint32_t> colour;
   /// One a cell, pack_anisotropy(); empty where it is the medium's.
   std::vector<std::int16_t> anisotropy;
+  /// One a cell, pack_velocity(); empty where nothing moves.
+  std::vector<glm::uvec2> velocity;
   glm::vec3 content_min{0.0F};  ///< cube-space box that holds every cell with density or emission
   glm::vec3 content_max{0.0F};
   bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const {
     return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + colour.size() * 4 +
-           anisotropy.size() * 2 + tree.size() * 4 + 200;
+           anisotropy.size() * 2 + velocity.size() * 8 + tree.size() * 4 + 200;
   }
 };
 
@@ -98,7 +104,7 @@ class GridBuilder {
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
   class LeafEmission;
-  class LeafScattering;
+  class LeafVectors;
   // mean and gradient: in units of the grid's density_unit.
   [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient, bool emits) const;
 

@@ -41,6 +41,7 @@ inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
 /// Of half opacity; the share of a pixel that the ground covers.
 inline constexpr FilmLayer volume_z{"volume z", GL_RG32F, 8};
 inline constexpr FilmLayer emission{"emission", GL_RGBA32F, 16};
+inline constexpr FilmLayer velocity{"velocity", GL_RGBA32F, 16};
 }  // namespace film_layers
 
 /// What passes leave for each other, of one picture. Layers are there from the first pass that writes them on.

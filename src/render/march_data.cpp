@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <glm/gtc/packing.hpp>
 #include <span>
 
@@ -82,6 +83,7 @@ core::CmGrid grid_of(const scene::MarchSource& source) {
     grid.box_min = vec3(source.box_low);
     grid.box_max = vec3(source.box_low + source.box_size);
   }
+  grid.moves = source.moves() ? 1U : 0U;
   grid.root_exponent = static_cast<std::uint32_t>(source.cube.log2_size - 1);
   return grid;
 }
@@ -95,11 +97,13 @@ struct ChannelBytes {
   explicit ChannelBytes(const scene::MarchSource& source)
       : emission(source.grid->emission.size() * sizeof(grid::EmissionRecord)),
         glow(source.glow.cells.size() * sizeof(scene::GlowingCell)),
+        velocity(source.grid->velocity.size() * sizeof(glm::uvec2)),
         colour(source.grid->colour.size() * sizeof(std::uint32_t)),
         anisotropy(source.grid->anisotropy.size() * sizeof(std::int16_t)) {}
-  std::size_t emission, glow, colour, anisotropy;
+  std::size_t emission, glow, velocity, colour, anisotropy;
   [[nodiscard]] std::size_t glow_at() const { return emission; }
-  [[nodiscard]] std::size_t colour_at() const { return glow_at() + glow; }
+  [[nodiscard]] std::size_t velocity_at() const { return glow_at() + glow; }
+  [[nodiscard]] std::size_t colour_at() const { return velocity_at() + velocity; }
   [[nodiscard]] std::size_t anisotropy_at() const { return colour_at() + colour; }
   // Whole texels.
   [[nodiscard]] std::size_t all() const { return (anisotropy_at() + anisotropy + 15) / 16 * 16; }
@@ -251,6 +255,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       const std::size_t first = data_.channels_.offset() + part.channels;
       part.grid.first_emission = static_cast<std::uint32_t>(first / 16);
       part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.glow_at()) / 16);
+      part.grid.first_velocity = static_cast<std::uint32_t>((first + channels.velocity_at()) / 4);
       part.grid.first_colour = static_cast<std::uint32_t>((first + channels.colour_at()) / 4);
       part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.anisotropy_at()) / 4);
       part.grid.glowing = static_cast<std::uint32_t>(part.source->glow.cells.size());
@@ -274,6 +279,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     const grid::TetGrid& grid = *part.source->grid;
     upload_.add_bytes(place_at(0), grid.emission.data(), channels.emission);
     upload_.add_bytes(place_at(channels.glow_at()), part.source->glow.cells.data(), channels.glow);
+    upload_.add_bytes(place_at(channels.velocity_at()), grid.velocity.data(), channels.velocity);
     upload_.add_bytes(place_at(channels.colour_at()), grid.colour.data(), channels.colour);
     upload_.add_bytes(place_at(channels.anisotropy_at()), grid.anisotropy.data(), channels.anisotropy);
   }
@@ -345,6 +351,21 @@ void MarchUpload::plan_channel_voxels() {
                  const std::vector<float> scattering = scattering_slab(*source_, slab.size(), first, last);
                  for_slab(*source_, forward->statistics(), first, last, [&](std::size_t at, float value) {
                    slab[at] = static_cast<std::uint16_t>(grid::pack_anisotropy(value, scattering[at]));
+                 });
+               });
+  }
+  if (const grid::MomentumField* momentum = source_->channels.momentum.get()) {
+    require_3d(limits_, source_->box_size, "velocity a voxel");
+    plan_slabs(data_.velocity_voxels_, {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, 4}, "creating voxels' velocities",
+               [this, momentum](std::span<std::uint16_t> slab, int first, int last) {
+                 std::vector<glm::dvec3> sums(slab.size() / 4);
+                 for (std::size_t i = 0; i < 3; ++i) {
+                   for_slab(*source_, momentum->component(i), first, last,
+                            [&](std::size_t at, float value) { sums[at][static_cast<int>(i)] = value; });
+                 }
+                 for_slab(*source_, *source_->statistics, first, last, [&](std::size_t at, float density) {
+                   const glm::uvec2 packed = grid::pack_velocity(sums[at], density, momentum->fastest());
+                   std::memcpy(&slab[4 * at], &packed, sizeof packed);
                  });
                });
   }
@@ -438,6 +459,7 @@ void MarchData::bind(const gl::Functions& gl) const {
   }
   if (scattering_voxels_) gl.BindTextureUnit(core::CM_UNIT_SCATTERING_VOXELS, scattering_voxels_.name());
   if (anisotropy_voxels_) gl.BindTextureUnit(core::CM_UNIT_ANISOTROPY_VOXELS, anisotropy_voxels_.name());
+  if (velocity_voxels_) gl.BindTextureUnit(core::CM_UNIT_VELOCITY_VOXELS, velocity_voxels_.name());
   if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, emission_voxels_.name());
   if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
   if (trees_) gl.BindTextureUnit(core::CM_UNIT_TREE, trees_.texture());

@@ -61,11 +61,12 @@ class MarchData {
   std::vector<gl::WordHeap::Span> cells_;  // a page's records each
   std::uint32_t page_shift_ = 0;
   std::array<gl::Object, 2> textures_;  // voxels, or values of bricks; slots of bricks
-  gl::WordHeap::Span channels_;         // of cells: what they give off, the table of those that do, their colours,
-                                        // their anisotropies; grid by grid
+  gl::WordHeap::Span channels_;         // of cells: what they give off, the table of those that do, their velocities,
+                                        // their colours, their anisotropies; grid by grid
   gl::Object emission_voxels_;
   gl::Object scattering_voxels_;
   gl::Object anisotropy_voxels_;
+  gl::Object velocity_voxels_;
   gl::WordHeap::Span trees_;
   std::uint64_t bytes_ = 0;
 };

@@ -343,16 +343,19 @@ bool Tracer::able(const MarchData& data, const PictureParameters& parameters, co
 }
 
 const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name,
-                                               bool channels) {
+                                               std::span<const char* const> macros) {
   std::vector<std::string> more;
   if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
-  if (channels) more.emplace_back(channels_macro);
+  more.insert(more.end(), macros.begin(), macros.end());
   return program(data.defines(obstacles.instances != nullptr), name, more);
 }
 
 const Tracer::Program& Tracer::facts_program(const Picture& picture, const MarchData& data,
-                                             const Obstacles& obstacles) {
-  return inspect_program(data, obstacles, "aovs.comp", picture.parameters_.medium.emits != 0U);
+                                             const Obstacles& obstacles, PixelFacts facts) {
+  constexpr std::array<const char*, 2> macros{channels_macro, "CM_VELOCITY 1"};
+  const bool emits = picture.parameters_.medium.emits != 0U;
+  const std::size_t used = facts == PixelFacts::all ? 2 : (emits ? 1 : 0);
+  return inspect_program(data, obstacles, "aovs.comp", std::span(macros).first(used));
 }
 
 void Tracer::make_shared_objects() {
@@ -490,6 +493,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.begun_ = picture.revision_ = ++revision_;
   picture.depth_row_ = 0;
   picture.facts_row_ = picture.facts_rays_ = 0;
+  picture.facts_ = PixelFacts::guides;
   empty(picture, shaded ? parameters.lights.sky_radiance : glm::vec3(0.0F), 0);
 }
 
@@ -503,6 +507,7 @@ void Tracer::clear(Picture& picture) {
   picture.begun_ = picture.revision_ = ++revision_;
   picture.view_ = View::shaded;
   picture.depth_row_ = picture.facts_row_ = picture.facts_rays_ = 0;
+  picture.facts_ = PixelFacts::guides;
   picture.complete_ = picture.done_ = true;
   picture.holes_ = false;
   empty(picture, glm::vec3(0.0F), 1);
@@ -780,16 +785,17 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacle
 }
 
 bool Tracer::able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles) {
-  return asked([&] { facts_program(picture, data, obstacles); });
+  return asked([&] { facts_program(picture, data, obstacles, PixelFacts::guides); });
 }
 
 bool Picture::has_facts() const { return film_.has(film_layers::normal); }
 
 bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
-                        std::uint32_t rays) {
+                        std::uint32_t rays, PixelFacts facts) {
   using namespace film_layers;
-  if (picture.facts_rays_ < rays) {
-    picture.facts_rays_ = rays;
+  if (picture.facts_rays_ < rays || picture.facts_ < facts) {
+    picture.facts_rays_ = std::max(picture.facts_rays_, rays);
+    picture.facts_ = std::max(picture.facts_, facts);
     picture.facts_row_ = 0;
   } else if (picture.facts_row_ >= picture.size_.y && picture.film_.has(normal)) {
     return true;
@@ -797,7 +803,7 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
     flights_.order();
-    const Program& program = facts_program(picture, data, obstacles);
+    const Program& program = facts_program(picture, data, obstacles, picture.facts_);
     program.object->use(*gl_);
     bind(data, obstacles);
     film.bind(*gl_, core::CM_IMAGE_NORMAL, normal, GL_WRITE_ONLY);
@@ -806,18 +812,20 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
     film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_EMISSION, emission, GL_WRITE_ONLY);
+    if (picture.facts_ == PixelFacts::all) film.bind(*gl_, core::CM_IMAGE_VELOCITY, velocity, GL_WRITE_ONLY);
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
     parameters.dispatch.samples = picture.facts_rays_;
     return inspect(picture, parameters, program, picture.facts_row_, until);
   };
-  const Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z, emission}, work};
+  Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z, emission}, work};
+  if (picture.facts_ == PixelFacts::all) pass.writes.push_back(velocity);
   return run(gl_, picture.film_, pass, deadline);
 }
 
 void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) const {
-  const std::array<FilmLayer, 5> layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
-                                        film_layers::normal, film_layers::albedo};
+  const std::array<FilmLayer, 6> layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
+                                        film_layers::normal,        film_layers::albedo,    film_layers::velocity};
   const FilmLayer& layer = layers.at(static_cast<std::size_t>(fact));
   const std::size_t channels = channels_of(fact);
   const std::size_t floats = std::size_t{picture.size_.x} * picture.size_.y * channels;

@@ -77,10 +77,12 @@ struct PictureSettings {
 };
 
 /// What is known of a pixel without light: glsl/aovs.comp says of each what it is.
-enum class PixelFact { transmittance, surface_z, volume_z, normal, albedo };
+enum class PixelFact { transmittance, surface_z, volume_z, normal, albedo, velocity };
 constexpr std::size_t channels_of(PixelFact fact) {
-  return fact == PixelFact::normal || fact == PixelFact::albedo ? 3 : 1;
+  return fact == PixelFact::normal || fact == PixelFact::albedo || fact == PixelFact::velocity ? 3 : 1;
 }
+/// Those of a pixel that are found together: what a filter asks for, or velocity as well.
+enum class PixelFacts { guides, all };
 
 /// Rays a pixel that facts are means of, where they are read; a filter does with few.
 constexpr std::uint32_t fact_rays = 16;
@@ -195,6 +197,7 @@ class Picture {
   std::uint32_t depth_row_ = 0;
   std::uint32_t facts_row_ = 0;
   std::uint32_t facts_rays_ = 0;  // those that are there or under way are of
+  PixelFacts facts_ = PixelFacts::guides;
 };
 
 /// Traces pictures by bounded dispatches over tiles. All calls need the context current and a StateGuard around.
@@ -249,8 +252,8 @@ class Tracer {
   /// Until about the deadline, the layers of PixelFact of this picture, data and obstacles being those it was made of;
   /// whether they are there, of at least so many rays a pixel. Goes on in the next call.
   bool find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
-                  std::uint32_t rays = fact_rays);
-  /// As able(), for find_facts().
+                  std::uint32_t rays = fact_rays, PixelFacts facts = PixelFacts::guides);
+  /// As able(), for find_facts() of guides.
   bool able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   /// A fact a pixel (PixelFact), each channels_of(fact) floats, once find_facts has found them.
   void read_fact(const Picture& picture, PixelFact fact, float* values) const;
@@ -312,8 +315,9 @@ class Tracer {
   const Program& trace_program(const Picture& picture, const MarchData& data);
   StagePrograms stage_programs(const Picture& picture, const MarchData& data);
   const Program& inspect_program(const MarchData& data, const Obstacles& obstacles, const char* name,
-                                 bool channels = false);
-  const Program& facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
+                                 std::span<const char* const> macros = {});
+  const Program& facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles,
+                               PixelFacts facts);
   // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);

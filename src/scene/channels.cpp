@@ -110,14 +110,19 @@ class Glow {
   light::BlackBody black_body_;
 };
 
+// What the ramp makes of a brick's density.
+void read_density(const volume::VolumeFrame& frame, const volume::Ramp& ramp, const ivec3& origin, Values& density) {
+  read(frame.density, origin, density);
+  for (float& value : density) value = ramp(value);
+}
+
 // What a frame has of a brick that scatters.
 struct Scatters {
   Values density{};
   std::array<Values, 3> colour{};
 
   void read_brick(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp, const ivec3& origin) {
-    read(frame.density, origin, density);
-    for (float& value : density) value = density_ramp(value);
+    read_density(frame, density_ramp, origin, density);
     for (std::size_t i = 0; frame.colour && i < 3; ++i) read((*frame.colour)[i], origin, colour[i]);
   }
   [[nodiscard]] vec3 coloured(std::size_t v) const {
@@ -237,6 +242,40 @@ std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const v
         const float scatters = frame.colour ? luminance(here.scatters.coloured(v)) : here.scatters.density[v];
         return glm::vec1(scatters * (0.5F + 0.5F * (here.anisotropy[0][v] - here.anisotropy[1][v])));
       })[0]);
+}
+
+std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame& frame,
+                                                       const volume::Ramp& density_ramp, const Progress* progress) {
+  if (!frame.velocity || frame.density.empty()) return std::nullopt;
+  const std::array<ScalarVolume, 6>& parts = frame.velocity->parts;
+  const glm::dmat3& to_index = frame.velocity->to_index;
+  glm::dvec3 most(0.0);  // along each axis of the lattice
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t first = 2 * static_cast<std::size_t>(axis);
+    most += glm::abs(to_index[axis]) * double{std::max(parts[first].max_value, parts[first + 1].max_value)};
+  }
+  const double fastest = std::min(std::max({most.x, most.y, most.z}), volume::fastest_velocity);
+  if (!(fastest > 0.0)) return std::nullopt;
+  BrickSet set("density");
+  set.add(frame.density);
+  struct Read {
+    Values density{};
+    std::array<Values, 6> parts{};
+  };
+  const glm::dmat3 to_relative = to_index / fastest;
+  auto components = fields_of<3, Read>(
+      frame.density.index_to_world, set.take(), "velocity", progress,
+      [&](const ivec3& origin, Read& here) {
+        read_density(frame, density_ramp, origin, here.density);
+        for (std::size_t i = 0; i < parts.size(); ++i) read(parts[i], origin, here.parts[i]);
+      },
+      [&](const Read& here, std::size_t v) {
+        const glm::dvec3 given(here.parts[0][v] - here.parts[1][v], here.parts[2][v] - here.parts[3][v],
+                               here.parts[4][v] - here.parts[5][v]);
+        const vec3 relative(glm::clamp(to_relative * given, -1.0, 1.0));
+        return here.density[v] * (0.5F + 0.5F * relative);
+      });
+  return grid::MomentumField::Values{std::move(components), static_cast<float>(fastest)};
 }
 
 }  // namespace cumulet::scene

@@ -41,6 +41,7 @@ struct MarchSource {
   [[nodiscard]] bool emits() const { return channels.emission || (grid && !grid->emission.empty()); }
   [[nodiscard]] bool coloured() const { return channels.scattering || (grid && !grid->colour.empty()); }
   [[nodiscard]] bool anisotropic() const { return channels.forward || (grid && !grid->anisotropy.empty()); }
+  [[nodiscard]] bool moves() const { return channels.momentum || (grid && !grid->velocity.empty()); }
   /// From grid values to density 0 to 1.
   [[nodiscard]] float density_a_value() const { return max_value > 0.0F ? 1.0F / max_value : 1.0F; }
 };

@@ -73,10 +73,7 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress) const {
   volume::VolumeFrame frame = volume::import_frame(path, grids, log, progress);
   const auto place = [&](volume::ScalarVolume& field) { field.index_to_world = to_world * field.index_to_world; };
   place(frame.density);
-  if (frame.temperature) place(*frame.temperature);
-  if (frame.flame) place(*frame.flame);
-  if (frame.colour) std::ranges::for_each(*frame.colour, place);
-  if (frame.anisotropy) std::ranges::for_each(*frame.anisotropy, place);
+  for (volume::ScalarVolume* field : frame.beside_density()) place(*field);
   try {
     return std::make_shared<const VolumeAsset>(std::move(frame), progress);
   } catch (const Error& e) {

@@ -516,7 +516,7 @@ cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linea
 
 cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    require(number(aov) <= CUMULET_AOV_ERROR, "the AOV is unknown");
+    require(number(aov) <= CUMULET_AOV_VELOCITY, "the AOV is unknown");
     v.read_aov(static_cast<core::Aov>(aov), values, count);
   });
 }

@@ -39,7 +39,8 @@ viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
   const auto name = [](const char* given) { return std::string(given == nullptr ? "" : given); };
   return {
       d.path,
-      {name(d.grid_name), name(d.temperature_grid), name(d.flame_grid), name(d.color_grid), name(d.anisotropy_grid)},
+      {name(d.grid_name), name(d.temperature_grid), name(d.flame_grid), name(d.color_grid), name(d.anisotropy_grid),
+       name(d.velocity_grid)},
       m,
       d.suggested_density_scale == 1};
 }

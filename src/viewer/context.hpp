@@ -163,7 +163,7 @@ class Context {
   void composite(render::Film& film, const render::PictureTextures& picture, const render::Display& display,
                  const render::FrameTarget& target);
   // Throws Error(invalid_argument) where the picture is of another scene than the one there is.
-  void find_facts(const Shot& shot, render::Picture& picture);
+  void find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts);
   // The picture denoised, which has its facts: row 0 the top.
   gl::Object by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network);
   gl::Object filtered(const render::Picture& picture, bool with_background);

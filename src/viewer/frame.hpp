@@ -67,7 +67,8 @@ enum class Aov {
   volume_depth = 4,
   normal = 5,
   albedo = 6,
-  error = 7
+  error = 7,
+  velocity = 8
 };
 
 }  // namespace cumulet::viewer

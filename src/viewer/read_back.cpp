@@ -1,6 +1,6 @@
 // What a context gives back of its pictures.
 
-#include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,6 +23,29 @@ constexpr std::uint64_t most_denoiser_bytes = std::uint64_t{512} << 20U;
 // Whether all of it, surfaces too, is of samples of light.
 bool is_traced(const render::Picture& picture) {
   return picture.view() == render::View::shaded && picture.layered() != render::Layered::beneath;
+}
+
+std::optional<render::PixelFact> fact_of(Aov aov) {
+  using render::PixelFact;
+  switch (aov) {
+    case Aov::transmittance:
+      return PixelFact::transmittance;
+    case Aov::surface_depth:
+      return PixelFact::surface_z;
+    case Aov::volume_depth:
+      return PixelFact::volume_z;
+    case Aov::normal:
+      return PixelFact::normal;
+    case Aov::albedo:
+      return PixelFact::albedo;
+    case Aov::velocity:
+      return PixelFact::velocity;
+    case Aov::beauty:
+    case Aov::volume:
+    case Aov::error:
+      break;
+  }
+  return std::nullopt;
 }
 
 // How many floats a picture of four channels has. Throws Error(invalid_argument) where there is no room for them.
@@ -117,12 +140,8 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   }
   const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
   const bool colour = aov == Aov::beauty || aov == Aov::volume;
-  const std::array<PixelFact, 5> facts{PixelFact::transmittance, PixelFact::surface_z, PixelFact::volume_z,
-                                       PixelFact::normal, PixelFact::albedo};
-  const auto is_fact = aov >= Aov::transmittance && aov <= Aov::albedo;
-  const PixelFact fact =
-      facts.at(is_fact ? static_cast<std::size_t>(aov) - static_cast<std::size_t>(Aov::transmittance) : 0);
-  const std::size_t floats = pixels * (colour ? 4 : (is_fact ? render::channels_of(fact) : 1));
+  const std::optional<PixelFact> fact = fact_of(aov);
+  const std::size_t floats = pixels * (colour ? 4 : (fact ? render::channels_of(*fact) : 1));
   if (values == nullptr || count < floats) {
     throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
   }
@@ -138,18 +157,20 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   } else if (aov == Aov::error) {
     progressive_.tracer().read_error(picture, values);
   } else {
-    find_facts(shot, picture);
-    progressive_.tracer().read_fact(picture, fact, values);
+    const bool moves = fact == PixelFact::velocity;
+    find_facts(shot, picture, moves ? render::PixelFacts::all : render::PixelFacts::guides);
+    progressive_.tracer().read_fact(picture, fact.value(), values);
   }
 }
 
-void Context::find_facts(const Shot& shot, render::Picture& picture) {
+void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts) {
   if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
     throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
   }
   const render::Obstacles met = obstacles(shot);
   compositor_.begin_denoising_anew();
-  while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0))) {
+  while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0), render::fact_rays,
+                                           facts)) {
   }
 }
 
@@ -164,7 +185,7 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
     throw Error(ErrorCode::unsupported, "only shaded pictures whose surfaces are traced can be denoised");
   }
   require_room(picture, rgba, count);
-  find_facts(shot, picture);
+  find_facts(shot, picture, render::PixelFacts::guides);
   const render::Display display = shot.display.shown(false);
   const gl::Object denoised =
       network != nullptr ? by_network(shot, picture, network) : filtered(picture, display.shows_background());

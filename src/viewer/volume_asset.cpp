@@ -87,13 +87,15 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   };
   constexpr std::type_identity<grid::RgbField> colours;
   constexpr std::type_identity<grid::ScalarField> numbers;
+  constexpr std::type_identity<grid::MomentumField> motion;
   const auto lock = patient_lock(mutex_, progress);
   if (!channels_ || channels_->density_ramp != density_ramp || channels_->emission != given) {
     channels_.reset();
     channels_ = Made{density_ramp,
                      given,
                      {field(colours, scene::emission_of(*frame_, given, &progress)),
-                      field(colours, scene::scattering_of(*frame_, density_ramp, &progress)), nullptr},
+                      field(colours, scene::scattering_of(*frame_, density_ramp, &progress)), nullptr,
+                      field(motion, scene::momentum_of(*frame_, density_ramp, &progress))},
                      std::nullopt};
   }
   grid::Channels made = channels_->channels;

@@ -68,7 +68,7 @@ class VolumeAsset {
   struct Made {
     volume::Ramp density_ramp;
     scene::Emission emission;
-    grid::Channels channels;  // but the next
+    grid::Channels channels;  // but what goes forward
     std::optional<decltype(grid::Channels::forward)> forward;
   };
   mutable std::optional<Made> channels_;

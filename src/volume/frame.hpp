@@ -10,6 +10,17 @@
 
 namespace cumulet::volume {
 
+/// Voxels a second, along an axis: the most that a half float holds.
+inline constexpr double fastest_velocity = 65504.0;
+
+/// How matter moves.
+struct Velocity {
+  /// Along x: how far it is above 0, and how far below; along y, and along z.
+  std::array<ScalarVolume, 6> parts;
+  /// Voxels a second along the lattice's axes = to_index * (x, y, z).
+  glm::dmat3 to_index{1.0};
+};
+
 /// The fields of one file, all on one lattice: each has the same index_to_world, and voxel (i,j,k) of each is the same
 /// place. Bounds and bricks are each field's own.
 struct VolumeFrame {
@@ -19,6 +30,10 @@ struct VolumeFrame {
   std::optional<std::array<ScalarVolume, 3>> colour = {};  ///< of what scatters: linear Rec. 709; red, green, blue
   /// The mean cosine of what scatters, from -1 to 1: how far it is above 0, and how far below.
   std::optional<std::array<ScalarVolume, 2>> anisotropy = {};
+  std::optional<Velocity> velocity = {};
+
+  /// All that the fields beside density are made of.
+  [[nodiscard]] std::vector<ScalarVolume*> beside_density();
 };
 
 /// Which grids of a file are which field. "none" leaves a field out. Empty: the grid whose name, in whatever case,
@@ -36,10 +51,13 @@ struct GridNames {
   std::string colour = {};
   /// anisotropy, scatter_anisotropy, phase_anisotropy, phase_g.
   std::string anisotropy = {};
+  /// velocity, vel, v: of vectors, staggered or not, or three grids of numbers with x, y and z behind that name, or
+  /// behind "_" or "." after it; else a staggered grid of vectors, whatever its name.
+  std::string velocity = {};
 };
 
 /// Which field each of a file's grids is where nothing is said of names: "density", "temperature", "flame", "color",
-/// "anisotropy", or "" for none; and "velocity", which is found but not rendered yet.
+/// "anisotropy", "velocity", or "" for none.
 std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 
 /// Reads the fields of a .vdb or .nvdb file, each as import_volume reads a grid.
@@ -53,9 +71,14 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 /// that are not 0. Offsets of whole voxels so move values exactly. What would fill more than 2^21 bricks of the lattice
 /// is refused, and voxels smaller than a 64th of the lattice's.
 ///
+/// A component of a staggered grid lies half a voxel below the voxel's centre, along its own axis, and is resampled from
+/// there. Velocities are world units a second along the axes of the file's world, but for those of a grid whose metadata
+/// say that they are in local space (is_local_space) and change with it (vector_type contravariant): these are its own
+/// voxels a second, along its own axes. More than 65504 voxels of the lattice a second count as that.
+///
 /// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
-/// out. Warnings: import_volume's; the grids that are not shown; temperature, colour or anisotropy that lies nowhere
-/// over density; anisotropy beyond -1 and 1, which counts as these. An info tells of colour in three grids that is not
+/// out. Warnings: import_volume's; the grids that are not shown; temperature, colour, anisotropy or velocity that
+/// lies nowhere over density; anisotropy beyond -1 and 1, which counts as these; velocities that are clamped. An info tells of colour in three grids that is not
 /// read, and of temperatures that seem to be kelvin, degrees Celsius, or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <sstream>
 #include <vector>
@@ -25,10 +26,12 @@ constexpr const char* no_grid = "none";
 /// Places in the file's list of grids.
 struct Chosen {
   std::optional<std::size_t> density, temperature, flame, anisotropy;
-  std::vector<std::size_t> colour;  ///< none; one of vectors; or red, green and blue
+  std::vector<std::size_t> colour;    ///< none; one of vectors; or red, green and blue
+  std::vector<std::size_t> velocity;  ///< none; one of vectors; or along x, y and z
 
   [[nodiscard]] std::vector<std::size_t> all() const {
     std::vector<std::size_t> out = colour;
+    out.insert(out.end(), velocity.begin(), velocity.end());
     for (const auto& field : {density, temperature, flame, anisotropy}) {
       if (field) out.push_back(*field);
     }
@@ -57,19 +60,47 @@ std::string colour_refusal(const GridInfo& grid) {
   return {};
 }
 
+/// Why a grid holds no velocities; empty if it may.
+std::string velocity_refusal(const GridInfo& grid) {
+  return grid.values == Values::lengths ? std::string() : "is of type " + grid.type + ", not of vectors";
+}
+
+/// One of vectors that has this name, or else the three grids of numbers. parts: what those are called.
+std::vector<std::size_t> choose_vectors(const std::vector<GridInfo>& grids, const std::string& name,
+                                        std::string (*refusal)(const GridInfo&), std::vector<std::size_t> three,
+                                        const std::array<const char*, 3>& parts) {
+  const std::vector<std::size_t> whole = named(grids, name);
+  const bool usable = std::ranges::any_of(whole, [&](std::size_t i) { return refusal(grids[i]).empty(); });
+  if (!three.empty() && !usable) return three;
+  if (whole.empty()) {
+    fail_without(grids, "has no grid of vectors \"" + name + "\", nor all of \"" + name + parts[0] + "\", \"" + name +
+                            parts[1] + "\" and \"" + name + parts[2] + "\"; it has ");
+  }
+  return {choose_named(grids, name, refusal)};
+}
+
+std::vector<std::size_t> choose_velocity(const std::vector<GridInfo>& grids, const std::string& name,
+                                         std::span<const std::size_t> taken) {
+  if (name == no_grid) return {};
+  if (!by_name(name)) return choose_vectors(grids, name, velocity_refusal, along_axes(grids, name), {"x", "y", "z"});
+  const auto free = [&](std::size_t i) { return std::ranges::find(taken, i) == taken.end(); };
+  const auto first = [&](const auto& suits) -> std::vector<std::size_t> {
+    for (std::size_t i = 0; i < grids.size(); ++i) {
+      if (free(i) && velocity_refusal(grids[i]).empty() && suits(grids[i])) return {i};
+    }
+    return {};
+  };
+  for (const std::string_view likely : velocity_names) {
+    std::vector<std::size_t> found = first([&](const GridInfo& grid) { return lower_case(grid.name) == likely; });
+    if (found.empty()) found = along_axes(grids, likely);
+    if (!found.empty() && std::ranges::all_of(found, free)) return found;
+  }
+  return first([](const GridInfo& grid) { return grid.grid_class == "staggered"; });
+}
+
 std::vector<std::size_t> choose_colour(const std::vector<GridInfo>& grids, const std::string& name) {
   if (name == no_grid) return {};
-  if (!by_name(name)) {
-    std::vector<std::size_t> of_channels = channels(grids, name);
-    const std::vector<std::size_t> whole = named(grids, name);
-    const bool usable = std::ranges::any_of(whole, [&](std::size_t i) { return colour_refusal(grids[i]).empty(); });
-    if (!of_channels.empty() && !usable) return of_channels;
-    if (whole.empty()) {
-      fail_without(grids, "has no grid of vectors \"" + name + "\", nor all of \"" + name + "_r\", \"" + name +
-                              "_g\" and \"" + name + "_b\"; it has ");
-    }
-    return {choose_named(grids, name, colour_refusal)};
-  }
+  if (!by_name(name)) return choose_vectors(grids, name, colour_refusal, channels(grids, name), {"_r", "_g", "_b"});
   for (const std::string_view likely : colour_names) {
     for (std::size_t i = 0; i < grids.size(); ++i) {
       if (lower_case(grids[i].name) == likely && colour_refusal(grids[i]).empty()) return {i};
@@ -88,7 +119,10 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
     return taken.back();
   };
   Chosen out{asked(names.density), asked(names.temperature), asked(names.flame), asked(names.anisotropy),
-             choose_colour(grids, names.colour)};
+             choose_colour(grids, names.colour), {}};
+  if (!by_name(names.colour)) taken.insert(taken.end(), out.colour.begin(), out.colour.end());
+  out.velocity = choose_velocity(grids, names.velocity, taken);
+  if (!by_name(names.velocity)) taken.insert(taken.end(), out.velocity.begin(), out.velocity.end());
   const auto find = [&](std::optional<std::size_t>& field, const std::string& name,
                         std::span<const std::string_view> likely) {
     if (by_name(name)) field = first_fog(grids, likely, taken);
@@ -140,6 +174,15 @@ std::string remark_on_temperature(const ScalarVolume& field) {
   return out.str();
 }
 
+/// Whether vectors are of their grid's own index space: OpenVDB's metadata.
+bool is_local(const GridInfo& grid) {
+  const auto says = [&](std::string_view name, std::string_view value) {
+    return std::ranges::any_of(
+        grid.metadata, [&](const Metadata& entry) { return entry.name == name && entry.value.starts_with(value); });
+  };
+  return says("is_local_space", "true") && says("vector_type", "contravariant");
+}
+
 class FrameImport {
  public:
   FrameImport(std::string file, const Log& log, Progress* progress)
@@ -166,6 +209,21 @@ class FrameImport {
   }
 
  private:
+  /// Equal shares of a load's fraction.
+  class Shares {
+   public:
+    Shares(Portion portion, std::size_t count) : portion_(portion), share_(1.0 / static_cast<double>(count)) {}
+    Portion next() {
+      const double from = share_ * done_++;
+      return portion_.part(from, from + share_);
+    }
+
+   private:
+    Portion portion_;
+    double share_;
+    int done_ = 0;
+  };
+
   void read(Reader& reader, const Chosen& chosen, Portion portion) {
     Shares shares(portion, chosen.all().size());
     const auto field = [&](std::size_t grid) {
@@ -186,15 +244,35 @@ class FrameImport {
     } else if (!chosen.colour.empty()) {
       std::ranges::transform(chosen.colour, out_.colour.emplace().begin(), field);
     }
+    if (!chosen.velocity.empty()) read_velocity(reader, chosen.velocity, shares);
+  }
+
+  void read_velocity(Reader& reader, const std::vector<std::size_t>& grids, Shares& shares) {
+    Velocity& velocity = out_.velocity.emplace();
+    std::array<std::array<ScalarVolume, 2>, 3> axes;
+    if (grids.size() == 1) {
+      axes = import_signed_vector_grid(reader, grids[0], file_, log_, progress_, shares.next());
+    } else {
+      std::ranges::transform(grids, axes.begin(), [&](std::size_t grid) {
+        return import_signed_grid(reader, grid, file_, log_, progress_, shares.next());
+      });
+    }
+    const GridInfo& first = reader.grids()[grids[0]];
+    if (is_local(first)) velocity.to_index = glm::dmat3(axes[0][0].index_to_world);
+    const bool staggered = grids.size() == 1 && first.grid_class == "staggered";
+    for (int axis = 0; axis < 3; ++axis) {
+      for (std::size_t sign = 0; sign < 2; ++sign) {
+        ScalarVolume& part = axes[static_cast<std::size_t>(axis)][sign];
+        // On the face that the voxel shares with the one before it.
+        if (staggered) part.index_to_world[3] -= 0.5 * part.index_to_world[axis];
+        velocity.parts[2 * static_cast<std::size_t>(axis) + sign] = std::move(part);
+      }
+    }
   }
 
   void place(Portion portion) {
-    std::vector<ScalarVolume*> fields;
-    if (out_.temperature) fields.push_back(&*out_.temperature);
-    if (out_.flame) fields.push_back(&*out_.flame);
-    const auto pointer = [](ScalarVolume& part) { return &part; };
-    if (out_.colour) std::ranges::transform(*out_.colour, std::back_inserter(fields), pointer);
-    if (out_.anisotropy) std::ranges::transform(*out_.anisotropy, std::back_inserter(fields), pointer);
+    if (out_.velocity) bring_to_index(*out_.velocity);
+    const std::vector<ScalarVolume*> fields = out_.beside_density();
     Shares shares(portion, fields.size());
     for (ScalarVolume* field : fields) {
       const std::string name = name_of(*field);
@@ -203,25 +281,47 @@ class FrameImport {
     if (out_.temperature) warn_if_apart({&*out_.temperature, 1});
     if (out_.colour) warn_if_apart(*out_.colour);
     if (out_.anisotropy) warn_if_apart(*out_.anisotropy);
+    if (out_.velocity) warn_if_apart(out_.velocity->parts);
   }
 
-  void clamp_anisotropy() {
+  // How many voxels had more.
+  static std::uint64_t clamp_to(float most, std::span<ScalarVolume> parts) {
     std::uint64_t beyond = 0;
     const auto clamp = [&](float& value, std::uint64_t voxels) {
-      if (value > 1.0F) beyond += voxels;
-      value = std::min(value, 1.0F);
+      if (value > most) beyond += voxels;
+      value = std::min(value, most);
     };
-    for (ScalarVolume& part : *out_.anisotropy) {
-      if (part.max_value > 1.0F) {
+    for (ScalarVolume& part : parts) {
+      if (part.max_value > most) {
         for (float& value : part.brick_values.as_floats()) clamp(value, 1);
       }
       for (Tile& tile : part.tiles) clamp(tile.value, voxels_of(tile));
       clamp(part.background, 0);
       clamp(part.max_value, 0);
     }
+    return beyond;
+  }
+
+  void clamp_anisotropy() {
+    const std::uint64_t beyond = clamp_to(1.0F, *out_.anisotropy);
     if (beyond == 0) return;
     remark(LogLevel::warning, name_of((*out_.anisotropy)[0]),
            std::to_string(beyond) + " voxels beyond -1 and 1 clamped to these");
+  }
+
+  // to_index: from the file's world to the lattice, too; and nothing faster than a half float says of it.
+  void bring_to_index(Velocity& velocity) const {
+    velocity.to_index = glm::inverse(glm::dmat3(out_.density.index_to_world)) * velocity.to_index;
+    double longest = 0.0;
+    const glm::dmat3 rows = glm::transpose(velocity.to_index);
+    for (int axis = 0; axis < 3; ++axis)
+      longest = std::max(longest, glm::dot(glm::abs(rows[axis]), glm::dvec3(1.0)));
+    const double most = std::min(fastest_velocity / longest, double{std::numeric_limits<float>::max()});
+    const std::uint64_t beyond = clamp_to(static_cast<float>(most), velocity.parts);
+    if (beyond == 0) return;
+    std::ostringstream text;
+    text << beyond << " components beyond " << fastest_velocity << " voxels a second clamped to that";
+    remark(LogLevel::warning, name_of(velocity.parts[0]), text.str());
   }
 
   void put_on_lattice(ScalarVolume& field, Portion portion) const {
@@ -262,21 +362,6 @@ class FrameImport {
     if (!text.empty()) log_.write(level, one_line(what + ": " + text));
   }
 
-  /// Equal shares of a load's fraction.
-  class Shares {
-   public:
-    Shares(Portion portion, std::size_t count) : portion_(portion), share_(1.0 / static_cast<double>(count)) {}
-    Portion next() {
-      const double from = share_ * done_++;
-      return portion_.part(from, from + share_);
-    }
-
-   private:
-    Portion portion_;
-    double share_;
-    int done_ = 0;
-  };
-
   std::string file_;
   const Log& log_;
   Progress* progress_;
@@ -285,9 +370,20 @@ class FrameImport {
 
 }  // namespace
 
+std::vector<ScalarVolume*> VolumeFrame::beside_density() {
+  std::vector<ScalarVolume*> fields;
+  if (temperature) fields.push_back(&*temperature);
+  if (flame) fields.push_back(&*flame);
+  const auto pointer = [](ScalarVolume& part) { return &part; };
+  if (colour) std::ranges::transform(*colour, std::back_inserter(fields), pointer);
+  if (anisotropy) std::ranges::transform(*anisotropy, std::back_inserter(fields), pointer);
+  if (velocity) std::ranges::transform(velocity->parts, std::back_inserter(fields), pointer);
+  return fields;
+}
+
 std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids) {
   std::vector<std::string> channels(grids.size());
-  for (const std::size_t grid : velocities(grids)) channels[grid] = "velocity";
+  for (const std::size_t grid : choose_velocity(grids, {}, {})) channels[grid] = "velocity";
   Chosen chosen;
   try {
     chosen = choose(grids, {});

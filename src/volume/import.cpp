@@ -85,7 +85,6 @@ namespace {
 
 // What is shown as density of a file that has none, the first of these first.
 constexpr std::array<std::string_view, 5> likely_names = {"flames", "flame", "fire", "temperature", "heat"};
-constexpr std::array<std::string_view, 3> velocity_names = {"velocity", "vel", "v"};
 
 bool is_among(std::size_t grid, std::span<const std::size_t> some) {
   return std::ranges::find(some, grid) != some.end();
@@ -99,6 +98,34 @@ std::string detail::lower_case(std::string text) {
   return text;
 }
 
+namespace {
+
+// Grids of numbers of this name with an axis' letter behind `join`.
+std::array<std::vector<std::size_t>, 3> axes_called(const std::vector<GridInfo>& grids, std::string_view name,
+                                                    std::string_view join) {
+  std::array<std::vector<std::size_t>, 3> found;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::string called = std::string(name).append(join) + "xyz"[axis];
+    for (std::size_t i = 0; i < grids.size(); ++i) {
+      if (grids[i].values == Values::scalars && lower_case(grids[i].name) == called) found[axis].push_back(i);
+    }
+  }
+  const bool whole = std::ranges::none_of(found, [](const auto& axis) { return axis.empty(); });
+  return whole ? found : std::array<std::vector<std::size_t>, 3>{};
+}
+
+constexpr std::array<std::string_view, 3> axis_joins = {"", "_", "."};
+
+}  // namespace
+
+std::vector<std::size_t> detail::along_axes(const std::vector<GridInfo>& grids, std::string_view name) {
+  for (const std::string_view join : axis_joins) {
+    const auto found = axes_called(grids, lower_case(std::string(name)), join);
+    if (!found[0].empty()) return {found[0][0], found[1][0], found[2][0]};
+  }
+  return {};
+}
+
 std::vector<std::size_t> detail::velocities(const std::vector<GridInfo>& grids) {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < grids.size(); ++i) {
@@ -106,18 +133,8 @@ std::vector<std::size_t> detail::velocities(const std::vector<GridInfo>& grids) 
     if (grids[i].values == Values::lengths && (called || grids[i].grid_class == "staggered")) found.push_back(i);
   }
   for (const std::string_view name : velocity_names) {
-    for (const std::string_view join : {"", "_", "."}) {
-      std::vector<std::size_t> parts;
-      int axes = 0;
-      for (const char axis : {'x', 'y', 'z'}) {
-        const std::size_t before = parts.size();
-        const std::string part = std::string(name).append(join) + axis;
-        for (std::size_t i = 0; i < grids.size(); ++i) {
-          if (grids[i].values == Values::scalars && lower_case(grids[i].name) == part) parts.push_back(i);
-        }
-        if (parts.size() > before) ++axes;
-      }
-      if (axes == 3) found.insert(found.end(), parts.begin(), parts.end());
+    for (const std::string_view join : axis_joins) {
+      for (const auto& axis : axes_called(grids, name, join)) found.insert(found.end(), axis.begin(), axis.end());
     }
   }
   return found;
@@ -498,6 +515,29 @@ auto of_grid(Reader& reader, std::size_t grid, const std::string& file, F&& f) {
   return naming(name, [&] { return f(entry.name, name); });
 }
 
+bool is_empty(const ScalarVolume& volume) { return volume.empty(); }
+bool is_empty(const std::array<ScalarVolume, 2>& signs) { return signs[0].empty(); }
+
+// What make() makes of each component of a grid of vectors.
+template <class Axis, class Make>
+std::array<Axis, 3> of_axes(Reader& reader, std::size_t grid, const std::string& file, const Log& log, Portion portion,
+                            const Make& make) {
+  return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
+    std::array<SourceGrid, 3> sources = reader.read_vector(grid, portion.part(0.0, reading), log, name + ": ");
+    std::array<Axis, 3> out;
+    double from = reading;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double to = from + (1.0 - reading) / 3.0;
+      // They are empty together, which is said once.
+      const Log& heard = axis > 0 && is_empty(out[0]) ? Log() : log;
+      out[axis] =
+          make(std::move(sources[axis]), grid_name, heard, name + ", " + "xyz"[axis] + ": ", portion.part(from, to));
+      from = to;
+    }
+    return out;
+  });
+}
+
 }  // namespace
 
 ScalarVolume detail::import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log,
@@ -512,21 +552,13 @@ ScalarVolume detail::import_grid(Reader& reader, std::size_t grid, const std::st
 
 std::array<ScalarVolume, 3> detail::import_vector_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                        const Log& log, Progress* progress, Portion portion) {
-  return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
-    std::array<SourceGrid, 3> sources = reader.read_vector(grid, portion.part(0.0, reading), log, name + ": ");
-    std::array<ScalarVolume, 3> out;
-    double from = reading;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double to = from + (1.0 - reading) / 3.0;
-      // They are empty together, which is said once.
-      const Log& heard = axis > 0 && out[0].empty() ? Log() : log;
-      out[axis] =
-          assemble(std::move(sources[axis]), heard, name + ", " + "xyz"[axis] + ": ", progress, portion.part(from, to));
-      out[axis].name = grid_name;
-      from = to;
-    }
-    return out;
-  });
+  return of_axes<ScalarVolume>(
+      reader, grid, file, log, portion,
+      [&](SourceGrid source, const std::string& grid_name, const Log& heard, const std::string& prefix, Portion part) {
+        ScalarVolume volume = assemble(std::move(source), heard, prefix, progress, part);
+        volume.name = grid_name;
+        return volume;
+      });
 }
 
 namespace {
@@ -554,27 +586,41 @@ class OneSign final : public LeafSource {
   float sign_;
 };
 
+std::array<ScalarVolume, 2> assemble_signed(SourceGrid whole, const std::string& grid_name, const Log& log,
+                                            const std::string& log_prefix, Progress* progress, Portion portion) {
+  const std::shared_ptr<const LeafSource> leaves = std::move(whole.leaves);
+  const auto part = [&](float sign, const Log& heard, Portion of_load) {
+    auto signed_leaves = std::make_unique<OneSign>(leaves, sign);
+    SourceGrid source{whole.index_to_world, (*signed_leaves)(whole.background), whole.tiles, nullptr};
+    for (SourceTile& tile : source.tiles) tile.box.value = (*signed_leaves)(tile.box.value);
+    source.leaves = std::move(signed_leaves);
+    ScalarVolume volume = assemble(std::move(source), heard, log_prefix, progress, of_load);
+    volume.name = grid_name;
+    return volume;
+  };
+  // Both have the same voxels that are no numbers, or none at all: that is said once.
+  ScalarVolume above = part(1.0F, log, portion.part(0.0, 0.5));
+  return {std::move(above), part(-1.0F, Log(), portion.part(0.5, 1.0))};
+}
+
 }  // namespace
 
 std::array<ScalarVolume, 2> detail::import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                        const Log& log, Progress* progress, Portion portion) {
   return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
     SourceGrid whole = reader.read(grid, portion.part(0.0, reading), log, name + ": ");
-    const std::shared_ptr<const LeafSource> leaves = std::move(whole.leaves);
-    const auto part = [&](float sign, const Log& heard, Portion of_load) {
-      auto signed_leaves = std::make_unique<OneSign>(leaves, sign);
-      SourceGrid source{whole.index_to_world, (*signed_leaves)(whole.background), whole.tiles, nullptr};
-      for (SourceTile& tile : source.tiles) tile.box.value = (*signed_leaves)(tile.box.value);
-      source.leaves = std::move(signed_leaves);
-      ScalarVolume volume = assemble(std::move(source), heard, name + ": ", progress, of_load);
-      volume.name = grid_name;
-      return volume;
-    };
-    // Both have the same voxels that are no numbers, or none at all: that is said once.
-    constexpr double half = 0.5 * (1.0 + reading);
-    ScalarVolume above = part(1.0F, log, portion.part(reading, half));
-    return std::array<ScalarVolume, 2>{std::move(above), part(-1.0F, Log(), portion.part(half, 1.0))};
+    return assemble_signed(std::move(whole), grid_name, log, name + ": ", progress, portion.part(reading, 1.0));
   });
+}
+
+std::array<std::array<ScalarVolume, 2>, 3> detail::import_signed_vector_grid(Reader& reader, std::size_t grid,
+                                                                             const std::string& file, const Log& log,
+                                                                             Progress* progress, Portion portion) {
+  return of_axes<std::array<ScalarVolume, 2>>(
+      reader, grid, file, log, portion,
+      [&](SourceGrid source, const std::string& grid_name, const Log& heard, const std::string& prefix, Portion part) {
+        return assemble_signed(std::move(source), grid_name, heard, prefix, progress, part);
+      });
 }
 
 ScalarVolume import_volume(const std::filesystem::path& file, const std::string& grid_name, const Log& log,

@@ -136,6 +136,9 @@ inline constexpr std::array<std::string_view, 3> density_names = {"density", "sm
 /// Grids that hold velocities: of vectors and called velocity, vel or v, in whatever case; staggered ones; and three of
 /// numbers that have these names with x, y and z behind them, or behind "_" or ".".
 std::vector<std::size_t> velocities(const std::vector<GridInfo>& grids);
+inline constexpr std::array<std::string_view, 3> velocity_names = {"velocity", "vel", "v"};
+/// Three grids of numbers with this name and x, y and z behind it, or behind "_" or "."; none where one is missing.
+std::vector<std::size_t> along_axes(const std::vector<GridInfo>& grids, std::string_view name);
 /// What a message says of a grid that is shown though nobody named it; empty where it needs no word. shown: all that
 /// are, of whatever field.
 std::string remark_on_choice(const std::vector<GridInfo>& grids, std::size_t chosen,
@@ -161,6 +164,10 @@ std::array<ScalarVolume, 3> import_vector_grid(Reader& reader, std::size_t grid,
 /// One scalar grid in two: by how much its values are above 0, and by how much below.
 std::array<ScalarVolume, 2> import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                const Log& log, Progress* progress, Portion portion);
+/// The components of a grid of vectors, each likewise.
+std::array<std::array<ScalarVolume, 2>, 3> import_signed_vector_grid(Reader& reader, std::size_t grid,
+                                                                     const std::string& file, const Log& log,
+                                                                     Progress* progress, Portion portion);
 
 std::string to_string(glm::ivec3 v);
 

@@ -176,6 +176,7 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
                                 "medium.flame_grid",
                                 "medium.color_grid",
                                 "medium.anisotropy_grid",
+                                "medium.velocity_grid",
                                 "surfaces.file",
                                 "surfaces.camera",
                                 "camera.eye",

@@ -294,6 +294,12 @@ typedef struct cumulet_volume_file_desc {
    * cumulet_volume_open_file.
    */
   int32_t suggested_density_scale;
+  /*
+   * How what is there moves, world units a second: what CUMULET_AOV_VELOCITY tells, and what nothing else of a picture
+   * depends on. A grid of vectors, or the three of numbers with x, y and z behind this name; to_world turns and
+   * stretches them. "none" saves memory: 24 bytes a voxel, at most, and 8 a cell.
+   */
+  const char* velocity_grid;
 } cumulet_volume_file_desc;
 
 CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
@@ -421,8 +427,7 @@ typedef struct cumulet_grid_info {
   /* Counts of the finite active voxels in equal steps from min_value to max_value. */
   uint64_t histogram[CUMULET_HISTOGRAM_BINS];
   /*
-   * What it is taken for by its name: "density", "temperature", "flame", "color", "anisotropy", or ""; and "velocity",
-   * of vectors or three grids of numbers, which nothing renders yet.
+   * What it is taken for by its name: "density", "temperature", "flame", "color", "anisotropy", "velocity", or "".
    */
   const char* channel;
 } cumulet_grid_info;
@@ -1381,14 +1386,17 @@ typedef enum cumulet_aov {
   CUMULET_AOV_NORMAL = 5,        /* 3 floats: mean shading normal of our surfaces in the pixel, world space, towards the
                                     eye, as if there were no volume; 0 where there is none */
   CUMULET_AOV_ALBEDO = 6,        /* 3 floats: mean linear base colour, likewise */
-  CUMULET_AOV_ERROR = 7 /* 1 float: estimated standard error of the pixel's luminance, with the sky's behind it:
-                           sqrt((<L^2> - <L>^2) / (n - 1)) of the luminances L of its n samples. Infinite where
-                           it has fewer than two */
+  CUMULET_AOV_ERROR = 7, /* 1 float: estimated standard error of the pixel's luminance, with the sky's behind it:
+                            sqrt((<L^2> - <L>^2) / (n - 1)) of the luminances L of its n samples. Infinite where
+                            it has fewer than two */
+  CUMULET_AOV_VELOCITY = 8 /* 3 floats: mean velocity of the volume where it scatters the camera's rays for the first
+                              time, before the nearest surface; world space, world units a second. 0 where it does
+                              nowhere, and where it has no velocities (velocity_grid); surfaces have none */
 } cumulet_aov;
 
 /*
  * [GL] One of these, of the picture so far: width x height (of the result) pixels, first pixel top left. count is the
- * number of floats at values. Transmittance, depths, normal and albedo are found when first asked for, by 16 rays a
+ * number of floats at values. Transmittance, depths, normal, albedo and velocity are found when first asked for, by 16 rays a
  * pixel (the depths by the one through its middle), without noise but where surfaces cover or transmit a part of the
  * light, which is a chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views, and for a
  * picture that is still of the volume before.
