@@ -204,7 +204,7 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
   for (const image::LayerName& layer : {layers::beauty, layers::volume})
     if (has(first, layer)) made.emplace_back(layer, mean(parts, layer));
   for (const image::LayerName& layer :
-       {layers::transmittance, layers::depth, layers::volume_depth, layers::normal, layers::albedo})
+       {layers::transmittance, layers::depth, layers::volume_depth, layers::normal, layers::albedo, layers::velocity})
     if (has(first, layer)) made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
 
   std::vector<image::Attribute> said = first.attributes;

@@ -5,10 +5,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "base/error.hpp"
 #include "base/luminance.hpp"
@@ -336,18 +338,65 @@ class GridBuilder::LeafEmission {
   bool linear_;
 };
 
-// What leaves hold of a field of three components.
-class GridBuilder::LeafVectors {
+// What scatters in leaves: density x colour.
+class GridBuilder::LeafScattering {
  public:
-  template <class Field>
-  explicit LeafVectors(const Field& field)
-      : component_{LeafMoments(field.component(0)), LeafMoments(field.component(1)), LeafMoments(field.component(2))} {}
+  explicit LeafScattering(const RgbField& scattering)
+      : component_{LeafMoments(scattering.component(0)), LeafMoments(scattering.component(1)),
+                   LeafMoments(scattering.component(2))} {}
   dvec3 operator()(const Node& node, const vec3& centroid) {
     return {component_[0](node, centroid).mass, component_[1](node, centroid).mass, component_[2](node, centroid).mass};
   }
 
  private:
   std::array<LeafMoments, 3> component_;
+};
+
+// How leaves move. BrickSums lose what is thin beside its brick, and here a quotient is all that counts: within bricks
+// voxels are summed up in double precision.
+class GridBuilder::LeafVelocity {
+ public:
+  LeafVelocity(const Statistics& density, const MomentumField& momentum)
+      : fields_{&density, &momentum.component(0), &momentum.component(1), &momentum.component(2)},
+        fastest_(momentum.fastest()) {}
+  glm::uvec2 operator()(const Node& node, const vec3& centroid) {
+    std::array<double, 4> sums{};
+    if (node.heap == 0) {
+      for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = fields_[i]->moments(v0_of(node.v0), node.shape).mass;
+    } else {
+      look_up(ivec3(centroid) & ~(volume::brick_size - 1));
+      const BrickTree& tree = brick_tree(kuhn_frame(corner_, volume::brick_size, node.permutation));
+      const std::uint32_t leaves = 512U / std::bit_floor(std::uint32_t{node.heap});
+      const auto voxels = std::span(tree.voxel).subspan(node.heap * leaves - 512U, leaves);
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        const Found& found = found_[i];
+        sums[i] = found.values == nullptr ? double{found.uniform} * leaves : 0.0;
+        for (std::size_t v = 0; found.values != nullptr && v < voxels.size(); ++v) sums[i] += found.values[voxels[v]];
+      }
+    }
+    return pack_velocity({sums[1], sums[2], sums[3]}, sums[0], fastest_);
+  }
+
+ private:
+  // A brick of a field, or what stands for it.
+  struct Found {
+    const float* values = nullptr;
+    float uniform = 0.0F;
+  };
+  void look_up(const ivec3& corner) {
+    if (corner == corner_) return;
+    corner_ = corner;
+    for (std::size_t i = 0; i < fields_.size(); ++i) {
+      const Statistics::Node& holder = fields_[i]->node_at(corner);
+      found_[i] = {holder.is_uniform() ? nullptr : fields_[i]->values(holder, rooms_[i]), holder.uniform};
+    }
+  }
+
+  std::array<const Statistics*, 4> fields_;  // density, then momentum along each axis
+  float fastest_;
+  ivec3 corner_{-1};  // of the brick that was found
+  std::array<Found, 4> found_;
+  std::array<volume::BrickValues::Brick, 4> rooms_;
 };
 
 std::int16_t pack_anisotropy(double forward, double scattering) {
@@ -404,12 +453,12 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     LeafMoments moments(*statistics_);
     std::optional<LeafEmission> emitted;
     if (channels.emission) emitted.emplace(*channels.emission, cells);
-    std::optional<LeafVectors> coloured;
+    std::optional<LeafScattering> coloured;
     if (channels.scattering) coloured.emplace(*channels.scattering);
     std::optional<LeafMoments> forward;
     if (channels.forward) forward.emplace(channels.forward->statistics());
-    std::optional<LeafVectors> momentum;
-    if (channels.momentum) momentum.emplace(*channels.momentum);
+    std::optional<LeafVelocity> velocity;
+    if (channels.momentum) velocity.emplace(*statistics_, *channels.momentum);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -439,8 +488,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
         scattered = luminance(scattering);
       }
       if (forward) grid.anisotropy[rank] = pack_anisotropy((*forward)(node, centroid).mass, scattered);
-      if (momentum)
-        grid.velocity[rank] = pack_velocity((*momentum)(node, centroid), m.mass, channels.momentum->fastest());
+      if (velocity) grid.velocity[rank] = (*velocity)(node, centroid);
       if (m.max > 0.0F || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);

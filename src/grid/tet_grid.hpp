@@ -104,7 +104,8 @@ class GridBuilder {
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
   class LeafEmission;
-  class LeafVectors;
+  class LeafScattering;
+  class LeafVelocity;
   // mean and gradient: in units of the grid's density_unit.
   [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient, bool emits) const;
 

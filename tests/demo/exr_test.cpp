@@ -170,7 +170,8 @@ TEST_P(Exr, SaysHowThePictureWasMade) {
 // Against the renderer itself, as merge_test is against samples.
 TEST_P(Exr, SevenMergedPartsAreTheWhole) {
   scene_.sampling.volume_alone = 1;
-  aovs_ = {CUMULET_AOV_VOLUME, CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_VOLUME_DEPTH, CUMULET_AOV_ERROR};
+  aovs_ = {CUMULET_AOV_VOLUME, CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_VOLUME_DEPTH, CUMULET_AOV_VELOCITY,
+           CUMULET_AOV_ERROR};
   std::vector<std::string> parts;
   for (const std::uint32_t samples : {5U, 1U, 8U, 2U, 1U, 4U, 3U}) {
     scene_.sampling.samples = samples;

@@ -338,7 +338,7 @@ class Program {
       case 1:
         return told(cumulet_read_display(viewer_.get(), bytes.data(), bytes.size()));
       case 2:
-        return told(cumulet_read_aov(viewer_.get(), static_cast<cumulet_aov>(data_.ConsumeIntegralInRange(0, 7)),
+        return told(cumulet_read_aov(viewer_.get(), static_cast<cumulet_aov>(data_.ConsumeIntegralInRange(0, 8)),
                                      values.data(), values.size()));
       case 3:
         return told(cumulet_measure_noise(viewer_.get(), &noise));

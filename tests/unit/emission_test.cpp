@@ -216,8 +216,7 @@ TEST(Anisotropy, OfACellIsTheMeanOfWhatScattersInIt) {
     EXPECT_GT(made.cells.size(), 100U);
     std::vector<double> scattering(made.cells.size());
     std::vector<double> forward(made.cells.size());
-    for (int i = 0; i < size * size * size; ++i) {
-      const ivec3 p(i / (size * size), i / size % size, i % size);
+    test::for_each_sixth(size, [&](const ivec3& p, const vec3& middle) {
       double scatters = test::value_at(frame.density, p + cells.cube.origin);
       if (coloured) {
         vec3 colour;
@@ -225,19 +224,10 @@ TEST(Anisotropy, OfACellIsTheMeanOfWhatScattersInIt) {
           colour[c] = test::value_at((*frame.colour)[static_cast<std::size_t>(c)], p + cells.cube.origin);
         scatters *= luminance(colour);
       }
-      const ivec3 odd = p & 1;
-      for (const ivec3& order :
-           {ivec3(0, 1, 2), ivec3(0, 2, 1), ivec3(1, 0, 2), ivec3(1, 2, 0), ivec3(2, 0, 1), ivec3(2, 1, 0)}) {
-        vec3 middle(p + odd);
-        for (int k = 0; k < 3; ++k) {
-          const float along = 0.25F * static_cast<float>(3 - k);
-          middle[order[k]] += odd[order[k]] != 0 ? -along : along;
-        }
-        const std::uint32_t cell = grid::locate(made, middle);
-        scattering[cell] += scatters;
-        forward[cell] += scatters * g(p + cells.cube.origin);
-      }
-    }
+      const std::uint32_t cell = grid::locate(made, middle);
+      scattering[cell] += scatters;
+      forward[cell] += scatters * g(p + cells.cube.origin);
+    });
     for (std::size_t cell = 0; cell < made.cells.size(); ++cell) {
       const double mean = scattering[cell] > 0.0 ? forward[cell] / scattering[cell] : 0.0;
       ASSERT_NEAR(stored_anisotropy(made, cell), mean, 1e-4) << cell;

@@ -687,6 +687,8 @@ TEST_P(GlInstances, LieWhereTheDriverHasThem) {
                                    CM_RECORD(grid.emission_unit),
                                    CM_RECORD(grid.first_glowing),
                                    CM_RECORD(grid.glowing),
+                                   CM_RECORD(grid.first_velocity),
+                                   CM_RECORD(grid.moves),
                                    CM_RECORD(glow.density),
                                    CM_RECORD(glow.extent),
                                    CM_RECORD(glow.least_stretch),

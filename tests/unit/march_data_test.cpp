@@ -49,7 +49,7 @@ class Random {
 };
 
 struct Sizes {
-  std::size_t cells = 0, emission = 0, glowing = 0, colour = 0, anisotropy = 0, tree = 1;
+  std::size_t cells = 0, emission = 0, glowing = 0, colour = 0, anisotropy = 0, velocity = 0, tree = 1;
 };
 
 MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
@@ -59,6 +59,7 @@ MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
   grid->emission = random.records<grid::EmissionRecord>(sizes.emission);
   grid->colour = random.records<std::uint32_t>(sizes.colour);
   grid->anisotropy = random.records<std::int16_t>(sizes.anisotropy);
+  grid->velocity = random.records<glm::uvec2>(sizes.velocity);
   grid->tree = random.records<std::uint32_t>(sizes.tree);
   for (grid::RootEntry& root : grid->roots) root = {random(), random()};
   grid->levels = seed;
@@ -72,7 +73,7 @@ MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
 }
 
 // What is in a grid's cells, channels, tree and roots, as shaders have it: in the order of `kinds`.
-constexpr std::array kinds{"records", "emission", "glow", "colour", "anisotropy", "tree", "roots"};
+constexpr std::array kinds{"records", "emission", "glow", "colour", "anisotropy", "velocity", "tree", "roots"};
 std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
   const grid::TetGrid& grid = *source->grid;
   std::array<Words, kinds.size()> words;
@@ -86,8 +87,9 @@ std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
   copy_words(words[2], source->glow.cells.data(), source->glow.cells.size() * 2);
   for (const std::uint32_t word : grid.colour) words[3].emplace_back(word, 0, 0, 0);
   for (const std::int16_t half : grid.anisotropy) words[4].emplace_back(static_cast<std::uint16_t>(half), 0, 0, 0);
-  for (const std::uint32_t word : grid.tree) words[5].emplace_back(word, 0, 0, 0);
-  for (const grid::RootEntry& root : grid.roots) words[6].emplace_back(root.first_leaf, root.first_internal, 0, 0);
+  for (const glm::uvec2& halves : grid.velocity) words[5].emplace_back(halves, 0, 0);
+  for (const std::uint32_t word : grid.tree) words[6].emplace_back(word, 0, 0, 0);
+  for (const grid::RootEntry& root : grid.roots) words[7].emplace_back(root.first_leaf, root.first_internal, 0, 0);
   return words;
 }
 
@@ -115,7 +117,7 @@ class GridSets : public test::GlTest {
 
   // By kernels, which know the grid and what is bound.
   Words read(const MarchData& data, const core::CmGrid& grid, std::size_t kind, std::size_t count) {
-    std::string text = "#version 450\nlayout(local_size_x = 64) in;\n#define CM_CHANNELS 1\n";
+    std::string text = "#version 450\nlayout(local_size_x = 64) in;\n#define CM_CHANNELS 1\n#define CM_VELOCITY 1\n";
     for (const std::string& define : data.defines(false)) text += "#define " + define + "\n";
     for (const char* file : {"shared.glsl", "bindings.glsl", "parameters.glsl", "cell.glsl", "buffers.glsl"})
       text += test::glsl_file(file);
@@ -125,6 +127,7 @@ class GridSets : public test::GlTest {
         "cm_glow_word(i)",
         "uvec4(cm_colour_record(i), 0u, 0u, 0u)",
         "uvec4((cm_anisotropy_record(i) >> (16u * (i & 1u))) & 65535u, 0u, 0u, 0u)",
+        "uvec4(cm_velocity_record(i), 0u, 0u)",
         "uvec4(cm_tree(i), 0u, 0u, 0u)",
         "uvec4(cm_root_leaf(i), cm_root_node(i), 0u, 0u)"};
     text += "layout(std430, binding = 0) buffer Words { uvec4 words[]; };\nvoid main() {\n";
@@ -155,6 +158,7 @@ class GridSets : public test::GlTest {
       EXPECT_EQ(grid->box_min, sources[s]->grid->content_min);
       EXPECT_EQ(grid->box_max, sources[s]->grid->content_max);
       EXPECT_EQ(grid->glowing, sources[s]->glow.cells.size());
+      EXPECT_EQ(grid->moves, sources[s]->grid->velocity.empty() ? 0U : 1U);
       const auto expected = expected_of(sources[s]);
       for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
         if (expected[kind].empty()) continue;
@@ -173,7 +177,8 @@ class GridSets : public test::GlTest {
   // Of odd sizes, as parts of one page, of two, and at the end of the last.
   const MarchSourcePtr plain_ = source_of({.cells = 1900, .tree = 301}, 1);
   const MarchSourcePtr coloured_ =
-      source_of({.cells = 301, .emission = 301, .glowing = 31, .colour = 301, .anisotropy = 301, .tree = 99}, 2);
+      source_of({.cells = 301, .emission = 301, .glowing = 31, .colour = 301, .anisotropy = 301, .velocity = 301, .tree = 99},
+                2);
   const MarchSourcePtr glowing_ = source_of({.cells = 399, .emission = 250, .glowing = 3, .tree = 1}, 3);
   const MarchSourcePtr other_ = source_of({.cells = 333, .colour = 333, .tree = 55}, 4);
   const Sources three_{plain_, coloured_, glowing_};
@@ -253,9 +258,9 @@ TEST_P(GridSets, WhatDoesNotFitIsRefusedByName) {
   EXPECT_EQ(refused(three_, 900),
             "2600 cells need more than 6 texture buffers of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, 900 texels");
   EXPECT_EQ(refused({coloured_}, 900), "taken");
-  EXPECT_EQ(refused({coloured_, glowing_}, 600),
+  EXPECT_EQ(refused({coloured_, glowing_}, 800),
             "the channels of 700 cells need more than one texture buffer of this driver's GL_MAX_TEXTURE_BUFFER_SIZE, "
-            "600 texels");
+            "800 texels");
   auto constant = std::make_shared<scene::MarchSource>(*plain_);
   constant->linear = false;
   EXPECT_EQ(refused({plain_, constant}, 0), "grids of different marches are not shown together");

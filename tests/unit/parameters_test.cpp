@@ -58,6 +58,8 @@ const std::array fields{
     CM_FIELD(grid, emission_unit),
     CM_FIELD(grid, first_glowing),
     CM_FIELD(grid, glowing),
+    CM_FIELD(grid, first_velocity),
+    CM_FIELD(grid, moves),
     CM_FIELD(glow, density),
     CM_FIELD(glow, extent),
     CM_FIELD(glow, least_stretch),

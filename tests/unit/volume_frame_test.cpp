@@ -530,16 +530,222 @@ TEST_F(Frame, FieldsBesideDensityAreKeptAndTold) {
   const openvdb::GridPtrVec grids = {box("density", scaled(1.0), 10, ones),
                                      box("flame", scaled(1.0, Vec3d(100.0)), 10, ones),
                                      box("temperature", scaled(0.9, Vec3d(100.0)), 10, ones), colour,
-                                     box("anisotropy", scaled(1.0, Vec3d(100.0)), 10, ones)};
+                                     box("anisotropy", scaled(1.0, Vec3d(100.0)), 10, ones),
+                                     box("vel_x", scaled(1.0, Vec3d(100.0)), 10, ones),
+                                     box("vel_y", scaled(1.0, Vec3d(100.0)), 10, ones),
+                                     box("vel_z", scaled(1.0, Vec3d(100.0)), 10, ones)};
   Messages messages;
   const VolumeFrame frame = import_frame(write(grids), {}, messages.log);
   EXPECT_EQ(frame.flame->bounds_min, glm::ivec3(100));
   EXPECT_EQ(frame.temperature->bounds_min, glm::ivec3(100));
-  ASSERT_EQ(messages.warnings.size(), 3U);
+  ASSERT_EQ(messages.warnings.size(), 4U);
   const std::string where = path().string() + ": grid ";
   EXPECT_EQ(messages.warnings[0], where + "\"temperature\": lies nowhere over \"density\"");
   EXPECT_EQ(messages.warnings[1], where + "\"Cd\": lies nowhere over \"density\"");
   EXPECT_EQ(messages.warnings[2], where + "\"anisotropy\": lies nowhere over \"density\"");
+  EXPECT_EQ(messages.warnings[3], where + "\"vel_x\": lies nowhere over \"density\"");
+}
+
+// --- velocities ---
+
+// Along the file's axes, of a lattice of voxels of this size.
+glm::dvec3 velocity_at(const VolumeFrame& frame, const glm::ivec3& p, double voxel = 1.0) {
+  const auto& parts = frame.velocity->parts;
+  glm::dvec3 given(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t first = 2 * static_cast<std::size_t>(axis);
+    given[axis] = double{value_at(parts[first], p)} - double{value_at(parts[first + 1], p)};
+  }
+  return voxel * (frame.velocity->to_index * given);
+}
+
+openvdb::Vec3SGrid::Ptr vectors(const std::string& name) {
+  auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
+  grid->setName(name);
+  for (int i = 0; i < 100; ++i) {
+    const auto value = static_cast<float>(i - 50);
+    grid->tree().setValue(Coord(i % 11, i % 7, i % 5), openvdb::Vec3f(value, -0.5F * value, 7.25F));
+  }
+  grid->tree().addTile(1, Coord(16, 0, 0), openvdb::Vec3f(0.0F, -3.0F, 1.0F), true);
+  return grid;
+}
+
+void expect_vectors(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
+  ASSERT_TRUE(frame.velocity);
+  for (auto it = grid.cbeginValueOn(); it; ++it) {
+    const Coord c = it.getCoord();
+    const openvdb::Vec3f v = *it;
+    ASSERT_EQ(velocity_at(frame, {c.x(), c.y(), c.z()}), glm::dvec3(v.x(), v.y(), v.z())) << c;
+  }
+  EXPECT_EQ(velocity_at(frame, glm::ivec3(-3)), glm::dvec3(0.0));
+}
+
+TEST_F(Frame, VelocityOfVectors) {
+  const auto density = dot("density", 1.0F);
+  for (const std::string name : {"velocity", "Vel", "v"}) {
+    for (const bool half : {false, true}) {
+      const auto grid = vectors(name);
+      grid->setSaveFloatAsHalf(half);
+      const auto file = write({density, grid});
+      Messages messages;
+      VolumeFrame frame = import_frame(file, {}, messages.log);
+      expect_vectors(frame, *grid);
+      EXPECT_TRUE(messages.warnings.empty());
+      EXPECT_TRUE(frame.velocity->parts[0].brick_values.are_halves()) << "they are so in either file";
+      EXPECT_EQ(frame.beside_density().size(), 6U);
+      EXPECT_FALSE(import_frame(file, naming({{&GridNames::velocity, "none"}}), {}).velocity);
+      expect_vectors(import_frame(file, naming({{&GridNames::velocity, name}}), {}), *grid);
+      EXPECT_HAS(refusal(file, naming({{&GridNames::velocity, "nope"}})),
+                 "has no grid of vectors \"nope\", nor all of \"nopex\", \"nopey\" and \"nopez\"; it has \"density\"");
+      EXPECT_HAS(refusal(file, naming({{&GridNames::velocity, "density"}})),
+                 "grid \"density\" is of type float, not of vectors");
+      EXPECT_FALSE(import_frame(file, naming({{&GridNames::colour, name}}), {}).velocity) << "it is the colour";
+    }
+  }
+  // Of several the name that comes first; any other if it is named.
+  const auto vel = vectors("vel");
+  const auto wind = vectors("wind");
+  auto velocity = vectors("velocity");
+  velocity->tree().clear();
+  velocity->tree().setValue(Coord(1, 2, 3), openvdb::Vec3f(1.0F, 2.0F, 3.0F));
+  write({density, vel, velocity, wind});
+  expect_vectors(import_frame(path(), {}, {}), *velocity);
+  expect_vectors(import_frame(path(), naming({{&GridNames::velocity, "wind"}}), {}), *wind);
+  EXPECT_EQ(cumulet::volume::channels_by_name(cumulet::volume::list_grids(path())),
+            (std::vector<std::string>{"density", "", "velocity", ""}));
+}
+
+TEST_F(Frame, VelocityOfANanoVdb) {
+  const auto density = dot("density", 1.0F);
+  for (const bool staggered : {false, true}) {
+    const auto grid = vectors("vel");
+    if (staggered) grid->setGridClass(openvdb::GRID_STAGGERED);
+    const VolumeFrame truth = import_frame(write({density, grid}), {}, {});
+    std::vector<nanovdb::GridHandle<>> handles;
+    handles.push_back(nanovdb::openToNanoVDB(*density));
+    handles.push_back(nanovdb::openToNanoVDB(*grid));
+    const fs::path nano = folder_ / "frame.nvdb";
+    nanovdb::io::writeGrids<nanovdb::HostBuffer, std::vector>(nano.string(), handles);
+    const VolumeFrame frame = import_frame(nano, {}, {});
+    ASSERT_TRUE(frame.velocity);
+    for (std::size_t i = 0; i < 6; ++i)
+      cumulet::test::expect_same_voxels(frame.velocity->parts[i], truth.velocity->parts[i]);
+  }
+}
+
+// A component lies on the voxel's lower face along its axis: at the centre is the mean of two.
+TEST_F(Frame, VelocityOfAStaggeredGrid) {
+  std::mt19937 random(11);
+  const auto noise = [&] { return static_cast<float>(random() % 2000) / 100.0F - 10.0F; };
+  auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
+  grid->setName("motion");
+  grid->setGridClass(openvdb::GRID_STAGGERED);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(scaled(0.5)));
+  constexpr int size = 12;
+  for (int i = 0; i < size * size * size; ++i) {
+    const Coord c(i / (size * size), i / size % size, i % size);
+    grid->tree().setValue(c, openvdb::Vec3f(noise(), noise(), noise()));
+  }
+  const auto density = box("density", scaled(0.5), size, [](const Vec3d&) { return 1.0F; });
+  const VolumeFrame frame = import_frame(write({density, grid}), {}, {});
+  ASSERT_TRUE(frame.velocity);
+  for (int i = 0; i < size * size * size; ++i) {
+    const Coord c(i / (size * size), i / size % size, i % size);
+    const glm::dvec3 found = velocity_at(frame, {c.x(), c.y(), c.z()}, 0.5);
+    for (int axis = 0; axis < 3; ++axis) {
+      Coord next = c;
+      ++next[axis];
+      const double mean = 0.5 * (double{grid->tree().getValue(c)[axis]} + double{grid->tree().getValue(next)[axis]});
+      ASSERT_NEAR(found[axis], mean, 1e-5) << c << ", axis " << axis;
+    }
+  }
+}
+
+// Of numbers, each with a lattice of its own, as simulations write faces that way.
+TEST_F(Frame, VelocityOfThreeGrids) {
+  const auto density = box("density", scaled(1.0), 10, [](const Vec3d&) { return 1.0F; });
+  const auto along = [](int axis) {
+    return [axis](const Vec3d& p) { return static_cast<float>(axis + 1) * (plane(p) - 2.5F); };
+  };
+  for (const std::string stem : {"velocity", "vel_", "v."}) {
+    openvdb::GridPtrVec grids{density};
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3d first(-2.0);
+      first[axis] -= 0.25;
+      grids.push_back(box(stem + "xyz"[axis], scaled(1.0, first), 16, along(axis)));
+    }
+    const VolumeFrame frame = import_frame(write(grids), {}, {});
+    ASSERT_TRUE(frame.velocity) << stem;
+    for (const glm::ivec3& p : {glm::ivec3(0), glm::ivec3(9), glm::ivec3(2, 7, 4)}) {
+      const glm::dvec3 found = velocity_at(frame, p);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(found[axis], along(axis)(Vec3d(p.x, p.y, p.z)), 1e-4) << stem;
+    }
+    const std::string named = stem == "velocity" ? stem : stem.substr(0, stem.size() - 1);
+    EXPECT_TRUE(import_frame(path(), naming({{&GridNames::velocity, named}}), {}).velocity);
+    EXPECT_FALSE(import_frame(path(), naming({{&GridNames::temperature, stem + "y"}}), {}).velocity);
+  }
+  // Named, they are nothing else; by another name they are not found.
+  const openvdb::GridPtrVec winds{dot("windx", 1.0F), dot("windy", 2.0F), dot("windz", 3.0F), dot("cloud", 1.0F)};
+  EXPECT_EQ(import_frame(write(winds), {}, {}).density.name, "windx");
+  const VolumeFrame frame = import_frame(path(), naming({{&GridNames::velocity, "wind"}}), {});
+  EXPECT_EQ(frame.density.name, "cloud");
+  EXPECT_EQ(velocity_at(frame, {1, 2, 3}), glm::dvec3(1.0, 2.0, 3.0));
+}
+
+// In the world, unless their metadata say that they are of their own lattice, and change with it.
+TEST_F(Frame, VelocityInLocalSpace) {
+  openvdb::math::Mat4d turned = scaled(2.0);
+  turned.postRotate(openvdb::math::Z_AXIS, 0.5 * M_PI);  // of row vectors: x to y, y to -x
+  auto density = box("density", turned, 10, [](const Vec3d&) { return 1.0F; });
+  auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(1.0F, 2.0F, 3.0F));
+  grid->setName("v");
+  grid->setTransform(density->transform().copy());
+  grid->tree().addTile(1, Coord(0), openvdb::Vec3f(1.0F, 2.0F, 3.0F), true);
+  const auto world = [&] {
+    const VolumeFrame frame = import_frame(write({density, grid}), {}, {});
+    return glm::dmat3(frame.density.index_to_world) * velocity_at(frame, {1, 2, 3});
+  };
+  const auto expect = [](const glm::dvec3& found, const glm::dvec3& wanted) {
+    EXPECT_LT(glm::distance(found, wanted), 1e-6) << found.x << " " << found.y << " " << found.z;
+  };
+  const Vec3d x = density->indexToWorld(Vec3d(1, 0, 0)) - density->indexToWorld(Vec3d(0.0));
+  const Vec3d y = density->indexToWorld(Vec3d(0, 1, 0)) - density->indexToWorld(Vec3d(0.0));
+  const Vec3d turned_vector = x + 2.0 * y + Vec3d(0.0, 0.0, 6.0);
+  expect(world(), {1.0, 2.0, 3.0});
+  grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+  expect(world(), {1.0, 2.0, 3.0});
+  grid->setIsInWorldSpace(false);
+  expect(world(), {turned_vector.x(), turned_vector.y(), turned_vector.z()});
+  grid->setVectorType(openvdb::VEC_CONTRAVARIANT_ABSOLUTE);
+  expect(world(), {turned_vector.x(), turned_vector.y(), turned_vector.z()});
+  grid->setVectorType(openvdb::VEC_INVARIANT);
+  expect(world(), {1.0, 2.0, 3.0});
+}
+
+TEST_F(Frame, VelocitiesThatAreNoneOrTooFastAreTold) {
+  const float infinite = std::numeric_limits<float>::infinity();
+  auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
+  grid->setName("vel");
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(scaled(0.5)));
+  grid->tree().setValue(Coord(0, 0, 0), openvdb::Vec3f(1e30F, -40000.0F, 1.0F));
+  grid->tree().setValue(Coord(0, 0, 1), openvdb::Vec3f(std::numeric_limits<float>::quiet_NaN(), -infinite, 2.0F));
+  grid->tree().setValue(Coord(0, 0, 2), openvdb::Vec3f(infinite, 3.0F, -30000.0F));
+  const auto density = box("density", scaled(0.5), 4, [](const Vec3d&) { return 1.0F; });
+  Messages messages;
+  const VolumeFrame frame = import_frame(write({density, grid}), {}, messages.log);
+  EXPECT_EQ(velocity_at(frame, {0, 0, 0}), glm::dvec3(65504.0, -65504.0, 2.0)) << "voxels a second";
+  EXPECT_EQ(velocity_at(frame, {0, 0, 1}), glm::dvec3(0.0, 0.0, 4.0));
+  EXPECT_EQ(velocity_at(frame, {0, 0, 2}), glm::dvec3(0.0, 6.0, -60000.0));
+  ASSERT_EQ(messages.warnings.size(), 3U);
+  EXPECT_HAS(messages.warnings[0], "grid \"vel\", x: 2 non-finite voxels counted as 0");
+  EXPECT_HAS(messages.warnings[1], "grid \"vel\", y: 1 non-finite voxel counted as 0");
+  EXPECT_HAS(messages.warnings[2], "grid \"vel\": 2 components beyond 65504 voxels a second clamped to that");
+  // Nothing moves, or nothing is there.
+  grid->tree().clear();
+  messages.warnings.clear();
+  EXPECT_TRUE(import_frame(write({density, grid}), {}, messages.log).velocity);
+  ASSERT_EQ(messages.warnings.size(), 1U);
+  EXPECT_HAS(messages.warnings[0], "is empty");
 }
 
 TEST_F(Frame, ALatticeOutOfReachIsRefused) {

@@ -103,6 +103,24 @@ inline volume::ScalarVolume slab(float value = 1.0F) {
   return make_volume({64, 8, 64}, glm::ivec3(0), [=](const glm::ivec3& /*p*/) { return value; });
 }
 
+/// Each sixth of the voxels of a cube from 0 on, of which cells are made: f(voxel, a point within it).
+template <class Function>
+void for_each_sixth(int size, Function f) {
+  for (int i = 0; i < size * size * size; ++i) {
+    const glm::ivec3 p(i / (size * size), i / size % size, i % size);
+    const glm::ivec3 odd = p & 1;
+    for (const glm::ivec3& order : {glm::ivec3(0, 1, 2), glm::ivec3(0, 2, 1), glm::ivec3(1, 0, 2), glm::ivec3(1, 2, 0),
+                                    glm::ivec3(2, 0, 1), glm::ivec3(2, 1, 0)}) {
+      glm::vec3 middle(p + odd);
+      for (int k = 0; k < 3; ++k) {
+        const float along = 0.25F * static_cast<float>(3 - k);
+        middle[order[k]] += odd[order[k]] != 0 ? -along : along;
+      }
+      f(p, middle);
+    }
+  }
+}
+
 /// A lumpy ball with empty parts, deterministic.
 inline volume::ScalarVolume noise_volume(const glm::ivec3& size, const glm::ivec3& low, int seed) {
   const glm::vec3 centre = glm::vec3(low) + 0.5F * glm::vec3(size);
