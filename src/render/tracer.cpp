@@ -350,8 +350,8 @@ const Tracer::Program& Tracer::inspect_program(const MarchData& data, const Obst
   return program(data.defines(obstacles.instances != nullptr), name, more);
 }
 
-const Tracer::Program& Tracer::facts_program(const Picture& picture, const MarchData& data,
-                                             const Obstacles& obstacles, PixelFacts facts) {
+const Tracer::Program& Tracer::facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles,
+                                             PixelFacts facts) {
   constexpr std::array<const char*, 2> macros{channels_macro, "CM_VELOCITY 1"};
   const bool emits = picture.parameters_.medium.emits != 0U;
   const std::size_t used = facts == PixelFacts::all ? 2 : (emits ? 1 : 0);

@@ -41,8 +41,8 @@ std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFram
 std::optional<volume::ScalarVolume> forward_of(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp = {},
                                                const Progress* progress = nullptr);
 
-/// The ramp of density x velocity, along the axes of the lattice, voxel by voxel: grid::MomentumField says how. Nothing if
-/// the frame has no velocity but 0, or no density. Throws as emission_of does.
+/// The ramp of density x velocity, along the axes of the lattice, voxel by voxel: grid::MomentumField says how. Nothing
+/// if the frame has no velocity but 0, or no density. Throws as emission_of does.
 std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame& frame,
                                                        const volume::Ramp& density_ramp = {},
                                                        const Progress* progress = nullptr);

@@ -37,12 +37,11 @@ viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
   require(d.suggested_density_scale == 0 || d.suggested_density_scale == 1,
           "suggested_density_scale is neither 0 nor 1");
   const auto name = [](const char* given) { return std::string(given == nullptr ? "" : given); };
-  return {
-      d.path,
-      {name(d.grid_name), name(d.temperature_grid), name(d.flame_grid), name(d.color_grid), name(d.anisotropy_grid),
-       name(d.velocity_grid)},
-      m,
-      d.suggested_density_scale == 1};
+  return {d.path,
+          {name(d.grid_name), name(d.temperature_grid), name(d.flame_grid), name(d.color_grid), name(d.anisotropy_grid),
+           name(d.velocity_grid)},
+          m,
+          d.suggested_density_scale == 1};
 }
 
 cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out, char* error,

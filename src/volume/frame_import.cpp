@@ -118,8 +118,8 @@ Chosen choose(const std::vector<GridInfo>& grids, const GridNames& names) {
     taken.push_back(choose_grid(grids, name));
     return taken.back();
   };
-  Chosen out{asked(names.density), asked(names.temperature), asked(names.flame), asked(names.anisotropy),
-             choose_colour(grids, names.colour), {}};
+  Chosen out{asked(names.density),    asked(names.temperature),           asked(names.flame),
+             asked(names.anisotropy), choose_colour(grids, names.colour), {}};
   if (!by_name(names.colour)) taken.insert(taken.end(), out.colour.begin(), out.colour.end());
   out.velocity = choose_velocity(grids, names.velocity, taken);
   if (!by_name(names.velocity)) taken.insert(taken.end(), out.velocity.begin(), out.velocity.end());
@@ -314,8 +314,7 @@ class FrameImport {
     velocity.to_index = glm::inverse(glm::dmat3(out_.density.index_to_world)) * velocity.to_index;
     double longest = 0.0;
     const glm::dmat3 rows = glm::transpose(velocity.to_index);
-    for (int axis = 0; axis < 3; ++axis)
-      longest = std::max(longest, glm::dot(glm::abs(rows[axis]), glm::dvec3(1.0)));
+    for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, glm::dot(glm::abs(rows[axis]), glm::dvec3(1.0)));
     const double most = std::min(fastest_velocity / longest, double{std::numeric_limits<float>::max()});
     const std::uint64_t beyond = clamp_to(static_cast<float>(most), velocity.parts);
     if (beyond == 0) return;

@@ -79,9 +79,9 @@ TEST_F(ImageIo, ExrRoundTripIsExact) {
 struct Rendered {
   static constexpr std::uint32_t width = 13;
   static constexpr std::uint32_t height = 7;
-  static constexpr LayerName names[] = {layers::beauty,       layers::volume, layers::transmittance,
-                                        layers::depth,        layers::volume_depth, layers::normal,
-                                        layers::albedo,       layers::error,  layers::velocity};
+  static constexpr LayerName names[] = {layers::beauty, layers::volume,       layers::transmittance,
+                                        layers::depth,  layers::volume_depth, layers::normal,
+                                        layers::albedo, layers::error,        layers::velocity};
   std::vector<std::vector<float>> values;
   std::vector<Layer> all;
 
@@ -125,15 +125,31 @@ TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
     EXPECT_EQ(i.channel().ySampling, 1);
   }
   // The names that docs/aovs.md promises.
-  EXPECT_EQ(names, (std::set<std::string>{"R", "G", "B", "A", "volume.R", "volume.G", "volume.B", "volume.A",
-                                          "transmittance.Y", "depth.Z", "volume_depth.Z", "normal.X", "normal.Y",
-                                          "normal.Z", "albedo.R", "albedo.G", "albedo.B", "error.Y", "velocity.X",
-                                          "velocity.Y", "velocity.Z"}));
+  EXPECT_EQ(names, (std::set<std::string>{"R",
+                                          "G",
+                                          "B",
+                                          "A",
+                                          "volume.R",
+                                          "volume.G",
+                                          "volume.B",
+                                          "volume.A",
+                                          "transmittance.Y",
+                                          "depth.Z",
+                                          "volume_depth.Z",
+                                          "normal.X",
+                                          "normal.Y",
+                                          "normal.Z",
+                                          "albedo.R",
+                                          "albedo.G",
+                                          "albedo.B",
+                                          "error.Y",
+                                          "velocity.X",
+                                          "velocity.Y",
+                                          "velocity.Z"}));
   std::set<std::string> layer_names;
   header.channels().layers(layer_names);
-  EXPECT_EQ(layer_names,
-            (std::set<std::string>{"volume", "transmittance", "depth", "volume_depth", "normal", "albedo", "error",
-                                   "velocity"}));
+  EXPECT_EQ(layer_names, (std::set<std::string>{"volume", "transmittance", "depth", "volume_depth", "normal", "albedo",
+                                                "error", "velocity"}));
   EXPECT_EQ(header.dataWindow(), Imath::Box2i({0, 0}, {12, 6}));
   EXPECT_EQ(header.displayWindow(), header.dataWindow());
   EXPECT_EQ(header.pixelAspectRatio(), 1.0f);

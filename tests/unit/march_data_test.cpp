@@ -176,9 +176,8 @@ class GridSets : public test::GlTest {
   std::unique_ptr<gl::WordHeap> heap_;
   // Of odd sizes, as parts of one page, of two, and at the end of the last.
   const MarchSourcePtr plain_ = source_of({.cells = 1900, .tree = 301}, 1);
-  const MarchSourcePtr coloured_ =
-      source_of({.cells = 301, .emission = 301, .glowing = 31, .colour = 301, .anisotropy = 301, .velocity = 301, .tree = 99},
-                2);
+  const MarchSourcePtr coloured_ = source_of(
+      {.cells = 301, .emission = 301, .glowing = 31, .colour = 301, .anisotropy = 301, .velocity = 301, .tree = 99}, 2);
   const MarchSourcePtr glowing_ = source_of({.cells = 399, .emission = 250, .glowing = 3, .tree = 1}, 3);
   const MarchSourcePtr other_ = source_of({.cells = 333, .colour = 333, .tree = 55}, 4);
   const Sources three_{plain_, coloured_, glowing_};

@@ -184,8 +184,8 @@ TEST_P(VelocityPicture, TwoSlabsFollowTheClosedForm) {
   const vec3 near(3.0F, -40.0F, 0.125F);
   const vec3 far(-7.0F, 10.0F, 25.0F);
   const auto is_near = [](const ivec3& p) { return p.z >= 8; };
-  VolumeFrame frame{.density =
-                        test::make_volume({64, 64, 16}, ivec3(0), [=](const ivec3& p) { return is_near(p) ? 0.5F : 1.0F; })};
+  VolumeFrame frame{
+      .density = test::make_volume({64, 64, 16}, ivec3(0), [=](const ivec3& p) { return is_near(p) ? 0.5F : 1.0F; })};
   frame.velocity = velocity({64, 64, 16}, ivec3(0), [=](const ivec3& p) { return is_near(p) ? near : far; });
   show(*viewer, std::move(frame));
   for (const test::MarchKind& kind : test::march_kinds) {
@@ -258,7 +258,8 @@ TEST_P(VelocityPicture, AFileMovesAsItStands) {
     viewer->viewer().set_places({{dmat4(1.0)}, {turned}});
     expect_all(look(*viewer, middle + dvec3(0.0, 0.0, 500.0), middle), dvec3(3.0, 9.0, -6.0), name_of(kind));
     const dvec3 there(turned * glm::dvec4(middle, 1.0));
-    expect_all(look(*viewer, there + dvec3(0.0, 0.0, 500.0), there), dvec3(-6.0, 9.0, -3.0), name_of(kind) + ", turned");
+    expect_all(look(*viewer, there + dvec3(0.0, 0.0, 500.0), there), dvec3(-6.0, 9.0, -3.0),
+               name_of(kind) + ", turned");
     viewer->viewer().set_places({{dmat4(1.0)}});
   }
 }

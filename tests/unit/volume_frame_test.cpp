@@ -529,7 +529,8 @@ TEST_F(Frame, FieldsBesideDensityAreKeptAndTold) {
   colour->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1.0, Vec3d(100.0))));
   const openvdb::GridPtrVec grids = {box("density", scaled(1.0), 10, ones),
                                      box("flame", scaled(1.0, Vec3d(100.0)), 10, ones),
-                                     box("temperature", scaled(0.9, Vec3d(100.0)), 10, ones), colour,
+                                     box("temperature", scaled(0.9, Vec3d(100.0)), 10, ones),
+                                     colour,
                                      box("anisotropy", scaled(1.0, Vec3d(100.0)), 10, ones),
                                      box("vel_x", scaled(1.0, Vec3d(100.0)), 10, ones),
                                      box("vel_y", scaled(1.0, Vec3d(100.0)), 10, ones),

@@ -297,7 +297,7 @@ typedef struct cumulet_volume_file_desc {
   /*
    * How what is there moves, world units a second: what CUMULET_AOV_VELOCITY tells, and what nothing else of a picture
    * depends on. A grid of vectors, or the three of numbers with x, y and z behind this name; to_world turns and
-   * stretches them. "none" saves memory: 24 bytes a voxel, at most, and 8 a cell.
+   * stretches them. "none" saves its reading, up to 36 bytes a voxel of main memory, and 8 a cell of either.
    */
   const char* velocity_grid;
 } cumulet_volume_file_desc;
@@ -1386,9 +1386,9 @@ typedef enum cumulet_aov {
   CUMULET_AOV_NORMAL = 5,        /* 3 floats: mean shading normal of our surfaces in the pixel, world space, towards the
                                     eye, as if there were no volume; 0 where there is none */
   CUMULET_AOV_ALBEDO = 6,        /* 3 floats: mean linear base colour, likewise */
-  CUMULET_AOV_ERROR = 7, /* 1 float: estimated standard error of the pixel's luminance, with the sky's behind it:
-                            sqrt((<L^2> - <L>^2) / (n - 1)) of the luminances L of its n samples. Infinite where
-                            it has fewer than two */
+  CUMULET_AOV_ERROR = 7,   /* 1 float: estimated standard error of the pixel's luminance, with the sky's behind it:
+                              sqrt((<L^2> - <L>^2) / (n - 1)) of the luminances L of its n samples. Infinite where
+                              it has fewer than two */
   CUMULET_AOV_VELOCITY = 8 /* 3 floats: mean velocity of the volume where it scatters the camera's rays for the first
                               time, before the nearest surface; world space, world units a second. 0 where it does
                               nowhere, and where it has no velocities (velocity_grid); surfaces have none */
@@ -1396,10 +1396,10 @@ typedef enum cumulet_aov {
 
 /*
  * [GL] One of these, of the picture so far: width x height (of the result) pixels, first pixel top left. count is the
- * number of floats at values. Transmittance, depths, normal, albedo and velocity are found when first asked for, by 16 rays a
- * pixel (the depths by the one through its middle), without noise but where surfaces cover or transmit a part of the
- * light, which is a chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views, and for a
- * picture that is still of the volume before.
+ * number of floats at values. Transmittance, depths, normal, albedo and velocity are found when first asked for, by 16
+ * rays a pixel (the depths by the one through its middle), without noise but where surfaces cover or transmit a part of
+ * the light, which is a chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views, and
+ * for a picture that is still of the volume before.
  */
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
