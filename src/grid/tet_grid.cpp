@@ -399,6 +399,41 @@ class GridBuilder::LeafVelocity {
   std::array<volume::BrickValues::Brick, 4> rooms_;
 };
 
+// All that leaves carry beside density.
+class GridBuilder::LeafChannels {
+ public:
+  LeafChannels(const Statistics& density, const Channels& channels, CellKind cells) {
+    if (channels.emission) emitted_.emplace(*channels.emission, cells);
+    if (channels.scattering) coloured_.emplace(*channels.scattering);
+    if (channels.forward) forward_.emplace(channels.forward->statistics());
+    if (channels.momentum) velocity_.emplace(density, *channels.momentum);
+  }
+  // Into the grid's arrays; mass: of its density. Whether it gives off light.
+  bool put(const Node& node, const vec3& centroid, double mass, TetGrid& grid, std::uint32_t rank) {
+    bool emits = false;
+    if (emitted_) {
+      const EmissionRecord given = (*emitted_)(node, centroid);
+      emits = glm::any(glm::greaterThan(given.mean, vec3(0.0F)));
+      grid.emission[rank] = given;
+    }
+    double scattered = mass;
+    if (coloured_) {
+      const dvec3 scattering = (*coloured_)(node, centroid);
+      grid.colour[rank] = pack_colour(mass > 0.0 ? vec3(scattering / mass) : vec3(0.0F));
+      scattered = luminance(scattering);
+    }
+    if (forward_) grid.anisotropy[rank] = pack_anisotropy((*forward_)(node, centroid).mass, scattered);
+    if (velocity_) grid.velocity[rank] = (*velocity_)(node, centroid);
+    return emits;
+  }
+
+ private:
+  std::optional<LeafEmission> emitted_;
+  std::optional<LeafScattering> coloured_;
+  std::optional<LeafMoments> forward_;
+  std::optional<LeafVelocity> velocity_;
+};
+
 std::int16_t pack_anisotropy(double forward, double scattering) {
   if (!(scattering > 0.0)) return 0;
   // Of more, the lobe is narrower than floats tell cosines apart.
@@ -451,14 +486,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   ProgressPart part(progress, 0.1, 1.0, count);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
     LeafMoments moments(*statistics_);
-    std::optional<LeafEmission> emitted;
-    if (channels.emission) emitted.emplace(*channels.emission, cells);
-    std::optional<LeafScattering> coloured;
-    if (channels.scattering) coloured.emplace(*channels.scattering);
-    std::optional<LeafMoments> forward;
-    if (channels.forward) forward.emplace(channels.forward->statistics());
-    std::optional<LeafVelocity> velocity;
-    if (channels.momentum) velocity.emplace(*statistics_, *channels.momentum);
+    const auto beside = std::make_unique<LeafChannels>(*statistics_, channels, cells);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -475,20 +503,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
         gradient =
             fit_linear(cell_class, in_frame, static_cast<float>(mean)).gradient * static_cast<float>(to_relative);
       }
-      bool emits = false;
-      if (emitted) {
-        const EmissionRecord given = (*emitted)(node, centroid);
-        emits = glm::any(glm::greaterThan(given.mean, vec3(0.0F)));
-        grid.emission[rank] = given;
-      }
-      double scattered = m.mass;
-      if (coloured) {
-        const dvec3 scattering = (*coloured)(node, centroid);
-        grid.colour[rank] = pack_colour(m.mass > 0.0 ? vec3(scattering / m.mass) : vec3(0.0F));
-        scattered = luminance(scattering);
-      }
-      if (forward) grid.anisotropy[rank] = pack_anisotropy((*forward)(node, centroid).mass, scattered);
-      if (velocity) grid.velocity[rank] = (*velocity)(node, centroid);
+      const bool emits = beside->put(node, centroid, m.mass, grid, rank);
       if (m.max > 0.0F || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);

@@ -106,6 +106,7 @@ class GridBuilder {
   class LeafEmission;
   class LeafScattering;
   class LeafVelocity;
+  class LeafChannels;
   // mean and gradient: in units of the grid's density_unit.
   [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient, bool emits) const;
 
