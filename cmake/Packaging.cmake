@@ -41,15 +41,27 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/include/cumulet ${PROJECT_BINARY_DIR
 
 # A program's manual page and completions, of what it says of its own flags.
 set(manual_files)
-foreach(program ${programs})
+set(scripts)
+if(CUMULET_FARM_PROGRAM)
+  set(scripts cumulet-farm)
+endif()
+foreach(program ${programs} ${scripts})
   set(page ${PROJECT_SOURCE_DIR}/docs/man/${program}.1.in)
   set(made ${CMAKE_BINARY_DIR}/manual/${program})
+  if(TARGET ${program})
+    set(file $<TARGET_FILE:${program}>)
+    set(of_program ${program})
+    install(TARGETS ${program} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+  else()
+    set(file ${CUMULET_FARM_PROGRAM})
+    set(of_program ${file})
+    install(PROGRAMS ${file} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
+  endif()
   add_custom_command(OUTPUT ${made}.1 ${made}.bash ${made}.zsh
-                     COMMAND ${CUMULET_GLAD_PYTHON} ${CMAKE_CURRENT_LIST_DIR}/manual.py $<TARGET_FILE:${program}> ${page}
+                     COMMAND ${CUMULET_GLAD_PYTHON} ${CMAKE_CURRENT_LIST_DIR}/manual.py ${file} ${page}
                              ${CMAKE_BINARY_DIR}/manual ${PROJECT_VERSION}
-                     DEPENDS ${program} ${page} ${CMAKE_CURRENT_LIST_DIR}/manual.py VERBATIM)
+                     DEPENDS ${of_program} ${page} ${CMAKE_CURRENT_LIST_DIR}/manual.py VERBATIM)
   list(APPEND manual_files ${made}.1)
-  install(TARGETS ${program} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
   install(FILES ${made}.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT programs)
   install(FILES ${made}.bash RENAME ${program} DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
           COMPONENT programs)
@@ -137,15 +149,15 @@ and a pkg-config file.")
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SECTION graphics)
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_LIBRARY_OUTPUT_DIRECTORY})
-  # Loaded by name, which dpkg-shlibdeps cannot see: EGL, a font. The driver is whatever the machine has.
-  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "${same_version}, libegl1, fonts-dejavu-core")
+  # Which dpkg-shlibdeps cannot see: EGL and a font, loaded by name, and cumulet-farm's interpreter. The driver is whatever the machine has.
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_DEPENDS "${same_version}, libegl1, fonts-dejavu-core, python3:any")
   set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS libgl1-mesa-dri)
-  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS libosmesa6)
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS "libosmesa6, slurm-client")
   set(CPACK_DEBIAN_PROGRAMS_DESCRIPTION "path-traced volumes - viewer and command line renderer
 cumulet-demo shows OpenVDB and NanoVDB volumes and glTF models in a window,
 path-traced as they are turned and changed. cumulet-render makes pictures of
-them without a display, cumulet-merge one of parts. cumulet-scene writes a
-sample scene.")
+them without a display, cumulet-merge one of parts, cumulet-farm makes them
+on many machines. cumulet-scene writes a sample scene.")
   set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # or it would come before those
   include(CPack)
 endif()

@@ -21,6 +21,7 @@ set(fallback_libraries "^lib(stdc\\+\\+|gcc_s|z|zstd|lzma)\\.so")
 set(host_dirs /usr/lib/x86_64-linux-gnu /usr/lib64 /usr/lib)
 
 file(GLOB programs ${stage}/${CPACK_CUMULET_BINDIR}/*)
+list(FILTER programs EXCLUDE REGEX "/cumulet-farm$")  # a script
 file(GLOB libraries ${lib_dir}/libcumulet.so.*.*)
 file(GET_RUNTIME_DEPENDENCIES
      EXECUTABLES ${programs} LIBRARIES ${libraries}

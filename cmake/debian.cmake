@@ -12,7 +12,7 @@ foreach(component library development programs)
 
   file(GLOB binaries ${usr}/${CPACK_CUMULET_BINDIR}/* ${usr}/${CPACK_CUMULET_LIBDIR}/libcumulet.so.*)
   foreach(file ${binaries})
-    if(NOT IS_SYMLINK ${file})
+    if(NOT IS_SYMLINK ${file} AND NOT file MATCHES "/cumulet-farm$")  # a script
       file(RPATH_REMOVE FILE ${file})
     endif()
   endforeach()

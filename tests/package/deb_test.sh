@@ -30,7 +30,7 @@ for deb in "${debs[@]}"; do
   cp -a "$work/unpacked/." "$root"
   rm -r "$work/unpacked"
 done
-for file in usr/bin/cumulet-{render,demo,scene} usr/share/man/man1/cumulet-render.1.gz \
+for file in usr/bin/cumulet-{render,merge,farm,demo,scene} usr/share/man/man1/cumulet-render.1.gz \
   usr/share/zsh/vendor-completions/_cumulet-render usr/share/doc/{libcumulet0,libcumulet-dev,cumulet}/copyright; do
   [ -s "$root/$file" ] || fail "no package has $file"
 done
@@ -83,6 +83,10 @@ in_root "$root" /usr/bin/cumulet-render --volume /tmp/scene/cumulus.vdb --size 3
 [ -s "$root/tmp/egl.png" ] || fail "cumulet-render wrote no picture"
 said=$(in_root "$root" /usr/bin/cumulet-demo --version) || fail "cumulet-demo did not start"
 [ "$said" = "cumulet-demo $version" ] || fail "cumulet-demo is '$said'"
+
+in_root "$root" /usr/bin/cumulet-farm run --samples 2 --parts 2 -o /tmp/farm.exr -- /tmp/scene/cumulus.vdb --size 32x32 ||
+  fail "cumulet-farm made no picture"
+[ -s "$root/tmp/farm.exr" ] || fail "cumulet-farm wrote no picture"
 
 # --- and a host builds against them --------------------------------------------------------------------------------------
 export PKG_CONFIG_SYSROOT_DIR=$root

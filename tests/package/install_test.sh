@@ -20,6 +20,7 @@ if found=$(grep -rlF -e "$(realpath "$build")" -e "$(realpath "$source")" "$tree
   fail "folders of the build are named in $found"
 fi
 while read -r file; do
+  head -c 4 "$file" | grep -q ELF || continue # a script
   path=$(readelf -d "$file" | sed -n 's/.*R\(UN\)*PATH).*\[\(.*\)\]/\2/p')
   # shellcheck disable=SC2016 # $ORIGIN is the loader's
   case $path in
@@ -67,7 +68,7 @@ for program in "$tree"/bin/*; do
   if grep -qE '@[a-z_]+@' "$page"; then fail "$program.1 has a gap"; fi
   # Examples, too: of the page, and of the README.
   { groff -man -Tascii -P-cbou "$page" && cat "$source/README.md"; } |
-    awk -v program="$program" 'more || $1 == program { print; more = /\\$/ }' |
+    awk -v program="$program" 'more || $1 == program { sub(/ -- .*/, " "); print; more = /\\$/ }' |
     { grep -oE -- '--[a-z][a-z-]*' || true; } | LC_ALL=C sort -u | LC_ALL=C comm -23 - <(echo "$flags") >"$work/unknown"
   [ ! -s "$work/unknown" ] || fail "examples of $program have $(tr '\n' ' ' <"$work/unknown")"
 

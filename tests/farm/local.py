@@ -1,0 +1,197 @@
+"""cumulet-farm on this machine: what it describes, runs, keeps, tries again and refuses.
+
+Usage: local.py PROGRAMS_FOLDER OUT_FOLDER
+"""
+
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+from common import Farm, empty, files, unfinished
+
+LINE = re.compile(r"task (\S+) \((\d+) of (\d+)\) (done in [\d.]+ s|kept|failed: .+)")
+
+
+def lines(text):
+    matches = [LINE.fullmatch(line) for line in text.splitlines() if " is tried again: " not in line]
+    assert all(matches), text
+    assert [int(m[2]) for m in matches] == list(range(1, len(matches) + 1)), text
+    return {m[1]: m[4].split()[0].rstrip(":") for m in matches}
+
+
+def parts(farm, out):
+    """Parts are merged into what cumulet-merge makes of the same parts, and one process but for rounding; then all is kept."""
+    whole = farm.whole(out / "whole", "12,14", 7)
+    wanted = farm.merged(out / "wanted", "12,14", [(0, 2), (2, 2), (4, 3)])
+    made = empty(out / "parts")
+    options = ["--frames", "12,14", "--samples", "7", "--parts", "3", "--processes", "2"]
+    done = farm.do("run", made, *options)
+    assert done.returncode == 0 and set(lines(done.stdout).values()) == {"done"}, done
+    assert len(lines(done.stdout)) == 8 and files(made) == wanted
+    for name in whole:
+        farm.equal_but_for_rounding(made / name, out / "whole" / name)
+    assert not files(made / "p.farm" / "parts") and not unfinished(made)
+    # Nothing twice: not the parts of frames that are there, either. One that is gone is made again, of its parts alone.
+    done = farm.do("run", made, *options)
+    assert done.returncode == 0 and set(lines(done.stdout).values()) == {"kept"}, done
+    (made / "p.0014.exr").unlink()
+    done = farm.do("run", made, "--processes", "2", arguments=False)
+    states = lines(done.stdout)
+    assert done.returncode == 0 and {name for name, state in states.items() if state == "done"} == {
+        "part0.1", "part1.1", "part2.1", "merge.1"}, done
+    assert files(made) == wanted
+    # More frames of the same are welcome, other samples are not, or all is begun anew.
+    done = farm.do("describe", made, *[{"12,14": "12,14,16"}.get(word, word) for word in options])
+    assert done.returncode == 0 and "12 tasks" in done.stdout, done
+    other = [{"7": "9"}.get(word, word) for word in options]
+    done = farm.do("run", made, *other)
+    assert done.returncode == 1 and "by other commands" in done.stderr and done.stderr.count("\n") == 1, done
+    assert files(made) == wanted
+    done = farm.do("run", made, *other, "--overwrite", "--keep-parts")
+    assert done.returncode == 0 and set(lines(done.stdout).values()) == {"done"} and files(made) != wanted, done
+    assert len(files(made / "p.farm" / "parts")) == 6
+
+
+def described(farm, out):
+    """By the description alone, and what docs/farm.md says of it, another queue makes the same: here one that knows no
+    more than argument lists, what they depend on, and which files they make."""
+    wanted = farm.merged(out / "wanted", "12,14", [(0, 2), (2, 2), (4, 3)])
+    made = empty(out / "described")
+    done = farm.do("describe", made, "--frames", "12,14", "--samples", "7", "--parts", "3", "--cpus", "2", "--memory", "900",
+                   "--minutes", "5")
+    assert done.returncode == 0 and not files(made), done
+    job = json.loads((made / "p.farm" / "job.json").read_text())
+    assert (job["format"], job["version"]) == ("cumulet-farm", 1)
+    assert job["resources"] == {"cpus": 2, "memory_mb": 900, "minutes": 5}
+    assert job["retry"] == {"attempts": 3, "wait_seconds": 5.0, "permanent_statuses": [2]}
+    done_tasks = set()
+    for task in job["tasks"]:
+        assert set(task["depends_on"]) <= done_tasks
+        for name in task["inputs"]:
+            assert os.path.isfile(os.path.join(job["folder"], name)), name
+        for command in task["commands"]:
+            subprocess.run(command, cwd=job["folder"], check=True, timeout=300, capture_output=True)
+        for name in task["outputs"]:
+            assert os.path.getsize(os.path.join(job["folder"], name)) > 0
+        done_tasks.add(task["id"])
+    assert list((made / "p.farm" / "shaders").iterdir())  # later starts are shorter
+    volumes = {os.path.basename(name) for task in job["tasks"] if task["layer"] == "part0" for name in task["inputs"]}
+    assert volumes == {"explosion_0012.vdb", "explosion_0014.vdb"}, volumes
+    assert files(made) == wanted
+    assert farm.do("status", made, arguments=False).returncode == 0
+
+
+def scene_files(farm, out):
+    """One picture, without numbers, of a scene file; what that names is told."""
+    folder = empty(out / "scene")
+    scene = folder / "one.json"
+    scene.write_text(json.dumps({"cumulet_scene": 1, "volume": {"file": "../volumes/explosion_0012.vdb"}}))
+    look = ["--scene", str(scene), *farm.look]
+    command = [str(farm.programs / "cumulet-farm"), "run", "--samples", "6", "--parts", "2", "-o", str(folder / "one.exr")]
+    done = subprocess.run([*command, "--", *look], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0 and (folder / "one.farm" / "job.json").exists(), done
+    job = json.loads((folder / "one.farm" / "job.json").read_text())
+    named = {os.path.basename(name) for name in job["tasks"][0]["inputs"]}
+    assert named == {"one.json", "explosion_0012.vdb"}, named
+    subprocess.run([farm.render, *look, "--spp", "6", "-o", folder / "whole.exr"], check=True, timeout=300,
+                   capture_output=True)
+    farm.equal_but_for_rounding(folder / "one.exr", folder / "whole.exr")
+
+
+def failing(farm, out):
+    """What fails is tried as often as asked, told, and keeps no other frame; what depends on it is not begun."""
+    made = empty(out / "failing")
+    options = ["--frames", "98,12", "--samples", "4", "--parts", "2", "--attempts", "2", "--wait", "0"]
+    done = farm.do("run", made, *options)
+    states = lines(done.stdout)
+    assert done.returncode == 1 and done.stderr.count("\n") == 1 and "3 of 6 tasks failed" in done.stderr, done
+    assert {name for name, state in states.items() if state == "failed"} == {"part0.0", "part1.0", "merge.0"}, done
+    assert done.stdout.count("is tried again: exit status 1, attempt 1 of 2") == 2, done
+    assert sorted(files(made)) == ["p.0012.exr"]
+    log = (made / "p.farm" / "logs" / "part0.0.log").read_text()
+    assert log.count(" begins") == 2 and "explosion_0098.vdb" in log, log
+    status = farm.do("status", made, arguments=False)
+    assert status.returncode == 1 and "merge: 1 of 2 done; not frames 98" in status.stdout, status
+    # A wrong command is wrong each time.
+    wrong = empty(out / "wrong")
+    farm.look = [*farm.look, "--no-such-flag"]
+    done = farm.do("run", wrong, "--frames", "12", "--wait", "0")
+    farm.look.pop()
+    assert done.returncode == 1 and "attempt 1 of 3" in done.stdout and "tried again" not in done.stdout, done
+
+
+def stopped(farm, out):
+    """SIGTERM: what samples have come to is kept, nothing goes on unseen, and the same command goes on from there."""
+    wanted = farm.whole(out / "stopped_wanted", "12", 2000)
+    made = empty(out / "stopped")
+    command = farm.command("run", made, "--frames", "12", "--samples", "2000", "--checkpoint-every", "0.1")
+    checkpoint = made / "p.farm" / "checkpoints" / "0012.render.ck"
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 120
+    while not checkpoint.exists():
+        assert process.poll() is None and time.monotonic() < end
+        time.sleep(0.01)
+    second = subprocess.run(farm.command("run", made, arguments=False), capture_output=True, text=True, timeout=60)
+    assert second.returncode == 1 and "another process runs this job" in second.stderr, second
+    process.send_signal(signal.SIGTERM)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 1 and "interrupted: 1 of 1 tasks not done" in error, error
+    assert not files(made) and checkpoint.exists()
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done
+    assert "goes on from" in (made / "p.farm" / "logs" / "render.0.log").read_text()
+    assert files(made) == wanted and not checkpoint.exists()
+
+
+def refused(farm, out):
+    """Before anything is made, in a line."""
+    made = out / "refused"
+    wrong = (["--frames", "9-1"], ["--frames", "a"], ["--frames", "1-4", "--parts", "2"], ["--parts", "0"],
+             ["--frames", "1", "--samples", "1", "--parts", "2"], ["--nothing"], ["--frames", "1", "--samples", "x"], [])
+    for options in wrong:
+        done = farm.do("run", made, *options)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and done.stdout == "", (options, done)
+    program = str(farm.programs / "cumulet-farm")
+    for words in (["run"], ["fly"], [], ["run", "-o", "p.png", "--frames", "1", "--samples", "4", "--parts", "2", "--", "a.vdb"],
+                  ["run", "-o", "p.##.##.exr", "--frames", "1", "--", "a.vdb"],
+                  ["run", "-o", "p.exr", "--frames", "1-2", "--", "a.vdb"], ["run", "-o", "p.exr", "--"],
+                  ["run", "-o", "p.exr", "--", "a.vdb", "--spp", "4"], ["run", "-o", "p.exr", "--", "a.vdb", "-o", "b.exr"],
+                  ["run", "-o", "p.exr", "--samples", "4", "--parts", "2", "--", "a.vdb", "--noise-target=2"],
+                  ["work", "-o", "p.exr"], ["status", "-o", "p.exr", "--", "a.vdb"]):
+        done = subprocess.run([program, *words], capture_output=True, text=True, timeout=60, cwd=out)
+        assert done.returncode == 2 and done.stderr.count("\n") == 1 and done.stdout == "", (words, done)
+    assert not made.exists() and not list(out.glob("*.farm"))
+    # Descriptions of others.
+    folder = empty(out / "bad.farm")
+    good = {"format": "cumulet-farm", "version": 1, "name": "x", "folder": str(out), "layers": ["a"],
+            "retry": {"attempts": 1, "wait_seconds": 0, "permanent_statuses": []}, "resources": {}, "tasks": []}
+    task = {"id": "a.0", "layer": "a", "index": 0, "frames": [], "commands": [], "inputs": [], "outputs": ["x"], "scratch": [],
+            "depends_on": [], "intermediate": False}
+    for text in ("", "[]", "{}", json.dumps({**good, "version": 2}), json.dumps({**good, "tasks": [{"id": "a"}]}),
+                 json.dumps({**good, "tasks": [{**task, "depends_on": ["a.0"]}]}),
+                 json.dumps({**good, "tasks": [task, task]}), json.dumps({**good, "tasks": [{**task, "commands": "rm"}]}),
+                 json.dumps({**good, "tasks": [{**task, "layer": "b"}]})):
+        (folder / "job.json").write_text(text)
+        done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 1 and done.stderr.count("\n") == 1 and "bad.farm/job.json" in done.stderr, (text, done)
+    # Commands that end well and make nothing have not made it.
+    (folder / "job.json").write_text(json.dumps({**good, "tasks": [{**task, "commands": [["true"]]}]}))
+    done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1 and "x is not there" in done.stdout, done
+
+
+def main():
+    programs, out = sys.argv[1], empty(pathlib.Path(sys.argv[2]))
+    farm = Farm(programs, out, ["--size", "32x24"])
+    for part in (refused, parts, described, scene_files, failing, stopped):
+        began = time.monotonic()
+        part(farm, out)
+        print(f"{part.__name__}: {time.monotonic() - began:.0f} s", flush=True)
+
+
+main()
