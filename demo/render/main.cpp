@@ -37,6 +37,7 @@
 #include "metadata.hpp"
 #include "options.hpp"
 #include "progress.hpp"
+#include "settled.hpp"
 
 namespace {
 
@@ -685,10 +686,14 @@ void settle(const Viewer& viewer, RenderOptions& options) {
 
 /// A studio for the whole sequence; options become what it has in common.
 std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& plan) {
+  const SceneOptions given = options.scene;
+  const bool kept = !options.settled.empty() && !is_settled(given);
+  const bool known = kept && cumulet::demo::read_settled(options.settled, options.scene);
+  if (kept && !known) cumulet::image::check_writable(options.settled);
   auto studio = std::make_unique<Studio>(options);
   wait(studio->viewer(), studio->progress());
   studio->choose_in_surfaces(options);
-  if (is_settled(options.scene)) return studio;
+  if (known || is_settled(options.scene)) return studio;
   for (const std::string& volume : plan.judged_by) {
     SceneOptions judged = options.scene;
     judged.volume = volume;
@@ -701,6 +706,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
     }
     studio->remark(judged);
     settle(studio->viewer(), options);
+    if (kept) cumulet::demo::write_settled(options.settled, given, options.scene);
     break;
   }
   return studio;

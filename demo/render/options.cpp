@@ -663,6 +663,12 @@ void check_together(const RenderOptions& options, bool part) {
     if (same_file(options.checkpoint, file))
       throw UsageError("--checkpoint and " + std::string(flag) + " are the same file");
   }
+  for (const auto& [flag, file] : {std::pair("--output", options.output),
+                                   {"--stats", options.stats},
+                                   {"--trace", options.trace},
+                                   {"--checkpoint", options.checkpoint}}) {
+    if (same_file(options.settled, file)) throw UsageError("--settled and " + std::string(flag) + " are the same file");
+  }
   if (same_file(options.stats, options.output)) throw UsageError("--stats and --output are the same file");
   if (same_file(options.trace, options.output)) throw UsageError("--trace and --output are the same file");
   if (same_file(options.trace, options.stats)) throw UsageError("--trace and --stats are the same file");
@@ -706,6 +712,14 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       "such as 5, 1-100, 1-100x2 or 1-3,7 (default: all that are there)");
   app.add_flag("--overwrite", options.overwrite, "Make frames anew that are there already, which are kept else")
       ->group(group);
+  add(
+      app, group, "--settled", "FILE",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        options.settled = text;
+      },
+      "Keep what all frames of a sequence have in common, and flags do not say, in this file: later runs need not read "
+      "the volume that it is taken from");
   app.add_flag("--info", options.info, "Tell what is in the files, and render nothing")->group(group);
   app.add_flag("--json", options.json, "The same as JSON")->group(group);
   add(

@@ -47,6 +47,7 @@ struct RenderOptions {
   std::string shader_cache;          // a folder; empty: none
   std::vector<Frame> frames;         // of the volume's sequence; empty: all, where its name is a sequence's
   bool overwrite = false;            // frames that are there already
+  std::string settled;               // what frames have in common; empty: found in each run
   bool info = false;                 // tell what is in the files, render nothing
   bool json = false;                 // as JSON
   std::string checkpoint;            // empty: none

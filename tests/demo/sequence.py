@@ -89,6 +89,36 @@ def alone_as_among_others(sequence, out):
     assert files(one)["p.0014.exr"] != files(all_of_them)["p.0014.exr"]
 
 
+def settled(sequence, out):
+    """What frames have in common is found once and kept: the same pictures, to the bit, and the volume that it was taken
+    from is not read again. That of another scene, or a damaged one, is found anew."""
+    wanted, pictures = empty(out / "unsettled"), empty(out / "settled")
+    status, _, _ = sequence.run(wanted / "p.####.exr", "--frames", "12-16x2")
+    assert status == 0
+    common = Sequence(sequence.render, empty(out / "common"))
+    for path in sequence.folder.glob("explosion_*.vdb"):
+        shutil.copy(path, common.folder)
+    largest = max(common.folder.iterdir(), key=lambda path: path.stat().st_size)
+    assert largest.name not in ("explosion_0012.vdb", "explosion_0014.vdb", "explosion_0016.vdb")
+    kept = pictures / "common"
+    run = lambda frame, *more: common.run(pictures / "p.####.exr", "--frames", str(frame), "--settled", str(kept), *more)
+    assert run(12)[0] == 0 and kept.exists()
+    before = kept.read_bytes()
+    largest.write_bytes(b"not a volume".ljust(largest.stat().st_size))
+    assert run(14)[0] == 0 and kept.read_bytes() == before
+    assert run(16)[0] == 0
+    made = files(pictures)
+    assert {name: made[name] for name in files(wanted)} == files(wanted)
+    # Of another scene, and cut off.
+    assert run(12, "--anisotropy", "0.3", "--overwrite")[0] == 0 and kept.read_bytes() != before
+    assert files(pictures)["p.0012.exr"] != made["p.0012.exr"]
+    kept.write_bytes(before[: len(before) // 2])
+    status, frames, _ = run(12, "--overwrite")
+    assert status == 0 and frames[0][1] == "done" and len(kept.read_bytes()) > len(before) // 2
+    nowhere = common.run(pictures / "q.####.exr", "--frames", "12", "--settled", str(out / "none" / "common"))
+    assert nowhere[0] == 1 and "none/common" in nowhere[2].splitlines()[-1], nowhere
+
+
 def begins_empty(sequence, out):
     """Before a fire is lit there is nothing: what all frames have in common is taken from one that shows something, though
     the empty one is the first, and the largest file."""
@@ -117,7 +147,8 @@ def refused(sequence, out):
         assert done.stdout == "" and done.stderr.count("\n") == 1, (done.stdout, done.stderr)
         return done.returncode, done.stderr
     for arguments in (["p.exr"], ["p.##.##.exr"], ["p.####.exr", "--frames", "9-1"], ["p.####.exr", "--frames", "a"],
-                      ["p.####.exr", "--stats", "s.json"], ["p.####.exr", "--info"]):
+                      ["p.####.exr", "--stats", "s.json"], ["p.####.exr", "--info"],
+                      ["p.####.exr", "--settled", ""], ["p.####.exr", "--settled", "c", "--trace", "c"]):
         status, line = said(*arguments)
         assert status == 2, (arguments, status, line)
     status, line = said(out / "none" / "p.####.exr")
@@ -173,6 +204,7 @@ def main():
     refused(sequence, out)
     bad_frames(sequence, out)
     alone_as_among_others(sequence, out)
+    settled(sequence, out)
     begins_empty(sequence, out)
     interrupted(sequence, out)
     killed(sequence, out, 10)
