@@ -13,8 +13,9 @@ def empty(folder):
 
 
 def files(folder):
-    """Name and bytes of all pictures that are whole, or claim to be."""
-    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.exr"))}
+    """Name and bytes of all pictures that are whole, or claim to be; of a job's parts, wherever they are in it."""
+    paths = folder.rglob("*.exr") if folder.name == "parts" else folder.glob("*.exr")
+    return {path.name: path.read_bytes() for path in sorted(paths)}
 
 
 def unfinished(folder):

@@ -130,7 +130,7 @@ def stopped(farm, out):
     wanted = farm.whole(out / "stopped_wanted", "12", 2000)
     made = empty(out / "stopped")
     command = farm.command("run", made, "--frames", "12", "--samples", "2000", "--checkpoint-every", "0.1")
-    checkpoint = made / "p.farm" / "checkpoints" / "0012.render.ck"
+    checkpoint = made / "p.farm" / "parts" / "0" / "0012.render.ck"
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 120
     while not checkpoint.exists():

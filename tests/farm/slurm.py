@@ -36,22 +36,22 @@ def drained(slurm):
     return not rows
 
 
-def at_work(slurm, node, checkpoints):
+def at_work(slurm, node):
     """A process of cumulet-render there, of which a checkpoint is kept."""
     for process in renders(slurm, node):
         words = slurm_machine.command_of(process)
         frame = words[words.index(b"--frames") + 1].decode().zfill(4)
-        pattern = pathlib.Path(words[words.index(b"--checkpoint") + 1].decode()).name
-        if (checkpoints / pattern.replace("####", frame)).exists():
+        checkpoint = words[words.index(b"--checkpoint") + 1].decode()
+        if os.path.exists(checkpoint.replace("####", frame)):
             return process
     return None
 
 
-def wait_for_work(slurm, node, checkpoints):
+def wait_for_work(slurm, node):
     found = []
 
     def is_there():
-        process = at_work(slurm, node, checkpoints)
+        process = at_work(slurm, node)
         if process is not None:
             found.append(process)
         return bool(found)
@@ -72,9 +72,8 @@ def killed(farm, slurm, out):
     again = farm.do("submit", made, *options)
     assert again.returncode == 1 and "still has arrays" in again.stderr and again.stderr.count("\n") == 1, again
 
-    checkpoints = made / "p.farm" / "checkpoints"
-    os.kill(wait_for_work(slurm, "node1", checkpoints), signal.SIGKILL)
-    wait_for_work(slurm, "node0", checkpoints)
+    os.kill(wait_for_work(slurm, "node1"), signal.SIGKILL)
+    wait_for_work(slurm, "node0")
     assert slurm.kill_node("node0") == 1
     slurm.wait("node0 is missed", lambda: slurm.states()["node0"].startswith("down"), 180)
     slurm.wait("the other node makes all", lambda: drained(slurm), 600)
@@ -94,7 +93,7 @@ def killed(farm, slurm, out):
     assert len(re.findall(r"^task \S+ begins", text, re.MULTILINE)) == 14, text
     assert text.count("killed by SIGKILL") == 1 and text.count("goes on from") == 2, text
     # What was made for frames alone is gone with what killed processes left.
-    assert not unfinished(made) and not files(made / "p.farm" / "parts") and not any(checkpoints.iterdir())
+    assert not unfinished(made) and not files(made / "p.farm" / "parts") and not list(made.rglob("*.ck"))
     assert farm.do("status", made, arguments=False).returncode == 0
     last = farm.do("submit", made, *options)
     assert last.returncode == 0 and "all 12 tasks are done" in last.stdout, last
