@@ -151,7 +151,7 @@ def main():
     farm = Farm(programs, out, ["--size", "64x48"])
     # A short name: sockets' must be.
     with tempfile.TemporaryDirectory(prefix="slurm-", ignore_cleanup_errors=True) as folder:
-        with slurm_machine.SlurmMachine(folder, nodes=2, max_array=4) as slurm:
+        with slurm_machine.SlurmMachine(folder, nodes=2, max_array=4, node_timeout=20) as slurm:
             farm.environment = slurm.environment
             for part in (killed, failed, split):
                 began = time.monotonic()

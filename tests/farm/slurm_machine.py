@@ -3,8 +3,10 @@ their own configuration and ports; no service of the system is asked or changed.
 """
 
 import contextlib
+import ctypes
 import os
 import pathlib
+import pwd
 import secrets
 import shutil
 import signal
@@ -92,6 +94,11 @@ def command_of(process):
     return []
 
 
+def end_with_test():
+    """A test that is killed leaves no daemon."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
 class SlurmMachine:
     def __init__(self, folder, nodes=2, max_array=1001, node_timeout=10):
         self.folder = pathlib.Path(folder)
@@ -105,7 +112,6 @@ class SlurmMachine:
         ports = free_ports(nodes + 1)
         lines = "\n".join(f"NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs=1 RealMemory=1000"
                           for name, port in zip(self.nodes, ports[1:]))
-        import pwd
         self.config = self.folder / "slurm.conf"
         self.config.write_text(CONFIG.format(folder=self.folder, host=host, controller_port=ports[0],
                                              user=pwd.getpwuid(os.getuid()).pw_name, nodes=lines, max_array=max_array,
@@ -147,7 +153,8 @@ class SlurmMachine:
     def start(self, name, *arguments, key=None):
         log = open(self.folder / f"{key or name}.out", "ab")
         self.daemons[key or name] = subprocess.Popen([find(name), *arguments], stdin=subprocess.DEVNULL, stdout=log,
-                                                     stderr=log, env=self.environment, start_new_session=True)
+                                                     stderr=log, env=self.environment, start_new_session=True,
+                                                     preexec_fn=end_with_test)
         log.close()
 
     def start_node(self, node):
@@ -160,7 +167,6 @@ class SlurmMachine:
 
     def steps(self, node=None):
         """Processes of slurmstepd of this Slurm (they outlive slurmd), of that node, or of all."""
-        spools = {f"{self.folder}/spool.{each}" for each in ([node] if node else self.nodes)}
         found = []
         for entry in pathlib.Path("/proc").iterdir():
             if entry.name.isdigit() and command_of(entry.name)[:1] and b"slurmstepd" in command_of(entry.name)[0]:
@@ -168,7 +174,7 @@ class SlurmMachine:
                     environment = (entry / "environ").read_bytes().split(b"\0")
                     if f"SLURM_CONF={self.config}".encode() not in environment:
                         continue
-                    if node is None or os.readlink(entry / "cwd") in spools or node in self.node_of(entry.name):
+                    if node is None or self.node_of(entry.name) == node:
                         found.append(int(entry.name))
         return found
 
@@ -178,8 +184,8 @@ class SlurmMachine:
             with contextlib.suppress(OSError):
                 for line in pathlib.Path(f"/proc/{process}/environ").read_bytes().split(b"\0"):
                     if line.startswith(b"SLURMD_NODENAME="):
-                        return [line.partition(b"=")[2].decode()]
-        return []
+                        return line.partition(b"=")[2].decode()
+        return None
 
     def kill_tree(self, process):
         for each in tree_of(process):
