@@ -85,6 +85,7 @@ constexpr Leaf leaves[] = {
     {"nodes[].scale[]", Kind::number},
     {"nodes[].weights[]", Kind::number},
     {"nodes[].extensions.KHR_lights_punctual.light", Kind::index},
+    {"nodes[].extensions.KHR_node_visibility.visible", Kind::boolean},
     {"meshes[].name", Kind::string},
     {"meshes[].weights[]", Kind::number},
     {"meshes[].primitives[].attributes.*", Kind::index},

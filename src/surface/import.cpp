@@ -42,14 +42,14 @@ class Assembler {
   }
 
  private:
-  /// Which meshes the displayed nodes show.
+  /// Which meshes the displayed nodes show. What is hidden for good costs nothing.
   void plan() {
     used_.resize(file_.model.meshes.size(), false);
     std::vector<bool> displayed(scene_->rig.nodes.size(), false);
     for (const std::uint32_t node : scene_->rig.displayed) displayed[node] = true;
     for (const std::uint32_t node : scene_->rig.displayed) {
       const tinygltf::Node& from = file_.model.nodes[node];
-      if (from.mesh >= 0) used_[static_cast<std::size_t>(from.mesh)] = true;
+      if (from.mesh >= 0 && !scene_->rig.hidden[node]) used_[static_cast<std::size_t>(from.mesh)] = true;
       if (from.skin >= 0 && static_cast<std::size_t>(from.skin) >= scene_->rig.skins.size()) {
         malformed(numbered("node", node) + ": there is no skin " + std::to_string(from.skin));
       }
@@ -106,7 +106,7 @@ class Assembler {
   void for_each_instance(const Visit& visit) const {
     for (const std::uint32_t node : scene_->rig.displayed) {
       const int mesh = file_.model.nodes[node].mesh;
-      if (mesh < 0) continue;
+      if (mesh < 0 || scene_->rig.hidden[node]) continue;
       for (const std::size_t place : parts_of_[static_cast<std::size_t>(mesh)]) {
         visit(node, scene_->parts[place], place);
       }
@@ -127,7 +127,7 @@ class Assembler {
         scene_->cameras.emplace_back(node, std::move(to));
       }
       const auto extension = from.extensions.find("KHR_lights_punctual");
-      if (extension == from.extensions.end() || !extension->second.Has("light")) continue;
+      if (extension == from.extensions.end() || !extension->second.Has("light") || scene_->rig.hidden[node]) continue;
       const auto light = static_cast<std::size_t>(extension->second.Get("light").GetNumberAsInt());
       if (light >= model.lights.size()) {
         malformed(numbered("node", node) + ": there is no light " + std::to_string(light));

@@ -37,6 +37,7 @@ class Importer {
     display();
     for (std::size_t i = 0; i < model_.skins.size(); ++i) rig_.skins.push_back(skin(i));
     for (std::size_t i = 0; i < model_.animations.size(); ++i) animation(i);
+    hide();
     if (unmatched_ > 0) {
       log_.warning(name_ + ": " + std::to_string(unmatched_) + " nodes have not a weight a morph target");
     }
@@ -83,6 +84,10 @@ class Importer {
     budget_.take(targets, sizeof(float), what);
     to.weights.resize(targets, 0.0F);
     for (std::size_t t = 0; t < std::min(targets, weights->size()); ++t) to.weights[t] = narrow((*weights)[t]);
+    const auto visibility = from.extensions.find("KHR_node_visibility");
+    if (visibility != from.extensions.end() && visibility->second.Has("visible")) {
+      to.visible = visibility->second.Get("visible").Get<bool>();
+    }
     return to;
   }
 
@@ -139,6 +144,14 @@ class Importer {
       }
       // A root that another root leads to, or is named twice, is not drawn twice.
       descend(static_cast<std::uint32_t>(root), seen, rig_.displayed);
+    }
+  }
+
+  void hide() {
+    rig_.hidden.resize(rig_.nodes.size(), false);
+    for (const std::uint32_t i : rig_.order) {
+      const Node& node = rig_.nodes[i];
+      rig_.hidden[i] = !node.visible || (node.parent >= 0 && rig_.hidden[static_cast<std::size_t>(node.parent)]);
     }
   }
 

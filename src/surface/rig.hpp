@@ -18,6 +18,7 @@ struct Node {
   glm::dquat rotation{1.0, 0.0, 0.0, 0.0};
   glm::dvec3 scale{1.0};
   std::vector<float> weights;  ///< of the morph targets of its mesh, as they rest
+  bool visible = true;         ///< as it rests; an invisible one hides what descends from it
 };
 
 struct Skin {
@@ -51,6 +52,7 @@ struct Rig {
   std::vector<Node> nodes;
   std::vector<std::uint32_t> order;      ///< of nodes, parents first
   std::vector<std::uint32_t> displayed;  ///< nodes of the file's scene, in its order
+  std::vector<bool> hidden;              ///< a node each: nothing shows it at any time, itself or what is above it
   std::vector<Skin> skins;
   std::vector<Track> tracks;
 };

@@ -75,7 +75,8 @@ inline GltfModel seed_materials() {
   root["extensionsUsed"] = {
       "KHR_lights_punctual",        "KHR_materials_unlit",    "KHR_materials_emissive_strength",
       "KHR_materials_ior",          "KHR_materials_specular", "KHR_materials_clearcoat",
-      "KHR_materials_transmission", "KHR_texture_transform",  "KHR_materials_pbrSpecularGlossiness"};
+      "KHR_materials_transmission", "KHR_texture_transform",  "KHR_materials_pbrSpecularGlossiness",
+      "KHR_node_visibility"};
   model.add("images", {{"bufferView", model.view(png(2, 1, 8, 6, {255, 0, 0, 255, 0, 255, 0, 128}))},
                        {"mimeType", "image/png"},
                        {"name", "two"}});
@@ -159,7 +160,7 @@ inline GltfModel seed_materials() {
   model.add("nodes", {{"camera", 1}, {"scale", {2, 2, 2}}, {"extensions", light(2)}});
   model.add("nodes", {{"translation", {0, 5, 0}}, {"extensions", light(1)}});
   model.add("nodes", {{"matrix", {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, -2, 0, 0, 0, 0, 1}}, {"mesh", mesh}});
-  model.add("nodes", {{"name", "nothing"}});
+  model.add("nodes", {{"name", "nothing"}, {"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}});
   root["scenes"] = json::array({{{"nodes", json::array({0})}}});
   root["scene"] = 0;
   return model;

@@ -11,6 +11,7 @@
 #include "base/error.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_check.hpp"
+#include "support/gltf_import.hpp"
 #include "support/gltf_model.hpp"
 #include "support/gltf_seeds.hpp"
 #include "surface/gltf_import.hpp"
@@ -20,64 +21,15 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::Bytes;
+using test::corners;
 using test::GltfModel;
+using test::has;
+using test::imported;
 using test::json;
-
-struct Lines {
-  std::vector<std::string> infos;
-  std::vector<std::string> warnings;
-  Log log{[this](LogLevel level, const char* message) {
-    (level >= LogLevel::warning ? warnings : infos).emplace_back(message);
-  }};
-};
-
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-ScenePtr imported(const Bytes& file, const Log& log = {}, const GltfLimits& limits = {}) {
-  ScenePtr scene = import_gltf(file, "made.gltf", "/nowhere", log, nullptr, limits);
-  EXPECT_EQ(test::broken(*scene), "");
-  EXPECT_EQ(test::broken(*scene, scene->pose(0.0)), "");
-  return scene;
-}
-ScenePtr imported(const GltfModel& model, const Log& log = {}) { return imported(model.gltf(), log); }
-
-/// The line with which a file is refused.
-std::string refused(const Bytes& file, ErrorCode code = ErrorCode::file, const GltfLimits& limits = {}) {
-  try {
-    import_gltf(file, "made.gltf", "/nowhere", {}, nullptr, limits);
-  } catch (const Error& error) {
-    const std::string line = error.what();
-    EXPECT_EQ(error.code(), code) << line;
-    EXPECT_TRUE(line.starts_with("made.gltf: ")) << line;
-    EXPECT_GT(line.size(), 12U) << line;
-    EXPECT_LT(line.size(), 600U) << line;
-    EXPECT_EQ(line.find_first_of("\n\r\t"), std::string::npos) << line;
-    return line;
-  }
-  ADD_FAILURE() << "was imported";
-  return "";
-}
-std::string refused(const GltfModel& model, ErrorCode code = ErrorCode::file) { return refused(model.gltf(), code); }
-
-void near(const glm::vec3& a, const glm::vec3& b, float within = 1e-5F) {
-  EXPECT_LT(glm::length(a - b), within) << a.x << " " << a.y << " " << a.z << ", not " << b.x << " " << b.y << " "
-                                        << b.z;
-}
-
-/// Where the corners of the first triangle are.
-std::array<glm::vec3, 3> corners(const Scene& scene, const Pose& pose, std::size_t triangle = 0) {
-  std::array<glm::vec3, 3> result{};
-  for (std::size_t k = 0; k < 3; ++k) result[k] = pose.vertices[scene.indices[3 * triangle + k]].position;
-  return result;
-}
-
-GltfModel triangle_model(const json& node = json::object(), const json& more = json::object()) {
-  GltfModel model;
-  json primitive = {{"attributes", {{"POSITION", model.triangle()}}}};
-  primitive.update(more);
-  model.show(primitive, node);
-  return model;
-}
+using test::Lines;
+using test::near;
+using test::refused;
+using test::triangle_model;
 
 TEST(Gltf, OneTriangleAsGltfAndAsGlb) {
   const GltfModel model = triangle_model();
