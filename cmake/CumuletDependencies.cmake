@@ -23,6 +23,7 @@ find_package(draco CONFIG REQUIRED)
 # Debian's libdraco exports an older tinygltf of its own: the right one comes first wherever both are linked.
 set_property(TARGET TinyGLTF::TinyGLTF APPEND PROPERTY INTERFACE_LINK_LIBRARIES draco::draco)
 find_package(meshoptimizer CONFIG REQUIRED)
+pkg_check_modules(CUMULET_WEBP REQUIRED IMPORTED_TARGET GLOBAL libwebp)
 find_path(CUMULET_JSON_INCLUDE_DIR nlohmann/json.hpp REQUIRED)
 
 find_path(CUMULET_GLM_INCLUDE_DIR glm/glm.hpp REQUIRED)

@@ -33,7 +33,8 @@ constexpr std::array known_extensions = {"KHR_lights_punctual",
                                          "KHR_texture_transform",
                                          "KHR_mesh_quantization",
                                          "KHR_draco_mesh_compression",
-                                         "EXT_meshopt_compression"};
+                                         "EXT_meshopt_compression",
+                                         "EXT_texture_webp"};
 
 bool known(const std::string& extension) {
   return std::find(known_extensions.begin(), known_extensions.end(), extension) != known_extensions.end();

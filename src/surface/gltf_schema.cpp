@@ -136,6 +136,7 @@ constexpr Leaf leaves[] = {
     {"images[].bufferView", Kind::index},
     {"textures[].sampler", Kind::index},
     {"textures[].source", Kind::index},
+    {"textures[].extensions.EXT_texture_webp.source", Kind::index},
     {"samplers[].magFilter", Kind::index},
     {"samplers[].minFilter", Kind::index},
     {"samplers[].wrapS", Kind::index},

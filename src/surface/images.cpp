@@ -1,3 +1,5 @@
+#include <webp/decode.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -60,16 +62,46 @@ Header jpeg_header(std::span<const std::uint8_t> bytes) {
   malformed("is a JPEG cut short");
 }
 
+/// Of RIFF, whose form is WEBP.
+bool is_webp(Bytes bytes) {
+  constexpr std::size_t form = 8;
+  return bytes.size() >= form + 4 && std::memcmp(bytes.data(), "RIFF", 4) == 0 &&
+         std::memcmp(&bytes[form], "WEBP", 4) == 0;
+}
+
+/// An even picture takes a few bytes, of whatever size: only the budget bounds it.
+Header webp_header(Bytes bytes) {
+  WebPBitstreamFeatures features{};
+  const VP8StatusCode status = WebPGetFeatures(bytes.data(), bytes.size(), &features);
+  if (status == VP8_STATUS_NOT_ENOUGH_DATA) malformed("is a WebP cut short");
+  if (status != VP8_STATUS_OK) malformed("is a malformed WebP");
+  if (features.has_animation != 0) malformed("is an animated WebP, of which Cumulet reads none");
+  return {static_cast<std::uint64_t>(features.width), static_cast<std::uint64_t>(features.height), 0};
+}
+
 Header read_header(std::span<const std::uint8_t> bytes) {
   if (bytes.size() >= png_signature.size() && std::equal(png_signature.begin(), png_signature.end(), bytes.begin())) {
     return png_header(bytes);
   }
   if (bytes.size() >= 4 && bytes[0] == 0xFF && bytes[1] == 0xD8) return jpeg_header(bytes);
+  if (is_webp(bytes)) return webp_header(bytes);
   constexpr std::array<std::uint8_t, 4> ktx2 = {0xAB, 'K', 'T', 'X'};
   if (bytes.size() >= ktx2.size() && std::equal(ktx2.begin(), ktx2.end(), bytes.begin())) {
     malformed("is a KTX2 image, of which Cumulet reads none");
   }
-  malformed("is neither PNG nor JPEG");
+  malformed("is neither PNG, JPEG nor WebP");
+}
+
+Image decode_webp(Bytes bytes, const Header& header) {
+  Image result;
+  result.width = static_cast<std::uint32_t>(header.width);
+  result.height = static_cast<std::uint32_t>(header.height);
+  result.rgba.resize(std::size_t{result.width} * result.height * 4);
+  if (WebPDecodeRGBAInto(bytes.data(), bytes.size(), result.rgba.data(), result.rgba.size(),
+                         static_cast<int>(4 * result.width)) == nullptr) {
+    malformed("cannot be decoded");
+  }
+  return result;
 }
 
 /// What is known to fit.
@@ -115,7 +147,8 @@ Image decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
     malformed(size + " do not fit into its " + std::to_string(bytes.size()) + " bytes");
   const std::uint64_t pixels = header.width * header.height;
   budget.take(pixels, 4, "an image of " + size);
-  return apart(budget.progress_for(4 * pixels), [bytes, owner] { return decode(bytes); });
+  return apart(budget.progress_for(4 * pixels),
+               [bytes, owner, header] { return is_webp(bytes) ? decode_webp(bytes, header) : decode(bytes); });
 }
 
 }  // namespace cumulet::surface::detail

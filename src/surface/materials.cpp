@@ -195,7 +195,13 @@ class Materials {
     const tinygltf::Texture& from = file_.model.textures[index];
     std::int32_t place = -1;
     const Sampler made = sampler(from.sampler, index);
-    const std::int64_t image = image_of(from, index);
+    std::int64_t image = -1;
+    // The core's image is for who cannot read the extension's, or cannot have it.
+    if (const auto* webp = find(from.extensions, "EXT_texture_webp")) {
+      image = image_of(static_cast<int>(number(*webp, "source", -1)), index);
+    }
+    if (image < 0) image = image_of(from.source, index);
+    if (image < 0 && from.source < 0) remark_on(from, index);
     if (image >= 0) {
       place = static_cast<std::int32_t>(scene_.textures.size());
       scene_.textures.push_back({static_cast<std::uint32_t>(image), made});
@@ -204,16 +210,20 @@ class Materials {
     return place;
   }
 
-  std::int64_t image_of(const tinygltf::Texture& from, std::size_t index) {
-    if (from.source < 0) {
-      // KHR_texture_basisu, EXT_texture_webp and the like; what none of them names is white by right.
-      if (!from.extensions.empty()) {
-        log_.warning(name_ + ": " + numbered("texture", index) + " has only an image of " +
-                     one_line(from.extensions.begin()->first) + ", and is left out");
-      }
-      return -1;
+  /// KHR_texture_basisu and the like; what no extension names is white by right.
+  void remark_on(const tinygltf::Texture& from, std::size_t index) {
+    for (const auto& [extension, value] : from.extensions) {
+      if (extension == "EXT_texture_webp") continue;  // of which was told
+      log_.warning(name_ + ": " + numbered("texture", index) + " has only an image of " + one_line(extension) +
+                   ", and is left out");
+      return;
     }
-    const auto source = static_cast<std::size_t>(from.source);
+  }
+
+  /// The place of a glTF image in Scene::images; -1 if there is none of this number below 0, or it cannot be had.
+  std::int64_t image_of(int number, std::size_t index) {
+    if (number < 0) return -1;
+    const auto source = static_cast<std::size_t>(number);
     if (source >= file_.images.size()) {
       malformed(numbered("texture", index) + ": there is no image " + std::to_string(source));
     }

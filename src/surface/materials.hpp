@@ -12,7 +12,7 @@ namespace cumulet::surface::detail {
 void import_materials(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress,
                       Scene& scene);
 
-/// Decodes a PNG or JPEG, whose bytes `owner` keeps; 16-bit channels are rounded to 8. Throws Error(file).
+/// Decodes a PNG, JPEG or WebP, whose bytes `owner` keeps; 16-bit channels are rounded to 8. Throws Error(file).
 Image decode_image(Bytes bytes, const Owner& owner, Budget& budget);
 
 /// A number of the file as a float: what is too large for one becomes the largest.

@@ -9,9 +9,14 @@ int main(int argc, char** argv) {
     folder.write(name, std::string(bytes.begin(), bytes.end()));
   };
   const std::pair<const char*, cumulet::test::GltfModel> models[] = {
-      {"materials", cumulet::test::seed_materials()},   {"animated", cumulet::test::seed_animated()},
-      {"draco", cumulet::test::seed_draco(2)},          {"draco_slow", cumulet::test::seed_draco(2, 0)},
-      {"draco_fast", cumulet::test::seed_draco(2, 10)}, {"meshopt", cumulet::test::seed_meshopt(2)}};
+      {"materials", cumulet::test::seed_materials()},
+      {"animated", cumulet::test::seed_animated()},
+      {"draco", cumulet::test::seed_draco(2)},
+      {"draco_slow", cumulet::test::seed_draco(2, 0)},
+      {"draco_fast", cumulet::test::seed_draco(2, 10)},
+      {"meshopt", cumulet::test::seed_meshopt(2)},
+      {"webp", cumulet::test::seed_webp(cumulet::test::webp(2, 2, cumulet::test::Bytes(16, 77)))},
+      {"webp_lossy", cumulet::test::seed_webp(cumulet::test::webp(2, 2, cumulet::test::Bytes(16, 77), 50.0F))}};
   for (const auto& [name, model] : models) {
     write(std::string(name) + ".gltf", model.gltf());
     write(std::string(name) + ".glb", model.glb());

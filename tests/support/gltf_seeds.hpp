@@ -5,10 +5,12 @@
 #include <draco/compression/encode.h>
 #include <draco/mesh/triangle_soup_mesh_builder.h>
 #include <meshoptimizer.h>
+#include <webp/encode.h>
 #include <zlib.h>
 
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "support/gltf_model.hpp"
 
@@ -66,6 +68,19 @@ inline std::string jpeg_base64() {
          "SUpTVFVWV1hZWmNkZWZnaGlqc3R1dnd4eXqCg4SFhoeIiYqSk5SVlpeYmZqio6Slpqeoqaqys7S1tre4ubrCw8TFxsfIycrS09TV1tfY2dri4"
          "+"
          "Tl5ufo6ery8/T19vf4+fr/2gAMAwEAAhEDEQA/AORoooqT9XP/2Q==";
+}
+
+/// A lossless WebP of these rows of RGBA; with a quality (0 to 100) a lossy one.
+inline Bytes webp(std::uint32_t width, std::uint32_t height, const Bytes& rgba,
+                  std::optional<float> quality = std::nullopt) {
+  std::uint8_t* packed = nullptr;
+  const int w = static_cast<int>(width);
+  const int h = static_cast<int>(height);
+  const std::size_t size = quality ? WebPEncodeRGBA(rgba.data(), w, h, 4 * w, *quality, &packed)
+                                   : WebPEncodeLosslessRGBA(rgba.data(), w, h, 4 * w, &packed);
+  Bytes file(packed, packed + size);
+  WebPFree(packed);
+  return file;
 }
 
 /// Materials with everything, textures, samplers, two cameras and three lights, on one triangle.
@@ -285,6 +300,22 @@ inline GltfModel seed_picture(std::uint32_t side) {
   model.show({{"attributes",
                {{"POSITION", model.vec3({0, 0, 0, 1, 0, 0, 0, 1, 0})}, {"TEXCOORD_0", model.vec2({0, 0, 1, 0, 0, 1})}}},
               {"material", 0}});
+  return model;
+}
+
+/// A texture of an image of EXT_texture_webp, and of another for who cannot read it, on a triangle.
+inline GltfModel seed_webp(const Bytes& picture, const std::optional<Bytes>& fallback = std::nullopt) {
+  GltfModel model;
+  model.root["extensionsUsed"] = {"EXT_texture_webp"};
+  if (!fallback) model.root["extensionsRequired"] = {"EXT_texture_webp"};
+  model.add("images", {{"bufferView", model.view(picture)}, {"mimeType", "image/webp"}, {"name", "small"}});
+  json texture = {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}};
+  if (fallback) {
+    texture["source"] = model.add("images", {{"bufferView", model.view(*fallback)}, {"mimeType", "image/png"}});
+  }
+  model.add("textures", texture);
+  model.add("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}, {"material", 0}});
   return model;
 }
 

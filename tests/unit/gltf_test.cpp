@@ -867,7 +867,7 @@ TEST(Gltf, TexturesThatCannotBeHadAreLeftOutWithALine) {
   EXPECT_TRUE(has(line(with({{"source", 0}}, {{"uri", "none.png"}})), "none.png: no such file"));
   EXPECT_TRUE(has(line(with({{"source", 0}}, {{"name", "empty"}})), "neither a URI nor a buffer view"));
   EXPECT_TRUE(has(line(embedded({0xAB, 'K', 'T', 'X', ' ', '2', '0'})), "KTX2"));
-  EXPECT_TRUE(has(line(embedded({'G', 'I', 'F', '8', '9', 'a', 0, 0, 0, 0})), "neither PNG nor JPEG"));
+  EXPECT_TRUE(has(line(embedded({'G', 'I', 'F', '8', '9', 'a', 0, 0, 0, 0})), "neither PNG, JPEG nor WebP"));
   EXPECT_TRUE(has(line(embedded(test::png(0, 1, 8, 2, {}))), "no pixels"));
   EXPECT_TRUE(has(line(embedded(test::png(1, 0x7FFFFFFF, 8, 2, {0, 0, 0}))), "too many"));
   EXPECT_TRUE(has(line(embedded(test::png(16000, 16000, 8, 6, {0, 0, 0, 0}))), "do not fit into its"));
@@ -1206,8 +1206,9 @@ Bytes mutated(const Bytes& from, std::mt19937& random) {
 }
 
 TEST(Gltf, MutatedFilesAreImportedOrRefusedByOneLine) {
-  const GltfModel seeds[] = {test::seed_materials(), test::seed_animated(), test::seed_draco(), test::seed_meshopt(),
-                             triangle_model()};
+  const GltfModel seeds[] = {test::seed_materials(), test::seed_animated(),
+                             test::seed_draco(),     test::seed_meshopt(),
+                             triangle_model(),       test::seed_webp(test::webp(8, 8, Bytes(256, 77), 50.0F))};
   GltfLimits limits;
   limits.memory = std::uint64_t{64} << 20U;
   limits.unbacked = 1U << 16U;
