@@ -111,15 +111,17 @@ class Emission {
 
 }  // namespace
 
-std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene, const Progress* progress) {
+std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene, const surface::Pose& pose,
+                                                 const Progress* progress) {
   const FromSrgb linear = srgb_decoding();
   std::vector<Emission> emissions;
   emissions.reserve(scene.materials.size());
-  for (const Material& material : scene.materials) emissions.emplace_back(linear, scene, material, progress);
+  for (const Material& material : surface::materials_of(scene, pose))
+    emissions.emplace_back(linear, scene, material, progress);
   std::vector<EmissiveTriangle> triangles;
   for (std::size_t i = 0; i < scene.draws.size(); ++i) {
     const surface::Draw& draw = scene.draws[i];
-    if (!(emissions[draw.material].mean() > 0.0F)) continue;
+    if (surface::is_hidden(pose, i) || !(emissions[draw.material].mean() > 0.0F)) continue;
     const std::uint32_t first = draw.first_index / 3;
     for (std::uint32_t j = 0; j < draw.index_count / 3; ++j) {
       triangles.push_back({first + j, static_cast<std::uint32_t>(i), 0.0F});
@@ -142,6 +144,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
   std::vector<double> areas;
   std::vector<double> power;
   double sum = 0.0;
+  const std::vector<Material>& materials = surface::materials_of(scene, pose);
   for (const EmissiveTriangle& t : triangles) {
     if (areas.size() % 4096 == 0) check(progress);
     const std::size_t first = 3 * std::size_t{t.triangle};
@@ -149,7 +152,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
     const dvec3 b = pose.vertices[scene.indices[first + 1]].position;
     const dvec3 c = pose.vertices[scene.indices[first + 2]].position;
     const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
-    const double sides = pose.double_sided || scene.materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
+    const double sides = pose.double_sided || materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
     const double emitted = area * t.luminance * sides;
     if (!(emitted > 0.0) || !std::isfinite(emitted)) continue;
     table.entries.emplace_back(t.triangle, 0U, 0U, pose.flipped[t.draw] != 0 ? 1U : 0U);

@@ -10,7 +10,7 @@
 
 namespace cumulet::light {
 
-/// A triangle whose material emits. What a pose does not change.
+/// A triangle whose material emits.
 struct EmissiveTriangle {
   std::uint32_t triangle = 0;
   std::uint32_t draw = 0;
@@ -18,9 +18,11 @@ struct EmissiveTriangle {
       0.0F;  ///< of its radiance, the mean over the triangle as far as a few texels of its texture tell; > 0
 };
 
-/// The scene's emissive triangles, in ascending order; those of unlit materials are not among them. O(n), and over the
-/// texels of emissive images, on TBB's threads. Throws Error(cancelled).
-std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene, const Progress* progress = nullptr);
+/// The scene's emissive triangles in a pose, in ascending order; those of unlit materials are not among them, nor those
+/// that are hidden. They serve for all poses with its materials and draws. O(n), and over the texels of emissive
+/// images, on TBB's threads. Throws Error(cancelled).
+std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene, const surface::Pose& pose,
+                                                 const Progress* progress = nullptr);
 
 /// Picks triangles in proportion to their power (light/alias_table.hpp).
 struct EmitterTable {

@@ -104,17 +104,27 @@ class RasterContent::Planner {
   Planner(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const gl::Limits& limits, Upload& upload)
       : gl_(gl), programs_(programs), limits_(limits), upload_(upload) {}
 
-  void fix(const std::shared_ptr<Fixed>& fixed) {
-    const scene::RasterSource& source = *fixed->source;
-    const surface::Scene& scene = *source.scene;
-    Fixed* const to = fixed.get();
-    to->textures.resize(source.textures.size());
-    for (std::size_t i = 0; i < source.textures.size(); ++i) add_texture(*to, i);
+  void share(const std::shared_ptr<Shared>& shared) {
+    const surface::Scene& scene = *shared->source->scene;
+    Shared* const to = shared.get();
+    to->textures.resize(to->source->textures.size());
+    for (std::size_t i = 0; i < to->textures.size(); ++i) add_texture(*to, i);
     upload_.add([gl = gl_, to] {
       for (const surface::Sampler& sampler : to->source->samplers) {
         to->samplers.push_back(make_scene_sampler(gl, sampler));
       }
     });
+    if (scene.attributes.empty() || scene.indices.empty()) return;
+    static_assert(sizeof(surface::VertexAttributes) == 32 && sizeof(surface::PosedVertex) == 40);
+    add_buffer(to->attributes, scene.attributes, "uploading the scene's vertices");
+    add_buffer(to->indices, scene.indices, "uploading the scene's indices");
+    to->bytes +=
+        scene.attributes.size() * sizeof(surface::VertexAttributes) + scene.indices.size() * sizeof(std::uint32_t);
+  }
+
+  void fix(const std::shared_ptr<Fixed>& fixed) {
+    const scene::RasterSource& source = *fixed->source;
+    Fixed* const to = fixed.get();
     to->program_of.resize(source.materials.size());
     for (std::size_t i = 0; i < source.materials.size(); ++i) {
       upload_.add([programs = programs_, to, i] { programs->ask(key_of(to->source->materials[i])); });
@@ -126,13 +136,7 @@ class RasterContent::Planner {
       });
     }
     add_buffer(to->material_block, source.material_blocks, "uploading the scene's materials");
-    to->bytes += source.material_blocks.size();
-    if (scene.attributes.empty() || scene.indices.empty()) return;
-    static_assert(sizeof(surface::VertexAttributes) == 32 && sizeof(surface::PosedVertex) == 40);
-    add_buffer(to->attributes, scene.attributes, "uploading the scene's vertices");
-    add_buffer(to->indices, scene.indices, "uploading the scene's indices");
-    to->bytes += scene.attributes.size() * sizeof(surface::VertexAttributes) +
-                 (scene.indices.size() + source.blended.size() * 3) * sizeof(std::uint32_t);
+    to->bytes += source.material_blocks.size() + source.blended.size() * 3 * sizeof(std::uint32_t);
     if (source.blended.empty()) return;
     upload_.add([gl = gl_, to] {
       to->sorted_indices = gl::make_buffer(gl, to->source->blended.size() * 3 * sizeof(std::uint32_t), nullptr,
@@ -152,8 +156,8 @@ class RasterContent::Planner {
   }
 
  private:
-  void add_texture(Fixed& to, std::size_t i) {
-    const scene::RasterSource::Texture& texture = to.source->textures[i];
+  void add_texture(Shared& to, std::size_t i) {
+    const scene::RasterPictures::Texture& texture = to.source->textures[i];
     const surface::Image& image = to.source->scene->images.at(texture.image);
     const auto most = static_cast<std::uint32_t>(limits_.texture_size_2d);
     if (image.width > most || image.height > most) {
@@ -174,8 +178,8 @@ class RasterContent::Planner {
     }
   }
 
-  static gl::Object make_texture(const gl::FunctionsPtr& gl, const scene::RasterSource& source, std::size_t i) {
-    const scene::RasterSource::Texture& texture = source.textures[i];
+  static gl::Object make_texture(const gl::FunctionsPtr& gl, const scene::RasterPictures& source, std::size_t i) {
+    const scene::RasterPictures::Texture& texture = source.textures[i];
     const surface::Image& image = source.scene->images[texture.image];
     GLuint name = 0;
     gl->CreateTextures(GL_TEXTURE_2D, 1, &name);
@@ -220,6 +224,14 @@ std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr&
   } else {
     content->fixed_ = std::make_shared<Fixed>();
     content->fixed_->source = std::move(input.scene);
+    const auto& pictures = content->fixed_->source->pictures;
+    if (last != nullptr && last->fixed_->shared->source == pictures) {
+      content->fixed_->shared = last->fixed_->shared;
+    } else {
+      content->fixed_->shared = std::make_shared<Shared>();
+      content->fixed_->shared->source = pictures;
+      planner.share(content->fixed_->shared);
+    }
     planner.fix(content->fixed_);
   }
   content->pose_ = std::move(input.pose);
@@ -390,8 +402,8 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
       for (GLuint i = 0; i < material.maps.size(); ++i) {
         const auto& map = material.maps[i];
         const GLuint unit = core::CM_UNIT_MAPS + i;
-        gl.BindTextureUnit(unit, map ? fixed.textures[map->texture].name() : white_.name());
-        gl.BindSampler(unit, map ? fixed.samplers[map->sampler].name() : 0);
+        gl.BindTextureUnit(unit, map ? fixed.shared->textures[map->texture].name() : white_.name());
+        gl.BindSampler(unit, map ? fixed.shared->samplers[map->sampler].name() : 0);
       }
       gl.BindBufferRange(GL_UNIFORM_BUFFER, core::CM_UNIFORM_MATERIAL, fixed.material_block.name(),
                          static_cast<GLintptr>(scene::RasterSource::material_stride * index), sizeof(CmMaterial));
@@ -432,7 +444,8 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     vertex_array = gl::make_vertex_array(gl_);
     const GLuint array = vertex_array.name();
     gl.VertexArrayVertexBuffer(array, 0, content_->posed_.name(), 0, sizeof(surface::PosedVertex));
-    gl.VertexArrayVertexBuffer(array, 1, content_->fixed_->attributes.name(), 0, sizeof(surface::VertexAttributes));
+    gl.VertexArrayVertexBuffer(array, 1, content_->fixed_->shared->attributes.name(), 0,
+                               sizeof(surface::VertexAttributes));
     const auto attribute = [&](GLuint location, GLint components, GLuint offset, GLuint binding) {
       gl.EnableVertexArrayAttrib(array, location);
       gl.VertexArrayAttribFormat(array, location, components, GL_FLOAT, GL_FALSE, offset);
@@ -480,7 +493,7 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
       for (const gl::Program* program : content_->fixed_->program_of) {
         gl.ProgramUniform2f(program->name(), 0, shift.x, shift.y);
       }
-      gl.VertexArrayElementBuffer(vertex_array.name(), content_->fixed_->indices.name());
+      gl.VertexArrayElementBuffer(vertex_array.name(), content_->fixed_->shared->indices.name());
       draw_batches(content_->scene().solid, mirrored);
     }
     if (!into.blended) continue;

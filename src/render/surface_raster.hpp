@@ -64,19 +64,25 @@ class RasterContent {
   /// Whether the scene has BLEND triangles, which have layers of their own.
   [[nodiscard]] bool blends() const { return !scene().blended.empty(); }
   /// GL memory.
-  [[nodiscard]] std::uint64_t bytes() const { return fixed_->bytes + posed_bytes_; }
+  [[nodiscard]] std::uint64_t bytes() const { return fixed_->shared->bytes + fixed_->bytes + posed_bytes_; }
 
  private:
   friend class SurfaceRaster;
-  /// What does not move.
-  struct Fixed {
-    std::shared_ptr<const scene::RasterSource> source;
+  /// What poses of a scene share.
+  struct Shared {
+    std::shared_ptr<const scene::RasterPictures> source;
     gl::Object attributes;
     gl::Object indices;
-    gl::Object sorted_indices;  // of blended triangles
-    gl::Object material_block;
     std::vector<gl::Object> textures;
     std::vector<gl::Object> samplers;
+    std::uint64_t bytes = 0;
+  };
+  /// What poses share that differ in vertices alone.
+  struct Fixed {
+    std::shared_ptr<const scene::RasterSource> source;
+    std::shared_ptr<Shared> shared;
+    gl::Object sorted_indices;  // of blended triangles
+    gl::Object material_block;
     std::vector<const gl::Program*> program_of;  // a material
     std::uint64_t bytes = 0;
   };

@@ -136,7 +136,7 @@ void pack_words(ModelSource& source, const Progress* progress) {
   });
 
   source.tables.materials = size_of(words);
-  for (const Material& material : scene.materials) {
+  for (const Material& material : surface::materials_of(scene, source.pose)) {
     words.resize(words.size() + core::CM_MATERIAL_WORDS);
     write_material(&words[words.size() - core::CM_MATERIAL_WORDS], material, source.pose.double_sided);
   }
@@ -191,11 +191,11 @@ ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Pr
   source->pose = std::move(pose);
   build(*source, progress);
   check(progress);
-  source->emissive = light::emissive_triangles(*source->scene, progress);
+  source->emissive = light::emissive_triangles(*source->scene, source->pose, progress);
   TextureAtlas atlas = pack_atlas(source->scene->images, largest_layer);
   shrink_images(atlas, source->scene->images, progress);
   source->atlas = std::make_shared<const TextureAtlas>(std::move(atlas));
-  source->raster = make_raster_source(source->scene, progress);
+  source->raster = make_raster_source(source->scene, source->pose, nullptr, progress);
   source->centres = blended_centres(*source->raster, source->pose, progress);
   check(progress);
   pack_words(*source, progress);
@@ -211,14 +211,20 @@ ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Pr
   check(progress);
   source->built_cost = last.built_cost;
   source->bvh.refit(source->pose.vertices, source->scene->indices, progress);
-  // A node that turned inside out has other flags, as have other sides; a tree whose boxes have grown apart is slow.
+  // A node that turned inside out has other flags, as have other sides; what shows up or goes is another tree, as is
+  // one whose boxes have grown apart, which is slow.
   const bool other_flags =
-      source->pose.flipped != last.pose.flipped || source->pose.double_sided != last.pose.double_sided;
+      surface::triangle_flags(*source->scene, source->pose) != surface::triangle_flags(*last.scene, last.pose);
   if (other_flags || source->bvh.cost() > 1.5 * source->built_cost) build(*source, progress);
   check(progress);
-  source->emissive = last.emissive;
   source->atlas = last.atlas;
-  source->raster = last.raster;
+  if (source->pose.hidden == last.pose.hidden && source->pose.materials == last.pose.materials) {
+    source->emissive = last.emissive;
+    source->raster = last.raster;
+  } else {
+    source->emissive = light::emissive_triangles(*source->scene, source->pose, progress);
+    source->raster = make_raster_source(source->scene, source->pose, last.raster->pictures, progress);
+  }
   source->centres = blended_centres(*source->raster, source->pose, progress);
   pack_words(*source, progress);
   return source;

@@ -60,42 +60,50 @@ std::size_t number_of(std::map<Key, std::size_t>& numbers, const Key& key) {
   return numbers.try_emplace(key, numbers.size()).first->second;
 }
 
-void add_materials(RasterSource& source) {
-  const surface::Scene& scene = *source.scene;
+void add_maps(RasterPictures& pictures) {
+  const surface::Scene& scene = *pictures.scene;
   std::map<std::pair<std::uint32_t, bool>, std::size_t> textures;
   using Ways = std::tuple<surface::Wrap, surface::Wrap, surface::Filter, surface::Filter, bool, surface::Filter>;
   std::map<Ways, std::size_t> samplers;
-  source.material_blocks.resize(RasterSource::material_stride * scene.materials.size());
-  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
-    const surface::Material& material = scene.materials[i];
-    const CmMaterial block = block_of(material);
-    std::memcpy(&source.material_blocks[i * RasterSource::material_stride], &block, sizeof(block));
-    RasterSource::Material& result = source.materials.emplace_back();
-    result.pass = material.transmission > 0.0F && !material.unlit ? AlphaMode::blend : material.alpha_mode;
-    result.double_sided = material.double_sided;
-    result.coated = material.clearcoat > 0.0F;
+  for (const surface::Material& material : scene.materials) {
+    RasterPictures::Maps& maps = pictures.maps.emplace_back();
     const auto uses = uses_of(material);
     for (std::size_t map = 0; map < uses.size(); ++map) {
       if (uses[map]->texture < 0) continue;
       const surface::Texture& texture = scene.textures.at(static_cast<std::size_t>(uses[map]->texture));
       const surface::Sampler& s = texture.sampler;
       const std::size_t image = number_of(textures, {texture.image, is_colour(map)});
-      if (image == source.textures.size()) source.textures.push_back({texture.image, is_colour(map), {}});
+      if (image == pictures.textures.size()) pictures.textures.push_back({texture.image, is_colour(map), {}});
       const std::size_t sampler =
           number_of(samplers, {s.wrap_s, s.wrap_t, s.magnify, s.minify, s.mipmaps, s.between_mipmaps});
-      if (sampler == source.samplers.size()) source.samplers.push_back(s);
-      result.maps[map] = RasterSource::Map{image, sampler};
+      if (sampler == pictures.samplers.size()) pictures.samplers.push_back(s);
+      maps[map] = RasterPictures::Map{image, sampler};
     }
   }
 }
 
-void add_levels(RasterSource& source, const Progress* progress) {
-  for (const RasterSource::Material& material : source.materials) {
-    for (const auto& map : material.maps) {
-      if (!map || !source.samplers[map->sampler].mipmaps) continue;
-      RasterSource::Texture& texture = source.textures[map->texture];
+void add_materials(RasterSource& source, const surface::Pose& pose) {
+  const std::vector<surface::Material>& materials = surface::materials_of(*source.scene, pose);
+  source.material_blocks.resize(RasterSource::material_stride * materials.size());
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    const surface::Material& material = materials[i];
+    const CmMaterial block = block_of(material);
+    std::memcpy(&source.material_blocks[i * RasterSource::material_stride], &block, sizeof(block));
+    RasterSource::Material& result = source.materials.emplace_back();
+    result.pass = material.transmission > 0.0F && !material.unlit ? AlphaMode::blend : material.alpha_mode;
+    result.double_sided = material.double_sided;
+    result.coated = material.clearcoat > 0.0F;
+    result.maps = source.pictures->maps[i];
+  }
+}
+
+void add_levels(RasterPictures& pictures, const Progress* progress) {
+  for (const RasterPictures::Maps& maps : pictures.maps) {
+    for (const auto& map : maps) {
+      if (!map || !pictures.samplers[map->sampler].mipmaps) continue;
+      RasterPictures::Texture& texture = pictures.textures[map->texture];
       if (!texture.smaller.empty()) continue;
-      const surface::Image& image = source.scene->images.at(texture.image);
+      const surface::Image& image = pictures.scene->images.at(texture.image);
       glm::uvec2 size(image.width, image.height);
       while (size != glm::uvec2(1U)) {
         const auto& larger = texture.smaller.empty() ? image.rgba : texture.smaller.back();
@@ -106,11 +114,11 @@ void add_levels(RasterSource& source, const Progress* progress) {
   }
 }
 
-void add_draws(RasterSource& source, const Progress* progress) {
+void add_draws(RasterSource& source, const surface::Pose& pose, const Progress* progress) {
   const std::vector<surface::Draw>& draws = source.scene->draws;
   for (std::uint32_t i = 0; i < draws.size(); ++i) {
     const surface::Draw& draw = draws[i];
-    if (draw.index_count == 0) continue;
+    if (draw.index_count == 0 || surface::is_hidden(pose, i)) continue;
     if (source.materials.at(draw.material).pass != AlphaMode::blend) {
       source.solid.push_back({draw.first_index, draw.index_count, i});
       continue;
@@ -178,12 +186,21 @@ std::vector<std::uint8_t> half_of(const std::vector<std::uint8_t>& rgba, glm::uv
   return out;
 }
 
-std::shared_ptr<const RasterSource> make_raster_source(surface::ScenePtr scene, const Progress* progress) {
+std::shared_ptr<const RasterSource> make_raster_source(surface::ScenePtr scene, const surface::Pose& pose,
+                                                       std::shared_ptr<const RasterPictures> pictures,
+                                                       const Progress* progress) {
+  if (!pictures) {
+    auto made = std::make_shared<RasterPictures>();
+    made->scene = scene;
+    add_maps(*made);
+    add_levels(*made, progress);
+    pictures = std::move(made);
+  }
   auto source = std::make_shared<RasterSource>();
   source->scene = std::move(scene);
-  add_materials(*source);
-  add_levels(*source, progress);
-  add_draws(*source, progress);
+  source->pictures = std::move(pictures);
+  add_materials(*source, pose);
+  add_draws(*source, pose, progress);
   return source;
 }
 

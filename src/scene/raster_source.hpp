@@ -19,14 +19,8 @@ namespace cumulet::core {
 
 namespace cumulet::scene {
 
-/// What SurfaceRaster needs of a scene, in main memory, so that a frame only copies it. Shared by its poses. No GL.
-struct RasterSource {
-  /// A range of indices with one state.
-  struct Batch {
-    std::uint32_t first = 0;
-    std::uint32_t count = 0;
-    std::uint32_t draw = 0;
-  };
+/// The textures that SurfaceRaster needs of a scene, in main memory. Of all its poses the same.
+struct RasterPictures {
   /// An image as colour or as data: one that serves as both is there twice.
   struct Texture {
     std::uint32_t image = 0;
@@ -37,8 +31,25 @@ struct RasterSource {
     std::size_t texture = 0;
     std::size_t sampler = 0;
   };
+  using Maps = std::array<std::optional<Map>, core::CM_MAPS>;
+
+  surface::ScenePtr scene;
+  std::vector<Texture> textures;
+  std::vector<surface::Sampler> samplers;
+  std::vector<Maps> maps;  ///< a material
+};
+
+/// What SurfaceRaster needs of a scene, in main memory, so that a frame only copies it. Shared by poses that differ in
+/// vertices alone. No GL.
+struct RasterSource {
+  /// A range of indices with one state.
+  struct Batch {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    std::uint32_t draw = 0;
+  };
   struct Material {
-    std::array<std::optional<Map>, core::CM_MAPS> maps;
+    RasterPictures::Maps maps;
     surface::AlphaMode pass = surface::AlphaMode::opaque;  ///< what transmits is drawn as what blends
     bool double_sided = false;
     bool coated = false;
@@ -49,16 +60,18 @@ struct RasterSource {
   static_assert(sizeof(core::CmMaterial) <= material_stride && material_stride % 256 == 0);
 
   surface::ScenePtr scene;
-  std::vector<Texture> textures;
-  std::vector<surface::Sampler> samplers;
+  std::shared_ptr<const RasterPictures> pictures;
   std::vector<Material> materials;
   std::vector<std::byte> material_blocks;
   std::vector<Batch> solid;    ///< OPAQUE, then MASK
   std::vector<Batch> blended;  ///< a triangle each
 };
 
-/// O(texels + blended triangles), on TBB's threads. Throws Error(cancelled).
-std::shared_ptr<const RasterSource> make_raster_source(surface::ScenePtr scene, const Progress* progress = nullptr);
+/// Of a pose; `pictures`: of another pose of the scene, if there is one. O(texels + blended triangles), on TBB's
+/// threads. Throws Error(cancelled).
+std::shared_ptr<const RasterSource> make_raster_source(surface::ScenePtr scene, const surface::Pose& pose,
+                                                       std::shared_ptr<const RasterPictures> pictures = nullptr,
+                                                       const Progress* progress = nullptr);
 
 /// Of the blended triangles in a pose of the scene: what they are sorted by.
 std::vector<glm::vec3> blended_centres(const RasterSource& source, const surface::Pose& pose,

@@ -659,11 +659,12 @@ std::vector<std::uint32_t> triangle_flags(const Scene& scene, const Pose& pose) 
   std::vector<std::uint32_t> flags(scene.triangle_count());
   for (std::size_t i = 0; i < scene.draws.size(); ++i) {
     const Draw& draw = scene.draws[i];
-    const Material& material = scene.materials[draw.material];
+    const Material& material = materials_of(scene, pose)[draw.material];
     std::uint32_t word = static_cast<std::uint32_t>(i) & TriangleFlags::user;
     if (material.alpha_mode != AlphaMode::opaque || material.transmission > 0.0F) word |= TriangleFlags::ask;
     if (!material.double_sided && !pose.double_sided) word |= TriangleFlags::one_sided;
     if (i < pose.flipped.size() && pose.flipped[i] != 0) word |= TriangleFlags::clockwise;
+    if (is_hidden(pose, i)) word |= TriangleFlags::left_out;
     const std::size_t first = draw.first_index / 3;
     for (std::size_t t = first; t < first + draw.index_count / 3; ++t) flags[t] = word;
   }

@@ -24,7 +24,7 @@ struct TriangleFlags {
 
 /// The flags of a scene's triangles in the order of Scene::indices: user bits the number of the Draw; ask for
 /// AlphaMode::mask and blend, and transmission; one_sided unless the material, or the pose, is double sided; clockwise
-/// where the pose is flipped.
+/// where the pose is flipped; left_out where it hides the draw.
 std::vector<std::uint32_t> triangle_flags(const Scene& scene, const Pose& pose);
 
 /// A binary bounding volume hierarchy, built by binned surface area heuristic (Wald, "On fast Construction of SAH-based

@@ -30,6 +30,7 @@ constexpr std::array known_extensions = {"KHR_lights_punctual",
                                          "KHR_materials_transmission",
                                          "KHR_materials_pbrSpecularGlossiness",
                                          "KHR_node_visibility",
+                                         "KHR_animation_pointer",
                                          "KHR_texture_transform",
                                          "KHR_mesh_quantization",
                                          "KHR_draco_mesh_compression",
@@ -190,7 +191,8 @@ struct SetAside {
   json images = json::array();
   std::vector<Indices> indices;
   std::vector<std::size_t> untyped;  ///< accessors of a type that is none of glTF's
-  std::size_t channels = 0;
+  std::vector<PointerChannel> pointers;
+  std::size_t channels = 0;  ///< that name neither a node nor a pointer
 };
 
 json take_member(json& root, const char* name) {
@@ -252,23 +254,27 @@ void complete_skins(json& root) {
   }
 }
 
-/// Drops channels that name no node, and counts them.
-std::size_t take_channels(json& root) {
-  std::size_t count = 0;
-  if (!root.contains("animations")) return count;
-  for (json& animation : root["animations"]) {
+/// Takes out channels that name no node.
+void take_channels(json& root, SetAside& aside) {
+  if (!root.contains("animations")) return;
+  json& animations = root["animations"];
+  for (std::size_t a = 0; a < animations.size(); ++a) {
+    json& animation = animations[a];
     if (!animation.contains("channels")) continue;
     json kept = json::array();
     for (json& channel : animation["channels"]) {
-      if (channel.contains("target") && !channel["target"].contains("node")) {
-        ++count;
-      } else {
+      const json target = channel.value("target", json());
+      const json::json_pointer pointer("/extensions/KHR_animation_pointer/pointer");
+      if (target.is_null() || target.contains("node")) {
         kept.push_back(std::move(channel));
+      } else if (target.value("path", std::string()) == "pointer" && target.contains(pointer)) {
+        aside.pointers.push_back({a, channel.value("sampler", -1), target[pointer].get<std::string>()});
+      } else {
+        ++aside.channels;
       }
     }
     animation["channels"] = std::move(kept);
   }
-  return count;
 }
 
 SetAside set_aside(json& root) {
@@ -278,7 +284,7 @@ SetAside set_aside(json& root) {
   aside.indices = take_indices(root);
   aside.untyped = take_types(root);
   complete_skins(root);
-  aside.channels = take_channels(root);
+  take_channels(root, aside);
   return aside;
 }
 
@@ -557,6 +563,7 @@ GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::fi
     file.model.meshes[mesh].primitives[primitive].indices = accessor;
   }
 
+  file.pointers = std::move(aside.pointers);
   for (const std::size_t accessor : aside.untyped) file.model.accessors.at(accessor).type = -1;
 
   Loader loader(file, log, name, budget, progress);

@@ -87,11 +87,19 @@ struct Missing {
 /// A buffer, or a buffer view, decompressed. What is not there matters to who reads it.
 using Data = std::variant<Bytes, NoData, Missing>;
 
+/// A channel of KHR_animation_pointer.
+struct PointerChannel {
+  std::size_t animation = 0;
+  int sampler = -1;
+  std::string pointer;  ///< JSON's
+};
+
 struct GltfFile {
   /// All but buffers and images, which stay empty. An index in it is -1 or at least 0, but not checked further.
   tinygltf::Model model;
   std::vector<Data> views;  ///< a buffer view each
   std::vector<ImageSource> images;
+  std::vector<PointerChannel> pointers;         ///< channels that the model lacks
   std::optional<std::filesystem::path> folder;  ///< where files that it refers to are; none: nowhere
 
   using Storage = std::deque<std::vector<std::uint8_t>>;

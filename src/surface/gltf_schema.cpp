@@ -150,6 +150,7 @@ constexpr Leaf leaves[] = {
     {"animations[].channels[].sampler", Kind::index},
     {"animations[].channels[].target.node", Kind::index},
     {"animations[].channels[].target.path", Kind::string},
+    {"animations[].channels[].target.extensions.KHR_animation_pointer.pointer", Kind::string},
     {"materials[].name", Kind::string},
     {"materials[].emissiveFactor[]", Kind::number, unit},
     {"materials[].alphaMode", Kind::string},

@@ -28,8 +28,12 @@ class Assembler {
       : file_(file), log_(log), name_(name), budget_(budget), progress_(progress) {}
 
   ScenePtr assemble() {
-    import_materials(file_, log_, name_, budget_, progress_, *scene_);
+    std::vector<MovableMaterial> movable = import_materials(file_, log_, name_, budget_, progress_, *scene_);
     scene_->rig = import_rig(file_, log_, name_, budget_, progress_, *scene_);
+    const auto moves_material = [](const Channel& channel) { return channel.property == Property::material; };
+    for (const Track& track : scene_->rig.tracks) {
+      if (std::ranges::any_of(track.channels, moves_material)) scene_->movable = std::move(movable);
+    }
     plan();
     meshes();
     look_at_winding();
@@ -132,7 +136,8 @@ class Assembler {
       if (light >= model.lights.size()) {
         malformed(numbered("node", node) + ": there is no light " + std::to_string(light));
       }
-      scene_->lights.emplace_back(node, import_light(model.lights[light], numbered("light", light)));
+      scene_->lights.push_back(
+          {node, static_cast<std::uint32_t>(light), import_light(model.lights[light], numbered("light", light))});
     }
   }
 

@@ -71,36 +71,40 @@ class Materials {
             Scene& scene)
       : file_(file), log_(log), name_(name), budget_(budget), progress_(progress), scene_(scene) {}
 
-  void import() {
+  std::vector<MovableMaterial> import() {
+    std::vector<MovableMaterial> movable;
     for (std::size_t i = 0; i < file_.model.materials.size(); ++i) {
       if (progress_ != nullptr) {
         progress_->at(0.5 * static_cast<double>(i) / static_cast<double>(file_.model.materials.size()));
       }
-      scene_.materials.push_back(material(file_.model.materials[i], numbered("material", i)));
+      movable.push_back(material(file_.model.materials[i], numbered("material", i)));
     }
-    scene_.materials.emplace_back();
+    movable.emplace_back();
+    for (const MovableMaterial& material : movable) scene_.materials.push_back(material.now);
     if (approximated_ > 0) {
       log_.warning(name_ + ": KHR_materials_pbrSpecularGlossiness is approximated: its diffuse colour as base colour");
     }
+    return movable;
   }
 
  private:
-  Material material(const tinygltf::Material& from, const std::string& what) {
-    Material to;
+  MovableMaterial material(const tinygltf::Material& from, const std::string& what) {
+    MovableMaterial movable;
+    Material& to = movable.now;
     to.name = one_line(from.name);
     const auto& pbr = from.pbrMetallicRoughness;
     if (pbr.baseColorFactor.size() != 4) malformed(what + ": baseColorFactor has not 4 numbers");
     to.base_color = glm::vec4(color(pbr.baseColorFactor), unit(pbr.baseColorFactor[3]));
-    to.base_color_texture = texture(use_of(pbr.baseColorTexture), what);
+    texture(TextureSlot::base_color, use_of(pbr.baseColorTexture), what, movable);
     to.metallic = unit(pbr.metallicFactor);
     to.roughness = unit(pbr.roughnessFactor);
-    to.metallic_roughness_texture = texture(use_of(pbr.metallicRoughnessTexture), what);
-    to.normal_texture = texture(use_of(from.normalTexture), what);
+    texture(TextureSlot::metallic_roughness, use_of(pbr.metallicRoughnessTexture), what, movable);
+    texture(TextureSlot::normal, use_of(from.normalTexture), what, movable);
     to.normal_scale = narrow(from.normalTexture.scale);
-    to.occlusion_texture = texture(use_of(from.occlusionTexture), what);
+    texture(TextureSlot::occlusion, use_of(from.occlusionTexture), what, movable);
     to.occlusion_strength = unit(from.occlusionTexture.strength);
-    to.emission = color(from.emissiveFactor);
-    to.emission_texture = texture(use_of(from.emissiveTexture), what);
+    to.emission = movable.emissive_factor = color(from.emissiveFactor);
+    texture(TextureSlot::emission, use_of(from.emissiveTexture), what, movable);
     to.alpha_cutoff = positive(from.alphaCutoff);
     to.double_sided = from.doubleSided;
     if (from.alphaMode == "MASK") {
@@ -110,15 +114,16 @@ class Materials {
     } else if (from.alphaMode != "OPAQUE") {
       malformed(what + ": alphaMode \"" + one_line(from.alphaMode) + "\" is none of glTF's");
     }
-    extensions(from.extensions, what, to);
-    return to;
+    extensions(from.extensions, what, movable);
+    return movable;
   }
 
-  void extensions(const tinygltf::ExtensionMap& from, const std::string& what, Material& to) {
+  void extensions(const tinygltf::ExtensionMap& from, const std::string& what, MovableMaterial& movable) {
+    Material& to = movable.now;
     to.unlit = find(from, "KHR_materials_unlit") != nullptr;
     if (const auto* strength = find(from, "KHR_materials_emissive_strength")) {
-      const float factor = positive(number(*strength, "emissiveStrength", 1.0));
-      for (int c = 0; c < 3; ++c) to.emission[c] = narrow(double{to.emission[c]} * factor);
+      movable.emissive_strength = positive(number(*strength, "emissiveStrength", 1.0));
+      for (int c = 0; c < 3; ++c) to.emission[c] = narrow(double{to.emission[c]} * movable.emissive_strength);
     }
     if (const auto* ior = find(from, "KHR_materials_ior")) {
       const double index = number(*ior, "ior", 1.5);
@@ -127,25 +132,26 @@ class Materials {
     }
     if (const auto* specular = find(from, "KHR_materials_specular")) {
       to.specular = unit(number(*specular, "specularFactor", 1.0));
-      to.specular_texture = texture(use_of(*specular, "specularTexture"), what);
+      texture(TextureSlot::specular, use_of(*specular, "specularTexture"), what, movable);
       to.specular_color = color(numbers(*specular, "specularColorFactor", {1.0, 1.0, 1.0}, what));
-      to.specular_color_texture = texture(use_of(*specular, "specularColorTexture"), what);
+      texture(TextureSlot::specular_color, use_of(*specular, "specularColorTexture"), what, movable);
     }
     if (const auto* clearcoat = find(from, "KHR_materials_clearcoat")) {
       to.clearcoat = unit(number(*clearcoat, "clearcoatFactor", 0.0));
-      to.clearcoat_texture = texture(use_of(*clearcoat, "clearcoatTexture"), what);
+      texture(TextureSlot::clearcoat, use_of(*clearcoat, "clearcoatTexture"), what, movable);
       to.clearcoat_roughness = unit(number(*clearcoat, "clearcoatRoughnessFactor", 0.0));
-      to.clearcoat_roughness_texture = texture(use_of(*clearcoat, "clearcoatRoughnessTexture"), what);
+      texture(TextureSlot::clearcoat_roughness, use_of(*clearcoat, "clearcoatRoughnessTexture"), what, movable);
     }
     if (const auto* transmission = find(from, "KHR_materials_transmission")) {
       to.transmission = unit(number(*transmission, "transmissionFactor", 0.0));
-      to.transmission_texture = texture(use_of(*transmission, "transmissionTexture"), what);
+      texture(TextureSlot::transmission, use_of(*transmission, "transmissionTexture"), what, movable);
     }
     if (const auto* glossiness = find(from, "KHR_materials_pbrSpecularGlossiness")) {
       const auto diffuse = numbers(*glossiness, "diffuseFactor", {1.0, 1.0, 1.0, 1.0}, what);
       const auto reflected = numbers(*glossiness, "specularFactor", {1.0, 1.0, 1.0}, what);
       to.base_color = glm::vec4(color(diffuse), unit(diffuse[3]));
-      to.base_color_texture = texture(use_of(*glossiness, "diffuseTexture"), what);
+      to.base_color_texture = {};
+      texture(TextureSlot::base_color, use_of(*glossiness, "diffuseTexture"), what, movable);
       to.metallic = 0.0F;
       to.roughness = 1.0F - unit(number(*glossiness, "glossinessFactor", 1.0));
       to.metallic_roughness_texture = {};
@@ -160,32 +166,29 @@ class Materials {
     }
   }
 
-  TextureUse texture(const Use& from, const std::string& what) {
-    TextureUse to;
-    if (from.index < 0) return to;
+  void texture(TextureSlot slot, const Use& from, const std::string& what, MovableMaterial& movable) {
+    if (from.index < 0) return;
     if (static_cast<std::size_t>(from.index) >= file_.model.textures.size()) {
       malformed(what + ": there is no texture " + std::to_string(from.index));
     }
+    TextureUse to;
     int uv_set = from.uv_set;
     if (from.transform != nullptr) {
       uv_set = static_cast<int>(number(*from.transform, "texCoord", uv_set));
-      // uv' = T * R * S * uv, as the extension says it.
       const auto offset = numbers(*from.transform, "offset", {0.0, 0.0}, what);
       const auto scale = numbers(*from.transform, "scale", {1.0, 1.0}, what);
-      const double angle = number(*from.transform, "rotation", 0.0);
-      const double cosine = std::cos(angle);
-      const double sine = std::sin(angle);
-      to.transform = glm::mat3x2(narrow(cosine * scale[0]), narrow(-sine * scale[0]), narrow(sine * scale[1]),
-                                 narrow(cosine * scale[1]), narrow(offset[0]), narrow(offset[1]));
+      TextureTransform& transform = movable.transforms[static_cast<std::size_t>(slot)];
+      transform = {{offset[0], offset[1]}, number(*from.transform, "rotation", 0.0), {scale[0], scale[1]}};
+      to.transform = transform.matrix();
     }
     if (uv_set > 1) {
       log_.warning(name_ + ": " + what + " uses TEXCOORD_" + std::to_string(uv_set) +
                    " for a texture: only sets 0 and 1 are read, and it is drawn without");
-      return {};
+      return;
     }
     to.uv_set = static_cast<std::uint32_t>(uv_set);
     to.texture = texture_of(static_cast<std::size_t>(from.index));
-    return to;
+    use_of(movable.now, slot) = to;
   }
 
   /// The place of a glTF texture in Scene::textures; -1 if its image cannot be had.
@@ -311,13 +314,14 @@ float narrow(double value) {
   return static_cast<float>(std::clamp(value, -most, most));
 }
 
-void import_materials(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress,
-                      Scene& scene) {
-  Materials(file, log, name, budget, progress, scene).import();
+std::vector<MovableMaterial> import_materials(const GltfFile& file, const Log& log, const std::string& name,
+                                              Budget& budget, Progress* progress, Scene& scene) {
+  return Materials(file, log, name, budget, progress, scene).import();
 }
 
-PunctualLight import_light(const tinygltf::Light& light, const std::string& what) {
-  PunctualLight to;
+MovableLight import_light(const tinygltf::Light& light, const std::string& what) {
+  MovableLight movable;
+  PunctualLight& to = movable.now;
   if (light.type == "directional") {
     to.kind = PunctualLight::Kind::directional;
   } else if (light.type == "spot") {
@@ -326,15 +330,16 @@ PunctualLight import_light(const tinygltf::Light& light, const std::string& what
     malformed(what + ": type \"" + one_line(light.type) + "\" is none of KHR_lights_punctual's");
   }
   if (!light.color.empty() && light.color.size() != 3) malformed(what + ": color has not 3 numbers");
-  const glm::vec3 tint = light.color.empty() ? glm::vec3(1.0F) : color(light.color);
-  to.intensity = tint * positive(light.intensity);
+  if (!light.color.empty()) movable.color = color(light.color);
+  movable.intensity = positive(light.intensity);
+  to.intensity = movable.color * movable.intensity;
   to.range = positive(light.range);
   if (to.kind == PunctualLight::Kind::spot) {
     const double outer = std::clamp(light.spot.outerConeAngle, 0.0, std::numbers::pi / 2);
     to.outer_cone = narrow(outer);
     to.inner_cone = narrow(std::clamp(light.spot.innerConeAngle, 0.0, outer));
   }
-  return to;
+  return movable;
 }
 
 SceneCamera import_camera(const tinygltf::Camera& camera, const std::string& what) {

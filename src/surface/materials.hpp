@@ -3,14 +3,16 @@
 // Private to surface/: images, textures, materials and lights of a glTF file.
 
 #include "surface/gltf_file.hpp"
+#include "surface/material_motion.hpp"
 #include "surface/scene.hpp"
 
 namespace cumulet::surface::detail {
 
 /// Fills images, textures and materials; the last material is the default one (glTF 2.0, 3.9.6), for primitives that
-/// name none. An image that cannot be had costs a warning, and is left out with its textures.
-void import_materials(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress,
-                      Scene& scene);
+/// name none. An image that cannot be had costs a warning, and is left out with its textures. Returns the materials as
+/// animations move them.
+std::vector<MovableMaterial> import_materials(const GltfFile& file, const Log& log, const std::string& name,
+                                              Budget& budget, Progress* progress, Scene& scene);
 
 /// Decodes a PNG, JPEG or WebP, whose bytes `owner` keeps; 16-bit channels are rounded to 8. Throws Error(file).
 Image decode_image(Bytes bytes, const Owner& owner, Budget& budget);
@@ -19,7 +21,7 @@ Image decode_image(Bytes bytes, const Owner& owner, Budget& budget);
 float narrow(double value);
 
 /// Where the light is and shines is left to the node.
-PunctualLight import_light(const tinygltf::Light& light, const std::string& what);
+MovableLight import_light(const tinygltf::Light& light, const std::string& what);
 /// Where the camera is is left to the node.
 SceneCamera import_camera(const tinygltf::Camera& camera, const std::string& what);
 

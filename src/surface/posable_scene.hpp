@@ -18,13 +18,21 @@ struct Instance {
   std::int32_t skin = -1;
 };
 
+/// A light under a node.
+struct PlacedLight {
+  std::uint32_t node = 0;
+  std::uint32_t light = 0;  ///< its number in the file
+  MovableLight at_rest;
+};
+
 class PosableScene final : public Scene {
  public:
   Rig rig;
   std::vector<MeshPart> parts;
   std::vector<Instance> instances;
-  std::vector<std::pair<std::uint32_t, PunctualLight>> lights;  ///< with their nodes
-  std::vector<std::pair<std::uint32_t, SceneCamera>> cameras;
+  std::vector<MovableMaterial> movable;  ///< the materials; empty: no animation moves any
+  std::vector<PlacedLight> lights;
+  std::vector<std::pair<std::uint32_t, SceneCamera>> cameras;  ///< with their nodes
 
   /// A draw of a part under a node, moved by a skin if that is not below 0. Throws Error(file) for too many vertices,
   /// Error(cancelled).
@@ -36,6 +44,10 @@ class PosableScene final : public Scene {
   [[nodiscard]] Pose pose(double time, std::size_t animation, const Progress* progress) const override;
 
  private:
+  /// Of what is there.
+  void bound(Pose& pose) const;
+  /// Materials and lights.
+  void move(const Track& track, double time, Pose& pose, std::vector<PlacedLight>& lights_now) const;
   /// True if the instance mirrors.
   bool place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const;
 };

@@ -165,6 +165,42 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
   return flipped;
 }
 
+void PosableScene::move(const Track& track, double time, Pose& pose, std::vector<PlacedLight>& lights_now) const {
+  std::vector<MovableMaterial> moved = movable;
+  std::vector<float> values;
+  for (const Channel& channel : track.channels) {
+    if (channel.property != Property::material && channel.property != Property::light) continue;
+    values.resize(channel.width);
+    sample(channel, time, values);
+    if (channel.property == Property::material) {
+      channel.of_material.set(moved[channel.target], values);
+      continue;
+    }
+    for (PlacedLight& light : lights_now) {
+      if (light.light == channel.target) channel.of_light.set(light.at_rest, values);
+    }
+  }
+  for (const MovableMaterial& material : moved) pose.materials.push_back(material.now);
+}
+
+void PosableScene::bound(Pose& pose) const {
+  glm::vec3 low(std::numeric_limits<float>::max());
+  glm::vec3 high(std::numeric_limits<float>::lowest());
+  bool any = false;
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    if (is_hidden(pose, i)) continue;
+    const std::size_t count = parts[instances[i].part].positions.size();
+    for (std::size_t v = instances[i].first_vertex; v < instances[i].first_vertex + count; ++v) {
+      low = glm::min(low, pose.vertices[v].position);
+      high = glm::max(high, pose.vertices[v].position);
+      any = true;
+    }
+  }
+  if (!any) return;
+  pose.low = low;
+  pose.high = high;
+}
+
 Pose PosableScene::pose(double time, std::size_t animation, const Progress* progress) const {
   const Track* track = animation < rig.tracks.size() ? &rig.tracks[animation] : nullptr;
   if (track != nullptr && !std::isfinite(time)) time = 0.0;
@@ -179,21 +215,17 @@ Pose PosableScene::pose(double time, std::size_t animation, const Progress* prog
   for (const Instance& instance : instances) {
     check(progress);
     result.flipped.push_back(place(instance, now, result, progress) ? 1 : 0);
+    result.hidden.push_back(now.visible[instance.node] ? 0 : 1);
   }
   check(progress);
-  if (!result.vertices.empty()) {
-    glm::vec3 low(std::numeric_limits<float>::max());
-    glm::vec3 high(std::numeric_limits<float>::lowest());
-    for (const PosedVertex& vertex : result.vertices) {
-      low = glm::min(low, vertex.position);
-      high = glm::max(high, vertex.position);
-    }
-    result.low = low;
-    result.high = high;
-  }
-  for (const auto& [node, light] : lights) {
-    const glm::dmat4& to_world = now.to_world[node];
-    result.lights.push_back(light);
+  bound(result);
+  std::vector<PlacedLight> lights_now = lights;
+  if (track != nullptr) move(*track, time, result, lights_now);
+  for (const PlacedLight& light : lights_now) {
+    if (!now.visible[light.node]) continue;
+    const glm::dmat4& to_world = now.to_world[light.node];
+    result.lights.push_back(light.at_rest.now);
+    result.lights.back().inner_cone = std::min(result.lights.back().inner_cone, result.lights.back().outer_cone);
     result.lights.back().position = glm::vec3(to_world[3]);
     if (!detail::finite(result.lights.back().position)) result.lights.back().position = glm::vec3(0.0F);
     result.lights.back().direction = direction(-glm::vec3(to_world[2]), glm::vec3(0, 0, -1));

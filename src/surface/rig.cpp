@@ -1,6 +1,7 @@
 #include "surface/rig.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <glm/gtc/type_ptr.hpp>
 
@@ -48,6 +49,10 @@ class Importer {
     if (frozen_ > 0) {
       log_.warning(name_ + ": " + std::to_string(frozen_) +
                    " animation channels of nodes that have a matrix, or no morph targets, are ignored");
+    }
+    if (not_followed_ > 0) {
+      const std::string others = not_followed_ == 1 ? "" : " and " + std::to_string(not_followed_ - 1) + " more";
+      log_.warning(name_ + ": animated pointers that are not followed: " + first_not_followed_ + others);
     }
     return std::move(rig_);
   }
@@ -148,10 +153,17 @@ class Importer {
   }
 
   void hide() {
+    std::vector<bool> shown(rig_.nodes.size(), false);  // by an animation
+    for (const Track& track : rig_.tracks) {
+      for (const Channel& channel : track.channels) {
+        if (channel.property == Property::visibility) shown[channel.target] = true;
+      }
+    }
     rig_.hidden.resize(rig_.nodes.size(), false);
     for (const std::uint32_t i : rig_.order) {
       const Node& node = rig_.nodes[i];
-      rig_.hidden[i] = !node.visible || (node.parent >= 0 && rig_.hidden[static_cast<std::size_t>(node.parent)]);
+      rig_.hidden[i] =
+          (!node.visible && !shown[i]) || (node.parent >= 0 && rig_.hidden[static_cast<std::size_t>(node.parent)]);
     }
   }
 
@@ -188,43 +200,122 @@ class Importer {
     check(progress_);
     const tinygltf::Animation& from = model_.animations[i];
     Track track;
-    for (std::size_t c = 0; c < from.channels.size(); ++c) {
-      const std::string what = numbered("animation", i) + ", " + numbered("channel", c);
-      auto made = channel(from, from.channels[c], what);
-      if (!made) continue;
+    const auto add = [&](std::optional<Channel> made) {
+      if (!made) return;
       track.duration = std::max(track.duration, double{made->times.back()});
       track.channels.push_back(std::move(*made));
+    };
+    for (std::size_t c = 0; c < from.channels.size(); ++c) {
+      const std::string what = numbered("animation", i) + ", " + numbered("channel", c);
+      const auto target = target_of(from.channels[c], what);
+      if (target) add(channel(from, from.channels[c].sampler, *target, what));
+    }
+    for (const PointerChannel& pointing : file_.pointers) {
+      if (pointing.animation != i) continue;
+      const std::string what = numbered("animation", i) + ", " + one_line(pointing.pointer);
+      const auto target = target_of(pointing.pointer, what);
+      if (target) {
+        add(channel(from, pointing.sampler, *target, what));
+      } else if (not_followed_++ == 0) {
+        first_not_followed_ = one_line(pointing.pointer);
+      }
     }
     scene_.animations.push_back({one_line(from.name), track.duration});
     rig_.tracks.push_back(std::move(track));
   }
 
   /// Nothing if it moves nothing.
-  std::optional<Channel> channel(const tinygltf::Animation& animation, const tinygltf::AnimationChannel& from,
-                                 const std::string& what) {
-    Channel to;
+  std::optional<Channel> target_of(const tinygltf::AnimationChannel& from, const std::string& what) const {
     if (from.target_node < 0) return std::nullopt;
-    to.node = static_cast<std::uint32_t>(from.target_node);
-    if (to.node >= rig_.nodes.size()) malformed(what + ": there is no node " + std::to_string(to.node));
-    if (from.sampler < 0 || static_cast<std::size_t>(from.sampler) >= animation.samplers.size()) {
-      malformed(what + ": there is no sampler " + std::to_string(from.sampler));
+    return node_target(static_cast<std::size_t>(from.target_node), from.target_path, what);
+  }
+
+  /// What a pointer of KHR_animation_pointer names; nothing if that is not followed.
+  std::optional<Channel> target_of(std::string_view pointer, const std::string& what) const {
+    std::size_t number = 0;
+    std::string_view rest = pointer;
+    if (below("/nodes/", rest, number)) {
+      return node_target(number, rest == "extensions/KHR_node_visibility/visible" ? "visible" : rest, what);
     }
-    const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<std::size_t>(from.sampler)];
-    const Node& node = rig_.nodes[to.node];
-    if (from.target_path == "translation") {
+    Channel to;
+    if (below("/materials/", rest, number)) {
+      const auto member = material_member(rest);
+      if (!member) return std::nullopt;
+      if (number >= model_.materials.size()) malformed(what + ": there is no material " + std::to_string(number));
+      to.property = Property::material;
+      to.width = member->width;
+      to.of_material = *member;
+    } else if (below("/extensions/KHR_lights_punctual/lights/", rest, number)) {
+      const auto member = light_member(rest);
+      if (!member) return std::nullopt;
+      if (number >= model_.lights.size()) malformed(what + ": there is no light " + std::to_string(number));
+      to.property = Property::light;
+      to.width = member->width;
+      to.of_light = *member;
+    } else {
+      return std::nullopt;
+    }
+    to.target = static_cast<std::uint32_t>(number);
+    return to;
+  }
+
+  /// Whether `text` begins with `head`, a number and a slash: takes them off it.
+  static bool below(std::string_view head, std::string_view& text, std::size_t& number) {
+    if (!text.starts_with(head)) return false;
+    std::string_view rest = text.substr(head.size());
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
+    if (error != std::errc()) return false;
+    rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
+    if (!rest.starts_with('/')) return false;
+    text = rest.substr(1);
+    return true;
+  }
+
+  std::optional<Channel> node_target(std::size_t node, std::string_view path, const std::string& what) const {
+    if (node >= rig_.nodes.size()) malformed(what + ": there is no node " + std::to_string(node));
+    Channel to;
+    to.target = static_cast<std::uint32_t>(node);
+    if (path == "translation") {
       to.property = Property::translation;
-    } else if (from.target_path == "rotation") {
+    } else if (path == "rotation") {
       to.property = Property::rotation;
       to.width = 4;
-    } else if (from.target_path == "scale") {
+    } else if (path == "scale") {
       to.property = Property::scale;
-    } else if (from.target_path == "weights") {
+    } else if (path == "weights") {
       to.property = Property::weights;
-      to.width = node.weights.size();
+      to.width = rig_.nodes[node].weights.size();
+    } else if (path == "visible") {
+      to.property = Property::visibility;
+      to.width = 1;
     } else {
       return std::nullopt;  // of an extension
     }
-    if (to.property == Property::weights ? to.width == 0 : node.matrix.has_value()) {
+    return to;
+  }
+
+  /// Whether an animation can move it: not what a matrix holds, nor weights of no targets.
+  [[nodiscard]] bool moves(const Channel& channel) const {
+    switch (channel.property) {
+      case Property::translation:
+      case Property::rotation:
+      case Property::scale:
+        return !rig_.nodes[channel.target].matrix.has_value();
+      case Property::weights:
+        return channel.width > 0;
+      default:
+        return true;
+    }
+  }
+
+  /// Nothing if it moves nothing.
+  std::optional<Channel> channel(const tinygltf::Animation& animation, int sampler_number, Channel to,
+                                 const std::string& what) {
+    if (sampler_number < 0 || static_cast<std::size_t>(sampler_number) >= animation.samplers.size()) {
+      malformed(what + ": there is no sampler " + std::to_string(sampler_number));
+    }
+    const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<std::size_t>(sampler_number)];
+    if (!moves(to)) {
       ++frozen_;
       return std::nullopt;
     }
@@ -234,6 +325,9 @@ class Importer {
       to.interpolation = Interpolation::cubic_spline;
     } else if (sampler.interpolation != "LINEAR") {
       malformed(what + ": interpolation \"" + one_line(sampler.interpolation) + "\" is none of glTF's");
+    }
+    if (to.property == Property::visibility && to.interpolation != Interpolation::step) {
+      malformed(what + ": what is true or false changes by STEP alone");
     }
     if (file_.without_data(sampler.input) || file_.without_data(sampler.output)) {
       ++without_data_;
@@ -264,11 +358,13 @@ class Importer {
         for (std::size_t c = 0; c < to.width; ++c) to.values.push_back(vector[static_cast<int>(c)]);
       }
     };
-    if (to.property == Property::weights) {
+    if (to.property == Property::weights || to.width == 1) {
       to.values = accessors_.scalars(accessor, what);
-    } else if (to.property == Property::rotation) {
+    } else if (to.width == 4) {
       if (accessors_.type(accessor, what) != TINYGLTF_TYPE_VEC4) malformed(what + " has the wrong type of element");
       flatten(accessors_.vectors<4>(accessor, what));
+    } else if (to.width == 2) {
+      flatten(accessors_.vectors<2>(accessor, what));
     } else {
       flatten(accessors_.vectors<3>(accessor, what));
     }
@@ -286,6 +382,8 @@ class Importer {
   std::size_t unmatched_ = 0;
   std::size_t without_data_ = 0;
   std::size_t frozen_ = 0;
+  std::size_t not_followed_ = 0;
+  std::string first_not_followed_;
 };
 
 glm::dquat quaternion(const float* from) {
@@ -364,13 +462,15 @@ Stance stance(const Rig& rig, const Track* track, double time) {
   for (const Node& node : rig.nodes) {
     local.push_back({node.translation, node.rotation, node.scale});
     result.weights.push_back(node.weights);
+    result.visible.push_back(node.visible);
   }
   if (track != nullptr) {
     std::vector<float> values;
     for (const Channel& channel : track->channels) {
+      if (channel.property == Property::material || channel.property == Property::light) continue;
       values.resize(channel.width);
       sample(channel, time, values);
-      Moved& moved = local[channel.node];
+      Moved& moved = local[channel.target];
       switch (channel.property) {
         case Property::translation:
           moved.translation = glm::make_vec3(values.data());
@@ -382,7 +482,12 @@ Stance stance(const Rig& rig, const Track* track, double time) {
           moved.scale = glm::make_vec3(values.data());
           break;
         case Property::weights:
-          result.weights[channel.node] = values;
+          result.weights[channel.target] = values;
+          break;
+        case Property::visibility:
+          result.visible[channel.target] = values[0] != 0.0F;
+          break;
+        default:
           break;
       }
     }
@@ -398,6 +503,7 @@ Stance stance(const Rig& rig, const Track* track, double time) {
       for (int c = 0; c < 3; ++c) matrix[c] *= local[i].scale[c];
       matrix[3] = glm::dvec4(local[i].translation, 1.0);
     }
+    if (node.parent >= 0 && !result.visible[static_cast<std::size_t>(node.parent)]) result.visible[i] = false;
     result.to_world[i] = node.parent < 0 ? matrix : result.to_world[static_cast<std::size_t>(node.parent)] * matrix;
   }
   return result;

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "surface/gltf_file.hpp"
+#include "surface/material_motion.hpp"
 #include "surface/scene.hpp"
 
 namespace cumulet::surface::detail {
@@ -27,16 +28,18 @@ struct Skin {
 };
 
 enum class Interpolation : std::uint8_t { linear, step, cubic_spline };
-enum class Property : std::uint8_t { translation, rotation, scale, weights };
+enum class Property : std::uint8_t { translation, rotation, scale, weights, visibility, material, light };
 
 /// glTF 2.0, 3.11 and appendix C.
 struct Channel {
-  std::uint32_t node = 0;
+  std::uint32_t target = 0;  ///< the number of a node, of a material or of a light
   Property property = Property::translation;
   Interpolation interpolation = Interpolation::linear;
   std::size_t width = 3;  ///< numbers a key
   std::vector<float> times;
-  std::vector<float> values;  ///< a key: its value, or in-tangent, value and out-tangent
+  std::vector<float> values;            ///< a key: its value, or in-tangent, value and out-tangent
+  Member<MovableMaterial> of_material;  ///< of Property::material
+  Member<MovableLight> of_light;        ///< of Property::light
 };
 
 struct Track {
@@ -62,9 +65,10 @@ struct Rig {
 Rig import_rig(const GltfFile& file, const Log& log, const std::string& name, Budget& budget, Progress* progress,
                Scene& scene);
 
-/// Local transforms and morph weights of all nodes at a time.
+/// Of all nodes at a time.
 struct Stance {
   std::vector<glm::dmat4> to_world;
+  std::vector<bool> visible;  ///< with all that they descend from
   std::vector<std::vector<float>> weights;
 };
 

@@ -46,6 +46,7 @@ struct TextureUse {
   std::int32_t texture = -1;  ///< -1: none
   std::uint32_t uv_set = 0;   ///< 0 or 1
   glm::mat3x2 transform{1.0F, 0.0F, 0.0F, 1.0F, 0.0F, 0.0F};
+  bool operator==(const TextureUse&) const = default;
 };
 
 enum class AlphaMode : std::uint8_t { opaque, mask, blend };
@@ -79,6 +80,7 @@ struct Material {
   TextureUse clearcoat_roughness_texture;  ///< G
   float transmission = 0.0F;
   TextureUse transmission_texture;  ///< R
+  bool operator==(const Material&) const = default;
 };
 
 /// KHR_lights_punctual, in the scene's units: candela for point and spot, lux for directional; Cumulet takes both as
@@ -132,10 +134,12 @@ struct Pose {
   double time = 0.0;
   std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
   std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
+  std::vector<std::uint8_t> hidden;   ///< a Draw each: 1 where it is not there at this time; empty: none
+  std::vector<Material> materials;    ///< as they are at this time; empty: the scene's
   bool double_sided = false;          ///< all materials count as double sided, whatever they say
   std::vector<PunctualLight> lights;
   std::vector<SceneCamera> cameras;
-  glm::dvec3 low{0.0};  ///< bounds of all triangles
+  glm::dvec3 low{0.0};  ///< bounds of all triangles that are there
   glm::dvec3 high{0.0};
 };
 
@@ -173,6 +177,13 @@ class Scene {
   /// Cancelled, throws Error(cancelled).
   [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0, const Progress* progress = nullptr) const = 0;
 };
+
+/// As they are in a pose of the scene.
+inline const std::vector<Material>& materials_of(const Scene& scene, const Pose& pose) {
+  return pose.materials.empty() ? scene.materials : pose.materials;
+}
+/// Whether a draw is not there.
+inline bool is_hidden(const Pose& pose, std::size_t draw) { return !pose.hidden.empty() && pose.hidden[draw] != 0; }
 
 using ScenePtr = std::shared_ptr<const Scene>;
 

@@ -13,6 +13,31 @@ inline bool finite(const glm::vec3& v) { return std::isfinite(v.x) && std::isfin
 inline bool unit(const glm::vec3& v) { return finite(v) && std::abs(glm::length(v) - 1.0F) < 1e-3F; }
 
 /// Empty, or what is broken.
+inline std::string broken(const surface::Scene& scene, const surface::Material& m) {
+  for (const surface::TextureUse* use :
+       {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture,
+        &m.emission_texture, &m.specular_texture, &m.specular_color_texture, &m.clearcoat_texture,
+        &m.clearcoat_roughness_texture, &m.transmission_texture}) {
+    if (use->texture < -1 || use->texture >= static_cast<std::int32_t>(scene.textures.size()) || use->uv_set > 1) {
+      return "a texture use is out of range";
+    }
+    for (int c = 0; c < 3; ++c) {
+      if (!std::isfinite(use->transform[c].x) || !std::isfinite(use->transform[c].y))
+        return "a transform is not finite";
+    }
+  }
+  const float numbers[] = {m.base_color.a,       m.metallic, m.roughness, m.normal_scale, m.alpha_cutoff,
+                           m.occlusion_strength, m.ior,      m.specular,  m.clearcoat,    m.clearcoat_roughness,
+                           m.transmission};
+  for (const float number : numbers) {
+    if (!std::isfinite(number)) return "a material is not finite";
+  }
+  if (!finite(glm::vec3(m.base_color)) || !finite(m.emission) || !finite(m.specular_color)) {
+    return "a colour is not finite";
+  }
+  return "";
+}
+
 inline std::string broken(const surface::Scene& scene) {
   if (scene.materials.empty()) return "no material";
   if (scene.indices.size() % 3 != 0) return "indices are not triangles";
@@ -34,27 +59,7 @@ inline std::string broken(const surface::Scene& scene) {
     if (image.rgba.size() != std::size_t{4} * image.width * image.height) return "an image is of another size";
   }
   for (const surface::Material& m : scene.materials) {
-    for (const surface::TextureUse* use :
-         {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture,
-          &m.emission_texture, &m.specular_texture, &m.specular_color_texture, &m.clearcoat_texture,
-          &m.clearcoat_roughness_texture, &m.transmission_texture}) {
-      if (use->texture < -1 || use->texture >= static_cast<std::int32_t>(scene.textures.size()) || use->uv_set > 1) {
-        return "a texture use is out of range";
-      }
-      for (int c = 0; c < 3; ++c) {
-        if (!std::isfinite(use->transform[c].x) || !std::isfinite(use->transform[c].y))
-          return "a transform is not finite";
-      }
-    }
-    const float numbers[] = {m.base_color.a,       m.metallic, m.roughness, m.normal_scale, m.alpha_cutoff,
-                             m.occlusion_strength, m.ior,      m.specular,  m.clearcoat,    m.clearcoat_roughness,
-                             m.transmission};
-    for (const float number : numbers) {
-      if (!std::isfinite(number)) return "a material is not finite";
-    }
-    if (!finite(glm::vec3(m.base_color)) || !finite(m.emission) || !finite(m.specular_color)) {
-      return "a colour is not finite";
-    }
+    if (const std::string what = broken(scene, m); !what.empty()) return what;
   }
   for (const surface::VertexAttributes& a : scene.attributes) {
     if (!finite(glm::vec3(a.uv[0], a.uv[1].x)) || !std::isfinite(a.uv[1].y)) return "a coordinate is not finite";
@@ -69,13 +74,18 @@ inline std::string broken(const surface::Scene& scene) {
 inline std::string broken(const surface::Scene& scene, const surface::Pose& pose) {
   if (pose.vertices.size() != scene.attributes.size()) return "a pose lacks vertices";
   if (pose.flipped.size() != scene.draws.size()) return "a pose lacks draws";
+  if (!pose.hidden.empty() && pose.hidden.size() != scene.draws.size()) return "a pose lacks draws";
+  if (!pose.materials.empty() && pose.materials.size() != scene.materials.size()) return "a pose lacks materials";
+  for (const surface::Material& m : pose.materials) {
+    if (const std::string what = broken(scene, m); !what.empty()) return what;
+  }
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
     const surface::Draw& draw = scene.draws[d];
     const bool mapped = scene.materials[draw.material].normal_texture.texture >= 0;
     for (std::size_t i = draw.first_index; i < std::size_t{draw.first_index} + draw.index_count; ++i) {
       const surface::PosedVertex& v = pose.vertices[scene.indices[i]];
       if (!finite(v.position)) return "a position is not finite";
-      for (int c = 0; c < 3; ++c) {
+      for (int c = 0; c < 3 && !surface::is_hidden(pose, d); ++c) {
         if (v.position[c] < pose.low[c] || v.position[c] > pose.high[c]) return "a position is out of bounds";
       }
       if (!unit(v.normal)) return "a normal is not of unit length";

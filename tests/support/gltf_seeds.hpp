@@ -241,6 +241,47 @@ inline GltfModel seed_animated() {
   return model;
 }
 
+/// An animation of one key a second by KHR_animation_pointer.
+struct Pointing {
+  std::string pointer;
+  std::size_t width;
+  std::vector<float> values;
+  const char* interpolation = "LINEAR";
+};
+inline void animate(GltfModel& model, const std::vector<Pointing>& pointings) {
+  json animation = {{"name", "pointers"}, {"samplers", json::array()}, {"channels", json::array()}};
+  const char* types[] = {"", "SCALAR", "VEC2", "VEC3", "VEC4"};
+  for (const Pointing& pointing : pointings) {
+    const std::size_t keys = pointing.values.size() / pointing.width;
+    std::vector<float> times;
+    for (std::size_t k = 0; k < keys; ++k) times.push_back(static_cast<float>(k));
+    animation["channels"].push_back(
+        {{"sampler", animation["samplers"].size()},
+         {"target",
+          {{"path", "pointer"}, {"extensions", {{"KHR_animation_pointer", {{"pointer", pointing.pointer}}}}}}}});
+    animation["samplers"].push_back({{"input", model.scalars(times)},
+                                     {"output", model.accessor(types[pointing.width], pointing.width, pointing.values)},
+                                     {"interpolation", pointing.interpolation}});
+  }
+  model.root["extensionsUsed"].push_back("KHR_animation_pointer");
+  model.add("animations", animation);
+}
+
+/// seed_materials() in motion.
+inline GltfModel seed_pointers() {
+  GltfModel model = seed_materials();
+  const std::string first = "/materials/0/";
+  animate(model,
+          {{first + "pbrMetallicRoughness/baseColorFactor", 4, {0, 0, 0, 0, 1, 0.5F, 0.25F, 1}},
+           {first + "emissiveFactor", 3, {0, 0, 0, 1, 1, 1}},
+           {first + "extensions/KHR_materials_emissive_strength/emissiveStrength", 1, {1, 9}},
+           {first + "pbrMetallicRoughness/baseColorTexture/extensions/KHR_texture_transform/offset", 2, {0, 0, 1, 2}},
+           {"/extensions/KHR_lights_punctual/lights/1/intensity", 1, {1, 3}},
+           {"/nodes/4/extensions/KHR_node_visibility/visible", 1, {0, 1}, "STEP"},
+           {"/nodes/1/rotation", 4, {0, 0, 0, 1, 0, 1, 0, 0}}});
+  return model;
+}
+
 /// A grid of (n + 1)^2 vertices in the unit square at z = 0, its triangles facing +z.
 struct Grid {
   std::vector<float> positions;

@@ -169,7 +169,7 @@ TEST(Emitters, ArePickedByPower) {
     scene->add_quad(square(static_cast<float>(i), 0.1F * static_cast<float>(i * i), i % 3 == 0), i % 4);
   }
   scene->rest.flipped[5] = 1;
-  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene);
+  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene, scene->rest);
   ASSERT_EQ(emissive.size(), 40U);
   const EmitterTable table = light::emitter_table(emissive, *scene, scene->rest);
   double sum = 0.0;
@@ -211,7 +211,7 @@ TEST(Emitters, WithoutAreaOrLightAreNone) {
   scene->materials[1].emission_texture.texture = 0;
   scene->add_quad(square(0.0F, 0.0F, true), 0);
   scene->add_quad(square(0.0F, 1.0F, true), 1);
-  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene);
+  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene, scene->rest);
   EXPECT_EQ(emissive.size(), 2U);
   const EmitterTable table = light::emitter_table(emissive, *scene, scene->rest);
   EXPECT_TRUE(table.entries.empty());
@@ -230,7 +230,7 @@ TEST(Emitters, TexturesSayWhichTrianglesShine) {
       scene->attributes[i].uv[0] = vec2(middle, 0.5F) + 0.2F * (scene->attributes[i].uv[0] - 0.5F);
     }
   }
-  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene);
+  const std::vector<EmissiveTriangle> emissive = light::emissive_triangles(*scene, scene->rest);
   ASSERT_EQ(emissive.size(), 4U);
   EXPECT_NEAR(emissive[0].luminance, 0.503, 0.001);
   EXPECT_NEAR(emissive[1].luminance, 0.503, 0.001);

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "scene/model_source.hpp"
 #include "support/gltf_import.hpp"
 #include "support/gltf_model.hpp"
 #include "support/gltf_seeds.hpp"
@@ -132,6 +133,183 @@ TEST(GltfWebp, HostileFilesCostOneLine) {
   GltfModel no_image = test::seed_webp(good);
   no_image.root["textures"][0]["extensions"]["EXT_texture_webp"]["source"] = 9;
   EXPECT_TRUE(has(refused(no_image), "texture 0: there is no image 9"));
+}
+
+/// A triangle with texture coordinates, of a material with a texture, under a node; and a light under another.
+GltfModel moving_model(const json& material = json::object()) {
+  GltfModel model;
+  model.root["extensionsUsed"] = {"KHR_lights_punctual"};
+  model.add("images", {{"bufferView", model.view(test::png(2, 1, 8, 6, {255, 0, 0, 255, 0, 255, 0, 255}))}});
+  model.add("textures", {{"source", 0}});
+  json with_texture = {{"emissiveTexture", {{"index", 0}}}};
+  with_texture.update(material);
+  model.add("materials", with_texture);
+  model.show({{"attributes", {{"POSITION", model.triangle()}, {"TEXCOORD_0", model.vec2({0, 0, 1, 0, 0, 1})}}},
+              {"targets", json::array({{{"POSITION", model.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1})}}})},
+              {"material", 0}});
+  model.root["extensions"]["KHR_lights_punctual"]["lights"] =
+      json::array({{{"type", "spot"}, {"spot", json::object()}, {"color", {1, 0.5, 0.25}}, {"intensity", 4}}});
+  model.add("nodes", {{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  return model;
+}
+
+TEST(GltfPointers, NodesMoveAsByPathsOfTheirOwn) {
+  GltfModel model = moving_model();
+  animate(model, {{"/nodes/0/translation", 3, {0, 0, 0, 10, 0, 0}},
+                  {"/nodes/0/scale", 3, {1, 1, 1, 3, 3, 3}},
+                  {"/nodes/0/rotation", 4, {0, 0, 0, 1, 0, 0, 0.70710678F, 0.70710678F}},
+                  {"/nodes/0/weights", 1, {0, 1}}});
+  const ScenePtr scene = imported(model);
+  ASSERT_EQ(scene->animations.size(), 1U);
+  EXPECT_EQ(scene->animations[0].duration, 1.0);
+  // At the end itself, which is not looped.
+  const auto at = test::corners(*scene, scene->pose(1.0));
+  test::near(at[0], {10, 0, 3});
+  test::near(at[1], {10, 3, 3});
+  test::near(test::corners(*scene, scene->pose(0.5))[0], {5, 0, 1});
+}
+
+TEST(GltfPointers, VisibilityComesAndGoesWithAllThatIsMadeOfIt) {
+  GltfModel model = moving_model({{"emissiveFactor", {1, 1, 1}}});
+  const json second = model.root["meshes"][0]["primitives"][0];
+  const int far = model.show(second, {{"translation", {50, 0, 0}}});
+  const int parent =
+      model.add("nodes", {{"children", json::array({far, 1})}, {"extensions", visible(false)}});  // and the light
+  animate(model,
+          {{"/nodes/" + std::to_string(parent) + "/extensions/KHR_node_visibility/visible", 1, {0, 1, 0}, "STEP"}});
+  const ScenePtr scene = imported(model);
+  EXPECT_EQ(scene->triangle_count(), 2U);
+  const Pose without = scene->pose(0.5);
+  const Pose with = scene->pose(1.5);
+  EXPECT_EQ(without.hidden, (std::vector<std::uint8_t>{0, 1}));
+  EXPECT_EQ(with.hidden, (std::vector<std::uint8_t>{0, 0}));
+  EXPECT_EQ(without.high.x, 1.0);
+  EXPECT_EQ(with.high.x, 51.0);
+  EXPECT_TRUE(without.lights.empty());
+  EXPECT_EQ(with.lights.size(), 1U);
+  EXPECT_EQ(scene->pose(0.0, 7).hidden, without.hidden);  // at rest
+  EXPECT_EQ(scene->pose(2.0).hidden, without.hidden);     // as by the last key
+
+  Progress progress;
+  const scene::ModelSourcePtr first = scene::make_model_source(scene, without, &progress);
+  EXPECT_EQ(first->bvh.records().size(), 1U);
+  EXPECT_EQ(first->emissive.size(), 1U);
+  EXPECT_EQ(first->raster->solid.size(), 1U);
+  const scene::ModelSourcePtr then = scene::make_model_source(*first, with, &progress);
+  EXPECT_EQ(then->bvh.records().size(), 2U);
+  EXPECT_EQ(then->emissive.size(), 2U);
+  EXPECT_EQ(then->raster->solid.size(), 2U);
+  EXPECT_EQ(then->raster->pictures, first->raster->pictures);
+  EXPECT_EQ(then->words, scene::make_model_source(scene, with, &progress)->words);
+}
+
+TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
+  GltfModel model = moving_model({{"emissiveFactor", {0, 0, 0}},
+                                  {"alphaMode", "MASK"},
+                                  {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 2}}}}}});
+  const std::string of = "/materials/0/";
+  const std::string transform = of + "emissiveTexture/extensions/KHR_texture_transform/";
+  animate(model, {{of + "pbrMetallicRoughness/baseColorFactor", 4, {0, 0, 0, 0, 1, 0.5F, 0.25F, 1}},
+                  {of + "pbrMetallicRoughness/metallicFactor", 1, {0, 1}},
+                  {of + "pbrMetallicRoughness/roughnessFactor", 1, {1, 3}},  // more than there is
+                  {of + "alphaCutoff", 1, {0.2F, 0.4F}},
+                  {of + "emissiveFactor", 3, {0, 0, 0, 1, 0.5F, 0}},
+                  {of + "extensions/KHR_materials_emissive_strength/emissiveStrength", 1, {4, 8}},
+                  {of + "extensions/KHR_materials_ior/ior", 1, {1.5F, 2}},
+                  {transform + "offset", 2, {0, 0, 1, 2}},
+                  {transform + "scale", 2, {1, 1, 3, -1}},
+                  {transform + "rotation", 1, {0, 1}}});
+  Lines lines;
+  const ScenePtr scene = imported(model.gltf(), lines.log);
+  EXPECT_TRUE(lines.warnings.empty());
+  // The same from a file that says so itself.
+  const json still_transform = {{"offset", {0.5, 1}}, {"scale", {2, 0}}, {"rotation", 0.5}};
+  const json still = {
+      {"pbrMetallicRoughness",
+       {{"baseColorFactor", {0.5, 0.25, 0.125, 0.5}}, {"metallicFactor", 0.5}, {"roughnessFactor", 1}}},
+      {"alphaMode", "MASK"},
+      {"alphaCutoff", 0.3F},
+      {"emissiveFactor", {0.5, 0.25, 0}},
+      {"emissiveTexture", {{"index", 0}, {"extensions", {{"KHR_texture_transform", still_transform}}}}},
+      {"extensions",
+       {{"KHR_materials_emissive_strength", {{"emissiveStrength", 6}}}, {"KHR_materials_ior", {{"ior", 1.75}}}}}};
+  const ScenePtr same = imported(moving_model(still).gltf());
+  const Pose pose = scene->pose(0.5);
+  ASSERT_EQ(pose.materials.size(), scene->materials.size());
+  const Material& got = pose.materials[0];
+  const Material& wanted = same->materials[0];
+  for (int c = 0; c < 4; ++c) EXPECT_FLOAT_EQ(got.base_color[c], wanted.base_color[c]);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_FLOAT_EQ(got.emission[c], wanted.emission[c]);
+    for (int r = 0; r < 2; ++r) {
+      EXPECT_NEAR(got.emission_texture.transform[c][r], wanted.emission_texture.transform[c][r], 1e-6);
+    }
+  }
+  EXPECT_FLOAT_EQ(got.metallic, wanted.metallic);
+  EXPECT_FLOAT_EQ(got.roughness, wanted.roughness);
+  EXPECT_FLOAT_EQ(got.alpha_cutoff, wanted.alpha_cutoff);
+  EXPECT_FLOAT_EQ(got.ior, wanted.ior);
+  EXPECT_EQ(got.emission_texture.texture, wanted.emission_texture.texture);
+  EXPECT_EQ(materials_of(*scene, scene->pose(0.0, 7))[0], scene->materials[0]);  // at rest
+  // At its beginning it is dark, and no light.
+  Progress progress;
+  const scene::ModelSourcePtr dark = scene::make_model_source(scene, scene->pose(0.0), &progress);
+  EXPECT_TRUE(dark->emissive.empty());
+  const scene::ModelSourcePtr bright = scene::make_model_source(*dark, pose, &progress);
+  const scene::ModelSourcePtr fresh = scene::make_model_source(scene, pose, &progress);
+  EXPECT_EQ(bright->emissive.size(), 1U);
+  EXPECT_EQ(bright->words, fresh->words);
+  EXPECT_NE(bright->words, dark->words);
+  EXPECT_EQ(bright->raster->material_blocks, fresh->raster->material_blocks);
+  EXPECT_EQ(bright->raster->pictures, dark->raster->pictures);
+  EXPECT_EQ(bright->atlas, dark->atlas);
+}
+
+TEST(GltfPointers, LightsAreThoseOfTheMoment) {
+  GltfModel model = moving_model();
+  const std::string of = "/extensions/KHR_lights_punctual/lights/0/";
+  animate(model, {{of + "color", 3, {0, 0, 0, 1, 0.5F, 0}},
+                  {of + "intensity", 1, {0, 8}},
+                  {of + "spot/outerConeAngle", 1, {0.2F, 0.4F}},
+                  {of + "spot/innerConeAngle", 1, {0, 2}}});
+  const ScenePtr scene = imported(model);
+  const Pose pose = scene->pose(0.5);
+  ASSERT_EQ(pose.lights.size(), 1U);
+  EXPECT_EQ(pose.lights[0].intensity, glm::vec3(2, 1, 0));
+  EXPECT_FLOAT_EQ(pose.lights[0].outer_cone, 0.3F);
+  EXPECT_FLOAT_EQ(pose.lights[0].inner_cone, 0.3F);  // never the wider
+  EXPECT_EQ(scene->pose(0.0, 7).lights[0].intensity, glm::vec3(4, 2, 1));
+}
+
+TEST(GltfPointers, WhatIsNotFollowedIsToldOnce) {
+  GltfModel model = moving_model();
+  animate(model, {{"/cameras/0/perspective/yfov", 1, {0.5F, 1}},
+                  {"/materials/0/extensions/KHR_materials_transmission/transmissionFactor", 1, {0, 1}},
+                  {"/materials/0/normalTexture/extensions/KHR_texture_transform/rotation", 1, {0, 1}},
+                  {"/nodes/x/translation", 3, {0, 0, 0, 1, 0, 0}},
+                  {"/nodes/0", 1, {0, 1}},
+                  {"", 1, {0, 1}},
+                  {"/nodes/0/translation", 3, {0, 0, 0, 10, 0, 0}}});
+  Lines lines;
+  const ScenePtr scene = imported(model, lines.log);
+  ASSERT_EQ(lines.warnings.size(), 1U);
+  EXPECT_TRUE(has(lines.warnings[0], "not followed: /cameras/0/perspective/yfov and 5 more")) << lines.warnings[0];
+  EXPECT_EQ(scene->pose(1.0).low.x, 10.0);
+}
+
+TEST(GltfPointers, HostileOnesAreRefusedInALine) {
+  const auto line = [](const test::Pointing& pointing) {
+    GltfModel model = moving_model();
+    animate(model, {pointing});
+    return refused(model);
+  };
+  EXPECT_TRUE(has(line({"/nodes/9/translation", 3, {0, 0, 0}}), "there is no node 9"));
+  // The number after the file's last is the default material's, which no file names.
+  EXPECT_TRUE(has(line({"/materials/1/alphaCutoff", 1, {0}}), "there is no material 1"));
+  EXPECT_TRUE(has(line({"/extensions/KHR_lights_punctual/lights/1/intensity", 1, {0}}), "there is no light 1"));
+  EXPECT_TRUE(has(line({"/nodes/0/extensions/KHR_node_visibility/visible", 1, {0, 1}}), "by STEP alone"));
+  EXPECT_TRUE(has(line({"/materials/0/emissiveFactor", 2, {0, 1}}), "wrong type of element"));
+  EXPECT_TRUE(has(line({"/materials/0/emissiveFactor", 4, {0, 1, 2, 3}}), "wrong type of element"));
 }
 
 }  // namespace

@@ -151,7 +151,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
   }
   RasterContentPtr content_of(const std::shared_ptr<HandScene>& scene, surface::Pose pose,
                               const cumulet::gl::Limits& limits) {
-    auto source = cumulet::scene::make_raster_source(scene);
+    auto source = cumulet::scene::make_raster_source(scene, pose);
     auto centres = std::make_shared<const std::vector<glm::vec3>>(cumulet::scene::blended_centres(*source, pose));
     render::Upload upload(gl_, "uploading");
     auto content = render::RasterContent::plan(
