@@ -115,6 +115,7 @@ void open_surfaces(Model& model, const std::string& path) {
   model.scene.surfaces = path;
   model.scene.surface = {};
   model.scene.surface.struct_size = sizeof model.scene.surface;
+  model.scene.surface_variant.clear();
   model.scene.surface_camera = -1;
   if (std::exchange(model.unchosen_ground, false) && model.scene.ground.place == CUMULET_GROUND_BELOW)
     model.scene.ground.place = CUMULET_GROUND_NONE;

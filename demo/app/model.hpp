@@ -132,6 +132,7 @@ struct Status {
   cumulet_stats stats{};
   cumulet_surfaces_info surfaces{};
   cumulet_animation_info animation{};  // that is set, of those
+  std::vector<std::string> variants;   // of their materials
   std::optional<double> compiled;      // the part of the first scene's programs that is, until all are
   bool busy = false;                   // a file is read, a grid is built, a sky computed or programs are compiled
   std::string loading;                 // the file that is read, until what it shows is there

@@ -241,9 +241,29 @@ void Panel::surfaces(Model& model) {
     rows_.draw(time, surface.time);
   });
   ImGui::EndDisabled();
+  variant(model);
   if (any) ui_.fact("Triangles", short_count(double(info.triangles)));
   if (ui_.button("Remove surfaces", "Shows the volume alone.")) model.scene.surfaces.clear();
   ImGui::EndDisabled();
+}
+
+void Panel::variant(Model& model) {
+  const std::vector<std::string>& names = model.status.variants;
+  if (names.empty()) return;
+  std::string& wanted = model.scene.surface_variant;
+  std::vector<Choice> choices = {{"none", 0, "The materials that the file has without a choice."}};
+  int chosen = wanted.empty() ? 0 : -1;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const int number = static_cast<int>(i) + 1;
+    choices.push_back({names[i].c_str(), number, "A variant of the file's materials."});
+    if (chosen < 0 && (names[i] == wanted || std::to_string(i) == wanted)) chosen = number;
+  }
+  if (!ui_.choose("Variant", "Which of the model's variants of materials is shown.", choices, chosen)) return;
+  const auto index = static_cast<std::size_t>(chosen - 1);
+  wanted = chosen == 0 ? "" : names[index];
+  // Where names do not tell, the number does.
+  if (chosen > 0 && std::ranges::find(names, wanted) - names.begin() != chosen - 1) wanted = std::to_string(index);
+  if (chosen > 0 && wanted.empty()) wanted = std::to_string(index);
 }
 
 void Panel::medium(Model& model, std::vector<Command>& commands) {

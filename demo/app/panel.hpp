@@ -47,6 +47,7 @@ class Panel {
   void medium(Model& model, std::vector<Command>& commands);
   void ramps(Model& model);
   void surfaces(Model& model);
+  void variant(Model& model);
   void grid(Model& model);
   void sampling(Model& model);
   void statistics(const Model& model);

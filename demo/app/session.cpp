@@ -276,11 +276,12 @@ void Session::drop_thumbnail() {
 }
 
 void Session::follow_surfaces() {
-  if (!same(known_->surface, scene_.surface)) {
-    check(cumulet_set_surface_settings(viewer_.get(), &scene_.surface));
+  if (!same(known_->surface, scene_.surface) || known_->surface_variant != scene_.surface_variant) {
+    set_surfaces();
     if (known_->surface.animation != scene_.surface.animation) read_surfaces();
   }
   known_->surface = scene_.surface;
+  known_->surface_variant = scene_.surface_variant;
   if (known_->surfaces == scene_.surfaces) return;
   known_->surfaces = scene_.surfaces;
   if (scene_.surfaces.empty()) {
@@ -293,6 +294,18 @@ void Session::follow_surfaces() {
   scene_.surfaces = known_->surfaces = shown_surfaces_;
 }
 
+void Session::set_surfaces() {
+  cumulet_surface_settings_desc settings = scene_.surface;
+  try {
+    // Of surfaces that are still read it is found once they are there.
+    if (known_->surfaces == scene_.surfaces && !waiting_for_surfaces_)
+      settings.variant = variant_number(scene_, status_.variants);
+  } catch (const std::runtime_error& error) {
+    tell(true, error.what());
+  }
+  check(cumulet_set_surface_settings(viewer_.get(), &settings));
+}
+
 void Session::remove_surfaces() {
   check(cumulet_set_surfaces(viewer_.get(), nullptr));
   scene_.surfaces.clear();
@@ -300,6 +313,7 @@ void Session::remove_surfaces() {
   shown_surfaces_.clear();
   status_.surfaces = {};
   status_.animation = {};
+  status_.variants.clear();
 }
 
 void Session::finish_surfaces() {
@@ -317,6 +331,7 @@ void Session::finish_surfaces() {
     return;
   }
   shown_surfaces_ = scene_.surfaces;
+  if (!scene_.surface_variant.empty()) set_surfaces();
   files_.push_back({shown_surfaces_, Answer::File::Fate::opened});
   if (scene_.surface_camera >= 0)
     check(cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene_.surface_camera)));
@@ -342,6 +357,7 @@ void Session::read_surfaces() {
   animation.struct_size = sizeof animation;
   const std::uint32_t number = scene_.surface.animation;
   if (number < info.animations) check(cumulet_surfaces_get_animation(shown, number, &animation));
+  status_.variants = variant_names(shown);
   cumulet_surfaces_release(shown);
 }
 

@@ -167,6 +167,7 @@ class Session {
   void follow_lamps();
   void follow_places();
   void follow_surfaces();
+  void set_surfaces();
   void remove_surfaces();
   void finish_surfaces();
   [[nodiscard]] cumulet_frame_desc frame() const;

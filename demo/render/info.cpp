@@ -114,6 +114,11 @@ Json surfaces_info(const std::string& path) {
     const auto animation = told<cumulet_animation_info>(cumulet_surfaces_get_animation, surfaces.get(), i);
     json["animations"].push_back({{"name", animation.name}, {"duration", animation.duration}});
   }
+  json["variants"] = Json::array();
+  for (std::uint32_t i = 0; i < info.variants; ++i) {
+    const auto variant = told<cumulet_variant_info>(cumulet_surfaces_get_variant, surfaces.get(), i);
+    json["variants"].push_back({{"name", variant.name}});
+  }
   return json;
 }
 

@@ -260,16 +260,21 @@ void warm_up(const Viewer& viewer, const RenderOptions& options, Progress& progr
   progress.stage("compiling shaders", 1.0);
 }
 
-void check_animation(const Viewer& viewer, const RenderOptions& options) {
+/// The surfaces' settings, once it is known what they have.
+cumulet_surface_settings_desc surface_settings(const Viewer& viewer, const SceneOptions& scene) {
   cumulet_surfaces* surfaces = nullptr;
   check(viewer, cumulet_get_surfaces(viewer.get(), &surfaces));
   cumulet_surfaces_info info{};
   info.struct_size = sizeof info;
   const cumulet_status status = cumulet_surfaces_get_info(surfaces, &info);
+  const std::vector<std::string> variants = cumulet::demo::variant_names(surfaces);
   cumulet_surfaces_release(surfaces);
   check(viewer, status);
-  const std::string refusal = cumulet::demo::animation_refusal(options.scene, info.animations);
+  const std::string refusal = cumulet::demo::animation_refusal(scene, info.animations);
   if (!refusal.empty()) throw std::runtime_error(refusal);
+  cumulet_surface_settings_desc settings = scene.surface;
+  settings.variant = cumulet::demo::variant_number(scene, variants);
+  return settings;
 }
 
 /// Better at once than after the samples.
@@ -510,7 +515,13 @@ class Studio {
   /// What can be asked for only of surfaces that are loaded.
   void choose_in_surfaces(const RenderOptions& options) {
     const auto& scene = options.scene;
-    if (!scene.surfaces.empty()) check_animation(viewer_, options);
+    if (!scene.surfaces.empty()) {
+      const cumulet_surface_settings_desc settings = surface_settings(viewer_, scene);
+      if (settings.variant != 0) {
+        check(viewer_, cumulet_set_surface_settings(viewer_.get(), &settings));
+        wait(viewer_, progress_);
+      }
+    }
     if (scene.surface_camera >= 0)
       check(viewer_, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
   }

@@ -444,6 +444,9 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       },
       "glTF 2.0 scene (.gltf, .glb) around and in the volume");
   add(
+      app, group, "--gltf-variant", "NAME|N", [&](const std::string& text) { scene.surface_variant = text; },
+      "Which variant of its materials, by name or from 0 (default: none); --info lists them");
+  add(
       app, group, "--gltf-camera", "N",
       [&](const std::string& text) {
         scene.surface_camera = static_cast<std::int32_t>(parse_integer(text, 0, 1000000));
@@ -564,7 +567,7 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
     if (app.count(flag) > 0 && scene.environment.empty())
       throw UsageError(std::string(flag) + " needs an environment: --env, or a --scene that names one");
   }
-  for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-camera"}) {
+  for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-variant", "--gltf-camera"}) {
     if (app.count(flag) > 0 && scene.surfaces.empty())
       throw UsageError(std::string(flag) + " needs a model: --gltf, or a --scene that names one");
   }

@@ -452,6 +452,7 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   if (second) read_second(reader, scene);
   read_volume(reader, format, scene);
   reader.text("surfaces.file", scene.surfaces);
+  reader.text("surfaces.variant", scene.surface_variant);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
   read_camera(reader, scene.camera);
   reader.text("environment.file", scene.environment);
@@ -600,6 +601,7 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
 
   if (!scene.surfaces.empty()) {
     writer.put("surfaces.file", named(scene.surfaces));
+    if (!scene.surface_variant.empty()) writer.put("surfaces.variant", scene.surface_variant);
     if (scene.surface_camera >= 0) writer.put("surfaces.camera", scene.surface_camera);
     writer.put_settings(scene.surface);
   }
@@ -687,6 +689,21 @@ std::string animation_refusal(const SceneOptions& scene, std::uint32_t animation
   if (wanted == 0 || wanted < animations) return {};  // 0: the default, of a file without any
   return scene.surfaces + ": there is no animation " + std::to_string(wanted) + ": the file has " +
          std::to_string(animations);
+}
+
+std::uint32_t variant_number(const SceneOptions& scene, const std::vector<std::string>& names) {
+  const std::string& wanted = scene.surface_variant;
+  if (wanted.empty()) return 0;
+  const auto named = std::ranges::find(names, wanted);
+  if (named != names.end()) return static_cast<std::uint32_t>(named - names.begin()) + 1;
+  std::uint32_t number = 0;
+  const char* const end = wanted.data() + wanted.size();
+  const auto [rest, error] = std::from_chars(wanted.data(), end, number);
+  if (error == std::errc() && rest == end && number < names.size()) return number + 1;
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "\"" : ", \"") + name + "\"";
+  throw std::runtime_error(scene.surfaces + ": there is no variant \"" + wanted + "\": the file has " +
+                           (list.empty() ? "none" : list));
 }
 
 void SceneOptions::set_daylight() {

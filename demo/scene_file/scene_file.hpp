@@ -48,6 +48,7 @@ struct SceneVolume : VolumeFile {
 struct SceneOptions : SceneVolume {
   std::vector<SceneVolume> others;   // beside the first; their max_bounces are 0: the first one's counts
   std::string surfaces;              // a glTF file; "": none
+  std::string surface_variant;       // of the surfaces' materials, by name or number; "": none
   std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
@@ -95,6 +96,20 @@ void for_each_group(Scene& scene, Visit&& visit) {
 /// Why surfaces with so many animations cannot be shown as the scene has it; empty if they can. The library shows a
 /// scene at rest whose animation is not there: whoever named it meant another.
 [[nodiscard]] std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations);
+
+/// Names of the surfaces' variants of materials.
+[[nodiscard]] inline std::vector<std::string> variant_names(const cumulet_surfaces* surfaces) {
+  std::vector<std::string> names;
+  cumulet_variant_info info{};
+  info.struct_size = sizeof info;
+  for (std::uint32_t i = 0; cumulet_surfaces_get_variant(surfaces, i, &info) == CUMULET_OK; ++i)
+    names.emplace_back(info.name);
+  return names;
+}
+
+/// cumulet_surface_settings_desc::variant for the scene's choice among these; 0 where it makes none. Throws
+/// std::runtime_error, one line that lists them, where it is not among them.
+[[nodiscard]] std::uint32_t variant_number(const SceneOptions& scene, const std::vector<std::string>& names);
 
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
 /// volume is taken from its folder. What the text does not say is as in SceneOptions(), on a clear day; of version

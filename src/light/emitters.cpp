@@ -121,7 +121,7 @@ std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene, const surfa
   std::vector<EmissiveTriangle> triangles;
   for (std::size_t i = 0; i < scene.draws.size(); ++i) {
     const surface::Draw& draw = scene.draws[i];
-    if (surface::is_hidden(pose, i) || !(emissions[draw.material].mean() > 0.0F)) continue;
+    if (surface::is_hidden(pose, i) || !(emissions[material_of(scene, pose, i)].mean() > 0.0F)) continue;
     const std::uint32_t first = draw.first_index / 3;
     for (std::uint32_t j = 0; j < draw.index_count / 3; ++j) {
       triangles.push_back({first + j, static_cast<std::uint32_t>(i), 0.0F});
@@ -132,7 +132,7 @@ std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene, const surfa
     check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       EmissiveTriangle& t = triangles[i];
-      t.luminance = emissions[scene.draws[t.draw].material].over(t.triangle);
+      t.luminance = emissions[material_of(scene, pose, t.draw)].over(t.triangle);
     }
   });
   return triangles;
@@ -152,7 +152,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
     const dvec3 b = pose.vertices[scene.indices[first + 1]].position;
     const dvec3 c = pose.vertices[scene.indices[first + 2]].position;
     const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
-    const double sides = pose.double_sided || materials[scene.draws[t.draw].material].double_sided ? 2.0 : 1.0;
+    const double sides = pose.double_sided || materials[material_of(scene, pose, t.draw)].double_sided ? 2.0 : 1.0;
     const double emitted = area * t.luminance * sides;
     if (!(emitted > 0.0) || !std::isfinite(emitted)) continue;
     table.entries.emplace_back(t.triangle, 0U, 0U, pose.flipped[t.draw] != 0 ? 1U : 0U);

@@ -394,7 +394,7 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
   const gl::Program* program = nullptr;
   std::optional<std::uint32_t> bound;
   for (const Batch& batch : batches) {
-    const std::uint32_t index = source.scene->draws[batch.draw].material;
+    const std::uint32_t index = surface::material_of(*source.scene, *content_->pose_, batch.draw);
     const scene::RasterSource::Material& material = source.materials[index];
     if (program != fixed.program_of[index]) fixed.program_of[index]->use(gl);
     program = fixed.program_of[index];

@@ -111,11 +111,13 @@ void pack_words(ModelSource& source, const Progress* progress) {
   check(progress);
   source.tables.triangles = size_of(words);
   resize(words, words.size() + scene.triangle_count(), progress);
-  for (const surface::Draw& draw : scene.draws) {
+  for (std::size_t d = 0; d < scene.draws.size(); ++d) {
     check(progress);
+    const surface::Draw& draw = scene.draws[d];
+    const std::uint32_t material = surface::material_of(scene, source.pose, d);
     for (std::uint32_t i = draw.first_index; i + 2 < draw.first_index + draw.index_count; i += 3) {
       words[source.tables.triangles + i / 3] =
-          uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], draw.material);
+          uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], material);
     }
   }
   check(progress);
@@ -218,7 +220,8 @@ ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Pr
   if (other_flags || source->bvh.cost() > 1.5 * source->built_cost) build(*source, progress);
   check(progress);
   source->atlas = last.atlas;
-  if (source->pose.hidden == last.pose.hidden && source->pose.materials == last.pose.materials) {
+  if (source->pose.hidden == last.pose.hidden && source->pose.materials == last.pose.materials &&
+      source->pose.chosen == last.pose.chosen) {
     source->emissive = last.emissive;
     source->raster = last.raster;
   } else {

@@ -119,7 +119,7 @@ void add_draws(RasterSource& source, const surface::Pose& pose, const Progress* 
   for (std::uint32_t i = 0; i < draws.size(); ++i) {
     const surface::Draw& draw = draws[i];
     if (draw.index_count == 0 || surface::is_hidden(pose, i)) continue;
-    if (source.materials.at(draw.material).pass != AlphaMode::blend) {
+    if (source.materials.at(surface::material_of(*source.scene, pose, i)).pass != AlphaMode::blend) {
       source.solid.push_back({draw.first_index, draw.index_count, i});
       continue;
     }
@@ -127,7 +127,7 @@ void add_draws(RasterSource& source, const surface::Pose& pose, const Progress* 
     for (std::uint32_t t = 0; t < draw.index_count; t += 3) source.blended.push_back({draw.first_index + t, 3, i});
   }
   std::ranges::stable_sort(source.solid, {}, [&](const RasterSource::Batch& batch) {
-    const std::uint32_t material = draws[batch.draw].material;
+    const std::uint32_t material = surface::material_of(*source.scene, pose, batch.draw);
     return std::pair(source.materials[material].pass, material);
   });
 }

@@ -346,7 +346,8 @@ struct Table<cumulet_surface_settings_desc> {
         .key = "surfaces.double_sided", .flag = "--double-sided",
         .help = "Show both sides of all surfaces, for files that are wound inside out",
         .row = {.label = "Double sided",
-                .tip = "Shows both sides of all surfaces, for models that are wound inside out."}})};
+                .tip = "Shows both sides of all surfaces, for models that are wound inside out."}}),
+      Setting(&Desc::variant, {.name = "variant"})};
 };
 
 template <>

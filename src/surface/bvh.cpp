@@ -659,7 +659,7 @@ std::vector<std::uint32_t> triangle_flags(const Scene& scene, const Pose& pose) 
   std::vector<std::uint32_t> flags(scene.triangle_count());
   for (std::size_t i = 0; i < scene.draws.size(); ++i) {
     const Draw& draw = scene.draws[i];
-    const Material& material = materials_of(scene, pose)[draw.material];
+    const Material& material = materials_of(scene, pose)[material_of(scene, pose, i)];
     std::uint32_t word = static_cast<std::uint32_t>(i) & TriangleFlags::user;
     if (material.alpha_mode != AlphaMode::opaque || material.transmission > 0.0F) word |= TriangleFlags::ask;
     if (!material.double_sided && !pose.double_sided) word |= TriangleFlags::one_sided;

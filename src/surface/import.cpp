@@ -35,6 +35,7 @@ class Assembler {
       if (std::ranges::any_of(track.channels, moves_material)) scene_->movable = std::move(movable);
     }
     plan();
+    variants();
     meshes();
     look_at_winding();
     place();
@@ -63,13 +64,23 @@ class Assembler {
     }
   }
 
+  void variants() {
+    const auto extension = file_.model.extensions.find("KHR_materials_variants");
+    if (extension == file_.model.extensions.end() || !extension->second.Has("variants")) return;
+    const tinygltf::Value& from = extension->second.Get("variants");
+    for (std::size_t v = 0; v < from.ArrayLen(); ++v) {
+      const tinygltf::Value& variant = from.Get(static_cast<int>(v));
+      scene_->variants.push_back({variant.Has("name") ? one_line(variant.Get("name").Get<std::string>()) : "", {}});
+    }
+  }
+
   void meshes() {
     parts_of_.resize(used_.size());
     for (std::size_t m = 0; m < used_.size(); ++m) {
       if (!used_[m]) continue;
       check(progress_);
       if (progress_ != nullptr) progress_->at(0.5 + 0.5 * static_cast<double>(m) / static_cast<double>(used_.size()));
-      for (MeshPart& part : import_mesh(file_, m, scene_->materials, budget_, remarks_)) {
+      for (MeshPart& part : import_mesh(file_, m, scene_->materials, scene_->variants.size(), budget_, remarks_)) {
         parts_of_[m].push_back(scene_->parts.size());
         scene_->parts.push_back(std::move(part));
       }
@@ -103,6 +114,10 @@ class Assembler {
         }
       }
       scene_->add_instance(place, node, skin, progress_);
+      budget_.take(part.variants.size(), sizeof(std::uint32_t), "all variants");
+      for (std::size_t v = 0; v < part.variants.size(); ++v) {
+        scene_->variants[v].materials.push_back(part.variants[v]);
+      }
     });
   }
 

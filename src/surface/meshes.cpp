@@ -63,11 +63,12 @@ std::vector<std::uint32_t> compact(std::vector<std::uint32_t>& indices, std::siz
 class Primitive {
  public:
   Primitive(const GltfFile& file, const tinygltf::Primitive& primitive, std::string what,
-            const std::vector<Material>& materials, Budget& budget, MeshRemarks& remarks)
+            const std::vector<Material>& materials, std::size_t variants, Budget& budget, MeshRemarks& remarks)
       : file_(file),
         from_(primitive),
         what_(std::move(what)),
         materials_(materials),
+        variants_(variants),
         budget_(budget),
         remarks_(remarks),
         accessors_(file, budget) {}
@@ -87,12 +88,8 @@ class Primitive {
     }
     decompress();
     part_.material = static_cast<std::uint32_t>(materials_.size() - 1);
-    if (from_.material >= 0) {
-      if (static_cast<std::size_t>(from_.material) + 1 >= materials_.size()) {
-        malformed(what_ + ": there is no material " + std::to_string(from_.material));
-      }
-      part_.material = static_cast<std::uint32_t>(from_.material);
-    }
+    if (from_.material >= 0) part_.material = known_material(from_.material);
+    read_variants();
     count_ = draco_ ? draco_->vertex_count() : accessors_.count(from_.attributes.at("POSITION"), label("POSITION"));
     check_counts();
     read_triangles();
@@ -204,7 +201,7 @@ class Primitive {
       if (!detail::finite(position)) malformed(label("POSITION") + " is not finite");
     }
     if (!part_.flat) read_normals();
-    const TextureUse& map = materials_[part_.material].normal_texture;
+    const TextureUse& map = normal_map();
     if (map.texture < 0) return;
     if (!part_.flat && has("TANGENT")) {
       part_.tangents = vectors<4>("TANGENT");
@@ -324,6 +321,46 @@ class Primitive {
     }
   }
 
+  [[nodiscard]] std::uint32_t known_material(int number) const {
+    // The last is the default one, which has no number.
+    if (number < 0 || static_cast<std::size_t>(number) + 1 >= materials_.size()) {
+      malformed(what_ + ": there is no material " + std::to_string(number));
+    }
+    return static_cast<std::uint32_t>(number);
+  }
+
+  /// KHR_materials_variants: what no mapping names keeps its material.
+  void read_variants() {
+    budget_.take(variants_, sizeof(std::uint32_t), what_);
+    part_.variants.assign(variants_, part_.material);
+    const auto extension = from_.extensions.find("KHR_materials_variants");
+    if (extension == from_.extensions.end() || !extension->second.Has("mappings")) return;
+    const tinygltf::Value& mappings = extension->second.Get("mappings");
+    for (std::size_t m = 0; m < mappings.ArrayLen(); ++m) {
+      const tinygltf::Value& mapping = mappings.Get(static_cast<int>(m));
+      if (!mapping.Has("material") || !mapping.Has("variants")) {
+        malformed(what_ + ": a mapping of KHR_materials_variants names no material, or no variants");
+      }
+      const std::uint32_t material = known_material(mapping.Get("material").GetNumberAsInt());
+      const tinygltf::Value& variants = mapping.Get("variants");
+      for (std::size_t v = 0; v < variants.ArrayLen(); ++v) {
+        const auto variant = static_cast<std::size_t>(variants.Get(static_cast<int>(v)).GetNumberAsInt());
+        if (variant >= variants_) malformed(what_ + ": there is no variant " + std::to_string(variant));
+        part_.variants[variant] = material;
+      }
+    }
+  }
+
+  /// Of the material, else of the first variant's that has one: a part has one set of tangents.
+  [[nodiscard]] const TextureUse& normal_map() const {
+    const TextureUse& own = materials_[part_.material].normal_texture;
+    if (own.texture >= 0) return own;
+    for (const std::uint32_t material : part_.variants) {
+      if (materials_[material].normal_texture.texture >= 0) return materials_[material].normal_texture;
+    }
+    return own;
+  }
+
   void read_targets() {
     for (std::size_t t = 0; t < from_.targets.size(); ++t) {
       const auto& target = from_.targets[t];
@@ -352,6 +389,7 @@ class Primitive {
   const tinygltf::Primitive& from_;
   std::string what_;
   const std::vector<Material>& materials_;
+  std::size_t variants_;
   Budget& budget_;
   MeshRemarks& remarks_;
   Accessors accessors_;
@@ -419,12 +457,12 @@ void make_unit(MeshPart& part) {
 }
 
 std::vector<MeshPart> import_mesh(const GltfFile& file, std::size_t mesh, const std::vector<Material>& materials,
-                                  Budget& budget, MeshRemarks& remarks) {
+                                  std::size_t variants, Budget& budget, MeshRemarks& remarks) {
   std::vector<MeshPart> parts;
   const tinygltf::Mesh& from = file.model.meshes[mesh];
   for (std::size_t p = 0; p < from.primitives.size(); ++p) {
     auto part = Primitive(file, from.primitives[p], numbered("mesh", mesh) + ", " + numbered("primitive", p), materials,
-                          budget, remarks)
+                          variants, budget, remarks)
                     .import();
     if (part && !part->indices.empty()) parts.push_back(std::move(*part));
   }

@@ -20,11 +20,12 @@ struct MorphTarget {
 /// The triangles of one primitive, at rest, in the space of its mesh.
 struct MeshPart {
   std::uint32_t material = 0;
+  std::vector<std::uint32_t> variants;  ///< its material in each variant of the file
   std::vector<std::uint32_t> indices;
   std::vector<VertexAttributes> attributes;
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;   ///< unit; not used if flat
-  std::vector<glm::vec4> tangents;  ///< empty: the material has no normal map
+  std::vector<glm::vec4> tangents;  ///< empty: the material has no normal map, nor has that of a variant
   bool flat = false;                ///< normals are the triangles', of which no two share a vertex
   std::size_t influences = 0;       ///< a vertex, of a skin
   std::vector<std::uint32_t> joints;
@@ -42,9 +43,9 @@ struct MeshRemarks {
   std::size_t unbound = 0;        ///< primitives under a node with a skin that no joint holds
 };
 
-/// All primitives of a mesh that draw triangles. Throws Error(file).
+/// All primitives of a mesh that draw triangles, in a file of so many variants. Throws Error(file).
 std::vector<MeshPart> import_mesh(const GltfFile& file, std::size_t mesh, const std::vector<Material>& materials,
-                                  Budget& budget, MeshRemarks& remarks);
+                                  std::size_t variants, Budget& budget, MeshRemarks& remarks);
 
 /// Triangles of a triangle list, strip or fan (glTF 2.0, 3.7.2.1), without those that name a vertex twice.
 std::vector<std::uint32_t> triangles(const std::vector<std::uint32_t>& indices, int mode);

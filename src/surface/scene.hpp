@@ -111,7 +111,7 @@ struct SceneCamera {
 struct Draw {
   std::uint32_t first_index = 0;
   std::uint32_t index_count = 0;  ///< a multiple of 3
-  std::uint32_t material = 0;
+  std::uint32_t material = 0;     ///< where no variant is chosen
   std::uint32_t node = 0;
 };
 
@@ -136,7 +136,9 @@ struct Pose {
   std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
   std::vector<std::uint8_t> hidden;   ///< a Draw each: 1 where it is not there at this time; empty: none
   std::vector<Material> materials;    ///< as they are at this time; empty: the scene's
-  bool double_sided = false;          ///< all materials count as double sided, whatever they say
+  std::vector<std::uint32_t>
+      chosen;                 ///< a Draw each: its material in the variant that is chosen; empty: the Draw's own
+  bool double_sided = false;  ///< all materials count as double sided, whatever they say
   std::vector<PunctualLight> lights;
   std::vector<SceneCamera> cameras;
   glm::dvec3 low{0.0};  ///< bounds of all triangles that are there
@@ -146,6 +148,12 @@ struct Pose {
 struct Animation {
   std::string name;
   double duration = 0.0;  ///< seconds
+};
+
+/// A choice of materials (KHR_materials_variants).
+struct Variant {
+  std::string name;
+  std::vector<std::uint32_t> materials;  ///< a Draw each
 };
 
 /// A checked glTF scene. Immutable: any thread may pose it.
@@ -160,6 +168,7 @@ class Scene {
   std::vector<std::uint32_t> indices;
   std::vector<VertexAttributes> attributes;
   std::vector<Animation> animations;
+  std::vector<Variant> variants;
 
   /// What the file has, shown or not.
   struct Counts {
@@ -181,6 +190,10 @@ class Scene {
 /// As they are in a pose of the scene.
 inline const std::vector<Material>& materials_of(const Scene& scene, const Pose& pose) {
   return pose.materials.empty() ? scene.materials : pose.materials;
+}
+/// The number of a draw's material.
+inline std::uint32_t material_of(const Scene& scene, const Pose& pose, std::size_t draw) {
+  return pose.chosen.empty() ? scene.draws[draw].material : pose.chosen[draw];
 }
 /// Whether a draw is not there.
 inline bool is_hidden(const Pose& pose, std::size_t draw) { return !pose.hidden.empty() && pose.hidden[draw] != 0; }

@@ -117,6 +117,7 @@ cumulet_status cumulet_surfaces_get_info(const cumulet_surfaces* surfaces, cumul
     out.meshes = counts.meshes;
     out.primitives = counts.primitives;
     out.textures = counts.textures;
+    out.variants = static_cast<uint32_t>(asset.scene().variants.size());
     write_desc(info, out, "cumulet_surfaces_info");
   });
 }
@@ -131,5 +132,17 @@ cumulet_status cumulet_surfaces_get_animation(const cumulet_surfaces* surfaces, 
     copy_text(animations[index].name, out.name, sizeof out.name);
     out.duration = animations[index].duration;
     write_desc(info, out, "cumulet_animation_info");
+  });
+}
+
+cumulet_status cumulet_surfaces_get_variant(const cumulet_surfaces* surfaces, uint32_t index,
+                                            cumulet_variant_info* info) {
+  return guarded(nullptr, 0, [&] {
+    require(surfaces != nullptr, "surfaces is NULL");
+    const auto& variants = surfaces->asset->scene().variants;
+    require(index < variants.size(), "there is no such variant");
+    cumulet_variant_info out{};
+    copy_text(variants[index].name, out.name, sizeof out.name);
+    write_desc(info, out, "cumulet_variant_info");
   });
 }

@@ -23,6 +23,9 @@ scene::ModelSourcePtr SurfaceAsset::posed(SurfaceChoice choice, Progress& progre
   progress.check();
   surface::Pose pose = scene_->pose(choice.time, choice.animation, &progress);
   pose.double_sided = choice.double_sided;
+  if (choice.variant > 0 && choice.variant <= scene_->variants.size()) {
+    pose.chosen = scene_->variants[choice.variant - 1].materials;
+  }
   scene::ModelSourcePtr made = last ? scene::make_model_source(*last, std::move(pose), &progress)
                                     : scene::make_model_source(scene_, std::move(pose), &progress);
   newest_ = made;

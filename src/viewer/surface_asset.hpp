@@ -18,6 +18,7 @@ struct SurfaceChoice {
   double time = 0.0;  // seconds
   std::uint32_t animation = 0;
   bool double_sided = false;  // all of its materials
+  std::uint32_t variant = 0;  // 0: none, else the scene's, from 1; one that is not there: none
   bool operator==(const SurfaceChoice&) const = default;
 };
 

@@ -136,6 +136,7 @@ TEST_F(Info, OfAModel) {
     "materials": [{"name": "a"}, {"name": "b"}, {"name": "c"}],
     "images": [{"uri": "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="}],
     "textures": [{"source": 0}, {"source": 0}],
+    "extensions": {"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}]}},
     "animations": [{"name": "slide", "samplers": [{"input": 1, "output": 2}],
                     "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}],
     "accessors": [
@@ -163,7 +164,9 @@ TEST_F(Info, OfAModel) {
   EXPECT_EQ(model["cameras"], 0);
   EXPECT_EQ(model["bounds_max"], json({6.0, 1.0, 0.0}));
   EXPECT_EQ(model["animations"], json::array({{{"name", "slide"}, {"duration", 2.0}}}));
+  EXPECT_EQ(model["variants"], json::array({{{"name", "day"}}, {{"name", "night"}}}));
   const std::string text = lines(scene);
+  expect_line(text, "- night");
   expect_line(text, "meshes: 2");
   expect_line(text, "textures: 2");
   expect_line(text, "- slide");

@@ -7,11 +7,15 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 fail() { echo "refused_test: $*" >&2; exit 1; }
 
-status=0
-"$render" --gltf "$model" --gltf-animation 99 --size 32x24 --spp 1 -o "$work/picture.png" >"$work/out" 2>"$work/error" ||
-  status=$?
-[ "$status" = 1 ] || fail "exit status $status: $(cat "$work/error")"
-[ ! -s "$work/out" ] || fail "said $(cat "$work/out")"
-[ "$(wc -l <"$work/error")" = 1 ] || fail "not one line: $(cat "$work/error")"
-grep -qF "$model: there is no animation 99: the file has 1" "$work/error" || fail "said $(cat "$work/error")"
-[ ! -e "$work/picture.png" ] || fail "there is a picture"
+refused() {
+  local status=0
+  "$render" --gltf "$model" "${@:2}" --size 32x24 --spp 1 -o "$work/picture.png" >"$work/out" 2>"$work/error" || status=$?
+  [ "$status" = 1 ] || fail "exit status $status: $(cat "$work/error")"
+  [ ! -s "$work/out" ] || fail "said $(cat "$work/out")"
+  [ "$(wc -l <"$work/error")" = 1 ] || fail "not one line: $(cat "$work/error")"
+  grep -qF "$model: $1" "$work/error" || fail "said $(cat "$work/error")"
+  [ ! -e "$work/picture.png" ] || fail "there is a picture"
+}
+
+refused "there is no animation 99: the file has 1" --gltf-animation 99
+refused 'there is no variant "night": the file has none' --gltf-variant night

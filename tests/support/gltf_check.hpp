@@ -51,6 +51,12 @@ inline std::string broken(const surface::Scene& scene) {
     }
     if (draw.material >= scene.materials.size()) return "a draw's material is out of range";
   }
+  for (const surface::Variant& variant : scene.variants) {
+    if (variant.materials.size() != scene.draws.size()) return "a variant lacks draws";
+    for (const std::uint32_t material : variant.materials) {
+      if (material >= scene.materials.size()) return "a variant's material is out of range";
+    }
+  }
   for (const surface::Texture& texture : scene.textures) {
     if (texture.image >= scene.images.size()) return "a texture's image is out of range";
   }
@@ -81,7 +87,9 @@ inline std::string broken(const surface::Scene& scene, const surface::Pose& pose
   }
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
     const surface::Draw& draw = scene.draws[d];
-    const bool mapped = scene.materials[draw.material].normal_texture.texture >= 0;
+    const auto has_map = [&](std::uint32_t m) { return scene.materials[m].normal_texture.texture >= 0; };
+    bool mapped = has_map(draw.material);
+    for (const surface::Variant& variant : scene.variants) mapped = mapped || has_map(variant.materials[d]);
     for (std::size_t i = draw.first_index; i < std::size_t{draw.first_index} + draw.index_count; ++i) {
       const surface::PosedVertex& v = pose.vertices[scene.indices[i]];
       if (!finite(v.position)) return "a position is not finite";

@@ -484,6 +484,21 @@ cumulet_status make_triangles(const std::vector<cumulet_mesh_desc>& meshes, cumu
   return status;
 }
 
+TEST_F(CApiSurfaces, VariantsAreTold) {
+  const std::string text = R"({"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_materials_variants"],
+      "extensions": {"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}]}}})";
+  cumulet_surfaces* surfaces = nullptr;
+  ASSERT_EQ(cumulet_surfaces_from_memory(text.data(), text.size(), nullptr, "made", &surfaces, nullptr, 0), CUMULET_OK);
+  EXPECT_EQ(info_of(surfaces).variants, 2U);
+  auto variant = make_desc<cumulet_variant_info>();
+  EXPECT_EQ(cumulet_surfaces_get_variant(surfaces, 1, &variant), CUMULET_OK);
+  EXPECT_STREQ(variant.name, "night");
+  EXPECT_EQ(cumulet_surfaces_get_variant(surfaces, 2, &variant), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_surfaces_get_variant(nullptr, 0, &variant), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_surfaces_get_variant(surfaces, 0, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  cumulet_surfaces_release(surfaces);
+}
+
 TEST_F(CApiSurfaces, HandlesOpenFilesAndTellOfThem) {
   char error[512] = "";
   cumulet_surfaces* surfaces = nullptr;

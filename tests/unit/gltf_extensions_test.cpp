@@ -8,6 +8,8 @@
 #include "support/gltf_import.hpp"
 #include "support/gltf_model.hpp"
 #include "support/gltf_seeds.hpp"
+#include "surface/bvh.hpp"
+#include "viewer/surface_asset.hpp"
 
 namespace cumulet::surface {
 namespace {
@@ -310,6 +312,86 @@ TEST(GltfPointers, HostileOnesAreRefusedInALine) {
   EXPECT_TRUE(has(line({"/nodes/0/extensions/KHR_node_visibility/visible", 1, {0, 1}}), "by STEP alone"));
   EXPECT_TRUE(has(line({"/materials/0/emissiveFactor", 2, {0, 1}}), "wrong type of element"));
   EXPECT_TRUE(has(line({"/materials/0/emissiveFactor", 4, {0, 1, 2, 3}}), "wrong type of element"));
+}
+
+/// Two triangles; the first is red, or green and then blue in variants "day" and "night". Green glows and cuts out.
+GltfModel variant_model() {
+  GltfModel model;
+  model.root["extensionsUsed"] = {"KHR_materials_variants"};
+  model.root["extensionsRequired"] = {"KHR_materials_variants"};
+  model.root["extensions"]["KHR_materials_variants"]["variants"] =
+      json::array({{{"name", "day"}}, {{"name", "night"}}});
+  model.add("images", {{"bufferView", model.view(test::png(1, 1, 8, 2, {128, 128, 255}))}});
+  model.add("textures", {{"source", 0}});
+  const auto coloured = [](const std::vector<double>& colour) {
+    return json{{"pbrMetallicRoughness", {{"baseColorFactor", colour}}}};
+  };
+  model.add("materials", coloured({1, 0, 0, 1}));
+  json green = coloured({0, 1, 0, 1});
+  green.update({{"emissiveFactor", {0, 1, 0}}, {"alphaMode", "MASK"}, {"doubleSided", true}});
+  model.add("materials", green);
+  json blue = coloured({0, 0, 1, 1});
+  blue["normalTexture"] = {{"index", 0}};
+  model.add("materials", blue);
+  const json attributes = {{"POSITION", model.triangle()}, {"TEXCOORD_0", model.vec2({0, 1, 1, 1, 0, 0})}};
+  json mappings = json::array();
+  mappings.push_back({{"material", 1}, {"variants", {0}}});
+  mappings.push_back({{"material", 2}, {"variants", {1}}});
+  model.show({{"attributes", attributes},
+              {"material", 0},
+              {"extensions", {{"KHR_materials_variants", {{"mappings", mappings}}}}}});
+  model.show({{"attributes", attributes}, {"material", 0}}, {{"translation", {2, 0, 0}}});
+  return model;
+}
+
+TEST(GltfVariants, MaterialsAreThoseThatAreChosen) {
+  Lines lines;
+  const ScenePtr scene = imported(variant_model(), lines.log);
+  EXPECT_TRUE(lines.warnings.empty());
+  ASSERT_EQ(scene->variants.size(), 2U);
+  EXPECT_EQ(scene->variants[0].name, "day");
+  EXPECT_EQ(scene->variants[0].materials, (std::vector<std::uint32_t>{1, 0}));
+  EXPECT_EQ(scene->variants[1].name, "night");
+  EXPECT_EQ(scene->variants[1].materials, (std::vector<std::uint32_t>{2, 0}));
+  EXPECT_EQ(scene->draws[0].material, 0U);
+  // Tangents are there for the variant that has a normal map.
+  EXPECT_EQ(glm::length(glm::vec3(scene->pose(0.0).vertices[0].tangent)), 1.0F);
+
+  const viewer::SurfaceAsset asset(scene, "made");
+  Progress progress;
+  const auto shown = [&](std::uint32_t variant) { return asset.posed({0.0, 0, false, variant}, progress); };
+  const scene::ModelSourcePtr none = shown(0);
+  EXPECT_TRUE(none->emissive.empty());
+  EXPECT_EQ(none->pose.chosen, std::vector<std::uint32_t>());
+  const scene::ModelSourcePtr day = shown(1);
+  EXPECT_EQ(day->pose.chosen, scene->variants[0].materials);
+  EXPECT_EQ(day->emissive.size(), 1U);
+  EXPECT_EQ(day->atlas, none->atlas);
+  EXPECT_EQ(day->raster->pictures, none->raster->pictures);
+  EXPECT_EQ(triangle_flags(*scene, day->pose)[0], static_cast<std::uint32_t>(TriangleFlags::ask));
+  EXPECT_EQ(triangle_flags(*scene, none->pose)[0], static_cast<std::uint32_t>(TriangleFlags::one_sided));
+  EXPECT_EQ(day->words[day->tables.triangles].w, 1U);
+  EXPECT_EQ(day->words[day->tables.triangles + 1].w, 0U);
+  // As made at once, and back again.
+  Pose pose = scene->pose(0.0);
+  pose.chosen = scene->variants[0].materials;
+  EXPECT_EQ(day->words, scene::make_model_source(scene, pose, &progress)->words);
+  EXPECT_EQ(shown(2)->words[none->tables.triangles].w, 2U);
+  EXPECT_EQ(shown(0)->words, none->words);
+  EXPECT_EQ(shown(3)->words, none->words);  // one that is not there
+}
+
+TEST(GltfVariants, HostileMappingsAreRefusedInALine) {
+  const auto line = [](const json& mapping) {
+    GltfModel model = variant_model();
+    model.root["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"]["mappings"] =
+        json::array({mapping});
+    return refused(model);
+  };
+  EXPECT_TRUE(has(line({{"material", 3}, {"variants", {0}}}), "there is no material 3"));
+  EXPECT_TRUE(has(line({{"material", 1}, {"variants", {2}}}), "there is no variant 2"));
+  EXPECT_TRUE(has(line({{"variants", {0}}}), "names no material"));
+  EXPECT_TRUE(has(line({{"material", 1}}), "names no material, or no variants"));
 }
 
 }  // namespace

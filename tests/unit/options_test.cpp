@@ -400,15 +400,16 @@ TEST_F(SceneOption, ABadFileIsNoUsageError) {
 
 TEST(Options, SurfacesMayComeAlone) {
   std::ostringstream out;
-  const auto options =
-      parse_render_options({"--gltf", "a.glb", "--gltf-time", "1.5", "--gltf-animation", "2", "--gltf-camera", "1",
-                            "--surface-light", "shadows", "--indirect-roughness", "0.25", "-o", "a.png"},
-                           out);
+  const auto options = parse_render_options(
+      {"--gltf", "a.glb", "--gltf-time", "1.5", "--gltf-animation", "2", "--gltf-camera", "1", "--gltf-variant",
+       "by night", "--surface-light", "shadows", "--indirect-roughness", "0.25", "-o", "a.png"},
+      out);
   ASSERT_TRUE(options.has_value());
   EXPECT_EQ(options->scene.surfaces, "a.glb");
   EXPECT_EQ(options->scene.volume, "");
   EXPECT_EQ(options->scene.surface.time, 1.5);
   EXPECT_EQ(options->scene.surface.animation, 2U);
+  EXPECT_EQ(options->scene.surface_variant, "by night");
   EXPECT_EQ(options->scene.surface_camera, 1);
   EXPECT_EQ(options->scene.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
   EXPECT_EQ(options->scene.surface.indirect_roughness, 0.25F);
@@ -420,7 +421,7 @@ TEST(Options, SurfacesMayComeAlone) {
 }
 
 TEST(Options, WhatIsOfAModelNeedsOne) {
-  for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-camera"}) {
+  for (const char* flag : {"--gltf-time", "--gltf-animation", "--gltf-variant", "--gltf-camera"}) {
     EXPECT_EQ(usage_error(with({flag, "1"})),
               std::string(flag) + " needs a model: --gltf, or a --scene that names one");
     EXPECT_EQ(usage_error(with({flag, "1", "--gltf", "a.glb"})), "");

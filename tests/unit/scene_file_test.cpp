@@ -35,6 +35,7 @@ SceneOptions full_scene() {
   scene.volume = "/data/cloud.vdb";
   scene.grid_name = "density[1]";
   scene.surfaces = "/models/a b.glb";
+  scene.surface_variant = "by \"night\"";
   scene.surface.time = 1.25;
   scene.surface.animation = 3;
   scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
@@ -104,6 +105,7 @@ TEST(SceneFile, EverythingIsReadBackAsItWasWritten) {
   EXPECT_EQ(read.volume, scene.volume);
   EXPECT_EQ(read.grid_name, scene.grid_name);
   EXPECT_EQ(read.surfaces, scene.surfaces);
+  EXPECT_EQ(read.surface_variant, scene.surface_variant);
   EXPECT_EQ(read.surface_camera, scene.surface_camera);
   EXPECT_EQ(read.width, scene.width);
   EXPECT_EQ(read.height, scene.height);
@@ -470,6 +472,32 @@ TEST(SceneFile, FilesAreWrittenAndReadWhole) {
   EXPECT_THROW(save_scene(full_scene(), "/nowhere/s.json"), std::runtime_error);
   std::ofstream(path) << std::string(2 << 20, ' ');
   EXPECT_THROW(static_cast<void>(load_scene(path)), std::runtime_error);
+}
+
+TEST(SceneFile, VariantsAreFoundByNameThenByNumber) {
+  SceneOptions scene;
+  scene.surfaces = "shoe.glb";
+  const auto number = [&](const std::string& wanted, const std::vector<std::string>& names) {
+    scene.surface_variant = wanted;
+    return variant_number(scene, names);
+  };
+  const std::vector<std::string> names = {"beach", "1", "street"};
+  EXPECT_EQ(number("", names), 0U);
+  EXPECT_EQ(number("street", names), 3U);
+  EXPECT_EQ(number("1", names), 2U);
+  EXPECT_EQ(number("0", names), 1U);
+  EXPECT_EQ(number("2", names), 3U);
+  const auto refusal = [&](const std::string& wanted, const std::vector<std::string>& of) -> std::string {
+    try {
+      number(wanted, of);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal("Beach", names), R"(shoe.glb: there is no variant "Beach": the file has "beach", "1", "street")");
+  for (const char* wanted : {"3", "-1", "0x", "4294967296"}) EXPECT_NE(refusal(wanted, names), "") << wanted;
+  EXPECT_EQ(refusal("0", {}), R"(shoe.glb: there is no variant "0": the file has none)");
 }
 
 }  // namespace

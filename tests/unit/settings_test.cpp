@@ -155,8 +155,8 @@ TEST(Settings, SceneFilesKeepEach) {
       EXPECT_TRUE(settings::same(read.*part, scene.*part)) << setting.key;
     });
   });
-  // What a picture's file has no say in.
-  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "preview", "volume_alone"}));
+  // What a picture's file has no say in, or says by name (surfaces.variant).
+  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "preview", "variant", "volume_alone"}));
 }
 
 TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
@@ -179,6 +179,7 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
                                 "medium.velocity_grid",
                                 "surfaces.file",
                                 "surfaces.camera",
+                                "surfaces.variant",
                                 "camera.eye",
                                 "camera.target",
                                 "camera.up",
@@ -219,8 +220,9 @@ TEST(Settings, AFlagSetsEach) {
     });
   });
   // --sun and --sky-model set three at once.
-  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "ground_albedo", "preview", "sky", "sun_azimuth_degrees",
-                                            "sun_elevation_degrees", "sun_irradiance", "turbidity", "volume_alone"}));
+  EXPECT_EQ(without,
+            (std::set<std::string>{"first_sample", "ground_albedo", "preview", "sky", "sun_azimuth_degrees",
+                                   "sun_elevation_degrees", "sun_irradiance", "turbidity", "variant", "volume_alone"}));
 }
 
 TEST(Settings, TheLibraryTakesEachAndNamesWhatItRefuses) {

@@ -460,9 +460,9 @@ CUMULET_API cumulet_status cumulet_inspection_get_metadata(const cumulet_inspect
  * _transmission (thin and clear: what passes goes straight on), KHR_texture_transform, KHR_mesh_quantization,
  * KHR_draco_mesh_compression, EXT_meshopt_compression, EXT_texture_webp, KHR_node_visibility (what is hidden neither
  * shows nor counts), KHR_animation_pointer (transforms, weights and visibility of nodes, factors and texture transforms
- * of materials, lights; a warning names what else a file animates). Watts per steradian and per square metre stand for KHR_lights_punctual's candela and lux. Emissive
- * triangles are lights, to their front alone where the material is single-sided.
- * Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
+ * of materials, lights; a warning names what else a file animates), KHR_materials_variants. Watts per steradian and per
+ * square metre stand for KHR_lights_punctual's candela and lux. Emissive triangles are lights, to their front alone
+ * where the material is single-sided. Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
  */
 
 /* Reads a .gltf or .glb file. */
@@ -521,6 +521,7 @@ typedef struct cumulet_surfaces_info {
   uint32_t meshes;
   uint32_t primitives; /* parts of meshes, each of one material */
   uint32_t textures;
+  uint32_t variants; /* choices of materials, one of which cumulet_surface_settings_desc may make */
 } cumulet_surfaces_info;
 
 /* The first call takes as long as a pose. */
@@ -535,6 +536,15 @@ typedef struct cumulet_animation_info {
 /* CUMULET_ERROR_INVALID_ARGUMENT if there is none of this number. */
 CUMULET_API cumulet_status cumulet_surfaces_get_animation(const cumulet_surfaces* surfaces, uint32_t index,
                                                           cumulet_animation_info* info);
+
+typedef struct cumulet_variant_info {
+  size_t struct_size;
+  char name[128]; /* "" if it has none */
+} cumulet_variant_info;
+
+/* KHR_materials_variants. CUMULET_ERROR_INVALID_ARGUMENT if there is none of this number. */
+CUMULET_API cumulet_status cumulet_surfaces_get_variant(const cumulet_surfaces* surfaces, uint32_t index,
+                                                        cumulet_variant_info* info);
 
 /* ---- Environments ------------------------------------------------------------------------------------------------ */
 
@@ -676,10 +686,12 @@ typedef struct cumulet_surface_settings_desc {
   float indirect_roughness;
   int32_t double_sided; /* 1: all materials show, and emit from, both of their sides, whatever the file says: for files
                            that are wound inside out (a warning tells of those). 0: as the file says */
+  uint32_t variant;     /* of the file's variants of materials the one of index variant - 1 (see
+                           cumulet_surfaces_get_variant); 0, or one that is not there: the materials without a choice */
 } cumulet_surface_settings_desc;
 
-/* How this viewer shows its surfaces. Poses them on the worker if the moment or double_sided changed; the last pose is
- * shown until then. */
+/* How this viewer shows its surfaces. Poses them on the worker if the moment, double_sided or the variant changed; the
+ * last pose is shown until then. */
 CUMULET_API cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer,
                                                         const cumulet_surface_settings_desc* desc);
 /* Moves the viewer's camera to one of the surfaces' own, as posed last: see cumulet_wait. */

@@ -527,6 +527,11 @@ class Surfaces {
     if (auto done = detail::result(cumulet_surfaces_get_animation(handle_, index, &c)); !done) return done.error();
     return AnimationInfo::of(c);
   }
+  [[nodiscard]] Result<VariantInfo> variant(std::uint32_t index) const noexcept {
+    auto c = detail::sized<cumulet_variant_info>();
+    if (auto done = detail::result(cumulet_surfaces_get_variant(handle_, index, &c)); !done) return done.error();
+    return VariantInfo::of(c);
+  }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
   /// Still this object's.
