@@ -189,6 +189,7 @@ constexpr const char* texture_uses[] = {
     "materials[].extensions.KHR_materials_clearcoat.clearcoatRoughnessTexture",
     "materials[].extensions.KHR_materials_transmission.transmissionTexture",
     "materials[].extensions.KHR_materials_pbrSpecularGlossiness.diffuseTexture",
+    "materials[].extensions.KHR_materials_pbrSpecularGlossiness.specularGlossinessTexture",
 };
 
 constexpr Leaf texture_use_leaves[] = {

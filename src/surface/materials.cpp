@@ -1,12 +1,16 @@
 #include "surface/materials.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include "base/progress_part.hpp"
+#include "surface/specular_glossiness.hpp"
 
 namespace cumulet::surface::detail {
 
@@ -82,7 +86,9 @@ class Materials {
     movable.emplace_back();
     for (const MovableMaterial& material : movable) scene_.materials.push_back(material.now);
     if (approximated_ > 0) {
-      log_.warning(name_ + ": KHR_materials_pbrSpecularGlossiness is approximated: its diffuse colour as base colour");
+      log_.warning(
+          name_ +
+          ": KHR_materials_pbrSpecularGlossiness is read as the metallic-roughness material that looks like it");
     }
     return movable;
   }
@@ -95,10 +101,11 @@ class Materials {
     const auto& pbr = from.pbrMetallicRoughness;
     if (pbr.baseColorFactor.size() != 4) malformed(what + ": baseColorFactor has not 4 numbers");
     to.base_color = glm::vec4(color(pbr.baseColorFactor), unit(pbr.baseColorFactor[3]));
-    texture(TextureSlot::base_color, use_of(pbr.baseColorTexture), what, movable);
+    const bool glossy = find(from.extensions, "KHR_materials_pbrSpecularGlossiness") != nullptr;
+    if (!glossy) texture(TextureSlot::base_color, use_of(pbr.baseColorTexture), what, movable);
     to.metallic = unit(pbr.metallicFactor);
     to.roughness = unit(pbr.roughnessFactor);
-    texture(TextureSlot::metallic_roughness, use_of(pbr.metallicRoughnessTexture), what, movable);
+    if (!glossy) texture(TextureSlot::metallic_roughness, use_of(pbr.metallicRoughnessTexture), what, movable);
     texture(TextureSlot::normal, use_of(from.normalTexture), what, movable);
     to.normal_scale = narrow(from.normalTexture.scale);
     texture(TextureSlot::occlusion, use_of(from.occlusionTexture), what, movable);
@@ -149,25 +156,101 @@ class Materials {
     if (const auto* glossiness = find(from, "KHR_materials_pbrSpecularGlossiness")) {
       const auto diffuse = numbers(*glossiness, "diffuseFactor", {1.0, 1.0, 1.0, 1.0}, what);
       const auto reflected = numbers(*glossiness, "specularFactor", {1.0, 1.0, 1.0}, what);
-      to.base_color = glm::vec4(color(diffuse), unit(diffuse[3]));
-      to.base_color_texture = {};
-      texture(TextureSlot::base_color, use_of(*glossiness, "diffuseTexture"), what, movable);
-      to.metallic = 0.0F;
-      to.roughness = 1.0F - unit(number(*glossiness, "glossinessFactor", 1.0));
-      to.metallic_roughness_texture = {};
-      // F0 = 0.04 * specular_color; the specular-glossiness texture is not read, so that a full factor with one would
-      // make a mirror.
-      if (!glossiness->Has("specularGlossinessTexture")) {
-        to.specular_color = glm::min(color(reflected) / 0.04F, glm::vec3(25.0F));
-      } else {
-        to.roughness = std::max(to.roughness, 0.5F);
-      }
+      likeness({glm::vec4(color(diffuse), unit(diffuse[3])), glm::min(color(reflected), 1.0F),
+                unit(number(*glossiness, "glossinessFactor", 1.0))},
+               use_of(*glossiness, "diffuseTexture"), use_of(*glossiness, "specularGlossinessTexture"), what, movable);
       ++approximated_;
     }
   }
 
+  /// In place of what the core's members say.
+  void likeness(const SpecularGlossiness& factors, const Use& diffuse, const Use& specular, const std::string& what,
+                MovableMaterial& movable) {
+    Material& to = movable.now;
+    const MetallicRoughness even = convert(factors);
+    to.base_color = even.base_color;
+    to.metallic = even.metallic;
+    to.roughness = even.roughness;
+    // They become one in one place, where the diffuse one is.
+    auto at = placed(TextureSlot::base_color, diffuse, what, movable);
+    const auto other = placed(TextureSlot::metallic_roughness, specular, what, movable);
+    if (!at) at = other;
+    if (!at) return;
+    if (other && (other->uv_set != at->uv_set || other->transform != at->transform)) {
+      log_.warning(
+          name_ + ": " + what +
+          " has its specular-glossiness texture in another place than its diffuse one: " + "it is drawn where that is");
+    }
+    movable.transforms[static_cast<std::size_t>(TextureSlot::metallic_roughness)] =
+        movable.transforms[static_cast<std::size_t>(TextureSlot::base_color)];
+    const auto textures = converted(factors, diffuse, specular, what);
+    if (!textures) return;
+    to.base_color = glm::vec4(1.0F);
+    to.metallic = 1.0F;
+    to.roughness = 1.0F;
+    to.base_color_texture = to.metallic_roughness_texture = *at;
+    to.base_color_texture.texture = textures->first;
+    to.metallic_roughness_texture.texture = textures->second;
+  }
+
+  /// The textures of a likeness: base colour, and metallic and roughness. Nothing if neither image can be had.
+  std::optional<std::pair<std::int32_t, std::int32_t>> converted(const SpecularGlossiness& f, const Use& diffuse,
+                                                                 const Use& specular, const std::string& what) {
+    const Conversion key{
+        {diffuse.index, specular.index},
+        {f.diffuse.r, f.diffuse.g, f.diffuse.b, f.diffuse.a, f.specular.r, f.specular.g, f.specular.b, f.glossiness}};
+    const auto known = converted_.find(key);
+    if (known != converted_.end()) return known->second;
+    const std::optional<Image> diffuse_image = picture(diffuse.index);
+    const std::optional<Image> specular_image = picture(specular.index);
+    auto& made = converted_[key];
+    if (!diffuse_image && !specular_image) return made;
+    ConvertedImages images;
+    try {
+      images = convert(f, diffuse_image, specular_image, budget_);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::file) throw;
+      log_.warning(name_ + ": " + what + " is drawn without textures: " + error.what());
+      return made;
+    }
+    const int main = diffuse_image ? diffuse.index : specular.index;
+    const Sampler ways =
+        sampler(file_.model.textures[static_cast<std::size_t>(main)].sampler, static_cast<std::size_t>(main));
+    const auto add = [&](Image& image) {
+      scene_.textures.push_back({static_cast<std::uint32_t>(scene_.images.size()), ways});
+      scene_.images.push_back(std::move(image));
+      return static_cast<std::int32_t>(scene_.textures.size()) - 1;
+    };
+    const std::int32_t base_color = add(images.base_color);
+    made = std::pair(base_color, add(images.metallic_roughness));
+    return made;
+  }
+
+  /// The image of a texture, which is not kept in the scene.
+  std::optional<Image> picture(int texture) {
+    if (texture < 0) return std::nullopt;
+    const auto index = static_cast<std::size_t>(texture);
+    const tinygltf::Texture& from = file_.model.textures[index];
+    std::optional<Image> image;
+    if (const auto* webp = find(from.extensions, "EXT_texture_webp")) {
+      image = read_image(static_cast<int>(number(*webp, "source", -1)), index);
+    }
+    if (!image) image = read_image(from.source, index);
+    if (!image && from.source < 0) remark_on(from, index);
+    return image;
+  }
+
   void texture(TextureSlot slot, const Use& from, const std::string& what, MovableMaterial& movable) {
-    if (from.index < 0) return;
+    auto to = placed(slot, from, what, movable);
+    if (!to) return;
+    to->texture = texture_of(static_cast<std::size_t>(from.index));
+    use_of(movable.now, slot) = *to;
+  }
+
+  /// A use of a texture that is yet to be found; nothing if there is none, or it cannot be read.
+  std::optional<TextureUse> placed(TextureSlot slot, const Use& from, const std::string& what,
+                                   MovableMaterial& movable) {
+    if (from.index < 0) return std::nullopt;
     if (static_cast<std::size_t>(from.index) >= file_.model.textures.size()) {
       malformed(what + ": there is no texture " + std::to_string(from.index));
     }
@@ -184,11 +267,10 @@ class Materials {
     if (uv_set > 1) {
       log_.warning(name_ + ": " + what + " uses TEXCOORD_" + std::to_string(uv_set) +
                    " for a texture: only sets 0 and 1 are read, and it is drawn without");
-      return;
+      return std::nullopt;
     }
     to.uv_set = static_cast<std::uint32_t>(uv_set);
-    to.texture = texture_of(static_cast<std::size_t>(from.index));
-    use_of(movable.now, slot) = to;
+    return to;
   }
 
   /// The place of a glTF texture in Scene::textures; -1 if its image cannot be had.
@@ -226,27 +308,36 @@ class Materials {
   /// The place of a glTF image in Scene::images; -1 if there is none of this number below 0, or it cannot be had.
   std::int64_t image_of(int number, std::size_t index) {
     if (number < 0) return -1;
+    const auto known = images_.find(number);
+    if (known != images_.end()) return known->second;
+    std::int64_t place = -1;
+    if (auto image = read_image(number, index)) {
+      place = static_cast<std::int64_t>(scene_.images.size());
+      scene_.images.push_back(std::move(*image));
+    }
+    images_[number] = place;
+    return place;
+  }
+
+  /// A glTF image of a texture, decoded; one that cannot be had costs a warning.
+  std::optional<Image> read_image(int number, std::size_t index) {
+    if (number < 0) return std::nullopt;
     const auto source = static_cast<std::size_t>(number);
     if (source >= file_.images.size()) {
       malformed(numbered("texture", index) + ": there is no image " + std::to_string(source));
     }
-    const auto known = images_.find(source);
-    if (known != images_.end()) return known->second;
     check(progress_);
     const ImageSource& image = file_.images[source];
-    std::int64_t place = -1;
     try {
       Image decoded = load(image);
       decoded.name = image.name;
-      place = static_cast<std::int64_t>(scene_.images.size());
-      scene_.images.push_back(std::move(decoded));
+      return decoded;
     } catch (const Error& error) {
       if (error.code() != ErrorCode::file) throw;
       const std::string named = image.name.empty() ? "" : " (" + image.name + ")";
       log_.warning(name_ + ": " + numbered("image", source) + named + " is left out: " + error.what());
     }
-    images_[source] = place;
-    return place;
+    return std::nullopt;
   }
 
   Image load(const ImageSource& image) {
@@ -302,7 +393,10 @@ class Materials {
   Progress* progress_;
   Scene& scene_;
   std::map<std::size_t, std::int32_t> textures_;
-  std::map<std::size_t, std::int64_t> images_;
+  std::map<int, std::int64_t> images_;
+  /// Textures and factors.
+  using Conversion = std::pair<std::array<int, 2>, std::array<float, 8>>;
+  std::map<Conversion, std::optional<std::pair<std::int32_t, std::int32_t>>> converted_;
   std::size_t approximated_ = 0;
 };
 

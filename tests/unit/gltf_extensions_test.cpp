@@ -9,6 +9,7 @@
 #include "support/gltf_model.hpp"
 #include "support/gltf_seeds.hpp"
 #include "surface/bvh.hpp"
+#include "surface/specular_glossiness.hpp"
 #include "viewer/surface_asset.hpp"
 
 namespace cumulet::surface {
@@ -392,6 +393,128 @@ TEST(GltfVariants, HostileMappingsAreRefusedInALine) {
   EXPECT_TRUE(has(line({{"material", 1}, {"variants", {2}}}), "there is no variant 2"));
   EXPECT_TRUE(has(line({{"variants", {0}}}), "names no material"));
   EXPECT_TRUE(has(line({{"material", 1}}), "names no material, or no variants"));
+}
+
+/// KHR_materials_pbrSpecularGlossiness on a triangle.
+GltfModel glossy_model(const json& glossiness) {
+  GltfModel model;
+  model.root["extensionsUsed"] = {"KHR_materials_pbrSpecularGlossiness"};
+  model.add("images", {{"bufferView", model.view(test::png(2, 1, 8, 6, {255, 0, 0, 255, 60, 60, 60, 128}))}});
+  model.add("images", {{"bufferView", model.view(test::png(1, 1, 8, 6, {255, 255, 255, 51}))}});
+  model.add("textures", {{"source", 0}});
+  model.add("textures", {{"source", 1}});
+  model.add("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"roughnessFactor", 0.1}}},
+                          {"extensions", {{"KHR_materials_pbrSpecularGlossiness", glossiness}}}});
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}, {"material", 0}});
+  return model;
+}
+
+/// Colours that a mixture of metal and dielectric has, in specular-glossiness terms: what conversion takes apart.
+detail::SpecularGlossiness mixture(const glm::vec3& colour, float metallic) {
+  const glm::vec3 specular = glm::mix(glm::vec3(0.04F), colour, metallic);
+  const float rest = 1.0F - std::max({specular.r, specular.g, specular.b});
+  return {glm::vec4(colour * (1.0F - metallic) * 0.96F / rest, 1.0F), specular, 0.25F};
+}
+
+TEST(GltfGlossiness, ConversionTakesApartWhatMixingMakes) {
+  // Grey ones are found again exactly; of coloured ones metals and dielectrics.
+  for (const float metallic : {0.0F, 0.25F, 0.5F, 0.9F, 1.0F}) {
+    for (const float grey : {0.2F, 0.5F, 0.8F}) {
+      if (grey < 0.25F && metallic > 0.0F && metallic < 1.0F) continue;  // two mixtures look like that
+      const detail::MetallicRoughness made = detail::convert(mixture(glm::vec3(grey), metallic));
+      EXPECT_NEAR(made.metallic, metallic, 2e-3F) << grey;
+      EXPECT_FLOAT_EQ(made.roughness, 0.75F);
+    }
+  }
+  const glm::vec3 gold(1.0F, 0.77F, 0.34F);
+  const detail::MetallicRoughness metal = detail::convert({glm::vec4(0, 0, 0, 0.5F), gold, 1.0F});
+  EXPECT_NEAR(metal.metallic, 1.0F, 1e-3F);
+  test::near(glm::vec3(metal.base_color), gold, 2e-3F);
+  EXPECT_EQ(metal.base_color.a, 0.5F);
+  EXPECT_EQ(metal.roughness, 0.0F);
+  const detail::MetallicRoughness plastic = detail::convert({glm::vec4(0.5F, 0.2F, 0.1F, 1), glm::vec3(0.04F), 0.5F});
+  EXPECT_NEAR(plastic.metallic, 0.0F, 1e-5F);
+  test::near(glm::vec3(plastic.base_color), {0.5F, 0.2F, 0.1F});
+}
+
+TEST(GltfGlossiness, FactorsAlone) {
+  const ScenePtr scene = imported(glossy_model(
+      {{"diffuseFactor", {0.5, 0.2, 0.1, 0.5}}, {"specularFactor", {0.04, 0.04, 0.04}}, {"glossinessFactor", 0.75}}));
+  const Material& m = scene->materials[0];
+  test::near(glm::vec3(m.base_color), {0.5F, 0.2F, 0.1F});
+  EXPECT_EQ(m.base_color.a, 0.5F);
+  EXPECT_NEAR(m.metallic, 0.0F, 1e-5F);
+  EXPECT_FLOAT_EQ(m.roughness, 0.25F);
+  EXPECT_EQ(m.base_color_texture.texture, -1);  // nor the core's
+  // As it is where nothing is said: a mirror.
+  const Material mirror = imported(glossy_model(json::object()))->materials[0];
+  EXPECT_NEAR(mirror.metallic, 1.0F, 1e-6F);
+  EXPECT_EQ(mirror.roughness, 0.0F);
+  test::near(glm::vec3(mirror.base_color), glm::vec3(1.0F));
+}
+
+TEST(GltfGlossiness, TexelsBecomeOthers) {
+  const json transform = {{"KHR_texture_transform", {{"offset", {0.5, 0.25}}}}};
+  const ScenePtr scene =
+      imported(glossy_model({{"specularFactor", {0.04, 0.04, 0.04}},
+                             {"diffuseTexture", {{"index", 0}, {"extensions", transform}}},
+                             {"specularGlossinessTexture", {{"index", 1}, {"extensions", transform}}}}));
+  const Material& m = scene->materials[0];
+  EXPECT_EQ(m.base_color, glm::vec4(1.0F));
+  EXPECT_EQ(m.metallic, 1.0F);
+  EXPECT_EQ(m.roughness, 1.0F);
+  EXPECT_EQ(m.base_color_texture.transform[2], glm::vec2(0.5F, 0.25F));
+  EXPECT_EQ(m.metallic_roughness_texture.transform, m.base_color_texture.transform);
+  ASSERT_EQ(scene->images.size(), 2U);  // and not those that they were made of
+  const auto image = [&](const TextureUse& use) -> const Image& {
+    return scene->images[scene->textures.at(static_cast<std::size_t>(use.texture)).image];
+  };
+  EXPECT_EQ(image(m.base_color_texture).rgba, (std::vector<std::uint8_t>{255, 0, 0, 255, 60, 60, 60, 128}));
+  EXPECT_EQ(image(m.metallic_roughness_texture).rgba, (std::vector<std::uint8_t>{0, 204, 0, 255, 0, 204, 0, 255}));
+
+  // A metal by its texture: black diffuse, its colour the specular one.
+  const ScenePtr metal =
+      imported(glossy_model({{"diffuseFactor", {0, 0, 0, 1}}, {"specularGlossinessTexture", {{"index", 0}}}}));
+  const Material& red = metal->materials[0];
+  ASSERT_EQ(metal->images.size(), 2U);
+  const Image& base = metal->images[0];
+  const Image& rough = metal->images[1];
+  EXPECT_EQ(red.base_color_texture.texture, 0);
+  EXPECT_NEAR(base.rgba[0], 255, 1);
+  EXPECT_NEAR(base.rgba[1], 0, 1);
+  EXPECT_EQ(base.rgba[3], 255);
+  EXPECT_NEAR(rough.rgba[2], 255, 1);
+  EXPECT_EQ(rough.rgba[1], 0);
+  EXPECT_EQ(rough.rgba[5], 127);
+}
+
+TEST(GltfGlossiness, OddTexturesAreTold) {
+  Lines lines;
+  imported(glossy_model(
+               {{"diffuseTexture", {{"index", 0}}}, {"specularGlossinessTexture", {{"index", 1}, {"texCoord", 1}}}}),
+           lines.log);
+  ASSERT_EQ(lines.warnings.size(), 2U);
+  EXPECT_TRUE(has(lines.warnings[0], "in another place than its diffuse one")) << lines.warnings[0];
+  EXPECT_TRUE(has(lines.warnings[1], "KHR_materials_pbrSpecularGlossiness is read as")) << lines.warnings[1];
+  EXPECT_TRUE(has(refused(glossy_model({{"specularGlossinessTexture", {{"index", 7}}}})), "there is no texture 7"));
+  GltfModel broken = glossy_model({{"diffuseFactor", {0.5, 0.5, 0.5, 1}},
+                                   {"specularFactor", {0.04, 0.04, 0.04}},
+                                   {"diffuseTexture", {{"index", 0}}}});
+  broken.root["images"][0] = {{"uri", "none.png"}};
+  const ScenePtr scene = imported(broken);
+  test::near(glm::vec3(scene->materials[0].base_color), glm::vec3(0.5F));
+  EXPECT_EQ(scene->materials[0].base_color_texture.texture, -1);
+}
+
+TEST(GltfGlossiness, MemoryIsBounded) {
+  GltfModel model = glossy_model({{"diffuseTexture", {{"index", 0}}}});
+  model.root["images"][0] = {{"bufferView", model.view(test::webp(1024, 1024, Bytes(std::size_t{4} << 20U, 9)))}};
+  GltfLimits limits;
+  limits.memory = 6U << 20U;
+  Lines lines;
+  EXPECT_TRUE(imported(model.gltf(), lines.log, limits)->images.empty());
+  ASSERT_EQ(lines.warnings.size(), 2U);
+  EXPECT_TRUE(has(lines.warnings[0], "material 0 is drawn without textures: images of")) << lines.warnings[0];
 }
 
 }  // namespace

@@ -649,13 +649,15 @@ TEST(Gltf, MaterialsAreReadWhole) {
   EXPECT_EQ(blend.alpha_mode, AlphaMode::blend);
   EXPECT_TRUE(blend.unlit);
 
-  // KHR_materials_pbrSpecularGlossiness, by what comes near.
+  // KHR_materials_pbrSpecularGlossiness, by its likeness: gltf_extensions_test.
   const Material& glossy = scene->materials[2];
-  near(glm::vec3(glossy.base_color), {0.4F, 0.5F, 0.6F});
-  EXPECT_EQ(glossy.metallic, 0.0F);
-  EXPECT_FLOAT_EQ(glossy.roughness, 0.25F);
-  near(glossy.specular_color, {2, 1, 0.5F});
-  EXPECT_GE(glossy.base_color_texture.texture, 0);
+  EXPECT_EQ(glossy.base_color, glm::vec4(1.0F));
+  EXPECT_EQ(glossy.metallic, 1.0F);
+  EXPECT_EQ(glossy.roughness, 1.0F);
+  ASSERT_GE(glossy.metallic_roughness_texture.texture, 0);
+  EXPECT_NE(glossy.base_color_texture.texture, glossy.metallic_roughness_texture.texture);
+  const Texture& likeness = scene->textures[static_cast<std::size_t>(glossy.metallic_roughness_texture.texture)];
+  EXPECT_EQ(scene->images[likeness.image].rgba[1], 64);  // roughness 0.25
   ASSERT_EQ(lines.warnings.size(), 1U);
   EXPECT_TRUE(has(lines.warnings[0], "KHR_materials_pbrSpecularGlossiness")) << lines.warnings[0];
 
@@ -699,7 +701,7 @@ TEST(Gltf, ImagesOfEightAndSixteenBitsAndJpeg) {
     EXPECT_NEAR(jpeg.rgba[4 * i + 2], 90, 4);
     EXPECT_EQ(jpeg.rgba[4 * i + 3], 255);
   }
-  EXPECT_EQ(scene->images.size(), 3U);  // however often they are used
+  EXPECT_EQ(scene->images.size(), 5U);  // however often they are used; two of them a likeness
 }
 
 TEST(Gltf, CamerasAndLightsStandWhereTheirNodesAre) {
