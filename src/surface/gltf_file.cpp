@@ -35,6 +35,7 @@ constexpr std::array known_extensions = {"KHR_lights_punctual",
                                          "KHR_texture_transform",
                                          "KHR_mesh_quantization",
                                          "KHR_draco_mesh_compression",
+                                         "EXT_mesh_gpu_instancing",
                                          "EXT_meshopt_compression",
                                          "EXT_texture_webp"};
 

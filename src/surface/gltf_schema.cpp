@@ -89,6 +89,7 @@ constexpr Leaf leaves[] = {
     {"nodes[].weights[]", Kind::number},
     {"nodes[].extensions.KHR_lights_punctual.light", Kind::index},
     {"nodes[].extensions.KHR_node_visibility.visible", Kind::boolean},
+    {"nodes[].extensions.EXT_mesh_gpu_instancing.attributes.*", Kind::index},
     {"meshes[].name", Kind::string},
     {"meshes[].weights[]", Kind::number},
     {"meshes[].primitives[].attributes.*", Kind::index},

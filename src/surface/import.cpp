@@ -1,11 +1,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <glm/gtc/quaternion.hpp>
 #include <limits>
+#include <map>
 #include <new>
+#include <optional>
+#include <set>
 
 #include "base/apart.hpp"
 #include "base/progress_part.hpp"
+#include "surface/accessors.hpp"
 #include "surface/gltf_file.hpp"
 #include "surface/gltf_import.hpp"
 #include "surface/materials.hpp"
@@ -35,6 +40,7 @@ class Assembler {
       if (std::ranges::any_of(track.channels, moves_material)) scene_->movable = std::move(movable);
     }
     plan();
+    instances();
     variants();
     meshes();
     look_at_winding();
@@ -64,6 +70,67 @@ class Assembler {
     }
   }
 
+  /// Where EXT_mesh_gpu_instancing places the meshes of displayed nodes.
+  void instances() {
+    const Accessors accessors(file_, budget_);
+    for (const std::uint32_t node : scene_->rig.displayed) {
+      const tinygltf::Node& from = file_.model.nodes[node];
+      const auto extension = from.extensions.find("EXT_mesh_gpu_instancing");
+      if (extension == from.extensions.end() || !extension->second.Has("attributes")) continue;
+      if (from.mesh < 0 || scene_->rig.hidden[node]) continue;
+      if (from.skin >= 0) {
+        ++skinned_instances_;
+        continue;
+      }
+      const tinygltf::Value& attributes = extension->second.Get("attributes");
+      if (!attributes.Keys().empty()) placings_[node] = placings(accessors, node, attributes);
+    }
+  }
+
+  /// A matrix an instance.
+  std::vector<glm::dmat4> placings(const Accessors& accessors, std::uint32_t node, const tinygltf::Value& attributes) {
+    const std::string what = numbered("node", node) + ", instances' ";
+    std::optional<std::size_t> count;
+    for (const std::string& name : attributes.Keys()) {
+      const std::size_t here = accessors.count(attributes.Get(name).GetNumberAsInt(), what + one_line(name));
+      if (count && *count != here) {
+        malformed(what + one_line(name) + " has " + std::to_string(here) + " elements, another attribute " +
+                  std::to_string(*count));
+      }
+      count = here;
+      if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE") own_attributes_.insert(one_line(name));
+    }
+    budget_.take(*count, sizeof(glm::dmat4), what + "transforms");
+    const auto read = [&]<int N>(const char* name, const glm::vec<N, float>& otherwise) {
+      if (!attributes.Has(name)) return std::vector<glm::vec<N, float>>(*count, otherwise);
+      const int accessor = attributes.Get(name).GetNumberAsInt();
+      // A VEC3 would serve for a VEC4.
+      if (accessors.type(accessor, what + name) != N) malformed(what + name + " has the wrong type of element");
+      auto values = accessors.vectors<N>(accessor, what + name);
+      for (const glm::vec<N, float>& value : values) {
+        for (int c = 0; c < N; ++c) {
+          if (!(std::abs(value[c]) < 1e18F)) malformed(what + name + " is not finite, or too large");
+        }
+      }
+      return values;
+    };
+    const auto translations = read("TRANSLATION", glm::vec3(0.0F));
+    const auto rotations = read("ROTATION", glm::vec4(0.0F, 0.0F, 0.0F, 1.0F));
+    const auto scales = read("SCALE", glm::vec3(1.0F));
+    std::vector<glm::dmat4> to(*count);
+    for (std::size_t i = 0; i < to.size(); ++i) {
+      budget_.check(i);
+      const glm::dvec4 r(rotations[i]);
+      const double length = glm::length(r);
+      const glm::dquat rotation =
+          length > 0.0 ? glm::dquat(r.w, r.x, r.y, r.z) / length : glm::dquat(1.0, 0.0, 0.0, 0.0);
+      to[i] = glm::mat4_cast(rotation);
+      for (int c = 0; c < 3; ++c) to[i][c] *= double{scales[i][c]};
+      to[i][3] = glm::dvec4(glm::dvec3(translations[i]), 1.0);
+    }
+    return to;
+  }
+
   void variants() {
     const auto extension = file_.model.extensions.find("KHR_materials_variants");
     if (extension == file_.model.extensions.end() || !extension->second.Has("variants")) return;
@@ -91,15 +158,27 @@ class Assembler {
   void place() {
     std::uint64_t vertices = 0;
     std::uint64_t indices = 0;
-    for_each_instance([&](std::uint32_t, const MeshPart& part, std::size_t) {
-      vertices += part.positions.size();
-      indices += part.indices.size();
+    std::uint64_t instanced = 0;
+    for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t) {
+      const std::uint64_t copies = copies_of(node);
+      const std::uint64_t triangles = part.indices.size() / 3;
+      const std::uint64_t most = budget_.limits().instanced_triangles;
+      if (placings_.contains(node)) {
+        if (triangles != 0 && copies > (most - instanced) / triangles) {
+          malformed(numbered("node", node) + ": instances are copied, and " + std::to_string(copies) + " of " +
+                    std::to_string(triangles) + " triangles are more than the " + std::to_string(most) +
+                    " that a file may have of them");
+        }
+        instanced += copies * triangles;
+      }
+      vertices += copies * part.positions.size();
+      indices += copies * part.indices.size();
     });
     budget_.take(vertices, sizeof(VertexAttributes) + sizeof(PosedVertex), "all vertices");
     budget_.take(indices, sizeof(std::uint32_t), "all indices");
     scene_->attributes.reserve(vertices);
     scene_->indices.reserve(indices);
-    for_each_instance([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
+    for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
       check(progress_);
       int skin = file_.model.nodes[node].skin;
       if (skin >= 0 && part.influences == 0) {
@@ -113,16 +192,26 @@ class Assembler {
                     " of " + std::to_string(joints) + " in " + numbered("skin", static_cast<std::size_t>(skin)));
         }
       }
-      scene_->add_instance(place, node, skin, progress_);
-      budget_.take(part.variants.size(), sizeof(std::uint32_t), "all variants");
-      for (std::size_t v = 0; v < part.variants.size(); ++v) {
-        scene_->variants[v].materials.push_back(part.variants[v]);
+      const auto placed = placings_.find(node);
+      for (std::uint64_t copy = 0; copy < copies_of(node); ++copy) {
+        check(progress_);
+        scene_->add_instance(place, node, skin, progress_);
+        if (placed != placings_.end()) scene_->instances.back().in_node = placed->second[copy];
+        budget_.take(part.variants.size(), sizeof(std::uint32_t), "all variants");
+        for (std::size_t v = 0; v < part.variants.size(); ++v) {
+          scene_->variants[v].materials.push_back(part.variants[v]);
+        }
       }
     });
   }
 
+  [[nodiscard]] std::uint64_t copies_of(std::uint32_t node) const {
+    const auto placed = placings_.find(node);
+    return placed == placings_.end() ? 1 : placed->second.size();
+  }
+
   template <class Visit>
-  void for_each_instance(const Visit& visit) const {
+  void for_each_part(const Visit& visit) const {
     for (const std::uint32_t node : scene_->rig.displayed) {
       const int mesh = file_.model.nodes[node].mesh;
       if (mesh < 0 || scene_->rig.hidden[node]) continue;
@@ -218,6 +307,15 @@ class Assembler {
     if (absent_joints_ > 0) {
       log_.warning(name_ + ": " + std::to_string(absent_joints_) + " nodes have a skin whose joints are in no scene");
     }
+    if (skinned_instances_ > 0) {
+      log_.warning(name_ + ": " + std::to_string(skinned_instances_) +
+                   " nodes have instances and a skin, and are drawn once");
+    }
+    if (!own_attributes_.empty()) {
+      std::string list;
+      for (const std::string& attribute : own_attributes_) list += (list.empty() ? "" : ", ") + attribute;
+      log_.warning(name_ + ": instances are drawn without " + one_line(list));
+    }
     if (scene_->indices.empty()) log_.warning(name_ + ": has no triangles");
   }
 
@@ -231,6 +329,9 @@ class Assembler {
   std::vector<std::vector<std::size_t>> parts_of_;
   MeshRemarks remarks_;
   std::size_t absent_joints_ = 0;
+  std::map<std::uint32_t, std::vector<glm::dmat4>> placings_;  ///< of nodes with EXT_mesh_gpu_instancing
+  std::size_t skinned_instances_ = 0;
+  std::set<std::string> own_attributes_;  ///< of instances, beside their transforms
 };
 
 }  // namespace

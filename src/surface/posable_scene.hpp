@@ -16,6 +16,7 @@ struct Instance {
   std::uint32_t node = 0;
   std::uint32_t first_vertex = 0;
   std::int32_t skin = -1;
+  glm::dmat4 in_node{1.0};  ///< where in its node's space the part is: EXT_mesh_gpu_instancing's
 };
 
 /// A light under a node.

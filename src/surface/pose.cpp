@@ -99,6 +99,7 @@ void PosableScene::finish() {
 bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const {
   const MeshPart& part = parts[instance.part];
   const std::vector<float>& weights = now.weights[instance.node];
+  const glm::dmat4 to_world = now.to_world[instance.node] * instance.in_node;
   std::vector<glm::mat4> joints;
   bool flipped = false;
   if (instance.skin >= 0) {
@@ -111,10 +112,10 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
     }
     flipped = 2 * mirrored > joints.size();
   } else {
-    flipped = mirrors(now.to_world[instance.node]);
+    flipped = mirrors(to_world);
   }
   const float side = flipped ? -1.0F : 1.0F;
-  const glm::mat4 rigid(now.to_world[instance.node]);
+  const glm::mat4 rigid(to_world);
   const glm::mat3 rigid_normals = cofactors(glm::mat3(rigid));
 
   PosedVertex* const vertices = &pose.vertices[instance.first_vertex];

@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
       {"draco_fast", cumulet::test::seed_draco(2, 10)},
       {"meshopt", cumulet::test::seed_meshopt(2)},
       {"pointers", cumulet::test::seed_pointers()},
+      {"instances", cumulet::test::seed_instances()},
       {"webp", cumulet::test::seed_webp(cumulet::test::webp(2, 2, cumulet::test::Bytes(16, 77)))},
       {"webp_lossy", cumulet::test::seed_webp(cumulet::test::webp(2, 2, cumulet::test::Bytes(16, 77), 50.0F))}};
   for (const auto& [name, model] : models) {

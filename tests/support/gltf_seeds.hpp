@@ -282,6 +282,19 @@ inline GltfModel seed_pointers() {
   return model;
 }
 
+/// A triangle in three places.
+inline GltfModel seed_instances() {
+  GltfModel model;
+  model.root["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  const json attributes = {{"TRANSLATION", model.vec3({0, 0, 0, 1, 0, 0, 2, 0, 0})},
+                           {"ROTATION", model.accessor<float>("VEC4", 4, {0, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0})},
+                           {"SCALE", model.vec3({1, 1, 1, -1, 1, 1, 2, 2, 2})},
+                           {"_ID", model.accessor<std::uint8_t>("SCALAR", 1, {1, 2, 3})}};
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}},
+             {{"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", attributes}}}}}});
+  return model;
+}
+
 /// A grid of (n + 1)^2 vertices in the unit square at z = 0, its triangles facing +z.
 struct Grid {
   std::vector<float> positions;

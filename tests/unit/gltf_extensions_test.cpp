@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <optional>
 
 #include "scene/model_source.hpp"
@@ -515,6 +516,90 @@ TEST(GltfGlossiness, MemoryIsBounded) {
   EXPECT_TRUE(imported(model.gltf(), lines.log, limits)->images.empty());
   ASSERT_EQ(lines.warnings.size(), 2U);
   EXPECT_TRUE(has(lines.warnings[0], "material 0 is drawn without textures: images of")) << lines.warnings[0];
+}
+
+/// A triangle under a node with instances of these accessors.
+GltfModel instanced_model(const std::function<json(GltfModel&)>& attributes, const json& node = json::object()) {
+  GltfModel model;
+  model.root["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  model.root["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+  json with_instances = node;
+  with_instances["extensions"] = {{"EXT_mesh_gpu_instancing", {{"attributes", attributes(model)}}}};
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}}, with_instances);
+  return model;
+}
+
+TEST(GltfInstances, StandWhereTheirAttributesAndTheirNodePutThem) {
+  GltfModel model = instanced_model(
+      [](GltfModel& m) {
+        return json{
+            {"TRANSLATION", m.vec3({0, 0, 0, 10, 0, 0, 0, 0, 5})},
+            // None, a quarter about z, and none; of normalised integers.
+            {"ROTATION", m.accessor<std::int16_t>("VEC4", 4, {0, 0, 0, 32767, 0, 0, 23170, 23170, 0, 0, 0, 32767},
+                                                  {{"normalized", true}})},
+            {"SCALE", m.vec3({1, 1, 1, 2, 3, 1, -1, 1, 1})}};
+      },
+      {{"translation", {100, 0, 0}}, {"scale", {2, 2, 2}}});
+  Lines lines;
+  const ScenePtr scene = imported(model, lines.log);
+  EXPECT_TRUE(lines.warnings.empty());
+  ASSERT_EQ(scene->triangle_count(), 3U);
+  ASSERT_EQ(scene->draws.size(), 3U);
+  const Pose pose = scene->pose(0.0);
+  test::near(test::corners(*scene, pose, 0)[1], {102, 0, 0});
+  const auto turned = test::corners(*scene, pose, 1);
+  test::near(turned[0], {120, 0, 0}, 1e-3F);
+  test::near(turned[1], {120, 4, 0}, 1e-3F);  // x, twice and twice as long, is y
+  test::near(turned[2], {114, 0, 0}, 1e-3F);  // y is -x
+  test::near(test::corners(*scene, pose, 2)[1], {98, 0, 10});
+  EXPECT_EQ(pose.flipped, (std::vector<std::uint8_t>{0, 0, 1}));
+  EXPECT_EQ(pose.low.x, 98.0);
+  test::near(glm::vec3(pose.high), {120, 4, 10}, 1e-3F);
+  // A normal keeps its side in the mirrored one.
+  test::near(pose.vertices[scene->indices[6]].normal, {0, 0, 1});
+}
+
+TEST(GltfInstances, MoveWithTheirNode) {
+  GltfModel model = instanced_model([](GltfModel& m) { return json{{"TRANSLATION", m.vec3({0, 0, 0, 3, 0, 0})}}; });
+  animate(model, {{"/nodes/0/translation", 3, {0, 0, 0, 0, 8, 0}}});
+  const ScenePtr scene = imported(model);
+  test::near(test::corners(*scene, scene->pose(1.0), 1)[0], {3, 8, 0});
+}
+
+TEST(GltfInstances, WhatIsNotReadIsTold) {
+  Lines lines;
+  GltfModel model = instanced_model([](GltfModel& m) { return json{{"_COLOR", m.vec3({1, 0, 0, 0, 1, 0})}}; });
+  const ScenePtr scene = imported(model, lines.log);
+  EXPECT_EQ(scene->triangle_count(), 2U);  // both in one place
+  ASSERT_EQ(lines.warnings.size(), 1U);
+  EXPECT_TRUE(has(lines.warnings[0], "instances are drawn without _COLOR")) << lines.warnings[0];
+  // Of no attribute it is a mesh as any other, of no instance it is none.
+  EXPECT_EQ(imported(instanced_model([](GltfModel&) { return json::object(); }))->triangle_count(), 1U);
+}
+
+TEST(GltfInstances, HostileOnesAreRefusedInALine) {
+  const auto line = [](const std::function<json(GltfModel&)>& attributes) {
+    return refused(instanced_model(attributes));
+  };
+  EXPECT_TRUE(has(line([](GltfModel& m) {
+                    return json{{"TRANSLATION", m.vec3({0, 0, 0})}, {"SCALE", m.vec3({1, 1, 1, 2, 2, 2})}};
+                  }),
+                  "node 0, instances' TRANSLATION has 1 elements, another attribute 2"));
+  EXPECT_TRUE(has(line([](GltfModel& m) { return json{{"SCALE", m.scalars({1})}}; }), "wrong type of element"));
+  EXPECT_TRUE(has(line([](GltfModel& m) { return json{{"ROTATION", m.vec3({0, 0, 0})}}; }), "wrong type of element"));
+  EXPECT_TRUE(has(line([](GltfModel&) { return json{{"SCALE", 77}}; }), "there is no accessor 77"));
+  EXPECT_TRUE(has(line([](GltfModel& m) { return json{{"SCALE", m.vec3({1, 1e30F, 1})}}; }), "or too large"));
+  GltfLimits limits;
+  limits.instanced_triangles = 9;
+  const auto many = [](std::size_t count) {
+    return instanced_model([count](GltfModel& m) {
+             return json{{"SCALE", m.vec3(std::vector<float>(3 * count, 1.0F))}};
+           })
+        .gltf();
+  };
+  EXPECT_EQ(imported(many(9), {}, limits)->triangle_count(), 9U);
+  EXPECT_TRUE(has(refused(many(10), ErrorCode::file, limits),
+                  "node 0: instances are copied, and 10 of 1 triangles are more than the 9"));
 }
 
 }  // namespace

@@ -1208,13 +1208,10 @@ Bytes mutated(const Bytes& from, std::mt19937& random) {
 }
 
 TEST(Gltf, MutatedFilesAreImportedOrRefusedByOneLine) {
-  const GltfModel seeds[] = {test::seed_materials(),
-                             test::seed_animated(),
-                             test::seed_draco(),
-                             test::seed_meshopt(),
-                             triangle_model(),
-                             test::seed_pointers(),
-                             test::seed_webp(test::webp(8, 8, Bytes(256, 77), 50.0F))};
+  const GltfModel seeds[] = {test::seed_materials(), test::seed_animated(),
+                             test::seed_draco(),     test::seed_meshopt(),
+                             triangle_model(),       test::seed_pointers(),
+                             test::seed_instances(), test::seed_webp(test::webp(8, 8, Bytes(256, 77), 50.0F))};
   GltfLimits limits;
   limits.memory = std::uint64_t{64} << 20U;
   limits.unbacked = 1U << 16U;

@@ -461,7 +461,8 @@ CUMULET_API cumulet_status cumulet_inspection_get_metadata(const cumulet_inspect
  * material that looks like it, textures converted as they are read), KHR_texture_transform, KHR_mesh_quantization,
  * KHR_draco_mesh_compression, EXT_meshopt_compression, EXT_texture_webp, KHR_node_visibility (what is hidden neither
  * shows nor counts), KHR_animation_pointer (transforms, weights and visibility of nodes, factors and texture transforms
- * of materials, lights; a warning names what else a file animates). Watts per steradian and per square metre stand for
+ * of materials, lights; a warning names what else a file animates), EXT_mesh_gpu_instancing (as copies, which may be
+ * 16,777,216 triangles together). Watts per steradian and per square metre stand for
  * KHR_lights_punctual's candela and lux. Emissive triangles are lights, to their front alone where the material is
  * single-sided. Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
  */
