@@ -36,9 +36,9 @@ class Assembler {
     std::vector<MovableMaterial> movable = import_materials(file_, log_, name_, budget_, progress_, *scene_);
     scene_->rig = import_rig(file_, log_, name_, budget_, progress_, *scene_);
     const auto moves_material = [](const Channel& channel) { return channel.property == Property::material; };
-    for (const Track& track : scene_->rig.tracks) {
-      if (std::ranges::any_of(track.channels, moves_material)) scene_->movable = std::move(movable);
-    }
+    const bool any = std::ranges::any_of(
+        scene_->rig.tracks, [&](const Track& track) { return std::ranges::any_of(track.channels, moves_material); });
+    if (any) scene_->movable = std::move(movable);
     plan();
     instances();
     variants();

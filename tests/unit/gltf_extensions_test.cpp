@@ -269,6 +269,16 @@ TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
   EXPECT_EQ(bright->atlas, dark->atlas);
 }
 
+TEST(GltfPointers, EachAnimationMovesMaterials) {
+  GltfModel model = moving_model();
+  animate(model, {{"/materials/0/alphaCutoff", 1, {0, 1}}});
+  animate(model, {{"/materials/0/pbrMetallicRoughness/metallicFactor", 1, {1, 0}}});
+  const ScenePtr scene = imported(model);
+  EXPECT_FLOAT_EQ(scene->pose(0.25, 0).materials.at(0).alpha_cutoff, 0.25F);
+  EXPECT_FLOAT_EQ(scene->pose(0.25, 1).materials.at(0).metallic, 0.75F);
+  EXPECT_FLOAT_EQ(scene->pose(0.25, 1).materials.at(0).alpha_cutoff, 0.5F);
+}
+
 TEST(GltfPointers, LightsAreThoseOfTheMoment) {
   GltfModel model = moving_model();
   const std::string of = "/extensions/KHR_lights_punctual/lights/0/";
