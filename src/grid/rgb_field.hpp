@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <utility>
 
@@ -28,6 +29,12 @@ class RgbField {
   [[nodiscard]] const glm::ivec3& bounds_max() const { return components_[0].bounds_max; }
   /// Whether the brick at this corner (cube space) is black.
   [[nodiscard]] bool is_zero(const glm::ivec3& corner) const;
+  /// Main memory.
+  [[nodiscard]] std::uint64_t bytes() const {
+    std::uint64_t bytes = 0;
+    for (std::size_t i = 0; i < 3; ++i) bytes += components_[i].bytes() + statistics_[i]->bytes();
+    return bytes;
+  }
 
  private:
   Components components_;  // the statistics point into it
@@ -43,6 +50,8 @@ class ScalarField {
   ScalarField& operator=(const ScalarField&) = delete;
 
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
+  /// Main memory.
+  [[nodiscard]] std::uint64_t bytes() const { return values_.bytes() + statistics_.bytes(); }
 
  private:
   volume::ScalarVolume values_;  // the statistics point into it
@@ -63,6 +72,8 @@ class MomentumField {
 
   [[nodiscard]] const Statistics& component(std::size_t i) const { return components_.component(i); }
   [[nodiscard]] float fastest() const { return fastest_; }
+  /// Main memory.
+  [[nodiscard]] std::uint64_t bytes() const { return components_.bytes(); }
 
  private:
   RgbField components_;
@@ -79,6 +90,12 @@ struct Channels {
   std::shared_ptr<const ScalarField> forward;
   /// Light knows nothing of it: no cell is split for it.
   std::shared_ptr<const MomentumField> momentum;
+
+  /// Main memory.
+  [[nodiscard]] std::uint64_t bytes() const {
+    return (emission ? emission->bytes() : 0) + (scattering ? scattering->bytes() : 0) +
+           (forward ? forward->bytes() : 0) + (momentum ? momentum->bytes() : 0);
+  }
 };
 
 }  // namespace cumulet::grid

@@ -105,6 +105,10 @@ class Statistics {
   [[nodiscard]] const std::vector<std::uint32_t>& nodes_of_size(int log2_size) const {
     return by_size_[static_cast<std::size_t>(log2_size)];
   }
+  /// Main memory, without the volume's.
+  [[nodiscard]] std::uint64_t bytes() const {
+    return nodes_.size() * (sizeof(Node) + 4) + moments_.size() * sizeof(Moments) + extra_values_.size() * 4;
+  }
 
  private:
   void build_topology(const volume::ScalarVolume& volume, Progress* progress);

@@ -67,6 +67,7 @@ void GpuScene::find_present(const scene::Snapshot& snapshot) {
       present_.pop_back();
     } else {
       present.source = was->source;
+      present.frame = was->frame;
     }
   }
   if (present_.empty()) present_ = data_of_;

@@ -159,6 +159,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
                   divisor,
                   scene_met(obstacles),
                   wish_.content.environment,
+                  wish_.frame,
                   wishes_,
                   scenes_};
   answer_seconds_ = 0.0;
@@ -305,6 +306,10 @@ bool Progressive::more() const {
     default:
       return true;
   }
+}
+
+bool Progressive::owes_picture() const {
+  return state() == State::due || state() == State::answering || state() == State::overtaken;
 }
 
 bool Progressive::converged() const { return state() == State::done && !more() && working_->divisor == 1; }

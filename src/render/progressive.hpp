@@ -26,7 +26,7 @@ struct PictureWish {
     scene::Part<light::Surroundings> surroundings;
     scene::Part<light::Lamps> lamps;
     scene::Part<std::optional<scene::Ground>> ground;
-    std::vector<scene::Volume> volumes;  // without their sources: what is there of them is data
+    std::vector<scene::Volume> volumes;  // without sources and frames: what is there of them is data
     Revision<MarchData> data;
     Revision<InstanceData> instances;
     Revision<ModelData> model;
@@ -46,6 +46,7 @@ struct PictureWish {
   };
   Content content;
   PictureParameters parameters;        // of the content, at full resolution
+  std::optional<std::uint32_t> frame;  // of a sequence, that the data are of
   std::uint32_t samples = 1;           // a pixel
   std::optional<double> noise_target;  // at full resolution: enough, whatever the samples
   bool depth = false;                  // find the volume's depth at half opacity as well
@@ -79,6 +80,8 @@ class Progressive {
   [[nodiscard]] Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
   /// The same for all pictures of what was wished when it was begun.
   [[nodiscard]] std::uint64_t shown_wish() const { return shown_ ? shown_->wish : 0; }
+  /// Of a sequence, the frame that it shows.
+  [[nodiscard]] std::optional<std::uint32_t> shown_frame() const { return shown_ ? shown_->frame : std::nullopt; }
   /// The same for all pictures of the same scene, from wherever.
   [[nodiscard]] std::uint64_t shown_scene() const { return shown_ ? shown_->scenes : 0; }
   /// What was shown before, where that may have pixels without a sample; else null.
@@ -100,6 +103,8 @@ class Progressive {
   /// Whether pictures may come coarse first, and need not be the same whatever was before.
   [[nodiscard]] bool previews() const { return wish_.content.preview; }
   [[nodiscard]] bool converged() const;
+  /// Whether no picture of the wish is shown yet, but one is to come.
+  [[nodiscard]] bool owes_picture() const;
   /// Whether advance has anything left to do.
   [[nodiscard]] bool more() const;
   /// Part of the work on the wish that is done, 0 to 1: never less than before, as long as the wish is the same.
@@ -123,6 +128,7 @@ class Progressive {
     std::uint32_t divisor = 1;              // of the resolution
     const surface::Scene* scene = nullptr;  // whose triangles its paths meet
     Revision<EnvironmentData> environment;  // that they escape to
+    std::optional<std::uint32_t> frame;     // of a sequence
     std::uint64_t wish = 0;                 // that it is of
     std::uint64_t scenes = 0;               // that there had been
   };

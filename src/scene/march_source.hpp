@@ -42,6 +42,11 @@ struct MarchSource {
   [[nodiscard]] bool coloured() const { return channels.scattering || (grid && !grid->colour.empty()); }
   [[nodiscard]] bool anisotropic() const { return channels.forward || (grid && !grid->anisotropy.empty()); }
   [[nodiscard]] bool moves() const { return channels.momentum || (grid && !grid->velocity.empty()); }
+  /// Main memory that it holds, voxels among it that others may hold as well.
+  [[nodiscard]] std::uint64_t bytes() const {
+    return (grid ? grid->bytes() : 0) + glow.cells.size() * sizeof(GlowingCell) + (volume ? volume->bytes() : 0) +
+           (statistics ? statistics->bytes() : 0) + brick_values.size() * 2 + brick_slots.size() * 4 + channels.bytes();
+  }
   /// From grid values to density 0 to 1.
   [[nodiscard]] float density_a_value() const { return max_value > 0.0F ? 1.0F / max_value : 1.0F; }
 };

@@ -59,6 +59,7 @@ struct Volume {
   MarchSourcePtr source;  ///< not null; all are of one march
   Part<Medium> medium;
   Place place;
+  std::optional<std::uint32_t> frame = {};  ///< of a sequence: which one the source is
   bool operator==(const Volume&) const = default;
 };
 

@@ -42,6 +42,10 @@ inline constexpr std::array ground_choices = {
     Choice{"none", CUMULET_GROUND_NONE, "None", "Nothing."},
     Choice{"below", CUMULET_GROUND_BELOW, "Below", "At the lowest point of volume and surfaces."},
     Choice{"at-height", CUMULET_GROUND_AT_HEIGHT, "At a height", "Where it is set to be."}};
+inline constexpr std::array repeat_choices = {
+    Choice{"hold", CUMULET_REPEAT_HOLD, "Hold", "The first and the last frame stay."},
+    Choice{"loop", CUMULET_REPEAT_LOOP, "Loop", "After the last frame the first."},
+    Choice{"ping-pong", CUMULET_REPEAT_PING_PONG, "Ping-pong", "Back, and forth again."}};
 inline constexpr std::array view_choices = {
     Choice{"shaded", CUMULET_VIEW_SHADED, "Shaded", "The path-traced picture."},
     Choice{"cells", CUMULET_VIEW_CELLS, "Cells", "The cells on a cut through the middle, coloured by level."},
@@ -458,6 +462,29 @@ struct Table<cumulet_display_desc> {
         .help = "Take the noise away: `fast` by a filter (default: fast)",
         .row = {.label = "Denoise",
                 .tip = "What the screen shows of few samples. Files with linear values have them as they are."}})};
+};
+
+template <>
+struct Table<cumulet_playback_desc> {
+  using Desc = cumulet_playback_desc;
+  static constexpr const char* name = "cumulet_playback_desc";
+  static constexpr std::tuple rows = {
+      Setting(&Desc::frames_per_second, {.name = "frames_per_second", .range = {0.0, 1e6},
+        .given = Range{0.0, 1e6, true}, .zero = 24.0,
+        .key = "sequence.frames_per_second",
+        .row = {.label = "Frames/s",
+                .tip = "How fast the sequence plays.",
+                .least = 1.0, .most = 120.0, .format = "%.4g"}}),
+      Setting(&Desc::offset_seconds, {.name = "offset_seconds", .range = {-1e9, 1e9},
+        .key = "sequence.offset_seconds",
+        .row = {.label = "Offset",
+                .tip = "When, by the clock that a model's animation has, the first frame comes.",
+                .least = -10.0, .most = 10.0, .format = "%.2f s"}}),
+      Setting(&Desc::repeat, {.name = "repeat", .choices = repeat_choices,
+        .key = "sequence.repeat",
+        .row = {.label = "Repeat", .tip = "What follows the last frame."}}),
+      Setting(&Desc::first_frame, {.name = "first_frame"}),
+      Setting(&Desc::frame_count, {.name = "frame_count"})};
 };
 
 template <>

@@ -34,6 +34,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   Built built;
   built.volume = volume;
   built.settings = settings;
+  built.active_voxels = volume->volume().active_voxels;
   const auto [voxels, statistics] = volume->density(settings.density_ramp, progress, built.seconds.statistics);
   Stopwatch watch;
   const grid::Channels channels =
@@ -130,6 +131,14 @@ void Builder::cancel_loads() {
     load_.reset();
   }
   worker_.cancel_loads();
+}
+
+void Builder::forget() {
+  const std::scoped_lock lock(mutex_);
+  load_.reset();
+  worker_.drop();
+  loaded_.reset();
+  built_.reset();
 }
 
 bool Builder::configure_load(const std::optional<BuildSettings>& settings) {

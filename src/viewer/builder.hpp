@@ -62,6 +62,7 @@ struct Built {
   VolumeAssetPtr volume;
   scene::MarchSourcePtr source;
   BuildSettings settings;
+  std::uint64_t active_voxels = 0;
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
   bool limited = false;
@@ -92,6 +93,8 @@ class Builder {
   void cancel();
   /// Loads alone: another volume is there.
   void cancel_loads();
+  /// Ends all, and nothing is known of it: neither what was read, nor how it ended.
+  void forget();
 
   /// The newest volume that was read, once.
   std::optional<LoadedVolume> take_loaded();

@@ -206,6 +206,40 @@ cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume
   });
 }
 
+cumulet_status cumulet_set_sequence(cumulet_viewer* viewer, cumulet_sequence* sequence) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_sequence(sequence == nullptr ? nullptr : sequence->asset); });
+}
+
+cumulet_status cumulet_get_sequence_info(cumulet_viewer* viewer, cumulet_sequence_info* info, uint8_t* states,
+                                         size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    read_desc(info, "cumulet_sequence_info");
+    const core::Viewer::SequenceStatus status = v.sequence();
+    const auto& frames = status.frames.frames;
+    if (states != nullptr && count < frames.size())
+      refuse("the sequence has " + std::to_string(frames.size()) + " frames");
+    cumulet_sequence_info out{};
+    out.frames = static_cast<uint32_t>(frames.size());
+    out.ready_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::ready));
+    out.failed_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::failed));
+    out.asked_frame = status.asked;
+    out.drawn_frame = status.drawn.value_or(0);
+    out.is_drawn = status.drawn ? 1 : 0;
+    out.bytes = status.frames.bytes;
+    write_desc(info, out, "cumulet_sequence_info");
+    if (states == nullptr) return;
+    std::ranges::transform(frames, states, [](core::FrameShelf::State state) { return static_cast<uint8_t>(state); });
+  });
+}
+
+cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame, char* cause, size_t size) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(cause != nullptr && size > 0, "there is no room for the cause");
+    const std::optional<cumulet::Error> failure = v.frame_failure(frame);
+    copy_text(failure ? failure->what() : "", cause, size);
+  });
+}
+
 cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     const std::span<const double> values = array_of(to_world, count, 16, "places");
@@ -572,8 +606,8 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.samples = had.samples;
     s.steps = had.steps;
     s.noise = had.noise;
-    if (const auto volume = v.volume()) {
-      const core::Bounds bounds = v.bounds_of(*volume);
+    if (const auto facts = v.facts()) {
+      const core::Bounds bounds = v.bounds_of(*facts);
       for (int axis = 0; axis < 3; ++axis) {
         s.bounds_min[axis] = bounds.min[axis];
         s.bounds_max[axis] = bounds.max[axis];

@@ -10,6 +10,7 @@
 #include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/instance.hpp"
+#include "viewer/sequence.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
 
@@ -30,6 +31,11 @@ struct cumulet_environment {
 
 struct cumulet_instance {
   std::shared_ptr<cumulet::viewer::Instance> asset;
+  std::atomic<int> references = 1;
+};
+
+struct cumulet_sequence {
+  std::shared_ptr<cumulet::viewer::Sequence> asset;
   std::atomic<int> references = 1;
 };
 

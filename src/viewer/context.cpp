@@ -117,7 +117,13 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.content.lamps = shot.scene->lamps;
   wish.content.ground = shot.scene->ground;
   wish.content.volumes = shot.scene->volumes;
-  for (scene::Volume& volume : wish.content.volumes) volume.source = nullptr;
+  for (scene::Volume& volume : wish.content.volumes) {
+    volume.source = nullptr;
+    volume.frame.reset();
+  }
+  for (const scene::Volume& volume : scene_.volumes()) {
+    if (volume.frame) wish.frame = volume.frame;
+  }
   wish.content.data = scene_.data_revision();
   wish.content.instances = scene_.instances_revision();
   wish.content.model = scene_.model_revision();

@@ -78,6 +78,10 @@ class Context {
   void draw(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Goes on with what a frame that draws will show.
   void denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown);
+  /// Of a sequence, the frame that is drawn.
+  [[nodiscard]] std::optional<std::uint32_t> shown_frame() const { return progressive_.shown_frame(); }
+  /// Whether what was uploaded last, or is being uploaded, is still to be seen, and will be.
+  [[nodiscard]] bool owes_picture() const { return scene_.uploading() || progressive_.owes_picture(); }
   /// What is known after the frame.
   void tell(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Whether the frame's failure is to be told: what does not build fails in each until a setting changes.

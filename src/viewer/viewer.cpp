@@ -77,6 +77,8 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
           log_, [this] { notify(); }, trace),
       environment_builder_([this] { notify(); }, trace),
       shelf_(
+          log_, [this] { notify(); }, trace),
+      frames_(
           log_, [this] { notify(); }, trace) {
   set_medium({});
   set_light({});
@@ -105,10 +107,7 @@ void Viewer::touch() {
 
 void Viewer::sync() {
   if (auto loaded = builder_.take_loaded()) {
-    volume_ = std::move(loaded->volume);
-    wishes_due_ = true;
-    built_for_.reset();
-    remark_on_anisotropy();
+    take_volume(std::move(loaded->volume));
     suggested_density_scale_ = loaded->density_scale;
     if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
   }
@@ -120,11 +119,9 @@ void Viewer::sync() {
     }
     built_ = std::move(*built);
     wishes_due_ = true;
-    if (suggested_density_scale_ && built_.volume == volume_) {
-      medium_.density_scale = *std::exchange(suggested_density_scale_, std::nullopt) / stretch();
-      show_medium();
-    }
+    if (built_.volume == volume_) take_suggestion();
   }
+  follow_sequence();
   follow_instances();
   if (auto surfaces = surface_builder_.take()) {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
@@ -137,6 +134,120 @@ void Viewer::sync() {
     if (const auto wanted = day(); wanted && !(daylight_ && daylight_->day == *wanted)) daylight_ = std::move(*sky);
     surround();
   }
+}
+
+void Viewer::take_suggestion() {
+  if (!suggested_density_scale_) return;
+  medium_.density_scale = *std::exchange(suggested_density_scale_, std::nullopt) / stretch();
+  show_medium();
+}
+
+void Viewer::take_volume(VolumeAssetPtr volume) {
+  volume_ = std::move(volume);
+  facts_ = volume_ ? volume_->facts() : nullptr;
+  built_for_.reset();
+  remark_on_anisotropy();
+  wishes_due_ = true;  // of it, or no longer
+}
+
+void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
+  if (!sequence && !followed_) return;
+  builder_.forget();
+  sync();
+  leave_sequence();
+  if (!sequence) {
+    take_volume(nullptr);
+    built_ = {};
+    touch();
+    return;
+  }
+  suggested_density_scale_.reset();
+  take_medium();
+  built_for_.reset();
+  Followed followed;
+  followed.listener = sequence->listen([this] { notify(); });
+  followed.sequence = std::move(sequence);
+  followed.settings = settings_at_once();
+  followed_ = std::move(followed);
+  follow_sequence();
+  touch();
+}
+
+void Viewer::leave_sequence() {
+  followed_.reset();
+  frames_.clear();
+}
+
+void Viewer::follow_sequence() {
+  if (!followed_) return;
+  Followed& f = *followed_;
+  if (auto judged = frames_.take_judged()) {
+    volume_ = nullptr;
+    facts_ = std::move(judged->facts);
+    wishes_due_ = true;
+    remark_on_anisotropy();
+    suggested_density_scale_ = judged->density_scale;
+    if (suggested_density_scale_) {
+      grid_.build.refine.density_scale = *suggested_density_scale_;
+      if (f.settings) f.settings->refine.density_scale = *suggested_density_scale_;
+      f.wish_due = true;
+    }
+  }
+  if (const std::uint64_t revision = f.sequence->revision(); revision != f.revision) {
+    f.revision = revision;
+    f.state = f.sequence->get();
+    f.wish_due = true;
+  }
+  if (f.wish_due) {
+    frames_.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), f.settings,
+                  f.state.memory_bytes});
+    f.wish_due = false;
+    f.take_due = true;
+    f.is_wanted = false;
+  }
+  if (const std::uint64_t shelved = frames_.revision(); shelved != f.shelved) {
+    f.shelved = shelved;
+    f.take_due = true;
+  }
+  if (f.take_due) take_frame();
+}
+
+void Viewer::take_frame() {
+  Followed& f = *followed_;
+  // However fast frames come, one that was taken is seen.
+  if (gl_ && sampling_.preview && f.frame && (!f.is_rendered || gl_->owes_picture())) return;
+  f.take_due = false;
+  auto ready = frames_.nearest();
+  if (!ready) return;
+  f.is_wanted = ready->wanted;
+  volume_ = ready->built.volume;
+  if (ready->frame == f.frame && ready->built.source == built_.source) return;
+  built_ = std::move(ready->built);
+  f.frame = ready->frame;
+  f.is_rendered = false;
+  if (!shown_.empty()) wishes_due_ = true;
+  take_suggestion();
+}
+
+Viewer::Followed& Viewer::followed() {
+  sync();
+  if (!followed_) throw Error(ErrorCode::invalid_argument, "the viewer shows no sequence");
+  return *followed_;
+}
+
+Viewer::SequenceStatus Viewer::sequence() {
+  const Followed& f = followed();
+  SequenceStatus status;
+  status.asked = f.state.moment.frame();
+  if (gl_) status.drawn = gl_->shown_frame();
+  status.frames = frames_.frames();
+  return status;
+}
+
+std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
+  if (frame >= followed().sequence->files()->count())
+    throw Error(ErrorCode::invalid_argument, "the sequence has no frame " + std::to_string(frame));
+  return frames_.failure_of(frame);
 }
 
 std::optional<BuildSettings> Viewer::settings_at_once() const {
@@ -158,6 +269,13 @@ void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   if (builder_.configure_load(settings_at_once())) return;
   sync();
   const auto settings = settings_at_once();
+  if (followed_) {
+    // Each frame may have what the one that is shown has not.
+    built_for_.reset();
+    followed_->settings = settings;
+    followed_->wish_due = true;
+    return;
+  }
   if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
   built_for_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
@@ -165,6 +283,7 @@ void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
 
 void Viewer::load_volume(const VolumeFile& file) {
   sync();
+  leave_sequence();
   suggested_density_scale_.reset();
   take_medium();
   builder_.load(file, settings_at_once());
@@ -179,11 +298,9 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
   }
   builder_.take_loaded();  // what was read, and not shown yet, never is
   sync();
-  volume_ = std::move(volume);
+  leave_sequence();
+  take_volume(std::move(volume));
   suggested_density_scale_.reset();
-  built_for_.reset();
-  remark_on_anisotropy();
-  wishes_due_ = true;  // of it, or no longer
   if (!volume_) {
     built_ = {};
   } else if (!grid_.camera_adaptive) {
@@ -196,6 +313,11 @@ void Viewer::set_volume(VolumeAssetPtr volume) {
 VolumeAssetPtr Viewer::volume() {
   sync();
   return volume_;
+}
+
+VolumeFactsPtr Viewer::facts() {
+  sync();
+  return facts_;
 }
 
 void Viewer::set_places(const std::vector<scene::Place>& places) {
@@ -359,6 +481,7 @@ void Viewer::rebuild() {
   }
   shelf_.forget_failures();
   wishes_due_ = true;
+  frames_.rebuild();
   take_medium();
   request_build();
   touch();
@@ -369,11 +492,16 @@ void Viewer::cancel() {
   surface_builder_.cancel();
   environment_builder_.cancel();
   shelf_.cancel();
+  frames_.cancel();
 }
 
 bool Viewer::busy() const { return builds() || surface_builder_.busy() || environment_builder_.busy(); }
 
-bool Viewer::builds() const { return builder_.busy() || shelf_.busy() || shelf_.revision() != shelved_; }
+bool Viewer::builds() const {
+  const bool frame_comes = followed_ && !followed_->is_wanted &&
+                           (followed_->wish_due || frames_.busy() || frames_.revision() != followed_->shelved);
+  return frame_comes || builder_.busy() || shelf_.busy() || shelf_.revision() != shelved_;
+}
 
 void Viewer::load_surfaces(const std::string& path) {
   sync();
@@ -451,7 +579,7 @@ void Viewer::wait(double timeout_ms) {
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   const auto idle = [&] {
     return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
-           shelf_.wait(until);
+           shelf_.wait(until) && frames_.wait(until);
   };
   // What comes of one may be work for another.
   do {
@@ -463,6 +591,7 @@ void Viewer::wait(double timeout_ms) {
   if (const auto failure = builder_.status().failure) throw Error(*failure);
   if (const auto failure = environment_builder_.status().failure) throw Error(*failure);
   if (const auto failure = shelf_.status().failure) throw Error(*failure);
+  if (const auto failure = frames_.status().failure) throw Error(*failure);
 }
 
 Viewer::Status Viewer::status() const {
@@ -471,9 +600,10 @@ Viewer::Status Viewer::status() const {
   const Worker::Status surfaces = surface_builder_.status();
   const Worker::Status environment = environment_builder_.status();
   const Worker::Status grids = shelf_.status();
-  Status status{volume.stage, volume.fraction, volume.failure ? volume.failure : grids.failure, surfaces.failure,
-                environment.failure};
-  for (const Worker::Status& other : {grids, surfaces, environment}) {
+  const Worker::Status frames = frames_.status();
+  const auto& own = volume.failure ? volume.failure : frames.failure;
+  Status status{volume.stage, volume.fraction, own ? own : grids.failure, surfaces.failure, environment.failure};
+  for (const Worker::Status& other : {frames, grids, surfaces, environment}) {
     if (status.stage != Progress::Stage::idle) break;
     status.stage = other.stage;
     status.fraction = other.fraction;
@@ -517,8 +647,8 @@ void Viewer::set_ramps(const Ramps& ramps) {
 
 void Viewer::remark_on_anisotropy() {
   if (medium_.phase.may_vary()) remarked_anisotropy_.reset();
-  if (!volume_ || !volume_->has_anisotropy() || medium_.phase.may_vary()) return;
-  const std::string& name = (*volume_->frame().anisotropy)[0].name;
+  if (!facts_ || !facts_->anisotropy_grid || medium_.phase.may_vary()) return;
+  const std::string& name = *facts_->anisotropy_grid;
   if (remarked_anisotropy_ == name) return;
   remarked_anisotropy_ = name;
   log_.info("grid \"" + name + "\" is not shown: the Mie phase function has an anisotropy of its own");
@@ -675,7 +805,7 @@ double Viewer::stretch() const {
   return most;
 }
 
-Bounds Viewer::bounds_of(const VolumeAsset& volume) const {
+Bounds Viewer::bounds_of(const VolumeFacts& volume) const {
   Bounds all = volume.bounds(places_.front().to_world);
   for (std::size_t i = 1; i < places_.size(); ++i) all = both(all, volume.bounds(places_[i].to_world));
   return all;
@@ -683,7 +813,7 @@ Bounds Viewer::bounds_of(const VolumeAsset& volume) const {
 
 std::optional<Bounds> Viewer::box() const {
   std::optional<Bounds> box;
-  if (volume_ && !volume_->empty()) box = bounds_of(*volume_);
+  if (facts_ && !facts_->empty) box = bounds_of(*facts_);
   const auto add = [&](const Bounds& other) { box = box ? both(*box, other) : other; };
   for (const Shown& shown : shown_) {
     if (shown.is_seen() && !shown.settings.volume->empty()) add(shown.settings.volume->bounds(shown.settings.to_world));
@@ -725,8 +855,8 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     reach.resize(normals.size(), std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < normals.size(); ++i) reach[i] = std::max(reach[i], glm::dot(p, normals[i]));
   };
-  const std::size_t count = (volume_ ? places_.size() : 0) + shown_.size();
-  const auto add_volume = [&](const VolumeAsset& volume, const glm::dmat4& to_world, const Medium& medium) {
+  const std::size_t count = (facts_ ? places_.size() : 0) + shown_.size();
+  const auto add_volume = [&](const VolumeFacts& volume, const glm::dmat4& to_world, const Medium& medium) {
     const Bounds box = volume.bounds(to_world);
     const auto add_box = [&] {
       for (int i = 0; i < 8; ++i)
@@ -740,16 +870,16 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     }
     const dvec3 along = glm::inverse(glm::dmat3(to_world)) * direction;
     const double density_scale = medium.density_scale / glm::length(along);
-    for (const dvec3& p : volume.coarse().visible(glm::normalize(along), density_scale))
+    for (const dvec3& p : volume.coarse.visible(glm::normalize(along), density_scale))
       add(dvec3(to_world * glm::dvec4(p, 1.0)));
     // What glows shows at any density.
-    if (volume.may_emit()) add_box();
+    if (volume.may_emit) add_box();
   };
   for (const scene::Place& place : places_) {
-    if (volume_) add_volume(*volume_, place.to_world, medium_);
+    if (facts_) add_volume(*facts_, place.to_world, medium_);
   }
   for (const Shown& shown : shown_) {
-    if (shown.is_seen()) add_volume(*shown.settings.volume, shown.settings.to_world, shown.settings.medium);
+    if (shown.is_seen()) add_volume(*shown.settings.volume->facts(), shown.settings.to_world, shown.settings.medium);
   }
   if (model_source_) {
     for (const surface::PosedVertex& vertex : model_source_->pose.vertices) add(vertex.position);
@@ -805,8 +935,9 @@ bool Viewer::shows_instances() const {
 void Viewer::show_volumes() {
   std::vector<scene::Volume> volumes;
   // What surfaces alone are in stands aside.
-  if (built_.source && (volume_ || !shows_instances())) {
-    for (const scene::Place& place : places_) volumes.push_back({0, built_.source, shown_medium_, place});
+  if (built_.source && (facts_ || !shows_instances())) {
+    const auto frame = followed_ ? followed_->frame : std::nullopt;
+    for (const scene::Place& place : places_) volumes.push_back({0, built_.source, shown_medium_, place, frame});
   }
   for (const Shown& shown : shown_) {
     if (shown.is_seen() && shown.built)
@@ -833,7 +964,9 @@ void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
     if (fits(volume)) continue;
     const auto was = std::ranges::find_if(
         scene_.volumes, [&](const scene::Volume& other) { return other.id == volume.id && fits(other); });
-    if (was != scene_.volumes.end()) volume.source = was->source;
+    if (was == scene_.volumes.end()) continue;
+    volume.source = was->source;
+    volume.frame = was->frame;
   }
   std::erase_if(volumes, [&](const scene::Volume& volume) { return !fits(volume); });
 }

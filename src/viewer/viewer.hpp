@@ -20,9 +20,11 @@
 #include "viewer/camera.hpp"
 #include "viewer/context.hpp"
 #include "viewer/environment_builder.hpp"
+#include "viewer/frame_shelf.hpp"
 #include "viewer/grid_shelf.hpp"
 #include "viewer/instance.hpp"
 #include "viewer/navigation.hpp"
+#include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_builder.hpp"
 
@@ -66,11 +68,24 @@ class Viewer {
   void set_volume(VolumeAssetPtr volume);
   /// The newest volume; null if there is none.
   VolumeAssetPtr volume();
+  /// What is known of the volume, or of the sequence; null if there is none.
+  VolumeFactsPtr facts();
+  /// Shows, in place of the volume, frames of it, as it stands at any time; null: none, and of one before nothing.
+  void set_sequence(std::shared_ptr<Sequence> sequence);
+  struct SequenceStatus {
+    std::uint32_t asked = 0;             ///< the frame at which it stands
+    std::optional<std::uint32_t> drawn;  ///< that is to be seen
+    FrameShelf::Status frames;
+  };
+  /// Throws Error(invalid_argument) where the viewer shows no sequence; so does the next.
+  SequenceStatus sequence();
+  /// Why a frame cannot be shown.
+  std::optional<Error> frame_failure(std::uint32_t frame);
   /// Where the volume stands, whichever it is: affine, from its own world, and once in each of these places, which are
   /// one at least. Moves what is there; a grid that suits a volume of that size no longer is built anew.
   void set_places(const std::vector<scene::Place>& places);
   /// World bounds of a volume there.
-  [[nodiscard]] Bounds bounds_of(const VolumeAsset& volume) const;
+  [[nodiscard]] Bounds bounds_of(const VolumeFacts& volume) const;
   /// Shows it beside the volume from now on, as it is at any time. Throws Error(invalid_argument) where it does.
   void add_instance(std::shared_ptr<Instance> instance);
   /// Throws Error(invalid_argument) where the viewer does not show it.
@@ -169,6 +184,14 @@ class Viewer {
   template <class Body>
   void with_gl(Body&& body);
   void sync();
+  // The sequence's newest wish, and what came of it.
+  void follow_sequence();
+  void take_frame();
+  void leave_sequence();
+  // It is this one, or none, from now on.
+  void take_volume(VolumeAssetPtr volume);
+  // The density scale that was suggested is the medium's, with the first grid that was made for it.
+  void take_suggestion();
   // concerned: volumes that are not, whatever they are, are left as they are.
   void request_build(bool (*concerned)(const VolumeAsset&) = nullptr);
   // What grids to come know of the medium.
@@ -269,7 +292,8 @@ class Viewer {
   Navigation navigation_;
   std::chrono::steady_clock::time_point last_frame_time_{};
 
-  VolumeAssetPtr volume_;                           // newest
+  VolumeAssetPtr volume_;                           // newest; of a sequence, of the frame taken last, if it is there
+  VolumeFactsPtr facts_;                            // of it, or of the sequence
   VolumeAssetPtr empty_volume_;                     // where there are surfaces alone
   std::optional<std::string> remarked_anisotropy_;  // the grid, as long as it is not shown
   Built built_;                                     // newest, and what is uploaded again in a new context
@@ -300,11 +324,29 @@ class Viewer {
   std::optional<BuildView> built_for_;  // camera-adaptive: what the grid was last asked for
   render::Totals totals_;
 
+  // A sequence that is shown in place of a volume.
+  struct Followed {
+    std::shared_ptr<Sequence> sequence;
+    std::shared_ptr<void> listener;
+    std::uint64_t revision = 0;             // of what was wished last
+    std::optional<BuildSettings> settings;  // none: they wait for a view
+    SequenceState state;
+    bool wish_due = true;
+    std::uint64_t shelved = 0;  // of frames_, when it was last looked at
+    bool take_due = false;
+    std::optional<std::uint32_t> frame;  // that was taken last
+    bool is_wanted = false;              // that one is all that there is to come
+    bool is_rendered = false;            // by a frame, since
+  };
+  [[nodiscard]] Followed& followed();
+  std::optional<Followed> followed_;
+
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;
   EnvironmentBuilder environment_builder_;
   GridShelf shelf_;
+  FrameShelf frames_;
 };
 
 }  // namespace cumulet::viewer

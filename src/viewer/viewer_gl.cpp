@@ -90,10 +90,10 @@ void Viewer::prepare(const Frame& frame) {
 
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
   const bool others = std::ranges::any_of(shown_, &Shown::is_seen);
-  const bool scene = volume_ || model_source_ || others;
+  const bool scene = facts_ || model_source_ || others;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
-  if (!volume_ && model_source_ && !shows_instances() && !built_.source && !builder_.busy()) {
+  if (!facts_ && model_source_ && !shows_instances() && !built_.source && !builder_.busy()) {
     Progress progress;
     built_ = build_grid(log_, empty_volume(), grid_.build, progress);
   }
@@ -108,11 +108,17 @@ void Viewer::prepare(const Frame& frame) {
 
   last_view_ = std::exchange(traced_view_, view_);
   const bool places_rest = !std::exchange(places_changed_, false);
-  if ((volume_ || others) && built_for_another()) {
+  if ((facts_ || others) && built_for_another()) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
     if (rests) {
       take_medium();
-      if (volume_) builder_.build(volume_, settings_for_view());
+      if (followed_) {
+        followed_->settings = settings_for_view();
+        followed_->wish_due = true;
+        follow_sequence();
+      } else if (volume_) {
+        builder_.build(volume_, settings_for_view());
+      }
       wishes_due_ = true;
       follow_instances();
       built_for_ = build_view();
@@ -153,6 +159,7 @@ FrameResult Viewer::render(const Frame& frame) {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), page_texels_, deadline);
     });
+    if (followed_) followed_->is_rendered = true;
     follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
@@ -164,11 +171,15 @@ FrameResult Viewer::render(const Frame& frame) {
       result.loading = true;
       result.converged = false;
     }
+    if (followed_ && followed_->take_due) {
+      result.more = true;
+      result.converged = false;
+    }
     const auto failed = [](const Worker::Status& status) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;
     };
     result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
-                    failed(environment_builder_.status()) || failed(shelf_.status());
+                    failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status());
     result.more = result.more || navigation_.moving() || built_for_another();
     if (failure && !g.is_news(shot, *failure)) failure.reset();
   });
@@ -274,7 +285,7 @@ Stats Viewer::stats() {
   s.cells = built_.cells;
   s.levels = built_.levels;
   s.limited = built_.limited;
-  s.active_voxels = volume_ ? volume_->volume().active_voxels : 0;
+  s.active_voxels = volume_ ? volume_->volume().active_voxels : (followed_ ? built_.active_voxels : 0);
   std::set<scene::MarchSourcePtr> grids{built_.source};
   std::set<VolumeAssetPtr> volumes{volume_};
   for (const Shown& shown : shown_) {

@@ -1,5 +1,6 @@
 #include "viewer/volume_asset.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
 #include <utility>
@@ -28,23 +29,43 @@ struct Box {
 }  // namespace
 
 VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
-    : frame_(make_left<const volume::VolumeFrame>(std::move(frame))), coarse_(frame_->density, progress) {
+    : frame_(make_left<const volume::VolumeFrame>(std::move(frame))) {
   const volume::ScalarVolume& density = frame_->density;
+  const auto is_there = [](const auto& field) { return field && !field->empty(); };
   Box shown;
   shown.add(density);
   if (frame_->flame) shown.add(*frame_->flame);
   Box all = shown;
   if (frame_->temperature) all.add(*frame_->temperature);
   if (shown.empty()) shown = all;
-  empty_ = all.empty();
-  if (empty_) shown = all = {density.bounds_min, density.bounds_max};
+  const bool empty = all.empty();
+  if (empty) shown = all = {density.bounds_min, density.bounds_max};
   cube_ = grid::fit_cube(density, all.low, all.high);
-  low_ = shown.low;
-  high_ = shown.high;
+  VolumeFacts facts{.empty = empty,
+                    .may_emit = is_there(frame_->flame) || is_there(frame_->temperature),
+                    .low = shown.low,
+                    .high = shown.high,
+                    .index_to_world = density.index_to_world,
+                    .anisotropy_grid = {},
+                    .coarse = volume::CoarseVolume(density, progress)};
+  if (frame_->anisotropy) facts.anisotropy_grid = (*frame_->anisotropy)[0].name;
+  facts_ = std::make_shared<const VolumeFacts>(std::move(facts));
 }
 
-Bounds VolumeAsset::bounds(const glm::dmat4& place) const {
-  return world_bounds(low_, high_, place * frame_->density.index_to_world);
+std::uint64_t VolumeAsset::bytes() const {
+  const volume::VolumeFrame& frame = *frame_;
+  std::uint64_t bytes = frame.density.bytes();
+  if (frame.temperature) bytes += frame.temperature->bytes();
+  if (frame.flame) bytes += frame.flame->bytes();
+  const auto add = [&](const volume::ScalarVolume& field) { bytes += field.bytes(); };
+  if (frame.colour) std::ranges::for_each(*frame.colour, add);
+  if (frame.anisotropy) std::ranges::for_each(*frame.anisotropy, add);
+  const std::scoped_lock lock(mutex_);
+  if (statistics_) bytes += statistics_->bytes();
+  if (ramped_) bytes += ramped_->density.voxels->bytes() + ramped_->density.statistics->bytes();
+  if (channels_) bytes += channels_->channels.bytes();
+  if (channels_ && channels_->forward && *channels_->forward) bytes += (*channels_->forward)->bytes();
+  return bytes;
 }
 
 const volume::ScalarVolume& VolumeAsset::main_field() const {

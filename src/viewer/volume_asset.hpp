@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 
 #include "base/progress.hpp"
 #include "grid/statistics.hpp"
@@ -12,6 +14,24 @@
 #include "volume/optical_depth.hpp"
 
 namespace cumulet::viewer {
+
+/// What is known of a volume without its voxels: enough to stand a camera before it.
+struct VolumeFacts {
+  bool empty = true;      ///< no field has an active voxel
+  bool may_emit = false;  ///< a field is there that can give off light
+  glm::ivec3 low{0};      ///< of the voxels that are seen
+  glm::ivec3 high{0};     ///< both inclusive
+  glm::dmat4 index_to_world{1.0};
+  std::optional<std::string> anisotropy_grid;  ///< its name
+  volume::CoarseVolume coarse;
+
+  /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such. place: where
+  /// it stands there.
+  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const {
+    return world_bounds(low, high, place * index_to_world);
+  }
+};
+using VolumeFactsPtr = std::shared_ptr<const VolumeFacts>;
 
 /// A volume and what is computed of it once, however many viewers show it. Immutable to its users; any thread.
 class VolumeAsset {
@@ -26,17 +46,15 @@ class VolumeAsset {
   [[nodiscard]] const volume::VolumeFrame& frame() const { return *frame_; }
   /// Its density; of fire alone the flame, or the temperature.
   [[nodiscard]] const volume::ScalarVolume& main_field() const;
-  /// Whether a field is there that can give off light.
-  [[nodiscard]] bool may_emit() const {
-    return (frame_->flame && !frame_->flame->empty()) || (frame_->temperature && !frame_->temperature->empty());
-  }
+  /// They may outlive it.
+  [[nodiscard]] const VolumeFactsPtr& facts() const { return facts_; }
+  [[nodiscard]] bool may_emit() const { return facts_->may_emit; }
   [[nodiscard]] bool has_anisotropy() const { return frame_->anisotropy.has_value(); }
-  /// Whether no field has an active voxel.
-  [[nodiscard]] bool empty() const { return empty_; }
-  /// World bounds of the active voxels of density and flame; of the temperature's, if there are no such. place: where
-  /// it stands there.
-  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const;
-  [[nodiscard]] const volume::CoarseVolume& coarse() const { return coarse_; }
+  [[nodiscard]] bool empty() const { return facts_->empty; }
+  [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const { return facts_->bounds(place); }
+  [[nodiscard]] const volume::CoarseVolume& coarse() const { return facts_->coarse; }
+  /// Main memory that it holds by now, with what was computed of it.
+  [[nodiscard]] std::uint64_t bytes() const;
   /// Density as marches see it; the statistics are good while the voxels are there.
   struct Density {
     std::shared_ptr<const volume::ScalarVolume> voxels;
@@ -53,11 +71,8 @@ class VolumeAsset {
 
  private:
   std::shared_ptr<const volume::VolumeFrame> frame_;
-  bool empty_ = true;
+  VolumeFactsPtr facts_;
   grid::Cube cube_;
-  volume::CoarseVolume coarse_;
-  glm::ivec3 low_{0};  // of what bounds() is of
-  glm::ivec3 high_{0};
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const grid::Statistics> statistics_;
   struct Ramped {

@@ -68,6 +68,20 @@ void Worker::end_jobs(bool loads_only) {
   changed_.notify_all();
 }
 
+void Worker::drop() {
+  std::optional<Job> old;
+  {
+    const std::scoped_lock lock(mutex_);
+    old = std::exchange(next_, std::nullopt);
+    failure_.reset();
+    if (current_) {
+      current_->dropped = true;
+      current_->progress->cancel();
+    }
+  }
+  changed_.notify_all();
+}
+
 void Worker::forget_failure() {
   const std::scoped_lock lock(mutex_);
   failure_.reset();
@@ -107,7 +121,7 @@ void Worker::run() {
     std::optional<Job> job = std::exchange(next_, std::nullopt);
     const auto progress = std::make_shared<Progress>();
     progress->begin(job->stage);
-    current_ = Current{progress, job->load, last_was_replaced_, false};
+    current_ = Current{progress, job->load, last_was_replaced_};
     lock.unlock();
     std::optional<Error> failure;
     {
@@ -117,9 +131,10 @@ void Worker::run() {
     job.reset();
     lock.lock();
     last_was_replaced_ = current_->replaced;
+    const bool dropped = current_->dropped;
     current_.reset();
     // A newer wish makes how this one ended old news.
-    if (!next_) failure_ = std::move(failure);
+    if (!next_ && !dropped) failure_ = std::move(failure);
     lock.unlock();
     changed_.notify_all();
     notify_();

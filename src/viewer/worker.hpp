@@ -53,7 +53,9 @@ class Worker {
   void replace(Job job) { take(std::move(job), true); }
   /// Ends both, soon, with ErrorCode::cancelled.
   void cancel() { end_jobs(false); }
-  /// The same of those that read a file.
+  /// The same, and nobody is told how they ended, nor how the one before did.
+  void drop();
+  /// cancel() of those that read a file.
   void cancel_loads() { end_jobs(true); }
 
   /// How the last job ended is told no more.
@@ -72,6 +74,7 @@ class Worker {
     bool load = false;
     bool spared = false;  // by replace(): the one before was cancelled for it
     bool replaced = false;
+    bool dropped = false;
   };
   void take(Job job, bool replaces);
   void end_jobs(bool loads_only);

@@ -47,6 +47,10 @@ struct ScalarVolume {
 
   /// No active voxel: bounds are then the one voxel (0, 0, 0), which is 0.
   [[nodiscard]] bool empty() const { return active_voxels == 0; }
+  /// Main memory, but for some hundreds.
+  [[nodiscard]] std::uint64_t bytes() const {
+    return brick_origins.size() * sizeof(glm::ivec3) + brick_values.bytes() + tiles.size() * sizeof(Tile);
+  }
 };
 
 /// An entry of a file's metadata, as text.

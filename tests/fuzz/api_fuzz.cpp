@@ -261,6 +261,56 @@ class Program {
     }
   }
 
+  void change_sequence() {
+    auto playback = described<cumulet_playback_desc>();
+    std::uint32_t frame = 0;
+    double seconds = 0.0;
+    switch (data_.ConsumeIntegralInRange(0, 7)) {
+      case 0:
+        cumulet_sequence_set_playback(sequence_.get(), &playback);
+        return;
+      case 1:
+        cumulet_sequence_set_time(sequence_.get(), bits<double>(number()));
+        return;
+      case 2:
+        cumulet_sequence_set_frame(sequence_.get(), bits<double>(number()));
+        return;
+      case 3:
+        if (cumulet_sequence_get_frame_at(sequence_.get(), bits<double>(number()), &frame) == CUMULET_OK && frame > 2)
+          fail("a frame that is not there");
+        cumulet_sequence_get_time_of(sequence_.get(), frame, &seconds);
+        return;
+      case 4:
+        return told(cumulet_set_sequence(viewer_.get(), data_.ConsumeBool() ? sequence_.get() : nullptr));
+      case 5: {
+        std::array<cumulet_sequence_info, 2> info{};
+        info[0] = described<cumulet_sequence_info>();
+        std::array<std::uint8_t, 4> states{};
+        return told(cumulet_get_sequence_info(viewer_.get(), info.data(), states.data(), states.size()));
+      }
+      case 6: {
+        std::array<char, 64> cause{};
+        told(cumulet_get_sequence_frame(viewer_.get(), data_.ConsumeIntegralInRange(0U, 4U), cause.data(),
+                                        cause.size()));
+        return check_line(cause.data());
+      }
+      default: {
+        constexpr std::array paths = {"/dev/null", "/dev/null/nowhere.vdb", ""};
+        auto file = described<cumulet_volume_file_desc>();
+        file.path = file.grid_name = file.temperature_grid = nullptr;
+        file.flame_grid = file.color_grid = file.anisotropy_grid = nullptr;
+        file.struct_size = std::min(file.struct_size, sizeof file);
+        auto desc = described<cumulet_sequence_desc>();
+        desc.paths = paths.data();
+        desc.count = data_.ConsumeIntegralInRange(0U, 3U);
+        desc.file = data_.ConsumeBool() ? &file : nullptr;
+        cumulet_sequence* sequence = nullptr;
+        made([&](char* error, std::size_t size) { return cumulet_sequence_create(&desc, &sequence, error, size); });
+        if (sequence != nullptr) sequence_.reset(sequence);
+      }
+    }
+  }
+
   void make_environment() {
     auto desc = described<cumulet_environment_desc>();
     desc.width = data_.ConsumeIntegralInRange<std::uint32_t>(0, 9);
@@ -440,7 +490,7 @@ class Program {
 
   void call() {
     cumulet_viewer* viewer = viewer_.get();
-    switch (data_.ConsumeIntegralInRange(0, 29)) {
+    switch (data_.ConsumeIntegralInRange(0, 30)) {
       case 0:
         return make_dense();
       case 1:
@@ -505,6 +555,8 @@ class Program {
         return set<cumulet_environment_settings_desc>(cumulet_set_environment_settings);
       case 28:
         return change_instances();
+      case 29:
+        return change_sequence();
       default:
         told(cumulet_detach(viewer));
         if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));
@@ -518,6 +570,7 @@ class Program {
   SurfacesRef surfaces_;
   EnvironmentRef environment_;
   InstanceRef instance_;
+  SequenceRef sequence_;
   ViewerPtr viewer_;
 };
 

@@ -311,6 +311,35 @@ TEST(CppInstance, IsSharedByCopies) {
   EXPECT_FALSE(Instance().set({}).has_value());
 }
 
+TEST(CppSequence, IsSharedByCopies) {
+  const BallFile ball;
+  const std::string path = ball.path();
+  const std::array<const char*, 3> paths{path.c_str(), "not-there.vdb", path.c_str()};
+  EXPECT_FALSE(Sequence::create({}).has_value());
+  const auto made = Sequence::create({.paths = paths, .file = {.suggested_density_scale = true}});
+  ASSERT_TRUE(made.has_value()) << made.error().message.c_str();
+  const Sequence sequence = *made;
+  EXPECT_TRUE(sequence.set_playback({.frames_per_second = 10.0, .repeat = Repeat::loop}));
+  EXPECT_FALSE(sequence.set_playback({.first_frame = 3}).has_value());
+  EXPECT_EQ(sequence.get_frame_at(0.4).value(), 1U);
+  EXPECT_EQ(sequence.get_time_of(2).value(), 0.2);
+  EXPECT_TRUE(sequence.set_time(0.1));
+  Viewer viewer = Viewer::create({}).value();
+  EXPECT_FALSE(viewer.get_sequence_info().has_value());
+  EXPECT_TRUE(viewer.set_sequence(sequence));
+  EXPECT_TRUE(viewer.wait());
+  std::array<std::uint8_t, 3> states{};
+  const SequenceInfo info = viewer.get_sequence_info(states).value();
+  EXPECT_EQ(info.frames, 3U);
+  EXPECT_EQ(info.asked_frame, 1U);
+  EXPECT_FALSE(info.is_drawn);
+  EXPECT_EQ(states[1], static_cast<std::uint8_t>(FrameState::failed));
+  EXPECT_EQ(viewer.get_sequence_frame(1)->view(), "not-there.vdb: no such file");
+  EXPECT_TRUE(sequence.set_frame(2.5 - 0.5));
+  EXPECT_TRUE(viewer.set_sequence({}));
+  EXPECT_FALSE(Sequence().set_time(0.0).has_value());
+}
+
 TEST(CppVolume, OfBricksAndTiles) {
   const std::array<std::int32_t, 3> origin{8, 0, 0};
   const std::vector<float> values(512, 2.0F);

@@ -28,15 +28,16 @@
  *     Calls for one viewer must not overlap, from whatever thread they come, with two exceptions that are safe at any
  *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
  *     objects with it, current on the calling thread: without, they are CUMULET_ERROR_GL each time and change nothing,
- *     and the next call with it goes on. No other call touches GL. Camera, volume, surfaces and programs handles may be
- *     used from any thread at any time. Files are read, grids are built, surfaces are posed and physical skies are
- *     computed on worker threads of the viewer's own; cumulet_render uploads what they made, within its time budget,
- * and shows the last good picture until then. The newest wish wins and none starves: what changes faster than it is
- * read, built, posed or uploaded is shown as often as it can be, and the newest last. The update callback comes from
- * any thread, a worker's included, and not after cumulet_destroy. Neither it nor the log callback may call the library,
- * but for the two exceptions and to retain and release handles: any other call from inside one, for whatever viewer or
- * handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while [GL] calls
- * of other viewers with the same programs wait for their turn: take no lock in them that is held around a [GL] call.
+ *     and the next call with it goes on. No other call touches GL. Camera, volume, sequence, surfaces and programs
+ *     handles may be used from any thread at any time. Files are read, grids are built, surfaces are posed and physical
+ * skies are computed on worker threads of the viewer's own; cumulet_render uploads what they made, within its time
+ * budget, and shows the last good picture until then. The newest wish wins and none starves: what changes faster than
+ * it is read, built, posed or uploaded is shown as often as it can be, and the newest last. The update callback comes
+ * from any thread, a worker's included, and not after cumulet_destroy. Neither it nor the log callback may call the
+ * library, but for the two exceptions and to retain and release handles: any other call from inside one, for whatever
+ * viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while
+ * [GL] calls of other viewers with the same programs wait for their turn: take no lock in them that is held around a
+ * [GL] call.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -116,6 +117,7 @@ typedef struct cumulet_surfaces cumulet_surfaces;       /* cumulet_surfaces_rele
 typedef struct cumulet_camera cumulet_camera;           /* cumulet_camera_release */
 typedef struct cumulet_programs cumulet_programs;       /* cumulet_programs_release */
 typedef struct cumulet_environment cumulet_environment; /* cumulet_environment_release */
+typedef struct cumulet_sequence cumulet_sequence;       /* cumulet_sequence_release */
 
 typedef enum cumulet_status {
   CUMULET_OK = 0,
@@ -448,6 +450,74 @@ typedef struct cumulet_metadata {
 CUMULET_API cumulet_status cumulet_inspection_get_metadata(const cumulet_inspection* inspection, int32_t grid,
                                                            uint32_t index, cumulet_metadata* out);
 
+/* ---- Sequences ------------------------------------------------------------------------------------------------- */
+
+/*
+ * Volumes that follow each other in time, of a file each: counted, free of GL, to be played by any number of viewers,
+ * all at the same moment. A host moves it, by the clock that its animations have or frame by frame; viewers that show
+ * it (cumulet_set_sequence) call their update callback where that is another frame. These calls are for any thread;
+ * error as in cumulet_create. Frames count from 0.
+ */
+
+typedef struct cumulet_sequence_desc {
+  size_t struct_size;
+  const char* const* paths; /* of a .vdb or .nvdb file a frame, copied; they need not be there, or right */
+  uint64_t count;           /* 1 to 1,000,000 */
+  /*
+   * What is shown of each file, and where it stands; its path is not looked at. With suggested_density_scale one
+   * density scale is suggested for all frames. NULL: what is found by name, there.
+   */
+  const cumulet_volume_file_desc* file;
+  /*
+   * Main memory for frames that are ready, in each viewer that shows it: cells, and beside these, as long as there is
+   * room, voxels, so that other settings need not read files anew. What is needed last goes first; the frame that is
+   * shown, and those that are being read and built, come on top. 0: 2 GiB.
+   */
+  uint64_t memory_bytes;
+} cumulet_sequence_desc;
+
+CUMULET_API cumulet_status cumulet_sequence_create(const cumulet_sequence_desc* desc, cumulet_sequence** out,
+                                                   char* error, size_t error_size);
+CUMULET_API cumulet_sequence* cumulet_sequence_retain(cumulet_sequence* sequence); /* returns it; NULL is allowed */
+CUMULET_API void cumulet_sequence_release(cumulet_sequence* sequence);             /* NULL is allowed */
+
+/* What follows the last frame that is played, and what comes before the first. */
+typedef enum cumulet_repeat {
+  CUMULET_REPEAT_HOLD = 0,     /* these stay */
+  CUMULET_REPEAT_LOOP = 1,     /* they begin anew */
+  CUMULET_REPEAT_PING_PONG = 2 /* they run back, and forth again; neither end comes twice */
+} cumulet_repeat;
+
+/* How a clock runs through the frames. */
+typedef struct cumulet_playback_desc {
+  size_t struct_size;
+  double frames_per_second; /* up to 1e6; 0: 24 */
+  double offset_seconds;    /* of the clock, when first_frame comes; -1e9 to 1e9 */
+  cumulet_repeat repeat;
+  uint32_t first_frame; /* that is played */
+  uint32_t frame_count; /* how many are; 0: all from the first on */
+} cumulet_playback_desc;
+
+/*
+ * From the next cumulet_sequence_set_time on; it stays where it is. CUMULET_ERROR_INVALID_ARGUMENT, and it stays as it
+ * was, for frames that it has not.
+ */
+CUMULET_API cumulet_status cumulet_sequence_set_playback(cumulet_sequence* sequence, const cumulet_playback_desc* desc);
+/*
+ * To this moment of the clock, -1e9 to 1e9 seconds. Whether time runs forwards or backwards, as it did between the last
+ * two of these calls, tells viewers which frames are next.
+ */
+CUMULET_API cumulet_status cumulet_sequence_set_time(cumulet_sequence* sequence, double seconds);
+/* To this frame, 0 to count - 1, played or not; of 2.25, frame 2 is shown. */
+CUMULET_API cumulet_status cumulet_sequence_set_frame(cumulet_sequence* sequence, double frame);
+/* Which frame cumulet_sequence_set_time would come to; it stays where it is. */
+CUMULET_API cumulet_status cumulet_sequence_get_frame_at(const cumulet_sequence* sequence, double seconds,
+                                                         uint32_t* frame);
+/* The other way round: the first moment, from offset_seconds on, at which a frame that is played comes; of one that is
+ * not what that would be if it were. */
+CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* sequence, uint32_t frame,
+                                                        double* seconds);
+
 /* ---- Surfaces -------------------------------------------------------------------------------------------------- */
 
 /*
@@ -625,7 +695,55 @@ CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_vo
  * (200,000 at least) or a place 1e12 away from the others: then the places before stay.
  */
 CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count);
-/* The volume last loaded or set, retained for the caller, who releases it; NULL if there is none. */
+/*
+ * Shows, in place of a volume, the frame at which the sequence stands, from now on and as it moves; retains it. What
+ * was shown before stays until a frame is there. NULL: no sequence, and if there was one, nothing. cumulet_set_volume,
+ * cumulet_load_volume and cumulet_load_volume_file end it, too.
+ *
+ * Frames are read and built on workers of the viewer's, ahead in the direction of play and as many as fit memory_bytes,
+ * and are uploaded by cumulet_render within its budget, which waits for none: it shows the nearest frame that is ready,
+ * and while previews are on each that it takes up until there is a picture of it. cumulet_get_sequence_info tells
+ * which. Frame k is the same grid, and of the same samples the same picture, whether it is played or set alone. What is
+ * not a frame's own is one for all, so that nothing jumps: where a camera that fits is placed, a ground below, bounds
+ * that are told, and the density scale that is suggested, all by the largest of the files that can be read and shows
+ * something, which is read first.
+ *
+ * A file that is missing or cannot be read is told by one warning in the log and by cumulet_get_sequence_frame, and is
+ * played over: the nearest earlier frame that can be shown stands in for it, or where there is none the nearest later.
+ * cumulet_rebuild reads all files anew. With none that can be shown the load has failed, as by cumulet_load_volume.
+ *
+ * cumulet_wait waits for the frame at which the sequence stands, not for those ahead; CUMULET_RENDER_LOADING and
+ * cumulet_get_progress are about the same. cumulet_cancel stops reading ahead until the sequence moves to another frame
+ * or a setting changes.
+ */
+CUMULET_API cumulet_status cumulet_set_sequence(cumulet_viewer* viewer, cumulet_sequence* sequence);
+
+typedef struct cumulet_sequence_info {
+  size_t struct_size;
+  uint32_t frames;        /* that it has */
+  uint32_t ready_frames;  /* that are in main memory as the settings have them */
+  uint32_t failed_frames; /* for which others stand in, as far as that is known */
+  uint32_t asked_frame;   /* at which it stands */
+  uint32_t drawn_frame;   /* of the picture that the last cumulet_render drew, where is_drawn */
+  int32_t is_drawn;       /* 0: none of its frames */
+  uint64_t bytes;         /* of main memory, of those that are ready */
+} cumulet_sequence_info;
+
+/*
+ * Of the viewer's sequence; CUMULET_ERROR_INVALID_ARGUMENT if it shows none. states: NULL, or where a
+ * cumulet_frame_state a frame is written, for a bar; count is the number of them there, info->frames or more.
+ */
+CUMULET_API cumulet_status cumulet_get_sequence_info(cumulet_viewer* viewer, cumulet_sequence_info* info,
+                                                     uint8_t* states, size_t count);
+typedef enum cumulet_frame_state {
+  CUMULET_FRAME_WAITING = 0, /* not read, or not built for the settings that there are now */
+  CUMULET_FRAME_READY = 1,
+  CUMULET_FRAME_FAILED = 2 /* another stands in for it */
+} cumulet_frame_state;
+/* Why a frame failed, in one line that names the file; "" if it did not. Cut to fit, zero-terminated. */
+CUMULET_API cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame, char* cause, size_t size);
+/* The volume last loaded or set, retained for the caller, who releases it; NULL if there is none. Of a sequence that of
+ * the frame that was taken last, or NULL where its voxels are not kept. */
 CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out);
 /* Stops loading and building, within some 20 ms (see cumulet_destroy); what was shown stays, with the settings it was
  * built with. Any thread, any time. */

@@ -682,6 +682,74 @@ class Instance {
   cumulet_instance* handle_ = nullptr;
 };
 
+// ---- Sequences ------------------------------------------------------------------------------------------------------
+
+struct SequenceDesc {
+  std::span<const char* const> paths{};
+  VolumeFileDesc file = {};
+  std::uint64_t memory_bytes = 0;
+};
+
+/// A share in volumes that follow each other: a copy is one more of the same. Any thread.
+class Sequence {
+ public:
+  Sequence() noexcept = default;
+  Sequence(const Sequence& other) noexcept : handle_(cumulet_sequence_retain(other.handle_)) {}
+  Sequence(Sequence&& other) noexcept : handle_(other.release()) {}
+  Sequence& operator=(Sequence other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Sequence() { cumulet_sequence_release(handle_); }
+
+  [[nodiscard]] static Result<Sequence> create(const SequenceDesc& desc) noexcept {
+    const cumulet_volume_file_desc file = desc.file;
+    const cumulet_sequence_desc c{.struct_size = sizeof c,
+                                  .paths = desc.paths.data(),
+                                  .count = desc.paths.size(),
+                                  .file = &file,
+                                  .memory_bytes = desc.memory_bytes};
+    return detail::made<Sequence>([&](cumulet_sequence** out, char* error, std::size_t size) {
+      return cumulet_sequence_create(&c, out, error, size);
+    });
+  }
+  [[nodiscard]] Result<> set_playback(const PlaybackDesc& desc) const noexcept {
+    const cumulet_playback_desc c = desc;
+    return detail::result(cumulet_sequence_set_playback(handle_, &c));
+  }
+  [[nodiscard]] Result<> set_time(double seconds) const noexcept {
+    return detail::result(cumulet_sequence_set_time(handle_, seconds));
+  }
+  [[nodiscard]] Result<> set_frame(double frame) const noexcept {
+    return detail::result(cumulet_sequence_set_frame(handle_, frame));
+  }
+  [[nodiscard]] Result<std::uint32_t> get_frame_at(double seconds) const noexcept {
+    std::uint32_t frame = 0;
+    if (auto done = detail::result(cumulet_sequence_get_frame_at(handle_, seconds, &frame)); !done) return done.error();
+    return frame;
+  }
+  [[nodiscard]] Result<double> get_time_of(std::uint32_t frame) const noexcept {
+    double seconds = 0.0;
+    if (auto done = detail::result(cumulet_sequence_get_time_of(handle_, frame, &seconds)); !done) return done.error();
+    return seconds;
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_sequence* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_sequence* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Sequence adopt(cumulet_sequence* handle) noexcept {
+    Sequence sequence;
+    sequence.handle_ = handle;
+    return sequence;
+  }
+
+ private:
+  cumulet_sequence* handle_ = nullptr;
+};
+
 // ---- Camera and input -----------------------------------------------------------------------------------------------
 
 struct CameraMatrices {
@@ -944,6 +1012,24 @@ class Viewer {
   [[nodiscard]] Result<> set_volume_places(std::span<const std::array<double, 16>> to_world) noexcept {
     const double* first = to_world.empty() ? nullptr : to_world.front().data();
     return result(cumulet_set_volume_places(handle(), first, static_cast<uint32_t>(to_world.size())));
+  }
+  /// An empty sequence: shows none.
+  [[nodiscard]] Result<> set_sequence(const Sequence& sequence) noexcept {
+    return result(cumulet_set_sequence(handle(), sequence.handle()));
+  }
+  /// states: room for a FrameState a frame, or none.
+  [[nodiscard]] Result<SequenceInfo> get_sequence_info(std::span<std::uint8_t> states = {}) noexcept {
+    auto c = detail::sized<cumulet_sequence_info>();
+    std::uint8_t* const first = states.empty() ? nullptr : states.data();
+    if (auto done = result(cumulet_get_sequence_info(handle(), &c, first, states.size())); !done) return done.error();
+    return SequenceInfo::of(c);
+  }
+  /// Why a frame failed, "" if it did not.
+  [[nodiscard]] Result<Text<512>> get_sequence_frame(std::uint32_t frame) noexcept {
+    std::array<char, 512> cause{};
+    if (auto done = result(cumulet_get_sequence_frame(handle(), frame, cause.data(), cause.size())); !done)
+      return done.error();
+    return Text<512>(cause.data());
   }
   [[nodiscard]] Result<> add_instance(const Instance& instance) noexcept {
     return result(cumulet_add_instance(handle(), instance.handle()));

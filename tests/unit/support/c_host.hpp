@@ -47,6 +47,10 @@ struct ReleaseInstance {
   void operator()(cumulet_instance* instance) const { cumulet_instance_release(instance); }
 };
 using InstanceRef = std::unique_ptr<cumulet_instance, ReleaseInstance>;
+struct ReleaseSequence {
+  void operator()(cumulet_sequence* sequence) const { cumulet_sequence_release(sequence); }
+};
+using SequenceRef = std::unique_ptr<cumulet_sequence, ReleaseSequence>;
 struct ReleasePrograms {
   void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
 };

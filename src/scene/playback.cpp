@@ -1,0 +1,69 @@
+#include "scene/playback.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace cumulet::scene {
+
+namespace {
+
+constexpr double rounding = 1e-6;  // of a frame
+
+double wrapped(double x, double period) {
+  const double rest = std::fmod(x, period);
+  const double above = rest < 0.0 ? rest + period : rest;
+  return above < period ? above : 0.0;  // of a tiny x below 0
+}
+
+double at_whole(double x) {
+  const double whole = std::round(x);
+  return std::abs(x - whole) < rounding ? whole : x;
+}
+
+}  // namespace
+
+std::uint32_t Moment::frame() const {
+  return static_cast<std::uint32_t>(std::max(0.0, forward ? std::floor(position) : std::ceil(position)));
+}
+
+Moment moment_at(const Playback& playback, double seconds) {
+  const double x = at_whole((seconds - playback.offset_seconds) * playback.frames_per_second);
+  const double first = playback.first;
+  const double last = playback.count - 1.0;
+  if (playback.repeat == Repeat::loop) return {first + wrapped(x, playback.count), true};
+  if (playback.repeat == Repeat::hold || last == 0.0) return {first + std::clamp(x, 0.0, last), true};
+  const double y = wrapped(x, 2.0 * last);
+  return y < last ? Moment{first + y, true} : Moment{first + 2.0 * last - y, false};
+}
+
+double time_of(const Playback& playback, double position) {
+  return playback.offset_seconds + (position - playback.first) / playback.frames_per_second;
+}
+
+std::vector<std::uint32_t> upcoming(const Playback& playback, const Moment& moment, bool forward) {
+  const std::int64_t now = moment.frame();
+  const std::int64_t first = playback.first;
+  const std::int64_t last = first + playback.count - 1;
+  std::vector<std::uint32_t> order;
+  std::vector<bool> known(playback.count);
+  const auto add = [&](std::int64_t frame) {
+    if (frame < first || frame > last || known[static_cast<std::size_t>(frame - first)]) return;
+    known[static_cast<std::size_t>(frame - first)] = true;
+    order.push_back(static_cast<std::uint32_t>(frame));
+  };
+  const auto run = [&](std::int64_t from, std::int64_t to) {
+    const std::int64_t step = from <= to ? 1 : -1;
+    for (std::int64_t frame = from; frame != to + step; frame += step) add(frame);
+  };
+  // From outside it goes on at the nearer end.
+  const std::int64_t begin = std::clamp(now, first, last);
+  if (now != begin) order.push_back(moment.frame());
+  const bool ascending = moment.forward == forward;
+  run(begin, ascending ? last : first);
+  if (playback.repeat == Repeat::loop) run(ascending ? first : last, begin);
+  run(begin, ascending ? first : last);
+  return order;
+}
+
+}  // namespace cumulet::scene

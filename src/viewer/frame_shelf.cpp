@@ -1,0 +1,409 @@
+#include "viewer/frame_shelf.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <iterator>
+#include <limits>
+#include <system_error>
+
+#include "viewer/stopwatch.hpp"
+
+namespace cumulet::viewer {
+
+namespace {
+
+constexpr const char* what = "building a sequence's frames";
+// One reads while another builds: reading is serial, building takes all cores.
+constexpr int worker_count = 2;
+
+// The largest first: frames that are not there last.
+std::vector<std::uint32_t> by_size(const FrameFiles& files) {
+  std::vector<std::pair<std::uintmax_t, std::uint32_t>> sized;
+  for (std::uint32_t frame = 0; frame < files.count(); ++frame) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(files.paths[frame], error);
+    sized.emplace_back(error ? 0 : size, frame);
+  }
+  std::ranges::stable_sort(sized, [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::uint32_t> frames;
+  std::ranges::transform(sized, std::back_inserter(frames), [](const auto& one) { return one.second; });
+  return frames;
+}
+
+}  // namespace
+
+FrameShelf::FrameShelf(Log log, const std::function<void()>& notify, Trace trace)
+    : log_(std::move(log)), notify_(notify), trace_(trace) {
+  for (int i = 0; i < worker_count; ++i) workers_.emplace_back([this] { tell(); }, trace);
+}
+
+void FrameShelf::wish(Wish wish) {
+  std::vector<Shelved> old;  // ends after the lock, as all that may be large
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!is_wished(wish.files)) {
+      for (Worker& worker : workers_) worker.cancel();
+      old = std::exchange(shelf_, std::vector<Shelved>(wish.files->count()));
+      judging_ = Judging::due;
+      judged_.reset();
+      said_.clear();
+    }
+    if (judged_ && judged_->density_scale && wish.settings)
+      wish.settings->refine.density_scale = *judged_->density_scale;
+    wish_ = std::move(wish);
+    cancelled_ = false;
+    std::ranges::move(take_excess(), std::back_inserter(old));
+    start();
+  }
+  changed_.notify_all();
+}
+
+void FrameShelf::clear() {
+  std::vector<Shelved> old;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (Worker& worker : workers_) worker.cancel();
+    wish_.reset();
+    old = std::exchange(shelf_, {});
+  }
+  changed_.notify_all();
+}
+
+void FrameShelf::rebuild() {
+  std::vector<Shelved> old;
+  const std::scoped_lock lock(mutex_);
+  if (!wish_) return;
+  for (Shelved& shelved : shelf_) {
+    if (shelved.volume) old.emplace_back().volume = std::exchange(shelved.volume, nullptr);
+    shelved.stale = true;
+    shelved.failure.reset();
+  }
+  // What is under way began before.
+  for (Worker& worker : workers_) worker.cancel();
+  if (judging_ == Judging::in_vain) judging_ = Judging::due;
+  cancelled_ = false;
+  start();
+}
+
+void FrameShelf::cancel() {
+  {
+    const std::scoped_lock lock(mutex_);
+    cancelled_ = true;
+    for (Worker& worker : workers_) worker.cancel();
+  }
+  changed_.notify_all();
+}
+
+std::optional<FrameShelf::Judged> FrameShelf::take_judged() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(judged_, std::nullopt);
+}
+
+std::optional<FrameShelf::Ready> FrameShelf::nearest() const {
+  const std::scoped_lock lock(mutex_);
+  if (!wish_) return std::nullopt;
+  const auto wanted = first();
+  const std::int64_t target = wanted.value_or(wish_->order.front());
+  std::optional<std::uint32_t> found;
+  const auto away = [&](std::uint32_t frame) { return std::abs(frame - target); };
+  for (std::uint32_t frame = 0; frame < shelf_.size(); ++frame) {
+    if (shelf_[frame].built && (!found || away(frame) < away(*found))) found = frame;
+  }
+  if (!found) return std::nullopt;
+  Ready ready{*found, *shelf_[*found].built, found == wanted && is_ready(shelf_[*found])};
+  ready.built.volume = shelf_[*found].volume;
+  return ready;
+}
+
+FrameShelf::Status FrameShelf::frames() const {
+  const std::scoped_lock lock(mutex_);
+  Status status;
+  for (const Shelved& shelved : shelf_) {
+    status.frames.push_back(shelved.failure ? State::failed : is_ready(shelved) ? State::ready : State::waiting);
+    status.bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
+  }
+  return status;
+}
+
+std::optional<Error> FrameShelf::failure_of(std::uint32_t frame) const {
+  const std::scoped_lock lock(mutex_);
+  return frame < shelf_.size() ? shelf_[frame].failure : std::nullopt;
+}
+
+bool FrameShelf::busy() const {
+  const std::scoped_lock lock(mutex_);
+  return waits();
+}
+
+Worker::Status FrameShelf::status() const {
+  const std::scoped_lock lock(mutex_);
+  Worker::Status status;
+  if (waits()) {
+    for (const Worker& worker : workers_) {
+      if (worker.busy()) status = worker.status();
+      if (status.stage != Progress::Stage::idle) break;
+    }
+  }
+  status.failure.reset();
+  if (wish_ && is_judged() && !first()) status.failure = shelf_[wish_->order.front()].failure;
+  return status;
+}
+
+bool FrameShelf::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
+  std::unique_lock lock(mutex_);
+  const auto ready = [this] { return !waits(); };
+  if (until) return changed_.wait_until(lock, *until, ready);
+  changed_.wait(lock, ready);
+  return true;
+}
+
+void FrameShelf::tell() {
+  {
+    const std::scoped_lock lock(mutex_);  // who waits has looked, or waits already
+  }
+  changed_.notify_all();
+  notify_();
+}
+
+// ---- under the lock ----
+
+void FrameShelf::start() {
+  if (is_judged() && !next()) return;
+  for (Worker& worker : workers_)
+    worker.post({what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }});
+}
+
+bool FrameShelf::is_ready(const Shelved& shelved) const {
+  return shelved.built && !shelved.stale && wish_->settings && suits(shelved.built->settings, *wish_->settings);
+}
+
+std::vector<std::optional<std::uint32_t>> FrameShelf::stand_ins() const {
+  std::vector<std::optional<std::uint32_t>> of(shelf_.size());
+  const auto good = std::ranges::find_if(shelf_, [](const Shelved& shelved) { return !shelved.failure; });
+  if (good == shelf_.end()) return of;
+  auto last = static_cast<std::uint32_t>(good - shelf_.begin());
+  for (std::uint32_t frame = 0; frame < shelf_.size(); ++frame) {
+    if (!shelf_[frame].failure) last = frame;
+    of[frame] = last;
+  }
+  return of;
+}
+
+std::vector<std::uint32_t> FrameShelf::kept() const {
+  std::uint64_t known = 0;
+  std::uint64_t known_bytes = 0;
+  for (const Shelved& shelved : shelf_) {
+    known += shelved.grid_bytes > 0 ? 1U : 0U;
+    known_bytes += shelved.grid_bytes;
+  }
+  const std::uint64_t likely = known > 0 ? known_bytes / known : 0;
+  std::vector<std::uint32_t> frames;
+  std::vector<bool> taken(shelf_.size());
+  std::uint64_t bytes = 0;
+  const auto shown = stand_ins();
+  for (const std::uint32_t wished : wish_->order) {
+    const auto frame = shown[wished];
+    if (!frame || taken[*frame]) continue;
+    const std::uint64_t takes = shelf_[*frame].grid_bytes > 0 ? shelf_[*frame].grid_bytes : likely;
+    if (!frames.empty() && bytes + takes > wish_->memory_bytes) break;
+    bytes += takes;
+    taken[*frame] = true;
+    frames.push_back(*frame);
+  }
+  return frames;
+}
+
+std::optional<std::uint32_t> FrameShelf::next() const {
+  if (!wish_ || !wish_->settings || cancelled_ || judging_ != Judging::done) return std::nullopt;
+  for (const std::uint32_t frame : kept()) {
+    const bool comes = std::ranges::find(under_way_, UnderWay{wish_->files, frame}) != under_way_.end();
+    if (!comes && !is_ready(shelf_[frame])) return frame;
+  }
+  return std::nullopt;
+}
+
+bool FrameShelf::waits() const {
+  if (!wish_ || cancelled_ || std::ranges::none_of(workers_, &Worker::busy)) return false;
+  if (!is_judged()) return true;
+  const auto wanted = first();
+  return wanted && !is_ready(shelf_[*wanted]);
+}
+
+std::vector<FrameShelf::Shelved> FrameShelf::take_excess() {
+  std::uint64_t bytes = 0;
+  for (const Shelved& shelved : shelf_)
+    bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
+  std::vector<Shelved> excess;
+  if (bytes <= wish_->memory_bytes) return excess;
+  // The most needed first, but for the very first, which stays.
+  constexpr std::size_t not_needed = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> rank(shelf_.size(), not_needed);
+  const std::vector<std::uint32_t> needed = kept();
+  for (std::size_t i = 0; i < needed.size(); ++i) rank[needed[i]] = i;
+  std::vector<std::uint32_t> frames;
+  for (std::uint32_t frame = 0; frame < shelf_.size(); ++frame) {
+    const bool is_first = !needed.empty() && frame == needed.front();
+    if (!is_first && (shelf_[frame].built || shelf_[frame].volume)) frames.push_back(frame);
+  }
+  std::ranges::sort(frames, [&](std::uint32_t a, std::uint32_t b) { return rank[a] > rank[b]; });
+  const auto fits = [&] { return bytes <= wish_->memory_bytes; };
+  for (const std::uint32_t frame : frames) {
+    Shelved& shelved = shelf_[frame];
+    if (fits()) return excess;
+    if (!shelved.volume) continue;
+    bytes -= shelved.volume_bytes;
+    excess.emplace_back().volume = std::exchange(shelved.volume, nullptr);
+  }
+  for (const std::uint32_t frame : frames) {
+    Shelved& shelved = shelf_[frame];
+    if (fits()) return excess;
+    if (!shelved.built) continue;
+    bytes -= shelved.grid_bytes;
+    excess.emplace_back().built = std::exchange(shelved.built, std::nullopt);
+  }
+  return excess;
+}
+
+// ---- on the workers ----
+
+void FrameShelf::work(Progress& progress) {
+  for (;;) {
+    std::optional<UnderWay> frame;
+    BuildSettings settings;
+    FrameFilesPtr to_judge;
+    {
+      std::unique_lock lock(mutex_);
+      while (wish_ && judging_ == Judging::under_way) {
+        changed_.wait_for(lock, std::chrono::milliseconds(5));
+        progress.check();
+      }
+      if (!wish_ || cancelled_) return;
+      if (judging_ == Judging::due) {
+        judging_ = Judging::under_way;
+        to_judge = wish_->files;
+      } else if (const auto found = next()) {
+        frame = UnderWay{wish_->files, *found};
+        under_way_.push_back(*frame);
+        settings = *wish_->settings;
+      } else {
+        return;
+      }
+    }
+    if (to_judge) {
+      judge(to_judge, progress);
+    } else {
+      build(*frame, settings, progress);
+    }
+    tell();
+  }
+}
+
+Log FrameShelf::log_of(const std::string& path) {
+  return Log([this, path](LogLevel level, const char* message) {
+    std::string said(message);
+    if (const auto at = said.find(path); at != std::string::npos) said.erase(at, path.size());
+    {
+      const std::scoped_lock lock(mutex_);
+      if (!said_.insert(said).second) return;
+    }
+    log_.write(level, message);
+  });
+}
+
+void FrameShelf::fail(const UnderWay& which, const Error& failure) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!is_wished(which.files)) return;
+    shelf_[which.frame].failure = failure;
+    ++revision_;
+  }
+  log_.warning(std::string(failure.what()) + ": another frame of the sequence is shown instead");
+}
+
+void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
+  Judged judged;
+  const auto end = [&](Judging how) {
+    const std::scoped_lock lock(mutex_);
+    if (!is_wished(files)) return;
+    judging_ = how;
+    if (how != Judging::done) return;
+    if (judged.density_scale && wish_->settings) wish_->settings->refine.density_scale = *judged.density_scale;
+    judged_ = judged;
+    ++revision_;
+  };
+  try {
+    for (const std::uint32_t frame : by_size(*files)) {
+      try {
+        progress.begin(Progress::Stage::loading);
+        const VolumeFile file = files->file(frame);
+        const VolumeAssetPtr volume = file.read(log_of(file.path), &progress);
+        progress.check();
+        const std::uint64_t bytes = volume->bytes();
+        {
+          const std::scoped_lock lock(mutex_);
+          if (!is_wished(files)) throw Error(ErrorCode::cancelled, "cancelled");
+          shelf_[frame].volume = volume;
+          shelf_[frame].volume_bytes = bytes;
+        }
+        if (!judged.facts || !volume->empty()) judged.facts = volume->facts();
+        if (!volume->empty()) break;
+      } catch (...) {
+        const Error failure = caught(what);
+        if (failure.code() == ErrorCode::cancelled) throw Error(failure);
+        fail({files, frame}, failure);
+      }
+    }
+    if (judged.facts && files->shown.suggested_density_scale)
+      judged.density_scale = judged.facts->coarse.suggest_density_scale();
+  } catch (...) {
+    end(Judging::due);
+    throw;
+  }
+  end(judged.facts ? Judging::done : Judging::in_vain);
+}
+
+void FrameShelf::build(const UnderWay& which, const BuildSettings& settings, Progress& progress) {
+  const VolumeFile file = which.files->file(which.frame);
+  const Trace::Span span(trace_, file.path);
+  const Log log = log_of(file.path);
+  Shelved made;
+  std::optional<Error> failure;
+  try {
+    {
+      const std::scoped_lock lock(mutex_);
+      if (is_wished(which.files)) made.volume = shelf_[which.frame].volume;
+    }
+    Stopwatch watch;
+    double load_seconds = 0.0;
+    if (!made.volume) {
+      progress.begin(Progress::Stage::loading);
+      made.volume = file.read(log, &progress);
+      load_seconds = watch.lap();
+    }
+    made.built = build_grid(log, made.volume, settings, progress);
+    made.built->seconds.load = load_seconds;
+    made.built->volume = nullptr;
+    made.grid_bytes = made.built->source->bytes();
+    made.volume_bytes = made.volume->bytes();
+    progress.check();
+  } catch (...) {
+    failure = caught(what);
+  }
+  const bool cancelled = failure && failure->code() == ErrorCode::cancelled;
+  // First: nobody begins it again in between.
+  if (failure && !cancelled) fail(which, *failure);
+  std::vector<Shelved> old;
+  {
+    const std::scoped_lock lock(mutex_);
+    std::erase(under_way_, which);
+    if (!failure && is_wished(which.files)) {
+      old.push_back(std::exchange(shelf_[which.frame], std::move(made)));
+      ++revision_;
+      std::ranges::move(take_excess(), std::back_inserter(old));
+    }
+  }
+  if (cancelled) throw Error(*failure);
+}
+
+}  // namespace cumulet::viewer

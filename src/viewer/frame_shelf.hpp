@@ -1,0 +1,140 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "viewer/sequence.hpp"
+
+namespace cumulet::viewer {
+
+/// Grids of a sequence's frames, read and built ahead on threads of its own, as many as fit a memory: those that come
+/// soonest. All calls are safe from any thread; none waits for a frame but wait().
+///
+/// First it judges the sequence by the largest file that can be read and shows something: what cameras and grounds go
+/// by, and the density scale that all frames have, so that nothing jumps. Frames that cannot be read are told once, and
+/// the nearest earlier one that can stands in for them; without one, the nearest later.
+class FrameShelf {
+ public:
+  struct Wish {
+    FrameFilesPtr files;
+    std::vector<std::uint32_t> order;       ///< frames that are needed, the soonest first; one at least, each once
+    std::optional<BuildSettings> settings;  ///< none yet: the sequence is judged, and nothing is built
+    std::uint64_t memory_bytes = 0;         ///< of main memory; the first frame is there at any
+  };
+
+  /// What the whole sequence goes by.
+  struct Judged {
+    VolumeFactsPtr facts;
+    std::optional<double> density_scale;  ///< if it is to be suggested
+  };
+
+  struct Ready {
+    std::uint32_t frame = 0;
+    Built built;         ///< its volume is null where there was no memory for voxels
+    bool wanted = true;  ///< nothing better comes: it is the frame, or stands in for it, as it is to be
+  };
+
+  enum class State { waiting = 0, ready = 1, failed = 2 };
+  struct Status {
+    std::vector<State> frames;
+    std::uint64_t bytes = 0;  ///< main memory of what is ready
+  };
+
+  /// notify: called on a worker after each frame, and when a job ended.
+  FrameShelf(Log log, const std::function<void()>& notify, Trace trace = {});
+
+  /// In place of the wish before. Frames under way are finished, so that of wishes that change faster than frames are
+  /// built every one that is begun can be seen. Other files: all that there was goes.
+  void wish(Wish wish);
+  /// Nothing is wished for any more.
+  void clear();
+  /// All are read and built anew, those that failed, too; until they are, there are those before.
+  void rebuild();
+  /// Ends what is under way, and what waits, until the next wish.
+  void cancel();
+
+  /// What is known of the sequence, once.
+  std::optional<Judged> take_judged();
+  /// What there is of the first frame that is wished for, or of the nearest one of which there is something.
+  [[nodiscard]] std::optional<Ready> nearest() const;
+  /// Another after each frame that was built, or failed.
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+  [[nodiscard]] Status frames() const;
+  /// Why a frame cannot be shown; nothing where it can be, or that is not known yet.
+  [[nodiscard]] std::optional<Error> failure_of(std::uint32_t frame) const;
+
+  /// Whether the first frame that is wished for is under way.
+  [[nodiscard]] bool busy() const;
+  /// Of the first frame; failed: no frame can be shown.
+  [[nodiscard]] Worker::Status status() const;
+  /// Until the first frame is there, or none can be. Returns whether it is so.
+  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+
+ private:
+  struct Shelved {
+    std::optional<Built> built;    // without its volume
+    VolumeAssetPtr volume;         // that it was built of, or is to be
+    std::uint64_t grid_bytes = 0;  // known once it was built
+    std::uint64_t volume_bytes = 0;
+    std::optional<Error> failure;
+    bool stale = false;  // to be built anew, whatever its settings
+  };
+  struct UnderWay {
+    FrameFilesPtr files;
+    std::uint32_t frame = 0;
+    bool operator==(const UnderWay&) const = default;
+  };
+  enum class Judging { due, under_way, done, in_vain };
+
+  void work(Progress& progress);
+  void judge(const FrameFilesPtr& files, Progress& progress);
+  void build(const UnderWay& which, const BuildSettings& settings, Progress& progress);
+  // That tells once a sequence what it is told of each file.
+  [[nodiscard]] Log log_of(const std::string& path);
+  void fail(const UnderWay& which, const Error& failure);
+  void tell();
+
+  // All of these under the lock.
+  void start();
+  [[nodiscard]] bool is_wished(const FrameFilesPtr& files) const { return wish_ && wish_->files == files; }
+  [[nodiscard]] bool is_ready(const Shelved& shelved) const;
+  [[nodiscard]] bool is_judged() const { return judging_ == Judging::done || judging_ == Judging::in_vain; }
+  // Of each frame the one that is shown for it: itself unless it failed; nothing if all did. O(frames).
+  [[nodiscard]] std::vector<std::optional<std::uint32_t>> stand_ins() const;
+  [[nodiscard]] std::optional<std::uint32_t> first() const { return stand_ins()[wish_->order.front()]; }
+  // Frames that are to be there: as many as the memory holds, by what they are known or likely to take.
+  [[nodiscard]] std::vector<std::uint32_t> kept() const;
+  [[nodiscard]] std::optional<std::uint32_t> next() const;
+  [[nodiscard]] bool waits() const;
+  // Gives up what does not fit: voxels first, then frames, the least needed first. What is returned is for its owner to
+  // free without the lock.
+  [[nodiscard]] std::vector<Shelved> take_excess();
+
+  Log log_;
+  std::function<void()> notify_;
+  Trace trace_;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::optional<Wish> wish_;
+  std::vector<Shelved> shelf_;  // one a frame
+  std::vector<UnderWay> under_way_;
+  Judging judging_ = Judging::due;
+  std::optional<Judged> judged_;  // that nobody took
+  std::set<std::string> said_;    // by the log, but for files' names
+  bool cancelled_ = false;        // until the next wish
+  std::atomic<std::uint64_t> revision_ = 0;
+  std::deque<Worker> workers_;  // last: their threads use all of the above
+};
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,118 @@
+// From a clock to frames of a sequence, and which come next.
+
+#include "scene/playback.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace {
+
+using cumulet::scene::Moment;
+using cumulet::scene::moment_at;
+using cumulet::scene::Playback;
+using cumulet::scene::Repeat;
+using cumulet::scene::time_of;
+using cumulet::scene::upcoming;
+using Frames = std::vector<std::uint32_t>;
+
+// What comes in so many frames' time, from the clock's frame `from` on.
+Frames played(const Playback& playback, int from, int count) {
+  Frames frames;
+  for (int i = from; i < from + count; ++i)
+    frames.push_back(moment_at(playback, playback.offset_seconds + i / playback.frames_per_second).frame());
+  return frames;
+}
+
+TEST(Playback, HoldsBothEnds) {
+  const Playback hold{.first = 3, .count = 4};
+  EXPECT_EQ(played(hold, -2, 9), (Frames{3, 3, 3, 4, 5, 6, 6, 6, 6}));
+}
+
+TEST(Playback, LoopsOnBothSides) {
+  const Playback loop{.repeat = Repeat::loop, .first = 3, .count = 4};
+  EXPECT_EQ(played(loop, -3, 10), (Frames{4, 5, 6, 3, 4, 5, 6, 3, 4, 5}));
+}
+
+TEST(Playback, PingPongShowsNoEndTwice) {
+  const Playback back{.repeat = Repeat::ping_pong, .first = 3, .count = 4};
+  EXPECT_EQ(played(back, -3, 14), (Frames{6, 5, 4, 3, 4, 5, 6, 5, 4, 3, 4, 5, 6, 5}));
+}
+
+TEST(Playback, ASingleFrameIsAlwaysThere) {
+  for (const Repeat repeat : {Repeat::hold, Repeat::loop, Repeat::ping_pong})
+    EXPECT_EQ(played({.repeat = repeat, .first = 2, .count = 1}, -3, 7), Frames(7, 2));
+}
+
+// Each frame is there for its whole time, whichever way it goes.
+TEST(Playback, FramesLastTheSame) {
+  for (const Repeat repeat : {Repeat::loop, Repeat::ping_pong}) {
+    const Playback playback{.frames_per_second = 10.0, .repeat = repeat, .count = 5};
+    for (int i = 0; i < 40; ++i) {
+      const auto frame = moment_at(playback, i / 10.0).frame();
+      for (const double part : {0.01, 0.5, 0.99})
+        EXPECT_EQ(moment_at(playback, (i + part) / 10.0).frame(), frame) << i << " and " << part;
+    }
+  }
+}
+
+TEST(Playback, AFramesTimeIsItsOwn) {
+  for (const double rate : {23.976, 24.0, 25.0, 29.97, 60.0, 1000.0 / 3.0}) {
+    const Playback playback{.frames_per_second = rate, .offset_seconds = 1.0 / 3.0, .first = 7, .count = 5000};
+    for (std::uint32_t frame = 7; frame < 5007; ++frame)
+      ASSERT_EQ(moment_at(playback, time_of(playback, frame)).frame(), frame) << rate;
+  }
+}
+
+TEST(Playback, SubFramesArePositions) {
+  const Playback playback{.frames_per_second = 10.0, .offset_seconds = 2.0, .repeat = Repeat::ping_pong, .count = 5};
+  EXPECT_NEAR(moment_at(playback, 2.125).position, 1.25, 1e-9);
+  EXPECT_NEAR(moment_at(playback, 2.525).position, 2.75, 1e-9);  // on the way back
+  EXPECT_FALSE(moment_at(playback, 2.525).forward);
+  EXPECT_EQ(moment_at(playback, 2.525).frame(), 3U);
+}
+
+TEST(Playback, WhatIsFarAwayIsStillAFrame) {
+  for (const Repeat repeat : {Repeat::hold, Repeat::loop, Repeat::ping_pong}) {
+    const Playback playback{.repeat = repeat, .first = 2, .count = 5};
+    for (const double seconds : {-1e15, -1e-18, 1e15, 1e300, -1e300}) {
+      const auto frame = moment_at(playback, seconds).frame();
+      EXPECT_GE(frame, 2U);
+      EXPECT_LE(frame, 6U);
+    }
+  }
+}
+
+TEST(Upcoming, AreInTheOrderOfPlay) {
+  Playback playback{.repeat = Repeat::hold, .first = 2, .count = 5};
+  EXPECT_EQ(upcoming(playback, {4.0, true}, true), (Frames{4, 5, 6, 3, 2}));
+  EXPECT_EQ(upcoming(playback, {4.0, true}, false), (Frames{4, 3, 2, 5, 6}));
+  playback.repeat = Repeat::loop;
+  EXPECT_EQ(upcoming(playback, {4.0, true}, true), (Frames{4, 5, 6, 2, 3}));
+  EXPECT_EQ(upcoming(playback, {4.0, true}, false), (Frames{4, 3, 2, 6, 5}));
+  playback.repeat = Repeat::ping_pong;
+  EXPECT_EQ(upcoming(playback, {4.0, true}, true), (Frames{4, 5, 6, 3, 2}));
+  EXPECT_EQ(upcoming(playback, {4.0, false}, true), (Frames{4, 3, 2, 5, 6}));
+}
+
+TEST(Upcoming, GoOnIntoTheRangeFromOutside) {
+  const Playback playback{.repeat = Repeat::loop, .first = 2, .count = 3};
+  EXPECT_EQ(upcoming(playback, {0.0, true}, true), (Frames{0, 2, 3, 4}));
+  EXPECT_EQ(upcoming(playback, {5.0, true}, true), (Frames{5, 4, 2, 3}));
+}
+
+TEST(Upcoming, AreAllThatArePlayedEachOnce) {
+  for (const Repeat repeat : {Repeat::hold, Repeat::loop, Repeat::ping_pong}) {
+    for (std::uint32_t now = 3; now < 7; ++now) {
+      for (const bool forward : {false, true}) {
+        const Playback playback{.repeat = repeat, .first = 3, .count = 4};
+        Frames order = upcoming(playback, {double(now), true}, forward);
+        EXPECT_EQ(order.front(), now);
+        std::ranges::sort(order);
+        EXPECT_EQ(order, (Frames{3, 4, 5, 6}));
+      }
+    }
+  }
+}
+
+}  // namespace

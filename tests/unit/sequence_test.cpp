@@ -1,0 +1,419 @@
+// Sequences, as hosts have them: what is refused, what is shown of broken ones, and that a frame is the same however it
+// came.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/c_host.hpp"
+#include "support/clip.hpp"
+
+namespace {
+
+using cumulet::headless::Backend;
+using cumulet::headless::Context;
+using cumulet::test::CameraRef;
+using cumulet::test::Clip;
+using cumulet::test::converge;
+using cumulet::test::difference;
+using cumulet::test::HostTarget;
+using cumulet::test::load_gl;
+using cumulet::test::make_desc;
+using cumulet::test::make_viewer;
+using cumulet::test::SequenceRef;
+using cumulet::test::ViewerPtr;
+using cumulet::test::VolumeRef;
+using Picture = std::vector<std::uint8_t>;
+
+struct Lines {
+  std::mutex mutex;
+  std::vector<std::string> warnings;
+  static void add(void* user, cumulet_log_level level, const char* message) {
+    auto& lines = *static_cast<Lines*>(user);
+    const std::scoped_lock lock(lines.mutex);
+    if (level == CUMULET_LOG_WARNING) lines.warnings.emplace_back(message);
+  }
+};
+
+SequenceRef make_sequence(const std::vector<std::string>& files, const cumulet_volume_file_desc* file = nullptr) {
+  std::vector<const char*> paths;
+  for (const std::string& path : files) paths.push_back(path.c_str());
+  auto desc = make_desc<cumulet_sequence_desc>();
+  desc.paths = paths.data();
+  desc.count = paths.size();
+  desc.file = file;
+  cumulet_sequence* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_sequence_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return SequenceRef(out);
+}
+
+class CSequence : public testing::Test {
+ protected:
+  static constexpr int count = 7;
+  [[nodiscard]] ViewerPtr make() {
+    return make_viewer(
+        {.get_proc = Context::get_proc, .user = &context_, .log = Lines::add, .log_user = &lines_, .samples = 2});
+  }
+  Picture picture(cumulet_viewer* of) {
+    auto frame = target_.frame();
+    frame.target = CUMULET_TARGET_NONE;
+    converge(of, frame);
+    frame.target = CUMULET_TARGET_FRAMEBUFFER;
+    target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+    EXPECT_EQ(cumulet_render(of, &frame, nullptr), CUMULET_OK) << cumulet_last_error(of);
+    return target_.pixels();
+  }
+  static cumulet_sequence_info info_of(cumulet_viewer* viewer) {
+    auto info = make_desc<cumulet_sequence_info>();
+    EXPECT_EQ(cumulet_get_sequence_info(viewer, &info, nullptr, 0), CUMULET_OK) << cumulet_last_error(viewer);
+    return info;
+  }
+  // All frames are ready, or failed; false after a minute.
+  static bool is_cached(cumulet_viewer* viewer) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    for (;;) {
+      const cumulet_sequence_info info = info_of(viewer);
+      if (info.ready_frames + info.failed_frames == info.frames) return true;
+      if (std::chrono::steady_clock::now() > until) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+  // Of this file, by itself.
+  Picture alone(int frame) {
+    const ViewerPtr viewer = make();
+    EXPECT_EQ(cumulet_load_volume(viewer.get(), clip_.path(frame).c_str(), nullptr), CUMULET_OK);
+    return picture(viewer.get());
+  }
+
+  Clip clip_{count};
+  Lines lines_;
+  Context context_ = Context::create(Backend::automatic);
+  GladGLContext gl_ = load_gl(Context::get_proc, &context_);
+  HostTarget target_{gl_, 32, 32};
+};
+
+TEST_F(CSequence, IsRefusedInOneLine) {
+  std::array<char, 256> error{};
+  cumulet_sequence* out = nullptr;
+  std::array<const char*, 2> paths{"a.vdb", nullptr};
+  auto desc = make_desc<cumulet_sequence_desc>();
+  const auto refused = [&](const char* cause) {
+    EXPECT_EQ(cumulet_sequence_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_STREQ(error.data(), cause);
+    EXPECT_EQ(out, nullptr);
+  };
+  refused("cumulet_sequence_desc.count is not from 1 to 1000000");
+  desc.count = 2;
+  refused("paths are NULL");
+  desc.paths = paths.data();
+  refused("cumulet_sequence_desc.paths[1] is NULL or empty");
+  desc.count = 1;
+  auto file = make_desc<cumulet_volume_file_desc>();
+  file.to_world[0] = 1.0;
+  desc.file = &file;
+  refused("to_world is not affine");
+
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  auto playback = make_desc<cumulet_playback_desc>();
+  const auto unplayable = [&] {
+    return cumulet_sequence_set_playback(sequence.get(), &playback) == CUMULET_ERROR_INVALID_ARGUMENT;
+  };
+  EXPECT_FALSE(unplayable());
+  playback.first_frame = count;
+  EXPECT_TRUE(unplayable());
+  playback.first_frame = 3;
+  playback.frame_count = 5;
+  EXPECT_TRUE(unplayable());
+  playback.frame_count = 4;
+  EXPECT_FALSE(unplayable());
+  playback.frames_per_second = -1.0;
+  EXPECT_TRUE(unplayable());
+  playback.frames_per_second = 10.0;
+  playback.offset_seconds = NAN;
+  EXPECT_TRUE(unplayable());
+  EXPECT_EQ(cumulet_sequence_set_playback(nullptr, &playback), CUMULET_ERROR_INVALID_ARGUMENT);
+  for (const double bad : {-0.5, count - 0.5, double(NAN)})
+    EXPECT_EQ(cumulet_sequence_set_frame(sequence.get(), bad), CUMULET_ERROR_INVALID_ARGUMENT) << bad;
+  for (const double bad : {2e9, double(NAN), std::numeric_limits<double>::infinity()})
+    EXPECT_EQ(cumulet_sequence_set_time(sequence.get(), bad), CUMULET_ERROR_INVALID_ARGUMENT) << bad;
+  std::uint32_t frame = 99;
+  double seconds = 99.0;
+  EXPECT_EQ(cumulet_sequence_get_frame_at(sequence.get(), 0.0, nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_sequence_get_time_of(sequence.get(), count, &seconds), CUMULET_ERROR_INVALID_ARGUMENT);
+  // What is refused changed nothing: frames 3 to 6 at 24 a second.
+  EXPECT_EQ(cumulet_sequence_get_frame_at(sequence.get(), 2.0 / 24.0, &frame), CUMULET_OK);
+  EXPECT_EQ(frame, 5U);
+  EXPECT_EQ(cumulet_sequence_get_time_of(sequence.get(), 5, &seconds), CUMULET_OK);
+  EXPECT_DOUBLE_EQ(seconds, 2.0 / 24.0);
+
+  const ViewerPtr viewer = make();
+  auto info = make_desc<cumulet_sequence_info>();
+  EXPECT_EQ(cumulet_get_sequence_info(viewer.get(), &info, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer shows no sequence");
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  std::array<std::uint8_t, count> states{};
+  EXPECT_EQ(cumulet_get_sequence_info(viewer.get(), &info, states.data(), count - 1), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the sequence has 7 frames");
+  EXPECT_EQ(cumulet_get_sequence_frame(viewer.get(), count, error.data(), error.size()),
+            CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_get_sequence_frame(viewer.get(), 0, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+// Played, scrubbed to, or loaded by itself: to the last bit.
+TEST_F(CSequence, AFrameIsTheSameHoweverItCame) {
+  clip_.empty(1);
+  clip_.with_flame(4);
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  for (const int frame : {5, 0, 1, 2, 3, 4, 5, 6, 3, 1}) {
+    ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), frame / 24.0), CUMULET_OK);
+    const Picture found = picture(viewer.get());
+    EXPECT_EQ(difference(found, alone(frame)), "") << frame;
+    const cumulet_sequence_info info = info_of(viewer.get());
+    EXPECT_EQ(info.asked_frame, std::uint32_t(frame));
+    EXPECT_EQ(info.is_drawn, 1);
+    EXPECT_EQ(info.drawn_frame, std::uint32_t(frame));
+  }
+  EXPECT_TRUE(is_cached(viewer.get()));
+  EXPECT_EQ(info_of(viewer.get()).ready_frames, std::uint32_t(count));
+  EXPECT_GT(info_of(viewer.get()).bytes, 10'000U);
+}
+
+TEST_F(CSequence, TellsWhatItPlaysOver) {
+  clip_.remove(2);
+  clip_.corrupt(3);
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  const Picture before = alone(1);
+  for (const int frame : {1, 2, 3}) {
+    ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), frame), CUMULET_OK);
+    EXPECT_EQ(difference(picture(viewer.get()), before), "") << frame;
+    EXPECT_EQ(info_of(viewer.get()).drawn_frame, 1U);
+    EXPECT_EQ(info_of(viewer.get()).asked_frame, std::uint32_t(frame));
+  }
+  ASSERT_TRUE(is_cached(viewer.get()));
+  std::array<std::uint8_t, count> states{};
+  auto info = make_desc<cumulet_sequence_info>();
+  ASSERT_EQ(cumulet_get_sequence_info(viewer.get(), &info, states.data(), states.size()), CUMULET_OK);
+  EXPECT_EQ(info.failed_frames, 2U);
+  constexpr std::uint8_t ready = CUMULET_FRAME_READY;
+  constexpr std::uint8_t failed = CUMULET_FRAME_FAILED;
+  EXPECT_EQ(states, (std::array<std::uint8_t, count>{ready, ready, failed, failed, ready, ready, ready}));
+  std::array<char, 512> cause{};
+  ASSERT_EQ(cumulet_get_sequence_frame(viewer.get(), 3, cause.data(), cause.size()), CUMULET_OK);
+  EXPECT_EQ(std::string(cause.data()).rfind(clip_.path(3) + ": ", 0), 0U) << cause.data();
+  ASSERT_EQ(cumulet_get_sequence_frame(viewer.get(), 4, cause.data(), cause.size()), CUMULET_OK);
+  EXPECT_STREQ(cause.data(), "");
+  EXPECT_EQ(lines_.warnings.size(), 2U);
+}
+
+TEST_F(CSequence, WithoutAFrameItFailsAndWhatWasThereStays) {
+  const ViewerPtr viewer = make();
+  ASSERT_EQ(cumulet_load_volume(viewer.get(), clip_.path(0).c_str(), nullptr), CUMULET_OK);
+  const Picture before = picture(viewer.get());
+  const SequenceRef none = make_sequence({"not-there.1.vdb", "not-there.2.vdb"});
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), none.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_FILE);
+  EXPECT_EQ(std::string(cumulet_last_error(viewer.get())).rfind("not-there.1.vdb: ", 0), 0U);
+  auto progress = make_desc<cumulet_progress>();
+  ASSERT_EQ(cumulet_get_progress(viewer.get(), &progress), CUMULET_OK);
+  EXPECT_EQ(progress.volume_status, CUMULET_ERROR_FILE);
+  auto result = make_desc<cumulet_frame_result>();
+  const auto frame = target_.frame();
+  target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+  ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
+  EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
+  EXPECT_EQ(difference(target_.pixels(), before), "");
+  EXPECT_EQ(info_of(viewer.get()).is_drawn, 0);
+  // The next wish makes it old news.
+  ASSERT_EQ(cumulet_load_volume(viewer.get(), clip_.path(0).c_str(), nullptr), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), before), "");
+}
+
+// One density scale, one camera and one ground, by the largest frame.
+TEST_F(CSequence, NothingJumps) {
+  std::vector<std::uintmax_t> sizes;
+  for (const std::string& path : clip_.paths()) sizes.push_back(std::filesystem::file_size(path));
+  const auto largest = static_cast<std::uint32_t>(std::ranges::max_element(sizes) - sizes.begin());
+  auto file = make_desc<cumulet_volume_file_desc>();
+  file.suggested_density_scale = 1;
+  const SequenceRef sequence = make_sequence(clip_.paths(), &file);
+  const auto camera_of = [](cumulet_viewer* viewer) {
+    cumulet_camera* camera = nullptr;
+    EXPECT_EQ(cumulet_get_camera(viewer, &camera), CUMULET_OK);
+    const CameraRef owner(camera);
+    auto desc = make_desc<cumulet_camera_desc>();
+    EXPECT_EQ(cumulet_camera_get(camera, &desc), CUMULET_OK);
+    return std::array{desc.eye[0], desc.eye[1], desc.eye[2], desc.target[0], desc.target[1], desc.target[2]};
+  };
+  const auto prepare = [&](cumulet_viewer* viewer) {
+    cumulet_camera* fits = nullptr;
+    const auto desc = make_desc<cumulet_camera_desc>();
+    EXPECT_EQ(cumulet_camera_create(&desc, &fits), CUMULET_OK);
+    const CameraRef owner(fits);
+    EXPECT_EQ(cumulet_set_camera(viewer, fits), CUMULET_OK);
+    auto ground = make_desc<cumulet_ground_desc>();
+    ground.place = CUMULET_GROUND_BELOW;
+    EXPECT_EQ(cumulet_set_ground(viewer, &ground), CUMULET_OK);
+  };
+  const ViewerPtr single = make();
+  prepare(single.get());
+  file.path = clip_.path(static_cast<int>(largest)).c_str();
+  ASSERT_EQ(cumulet_load_volume_file(single.get(), &file), CUMULET_OK);
+  const Picture largest_alone = picture(single.get());
+
+  const ViewerPtr viewer = make();
+  prepare(viewer.get());
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  for (const std::uint32_t frame : {0U, 6U, 3U, largest}) {
+    ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), frame), CUMULET_OK);
+    const Picture found = picture(viewer.get());
+    EXPECT_EQ(camera_of(viewer.get()), camera_of(single.get())) << frame;
+    if (frame == largest) {
+      EXPECT_EQ(difference(found, largest_alone), "");
+    }
+  }
+  auto stats = make_desc<cumulet_stats>();
+  auto wanted = make_desc<cumulet_stats>();
+  ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+  ASSERT_EQ(cumulet_get_stats(single.get(), &wanted), CUMULET_OK);
+  EXPECT_TRUE(std::ranges::equal(stats.bounds_max, wanted.bounds_max));
+}
+
+TEST_F(CSequence, VolumesAndSequencesTakeTurns) {
+  const ViewerPtr viewer = make();
+  const Picture first = alone(0);
+  const Picture third = alone(2);
+  SequenceRef sequence = make_sequence(clip_.paths());
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), first), "");
+  cumulet_volume* volume = nullptr;
+  ASSERT_EQ(cumulet_get_volume(viewer.get(), &volume), CUMULET_OK);
+  ASSERT_NE(volume, nullptr);
+  const VolumeRef owner(volume);
+  ASSERT_EQ(cumulet_load_volume(viewer.get(), clip_.path(2).c_str(), nullptr), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), third), "");
+  auto info = make_desc<cumulet_sequence_info>();
+  EXPECT_EQ(cumulet_get_sequence_info(viewer.get(), &info, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), nullptr), CUMULET_OK);  // there is none
+  EXPECT_EQ(difference(picture(viewer.get()), third), "");
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), first), "");
+  ASSERT_EQ(cumulet_set_volume(viewer.get(), volume), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), first), "");
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  sequence.reset();  // the viewer has its share
+  EXPECT_EQ(difference(picture(viewer.get()), first), "");
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), nullptr), CUMULET_OK);
+  double box[6];
+  EXPECT_EQ(cumulet_get_bounds(viewer.get(), box, box + 3), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(CSequence, OtherSettingsAreThoseOfAllFrames) {
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  picture(viewer.get());
+  ASSERT_TRUE(is_cached(viewer.get()));
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.threshold = 0.02;
+  grid.cells = CUMULET_CELLS_CONSTANT;
+  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+  for (const int frame : {0, 4}) {
+    ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), frame), CUMULET_OK);
+    const Picture found = picture(viewer.get());
+    const ViewerPtr single = make();
+    ASSERT_EQ(cumulet_set_grid(single.get(), &grid), CUMULET_OK);
+    ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(frame).c_str(), nullptr), CUMULET_OK);
+    EXPECT_EQ(difference(found, picture(single.get())), "") << frame;
+  }
+  // Cells that follow the camera wait for one.
+  grid.camera_adaptive = 1;
+  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+  ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 2.0), CUMULET_OK);
+  const Picture found = picture(viewer.get());
+  const ViewerPtr single = make();
+  ASSERT_EQ(cumulet_set_grid(single.get(), &grid), CUMULET_OK);
+  ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(2).c_str(), nullptr), CUMULET_OK);
+  EXPECT_EQ(difference(found, picture(single.get())), "");
+}
+
+// Once they are there, each frame that is asked for for long enough to be drawn is drawn, with previews and a budget.
+TEST_F(CSequence, PlaysEachFrameOnceItIsCached) {
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
+  auto playback = make_desc<cumulet_playback_desc>();
+  playback.repeat = CUMULET_REPEAT_LOOP;
+  ASSERT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  auto frame = target_.frame();
+  frame.budget_ms = 5.0;
+  ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+  ASSERT_TRUE(is_cached(viewer.get()));
+  for (int i = 0; i < 3 * count; ++i) {
+    ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), i / 24.0), CUMULET_OK);
+    // Of a test's own clock: frames that are drawn, not seconds, which a busy machine has few of.
+    int calls = 0;
+    do {
+      ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
+    } while (info_of(viewer.get()).drawn_frame != std::uint32_t(i % count) && ++calls < 200);
+    EXPECT_LT(calls, 200) << i;
+  }
+}
+
+TEST_F(CSequence, MovesInAnyThread) {
+  clip_.corrupt(5);
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  const ViewerPtr other = make();
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sequence(other.get(), sequence.get()), CUMULET_OK);
+  std::atomic<bool> ends = false;
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; !ends; ++i) {
+        EXPECT_EQ(cumulet_sequence_set_time(sequence.get(), 0.01 * ((t * 7 + i) % 60)), CUMULET_OK);
+        auto playback = make_desc<cumulet_playback_desc>();
+        playback.repeat = static_cast<cumulet_repeat>(i % 3);
+        playback.first_frame = static_cast<std::uint32_t>(t);
+        EXPECT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
+        EXPECT_EQ(cumulet_sequence_set_frame(sequence.get(), i % count), CUMULET_OK);
+        std::this_thread::yield();
+      }
+    });
+  }
+  auto frame = target_.frame();
+  frame.budget_ms = 2.0;
+  for (int i = 0; i < 40; ++i) {
+    for (const auto* shows : {&viewer, &other})
+      EXPECT_EQ(cumulet_render(shows->get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(shows->get());
+    if (i % 9 == 4) {
+      ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+    }
+    if (i % 9 == 7) cumulet_cancel(other.get());
+  }
+  ends = true;
+  for (std::thread& thread : threads) thread.join();
+  ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 4.0), CUMULET_OK);
+  const Picture found = picture(viewer.get());
+  EXPECT_EQ(difference(found, alone(4)), "");
+  EXPECT_EQ(difference(picture(other.get()), found), "");
+}
+
+}  // namespace
