@@ -97,6 +97,7 @@ double App::patience() const {
   double wait = player_ ? order_.idle : std::numeric_limits<double>::infinity();
   if (owes_) wait = std::min(wait, std::max(drawn_at_ + picture_frame - now_, least_frame));
   constexpr double glow_frame = 1.0 / 30.0;
+  if (model_.playing) return std::min(wait, least_frame);
   if (now_ - last_event_ < event_glow) return std::min(wait, glow_frame);
   constexpr double blink = 0.4;
   constexpr double slow_frame = 0.1;
@@ -107,11 +108,12 @@ double App::patience() const {
 }
 
 void App::frame() {
-  now_ = glfwGetTime();
+  const double before = std::exchange(now_, glfwGetTime());
   const auto scale = static_cast<float>(options_.ui_scale > 0.0 ? options_.ui_scale : window_->content_scale());
   if (scale != ui_scale_) Window::set_ui_scale(scale);
   ui_scale_ = scale;
   take();
+  if (model_.playing) advance_clock(stepped() ? replay_frame : now_ - before);
 
   order_ = {};
   if (player_) {
@@ -142,6 +144,7 @@ void App::frame() {
   execute(commands);
 
   if (std::exchange(camera_moved_, false) && model_.navigation.turntable_degrees_per_second == 0.0) last_motion_ = now_;
+  follow_playback();
   held_ = ImGui::IsAnyItemActive() || viewport_buttons_ != 0 || now_ - last_motion_ < motion_rest;
   ask();
   if (stepped()) {
@@ -205,7 +208,9 @@ void App::handle_key(const Event& event) {
   if (event.down && !in_popup) {
     const bool escape = event.code == GLFW_KEY_ESCAPE;
     const auto command = command_of(event.code, event.modifiers, io.WantTextInput);
-    if (command && !(escape && ImGui::IsAnyItemActive())) {
+    // Space is the control's where the keyboard is at one.
+    const bool presses = event.code == GLFW_KEY_SPACE && io.NavVisible;
+    if (command && !presses && !(escape && ImGui::IsAnyItemActive())) {
       execute(*command);
       return;
     }
@@ -352,7 +357,9 @@ void App::execute(const Command& command) {
       model_.scene.sampling.view = static_cast<cumulet_view>(command.value);
       break;
     case Action::grids_dialog:
-      panel_.picker().open(model_.scene.volume, Window::wake);
+      panel_.picker().open(
+          model_.status.play ? model_.status.play->row.file(model_.status.play->info.asked_frame) : model_.scene.volume,
+          Window::wake);
       break;
     case Action::choose_grid:
       suggest_next_ = model_.scene.grid_name != command.text;
@@ -365,6 +372,25 @@ void App::execute(const Command& command) {
       break;
     case Action::auto_density:
       requests_.push_back({Request::Type::suggest_density});
+      break;
+    case Action::play_row:
+      play_row();
+      break;
+    case Action::play:
+      if (model_.status.play) model_.playing = !model_.playing;
+      break;
+    case Action::step:
+      step(command.value);
+      break;
+    case Action::go_to:
+      model_.playing = false;
+      go_to(static_cast<std::uint32_t>(command.value));
+      break;
+    case Action::begin_here:
+      if (model_.status.play) model_.scene.sequence.first = model_.status.play->frame();
+      break;
+    case Action::end_here:
+      if (model_.status.play) model_.scene.sequence.last = model_.status.play->frame();
       break;
     case Action::quit:
       quit_ = true;
@@ -383,6 +409,58 @@ void App::cancel() {
     ImGui::SetWindowFocus(nullptr);
 }
 
+void App::go_to(std::uint32_t index) {
+  const auto& play = model_.status.play;
+  if (!play) return;
+  static_cast<void>(cumulet_sequence_set_frame(play->sequence.get(), index));
+  static_cast<void>(cumulet_sequence_get_time_of(play->sequence.get(), index, &model_.clock));
+}
+
+void App::step(int frames) {
+  const auto& play = model_.status.play;
+  if (!play) return;
+  model_.playing = false;
+  const auto last = static_cast<std::int64_t>(play->row.count()) - 1;
+  go_to(static_cast<std::uint32_t>(std::clamp<std::int64_t>(std::int64_t{play->info.asked_frame} + frames, 0, last)));
+}
+
+void App::play_row() {
+  const auto& row = model_.status.neighbours;
+  if (!row) return;
+  SceneOptions& scene = model_.scene;
+  for (std::uint32_t i = 0; i < row->count(); ++i)
+    if (row->file(i) == scene.volume) scene.sequence.frame = row->number(i);
+  scene.volume = row->pattern().text();
+}
+
+void App::advance_clock(double seconds) {
+  const auto& play = model_.status.play;
+  if (!play) {
+    model_.playing = false;
+    return;
+  }
+  model_.clock += seconds;
+  const cumulet_playback_desc playback = playback_of(model_.scene.sequence, play->row);
+  const double length = playback.frame_count / playback.frames_per_second;
+  // What is held at its end is at its end.
+  if (playback.repeat == CUMULET_REPEAT_HOLD && model_.clock >= playback.offset_seconds + length) {
+    model_.playing = false;
+    go_to(playback.first_frame + playback.frame_count - 1);
+    return;
+  }
+  static_cast<void>(cumulet_sequence_set_time(play->sequence.get(), model_.clock));
+}
+
+void App::follow_playback() {
+  const auto& play = model_.status.play;
+  if (!play) return;
+  const cumulet_playback_desc now = playback_of(model_.scene.sequence, play->row);
+  const bool known = std::exchange(known_sequence_, play->sequence.get()) == play->sequence.get();
+  if (known && settings::same(now, playback_of(wish_.scene.sequence, play->row))) return;
+  // The frame stays where the clock runs otherwise.
+  model_.clock = now.offset_seconds + (double(play->info.asked_frame) - now.first_frame) / now.frames_per_second;
+}
+
 void App::open(const std::string& path) {
   if (path.empty()) return;
   if (is_model(path)) {
@@ -395,6 +473,9 @@ void App::open(const std::string& path) {
   }
   if (!has_ending(path, ".json")) {
     set_volume(model_.scene, {.volume = path});
+    model_.scene.sequence.first.reset();
+    model_.scene.sequence.last.reset();
+    model_.scene.sequence.frame.reset();
     model_.scene.visible = true;
     fit_next_ = suggest_next_ = pick_next_ = reload_ = true;
     return;
@@ -422,6 +503,7 @@ void App::save_scene(const std::string& path) {
   // The same framing in cumulet-render.
   scene.width = static_cast<std::uint32_t>(std::clamp(viewport_.width, 1.0, 16384.0));
   scene.height = static_cast<std::uint32_t>(std::clamp(viewport_.height, 1.0, 16384.0));
+  if (model_.status.play) scene.sequence.frame = model_.status.play->frame();
   try {
     demo::save_scene(scene, path);
     model_.scene_path = path;
@@ -461,6 +543,7 @@ void App::ask() {
   Wish wish;
   wish.number = wish_.number;
   wish.scene = model_.scene;
+  if (model_.status.play) wish.scene.surface.time = std::max(model_.clock, 0.0);
   wish.camera_edit = wish_.camera_edit + (same_camera(wish.scene.camera, wish_.scene.camera) ? 0 : 1);
   const bool load = std::exchange(reload_, false) || volume_of(wish.scene) != volume_of(wish_.scene);
   wish.volume_edit = wish_.volume_edit + (load ? 1 : 0);
@@ -706,6 +789,24 @@ void App::write_report(const std::string& path) const {
       {"inspect", status.stats.pass_seconds_inspect},   {"display", status.stats.pass_seconds_display}};
   json["pictures"] = pictures_;
   json["grid"] = status.grid;
+  if (status.play) {
+    const auto& [sequence, row, info, states, failure] = *status.play;
+    json["sequence"] = {{"frame", row.number(info.asked_frame)},
+                        {"drawn", info.is_drawn != 0 ? Json(row.number(info.drawn_frame)) : Json()},
+                        {"first", row.number(0)},
+                        {"count", row.count()},
+                        {"ready", info.ready_frames},
+                        {"failed", info.failed_frames},
+                        {"failure", failure},
+                        {"playing", model_.playing},
+                        {"clock", model_.clock}};
+    const SceneSequence& given = model_.scene.sequence;
+    json["sequence"]["first_played"] = given.first ? Json(*given.first) : Json();
+    json["sequence"]["last_played"] = given.last ? Json(*given.last) : Json();
+    json["sequence"]["frames_per_second"] = given.playback.frames_per_second;
+    json["sequence"]["repeat"] = static_cast<int>(given.playback.repeat);
+  }
+  json["neighbours"] = status.neighbours ? status.neighbours->count() : 0;
   json["state"] = last_state_;
   json["dialog"] = panel_.dialog_open();
   json["recent"] = model_.preferences.recent;

@@ -51,6 +51,13 @@ class App {
   void save_scene(const std::string& path);
   void step_history(bool back);
   void cancel();
+  /// To a frame, by its place in the row.
+  void go_to(std::uint32_t index);
+  void play_row();
+  void step(int frames);
+  /// Moves the clock, and what goes by it.
+  void advance_clock(double seconds);
+  void follow_playback();
 
   void follow_history();
   /// Sends what has changed to the renderer.
@@ -121,8 +128,9 @@ class App {
   std::uint64_t answered_surfaces_ = 0;
   std::uint64_t answered_environment_ = 0;
   bool camera_moved_ = false;
-  bool starting_ = true;       // until what the command line named is there, or is not
-  std::string opening_scene_;  // a scene file whose parts are still to come
+  const cumulet_sequence* known_sequence_ = nullptr;  // that the clock is of
+  bool starting_ = true;                              // until what the command line named is there, or is not
+  std::string opening_scene_;                         // a scene file whose parts are still to come
   std::string opening_environment_;
   std::uint64_t pictures_ = 0;  // that came to be shown
   std::uint64_t drawn_pictures_ = 0;

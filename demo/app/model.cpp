@@ -55,6 +55,11 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_4, 0, {Action::view, "", CUMULET_VIEW_DENSITY}, "", ""},
       {GLFW_KEY_5, 0, {Action::view, "", CUMULET_VIEW_WIREFRAME}, "", ""},
       {GLFW_KEY_M, 0, {Action::next_march}, "M", "Next march"},
+      {GLFW_KEY_SPACE, 0, {Action::play}, "Space", "Play a sequence, and pause"},
+      {GLFW_KEY_COMMA, 0, {Action::step, "", -1}, ",  .", "A frame back, a frame on"},
+      {GLFW_KEY_PERIOD, 0, {Action::step, "", 1}, "", ""},
+      {GLFW_KEY_I, 0, {Action::begin_here}, "I  O", "Play from this frame, to this frame"},
+      {GLFW_KEY_O, 0, {Action::end_here}, "", ""},
       {GLFW_KEY_LEFT_BRACKET, 0, {Action::darker}, "[  ]", "Exposure, a third of a stop"},
       {GLFW_KEY_RIGHT_BRACKET, 0, {Action::brighter}, "", ""},
       {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel"},
@@ -101,6 +106,15 @@ std::optional<double> FrameTimes::shown(double at, bool picture, bool due) {
 double device_seconds(const cumulet_stats& stats) {
   return stats.pass_seconds_upload + stats.pass_seconds_host_depth + stats.pass_seconds_surfaces +
          stats.pass_seconds_trace + stats.pass_seconds_inspect + stats.pass_seconds_display;
+}
+
+cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row) {
+  cumulet_playback_desc desc = sequence.playback;
+  const std::uint32_t first = sequence.first ? row.index_of(*sequence.first) : 0;
+  const std::uint32_t last = sequence.last ? row.index_of(*sequence.last) : row.count() - 1;
+  desc.first_frame = std::min(first, last);
+  desc.frame_count = last - desc.first_frame + 1;
+  return desc;
 }
 
 Model::Model() {
@@ -156,6 +170,7 @@ void tell(Model& model, bool error, const std::string& text, double now) {
 
 void spell_out_defaults(SceneOptions& scene) {
   for_each_group(scene, [](auto& group) { settings::spell_out_zeros(group); });
+  settings::spell_out_zeros(scene.sequence.playback);
   settings::spell_out_zeros(scene.camera);
   for (SceneVolume& other : scene.others) {
     const double scale = other.medium.density_scale;

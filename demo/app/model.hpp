@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <frame_row.hpp>
+#include <memory>
 #include <optional>
 #include <scene_file.hpp>
 #include <string>
@@ -50,6 +52,12 @@ enum class Action {
   choose_grid,   // text
   choose_up,     // value: an UpAxis
   auto_density,  // a density scale that suits the volume
+  play_row,      // the sequence that the volume's file is in
+  play,          // and pause
+  step,          // value: frames, on or back
+  go_to,         // value: a frame's place in the row
+  begin_here,    // the frame is the first that is played
+  end_here,
   quit
 };
 
@@ -125,6 +133,20 @@ struct FieldValues {
 /// Heights of bars, from 0 to 1, of counts that differ by orders of magnitude.
 [[nodiscard]] std::vector<float> heights(const std::uint64_t (&counts)[CUMULET_HISTOGRAM_BINS]);
 
+/// A sequence that is shown.
+struct Play {
+  std::shared_ptr<cumulet_sequence> sequence;  // any thread moves it
+  FrameRow row;
+  cumulet_sequence_info info{};
+  std::vector<std::uint8_t> states;  // cumulet_frame_state, each
+  std::string failure;               // of the frame where it stands
+
+  [[nodiscard]] Frame frame() const { return row.number(info.asked_frame); }
+};
+
+/// As the library takes it, of these files.
+[[nodiscard]] cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row);
+
 /// What the viewer has told last.
 struct Status {
   cumulet_frame_result frame{};
@@ -138,6 +160,8 @@ struct Status {
   std::string loading;                 // the file that is read, until what it shows is there
   ThumbnailPtr thumbnail;              // of the environment that is shown; null: none, or not yet
   bool has_volume = false;
+  std::optional<Play> play;                                // where it is a sequence's
+  std::optional<FrameRow> neighbours;                      // where it is one of several that are numbered
   std::string grid;                                        // of the file, that is shown
   double noise = 0.0;                                      // relative standard error, 0: not known
   std::array<FieldValues, settings::ramps.size()> fields;  // each ramp's
@@ -164,6 +188,8 @@ struct Model {
   bool adaptive_resolution = true;
   bool panel = true;
   bool help = false;
+  bool playing = false;
+  double clock = 0.0;  // seconds, of the sequence and of the model's animation beside it
   bool can_undo = false;
   bool can_redo = false;
   std::string scene_path;  // of the scene file last opened or saved

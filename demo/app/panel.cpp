@@ -15,6 +15,7 @@ namespace cumulet::demo {
 namespace {
 
 constexpr float panel_width = 372.0f;
+constexpr float timeline_height = 58.0f;
 constexpr ImGuiWindowFlags overlay = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                                      ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing |
                                      ImGuiWindowFlags_NoNav | ImGuiWindowFlags_AlwaysAutoResize;
@@ -32,7 +33,9 @@ std::string file_name(const std::string& path) { return std::filesystem::path(pa
 
 Rectangle Panel::viewport(const Model& model, double width, double height, float scale) {
   const double side = model.panel ? std::min(std::round(static_cast<double>(panel_width * scale)), width * 0.5) : 0.0;
-  return {0.0, 0.0, std::max(width - side, 0.0), height};
+  const double below =
+      model.status.play ? std::min(std::round(static_cast<double>(timeline_height * scale)), height) : 0.0;
+  return {0.0, 0.0, std::max(width - side, 0.0), height - below};
 }
 
 void Panel::draw(Model& model, float scale, double time, std::vector<Command>& commands) {
@@ -41,6 +44,7 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   view_ = viewport(model, static_cast<double>(screen.x), static_cast<double>(screen.y), scale);
   if (model.panel) side(model, commands);
+  if (model.status.play) timeline(model, commands);
   if (!model.status.has_volume && !model.status.busy) hint();
   // What is computed in the blink of an eye, as skies are while the sun is dragged, needs no bar.
   const bool works = model.status.work.stage != CUMULET_STAGE_IDLE || model.status.compiled;
@@ -76,6 +80,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
     }
   };
   section("File", true, [&] { file(model, commands); });
+  if (model.status.play || model.status.neighbours) section("Sequence", true, [&] { sequence(model, commands); });
   section("Display", true, [&] { display(model); });
   section("Light", true, [&] { light(model); });
   section("Environment", true, [&] { environment(model, commands); });
@@ -238,7 +243,11 @@ void Panel::surfaces(Model& model) {
   ImGui::BeginDisabled(info.animations == 0);
   settings::with(&Desc::time, [&](auto time) {
     time.row.most = std::max(model.status.animation.duration, 1e-3);
-    rows_.draw(time, surface.time);
+    // Beside a sequence it goes by that one's clock.
+    double clock = std::max(model.clock, 0.0);
+    ImGui::BeginDisabled(model.status.play.has_value());
+    rows_.draw(time, model.status.play ? clock : surface.time);
+    ImGui::EndDisabled();
   });
   ImGui::EndDisabled();
   variant(model);

@@ -44,6 +44,9 @@ class Panel {
   /// Where a volume stands; number: what its controls' labels end with.
   void stand(SceneVolume& volume, const std::string& number);
   void lamps(Model& model);
+  void sequence(Model& model, std::vector<Command>& commands);
+  /// Below the picture: the frames, which of them are ready, and where it stands.
+  void timeline(Model& model, std::vector<Command>& commands);
   void medium(Model& model, std::vector<Command>& commands);
   void ramps(Model& model);
   void surfaces(Model& model);

@@ -141,6 +141,7 @@ void Session::follow(const Wish& wish) {
   follow_surfaces();
   follow_places();
   follow_volume();
+  follow_playback();
   follow_visible();
   if (!std::ranges::equal(known_->others, scene_.others, same_volume)) follow_others();
 }
@@ -148,7 +149,9 @@ void Session::follow(const Wish& wish) {
 void Session::follow_visible() {
   if (waiting_ || known_->visible == scene_.visible) return;
   known_->visible = scene_.visible;
-  if (scene_.visible) {
+  if (sequence_) {
+    check(cumulet_set_sequence(viewer_.get(), scene_.visible ? sequence_.get() : nullptr));
+  } else if (scene_.visible) {
     if (hidden_) check(cumulet_set_volume(viewer_.get(), hidden_.get()));
     hidden_.reset();
   } else {
@@ -369,6 +372,59 @@ void Session::set_camera() {
   if (is_unplaced(scene_.camera) && !is_unplaced(seen_)) scene_.camera = known_->camera = seen_;
 }
 
+bool Session::begin_volume() {
+  cumulet_volume_file_desc file = volume_file(scene_);
+  file.suggested_density_scale = suggest_ ? 1 : 0;
+  try {
+    row_ = FrameRow::of_name(scene_.volume);
+  } catch (const std::exception& error) {
+    tell(true, error.what());
+    return false;
+  }
+  sequence_.reset();
+  if (!row_) return check(cumulet_load_volume_file(viewer_.get(), &file));
+  std::vector<std::string> names;
+  for (std::uint32_t i = 0; i < row_->count(); ++i) names.push_back(row_->file(i));
+  std::vector<const char*> paths;
+  for (const std::string& name : names) paths.push_back(name.c_str());
+  cumulet_sequence_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.paths = paths.data();
+  desc.count = paths.size();
+  desc.file = &file;
+  cumulet_sequence* made = nullptr;
+  std::array<char, 512> error{};
+  if (cumulet_sequence_create(&desc, &made, error.data(), error.size()) != CUMULET_OK) {
+    tell(true, error.data());
+    return false;
+  }
+  sequence_ = {made, cumulet_sequence_release};
+  const cumulet_playback_desc playback = playback_of(scene_.sequence, *row_);
+  const Frame frame = scene_.sequence.frame.value_or(row_->number(playback.first_frame));
+  static_cast<void>(cumulet_sequence_set_playback(made, &playback));
+  static_cast<void>(cumulet_sequence_set_frame(made, row_->index_of(frame)));
+  return check(cumulet_set_sequence(viewer_.get(), made));
+}
+
+void Session::follow_playback() {
+  if (!sequence_) return;
+  const cumulet_playback_desc playback = playback_of(scene_.sequence, *row_);
+  check(cumulet_sequence_set_playback(sequence_.get(), &playback));
+}
+
+void Session::see_sequence() {
+  status_.play.reset();
+  if (!sequence_ || !scene_.visible) return;
+  Play play{sequence_, *row_, {}, std::vector<std::uint8_t>(row_->count()), {}};
+  play.info.struct_size = sizeof play.info;
+  if (cumulet_get_sequence_info(viewer_.get(), &play.info, play.states.data(), play.states.size()) != CUMULET_OK)
+    return;
+  std::array<char, 512> cause{};
+  static_cast<void>(cumulet_get_sequence_frame(viewer_.get(), play.info.asked_frame, cause.data(), cause.size()));
+  play.failure = cause.data();
+  status_.play = std::move(play);
+}
+
 void Session::follow_volume() {
   if (volume_of(*known_) == volume_of(scene_)) return;
   set_volume(*known_, volume_of(scene_));
@@ -376,15 +432,16 @@ void Session::follow_volume() {
     check(cumulet_set_volume(viewer_.get(), nullptr));
     shown_volume_ = {};
     hidden_.reset();
+    sequence_.reset();
     grids_.clear();
+    row_.reset();
+    status_.neighbours.reset();
     status_.has_volume = false;
     status_.fields = {};
     waiting_ = false;
     return;
   }
-  cumulet_volume_file_desc file = volume_file(scene_);
-  file.suggested_density_scale = suggest_ ? 1 : 0;
-  waiting_ = check(cumulet_load_volume_file(viewer_.get(), &file));
+  waiting_ = begin_volume();
   if (waiting_) return;
   files_.push_back({scene_.volume, Answer::File::Fate::failed});
   fit_.reset();
@@ -464,6 +521,7 @@ void Session::see_work() {
   static_cast<void>(cumulet_get_stats(viewer_.get(), &status_.stats));
   status_.busy = status_.work.stage != CUMULET_STAGE_IDLE || status_.compiled ||
                  (status_.frame.flags & CUMULET_RENDER_LOADING) != 0;
+  see_sequence();
   see_ends();
   finish_others();
   status_.loading = waiting_                   ? scene_.volume
@@ -592,8 +650,13 @@ void Session::finish_load() {
       status_.fields[i] = {values.max_value, heights(values.histogram)};
   }
   std::array<char, 512> error{};
-  if (cumulet_list_grids(shown_volume_.volume.c_str(), add, &grids_, error.data(), error.size()) != CUMULET_OK)
-    tell(true, error.data());
+  // A sequence's first frame that can be read tells for all.
+  const auto file = [&](std::uint32_t i) { return row_ ? row_->file(i) : shown_volume_.volume; };
+  cumulet_status listed = CUMULET_ERROR_FILE;
+  for (std::uint32_t i = 0; listed != CUMULET_OK && i < (row_ ? row_->count() : 1); ++i)
+    listed = cumulet_list_grids(file(i).c_str(), add, &grids_, error.data(), error.size());
+  if (listed != CUMULET_OK) tell(true, error.data());
+  status_.neighbours = row_ ? std::nullopt : FrameRow::around(shown_volume_.volume);
   files_.push_back({shown_volume_.volume, Answer::File::Fate::opened});
   if (std::exchange(suggest_, false)) suggest_look();
   follow_visible();
@@ -619,7 +682,13 @@ void Session::suggest_density() {
   const VolumePtr volume = shown();
   double scale = 0.0;
   // What shows nothing at any scale keeps the one it has.
-  if (!volume || cumulet_volume_suggest_density_scale(volume.get(), &scale) != CUMULET_OK) return;
+  if (sequence_) {
+    see_sequence();
+    if (status_.play) scale = status_.play->info.suggested_density_scale;
+    if (scale == 0.0) return;
+  } else if (!volume || cumulet_volume_suggest_density_scale(volume.get(), &scale) != CUMULET_OK) {
+    return;
+  }
   density_scale_ = scale;
   // At once: what is fitted next depends on it.
   known_->medium.density_scale = scene_.medium.density_scale = scale;

@@ -150,6 +150,10 @@ class Session {
   /// Tells a failed call.
   bool check(cumulet_status status);
   void follow_volume();
+  // Begins to read it, be it a file's or a sequence's.
+  bool begin_volume();
+  void follow_playback();
+  void see_sequence();
   // Hides the volume, or shows it again.
   void follow_visible();
   // Shows the others that are there, and begins to open the next that is not.
@@ -225,7 +229,9 @@ class Session {
   double last_noise_ = 0.0;
   std::uint64_t noise_samples_ = 0;
   Status status_;
-  VolumePtr hidden_;  // the viewer's volume, while it is not to be seen
+  VolumePtr hidden_;                            // the viewer's volume, while it is not to be seen
+  std::shared_ptr<cumulet_sequence> sequence_;  // in its place
+  std::optional<FrameRow> row_;                 // of that
   Instances others_;
   struct Opening {
     VolumeFile file;

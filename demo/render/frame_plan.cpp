@@ -62,7 +62,9 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   if (options.info) throw UsageError("--info is of one file, and '" + volume->text() + "' are many");
   const std::vector<Frame> there = volume->frames_there();
   if (there.empty()) throw std::runtime_error(volume->text() + ": no file of such a name is there");
-  const std::vector<Frame>& frames = options.frames.empty() ? there : options.frames;
+  std::vector<Frame> frames = options.frames;
+  if (frames.empty() && options.scene.sequence.frame) frames = {*options.scene.sequence.frame};
+  if (frames.empty()) frames = there;
   const Written output("--output", options.output, frames.size());
   const Written stats("--stats", options.stats, frames.size());
   const Written checkpoint("--checkpoint", options.checkpoint, frames.size());

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <file.hpp>
 #include <filesystem>
+#include <frames.hpp>
 #include <lamp_limits.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -428,6 +429,21 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   volume.visible = visible != 0;
 }
 
+void read_sequence(Reader& reader, SceneSequence& sequence) {
+  read_settings(reader, sequence.playback);
+  const auto frame = [&](const char* key, std::optional<std::uint32_t>& out) {
+    std::uint32_t number = 0;
+    if (!reader.has(key)) return;
+    reader.integer(key, number, 0.0, last_frame);
+    out = number;
+  };
+  frame("sequence.first_frame", sequence.first);
+  frame("sequence.last_frame", sequence.last);
+  frame("sequence.frame", sequence.frame);
+  if (sequence.first && sequence.last && *sequence.first > *sequence.last)
+    reader.wrong("sequence.last_frame", "comes before sequence.first_frame");
+}
+
 /// What the second version has and the first has not.
 void read_second(Reader& reader, SceneOptions& scene) {
   reader.set_format(SceneFormat::second);
@@ -444,6 +460,7 @@ void read_second(Reader& reader, SceneOptions& scene) {
     if (volume.medium.max_bounces != 0) reader.wrong("medium.max_bounces", "is the first volume's, for all of them");
   }
   reader.of_volume(0);
+  read_sequence(reader, scene.sequence);
 }
 
 void read_scene(Reader& reader, SceneOptions& scene) {
@@ -587,6 +604,14 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
   }
 }
 
+void put_sequence(Writer& writer, const SceneSequence& sequence) {
+  const bool unsaid = settings::same(sequence.playback, SceneOptions().sequence.playback);
+  if (!unsaid) writer.put_settings(sequence.playback);
+  if (sequence.first) writer.put("sequence.first_frame", *sequence.first);
+  if (sequence.last) writer.put("sequence.last_frame", *sequence.last);
+  if (sequence.frame) writer.put("sequence.frame", *sequence.frame);
+}
+
 /// named: a file's name as it is to be written.
 template <class Named>
 Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) {
@@ -598,6 +623,7 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
     put_volume(writer, format, scene.others[i], named(scene.others[i].volume));
   }
   writer.of_volume(0);
+  if (second) put_sequence(writer, scene.sequence);
 
   if (!scene.surfaces.empty()) {
     writer.put("surfaces.file", named(scene.surfaces));
@@ -661,6 +687,7 @@ std::string SceneVolume::label() const { return name.empty() ? fs::path(volume).
 SceneOptions::SceneOptions() {
   for_each_group(*this, [](auto& group) { group.struct_size = sizeof group; });
   camera.struct_size = sizeof camera;
+  sequence.playback.struct_size = sizeof sequence.playback;
   sampling.samples = 64;
   display.denoise = CUMULET_DENOISE_FAST;
 }
@@ -783,7 +810,8 @@ void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat 
 }
 
 bool same_scene(const SceneOptions& a, const SceneOptions& b) {
-  const auto all = [](const SceneOptions& s) {
+  const auto all = [](SceneOptions s) {
+    s.sequence.frame.reset();
     return to_json(s, SceneFormat::second, [](const std::string& file) { return file; });
   };
   return all(a) == all(b);

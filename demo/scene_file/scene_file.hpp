@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <ramp.hpp>
 #include <string>
 #include <vector>
@@ -44,9 +45,18 @@ struct SceneVolume : VolumeFile {
   [[nodiscard]] bool is_shown() const { return visible && !volume.empty(); }
 };
 
+/// How a scene's first volume plays, where its file's name has a place for a frame's number (demo/sequence).
+struct SceneSequence {
+  cumulet_playback_desc playback{};         // but for its frames, which are those from...
+  std::optional<std::uint32_t> first = {};  // ...this one's number on: else from the first that is there...
+  std::optional<std::uint32_t> last = {};   // ...to this one's: else to the last
+  std::optional<std::uint32_t> frame = {};  // where it stands
+};
+
 /// What every demo program can show. Its first volume is what flags and the demo's panel set, and may be none.
 struct SceneOptions : SceneVolume {
   std::vector<SceneVolume> others;   // beside the first; their max_bounces are 0: the first one's counts
+  SceneSequence sequence;            // of the first
   std::string surfaces;              // a glTF file; "": none
   std::string surface_variant;       // of the surfaces' materials, by name or number; "": none
   std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera

@@ -226,6 +226,7 @@ cumulet_status cumulet_get_sequence_info(cumulet_viewer* viewer, cumulet_sequenc
     out.drawn_frame = status.drawn.value_or(0);
     out.is_drawn = status.drawn ? 1 : 0;
     out.bytes = status.frames.bytes;
+    out.suggested_density_scale = status.density_scale.value_or(0.0);
     write_desc(info, out, "cumulet_sequence_info");
     if (states == nullptr) return;
     std::ranges::transform(frames, states, [](core::FrameShelf::State state) { return static_cast<uint8_t>(state); });

@@ -49,7 +49,8 @@ void FrameShelf::wish(Wish wish) {
       judged_.reset();
       said_.clear();
     }
-    if (judged_ && judged_->density_scale && wish.settings)
+    const bool suggested = wish.files->shown.suggested_density_scale;
+    if (suggested && judged_ && judged_->density_scale && wish.settings)
       wish.settings->refine.density_scale = *judged_->density_scale;
     wish_ = std::move(wish);
     cancelled_ = false;
@@ -328,7 +329,8 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
     if (!is_wished(files)) return;
     judging_ = how;
     if (how != Judging::done) return;
-    if (judged.density_scale && wish_->settings) wish_->settings->refine.density_scale = *judged.density_scale;
+    if (files->shown.suggested_density_scale && judged.density_scale && wish_->settings)
+      wish_->settings->refine.density_scale = *judged.density_scale;
     judged_ = judged;
     ++revision_;
   };
@@ -354,8 +356,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
         fail({files, frame}, failure);
       }
     }
-    if (judged.facts && files->shown.suggested_density_scale)
-      judged.density_scale = judged.facts->coarse.suggest_density_scale();
+    if (judged.facts) judged.density_scale = judged.facts->coarse.suggest_density_scale();
   } catch (...) {
     end(Judging::due);
     throw;

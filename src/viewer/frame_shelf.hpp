@@ -36,7 +36,7 @@ class FrameShelf {
   /// What the whole sequence goes by.
   struct Judged {
     VolumeFactsPtr facts;
-    std::optional<double> density_scale;  ///< if it is to be suggested
+    std::optional<double> density_scale;  ///< that suits it
   };
 
   struct Ready {

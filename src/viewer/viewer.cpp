@@ -186,7 +186,8 @@ void Viewer::follow_sequence() {
     facts_ = std::move(judged->facts);
     wishes_due_ = true;
     remark_on_anisotropy();
-    suggested_density_scale_ = judged->density_scale;
+    f.density_scale = judged->density_scale;
+    if (f.sequence->files()->shown.suggested_density_scale) suggested_density_scale_ = judged->density_scale;
     if (suggested_density_scale_) {
       grid_.build.refine.density_scale = *suggested_density_scale_;
       if (f.settings) f.settings->refine.density_scale = *suggested_density_scale_;
@@ -241,6 +242,7 @@ Viewer::SequenceStatus Viewer::sequence() {
   status.asked = f.state.moment.frame();
   if (gl_) status.drawn = gl_->shown_frame();
   status.frames = frames_.frames();
+  status.density_scale = f.density_scale;
   return status;
 }
 

@@ -76,6 +76,7 @@ class Viewer {
     std::uint32_t asked = 0;             ///< the frame at which it stands
     std::optional<std::uint32_t> drawn;  ///< that is to be seen
     FrameShelf::Status frames;
+    std::optional<double> density_scale;  ///< that suits all of them
   };
   /// Throws Error(invalid_argument) where the viewer shows no sequence; so does the next.
   SequenceStatus sequence();
@@ -331,6 +332,7 @@ class Viewer {
     std::uint64_t revision = 0;             // of what was wished last
     std::optional<BuildSettings> settings;  // none: they wait for a view
     SequenceState state;
+    std::optional<double> density_scale;  // that suits it, once it is judged
     bool wish_due = true;
     std::uint64_t shelved = 0;  // of frames_, when it was last looked at
     bool take_due = false;

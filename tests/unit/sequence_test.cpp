@@ -285,6 +285,12 @@ TEST_F(CSequence, NothingJumps) {
       EXPECT_EQ(difference(found, largest_alone), "");
     }
   }
+  cumulet_volume* volume = nullptr;
+  ASSERT_EQ(cumulet_get_volume(single.get(), &volume), CUMULET_OK);
+  const VolumeRef owner(volume);
+  double scale = 0.0;
+  ASSERT_EQ(cumulet_volume_suggest_density_scale(volume, &scale), CUMULET_OK);
+  EXPECT_EQ(info_of(viewer.get()).suggested_density_scale, scale);
   auto stats = make_desc<cumulet_stats>();
   auto wanted = make_desc<cumulet_stats>();
   ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);

@@ -720,13 +720,14 @@ CUMULET_API cumulet_status cumulet_set_sequence(cumulet_viewer* viewer, cumulet_
 
 typedef struct cumulet_sequence_info {
   size_t struct_size;
-  uint32_t frames;        /* that it has */
-  uint32_t ready_frames;  /* that are in main memory as the settings have them */
-  uint32_t failed_frames; /* for which others stand in, as far as that is known */
-  uint32_t asked_frame;   /* at which it stands */
-  uint32_t drawn_frame;   /* of the picture that the last cumulet_render drew, where is_drawn */
-  int32_t is_drawn;       /* 0: none of its frames */
-  uint64_t bytes;         /* of main memory, of those that are ready */
+  uint32_t frames;                /* that it has */
+  uint32_t ready_frames;          /* that are in main memory as the settings have them */
+  uint32_t failed_frames;         /* for which others stand in, as far as that is known */
+  uint32_t asked_frame;           /* at which it stands */
+  uint32_t drawn_frame;           /* of the picture that the last cumulet_render drew, where is_drawn */
+  int32_t is_drawn;               /* 0: none of its frames */
+  uint64_t bytes;                 /* of main memory, of those that are ready */
+  double suggested_density_scale; /* cumulet_volume_suggest_density_scale, of the largest; 0: not known yet, or none */
 } cumulet_sequence_info;
 
 /*

@@ -1,0 +1,107 @@
+// The sequence's controls, beside the picture and below it.
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "panel.hpp"
+
+namespace cumulet::demo {
+
+void Panel::sequence(Model& model, std::vector<Command>& commands) {
+  if (!model.status.play) {
+    const FrameRow& row = *model.status.neighbours;
+    ui_.fact("Frames", std::to_string(row.number(0)) + " to " + std::to_string(row.number(row.count() - 1)));
+    if (ui_.button("Play the sequence", "The volume is one of several files that are numbered: plays them all.",
+                   {-1.0f, 0.0f}))
+      commands.push_back({Action::play_row});
+    return;
+  }
+  const Play& play = *model.status.play;
+  SceneSequence& sequence = model.scene.sequence;
+  settings::for_each<cumulet_playback_desc>(
+      [&](const auto& setting) { rows_.draw(setting, sequence.playback.*setting.field); });
+  const Frame least = play.row.number(0);
+  const Frame most = play.row.number(play.row.count() - 1);
+  const cumulet_playback_desc played = playback_of(sequence, play.row);
+  Frame first = play.row.number(played.first_frame);
+  Frame last = play.row.number(played.first_frame + played.frame_count - 1);
+  if (ui_.slider("First played", "The frame that playing begins with (I: the one that is shown).", first, least, most,
+                 "%u"))
+    sequence.first = std::min(first, last);
+  if (ui_.slider("Last played", "The one that it ends with (O: the one that is shown).", last, least, most, "%u"))
+    sequence.last = std::max(first, last);
+  ui_.fact("Ready", std::to_string(play.info.ready_frames) + " of " + std::to_string(play.info.frames) + ", " +
+                        short_bytes(static_cast<double>(play.info.bytes)));
+  if (play.info.failed_frames > 0) ui_.fact("Missing", std::to_string(play.info.failed_frames));
+}
+
+void Panel::timeline(Model& model, std::vector<Command>& commands) {
+  const Play& play = *model.status.play;
+  const auto top = static_cast<float>(view_.height);
+  const auto width = static_cast<float>(view_.width);
+  ImGui::SetNextWindowPos({0.0f, top});
+  ImGui::SetNextWindowSize({width, ImGui::GetIO().DisplaySize.y - top});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(8.0f), ui_.px(5.0f)});
+  ImGui::Begin("Timeline", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
+                   ImGuiWindowFlags_NoScrollWithMouse);
+  ImGui::PopStyleVar(2);
+  const ImVec2 size(ui_.px(62.0f), 0.0f);
+  if (ui_.button("Back", "A frame back (comma).", size)) commands.push_back({Action::step, {}, -1});
+  ImGui::SameLine();
+  if (ui_.button(model.playing ? "Pause" : "Play", "Plays the frames, and pauses (Space).", size))
+    commands.push_back({Action::play});
+  ImGui::SameLine();
+  if (ui_.button("On", "A frame on (full stop).", size)) commands.push_back({Action::step, {}, 1});
+  ImGui::SameLine();
+  std::string text = "Frame " + std::to_string(play.frame());
+  const bool other = play.info.is_drawn != 0 && play.info.drawn_frame != play.info.asked_frame;
+  if (other) text += ", shown is " + std::to_string(play.row.number(play.info.drawn_frame));
+  if (!play.failure.empty()) text += ": " + play.failure;
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted(text.c_str());
+  ui_.remember("Frame", play.failure.c_str());
+
+  // The frames, from left to right: which are ready, which are played, where it stands.
+  const ImVec2 room(ImGui::GetContentRegionAvail().x, std::max(ImGui::GetContentRegionAvail().y, ui_.px(8.0f)));
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  ImGui::InvisibleButton("##Playhead", {std::max(room.x, 1.0f), room.y});
+  const auto count = static_cast<float>(play.row.count());
+  if (ImGui::IsItemActive()) {
+    const float part = (ImGui::GetIO().MousePos.x - corner.x) / std::max(room.x, 1.0f);
+    const auto index = static_cast<std::uint32_t>(std::clamp(std::floor(part * count), 0.0f, count - 1.0f));
+    commands.push_back({Action::go_to, {}, static_cast<int>(index)});
+  }
+  ui_.remember("Playhead", "Drag to a frame. Bright are those that are ready, red those that cannot be read.");
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const auto x_of = [&](float index) { return corner.x + room.x * index / count; };
+  const auto bar = [&](float from, float to, float high, float low, ImU32 colour) {
+    list.AddRectFilled({x_of(from), corner.y + high * room.y},
+                       {std::max(x_of(to), x_of(from) + 1.0f), corner.y + low * room.y}, colour);
+  };
+  bar(0.0f, count, 0.0f, 1.0f, IM_COL32(40, 44, 50, 255));
+  const cumulet_playback_desc played = playback_of(model.scene.sequence, play.row);
+  const auto first = static_cast<float>(played.first_frame);
+  bar(first, first + static_cast<float>(played.frame_count), 0.0f, 1.0f, IM_COL32(62, 68, 78, 255));
+  for (std::size_t i = 0; i < play.states.size();) {
+    std::size_t end = i + 1;
+    while (end < play.states.size() && play.states[end] == play.states[i]) ++end;
+    const auto from = static_cast<float>(i);
+    const auto to = static_cast<float>(end);
+    if (play.states[i] == CUMULET_FRAME_READY) bar(from, to, 0.72f, 1.0f, IM_COL32(95, 143, 191, 255));
+    if (play.states[i] == CUMULET_FRAME_FAILED) bar(from, to, 0.72f, 1.0f, IM_COL32(200, 90, 75, 255));
+    i = end;
+  }
+  const auto asked = static_cast<float>(play.info.asked_frame);
+  bar(asked, asked + 1.0f, 0.0f, 1.0f, IM_COL32(236, 236, 236, 200));
+  if (other) {
+    const auto drawn = static_cast<float>(play.info.drawn_frame);
+    bar(drawn, drawn + 1.0f, 0.0f, 0.72f, IM_COL32(236, 200, 120, 160));
+  }
+  ImGui::End();
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,53 @@
+#include "frame_row.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <numeric>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+namespace cumulet::demo {
+namespace {
+
+constexpr std::uint32_t most_played = 1'000'000;  // the library's
+
+}  // namespace
+
+FrameRow::FrameRow(FramePattern pattern, const std::vector<Frame>& there)
+    : pattern_(std::move(pattern)), first_(there.front()) {
+  Frame step = 0;
+  for (const Frame frame : there) step = std::gcd(step, frame - first_);
+  step_ = std::max(step, Frame{1});
+  count_ = (there.back() - first_) / step_ + 1;
+}
+
+std::optional<FrameRow> FrameRow::of_name(const std::string& name) {
+  std::error_code error;
+  if (name.empty() || std::filesystem::exists(name, error)) return std::nullopt;
+  auto pattern = FramePattern::parse(name);
+  if (!pattern) return std::nullopt;
+  const std::vector<Frame> there = pattern->frames_there();
+  if (there.empty()) throw std::runtime_error(pattern->text() + ": no file of such a name is there");
+  const FrameRow row(*pattern, there);
+  if (row.count() > most_played)
+    throw std::runtime_error(pattern->text() + ": from the first to the last file there are more than " +
+                             std::to_string(most_played) + " frames");
+  return row;
+}
+
+std::optional<FrameRow> FrameRow::around(const std::string& file) {
+  auto pattern = FramePattern::of_file(file);
+  if (!pattern) return std::nullopt;
+  const std::vector<Frame> there = pattern->frames_there();
+  if (there.size() < 2) return std::nullopt;
+  const FrameRow row(*std::move(pattern), there);
+  return row.count() <= most_played ? std::optional(row) : std::nullopt;
+}
+
+std::uint32_t FrameRow::index_of(Frame number) const {
+  if (number <= first_) return 0;
+  return std::min((number - first_ + step_ / 2) / step_, count_ - 1);
+}
+
+}  // namespace cumulet::demo

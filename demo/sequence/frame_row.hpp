@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "frame_pattern.hpp"
+#include "frames.hpp"
+
+namespace cumulet::demo {
+
+/// Numbered files as they play: a frame each, from the first that is there to the last, in equal steps. One that is not
+/// there is a gap, and takes its time.
+class FrameRow {
+ public:
+  /// Of a name with a place for a number. Nothing for a name without, and for a file that is there by just that name.
+  /// Throws UsageError as FramePattern::parse, and std::runtime_error, one line, where no such file is there.
+  [[nodiscard]] static std::optional<FrameRow> of_name(const std::string& name);
+  /// That this file is in; nothing where it is the only one.
+  [[nodiscard]] static std::optional<FrameRow> around(const std::string& file);
+
+  [[nodiscard]] std::uint32_t count() const { return count_; }
+  [[nodiscard]] Frame number(std::uint32_t index) const { return first_ + index * step_; }
+  /// The nearest.
+  [[nodiscard]] std::uint32_t index_of(Frame number) const;
+  [[nodiscard]] std::string file(std::uint32_t index) const { return pattern_.file(number(index)); }
+  [[nodiscard]] const FramePattern& pattern() const { return pattern_; }
+
+ private:
+  /// there: not empty, ascending.
+  FrameRow(FramePattern pattern, const std::vector<Frame>& there);
+
+  FramePattern pattern_;
+  Frame first_;
+  Frame step_ = 1;
+  std::uint32_t count_ = 1;
+};
+
+}  // namespace cumulet::demo
