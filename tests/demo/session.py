@@ -207,6 +207,64 @@ def test_volumes(s):
     assert_differ(first, second, area)
 
 
+def test_timeline(s):
+    """A numbered file is one frame until it is asked to play; then it is stepped, played, scrubbed, cut and saved."""
+    frames = [f"fire_{number:02}.vdb" for number in range(3, 9)]
+    for number, name in enumerate(frames):
+        # Frame 3 is the explosion, 4 missing, 5 the cloud, 6 corrupt, 7 the explosion, 8 the cloud.
+        if name == "fire_06.vdb":
+            (s.out / name).write_bytes(b"no volume")
+        elif name != "fire_04.vdb":
+            shutil.copy(s.cumulus if number in (2, 5) else s.explosion, s.out / name)
+    there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
+    quick = ["--spp", "2", "--albedo", "0.5,0.5,0.5", "--max-bounces", "2"]
+    size = ["--size", "640x260"]
+    s.play("timeline",
+           [*there, *shot("alone"), 'click "Play the sequence"', *there, *shot("opened"),
+            "key .", *there, *shot("next"), "key ,", "key ,", *there, *shot("missing"),
+            "key o", "key ctrl+z", "frames 2", 'report "undone.json"', "key i", 'click "Repeat"', "frames 2",
+            'click "Repeat/Loop"', "frames 2", "key space", "frames 60", 'report "playing.json"', "key space", *there,
+            'click "Playhead" 0.99 0.5', "key escape", "key escape", *there, *shot("scrubbed"), "key ctrl+s", "frames 2", "key ctrl+a",
+            'text "played.json"', "key enter", "frames 3",
+            'click "Playhead" 0.01 0.5', *there, "key space", "frames 12", "key space", *there, 'report "again.json"'],
+           "fire_05.vdb", *quick, size=size)
+    alone, opened, following, missing = (s.report(name) for name in ("alone", "opened", "next", "missing"))
+    assert "sequence" not in alone and alone["neighbours"] == 6, alone
+    assert opened["sequence"]["frame"] == opened["sequence"]["drawn"] == 5, opened["sequence"]
+    assert opened["sequence"]["first"] == 3 and opened["sequence"]["count"] == 6, opened["sequence"]
+    assert opened["viewport"][3] < alone["viewport"][3], "the timeline is below the picture"
+    assert following["sequence"]["frame"] == 6 and following["sequence"]["drawn"] == 5, "the one before stands in"
+    assert "fire_06.vdb" in following["sequence"]["failure"], following["sequence"]
+    assert missing["sequence"]["frame"] == 4 and missing["sequence"]["drawn"] == 3, missing["sequence"]
+    assert missing["sequence"]["ready"] == 4 and missing["sequence"]["failed"] == 2, missing["sequence"]
+    told = [m["text"] for m in opened["messages"] + following["messages"] + missing["messages"]]
+    for name in ("fire_04.vdb", "fire_06.vdb"):
+        assert any(name in text for text in told), told
+    assert s.report("undone")["sequence"]["last_played"] is None, "the range is undone"
+    assert s.report("undone")["sequence"]["frame"] == 4, "and the playhead is not"
+    playing = s.report("playing")["sequence"]
+    assert playing["playing"] and playing["first_played"] == 4 and playing["frame"] >= 4, playing
+    assert playing["clock"] - missing["sequence"]["clock"] > 0.9, "it is by the clock of frames"
+    scrubbed = s.report("scrubbed")["sequence"]
+    assert scrubbed["frame"] == scrubbed["drawn"] == 8 and not scrubbed["playing"], scrubbed
+    assert_differ(look(s, "missing")[0], look(s, "scrubbed")[0], look(s, "scrubbed")[2])
+    assert s.report("again")["sequence"]["frame"] >= 4, "from outside it plays the range"
+    # As it was saved, in both programs.
+    scene = json.loads((s.out / "played.json").read_text())
+    assert scene["volumes"][0]["file"] == "fire_##.vdb" and scene["sequence"]["frame"] == 8, scene
+    assert scene["sequence"]["first_frame"] == 4 and scene["sequence"]["repeat"] == "loop", scene["sequence"]
+    s.play("loaded", [*there, "key escape", "key escape", "frames 2", *shot("loaded")], "--scene", "played.json", "--spp", "2", size=size)
+    loaded = s.report("loaded")["sequence"]
+    assert loaded["frame"] == 8 and loaded["first_played"] == 4 and loaded["repeat"] == 1, loaded
+    assert_alike(look(s, "loaded")[0], look(s, "scrubbed")[0], look(s, "loaded")[2])
+    run = subprocess.run([s.renderer, "--scene", "played.json", "--spp", "4", "--size", "64x48", "-o", "eight.png"],
+                         cwd=s.out, env=s.environment, capture_output=True, text=True, check=False)
+    assert run.returncode == 0 and "frame 8 (1 of 1) done eight.png" in run.stdout, (run.stdout, run.stderr)
+    run = subprocess.run([s.renderer, "--scene", "played.json", "--frames", "5,7", "--spp", "4", "--size", "64x48", "-o",
+                          "other.#.png"], cwd=s.out, env=s.environment, capture_output=True, text=True, check=False)
+    assert run.returncode == 0 and (s.out / "other.5.png").exists() and (s.out / "other.7.png").exists(), run.stderr
+
+
 def test_environment(s):
     """Dropped, turned by its picture, turned back, lost to a bad file, undone."""
     write_environment(s.out / "left.hdr", lambda x: x < 16)

@@ -8,6 +8,7 @@
 
 #include "frame_pattern.hpp"
 #include "frame_plan.hpp"
+#include "frame_row.hpp"
 #include "support/folder.hpp"
 
 namespace {
@@ -219,6 +220,40 @@ TEST_F(Plan, WhatIsNoSequenceIsRefused) {
   EXPECT_FALSE(plan);
   options.overwrite = true;
   EXPECT_NE(said().find("--overwrite"), std::string::npos);
+}
+
+TEST_F(Plan, ASceneThatStandsAtAFrameIsThatFrame) {
+  for (const char* name : {"f.1.vdb", "f.2.vdb", "f.3.vdb"}) there(name, 10);
+  options.scene.volume = folder / "f.#.vdb";
+  options.scene.sequence.frame = 2;
+  options.output = "pic.exr";
+  ASSERT_EQ(said(), "");
+  ASSERT_EQ(plan->frames.size(), 1U);
+  EXPECT_EQ(plan->frames[0].number, 2U);
+  options.frames = {1, 3};
+  options.output = "pic.#.exr";
+  ASSERT_EQ(said(), "");
+  EXPECT_EQ(plan->frames.size(), 2U);
+}
+
+TEST_F(Plan, ARowHasGapsAndEqualSteps) {
+  for (const char* name : {"f.0010.vdb", "f.0014.vdb", "f.0012.vdb", "f.0020.vdb", "other.0011.vdb"}) there(name, 10);
+  const auto row = FrameRow::of_name(folder / "f.####.vdb");
+  ASSERT_TRUE(row);
+  EXPECT_EQ(row->count(), 6U);
+  EXPECT_EQ(row->number(1), 12U);
+  EXPECT_EQ(row->file(3), (folder / "f.0016.vdb").string());
+  EXPECT_EQ(row->index_of(12), 1U);
+  EXPECT_EQ(row->index_of(3), 0U);
+  EXPECT_EQ(row->index_of(99), 5U);
+  EXPECT_EQ(FrameRow::around(folder / "f.0012.vdb")->count(), 6U);
+  EXPECT_FALSE(FrameRow::around(folder / "other.0011.vdb")) << "it is alone";
+  EXPECT_FALSE(FrameRow::of_name(folder / "f.0012.vdb"));
+  EXPECT_FALSE(FrameRow::of_name(""));
+  EXPECT_THROW(static_cast<void>(FrameRow::of_name(folder / "none.####.vdb")), std::runtime_error);
+  for (const char* name : {"far.1.vdb", "far.2.vdb", "far.9000000.vdb"}) there(name, 10);
+  EXPECT_THROW(static_cast<void>(FrameRow::of_name(folder / "far.#.vdb")), std::runtime_error);
+  EXPECT_FALSE(FrameRow::around(folder / "far.1.vdb"));
 }
 
 TEST(FrameLine, OneOfEachState) {

@@ -500,4 +500,46 @@ TEST(SceneFile, VariantsAreFoundByNameThenByNumber) {
   EXPECT_EQ(refusal("0", {}), R"(shoe.glb: there is no variant "0": the file has none)");
 }
 
+TEST(SceneFile, ASequenceIsKept) {
+  const auto text = [](const std::string& sequence) {
+    return R"({"cumulet_scene": 2, "volumes": [{"file": "fire.####.vdb"}], "sequence": )" + sequence + "}";
+  };
+  const SceneOptions scene =
+      parse_scene(text(R"({"frames_per_second": 12.5, "offset_seconds": -1, "repeat": "ping-pong", "first_frame": 3,
+                           "last_frame": 40, "frame": 7})"),
+                  "/folder/scene.json");
+  EXPECT_EQ(scene.volume, "/folder/fire.####.vdb");
+  EXPECT_EQ(scene.sequence.playback.frames_per_second, 12.5);
+  EXPECT_EQ(scene.sequence.playback.offset_seconds, -1.0);
+  EXPECT_EQ(scene.sequence.playback.repeat, CUMULET_REPEAT_PING_PONG);
+  EXPECT_EQ(scene.sequence.first, 3U);
+  EXPECT_EQ(scene.sequence.last, 40U);
+  EXPECT_EQ(scene.sequence.frame, 7U);
+  const SceneOptions again = parse_scene(scene_text(scene, "/folder/scene.json"), "/folder/scene.json");
+  EXPECT_TRUE(same_scene(scene, again));
+  EXPECT_EQ(again.sequence.frame, 7U);
+  // The playhead is no change of the scene; how it plays is.
+  SceneOptions other = scene;
+  other.sequence.frame = 8;
+  EXPECT_TRUE(same_scene(scene, other));
+  other.sequence.last = 8;
+  EXPECT_FALSE(same_scene(scene, other));
+  // Nothing is written of what nobody said.
+  EXPECT_EQ(scene_text(SceneOptions(), "scene.json").find("sequence"), std::string::npos);
+  const auto refused = [&](const std::string& sequence) {
+    try {
+      static_cast<void>(parse_scene(text(sequence), "scene.json"));
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string("is taken");
+  };
+  EXPECT_EQ(refused(R"({"repeat": "bounce"})").rfind("scene.json: sequence.repeat: ", 0), 0U);
+  EXPECT_EQ(refused(R"({"frames_per_second": 0})").rfind("scene.json: sequence.frames_per_second: ", 0), 0U);
+  EXPECT_EQ(refused(R"({"frame": -1})").rfind("scene.json: sequence.frame: ", 0), 0U);
+  EXPECT_EQ(refused(R"({"first_frame": 9, "last_frame": 8})"),
+            "scene.json: sequence.last_frame: comes before sequence.first_frame");
+  EXPECT_EQ(refused(R"({"speed": 2})"), "scene.json: sequence.speed: there is no such setting");
+}
+
 }  // namespace

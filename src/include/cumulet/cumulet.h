@@ -703,7 +703,8 @@ CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, con
  * Frames are read and built on workers of the viewer's, ahead in the direction of play and as many as fit memory_bytes,
  * and are uploaded by cumulet_render within its budget, which waits for none: it shows the nearest frame that is ready,
  * and while previews are on each that it takes up until there is a picture of it. cumulet_get_sequence_info tells
- * which. Frame k is the same grid, and of the same samples the same picture, whether it is played or set alone. What is
+ * which. The first frame of other channels than those before compiles the programs that it needs (cumulet_warm_up).
+ * Frame k is the same grid, and of the same samples the same picture, whether it is played or set alone. What is
  * not a frame's own is one for all, so that nothing jumps: where a camera that fits is placed, a ground below, bounds
  * that are told, and the density scale that is suggested, all by the largest of the files that can be read and shows
  * something, which is read first.
