@@ -14,8 +14,6 @@ namespace cumulet::viewer {
 namespace {
 
 constexpr const char* what = "building a sequence's frames";
-// One reads while another builds: reading is serial, building takes all cores.
-constexpr int worker_count = 2;
 
 // The largest first: frames that are not there last.
 std::vector<std::uint32_t> by_size(const FrameFiles& files) {
@@ -34,16 +32,14 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
 }  // namespace
 
 FrameShelf::FrameShelf(Log log, const std::function<void()>& notify, Trace trace)
-    : log_(std::move(log)), notify_(notify), trace_(trace) {
-  for (int i = 0; i < worker_count; ++i) workers_.emplace_back([this] { tell(); }, trace);
-}
+    : log_(std::move(log)), notify_(notify), trace_(trace), worker_([this] { tell(); }, trace) {}
 
 void FrameShelf::wish(Wish wish) {
   std::vector<Shelved> old;  // ends after the lock, as all that may be large
   {
     const std::scoped_lock lock(mutex_);
     if (!is_wished(wish.files)) {
-      for (Worker& worker : workers_) worker.cancel();
+      worker_.cancel();
       old = std::exchange(shelf_, std::vector<Shelved>(wish.files->count()));
       judging_ = Judging::due;
       judged_.reset();
@@ -64,7 +60,7 @@ void FrameShelf::clear() {
   std::vector<Shelved> old;
   {
     const std::scoped_lock lock(mutex_);
-    for (Worker& worker : workers_) worker.cancel();
+    worker_.cancel();
     wish_.reset();
     old = std::exchange(shelf_, {});
   }
@@ -81,7 +77,7 @@ void FrameShelf::rebuild() {
     shelved.failure.reset();
   }
   // What is under way began before.
-  for (Worker& worker : workers_) worker.cancel();
+  worker_.cancel();
   if (judging_ == Judging::in_vain) judging_ = Judging::due;
   cancelled_ = false;
   start();
@@ -91,7 +87,7 @@ void FrameShelf::cancel() {
   {
     const std::scoped_lock lock(mutex_);
     cancelled_ = true;
-    for (Worker& worker : workers_) worker.cancel();
+    worker_.cancel();
   }
   changed_.notify_all();
 }
@@ -140,12 +136,7 @@ bool FrameShelf::busy() const {
 Worker::Status FrameShelf::status() const {
   const std::scoped_lock lock(mutex_);
   Worker::Status status;
-  if (waits()) {
-    for (const Worker& worker : workers_) {
-      if (worker.busy()) status = worker.status();
-      if (status.stage != Progress::Stage::idle) break;
-    }
-  }
+  if (waits()) status = worker_.status();
   status.failure.reset();
   if (wish_ && is_judged() && !first()) status.failure = shelf_[wish_->order.front()].failure;
   return status;
@@ -171,8 +162,7 @@ void FrameShelf::tell() {
 
 void FrameShelf::start() {
   if (is_judged() && !next()) return;
-  for (Worker& worker : workers_)
-    worker.post({what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }});
+  worker_.post({what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }});
 }
 
 bool FrameShelf::is_ready(const Shelved& shelved) const {
@@ -218,14 +208,13 @@ std::vector<std::uint32_t> FrameShelf::kept() const {
 std::optional<std::uint32_t> FrameShelf::next() const {
   if (!wish_ || !wish_->settings || cancelled_ || judging_ != Judging::done) return std::nullopt;
   for (const std::uint32_t frame : kept()) {
-    const bool comes = std::ranges::find(under_way_, UnderWay{wish_->files, frame}) != under_way_.end();
-    if (!comes && !is_ready(shelf_[frame])) return frame;
+    if (!is_ready(shelf_[frame])) return frame;
   }
   return std::nullopt;
 }
 
 bool FrameShelf::waits() const {
-  if (!wish_ || cancelled_ || std::ranges::none_of(workers_, &Worker::busy)) return false;
+  if (!wish_ || cancelled_ || !worker_.busy()) return false;
   if (!is_judged()) return true;
   const auto wanted = first();
   return wanted && !is_ready(shelf_[*wanted]);
@@ -266,26 +255,20 @@ std::vector<FrameShelf::Shelved> FrameShelf::take_excess() {
   return excess;
 }
 
-// ---- on the workers ----
+// ---- on the worker ----
 
 void FrameShelf::work(Progress& progress) {
   for (;;) {
-    std::optional<UnderWay> frame;
+    std::optional<Which> frame;
     BuildSettings settings;
     FrameFilesPtr to_judge;
     {
-      std::unique_lock lock(mutex_);
-      while (wish_ && judging_ == Judging::under_way) {
-        changed_.wait_for(lock, std::chrono::milliseconds(5));
-        progress.check();
-      }
+      const std::scoped_lock lock(mutex_);
       if (!wish_ || cancelled_) return;
       if (judging_ == Judging::due) {
-        judging_ = Judging::under_way;
         to_judge = wish_->files;
       } else if (const auto found = next()) {
-        frame = UnderWay{wish_->files, *found};
-        under_way_.push_back(*frame);
+        frame = Which{wish_->files, *found};
         settings = *wish_->settings;
       } else {
         return;
@@ -312,7 +295,7 @@ Log FrameShelf::log_of(const std::string& path) {
   });
 }
 
-void FrameShelf::fail(const UnderWay& which, const Error& failure) {
+void FrameShelf::fail(const Which& which, const Error& failure) {
   {
     const std::scoped_lock lock(mutex_);
     if (!is_wished(which.files)) return;
@@ -364,7 +347,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
   end(judged.facts ? Judging::done : Judging::in_vain);
 }
 
-void FrameShelf::build(const UnderWay& which, const BuildSettings& settings, Progress& progress) {
+void FrameShelf::build(const Which& which, const BuildSettings& settings, Progress& progress) {
   const VolumeFile file = which.files->file(which.frame);
   const Trace::Span span(trace_, file.path);
   const Log log = log_of(file.path);
@@ -397,7 +380,6 @@ void FrameShelf::build(const UnderWay& which, const BuildSettings& settings, Pro
   std::vector<Shelved> old;
   {
     const std::scoped_lock lock(mutex_);
-    std::erase(under_way_, which);
     if (!failure && is_wished(which.files)) {
       old.push_back(std::exchange(shelf_[which.frame], std::move(made)));
       ++revision_;

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -18,7 +17,7 @@
 
 namespace cumulet::viewer {
 
-/// Grids of a sequence's frames, read and built ahead on threads of its own, as many as fit a memory: those that come
+/// Grids of a sequence's frames, read and built ahead on a thread of its own, as many as fit a memory: those that come
 /// soonest. All calls are safe from any thread; none waits for a frame but wait().
 ///
 /// First it judges the sequence by the largest file that can be read and shows something: what cameras and grounds go
@@ -90,26 +89,25 @@ class FrameShelf {
     std::optional<Error> failure;
     bool stale = false;  // to be built anew, whatever its settings
   };
-  struct UnderWay {
+  struct Which {
     FrameFilesPtr files;
     std::uint32_t frame = 0;
-    bool operator==(const UnderWay&) const = default;
   };
-  enum class Judging { due, under_way, done, in_vain };
+  enum class Judging { due, done, in_vain };
 
   void work(Progress& progress);
   void judge(const FrameFilesPtr& files, Progress& progress);
-  void build(const UnderWay& which, const BuildSettings& settings, Progress& progress);
+  void build(const Which& which, const BuildSettings& settings, Progress& progress);
   // That tells once a sequence what it is told of each file.
   [[nodiscard]] Log log_of(const std::string& path);
-  void fail(const UnderWay& which, const Error& failure);
+  void fail(const Which& which, const Error& failure);
   void tell();
 
   // All of these under the lock.
   void start();
   [[nodiscard]] bool is_wished(const FrameFilesPtr& files) const { return wish_ && wish_->files == files; }
   [[nodiscard]] bool is_ready(const Shelved& shelved) const;
-  [[nodiscard]] bool is_judged() const { return judging_ == Judging::done || judging_ == Judging::in_vain; }
+  [[nodiscard]] bool is_judged() const { return judging_ != Judging::due; }
   // Of each frame the one that is shown for it: itself unless it failed; nothing if all did. O(frames).
   [[nodiscard]] std::vector<std::optional<std::uint32_t>> stand_ins() const;
   [[nodiscard]] std::optional<std::uint32_t> first() const { return stand_ins()[wish_->order.front()]; }
@@ -128,13 +126,12 @@ class FrameShelf {
   mutable std::condition_variable changed_;
   std::optional<Wish> wish_;
   std::vector<Shelved> shelf_;  // one a frame
-  std::vector<UnderWay> under_way_;
   Judging judging_ = Judging::due;
   std::optional<Judged> judged_;  // that nobody took
   std::set<std::string> said_;    // by the log, but for files' names
   bool cancelled_ = false;        // until the next wish
   std::atomic<std::uint64_t> revision_ = 0;
-  std::deque<Worker> workers_;  // last: their threads use all of the above
+  Worker worker_;  // last: its thread uses all of the above
 };
 
 }  // namespace cumulet::viewer

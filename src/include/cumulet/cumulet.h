@@ -700,14 +700,14 @@ CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, con
  * was shown before stays until a frame is there. NULL: no sequence, and if there was one, nothing. cumulet_set_volume,
  * cumulet_load_volume and cumulet_load_volume_file end it, too.
  *
- * Frames are read and built on workers of the viewer's, ahead in the direction of play and as many as fit memory_bytes,
- * and are uploaded by cumulet_render within its budget, which waits for none: it shows the nearest frame that is ready,
- * and while previews are on each that it takes up until there is a picture of it. cumulet_get_sequence_info tells
- * which. The first frame of other channels than those before compiles the programs that it needs (cumulet_warm_up).
- * Frame k is the same grid, and of the same samples the same picture, whether it is played or set alone. What is
- * not a frame's own is one for all, so that nothing jumps: where a camera that fits is placed, a ground below, bounds
- * that are told, and the density scale that is suggested, all by the largest of the files that can be read and shows
- * something, which is read first.
+ * Frames are read and built on a worker of the viewer's, ahead in the direction of play and as many as fit
+ * memory_bytes, and are uploaded by cumulet_render within its budget, which waits for none: it shows the nearest frame
+ * that is ready, and while previews are on each that it takes up until there is a picture of it.
+ * cumulet_get_sequence_info tells which. The first frame of other channels than those before compiles the programs that
+ * it needs (cumulet_warm_up). Frame k is the same grid, and of the same samples the same picture, whether it is played
+ * or set alone. What is not a frame's own is one for all, so that nothing jumps: where a camera that fits is placed, a
+ * ground below, bounds that are told, and the density scale that is suggested, all by the largest of the files that can
+ * be read and shows something, which is read first.
  *
  * A file that is missing or cannot be read is told by one warning in the log and by cumulet_get_sequence_frame, and is
  * played over: the nearest earlier frame that can be shown stands in for it, or where there is none the nearest later.
