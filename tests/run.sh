@@ -186,7 +186,8 @@ if [ "$tier" = long ]; then
   run_ctest release-long build/release --label-regex long
   # What TSan cannot see into is left out. TBB has one thread (of one core), or its own ways of waiting would count as
   # races; the library's threads stay many.
-  export TSAN_OPTIONS=ignore_noninstrumented_modules=1:history_size=7 LP_NUM_THREADS=0
+  export TSAN_OPTIONS=ignore_noninstrumented_modules=1:history_size=7:suppressions=$root/tests/threads.supp
+  export LP_NUM_THREADS=0
   launcher=(taskset --cpu-list "$(taskset --cpu-list --pid $$ | sed 's/.*: \([0-9]*\).*/\1/')")
   build_and_test tsan cumulet_threads_tests . --label-regex threads
   launcher=()

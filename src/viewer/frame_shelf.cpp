@@ -31,8 +31,8 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
 
 }  // namespace
 
-FrameShelf::FrameShelf(Log log, const std::function<void()>& notify, Trace trace)
-    : log_(std::move(log)), notify_(notify), trace_(trace), worker_([this] { tell(); }, trace) {}
+FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace)
+    : log_(std::move(log)), notify_(std::move(notify)), trace_(trace), worker_([this] { tell(); }, trace) {}
 
 void FrameShelf::wish(Wish wish) {
   std::vector<Shelved> old;  // ends after the lock, as all that may be large

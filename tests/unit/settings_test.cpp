@@ -187,7 +187,13 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
                                 "camera.orthographic_height",
                                 "picture.width",
                                 "picture.height",
-                                "environment.file"};
+                                "environment.file",
+                                "sequence.first_frame",
+                                "sequence.last_frame",
+                                "sequence.frame"};
+  settings::for_each<cumulet_playback_desc>([&](const auto& setting) {
+    if (*setting.key != '\0') keys.insert(setting.key);
+  });
   for_each_descriptor([&](auto part, auto) {
     settings::for_each<std::decay_t<decltype(SceneOptions().*part)>>([&](const auto& setting) {
       if (*setting.key != '\0') keys.insert(setting.key);
