@@ -53,13 +53,8 @@ VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
 }
 
 std::uint64_t VolumeAsset::bytes() const {
-  const volume::VolumeFrame& frame = *frame_;
-  std::uint64_t bytes = frame.density.bytes();
-  if (frame.temperature) bytes += frame.temperature->bytes();
-  if (frame.flame) bytes += frame.flame->bytes();
-  const auto add = [&](const volume::ScalarVolume& field) { bytes += field.bytes(); };
-  if (frame.colour) std::ranges::for_each(*frame.colour, add);
-  if (frame.anisotropy) std::ranges::for_each(*frame.anisotropy, add);
+  std::uint64_t bytes = frame_->density.bytes();
+  for (const volume::ScalarVolume* field : frame_->beside_density()) bytes += field->bytes();
   const std::scoped_lock lock(mutex_);
   if (statistics_) bytes += statistics_->bytes();
   if (ramped_) bytes += ramped_->density.voxels->bytes() + ramped_->density.statistics->bytes();

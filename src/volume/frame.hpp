@@ -33,6 +33,7 @@ struct VolumeFrame {
   std::optional<Velocity> velocity = {};
 
   /// All that the fields beside density are made of.
+  [[nodiscard]] std::vector<const ScalarVolume*> beside_density() const;
   [[nodiscard]] std::vector<ScalarVolume*> beside_density();
 };
 

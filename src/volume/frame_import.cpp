@@ -369,16 +369,26 @@ class FrameImport {
 
 }  // namespace
 
-std::vector<ScalarVolume*> VolumeFrame::beside_density() {
-  std::vector<ScalarVolume*> fields;
-  if (temperature) fields.push_back(&*temperature);
-  if (flame) fields.push_back(&*flame);
-  const auto pointer = [](ScalarVolume& part) { return &part; };
-  if (colour) std::ranges::transform(*colour, std::back_inserter(fields), pointer);
-  if (anisotropy) std::ranges::transform(*anisotropy, std::back_inserter(fields), pointer);
-  if (velocity) std::ranges::transform(velocity->parts, std::back_inserter(fields), pointer);
+namespace {
+
+template <class Field, class Frame>
+std::vector<Field*> fields_beside_density(Frame& frame) {
+  std::vector<Field*> fields;
+  if (frame.temperature) fields.push_back(&*frame.temperature);
+  if (frame.flame) fields.push_back(&*frame.flame);
+  const auto pointer = [](Field& part) { return &part; };
+  if (frame.colour) std::ranges::transform(*frame.colour, std::back_inserter(fields), pointer);
+  if (frame.anisotropy) std::ranges::transform(*frame.anisotropy, std::back_inserter(fields), pointer);
+  if (frame.velocity) std::ranges::transform(frame.velocity->parts, std::back_inserter(fields), pointer);
   return fields;
 }
+
+}  // namespace
+
+std::vector<const ScalarVolume*> VolumeFrame::beside_density() const {
+  return fields_beside_density<const ScalarVolume>(*this);
+}
+std::vector<ScalarVolume*> VolumeFrame::beside_density() { return fields_beside_density<ScalarVolume>(*this); }
 
 std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids) {
   std::vector<std::string> channels(grids.size());
