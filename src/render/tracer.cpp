@@ -328,10 +328,11 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.channels_ = medium.emits != 0U || medium.coloured != 0U || medium.anisotropic != 0U;
   picture.environment_ = obstacles.environment != nullptr;
   picture.lamps_ = obstacles.lamps_met() > 0;
-  picture.equiangular_ = picture.lamps_ && parameters.equiangular;
   picture.several_ = obstacles.instances != nullptr;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
+  // What the volume alone has is told by what a path first met, and such light may lie before a surface.
+  picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_;
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
 }
 

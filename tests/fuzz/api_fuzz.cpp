@@ -22,6 +22,7 @@ using cumulet::test::CameraRef;
 using cumulet::test::EnvironmentRef;
 using cumulet::test::InstanceRef;
 using cumulet::test::ProgramsRef;
+using cumulet::test::SequenceRef;
 using cumulet::test::SurfacesRef;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
@@ -298,7 +299,7 @@ class Program {
         constexpr std::array paths = {"/dev/null", "/dev/null/nowhere.vdb", ""};
         auto file = described<cumulet_volume_file_desc>();
         file.path = file.grid_name = file.temperature_grid = nullptr;
-        file.flame_grid = file.color_grid = file.anisotropy_grid = nullptr;
+        file.flame_grid = file.color_grid = file.anisotropy_grid = file.velocity_grid = nullptr;
         file.struct_size = std::min(file.struct_size, sizeof file);
         auto desc = described<cumulet_sequence_desc>();
         desc.paths = paths.data();
