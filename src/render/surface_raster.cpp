@@ -393,8 +393,12 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
   const scene::RasterSource& source = *fixed.source;
   const gl::Program* program = nullptr;
   std::optional<std::uint32_t> bound;
-  for (const Batch& batch : batches) {
-    const std::uint32_t index = surface::material_of(*source.scene, *content_->pose_, batch.draw);
+  const auto material_of = [&](const Batch& batch) {
+    return surface::material_of(*source.scene, *content_->pose_, batch.draw);
+  };
+  for (std::size_t b = 0; b < batches.size();) {
+    const Batch& batch = batches[b];
+    const std::uint32_t index = material_of(batch);
     const scene::RasterSource::Material& material = source.materials[index];
     if (program != fixed.program_of[index]) fixed.program_of[index]->use(gl);
     program = fixed.program_of[index];
@@ -415,11 +419,22 @@ void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) 
       bound = index;
     }
     // The picture stands on its head in the target, which turns the winding round.
-    gl.FrontFace(mirrored == (content_->pose_->flipped[batch.draw] != 0) ? GL_CW : GL_CCW);
+    const std::uint8_t flipped = content_->pose_->flipped[batch.draw];
+    gl.FrontFace(mirrored == (flipped != 0) ? GL_CW : GL_CCW);
+    // Copies of a mesh come one after the other: one call draws them all.
+    std::uint64_t count = batch.count;
+    for (++b; b < batches.size(); ++b) {
+      const Batch& next = batches[b];
+      if (next.first != batch.first + count || count + next.count > std::numeric_limits<GLsizei>::max() ||
+          content_->pose_->flipped[next.draw] != flipped || material_of(next) != index) {
+        break;
+      }
+      count += next.count;
+    }
     const std::uintptr_t offset = std::uintptr_t{batch.first} * sizeof(std::uint32_t);
     // NOLINTNEXTLINE(performance-no-int-to-ptr): so GL takes offsets
     const void* start = reinterpret_cast<const void*>(offset);
-    gl.DrawElements(GL_TRIANGLES, static_cast<GLsizei>(batch.count), GL_UNSIGNED_INT, start);
+    gl.DrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT, start);
   }
 }
 

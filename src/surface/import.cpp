@@ -159,6 +159,7 @@ class Assembler {
     std::uint64_t vertices = 0;
     std::uint64_t indices = 0;
     std::uint64_t instanced = 0;
+    std::uint64_t draws = 0;
     for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t) {
       const std::uint64_t copies = copies_of(node);
       const std::uint64_t triangles = part.indices.size() / 3;
@@ -171,11 +172,16 @@ class Assembler {
         }
         instanced += copies * triangles;
       }
+      draws += copies;
       vertices += copies * part.positions.size();
       indices += copies * part.indices.size();
     });
     budget_.take(vertices, sizeof(VertexAttributes) + sizeof(PosedVertex), "all vertices");
     budget_.take(indices, sizeof(std::uint32_t), "all indices");
+    // Of triangles alone there are as many draws.
+    budget_.take(draws, sizeof(Instance) + sizeof(Draw), "all instances");
+    scene_->instances.reserve(draws);
+    scene_->draws.reserve(draws);
     scene_->attributes.reserve(vertices);
     scene_->indices.reserve(indices);
     for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t place) {

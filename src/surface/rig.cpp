@@ -428,7 +428,7 @@ void sample(const Channel& channel, double time, std::span<float> to) {
     if (rotation) {
       store(glm::slerp(quaternion(v0), quaternion(v1), u), to);
     } else {
-      for (std::size_t c = 0; c < channel.width; ++c) to[c] = static_cast<float>(v0[c] * (1.0 - u) + v1[c] * u);
+      for (std::size_t c = 0; c < channel.width; ++c) to[c] = narrow(v0[c] * (1.0 - u) + v1[c] * u);
     }
     return;
   }
@@ -438,8 +438,9 @@ void sample(const Channel& channel, double time, std::span<float> to) {
   const double u2 = u * u;
   const double u3 = u2 * u;
   for (std::size_t c = 0; c < channel.width; ++c) {
-    to[c] = static_cast<float>((2.0 * u3 - 3.0 * u2 + 1.0) * v0[c] + span * (u3 - 2.0 * u2 + u) * out[c] +
-                               (-2.0 * u3 + 3.0 * u2) * v1[c] + span * (u3 - u2) * in[c]);
+    // Tangents that are numbers may lead to none.
+    to[c] = narrow((2.0 * u3 - 3.0 * u2 + 1.0) * v0[c] + span * (u3 - 2.0 * u2 + u) * out[c] +
+                   (-2.0 * u3 + 3.0 * u2) * v1[c] + span * (u3 - u2) * in[c]);
   }
   if (rotation) store(quaternion(to.data()), to);
 }

@@ -252,7 +252,8 @@ inline void animate(GltfModel& model, const std::vector<Pointing>& pointings) {
   json animation = {{"name", "pointers"}, {"samplers", json::array()}, {"channels", json::array()}};
   const char* types[] = {"", "SCALAR", "VEC2", "VEC3", "VEC4"};
   for (const Pointing& pointing : pointings) {
-    const std::size_t keys = pointing.values.size() / pointing.width;
+    const bool cubic = pointing.interpolation == std::string_view("CUBICSPLINE");
+    const std::size_t keys = pointing.values.size() / pointing.width / (cubic ? 3 : 1);
     std::vector<float> times;
     for (std::size_t k = 0; k < keys; ++k) times.push_back(static_cast<float>(k));
     animation["channels"].push_back(

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <optional>
 
@@ -293,6 +294,43 @@ TEST(GltfPointers, LightsAreThoseOfTheMoment) {
   EXPECT_FLOAT_EQ(pose.lights[0].outer_cone, 0.3F);
   EXPECT_FLOAT_EQ(pose.lights[0].inner_cone, 0.3F);  // never the wider
   EXPECT_EQ(scene->pose(0.0, 7).lights[0].intensity, glm::vec3(4, 2, 1));
+}
+
+TEST(GltfPointers, SplinesThatLeadBeyondAllNumbersStayNumbers) {
+  // In-tangents, values and out-tangents of two keys.
+  constexpr float steep = 3e38F;
+  const auto spline = [](const std::string& pointer, std::size_t width) {
+    std::vector<float> values;
+    for (int key = 0; key < 2; ++key) {
+      values.insert(values.end(), width, key == 0 ? 0.0F : -steep);
+      values.insert(values.end(), width, 1.5F);
+      values.insert(values.end(), width, key == 0 ? steep : 0.0F);
+    }
+    return test::Pointing{pointer, width, values, "CUBICSPLINE"};
+  };
+  GltfModel model = moving_model();
+  const std::string of = "/materials/0/";
+  const std::string transform = of + "emissiveTexture/extensions/KHR_texture_transform/";
+  animate(model, {spline(of + "extensions/KHR_materials_ior/ior", 1), spline(of + "normalTexture/scale", 1),
+                  spline(of + "emissiveFactor", 3), spline(transform + "offset", 2), spline(transform + "scale", 2),
+                  spline(transform + "rotation", 1), spline("/extensions/KHR_lights_punctual/lights/0/intensity", 1),
+                  spline("/nodes/0/translation", 3), spline("/nodes/0/rotation", 4)});
+  // Tangents are a second, and each is bounded: a long time makes more of them than a float holds.
+  constexpr float last = 1e25F;
+  for (auto& accessor : model.root["animations"][0]["samplers"]) accessor["input"] = model.scalars({0, last});
+  const ScenePtr scene = imported(model);
+  for (const double time : {0.01, 0.3, 0.5, 0.99}) {
+    const Pose pose = scene->pose(time * double{last});
+    const Material& got = pose.materials.at(0);
+    EXPECT_TRUE(std::isfinite(got.ior) && got.ior >= 1.0F) << time;
+    EXPECT_TRUE(std::isfinite(got.normal_scale)) << time;
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_TRUE(std::isfinite(got.emission[c])) << time;
+      for (int r = 0; r < 2; ++r) EXPECT_TRUE(std::isfinite(got.emission_texture.transform[c][r])) << time;
+      EXPECT_TRUE(std::isfinite(pose.lights.at(0).intensity[c])) << time;
+      EXPECT_TRUE(std::isfinite(pose.low[c]) && std::isfinite(pose.high[c])) << time;
+    }
+  }
 }
 
 TEST(GltfPointers, WhatIsNotFollowedIsToldOnce) {
@@ -610,6 +648,11 @@ TEST(GltfInstances, HostileOnesAreRefusedInALine) {
   EXPECT_EQ(imported(many(9), {}, limits)->triangle_count(), 9U);
   EXPECT_TRUE(has(refused(many(10), ErrorCode::file, limits),
                   "node 0: instances are copied, and 10 of 1 triangles are more than the 9"));
+  // Each copy takes a draw and a place of its own, of however few triangles; all else of 1000 fits.
+  GltfLimits small;
+  small.memory = 400U << 10U;
+  EXPECT_EQ(imported(many(100), {}, small)->draws.size(), 100U);
+  EXPECT_TRUE(has(refused(many(1000), ErrorCode::file, small), "all instances would need more than the"));
 }
 
 }  // namespace
