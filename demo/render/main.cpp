@@ -699,7 +699,7 @@ void settle(const Viewer& viewer, RenderOptions& options) {
 std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& plan) {
   const SceneOptions given = options.scene;
   const bool kept = !options.settled.empty() && !is_settled(given);
-  const bool known = kept && cumulet::demo::read_settled(options.settled, options.scene);
+  const bool known = kept && cumulet::demo::read_settled(options.settled, options.scene, plan.judged_by);
   if (kept && !known) cumulet::image::check_writable(options.settled);
   auto studio = std::make_unique<Studio>(options);
   wait(studio->viewer(), studio->progress());
@@ -708,6 +708,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
   for (const std::string& volume : plan.judged_by) {
     SceneOptions judged = options.scene;
     judged.volume = volume;
+    const std::string state = cumulet::demo::volume_state(volume);  // before: it may be written anew meanwhile
     try {
       studio->load(judged);
       static_cast<void>(ground_below(studio->viewer(), judged));  // an empty one tells nothing
@@ -717,7 +718,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
     }
     studio->remark(judged);
     settle(studio->viewer(), options);
-    if (kept) cumulet::demo::write_settled(options.settled, given, options.scene);
+    if (kept) cumulet::demo::write_settled(options.settled, given, options.scene, state);
     break;
   }
   return studio;

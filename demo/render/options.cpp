@@ -722,7 +722,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.settled = text;
       },
       "Keep what all frames of a sequence have in common, and flags do not say, in this file: later runs need not read "
-      "the volume that it is taken from");
+      "the volume that it is taken from, as long as that is the same by size and time");
   app.add_flag("--info", options.info, "Tell what is in the files, and render nothing")->group(group);
   app.add_flag("--json", options.json, "The same as JSON")->group(group);
   add(

@@ -1,5 +1,7 @@
 #include "settled.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <file.hpp>
 #include <filesystem>
 #include <optional>
@@ -10,9 +12,9 @@
 namespace cumulet::demo {
 namespace {
 
-constexpr std::string_view first_line = "Cumulet settled 1\n";
+constexpr std::string_view first_line = "Cumulet settled 2\n";
 
-/// What it was found for, a line; the scene comes after it.
+/// What it was found for, a line; the volume's state and the scene come after it.
 std::string head(const SceneOptions& given) {
   return std::string(first_line) + version_text() + ' ' + scene_hash(given) + ' ' + std::to_string(given.width) + 'x' +
          std::to_string(given.height) + '\n';
@@ -20,15 +22,33 @@ std::string head(const SceneOptions& given) {
 
 }  // namespace
 
-bool read_settled(const std::string& file, SceneOptions& scene) {
+std::string volume_state(const std::string& volume) {
+  std::error_code none;
+  const std::uintmax_t size = std::filesystem::file_size(volume, none);
+  const auto changed = std::filesystem::last_write_time(volume, none).time_since_epoch();
+  // Whole seconds: not all file systems have more, and nodes may see one by different ways.
+  return std::to_string(size) + ' ' +
+         std::to_string(std::chrono::duration_cast<std::chrono::seconds>(changed).count()) + ' ' +
+         std::filesystem::path(volume).filename().string();
+}
+
+bool read_settled(const std::string& file, SceneOptions& scene, std::span<const std::string> volumes) {
   std::error_code none;
   if (!std::filesystem::exists(file, none)) return false;
   const std::string text = image::read_file(file);
   const std::string wanted = head(scene);
   if (!text.starts_with(wanted)) return false;
+  const std::string_view rest = std::string_view(text).substr(wanted.size());
+  const std::string_view state = rest.substr(0, rest.find('\n'));
+  if (state.size() == rest.size()) return false;
+  const bool same = std::ranges::any_of(volumes, [&](const std::string& volume) {
+    // The name first: others need not be looked at.
+    return state.ends_with(' ' + std::filesystem::path(volume).filename().string()) && volume_state(volume) == state;
+  });
+  if (!same) return false;
   std::optional<SceneOptions> found;
   try {
-    found = parse_scene(text.substr(wanted.size()), file);
+    found = parse_scene(std::string(rest.substr(state.size() + 1)), file);
   } catch (const std::runtime_error&) {
     return false;
   }
@@ -39,8 +59,9 @@ bool read_settled(const std::string& file, SceneOptions& scene) {
   return true;
 }
 
-void write_settled(const std::string& file, const SceneOptions& given, const SceneOptions& found) {
-  image::replace_file(file, head(given) + scene_text(found, file));
+void write_settled(const std::string& file, const SceneOptions& given, const SceneOptions& found,
+                   const std::string& state) {
+  image::replace_file(file, head(given) + state + '\n' + scene_text(found, file));
 }
 
 }  // namespace cumulet::demo

@@ -3,6 +3,7 @@
 Usage: sequence.py RENDER SCENE OUT_FOLDER
 """
 
+import os
 import pathlib
 import random
 import re
@@ -104,11 +105,21 @@ def settled(sequence, out):
     run = lambda frame, *more: common.run(pictures / "p.####.exr", "--frames", str(frame), "--settled", str(kept), *more)
     assert run(12)[0] == 0 and kept.exists()
     before = kept.read_bytes()
-    largest.write_bytes(b"not a volume".ljust(largest.stat().st_size))
+    was, voxels = largest.stat(), largest.read_bytes()
+    largest.write_bytes(b"not a volume".ljust(was.st_size))
+    os.utime(largest, (was.st_atime, was.st_mtime))
     assert run(14)[0] == 0 and kept.read_bytes() == before
     assert run(16)[0] == 0
     made = files(pictures)
     assert {name: made[name] for name in files(wanted)} == files(wanted)
+    # Simulated anew, under the same name: it is judged by what is there now, and here that is another volume.
+    os.utime(largest, (was.st_atime, was.st_mtime + 5))
+    assert run(12, "--overwrite")[0] == 0 and kept.read_bytes() != before
+    largest.write_bytes(voxels)
+    os.utime(largest, (was.st_atime, was.st_mtime))
+    kept.unlink()  # or it would stay: the one that it was taken from then is as it was
+    assert run(12, "--overwrite")[0] == 0 and kept.read_bytes() == before
+    assert files(pictures)["p.0012.exr"] == made["p.0012.exr"]
     # Of another scene, and cut off.
     assert run(12, "--anisotropy", "0.3", "--overwrite")[0] == 0 and kept.read_bytes() != before
     assert files(pictures)["p.0012.exr"] != made["p.0012.exr"]
