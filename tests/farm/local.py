@@ -136,16 +136,89 @@ def stopped(farm, out):
     while not checkpoint.exists():
         assert process.poll() is None and time.monotonic() < end
         time.sleep(0.01)
-    second = subprocess.run(farm.command("run", made, arguments=False), capture_output=True, text=True, timeout=60)
-    assert second.returncode == 1 and "another process runs this job" in second.stderr, second
+    log = made / "p.farm" / "logs" / "render.0.log"
+    (made / "p.0012.exr").write_bytes(b"of a live job")
+    for words in (["run"], ["submit"], ["run", "--overwrite"], ["describe", "--overwrite"]):
+        second = farm.do(words[0], made, *(["--frames", "12", *words[1:]] if words[1:] else []), arguments=bool(words[1:]))
+        assert second.returncode == 1 and "another process runs this job" in second.stderr, second
+        assert checkpoint.exists() and log.exists() and (made / "p.0012.exr").exists(), words
+    (made / "p.0012.exr").unlink()
     process.send_signal(signal.SIGTERM)
     _, error = process.communicate(timeout=60)
     assert process.returncode == 1 and "interrupted: 1 of 1 tasks not done" in error, error
     assert not files(made) and checkpoint.exists()
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done
-    assert "goes on from" in (made / "p.farm" / "logs" / "render.0.log").read_text()
+    assert "goes on from" in log.read_text()
     assert files(made) == wanted and not checkpoint.exists()
+
+
+def apart(farm, out):
+    """Pictures of other names, settled things of other volumes, and what a queue still has."""
+    made = empty(out / "apart")
+    folder = made / "p.farm"
+    done = farm.do("run", made, "--frames", "12", "--samples", "2")
+    assert done.returncode == 0 and (folder / "settled").exists(), done
+    # The same names, otherwise written, and others that want the same folder.
+    command = [str(farm.programs / "cumulet-farm"), "describe", "--samples", "2", "--frames"]
+    for name, frame, status in (("p.%04d.exr", "14", 0), ("p.####.png", "12", 1), ("p_####.exr", "12", 1)):
+        done = subprocess.run([*command, frame, "-o", str(made / name), "--", *farm.arguments()], capture_output=True, text=True,
+                              timeout=60)
+        assert done.returncode == status and done.stderr.count("\n") == status, done
+        assert status == 0 or f"makes {made / 'p.%04d.exr'}" in done.stderr, done
+    assert "p.%04d.exr" in (folder / "job.json").read_text()
+    # Slurm's answer decides, and no answer is none.
+    tools = empty(out / "tools")
+    environment = {**os.environ, "PATH": f"{tools}:{os.environ['PATH']}"}
+    def answered(script, *more):
+        (tools / "squeue").write_text(f"#!/bin/sh\n{script}\n")
+        (tools / "squeue").chmod(0o755)
+        (folder / "slurm.json").write_text(json.dumps({"arrays": [{"id": "7", "layer": "render", "first": 0}]}))
+        return subprocess.run(farm.command("describe", made, "--frames", "12", "--samples", "2", *more), capture_output=True,
+                              text=True, timeout=60, env=environment)
+    assert answered("echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1").returncode == 0
+    assert answered("exit 0").returncode == 0
+    for script, told in (("echo 7", "still has arrays"),
+                         ("echo 'Unable to contact slurm controller' >&2; exit 1", "Unable to contact")):
+        done = answered(script, "--overwrite")
+        assert done.returncode == 1 and told in done.stderr and done.stderr.count("\n") == 1, done
+        assert (made / "p.0012.exr").exists() and (folder / "settled").exists()
+    done = answered("exit 0", "--overwrite")
+    assert done.returncode == 0 and not (made / "p.0012.exr").exists(), done
+    assert not (folder / "settled").exists() and not (folder / "slurm.json").exists() and (folder / "shaders").exists()
+    # One's own files, as one word or two.
+    for words in ([f"--settled={made / 'mine'}", f"--shader-cache={made / 'own'}"],
+                  ["--settled", str(made / "mine"), "--shader-cache", str(made / "own")]):
+        done = subprocess.run([*farm.command("describe", made, "--frames", "12", "--overwrite"), *words],
+                              capture_output=True, text=True, timeout=60)
+        text = (folder / "job.json").read_text()
+        assert done.returncode == 0 and str(folder / "settled") not in text and str(folder / "shaders") not in text, text
+
+
+def sent_again(farm, out):
+    """A preempted task goes on, however few its attempts are; for ever it does not."""
+    made = empty(out / "sent_again")
+    assert farm.do("describe", made, "--frames", "12", "--samples", "2", "--attempts", "2").returncode == 0
+    command = farm.command("work", made, "--task", "render.0", arguments=False)
+    for times, status in ((100, 1), (99, 0)):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300,
+                              env={**os.environ, "SLURM_RESTART_COUNT": str(times)})
+        assert done.returncode == status and ("sent again 100 times" in done.stderr) == (status == 1), done
+
+
+def slurm_flags(farm, out):
+    """What sbatch is given, by one that writes it down: a folder's % is no pattern of Slurm's."""
+    made = empty(out / "50% %A")
+    tools = empty(out / "tools")
+    for name, script in (("scontrol", "echo 'MaxArraySize = 1001'"),
+                         ("sbatch", f"printf '%s\\n' \"$@\" > '{tools}/flags'; cat > /dev/null; echo 7")):
+        (tools / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tools / name).chmod(0o755)
+    done = subprocess.run(farm.command("submit", made, "--frames", "12", "--samples", "2"), capture_output=True, text=True,
+                          timeout=60, env={**os.environ, "PATH": f"{tools}:{os.environ['PATH']}"})
+    assert done.returncode == 0, done
+    flags = (tools / "flags").read_text().splitlines()
+    assert f"--output={out}/50%% %%A/p.farm/logs/slurm-%A_%a.out" in flags, flags
 
 
 def refused(farm, out):
@@ -179,16 +252,17 @@ def refused(farm, out):
         (folder / "job.json").write_text(text)
         done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
         assert done.returncode == 1 and done.stderr.count("\n") == 1 and "bad.farm/job.json" in done.stderr, (text, done)
-    # Commands that end well and make nothing have not made it.
-    (folder / "job.json").write_text(json.dumps({**good, "tasks": [{**task, "commands": [["true"]]}]}))
-    done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 1 and "x is not there" in done.stdout, done
+    # Commands that end well and make nothing, or a file of no bytes, have not made it.
+    for command in (["true"], ["touch", "x"]):
+        (folder / "job.json").write_text(json.dumps({**good, "tasks": [{**task, "commands": [command]}]}))
+        done = subprocess.run([program, "run", "--job", str(folder)], capture_output=True, text=True, timeout=60)
+        assert done.returncode == 1 and "x is not there" in done.stdout, done
 
 
 def main():
     programs, out = sys.argv[1], empty(pathlib.Path(sys.argv[2]))
     farm = Farm(programs, out, ["--size", "32x24"])
-    for part in (refused, parts, described, scene_files, failing, stopped):
+    for part in (refused, slurm_flags, sent_again, apart, parts, described, scene_files, failing, stopped):
         began = time.monotonic()
         part(farm, out)
         print(f"{part.__name__}: {time.monotonic() - began:.0f} s", flush=True)
