@@ -31,6 +31,13 @@ void require_3d(const gl::Limits& limits, const ivec3& size, const char* what) {
   }
 }
 
+// Whether velocity a voxel has a texture: a picture needs none, and its 8 bytes a voxel are no reason to refuse one.
+bool holds_motion(const gl::Limits& limits, const ivec3& size) {
+  constexpr std::int64_t most = std::int64_t{1} << 27;
+  const glm::i64vec3 voxels(size);
+  return std::max({size.x, size.y, size.z}) <= limits.texture_size_3d && voxels.x * voxels.y * voxels.z <= most;
+}
+
 // Slices first to last (not included) of a dense volume: put(place in them, value) for each voxel.
 template <class Put>
 void for_slab(const scene::MarchSource& source, const grid::Statistics& statistics, int first, int last,
@@ -354,8 +361,9 @@ void MarchUpload::plan_channel_voxels() {
                  });
                });
   }
-  if (const grid::MomentumField* momentum = source_->channels.momentum.get()) {
-    require_3d(limits_, source_->box_size, "velocity a voxel");
+  const bool shows_motion = holds_motion(limits_, source_->box_size);
+  if (!shows_motion) data_.parts_[0].grid.moves = 0;
+  if (const grid::MomentumField* momentum = source_->channels.momentum.get(); momentum != nullptr && shows_motion) {
     plan_slabs(data_.velocity_voxels_, {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, 4}, "creating voxels' velocities",
                [this, momentum](std::span<std::uint16_t> slab, int first, int last) {
                  std::vector<glm::dvec3> sums(slab.size() / 4);

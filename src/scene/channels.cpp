@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/luminance.hpp"
+#include "base/one_line.hpp"
 #include "base/progress_part.hpp"
 #include "light/black_body.hpp"
 #include "volume/bricks.hpp"
@@ -245,7 +246,8 @@ std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const v
 }
 
 std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame& frame,
-                                                       const volume::Ramp& density_ramp, const Progress* progress) {
+                                                       const volume::Ramp& density_ramp, const Progress* progress,
+                                                       const Log& log) {
   if (!frame.velocity || frame.density.empty()) return std::nullopt;
   const std::array<ScalarVolume, 6>& parts = frame.velocity->parts;
   const glm::dmat3& to_index = frame.velocity->to_index;
@@ -257,7 +259,13 @@ std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame
   const double fastest = std::min(std::max({most.x, most.y, most.z}), volume::fastest_velocity);
   if (!(fastest > 0.0)) return std::nullopt;
   BrickSet set("density");
-  set.add(frame.density);
+  try {
+    set.add(frame.density);
+  } catch (const Error& error) {
+    // No picture depends on it.
+    log.warning(one_line("grid \"" + parts[0].name + "\": the velocity is left out: " + error.what()));
+    return std::nullopt;
+  }
   struct Read {
     Values density{};
     std::array<Values, 6> parts{};

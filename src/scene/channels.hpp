@@ -4,6 +4,7 @@
 #include <glm/glm.hpp>
 #include <optional>
 
+#include "base/log.hpp"
 #include "grid/rgb_field.hpp"
 #include "volume/frame.hpp"
 #include "volume/ramp.hpp"
@@ -42,9 +43,10 @@ std::optional<volume::ScalarVolume> forward_of(const volume::VolumeFrame& frame,
                                                const Progress* progress = nullptr);
 
 /// The ramp of density x velocity, along the axes of the lattice, voxel by voxel: grid::MomentumField says how. Nothing
-/// if the frame has no velocity but 0, or no density. Throws as emission_of does.
+/// if the frame has no velocity but 0, or no density; nor, with a warning, where density without any detail is as much
+/// as emission_of throws for.
 std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame& frame,
                                                        const volume::Ramp& density_ramp = {},
-                                                       const Progress* progress = nullptr);
+                                                       const Progress* progress = nullptr, const Log& log = {});
 
 }  // namespace cumulet::scene

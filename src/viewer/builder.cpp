@@ -38,7 +38,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   const auto [voxels, statistics] = volume->density(settings.density_ramp, progress, built.seconds.statistics);
   Stopwatch watch;
   const grid::Channels channels =
-      volume->channels(settings.density_ramp, settings.emission, settings.anisotropic, progress);
+      volume->channels(settings.density_ramp, settings.emission, settings.anisotropic, progress, log);
   built.seconds.statistics += watch.lap();
   progress.begin(Progress::Stage::refining);
   if (settings.march != scene::March::tet) {

@@ -58,8 +58,14 @@ std::uint64_t VolumeAsset::bytes() const {
   const std::scoped_lock lock(mutex_);
   if (statistics_) bytes += statistics_->bytes();
   if (ramped_) bytes += ramped_->density.voxels->bytes() + ramped_->density.statistics->bytes();
-  if (channels_) bytes += channels_->channels.bytes();
-  if (channels_ && channels_->forward && *channels_->forward) bytes += (*channels_->forward)->bytes();
+  grid::Channels made;
+  if (glowing_) made.emission = glowing_->emission;
+  if (weighted_) {
+    made.scattering = weighted_->scattering;
+    made.momentum = weighted_->momentum;
+    made.forward = weighted_->forward.value_or(nullptr);
+  }
+  bytes += made.bytes();
   return bytes;
 }
 
@@ -93,7 +99,7 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
 }
 
 grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
-                                     bool anisotropic, Progress& progress) const {
+                                     bool anisotropic, Progress& progress, const Log& log) const {
   scene::Emission given = emission;
   // What has a temperature alone would be nothing.
   const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
@@ -105,21 +111,18 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   constexpr std::type_identity<grid::ScalarField> numbers;
   constexpr std::type_identity<grid::MomentumField> motion;
   const auto lock = patient_lock(mutex_, progress);
-  if (!channels_ || channels_->density_ramp != density_ramp || channels_->emission != given) {
-    channels_.reset();
-    channels_ = Made{density_ramp,
-                     given,
-                     {field(colours, scene::emission_of(*frame_, given, &progress)),
-                      field(colours, scene::scattering_of(*frame_, density_ramp, &progress)), nullptr,
-                      field(motion, scene::momentum_of(*frame_, density_ramp, &progress))},
-                     std::nullopt};
+  if (!glowing_ || glowing_->settings != given) {
+    glowing_.reset();
+    glowing_ = Glowing{given, field(colours, scene::emission_of(*frame_, given, &progress))};
   }
-  grid::Channels made = channels_->channels;
-  if (anisotropic) {
-    if (!channels_->forward) channels_->forward = field(numbers, scene::forward_of(*frame_, density_ramp, &progress));
-    made.forward = *channels_->forward;
+  if (!weighted_ || weighted_->density_ramp != density_ramp) {
+    weighted_.reset();
+    weighted_ = Weighted{density_ramp, field(colours, scene::scattering_of(*frame_, density_ramp, &progress)),
+                         field(motion, scene::momentum_of(*frame_, density_ramp, &progress, log)), std::nullopt};
   }
-  return made;
+  if (anisotropic && !weighted_->forward)
+    weighted_->forward = field(numbers, scene::forward_of(*frame_, density_ramp, &progress));
+  return {glowing_->emission, weighted_->scattering, anisotropic ? *weighted_->forward : nullptr, weighted_->momentum};
 }
 
 }  // namespace cumulet::viewer

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "base/log.hpp"
 #include "base/progress.hpp"
 #include "grid/statistics.hpp"
 #include "scene/channels.hpp"
@@ -65,9 +66,9 @@ class VolumeAsset {
   /// Error(cancelled) if this caller's progress is.
   [[nodiscard]] Density density(const volume::Ramp& ramp, Progress& progress, double& seconds) const;
   /// What it has beside density; anisotropic: its anisotropy, too. The last that were asked for are kept: another
-  /// threshold or camera asks for the same.
+  /// threshold or camera asks for the same. log hears of what is left out, when it is made.
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
-                                        bool anisotropic, Progress& progress) const;
+                                        bool anisotropic, Progress& progress, const Log& log = {}) const;
 
  private:
   std::shared_ptr<const volume::VolumeFrame> frame_;
@@ -80,13 +81,18 @@ class VolumeAsset {
     Density density;
   };
   mutable std::optional<Ramped> ramped_;
-  struct Made {
+  struct Glowing {
+    scene::Emission settings;
+    decltype(grid::Channels::emission) emission;
+  };
+  mutable std::optional<Glowing> glowing_;
+  struct Weighted {
     volume::Ramp density_ramp;
-    scene::Emission emission;
-    grid::Channels channels;  // but what goes forward
+    decltype(grid::Channels::scattering) scattering;
+    decltype(grid::Channels::momentum) momentum;
     std::optional<decltype(grid::Channels::forward)> forward;
   };
-  mutable std::optional<Made> channels_;
+  mutable std::optional<Weighted> weighted_;  // by density
 };
 
 using VolumeAssetPtr = std::shared_ptr<const VolumeAsset>;

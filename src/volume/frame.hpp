@@ -75,13 +75,15 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 /// A component of a staggered grid lies half a voxel below the voxel's centre, along its own axis, and is resampled
 /// from there. Velocities are world units a second along the axes of the file's world, but for those of a grid whose
 /// metadata say that they are in local space (is_local_space) and change with it (vector_type contravariant): these are
-/// its own voxels a second, along its own axes. More than 65504 voxels of the lattice a second count as that.
+/// its own voxels a second, along its own axes. More than 65504 voxels of the lattice a second count as that. Where
+/// there is density, velocity is kept over the box of its active voxels and one voxel more, in whole bricks: elsewhere
+/// it may be missing.
 ///
 /// Throws Error(file) as import_volume does, too for a name that the file does not have and where every field is left
-/// out. Warnings: import_volume's; the grids that are not shown; temperature, colour, anisotropy or velocity that
-/// lies nowhere over density; anisotropy beyond -1 and 1, which counts as these; velocities that are clamped. An info
-/// tells of colour in three grids that is not read, and of temperatures that seem to be kelvin, degrees Celsius, or
-/// from 0 to 1.
+/// out; but a velocity that nobody named is left out where it fails, with a warning that says why. Warnings:
+/// import_volume's; the grids that are not shown; temperature, colour, anisotropy or velocity that lies nowhere over
+/// density; anisotropy beyond -1 and 1, which counts as these; velocities that are clamped. An info tells of colour in
+/// three grids that is not read, and of temperatures that seem to be kelvin, degrees Celsius, or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <span>
 #include <sstream>
+#include <utility>
 #include <vector>
 
 #include "volume/bricks.hpp"
@@ -196,6 +197,7 @@ class FrameImport {
     if (by_name(names.colour) && chosen.colour.empty()) remark_on_colour(reader.grids());
     constexpr double reading = 0.8;
     const Portion whole{reader.opened(), 1.0};
+    velocity_is_named_ = !by_name(names.velocity);
     read(reader, chosen, whole.part(0.0, reading));
     const auto any = [](const std::optional<ScalarVolume>& field) { return field && !field->empty(); };
     if (!chosen.density || (out_.density.empty() && (any(out_.flame) || any(out_.temperature)))) {
@@ -244,11 +246,24 @@ class FrameImport {
     } else if (!chosen.colour.empty()) {
       std::ranges::transform(chosen.colour, out_.colour.emplace().begin(), field);
     }
-    if (!chosen.velocity.empty()) read_velocity(reader, chosen.velocity, shares);
+    if (chosen.velocity.empty()) return;
+    try_velocity([&] { out_.velocity = read_velocity(reader, chosen.velocity, shares); });
   }
 
-  void read_velocity(Reader& reader, const std::vector<std::size_t>& grids, Shares& shares) {
-    Velocity& velocity = out_.velocity.emplace();
+  /// A picture needs none: one that nobody named is left out where it fails.
+  template <class Work>
+  void try_velocity(const Work& work) const {
+    try {
+      work();
+    } catch (const Error& error) {
+      const bool of_the_grid = error.code() != ErrorCode::cancelled && error.code() != ErrorCode::out_of_memory;
+      if (velocity_is_named_ || !of_the_grid) throw;
+      remark(LogLevel::warning, error.what(), "the velocity is left out");
+    }
+  }
+
+  Velocity read_velocity(Reader& reader, const std::vector<std::size_t>& grids, Shares& shares) const {
+    Velocity velocity;
     std::array<std::array<ScalarVolume, 2>, 3> axes;
     if (grids.size() == 1) {
       axes = import_signed_vector_grid(reader, grids[0], file_, log_, progress_, shares.next());
@@ -268,20 +283,32 @@ class FrameImport {
         velocity.parts[2 * static_cast<std::size_t>(axis) + sign] = std::move(part);
       }
     }
+    return velocity;
   }
 
   void place(Portion portion) {
-    if (out_.velocity) bring_to_index(*out_.velocity);
-    const std::vector<ScalarVolume*> fields = out_.beside_density();
-    Shares shares(portion, fields.size());
-    for (ScalarVolume* field : fields) {
-      const std::string name = name_of(*field);
-      naming(name, [&] { put_on_lattice(*field, shares.next()); });
-    }
+    Shares shares(portion, out_.beside_density().size());
+    std::optional<Velocity> velocity = std::exchange(out_.velocity, std::nullopt);
+    const auto put = [&](ScalarVolume& field, const std::optional<Box>& within) {
+      const std::string name = name_of(field);
+      naming(name, [&] { put_on_lattice(field, within, shares.next()); });
+    };
+    for (ScalarVolume* field : out_.beside_density()) put(*field, std::nullopt);
     if (out_.temperature) warn_if_apart({&*out_.temperature, 1});
     if (out_.colour) warn_if_apart(*out_.colour);
     if (out_.anisotropy) warn_if_apart(*out_.anisotropy);
-    if (out_.velocity) warn_if_apart(out_.velocity->parts);
+    if (velocity) {
+      try_velocity([&] {
+        bring_to_index(*velocity);
+        // Elsewhere nothing moves that scatters.
+        std::optional<Box> within;
+        if (!out_.density.empty()) within = Box{out_.density.bounds_min - 1, out_.density.bounds_max + 1};
+        const bool moves = std::ranges::any_of(velocity->parts, [](const auto& part) { return part.max_value > 0.0F; });
+        for (ScalarVolume& part : velocity->parts) put(part, within);
+        if (moves) warn_if_elsewhere(velocity->parts);
+        out_.velocity = std::move(velocity);
+      });
+    }
   }
 
   // How many voxels had more.
@@ -323,13 +350,17 @@ class FrameImport {
     remark(LogLevel::warning, name_of(velocity.parts[0]), text.str());
   }
 
-  void put_on_lattice(ScalarVolume& field, Portion portion) const {
+  void put_on_lattice(ScalarVolume& field, const std::optional<Box>& within, Portion portion) const {
     const glm::dmat4& lattice = out_.density.index_to_world;
-    if (!field.empty() && !same_places(field.index_to_world, lattice, {field.bounds_min, field.bounds_max})) {
+    const Box bounds{field.bounds_min, field.bounds_max};
+    const bool placed = field.empty() || same_places(field.index_to_world, lattice, bounds);
+    const bool clipped = within && !within->contains(bounds) && field.background == 0.0F;
+    if (!placed || (clipped && !field.empty())) {
       constexpr double sampling = 0.7;
-      SourceGrid placed = resample(field, lattice, progress_, portion.part(0.0, sampling));
+      SourceGrid source = placed ? bricks_within(field, *within)
+                                 : resample(field, lattice, within, progress_, portion.part(0.0, sampling));
       // What there is to say of its values is said.
-      ScalarVolume volume = assemble(std::move(placed), {}, {}, progress_, portion.part(sampling, 1.0));
+      ScalarVolume volume = assemble(std::move(source), {}, {}, progress_, portion.part(sampling, 1.0));
       volume.name = field.name;
       volume.negative_voxels = field.negative_voxels;
       volume.non_finite_voxels = field.non_finite_voxels;
@@ -349,9 +380,13 @@ class FrameImport {
 
   /// Of a field's parts those that are empty say nothing, such as what is below 0 of an anisotropy that nowhere is.
   void warn_if_apart(std::span<const ScalarVolume> parts) const {
-    const auto empty = [](const ScalarVolume& part) { return part.empty(); };
+    if (!std::ranges::all_of(parts, [](const ScalarVolume& part) { return part.empty(); })) warn_if_elsewhere(parts);
+  }
+
+  /// Those that are empty count as elsewhere.
+  void warn_if_elsewhere(std::span<const ScalarVolume> parts) const {
     const auto elsewhere = [&](const ScalarVolume& part) { return part.empty() || apart(part, out_.density); };
-    if (out_.density.empty() || std::ranges::all_of(parts, empty) || !std::ranges::all_of(parts, elsewhere)) return;
+    if (out_.density.empty() || !std::ranges::all_of(parts, elsewhere)) return;
     remark(LogLevel::warning, name_of(parts[0]), "lies nowhere over \"" + out_.density.name + "\"");
   }
 
@@ -364,6 +399,7 @@ class FrameImport {
   std::string file_;
   const Log& log_;
   Progress* progress_;
+  bool velocity_is_named_ = false;
   VolumeFrame out_;
 };
 

@@ -49,6 +49,26 @@ class BrickLeaves final : public LeafSource {
   std::vector<const Brick*> order_;
 };
 
+/// Some of a field's own bricks.
+class OwnLeaves final : public LeafSource {
+ public:
+  OwnLeaves(const ScalarVolume& field, std::vector<std::size_t> bricks) : field_(field), bricks_(std::move(bricks)) {}
+  [[nodiscard]] std::size_t count() const override { return bricks_.size(); }
+  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return field_.brick_origins[bricks_[leaf]]; }
+  [[nodiscard]] ActiveMask active(std::size_t leaf) const override {
+    BrickValues::Brick room;
+    return not_zero(std::span<const float, brick_voxels>(field_.brick_values.brick(bricks_[leaf], room), brick_voxels));
+  }
+  void values(std::size_t leaf, float* out) const override {
+    BrickValues::Brick room;
+    std::copy_n(field_.brick_values.brick(bricks_[leaf], room), brick_voxels, out);
+  }
+
+ private:
+  const ScalarVolume& field_;
+  std::vector<std::size_t> bricks_;
+};
+
 /// The field's bricks and tiles that meet a box of its voxels: places in brick_origins, then in tiles.
 using Items = std::vector<std::uint32_t>;
 
@@ -152,8 +172,10 @@ Span image(const glm::dmat4& transform, const glm::dvec3& min, const glm::dvec3&
 
 class Resampling {
  public:
-  Resampling(const ScalarVolume& field, const glm::dmat4& lattice, Progress* progress, Portion portion)
+  Resampling(const ScalarVolume& field, const glm::dmat4& lattice, const std::optional<Box>& within, Progress* progress,
+             Portion portion)
       : field_(field),
+        within_(within),
         to_field_(glm::inverse(field.index_to_world) * lattice),
         part_(progress, portion.from, portion.to, pieces(0)) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -170,24 +192,36 @@ class Resampling {
     // What is not zero reaches to the next centres around the field's voxels.
     const Span span =
         image(glm::inverse(to_field_), glm::dvec3(field_.bounds_min) - 1.0, glm::dvec3(field_.bounds_max) + 1.0);
-    const glm::dvec3 min = glm::floor(span.min - reach_);
-    const glm::dvec3 max = glm::ceil(span.max + reach_);
+    glm::dvec3 min = glm::floor(span.min - reach_);
+    glm::dvec3 max = glm::ceil(span.max + reach_);
+    if (within_) {
+      min = glm::max(min, glm::dvec3(within_->min));
+      max = glm::min(max, glm::dvec3(within_->max));
+    }
+    SourceGrid out;
+    if (glm::any(glm::greaterThan(min, max))) {
+      out.leaves = std::make_unique<BrickLeaves>(std::move(bricks_));
+      return out;
+    }
     if (!glm::all(glm::lessThan(glm::max(glm::abs(min), glm::abs(max)), glm::dvec3(max_coordinate))) ||
         !glm::all(glm::lessThan(max - min, glm::dvec3(max_extent)))) {
       fail("is too far off or too large for the lattice of the file's other fields");
     }
-    // Each of the field's bricks fills as many as it is larger by.
-    const double larger = 1.0 / std::abs(glm::determinant(glm::dmat3(to_field_)));
-    if (static_cast<double>(field_.brick_origins.size()) * larger > static_cast<double>(most_bricks)) too_large();
     box_ = {glm::ivec3(min), glm::ivec3(max)};
     const glm::ivec3 low = box_.min & ~(brick_size - 1);
+    // Each of the field's bricks fills as many as it is larger by, all of them no more than there are.
+    const double larger = 1.0 / std::abs(glm::determinant(glm::dmat3(to_field_)));
+    const glm::dvec3 bricks((box_.max >> 3) - (low >> 3) + 1);
+    if (std::min(static_cast<double>(field_.brick_origins.size()) * larger, bricks.x * bricks.y * bricks.z) >
+        static_cast<double>(most_bricks)) {
+      too_large();
+    }
     int size = brick_size;
     for (const glm::ivec3 extent = box_.max - low; size <= std::max({extent.x, extent.y, extent.z});) size *= 2;
     Items items(field_.brick_origins.size() + field_.tiles.size());
     for (std::uint32_t i = 0; i < items.size(); ++i) items[i] = i;
     refine(low, size, 0, items);
 
-    SourceGrid out;
     for (const std::vector<SourceTile>& tiles : tiles_) out.tiles.insert(out.tiles.end(), tiles.begin(), tiles.end());
     out.leaves = std::make_unique<BrickLeaves>(std::move(bricks_));
     return out;
@@ -280,6 +314,7 @@ class Resampling {
   }
 
   const ScalarVolume& field_;
+  const std::optional<Box> within_;
   glm::dmat4 to_field_;
   glm::ivec3 samples_{1};
   glm::dvec3 reach_{0.0};
@@ -304,9 +339,26 @@ bool same_places(const glm::dmat4& a, const glm::dmat4& b, const Box& voxels) {
   return true;
 }
 
-SourceGrid resample(const ScalarVolume& field, const glm::dmat4& lattice, Progress* progress, Portion portion) {
-  SourceGrid out = Resampling(field, lattice, progress, portion).run();
+SourceGrid resample(const ScalarVolume& field, const glm::dmat4& lattice, const std::optional<Box>& within,
+                    Progress* progress, Portion portion) {
+  SourceGrid out = Resampling(field, lattice, within, progress, portion).run();
   out.index_to_world = lattice;
+  return out;
+}
+
+SourceGrid bricks_within(const ScalarVolume& field, const Box& box) {
+  const Box whole{box.min & ~(brick_size - 1), box.max | (brick_size - 1)};
+  SourceGrid out;
+  out.index_to_world = field.index_to_world;
+  std::vector<std::size_t> bricks;
+  for (std::size_t i = 0; i < field.brick_origins.size(); ++i) {
+    if (const glm::ivec3 origin = field.brick_origins[i]; whole.contains({origin, origin})) bricks.push_back(i);
+  }
+  for (const Tile& tile : field.tiles) {
+    const Box part = whole.clipped({tile.min, tile.max});
+    if (!part.empty()) out.tiles.push_back({{part.min, part.max, tile.value}, true});
+  }
+  out.leaves = std::make_unique<OwnLeaves>(field, std::move(bricks));
   return out;
 }
 

@@ -16,6 +16,7 @@
 #include "support/fake_gl.hpp"
 #include "support/gl_compute.hpp"
 #include "support/gl_state.hpp"
+#include "support/volumes.hpp"
 
 namespace {
 
@@ -242,6 +243,46 @@ TEST_P(GridSets, WhatIsLargeGoesInPieces) {
   while (!copy.advance(Deadline::min())) ++steps;
   EXPECT_GE(steps, 4 + 2 + 3) << "of 2 MiB";
   expect_whole(copy.take(), {large, plain_}, "copied");
+}
+
+// Of voxels it takes a texture of the whole box: no reason to refuse what has few bricks in it.
+TEST_P(GridSets, MotionThatDoesNotFitIsLeftOut) {
+  const auto brick_source = [](int size, bool moves) {
+    const volume::ScalarVolume ends =
+        test::make_volume(glm::ivec3(8), glm::ivec3(0), [](const glm::ivec3& p) { return p.x == 0 ? 1.0F : 0.5F; });
+    auto voxels = std::make_shared<volume::ScalarVolume>(ends);
+    voxels->brick_origins.emplace_back((size - 1) & ~7);
+    std::vector<float>& values = voxels->brick_values.as_floats();
+    values.resize(2 * values.size());
+    values[512] = 1.0F;
+    voxels->bounds_max = voxels->brick_origins.back();
+    const grid::Cube cube = grid::fit_cube(*voxels);
+    grid::Channels channels;
+    const grid::MomentumField::Values momentum{{*voxels, *voxels, *voxels}, 1.0F};
+    if (moves) channels.momentum = std::make_shared<const grid::MomentumField>(momentum, cube);
+    auto statistics = std::make_shared<const grid::Statistics>(*voxels, cube);
+    return std::make_shared<const scene::MarchSource>(
+        scene::make_voxel_source(scene::March::brick, voxels, statistics, channels));
+  };
+  const auto look = [&](int size, int texture_size) {
+    gl::Limits limits = gl::query_limits(*gl_);
+    if (texture_size > 0) limits.texture_size_3d = texture_size;
+    std::array<std::uint64_t, 2> bytes{};
+    std::uint32_t moves = 0;
+    for (const bool moving : {false, true}) {
+      MarchUpload work(gl_, limits, *heap_, {brick_source(size, moving)});
+      while (!work.advance(Deadline::min())) {
+      }
+      const MarchData data = work.take();
+      bytes[moving ? 1 : 0] = data.bytes();
+      moves = data.grid().moves;
+    }
+    EXPECT_EQ(bytes[1] > bytes[0], moves == 1) << size;
+    return moves;
+  };
+  EXPECT_EQ(look(100, 0), 1U);
+  EXPECT_EQ(look(100, 64), 0U) << "wider than a texture";
+  EXPECT_EQ(look(521, 0), 0U) << "521 cubed is more than 2^27";
 }
 
 TEST_P(GridSets, WhatDoesNotFitIsRefusedByName) {

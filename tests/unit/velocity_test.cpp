@@ -119,6 +119,46 @@ TEST(Velocity, ThatIsNoneOrTooMuch) {
   EXPECT_FALSE(scene::momentum_of(frame)) << "nothing scatters";
 }
 
+TEST(Velocity, OfMuchWithoutDetailIsLeftOutWithAWarning) {
+  VolumeFrame frame{.density = test::slab()};
+  const ivec3 size(64, 8, 64);
+  frame.velocity = velocity(size, ivec3(0), [](const ivec3& /*p*/) { return vec3(1.0F); });
+  frame.density.brick_origins.clear();
+  frame.density.brick_values = {};
+  frame.density.bounds_max = ivec3(1023, 1023, 1031);
+  frame.density.tiles = {{ivec3(0), frame.density.bounds_max, 1.0F}};
+  std::vector<std::string> heard;
+  const Log log([&](LogLevel level, const char* text) {
+    EXPECT_EQ(level, LogLevel::warning);
+    heard.emplace_back(text);
+  });
+  EXPECT_FALSE(scene::momentum_of(frame, {}, nullptr, log));
+  ASSERT_EQ(heard.size(), 1U);
+  EXPECT_NE(heard[0].find("the velocity is left out: density without detail fills more than 262144 bricks"),
+            std::string::npos);
+}
+
+// Another light moves nothing.
+TEST(Velocity, IsKeptWhileEmissionChanges) {
+  VolumeFrame frame{.density = test::slab(), .flame = test::slab(0.5F)};
+  const ivec3 size(64, 8, 64);
+  frame.velocity = velocity(size, ivec3(0), [](const ivec3& /*p*/) { return vec3(1.0F); });
+  frame.colour = {test::slab(), test::slab(0.5F), test::slab(0.25F)};
+  const viewer::VolumeAsset asset(std::move(frame));
+  Progress progress;
+  const volume::Ramp ramp({{0.0F, 0.0F}, {1.0F, 0.5F}});
+  const grid::Channels first = asset.channels({}, {}, false, progress);
+  const grid::Channels other = asset.channels({}, {.flame_strength = 2.0}, false, progress);
+  const grid::Channels ramped = asset.channels(ramp, {.flame_strength = 2.0}, false, progress);
+  ASSERT_TRUE(first.momentum && first.scattering && first.emission);
+  EXPECT_EQ(first.momentum, other.momentum);
+  EXPECT_EQ(first.scattering, other.scattering);
+  EXPECT_NE(first.emission, other.emission);
+  EXPECT_NE(other.momentum, ramped.momentum);
+  EXPECT_NE(other.scattering, ramped.scattering);
+  EXPECT_EQ(other.emission, ramped.emission);
+}
+
 // ---- Pixels
 
 class VelocityPicture : public test::ViewerTest {

@@ -582,7 +582,7 @@ void expect_vectors(const VolumeFrame& frame, const openvdb::Vec3SGrid& grid) {
 }
 
 TEST_F(Frame, VelocityOfVectors) {
-  const auto density = dot("density", 1.0F);
+  const auto density = box("density", scaled(1.0), 24, [](const Vec3d&) { return 1.0F; });
   for (const std::string name : {"velocity", "Vel", "v"}) {
     for (const bool half : {false, true}) {
       const auto grid = vectors(name);
@@ -747,6 +747,77 @@ TEST_F(Frame, VelocitiesThatAreNoneOrTooFastAreTold) {
   EXPECT_TRUE(import_frame(write({density, grid}), {}, messages.log).velocity);
   ASSERT_EQ(messages.warnings.size(), 1U);
   EXPECT_HAS(messages.warnings[0], "is empty");
+}
+
+// What nobody named is no reason to refuse what was asked for.
+TEST_F(Frame, AVelocityThatFailsIsLeftOutUnlessItIsNamed) {
+  const auto density = box("density", scaled(1.0), 10, [](const Vec3d&) { return 1.0F; });
+  const auto expect = [&](const openvdb::GridPtrVec& grids, const std::string& name, const std::string& cause) {
+    const auto file = write(grids);
+    Messages messages;
+    const VolumeFrame frame = import_frame(file, {}, messages.log);
+    EXPECT_FALSE(frame.velocity);
+    EXPECT_EQ(frame.density.active_voxels, 1000U);
+    ASSERT_EQ(messages.warnings.size(), 1U);
+    EXPECT_HAS(messages.warnings[0], file.string() + ": grid \"" + name);
+    EXPECT_HAS(messages.warnings[0], cause);
+    EXPECT_HAS(messages.warnings[0], ": the velocity is left out");
+    EXPECT_HAS(refusal(file, naming({{&GridNames::velocity, name}})), cause);
+    EXPECT_FALSE(import_frame(file, naming({{&GridNames::velocity, "none"}}), {}).velocity);
+  };
+  const auto fine = vectors("motion");
+  fine->setGridClass(openvdb::GRID_STAGGERED);
+  fine->setTransform(openvdb::math::Transform::createLinearTransform(scaled(1e-3)));
+  expect({density, fine}, "motion", "has voxels too small");
+  auto wide = vectors("vel");
+  wide->tree().setValue(Coord(1 << 22, 0, 0), openvdb::Vec3f(1.0F));
+  expect({density, wide}, "vel", "voxels span");
+  const auto wide_x = fog("vx");
+  wide_x->tree().setValue(Coord(0), 1.0F);
+  wide_x->tree().setValue(Coord(1 << 22, 0, 0), 2.0F);
+  write({density, wide_x, dot("vy", 1.0F), dot("vz", 1.0F)});
+  Messages messages;
+  EXPECT_FALSE(import_frame(path(), {}, messages.log).velocity);
+  ASSERT_EQ(messages.warnings.size(), 1U);
+  EXPECT_HAS(messages.warnings[0], "grid \"vx\": its active voxels span");
+  EXPECT_HAS(refusal(path(), naming({{&GridNames::velocity, "v"}})), "voxels span");
+}
+
+// However large the domain: of a lattice far finer, too, what is kept is of density's box.
+TEST_F(Frame, AVelocityIsKeptOverDensityAlone) {
+  const auto ones = [](const Vec3d&) { return 1.0F; };
+  std::mt19937 random(3);
+  const auto component = [&] { return static_cast<float>(random() % 2000) / 100.0F - 10.0F; };
+  for (const bool staggered : {false, true}) {
+    const auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
+    grid->setName("vel");
+    if (staggered) grid->setGridClass(openvdb::GRID_STAGGERED);
+    constexpr int size = 48;
+    for (int i = 0; i < size * size * size; ++i) {
+      const Coord c(i / (size * size) - 16, i / size % size - 16, i % size - 16);
+      grid->tree().setValue(c, openvdb::Vec3f(component(), component(), component()));
+    }
+    // Of no density: all that there is of it.
+    const VolumeFrame all = import_frame(write({box("flame", scaled(1.0), 10, ones), grid}), {}, {});
+    const VolumeFrame frame = import_frame(write({box("density", scaled(1.0), 10, ones), grid}), {}, {});
+    ASSERT_TRUE(all.velocity && frame.velocity);
+    for (const ScalarVolume& part : frame.velocity->parts) {
+      EXPECT_LE(part.brick_origins.size(), 27U) << "10 voxels and one on either side";
+      EXPECT_TRUE(glm::all(glm::greaterThanEqual(part.bounds_min, glm::ivec3(-8))));
+      EXPECT_TRUE(glm::all(glm::lessThan(part.bounds_max, glm::ivec3(16))));
+    }
+    EXPECT_GE(all.velocity->parts[0].brick_origins.size(), 216U);
+    for (int i = 0; i < 12 * 12 * 12; ++i) {
+      const glm::ivec3 p(i / 144 - 1, i / 12 % 12 - 1, i % 12 - 1);
+      ASSERT_EQ(velocity_at(frame, p), velocity_at(all, p)) << p.x << " " << p.y << " " << p.z;
+    }
+  }
+  // The whole would fill more bricks than there may be.
+  const auto coarse = vectors("vel");
+  coarse->setTransform(openvdb::math::Transform::createLinearTransform(scaled(200.0)));
+  Messages messages;
+  EXPECT_TRUE(import_frame(write({box("density", scaled(1.0), 10, ones), coarse}), {}, messages.log).velocity);
+  EXPECT_TRUE(messages.warnings.empty());
 }
 
 TEST_F(Frame, ALatticeOutOfReachIsRefused) {

@@ -300,6 +300,8 @@ typedef struct cumulet_volume_file_desc {
    * How what is there moves, world units a second: what CUMULET_AOV_VELOCITY tells, and what nothing else of a picture
    * depends on. A grid of vectors, or the three of numbers with x, y and z behind this name; to_world turns and
    * stretches them. "none" saves its reading, up to 36 bytes a voxel of main memory, and 8 a cell of either.
+   * One that is named must be good; one that is found by its name alone is left out where it cannot be had, with a
+   * warning.
    */
   const char* velocity_grid;
 } cumulet_volume_file_desc;
@@ -1527,7 +1529,9 @@ typedef enum cumulet_aov {
                               it has fewer than two */
   CUMULET_AOV_VELOCITY = 8 /* 3 floats: mean velocity of the volume where it scatters the camera's rays for the first
                               time, before the nearest surface; world space, world units a second. 0 where it does
-                              nowhere, and where it has no velocities (velocity_grid); surfaces have none */
+                              nowhere, and where it has no velocities (velocity_grid); surfaces have none. In voxel
+                              marches 0, too, of a volume whose box has more than 2^27 voxels or is longer than
+                              GL_MAX_3D_TEXTURE_SIZE */
 } cumulet_aov;
 
 /*
