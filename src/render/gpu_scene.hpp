@@ -51,6 +51,7 @@ class GpuScene {
   /// Another with another environment, or none.
   [[nodiscard]] Revision<EnvironmentData> environment_revision() const { return environment_revision_; }
   [[nodiscard]] bool draws_surfaces() const { return static_cast<bool>(raster_); }
+  [[nodiscard]] bool uploading_volumes() const { return upload_.has_value(); }
   [[nodiscard]] bool uploading() const { return upload_ || model_upload_ || environment_upload_; }
   /// 0 to 1, of what is under way; else 1.
   [[nodiscard]] double progress() const;

@@ -45,13 +45,13 @@ struct PictureWish {
     [[nodiscard]] bool shows_same(const Content& other) const;
   };
   Content content;
-  PictureParameters parameters;        // of the content, at full resolution
-  std::optional<std::uint32_t> frame;  // of a sequence, that the data are of
-  std::uint32_t samples = 1;           // a pixel
-  std::optional<double> noise_target;  // at full resolution: enough, whatever the samples
-  bool depth = false;                  // find the volume's depth at half opacity as well
-  bool guides = false;                 // and facts of pixels, for a filter
-  bool held = false;                   // a hand is at what changes it: another change is likely
+  PictureParameters parameters;               // of the content, at full resolution
+  std::optional<scene::SequenceFrame> frame;  // that the data are of
+  std::uint32_t samples = 1;                  // a pixel
+  std::optional<double> noise_target;         // at full resolution: enough, whatever the samples
+  bool depth = false;                         // find the volume's depth at half opacity as well
+  bool guides = false;                        // and facts of pixels, for a filter
+  bool held = false;                          // a hand is at what changes it: another change is likely
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
@@ -81,7 +81,9 @@ class Progressive {
   /// The same for all pictures of what was wished when it was begun.
   [[nodiscard]] std::uint64_t shown_wish() const { return shown_ ? shown_->wish : 0; }
   /// Of a sequence, the frame that it shows.
-  [[nodiscard]] std::optional<std::uint32_t> shown_frame() const { return shown_ ? shown_->frame : std::nullopt; }
+  [[nodiscard]] std::optional<scene::SequenceFrame> shown_frame() const {
+    return shown_ ? shown_->frame : std::nullopt;
+  }
   /// The same for all pictures of the same scene, from wherever.
   [[nodiscard]] std::uint64_t shown_scene() const { return shown_ ? shown_->scenes : 0; }
   /// What was shown before, where that may have pixels without a sample; else null.
@@ -128,9 +130,9 @@ class Progressive {
     std::uint32_t divisor = 1;              // of the resolution
     const surface::Scene* scene = nullptr;  // whose triangles its paths meet
     Revision<EnvironmentData> environment;  // that they escape to
-    std::optional<std::uint32_t> frame;     // of a sequence
-    std::uint64_t wish = 0;                 // that it is of
-    std::uint64_t scenes = 0;               // that there had been
+    std::optional<scene::SequenceFrame> frame;
+    std::uint64_t wish = 0;    // that it is of
+    std::uint64_t scenes = 0;  // that there had been
   };
   [[nodiscard]] const std::optional<Work>& newest_work() const {
     return wish_.content.preview || !working_ ? shown_ : working_;

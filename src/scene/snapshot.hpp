@@ -52,6 +52,14 @@ struct Place {
   bool operator==(const Place&) const = default;
 };
 
+/// Which of a sequence's frames a source is.
+struct SequenceFrame {
+  std::uint32_t number = 0;
+  std::uint64_t sequence = 0;  ///< another each time that one is set
+  std::uint64_t taken = 0;     ///< another for each source
+  bool operator==(const SequenceFrame&) const = default;
+};
+
 /// A lattice in the world that its source has, which stands at its place. Units of length are those of the scene,
 /// whatever a place stretches: extinction and emission are a unit there.
 struct Volume {
@@ -59,7 +67,7 @@ struct Volume {
   MarchSourcePtr source;  ///< not null; all are of one march
   Part<Medium> medium;
   Place place;
-  std::optional<std::uint32_t> frame = {};  ///< of a sequence: which one the source is
+  std::optional<SequenceFrame> frame = {};  ///< where it is a sequence's
   bool operator==(const Volume&) const = default;
 };
 

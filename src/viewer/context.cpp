@@ -108,6 +108,18 @@ void Context::take_host_depth(const Shot& shot, const Frame& frame) {
   }
 }
 
+std::optional<scene::SequenceFrame> Context::uploaded_frame() const {
+  for (const scene::Volume& volume : scene_.volumes()) {
+    if (volume.frame) return volume.frame;
+  }
+  return std::nullopt;
+}
+
+bool Context::owes(const scene::SequenceFrame& frame) const {
+  if (shown_frame() == frame) return false;
+  return uploaded_frame() == frame ? progressive_.owes_picture() : scene_.uploading_volumes();
+}
+
 render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const {
   render::PictureWish wish;
   wish.parameters = parameters(shot, met);
@@ -121,9 +133,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
     volume.source = nullptr;
     volume.frame.reset();
   }
-  for (const scene::Volume& volume : scene_.volumes()) {
-    if (volume.frame) wish.frame = volume.frame;
-  }
+  wish.frame = uploaded_frame();
   wish.content.data = scene_.data_revision();
   wish.content.instances = scene_.instances_revision();
   wish.content.model = scene_.model_revision();

@@ -79,9 +79,9 @@ class Context {
   /// Goes on with what a frame that draws will show.
   void denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown);
   /// Of a sequence, the frame that is drawn.
-  [[nodiscard]] std::optional<std::uint32_t> shown_frame() const { return progressive_.shown_frame(); }
-  /// Whether what was uploaded last, or is being uploaded, is still to be seen, and will be.
-  [[nodiscard]] bool owes_picture() const { return scene_.uploading() || progressive_.owes_picture(); }
+  [[nodiscard]] std::optional<scene::SequenceFrame> shown_frame() const { return progressive_.shown_frame(); }
+  /// Whether that frame, which was uploaded last, or is being uploaded, is still to be seen, and will be.
+  [[nodiscard]] bool owes(const scene::SequenceFrame& frame) const;
   /// What is known after the frame.
   void tell(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Whether the frame's failure is to be told: what does not build fails in each until a setting changes.
@@ -142,6 +142,8 @@ class Context {
     gl::Object depth;
   };
 
+  // Of what has been uploaded.
+  [[nodiscard]] std::optional<scene::SequenceFrame> uploaded_frame() const;
   // Whether there is a target of any size.
   [[nodiscard]] static bool draws(const Shot& shot, const Frame& frame);
   [[nodiscard]] render::Obstacles obstacles(const Shot& shot);

@@ -168,6 +168,7 @@ void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
   followed.listener = sequence->listen([this] { notify(); });
   followed.sequence = std::move(sequence);
   followed.settings = settings_at_once();
+  followed.id = ++last_followed_;
   followed_ = std::move(followed);
   follow_sequence();
   touch();
@@ -216,15 +217,15 @@ void Viewer::follow_sequence() {
 void Viewer::take_frame() {
   Followed& f = *followed_;
   // However fast frames come, one that was taken is seen.
-  if (gl_ && sampling_.preview && f.frame && (!f.is_rendered || gl_->owes_picture())) return;
+  if (gl_ && sampling_.preview && f.frame && (!f.is_rendered || gl_->owes(*f.frame))) return;
   f.take_due = false;
   auto ready = frames_.nearest();
   if (!ready) return;
   f.is_wanted = ready->wanted;
   volume_ = ready->built.volume;
-  if (ready->frame == f.frame && ready->built.source == built_.source) return;
+  if (f.frame && ready->frame == f.frame->number && ready->built.source == built_.source) return;
   built_ = std::move(ready->built);
-  f.frame = ready->frame;
+  f.frame = scene::SequenceFrame{ready->frame, f.id, ++last_taken_};
   f.is_rendered = false;
   if (!shown_.empty()) wishes_due_ = true;
   take_suggestion();
@@ -240,7 +241,9 @@ Viewer::SequenceStatus Viewer::sequence() {
   const Followed& f = followed();
   SequenceStatus status;
   status.asked = f.state.moment.frame();
-  if (gl_) status.drawn = gl_->shown_frame();
+  // What was there before may be another's.
+  if (const auto shown = gl_ ? gl_->shown_frame() : std::nullopt; shown && shown->sequence == f.id)
+    status.drawn = shown->number;
   status.frames = frames_.frames();
   status.density_scale = f.density_scale;
   return status;

@@ -336,12 +336,15 @@ class Viewer {
     bool wish_due = true;
     std::uint64_t shelved = 0;  // of frames_, when it was last looked at
     bool take_due = false;
-    std::optional<std::uint32_t> frame;  // that was taken last
-    bool is_wanted = false;              // that one is all that there is to come
-    bool is_rendered = false;            // by a frame, since
+    std::uint64_t id = 0;                       // of this following
+    std::optional<scene::SequenceFrame> frame;  // that was taken last
+    bool is_wanted = false;                     // that one is all that there is to come
+    bool is_rendered = false;                   // by a frame, since
   };
   [[nodiscard]] Followed& followed();
   std::optional<Followed> followed_;
+  std::uint64_t last_followed_ = 0;
+  std::uint64_t last_taken_ = 0;
 
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above

@@ -382,6 +382,50 @@ TEST_F(CSequence, PlaysEachFrameOnceItIsCached) {
   }
 }
 
+// On a device so slow that no picture is whole before the next wish.
+TEST_F(CSequence, PlaysOnWhileTheCameraMoves) {
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
+  auto navigation = make_desc<cumulet_navigation_desc>();
+  navigation.turntable_degrees_per_second = 90.0;
+  ASSERT_EQ(cumulet_set_navigation(viewer.get(), &navigation), CUMULET_OK);
+  auto playback = make_desc<cumulet_playback_desc>();
+  playback.repeat = CUMULET_REPEAT_LOOP;
+  ASSERT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  const HostTarget large(gl_, 1536, 1536);
+  auto frame = large.frame();
+  frame.target = CUMULET_TARGET_NONE;
+  frame.budget_ms = 0.0;
+  ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+  ASSERT_TRUE(is_cached(viewer.get()));
+  for (int i = 0; i < 2 * count; ++i) {
+    ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), i / 24.0), CUMULET_OK);
+    int calls = 0;
+    do {
+      ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
+    } while (info_of(viewer.get()).drawn_frame != std::uint32_t(i % count) && ++calls < 2000);
+    ASSERT_LT(calls, 2000) << i;
+  }
+}
+
+TEST_F(CSequence, WhatAnotherShowsIsNoneOfItsFrames) {
+  const ViewerPtr viewer = make();
+  const SequenceRef all = make_sequence(clip_.paths());
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), all.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_sequence_set_frame(all.get(), 5.0), CUMULET_OK);
+  picture(viewer.get());
+  ASSERT_EQ(info_of(viewer.get()).drawn_frame, 5U);
+  const SequenceRef two = make_sequence({clip_.path(1), clip_.path(2)});
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), two.get()), CUMULET_OK);
+  EXPECT_EQ(info_of(viewer.get()).is_drawn, 0);
+  picture(viewer.get());
+  EXPECT_EQ(info_of(viewer.get()).is_drawn, 1);
+  EXPECT_EQ(info_of(viewer.get()).drawn_frame, 0U);
+}
+
 TEST_F(CSequence, MovesInAnyThread) {
   clip_.corrupt(5);
   const SequenceRef sequence = make_sequence(clip_.paths());
