@@ -62,6 +62,7 @@ void FrameShelf::clear() {
     const std::scoped_lock lock(mutex_);
     worker_.cancel();
     wish_.reset();
+    judged_.reset();
     old = std::exchange(shelf_, {});
   }
   changed_.notify_all();
@@ -135,10 +136,16 @@ bool FrameShelf::busy() const {
 
 Worker::Status FrameShelf::status() const {
   const std::scoped_lock lock(mutex_);
+  const Worker::Status work = worker_.status();
   Worker::Status status;
-  if (waits()) status = worker_.status();
+  if (waits()) status = work;
   status.failure.reset();
-  if (wish_ && is_judged() && !first()) status.failure = shelf_[wish_->order.front()].failure;
+  if (!wish_) return status;
+  if (is_judged() && !first()) {
+    status.failure = shelf_[wish_->order.front()].failure;
+  } else if (work.failure && work.failure->code() != ErrorCode::cancelled) {
+    status.failure = work.failure;  // of no file's: what there was to build is not
+  }
   return status;
 }
 
@@ -161,7 +168,10 @@ void FrameShelf::tell() {
 // ---- under the lock ----
 
 void FrameShelf::start() {
-  if (is_judged() && !next()) return;
+  if (is_judged() && !next()) {
+    worker_.forget_failure();
+    return;
+  }
   worker_.post({what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }});
 }
 
@@ -295,9 +305,10 @@ Log FrameShelf::log_of(const std::string& path) {
   });
 }
 
-void FrameShelf::fail(const Which& which, const Error& failure) {
+void FrameShelf::fail(const Which& which, const Error& failure, const Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
+    progress.check();  // who wants it anew asks under the lock, too
     if (!is_wished(which.files)) return;
     shelf_[which.frame].failure = failure;
     ++revision_;
@@ -310,6 +321,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
   const auto end = [&](Judging how) {
     const std::scoped_lock lock(mutex_);
     if (!is_wished(files)) return;
+    if (how != Judging::due) progress.check();
     judging_ = how;
     if (how != Judging::done) return;
     if (files->shown.suggested_density_scale && judged.density_scale && wish_->settings)
@@ -336,7 +348,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
       } catch (...) {
         const Error failure = caught(what);
         if (failure.code() == ErrorCode::cancelled) throw Error(failure);
-        fail({files, frame}, failure);
+        fail({files, frame}, failure, progress);
       }
     }
     if (judged.facts) judged.density_scale = judged.facts->coarse.suggest_density_scale();
@@ -376,10 +388,11 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, Progre
   }
   const bool cancelled = failure && failure->code() == ErrorCode::cancelled;
   // First: nobody begins it again in between.
-  if (failure && !cancelled) fail(which, *failure);
+  if (failure && !cancelled) fail(which, *failure, progress);
   std::vector<Shelved> old;
   {
     const std::scoped_lock lock(mutex_);
+    if (!failure) progress.check();
     if (!failure && is_wished(which.files)) {
       old.push_back(std::exchange(shelf_[which.frame], std::move(made)));
       ++revision_;

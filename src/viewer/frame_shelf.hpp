@@ -75,7 +75,7 @@ class FrameShelf {
 
   /// Whether the first frame that is wished for is under way.
   [[nodiscard]] bool busy() const;
-  /// Of the first frame; failed: no frame can be shown.
+  /// Of the first frame; failed: no frame can be shown, or no more are made.
   [[nodiscard]] Worker::Status status() const;
   /// Until the first frame is there, or none can be. Returns whether it is so.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
@@ -100,7 +100,7 @@ class FrameShelf {
   void build(const Which& which, const BuildSettings& settings, Progress& progress);
   // That tells once a sequence what it is told of each file.
   [[nodiscard]] Log log_of(const std::string& path);
-  void fail(const Which& which, const Error& failure);
+  void fail(const Which& which, const Error& failure, const Progress& progress);
   void tell();
 
   // All of these under the lock.

@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -241,6 +242,45 @@ TEST_F(Shelf, OtherFilesLeaveNothing) {
   EXPECT_FALSE(shelf_.nearest());
   EXPECT_TRUE(shelf_.wait(std::nullopt));
   EXPECT_TRUE(shelf_.frames().frames.empty());
+  EXPECT_FALSE(shelf_.take_judged());
+}
+
+// As by a host that mends the file as soon as it is told: what was found before does not count.
+TEST_F(Shelf, ReadsAnewWhatIsMendedWhileItIsJudged) {
+  const Clip other(1);
+  other.remove(0);
+  std::unique_ptr<FrameShelf> shelf;
+  std::atomic<int> mended = 0;
+  const auto mend = [&](cumulet::LogLevel level, const char* /*text*/) {
+    if (level != cumulet::LogLevel::warning || mended++ > 0) return;
+    cumulet::test::write_frame(other.path(0), {cumulet::test::clip_ball(0)});
+    shelf->rebuild();
+  };
+  shelf = std::make_unique<FrameShelf>(cumulet::Log(mend), [] {});
+  const auto files = std::make_shared<const FrameFiles>(FrameFiles{other.paths(), {}});
+  shelf->wish({files, {0}, BuildSettings{}, plenty});
+  ASSERT_TRUE(comes([&] { return !shelf->busy() && mended > 0; }));
+  EXPECT_FALSE(shelf->status().failure);
+  ASSERT_TRUE(shelf->nearest());
+  EXPECT_TRUE(shelf->nearest()->wanted);
+}
+
+TEST_F(Shelf, TellsWhyItStopped) {
+  clip_.corrupt(3);
+  std::atomic<bool> throws = true;
+  FrameShelf shelf(cumulet::Log([&](cumulet::LogLevel, const char*) {
+                     if (throws) throw std::runtime_error("no room");
+                   }),
+                   [] {});
+  shelf.wish({files(), from(3), BuildSettings{}, plenty});
+  ASSERT_TRUE(comes([&] { return shelf.status().failure.has_value(); }));
+  EXPECT_STREQ(shelf.status().failure->what(), "internal error: no room");
+  EXPECT_TRUE(shelf.wait(std::nullopt));
+  throws = false;
+  shelf.rebuild();
+  ASSERT_TRUE(shelf.wait(std::nullopt));
+  EXPECT_FALSE(shelf.status().failure);
+  EXPECT_TRUE(shelf.nearest());
 }
 
 TEST_F(Shelf, StopsUntilTheNextWish) {
