@@ -95,6 +95,8 @@ class Builder {
   void cancel_loads();
   /// Ends all, and nothing is known of it: neither what was read, nor how it ended.
   void forget();
+  /// How the last job ended is old news.
+  void forget_failure() { worker_.forget_failure(); }
 
   /// The newest volume that was read, once.
   std::optional<LoadedVolume> take_loaded();

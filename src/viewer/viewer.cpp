@@ -110,6 +110,10 @@ void Viewer::sync() {
     take_volume(std::move(loaded->volume));
     suggested_density_scale_ = loaded->density_scale;
     if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
+    if (followed_) {
+      leave_sequence();
+      take_medium();
+    }
   }
   if (auto built = builder_.take_built()) {
     // A rebuild keeps what the load took.
@@ -271,16 +275,19 @@ BuildSettings Viewer::settings_for_view() const {
 bool Viewer::built_for_another() const { return grid_.camera_adaptive && view_ && built_for_ != build_view(); }
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
-  if (builder_.configure_load(settings_at_once())) return;
+  const bool loads = builder_.configure_load(settings_at_once());
+  if (loads && !followed_) return;
   sync();
   const auto settings = settings_at_once();
   if (followed_) {
+    if (!loads) builder_.forget_failure();  // of a load that was to end the sequence
     // Each frame may have what the one that is shown has not.
     built_for_.reset();
     followed_->settings = settings;
     followed_->wish_due = true;
     return;
   }
+  if (loads) return;
   if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
   built_for_.reset();
   if (volume_ && settings) builder_.build(volume_, *settings);
@@ -288,10 +295,14 @@ void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
 
 void Viewer::load_volume(const VolumeFile& file) {
   sync();
-  leave_sequence();
-  suggested_density_scale_.reset();
+  const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
   take_medium();
   builder_.load(file, settings_at_once());
+  // A sequence goes on until the volume is there.
+  if (followed_) {
+    suggested_density_scale_ = suggested;
+    take_medium();
+  }
   touch();
 }
 

@@ -328,6 +328,51 @@ TEST_F(CSequence, VolumesAndSequencesTakeTurns) {
   EXPECT_EQ(cumulet_get_bounds(viewer.get(), box, box + 3), CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
+TEST_F(CSequence, GoesOnWhereAVolumeCannotBeRead) {
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  picture(viewer.get());
+  ASSERT_EQ(cumulet_load_volume(viewer.get(), "missing.vdb", nullptr), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_FILE);
+  EXPECT_EQ(std::string(cumulet_last_error(viewer.get())).rfind("missing.vdb: ", 0), 0U);
+  EXPECT_EQ(info_of(viewer.get()).frames, std::uint32_t(count));
+  ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 4.0), CUMULET_OK);
+  auto frame = target_.frame();
+  int calls = 0;
+  while (info_of(viewer.get()).drawn_frame != 4U && ++calls < 2000)
+    ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+  EXPECT_LT(calls, 2000);
+  // Another setting is of all frames, and makes the failure old news.
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.threshold = 0.02;
+  grid.cells = CUMULET_CELLS_CONSTANT;
+  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+  const Picture found = picture(viewer.get());
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  const ViewerPtr single = make();
+  ASSERT_EQ(cumulet_set_grid(single.get(), &grid), CUMULET_OK);
+  ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(4).c_str(), nullptr), CUMULET_OK);
+  EXPECT_EQ(difference(found, picture(single.get())), "");
+  // Settings that change while it is read are those of both.
+  ASSERT_EQ(cumulet_load_volume(viewer.get(), "missing.vdb", nullptr), CUMULET_OK);
+  grid.threshold = 0.05;
+  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_grid(single.get(), &grid), CUMULET_OK);
+  ASSERT_TRUE(is_cached(viewer.get()));
+  ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 2.0), CUMULET_OK);
+  ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(2).c_str(), nullptr), CUMULET_OK);
+  calls = 0;
+  while (info_of(viewer.get()).drawn_frame != 2U && ++calls < 2000)
+    ASSERT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+  auto stats = make_desc<cumulet_stats>();
+  auto wanted = make_desc<cumulet_stats>();
+  ASSERT_EQ(cumulet_wait(single.get(), -1.0), CUMULET_OK);
+  ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+  ASSERT_EQ(cumulet_get_stats(single.get(), &wanted), CUMULET_OK);
+  EXPECT_EQ(stats.cells, wanted.cells);
+}
+
 TEST_F(CSequence, OtherSettingsAreThoseOfAllFrames) {
   const SequenceRef sequence = make_sequence(clip_.paths());
   const ViewerPtr viewer = make();

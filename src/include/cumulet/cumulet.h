@@ -37,7 +37,8 @@
  * library, but for the two exceptions and to retain and release handles: any other call from inside one, for whatever
  * viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while
  * [GL] calls of other viewers with the same programs wait for their turn: take no lock in them that is held around a
- * [GL] call.
+ * [GL] call. Calls that change a camera, an instance or a sequence run the update callbacks of the viewers that show it
+ * while other calls for the same handle wait for them: nor take a lock that is held around calls for such handles.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -699,8 +700,9 @@ CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_vo
 CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count);
 /*
  * Shows, in place of a volume, the frame at which the sequence stands, from now on and as it moves; retains it. What
- * was shown before stays until a frame is there. NULL: no sequence, and if there was one, nothing. cumulet_set_volume,
- * cumulet_load_volume and cumulet_load_volume_file end it, too.
+ * was shown before stays until a frame is there. NULL: no sequence, and if there was one, nothing. cumulet_set_volume
+ * ends it, too, and so does what cumulet_load_volume and cumulet_load_volume_file read, once it is there: if that fails
+ * the sequence goes on.
  *
  * Frames are read and built on a worker of the viewer's, ahead in the direction of play and as many as fit
  * memory_bytes, and are uploaded by cumulet_render within its budget, which waits for none: it shows the nearest frame
@@ -713,7 +715,8 @@ CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, con
  *
  * A file that is missing or cannot be read is told by one warning in the log and by cumulet_get_sequence_frame, and is
  * played over: the nearest earlier frame that can be shown stands in for it, or where there is none the nearest later.
- * cumulet_rebuild reads all files anew. With none that can be shown the load has failed, as by cumulet_load_volume.
+ * cumulet_rebuild reads all files anew; what is one for all stays as the first reading found it. With none that can be
+ * shown the load has failed, as by cumulet_load_volume.
  *
  * cumulet_wait waits for the frame at which the sequence stands, not for those ahead; CUMULET_RENDER_LOADING and
  * cumulet_get_progress are about the same. cumulet_cancel stops reading ahead until the sequence moves to another frame
