@@ -377,7 +377,7 @@ void App::execute(const Command& command) {
       play_row();
       break;
     case Action::play:
-      if (model_.status.play) model_.playing = !model_.playing;
+      play_or_pause();
       break;
     case Action::step:
       step(command.value);
@@ -422,6 +422,15 @@ void App::step(int frames) {
   model_.playing = false;
   const auto last = static_cast<std::int64_t>(play->row.count()) - 1;
   go_to(static_cast<std::uint32_t>(std::clamp<std::int64_t>(std::int64_t{play->info.asked_frame} + frames, 0, last)));
+}
+
+void App::play_or_pause() {
+  const auto& play = model_.status.play;
+  if (!play) return;
+  model_.playing = !model_.playing;
+  const cumulet_playback_desc playback = playback_of(model_.scene.sequence, play->row);
+  const bool at_end = play->info.asked_frame >= playback.first_frame + playback.frame_count - 1;
+  if (model_.playing && playback.repeat == CUMULET_REPEAT_HOLD && at_end) go_to(playback.first_frame);
 }
 
 void App::play_row() {
@@ -503,7 +512,10 @@ void App::save_scene(const std::string& path) {
   // The same framing in cumulet-render.
   scene.width = static_cast<std::uint32_t>(std::clamp(viewport_.width, 1.0, 16384.0));
   scene.height = static_cast<std::uint32_t>(std::clamp(viewport_.height, 1.0, 16384.0));
-  if (model_.status.play) scene.sequence.frame = model_.status.play->frame();
+  if (model_.status.play) {
+    scene.sequence.frame = model_.status.play->frame();
+    if (!scene.surfaces.empty()) scene.surface.time = std::max(model_.clock, 0.0);
+  }
   try {
     demo::save_scene(scene, path);
     model_.scene_path = path;

@@ -54,6 +54,8 @@ class App {
   /// To a frame, by its place in the row.
   void go_to(std::uint32_t index);
   void play_row();
+  /// Or pauses; anew from the beginning at an end that is held.
+  void play_or_pause();
   void step(int frames);
   /// Moves the clock, and what goes by it.
   void advance_clock(double seconds);

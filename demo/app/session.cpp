@@ -375,16 +375,16 @@ void Session::set_camera() {
 bool Session::begin_volume() {
   cumulet_volume_file_desc file = volume_file(scene_);
   file.suggested_density_scale = suggest_ ? 1 : 0;
+  std::optional<FrameRow> row;
   try {
-    row_ = FrameRow::of_name(scene_.volume);
+    row = FrameRow::of_name(scene_.volume);
   } catch (const std::exception& error) {
     tell(true, error.what());
     return false;
   }
-  sequence_.reset();
-  if (!row_) return check(cumulet_load_volume_file(viewer_.get(), &file));
+  if (!row) return check(cumulet_load_volume_file(viewer_.get(), &file));
   std::vector<std::string> names;
-  for (std::uint32_t i = 0; i < row_->count(); ++i) names.push_back(row_->file(i));
+  for (std::uint32_t i = 0; i < row->count(); ++i) names.push_back(row->file(i));
   std::vector<const char*> paths;
   for (const std::string& name : names) paths.push_back(name.c_str());
   cumulet_sequence_desc desc{};
@@ -398,12 +398,31 @@ bool Session::begin_volume() {
     tell(true, error.data());
     return false;
   }
-  sequence_ = {made, cumulet_sequence_release};
-  const cumulet_playback_desc playback = playback_of(scene_.sequence, *row_);
-  const Frame frame = scene_.sequence.frame.value_or(row_->number(playback.first_frame));
+  std::shared_ptr<cumulet_sequence> sequence(made, cumulet_sequence_release);
+  const cumulet_playback_desc playback = playback_of(scene_.sequence, *row);
+  const Frame frame = scene_.sequence.frame.value_or(row->number(playback.first_frame));
   static_cast<void>(cumulet_sequence_set_playback(made, &playback));
-  static_cast<void>(cumulet_sequence_set_frame(made, row_->index_of(frame)));
-  return check(cumulet_set_sequence(viewer_.get(), made));
+  static_cast<void>(cumulet_sequence_set_frame(made, row->index_of(frame)));
+  VolumePtr volume = sequence_ || !known_->visible ? nullptr : shown();
+  if (!check(cumulet_set_sequence(viewer_.get(), made))) return false;
+  if (!before_) before_ = Before{sequence_, row_, std::move(volume)};
+  sequence_ = std::move(sequence);
+  row_ = std::move(row);
+  return true;
+}
+
+void Session::restore_volume() {
+  set_volume(scene_, shown_volume_);
+  set_volume(*known_, shown_volume_);
+  fit_.reset();
+  if (!before_) return;
+  Before before = *std::exchange(before_, std::nullopt);
+  sequence_ = std::move(before.sequence);
+  row_ = std::move(before.row);
+  if (before.volume)
+    check(cumulet_set_volume(viewer_.get(), before.volume.get()));
+  else
+    check(cumulet_set_sequence(viewer_.get(), known_->visible ? sequence_.get() : nullptr));
 }
 
 void Session::follow_playback() {
@@ -433,6 +452,7 @@ void Session::follow_volume() {
     shown_volume_ = {};
     hidden_.reset();
     sequence_.reset();
+    before_.reset();
     grids_.clear();
     row_.reset();
     status_.neighbours.reset();
@@ -444,9 +464,7 @@ void Session::follow_volume() {
   waiting_ = begin_volume();
   if (waiting_) return;
   files_.push_back({scene_.volume, Answer::File::Fate::failed});
-  fit_.reset();
-  set_volume(scene_, shown_volume_);
-  set_volume(*known_, shown_volume_);
+  restore_volume();
 }
 
 cumulet_frame_desc Session::frame() const {
@@ -623,10 +641,15 @@ Answer Session::answer() {
 void Session::finish_load() {
   waiting_ = false;
   if (load_failed(status_.work.volume_status, status_.work.volume_message, scene_.volume)) {
-    set_volume(scene_, shown_volume_);
-    set_volume(*known_, shown_volume_);
-    fit_.reset();
+    restore_volume();
     return;
+  }
+  before_.reset();
+  cumulet_sequence_info playing{};
+  playing.struct_size = sizeof playing;
+  if (cumulet_get_sequence_info(viewer_.get(), &playing, nullptr, 0) != CUMULET_OK) {
+    sequence_.reset();
+    row_.reset();
   }
   shown_volume_ = volume_of(scene_);
   hidden_.reset();

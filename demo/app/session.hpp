@@ -152,6 +152,8 @@ class Session {
   void follow_volume();
   // Begins to read it, be it a file's or a sequence's.
   bool begin_volume();
+  // After a load that failed: as it was before.
+  void restore_volume();
   void follow_playback();
   void see_sequence();
   // Hides the volume, or shows it again.
@@ -232,6 +234,12 @@ class Session {
   VolumePtr hidden_;                            // the viewer's volume, while it is not to be seen
   std::shared_ptr<cumulet_sequence> sequence_;  // in its place
   std::optional<FrameRow> row_;                 // of that
+  struct Before {
+    std::shared_ptr<cumulet_sequence> sequence;
+    std::optional<FrameRow> row;
+    VolumePtr volume;  // where there was no sequence
+  };
+  std::optional<Before> before_;  // what a sequence stands in place of, until the load has ended
   Instances others_;
   struct Opening {
     VolumeFile file;
