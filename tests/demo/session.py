@@ -263,6 +263,24 @@ def test_timeline(s):
     run = subprocess.run([s.renderer, "--scene", "played.json", "--frames", "5,7", "--spp", "4", "--size", "64x48", "-o",
                           "other.#.png"], cwd=s.out, env=s.environment, capture_output=True, text=True, check=False)
     assert run.returncode == 0 and (s.out / "other.5.png").exists() and (s.out / "other.7.png").exists(), run.stderr
+    # What cannot be read leaves what plays; at an end that is held it plays from the beginning.
+    (s.out / "cut.vdb").write_bytes(b"no volume")
+    for number in (1, 2):
+        (s.out / f"cut_{number}.vdb").write_bytes(b"no volume")
+    mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
+    s.play("kept", [*there, 'drop "cut.vdb"', *there, 'report "cut.json"', 'drop "cut_#.vdb"', *there, 'report "all.json"',
+                    *(["key .", "frames 3"] * 5), *there,
+                    "key ctrl+s", "frames 2", "key ctrl+a", 'text "beside.json"', "key enter", "frames 3",
+                    "key space", "frames 3", 'report "begun.json"'],
+           "fire_##.vdb", "--gltf", str(mountains), "--spp", "1", size=size)
+    for name, cause in (("cut", "cut.vdb"), ("all", "cut_1.vdb")):
+        report = s.report(name)
+        assert report["sequence"]["count"] == 6 and report["sequence"]["drawn"] == 3, report["sequence"]
+        assert any(m["error"] and cause in m["text"] for m in report["messages"]), report["messages"]
+    begun = s.report("begun")["sequence"]
+    assert begun["playing"] and begun["frame"] < 8, begun
+    beside = json.loads((s.out / "beside.json").read_text())
+    assert beside["sequence"]["frame"] == 8 and abs(beside["models"][0]["time"] - 5 / 24) < 1e-6, beside
 
 
 def test_environment(s):
