@@ -125,7 +125,9 @@ struct SurfaceSettings {
   float indirect_roughness = 0.0F;
 
   static SurfaceSettings of(const cumulet_surface_settings_desc& d) {
-    return {{d.time, d.animation, d.double_sided == 1, d.variant}, static_cast<SurfaceLight>(d.light), d.indirect_roughness};
+    return {{d.time, d.animation, d.double_sided == 1, d.variant},
+            static_cast<SurfaceLight>(d.light),
+            d.indirect_roughness};
   }
 };
 
