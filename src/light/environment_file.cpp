@@ -1,5 +1,6 @@
 #include "light/environment_file.hpp"
 
+#include <IlmThreadPool.h>
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -30,6 +31,13 @@
 namespace cumulet::light {
 
 namespace {
+
+// OpenEXR's own statics, made when the library is loaded: at exit they then go after a decode that was left
+// (base/apart), which is waited for. Made with the first file they would go before it.
+[[maybe_unused]] const bool open_exr_is_made = []() noexcept {
+  Imf::staticInitialize();
+  return IlmThread::ThreadPool::globalThreadPool().numThreads() >= 0;
+}();
 
 // Of a load's progress.
 constexpr double decoded_from = 0.2;
