@@ -105,6 +105,14 @@ class App {
   unsigned viewport_buttons_ = 0;  // pressed in the picture, a bit each
   bool held_ = false;              // a change is still going on
   bool quit_ = false;
+  bool reload_ = false;  // the volume, though it is the same
+  bool fit_next_ = false;
+  bool suggest_next_ = false;
+  bool pick_next_ = false;  // a file that was opened without a grid's name is there next
+  bool answer_waits_ = false;
+  bool camera_moved_ = false;
+  bool starting_ = true;  // until what the command line named is there, or is not
+  bool owes_ = false;     // a frame of what changed, as one that would have shown it was not drawn
   double now_ = 0.0;
   double last_event_ = 0.0;
   double last_motion_ = -1.0;
@@ -116,28 +124,20 @@ class App {
   std::optional<cumulet_medium_desc> look_;  // that a volume got, nothing being said of its medium
   std::vector<ViewerInput> inputs_;
   std::vector<Request> requests_;
-  bool reload_ = false;  // the volume, though it is the same
-  bool fit_next_ = false;
-  bool suggest_next_ = false;
-  bool pick_next_ = false;  // a file that was opened without a grid's name is there next
   std::uint64_t answered_ = 0;
   std::uint64_t drawn_ = 0;  // the newest that a picture was drawn for
   // The oldest change that no picture has followed yet.
   std::optional<double> changed_at_;
   std::uint64_t changed_number_ = 0;
-  bool answer_waits_ = false;
   std::uint64_t answered_volume_ = 0;  // edits that the last answer knew of
   std::uint64_t answered_surfaces_ = 0;
   std::uint64_t answered_environment_ = 0;
-  bool camera_moved_ = false;
   const cumulet_sequence* known_sequence_ = nullptr;  // that the clock is of
-  bool starting_ = true;                              // until what the command line named is there, or is not
   std::string opening_scene_;                         // a scene file whose parts are still to come
   std::string opening_environment_;
   std::uint64_t pictures_ = 0;  // that came to be shown
   std::uint64_t drawn_pictures_ = 0;
   double drawn_at_ = -1.0;
-  bool owes_ = false;  // a frame of what changed, as one that would have shown it was not drawn
   FrameTimes frame_times_;
   std::string last_state_;  // the state line of the frame before this
   std::uint64_t frames_ = 0;

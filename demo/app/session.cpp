@@ -384,8 +384,10 @@ bool Session::begin_volume() {
   }
   if (!row) return check(cumulet_load_volume_file(viewer_.get(), &file));
   std::vector<std::string> names;
+  names.reserve(row->count());
   for (std::uint32_t i = 0; i < row->count(); ++i) names.push_back(row->file(i));
   std::vector<const char*> paths;
+  paths.reserve(names.size());
   for (const std::string& name : names) paths.push_back(name.c_str());
   cumulet_sequence_desc desc{};
   desc.struct_size = sizeof desc;
