@@ -2,12 +2,10 @@
 // The path tracer as one kernel, where paths meet no triangles. One lane a pixel of some blocks of the tile: loads its
 // path, runs it for a bounded number of rounds, stores it.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
-// variants: - or CM_LAYERS=1
-// variants: - or CM_AOVS=1
+// variants: - or CM_LAYERS=1 or CM_AOVS=1 or CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 or CM_LAMPS=1 CM_LAYERS=1 or CM_LAMPS=1 CM_AOVS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
-// variants: - or CM_LAMPS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

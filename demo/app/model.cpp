@@ -164,7 +164,11 @@ void tell(Model& model, bool error, const std::string& text, double now) {
   constexpr std::size_t most = 3;
   const std::string line = one_line(text);
   std::erase_if(model.messages, [&](const Message& message) { return message.text == line; });
-  if (model.messages.size() >= most) model.messages.erase(model.messages.begin());
+  if (model.messages.size() >= most) {
+    // What failed stays, while there is something else to leave out.
+    const auto notice = std::ranges::find(model.messages, false, &Message::error);
+    model.messages.erase(notice != model.messages.end() ? notice : model.messages.begin());
+  }
   model.messages.push_back({error, line, now + seconds});
 }
 

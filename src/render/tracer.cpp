@@ -331,8 +331,10 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.several_ = obstacles.instances != nullptr;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
-  // What the volume alone has is told by what a path first met, and such light may lie before a surface.
-  picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_;
+  // What the volume alone has is told by what a path first met, and such light may lie before a surface; and a layer's
+  // colour waits in the place of such a look's light.
+  picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ &&
+                         (picture.traced_ > 0 || picture.layered_ == Layered::no);
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
 }
 

@@ -357,6 +357,12 @@ void Caller::call_all() {
   cumulet_programs* new_programs = nullptr;
   cumulet_instance* new_instance = nullptr;
   auto instance = make_desc<cumulet_instance_desc>();
+  cumulet_sequence* new_sequence = nullptr;
+  const auto sequence = make_desc<cumulet_sequence_desc>();
+  const auto playback = make_desc<cumulet_playback_desc>();
+  auto sequence_info = make_desc<cumulet_sequence_info>();
+  auto variant = make_desc<cumulet_variant_info>();
+  std::uint32_t at = 0;
   auto programs = make_desc<cumulet_programs_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
   std::array<float, 3> rgb{};
@@ -370,7 +376,8 @@ void Caller::call_all() {
                 "cumulet_volume_release", "cumulet_surfaces_retain", "cumulet_surfaces_release",
                 "cumulet_programs_retain", "cumulet_programs_release", "cumulet_camera_release",
                 "cumulet_environment_retain", "cumulet_environment_release", "cumulet_instance_retain",
-                "cumulet_instance_release", "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
+                "cumulet_instance_release", "cumulet_sequence_retain", "cumulet_sequence_release",
+                "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
@@ -378,6 +385,7 @@ void Caller::call_all() {
   cumulet_environment_release(cumulet_environment_retain(nullptr));
   cumulet_inspection_release(nullptr);
   cumulet_instance_release(cumulet_instance_retain(nullptr));
+  cumulet_sequence_release(cumulet_sequence_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
   // Refused without a status.
   cumulet_destroy(viewer);
@@ -408,6 +416,13 @@ void Caller::call_all() {
   CALL(cumulet_surfaces_from_triangles, &triangles, &new_surfaces, nullptr, 0);
   CALL(cumulet_surfaces_get_info, surfaces, &surfaces_info);
   CALL(cumulet_surfaces_get_animation, surfaces, 0, &animation);
+  CALL(cumulet_surfaces_get_variant, surfaces, 0, &variant);
+  CALL(cumulet_sequence_create, &sequence, &new_sequence, nullptr, 0);
+  CALL(cumulet_sequence_set_playback, new_sequence, &playback);
+  CALL(cumulet_sequence_set_time, new_sequence, 0.0);
+  CALL(cumulet_sequence_set_frame, new_sequence, 0.0);
+  CALL(cumulet_sequence_get_frame_at, new_sequence, 0.0, &at);
+  CALL(cumulet_sequence_get_time_of, new_sequence, 0, &number);
   CALL(cumulet_instance_create, &instance, &new_instance, nullptr, 0);
   CALL(cumulet_instance_set, new_instance, &instance);
   CALL(cumulet_instance_set_to_world, new_instance, m.data());
@@ -435,6 +450,9 @@ void Caller::call_all() {
     CALL(cumulet_get_volume, v, &new_volume);
     CALL(cumulet_add_instance, v, new_instance);
     CALL(cumulet_remove_instance, v, new_instance);
+    CALL(cumulet_set_sequence, v, nullptr);
+    CALL(cumulet_get_sequence_info, v, &sequence_info, nullptr, 0);
+    CALL(cumulet_get_sequence_frame, v, 0, nullptr, 0);
     CALL(cumulet_load_surfaces, v, "none.glb");
     CALL(cumulet_set_surfaces, v, nullptr);
     CALL(cumulet_get_surfaces, v, &new_surfaces);
@@ -474,7 +492,7 @@ void Caller::call_all() {
     CALL(cumulet_get_stats, v, &stats);
   }
   if (new_viewer != nullptr || new_camera != nullptr || new_volume != nullptr || new_surfaces != nullptr ||
-      new_environment != nullptr || new_inspection != nullptr || new_programs != nullptr) {
+      new_environment != nullptr || new_inspection != nullptr || new_programs != nullptr || new_sequence != nullptr) {
     wrong.push_back("a refused call gave a handle");
   }
 }
