@@ -89,6 +89,7 @@ const int CM_IMAGE_VELOCITY = 6;
 const int CM_IMAGE_MEANS = 0;       // resolve.comp
 const int CM_IMAGE_BACKGROUND_MEANS = 1;
 const int CM_IMAGE_HOST_DEPTH = 0;  // host_depth.comp
+const int CM_IMAGE_TRANSMITTANCE_MAP = 0;  // transmittance.comp
 const int CM_IMAGE_DENOISED = 0;    // denoise_convolution.comp
 const int CM_IMAGE_GUIDE_COLOUR = 0;  // denoise_guides.comp
 const int CM_IMAGE_GUIDE_ALBEDO = 1;

@@ -4,6 +4,11 @@
 #ifndef CM_WALK_GLSL
 #define CM_WALK_GLSL
 
+// Which instances a ray comes to: what cameras see, if the includer does not say otherwise.
+#ifndef CM_WALK_FLAGS
+#define CM_WALK_FLAGS CM_INSTANCE_SEEN
+#endif
+
 // That a ray may be in at once. With more of them at one place those that it enters last are taken up when others end.
 #if CM_INSTANCES
 #define CM_MOST_FRONTS 4
@@ -60,7 +65,7 @@ float cm_front_extinction(CmFront front, float t) {
 // The volume that comes next.
 void cm_walk_seek(inout CmWalk walk) {
 #if CM_INSTANCES
-  if (!cm_next_instance(walk.o, walk.d, walk.t_end, CM_INSTANCE_SEEN, walk.entry, walk.volume)) walk.entry = 3.0e38;
+  if (!cm_next_instance(walk.o, walk.d, walk.t_end, CM_WALK_FLAGS, walk.entry, walk.volume)) walk.entry = 3.0e38;
 #else
   walk.entry = 3.0e38;
 #endif

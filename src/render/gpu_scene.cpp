@@ -201,6 +201,20 @@ light::Lit GpuScene::ball_of(const scene::Volume& volume) const {
           0.5 * glm::length(glm::dmat3(to_world) * glm::dvec3(grid.box_max - grid.box_min))};
 }
 
+std::vector<glm::dvec3> GpuScene::corners() const {
+  std::vector<glm::dvec3> corners;
+  corners.reserve(8 * present_.size());
+  for (const scene::Volume& volume : present_) {
+    const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
+    const core::CmGrid& grid = *data_->grid(*volume.source);
+    for (unsigned i = 0; i < 8; ++i) {
+      const glm::bvec3 high((i & 1U) != 0, (i & 2U) != 0, (i & 4U) != 0);
+      corners.emplace_back(to_world * glm::dvec4(glm::mix(grid.box_min, grid.box_max, high), 1.0));
+    }
+  }
+  return corners;
+}
+
 double GpuScene::optical_depth() const {
   const double radius = lit()[0].radius;
   double depth = 0.0;

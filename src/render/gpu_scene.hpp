@@ -61,6 +61,9 @@ class GpuScene {
   /// Of surfaces, of what draws them, and of what is kept for more.
   [[nodiscard]] std::uint64_t other_bytes() const;
 
+  /// Eight of the box of each volume that is here, in the world.
+  [[nodiscard]] std::vector<glm::dvec3> corners() const;
+
   /// As the snapshot has it, of the environment that is here.
   [[nodiscard]] light::Surroundings surroundings(const scene::Snapshot& snapshot) const;
   /// The snapshot's, and as their sky the mean of the environment that is there, or is to be.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <thread>
 #include <utility>
 
 #include "base/milliseconds.hpp"
@@ -276,6 +277,44 @@ double Flights::expected_ms() const {
   double sum = 0.0;
   for (const Flight& flight : flying_) sum += flight.what.most_ms;
   return likely_ * sum;
+}
+
+void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
+
+void send_rows(Flights& flights, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size, std::uint32_t& row,
+               Clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
+               const std::function<void()>& collect) {
+  const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
+  const auto slots = [&](std::uint32_t rows) { return double(rows) * size.x / lanes_a_slot; };
+  bool sent = false;
+  while (row < size.y) {
+    const double left = part_of_rest * milliseconds_until(deadline) - flights.expected_ms();
+    const bool anyway = !sent && flights.empty();
+    const double most_ms = std::clamp(left, anyway ? least_ms : 0.0, aim);
+    const auto fits = [&](std::uint32_t rows) {
+      const auto ms = cost->most(slots(rows));
+      return ms && *ms <= most_ms;
+    };
+    std::uint32_t height = 8;
+    while (height < size.y && fits(2 * height)) height *= 2;
+    if (!flights.full() && (anyway || fits(height) || !cost->most(1.0))) {
+      height = std::min(height, size.y - row);
+      Dispatched what;
+      what.slots = slots(height);
+      what.cost = cost;
+      what.most_ms = cost->most(what.slots).value_or(0.0);
+      flights.begin(Flights::Kind::dispatch);
+      send({row, row + height});
+      flights.end(std::move(what), 0, 0);
+      row += height;
+      sent = true;
+    } else if (flights.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) {
+      break;
+    } else {
+      pass_time();
+    }
+    collect();
+  }
 }
 
 }  // namespace cumulet::render

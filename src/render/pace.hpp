@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
@@ -87,6 +88,10 @@ struct Dispatched {
 constexpr double lanes_a_slot = 8.0;
 /// What a frame may take of the device whatever its budget, so that there is progress.
 constexpr double least_ms = 1.0;
+/// What a dispatch may take at most: well under any driver's watchdog, well over its own cost.
+constexpr double dispatch_ms = 500.0;
+/// Of the time left, that a dispatch may likely take.
+constexpr double part_of_rest = 0.9;
 
 /// What to dispatch of a tile's blocks, from that one on: as many as are worth a dispatch of aim_ms, and as many rounds
 /// of them, but no more than most_rounds. Nothing if it is likely to take longer.
@@ -190,5 +195,15 @@ class Flights {
   bool timers_ = true;   // tell the truth
   double likely_ = 0.5;  // of what a dispatch takes at most
 };
+
+/// While there is nothing to do but to wait for the device: no call into GL waits.
+void pass_time();
+
+/// Sends rows, from row on, of what is a round for each of its pixels, until all are sent or about the deadline; what
+/// follows in GL comes after them. send gets the first row and the one after the last, and dispatches them; collect
+/// takes up what has landed, and teaches cost.
+void send_rows(Flights& flights, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size, std::uint32_t& row,
+               std::chrono::steady_clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
+               const std::function<void()>& collect);
 
 }  // namespace cumulet::render

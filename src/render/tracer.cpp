@@ -8,7 +8,6 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
-#include <thread>
 
 #include "base/error.hpp"
 #include "base/luminance.hpp"
@@ -23,10 +22,8 @@ namespace {
 constexpr std::uint32_t tile_edge = 512;
 constexpr std::uint32_t block_width = PathKernels::block_width;
 constexpr std::uint32_t block_height = PathKernels::block_height;
-constexpr double hasty_rest = 0.03;    // of a tile's pixels
-constexpr double dispatch_ms = 500.0;  // well under any driver's watchdog, well over the cost of a dispatch
+constexpr double hasty_rest = 0.03;  // of a tile's pixels
 constexpr std::uint32_t most_rounds = 65536;
-constexpr double part_of_rest = 0.9;  // of the time left, that a dispatch may likely take
 constexpr std::uint32_t longest_pass = 64;
 constexpr std::uint32_t most_samples = 1U << 31U;
 constexpr double nearly_done = 0.99;
@@ -41,9 +38,6 @@ std::size_t far_step(std::size_t n) {
   while (std::gcd(step, n) != 1) ++step;
   return step;
 }
-
-// While there is nothing to do but to wait for the device: no call into GL waits.
-void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 
 // Surfaces may be others than when a picture was begun, and lamps: poses and the host's depth change.
 void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
@@ -723,44 +717,16 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   gl::check(*gl_, "tracing");
 }
 
-// Sends rows of a dispatch that is a round for each of its pixels; what follows in GL comes after them.
 bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program,
                      std::uint32_t& row, Deadline deadline) {
   core::CmParameters p = parameters;
-  const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
-  bool sent = false;
-  while (row < picture.size_.y) {
-    const double left = part_of_rest * milliseconds_until(deadline) - flights_.expected_ms();
-    const bool anyway = !sent && flights_.empty();
-    const double most_ms = std::clamp(left, anyway ? least_ms : 0.0, aim);
-    const auto slots = [&](std::uint32_t rows) { return double(rows) * picture.size_.x / lanes_a_slot; };
-    const auto fits = [&](std::uint32_t rows) {
-      const auto ms = program.cost->most(slots(rows));
-      return ms && *ms <= most_ms;
-    };
-    std::uint32_t height = 8;
-    while (height < picture.size_.y && fits(2 * height)) height *= 2;
-    if (!flights_.full() && (anyway || fits(height) || !program.cost->most(1.0))) {
-      height = std::min(height, picture.size_.y - row);
-      p.dispatch.tile_size = picture.size_;
-      p.dispatch.rows = {row, row + height};
-      gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
-      Dispatched what;
-      what.slots = slots(height);
-      what.cost = program.cost;
-      what.most_ms = program.cost->most(what.slots).value_or(0.0);
-      flights_.begin(Flights::Kind::dispatch);
-      gl_->DispatchCompute((picture.size_.x + 7) / 8, (height + 7) / 8, 1);
-      flights_.end(std::move(what), 0, 0);
-      row += height;
-      sent = true;
-    } else if (flights_.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) {
-      break;
-    } else {
-      pass_time();
-    }
-    collect();
-  }
+  p.dispatch.tile_size = picture.size_;
+  const auto send = [&](glm::uvec2 rows) {
+    p.dispatch.rows = rows;
+    gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
+    gl_->DispatchCompute((picture.size_.x + 7) / 8, (rows.y - rows.x + 7) / 8, 1);
+  };
+  send_rows(flights_, program.cost, picture.size_, row, deadline, send, [&] { collect(); });
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
                                GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
   gl::check(*gl_, "looking at the pixels");

@@ -3,33 +3,16 @@
 #include <array>
 
 #include "settings/ramp.hpp"
-#include "viewer/c_handles.hpp"
 #include "viewer/c_lamps.hpp"
 #include "viewer/c_ramp.hpp"
 #include "viewer/c_settings.hpp"
-#include "viewer/c_support.hpp"
-#include "viewer/viewer.hpp"
-
-struct cumulet_viewer {
-  std::unique_ptr<cumulet::viewer::Viewer> viewer;
-  std::string last_error;
-  cumulet::c_abi::KeptHandle<cumulet_volume> volume;
-  cumulet::c_abi::KeptHandle<cumulet_surfaces> surfaces;
-  cumulet::c_abi::KeptHandle<cumulet_environment> environment;
-};
+#include "viewer/c_viewer.hpp"
 
 namespace {
 
 using namespace cumulet::c_abi;
 namespace core = cumulet::viewer;
 namespace render = cumulet::render;
-
-template <class Call>
-cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
-  // Not even the message may be touched from inside a callback: another thread may be in a call.
-  if (viewer == nullptr || cumulet::CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
-  return cumulet::c_abi::guarded(viewer->last_error, [&] { call(*viewer->viewer); });
-}
 
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
 

@@ -365,6 +365,21 @@ void Context::denoise_undrawn(const Shot& shot, const Frame& frame, render::Pict
   display_timer_.run([&] { render::run(functions_, shown.film(), pass, deadline_after(filter_ms)); });
 }
 
+MapResult Context::update_map(const Shot& shot, const MapRequest& request, render::Deadline deadline) {
+  using Kind = render::MapLight::Kind;
+  render::MapRequest wanted{
+      {}, std::min(request.size, static_cast<std::uint32_t>(limits_.texture_size_3d)), request.slices};
+  if (request.light == MapLight::point) {
+    wanted.light = {Kind::point, {}, request.position};
+  } else {
+    const glm::dvec3 sun(scene_.lights(*shot.scene).to_sun);
+    wanted.light = {Kind::parallel, glm::normalize(request.light == MapLight::sun ? sun : request.towards), {}};
+  }
+  render::TransmittanceMap& map = maps_.try_emplace(request.slot, functions_, programs_).first->second;
+  map.advance(wanted, *shot.scene, scene_, deadline);
+  return {map.texture(), map.size(), map.slices(), !map.is_newest(), map.to_map(), map.range()};
+}
+
 void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
   const bool drawing = draws(shot, frame);
   if (const render::Picture* shown = progressive_.shown()) {
@@ -401,8 +416,11 @@ render::PassSeconds Context::pass_seconds() const {
 
 std::uint64_t Context::bytes() const {
   const glm::u64vec2 depth_size = host_depth_.size();
-  return scene_.data_bytes() + scene_.other_bytes() + progressive_.bytes() + empty_.bytes() + compositor_.bytes() +
-         (target_ ? target_.of().bytes() : 0) + depth_size.x * depth_size.y * host_depth_.layers() * 4;
+  std::uint64_t maps = 0;
+  for (const auto& [slot, map] : maps_) maps += map.bytes();
+  return scene_.data_bytes() + scene_.other_bytes() + maps + progressive_.bytes() + empty_.bytes() +
+         compositor_.bytes() + (target_ ? target_.of().bytes() : 0) +
+         depth_size.x * depth_size.y * host_depth_.layers() * 4;
 }
 
 }  // namespace cumulet::viewer

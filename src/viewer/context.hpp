@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -20,6 +21,7 @@
 #include "render/pass_timer.hpp"
 #include "render/progressive.hpp"
 #include "render/rehearsal.hpp"
+#include "render/transmittance_map.hpp"
 #include "viewer/frame.hpp"
 #include "viewer/settings.hpp"
 
@@ -88,6 +90,11 @@ class Context {
   [[nodiscard]] bool is_news(const Shot& shot, const Error& failure);
   /// What it took, where the host shared the cores.
   void learn(const Frame& frame, double taken_ms) { reserve_.learn(frame.budget_ms, taken_ms); }
+
+  // ---- for the host's own drawing ----
+
+  [[nodiscard]] MapResult update_map(const Shot& shot, const MapRequest& request, render::Deadline deadline);
+  void drop_map(std::uint32_t slot) { maps_.erase(slot); }
 
   // ---- before the first ----
 
@@ -205,10 +212,11 @@ class Context {
   render::Picture empty_;
   std::optional<std::uint64_t> alone_failed_;  // settings at which the surfaces beneath it could not be drawn
   Slot<TargetTextures, TargetKind> target_;
-  std::unique_ptr<render::Rehearsal> rehearsal_;  // under way
-  double warm_ = 0.0;                             // the part of it that was told
-  std::optional<Error> unbuilt_;                  // the first failure in it, to be told in the end
-  std::optional<std::uint64_t> tried_;            // settings at which programs that do not build were tried
+  std::map<std::uint32_t, render::TransmittanceMap> maps_;  // by slot
+  std::unique_ptr<render::Rehearsal> rehearsal_;            // under way
+  double warm_ = 0.0;                                       // the part of it that was told
+  std::optional<Error> unbuilt_;                            // the first failure in it, to be told in the end
+  std::optional<std::uint64_t> tried_;                      // settings at which programs that do not build were tried
   bool knows_dispatches_ = false;
 };
 

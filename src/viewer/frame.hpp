@@ -58,6 +58,30 @@ struct Pick {
   std::uint64_t tag = 0;               // of an instance
 };
 
+/// cumulet_map_light.
+enum class MapLight { sun = 0, direction = 1, point = 2 };
+
+/// cumulet_transmittance_map_desc, checked.
+struct MapRequest {
+  std::uint32_t slot = 0;
+  MapLight light = MapLight::sun;
+  glm::dvec3 towards{0.0};   // of a direction, not zero
+  glm::dvec3 position{0.0};  // of a point
+  std::uint32_t size = 256;
+  std::uint32_t slices = 32;
+  double budget_ms = 2.0;
+};
+
+/// What cumulet_update_transmittance_map tells.
+struct MapResult {
+  GLuint texture = 0;
+  std::uint32_t size = 0;
+  std::uint32_t slices = 0;
+  bool more = false;
+  glm::dmat4 to_map{1.0};
+  glm::dvec2 range{0.0};
+};
+
 /// cumulet_aov.
 enum class Aov {
   beauty = 0,

@@ -141,6 +141,8 @@ class Viewer {
   /// Compiles and uses once the programs that frames like this need; all: compiles every other, too.
   WarmUp warm_up(const Frame& frame, bool all);
   Pick pick(double x, double y);
+  MapResult update_map(const MapRequest& request);
+  void drop_map(std::uint32_t slot);
   /// Throws Error(invalid_argument) without a volume.
   Bounds bounds();
   void read_linear(float* rgba, std::size_t count);

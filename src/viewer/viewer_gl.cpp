@@ -201,6 +201,24 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   return result;
 }
 
+// ---- for the host's own drawing ----
+
+MapResult Viewer::update_map(const MapRequest& request) {
+  MapResult result;
+  const render::Deadline deadline = deadline_after(request.budget_ms);
+  with_gl([&](Context& g) {
+    const gl::DebugGroup group(*g.functions(), "cumulet: transmittance map");
+    const Trace::Span span(trace_, "cumulet: transmittance map");
+    result = g.update_map(shot(), request, deadline);
+  });
+  result.more = result.more || gl().scene().uploading_volumes() || busy();
+  return result;
+}
+
+void Viewer::drop_map(std::uint32_t slot) {
+  with_gl([&](Context& g) { g.drop_map(slot); });
+}
+
 // ---- reading back ----
 
 Pick Viewer::pick(double x, double y) {

@@ -1464,6 +1464,68 @@ typedef struct cumulet_warm_up_result {
 CUMULET_API cumulet_status cumulet_warm_up(cumulet_viewer* viewer, const cumulet_frame_desc* frame,
                                            cumulet_warm_up_scope scope, cumulet_warm_up_result* result);
 
+/* ---- Shadows on what the host draws -------------------------------------------------------------------------------
+ */
+
+typedef enum cumulet_map_light {
+  CUMULET_MAP_LIGHT_SUN = 0,       /* the viewer's (cumulet_light_desc): parallel light */
+  CUMULET_MAP_LIGHT_DIRECTION = 1, /* parallel light of the host's */
+  CUMULET_MAP_LIGHT_POINT = 2      /* a lamp that shines in all directions, outside volumes or within */
+} cumulet_map_light;
+
+typedef struct cumulet_transmittance_map_desc {
+  size_t struct_size;
+  uint32_t slot; /* 0 to 15: which of the viewer's maps, each of a light */
+  cumulet_map_light light;
+  double direction[3]; /* CUMULET_MAP_LIGHT_DIRECTION: world, towards the light, of any length but 0 */
+  double position[3];  /* CUMULET_MAP_LIGHT_POINT: world */
+  uint32_t size;       /* texels of width and height, 16 to 4096, no more than GL_MAX_3D_TEXTURE_SIZE; 0: 256 */
+  uint32_t slices;     /* along the light's rays, 2 to 256; 0: 32 */
+  double budget_ms;    /* as cumulet_frame_desc's; 0: 2 */
+} cumulet_transmittance_map_desc;
+
+typedef struct cumulet_transmittance_map {
+  size_t struct_size;
+  uint32_t texture; /* GL name of a GL_TEXTURE_3D, GL_R16F, filtered linearly, clamped to its edges: valid until the
+                       next call for this slot, or detach */
+  uint32_t size;    /* its texels of width and height; smaller than asked for while the scene changes */
+  uint32_t slices;
+  int32_t more;         /* 1: it is not of the newest scene yet, or coarser than asked for: call again */
+  double to_map[16];    /* column by column, as OpenGL has matrices; affine. Of parallel light: world to texture
+                           coordinates. Of a point: world to the vector from it, in world units */
+  double near_distance; /* of a point: how far from it the middles of the first and the last slice are; else 0 */
+  double far_distance;
+} cumulet_transmittance_map;
+
+/*
+ * [GL] Shadows of volumes on what the host draws: a deep shadow map (Lokovic and Veach 2000) of one light, which holds
+ * what part of it comes through all of the viewer's volumes, instances among them, to points before, within and behind
+ * them. Exact in the middles of its texels, by closed form from cell to cell, without noise (of at most four volumes at
+ * one place); the viewer's surfaces, its ground and the host's depth throw no shadow in it. The shader of a surface
+ * multiplies its light by
+ *
+ *     uniform sampler3D map;  uniform mat4 to_map;  uniform vec2 range;  // near_distance, far_distance
+ *     float shadow = cumulet_transmittance(map, to_map, range, world);   // cumulet_transmittance_map_glsl()
+ *
+ * Call it once a frame and light, after cumulet_render, whose newest upload it is of. While nothing changes that costs
+ * nothing. A map is made within the budget, over some calls if need be, the last one being told meanwhile; before the
+ * first, and without a volume, it is one texel of 1: all light. In a scene that changes before a map is done the next
+ * is coarser, down to an eighth, so that it follows; once it rests the map is made in full. 2 bytes a texel, twice
+ * while one is being made (256 x 256 x 32: 4 MiB), counted in cumulet_stats.gl_bytes. Fails as cumulet_render; map then
+ * stays as it was.
+ */
+CUMULET_API cumulet_status cumulet_update_transmittance_map(cumulet_viewer* viewer,
+                                                            const cumulet_transmittance_map_desc* desc,
+                                                            cumulet_transmittance_map* map);
+/* [GL] Frees that map; without one it does nothing. */
+CUMULET_API cumulet_status cumulet_drop_transmittance_map(cumulet_viewer* viewer, uint32_t slot);
+/*
+ * GLSL (1.30 and later) for the host's shaders, zero-terminated, to be put after their #version line and before its
+ * use: float cumulet_transmittance(sampler3D map, mat4 to_map, vec2 range, vec3 world) the part of the light, 0 to 1,
+ * that comes to a point of the world. One look into the texture.
+ */
+CUMULET_API const char* cumulet_transmittance_map_glsl(void);
+
 typedef struct cumulet_pick {
   size_t struct_size;
   int32_t hit;        /* 1: a surface is met, or the volume reaches half opacity, along the pixel's ray */

@@ -1147,6 +1147,15 @@ class Viewer {
     }
     return WarmUpResult::of(c);
   }
+  [[nodiscard]] Result<TransmittanceMap> update_transmittance_map(const TransmittanceMapDesc& desc) noexcept {
+    const cumulet_transmittance_map_desc wanted = desc;
+    auto c = detail::sized<cumulet_transmittance_map>();
+    if (auto done = result(cumulet_update_transmittance_map(handle(), &wanted, &c)); !done) return done.error();
+    return TransmittanceMap::of(c);
+  }
+  [[nodiscard]] Result<> drop_transmittance_map(std::uint32_t slot) noexcept {
+    return result(cumulet_drop_transmittance_map(handle(), slot));
+  }
   [[nodiscard]] Result<Pick> pick_at(double x, double y) noexcept {
     auto c = detail::sized<cumulet_pick>();
     if (auto done = result(cumulet_pick_at(handle(), x, y, &c)); !done) return done.error();

@@ -1,0 +1,56 @@
+#version 450
+// A light's transmittance map (cumulet_update_transmittance_map): what of it comes through all volumes to the points of
+// a lattice, slice behind slice along its rays. A deep shadow map (Lokovic and Veach 2000) at even depths; without
+// noise, in closed form from cell to cell. Parallel rays are those of an orthographic view from the light; those of a
+// point are by octahedra (Meyer et al., "On Floating-Point Normal Vectors", 2010), whose folds texels lie on, so that
+// what is filtered across one is of the same rays.
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#include "bindings.glsl"
+#include "shared.glsl"
+#include "parameters.glsl"
+#include "cell.glsl"
+#include "buffers.glsl"
+#include "march.glsl"
+#include "ray.glsl"
+// Who is hidden from cameras has its shadow.
+#define CM_WALK_FLAGS 0u
+#include "walk.glsl"
+
+layout(r16f, binding = CM_IMAGE_TRANSMITTANCE_MAP) uniform writeonly image3D cm_map;
+layout(location = 0) uniform bool cm_from_point;
+layout(location = 1) uniform vec2 cm_range;  // world: where the first and the last slice are on a ray
+
+void main() {
+  uvec2 texel = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
+  if (texel.x >= cm.dispatch.tile_size.x || texel.y >= cm.dispatch.rows.y) return;
+  vec3 o;
+  vec3 w;
+  cm_camera_ray(texel, vec2(0.5), o, w);
+  if (cm_from_point) {
+    vec2 place = 2.0 * vec2(texel) / vec2(cm.dispatch.tile_size - 1u) - 1.0;
+    w = vec3(place, 1.0 - abs(place.x) - abs(place.y));
+    if (w.z < 0.0) w.xy = (1.0 - abs(place.yx)) * vec2(place.x < 0.0 ? -1.0 : 1.0, place.y < 0.0 ? -1.0 : 1.0);
+    w = normalize(w);
+  }
+  int slices = imageSize(cm_map).z;
+  float step_t = (cm_range.y - cm_range.x) / float(slices - 1);
+  int slice = 0;
+  float used = 0.0;
+  CmWalk walk = cm_walk(o, cm_to_cube(w), cm_range.y);
+  for (int i = 0; i < 100000 && slice < slices; ++i) {
+    float t_1, e_0, e_1;
+    if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+    float span = t_1 - walk.t;
+    for (; slice < slices; ++slice) {
+      float t = cm_range.x + step_t * float(slice);
+      if (t >= t_1) break;
+      float here = used + cm_depth_of(e_0, e_1, span, t - walk.t);
+      imageStore(cm_map, ivec3(texel, slice), vec4(exp(-here)));
+    }
+    used += 0.5 * (e_0 + e_1) * span;
+    cm_walk_on(walk, t_1);
+  }
+  for (; slice < slices; ++slice) imageStore(cm_map, ivec3(texel, slice), vec4(exp(-used)));
+}
