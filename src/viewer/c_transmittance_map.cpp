@@ -10,6 +10,7 @@ using namespace cumulet::c_abi;
 namespace core = cumulet::viewer;
 
 constexpr std::uint32_t most_slots = 16;
+constexpr std::uint64_t most_texels = std::uint64_t{1} << 27U;
 
 core::MapRequest request_of(const cumulet_transmittance_map_desc* desc) {
   const cumulet_transmittance_map_desc d = read_desc(desc, "cumulet_transmittance_map_desc");
@@ -34,6 +35,8 @@ core::MapRequest request_of(const cumulet_transmittance_map_desc* desc) {
   }
   if (d.size != 0) request.size = d.size;
   if (d.slices != 0) request.slices = d.slices;
+  require(std::uint64_t{request.size} * request.size * request.slices <= most_texels,
+          "cumulet_transmittance_map_desc.size and slices are more than 2^27 texels");
   if (d.budget_ms > 0.0) request.budget_ms = d.budget_ms;
   return request;
 }

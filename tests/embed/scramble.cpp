@@ -135,6 +135,13 @@ TEST_P(Scramble, EveryCallLeavesTheStateAsItWas) {
   auto pick = make_desc<cumulet_pick>();
   double noise = 0.0;
   for (int i = 0; i < 3; ++i) {
+    for (const cumulet_map_light light : {CUMULET_MAP_LIGHT_SUN, CUMULET_MAP_LIGHT_POINT}) {
+      auto desc = make_desc<cumulet_transmittance_map_desc>();
+      auto map = make_desc<cumulet_transmittance_map>();
+      desc.light = light;
+      expect_kept(host, ++seed, "transmittance map", [&] { return cumulet_update_transmittance_map(v, &desc, &map); });
+    }
+    expect_kept(host, ++seed, "drop it", [&] { return cumulet_drop_transmittance_map(v, 0); });
     expect_kept(host, ++seed, "pick_at", [&] { return cumulet_pick_at(v, side / 2.0, side / 2.0, &pick); });
     expect_kept(host, ++seed, "read_linear", [&] { return cumulet_read_linear(v, rgba.data(), rgba.size()); });
     expect_kept(host, ++seed, "read_display", [&] { return cumulet_read_display(v, bytes.data(), bytes.size()); });
@@ -223,7 +230,7 @@ TEST_P(Scramble, EveryCallWithSurfacesToo) {
       render(name + " view " + std::to_string(view), target.frame());
     }
     converge(v, target.frame());
-    for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_ERROR; ++aov) {
+    for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VELOCITY; ++aov) {
       expect_kept(host, ++seed, name + " aov " + std::to_string(aov),
                   [&] { return cumulet_read_aov(v, static_cast<cumulet_aov>(aov), rgba.data(), rgba.size()); });
     }

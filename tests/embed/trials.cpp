@@ -194,6 +194,8 @@ class NoContext : public Trial {
     auto frame = target_.frame();
     frame.target = CUMULET_TARGET_NONE;
     auto pick = make_desc<cumulet_pick>();
+    const auto map_desc = make_desc<cumulet_transmittance_map_desc>();
+    auto map = make_desc<cumulet_transmittance_map>();
     std::vector<float> rgba(std::size_t{side} * side * 4);
     std::vector<std::uint8_t> bytes(rgba.size());
     double noise = 0.0;
@@ -203,6 +205,8 @@ class NoContext : public Trial {
       for (const auto& call : std::vector<std::function<cumulet_status()>>{
                [&] { return cumulet_render(v_, &frame, nullptr); },
                [&] { return cumulet_pick_at(v_, 1.0, 1.0, &pick); },
+               [&] { return cumulet_update_transmittance_map(v_, &map_desc, &map); },
+               [&] { return cumulet_drop_transmittance_map(v_, 0); },
                [&] { return cumulet_read_linear(v_, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_display(v_, bytes.data(), bytes.size()); },
                [&] { return cumulet_read_aov(v_, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
@@ -336,6 +340,8 @@ void Caller::call_all() {
   const auto settings = make_desc<cumulet_surface_settings_desc>();
   auto pose = make_desc<cumulet_camera_desc>();
   auto pick = make_desc<cumulet_pick>();
+  const auto map_desc = make_desc<cumulet_transmittance_map_desc>();
+  auto map = make_desc<cumulet_transmittance_map>();
   auto stats = make_desc<cumulet_stats>();
   auto denoise = make_desc<cumulet_denoise_desc>();
   denoise.network = "none.tza";
@@ -372,12 +378,13 @@ void Caller::call_all() {
     answer("cumulet_get_progress", cumulet_get_progress(v, &progress), CUMULET_OK);
     cumulet_cancel(v);
   }
-  names.insert({"cumulet_cancel", "cumulet_status_text", "cumulet_version", "cumulet_volume_retain",
-                "cumulet_volume_release", "cumulet_surfaces_retain", "cumulet_surfaces_release",
-                "cumulet_programs_retain", "cumulet_programs_release", "cumulet_camera_release",
-                "cumulet_environment_retain", "cumulet_environment_release", "cumulet_instance_retain",
-                "cumulet_instance_release", "cumulet_sequence_retain", "cumulet_sequence_release",
-                "cumulet_inspection_release", "cumulet_destroy", "cumulet_last_error"});
+  names.insert({"cumulet_cancel",           "cumulet_status_text",           "cumulet_version",
+                "cumulet_volume_retain",    "cumulet_volume_release",        "cumulet_surfaces_retain",
+                "cumulet_surfaces_release", "cumulet_programs_retain",       "cumulet_programs_release",
+                "cumulet_camera_release",   "cumulet_environment_retain",    "cumulet_environment_release",
+                "cumulet_instance_retain",  "cumulet_instance_release",      "cumulet_sequence_retain",
+                "cumulet_sequence_release", "cumulet_inspection_release",    "cumulet_destroy",
+                "cumulet_last_error",       "cumulet_transmittance_map_glsl"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
@@ -387,6 +394,7 @@ void Caller::call_all() {
   cumulet_instance_release(cumulet_instance_retain(nullptr));
   cumulet_sequence_release(cumulet_sequence_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
+  if (cumulet_transmittance_map_glsl() == nullptr) wrong.push_back("glsl");
   // Refused without a status.
   cumulet_destroy(viewer);
   cumulet_destroy(other);
@@ -480,6 +488,8 @@ void Caller::call_all() {
     CALL(cumulet_render, v, &frame, nullptr);
     CALL(cumulet_warm_up, v, &frame, CUMULET_WARM_UP_SCENE, &warm_up);
     CALL(cumulet_pick_at, v, 0.0, 0.0, &pick);
+    CALL(cumulet_update_transmittance_map, v, &map_desc, &map);
+    CALL(cumulet_drop_transmittance_map, v, 0U);
     CALL(cumulet_get_bounds, v, low.data(), high.data());
     CALL(cumulet_read_linear, v, one.data(), one.size());
     CALL(cumulet_read_display, v, bytes.data(), bytes.size());

@@ -379,7 +379,15 @@ class Program {
     std::array<cumulet_pick, 2> pick{};
     pick[0] = described<cumulet_pick>();
     std::size_t room = bytes.size();
-    switch (data_.ConsumeIntegralInRange(0, 6)) {
+    switch (data_.ConsumeIntegralInRange(0, 8)) {
+      case 8:
+        return told(cumulet_drop_transmittance_map(viewer_.get(), data_.ConsumeIntegralInRange(0U, 17U)));
+      case 7: {
+        const auto desc = described<cumulet_transmittance_map_desc>();
+        std::array<cumulet_transmittance_map, 2> map{};
+        map[0] = described<cumulet_transmittance_map>();
+        return told(cumulet_update_transmittance_map(viewer_.get(), &desc, map.data()));
+      }
       case 5:
         return told(cumulet_read_accumulation(viewer_.get(), bytes.data(), &room));
       case 6:

@@ -226,6 +226,9 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
   filled(make_desc<cumulet_progress>(), [&](cumulet_progress* p) { return cumulet_get_progress(v_, p); });
   filled(make_desc<cumulet_stats>(), [&](cumulet_stats* s) { return cumulet_get_stats(v_, s); });
   filled(make_desc<cumulet_pick>(), [&](cumulet_pick* p) { return cumulet_pick_at(v_, 1.0, 1.0, p); });
+  const auto map = make_desc<cumulet_transmittance_map_desc>();
+  filled(make_desc<cumulet_transmittance_map>(),
+         [&](cumulet_transmittance_map* m) { return cumulet_update_transmittance_map(v_, &map, m); });
   filled(make_desc<cumulet_volume_info>(),
          [&](cumulet_volume_info* i) { return cumulet_volume_get_info(volume_.get(), i); });
   filled(make_desc<cumulet_values_info>(),

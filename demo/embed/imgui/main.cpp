@@ -1,5 +1,5 @@
 // Cumulet in Dear ImGui panels, two ways: as an image of its own, and composited into a scene that the host draws with
-// its own shaders and depth. Both viewers share one volume and one camera.
+// its own shaders and depth, on which the volume's shadow falls. Both viewers share one volume and one camera.
 //
 //     cumulet-embed-imgui --volume FILE [--test OUT_DIR]
 //
@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,23 +68,33 @@ void main() {
   gl_Position = to_clip * vec4(position, 1);
 })";
 
-constexpr const char* box_fragment = R"(#version 450 core
+// Between these stands cumulet_transmittance(), of cumulet_transmittance_map_glsl().
+constexpr const char* fragment_version = "#version 450 core\n";
+constexpr const char* box_fragment = R"(
 uniform vec3 colour;
 uniform float tile;
+uniform vec3 to_sun;
+uniform sampler3D shadow_map;
+uniform mat4 to_shadow_map;
 in vec3 position;
 flat in vec3 normal;
 out vec4 result;
 void main() {
   vec2 square = floor(position.xz / max(tile, 1e-6));
   float check = tile > 0 ? 0.6 + 0.4 * mod(square.x + square.y, 2) : 1;
-  result = vec4(colour * check * (0.55 + 0.45 * dot(normal, vec3(0.37, 0.83, 0.42))), 1);
+  float sun = max(dot(normal, to_sun), 0) * cumulet_transmittance(shadow_map, to_shadow_map, vec2(0), position);
+  result = vec4(colour * check * (0.35 + 0.75 * sun), 1);
 })";
 
 GLuint make_program() {
   const GLuint program = glCreateProgram();
-  for (const auto& [type, source] : {std::pair(GL_VERTEX_SHADER, box_vertex), {GL_FRAGMENT_SHADER, box_fragment}}) {
-    const GLuint shader = glCreateShader(static_cast<GLenum>(type));
-    glShaderSource(shader, 1, &source, nullptr);
+  const std::array<const char*, 1> vertex{box_vertex};
+  const std::array<const char*, 3> fragment{fragment_version, cumulet_transmittance_map_glsl(), box_fragment};
+  using Sources = std::span<const char* const>;
+  for (const auto& [type, sources] :
+       {std::pair<GLenum, Sources>(GL_VERTEX_SHADER, vertex), {GL_FRAGMENT_SHADER, fragment}}) {
+    const GLuint shader = glCreateShader(type);
+    glShaderSource(shader, static_cast<GLsizei>(sources.size()), sources.data(), nullptr);
     glCompileShader(shader);
     glAttachShader(program, shader);
     glDeleteShader(shader);
@@ -127,9 +138,12 @@ struct SceneTarget {
   }
 };
 
+// Azimuth 60 degrees from +Z, elevation 40: as the viewers' sun.
+constexpr std::array<float, 3> to_sun{0.6634F, 0.6428F, 0.3830F};
+
 /// Sky, a checkered ground below the volume's box, and three cubes: in front of it, half inside, behind.
 void draw_scene(const SceneTarget& target, GLuint program, GLuint vertex_array, const cumulet::Matrix& to_clip,
-                const cumulet::Bounds& bounds) {
+                const cumulet::Bounds& bounds, const cumulet::TransmittanceMap& shadow) {
   glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer);
   glViewport(0, 0, target.width, target.height);
   glDisable(GL_SCISSOR_TEST);
@@ -146,11 +160,17 @@ void draw_scene(const SceneTarget& target, GLuint program, GLuint vertex_array, 
     centre[i] = static_cast<float>(0.5 * (bounds.min[i] + bounds.max[i]));
     size[i] = static_cast<float>(bounds.max[i] - bounds.min[i]);
   }
-  std::array<float, 16> matrix{};
-  std::transform(to_clip.begin(), to_clip.end(), matrix.begin(), [](double v) { return static_cast<float>(v); });
   glUseProgram(program);
   glBindVertexArray(vertex_array);
-  glUniformMatrix4fv(glGetUniformLocation(program, "to_clip"), 1, GL_FALSE, matrix.data());
+  const auto set_matrix = [&](const char* name, const cumulet::Matrix& values) {
+    std::array<float, 16> matrix{};
+    std::transform(values.begin(), values.end(), matrix.begin(), [](double v) { return static_cast<float>(v); });
+    glUniformMatrix4fv(glGetUniformLocation(program, name), 1, GL_FALSE, matrix.data());
+  };
+  set_matrix("to_clip", to_clip);
+  set_matrix("to_shadow_map", shadow.to_map);
+  glUniform3fv(glGetUniformLocation(program, "to_sun"), 1, to_sun.data());
+  glBindTextureUnit(0, shadow.texture);
   const auto box = [&](float x, float y, float z, float rx, float ry, float rz, const std::array<float, 3>& colour,
                        float tile) {
     glUniform3f(glGetUniformLocation(program, "low"), x - rx, y - ry, z - rz);
@@ -263,6 +283,7 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
   GLuint vertex_array = 0;
   glCreateVertexArrays(1, &vertex_array);
 
+  cumulet::TransmittanceMap shadow = must(scene_viewer.update_transmittance_map({}));
   bool volume_shared = false, picture_wanted = false, p_was_down = false;
   int pictures = 0;
   ImVec2 last_room;
@@ -305,13 +326,15 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
       target.resize(panel.width, panel.height);
       const auto [view, projection] =
           must(camera.get_matrices(double(panel.width) / panel.height, cumulet::Clip::negative_one_to_one));
-      draw_scene(target, program, vertex_array, multiply(projection, view), must(scene_viewer.get_bounds()));
+      draw_scene(target, program, vertex_array, multiply(projection, view), must(scene_viewer.get_bounds()), shadow);
       scene = must(scene_viewer.render({.framebuffer = target.framebuffer,
                                         .width = static_cast<std::uint32_t>(panel.width),
                                         .height = static_cast<std::uint32_t>(panel.height),
                                         .depth_source = cumulet::DepthSource::texture,
                                         .depth_name = target.depth}));
       panel.show(target.colour, false);
+      // Of what was uploaded in render, for the next frame's scene.
+      shadow = must(scene_viewer.update_transmittance_map({}));
     }
     ImGui::End();
 
@@ -325,12 +348,14 @@ void run(GLFWwindow* window, const std::string& volume_path, const std::string& 
     const bool p_down = glfwGetKey(window, GLFW_KEY_P) == GLFW_PRESS;
     picture_wanted = picture_wanted || (p_down && !p_was_down);
     p_was_down = p_down;
-    if (picture_wanted && image.has(cumulet::RenderFlags::converged) && scene.has(cumulet::RenderFlags::converged)) {
+    if (picture_wanted && image.has(cumulet::RenderFlags::converged) && scene.has(cumulet::RenderFlags::converged) &&
+        !shadow.more) {
       write_picture(folder + "/imgui-" + std::to_string(++pictures) + ".ppm", width, height);
       picture_wanted = false;
     }
     glfwSwapBuffers(window);
-    if (image.has(cumulet::RenderFlags::more) || scene.has(cumulet::RenderFlags::more) || picture_wanted) {
+    if (image.has(cumulet::RenderFlags::more) || scene.has(cumulet::RenderFlags::more) || shadow.more ||
+        picture_wanted) {
       glfwPollEvents();
     } else {
       glfwWaitEventsTimeout(0.1);

@@ -1480,7 +1480,7 @@ typedef struct cumulet_transmittance_map_desc {
   double direction[3]; /* CUMULET_MAP_LIGHT_DIRECTION: world, towards the light, of any length but 0 */
   double position[3];  /* CUMULET_MAP_LIGHT_POINT: world */
   uint32_t size;       /* texels of width and height, 16 to 4096, no more than GL_MAX_3D_TEXTURE_SIZE; 0: 256 */
-  uint32_t slices;     /* along the light's rays, 2 to 256; 0: 32 */
+  uint32_t slices;     /* along the light's rays, 2 to 256; 0: 32. Of no more than 2^27 texels in all */
   double budget_ms;    /* as cumulet_frame_desc's; 0: 2 */
 } cumulet_transmittance_map_desc;
 
