@@ -65,11 +65,12 @@ void main() {
 #endif
   float share = 1.0 / float(cm.dispatch.samples);
   for (int i = 0; i < int(cm.dispatch.samples); ++i) {
-    // Roberts's two-dimensional sequence; the first ray is the centre's.
+    // Roberts's sequences; the first ray is the pixel's and the lens' middle.
     vec2 within = fract(0.5 + float(i) * vec2(0.7548776662, 0.5698402910));
     vec3 o;
     vec3 w;
-    float t_per_z = cm_camera_ray(pixel, within, o, w);
+    vec2 lens = fract(0.5 + float(i) * vec2(0.6287067210, 0.5385972572));
+    float t_per_z = cm_lens_ray(pixel, within, cm_on_disc(lens), o, w);
     vec3 d = cm_to_cube(w);
     float surface_t = t_per_z * cm_surface_z(pixel, within, uint(i));
 #if CM_SURFACES

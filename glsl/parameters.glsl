@@ -56,8 +56,11 @@ CM_BLOCK(CmView) {
   CM_ALIGN(16) vec3 eye;      // cube space
   uint orthographic;          // 1: rays are parallel, from points about the eye
   CM_ALIGN(16) vec3 forward;  // world, unit; with right and up it spans the image plane at distance 1
+  float inverse_focus;        // 1 over the distance of what a lens has sharp
   CM_ALIGN(16) vec3 right;    // world, half the width of that plane
+  float lens_right;           // radius of the lens over the length of right, and of up; 0: a pinhole
   CM_ALIGN(16) vec3 up;       // likewise, height
+  float lens_up;
   CM_ALIGN(8) uvec2 size;     // pixels
   CM_EQUALITY(CmView)
 };

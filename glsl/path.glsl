@@ -71,7 +71,9 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.number = sample_number;
   vec2 within = cm_even_pair(sample_number, p.stream, 0u);
   vec2 along = cm_even_pair(sample_number, p.stream, 1u);
-  float t_per_z = cm_camera_ray(at, within, p.o, p.w);
+  vec2 lens = vec2(0.0f, 0.0f);
+  if (cm.view.lens_right > 0.0f) lens = cm_on_disc(cm_even_pair(sample_number, p.stream, CM_SET_LENS));
+  float t_per_z = cm_lens_ray(at, within, lens, p.o, p.w);
   p.d = cm_to_cube(p.w);
   p.throughput = vec3(1.0f, 1.0f, 1.0f);
   p.radiance = vec3(0.0f, 0.0f, 0.0f);

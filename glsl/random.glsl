@@ -62,6 +62,9 @@ CM_FN vec2 cm_even_pair(uint number, uint pixel, uint set) {
               cm_unit_float(bitfieldReverse(cm_owen_scramble(second, seed.z))));
 }
 
+// A set that no event has (glsl/path_vertex.glsl counts theirs from 2).
+const uint CM_SET_LENS = 0xffffffffu;
+
 // Free path in optical depth of u in [0, 1).
 CM_FN float cm_free_depth(float u) { return -log(1.0f - u); }
 

@@ -44,16 +44,32 @@ CM_FN vec2 cm_box_range(vec3 o, vec3 d) {
   return vec2(max(0.0f, line.x), line.y);
 }
 
-// The ray through a point of a pixel: o in cube space, w a unit vector in world space. Returns the distance along it per
-// unit of view depth.
-CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3) w) {
+// A point of the unit square on the unit disc, evenly, its middle in the middle (Shirley and Chiu, "A Low Distortion Map
+// Between Disk and Square", 1997).
+CM_FN vec2 cm_on_disc(vec2 square) {
+  vec2 s = 2.0f * square - vec2(1.0f, 1.0f);
+  bool wide = abs(s.x) > abs(s.y);
+  float radius = wide ? s.x : s.y;
+  if (radius == 0.0f) return vec2(0.0f, 0.0f);
+  float angle = 0.785398163f * (wide ? s.y / s.x : 2.0f - s.x / s.y);
+  return radius * vec2(cos(angle), sin(angle));
+}
+
+// The ray through a point of a pixel and one of the lens (unit disc): o in cube space, w a unit vector in world space.
+// Returns the distance along it per unit of view depth.
+CM_FN float cm_lens_ray(uvec2 pixel, vec2 within, vec2 lens, CM_OUT(vec3) o, CM_OUT(vec3) w) {
   float x = 2.0f * (float(pixel.x) + within.x) / float(cm.view.size.x) - 1.0f;
   float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(cm.view.size.y);
   vec3 aside = x * cm.view.right + y * cm.view.up;
-  vec3 v = cm.view.forward + (1.0f - float(cm.view.orthographic)) * aside;
-  o = cm.view.eye + float(cm.view.orthographic) * cm_to_cube(aside);
+  vec3 off = lens.x * cm.view.lens_right * cm.view.right + lens.y * cm.view.lens_up * cm.view.up;
+  vec3 v = cm.view.forward + (1.0f - float(cm.view.orthographic)) * aside - cm.view.inverse_focus * off;
+  o = cm.view.eye + cm_to_cube(float(cm.view.orthographic) * aside + off);
   w = normalize(v);
   return length(v);
+}
+// Through the middle of the lens.
+CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3) w) {
+  return cm_lens_ray(pixel, within, vec2(0.0f, 0.0f), o, w);
 }
 
 // The optical depth of the first `way` of a cell's part of a ray, span long, with extinctions e_0 and e_1 at its ends.

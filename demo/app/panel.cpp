@@ -375,6 +375,11 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
 
   cumulet_camera_desc& view = model.scene.camera;
   settings::with(&cumulet_camera_desc::fovy_degrees, [&](const auto& fovy) { rows_.draw(fovy, view.fovy_degrees); });
+  settings::with(&cumulet_camera_desc::lens_radius, [&](const auto& lens) { rows_.draw(lens, view.lens_radius); });
+  ImGui::BeginDisabled(view.lens_radius == 0.0);
+  settings::with(&cumulet_camera_desc::focus_distance,
+                 [&](const auto& focus) { rows_.draw(focus, view.focus_distance); });
+  ImGui::EndDisabled();
   bool orthographic = view.orthographic_height > 0.0;
   if (ui_.checkbox("Orthographic", "Parallel rays.", orthographic)) {
     const double distance =

@@ -117,6 +117,7 @@ void Session::follow(const Wish& wish) {
       fit_.emplace();
       fit_->struct_size = sizeof *fit_;
       fit_->fovy_degrees = scene_.camera.fovy_degrees;
+      fit_->lens_radius = scene_.camera.lens_radius;
     }
     suggest_ = wish_.suggest;
   }

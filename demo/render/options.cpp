@@ -169,7 +169,8 @@ void parse_size(std::string_view text, SceneOptions& scene) {
   scene.height = static_cast<std::uint32_t>(parse_integer(sides[1], 1, 16384));
 }
 
-cumulet_camera_desc parse_camera(std::string_view text) {
+/// Where it stands; its lens is as it was.
+void parse_camera(std::string_view text, cumulet_camera_desc& camera) {
   const std::vector<std::string_view> parts = words(text);
   if (parts.size() != 3) throw UsageError(in_quotes(text) + " is not \"ex,ey,ez tx,ty,tz fovy\"");
   const std::vector<double> eye = parse_numbers(parts[0], 3);
@@ -178,12 +179,14 @@ cumulet_camera_desc parse_camera(std::string_view text) {
   const double fovy = parse_number(parts[2]);
   if (!(fovy > 0.0 && fovy < 180.0))
     throw UsageError(in_quotes(parts[2]) + " is not an angle between 0 and 180 degrees");
-  cumulet_camera_desc camera{};
+  const cumulet_camera_desc before = camera;
+  camera = {};
   camera.struct_size = sizeof camera;
+  camera.lens_radius = before.lens_radius;
+  camera.focus_distance = before.focus_distance;
   std::copy(eye.begin(), eye.end(), camera.eye);
   std::copy(target.begin(), target.end(), camera.target);
   camera.fovy_degrees = fovy;
-  return camera;
 }
 
 void parse_sun(std::string_view text, cumulet_light_desc& light) {
@@ -455,8 +458,9 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
   add_settings(app, group, scene.surface);
   add(
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
-      [&](const std::string& text) { scene.camera = parse_camera(text); },
+      [&](const std::string& text) { parse_camera(text, scene.camera); },
       "Eye, target and vertical field of view in degrees (default: fit the scene)");
+  add_settings(app, group, scene.camera);
 
   const auto take_auto = [&scene](std::string_view flag, const std::string& text) {
     if (flag != "--density-scale") return false;

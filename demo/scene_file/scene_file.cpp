@@ -344,6 +344,8 @@ void read_camera(Reader& reader, cumulet_camera_desc& desc) {
     reader.wrong("camera.up", "has no direction");
   reader.number("camera.fovy_degrees", desc.fovy_degrees, {0.0, 180.0, true});
   reader.number("camera.orthographic_height", desc.orthographic_height, settings::not_negative);
+  reader.number("camera.lens_radius", desc.lens_radius, settings::not_negative);
+  reader.number("camera.focus_distance", desc.focus_distance, settings::not_negative);
 }
 
 template <class Desc, class Value>
@@ -641,6 +643,8 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   if (view.up[0] != 0.0 || view.up[1] != 0.0 || view.up[2] != 0.0) camera["up"] = three(view.up);
   if (view.fovy_degrees > 0.0) camera["fovy_degrees"] = view.fovy_degrees;
   if (view.orthographic_height > 0.0) camera["orthographic_height"] = view.orthographic_height;
+  if (view.lens_radius > 0.0) camera["lens_radius"] = view.lens_radius;
+  if (view.focus_distance > 0.0) camera["focus_distance"] = view.focus_distance;
   writer.put("camera", camera);
 
   writer.put_settings(scene.light);

@@ -362,6 +362,11 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   p.view.forward = glm::vec3(view.forward);
   p.view.right = glm::vec3(view.right);
   p.view.up = glm::vec3(view.up);
+  if (view.lens_radius > 0.0) {
+    p.view.inverse_focus = static_cast<float>(1.0 / view.focus);
+    p.view.lens_right = static_cast<float>(view.lens_radius / glm::length(view.right));
+    p.view.lens_up = static_cast<float>(view.lens_radius / glm::length(view.up));
+  }
   p.view.size = size;
   light::MediumLight own;
   if (instances_) {

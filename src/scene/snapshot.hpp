@@ -35,6 +35,8 @@ struct Viewpoint {
   glm::dvec3 right{1.0, 0.0, 0.0};  // scaled by half the picture's width at z = 1 (orthographic: half its width)
   glm::dvec3 up{0.0, 1.0, 0.0};     // likewise
   bool orthographic = false;
+  double lens_radius = 0.0;  // 0: a pinhole, all is sharp
+  double focus = 1.0;        // z of what is sharp with a lens
   bool operator==(const Viewpoint&) const = default;
 };
 

@@ -502,7 +502,19 @@ struct Table<cumulet_camera_desc> {
       Setting(&Desc::orthographic_height, {.name = "orthographic_height"}),
       Setting(&Desc::near_plane, {.name = "near_plane"}),
       Setting(&Desc::far_plane, {.name = "far_plane"}),
-      Setting(&Desc::depth, {.name = "depth", .choices = depth_choices})};
+      Setting(&Desc::depth, {.name = "depth", .choices = depth_choices}),
+      Setting(&Desc::lens_radius, {.name = "lens_radius", .range = not_negative,
+        .key = "camera.lens_radius", .flag = "--lens-radius", .type = "R",
+        .help = "Blur what is not in focus, as a lens of this radius does, in world units",
+        .row = {.label = "Lens radius",
+                .tip = "Of a lens, which blurs what is nearer or farther than its focus.",
+                .least = 1e-3, .most = 100.0, .format = "%.3g", .logarithmic = true, .zero = "Pinhole"}}),
+      Setting(&Desc::focus_distance, {.name = "focus_distance", .range = not_negative,
+        .key = "camera.focus_distance", .flag = "--focus-distance", .type = "D",
+        .help = "What a lens has sharp: its distance from the eye, along the axis; 0: the target's",
+        .row = {.label = "Focus",
+                .tip = "Distance of what is sharp.",
+                .least = 1e-2, .most = 1e4, .format = "%.4g", .logarithmic = true, .zero = "At the target"}})};
 };
 
 template <>

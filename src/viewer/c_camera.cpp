@@ -37,7 +37,11 @@ CameraPose pose_of(const cumulet_camera_desc* desc) {
   const bool infinite = !orthographic && d.far_plane > farthest;
   require(d.far_plane == 0.0 || infinite || (d.far_plane > near && d.far_plane <= farthest),
           "cumulet_camera_desc.far_plane is not beyond the near plane");
+  require(in_range(d.lens_radius, 0.0, farthest), "cumulet_camera_desc.lens_radius is not from 0 to 1e30");
+  require(in_range(d.focus_distance, 0.0, farthest), "cumulet_camera_desc.focus_distance is not from 0 to 1e30");
   CameraPose pose;
+  pose.lens_radius = d.lens_radius;
+  pose.focus_distance = d.focus_distance;
   pose.eye = to_dvec3(d.eye);
   pose.target = to_dvec3(d.target);
   const glm::dvec3 look = pose.target - pose.eye;
@@ -92,6 +96,8 @@ cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_d
     d.near_plane = pose.near_plane;
     d.far_plane = pose.far_plane;
     d.depth = static_cast<cumulet_depth>(pose.depth);
+    d.lens_radius = pose.lens_radius;
+    d.focus_distance = pose.focus_distance;
     write_desc(desc, d, "cumulet_camera_desc");
   });
 }

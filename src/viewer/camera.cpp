@@ -150,6 +150,15 @@ Planes planes_of(const CameraPose& pose) {
   return {near, pose.far_plane > near ? pose.far_plane : std::numeric_limits<double>::infinity()};
 }
 
+/// Of the pose, whose eye is where z counts from, less `before`.
+void set_lens(const CameraPose& pose, double before, ViewFrame& frame) {
+  if (!(pose.lens_radius > 0.0)) return;
+  const double focus = (pose.focus_distance > 0.0 ? pose.focus_distance : distance_of(pose)) - before;
+  // What is sharp cannot be behind the eye.
+  frame.focus = std::max(focus, 1e-6 * distance_of(pose));
+  frame.lens_radius = pose.lens_radius;
+}
+
 ViewFrame frame_of(const CameraPose& pose, double aspect) {
   const Axes axes = axes_of(pose);
   const Planes planes = planes_of(pose);
@@ -157,6 +166,7 @@ ViewFrame frame_of(const CameraPose& pose, double aspect) {
   ViewFrame frame;
   frame.forward = axes.forward;
   frame.orthographic = pose.orthographic_height > 0.0;
+  set_lens(pose, frame.orthographic ? planes.near : 0.0, frame);
   if (frame.orthographic) {
     const double half = 0.5 * pose.orthographic_height;
     frame.eye = pose.eye + axes.forward * planes.near;
@@ -264,6 +274,8 @@ ViewFrame frame_of(const dmat4& view, const dmat4& projection, ClipDepth clip) {
 /// The pose that sees most nearly what the frame does: the same in the picture's middle. before: what it does not tell.
 CameraPose nearest_pose(const ViewFrame& frame, const CameraPose& before) {
   CameraPose pose;
+  pose.lens_radius = before.lens_radius;
+  pose.focus_distance = before.focus_distance;
   const double length = glm::length(frame.forward);
   const dvec3 forward = frame.forward / length;
   const double half_height = glm::length(frame.up);
@@ -534,7 +546,9 @@ ViewFrame Camera::view(double aspect, const std::optional<Subject>& subject) {
         own_ = pose_;
       }
     }
-    return matrices_frame_;
+    ViewFrame frame = matrices_frame_;
+    set_lens(pose_, 0.0, frame);  // an orthographic pose of theirs has its eye in the near plane
+    return frame;
   }
   if (!(aspect > 0.0 && std::isfinite(aspect)))
     return frame_of(placed(pose_, std::nullopt, 1.0, 0.0), 1.0);  // no picture

@@ -27,6 +27,8 @@ struct CameraPose {
   double near_plane = 0.0;           // 0: the default, see cumulet.h
   double far_plane = 0.0;            // 0: the default
   DepthConvention depth = DepthConvention::standard;
+  double lens_radius = 0.0;     // 0: a pinhole
+  double focus_distance = 0.0;  // 0: at the target
   bool operator==(const CameraPose&) const = default;
 };
 

@@ -185,6 +185,8 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
                                 "camera.up",
                                 "camera.fovy_degrees",
                                 "camera.orthographic_height",
+                                "camera.lens_radius",
+                                "camera.focus_distance",
                                 "picture.width",
                                 "picture.height",
                                 "environment.file",

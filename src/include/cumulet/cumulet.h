@@ -1218,7 +1218,7 @@ typedef enum cumulet_clip {
 } cumulet_clip;
 
 /*
- * A pinhole or orthographic camera. eye == target: placed once, by the first viewer that renders through it with
+ * A perspective or orthographic camera, of a pinhole or a lens. eye == target: placed once, by the first viewer that renders through it with
  * something to show, so that it fits what is seen from +Z and a little above. Seen are triangles, and the volume where
  * its opacity, at the density scale of that moment, is 5 % or more; where nothing is, the bounds. 6 % of the picture's
  * shorter side, or more, stay free on each side. Near and far plane do not clip the volume: they say what depth buffers
@@ -1234,8 +1234,16 @@ typedef struct cumulet_camera_desc {
   double near_plane;          /* 0: 0.1 for perspective, 0 for orthographic */
   double far_plane;           /* 0: infinite for perspective, 1000 x orthographic_height for orthographic */
   cumulet_depth depth;
+  double lens_radius;    /* world units: a thin lens, round; what is not at focus_distance is blurred; 0: a pinhole */
+  double focus_distance; /* from the eye along the axis to the plane that is sharp; 0: to the target's */
 } cumulet_camera_desc;
 
+/*
+ * Depth of field, by a lens: a point at z is a disc of lens_radius x |z - focus| / z, in the plane that is sharp. Traced
+ * pictures and AOVs have it. What is rasterised (surfaces of previews, and with CUMULET_SURFACE_LIGHT_NONE), debug
+ * views, picks and depths are through the lens' middle, and the host's depth ends rays as if they came from there. A
+ * lens is kept by cumulet_camera_set_matrices.
+ */
 /* Cameras may be shared by viewers. A viewer is made with one of its own. */
 CUMULET_API cumulet_status cumulet_camera_create(const cumulet_camera_desc* desc, cumulet_camera** out);
 CUMULET_API void cumulet_camera_release(cumulet_camera* camera); /* NULL is allowed */
