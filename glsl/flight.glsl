@@ -172,7 +172,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   vec3 emitted = vec3(0.0f, 0.0f, 0.0f);
   // Looks might have found it as well.
   float flights = p.bounces > 0u ? p.density : 1.0f;
-  float looks = p.bounces > 0u ? cm.lights.cell_chance : 0.0f;
+  float looks = p.bounces > 0u ? cm.lights.cell_chance * cm_look_chance(p, CM_LIGHT_CELL, p.density, 0.0f) : 0.0f;
 #endif
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;

@@ -357,10 +357,47 @@ CM_FN bool cm_is_far(CmLightSample light) {
   return (light.kind == CM_LIGHT_SUN && cm.lights.sun_spread > 0.0f) CM_FAR_LIGHTS(CM_IS_FAR);
 }
 
-// What a flight brings along w, which it took with that density, if it escapes with that transmittance.
-#define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE) \
-  brought += RADIANCE(w) * cm_balance(transmittance * flight, cm_light_pdf(cm_light_hit(NUMBER, o, w, flight)));
-CM_FN vec3 cm_far_light(vec3 o, vec3 w, float flight, float transmittance) {
+// The share of looks for what is far away and even that are worth making. Flights find it by themselves: those that are
+// not absorbed, and are not at their last event, escape to it in the end, each with as much.
+CM_FN float cm_look_share_of_even(CmPath p) {
+  vec3 albedo = CM_MEDIUM.albedo;
+#if CM_CHANNELS && defined(CM_MARCH)
+  if (CM_MEDIUM.coloured != 0u) albedo *= cm_march_colour(p.start_cell);
+#endif
+  float absorbed = 1.0f - max(albedo.x, max(albedo.y, albedo.z));
+  float left = float(cm.integrator.max_bounces) + 1.0f - float(p.bounces);
+  return min(1.0f, max(3.0f * absorbed, cm.integrator.max_bounces != 0u ? 4.0f / left : 0.0f));
+}
+
+// The chance that a look is made, where one of that kind was drawn with that density (its kind's chance in it) along a
+// direction that flights take with that one: in the medium, looks that would tell little are left out by Russian roulette
+// (tests/bench/README.md has what that is worth).
+CM_FN float cm_look_chance(CmPath p, uint kind, float flight, float density) {
+  if (p.start != CM_IN_MEDIUM) return 1.0f;
+  if (kind == CM_LIGHT_SKY) return cm_look_share_of_even(p);
+  // By what comes along, of which a path of many events needs less; but of what is near it is the distance that counts.
+  float share = 12.5663706f * flight;
+  bool near = kind == CM_LIGHT_LAMP || kind == CM_LIGHT_TRIANGLE || kind == CM_LIGHT_CELL;
+  if (!near) share *= clamp(8.0f / float(p.bounces), 0.25f, 1.0f);
+#if CM_ENVIRONMENT
+  // Where it is brighter than its mean, as a sun in it, flights seldom find it.
+  float bright = 12.5663706f * density / max(cm.lights.environment_chance, 1e-30f);
+  if (kind == CM_LIGHT_ENVIRONMENT) share *= max(cm_look_share_of_even(p), min(1.0f, 0.125f * bright));
+#endif
+  return min(1.0f, share);
+}
+
+// Of looks that are made, to come to what the path's flight has come to.
+CM_FN float cm_look_pdf(CmPath p, CmLightHit hit) {
+  float density = cm_light_pdf(hit);
+  return density * cm_look_chance(p, hit.kind, hit.flight, density);
+}
+
+// What a flight brings that escapes with that transmittance.
+#define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)           \
+  brought += RADIANCE(p.w) * cm_balance(transmittance * p.density, \
+                                        cm_look_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.density)));
+CM_FN vec3 cm_far_light(CmPath p, float transmittance) {
   vec3 brought = vec3(0.0f, 0.0f, 0.0f);
   CM_FAR_LIGHTS(CM_ESCAPED)
   CM_ESCAPED(CM_LIGHT_SUN, unused, unused, unused, cm_sun_radiance)

@@ -104,7 +104,7 @@ CM_FN void cm_escape(CM_INOUT(CmPath) p) {
   float depth = p.depth_0 - p.depth;
   float transmittance = exp(-depth);
   if (p.ray == CM_RAY_FLIGHT) {
-    if (p.bounces > 0u) p.radiance += p.throughput * cm_far_light(p.o, p.w, p.density, transmittance);
+    if (p.bounces > 0u) p.radiance += p.throughput * cm_far_light(p, transmittance);
   } else {
     float survival = min(1.0f, exp(CM_SHADOW_DEPTH - depth));
     p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.density)));
@@ -162,6 +162,20 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   vec3 u = vec3(look.draw.turn.x, look.draw.turn.y, look.draw.choice);
   look.light = cm_sky_sample(p, here, u);
   if (look.looks) look.light = cm_light_sample(p, here, u);
+#ifdef CM_MARCH  // what has no march is on triangles
+  if (look.looks) {
+    float chance = cm_look_chance(p, look.light.kind, cm_scattered(p, look.light.direction), look.light.density);
+    look.looks = look.draw.way < chance;
+    look.draw.way = look.looks ? look.draw.way / chance : (look.draw.way - chance) / (1.0f - chance);
+    look.light.density *= chance;
+    if (!look.looks) {
+      // The chance may depend on the light's direction, and so on the numbers that it was drawn with.
+      look.draw.turn.x = cm_random(p.random, p.stream);
+      look.draw.turn.y = cm_random(p.random, p.stream);
+      look.light = cm_sky_sample(p, here, u);
+    }
+  }
+#endif
   // Of the choices of the sky each is as likely: for a lobe.
   if (look.looks && look.light.kind == CM_LIGHT_SKY) look.draw.choice = min(1.0f, u.z / cm.lights.sky_chance);
   if (look.light.kind == CM_LIGHT_CELL && cm_is_dark(p)) look.light.radiance = vec3(0.0f, 0.0f, 0.0f);

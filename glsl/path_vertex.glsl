@@ -180,7 +180,7 @@ CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
     hit.triangle = p.triangle;
     hit.point = vertex.surface.position;
     hit.normal = vertex.surface.geometric;
-    emission *= p.lifted != 0u ? 0.0f : cm_balance(p.density, cm_light_pdf(hit));
+    emission *= p.lifted != 0u ? 0.0f : cm_balance(p.density, cm_look_pdf(p, hit));
   }
   p.radiance += p.throughput * emission;
 }

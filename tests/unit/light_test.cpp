@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
+#include <utility>
 
 #include "gl/shader_sources.hpp"
 #include "grid/cell.hpp"
@@ -341,6 +343,96 @@ TEST_P(Sun, OfAnAngleLightsAMediumAsQuadratureHasItHoweverItIsFound) {
       for (std::uint32_t i = 0; i < 64; ++i) mean += cpu.traced({i % 8, i / 8}).sum.x / 256.0 / 64.0;
       EXPECT_NEAR(mean, expected, (chance < 1.0F ? 0.03 : 0.1) * expected) << g << " " << chance;
     }
+  }
+}
+
+// Paths through that box as they would be written down: every event looks for a sun without extent, and what escapes
+// finds the sky, or a sun that has one, by itself. No weights, no roulette. Mean and standard error.
+std::pair<double, double> plainly_traced(const dvec3& size, double sigma, double g, double albedo,
+                                         const viewer::Light& light) {
+  constexpr int paths = 400'000;
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> number(0.0, 1.0);
+  const double elevation = light.sun_elevation_degrees * pi / 180.0;
+  const dvec3 to_sun(0.0, std::sin(elevation), std::cos(elevation));
+  const double half = light.sun_angle_degrees * pi / 360.0;
+  const double sun_radiance = half > 0.0 ? light.sun_irradiance.x / (pi * std::pow(std::sin(half), 2.0)) : 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (int i = 0; i < paths; ++i) {
+    dvec3 at(0.5 * size.x, 0.5 * size.y, size.z);
+    dvec3 w(0.0, 0.0, -1.0);
+    const auto way_out = [&](const dvec3& along) {
+      double out = 1e30;
+      for (int axis = 0; axis < 3; ++axis) {
+        if (along[axis] != 0.0) out = std::min(out, ((along[axis] > 0.0 ? size[axis] : 0.0) - at[axis]) / along[axis]);
+      }
+      return out;
+    };
+    double brought = 0.0;
+    double throughput = 1.0;
+    for (;;) {
+      const double way = -std::log(1.0 - number(random)) / sigma;
+      if (way >= way_out(w)) {
+        brought += throughput * light.sky_radiance.x;
+        if (half > 0.0 && glm::dot(w, to_sun) > std::cos(half)) brought += throughput * sun_radiance;
+        break;
+      }
+      at += way * w;
+      throughput *= albedo;
+      if (!(half > 0.0)) {
+        const double phase = (1.0 - g * g) / (4.0 * pi * std::pow(1.0 + g * g - 2.0 * g * glm::dot(w, to_sun), 1.5));
+        brought += throughput * phase * std::exp(-sigma * way_out(to_sun)) * light.sun_irradiance.x;
+      }
+      const double s = (1.0 - g * g) / (1.0 - g + 2.0 * g * number(random));
+      const double cosine = g != 0.0 ? (1.0 + g * g - s * s) / (2.0 * g) : 1.0 - 2.0 * number(random);
+      const dvec3 across = glm::normalize(glm::cross(w, std::abs(w.y) < 0.9 ? dvec3(0, 1, 0) : dvec3(1, 0, 0)));
+      const double angle = 2.0 * pi * number(random);
+      w = glm::normalize(cosine * w + std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) *
+                                          (std::cos(angle) * across + std::sin(angle) * glm::cross(w, across)));
+    }
+    sum += brought / paths;
+    squares += brought * brought / paths;
+  }
+  return {sum, std::sqrt(std::max(0.0, squares - sum * sum) / paths)};
+}
+
+// Of many events, where looks that would tell little are left out: few for an even sky, few of many, and few
+// along directions in which little is scattered. (An even sky in white is the furnace of trace_test.)
+TEST_P(Sun, AndSkyLightADeepMediumAsPlainPathsHaveIt) {
+  const BoxOfVoxels box;
+  const double sigma = 0.3;
+  struct Case {
+    const char* name;
+    float g;
+    float albedo;
+    float sky;
+    float sun;
+    float degrees;
+  };
+  for (const Case& of :
+       {Case{"sky", 0.3F, 0.9F, 1.0F, 0.0F, 0.0F}, Case{"sun, white", 0.0F, 1.0F, 0.0F, 5.0F, 0.0F},
+        Case{"sun", 0.7F, 0.95F, 0.0F, 5.0F, 0.0F}, Case{"wide sun", 0.7F, 0.95F, 0.0F, 5.0F, 60.0F},
+        Case{"wide sun, white", -0.4F, 1.0F, 0.0F, 5.0F, 60.0F}, Case{"both", 0.6F, 0.97F, 0.5F, 3.0F, 40.0F}}) {
+    SCOPED_TRACE(of.name);
+    viewer::Light light;
+    light.sun_azimuth_degrees = 0.0F;
+    light.sun_elevation_degrees = 50.0F;
+    light.sun_irradiance = vec3(of.sun);
+    light.sun_angle_degrees = of.degrees;
+    light.sky_radiance = vec3(of.sky);
+    const auto viewer = make();
+    box.show(*viewer);
+    viewer->set_light(light);
+    viewer->set_medium({sigma, vec3(of.albedo), {of.g}, 0});
+    const test::Picture picture = test::render(*viewer, {16, 16, 512, 1, render::View::shaded});
+    const double mean = picture.mean().x;
+    double square = 0.0;
+    for (const glm::vec4& pixel : picture.pixels) square += std::pow(pixel.x - mean, 2.0) / 256.0;
+    const auto [expected, error] = plainly_traced(dvec3(box.voxels), sigma, of.g, of.albedo, light);
+    const double errors = std::sqrt(square / 256.0 + error * error);
+    EXPECT_NEAR(mean, expected, 4.0 * errors);
+    EXPECT_LT(errors, 0.01 * expected) << "or it would tell nothing";
   }
 }
 
