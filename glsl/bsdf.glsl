@@ -1,9 +1,13 @@
 // What a surface reflects: the metallic-roughness material of glTF 2.0 (appendix B) with KHR_materials_ior, _specular
-// and _clearcoat. Shared by GLSL and C++; the includer has before this
+// and _clearcoat; with CM_RICH also _transmission, _volume, _dispersion, _sheen, _anisotropy and _iridescence
+// (glsl/film.glsl, glsl/sheen.glsl). Shared by GLSL and C++; the includer has before this
 //   vec2 cm_ggx_albedo(float roughness, float cosine)
 //   vec2 cm_ggx_albedo_average(float roughness)
 // of src/surface/ggx_albedo.hpp's table: a GGX lobe with a Fresnel term of f0 and f90 reflects f0 x + f90 y of constant
-// radiance, towards a cosine and on average over all of them (weighed by the cosine).
+// radiance, towards a cosine and on average over all of them (weighed by the cosine); with CM_RICH
+//   float cm_sheen_albedo(float roughness, float cosine)
+//   float cm_sheen_albedo_average(float roughness)
+// of src/surface/sheen_albedo.hpp's.
 //
 // Three lobes: a GGX coat over a GGX base, and a Lambertian one under the base. Appendix B weighs the Lambertian lobe by
 // 1 - F(v.h), which reflects up to 1.7 times the light that comes in at grazing angles. Here it is coupled to the base by
@@ -15,12 +19,23 @@
 // The Lambertian lobe keeps the normal that is not bent: it mirrors nothing, and loses light at rims by a bent one. It
 // ends softly where light sinks below the smooth surface under a normal map: see cm_terminator.
 //
-// wo and wi are unit vectors that point away from the surface, wo towards where the light goes. Nothing is transmitted.
+// wo and wi are unit vectors that point away from the surface, wo towards where the light goes.
+//
+// Transmission, of what passes the interface and is not metal, takes the Lambertian lobe's place. A thin wall has the
+// base lobe's shape on its other side, but as smooth as lobes get it lets light go straight on, which is no lobe:
+// cm_bsdf_passes. A volume's boundary refracts by the same microfacets (Walter, Marschner, Li and Torrance, "Microfacet
+// Models for Refraction through Rough Surfaces", EGSR 2007). Radiance is taken for what it is over the square of the
+// index, so that nothing changes where light goes in and comes out again. What is lost between microfacets is not given
+// back: of constant radiance at most 0.04 at a roughness of 0.2, 0.21 at 0.5 and 0.7 at 1 (rich_bsdf_test).
 #ifndef CM_BSDF_GLSL
 #define CM_BSDF_GLSL
 #include "frame.glsl"
 #include "ggx.glsl"
 #include "numbers.glsl"
+#if CM_RICH
+#include "film.glsl"
+#include "sheen.glsl"
+#endif
 
 struct CmSurface {
   vec3 base_color;            // linear, 0 to 1
@@ -33,6 +48,17 @@ struct CmSurface {
   float specular;             // its reflectance at grazing incidence
   float clearcoat;            // weight of the coat, of ior 1.5
   float clearcoat_roughness;  // as roughness
+#if CM_RICH
+  vec3 geometric;         // of the triangle, unit, on wo's side: what is transmitted is behind it
+  vec3 tangent;           // unit, at right angles to the normal: where the first alpha is
+  CmAlpha alpha;          // of the base lobe; roughness is that of their mean
+  vec3 sheen;             // linear, 0 to 1
+  float sheen_roughness;  // as roughness
+  CmFilm film;
+  float film_average;     // see cm_film_average
+  float transmission;     // 0 to 1
+  float eta;              // index of refraction behind the surface over that before it; 0: a thin wall
+#endif
 };
 
 const float CM_COAT_F0 = 0.04f;
@@ -55,14 +81,72 @@ CM_FN float cm_interface_fresnel(CmSurface s, float cosine) {
   return f0 + (s.specular - f0) * cm_schlick(cosine);
 }
 
-// What is left of constant radiance below the dielectric's interface, and below the coat, towards a cosine or by the
-// average of the table.
-CM_FN float cm_below_interface(CmSurface s, vec2 albedo) {
-  return max(0.0f, 1.0f - cm_max3(s.f0) * albedo.x - s.specular * albedo.y);
+#if CM_RICH
+
+CM_FN void cm_surface_frame(CmSurface s, CM_OUT(vec3) u, CM_OUT(vec3) v) {
+  u = s.tangent;
+  v = cross(s.normal, u);
 }
-CM_FN float cm_below_coat(CmSurface s, vec2 albedo) {
-  return 1.0f - s.clearcoat * (CM_COAT_F0 * albedo.x + albedo.y);
+
+CM_FN CmAlpha cm_base_alpha(CmSurface s) { return s.alpha; }
+CM_FN CmAlpha cm_coat_alpha(CmSurface s) { return vec2(cm_alpha(s.clearcoat_roughness)); }
+
+// Of an interface of these reflectances, which wo sees at a cosine: at that of the thinner side, where all is reflected
+// if none leads there.
+CM_FN vec3 cm_interface_fresnel_of(CmSurface s, vec3 f0, float f90, float cosine) {
+  if (s.eta > 0.0f && s.eta < 1.0f) {
+    float sine2 = (1.0f - cosine * cosine) / (s.eta * s.eta);
+    if (sine2 >= 1.0f) return vec3(1.0f);
+    cosine = sqrt(1.0f - sine2);
+  }
+  vec3 f = f0 + (vec3(f90) - f0) * cm_schlick(cosine);
+  float film = cm_film_share(s.film);
+  if (film > 0.0f) f = mix(f, cm_film_fresnel(s.film, f0, cosine), film);
+  return f;
 }
+CM_FN vec3 cm_base_fresnel(CmSurface s, float cosine) {
+  return cm_interface_fresnel_of(s, mix(s.f0, s.base_color, s.metallic), mix(s.specular, 1.0f, s.metallic), cosine);
+}
+CM_FN float cm_dielectric_fresnel(CmSurface s, float cosine) {
+  return cm_max3(cm_interface_fresnel_of(s, s.f0, s.specular, cosine));
+}
+
+// What a film adds to the reflectance of the dielectric's interface, towards a cosine and on average.
+CM_FN float cm_film_adds(CmSurface s, float cosine) {
+  if (!(s.film.weight > 0.0f)) return 0.0f;
+  float f0 = cm_max3(s.f0);
+  return cm_dielectric_fresnel(s, cosine) - (f0 + (s.specular - f0) * cm_schlick(cosine));
+}
+CM_FN float cm_film_average(CmSurface s) {
+  // By Gauss and Legendre over the squared cosine.
+  float sum = 8.0f * cm_film_adds(s, 0.70710678f);
+  sum += 5.0f * (cm_film_adds(s, 0.33571049f) + cm_film_adds(s, 0.94196513f));
+  return sum * (1.0f / 18.0f);
+}
+
+// What is left of constant radiance below the dielectric's interface, towards a cosine and on average, and below the
+// sheen. What a film adds is taken as if the lobe were narrow.
+CM_FN float cm_below_interface_of(CmSurface s, vec2 albedo, float film) {
+  float reflected = cm_max3(s.f0) * albedo.x + s.specular * albedo.y;
+  return clamp(1.0f - reflected - film * (albedo.x + albedo.y), 0.0f, 1.0f);
+}
+CM_FN float cm_below_interface(CmSurface s, float cosine) {
+  return cm_below_interface_of(s, cm_ggx_albedo(s.roughness, cosine), cm_film_adds(s, cosine));
+}
+CM_FN float cm_below_interface_average(CmSurface s) {
+  return cm_below_interface_of(s, cm_ggx_albedo_average(s.roughness), s.film_average);
+}
+CM_FN float cm_below_sheen(CmSurface s, float albedo) { return max(0.0f, 1.0f - cm_max3(s.sheen) * albedo); }
+CM_FN float cm_below_sheen_towards(CmSurface s, float cosine) {
+  return cm_max3(s.sheen) > 0.0f ? cm_below_sheen(s, cm_sheen_albedo(s.sheen_roughness, cosine)) : 1.0f;
+}
+
+#else
+
+CM_FN void cm_surface_frame(CmSurface s, CM_OUT(vec3) u, CM_OUT(vec3) v) { cm_frame(s.normal, u, v); }
+
+CM_FN CmAlpha cm_base_alpha(CmSurface s) { return cm_alpha(s.roughness); }
+CM_FN CmAlpha cm_coat_alpha(CmSurface s) { return cm_alpha(s.clearcoat_roughness); }
 
 // Of the base lobe: dielectric and metal are both linear in f0 and f90.
 CM_FN vec3 cm_base_fresnel(CmSurface s, float cosine) {
@@ -71,20 +155,139 @@ CM_FN vec3 cm_base_fresnel(CmSurface s, float cosine) {
   return f0 + (vec3(f90) - f0) * cm_schlick(cosine);
 }
 
+// What is left of constant radiance below the dielectric's interface, towards a cosine and on average, and below the
+// coat.
+CM_FN float cm_below_interface_of(CmSurface s, vec2 albedo) {
+  return max(0.0f, 1.0f - cm_max3(s.f0) * albedo.x - s.specular * albedo.y);
+}
+CM_FN float cm_below_interface(CmSurface s, float cosine) {
+  return cm_below_interface_of(s, cm_ggx_albedo(s.roughness, cosine));
+}
+CM_FN float cm_below_interface_average(CmSurface s) {
+  return cm_below_interface_of(s, cm_ggx_albedo_average(s.roughness));
+}
+
+#endif
+
+CM_FN float cm_below_coat(CmSurface s, vec2 albedo) {
+  return 1.0f - s.clearcoat * (CM_COAT_F0 * albedo.x + albedo.y);
+}
+CM_FN float cm_below_coat_towards(CmSurface s, float cosine) {
+  return s.clearcoat > 0.0f ? cm_below_coat(s, cm_ggx_albedo(s.clearcoat_roughness, cosine)) : 1.0f;
+}
+
 // Reflected share of constant radiance by the Lambertian lobe alone, without the coat.
 CM_FN vec3 cm_matte_albedo(CmSurface s, float cosine) {
-  return s.base_color * ((1.0f - s.metallic) * cm_below_interface(s, cm_ggx_albedo(s.roughness, cosine)));
+  float share = (1.0f - s.metallic) * cm_below_interface(s, cosine);
+#if CM_RICH
+  share *= 1.0f - s.transmission;
+#endif
+  return s.base_color * share;
 }
 
-// Probabilities of choosing the coat (x), the base lobe (y) and the Lambertian one (z): roughly as they reflect.
-CM_FN vec3 cm_lobe_weights(CmSurface s, float cosine) {
-  float below = s.clearcoat > 0.0f ? cm_below_coat(s, cm_ggx_albedo(s.clearcoat_roughness, cosine)) : 1.0f;
-  vec3 w = vec3(1.0f - below, below * cm_max3(cm_base_fresnel(s, cosine)), below * cm_max3(cm_matte_albedo(s, cosine)));
-  float sum = w.x + w.y + w.z;
-  return sum > 0.0f ? w * (1.0f / sum) : vec3(0.0f, 0.0f, 1.0f);
+#if CM_RICH
+
+// The colour that goes through, of what passes the interface.
+CM_FN vec3 cm_transmitted(CmSurface s) { return s.base_color * (s.transmission * (1.0f - s.metallic)); }
+
+// Whether transmission is no lobe: cm_bsdf_passes.
+CM_FN bool cm_is_clear(CmSurface s) { return s.eta == 0.0f && max(s.alpha.x, s.alpha.y) <= 1.001f * CM_LEAST_ALPHA; }
+
+// What goes straight on: the chance with which paths do so is the largest channel's, and those that do not have the
+// lobes' share of the others.
+CM_FN vec3 cm_bsdf_passes(CmSurface s, vec3 wo) {
+  if (!(s.transmission > 0.0f) || !cm_is_clear(s)) return vec3(0.0f);
+  float cosine = clamp(dot(s.normal, wo), 0.0f, 1.0f);
+  float below = cm_below_coat_towards(s, cosine) * cm_below_sheen_towards(s, cosine);
+  return min(cm_transmitted(s) * (below * (1.0f - cm_dielectric_fresnel(s, cosine))), vec3(1.0f));
 }
 
-// The lobes' sum times |cos|; the Lambertian one, which sees wi at matte_cosine, weighed by `terminator`.
+// Of a microfacet that wo sees at this cosine the chance to reflect, not transmit.
+CM_FN float cm_reflects(CmSurface s, float cosine) {
+  if (!(s.transmission > 0.0f) || cm_is_clear(s)) return 1.0f;
+  float through = cm_max3(cm_transmitted(s)) * (1.0f - cm_dielectric_fresnel(s, cosine));
+  if (!(through > 0.0f)) return 1.0f;
+  return cm_max3(cm_base_fresnel(s, cosine)) / (cm_max3(cm_base_fresnel(s, cosine)) + through);
+}
+
+// The microfacet's normal that refracts wi to wo; whether there is one.
+CM_FN bool cm_refracting(CmSurface s, vec3 wo, vec3 wi, CM_OUT(vec3) h) {
+  h = wo + wi * s.eta;
+  float length2 = dot(h, h);
+  if (!(length2 > 1e-20f)) return false;
+  h *= (h.z < 0.0f ? -1.0f : 1.0f) * inversesqrt(length2);
+  return h.z > 1e-6f && dot(wo, h) > 0.0f && dot(wi, h) < 0.0f;
+}
+
+// |dh / dwi| of that.
+CM_FN float cm_refraction_jacobian(CmSurface s, vec3 wo, vec3 wi, vec3 h) {
+  float sum = dot(wo, h) + s.eta * dot(wi, h);
+  return s.eta * s.eta * abs(dot(wi, h)) / max(sum * sum, 1e-20f);
+}
+
+// Where wo goes on behind a microfacet; its own direction back where all is reflected.
+CM_FN vec3 cm_refracted(CmSurface s, vec3 wo, vec3 h) {
+  float cosine = dot(wo, h);
+  float sine2 = (1.0f - cosine * cosine) / (s.eta * s.eta);
+  if (sine2 >= 1.0f) return wo;
+  return normalize(h * (cosine / s.eta - sqrt(1.0f - sine2)) - wo * (1.0f / s.eta));
+}
+
+// The lobe on the other side times |cos|.
+CM_FN vec3 cm_through_eval(CmSurface s, vec3 wo, vec3 wi) {
+  if (!(wi.z < 0.0f) || !(s.transmission > 0.0f) || cm_is_clear(s)) return vec3(0.0f);
+  float below = cm_below_coat_towards(s, wo.z) * cm_below_sheen_towards(s, wo.z);
+  vec3 mirrored = vec3(wi.x, wi.y, -wi.z);
+  vec3 h = normalize(wo + mirrored);
+  float lobe = 0.0f;
+  if (s.eta == 0.0f) {
+    lobe = cm_ggx(s.alpha, wo, mirrored, h);
+  } else if (cm_refracting(s, wo, wi, h)) {
+    lobe = cm_ggx(s.alpha, wo, mirrored, h) * 4.0f * dot(wo, h) * cm_refraction_jacobian(s, wo, wi, h);
+  }
+  return lobe > 0.0f ? cm_transmitted(s) * (below * lobe * (1.0f - cm_dielectric_fresnel(s, dot(wo, h)))) : vec3(0.0f);
+}
+
+// Density of what the base lobe's microfacets send there.
+CM_FN float cm_through_pdf(CmSurface s, vec3 wo, vec3 wi) {
+  if (!(s.transmission > 0.0f)) return 0.0f;
+  vec3 h = wo + vec3(wi.x, wi.y, -wi.z);
+  float jacobian = 0.0f;
+  if (s.eta == 0.0f) {
+    float length2 = dot(h, h);
+    h *= inversesqrt(max(length2, 1e-20f));
+    jacobian = cm_is_positive(h.z) ? 1.0f : 0.0f;
+  } else if (cm_refracting(s, wo, wi, h)) {
+    jacobian = 4.0f * dot(wo, h) * cm_refraction_jacobian(s, wo, wi, h);
+  }
+  return jacobian > 0.0f ? jacobian * cm_ggx_pdf(s.alpha, wo, h) * (1.0f - cm_reflects(s, dot(wo, h))) : 0.0f;
+}
+
+#endif
+
+// Probabilities of choosing the coat (x), the base lobe and what it transmits (y), the Lambertian one (z) and the sheen
+// (w): roughly as they reflect.
+CM_FN vec4 cm_lobe_weights(CmSurface s, float cosine) {
+  float below = cm_below_coat_towards(s, cosine);
+  float sheen = 0.0f;
+#if CM_RICH
+  float coat = below;
+  below *= cm_below_sheen_towards(s, cosine);
+  sheen = coat - below;
+  vec4 w = vec4(1.0f - coat, 0.0f, 0.0f, sheen);
+  w.y = cm_max3(cm_base_fresnel(s, cosine));
+  if (!cm_is_clear(s)) w.y += cm_max3(cm_transmitted(s)) * (1.0f - cm_dielectric_fresnel(s, cosine));
+  w.y *= below;
+  w.z = below * cm_max3(cm_matte_albedo(s, cosine));
+#else
+  vec4 w = vec4(1.0f - below, below * cm_max3(cm_base_fresnel(s, cosine)),
+                below * cm_max3(cm_matte_albedo(s, cosine)), sheen);
+#endif
+  float sum = w.x + w.y + w.z + w.w;
+  return sum > 0.0f ? w * (1.0f / sum) : vec4(0.0f, 0.0f, 1.0f, 0.0f);
+}
+
+// The reflected lobes' sum times |cos|; the Lambertian one, which sees wi at matte_cosine, weighed by `terminator`.
 CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine, vec3 wo, vec3 wi) {
   if (!cm_is_positive(wo.z)) return vec3(0.0f);
   float cosine = 1.0f;
@@ -94,22 +297,34 @@ CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine,
   if (above) {
     h = normalize(wo + wi);
     cosine = dot(wo, h);
-    f = cm_base_fresnel(s, cosine) * cm_ggx(cm_alpha(s.roughness), wo, wi, h);
+    f = cm_base_fresnel(s, cosine) * cm_ggx(cm_base_alpha(s), wo, wi, h);
   }
   vec3 matte = vec3(0.0f);
   if (s.metallic < 1.0f && matte_cosine > 0.0f) {
-    float average = cm_below_interface(s, cm_ggx_albedo_average(s.roughness));
-    float through = cm_below_interface(s, cm_ggx_albedo(s.roughness, matte_cosine)) / max(average, 1e-6f);
+    float average = cm_below_interface_average(s);
+    float through = cm_below_interface(s, matte_cosine) / max(average, 1e-6f);
     matte = cm_matte_albedo(s, wo.z) * (terminator * through * matte_cosine * CM_INV_PI);
   }
+#if CM_RICH
+  if (cm_max3(s.sheen) > 0.0f) {
+    float rough = s.sheen_roughness;
+    float out_of = cm_below_sheen_towards(s, wo.z);
+    float into = cm_below_sheen_towards(s, max(matte_cosine, 0.0f));
+    matte *= out_of * into / max(cm_below_sheen(s, cm_sheen_albedo_average(rough)), 1e-6f);
+    if (above) {
+      f *= min(out_of, cm_below_sheen_towards(s, wi.z));
+      f += s.sheen * cm_sheen(rough, wo, wi, h);
+    }
+  }
+#endif
   if (s.clearcoat > 0.0f) {
     float rough = s.clearcoat_roughness;
-    float out_of = cm_below_coat(s, cm_ggx_albedo(rough, wo.z));
-    float into = cm_below_coat(s, cm_ggx_albedo(rough, max(matte_cosine, 0.0f)));
+    float out_of = cm_below_coat_towards(s, wo.z);
+    float into = cm_below_coat_towards(s, max(matte_cosine, 0.0f));
     matte *= out_of * into / cm_below_coat(s, cm_ggx_albedo_average(rough));
     if (above) {
-      f *= min(out_of, cm_below_coat(s, cm_ggx_albedo(rough, wi.z)));
-      f += vec3(cm_coat_fresnel(s, cosine) * cm_ggx(cm_alpha(rough), wo, wi, h));
+      f *= min(out_of, cm_below_coat_towards(s, wi.z));
+      f += vec3(cm_coat_fresnel(s, cosine) * cm_ggx(cm_coat_alpha(s), wo, wi, h));
     }
   }
   return f + matte;
@@ -117,13 +332,21 @@ CM_FN vec3 cm_bsdf_eval_local(CmSurface s, float terminator, float matte_cosine,
 
 CM_FN float cm_bsdf_pdf_local(CmSurface s, float matte_cosine, vec3 wo, vec3 wi) {
   if (!cm_is_positive(wo.z)) return 0.0f;
-  vec3 lobes = cm_lobe_weights(s, wo.z);
+  vec4 lobes = cm_lobe_weights(s, wo.z);
   float pdf = lobes.z * max(matte_cosine, 0.0f) * CM_INV_PI;
+#if CM_RICH
+  if (wi.z > 0.0f) pdf += lobes.w * CM_SHEEN_PDF;
+  if (lobes.y > 0.0f) pdf += lobes.y * cm_through_pdf(s, wo, wi);
+#endif
   // Lobes that mirror throw some of their samples below the surface, where the Lambertian one may still see them.
   vec3 h = normalize(wo + wi);
   if (!cm_is_positive(h.z)) return pdf;
-  if (lobes.y > 0.0f) pdf += lobes.y * cm_ggx_pdf(cm_alpha(s.roughness), wo, h);
-  if (lobes.x > 0.0f) pdf += lobes.x * cm_ggx_pdf(cm_alpha(s.clearcoat_roughness), wo, h);
+  float base = lobes.y;
+#if CM_RICH
+  base *= cm_reflects(s, dot(wo, h));
+#endif
+  if (base > 0.0f) pdf += base * cm_ggx_pdf(cm_base_alpha(s), wo, h);
+  if (lobes.x > 0.0f) pdf += lobes.x * cm_ggx_pdf(cm_coat_alpha(s), wo, h);
   return pdf;
 }
 
@@ -141,38 +364,51 @@ CM_FN float cm_terminator(CmSurface s, vec3 wi) {
   return t * (1.0f + t * (1.0f - t));
 }
 
-// f |cos wi|: 0 where either is not above the surface. f is reciprocal where the normal is not mapped.
+// f |cos wi|: 0 where either is not above the surface, but for what is transmitted. f is reciprocal where the normal is
+// not mapped; transmitted, f over the square of the index on wi's side is.
 CM_FN vec3 cm_bsdf_eval(CmSurface s, vec3 wo, vec3 wi) {
   vec3 u;
   vec3 v;
-  cm_frame(s.normal, u, v);
-  return cm_bsdf_eval_local(s, cm_terminator(s, wi), dot(s.matte_normal, wi), cm_into_frame(u, v, s.normal, wo),
-                            cm_into_frame(u, v, s.normal, wi));
+  cm_surface_frame(s, u, v);
+  vec3 o = cm_into_frame(u, v, s.normal, wo);
+  vec3 i = cm_into_frame(u, v, s.normal, wi);
+#if CM_RICH
+  if (s.transmission > 0.0f && dot(s.geometric, wi) < 0.0f) return cm_is_positive(o.z) ? cm_through_eval(s, o, i) : vec3(0.0f);
+#endif
+  return cm_bsdf_eval_local(s, cm_terminator(s, wi), dot(s.matte_normal, wi), o, i);
 }
 
 // Density of cm_bsdf_sample's wi by solid angle.
 CM_FN float cm_bsdf_pdf(CmSurface s, vec3 wo, vec3 wi) {
   vec3 u;
   vec3 v;
-  cm_frame(s.normal, u, v);
+  cm_surface_frame(s, u, v);
   return cm_bsdf_pdf_local(s, dot(s.matte_normal, wi), cm_into_frame(u, v, s.normal, wo),
                            cm_into_frame(u, v, s.normal, wi));
 }
 
-// A direction for u in [0, 1)^3; u0 picks the lobe. May be below the surface: eval is 0 where it is for every lobe.
+// A direction for u in [0, 1)^3; u0 picks the lobe. May be where no lobe is: eval is 0 there.
 CM_FN vec3 cm_bsdf_sample(CmSurface s, vec3 wo, float u0, float u1, float u2) {
   vec3 u;
   vec3 v;
-  cm_frame(s.normal, u, v);
+  cm_surface_frame(s, u, v);
   vec3 o = cm_into_frame(u, v, s.normal, wo);
   if (!cm_is_positive(o.z)) return s.normal;
-  vec3 lobes = cm_lobe_weights(s, o.z);
+  vec4 lobes = cm_lobe_weights(s, o.z);
   vec3 i;
   vec3 n = s.normal;
   if (u0 < lobes.x + lobes.y) {
-    float alpha = cm_alpha(u0 < lobes.x ? s.clearcoat_roughness : s.roughness);
+    CmAlpha alpha = cm_base_alpha(s);
+    if (u0 < lobes.x) alpha = cm_coat_alpha(s);
     vec3 h = cm_ggx_visible_normal(alpha, o, u1, u2);
     i = h * (2.0f * dot(o, h)) - o;
+#if CM_RICH
+    if (u0 >= lobes.x && u0 - lobes.x >= lobes.y * cm_reflects(s, dot(o, h))) {
+      i = s.eta == 0.0f ? vec3(i.x, i.y, -i.z) : cm_refracted(s, o, h);
+    }
+  } else if (u0 >= 1.0f - lobes.w) {
+    i = cm_sheen_direction(u1, u2);
+#endif
   } else {
     n = s.matte_normal;
     cm_frame(n, u, v);
@@ -197,6 +433,8 @@ CM_FN vec3 cm_bend_normal(vec3 normal, vec3 geometric, vec3 wo) {
   float bent2 = dot(bent, bent);
   return bent2 > 1e-12f ? bent * (1.0f / sqrt(bent2)) : geometric;
 }
+
+#if !CM_RICH
 
 // What a sky of constant radiance 1 comes back as, nothing in its way: the integral of cm_bsdf_eval over wi, by lobes.
 struct CmAlbedos {
@@ -226,5 +464,7 @@ CM_FN CmAlbedos cm_bsdf_albedos(CmSurface s, vec3 wo) {
 
 CM_FN vec3 cm_albedo_of(CmAlbedos albedos) { return albedos.base + albedos.coat + albedos.matte; }
 CM_FN vec3 cm_bsdf_albedo(CmSurface s, vec3 wo) { return cm_albedo_of(cm_bsdf_albedos(s, wo)); }
+
+#endif
 
 #endif

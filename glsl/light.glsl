@@ -246,9 +246,7 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
   bool front = along == (uintBitsToFloat(entry.w) < 0.0f);
   light.radiance = front || (flags & CM_ONE_SIDED) == 0u ? cm_emission(m) : vec3(0.0f, 0.0f, 0.0f);
-  if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u || cm_floats(word + CM_MATERIAL_COAT).y > 0.0f) {
-    light.radiance *= cm_coverage(m);
-  }
+  if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u) light.radiance *= cm_coverage(m);
   return light;
 }
 

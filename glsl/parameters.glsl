@@ -33,6 +33,9 @@
 #ifndef CM_EQUIANGULAR
 #define CM_EQUIANGULAR 0
 #endif
+#ifndef CM_RICH
+#define CM_RICH 0
+#endif
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
 #endif
@@ -157,6 +160,8 @@ CM_BLOCK(CmSurfaceTables) {
   uint emitter_count;
   uint ggx_albedo;  // src/surface/ggx_albedo.hpp's cells
   uint ggx_albedo_averages;
+  uint sheen_albedo;  // src/surface/sheen_albedo.hpp's words
+  uint rich;          // 1: there are materials that only CM_RICH does justice, and paths keep what they are within
   CM_EQUALITY(CmSurfaceTables)
 };
 

@@ -81,6 +81,12 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.blurred = 0u;
   p.in_volume = 0u;
   p.at_layer = 0u;
+#if CM_RICH
+  p.within = 0u;
+  p.outside = 0u;
+  p.through = 0u;
+  p.dispersed = 0u;
+#endif
   p.light = cm_background_radiance(p.w);
   p.steps = 0u;
   p.depth_0 = cm_free_depth(along.x);
@@ -234,6 +240,9 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
     if (cm_blurs(turn)) p.blurred = 1u;
   }
   p.lifted = turn.lifted ? 1u : 0u;
+#if CM_RICH
+  cm_leave_surface(p, vertex, turn, looks);
+#endif
   p.d = cm_to_cube(light.direction);
   p.ray = looks ? CM_RAY_TO_LIGHT : CM_RAY_FLIGHT;
   p.found = CM_FOUND_NOT_ASKED;
@@ -275,7 +284,7 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
   if (escaped) cm_escape(p);
   bool finished = escaped && flight;
   if (met) cm_see(p, vertex);
-  bool dark = (met && cm_among_surfaces_dark(p)) || ((collided || grounded) && cm_is_dark(p));
+  bool dark = (met && cm_among_surfaces_dark(p) && !cm_came_through(p)) || ((collided || grounded) && cm_is_dark(p));
   cm_glow(p, flight, collided && !dark);
   arrived = collided || met || grounded;
   if (grounded) p.t = cm_ground_distance(p.o, p.d);

@@ -74,6 +74,11 @@
 //   start_instance  that o is in, in the medium; then start_cell is a cell of that
 //   met, met_cell   of a flight: where the nearest collision is that it knows, which is at t_end; CM_NONE: none
 //   gathers         1: all is known of its end, and it goes through what glows and overlaps once more
+// CM_PATH_WITHIN, only with CM_RICH, and only for kernels that know of triangles' materials:
+//   within          number of the material whose volume the flight is within, plus one; 0: of none
+//   outside         likewise, what that lies in
+//   through         1: the ray starts on the side of its triangle that the path did not come from
+//   dispersed       1: the path is of one wavelength
 // BITS have a number of bits of a word that they share with their neighbours.
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
@@ -99,6 +104,9 @@
 #define CM_PATH_VISIT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                          \
   UINT(instance) FLOAT(entry) UINT(start_instance) UINT(met) UVEC2(met_cell) BITS(gathers, 1)
 
+#define CM_PATH_WITHIN(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                         \
+  UINT(within) UINT(outside) BITS(through, 1) BITS(dispersed, 1)
+
 #define CM_PATH_VEC3(name) vec3 name;
 #define CM_PATH_VEC2(name) vec2 name;
 #define CM_PATH_UVEC2(name) uvec2 name;
@@ -121,6 +129,7 @@
 #define CM_FLIGHT_QUADS ((CM_PATH_WORDS(CM_PATH_FLIGHT) + 3) / 4)
 #define CM_ENDS_QUADS ((CM_PATH_WORDS(CM_PATH_ENDS) + 3) / 4)
 #define CM_VISIT_QUADS ((CM_PATH_WORDS(CM_PATH_VISIT) + 3) / 4)
+#define CM_WITHIN_QUADS ((CM_PATH_WORDS(CM_PATH_WITHIN) + 3) / 4)
 #define CM_PATH_QUADS (CM_RAY_QUADS + CM_SUM_QUADS + CM_FLIGHT_QUADS + CM_ENDS_QUADS)
 
 struct CmPath {
@@ -130,6 +139,9 @@ struct CmPath {
   CM_PATH_ENDS(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
 #if CM_INSTANCES
   CM_PATH_VISIT(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
+#endif
+#if CM_RICH
+  CM_PATH_WITHIN(CM_PATH_VEC3, CM_PATH_VEC2, CM_PATH_UVEC2, CM_PATH_FLOAT, CM_PATH_UINT, CM_PATH_BITS)
 #endif
 };
 

@@ -80,6 +80,20 @@ void cm_load_visit(inout CmPath p, uint lane) {}
 void cm_store_visit(CmPath p, uint lane) {}
 #endif
 
+// What a path is within, behind what visits may take; a path begins within nothing.
+#define CM_FIRST_WITHIN (CM_PATH_QUADS + CM_VISIT_QUADS)
+#if CM_RICH
+void cm_load_within(inout CmPath p, uint lane) { CM_LOAD(CM_PATH_WITHIN, CM_WITHIN_QUADS, CM_FIRST_WITHIN) }
+void cm_store_within(CmPath p, uint lane) { CM_STORE(CM_PATH_WITHIN, CM_WITHIN_QUADS, CM_FIRST_WITHIN) }
+#else
+void cm_load_within(inout CmPath p, uint lane) {}
+void cm_store_within(CmPath p, uint lane) {}
+#endif
+void cm_begin_within(uint lane) {
+  if (cm.surfaces.rich == 0u) return;
+  for (int i = 0; i < CM_WITHIN_QUADS; ++i) cm_paths[lane + uint(CM_FIRST_WITHIN + i) * cm_lanes()] = uvec4(0u);
+}
+
 CmPath cm_begin_path() {
   CmPath p;
   CM_PATH_RAY(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
@@ -88,6 +102,9 @@ CmPath cm_begin_path() {
   CM_PATH_ENDS(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
 #if CM_INSTANCES
   CM_PATH_VISIT(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
+#endif
+#if CM_RICH
+  CM_PATH_WITHIN(CM_ZERO_VEC3, CM_ZERO_VEC2, CM_ZERO_UVEC2, CM_ZERO_FLOAT, CM_ZERO_UINT, CM_ZERO_BITS)
 #endif
   p.stage = CM_STAGE_CAMERA;
   return p;

@@ -8,6 +8,8 @@
 
 // Events of a path whose rays take numbers that are even over the pixel's samples: later ones gain next to nothing.
 #define CM_EVEN_EVENTS 4u
+// Beyond their sets.
+#define CM_WAVELENGTH_SET 64u
 
 // The numbers that a ray from an event takes.
 struct CmDraw {
@@ -33,6 +35,10 @@ CM_FN CmDraw cm_draw(CM_INOUT(CmPath) p, bool looks) {
   return draw;
 }
 
+#if CM_RICH
+#include "dispersion.glsl"
+#endif
+
 // What a path does with light along a direction from a vertex.
 struct CmTurn {
   vec3 share;          // of light that goes on: the phase function, or the BSDF times the cosine
@@ -40,6 +46,10 @@ struct CmTurn {
   float lobe_density;  // the same, of the lobes alone
   vec3 weight;         // share over density
   bool lifted;         // the ray starts above its triangle
+#if CM_RICH
+  bool through;        // it starts behind its triangle
+  bool disperses;      // from then on it is of one wavelength
+#endif
 };
 
 // Of a medium whose phase function has a second lobe. A variant, for software drivers run what is not taken.
@@ -98,7 +108,111 @@ CM_FN bool cm_is_dark(CmPath p) { return cm_among_surfaces_dark(p) && p.start ==
 struct CmVertex {
   bool on_triangle;
   CmSurfacePoint surface;  // if so
+#if CM_RICH
+  uint bounds;   // number of the material whose volume the triangle bounds, plus one; 0: of none
+  bool leaves;   // the path comes from inside
+  vec3 colour;   // of the wavelength that goes on, where that is new; else white
+  bool disperses;
+#endif
 };
+
+// A flight that has come through a surface is no light among surfaces.
+CM_FN bool cm_came_through(CmPath p) {
+#if CM_RICH
+  return p.through != 0u && p.start == CM_ON_TRIANGLE;
+#else
+  return false;
+#endif
+}
+
+#if CM_RICH
+
+CM_FN uint cm_material_word(uint number) { return cm.surfaces.materials + CM_MATERIAL_WORDS * number; }
+
+// Of a material's volume, by its number plus one; of none: air.
+CM_FN float cm_index(uint within) { return within == 0u ? 1.0f : cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_VOLUME).w; }
+CM_FN float cm_index_at(uint within, float wavelength) {
+  if (within == 0u) return 1.0f;
+  return cm_cauchy(cm_index(within), cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_ANISOTROPY).w, wavelength);
+}
+CM_FN bool cm_disperses(uint within) {
+  return within != 0u && cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_ANISOTROPY).w > 0.0f;
+}
+CM_FN vec3 cm_transmittance_within(uint within, float way) {
+  if (within == 0u) return vec3(1.0f);
+  return exp(vec3(cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_VOLUME)) * -way);
+}
+
+// What lies beyond the boundary of a volume that a path within `within`, in `outside`, leaves. Closed meshes may lie one
+// in another, and two deep.
+CM_FN uint cm_beyond(uint bounds, uint within, uint outside) { return within == bounds ? outside : within; }
+
+// Crosses it.
+CM_FN void cm_cross(uint bounds, bool leaves, CM_INOUT(uint) within, CM_INOUT(uint) outside) {
+  if (bounds == 0u) return;
+  if (leaves) {
+    within = cm_beyond(bounds, within, outside);
+    if (within == outside || outside == bounds) outside = 0u;
+  } else {
+    outside = within;
+    within = bounds;
+  }
+}
+
+// The number plus one of a triangle's material, if it bounds a volume.
+CM_FN uint cm_bounds(uint triangle) {
+  uint material = cm_words(cm.surfaces.triangles + triangle).w;
+  return cm_floats(cm_material_word(material) + CM_MATERIAL_VOLUME).w > 0.0f ? material + 1u : 0u;
+}
+
+// What the path knows of both sides of a triangle that it is on.
+CM_FN void cm_bound(CmPath p, CM_INOUT(CmVertex) vertex) {
+  vertex.bounds = cm_bounds(p.triangle);
+  vertex.leaves = p.back != 0u;
+  vertex.colour = vec3(1.0f);
+  vertex.disperses = false;
+  if (vertex.bounds == 0u) return;
+  uint other = vertex.leaves ? cm_beyond(vertex.bounds, p.within, p.outside) : p.within;
+  uint before = vertex.leaves ? vertex.bounds : other;
+  uint behind = vertex.leaves ? other : vertex.bounds;
+  float ratio = cm_index(behind) / cm_index(before);
+  float in_air = vertex.surface.material.eta;
+  float eta = ratio;
+  if (cm_disperses(before) || cm_disperses(behind)) {
+    float wavelength = cm_wavelength(cm_even_pair(p.number, p.stream, CM_WAVELENGTH_SET).x);
+    eta = cm_index_at(behind, wavelength) / cm_index_at(before, wavelength);
+    if (p.dispersed == 0u) {
+      vertex.disperses = true;
+      vertex.colour = cm_wavelength_colour(wavelength);
+    }
+    // White light is mirrored as by the middle index.
+    if (p.dispersed != 0u || vertex.leaves) ratio = eta;
+  }
+  float r = (ratio - 1.0f) / (ratio + 1.0f);
+  float r_air = (in_air - 1.0f) / (in_air + 1.0f);
+  vertex.surface.material.f0 = min(vertex.surface.material.f0 * ((r * r) / (r_air * r_air)), vec3(1.0f));
+  vertex.surface.material.eta = cm_apart(eta);
+  vertex.surface.material.film_average = cm_film_average(vertex.surface.material);
+}
+
+// What a ray on its way through the tree finds of volumes between its start and where it ends, or comes to a collision.
+CM_FN void cm_absorb(CM_INOUT(CmPath) p, bool met, CmHit hit) {
+  bool flight = p.ray == CM_RAY_FLIGHT;
+  // Media that glow are marched after this: what a flight meets then is dimmed where it meets it.
+  if (flight && cm.medium.emits != 0u) return;
+  uint within = p.within;
+  uint outside = p.outside;
+  if (!flight && p.start == CM_ON_TRIANGLE && p.through != 0u) cm_cross(cm_bounds(p.triangle), p.back != 0u, within, outside);
+  if (flight && met && within == 0u && !hit.front) within = cm_bounds(hit.triangle);  // cameras may be inside
+  float way = met ? hit.t : (flight && p.event == CM_EVENT_COLLISION ? p.t : p.reach);
+  // What never ends has left through a hole of a mesh.
+  if (way > 1e30f) return;
+  vec3 transmittance = cm_transmittance_within(within, way);
+  if (flight) p.throughput *= transmittance;
+  if (!flight || p.bounces == 0u) p.light *= transmittance;
+}
+
+#endif
 
 // Whether a triangle may be nearer than the event that the ray has come to. The tree is asked after the march, not
 // before: in a dense medium the way to a collision is short, and few boxes are near it; and most shadow rays end in the
@@ -127,7 +241,8 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   vec3 o = cm_from_cube_point(p.o);
   if (p.start == CM_ON_TRIANGLE && p.ray != CM_RAY_EQUIANGULAR) {
     vec3 shift;
-    o = cm_surface_origin(p.triangle, p.weights, p.behind != 0u, d, shift);
+    bool lifts = !cm_came_through(p);
+    o = cm_surface_origin(p.triangle, p.weights, p.behind != 0u, lifts, d, shift);
     // Shadow rays end where they would from the point itself: at a lamp.
     if (!flight) d -= shift / p.reach;
   }
@@ -135,7 +250,26 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   cm_hit_camera = flight && p.bounces == 0u;
   CmHit hit;
   float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;
+#if CM_RICH
+  cm_hit_direction = normalize(d);
+  bool met = false;
+  // Once more up to where a flight ends: on its way the tree shows it what it passes, and what lies behind.
+  for (int turn = 0; turn < 2; ++turn) {
+    CmHit found;
+    cm_hit_passed = vec3(1.0f);
+    bool ends = cm_bvh_trace(o, d, 0.0f, turn == 0 ? reach : hit.t, !flight, found);
+    if (turn == 0) {
+      met = ends;
+      hit = found;
+    }
+    if (!(met && flight) || cm_hit_passed == vec3(1.0f)) break;
+  }
+  if (flight) p.throughput *= cm_hit_passed;
+  if (!flight || p.bounces == 0u) p.light *= cm_hit_passed;
+  cm_absorb(p, met, hit);
+#else
   bool met = cm_bvh_trace(o, d, 0.0f, reach, !flight, hit);
+#endif
   if (met && !flight) p.event = CM_EVENT_COLLISION;
   if (met && flight) {
     p.triangle = hit.triangle;
@@ -165,14 +299,35 @@ CM_FN CmVertex cm_on_triangle(CmPath p) {
   if (p.blurred != 0u) {
     float least = cm.integrator.blurred_roughness;
     vertex.surface.material.roughness = max(vertex.surface.material.roughness, least);
+#if CM_RICH
+    // What is clear lets light pass as it is.
+    if (vertex.surface.kept == 1.0f) {
+      vertex.surface.material.alpha = max(vertex.surface.material.alpha, vec2(cm_alpha(least)));
+    }
+#endif
     vertex.surface.material.clearcoat_roughness = max(vertex.surface.material.clearcoat_roughness, least);
   }
+#if CM_RICH
+  cm_bound(p, vertex);
+#endif
   return vertex;
+}
+
+// How far a flight has come that has ended.
+CM_FN float cm_flight_end(CmPath p, CmVertex vertex) {
+  if (vertex.on_triangle) return dot(vertex.surface.position - cm_from_cube_point(p.o), p.w);
+  return p.event == CM_EVENT_COLLISION ? p.t : p.t_end;
 }
 
 // The light of what a path has met.
 CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
   vec3 emission = vertex.surface.emission;
+#if CM_RICH
+  if (cm.medium.emits != 0u) {
+    uint within = p.within == 0u && vertex.leaves ? vertex.bounds : p.within;
+    p.throughput *= cm_transmittance_within(within, max(0.0f, cm_flight_end(p, vertex)));
+  }
+#endif
   // The look for light before the flight that met it might have found it, whatever the medium between; not at the same
   // angle where the flight started above its triangle: then looks alone count.
   if (CM_SURFACES > 1 && p.bounces > 0u && !vertex.surface.unlit) {
@@ -191,12 +346,6 @@ CM_FN bool cm_stand(CM_INOUT(CmPath) p, CmVertex vertex) {
   p.start = CM_ON_TRIANGLE;
   p.behind = vertex.surface.behind ? 1u : 0u;
   return vertex.surface.unlit;
-}
-
-// How far a flight has come that has ended.
-CM_FN float cm_flight_end(CmPath p, CmVertex vertex) {
-  if (vertex.on_triangle) return dot(vertex.surface.position - cm_from_cube_point(p.o), p.w);
-  return p.event == CM_EVENT_COLLISION ? p.t : p.t_end;
 }
 
 // Where looks for light start, in the world.
@@ -221,12 +370,22 @@ CM_FN vec3 cm_turn_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
 CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
   CmTurn turn;
   turn.lifted = false;
+#if CM_RICH
+  turn.through = false;
+  turn.disperses = false;
+#endif
   if (vertex.on_triangle) {
     turn.share = cm_surface_eval(vertex.surface, p.w, wi);
     turn.lobe_density = cm_surface_pdf(vertex.surface, p.w, wi);
     turn.density = (1.0f - cm.lights.glow_chance) * turn.lobe_density +
                    cm_light_pdf(cm_light_hit(CM_LIGHT_GLOW, p.o, wi, turn.lobe_density));
     turn.lifted = vertex.surface.lifted && cm_lift_share(dot(vertex.surface.geometric, wi)) > 0.0f;
+#if CM_RICH
+    turn.through = vertex.surface.material.transmission > 0.0f && dot(vertex.surface.geometric, wi) < 0.0f;
+    turn.lifted = turn.lifted && !turn.through;
+    turn.disperses = vertex.disperses && (turn.through || vertex.leaves);
+    if (turn.disperses) turn.share *= vertex.colour;
+#endif
   } else {
     turn.lobe_density = cm_scattered(p, wi);
     turn.density = turn.lobe_density;
@@ -235,6 +394,20 @@ CM_FN CmTurn cm_turn(CmPath p, CmVertex vertex, vec3 wi) {
   turn.weight = turn.density > 0.0f ? turn.share / turn.density : vec3(0.0f);
   return turn;
 }
+
+#if CM_RICH
+
+// Which side the ray starts on, and what a flight is within from there.
+CM_FN void cm_leave_surface(CM_INOUT(CmPath) p, CmVertex vertex, CmTurn turn, bool looks) {
+  p.through = turn.through ? 1u : 0u;
+  if (!vertex.on_triangle) return;
+  p.behind = vertex.surface.behind != turn.through ? 1u : 0u;
+  if (looks) return;
+  if (turn.through) cm_cross(vertex.bounds, vertex.leaves, p.within, p.outside);
+  if (turn.disperses) p.dispersed = 1u;
+}
+
+#endif
 
 // Whether a path is scattered wider than a surface of the least roughness does: a quarter of that lobe's highest
 // density, and no matte surface is smooth.
@@ -249,6 +422,7 @@ struct CmVertex {
   bool on_triangle;  // never
 };
 
+CM_FN bool cm_came_through(CmPath p) { return false; }
 CM_FN bool cm_asks(CmPath p) { return false; }
 CM_FN bool cm_asks_first(CmPath p) { return false; }
 CM_FN void cm_meet(CM_INOUT(CmPath) p) {}

@@ -16,6 +16,10 @@ CM_FN uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.surfaces.records + 
 // What the ray under way is, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
+#if CM_RICH
+vec3 cm_hit_direction = vec3(0.0f);  // world, unit
+vec3 cm_hit_passed = vec3(1.0f);     // what is left of its light by what it has passed so far, over the chance to pass
+#endif
 
 CM_FN vec2 cm_ggx_albedo(float roughness, float cosine) {
   vec2 place = cm_ggx_albedo_place(roughness, cosine);
@@ -33,6 +37,27 @@ CM_FN vec2 cm_ggx_albedo_average(float roughness) {
   uvec4 ends = cm_words(cm.surfaces.ggx_albedo_averages + uint(row));
   return mix(unpackHalf2x16(ends.x), unpackHalf2x16(ends.y), place - float(row));
 }
+
+#if CM_RICH
+
+CM_FN float cm_sheen_albedo(float roughness, float cosine) {
+  vec2 place = cm_ggx_albedo_place(roughness, cosine);
+  ivec2 cell = min(ivec2(place), CM_GGX_ALBEDO_SIZE - 2);
+  vec2 f = place - vec2(cell);
+  vec4 corners = cm_floats(cm.surfaces.sheen_albedo + uint(cell.y * (CM_GGX_ALBEDO_SIZE - 1) + cell.x));
+  vec2 ends = mix(vec2(corners.x, corners.z), vec2(corners.y, corners.w), f.x);
+  return mix(ends.x, ends.y, f.y);
+}
+
+CM_FN float cm_sheen_albedo_average(float roughness) {
+  float place = cm_ggx_albedo_place(roughness, 0.0f).y;
+  int row = min(int(place), CM_GGX_ALBEDO_SIZE - 2);
+  int first = (CM_GGX_ALBEDO_SIZE - 1) * (CM_GGX_ALBEDO_SIZE - 1);
+  vec4 ends = cm_floats(cm.surfaces.sheen_albedo + uint(first + row));
+  return mix(ends.x, ends.y, place - float(row));
+}
+
+#endif
 
 #include "bsdf.glsl"
 
@@ -122,35 +147,15 @@ CM_FN vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
 
 CM_FN uint cm_material_flags(uint material) { return cm_words(cm.surfaces.materials + CM_MATERIAL_WORDS * material + CM_MATERIAL_FLAGS).x; }
 
-// The share of rays that end at a point of a triangle. Coverage (BLEND) and transmission are chances, so that no order of
-// surfaces and volume has to be found.
+// The share of rays that a point of a triangle is there for. Coverage (BLEND) is a chance, so that no order of surfaces
+// and volume has to be found.
 CM_FN float cm_coverage(CmVertexMix m) {
   uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
   uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
-  float transmission = cm_floats(word + CM_MATERIAL_COAT).y;
   vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
   if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + CM_MATERIAL_EMISSION).w) return 0.0f;
-  float solid = (flags & CM_ALPHA_BLEND) != 0u ? clamp(base.a, 0.0f, 1.0f) : 1.0f;
-  if (transmission > 0.0f) {
-    // Thin and clear: what passes goes straight on, in the share of the base colour's luminance.
-    float passes = transmission * cm_texture(m.corner.w, CM_USE_TRANSMISSION, m, false).r;
-    solid *= 1.0f - passes * clamp(cm_luminance(vec3(base)), 0.0f, 1.0f);
-  }
-  return solid;
+  return (flags & CM_ALPHA_BLEND) != 0u ? clamp(base.a, 0.0f, 1.0f) : 1.0f;
 }
-
-// Whether a ray ends at a triangle that asks.
-CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
-  float solid = cm_coverage(cm_vertex_mix(triangle, weights));
-  return solid >= 1.0f || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x) < solid;
-}
-
-// Cameras see through the backs of single-sided materials; light does not.
-#define CM_HIT_ACCEPT
-#define CM_BVH_CULLS cm_hit_camera
-#define CM_BVH_LOW cm.surfaces.low
-#define CM_BVH_HIGH cm.surfaces.high
-#include "bvh.glsl"
 
 struct CmSurfacePoint {
   CmSurface material;
@@ -160,6 +165,9 @@ struct CmSurfacePoint {
   bool lifted;     // rays that leave it at grazing angles start above it: see cm_lift
   vec3 emission;   // to that side
   bool unlit;
+#if CM_RICH
+  float kept;      // one over the chance that a path ends here, of what does not pass
+#endif
 };
 
 // From a point of a triangle to the smooth surface that its vertices' normals speak of, where that bulges towards
@@ -192,13 +200,30 @@ struct CmMaps {
   vec4 specular_color;
   vec4 clearcoat;
   vec4 clearcoat_roughness;
+#if CM_RICH
+  vec4 transmission;
+  vec4 sheen_color;
+  vec4 sheen_roughness;
+  vec4 anisotropy;
+  vec4 iridescence;
+  vec4 film_thickness;
+#endif
 };
+
+#if CM_RICH
+const uint CM_LAST_USE = CM_USE_FILM_THICKNESS;
+#else
+const uint CM_LAST_USE = CM_USE_CLEARCOAT_ROUGHNESS;
+#endif
 
 // In a loop: one after the other they would be the most of a kernel's code.
 CM_FN CmMaps cm_maps(uint material, CmVertexMix m) {
   CmMaps maps;
-  for (uint use = CM_USE_BASE_COLOR; use <= CM_USE_CLEARCOAT_ROUGHNESS; use += 2u) {
+  for (uint use = CM_USE_BASE_COLOR; use <= CM_LAST_USE; use += 2u) {
     bool srgb = use == CM_USE_BASE_COLOR || use == CM_USE_EMISSION || use == CM_USE_SPECULAR_COLOR;
+#if CM_RICH
+    srgb = srgb || use == CM_USE_SHEEN_COLOR;
+#endif
     vec4 value = cm_texture(material, use, m, srgb);
     if (use == CM_USE_BASE_COLOR) maps.base_color = value;
     if (use == CM_USE_METALLIC_ROUGHNESS) maps.metallic_roughness = value;
@@ -208,6 +233,14 @@ CM_FN CmMaps cm_maps(uint material, CmVertexMix m) {
     if (use == CM_USE_SPECULAR_COLOR) maps.specular_color = value;
     if (use == CM_USE_CLEARCOAT) maps.clearcoat = value;
     if (use == CM_USE_CLEARCOAT_ROUGHNESS) maps.clearcoat_roughness = value;
+#if CM_RICH
+    if (use == CM_USE_TRANSMISSION) maps.transmission = value;
+    if (use == CM_USE_SHEEN_COLOR) maps.sheen_color = value;
+    if (use == CM_USE_SHEEN_ROUGHNESS) maps.sheen_roughness = value;
+    if (use == CM_USE_ANISOTROPY) maps.anisotropy = value;
+    if (use == CM_USE_IRIDESCENCE) maps.iridescence = value;
+    if (use == CM_USE_FILM_THICKNESS) maps.film_thickness = value;
+#endif
   }
   return maps;
 }
@@ -218,7 +251,68 @@ CM_FN vec3 cm_emission(CmVertexMix m) {
   return vec3(emission) * vec3(cm_texture(m.corner.w, CM_USE_EMISSION, m, true));
 }
 
-// The point of a triangle that a path along w (world) has met, on its back or its front.
+#if CM_RICH
+
+// The tangent that a base lobe is turned by: across the normal.
+CM_FN vec3 cm_across(vec3 normal, vec3 tangent) {
+  vec3 across = tangent - dot(tangent, normal) * normal;
+  float length2 = dot(across, across);
+  if (length2 > 1e-12f) return across * inversesqrt(length2);
+  vec3 u;
+  vec3 v;
+  cm_frame(normal, u, v);
+  return u;
+}
+
+// An index over another that is not quite 1, where refraction has no half vector.
+CM_FN float cm_apart(float eta) { return abs(eta - 1.0f) < 1e-3f ? (eta < 1.0f ? 0.999f : 1.001f) : eta; }
+
+// What the extensions say of the surface. tangent: along growing u, and its hand; shading: the normal that they are about.
+CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent, vec3 shading, vec3 geometric, bool from_back) {
+  vec4 sheen = cm_floats(word + CM_MATERIAL_SHEEN);
+  vec4 film = cm_floats(word + CM_MATERIAL_FILM);
+  vec4 turn = cm_floats(word + CM_MATERIAL_ANISOTROPY);
+  float volume_ior = cm_floats(word + CM_MATERIAL_VOLUME).w;
+  s.geometric = geometric;
+  s.sheen = min(vec3(sheen) * vec3(maps.sheen_color), vec3(1.0f));
+  s.sheen_roughness = clamp(sheen.w * maps.sheen_roughness.a, 0.0f, 1.0f);
+  s.transmission = clamp(cm_floats(word + CM_MATERIAL_COAT).y * maps.transmission.r, 0.0f, 1.0f);
+  s.eta = volume_ior > 0.0f ? cm_apart(from_back ? 1.0f / volume_ior : volume_ior) : 0.0f;
+  // The coat and the sheen of a volume are outside.
+  if (volume_ior > 0.0f && from_back) {
+    s.clearcoat = 0.0f;
+    s.sheen = vec3(0.0f);
+  }
+  s.film.weight = clamp(film.x * maps.iridescence.r, 0.0f, 1.0f);
+  s.film.ior = film.y;
+  s.film.thickness = mix(film.z, film.w, maps.film_thickness.g);
+  s.film.outside = 1.0f + 0.5f * s.clearcoat;
+
+  vec2 along = vec2(1.0f, 0.0f);
+  float strength = turn.x;
+  if (cm_words(word + CM_USE_ANISOTROPY).x != 0u) {
+    along = vec2(maps.anisotropy) * 2.0f - 1.0f;
+    along = dot(along, along) > 1e-12f ? normalize(along) : vec2(1.0f, 0.0f);
+    strength *= maps.anisotropy.b;
+  }
+  along = vec2(turn.y * along.x - turn.z * along.y, turn.z * along.x + turn.y * along.y);
+  vec3 t = vec3(0.0f);
+  float alpha = cm_alpha(s.roughness);
+  s.alpha = vec2(alpha);
+  if (strength > 0.0f && tangent.w != 0.0f) {
+    vec3 u = cm_across(shading, vec3(tangent));
+    t = u * along.x + cross(shading, u) * ((tangent.w < 0.0f ? -1.0f : 1.0f) * along.y);
+    s.alpha.x = mix(alpha, 1.0f, min(strength * strength, 1.0f));
+    s.roughness = sqrt(sqrt(s.alpha.x * s.alpha.y));
+  }
+  s.tangent = cm_across(s.normal, t);
+  s.film_average = cm_film_average(s);
+}
+
+#endif
+
+// The point of a triangle that a path along w (world) has met, on its back or its front. With CM_RICH a volume's boundary
+// bounds air: cm_bound (path_vertex.glsl) knows better.
 CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
   CmSurfacePoint point;
   CmVertexMix m = cm_vertex_mix(triangle, weights);
@@ -232,7 +326,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
     uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
     uvec4 first = cm_words(vertex + CM_VERTEX_PLACE);
     uvec4 last = cm_words(vertex + CM_VERTEX_REST);
-    position[i] = cm_bvh_floats(first);
+    position[i] = uintBitsToFloat(uvec3(first));
     normals[i] = cm_octahedral(first.w);
     normal += m.weight[i] * normals[i];
     float hand = uintBitsToFloat(last.y);
@@ -268,6 +362,9 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
       if (dot(bumped, bumped) > 1e-12f) normal = normalize(bumped);
     }
   }
+#if CM_RICH
+  vec3 shading = normal;  // of the front
+#endif
   if (back) normal = -normal;
   point.material.matte_normal = normal;
   normal = cm_bend_normal(normal, point.geometric, -w);
@@ -285,12 +382,50 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
   point.material.specular = specular;
   point.material.clearcoat = b.w * maps.clearcoat.r;
   point.material.clearcoat_roughness = c.x * maps.clearcoat_roughness.g;
+#if CM_RICH
+  cm_enrich(point.material, word, maps, tangent, shading, point.geometric, from_back);
+  if (point.unlit) point.material.transmission = 0.0f;
+  // What passes has not come here: the others stand for it.
+  vec3 passes = cm_bsdf_passes(point.material, -w);
+  point.kept = 1.0f / max(1.0f - cm_max3(passes), 1e-6f);
+  point.emission *= point.kept;
+#endif
   return point;
 }
 
+// Whether a ray ends at a triangle that asks. What is clear lets light pass by the chance of the channel that passes most.
+CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
+  float solid = cm_coverage(cm_vertex_mix(triangle, weights));
+#if CM_RICH
+  float u = cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x);
+  if (u >= solid) return false;
+  CmSurfacePoint point = cm_surface_point(triangle, weights, cm_hit_direction, false);
+  vec3 passes = cm_bsdf_passes(point.material, -cm_hit_direction);
+  float most = cm_max3(passes);
+  if (u >= solid * most) return true;
+  cm_hit_passed *= passes / most;
+  return false;
+#else
+  return solid >= 1.0f || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x) < solid;
+#endif
+}
+
+// Cameras see through the backs of single-sided materials; light does not.
+#define CM_HIT_ACCEPT
+#define CM_BVH_CULLS cm_hit_camera
+#define CM_BVH_LOW cm.surfaces.low
+#define CM_BVH_HIGH cm.surfaces.high
+#include "bvh.glsl"
+
 // Reflected share of light from wi (world, unit) towards where the path came from, times the cosine. Not 0 below the
 // triangle: what is seen there from the ray's start counts, often the surface itself.
-CM_FN vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_eval(point.material, -w, wi); }
+CM_FN vec3 cm_surface_eval(CmSurfacePoint point, vec3 w, vec3 wi) {
+  vec3 share = cm_bsdf_eval(point.material, -w, wi);
+#if CM_RICH
+  share *= point.kept;
+#endif
+  return share;
+}
 
 // Density of cm_surface_sample's directions by solid angle.
 CM_FN float cm_surface_pdf(CmSurfacePoint point, vec3 w, vec3 wi) { return cm_bsdf_pdf(point.material, -w, wi); }
@@ -300,9 +435,10 @@ CM_FN vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1,
   return cm_bsdf_sample(point.material, -w, u_0, u_1, u_2);
 }
 
-// Where a ray along d (world, unit) starts from a point of a triangle, in the world: beside it, on the side that its
-// path came from. shift: from the point itself, but for the rounding.
-CM_FN vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, CM_OUT(vec3) shift) {
+// Where a ray along d (world, unit) starts from a point of a triangle, in the world: beside it, on the side from which
+// its vertices turn clockwise, or on the other. lifts: cm_lift applies. shift: from the point itself, but for the
+// rounding.
+CM_FN vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, bool lifts, vec3 d, CM_OUT(vec3) shift) {
   uvec4 corner = cm_words(cm.surfaces.triangles + triangle);
   vec3 position[3];
   vec3 normals[3];
@@ -316,7 +452,7 @@ CM_FN vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, vec3 d, C
   if (behind) g = -g;
   vec3 weight = vec3(1.0f - weights.x - weights.y, weights);
   vec3 p = weight.x * position[0] + weight.y * position[1] + weight.z * position[2];
-  shift = cm_lift_share(dot(g, d)) * cm_lift(p, weight, position, normals, g);
+  shift = lifts ? cm_lift_share(dot(g, d)) * cm_lift(p, weight, position, normals, g) : vec3(0.0f);
   return cm_offset_origin(p + shift, g);
 }
 

@@ -9,8 +9,8 @@ const uint CM_VERTEX_PLACE = 0u;
 const uint CM_VERTEX_UV = 1u;
 const uint CM_VERTEX_REST = 2u;
 
-// A material; then two words for each of its textures.
-const uint CM_MATERIAL_WORDS = 24u;
+// A material: words of its own, and two for each of its textures.
+const uint CM_MATERIAL_WORDS = 38u;
 const uint CM_MATERIAL_BASE_COLOR = 0u;
 const uint CM_MATERIAL_EMISSION = 1u;        // w: alpha cutoff
 const uint CM_MATERIAL_REFLECTION = 2u;      // metallic, roughness, ((ior - 1) / (ior + 1))^2, specular
@@ -26,6 +26,15 @@ const uint CM_USE_SPECULAR_COLOR = 16u;
 const uint CM_USE_CLEARCOAT = 18u;
 const uint CM_USE_CLEARCOAT_ROUGHNESS = 20u;
 const uint CM_USE_TRANSMISSION = 22u;
+const uint CM_USE_SHEEN_COLOR = 24u;
+const uint CM_USE_SHEEN_ROUGHNESS = 26u;
+const uint CM_USE_ANISOTROPY = 28u;
+const uint CM_USE_IRIDESCENCE = 30u;
+const uint CM_USE_FILM_THICKNESS = 32u;
+const uint CM_MATERIAL_SHEEN = 34u;       // w: its roughness
+const uint CM_MATERIAL_FILM = 35u;        // iridescence, index, least thickness, largest
+const uint CM_MATERIAL_VOLUME = 36u;      // absorption, 1 / m; w: index of what it bounds, 0 of a thin wall
+const uint CM_MATERIAL_ANISOTROPY = 37u;  // strength, cosine and sine of its turn; w: dispersion
 
 // A material's flags.
 const uint CM_ALPHA_MASK = 1u;

@@ -32,6 +32,7 @@ void main() {
     CmPath p = cm_begin_path();
     cm_camera(p, samples, at);
     cm_store_path(p, lane);
+    cm_begin_within(lane);
   }
   atomicAdd(cm_blocks[cm_block_of(local)].y, 1u);
   if (samples == 0u) atomicAdd(cm_blocks[cm_block_of(local)].z, 1u);
@@ -54,6 +55,7 @@ void main() {
     atomicAdd(cm_blocks[block].y, 0xffffffffu);
   } else {
     cm_camera(p, pixel.samples, at);
+    cm_begin_within(lane);
     cm_enqueue(CM_QUEUE_TRAVEL, cm_round + 1u, lane);
   }
   cm_store_path(p, lane);

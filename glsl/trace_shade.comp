@@ -1,9 +1,8 @@
 #version 450
 // What happens on the triangles that paths have met, or whose shadow rays have ended: glsl/path_queue.glsl.
-// variants: CM_SURFACES=1,2
+// variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_RICH=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1
 // variants: - or CM_ENVIRONMENT=1
-// variants: - or CM_EQUIANGULAR=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"
@@ -42,8 +41,13 @@ void main() {
   CmPath p = cm_begin_path();
   cm_load_flight(p, lane);
   cm_load_ends(p, lane);
+#if CM_RICH
+  cm_load_sum(p, lane);  // the sample's number
+#endif
+  cm_load_within(p, lane);
   CmVertex vertex = cm_on_triangle(p);
   p = cm_load_path(lane);
+  cm_load_within(p, lane);
 #if CM_EQUIANGULAR
   CmPassed passed = cm_pass(p, vertex);
 #endif
@@ -69,6 +73,7 @@ void main() {
     p.w = kept.w;
     p.throughput = kept.throughput;
     cm_scatter(p, vertex, look);
+    cm_store_within(p, lane);
   }
   cm_store_ray(p, lane);
   cm_store_flight(p, lane);

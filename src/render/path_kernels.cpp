@@ -17,9 +17,9 @@ namespace cumulet::render {
 
 namespace {
 
-// visits: of paths among several volumes.
-constexpr std::size_t lane_bytes(bool visits) {
-  return std::size_t{16} * (CM_PATH_QUADS + (visits ? CM_VISIT_QUADS : 0));
+// visits: of paths among several volumes; within: of what they are within, which lies behind that in any case.
+constexpr std::size_t lane_bytes(bool visits, bool within) {
+  return std::size_t{16} * (CM_PATH_QUADS + (visits || within ? CM_VISIT_QUADS : 0) + (within ? CM_WITHIN_QUADS : 0));
 }
 
 // A head is what glDispatchComputeIndirect reads, and how many paths wait.
@@ -33,12 +33,12 @@ std::uint32_t groups_across(std::uint32_t tile_width) {
 
 }  // namespace
 
-void PathKernels::reserve(std::size_t lanes, bool stages, bool visits) {
+void PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within) {
   if (!blocks_) {
     blocks_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
                               "creating the counters");
   }
-  const std::size_t path_bytes = lanes * lane_bytes(visits);
+  const std::size_t path_bytes = lanes * lane_bytes(visits, within);
   if (path_bytes > path_bytes_) {
     paths_ = {};
     path_bytes_ = 0;

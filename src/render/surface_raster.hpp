@@ -107,7 +107,8 @@ class RasterContent {
 /// BLEND triangles are drawn into layers of their own, tested against the others' z, from the back to the front by the
 /// view depth of their centres, those of all draws together. That is right for triangles that neither intersect nor
 /// overlap in depth; ties keep the file's order. Their z is the nearest's. KHR_materials_transmission is approximated
-/// as BLEND of one colour's coverage: thin, not refracted.
+/// as BLEND of one colour's coverage: thin, not refracted, a volume tinted as by its material's own thickness. Lobes of
+/// KHR_materials_anisotropy are round, of the mean width; sheen, films and dispersion are left out.
 ///
 /// Needs the context current and a StateGuard around; leaves any state that the guard puts back. GL 4.5 core.
 class SurfaceRaster {

@@ -50,6 +50,7 @@ constexpr const char* noise_kernel = "noise.comp";
 constexpr const char* channels_macro = "CM_CHANNELS 1";
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
 constexpr const char* equiangular_macro = "CM_EQUIANGULAR 1";
+constexpr const char* rich_macro = "CM_RICH 1";
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
@@ -264,6 +265,11 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
   }
   if (picture.environment_) shade.emplace_back(environment_macro);
   if (picture.equiangular_) shade.emplace_back(equiangular_macro);
+  std::vector<std::string> meet{"CM_SURFACES 1"};
+  if (picture.rich_) {
+    shade.emplace_back(rich_macro);
+    meet.emplace_back(rich_macro);
+  }
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
   if (picture.environment_) camera.emplace_back(environment_macro);
@@ -272,7 +278,7 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
   StagePrograms programs;
   programs.begin = program(begin, "trace_camera.comp").object;
   programs.travel = trace_program(picture, data).object;
-  programs.meet = program({"CM_SURFACES 1"}, "trace_meet.comp").object;
+  programs.meet = program(meet, "trace_meet.comp").object;
   programs.shade = program(shade, "trace_shade.comp").object;
   programs.camera = program(camera, "trace_camera.comp").object;
   return programs;
@@ -309,7 +315,7 @@ unsigned Tracer::traced_of(const PictureParameters& parameters, const Obstacles&
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
   const ModelData* met = settings.view == View::shaded && !preview ? obstacles.met() : nullptr;
-  return met == nullptr ? 0 : (met->lights().triangles > 0 ? 2 : 1);
+  return met == nullptr ? 0 : (met->lights().triangles > 0 || met->tables().rich != 0U ? 2 : 1);
 }
 
 void Tracer::classify(Picture& picture, const PictureParameters& parameters, const Obstacles& obstacles,
@@ -317,6 +323,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   const bool shaded = settings.view == View::shaded;
   picture.view_ = settings.view;
   picture.traced_ = traced_of(parameters, obstacles, settings);
+  picture.rich_ = picture.traced_ > 0 && obstacles.met()->tables().rich != 0U;
   picture.second_lobe_ = parameters.medium.second_share > 0.0F;
   const core::CmMedium& medium = parameters.medium;
   picture.channels_ = medium.emits != 0U || medium.coloured != 0U || medium.anisotropic != 0U;
@@ -327,7 +334,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.volume_alone_ = shaded && settings.volume_alone;
   // What the volume alone has is told by what a path first met, and such light may lie before a surface; and a layer's
   // colour waits in the place of such a look's light.
-  picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ &&
+  picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ && !picture.rich_ &&
                          (picture.traced_ > 0 || picture.layered_ == Layered::no);
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
 }
@@ -460,7 +467,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   }
   if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
-  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0, picture.several_);
+  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0, picture.several_, picture.rich_);
   find_programs(picture, data, obstacles);
   picture.parameters_ = assemble(parameters, obstacles);
   picture.target_samples_ = samples;
@@ -680,6 +687,7 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   const glm::uvec2 extent = picture.tile_extent();
   core::CmParameters parameters = picture.parameters_;
   describe(obstacles, parameters);
+  parameters.surfaces.rich = picture.rich_ ? 1U : 0U;  // as its paths have room
   parameters.dispatch.tile_corner = picture.tile_corner();
   parameters.dispatch.tile_size = extent;
   parameters.dispatch.rounds = what.rounds;

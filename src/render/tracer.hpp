@@ -158,6 +158,7 @@ class Picture {
   bool lamps_ = false;        // paths that meet no triangles look for lamps
   bool equiangular_ = false;  // and from points of flights
   bool several_ = false;      // volumes
+  bool rich_ = false;         // materials that need CM_RICH
   [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
   // Samples of each pixel after a pass that ends with so many.

@@ -15,6 +15,7 @@
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
 #include "surface/ggx_albedo.hpp"
+#include "surface/sheen_albedo.hpp"
 
 namespace cumulet::core {
 #include "surface_tables.glsl"
@@ -83,6 +84,19 @@ void write_material(uvec4* to, const Material& m, bool double_sided) {
   write_use(to + core::CM_USE_CLEARCOAT, m.clearcoat_texture);
   write_use(to + core::CM_USE_CLEARCOAT_ROUGHNESS, m.clearcoat_roughness_texture);
   write_use(to + core::CM_USE_TRANSMISSION, m.transmission_texture);
+  write_use(to + core::CM_USE_SHEEN_COLOR, m.sheen_color_texture);
+  write_use(to + core::CM_USE_SHEEN_ROUGHNESS, m.sheen_roughness_texture);
+  write_use(to + core::CM_USE_ANISOTROPY, m.anisotropy_texture);
+  write_use(to + core::CM_USE_IRIDESCENCE, m.iridescence_texture);
+  write_use(to + core::CM_USE_FILM_THICKNESS, m.film_thickness_texture);
+  // Without a texture it is as thick as can be: by that mix, white is.
+  to[core::CM_MATERIAL_SHEEN] = bits(m.sheen_color, m.sheen_roughness);
+  to[core::CM_MATERIAL_FILM] = bits(vec4(m.iridescence, m.film_ior, m.film_thinnest, m.film_thickest));
+  constexpr float mirror = 1e4F;  // for the index that is infinite, which glTF writes as 0
+  const float index = m.ior > 0.0F ? std::min(m.ior, mirror) : mirror;
+  to[core::CM_MATERIAL_VOLUME] = bits(m.absorption, surface::bounds_volume(m) ? index : 0.0F);
+  to[core::CM_MATERIAL_ANISOTROPY] =
+      bits(vec4(m.anisotropy, std::cos(m.anisotropy_rotation), std::sin(m.anisotropy_rotation), m.dispersion));
 }
 
 std::uint32_t wrap_bits(surface::Wrap wrap) {
@@ -94,6 +108,14 @@ std::uint32_t wrap_bits(surface::Wrap wrap) {
     default:
       return core::CM_WRAP_REPEAT;
   }
+}
+
+bool draws_rich(const surface::Scene& scene, const surface::Pose& pose) {
+  for (std::size_t d = 0; d < scene.draws.size(); ++d) {
+    if (surface::is_hidden(pose, d)) continue;
+    if (surface::is_rich(surface::materials_of(scene, pose)[surface::material_of(scene, pose, d)])) return true;
+  }
+  return false;
 }
 
 std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
@@ -157,10 +179,16 @@ void pack_words(ModelSource& source, const Progress* progress) {
   const surface::GgxAlbedo& albedo = surface::GgxAlbedo::table();
   const std::vector<uvec4> cells = albedo.cells();
   const std::vector<uvec4> averages = albedo.average_cells();
+  source.tables.rich = draws_rich(scene, source.pose) ? 1U : 0U;
   source.tables.ggx_albedo = size_of(words);
   words.insert(words.end(), cells.begin(), cells.end());
   source.tables.ggx_albedo_averages = size_of(words);
   words.insert(words.end(), averages.begin(), averages.end());
+  source.tables.sheen_albedo = size_of(words);
+  if (source.tables.rich != 0U) {
+    const std::vector<uvec4> sheen = surface::SheenAlbedo::table().words();
+    words.insert(words.end(), sheen.begin(), sheen.end());
+  }
   source.lights = light::scene_lights(source.pose, table);
   source.tables.low = glm::prevFloat(vec3(source.pose.low));
   source.tables.high = glm::nextFloat(vec3(source.pose.high));

@@ -33,11 +33,24 @@ bool is_colour(std::size_t map) {
   return map == core::CM_MAP_BASE_COLOR || map == core::CM_MAP_EMISSION || map == core::CM_MAP_SPECULAR_COLOR;
 }
 
+// As roughness goes, of a lobe as wide as an anisotropic one is on average.
+float mean_roughness(const surface::Material& m) {
+  const float across = m.roughness * m.roughness;
+  const float along = glm::mix(across, 1.0F, m.anisotropy * m.anisotropy);
+  return std::sqrt(std::sqrt(across * along));
+}
+
+// Through a volume as thick as the material says.
+glm::vec3 tint_of(const surface::Material& m) {
+  if (!surface::bounds_volume(m)) return glm::vec3(1.0F);
+  return glm::mix(glm::vec3(1.0F), glm::exp(-m.absorption * m.thickness), m.transmission);
+}
+
 CmMaterial block_of(const surface::Material& m) {
   CmMaterial block{};
-  block.base_color = m.base_color;
+  block.base_color = m.base_color * glm::vec4(tint_of(m), 1.0F);
   block.emission = glm::vec4(m.emission, m.alpha_cutoff);
-  block.reflection = glm::vec4(m.metallic, m.roughness, m.normal_scale, m.occlusion_strength);
+  block.reflection = glm::vec4(m.metallic, mean_roughness(m), m.normal_scale, m.occlusion_strength);
   const float r = m.ior > 0.0F ? (m.ior - 1.0F) / (m.ior + 1.0F) : 1.0F;
   block.specular = glm::vec4(m.specular_color * (r * r), m.specular);
   block.coat = glm::vec4(m.clearcoat, m.clearcoat_roughness, m.transmission, 0.0F);

@@ -38,6 +38,11 @@ constexpr std::array<Slot, texture_slots> slots = {{
     {"extensions/KHR_materials_clearcoat/clearcoatTexture", &Material::clearcoat_texture},
     {"extensions/KHR_materials_clearcoat/clearcoatRoughnessTexture", &Material::clearcoat_roughness_texture},
     {"extensions/KHR_materials_transmission/transmissionTexture", &Material::transmission_texture},
+    {"extensions/KHR_materials_sheen/sheenColorTexture", &Material::sheen_color_texture},
+    {"extensions/KHR_materials_sheen/sheenRoughnessTexture", &Material::sheen_roughness_texture},
+    {"extensions/KHR_materials_anisotropy/anisotropyTexture", &Material::anisotropy_texture},
+    {"extensions/KHR_materials_iridescence/iridescenceTexture", &Material::iridescence_texture},
+    {"extensions/KHR_materials_iridescence/iridescenceThicknessTexture", &Material::film_thickness_texture},
 }};
 
 struct Factor {
@@ -76,6 +81,32 @@ constexpr Factor factors[] = {
      [](MovableMaterial& m, Numbers v) { m.now.specular_color = color(v); }},
     {"extensions/KHR_materials_clearcoat/clearcoatRoughnessFactor", 1,
      [](MovableMaterial& m, Numbers v) { m.now.clearcoat_roughness = unit(v[0]); }},
+    {"extensions/KHR_materials_volume/attenuationDistance", 1,
+     [](MovableMaterial& m, Numbers v) {
+       m.attenuation_distance = positive(v[0]);
+       fold_absorption(m);
+     }},
+    {"extensions/KHR_materials_volume/attenuationColor", 3,
+     [](MovableMaterial& m, Numbers v) {
+       m.attenuation_color = color(v);
+       fold_absorption(m);
+     }},
+    {"extensions/KHR_materials_dispersion/dispersion", 1,
+     [](MovableMaterial& m, Numbers v) { m.now.dispersion = positive(v[0]); }},
+    {"extensions/KHR_materials_sheen/sheenColorFactor", 3,
+     [](MovableMaterial& m, Numbers v) { m.now.sheen_color = glm::min(color(v), 1.0F); }},
+    {"extensions/KHR_materials_sheen/sheenRoughnessFactor", 1,
+     [](MovableMaterial& m, Numbers v) { m.now.sheen_roughness = unit(v[0]); }},
+    {"extensions/KHR_materials_anisotropy/anisotropyRotation", 1,
+     [](MovableMaterial& m, Numbers v) { m.now.anisotropy_rotation = narrow(v[0]); }},
+    {"extensions/KHR_materials_iridescence/iridescenceFactor", 1,
+     [](MovableMaterial& m, Numbers v) { m.now.iridescence = unit(v[0]); }},
+    {"extensions/KHR_materials_iridescence/iridescenceIor", 1,
+     [](MovableMaterial& m, Numbers v) { m.now.film_ior = film_ior(v[0]); }},
+    {"extensions/KHR_materials_iridescence/iridescenceThicknessMinimum", 1,
+     [](MovableMaterial& m, Numbers v) { m.now.film_thinnest = film_thickness(v[0]); }},
+    {"extensions/KHR_materials_iridescence/iridescenceThicknessMaximum", 1,
+     [](MovableMaterial& m, Numbers v) { m.now.film_thickest = film_thickness(v[0]); }},
 };
 
 /// `to` of the slot's transform, and of the use's matrix.
@@ -94,6 +125,16 @@ glm::mat3x2 TextureTransform::matrix() const {
   const double sine = std::sin(rotation);
   return {narrow(cosine * scale.x), narrow(-sine * scale.x), narrow(sine * scale.y),
           narrow(cosine * scale.y), narrow(offset.x),        narrow(offset.y)};
+}
+
+void fold_absorption(MovableMaterial& m) {
+  // Beer and Lambert: what is left of white after that distance is that colour.
+  constexpr float darkest = 1e-30F;
+  const float distance = m.attenuation_distance;
+  for (int c = 0; c < 3; ++c) {
+    const float left = std::clamp(m.attenuation_color[c], darkest, 1.0F);
+    m.now.absorption[c] = distance > 0.0F ? narrow(-std::log(double{left}) / distance) : 0.0F;
+  }
 }
 
 TextureUse& use_of(Material& material, TextureSlot slot) { return material.*slots[static_cast<std::size_t>(slot)].use; }

@@ -2,6 +2,7 @@
 
 // Private to surface/: materials and lights in glTF's own terms, as animations move them (KHR_animation_pointer).
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <glm/glm.hpp>
@@ -33,9 +34,14 @@ enum class TextureSlot : std::uint8_t {
   specular_color,
   clearcoat,
   clearcoat_roughness,
-  transmission
+  transmission,
+  sheen_color,
+  sheen_roughness,
+  anisotropy,
+  iridescence,
+  film_thickness
 };
-constexpr std::size_t texture_slots = 10;
+constexpr std::size_t texture_slots = 15;
 
 /// A material's use of a texture.
 TextureUse& use_of(Material& material, TextureSlot slot);
@@ -45,8 +51,17 @@ struct MovableMaterial {
   Material now;
   glm::vec3 emissive_factor{0.0F};
   float emissive_strength = 1.0F;
+  float attenuation_distance = 0.0F;  ///< metres; 0 and beyond what narrow() keeps: nothing is absorbed
+  glm::vec3 attenuation_color{1.0F};
   std::array<TextureTransform, texture_slots> transforms;
 };
+
+/// An index and a thickness (nanometres) of a film, in the range in which its phases are numbers.
+inline float film_ior(float ior) { return std::clamp(ior, 1.0F, 1e4F); }
+inline float film_thickness(float thickness) { return std::clamp(thickness, 0.0F, 1e9F); }
+
+/// Makes the absorption of what attenuates.
+void fold_absorption(MovableMaterial& material);
 
 /// Likewise.
 struct MovableLight {
@@ -63,7 +78,8 @@ struct Member {
 };
 
 /// What a JSON pointer below a material leads to; nothing for what animations do not move here: textures themselves,
-/// and what decides of a pass or of a mesh's tangents (transmission, clearcoat, a normal map's rotation and scale).
+/// and what decides of a pass or of a mesh's tangents (transmission, thickness, clearcoat, the strength of anisotropy,
+/// a normal map's rotation and scale).
 std::optional<Member<MovableMaterial>> material_member(std::string_view path);
 /// The same below a light.
 std::optional<Member<MovableLight>> light_member(std::string_view path);

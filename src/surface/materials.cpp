@@ -153,6 +153,7 @@ class Materials {
       to.transmission = unit(number(*transmission, "transmissionFactor", 0.0));
       texture(TextureSlot::transmission, use_of(*transmission, "transmissionTexture"), what, movable);
     }
+    layers(from, what, movable);
     if (const auto* glossiness = find(from, "KHR_materials_pbrSpecularGlossiness")) {
       const auto diffuse = numbers(*glossiness, "diffuseFactor", {1.0, 1.0, 1.0, 1.0}, what);
       const auto reflected = numbers(*glossiness, "specularFactor", {1.0, 1.0, 1.0}, what);
@@ -160,6 +161,42 @@ class Materials {
                 unit(number(*glossiness, "glossinessFactor", 1.0))},
                use_of(*glossiness, "diffuseTexture"), use_of(*glossiness, "specularGlossinessTexture"), what, movable);
       ++approximated_;
+    }
+  }
+
+  /// What only richer kernels draw.
+  void layers(const tinygltf::ExtensionMap& from, const std::string& what, MovableMaterial& movable) {
+    Material& to = movable.now;
+    if (const auto* volume = find(from, "KHR_materials_volume")) {
+      to.thickness = positive(number(*volume, "thicknessFactor", 0.0));
+      movable.attenuation_distance =
+          positive(number(*volume, "attenuationDistance", std::numeric_limits<double>::infinity()));
+      movable.attenuation_color = color(numbers(*volume, "attenuationColor", {1.0, 1.0, 1.0}, what));
+      fold_absorption(movable);
+    }
+    if (const auto* dispersion = find(from, "KHR_materials_dispersion")) {
+      to.dispersion = positive(number(*dispersion, "dispersion", 0.0));
+    }
+    if (const auto* sheen = find(from, "KHR_materials_sheen")) {
+      to.sheen_color = glm::min(color(numbers(*sheen, "sheenColorFactor", {0.0, 0.0, 0.0}, what)), 1.0F);
+      texture(TextureSlot::sheen_color, use_of(*sheen, "sheenColorTexture"), what, movable);
+      to.sheen_roughness = unit(number(*sheen, "sheenRoughnessFactor", 0.0));
+      texture(TextureSlot::sheen_roughness, use_of(*sheen, "sheenRoughnessTexture"), what, movable);
+    }
+    if (const auto* anisotropy = find(from, "KHR_materials_anisotropy")) {
+      to.anisotropy = unit(number(*anisotropy, "anisotropyStrength", 0.0));
+      to.anisotropy_rotation = narrow(number(*anisotropy, "anisotropyRotation", 0.0));
+      texture(TextureSlot::anisotropy, use_of(*anisotropy, "anisotropyTexture"), what, movable);
+    }
+    if (const auto* iridescence = find(from, "KHR_materials_iridescence")) {
+      to.iridescence = unit(number(*iridescence, "iridescenceFactor", 0.0));
+      texture(TextureSlot::iridescence, use_of(*iridescence, "iridescenceTexture"), what, movable);
+      const double index = number(*iridescence, "iridescenceIor", 1.3);
+      if (index < 1.0) malformed(what + ": iridescenceIor is below 1");
+      to.film_ior = film_ior(narrow(index));
+      to.film_thinnest = film_thickness(narrow(number(*iridescence, "iridescenceThicknessMinimum", 100.0)));
+      to.film_thickest = film_thickness(narrow(number(*iridescence, "iridescenceThicknessMaximum", 400.0)));
+      texture(TextureSlot::film_thickness, use_of(*iridescence, "iridescenceThicknessTexture"), what, movable);
     }
   }
 

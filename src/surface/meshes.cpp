@@ -201,8 +201,8 @@ class Primitive {
       if (!detail::finite(position)) malformed(label("POSITION") + " is not finite");
     }
     if (!part_.flat) read_normals();
-    const TextureUse& map = normal_map();
-    if (map.texture < 0) return;
+    const TextureUse* const map = tangent_map();
+    if (map == nullptr) return;
     if (!part_.flat && has("TANGENT")) {
       part_.tangents = vectors<4>("TANGENT");
       not_finite_ |= replace_not_finite(part_.tangents);
@@ -215,11 +215,11 @@ class Primitive {
       }
       return;
     }
-    const std::string set = "TEXCOORD_" + std::to_string(map.uv_set);
+    const std::string set = "TEXCOORD_" + std::to_string(map->uv_set);
     std::vector<glm::vec2> uvs(part_.positions.size());
     if (has(set)) uvs = vectors<2>(set);
     replace_not_finite(uvs);
-    for (glm::vec2& uv : uvs) uv = map.transform * glm::vec3(uv, 1.0F);
+    for (glm::vec2& uv : uvs) uv = map->transform * glm::vec3(uv, 1.0F);
     std::vector<std::uint32_t> origins;
     budget_.take(part_.indices.size(), 96, what_);  // of its tables
     part_.tangents = make_tangents(part_.indices, part_.positions, part_.flat ? flat_normals() : part_.normals, uvs,
@@ -351,14 +351,20 @@ class Primitive {
     }
   }
 
-  /// Of the material, else of the first variant's that has one: a part has one set of tangents.
-  [[nodiscard]] const TextureUse& normal_map() const {
-    const TextureUse& own = materials_[part_.material].normal_texture;
-    if (own.texture >= 0) return own;
-    for (const std::uint32_t material : part_.variants) {
-      if (materials_[material].normal_texture.texture >= 0) return materials_[material].normal_texture;
+  /// The map along which tangents grow, of the material, else of the first variant's that has one: a part has one set
+  /// of tangents. Null: it needs none.
+  [[nodiscard]] const TextureUse* tangent_map() const {
+    const TextureUse* map = tangent_map(materials_[part_.material]);
+    for (std::size_t v = 0; map == nullptr && v < part_.variants.size(); ++v) {
+      map = tangent_map(materials_[part_.variants[v]]);
     }
-    return own;
+    return map;
+  }
+
+  /// glTF has them of the normal map; anisotropy without one has its own, or the first set as it is.
+  static const TextureUse* tangent_map(const Material& material) {
+    if (material.normal_texture.texture >= 0) return &material.normal_texture;
+    return material.anisotropy > 0.0F ? &material.anisotropy_texture : nullptr;
   }
 
   void read_targets() {

@@ -80,8 +80,34 @@ struct Material {
   TextureUse clearcoat_roughness_texture;  ///< G
   float transmission = 0.0F;
   TextureUse transmission_texture;  ///< R
+  float thickness =
+      0.0F;  ///< metres; 0: a thin wall; else the triangles bound a volume, and previews are told how thick
+  glm::vec3 absorption{0.0F};  ///< of that volume, 1 / m of the world
+  float dispersion = 0.0F;     ///< 20 over Abbe's number, of that volume
+  glm::vec3 sheen_color{0.0F};
+  TextureUse sheen_color_texture;
+  float sheen_roughness = 0.0F;
+  TextureUse sheen_roughness_texture;  ///< A
+  float anisotropy = 0.0F;             ///< strength, along the tangent
+  float anisotropy_rotation = 0.0F;    ///< radians, from there to the bitangent
+  TextureUse anisotropy_texture;       ///< RG direction, B strength
+  float iridescence = 0.0F;
+  TextureUse iridescence_texture;  ///< R
+  float film_ior = 1.3F;
+  float film_thinnest = 100.0F;       ///< nanometres, where the texture is 0
+  float film_thickest = 400.0F;       ///< where it is 1, and without one
+  TextureUse film_thickness_texture;  ///< G
   bool operator==(const Material&) const = default;
 };
+
+/// Whether its triangles are the boundary of a volume, which light enters by transmission (KHR_materials_volume): both
+/// their sides count.
+inline bool bounds_volume(const Material& m) { return m.transmission > 0.0F && m.thickness > 0.0F && !m.unlit; }
+/// Whether it needs the path tracer's richer kernels (CM_RICH of glsl/ggx.glsl).
+inline bool is_rich(const Material& m) {
+  return !m.unlit &&
+         (m.transmission > 0.0F || m.sheen_color != glm::vec3(0.0F) || m.anisotropy > 0.0F || m.iridescence > 0.0F);
+}
 
 /// KHR_lights_punctual, in the scene's units: candela for point and spot, lux for directional; Cumulet takes both as
 /// radiant (W/sr, W/m2).

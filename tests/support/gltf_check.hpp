@@ -17,7 +17,8 @@ inline std::string broken(const surface::Scene& scene, const surface::Material& 
   for (const surface::TextureUse* use :
        {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture,
         &m.emission_texture, &m.specular_texture, &m.specular_color_texture, &m.clearcoat_texture,
-        &m.clearcoat_roughness_texture, &m.transmission_texture}) {
+        &m.clearcoat_roughness_texture, &m.transmission_texture, &m.sheen_color_texture, &m.sheen_roughness_texture,
+        &m.anisotropy_texture, &m.iridescence_texture, &m.film_thickness_texture}) {
     if (use->texture < -1 || use->texture >= static_cast<std::int32_t>(scene.textures.size()) || use->uv_set > 1) {
       return "a texture use is out of range";
     }
@@ -26,13 +27,15 @@ inline std::string broken(const surface::Scene& scene, const surface::Material& 
         return "a transform is not finite";
     }
   }
-  const float numbers[] = {m.base_color.a,       m.metallic, m.roughness, m.normal_scale, m.alpha_cutoff,
-                           m.occlusion_strength, m.ior,      m.specular,  m.clearcoat,    m.clearcoat_roughness,
-                           m.transmission};
+  const float numbers[] = {m.base_color.a,        m.metallic,    m.roughness,  m.normal_scale,    m.alpha_cutoff,
+                           m.occlusion_strength,  m.ior,         m.specular,   m.clearcoat,       m.clearcoat_roughness,
+                           m.transmission,        m.thickness,   m.dispersion, m.sheen_roughness, m.anisotropy,
+                           m.anisotropy_rotation, m.iridescence, m.film_ior,   m.film_thinnest,   m.film_thickest};
   for (const float number : numbers) {
     if (!std::isfinite(number)) return "a material is not finite";
   }
-  if (!finite(glm::vec3(m.base_color)) || !finite(m.emission) || !finite(m.specular_color)) {
+  if (!finite(glm::vec3(m.base_color)) || !finite(m.emission) || !finite(m.specular_color) || !finite(m.absorption) ||
+      !finite(m.sheen_color)) {
     return "a colour is not finite";
   }
   return "";
@@ -87,7 +90,9 @@ inline std::string broken(const surface::Scene& scene, const surface::Pose& pose
   }
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
     const surface::Draw& draw = scene.draws[d];
-    const auto has_map = [&](std::uint32_t m) { return scene.materials[m].normal_texture.texture >= 0; };
+    const auto has_map = [&](std::uint32_t m) {
+      return scene.materials[m].normal_texture.texture >= 0 || scene.materials[m].anisotropy > 0.0F;
+    };
     bool mapped = has_map(draw.material);
     for (const surface::Variant& variant : scene.variants) mapped = mapped || has_map(variant.materials[d]);
     for (std::size_t i = draw.first_index; i < std::size_t{draw.first_index} + draw.index_count; ++i) {

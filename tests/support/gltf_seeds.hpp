@@ -88,10 +88,11 @@ inline GltfModel seed_materials() {
   GltfModel model;
   json& root = model.root;
   root["extensionsUsed"] = {
-      "KHR_lights_punctual",        "KHR_materials_unlit",    "KHR_materials_emissive_strength",
-      "KHR_materials_ior",          "KHR_materials_specular", "KHR_materials_clearcoat",
-      "KHR_materials_transmission", "KHR_texture_transform",  "KHR_materials_pbrSpecularGlossiness",
-      "KHR_node_visibility"};
+      "KHR_lights_punctual",        "KHR_materials_unlit",      "KHR_materials_emissive_strength",
+      "KHR_materials_ior",          "KHR_materials_specular",   "KHR_materials_clearcoat",
+      "KHR_materials_transmission", "KHR_texture_transform",    "KHR_materials_pbrSpecularGlossiness",
+      "KHR_node_visibility",        "KHR_materials_volume",     "KHR_materials_dispersion",
+      "KHR_materials_sheen",        "KHR_materials_anisotropy", "KHR_materials_iridescence"};
   model.add("images", {{"bufferView", model.view(png(2, 1, 8, 6, {255, 0, 0, 255, 0, 255, 0, 128}))},
                        {"mimeType", "image/png"},
                        {"name", "two"}});
@@ -136,7 +137,27 @@ inline GltfModel seed_materials() {
                  {"clearcoatRoughnessFactor", 0.15},
                  {"clearcoatTexture", jpeg},
                  {"clearcoatRoughnessTexture", wide}}},
-               {"KHR_materials_transmission", {{"transmissionFactor", 0.35}, {"transmissionTexture", jpeg}}}}}});
+               {"KHR_materials_transmission", {{"transmissionFactor", 0.35}, {"transmissionTexture", jpeg}}},
+               {"KHR_materials_volume",
+                {{"thicknessFactor", 2},
+                 {"thicknessTexture", jpeg},
+                 {"attenuationDistance", 0.5},
+                 {"attenuationColor", {1, 0.5, 0.25}}}},
+               {"KHR_materials_dispersion", {{"dispersion", 0.36}}},
+               {"KHR_materials_sheen",
+                {{"sheenColorFactor", {0.3, 0.2, 0.1}},
+                 {"sheenColorTexture", turned},
+                 {"sheenRoughnessFactor", 0.45},
+                 {"sheenRoughnessTexture", jpeg}}},
+               {"KHR_materials_anisotropy",
+                {{"anisotropyStrength", 0.65}, {"anisotropyRotation", 1.57}, {"anisotropyTexture", wide}}},
+               {"KHR_materials_iridescence",
+                {{"iridescenceFactor", 0.55},
+                 {"iridescenceTexture", jpeg},
+                 {"iridescenceIor", 1.8},
+                 {"iridescenceThicknessMinimum", 150},
+                 {"iridescenceThicknessMaximum", 650},
+                 {"iridescenceThicknessTexture", turned}}}}}});
   model.add("materials", {{"alphaMode", "BLEND"}, {"extensions", {{"KHR_materials_unlit", json::object()}}}});
   model.add("materials", {{"extensions",
                            {{"KHR_materials_pbrSpecularGlossiness",

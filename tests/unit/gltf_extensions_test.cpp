@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <optional>
 
 #include "scene/model_source.hpp"
+#include "support/gltf_check.hpp"
 #include "support/gltf_import.hpp"
 #include "support/gltf_model.hpp"
 #include "support/gltf_seeds.hpp"
@@ -362,6 +364,169 @@ TEST(GltfPointers, HostileOnesAreRefusedInALine) {
   EXPECT_TRUE(has(line({"/nodes/0/extensions/KHR_node_visibility/visible", 1, {0, 1}}), "by STEP alone"));
   EXPECT_TRUE(has(line({"/materials/0/emissiveFactor", 2, {0, 1}}), "wrong type of element"));
   EXPECT_TRUE(has(line({"/materials/0/emissiveFactor", 4, {0, 1, 2, 3}}), "wrong type of element"));
+}
+
+/// One triangle of a material with these extensions.
+GltfModel layered_model(const json& extensions) {
+  GltfModel model;
+  model.root["extensionsUsed"] = json::array();
+  for (const auto& [name, value] : extensions.items()) model.root["extensionsUsed"].push_back(name);
+  model.root["extensionsRequired"] = model.root["extensionsUsed"];
+  model.add("materials", {{"extensions", extensions}});
+  model.show({{"attributes", {{"POSITION", model.triangle()}}}, {"material", 0}});
+  return model;
+}
+
+TEST(GltfLayers, WhatIsNotSaidIsAsTheExtensionsHaveIt) {
+  const json none = json::object();
+  Lines lines;
+  const ScenePtr scene = imported(layered_model({{"KHR_materials_volume", none},
+                                                 {"KHR_materials_dispersion", none},
+                                                 {"KHR_materials_sheen", none},
+                                                 {"KHR_materials_anisotropy", none},
+                                                 {"KHR_materials_iridescence", none}}),
+                                  lines.log);
+  EXPECT_TRUE(lines.warnings.empty());
+  Material expected;
+  EXPECT_EQ(scene->materials[0], expected);
+  EXPECT_FALSE(is_rich(scene->materials[0]));
+  // And what is endless, or of no length, absorbs nothing.
+  for (const char* distance : {"null", "0"}) {
+    json volume = {{"thicknessFactor", 1}, {"attenuationColor", {0, 0.5, 1}}};
+    if (std::string_view(distance) == "0") volume["attenuationDistance"] = 0;
+    const ScenePtr clear = imported(layered_model({{"KHR_materials_volume", volume}}));
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(clear->materials[0].absorption[c], 0.0F, 1e-15F) << distance;
+  }
+}
+
+TEST(GltfLayers, VolumesAreBoundedByBothSidesOfWhatTransmits) {
+  const json volume = {{"thicknessFactor", 0.5}};
+  const json through = {{"transmissionFactor", 1}};
+  const ScenePtr wall = imported(layered_model({{"KHR_materials_transmission", through}}));
+  EXPECT_FALSE(bounds_volume(wall->materials[0]));
+  EXPECT_EQ(triangle_flags(*wall, wall->pose(0.0))[0] & (TriangleFlags::ask | TriangleFlags::one_sided),
+            TriangleFlags::ask | TriangleFlags::one_sided);
+  const ScenePtr solid = imported(layered_model({{"KHR_materials_volume", volume}}));
+  EXPECT_FALSE(bounds_volume(solid->materials[0]));  // what does not transmit
+  const ScenePtr glass =
+      imported(layered_model({{"KHR_materials_volume", volume}, {"KHR_materials_transmission", through}}));
+  EXPECT_TRUE(bounds_volume(glass->materials[0]));
+  EXPECT_EQ(triangle_flags(*glass, glass->pose(0.0))[0] & (TriangleFlags::ask | TriangleFlags::one_sided), 0U);
+}
+
+TEST(GltfLayers, OnlyWhatIsSeenMakesPathsDearer) {
+  Progress progress;
+  const auto rich = [&](const json& extensions, bool shown) {
+    GltfModel model = layered_model(extensions);
+    if (!shown) model.root["meshes"][0]["primitives"][0].erase("material");
+    const ScenePtr scene = imported(model);
+    return scene::make_model_source(scene, scene->pose(0.0), &progress)->tables.rich != 0U;
+  };
+  const json sheen = {{"KHR_materials_sheen", {{"sheenColorFactor", {0, 0.1, 0}}}}};
+  EXPECT_TRUE(rich(sheen, true));
+  EXPECT_FALSE(rich(sheen, false));
+  EXPECT_TRUE(rich({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.1}}}}, true));
+  EXPECT_TRUE(rich({{"KHR_materials_iridescence", {{"iridescenceFactor", 0.1}}}}, true));
+  EXPECT_TRUE(rich({{"KHR_materials_transmission", {{"transmissionFactor", 0.1}}}}, true));
+  EXPECT_FALSE(rich({{"KHR_materials_volume", {{"thicknessFactor", 1}}}}, true));
+  EXPECT_FALSE(rich({{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}}, true));
+}
+
+TEST(GltfLayers, AnisotropyHasTangentsWithoutANormalMap) {
+  GltfModel model = layered_model({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}}}});
+  // u grows along +y of the triangle.
+  model.root["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = model.vec2({0, 0, 0, 1, 1, 0});
+  const ScenePtr scene = imported(model);
+  const Pose pose = scene->pose(0.0);
+  EXPECT_EQ(test::broken(*scene, pose), "");
+  test::near(glm::vec3(pose.vertices[0].tangent), {0, 1, 0});
+  // Nor without coordinates.
+  const ScenePtr bare = imported(layered_model({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}}}}));
+  EXPECT_EQ(test::broken(*bare, bare->pose(0.0)), "");
+}
+
+TEST(GltfLayers, HostileNumbersAreBoundedOrRefusedInALine) {
+  const auto line = [](const char* extension, const json& members) {
+    return refused(layered_model({{extension, members}}));
+  };
+  EXPECT_TRUE(has(line("KHR_materials_volume", {{"attenuationColor", {1, 1}}}), "attenuationColor has not 3 numbers"));
+  EXPECT_TRUE(has(line("KHR_materials_volume", {{"thicknessFactor", "1"}}), "thicknessFactor is not a number"));
+  EXPECT_TRUE(has(line("KHR_materials_volume", {{"thicknessTexture", 0}}), "thicknessTexture is not an object"));
+  EXPECT_TRUE(has(line("KHR_materials_sheen", {{"sheenColorFactor", 1}}), "sheenColorFactor is not an array"));
+  EXPECT_TRUE(has(line("KHR_materials_sheen", {{"sheenColorTexture", {{"index", 3}}}}), "there is no texture 3"));
+  EXPECT_TRUE(has(line("KHR_materials_anisotropy", {{"anisotropyRotation", nullptr}}), "anisotropyRotation is not"));
+  EXPECT_TRUE(has(line("KHR_materials_iridescence", {{"iridescenceIor", 0.5}}), "iridescenceIor is below 1"));
+  EXPECT_TRUE(has(line("KHR_materials_dispersion", {{"dispersion", json::array()}}), "dispersion is not a number"));
+
+  constexpr double huge = 1e300;
+  const ScenePtr scene = imported(layered_model(
+      {{"KHR_materials_transmission", {{"transmissionFactor", huge}}},
+       {"KHR_materials_volume",
+        {{"thicknessFactor", huge}, {"attenuationDistance", 1e-300}, {"attenuationColor", {0, -huge, huge}}}},
+       {"KHR_materials_dispersion", {{"dispersion", huge}}},
+       {"KHR_materials_sheen", {{"sheenColorFactor", {huge, -1, 0.5}}, {"sheenRoughnessFactor", huge}}},
+       {"KHR_materials_anisotropy", {{"anisotropyStrength", -huge}, {"anisotropyRotation", huge}}},
+       {"KHR_materials_iridescence",
+        {{"iridescenceFactor", 7},
+         {"iridescenceIor", huge},
+         {"iridescenceThicknessMinimum", -huge},
+         {"iridescenceThicknessMaximum", huge}}}}));
+  EXPECT_EQ(test::broken(*scene), "");
+  const Material& m = scene->materials[0];
+  EXPECT_EQ(m.sheen_color, glm::vec3(1, 0, 0.5F));
+  EXPECT_EQ(m.anisotropy, 0.0F);
+  EXPECT_EQ(m.film_thinnest, 0.0F);
+  EXPECT_EQ(m.iridescence, 1.0F);
+}
+
+TEST(GltfLayers, PreviewsDrawVolumesAsTintedWallsAndRoundLobes) {
+  GltfModel model =
+      layered_model({{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                     {"KHR_materials_volume",
+                      {{"thicknessFactor", 4}, {"attenuationDistance", 2}, {"attenuationColor", {1, 0.5, 0.1}}}},
+                     {"KHR_materials_anisotropy", {{"anisotropyStrength", 0.8}}}});
+  model.root["materials"][0]["pbrMetallicRoughness"] = {{"roughnessFactor", 0.5}};
+  const ScenePtr scene = imported(model);
+  Progress progress;
+  const auto raster = scene::make_model_source(scene, scene->pose(0.0), &progress)->raster;
+  EXPECT_EQ(raster->materials[0].pass, AlphaMode::blend);
+  core::CmMaterial block{};
+  std::memcpy(&block, raster->material_blocks.data(), sizeof block);
+  test::near(glm::vec3(block.base_color), {1, 0.25F, 0.01F});
+  // The mean of alphas: 0.25 across, and a mix of that and 1 along.
+  EXPECT_NEAR(block.reflection.y, std::sqrt(std::sqrt(0.25 * (0.25 * 0.36 + 0.64))), 1e-5);
+}
+
+TEST(GltfLayers, FactorsMoveByPointers) {
+  GltfModel model = layered_model({{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                                   {"KHR_materials_volume", {{"thicknessFactor", 1}, {"attenuationDistance", 2}}},
+                                   {"KHR_materials_sheen", json::object()},
+                                   {"KHR_materials_anisotropy", {{"anisotropyStrength", 1}}},
+                                   {"KHR_materials_iridescence", {{"iridescenceFactor", 1}}}});
+  const std::string of = "/materials/0/extensions/KHR_materials_";
+  animate(model, {{of + "volume/attenuationColor", 3, {1, 1, 1, 0, 0, 0}},
+                  {of + "dispersion/dispersion", 1, {0, 2}},
+                  {of + "sheen/sheenColorFactor", 3, {0, 0, 0, 2, 1, 0.5F}},
+                  {of + "sheen/sheenRoughnessFactor", 1, {0, 1}},
+                  {of + "anisotropy/anisotropyRotation", 1, {0, 4}},
+                  {of + "iridescence/iridescenceIor", 1, {1, 2}},
+                  {of + "iridescence/iridescenceThicknessMaximum", 1, {100, 500}}});
+  Lines lines;
+  const ScenePtr scene = imported(model, lines.log);
+  EXPECT_TRUE(lines.warnings.empty());
+  const Material m = scene->pose(0.5).materials.at(0);
+  EXPECT_NEAR(m.absorption.x, 0.5 * std::log(2.0), 1e-6);
+  EXPECT_FLOAT_EQ(m.dispersion, 1.0F);
+  EXPECT_EQ(m.sheen_color, glm::vec3(1.0F, 0.5F, 0.25F));
+  EXPECT_FLOAT_EQ(m.sheen_roughness, 0.5F);
+  EXPECT_FLOAT_EQ(m.anisotropy_rotation, 2.0F);
+  EXPECT_FLOAT_EQ(m.film_ior, 1.5F);
+  EXPECT_FLOAT_EQ(m.film_thickest, 300.0F);
+  // What decides of tangents and of sides stays.
+  animate(model, {{of + "volume/thicknessFactor", 1, {0, 1}}, {of + "anisotropy/anisotropyStrength", 1, {0, 1}}});
+  const ScenePtr stays = imported(model, lines.log);
+  ASSERT_EQ(lines.warnings.size(), 1U);
+  EXPECT_TRUE(has(lines.warnings[0], "not followed")) << lines.warnings[0];
 }
 
 /// Two triangles; the first is red, or green and then blue in variants "day" and "night". Green glows and cuts out.

@@ -629,10 +629,23 @@ TEST(Gltf, MaterialsAreReadWhole) {
   EXPECT_FLOAT_EQ(m.clearcoat, 0.8F);
   EXPECT_FLOAT_EQ(m.clearcoat_roughness, 0.15F);
   EXPECT_FLOAT_EQ(m.transmission, 0.35F);
+  EXPECT_FLOAT_EQ(m.thickness, 2.0F);
+  near(m.absorption, {0.0F, 2.0F * std::log(2.0F), 2.0F * std::log(4.0F)});
+  EXPECT_FLOAT_EQ(m.dispersion, 0.36F);
+  near(m.sheen_color, {0.3F, 0.2F, 0.1F});
+  EXPECT_FLOAT_EQ(m.sheen_roughness, 0.45F);
+  EXPECT_FLOAT_EQ(m.anisotropy, 0.65F);
+  EXPECT_FLOAT_EQ(m.anisotropy_rotation, 1.57F);
+  EXPECT_FLOAT_EQ(m.iridescence, 0.55F);
+  EXPECT_FLOAT_EQ(m.film_ior, 1.8F);
+  EXPECT_FLOAT_EQ(m.film_thinnest, 150.0F);
+  EXPECT_FLOAT_EQ(m.film_thickest, 650.0F);
+  EXPECT_EQ(m.film_thickness_texture.uv_set, 1U);
   for (const TextureUse* use :
        {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.occlusion_texture,
         &m.emission_texture, &m.specular_texture, &m.specular_color_texture, &m.clearcoat_texture,
-        &m.clearcoat_roughness_texture, &m.transmission_texture}) {
+        &m.clearcoat_roughness_texture, &m.transmission_texture, &m.sheen_color_texture, &m.sheen_roughness_texture,
+        &m.anisotropy_texture, &m.iridescence_texture, &m.film_thickness_texture}) {
     EXPECT_GE(use->texture, 0);
   }
   // KHR_texture_transform at uv = (1, 0) and (0, 1): scaled, turned by 0.5, moved.
@@ -836,11 +849,11 @@ TEST(Gltf, ExtensionsRequiredAreKnownOrRefusedByName) {
   model.root["extensionsRequired"] = json::array({"KHR_texture_basisu"});
   EXPECT_TRUE(has(refused(model, ErrorCode::unsupported), "KHR_texture_basisu"));
   model.root.erase("extensionsRequired");
-  model.root["extensionsUsed"] = {"VENDOR_secret", "KHR_materials_ior", "KHR_materials_sheen"};
+  model.root["extensionsUsed"] = {"VENDOR_secret", "KHR_materials_ior", "KHR_materials_diffuse_transmission"};
   Lines lines;
   imported(model, lines.log);
   ASSERT_EQ(lines.warnings.size(), 1U);
-  EXPECT_TRUE(has(lines.warnings[0], "KHR_materials_sheen, VENDOR_secret")) << lines.warnings[0];
+  EXPECT_TRUE(has(lines.warnings[0], "KHR_materials_diffuse_transmission, VENDOR_secret")) << lines.warnings[0];
   EXPECT_FALSE(has(lines.warnings[0], "ior"));
 }
 

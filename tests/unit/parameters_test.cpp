@@ -99,6 +99,8 @@ const std::array fields{
     CM_FIELD(surfaces, emitter_count),
     CM_FIELD(surfaces, ggx_albedo),
     CM_FIELD(surfaces, ggx_albedo_averages),
+    CM_FIELD(surfaces, sheen_albedo),
+    CM_FIELD(surfaces, rich),
     CM_FIELD(lamps, count),
     CM_FIELD(environment, size),
     CM_FIELD(environment, words),

@@ -529,15 +529,18 @@ CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* 
  * calls are synchronous, for any thread; error as in cumulet_create. cumulet_load_surfaces is the asynchronous way.
  *
  * The library reads all of glTF 2.0's triangles, materials, skins, morph targets, animations, cameras, and these
- * extensions: KHR_lights_punctual, KHR_materials_unlit, _emissive_strength, _ior, _specular, _clearcoat, _transmission
- * (thin and clear: what passes goes straight on), _variants and _pbrSpecularGlossiness (as the metallic-roughness
- * material that looks like it, textures converted as they are read), KHR_texture_transform, KHR_mesh_quantization,
- * KHR_draco_mesh_compression, EXT_meshopt_compression, EXT_texture_webp, KHR_node_visibility (what is hidden neither
- * shows nor counts), KHR_animation_pointer (transforms, weights and visibility of nodes, factors and texture transforms
- * of materials, lights; a warning names what else a file animates), EXT_mesh_gpu_instancing (as copies, which may be
- * 16,777,216 triangles together). Watts per steradian and per square metre stand for
- * KHR_lights_punctual's candela and lux. Emissive triangles are lights, to their front alone where the material is
- * single-sided. Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
+ * extensions: KHR_lights_punctual, KHR_materials_unlit, _emissive_strength, _ior, _specular, _clearcoat, _transmission,
+ * _volume (which refracts and absorbs within closed meshes, one in another two deep; a thickness of 0 is a thin wall,
+ * whose light goes straight on where it is smooth), _dispersion, _sheen, _anisotropy, _iridescence, _variants and
+ * _pbrSpecularGlossiness (as the metallic-roughness material that looks like it, textures converted as they are read).
+ * In previews, before the first samples, and where surfaces are drawn and not traced, volumes are walls of their
+ * thickness, unrefracted and of one colour, anisotropic lobes are round, and sheen and films are left out.
+ * KHR_texture_transform, KHR_mesh_quantization, KHR_draco_mesh_compression, EXT_meshopt_compression, EXT_texture_webp,
+ * KHR_node_visibility (what is hidden neither shows nor counts), KHR_animation_pointer (transforms, weights and
+ * visibility of nodes, factors and texture transforms of materials, lights; a warning names what else a file animates),
+ * EXT_mesh_gpu_instancing (as copies, which may be 16,777,216 triangles together). Watts per steradian and per square
+ * metre stand for KHR_lights_punctual's candela and lux. Emissive triangles are lights, to their front alone where the
+ * material is single-sided. Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
  */
 
 /* Reads a .gltf or .glb file. */
