@@ -78,7 +78,7 @@ void main() {
     CmHit hit;
     cm_hit_seed = cm_hash3(uvec3(pixel.y * cm.view.size.x + pixel.x, uint(i), cm.integrator.seed)).x;
     cm_hit_camera = true;
-    if (cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, hit)) {
+    if (cm_trace_models(cm_from_cube_point(o), w, 0.0, surface_t, false, hit)) {
       surface_t = hit.t;
       CmSurfacePoint point = cm_surface_point(hit.triangle, hit.barycentrics, w, !hit.front);
       normal += point.material.normal;

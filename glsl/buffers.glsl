@@ -1,4 +1,5 @@
 // Bindings of the marches' data, of surfaces' and of the host's depth.
+#include "tree_node.glsl"
 #include "here.glsl"
 
 layout(binding = CM_UNIT_HOST_DEPTH) uniform sampler2DArray cm_surface;
@@ -37,7 +38,12 @@ float cm_layer_surface(uvec2 pixel, vec2 within, uint sample_number, float u, ou
 layout(binding = CM_UNIT_SCENE_WORDS) uniform usamplerBuffer cm_scene_words;
 layout(binding = CM_UNIT_ATLAS) uniform sampler2DArray cm_atlas;
 
-uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(cm.surfaces.words + word)); }
+#include "model_table.glsl"
+layout(std140, binding = CM_STORAGE_MODELS) readonly buffer CmModels { CmModel cm_models[]; };
+layout(std140, binding = CM_STORAGE_MODEL_NODES) readonly buffer CmModelNodes { CmInstanceNode cm_model_nodes[]; };
+uint cm_model = 0u;
+
+uvec4 cm_words(uint word) { return texelFetch(cm_scene_words, int(word)); }
 vec4 cm_atlas_value(ivec3 at) { return texelFetch(cm_atlas, at, 0); }
 #endif
 

@@ -5,7 +5,8 @@
 //   bool cm_hit_accept(uint triangle, vec2 barycentrics)   false: the ray goes on as if nothing were there
 // Without CM_HIT_ACCEPT they are hit like any other. Nodes to come back to are kept in an array of each lane, or, where
 // the includer defines CM_BVH_SHARED_STACK as the size of its work groups, in shared memory: GPUs have few registers.
-// Where it defines CM_BVH_LOW and CM_BVH_HIGH, a box around all triangles, rays that miss it never touch the tree.
+// Where it defines CM_BVH_LOW and CM_BVH_HIGH, a box around all triangles, cm_bvh_near asks that alone. Where it defines
+// CM_BVH_NUMBER(triangle), hits tell of that number.
 //
 // d need not be unit: t counts in its lengths, and hits have t_min < t < t_max. Components of d may be 0. Nothing is hit
 // by a ray that starts beyond 1e12, or whose largest direction component is not in [1e-12, 1e12], or that is NaN.
@@ -33,9 +34,13 @@
 #define CM_BVH_CULLS true
 #endif
 
+#ifndef CM_BVH_NUMBER
+#define CM_BVH_NUMBER(triangle) triangle
+#endif
+
 struct CmHit {
   float t;
-  uint triangle;      // its number in the scene; CM_BVH_NONE: nothing hit
+  uint triangle;      // its number; CM_BVH_NONE: nothing hit
   uint record;        // its place in the tree, for cm_bvh_point and cm_bvh_normal
   uint flags;
   vec2 barycentrics;  // weights of v1 and v2
@@ -86,18 +91,21 @@ CM_FN bool cm_bvh_near(vec3 o, vec3 d, float t_min, float t_max) {
 }
 #endif
 
-// The nearest hit, or with `any` the first one found.
-CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_OUT(CmHit) hit) {
+// Nothing has been hit yet, short of t_max.
+CM_FN void cm_bvh_begin(float t_max, CM_OUT(CmHit) hit) {
   hit.t = min(t_max, 1.0e25f);  // beyond any hit, short of where the builder puts an empty box
   hit.triangle = CM_BVH_NONE;
   hit.record = 0u;
   hit.flags = 0u;
   hit.barycentrics = vec2(0.0f, 0.0f);
   hit.front = true;
+}
+
+// A hit that is nearer than the one given, t > t_first >= 0: the nearest, or with `any` the first one found.
+CM_FN void cm_bvh_search(vec3 o, vec3 d, float t_first, bool any, CM_INOUT(CmHit) hit) {
   vec3 size = abs(d);
   float longest = max(max(size.x, size.y), size.z);
   bool sound = longest >= 1.0e-12f && cm_is_within(d, 1.0e12f) && cm_is_within(o, 1.0e12f);
-  float t_first = max(t_min, 0.0f);
   vec3 slack;
   vec3 inverse = cm_bvh_inverse(d, slack);
   // Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013: the ray becomes the z axis.
@@ -112,9 +120,6 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
 #endif
   int top = 0;
   uint link = sound ? 0u : CM_BVH_NONE;
-#ifdef CM_BVH_LOW
-  if (!cm_bvh_near(o, d, t_first, hit.t)) link = CM_BVH_NONE;
-#endif
   while (link != CM_BVH_NONE) {
     while (link < CM_BVH_LEAF) {
       uint texel = link * 4u;
@@ -171,7 +176,7 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
 #endif
       if (meets) {
         hit.t = t;
-        hit.triangle = texel_0.w;
+        hit.triangle = CM_BVH_NUMBER(texel_0.w);
         hit.record = record;
         hit.flags = texel_1.w;
         hit.barycentrics = barycentrics;
@@ -181,6 +186,12 @@ CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_O
     --top;
     link = top >= 0 && !(any && hit.triangle != CM_BVH_NONE) ? CM_BVH_KEPT(max(top, 0)) : CM_BVH_NONE;
   }
+}
+
+// The nearest hit, or with `any` the first one found.
+CM_FN bool cm_bvh_trace(vec3 o, vec3 d, float t_min, float t_max, bool any, CM_OUT(CmHit) hit) {
+  cm_bvh_begin(t_max, hit);
+  cm_bvh_search(o, d, max(t_min, 0.0f), any, hit);
   return hit.triangle != CM_BVH_NONE;
 }
 

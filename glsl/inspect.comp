@@ -157,7 +157,7 @@ void main() {
 #if CM_SURFACES
   CmHit triangle;
   cm_hit_camera = true;
-  bool solid = cm_bvh_closest(cm_from_cube_point(o), w, 0.0, surface_t, triangle);
+  bool solid = cm_trace_models(cm_from_cube_point(o), w, 0.0, surface_t, false, triangle);
   if (solid) surface_t = triangle.t;
 #endif
   // Width of a pixel in world space, over t where perspective.
@@ -222,10 +222,14 @@ void main() {
   }
   if (view == CM_VIEW_DEPTH) {
     bool met_volume = half_t > 0.0;
+    uvec4 met = uvec4(met_volume ? 1u : 0u, densest, 0u, 0u);
 #if CM_SURFACES
-    if (solid && !met_volume) half_t = triangle.t;
+    if (solid && !met_volume) {
+      half_t = triangle.t;
+      met = uvec4(2u, triangle.triangle, 0u, 0u);
+    }
 #endif
-    if (cm.dispatch.picks != 0u) imageStore(cm_counts, ivec2(local), uvec4(met_volume ? 1u : 0u, densest, 0u, 0u));
+    if (cm.dispatch.picks != 0u) imageStore(cm_counts, ivec2(local), met);
     imageStore(cm_volume_z, ivec2(cm.dispatch.picks != 0u ? local : pixel), vec4(half_t / t_per_z));
     return;
   }

@@ -3,7 +3,7 @@
 #ifndef CM_INSTANCE_TABLE_GLSL
 #define CM_INSTANCE_TABLE_GLSL
 
-const uint CM_INSTANCE_NONE = 0xffffffffu;
+#include "tree_node.glsl"
 
 // Of a record's flags.
 const uint CM_INSTANCE_SEEN = 1u;      // by camera rays; others meet it in any case
@@ -19,14 +19,6 @@ CM_BLOCK(CmInstance) {
   uint flags;
   uint alias;        // of an entry, drawn evenly: it stands for itself where a random word is below this,
   uint alias_other;  // else for that
-};
-
-// In the order in which they are met: after a node that a ray comes near the one behind it, else the one that it names.
-CM_BLOCK(CmInstanceNode) {
-  CM_ALIGN(16) vec3 low;  // scene's frame
-  uint skip;              // of the first node, the root: how many there are
-  CM_ALIGN(16) vec3 high;
-  uint instance;          // CM_INSTANCE_NONE: an inner node, of all up to skip
 };
 
 #endif

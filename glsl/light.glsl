@@ -196,56 +196,62 @@ CM_FN CmLightSample cm_lamp_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 
 #if CM_SURFACES
 
-// ---- Emissive triangles; their table is that of src/light/emitters.hpp
+// ---- Emissive triangles; the tables are those of src/light/emitters.hpp, one a mesh
 
-CM_FN uvec4 cm_emitter(uint i) { return cm_words(cm.surfaces.emitters + i); }
+CM_FN uvec4 cm_emitter(uint model, uint i) { return cm_words(cm_models[model].emitters + i); }
 
-// Density by solid angle of a point on one, picked by power and then by area: `way` from where it is looked at, under
-// `cosine` to its normal.
-CM_FN float cm_emitter_density(uvec4 entry, vec3 way, float cosine) {
-  return abs(uintBitsToFloat(entry.w)) * dot(way, way) / max(abs(cosine), 1e-12f);
+// Density by solid angle of a point on one, picked by its model's power, by its own and then by area: `way` from where it
+// is looked at, along w; n: its unit normal.
+CM_FN float cm_emitter_density(uint model, uvec4 entry, vec3 way, vec3 w, vec3 n) {
+  float by_area = cm_models[model].emitter_chance * abs(uintBitsToFloat(entry.w)) * cm_own_area(model, n);
+  return by_area * dot(way, way) / max(abs(dot(n, w)), 1e-12f);
 }
 
-// 0 of a triangle that is not in the table. O(log n).
+// 0 of a triangle that is not in a table. O(log n).
 CM_FN float cm_triangle_pdf(CmLightHit hit) {
+  uint model = cm_model_of(hit.triangle);
+  uint triangle = hit.triangle - cm_models[model].first;
   uint low = 0u;
-  uint high = cm.surfaces.emitter_count;
+  uint high = cm_models[model].emitter_count;
+  if (high == 0u) return 0.0f;
   while (low + 1u < high) {
     uint middle = (low + high) >> 1u;
-    bool below = cm_emitter(middle).x <= hit.triangle;
+    bool below = cm_emitter(model, middle).x <= triangle;
     low = below ? middle : low;
     high = below ? high : middle;
   }
-  uvec4 entry = cm_emitter(low);
+  uvec4 entry = cm_emitter(model, low);
   vec3 way = hit.point - cm_from_cube_point(hit.o);
-  return entry.x == hit.triangle ? cm_emitter_density(entry, way, dot(hit.normal, hit.w)) : 0.0f;
+  return entry.x == triangle ? cm_emitter_density(model, entry, way, hit.w, hit.normal) : 0.0f;
 }
 
 // O(1). The distance is to just before it.
 CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
+  uvec2 which = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x7f4a7c15u)));
+  uint model = cm_below(which.x, cm.surfaces.models);
+  if (which.y > cm_models[model].alias || cm_models[model].emitter_count == 0u) model = cm_models[model].alias_other;
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
-  uvec4 entry = cm_emitter(cm_below(pick.x, cm.surfaces.emitter_count));
-  if (pick.y > entry.y) entry = cm_emitter(entry.z);
+  uvec4 entry = cm_emitter(model, cm_below(pick.x, cm_models[model].emitter_count));
+  if (pick.y > entry.y) entry = cm_emitter(model, entry.z);
   float root = sqrt(u.x);
-  CmVertexMix m = cm_vertex_mix(entry.x, vec2(root * (1.0f - u.y), root * u.y));
-  vec3 a = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.x));
-  vec3 b = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.y));
-  vec3 c = vec3(cm_floats(cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner.z));
-  vec3 g = cross(b - a, c - a);
-  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
+  CmVertexMix m = cm_vertex_mix(model, entry.x, vec2(root * (1.0f - u.y), root * u.y));
+  vec3 a = cm_out_of_model_point(model, vec3(cm_floats(m.corner.x)));
+  vec3 b = cm_out_of_model_point(model, vec3(cm_floats(m.corner.y)));
+  vec3 c = cm_out_of_model_point(model, vec3(cm_floats(m.corner.z)));
+  vec3 g = cm_turning_normal(a, b, c);
   vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
   bool along = dot(g, point - here) > 0.0f;  // seen from where the vertices turn clockwise
-  vec3 way = cm_offset_origin(point, along ? -g : g) - here;
+  vec3 aside = along ? -g : g;
+  vec3 way = cm_offset_origin(point, aside) + cm_model_room(model, point) * aside - here;
   float length_2 = max(dot(way, way), 1e-24f);
   CmLightSample light;
   light.kind = CM_LIGHT_TRIANGLE;
   light.direction = way * inversesqrt(length_2);
   light.distance = sqrt(length_2) * 0.99999f;
-  light.density = cm_emitter_density(entry, way, dot(g, light.direction));
-  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
-  uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
-  bool front = along == (uintBitsToFloat(entry.w) < 0.0f);
-  light.radiance = front || (flags & CM_ONE_SIDED) == 0u ? cm_emission(m) : vec3(0.0f, 0.0f, 0.0f);
+  light.density = cm_emitter_density(model, entry, way, light.direction, g);
+  uint flags = cm_words(m.material + CM_MATERIAL_FLAGS).x;
+  bool clockwise = (uintBitsToFloat(entry.w) < 0.0f) != cm_mirrors(model);
+  light.radiance = along == clockwise || (flags & CM_ONE_SIDED) == 0u ? cm_emission(m) : vec3(0.0f, 0.0f, 0.0f);
   if ((flags & (CM_ALPHA_MASK | CM_ALPHA_BLEND)) != 0u) light.radiance *= cm_coverage(m);
   return light;
 }

@@ -146,19 +146,12 @@ CM_BLOCK(CmLights) {
   CM_EQUALITY(CmLights)
 };
 
-// The box of all triangles, and first words of the tables of glsl/surface.glsl and their sizes: render::ModelData.
+// The box of all triangles, and what models share (glsl/model_table.glsl): render::ModelTable.
 CM_BLOCK(CmSurfaceTables) {
-  CM_ALIGN(16) vec3 low;   // world
+  CM_ALIGN(16) vec3 low;  // world
+  uint models;            // of the table
   CM_ALIGN(16) vec3 high;
-  uint words;    // where all of them begin in their page; the others count from here
-  uint records;  // of the triangle tree
-  uint triangles;
-  uint vertices;
-  uint materials;
-  uint textures;
-  uint emitters;
-  uint emitter_count;
-  uint ggx_albedo;  // src/surface/ggx_albedo.hpp's cells
+  uint ggx_albedo;  // words: src/surface/ggx_albedo.hpp's cells
   uint ggx_albedo_averages;
   uint sheen_albedo;  // src/surface/sheen_albedo.hpp's words
   uint rich;          // 1: there are materials that only CM_RICH does justice, and paths keep what they are within

@@ -75,7 +75,7 @@
 //   met, met_cell   of a flight: where the nearest collision is that it knows, which is at t_end; CM_NONE: none
 //   gathers         1: all is known of its end, and it goes through what glows and overlaps once more
 // CM_PATH_WITHIN, only with CM_RICH, and only for kernels that know of triangles' materials:
-//   within          number of the material whose volume the flight is within, plus one; 0: of none
+//   within          first word of the material whose volume the flight is within, plus one; 0: of none
 //   outside         likewise, what that lies in
 //   through         1: the ray starts on the side of its triangle that the path did not come from
 //   dispersed       1: the path is of one wavelength

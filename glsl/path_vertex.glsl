@@ -109,7 +109,7 @@ struct CmVertex {
   bool on_triangle;
   CmSurfacePoint surface;  // if so
 #if CM_RICH
-  uint bounds;   // number of the material whose volume the triangle bounds, plus one; 0: of none
+  uint bounds;   // first word of the material whose volume the triangle bounds, plus one; 0: of none
   bool leaves;   // the path comes from inside
   vec3 colour;   // of the wavelength that goes on, where that is new; else white
   bool disperses;
@@ -127,20 +127,18 @@ CM_FN bool cm_came_through(CmPath p) {
 
 #if CM_RICH
 
-CM_FN uint cm_material_word(uint number) { return cm.surfaces.materials + CM_MATERIAL_WORDS * number; }
-
-// Of a material's volume, by its number plus one; of none: air.
-CM_FN float cm_index(uint within) { return within == 0u ? 1.0f : cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_VOLUME).w; }
+// Of a material's volume, by its first word plus one; of none: air.
+CM_FN float cm_index(uint within) { return within == 0u ? 1.0f : cm_floats(within - 1u + CM_MATERIAL_VOLUME).w; }
 CM_FN float cm_index_at(uint within, float wavelength) {
   if (within == 0u) return 1.0f;
-  return cm_cauchy(cm_index(within), cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_ANISOTROPY).w, wavelength);
+  return cm_cauchy(cm_index(within), cm_floats(within - 1u + CM_MATERIAL_ANISOTROPY).w, wavelength);
 }
 CM_FN bool cm_disperses(uint within) {
-  return within != 0u && cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_ANISOTROPY).w > 0.0f;
+  return within != 0u && cm_floats(within - 1u + CM_MATERIAL_ANISOTROPY).w > 0.0f;
 }
 CM_FN vec3 cm_transmittance_within(uint within, float way) {
   if (within == 0u) return vec3(1.0f);
-  return exp(vec3(cm_floats(cm_material_word(within - 1u) + CM_MATERIAL_VOLUME)) * -way);
+  return exp(vec3(cm_floats(within - 1u + CM_MATERIAL_VOLUME)) * -way);
 }
 
 // What lies beyond the boundary of a volume that a path within `within`, in `outside`, leaves. Closed meshes may lie one
@@ -159,10 +157,12 @@ CM_FN void cm_cross(uint bounds, bool leaves, CM_INOUT(uint) within, CM_INOUT(ui
   }
 }
 
-// The number plus one of a triangle's material, if it bounds a volume.
+// The first word plus one of a triangle's material, if it bounds a volume.
 CM_FN uint cm_bounds(uint triangle) {
-  uint material = cm_words(cm.surfaces.triangles + triangle).w;
-  return cm_floats(cm_material_word(material) + CM_MATERIAL_VOLUME).w > 0.0f ? material + 1u : 0u;
+  uint model = cm_model_of(triangle);
+  uint number = cm_words(cm_models[model].triangles + triangle - cm_models[model].first).w;
+  uint material = cm_models[model].materials + CM_MATERIAL_WORDS * number;
+  return cm_floats(material + CM_MATERIAL_VOLUME).w > 0.0f ? material + 1u : 0u;
 }
 
 // What the path knows of both sides of a triangle that it is on.
@@ -257,7 +257,7 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   for (int turn = 0; turn < 2; ++turn) {
     CmHit found;
     cm_hit_passed = vec3(1.0f);
-    bool ends = cm_bvh_trace(o, d, 0.0f, turn == 0 ? reach : hit.t, !flight, found);
+    bool ends = cm_trace_models(o, d, 0.0f, turn == 0 ? reach : hit.t, !flight, found);
     if (turn == 0) {
       met = ends;
       hit = found;
@@ -268,7 +268,7 @@ CM_FN void cm_meet(CM_INOUT(CmPath) p) {
   if (!flight || p.bounces == 0u) p.light *= cm_hit_passed;
   cm_absorb(p, met, hit);
 #else
-  bool met = cm_bvh_trace(o, d, 0.0f, reach, !flight, hit);
+  bool met = cm_trace_models(o, d, 0.0f, reach, !flight, hit);
 #endif
   if (met && !flight) p.event = CM_EVENT_COLLISION;
   if (met && flight) {

@@ -1,17 +1,19 @@
 // Triangles and materials as the path tracer meets them: what the tables of one buffer of words say of a point
 // (surface_tables.glsl). Includes bvh.glsl and bsdf.glsl. Shared by GLSL and C++; the includer provides
 //   uvec4 cm_words(uint word)       of the tables
+//   CmModel cm_models[], CmInstanceNode cm_model_nodes[]   and uint cm_model: model.glsl
 //   vec4 cm_atlas_value(ivec3 at)   of the layers of images: a texel of straight alpha, each channel from 0 to 1
 #ifndef CM_SURFACE_GLSL
 #define CM_SURFACE_GLSL
 #include "ggx.glsl"
 #include "luminance.glsl"
 #include "surface_tables.glsl"
+#include "model_space.glsl"
 
 CM_FN vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }
 
-CM_FN uvec4 cm_bvh_node(uint texel) { return cm_words(texel); }
-CM_FN uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm.surfaces.records + texel); }
+CM_FN uvec4 cm_bvh_node(uint texel) { return cm_words(cm_models[cm_model].nodes + texel); }
+CM_FN uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm_models[cm_model].records + texel); }
 
 // What the ray under way is, for cm_hit_accept.
 uint cm_hit_seed = 0u;
@@ -72,23 +74,28 @@ CM_FN vec3 cm_octahedral(uint word) {
 }
 
 struct CmVertexMix {
-  uvec4 corner;  // the three vertices, and the material
+  uint model;
+  uvec3 corner;   // first words of the three vertices
+  uint material;  // first word
   vec3 weight;
   vec2 uv_0;
   vec2 uv_1;
   vec4 color;
 };
 
-CM_FN CmVertexMix cm_vertex_mix(uint triangle, vec2 weights) {
+// Of a model's triangle, which has this number in its mesh.
+CM_FN CmVertexMix cm_vertex_mix(uint model, uint triangle, vec2 weights) {
   CmVertexMix m;
-  m.corner = cm_words(cm.surfaces.triangles + triangle);
+  m.model = model;
+  uvec4 words = cm_words(cm_models[model].triangles + triangle);
+  m.corner = uvec3(cm_models[model].vertices) + CM_VERTEX_WORDS * uvec3(words);
+  m.material = cm_models[model].materials + CM_MATERIAL_WORDS * words.w;
   m.weight = vec3(1.0f - weights.x - weights.y, weights);
   vec4 uv = vec4(0.0f);
   m.color = vec4(0.0f);
   for (int i = 0; i < 3; ++i) {
-    uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
-    uv += m.weight[i] * cm_floats(vertex + CM_VERTEX_UV);
-    uvec4 last = cm_words(vertex + CM_VERTEX_REST);
+    uv += m.weight[i] * cm_floats(m.corner[i] + CM_VERTEX_UV);
+    uvec4 last = cm_words(m.corner[i] + CM_VERTEX_REST);
     m.color += m.weight[i] * vec4(unpackUnorm2x16(last.z), unpackUnorm2x16(last.w));
   }
   m.uv_0 = vec2(uv.x, uv.y);
@@ -118,15 +125,15 @@ CM_FN vec3 cm_from_srgb(vec3 v) {
 
 // A material's texture at a point, filtered bilinearly (samples are spread over the pixel: that is the minification
 // filter); white where there is none.
-CM_FN vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
-  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * material + use;
+CM_FN vec4 cm_texture(CmVertexMix m, uint use, bool srgb) {
+  uint word = m.material + use;
   uvec4 head = cm_words(word);
   if (head.x == 0u) return vec4(1.0f);
   vec4 tail = cm_floats(word + 1u);
   vec3 rest = uintBitsToFloat(uvec3(head.y, head.z, head.w));
   vec2 uv = (head.x & CM_USE_SECOND_UV) != 0u ? m.uv_1 : m.uv_0;
   uv = vec2(rest.x * uv.x + rest.z * uv.y, rest.y * uv.x + tail.x * uv.y) + vec2(tail.y, tail.z);
-  uvec4 t = cm_words(cm.surfaces.textures + (head.x & ~CM_USE_SECOND_UV) - 1u);
+  uvec4 t = cm_words(cm_models[m.model].textures + (head.x & ~CM_USE_SECOND_UV) - 1u);
   vec2 size = vec2(t.y & 0xffffu, t.y >> 16);
   // Far outside, whole turns would lose the fraction's precision: each wrap mode repeats after two.
   bvec2 clamped = bvec2((t.w & CM_WRAP_MASK) == CM_WRAP_CLAMP, ((t.w >> CM_WRAP_T_SHIFT) & CM_WRAP_MASK) == CM_WRAP_CLAMP);
@@ -145,14 +152,12 @@ CM_FN vec4 cm_texture(uint material, uint use, CmVertexMix m, bool srgb) {
   return sum;
 }
 
-CM_FN uint cm_material_flags(uint material) { return cm_words(cm.surfaces.materials + CM_MATERIAL_WORDS * material + CM_MATERIAL_FLAGS).x; }
-
 // The share of rays that a point of a triangle is there for. Coverage (BLEND) is a chance, so that no order of surfaces
 // and volume has to be found.
 CM_FN float cm_coverage(CmVertexMix m) {
-  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w;
+  uint word = m.material;
   uint flags = cm_words(word + CM_MATERIAL_FLAGS).x;
-  vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * cm_texture(m.corner.w, CM_USE_BASE_COLOR, m, true) * m.color;
+  vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * cm_texture(m, CM_USE_BASE_COLOR, true) * m.color;
   if ((flags & CM_ALPHA_MASK) != 0u && base.a < cm_floats(word + CM_MATERIAL_EMISSION).w) return 0.0f;
   return (flags & CM_ALPHA_BLEND) != 0u ? clamp(base.a, 0.0f, 1.0f) : 1.0f;
 }
@@ -170,14 +175,39 @@ struct CmSurfacePoint {
 #endif
 };
 
+// The corners of a triangle in the world.
+struct CmCorners {
+  vec3 position[3];
+  vec3 normal[3];
+};
+
+CM_FN CmCorners cm_corners(CmVertexMix m) {
+  CmCorners corners;
+  for (int i = 0; i < 3; ++i) {
+    uvec4 first = cm_words(m.corner[i] + CM_VERTEX_PLACE);
+    corners.position[i] = cm_out_of_model_point(m.model, uintBitsToFloat(uvec3(first)));
+    corners.normal[i] = cm_model_normal(m.model, cm_octahedral(first.w));
+  }
+  return corners;
+}
+
+CM_FN bool cm_mirrors(uint model) { return (cm_models[model].flags & CM_MODEL_MIRRORS) != 0u; }
+
+// The unit normal on the side from which a triangle's vertices turn counter-clockwise in the world.
+CM_FN vec3 cm_turning_normal(vec3 a, vec3 b, vec3 c) {
+  vec3 g = cross(b - a, c - a);
+  // Scaled first: the cross product of a tiny triangle has no length in fp32.
+  return normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
+}
+
 // From a point of a triangle to the smooth surface that its vertices' normals speak of, where that bulges towards
 // `geometric`: the mean of the point's projections onto the vertices' tangent planes (Hanika, "Hacking the Shadow
 // Terminator", Ray Tracing Gems II, chapter 4, 2021). 0 where it is flat, to what normals of 16 bits can tell.
-CM_FN vec3 cm_lift(vec3 p, vec3 weight, vec3 position[3], vec3 normal[3], vec3 geometric) {
+CM_FN vec3 cm_lift(vec3 p, vec3 weight, CmCorners corners, vec3 geometric) {
   vec3 lift = vec3(0.0f);
   for (int i = 0; i < 3; ++i) {
-    vec3 n = dot(normal[i], geometric) < 0.0f ? -normal[i] : normal[i];
-    vec3 from = p - position[i];
+    vec3 n = dot(corners.normal[i], geometric) < 0.0f ? -corners.normal[i] : corners.normal[i];
+    vec3 from = p - corners.position[i];
     float below = -dot(from, n) - 1e-4f * (abs(from.x) + abs(from.y) + abs(from.z));
     lift += weight[i] * max(0.0f, below) * n;
   }
@@ -217,14 +247,14 @@ const uint CM_LAST_USE = CM_USE_CLEARCOAT_ROUGHNESS;
 #endif
 
 // In a loop: one after the other they would be the most of a kernel's code.
-CM_FN CmMaps cm_maps(uint material, CmVertexMix m) {
+CM_FN CmMaps cm_maps(CmVertexMix m) {
   CmMaps maps;
   for (uint use = CM_USE_BASE_COLOR; use <= CM_LAST_USE; use += 2u) {
     bool srgb = use == CM_USE_BASE_COLOR || use == CM_USE_EMISSION || use == CM_USE_SPECULAR_COLOR;
 #if CM_RICH
     srgb = srgb || use == CM_USE_SHEEN_COLOR;
 #endif
-    vec4 value = cm_texture(material, use, m, srgb);
+    vec4 value = cm_texture(m, use, srgb);
     if (use == CM_USE_BASE_COLOR) maps.base_color = value;
     if (use == CM_USE_METALLIC_ROUGHNESS) maps.metallic_roughness = value;
     if (use == CM_USE_NORMAL) maps.normal = value;
@@ -247,8 +277,7 @@ CM_FN CmMaps cm_maps(uint material, CmVertexMix m) {
 
 // What a material emits where it is seen from its front.
 CM_FN vec3 cm_emission(CmVertexMix m) {
-  vec4 emission = cm_floats(cm.surfaces.materials + CM_MATERIAL_WORDS * m.corner.w + CM_MATERIAL_EMISSION);
-  return vec3(emission) * vec3(cm_texture(m.corner.w, CM_USE_EMISSION, m, true));
+  return vec3(cm_floats(m.material + CM_MATERIAL_EMISSION)) * vec3(cm_texture(m, CM_USE_EMISSION, true));
 }
 
 #if CM_RICH
@@ -315,36 +344,31 @@ CM_FN void cm_enrich(CM_INOUT(CmSurface) s, uint word, CmMaps maps, vec4 tangent
 // bounds air: cm_bound (path_vertex.glsl) knows better.
 CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool from_back) {
   CmSurfacePoint point;
-  CmVertexMix m = cm_vertex_mix(triangle, weights);
-  uint material = m.corner.w;
-  uint word = cm.surfaces.materials + CM_MATERIAL_WORDS * material;
-  vec3 position[3];
-  vec3 normals[3];
+  uint model = cm_model_of(triangle);
+  CmVertexMix m = cm_vertex_mix(model, triangle - cm_models[model].first, weights);
+  uint word = m.material;
+  CmCorners corners = cm_corners(m);
   vec3 normal = vec3(0.0f);
   vec4 tangent = vec4(0.0f);
   for (int i = 0; i < 3; ++i) {
-    uint vertex = cm.surfaces.vertices + CM_VERTEX_WORDS * m.corner[i];
-    uvec4 first = cm_words(vertex + CM_VERTEX_PLACE);
-    uvec4 last = cm_words(vertex + CM_VERTEX_REST);
-    position[i] = uintBitsToFloat(uvec3(first));
-    normals[i] = cm_octahedral(first.w);
-    normal += m.weight[i] * normals[i];
+    uvec4 last = cm_words(m.corner[i] + CM_VERTEX_REST);
+    normal += m.weight[i] * corners.normal[i];
     float hand = uintBitsToFloat(last.y);
-    if (hand != 0.0f) tangent += m.weight[i] * vec4(cm_octahedral(last.x), hand);
+    if (hand != 0.0f) tangent += m.weight[i] * vec4(cm_out_of_model(model, cm_octahedral(last.x)), hand);
   }
-  point.position = m.weight.x * position[0] + m.weight.y * position[1] + m.weight.z * position[2];
-  vec3 g = cross(position[1] - position[0], position[2] - position[0]);
-  // Scaled first: the cross product of a tiny triangle has no length in fp32.
-  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
+  if (cm_mirrors(model)) tangent.w = -tangent.w;
+  point.position = m.weight.x * corners.position[0] + m.weight.y * corners.position[1] +
+                   m.weight.z * corners.position[2];
+  vec3 g = cm_turning_normal(corners.position[0], corners.position[1], corners.position[2]);
   point.behind = dot(g, w) > 0.0f;
   point.geometric = point.behind ? -g : g;
-  point.lifted = cm_lift(point.position, m.weight, position, normals, point.geometric) != vec3(0.0f);
+  point.lifted = cm_lift(point.position, m.weight, corners, point.geometric) != vec3(0.0f);
   float normal_length = length(normal);
   normal = normal_length > 1e-6f ? normal / normal_length : g;
   bool back = dot(normal, point.geometric) < 0.0f;
   point.material.smooth_normal = back ? -normal : normal;
 
-  CmMaps maps = cm_maps(material, m);
+  CmMaps maps = cm_maps(m);
   vec4 base = cm_floats(word + CM_MATERIAL_BASE_COLOR) * maps.base_color * m.color;
   vec4 a = cm_floats(word + CM_MATERIAL_REFLECTION);
   vec4 b = cm_floats(word + CM_MATERIAL_SPECULAR_COLOR);
@@ -393,20 +417,22 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
   return point;
 }
 
-// Whether a ray ends at a triangle that asks. What is clear lets light pass by the chance of the channel that passes most.
+// Whether a ray ends at a triangle of the mesh that asks. What is clear lets light pass by the chance of the channel that
+// passes most.
 CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
-  float solid = cm_coverage(cm_vertex_mix(triangle, weights));
+  float solid = cm_coverage(cm_vertex_mix(cm_model, triangle, weights));
+  uint number = cm_models[cm_model].first + triangle;
 #if CM_RICH
-  float u = cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x);
+  float u = cm_unit_float(cm_hash3(uvec3(cm_hit_seed, number, 0x68bc21ebu)).x);
   if (u >= solid) return false;
-  CmSurfacePoint point = cm_surface_point(triangle, weights, cm_hit_direction, false);
+  CmSurfacePoint point = cm_surface_point(number, weights, cm_hit_direction, false);
   vec3 passes = cm_bsdf_passes(point.material, -cm_hit_direction);
   float most = cm_max3(passes);
   if (u >= solid * most) return true;
   cm_hit_passed *= passes / most;
   return false;
 #else
-  return solid >= 1.0f || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, triangle, 0x68bc21ebu)).x) < solid;
+  return solid >= 1.0f || cm_unit_float(cm_hash3(uvec3(cm_hit_seed, number, 0x68bc21ebu)).x) < solid;
 #endif
 }
 
@@ -415,7 +441,9 @@ CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
 #define CM_BVH_CULLS cm_hit_camera
 #define CM_BVH_LOW cm.surfaces.low
 #define CM_BVH_HIGH cm.surfaces.high
+#define CM_BVH_NUMBER(triangle) (cm_models[cm_model].first + (triangle))
 #include "bvh.glsl"
+#include "model.glsl"
 
 // Reflected share of light from wi (world, unit) towards where the path came from, times the cosine. Not 0 below the
 // triangle: what is seen there from the ray's start counts, often the surface itself.
@@ -439,21 +467,14 @@ CM_FN vec3 cm_surface_sample(CmSurfacePoint point, vec3 w, float u_0, float u_1,
 // its vertices turn clockwise, or on the other. lifts: cm_lift applies. shift: from the point itself, but for the
 // rounding.
 CM_FN vec3 cm_surface_origin(uint triangle, vec2 weights, bool behind, bool lifts, vec3 d, CM_OUT(vec3) shift) {
-  uvec4 corner = cm_words(cm.surfaces.triangles + triangle);
-  vec3 position[3];
-  vec3 normals[3];
-  for (int i = 0; i < 3; ++i) {
-    uvec4 first = cm_words(cm.surfaces.vertices + CM_VERTEX_WORDS * corner[i] + CM_VERTEX_PLACE);
-    position[i] = cm_bvh_floats(first);
-    normals[i] = cm_octahedral(first.w);
-  }
-  vec3 g = cross(position[1] - position[0], position[2] - position[0]);
-  g = normalize(g / max(max(abs(g.x), max(abs(g.y), abs(g.z))), 1e-38f));
+  uint model = cm_model_of(triangle);
+  CmVertexMix m = cm_vertex_mix(model, triangle - cm_models[model].first, weights);
+  CmCorners corners = cm_corners(m);
+  vec3 g = cm_turning_normal(corners.position[0], corners.position[1], corners.position[2]);
   if (behind) g = -g;
-  vec3 weight = vec3(1.0f - weights.x - weights.y, weights);
-  vec3 p = weight.x * position[0] + weight.y * position[1] + weight.z * position[2];
-  shift = lifts ? cm_lift_share(dot(g, d)) * cm_lift(p, weight, position, normals, g) : vec3(0.0f);
-  return cm_offset_origin(p + shift, g);
+  vec3 p = m.weight.x * corners.position[0] + m.weight.y * corners.position[1] + m.weight.z * corners.position[2];
+  shift = lifts ? cm_lift_share(dot(g, d)) * cm_lift(p, m.weight, corners, g) : vec3(0.0f);
+  return cm_offset_origin(p + shift, g) + cm_model_room(model, p) * g;
 }
 
 #endif

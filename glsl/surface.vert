@@ -4,11 +4,16 @@
 #include "shared.glsl"
 #include "surface_parameters.glsl"
 
-layout(location = 0) in vec3 cm_position;  // world
+layout(location = 0) in vec3 cm_position;  // its own space
 layout(location = 1) in vec3 cm_normal;
 layout(location = 2) in vec4 cm_tangent;
 layout(location = 3) in vec4 cm_uv;  // both sets
 layout(location = 4) in vec4 cm_color;
+layout(location = 5) in vec3 cm_place_x;  // columns of the linear part of its own space to the world
+layout(location = 6) in vec3 cm_place_y;
+layout(location = 7) in vec3 cm_place_z;
+layout(location = 8) in vec3 cm_place_high;  // its origin, from the eye; with the next a sum of more digits than a float has
+layout(location = 9) in vec3 cm_place_low;
 layout(location = 0) uniform vec2 cm_shift;  // of the layer, in normalised device coordinates
 
 layout(location = 0) out vec3 cm_from_eye;
@@ -19,14 +24,28 @@ layout(location = 4) out vec4 cm_vertex_color;
 layout(location = 5) out float cm_z;
 
 void main() {
-  // Near the eye the first difference is exact, however far both are from the origin.
-  precise vec3 q = (cm_position - cm_view.eye_high.xyz) - cm_view.eye_low.xyz;
+  // Near the eye the first sum is exact, however far both are from the origin.
+  precise vec3 turned = cm_place_x * cm_position.x + cm_place_y * cm_position.y + cm_place_z * cm_position.z;
+  precise vec3 q = (turned + cm_place_high) + cm_place_low;
   precise vec3 v = cm_view.to_view_x.xyz * q.x + cm_view.to_view_y.xyz * q.y + cm_view.to_view_z.xyz * q.z;
   float w = cm_view.depth.w != 0.0 ? 1.0 : v.z;
   gl_Position = vec4(v.x + cm_shift.x * w, -v.y + cm_shift.y * w, cm_view.depth.x + cm_view.depth.y * v.z, w);
   cm_from_eye = q;
-  cm_shading_normal = cm_normal;
-  cm_shading_tangent = cm_tangent;
+  // Products of short columns would vanish.
+  vec3 longest = max(max(abs(cm_place_x), abs(cm_place_y)), abs(cm_place_z));
+  float scale = 1.0 / max(max(longest.x, longest.y), longest.z);
+  vec3 x = scale * cm_place_x;
+  vec3 y = scale * cm_place_y;
+  vec3 z = scale * cm_place_z;
+  vec3 across = cross(y, z);
+  float side = dot(x, across) < 0.0 ? -1.0 : 1.0;
+  vec3 normal = across * cm_normal.x + cross(z, x) * cm_normal.y + cross(x, y) * cm_normal.z;
+  vec3 tangent = x * cm_tangent.x + y * cm_tangent.y + z * cm_tangent.z;
+  // Of equal lengths: they are interpolated.
+  float n_n = dot(normal, normal);
+  float t_t = dot(tangent, tangent);
+  cm_shading_normal = n_n > 0.0 ? side * normal * inversesqrt(n_n) * length(cm_normal) : cm_normal;
+  cm_shading_tangent = vec4(t_t > 0.0 ? tangent * inversesqrt(t_t) : tangent, side * cm_tangent.w);
   cm_texture_uv = cm_uv;
   cm_vertex_color = cm_color;
   cm_z = v.z;

@@ -22,8 +22,6 @@ struct CmSurfaceView {
 #else
 layout(std140, binding = CM_UNIFORM_SURFACE_VIEW) uniform CmSurfaceView {
 #endif
-  vec4 eye_high;        // world; with eye_low a sum of more digits than a float has
-  vec4 eye_low;
   vec4 to_view_x;       // columns of world (from the eye) to picture: x and y are -1 to 1 (times z in perspective), z is
   vec4 to_view_y;       // the view depth
   vec4 to_view_z;

@@ -1,5 +1,5 @@
 // The tables of words that the path tracer knows a scene's triangles by: surface.glsl reads them, and
-// scene/model_source.cpp writes them. A word is a uvec4. Where each table begins: CmSurfaceTables (parameters.glsl).
+// scene/model_source.cpp writes them. A word is a uvec4. Where each table begins: CmModel (model_table.glsl).
 #ifndef CM_SURFACE_TABLES_GLSL
 #define CM_SURFACE_TABLES_GLSL
 

@@ -66,7 +66,8 @@ struct Functions : GladGLContext {
   void ScissorIndexed(GLuint index, GLint left, GLint bottom, GLsizei width, GLsizei height) const;
 
   void DrawArrays(GLenum mode, GLint first, GLsizei count) const;
-  void DrawElements(GLenum mode, GLsizei count, GLenum type, const void* indices) const;
+  void DrawElementsInstancedBaseInstance(GLenum mode, GLsizei count, GLenum type, const void* indices,
+                                         GLsizei instances, GLuint first) const;
   void ClearNamedFramebufferfv(GLuint framebuffer, GLenum buffer, GLint index, const GLfloat* value) const;
   void BlitNamedFramebuffer(GLuint from, GLuint to, GLint x0, GLint y0, GLint x1, GLint y1, GLint u0, GLint v0,
                             GLint u1, GLint v1, GLbitfield mask, GLenum filter) const;

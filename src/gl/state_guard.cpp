@@ -728,9 +728,10 @@ void Functions::DrawArrays(GLenum mode, GLint first, GLsizei count) const {
   GladGLContext::DrawArrays(mode, first, count);
 }
 
-void Functions::DrawElements(GLenum mode, GLsizei count, GLenum type, const void* indices) const {
+void Functions::DrawElementsInstancedBaseInstance(GLenum mode, GLsizei count, GLenum type, const void* indices,
+                                                  GLsizei instances, GLuint first) const {
   if (guard != nullptr) guard->raster();
-  GladGLContext::DrawElements(mode, count, type, indices);
+  GladGLContext::DrawElementsInstancedBaseInstance(mode, count, type, indices, instances, first);
 }
 
 void Functions::ClearNamedFramebufferfv(GLuint framebuffer, GLenum buffer, GLint index, const GLfloat* value) const {

@@ -138,8 +138,8 @@ std::vector<EmissiveTriangle> emissive_triangles(const Scene& scene, const surfa
   return triangles;
 }
 
-EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const Scene& scene,
-                           const surface::Pose& pose, const Progress* progress) {
+EmitterTable emitter_table(std::span<const EmissiveTriangle> triangles, const Scene& scene, const surface::Pose& pose,
+                           const Progress* progress, std::uint32_t first_triangle) {
   EmitterTable table;
   std::vector<double> areas;
   std::vector<double> power;
@@ -155,7 +155,7 @@ EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const
     const double sides = pose.double_sided || materials[material_of(scene, pose, t.draw)].double_sided ? 2.0 : 1.0;
     const double emitted = area * t.luminance * sides;
     if (!(emitted > 0.0) || !std::isfinite(emitted)) continue;
-    table.entries.emplace_back(t.triangle, 0U, 0U, pose.flipped[t.draw] != 0 ? 1U : 0U);
+    table.entries.emplace_back(t.triangle - first_triangle, 0U, 0U, pose.flipped[t.draw] != 0 ? 1U : 0U);
     areas.push_back(area);
     power.push_back(emitted);
     sum += emitted;

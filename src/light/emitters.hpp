@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "surface/scene.hpp"
@@ -26,15 +27,16 @@ std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene, co
 
 /// Picks triangles in proportion to their power (light/alias_table.hpp).
 struct EmitterTable {
-  /// One a triangle that has an area, in ascending order of x: x: triangle; y: entry i, drawn evenly, stands for itself
+  /// One a triangle that has an area, in ascending order of x: x: triangle, from the first; y: entry i, drawn evenly, stands for itself
   /// where a random word is at most y, z: else for this entry; w: a float, the chance to be picked per area, negative
   /// where the triangle's front is where its vertices turn clockwise.
   std::vector<glm::uvec4> entries;
   double flux = 0.0;  ///< luminance of all that they emit: pi x radiance x area x sides
 };
 
-/// The table of a pose. O(n). Throws Error(cancelled).
-EmitterTable emitter_table(const std::vector<EmissiveTriangle>& triangles, const surface::Scene& scene,
-                           const surface::Pose& pose, const Progress* progress = nullptr);
+/// The table of a pose, of those of its emissive triangles that are given; first: the number of what they count from.
+/// O(n). Throws Error(cancelled).
+EmitterTable emitter_table(std::span<const EmissiveTriangle> triangles, const surface::Scene& scene,
+                           const surface::Pose& pose, const Progress* progress = nullptr, std::uint32_t first = 0);
 
 }  // namespace cumulet::light

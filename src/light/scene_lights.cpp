@@ -19,14 +19,11 @@ double flux_of(const surface::PunctualLight& lamp, double cross_section) {
 
 }  // namespace
 
-SceneLights scene_lights(const surface::Pose& pose, const EmitterTable& triangles) {
+SceneLights scene_lights(std::span<const surface::PunctualLight> lamps, double radius) {
   SceneLights lights;
-  const double radius = 0.5 * glm::length(pose.high - pose.low);
   lights.cross_section = std::numbers::pi * radius * radius;
-  lights.lamps = static_cast<std::uint32_t>(pose.lights.size());
-  for (const surface::PunctualLight& lamp : pose.lights) lights.lamp_flux += flux_of(lamp, lights.cross_section);
-  lights.triangles = static_cast<std::uint32_t>(triangles.entries.size());
-  lights.triangle_flux = triangles.flux;
+  lights.lamps = static_cast<std::uint32_t>(lamps.size());
+  for (const surface::PunctualLight& lamp : lamps) lights.lamp_flux += flux_of(lamp, lights.cross_section);
   return lights;
 }
 

@@ -46,10 +46,9 @@ MarchUpload::Sources sources_of(const std::vector<scene::Volume>& volumes) {
 
 void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline) {
   const MarchUpload::Sources sources = sources_of(snapshot.volumes);
-  const scene::ModelSourcePtr model = snapshot.models.empty() ? nullptr : snapshot.models.front().source;
   if (sources.empty()) drop_data();
   update_environment(*snapshot.surroundings, wanted, deadline);
-  update_model(model, wanted, deadline);
+  update_models(snapshot, wanted, deadline);
   if (!sources.empty()) update_data(sources, snapshot.volumes, wanted, deadline);
   find_present(snapshot);
   update_instances(wanted);
@@ -112,34 +111,72 @@ void GpuScene::update_instances(const Wanted& wanted) {
   }
 }
 
-void GpuScene::update_model(const scene::ModelSourcePtr& source, const Wanted& wanted, Deadline deadline) {
-  if (!source) {
+std::vector<scene::Model> GpuScene::present_models(const scene::Snapshot& snapshot) const {
+  std::vector<scene::Model> present;
+  if (!model_) return present;
+  const auto is_here = [&](const scene::ModelSourcePtr& source) {
+    return std::ranges::find(model_.of(), source) != model_.of().end();
+  };
+  const std::vector<scene::Model>& before = placed_ && placed_.of().data == *model_ ? placed_.of().models : models_of_;
+  for (const scene::Model& model : snapshot.models) {
+    scene::Model shown = model;
+    if (!is_here(model.source)) {
+      const auto was = std::ranges::find(before, model.id, &scene::Model::id);
+      if (was == before.end() || !is_here(was->source)) continue;
+      shown.source = was->source;
+    }
+    present.push_back(std::move(shown));
+  }
+  return present;
+}
+
+void GpuScene::update_models(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline) {
+  ModelData::Sources sources;
+  for (const scene::Model& model : snapshot.models) {
+    if (std::ranges::find(sources, model.source) == sources.end()) sources.push_back(model.source);
+  }
+  if (sources.empty()) {
     if (!model_.empty()) model_revision_.advance();
+    placed_.clear();
     model_.clear();
+    models_of_.clear();
     model_upload_.reset();
   }
-  if (!source || !wanted.raster) show_raster(source, nullptr);
+  if (sources.empty() || !wanted.raster) show_raster(sources, {});
+  if (sources.empty()) return;
+  std::optional<Error> failure;
+  try {
+    upload_models(sources, snapshot.models, wanted, deadline);
+  } catch (const Error& error) {
+    failure = error;
+  }
+  place_models(present_models(snapshot), wanted);
+  if (failure) throw Error(*failure);
+}
+
+void GpuScene::upload_models(const ModelData::Sources& sources, const std::vector<scene::Model>& models,
+                             const Wanted& wanted, Deadline deadline) {
   // As with volumes: what is under way goes on to its end. What paths meet and what is drawn changes at once, or a
   // picture would be of two poses.
-  while (source) {
+  for (;;) {
     if (!model_upload_) {
-      const bool paths = model_.wants(source, wanted.settings);
-      const bool raster = wanted.raster && raster_.wants(source, wanted.settings);
-      if (!paths && !raster) break;
+      const bool paths = model_.wants(sources, wanted.settings);
+      const bool raster = wanted.raster && raster_.wants(sources, wanted.settings);
+      if (!paths && !raster) return;
       const ModelParts parts = !raster ? ModelParts::paths : (paths ? ModelParts::both : ModelParts::raster);
-      model_upload_ = ModelUnderWay{source, wanted.settings, parts, nullptr};
+      model_upload_ = ModelsUnderWay{sources, models, wanted.settings, parts, nullptr};
     }
-    ModelUnderWay& upload = *model_upload_;
+    ModelsUnderWay& upload = *model_upload_;
     try {
       if (!upload.work) {
         upload.work = std::make_unique<ModelUpload>(gl_, programs_, limits_, heap_, upload.of, upload.parts,
-                                                    model_.get(), raster_ ? *raster_ : nullptr);
+                                                    model_ ? *model_ : nullptr, raster_ ? *raster_ : RasterContents{});
       }
-      if (!upload.work->advance(deadline)) break;
-      finish_model();
+      if (!upload.work->advance(deadline)) return;
+      finish_models();
     } catch (const Error&) {
       if (upload.work && upload.work->done()) {
-        finish_model();
+        finish_models();
       } else {
         model_.fail(upload.of, upload.settings);
         raster_.fail(upload.of, upload.settings);
@@ -150,21 +187,53 @@ void GpuScene::update_model(const scene::ModelSourcePtr& source, const Wanted& w
   }
 }
 
-void GpuScene::finish_model() {
-  const ModelUnderWay upload = *std::exchange(model_upload_, std::nullopt);
+void GpuScene::finish_models() {
+  const ModelsUnderWay upload = *std::exchange(model_upload_, std::nullopt);
   model_revision_.advance();
-  if (auto data = upload.work->take_data()) model_.put(upload.of, std::move(*data));
+  if (auto data = upload.work->take_data()) {
+    model_.put(upload.of, std::move(data));
+    models_of_ = upload.models;
+    place_models(upload.models, {.settings = upload.settings});
+  }
   if (upload.parts == ModelParts::paths) return;
-  const RasterContentPtr raster = upload.work->take_raster();
-  show_raster(upload.of, raster);  // where it failed rays meet the triangles
-  if (!raster) raster_.fail(upload.of, upload.settings);
+  RasterContents raster = upload.work->take_raster();
+  const bool failed = raster.empty();
+  show_raster(upload.of, std::move(raster));  // where it failed rays meet the triangles
+  if (failed) raster_.fail(upload.of, upload.settings);
 }
 
-void GpuScene::show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content) {
-  if (!content && raster_.empty()) return;
-  surface_pass_.show(content);
+void GpuScene::place_models(std::vector<scene::Model> models, const Wanted& wanted) {
+  if (!model_) return;
+  PlacedOf of{std::move(models), *model_};
+  if (!placed_.wants(of, wanted.settings)) return;
+  try {
+    placed_.put(of, PlacedModels::make(gl_, limits_, of.models, of.data, placed_.get()));
+  } catch (const Error&) {
+    placed_.fail(of, wanted.settings);
+    throw;
+  }
+  model_revision_.advance();
+  place_raster();
+}
+
+void GpuScene::show_raster(const ModelData::Sources& of, RasterContents contents) {
+  if (contents.empty() && raster_.empty()) return;
   raster_.clear();
-  if (content) raster_.put(of, content);
+  if (!contents.empty()) raster_.put(of, std::move(contents));
+  place_raster();
+}
+
+void GpuScene::place_raster() {
+  std::vector<RasterItem> items;
+  if (raster_ && placed_) {
+    for (const scene::Model& model : placed_.of().models) {
+      const auto source = std::ranges::find(raster_.of(), model.source);
+      if (source == raster_.of().end()) continue;
+      items.push_back({(*raster_)[static_cast<std::size_t>(source - raster_.of().begin())], model.to_world,
+                       model.shadow_only});
+    }
+  }
+  surface_pass_.show(std::move(items));
 }
 
 void GpuScene::update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline) {
@@ -235,28 +304,30 @@ std::array<light::Lit, 2> GpuScene::lit() const {
   } else if (!present_.empty()) {
     lit[0] = ball_of(present_.front());
   }
-  if (model_) {
-    const surface::Pose& pose = model_.of()->pose;
-    lit[1] = {0.5 * (pose.low + pose.high), 0.5 * glm::length(pose.high - pose.low)};
+  if (placed_) {
+    const scene::ModelTable& table = placed_->table();
+    lit[1] = {0.5 * (table.low + table.high), 0.5 * glm::length(table.high - table.low)};
   }
   return lit;
 }
 
 void GpuScene::update_lamps(const scene::Snapshot& snapshot, const Wanted& wanted) {
-  const auto make = [&](Slot<LampData, LampsOf>& lamps, const scene::ModelSourcePtr& model) {
-    const auto of_scene = model ? std::span(model->pose.lights) : std::span<const surface::PunctualLight>();
-    LampsOf of{snapshot.lamps, model, {}};
+  const auto make = [&](Slot<LampData, LampsOf>& lamps, const PlacedModels* models) {
+    const auto of_scene =
+        models != nullptr ? std::span(models->table().lamps) : std::span<const surface::PunctualLight>();
+    LampsOf of{snapshot.lamps, {}, {}};
     // What no lamp shines on makes no other table.
+    if (!of_scene.empty()) of.models = models->models();
     if (!of_scene.empty() || !snapshot.lamps->empty()) of.lit = lit();
     if (!lamps.wants(of, wanted.settings)) return;
     lamps.make(of, wanted.settings, [&] { return LampData::make(gl_, limits_, *snapshot.lamps, of_scene, of.lit); });
   };
-  if (model_) {
+  if (placed_) {
     make(host_lamps_, nullptr);
   } else {
     host_lamps_.clear();
   }
-  make(lamps_, model_ ? model_.of() : nullptr);
+  make(lamps_, placed_.get());
 }
 
 void GpuScene::drop_data() {
@@ -310,7 +381,11 @@ std::optional<double> GpuScene::upload_seconds(const scene::MarchSourcePtr& of) 
 }
 
 std::uint64_t GpuScene::other_bytes() const {
-  return (model_ ? model_->bytes() : 0) + (raster_ ? (*raster_)->bytes() : 0) +
+  std::uint64_t raster = 0;
+  if (raster_) {
+    for (const RasterContentPtr& content : *raster_) raster += content->bytes();
+  }
+  return (model_ ? (*model_)->bytes() : 0) + (placed_ ? placed_->bytes() : 0) + raster +
          (environment_ ? environment_->bytes() : 0) + (instances_ ? instances_->bytes() : 0) + surface_pass_.bytes() +
          heap_.free_bytes();
 }
@@ -333,7 +408,7 @@ light::DistantLights GpuScene::lights(const scene::Snapshot& snapshot) const {
 
 Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   Obstacles obstacles;
-  obstacles.scene = model_.get();
+  obstacles.scene = placed_.get();
   obstacles.raster = raster_ ? &surface_pass_ : nullptr;
   obstacles.traced = traced || obstacles.raster == nullptr;
   if (*snapshot.view) obstacles.view = **snapshot.view;
@@ -349,7 +424,7 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
                         .lamps = *snapshot.lamps};
   obstacles.environment = environment_.get();
   // Chances are of a table as a whole.
-  obstacles.lamps = !model_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
+  obstacles.lamps = !placed_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
   obstacles.instances = instances_.get();
   return obstacles;
 }
@@ -391,7 +466,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   }
   own.radius = lit()[0].radius;
   own.aimed = integrator.light_among_surfaces != 0U && (p.medium.emits != 0U || p.medium.source != glm::vec3(0.0F));
-  const ModelData* met = obstacles.met();
+  const PlacedModels* met = obstacles.met();
   light::SceneLights near = met != nullptr ? met->lights() : light::SceneLights{};
   light::add_lamps(near, *snapshot.lamps);
   near.lamps_arrive = obstacles.lamps != nullptr ? obstacles.lamps->arrives() : 0.0;

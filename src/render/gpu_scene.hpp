@@ -46,11 +46,13 @@ class GpuScene {
   [[nodiscard]] Revision<MarchData> data_revision() const { return data_revision_; }
   /// Another where volumes stand elsewhere, of which there are several.
   [[nodiscard]] Revision<InstanceData> instances_revision() const { return instances_revision_; }
-  /// Another where paths meet other triangles, or other surfaces are drawn.
+  /// Another where paths meet other triangles, or others are drawn, or at another place.
   [[nodiscard]] Revision<ModelData> model_revision() const { return model_revision_; }
   /// Another with another environment, or none.
   [[nodiscard]] Revision<EnvironmentData> environment_revision() const { return environment_revision_; }
   [[nodiscard]] bool draws_surfaces() const { return static_cast<bool>(raster_); }
+  /// Null: none are here.
+  [[nodiscard]] const PlacedModels* models() const { return placed_.get(); }
   [[nodiscard]] bool uploading_volumes() const { return upload_.has_value(); }
   [[nodiscard]] bool uploading() const { return upload_ || model_upload_ || environment_upload_; }
   /// 0 to 1, of what is under way; else 1.
@@ -75,9 +77,16 @@ class GpuScene {
                                              const core::CmIntegrator& integrator, glm::uvec2 size) const;
 
  private:
-  void update_model(const scene::ModelSourcePtr& source, const Wanted& wanted, Deadline deadline);
-  void finish_model();
-  void show_raster(const scene::ModelSourcePtr& of, const RasterContentPtr& content);
+  void update_models(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline);
+  void upload_models(const ModelData::Sources& sources, const std::vector<scene::Model>& models, const Wanted& wanted,
+                     Deadline deadline);
+  void finish_models();
+  // Those of the snapshot whose sources are here; one whose newest is not with the one that it had.
+  [[nodiscard]] std::vector<scene::Model> present_models(const scene::Snapshot& snapshot) const;
+  void place_models(std::vector<scene::Model> models, const Wanted& wanted);
+  void show_raster(const ModelData::Sources& of, RasterContents contents);
+  // What is drawn stands where what paths meet does.
+  void place_raster();
   void drop_data();
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.
@@ -115,17 +124,25 @@ class GpuScene {
   };
   Took took_;                           // the newest upload
   std::vector<scene::Volume> present_;  // what of the snapshot's is in data
-  struct ModelUnderWay {
-    scene::ModelSourcePtr of;
+  struct ModelsUnderWay {
+    ModelData::Sources of;
+    std::vector<scene::Model> models;  // with those
     std::uint64_t settings = 0;
     ModelParts parts = ModelParts::both;
     std::unique_ptr<ModelUpload> work;
   };
   Revision<ModelData> model_revision_;
-  Slot<ModelData, scene::ModelSourcePtr> model_;
-  Slot<RasterContentPtr, scene::ModelSourcePtr> raster_;  // where it is of use
-  SurfaceRaster surface_pass_;                            // shows that
-  std::optional<ModelUnderWay> model_upload_;             // of what both will be
+  Slot<ModelDataPtr, ModelData::Sources> model_;
+  std::vector<scene::Model> models_of_;  // that it came with
+  struct PlacedOf {
+    std::vector<scene::Model> models;
+    ModelDataPtr data;
+    bool operator==(const PlacedOf&) const = default;
+  };
+  Slot<PlacedModels, PlacedOf> placed_;                 // where there are any
+  Slot<RasterContents, ModelData::Sources> raster_;     // where it is of use
+  SurfaceRaster surface_pass_;                          // shows that
+  std::optional<ModelsUnderWay> model_upload_;          // of what both will be
   struct EnvironmentUnderWay {
     light::EnvironmentPtr of;
     std::uint64_t settings = 0;
@@ -144,7 +161,7 @@ class GpuScene {
   Revision<InstanceData> instances_revision_;
   struct LampsOf {
     scene::Part<light::Lamps> host;
-    scene::ModelSourcePtr model;  // that is here
+    std::vector<scene::Model> models;  // that are here
     std::array<light::Lit, 2> lit;
     bool operator==(const LampsOf&) const = default;
   };

@@ -39,9 +39,9 @@ std::uint32_t seed_of(const PictureParameters& parameters) {
   return hash;
 }
 
-const surface::Scene* scene_met(const Obstacles& obstacles) {
-  const ModelData* met = obstacles.met();
-  return met != nullptr ? met->scene() : nullptr;
+std::shared_ptr<const void> scene_met(const Obstacles& obstacles) {
+  const PlacedModels* met = obstacles.met();
+  return met != nullptr ? met->numbering() : nullptr;
 }
 
 }  // namespace

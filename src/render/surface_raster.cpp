@@ -5,13 +5,13 @@
 #include <cstring>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <string>
 #include <tuple>
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
 #include "light/lamps.hpp"
+#include "scene/model_table.hpp"
 #include "surface/ggx_albedo.hpp"
 
 namespace cumulet::core {
@@ -94,6 +94,25 @@ gl::Object make_scene_sampler(const gl::FunctionsPtr& gl, const surface::Sampler
   return object;
 }
 
+struct Bounds {
+  glm::dvec3 low;
+  glm::dvec3 high;
+};
+
+// Of what is drawn.
+std::optional<Bounds> bounds_of(std::span<const RasterItem> items) {
+  std::optional<Bounds> all;
+  for (const RasterItem& item : items) {
+    if (item.shadow_only) continue;
+    const surface::Pose& pose = item.content->pose();
+    const scene::Block block = scene::block_of(item.to_world, pose.low, pose.high);
+    const glm::dvec3 reach = scene::reach_of(block);
+    const Bounds own{block.middle - reach, block.middle + reach};
+    all = all ? Bounds{glm::min(all->low, own.low), glm::max(all->high, own.high)} : own;
+  }
+  return all;
+}
+
 }  // namespace
 
 glm::vec2 surface_jitter(unsigned layer, unsigned layers) { return core::cm_layer_jitter(layer, layers); }
@@ -136,12 +155,7 @@ class RasterContent::Planner {
       });
     }
     add_buffer(to->material_block, source.material_blocks, "uploading the scene's materials");
-    to->bytes += source.material_blocks.size() + source.blended.size() * 3 * sizeof(std::uint32_t);
-    if (source.blended.empty()) return;
-    upload_.add([gl = gl_, to] {
-      to->sorted_indices = gl::make_buffer(gl, to->source->blended.size() * 3 * sizeof(std::uint32_t), nullptr,
-                                           GL_DYNAMIC_STORAGE_BIT, "creating the indices of blended triangles");
-    });
+    to->bytes += source.material_blocks.size();
   }
 
   /// A buffer of just these, made before the first of them is copied.
@@ -243,39 +257,124 @@ std::shared_ptr<const RasterContent> RasterContent::plan(const gl::FunctionsPtr&
   return content;
 }
 
-void SurfaceRaster::show(std::shared_ptr<const RasterContent> content) {
-  content_ = std::move(content);
+const SurfaceRaster::Places& SurfaceRaster::Shown::places_of(std::uint32_t draw) const {
+  const std::vector<surface::Prototype>& prototypes = content->scene().scene->prototypes;
+  const auto after = std::ranges::upper_bound(prototypes, draw, {}, &surface::Prototype::first_draw);
+  return sets[static_cast<std::size_t>(after - prototypes.begin())];
+}
+
+bool SurfaceRaster::blends() const {
+  return std::ranges::any_of(drawn_, [](const Shown& shown) { return shown.content->blends(); });
+}
+
+void SurfaceRaster::add_places(Shown& shown, std::vector<glm::dmat4> places) {
+  const auto volume = [](const glm::dmat4& place) { return glm::determinant(glm::dmat3(place)); };
+  std::erase_if(places, [&](const glm::dmat4& place) { return !(std::abs(volume(place)) > 0.0); });
+  const auto mirrored = std::ranges::stable_partition(places, [&](const glm::dmat4& p) { return volume(p) > 0.0; });
+  const auto count = static_cast<std::uint32_t>(mirrored.size());
+  shown.sets.push_back({static_cast<std::uint32_t>(places_.size()), static_cast<std::uint32_t>(places.size()) - count,
+                        count});
+  places_.insert(places_.end(), places.begin(), places.end());
+}
+
+void SurfaceRaster::show(std::vector<RasterItem> items) {
+  items_ = std::move(items);
   shown_ = std::make_shared<char>();
+  drawn_.clear();
+  places_.clear();
   sorted_.clear();
   sorted_view_.reset();
+  for (const RasterItem& item : items_) {
+    const auto is = [&](const Shown& shown) { return shown.content == item.content; };
+    if (item.shadow_only || !item.content->drawable() || std::ranges::any_of(drawn_, is)) continue;
+    drawn_.push_back({item.content, {}});
+  }
+  for (Shown& shown : drawn_) {
+    std::vector<glm::dmat4> whole;
+    for (const RasterItem& item : items_) {
+      if (!item.shadow_only && item.content == shown.content) whole.push_back(item.to_world);
+    }
+    add_places(shown, whole);
+    for (const std::vector<glm::dmat4>& placings : shown.content->pose().placings) {
+      std::vector<glm::dmat4> all;
+      for (const glm::dmat4& to_world : whole) {
+        for (const glm::dmat4& placing : placings) all.push_back(to_world * placing);
+      }
+      add_places(shown, std::move(all));
+    }
+  }
 }
 
 void SurfaceRaster::sort_blended(const SurfaceView& view) {
   if (!blends() || sorted_view_ == view) return;
-  const std::vector<glm::vec3>& centres = *content_->centres_;
   const glm::dmat3 matrix = to_view(view);
   const glm::dvec3 row(matrix[0][2], matrix[1][2], matrix[2][2]);
-  std::vector<double> z(centres.size());
-  std::transform(centres.begin(), centres.end(), z.begin(),
-                 [&](const glm::vec3& centre) { return glm::dot(row, glm::dvec3(centre) - view.eye); });
-  std::vector<std::uint32_t> order(centres.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return z[a] > z[b]; });
+  struct Triangle {
+    double z;
+    std::uint32_t shown;
+    std::uint32_t place;
+    std::uint32_t number;  // of the content's blended
+  };
+  std::vector<Triangle> order;
+  for (std::uint32_t i = 0; i < drawn_.size(); ++i) {
+    const RasterContent& content = *drawn_[i].content;
+    for (std::uint32_t t = 0; t < content.scene().blended.size(); ++t) {
+      const Places& places = drawn_[i].places_of(content.scene().blended[t].draw);
+      const glm::dvec4 centre((*content.centres_)[t], 1.0);
+      for (std::uint32_t p = places.first; p < places.first + places.upright + places.mirrored; ++p)
+        order.push_back({glm::dot(row, glm::dvec3(places_[p] * centre) - view.eye), i, p, t});
+    }
+  }
+  std::ranges::stable_sort(order, std::ranges::greater{}, &Triangle::z);
   std::vector<std::uint32_t> indices;
   indices.reserve(order.size() * 3);
   sorted_.clear();
-  for (const std::uint32_t i : order) {
-    const Batch& triangle = content_->scene().blended[i];
-    if (sorted_.empty() || sorted_.back().draw != triangle.draw) {
-      sorted_.push_back({static_cast<std::uint32_t>(indices.size()), 0, triangle.draw});
+  for (const Triangle& triangle : order) {
+    const scene::RasterSource& source = drawn_[triangle.shown].content->scene();
+    const Batch& batch = source.blended[triangle.number];
+    if (sorted_.empty() || sorted_.back().batch.draw != batch.draw || sorted_.back().shown != triangle.shown ||
+        sorted_.back().place != triangle.place) {
+      sorted_.push_back(
+          {triangle.shown, triangle.place, {static_cast<std::uint32_t>(indices.size()), 0, batch.draw}});
     }
-    sorted_.back().count += 3;
-    const auto first = content_->scene().scene->indices.begin() + triangle.first;
+    sorted_.back().batch.count += 3;
+    const auto first = source.scene->indices.begin() + batch.first;
     indices.insert(indices.end(), first, first + 3);
   }
-  gl_->NamedBufferSubData(content_->fixed_->sorted_indices.name(), 0,
-                          static_cast<GLsizeiptr>(indices.size() * sizeof(std::uint32_t)), indices.data());
+  fill(sorted_indices_, sorted_bytes_, indices.data(), indices.size() * sizeof(std::uint32_t),
+       "creating the indices of blended triangles");
   sorted_view_ = view;
+}
+
+void SurfaceRaster::fill(gl::Object& buffer, std::size_t& size, const void* from, std::size_t bytes,
+                         const char* what) const {
+  if (!buffer || size < bytes) {
+    buffer = {};
+    buffer = gl::make_buffer(gl_, std::max<std::size_t>(bytes, 16), nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+    size = bytes;
+  }
+  if (bytes > 0) gl_->NamedBufferSubData(buffer.name(), 0, static_cast<GLsizeiptr>(bytes), from);
+}
+
+// Columns, and where their origin is from the eye: a sum of more digits than a float has.
+struct SurfaceRaster::PlaceRecord {
+  glm::vec3 x;
+  glm::vec3 y;
+  glm::vec3 z;
+  glm::vec3 high;
+  glm::vec3 low;
+};
+
+void SurfaceRaster::upload_places(const SurfaceView& view) {
+  std::vector<PlaceRecord> records;
+  records.reserve(places_.size());
+  for (const glm::dmat4& place : places_) {
+    const glm::dvec3 from_eye = glm::dvec3(place[3]) - view.eye;
+    const glm::vec3 high(from_eye);
+    records.push_back({glm::vec3(place[0]), glm::vec3(place[1]), glm::vec3(place[2]), high,
+                       glm::vec3(from_eye - glm::dvec3(high))});
+  }
+  fill(place_buffer_, place_bytes_, records.data(), records.size() * sizeof(PlaceRecord), "creating the surfaces' places");
 }
 
 void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into) {
@@ -325,7 +424,7 @@ void SurfaceRaster::make_fixtures() {
 }
 
 std::uint64_t SurfaceRaster::bytes() const {
-  std::uint64_t bytes = light_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
+  std::uint64_t bytes = light_bytes_ + place_bytes_ + sorted_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
   if (gloss_) bytes += std::uint64_t{core::CM_GLOSS_WIDTH} * core::CM_GLOSS_HEIGHT * core::CM_GLOSS_LEVELS * 16;
   if (!view_block_) return bytes;
   const std::uint64_t table = std::uint64_t(surface::GgxAlbedo::width()) * surface::GgxAlbedo::height() * 4;
@@ -346,12 +445,10 @@ void SurfaceRaster::upload_gloss(const light::GlossPtr& gloss) {
 
 void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& lighting) {
   const glm::dmat3 matrix = to_view(view);
-  const glm::vec3 eye(view.eye);
-  const glm::dvec2 depth = content_ ? depth_of(view, matrix, content_->pose_->low, content_->pose_->high)
-                                    : depth_of(view, matrix, view.eye, view.eye);
+  const std::optional<Bounds> bounds = bounds_of(items_);
+  const glm::dvec2 depth = bounds ? depth_of(view, matrix, bounds->low, bounds->high)
+                                  : depth_of(view, matrix, view.eye, view.eye);
   CmSurfaceView block{};
-  block.eye_high = glm::vec4(eye, 0.0F);
-  block.eye_low = glm::vec4(glm::vec3(view.eye - glm::dvec3(eye)), 0.0F);
   block.to_view_x = glm::vec4(glm::vec3(matrix[0]), 0.0F);
   block.to_view_y = glm::vec4(glm::vec3(matrix[1]), 0.0F);
   block.to_view_z = glm::vec4(glm::vec3(matrix[2]), 0.0F);
@@ -362,8 +459,11 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.sky_radiance = glm::vec4(lighting.sky_radiance, 0.0F);
   block.sky = block_of(lighting.sky);
   block.sky_turn = glm::vec4(lighting.sky_turn, lighting.gloss_strength, 0.0F);
-  const std::span<const surface::PunctualLight> lamps =
-      content_ ? std::span(content_->pose_->lights) : std::span<const surface::PunctualLight>();
+  std::vector<surface::PunctualLight> lamps;
+  for (const RasterItem& item : items_) {
+    for (const surface::PunctualLight& lamp : item.content->pose().lights)
+      lamps.push_back(scene::placed(lamp, item.to_world));
+  }
   light::Lamps of_host = lighting.lamps;
   for (light::Lamp& lamp : of_host) {
     // Lit from its middle alone: there a wide sun's disc is brighter than on average.
@@ -374,69 +474,113 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.counts.y = lighting.gloss && lighting.gloss_strength > 0.0F ? 1U : 0U;
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
-  const std::size_t bytes = std::max<std::size_t>(records.size(), 1) * sizeof(CmLamp);
-  if (!light_buffer_ || light_bytes_ < bytes) {
-    light_buffer_ = gl::make_buffer(gl_, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the surfaces' lights");
-    light_bytes_ = bytes;
-  }
-  if (!records.empty()) {
-    gl_->NamedBufferSubData(light_buffer_.name(), 0, static_cast<GLsizeiptr>(records.size() * sizeof(CmLamp)),
-                            records.data());
-  }
+  fill(light_buffer_, light_bytes_, records.data(), records.size() * sizeof(CmLamp), "creating the surfaces' lights");
   gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_SURFACE_VIEW, view_block_.name());
   gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_LAMPS, light_buffer_.name());
 }
 
-void SurfaceRaster::draw_batches(std::span<const Batch> batches, bool mirrored) const {
-  const auto& gl = *gl_;
-  const RasterContent::Fixed& fixed = *content_->fixed_;
-  const scene::RasterSource& source = *fixed.source;
-  const gl::Program* program = nullptr;
-  std::optional<std::uint32_t> bound;
-  const auto material_of = [&](const Batch& batch) {
-    return surface::material_of(*source.scene, *content_->pose_, batch.draw);
-  };
-  for (std::size_t b = 0; b < batches.size();) {
-    const Batch& batch = batches[b];
-    const std::uint32_t index = material_of(batch);
-    const scene::RasterSource::Material& material = source.materials[index];
-    if (program != fixed.program_of[index]) fixed.program_of[index]->use(gl);
-    program = fixed.program_of[index];
-    if (bound != index) {
+// What has been bound, and draws batches.
+class SurfaceRaster::Pen {
+ public:
+  Pen(const SurfaceRaster& raster, GLuint vertex_array, bool mirrored)
+      : raster_(raster), gl_(*raster.gl_), array_(vertex_array), mirrored_(mirrored) {}
+
+  /// Batches of the content's own indices, each at all of its places.
+  void solid(const Shown& shown) {
+    const RasterContent& content = *shown.content;
+    const std::vector<Batch>& batches = content.scene().solid;
+    take(content, content.fixed_->shared->indices.name());
+    for (std::size_t b = 0; b < batches.size();) {
+      const Batch& batch = batches[b];
+      const Places& places = shown.places_of(batch.draw);
+      const std::uint8_t flipped = content.pose().flipped[batch.draw];
+      const std::uint32_t material = material_of(content, batch);
+      // Copies of a mesh come one after the other: one call draws them all.
+      std::uint64_t count = batch.count;
+      for (++b; b < batches.size(); ++b) {
+        const Batch& next = batches[b];
+        if (next.first != batch.first + count || count + next.count > std::numeric_limits<GLsizei>::max() ||
+            &shown.places_of(next.draw) != &places || content.pose().flipped[next.draw] != flipped ||
+            material_of(content, next) != material) {
+          break;
+        }
+        count += next.count;
+      }
+      draw(content, {batch.first, static_cast<std::uint32_t>(count), batch.draw}, places.first, places.upright, false);
+      draw(content, {batch.first, static_cast<std::uint32_t>(count), batch.draw}, places.first + places.upright,
+           places.mirrored, true);
+    }
+  }
+
+  /// Of the sorted indices.
+  void blended(const Blended& what) {
+    const Shown& shown = raster_.drawn_[what.shown];
+    take(*shown.content, raster_.sorted_indices_.name());
+    const Places& places = shown.places_of(what.batch.draw);
+    draw(*shown.content, what.batch, what.place, 1, what.place >= places.first + places.upright);
+  }
+
+ private:
+  [[nodiscard]] static std::uint32_t material_of(const RasterContent& content, const Batch& batch) {
+    return surface::material_of(*content.scene().scene, content.pose(), batch.draw);
+  }
+
+  void take(const RasterContent& content, GLuint indices) {
+    if (&content != content_) {
+      gl_.VertexArrayVertexBuffer(array_, 0, content.posed_.name(), 0, sizeof(surface::PosedVertex));
+      gl_.VertexArrayVertexBuffer(array_, 1, content.fixed_->shared->attributes.name(), 0,
+                                  sizeof(surface::VertexAttributes));
+      program_ = nullptr;
+      material_ = nullptr;
+    }
+    if (indices != indices_) gl_.VertexArrayElementBuffer(array_, indices);
+    content_ = &content;
+    indices_ = indices;
+  }
+
+  void draw(const RasterContent& content, const Batch& batch, std::uint32_t first_place, std::uint32_t places,
+            bool in_mirror) {
+    if (places == 0) return;
+    const RasterContent::Fixed& fixed = *content.fixed_;
+    const std::uint32_t index = material_of(content, batch);
+    const scene::RasterSource::Material& material = content.scene().materials[index];
+    if (program_ != fixed.program_of[index]) fixed.program_of[index]->use(gl_);
+    program_ = fixed.program_of[index];
+    if (material_ != &material) {
       for (GLuint i = 0; i < material.maps.size(); ++i) {
         const auto& map = material.maps[i];
         const GLuint unit = core::CM_UNIT_MAPS + i;
-        gl.BindTextureUnit(unit, map ? fixed.shared->textures[map->texture].name() : white_.name());
-        gl.BindSampler(unit, map ? fixed.shared->samplers[map->sampler].name() : 0);
+        gl_.BindTextureUnit(unit, map ? fixed.shared->textures[map->texture].name() : raster_.white_.name());
+        gl_.BindSampler(unit, map ? fixed.shared->samplers[map->sampler].name() : 0);
       }
-      gl.BindBufferRange(GL_UNIFORM_BUFFER, core::CM_UNIFORM_MATERIAL, fixed.material_block.name(),
-                         static_cast<GLintptr>(scene::RasterSource::material_stride * index), sizeof(CmMaterial));
-      if (material.double_sided || content_->pose_->double_sided) {
-        gl.Disable(GL_CULL_FACE);
+      gl_.BindBufferRange(GL_UNIFORM_BUFFER, core::CM_UNIFORM_MATERIAL, fixed.material_block.name(),
+                          static_cast<GLintptr>(scene::RasterSource::material_stride * index), sizeof(CmMaterial));
+      if (material.double_sided || content.pose().double_sided) {
+        gl_.Disable(GL_CULL_FACE);
       } else {
-        gl.Enable(GL_CULL_FACE);
+        gl_.Enable(GL_CULL_FACE);
       }
-      bound = index;
+      material_ = &material;
     }
     // The picture stands on its head in the target, which turns the winding round.
-    const std::uint8_t flipped = content_->pose_->flipped[batch.draw];
-    gl.FrontFace(mirrored == (flipped != 0) ? GL_CW : GL_CCW);
-    // Copies of a mesh come one after the other: one call draws them all.
-    std::uint64_t count = batch.count;
-    for (++b; b < batches.size(); ++b) {
-      const Batch& next = batches[b];
-      if (next.first != batch.first + count || count + next.count > std::numeric_limits<GLsizei>::max() ||
-          content_->pose_->flipped[next.draw] != flipped || material_of(next) != index) {
-        break;
-      }
-      count += next.count;
-    }
+    const bool flipped = (content.pose().flipped[batch.draw] != 0) != in_mirror;
+    gl_.FrontFace(mirrored_ == flipped ? GL_CW : GL_CCW);
     const std::uintptr_t offset = std::uintptr_t{batch.first} * sizeof(std::uint32_t);
     // NOLINTNEXTLINE(performance-no-int-to-ptr): so GL takes offsets
     const void* start = reinterpret_cast<const void*>(offset);
-    gl.DrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT, start);
+    gl_.DrawElementsInstancedBaseInstance(GL_TRIANGLES, static_cast<GLsizei>(batch.count), GL_UNSIGNED_INT, start,
+                                          static_cast<GLsizei>(places), first_place);
   }
-}
+
+  const SurfaceRaster& raster_;
+  const gl::Functions& gl_;
+  GLuint array_;
+  bool mirrored_;  // the picture
+  const RasterContent* content_ = nullptr;
+  GLuint indices_ = 0;
+  const gl::Program* program_ = nullptr;
+  const scene::RasterSource::Material* material_ = nullptr;
+};
 
 void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lighting, glm::uvec2 size, unsigned layers,
                          SurfaceLayers& into) {
@@ -454,13 +598,13 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
   const std::array<GLenum, 2> buffers{GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
   gl.NamedFramebufferDrawBuffers(target, 2, buffers.data());
   gl::Object vertex_array;
-  const bool drawable = content_ != nullptr && content_->drawable();
+  const bool drawable = !drawn_.empty();
   if (drawable) {
+    upload_places(view);
     vertex_array = gl::make_vertex_array(gl_);
     const GLuint array = vertex_array.name();
-    gl.VertexArrayVertexBuffer(array, 0, content_->posed_.name(), 0, sizeof(surface::PosedVertex));
-    gl.VertexArrayVertexBuffer(array, 1, content_->fixed_->shared->attributes.name(), 0,
-                               sizeof(surface::VertexAttributes));
+    gl.VertexArrayVertexBuffer(array, 2, place_buffer_.name(), 0, sizeof(PlaceRecord));
+    gl.VertexArrayBindingDivisor(array, 2, 1);
     const auto attribute = [&](GLuint location, GLint components, GLuint offset, GLuint binding) {
       gl.EnableVertexArrayAttrib(array, location);
       gl.VertexArrayAttribFormat(array, location, components, GL_FLOAT, GL_FALSE, offset);
@@ -471,6 +615,11 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     attribute(2, 4, offsetof(surface::PosedVertex, tangent), 0);
     attribute(3, 4, offsetof(surface::VertexAttributes, uv), 1);
     attribute(4, 4, offsetof(surface::VertexAttributes, color), 1);
+    attribute(5, 3, offsetof(PlaceRecord, x), 2);
+    attribute(6, 3, offsetof(PlaceRecord, y), 2);
+    attribute(7, 3, offsetof(PlaceRecord, z), 2);
+    attribute(8, 3, offsetof(PlaceRecord, high), 2);
+    attribute(9, 3, offsetof(PlaceRecord, low), 2);
     gl.BindVertexArray(array);
     gl.BindTextureUnit(core::CM_UNIT_GGX_ALBEDO, albedo_table_.name());
     gl.BindSampler(core::CM_UNIT_GGX_ALBEDO, table_sampler_.name());
@@ -505,19 +654,20 @@ void SurfaceRaster::draw(const SurfaceView& view, const SurfaceLighting& lightin
     gl.ClearNamedFramebufferfv(target, GL_DEPTH, 0, &far);
     const glm::vec2 shift = (glm::vec2(0.5F) - surface_jitter(layer, layers)) * 2.0F / glm::vec2(size);
     if (drawable) {
-      for (const gl::Program* program : content_->fixed_->program_of) {
-        gl.ProgramUniform2f(program->name(), 0, shift.x, shift.y);
+      for (const Shown& shown : drawn_) {
+        for (const gl::Program* program : shown.content->fixed_->program_of)
+          gl.ProgramUniform2f(program->name(), 0, shift.x, shift.y);
       }
-      gl.VertexArrayElementBuffer(vertex_array.name(), content_->fixed_->shared->indices.name());
-      draw_batches(content_->scene().solid, mirrored);
+      Pen pen(*this, vertex_array.name(), mirrored);
+      for (const Shown& shown : drawn_) pen.solid(shown);
     }
     if (!into.blended) continue;
     clear_to(layers + layer);
     if (!drawable) continue;
     for (GLuint i = 0; i < buffers.size(); ++i) gl.Enablei(GL_BLEND, i);
     gl.DepthMask(GL_FALSE);
-    gl.VertexArrayElementBuffer(vertex_array.name(), content_->fixed_->sorted_indices.name());
-    draw_batches(sorted_, mirrored);
+    Pen pen(*this, vertex_array.name(), mirrored);
+    for (const Blended& what : sorted_) pen.blended(what);
     for (GLuint i = 0; i < buffers.size(); ++i) gl.Disablei(GL_BLEND, i);
   }
   gl::check(gl, "drawing the surfaces");

@@ -65,6 +65,8 @@ class RasterContent {
   [[nodiscard]] bool blends() const { return !scene().blended.empty(); }
   /// GL memory.
   [[nodiscard]] std::uint64_t bytes() const { return fixed_->shared->bytes + fixed_->bytes + posed_bytes_; }
+  [[nodiscard]] const surface::Pose& pose() const { return *pose_; }
+  [[nodiscard]] bool is_of(const surface::Scene& other) const { return scene().scene.get() == &other; }
 
  private:
   friend class SurfaceRaster;
@@ -81,7 +83,6 @@ class RasterContent {
   struct Fixed {
     std::shared_ptr<const scene::RasterSource> source;
     std::shared_ptr<Shared> shared;
-    gl::Object sorted_indices;  // of blended triangles
     gl::Object material_block;
     std::vector<const gl::Program*> program_of;  // a material
     std::uint64_t bytes = 0;
@@ -98,7 +99,17 @@ class RasterContent {
   std::uint64_t posed_bytes_ = 0;
 };
 
-/// Draws a glTF scene into layers; the mean of BLEND layers over the others is the anti-aliased picture.
+using RasterContentPtr = std::shared_ptr<const RasterContent>;
+using RasterContents = std::vector<RasterContentPtr>;
+
+/// One that stands somewhere.
+struct RasterItem {
+  RasterContentPtr content;  ///< not null, and whole
+  glm::dmat4 to_world{1.0};  ///< affine
+  bool shadow_only = false;  ///< of it only lamps count
+};
+
+/// Draws glTF scenes into layers; the mean of BLEND layers over the others is the anti-aliased picture.
 ///
 /// Materials are metallic-roughness with KHR_materials_ior, _specular, _clearcoat, _emissive_strength and _unlit, as
 /// glsl/bsdf.glsl has them, normal and occlusion maps (occlusion dims the sky alone) and vertex colours. Nothing casts
@@ -115,8 +126,8 @@ class SurfaceRaster {
  public:
   explicit SurfaceRaster(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// From now on draws this, which is whole; null: no surfaces.
-  void show(std::shared_ptr<const RasterContent> content);
+  /// From now on draws these. O(placings).
+  void show(std::vector<RasterItem> items);
   /// Renders layers 1 to 8 of size > 0, into textures that are made anew where they do not fit. Where it shows
   /// nothing they are empty. Throws Error(out_of_memory), the layers then gone or of an undefined content, and
   /// Error(internal) for a view that spans no space. O(layers (triangles + pixels)).
@@ -128,22 +139,48 @@ class SurfaceRaster {
   /// Another with every show(): what is drawn of one and the same looks the same.
   [[nodiscard]] const std::shared_ptr<const void>& content() const { return shown_; }
   /// Whether what it shows has BLEND triangles, which have layers of their own.
-  [[nodiscard]] bool blends() const { return content_ != nullptr && content_->blends(); }
+  [[nodiscard]] bool blends() const;
 
  private:
   using Batch = scene::RasterSource::Batch;
+  // Of places_: those that mirror come last.
+  struct Places {
+    std::uint32_t first = 0;
+    std::uint32_t upright = 0;
+    std::uint32_t mirrored = 0;
+  };
+  // A content that is drawn, and where: the draws that are posed as they stand, then each prototype's.
+  struct Shown {
+    RasterContentPtr content;
+    std::vector<Places> sets;
+    [[nodiscard]] const Places& places_of(std::uint32_t draw) const;
+  };
+  // A blended triangle, or several of one draw at one place.
+  struct Blended {
+    std::uint32_t shown = 0;
+    std::uint32_t place = 0;
+    Batch batch;  // of the sorted indices
+  };
 
   void sort_blended(const SurfaceView& view);
   void make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into);
   void make_fixtures();
   void upload_gloss(const light::GlossPtr& gloss);
   void upload_view(const SurfaceView& view, const SurfaceLighting& lighting);
-  void draw_batches(std::span<const Batch> batches, bool mirrored) const;
+  struct PlaceRecord;
+  void upload_places(const SurfaceView& view);
+  // Makes it anew where it is too small.
+  void fill(gl::Object& buffer, std::size_t& size, const void* from, std::size_t bytes, const char* what) const;
+  void add_places(Shown& shown, std::vector<glm::dmat4> places);
+  // Batches of a content, each at all of its places, or at one.
+  class Pen;
 
   gl::FunctionsPtr gl_;
-  std::shared_ptr<const RasterContent> content_;
+  std::vector<RasterItem> items_;
+  std::vector<Shown> drawn_;
+  std::vector<glm::dmat4> places_;
   std::shared_ptr<const void> shown_;
-  std::vector<Batch> sorted_;  // of blended triangles, into sorted_indices
+  std::vector<Blended> sorted_;
   std::optional<SurfaceView> sorted_view_;
 
   gl::Object white_;
@@ -155,6 +192,10 @@ class SurfaceRaster {
   gl::Object view_block_;
   gl::Object light_buffer_;
   std::size_t light_bytes_ = 0;
+  gl::Object place_buffer_;
+  std::size_t place_bytes_ = 0;
+  gl::Object sorted_indices_;  // of blended triangles
+  std::size_t sorted_bytes_ = 0;
 
   gl::Object depth_test_;
   glm::uvec2 depth_test_size_{0U};

@@ -314,7 +314,7 @@ unsigned Tracer::traced_of(const PictureParameters& parameters, const Obstacles&
   // has where there is no other light.
   const glm::vec3 distant = parameters.lights.sun_irradiance + parameters.lights.sky_radiance;
   const bool preview = settings.layered == Layered::beneath && distant != glm::vec3(0.0F);
-  const ModelData* met = settings.view == View::shaded && !preview ? obstacles.met() : nullptr;
+  const PlacedModels* met = settings.view == View::shaded && !preview ? obstacles.met() : nullptr;
   return met == nullptr ? 0 : (met->lights().triangles > 0 || met->tables().rich != 0U ? 2 : 1);
 }
 
@@ -836,8 +836,8 @@ Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& para
   gl_->GetTextureImage(pick_.name(), 0, GL_RED, GL_FLOAT, sizeof(picked.z), &picked.z);
   gl_->GetTextureImage(pick_place_.name(), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, sizeof(met), &met);
   gl::check(*gl_, "picking");
-  picked.met_volume = met.x != 0U;
-  picked.place = met.y;
+  if (met.x == 1U) picked.place = met.y;
+  if (met.x == 2U) picked.triangle = met.y;
   return picked;
 }
 

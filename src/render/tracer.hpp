@@ -42,7 +42,7 @@ struct Obstacles {
   GLuint depth = 0;  // 0: none
   unsigned layers = 0;
   glm::uvec2 size{0U};
-  const ModelData* scene = nullptr;
+  const PlacedModels* scene = nullptr;
   bool traced = true;               // paths meet the scene's triangles; else only the surface pass knows of them
   SurfaceRaster* raster = nullptr;  // the surface pass, and what it is drawn with
   SurfaceView view;
@@ -52,7 +52,7 @@ struct Obstacles {
   const InstanceData* instances = nullptr;       // where the volume is several; else it is the only one
 
   /// The scene whose triangles paths meet; null: they meet none.
-  [[nodiscard]] const ModelData* met() const { return traced ? scene : nullptr; }
+  [[nodiscard]] const PlacedModels* met() const { return traced ? scene : nullptr; }
   [[nodiscard]] std::uint32_t lamps_met() const { return lamps == nullptr ? 0 : lamps->count(); }
 };
 
@@ -225,8 +225,8 @@ class Tracer {
   /// One pixel of a picture with these parameters.
   struct Picked {
     float z = 0.0F;           ///< view depth at half opacity, or of a triangle; 0: neither is there
-    bool met_volume = false;  ///< it is the first; then
-    std::uint32_t place = 0;  ///< of which volume there is most
+    std::optional<std::uint32_t> place;     ///< where it is the first: of which volume there is most
+    std::optional<std::uint32_t> triangle;  ///< where it is the second: its number among those of all models
   };
   Picked pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles, glm::uvec2 pixel);
   /// A picture of one transparent pixel, before a black background: what there is before the first.

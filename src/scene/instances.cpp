@@ -11,7 +11,7 @@
 #include "base/error.hpp"
 #include "light/alias_table.hpp"
 #include "scene/space.hpp"
-#include "surface/bvh.hpp"
+#include "scene/threaded_tree.hpp"
 
 namespace cumulet::scene {
 
@@ -21,9 +21,6 @@ using core::CmInstance;
 using core::CmInstanceNode;
 using glm::dvec3;
 using glm::vec3;
-using surface::Bvh;
-
-constexpr double farthest = 1e12;  // what surface::Bvh takes
 
 // Of which shaders' products are finite.
 bool is_sound(const vec3& v) { return core::cm_is_within(v, 1e15F); }
@@ -33,32 +30,7 @@ bool is_sound(const core::CmSpace& s) {
          is_sound(s.from_cube_y) && is_sound(s.from_cube_z) && is_sound(s.cube_origin);
 }
 
-// An instance's box in the scene's frame: middle + the edges' halves, each times -1 to 1.
-struct Block {
-  dvec3 middle{0.0};
-  std::array<dvec3, 3> half{};
-
-  // Along an axis, how far it reaches from its middle.
-  [[nodiscard]] double reach(const dvec3& axis) const {
-    return std::abs(glm::dot(axis, half[0])) + std::abs(glm::dot(axis, half[1])) + std::abs(glm::dot(axis, half[2]));
-  }
-};
-
-dvec3 reach_of(const Block& block) {
-  return {block.reach({1.0, 0.0, 0.0}), block.reach({0.0, 1.0, 0.0}), block.reach({0.0, 0.0, 1.0})};
-}
-
 bool is_solid(const core::CmGrid& grid) { return glm::all(glm::lessThan(grid.box_min, grid.box_max)); }
-
-Block block_of(const glm::dmat4& to_scene, const core::CmGrid& grid) {
-  const dvec3 low(grid.box_min);
-  const dvec3 high(grid.box_max);
-  Block block;
-  block.middle = dvec3(to_scene * glm::dvec4(0.5 * (low + high), 1.0));
-  for (int axis = 0; axis < 3; ++axis)
-    block.half[static_cast<std::size_t>(axis)] = 0.5 * (high[axis] - low[axis]) * dvec3(to_scene[axis]);
-  return block;
-}
 
 // Whether there is an axis along which they lie apart: those upright to two edges, of one or of both, suffice. Blocks
 // that touch are apart.
@@ -78,66 +50,6 @@ bool overlap(const Block& a, const Block& b) {
   }
   return true;
 }
-
-// The tree of boxes that triangles have, in the order that needs no stack.
-class Threaded {
- public:
-  // Two corners each, in the order of the instances; left_out: of those that are empty.
-  static std::vector<CmInstanceNode> nodes_of(const std::vector<surface::PosedVertex>& corners,
-                                              const std::vector<std::uint32_t>& left_out) {
-    // Of two corners a triangle has the same box.
-    std::vector<std::uint32_t> indices;
-    indices.reserve(corners.size() / 2 * 3);
-    for (std::uint32_t i = 0; i < corners.size(); i += 2) indices.insert(indices.end(), {i, i + 1, i});
-    const Bvh tree = Bvh::build(corners, indices, left_out);
-    Threaded threaded(tree);
-    const auto& root = tree.nodes()[0].child;
-    const bool both = threaded.is_there(root[1]);
-    threaded.add_inner(both ? glm::min(root[0].low, root[1].low) : root[0].low,
-                       both ? glm::max(root[0].high, root[1].high) : root[0].high, [&] {
-                         for (const Bvh::Node::Child& child : root) threaded.add(child);
-                       });
-    return std::move(threaded.nodes_);
-  }
-
- private:
-  explicit Threaded(const Bvh& tree) : tree_(tree) {}
-
-  static std::size_t first_of(const Bvh::Node::Child& leaf) { return leaf.link & 0x1fffffffU; }
-  // A tree of one leaf has no second child, one of nothing has none.
-  [[nodiscard]] bool is_there(const Bvh::Node::Child& child) const {
-    return child.link < Bvh::leaf_bit || first_of(child) < tree_.records().size();
-  }
-
-  template <class Children>
-  void add_inner(const vec3& low, const vec3& high, const Children& add_children) {
-    const std::size_t at = nodes_.size();
-    nodes_.push_back({low, 0, high, core::CM_INSTANCE_NONE});
-    add_children();
-    nodes_[at].skip = static_cast<std::uint32_t>(nodes_.size());
-  }
-
-  // No deeper than Bvh::max_depth.
-  void add(const Bvh::Node::Child& child) {  // NOLINT(misc-no-recursion)
-    if (child.link < Bvh::leaf_bit) {
-      add_inner(child.low, child.high, [&] {
-        for (const Bvh::Node::Child& next : tree_.nodes()[child.link].child) add(next);
-      });
-      return;
-    }
-    if (!is_there(child)) return;
-    const std::size_t count = ((child.link >> 29U) & 3U) + 1;
-    const auto add_leaves = [&] {
-      for (const Bvh::Record& record : tree_.records().subspan(first_of(child), count)) {
-        nodes_.push_back({record.v0, static_cast<std::uint32_t>(nodes_.size() + 1), record.v1, record.triangle});
-      }
-    };
-    count == 1 ? add_leaves() : add_inner(child.low, child.high, add_leaves);
-  }
-
-  const Bvh& tree_;
-  std::vector<CmInstanceNode> nodes_;
-};
 
 // Whether any other's box has points of this one's.
 bool overlaps_another(const InstanceTable& table, const std::vector<Block>& blocks, const CmInstanceNode& leaf) {
@@ -184,7 +96,7 @@ dvec3 origin_of(std::span<const Instance> instances) {
   dvec3 high(-low);
   for (const Instance& instance : instances) {
     if (!is_solid(instance.grid)) continue;
-    const Block block = block_of(instance.place * instance.source->cube.to_world, instance.grid);
+    const Block block = block_of(instance.place * instance.source->cube.to_world, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max));
     const dvec3 reach = reach_of(block);
     low = glm::min(low, block.middle - reach);
     high = glm::max(high, block.middle + reach);
@@ -199,8 +111,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
   InstanceTable table;
   std::vector<Block> blocks;
   std::vector<PlacedGlow> glow;
-  std::vector<surface::PosedVertex> corners;
-  std::vector<std::uint32_t> left_out;
+  std::vector<TreeBox> boxes;
   const auto refuse = [&](ErrorCode code, const char* cause) {
     throw Error(code, "instance " + std::to_string(table.records.size()) + ": " + cause);
   };
@@ -216,19 +127,17 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
                    (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U);
     glow.push_back(glow_of(instance.source->glow, cube.to_world, instance.place));
-    const Block& block = blocks.emplace_back(block_of(to_scene, instance.grid));
+    const Block& block = blocks.emplace_back(block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max)));
     const dvec3 reach = reach_of(block);
     const dvec3 most = glm::abs(block.middle) + reach;
     const double size = std::max({most.x, most.y, most.z});
     if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the scene");
     // A ray that its own box takes for inside is here, but for what rounding may be.
     const dvec3 room = reach + 2e-6 * size;
-    corners.push_back({vec3(block.middle - room), vec3(0.0F)});
-    corners.push_back({vec3(block.middle + room), vec3(0.0F)});
-    left_out.push_back(is_solid(instance.grid) ? 0U : surface::TriangleFlags::left_out);
+    boxes.push_back({vec3(block.middle - room), vec3(block.middle + room), is_solid(instance.grid)});
     table.records.push_back(record);
   }
-  table.nodes = Threaded::nodes_of(corners, left_out);
+  table.nodes = threaded_tree(boxes);
   for (const CmInstanceNode& node : table.nodes) {
     if (node.instance != core::CM_INSTANCE_NONE && overlaps_another(table, blocks, node))
       table.records[node.instance].flags |= core::CM_INSTANCE_OVERLAPS;

@@ -8,6 +8,7 @@
 
 #include "base/parameters.hpp"
 #include "scene/march_source.hpp"
+#include "scene/threaded_tree.hpp"
 
 namespace cumulet::core {
 #include "instance_table.glsl"

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <glm/ext/vector_ulp.hpp>
 #include <numbers>
 #include <numeric>
 #include <span>
@@ -14,8 +13,6 @@
 #include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
-#include "surface/ggx_albedo.hpp"
-#include "surface/sheen_albedo.hpp"
 
 namespace cumulet::core {
 #include "surface_tables.glsl"
@@ -99,15 +96,17 @@ void write_material(uvec4* to, const Material& m, bool double_sided) {
       bits(vec4(m.anisotropy, std::cos(m.anisotropy_rotation), std::sin(m.anisotropy_rotation), m.dispersion));
 }
 
-std::uint32_t wrap_bits(surface::Wrap wrap) {
-  switch (wrap) {
-    case surface::Wrap::mirrored:
-      return core::CM_WRAP_MIRRORED;
-    case surface::Wrap::clamp:
-      return core::CM_WRAP_CLAMP;
-    default:
-      return core::CM_WRAP_REPEAT;
-  }
+std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
+
+void pack_tree(ModelSource& source, ModelMesh& mesh, const Progress* progress) {
+  std::vector<uvec4>& words = source.words;
+  const auto nodes = std::as_bytes(mesh.bvh.nodes());
+  const auto records = std::as_bytes(mesh.bvh.records());
+  mesh.nodes = size_of(words);
+  mesh.records = mesh.nodes + static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
+  resize(words, words.size() + (nodes.size() + records.size()) / sizeof(uvec4), progress);
+  std::memcpy(words.data() + mesh.nodes, nodes.data(), nodes.size());
+  if (!records.empty()) std::memcpy(words.data() + mesh.records, records.data(), records.size());
 }
 
 bool draws_rich(const surface::Scene& scene, const surface::Pose& pose) {
@@ -118,39 +117,44 @@ bool draws_rich(const surface::Scene& scene, const surface::Pose& pose) {
   return false;
 }
 
-std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
+void pack_emitters(ModelSource& source, ModelMesh& mesh, const Progress* progress) {
+  const auto number = [](const light::EmissiveTriangle& t) { return t.triangle; };
+  const auto low = std::ranges::lower_bound(source.emissive, mesh.first_triangle, {}, number);
+  const auto high = std::ranges::lower_bound(source.emissive, mesh.first_triangle + mesh.triangle_count, {}, number);
+  const light::EmitterTable table =
+      light::emitter_table({low, high}, *source.scene, source.pose, progress, mesh.first_triangle);
+  mesh.emitters = size_of(source.words);
+  mesh.emitter_count = size_of(table.entries);
+  mesh.flux = table.flux;
+  source.words.insert(source.words.end(), table.entries.begin(), table.entries.end());
+}
 
 void pack_words(ModelSource& source, const Progress* progress) {
   const surface::Scene& scene = *source.scene;
   std::vector<uvec4>& words = source.words;
-  const auto nodes = std::as_bytes(source.bvh.nodes());
-  const auto records = std::as_bytes(source.bvh.records());
-  source.tables.records = static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
-  resize(words, (nodes.size() + records.size()) / sizeof(uvec4), progress);
-  std::memcpy(words.data(), nodes.data(), nodes.size());
-  if (!records.empty()) std::memcpy(words.data() + source.tables.records, records.data(), records.size());
+  for (ModelMesh& mesh : source.meshes) pack_tree(source, mesh, progress);
 
   check(progress);
-  source.tables.triangles = size_of(words);
+  const std::uint32_t triangles = size_of(words);
   resize(words, words.size() + scene.triangle_count(), progress);
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
     check(progress);
     const surface::Draw& draw = scene.draws[d];
     const std::uint32_t material = surface::material_of(scene, source.pose, d);
     for (std::uint32_t i = draw.first_index; i + 2 < draw.first_index + draw.index_count; i += 3) {
-      words[source.tables.triangles + i / 3] =
-          uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], material);
+      words[triangles + i / 3] = uvec4(scene.indices[i], scene.indices[i + 1], scene.indices[i + 2], material);
     }
   }
+  for (ModelMesh& mesh : source.meshes) mesh.triangles = triangles + mesh.first_triangle;
   check(progress);
-  source.tables.vertices = size_of(words);
+  source.vertices = size_of(words);
   resize(words, words.size() + core::CM_VERTEX_WORDS * scene.attributes.size(), progress);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
     check(progress);
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const surface::PosedVertex& v = source.pose.vertices[i];
       const surface::VertexAttributes& a = scene.attributes[i];
-      uvec4* to = &words[source.tables.vertices + core::CM_VERTEX_WORDS * i];
+      uvec4* to = &words[source.vertices + core::CM_VERTEX_WORDS * i];
       to[core::CM_VERTEX_PLACE] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
       to[core::CM_VERTEX_UV] = bits(vec4(a.uv[0], a.uv[1]));
       to[core::CM_VERTEX_REST] =
@@ -159,57 +163,46 @@ void pack_words(ModelSource& source, const Progress* progress) {
     }
   });
 
-  source.tables.materials = size_of(words);
+  source.materials = size_of(words);
   for (const Material& material : surface::materials_of(scene, source.pose)) {
     words.resize(words.size() + core::CM_MATERIAL_WORDS);
     write_material(&words[words.size() - core::CM_MATERIAL_WORDS], material, source.pose.double_sided);
   }
-  source.tables.textures = size_of(words);
-  for (const surface::Texture& texture : scene.textures) {
-    const TextureAtlas::Place& place = source.atlas->places[texture.image];
-    words.emplace_back(place.corner.x | place.corner.y << 16U, place.size.x | place.size.y << 16U, place.layer,
-                       wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << core::CM_WRAP_T_SHIFT |
-                           (texture.sampler.magnify == surface::Filter::nearest ? core::CM_TEXTURE_NEAREST : 0U));
-  }
   check(progress);
-  const light::EmitterTable table = light::emitter_table(source.emissive, scene, source.pose, progress);
-  source.tables.emitters = size_of(words);
-  source.tables.emitter_count = size_of(table.entries);
-  words.insert(words.end(), table.entries.begin(), table.entries.end());
-  const surface::GgxAlbedo& albedo = surface::GgxAlbedo::table();
-  const std::vector<uvec4> cells = albedo.cells();
-  const std::vector<uvec4> averages = albedo.average_cells();
-  source.tables.rich = draws_rich(scene, source.pose) ? 1U : 0U;
-  source.tables.ggx_albedo = size_of(words);
-  words.insert(words.end(), cells.begin(), cells.end());
-  source.tables.ggx_albedo_averages = size_of(words);
-  words.insert(words.end(), averages.begin(), averages.end());
-  source.tables.sheen_albedo = size_of(words);
-  if (source.tables.rich != 0U) {
-    const std::vector<uvec4> sheen = surface::SheenAlbedo::table().words();
-    words.insert(words.end(), sheen.begin(), sheen.end());
-  }
-  source.lights = light::scene_lights(source.pose, table);
-  source.tables.low = glm::prevFloat(vec3(source.pose.low));
-  source.tables.high = glm::nextFloat(vec3(source.pose.high));
+  for (ModelMesh& mesh : source.meshes) pack_emitters(source, mesh, progress);
+  source.rich = draws_rich(scene, source.pose);
 }
 
-void build(ModelSource& source, const Progress* progress) {
-  check(progress);
-  const std::vector<std::uint32_t> flags = surface::triangle_flags(*source.scene, source.pose);
-  check(progress);
-  source.bvh = surface::Bvh::build(source.pose.vertices, source.scene->indices, flags, progress);
-  source.built_cost = source.bvh.cost();
+// Triangles [first, first + count) of the scene.
+template <class T>
+std::span<const T> part_of(const std::vector<T>& all, const ModelMesh& mesh, std::size_t each) {
+  return std::span(all).subspan(each * mesh.first_triangle, each * mesh.triangle_count);
 }
 
-// What is put into the atlas for images that are larger than their places, as they are encoded.
-void shrink_images(TextureAtlas& atlas, const std::vector<surface::Image>& images, const Progress* progress) {
-  atlas.smaller.resize(images.size());
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    std::vector<std::uint8_t>& smaller = atlas.smaller[i];
-    for (uvec2 size(images[i].width, images[i].height); size != atlas.places[i].size; size = glm::max(size / 2U, 1U)) {
-      smaller = half_of(smaller.empty() ? images[i].rgba : smaller, size, false, progress);
-    }
+void build(ModelSource& source, ModelMesh& mesh, const std::vector<std::uint32_t>& flags, const Progress* progress) {
+  mesh.bvh = surface::Bvh::build(source.pose.vertices, part_of(source.scene->indices, mesh, 3), part_of(flags, mesh, 1),
+                                 progress);
+  mesh.built_cost = mesh.bvh.cost();
+}
+
+// Draws [first, last), as they are in the indices.
+void add_mesh(ModelSource& source, std::size_t first, std::size_t last, std::vector<glm::dmat4> placings) {
+  const surface::Scene& scene = *source.scene;
+  const std::size_t end = last < scene.draws.size() ? scene.draws[last].first_index : scene.indices.size();
+  ModelMesh mesh;
+  mesh.first_triangle = first < scene.draws.size() ? scene.draws[first].first_index / 3 : 0;
+  mesh.triangle_count = static_cast<std::uint32_t>(end / 3) - mesh.first_triangle;
+  mesh.placings = std::move(placings);
+  if (mesh.triangle_count > 0) source.meshes.push_back(std::move(mesh));
+}
+
+void find_meshes(ModelSource& source) {
+  const surface::Scene& scene = *source.scene;
+  source.meshes.clear();
+  if (scene.first_prototype_draw() > 0) add_mesh(source, 0, scene.first_prototype_draw(), {glm::dmat4(1.0)});
+  for (std::size_t p = 0; p < scene.prototypes.size(); ++p) {
+    const surface::Prototype& prototype = scene.prototypes[p];
+    add_mesh(source, prototype.first_draw, prototype.first_draw + prototype.draw_count, source.pose.placings[p]);
   }
 }
 
@@ -219,12 +212,13 @@ ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Pr
   auto source = make_left<ModelSource>();
   source->scene = std::move(scene);
   source->pose = std::move(pose);
-  build(*source, progress);
+  find_meshes(*source);
+  check(progress);
+  const std::vector<std::uint32_t> flags = surface::triangle_flags(*source->scene, source->pose);
+  for (ModelMesh& mesh : source->meshes) build(*source, mesh, flags, progress);
   check(progress);
   source->emissive = light::emissive_triangles(*source->scene, source->pose, progress);
-  TextureAtlas atlas = pack_atlas(source->scene->images, largest_layer);
-  shrink_images(atlas, source->scene->images, progress);
-  source->atlas = std::make_shared<const TextureAtlas>(std::move(atlas));
+  source->images = std::make_shared<const TextureImages>(texture_images(source->scene, largest_layer, progress));
   source->raster = make_raster_source(source->scene, source->pose, nullptr, progress);
   source->centres = blended_centres(*source->raster, source->pose, progress);
   check(progress);
@@ -237,17 +231,22 @@ ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Pr
   source->scene = last.scene;
   source->pose = std::move(pose);
   check(progress);
-  source->bvh = last.bvh;
-  check(progress);
-  source->built_cost = last.built_cost;
-  source->bvh.refit(source->pose.vertices, source->scene->indices, progress);
+  find_meshes(*source);
   // A node that turned inside out has other flags, as have other sides; what shows up or goes is another tree, as is
   // one whose boxes have grown apart, which is slow.
-  const bool other_flags =
-      surface::triangle_flags(*source->scene, source->pose) != surface::triangle_flags(*last.scene, last.pose);
-  if (other_flags || source->bvh.cost() > 1.5 * source->built_cost) build(*source, progress);
+  const std::vector<std::uint32_t> flags = surface::triangle_flags(*source->scene, source->pose);
+  const bool other_flags = flags != surface::triangle_flags(*last.scene, last.pose);
+  for (std::size_t i = 0; i < source->meshes.size(); ++i) {
+    ModelMesh& mesh = source->meshes[i];
+    check(progress);
+    mesh.bvh = last.meshes[i].bvh;
+    mesh.built_cost = last.meshes[i].built_cost;
+    check(progress);
+    mesh.bvh.refit(source->pose.vertices, part_of(source->scene->indices, mesh, 3), progress);
+    if (other_flags || mesh.bvh.cost() > 1.5 * mesh.built_cost) build(*source, mesh, flags, progress);
+  }
   check(progress);
-  source->atlas = last.atlas;
+  source->images = last.images;
   if (source->pose.hidden == last.pose.hidden && source->pose.materials == last.pose.materials &&
       source->pose.chosen == last.pose.chosen) {
     source->emissive = last.emissive;

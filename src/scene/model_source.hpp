@@ -1,12 +1,12 @@
 #pragma once
 
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
 #include <vector>
 
-#include "base/parameters.hpp"
+#include "base/shared_code.hpp"
 #include "light/emitters.hpp"
-#include "light/scene_lights.hpp"
 #include "scene/raster_source.hpp"
 #include "scene/texture_atlas.hpp"
 #include "surface/bvh.hpp"
@@ -14,19 +14,35 @@
 
 namespace cumulet::scene {
 
+/// Triangles that stand together, with a tree of their own: those that are posed in the model's own world, or a
+/// prototype's. Words: of the model's.
+struct ModelMesh {
+  std::uint32_t first_triangle = 0;
+  std::uint32_t triangle_count = 0;
+  surface::Bvh bvh;
+  double built_cost = 0.0;              ///< of the tree before it was refitted
+  std::vector<glm::dmat4> placings{1};  ///< to the model's own world
+  std::uint32_t nodes = 0;              ///< where each of its tables begins
+  std::uint32_t records = 0;
+  std::uint32_t triangles = 0;
+  std::uint32_t emitters = 0;
+  std::uint32_t emitter_count = 0;
+  double flux = 0.0;  ///< as light::EmitterTable has it, in its own space
+};
+
 /// What is shown of one pose of a scene, in main memory: what paths read, and what the surface pass does. No GL.
 struct ModelSource {
   surface::ScenePtr scene;
   surface::Pose pose;
-  surface::Bvh bvh;
-  double built_cost = 0.0;  // of the tree before it was refitted
+  std::vector<ModelMesh> meshes;  ///< those that have triangles
   std::vector<light::EmissiveTriangle> emissive;
-  std::vector<glm::uvec4> words;   // the tables of glsl/surface.glsl
-  core::CmSurfaceTables tables{};  // where each begins
-  light::SceneLights lights;
-  std::shared_ptr<const TextureAtlas> atlas;
+  std::vector<glm::uvec4> words;  ///< the tables of glsl/surface.glsl, but for textures
+  std::uint32_t vertices = 0;     ///< where those begin that all meshes share
+  std::uint32_t materials = 0;
+  bool rich = false;  ///< it shows materials that need CM_RICH (glsl/ggx.glsl)
+  std::shared_ptr<const TextureImages> images;
   std::shared_ptr<const RasterSource> raster;
-  std::vector<glm::vec3> centres;  // of the raster's blended triangles
+  std::vector<glm::vec3> centres;  ///< of the raster's blended triangles
 };
 
 using ModelSourcePtr = std::shared_ptr<const ModelSource>;

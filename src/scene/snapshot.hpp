@@ -73,9 +73,12 @@ struct Volume {
   bool operator==(const Volume&) const = default;
 };
 
-/// Surfaces in a pose.
+/// Surfaces in a pose, and where they stand.
 struct Model {
-  ModelSourcePtr source;
+  std::uint64_t id = 0;      ///< of what stays the same model, whatever it is of
+  ModelSourcePtr source;     ///< not null
+  glm::dmat4 to_world{1.0};  ///< affine, from the world that it was posed in
+  bool shadow_only = false;  ///< no camera ray meets it; others do
   bool operator==(const Model&) const = default;
 };
 

@@ -3,7 +3,14 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
+#include <utility>
+
+#include "base/shared_code.hpp"
+#include "scene/raster_source.hpp"
+
+namespace cumulet::core {
+#include "surface_tables.glsl"
+}  // namespace cumulet::core
 
 namespace cumulet::scene {
 
@@ -18,46 +25,79 @@ uvec2 halved_to_fit(uvec2 size, std::uint32_t largest) {
   return size;
 }
 
+std::uint32_t wrap_bits(surface::Wrap wrap) {
+  switch (wrap) {
+    case surface::Wrap::mirrored:
+      return core::CM_WRAP_MIRRORED;
+    case surface::Wrap::clamp:
+      return core::CM_WRAP_CLAMP;
+    default:
+      return core::CM_WRAP_REPEAT;
+  }
+}
+
 }  // namespace
 
-TextureAtlas pack_atlas(const std::vector<surface::Image>& images, std::uint32_t largest) {
+TextureImages texture_images(surface::ScenePtr scene, std::uint32_t largest, const Progress* progress) {
+  TextureImages to;
+  to.smaller.resize(scene->images.size());
+  for (std::size_t i = 0; i < scene->images.size(); ++i) {
+    const surface::Image& image = scene->images[i];
+    to.sizes.push_back(halved_to_fit({image.width, image.height}, largest));
+    std::vector<std::uint8_t>& smaller = to.smaller[i];
+    for (uvec2 size(image.width, image.height); size != to.sizes[i]; size = glm::max(size / 2U, 1U)) {
+      smaller = half_of(smaller.empty() ? image.rgba : smaller, size, false, progress);
+    }
+  }
+  to.scene = std::move(scene);
+  return to;
+}
+
+TextureAtlas pack_atlas(std::span<const TextureImagesPtr> scenes) {
   TextureAtlas atlas;
-  atlas.places.resize(images.size());
-  if (images.empty()) return atlas;
+  std::vector<TextureAtlas::Place*> order;
   std::uint32_t widest = 1;
   std::uint64_t texels = 0;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const uvec2 size = halved_to_fit({images[i].width, images[i].height}, largest);
-    atlas.places[i].size = size;
-    widest = std::max({widest, size.x, size.y});
-    texels += std::uint64_t{size.x} * size.y;
+  atlas.places.resize(scenes.size());
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    atlas.places[i].resize(scenes[i]->sizes.size());
+    for (std::size_t j = 0; j < atlas.places[i].size(); ++j) {
+      const uvec2 size = scenes[i]->sizes[j];
+      atlas.places[i][j].size = size;
+      order.push_back(&atlas.places[i][j]);
+      widest = std::max({widest, size.x, size.y});
+      texels += std::uint64_t{size.x} * size.y;
+    }
   }
+  if (order.empty()) return atlas;
   const auto square = std::bit_ceil(static_cast<std::uint32_t>(std::ceil(std::sqrt(double(texels)))));
-  atlas.edge = std::min(largest, std::max(widest, std::min(square, usual_edge)));
-  std::vector<std::size_t> order(images.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(
-      order, [&](std::size_t a, std::size_t b) { return atlas.places[a].size.y > atlas.places[b].size.y; });
+  atlas.edge = std::max(widest, std::min(square, usual_edge));
+  std::ranges::stable_sort(order, [](const auto* a, const auto* b) { return a->size.y > b->size.y; });
   uvec2 at(0U);
   std::uint32_t shelf = 0;
-  for (const std::size_t i : order) {
-    TextureAtlas::Place& place = atlas.places[i];
-    if (at.x + place.size.x > atlas.edge) {
+  for (TextureAtlas::Place* const place : order) {
+    if (at.x + place->size.x > atlas.edge) {
       at = {0U, at.y + shelf};
       shelf = 0;
     }
-    if (at.y + place.size.y > atlas.edge) {
+    if (at.y + place->size.y > atlas.edge) {
       at = uvec2(0U);
       shelf = 0;
       ++atlas.layers;
     }
-    place.corner = at;
-    place.layer = atlas.layers;
-    at.x += place.size.x;
-    shelf = std::max(shelf, place.size.y);
+    place->corner = at;
+    place->layer = atlas.layers;
+    at.x += place->size.x;
+    shelf = std::max(shelf, place->size.y);
   }
   ++atlas.layers;
   return atlas;
+}
+
+glm::uvec4 texture_word(const surface::Texture& texture, const TextureAtlas::Place& place) {
+  return {place.corner.x | place.corner.y << 16U, place.size.x | place.size.y << 16U, place.layer,
+          wrap_bits(texture.sampler.wrap_s) | wrap_bits(texture.sampler.wrap_t) << core::CM_WRAP_T_SHIFT |
+              (texture.sampler.magnify == surface::Filter::nearest ? core::CM_TEXTURE_NEAREST : 0U)};
 }
 
 }  // namespace cumulet::scene

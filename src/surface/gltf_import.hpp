@@ -17,8 +17,6 @@ struct GltfLimits {
   std::uint64_t memory = std::uint64_t{16} << 30U;   ///< bytes, of all decoded data together
   std::uint64_t unbacked = std::uint64_t{1} << 24U;  ///< elements of an accessor that has no buffer view
   std::uint32_t image_side = 16384;                  ///< pixels
-  /// Triangles of instances (EXT_mesh_gpu_instancing), which are copies.
-  std::uint64_t instanced_triangles = std::uint64_t{1} << 24U;
 };
 
 /// As import_gltf(path), of the bytes of a .gltf or .glb. `label` stands for the path in errors and log lines; files

@@ -100,7 +100,8 @@ class Assembler {
       count = here;
       if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE") own_attributes_.insert(one_line(name));
     }
-    budget_.take(*count, sizeof(glm::dmat4), what + "transforms");
+    // Here, in a pose, and in the tables and trees of what is shown.
+    budget_.take(*count, 4 * sizeof(glm::dmat4), what + "transforms");
     const auto read = [&]<int N>(const char* name, const glm::vec<N, float>& otherwise) {
       if (!attributes.Has(name)) return std::vector<glm::vec<N, float>>(*count, otherwise);
       const int accessor = attributes.Get(name).GetNumberAsInt();
@@ -158,24 +159,13 @@ class Assembler {
   void place() {
     std::uint64_t vertices = 0;
     std::uint64_t indices = 0;
-    std::uint64_t instanced = 0;
     std::uint64_t draws = 0;
-    for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t) {
-      const std::uint64_t copies = copies_of(node);
-      const std::uint64_t triangles = part.indices.size() / 3;
-      const std::uint64_t most = budget_.limits().instanced_triangles;
-      if (placings_.contains(node)) {
-        if (triangles != 0 && copies > (most - instanced) / triangles) {
-          malformed(numbered("node", node) + ": instances are copied, and " + std::to_string(copies) + " of " +
-                    std::to_string(triangles) + " triangles are more than the " + std::to_string(most) +
-                    " that a file may have of them");
-        }
-        instanced += copies * triangles;
-      }
-      draws += copies;
-      vertices += copies * part.positions.size();
-      indices += copies * part.indices.size();
-    });
+    const auto count = [&](std::uint32_t, const MeshPart& part, std::size_t) {
+      ++draws;
+      vertices += part.positions.size();
+      indices += part.indices.size();
+    };
+    for_each_part(count);
     budget_.take(vertices, sizeof(VertexAttributes) + sizeof(PosedVertex), "all vertices");
     budget_.take(indices, sizeof(std::uint32_t), "all indices");
     // Of triangles alone there are as many draws.
@@ -184,36 +174,42 @@ class Assembler {
     scene_->draws.reserve(draws);
     scene_->attributes.reserve(vertices);
     scene_->indices.reserve(indices);
+    // Prototypes come last, each of a node.
     for_each_part([&](std::uint32_t node, const MeshPart& part, std::size_t place) {
-      check(progress_);
-      int skin = file_.model.nodes[node].skin;
-      if (skin >= 0 && part.influences == 0) {
-        ++remarks_.unbound;
-        skin = -1;
-      }
-      if (skin >= 0) {
-        const std::size_t joints = scene_->rig.skins[static_cast<std::size_t>(skin)].joints.size();
-        if (part.joint_count > joints) {
-          malformed(numbered("node", node) + ": a vertex is bound to joint " + std::to_string(part.joint_count - 1) +
-                    " of " + std::to_string(joints) + " in " + numbered("skin", static_cast<std::size_t>(skin)));
-        }
-      }
-      const auto placed = placings_.find(node);
-      for (std::uint64_t copy = 0; copy < copies_of(node); ++copy) {
-        check(progress_);
-        scene_->add_instance(place, node, skin, progress_);
-        if (placed != placings_.end()) scene_->instances.back().in_node = placed->second[copy];
-        budget_.take(part.variants.size(), sizeof(std::uint32_t), "all variants");
-        for (std::size_t v = 0; v < part.variants.size(); ++v) {
-          scene_->variants[v].materials.push_back(part.variants[v]);
-        }
-      }
+      if (!placings_.contains(node)) place_part(node, part, place);
     });
+    for (auto& [node, in_node] : placings_) {
+      const auto first = static_cast<std::uint32_t>(scene_->draws.size());
+      for (const std::size_t place : parts_of_[static_cast<std::size_t>(file_.model.nodes[node].mesh)]) {
+        place_part(node, scene_->parts[place], place);
+        scene_->instances.back().in_prototype = true;
+      }
+      const auto parts = static_cast<std::uint32_t>(scene_->draws.size()) - first;
+      if (parts == 0) continue;
+      scene_->prototypes.push_back({first, parts, static_cast<std::uint32_t>(in_node.size())});
+      scene_->placings.push_back({node, std::move(in_node)});
+    }
   }
 
-  [[nodiscard]] std::uint64_t copies_of(std::uint32_t node) const {
-    const auto placed = placings_.find(node);
-    return placed == placings_.end() ? 1 : placed->second.size();
+  void place_part(std::uint32_t node, const MeshPart& part, std::size_t place) {
+    check(progress_);
+    int skin = file_.model.nodes[node].skin;
+    if (skin >= 0 && part.influences == 0) {
+      ++remarks_.unbound;
+      skin = -1;
+    }
+    if (skin >= 0) {
+      const std::size_t joints = scene_->rig.skins[static_cast<std::size_t>(skin)].joints.size();
+      if (part.joint_count > joints) {
+        malformed(numbered("node", node) + ": a vertex is bound to joint " + std::to_string(part.joint_count - 1) +
+                  " of " + std::to_string(joints) + " in " + numbered("skin", static_cast<std::size_t>(skin)));
+      }
+    }
+    scene_->add_instance(place, node, skin, progress_);
+    budget_.take(part.variants.size(), sizeof(std::uint32_t), "all variants");
+    for (std::size_t v = 0; v < part.variants.size(); ++v) {
+      scene_->variants[v].materials.push_back(part.variants[v]);
+    }
   }
 
   template <class Visit>

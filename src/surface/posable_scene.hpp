@@ -16,7 +16,13 @@ struct Instance {
   std::uint32_t node = 0;
   std::uint32_t first_vertex = 0;
   std::int32_t skin = -1;
-  glm::dmat4 in_node{1.0};  ///< where in its node's space the part is: EXT_mesh_gpu_instancing's
+  bool in_prototype = false;  ///< posed in its node's space
+};
+
+/// Where a prototype is shown, in the space of its node.
+struct Placings {
+  std::uint32_t node = 0;
+  std::vector<glm::dmat4> in_node;
 };
 
 /// A light under a node.
@@ -31,6 +37,7 @@ class PosableScene final : public Scene {
   Rig rig;
   std::vector<MeshPart> parts;
   std::vector<Instance> instances;
+  std::vector<Placings> placings;  ///< a prototype each
   std::vector<MovableMaterial> movable;  ///< the materials; empty: no animation moves any
   std::vector<PlacedLight> lights;
   std::vector<std::pair<std::uint32_t, SceneCamera>> cameras;  ///< with their nodes
@@ -49,6 +56,8 @@ class PosableScene final : public Scene {
   void bound(Pose& pose) const;
   /// Materials and lights.
   void move(const Track& track, double time, Pose& pose, std::vector<PlacedLight>& lights_now) const;
+  /// Where each prototype's draws are shown; those that are flat nowhere.
+  [[nodiscard]] std::vector<std::vector<glm::dmat4>> place_prototypes(const Stance& now) const;
   /// True if the instance mirrors.
   bool place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const;
 };

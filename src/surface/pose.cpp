@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "base/progress_part.hpp"
 #include "surface/posable_scene.hpp"
@@ -11,6 +12,8 @@
 namespace cumulet::surface::detail {
 
 namespace {
+
+constexpr std::size_t most_bounded = std::size_t{1} << 22U;  // vertices of copies that are looked at one by one
 
 /// Of the inverse transpose but for its length: det(M) * M^-T, which is finite for every M.
 glm::mat3 cofactors(const glm::mat3& m) {
@@ -99,7 +102,7 @@ void PosableScene::finish() {
 bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const {
   const MeshPart& part = parts[instance.part];
   const std::vector<float>& weights = now.weights[instance.node];
-  const glm::dmat4 to_world = now.to_world[instance.node] * instance.in_node;
+  const glm::dmat4 to_world = instance.in_prototype ? glm::dmat4(1.0) : now.to_world[instance.node];
   std::vector<glm::mat4> joints;
   bool flipped = false;
   if (instance.skin >= 0) {
@@ -184,17 +187,56 @@ void PosableScene::move(const Track& track, double time, Pose& pose, std::vector
   for (const MovableMaterial& material : moved) pose.materials.push_back(material.now);
 }
 
+std::vector<std::vector<glm::dmat4>> PosableScene::place_prototypes(const Stance& now) const {
+  std::vector<std::vector<glm::dmat4>> all;
+  for (const Placings& of : placings) {
+    std::vector<glm::dmat4>& placed = all.emplace_back();
+    if (!now.visible[of.node]) continue;
+    for (const glm::dmat4& in_node : of.in_node) {
+      const glm::dmat4 to_world = now.to_world[of.node] * in_node;
+      const double volume = glm::determinant(glm::dmat3(to_world));
+      if (finite(to_world) && std::isnormal(volume)) placed.push_back(to_world);
+    }
+  }
+  return all;
+}
+
 void PosableScene::bound(Pose& pose) const {
   glm::vec3 low(std::numeric_limits<float>::max());
   glm::vec3 high(std::numeric_limits<float>::lowest());
   bool any = false;
+  const auto add = [&](const glm::vec3& p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+    any = true;
+  };
   for (std::size_t i = 0; i < instances.size(); ++i) {
     if (is_hidden(pose, i)) continue;
     const std::size_t count = parts[instances[i].part].positions.size();
-    for (std::size_t v = instances[i].first_vertex; v < instances[i].first_vertex + count; ++v) {
-      low = glm::min(low, pose.vertices[v].position);
-      high = glm::max(high, pose.vertices[v].position);
-      any = true;
+    const std::span<const PosedVertex> vertices(&pose.vertices[instances[i].first_vertex], count);
+    if (!instances[i].in_prototype) {
+      for (const PosedVertex& vertex : vertices) add(vertex.position);
+      continue;
+    }
+    // Of many copies the corners of a box, of few each vertex.
+    const auto prototype = std::ranges::upper_bound(prototypes, i, {}, &Prototype::first_draw) - prototypes.begin() - 1;
+    const std::vector<glm::dmat4>& placed = pose.placings[static_cast<std::size_t>(prototype)];
+    std::vector<glm::vec3> points;
+    if (placed.size() * count <= most_bounded) {
+      for (const PosedVertex& vertex : vertices) points.push_back(vertex.position);
+    } else {
+      glm::vec3 own_low(std::numeric_limits<float>::max());
+      glm::vec3 own_high(std::numeric_limits<float>::lowest());
+      for (const PosedVertex& vertex : vertices) {
+        own_low = glm::min(own_low, vertex.position);
+        own_high = glm::max(own_high, vertex.position);
+      }
+      for (unsigned c = 0; c < 8; ++c)
+        points.emplace_back((c & 1U) != 0 ? own_high.x : own_low.x, (c & 2U) != 0 ? own_high.y : own_low.y,
+                            (c & 4U) != 0 ? own_high.z : own_low.z);
+    }
+    for (const glm::dmat4& to_world : placed) {
+      for (const glm::vec3& p : points) add(glm::vec3(to_world * glm::dvec4(p, 1.0)));
     }
   }
   if (!any) return;
@@ -219,6 +261,7 @@ Pose PosableScene::pose(double time, std::size_t animation, const Progress* prog
     result.hidden.push_back(now.visible[instance.node] ? 0 : 1);
   }
   check(progress);
+  result.placings = place_prototypes(now);
   bound(result);
   std::vector<PlacedLight> lights_now = lights;
   if (track != nullptr) move(*track, time, result, lights_now);

@@ -141,13 +141,21 @@ struct Draw {
   std::uint32_t node = 0;
 };
 
+/// Draws that a pose places together any number of times (EXT_mesh_gpu_instancing), of vertices in a space of their own.
+/// One after another in the draws and in the indices, as prototypes are.
+struct Prototype {
+  std::uint32_t first_draw = 0;
+  std::uint32_t draw_count = 0;
+  std::uint32_t placings = 0;  ///< where it is shown
+};
+
 /// What does not move: shared by every pose.
 struct VertexAttributes {
   glm::vec2 uv[2] = {};
   glm::vec4 color{1.0F};  ///< linear
 };
 
-/// What moves, in world space.
+/// What moves, in world space, or in its prototype's.
 struct PosedVertex {
   glm::vec3 position;
   glm::vec3 normal;         ///< unit
@@ -161,6 +169,7 @@ struct Pose {
   std::vector<PosedVertex> vertices;  ///< as many as Scene::attributes
   std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
   std::vector<std::uint8_t> hidden;   ///< a Draw each: 1 where it is not there at this time; empty: none
+  std::vector<std::vector<glm::dmat4>> placings;  ///< a Prototype each: to the world
   std::vector<Material> materials;    ///< as they are at this time; empty: the scene's
   std::vector<std::uint32_t>
       chosen;                 ///< a Draw each: its material in the variant that is chosen; empty: the Draw's own
@@ -190,7 +199,8 @@ class Scene {
   std::vector<Image> images;
   std::vector<Texture> textures;
   std::vector<Material> materials;  ///< at least one
-  std::vector<Draw> draws;          ///< in the order of the file
+  std::vector<Draw> draws;          ///< in the order of the file, but for those of prototypes, which come last
+  std::vector<Prototype> prototypes;
   std::vector<std::uint32_t> indices;
   std::vector<VertexAttributes> attributes;
   std::vector<Animation> animations;
@@ -206,12 +216,28 @@ class Scene {
   Counts counts;
 
   [[nodiscard]] std::size_t triangle_count() const { return indices.size() / 3; }
+  /// Of a prototype's as many as it has placings.
+  [[nodiscard]] std::uint64_t shown_triangles() const;
+  /// The first that is a prototype's.
+  [[nodiscard]] std::size_t first_prototype_draw() const {
+    return prototypes.empty() ? draws.size() : prototypes.front().first_draw;
+  }
 
   /// The scene `time` seconds into animation `animation` (looped past its end); as it rests, if there is no such one.
   /// Linear, step and cubic spline interpolation, skins and morph targets (glTF 2.0, 3.7.3, 3.7.2.2, 3.11).
   /// Cancelled, throws Error(cancelled).
   [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0, const Progress* progress = nullptr) const = 0;
 };
+
+inline std::uint64_t Scene::shown_triangles() const {
+  std::uint64_t all = triangle_count();
+  for (const Prototype& prototype : prototypes) {
+    std::uint64_t own = 0;
+    for (std::uint32_t i = 0; i < prototype.draw_count; ++i) own += draws[prototype.first_draw + i].index_count / 3;
+    all = all - own + own * prototype.placings;
+  }
+  return all;
+}
 
 /// As they are in a pose of the scene.
 inline const std::vector<Material>& materials_of(const Scene& scene, const Pose& pose) {

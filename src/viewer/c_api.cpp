@@ -244,6 +244,20 @@ cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) 
   });
 }
 
+cumulet_status cumulet_add_model(cumulet_viewer* viewer, cumulet_model* model) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(model != nullptr, "the model is NULL");
+    v.add_model(model->asset);
+  });
+}
+
+cumulet_status cumulet_remove_model(cumulet_viewer* viewer, cumulet_model* model) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(model != nullptr, "the model is NULL");
+    v.remove_model(*model->asset);
+  });
+}
+
 cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_instance* instance) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
@@ -492,6 +506,12 @@ cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumul
     out.met_volume = p.place ? 1 : 0;
     out.place = p.place.value_or(0);
     out.tag = p.tag;
+    if (p.surface) {
+      out.met_surface = 1;
+      out.material = p.surface->material;
+      copy_text(p.surface->material_name, out.material_name, sizeof out.material_name);
+      for (int axis = 0; axis < 3; ++axis) out.normal[axis] = p.surface->normal[axis];
+    }
     write_desc(pick, out, "cumulet_pick");
   });
 }

@@ -34,6 +34,11 @@ struct cumulet_instance {
   std::atomic<int> references = 1;
 };
 
+struct cumulet_model {
+  std::shared_ptr<cumulet::viewer::ModelInstance> asset;
+  std::atomic<int> references = 1;
+};
+
 struct cumulet_sequence {
   std::shared_ptr<cumulet::viewer::Sequence> asset;
   std::atomic<int> references = 1;

@@ -104,7 +104,7 @@ cumulet_status cumulet_surfaces_get_info(const cumulet_surfaces* surfaces, cumul
     const viewer::SurfaceAsset::Rest rest = asset.rest();
     cumulet_surfaces_info out{};
     copy_text(asset.name(), out.name, sizeof out.name);
-    out.triangles = asset.scene().triangle_count();
+    out.triangles = asset.scene().shown_triangles();
     const surface::Scene::Counts& counts = asset.scene().counts;
     out.materials = counts.materials;
     out.lights = static_cast<uint32_t>(rest.lights);

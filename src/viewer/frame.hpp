@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <optional>
+#include <string>
 
 #include "gl/api.hpp"
 #include "render/display.hpp"
@@ -55,7 +56,14 @@ struct Pick {
   double distance = 0.0;
   std::optional<std::uint32_t> place;  // of a volume, where one is met
   std::uint64_t volume = 0;            // that one's scene::Volume::id
-  std::uint64_t tag = 0;               // of an instance
+  std::uint64_t model = 0;             // where a surface is met: its scene::Model::id
+  std::uint64_t tag = 0;               // of an instance or a model
+  struct Surface {
+    glm::dvec3 normal{0.0};  // unit, towards where the ray comes from
+    std::uint32_t material = 0;
+    std::string material_name;
+  };
+  std::optional<Surface> surface;  // where one is met
 };
 
 /// cumulet_map_light.

@@ -9,6 +9,7 @@
 
 #include "base/listeners.hpp"
 #include "viewer/settings.hpp"
+#include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
 
 namespace cumulet::viewer {
@@ -23,26 +24,53 @@ struct InstanceSettings {
   std::uint64_t tag = 0;  ///< the host's own
 };
 
+/// Surfaces in scenes, likewise.
+struct ModelSettings {
+  SurfaceAssetPtr surfaces;  ///< null: nothing
+  SurfaceChoice choice;
+  glm::dmat4 to_world{1.0};
+  bool hidden = false;
+  bool shadow_only = false;
+  std::uint64_t tag = 0;  ///< the host's own
+};
+
 /// What several viewers may show. All calls are safe from any thread.
-class Instance {
+template <class Settings>
+class Shared {
  public:
-  explicit Instance(InstanceSettings settings) : settings_(std::move(settings)) {}
+  explicit Shared(Settings settings) : settings_(std::move(settings)) {}
 
   /// change is called under a lock, and must not throw.
-  void edit(const std::function<void(InstanceSettings&)>& change);
-  [[nodiscard]] InstanceSettings get() const;
+  void edit(const std::function<void(Settings&)>& change) {
+    {
+      const std::scoped_lock lock(mutex_);
+      change(settings_);
+      ++revision_;
+    }
+    listeners_.tell();
+  }
+  [[nodiscard]] Settings get() const {
+    const std::scoped_lock lock(mutex_);
+    return settings_;
+  }
   /// Another after each change.
-  [[nodiscard]] std::uint64_t revision() const;
-  /// Listeners::listen() to changes; must not change an instance.
+  [[nodiscard]] std::uint64_t revision() const {
+    const std::scoped_lock lock(mutex_);
+    return revision_;
+  }
+  /// Listeners::listen() to changes; must not change one.
   [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
     return listeners_.listen(std::move(changed));
   }
 
  private:
   mutable std::mutex mutex_;
-  InstanceSettings settings_;
+  Settings settings_;
   std::uint64_t revision_ = 1;
   Listeners listeners_;
 };
+
+using Instance = Shared<InstanceSettings>;
+using ModelInstance = Shared<ModelSettings>;
 
 }  // namespace cumulet::viewer

@@ -66,6 +66,39 @@ void put_before(const render::Display& display, std::span<float> rgba) {
   }
 }
 
+// What of the models a ray has met at the pick's position.
+void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle, const dvec3& ray) {
+  const scene::ModelTable& table = models.table();
+  const std::size_t record = table.record_of(triangle);
+  const scene::Model& model = models.models().at(table.parts.at(record).model);
+  const scene::ModelSource& source = *model.source;
+  const scene::ModelMesh& mesh = source.meshes.at(table.parts[record].mesh);
+  const surface::Scene& scene = *source.scene;
+  const std::size_t index = 3 * (std::size_t{mesh.first_triangle} + triangle - table.records[record].first);
+  const glm::dmat3 to_world(dvec3(table.records[record].to_world_x), dvec3(table.records[record].to_world_y),
+                            dvec3(table.records[record].to_world_z));
+  const dvec3 origin(table.records[record].origin);
+  // Areas opposite to the corners are the weights of their normals.
+  std::array<dvec3, 3> from_here;
+  for (std::size_t i = 0; i < 3; ++i)
+    from_here[i] = to_world * dvec3(source.pose.vertices[scene.indices[index + i]].position) + origin - pick.position;
+  dvec3 normal(0.0);
+  for (std::size_t i = 0; i < 3; ++i)
+    normal += glm::length(glm::cross(from_here[(i + 1) % 3], from_here[(i + 2) % 3])) *
+              dvec3(source.pose.vertices[scene.indices[index + i]].normal);
+  normal = glm::transpose(glm::inverse(to_world)) * normal;
+  if (!(glm::length(normal) > 0.0)) normal = glm::cross(from_here[1] - from_here[0], from_here[2] - from_here[0]);
+  normal = glm::length(normal) > 0.0 ? glm::normalize(normal) : dvec3(0.0);
+  const auto draw = std::ranges::find_if(scene.draws, [&](const surface::Draw& d) {
+    return index >= d.first_index && index < std::size_t{d.first_index} + d.index_count;
+  });
+  const std::uint32_t material =
+      surface::material_of(scene, source.pose, static_cast<std::size_t>(draw - scene.draws.begin()));
+  pick.model = model.id;
+  pick.surface = Pick::Surface{glm::dot(normal, ray) > 0.0 ? -normal : normal, material,
+                               scene.materials.at(material).name};
+}
+
 }  // namespace
 
 Pick Context::pick(const Shot& shot, double x, double y) {
@@ -81,13 +114,17 @@ Pick Context::pick(const Shot& shot, double x, double y) {
   const dvec3 aside = right * view->right + up * view->up;
   const dvec3 origin = view->orthographic ? view->eye + aside : view->eye;
   const dvec3 ray = view->orthographic ? view->forward : view->forward + aside;
-  Pick pick{true, origin + z * ray, z * glm::length(ray), {}};
-  if (!picked.met_volume) return pick;
+  Pick pick;
+  pick.hit = true;
+  pick.position = origin + z * ray;
+  pick.distance = z * glm::length(ray);
+  if (picked.triangle) meet(pick, *scene_.models(), *picked.triangle, ray);
+  if (!picked.place) return pick;
   // The places of one volume lie together.
   const std::vector<scene::Volume>& volumes = scene_.volumes();
-  pick.volume = volumes.at(picked.place).id;
+  pick.volume = volumes.at(*picked.place).id;
   const auto first = std::ranges::find_if(volumes, [&](const scene::Volume& v) { return v.id == pick.volume; });
-  pick.place = picked.place - static_cast<std::uint32_t>(first - volumes.begin());
+  pick.place = *picked.place - static_cast<std::uint32_t>(first - volumes.begin());
   return pick;
 }
 

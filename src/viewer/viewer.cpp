@@ -10,6 +10,7 @@
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
+#include "scene/model_table.hpp"
 #include "scene/space.hpp"
 
 namespace cumulet::viewer {
@@ -21,6 +22,8 @@ using Clock = std::chrono::steady_clock;
 
 // Volumes that cameras are fitted to by how they look, not by their boxes.
 constexpr std::size_t most_looked_at = 8;
+// Triangles that they are fitted to one by one.
+constexpr std::size_t most_vertices = std::size_t{1} << 24U;
 
 bool glows(const VolumeAsset& volume) { return volume.may_emit(); }
 
@@ -78,6 +81,7 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
       environment_builder_([this] { notify(); }, trace),
       shelf_(
           log_, [this] { notify(); }, trace),
+      poses_([this] { notify(); }, trace),
       frames_(
           log_, [this] { notify(); }, trace) {
   set_medium({});
@@ -127,6 +131,7 @@ void Viewer::sync() {
   }
   follow_sequence();
   follow_instances();
+  follow_models();
   if (auto surfaces = surface_builder_.take()) {
     if (surfaces->asset) surface_asset_ = std::move(surfaces->asset);
     model_source_ = std::move(surfaces->source);
@@ -373,6 +378,83 @@ std::vector<Viewer::Shown>::iterator Viewer::find(const Instance& instance) {
   return std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.instance.get() == &instance; });
 }
 
+void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
+  sync();
+  if (find(*model) != shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the viewer shows the model already");
+  ShownModel shown;
+  shown.id = ++last_id_;
+  shown.listener = model->listen([this] { notify(); });
+  shown.model = std::move(model);
+  shown_models_.push_back(std::move(shown));
+  sync();  // what it is of begins to be posed
+  touch();
+}
+
+void Viewer::remove_model(const ModelInstance& model) {
+  sync();
+  const auto place = find(model);
+  if (place == shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the model");
+  shown_models_.erase(place);
+  poses_due_ = true;
+  touch();
+}
+
+std::vector<Viewer::ShownModel>::iterator Viewer::find(const ModelInstance& model) {
+  return std::ranges::find_if(shown_models_, [&](const ShownModel& shown) { return shown.model.get() == &model; });
+}
+
+void Viewer::follow_models() {
+  for (ShownModel& shown : shown_models_) {
+    const std::uint64_t revision = shown.model->revision();
+    if (revision == shown.revision) continue;
+    const SurfaceAssetPtr before = shown.settings.surfaces;
+    shown.settings = shown.model->get();
+    shown.revision = revision;
+    if (before != shown.settings.surfaces && shown.source &&
+        (!shown.settings.surfaces || shown.source->scene.get() != &shown.settings.surfaces->scene())) {
+      shown.source = nullptr;
+      shown.begun.reset();
+    }
+    poses_due_ = true;
+    ++settings_revision_;
+  }
+  if (const std::uint64_t posed = poses_.revision(); posed != posed_ || poses_due_) {
+    posed_ = posed;
+    std::vector<PoseShelf::Wish> wishes;
+    for (ShownModel& shown : shown_models_) {
+      if (!shown.is_wanted()) {
+        shown.wish.reset();
+        continue;
+      }
+      PoseShelf::Wish wish{shown.settings.surfaces, shown.settings.choice};
+      if (shown.wish != wish) {
+        if (shown.wish && poses_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
+        shown.wish = wish;
+      }
+      if (std::ranges::find(wishes, wish) == wishes.end()) wishes.push_back(std::move(wish));
+    }
+    // Before the wishes, with which what was begun for others goes.
+    for (ShownModel& shown : shown_models_) {
+      if (!shown.wish) continue;
+      auto source = poses_.built(*shown.wish);
+      // Of wishes that change faster than they are posed, one that was begun.
+      if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces) source = poses_.built(*shown.begun);
+      if (source) shown.source = std::move(*source);
+    }
+    if (std::exchange(poses_due_, false)) poses_.wish(std::move(wishes));
+  }
+}
+
+std::vector<scene::Model> Viewer::models() const {
+  std::vector<scene::Model> models;
+  if (model_source_) models.push_back({0, model_source_});
+  for (const ShownModel& shown : shown_models_) {
+    if (shown.is_shown())
+      models.push_back({shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only});
+  }
+  return models;
+}
+
 void Viewer::follow_instances() {
   for (Shown& shown : shown_) {
     const std::uint64_t revision = shown.instance->revision();
@@ -497,6 +579,8 @@ void Viewer::rebuild() {
   }
   shelf_.forget_failures();
   wishes_due_ = true;
+  poses_.forget_failures();
+  poses_due_ = true;
   frames_.rebuild();
   take_medium();
   request_build();
@@ -508,10 +592,14 @@ void Viewer::cancel() {
   surface_builder_.cancel();
   environment_builder_.cancel();
   shelf_.cancel();
+  poses_.cancel();
   frames_.cancel();
 }
 
-bool Viewer::busy() const { return builds() || surface_builder_.busy() || environment_builder_.busy(); }
+bool Viewer::busy() const {
+  const bool poses = poses_.busy() || poses_.revision() != posed_;
+  return builds() || surface_builder_.busy() || poses || environment_builder_.busy();
+}
 
 bool Viewer::builds() const {
   const bool frame_comes = followed_ && !followed_->is_wanted &&
@@ -595,7 +683,7 @@ void Viewer::wait(double timeout_ms) {
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   const auto idle = [&] {
     return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
-           shelf_.wait(until) && frames_.wait(until);
+           shelf_.wait(until) && poses_.wait(until) && frames_.wait(until);
   };
   // What comes of one may be work for another.
   do {
@@ -604,6 +692,7 @@ void Viewer::wait(double timeout_ms) {
     sync();
   } while (busy());
   if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
+  if (const auto failure = poses_.status().failure) throw Error(*failure);
   if (const auto failure = builder_.status().failure) throw Error(*failure);
   if (const auto failure = environment_builder_.status().failure) throw Error(*failure);
   if (const auto failure = shelf_.status().failure) throw Error(*failure);
@@ -617,9 +706,11 @@ Viewer::Status Viewer::status() const {
   const Worker::Status environment = environment_builder_.status();
   const Worker::Status grids = shelf_.status();
   const Worker::Status frames = frames_.status();
+  const Worker::Status poses = poses_.status();
   const auto& own = volume.failure ? volume.failure : frames.failure;
-  Status status{volume.stage, volume.fraction, own ? own : grids.failure, surfaces.failure, environment.failure};
-  for (const Worker::Status& other : {frames, grids, surfaces, environment}) {
+  Status status{volume.stage, volume.fraction, own ? own : grids.failure,
+                surfaces.failure ? surfaces.failure : poses.failure, environment.failure};
+  for (const Worker::Status& other : {frames, grids, surfaces, poses, environment}) {
     if (status.stage != Progress::Stage::idle) break;
     status.stage = other.stage;
     status.fraction = other.fraction;
@@ -834,11 +925,23 @@ std::optional<Bounds> Viewer::box() const {
   for (const Shown& shown : shown_) {
     if (shown.is_seen() && !shown.settings.volume->empty()) add(shown.settings.volume->bounds(shown.settings.to_world));
   }
-  if (shows_triangles()) add({model_source_->pose.low, model_source_->pose.high});
+  if (model_source_ && model_source_->scene->triangle_count() > 0)
+    add({model_source_->pose.low, model_source_->pose.high});
+  for (const ShownModel& shown : shown_models_) {
+    if (!shown.is_shown()) continue;
+    const scene::ModelBounds bounds = scene::bounds_of(*shown.source, shown.settings.to_world);
+    if (bounds.any) add({bounds.low, bounds.high});
+  }
   return box;
 }
 
-bool Viewer::shows_triangles() const { return model_source_ && model_source_->scene->triangle_count() > 0; }
+bool Viewer::shows_models() const {
+  return model_source_ || std::ranges::any_of(shown_models_, &ShownModel::is_shown);
+}
+
+bool Viewer::shows_triangles() const {
+  return std::ranges::any_of(models(), [](const scene::Model& m) { return m.source->scene->triangle_count() > 0; });
+}
 
 std::optional<scene::Ground> Viewer::ground() const {
   const auto all = box();
@@ -891,14 +994,33 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     // What glows shows at any density.
     if (volume.may_emit) add_box();
   };
+  std::size_t vertices = 0;
+  const auto add_mesh = [&](const scene::Model& model, const scene::ModelMesh& mesh, const glm::dmat4& to_world) {
+    const surface::Scene& scene = *model.source->scene;
+    // Of many copies what sticks out of one is their boxes'.
+    vertices += mesh.triangle_count;
+    if (vertices > most_vertices) {
+      const auto [low, high] = scene::box_of(mesh.bvh);
+      const scene::Block block = scene::block_of(to_world, low, high);
+      for (int i = 0; i < 8; ++i)
+        add(block.middle + ((i & 1) != 0 ? 1.0 : -1.0) * block.half[0] + ((i & 2) != 0 ? 1.0 : -1.0) * block.half[1] +
+            ((i & 4) != 0 ? 1.0 : -1.0) * block.half[2]);
+      return;
+    }
+    const auto first = scene.indices.begin() + 3 * std::ptrdiff_t{mesh.first_triangle};
+    for (auto i = first; i != first + 3 * std::ptrdiff_t{mesh.triangle_count}; ++i)
+      add(dvec3(to_world * glm::dvec4(model.source->pose.vertices[*i].position, 1.0)));
+  };
   for (const scene::Place& place : places_) {
     if (facts_) add_volume(*facts_, place.to_world, medium_);
   }
   for (const Shown& shown : shown_) {
     if (shown.is_seen()) add_volume(*shown.settings.volume->facts(), shown.settings.to_world, shown.settings.medium);
   }
-  if (model_source_) {
-    for (const surface::PosedVertex& vertex : model_source_->pose.vertices) add(vertex.position);
+  for (const scene::Model& model : models()) {
+    for (const scene::ModelMesh& mesh : model.source->meshes) {
+      for (const glm::dmat4& placing : mesh.placings) add_mesh(model, mesh, model.to_world * placing);
+    }
   }
   return reach;
 }
@@ -937,8 +1059,8 @@ VolumeAssetPtr Viewer::empty_volume() {
     volume::ScalarVolume empty;
     empty.name = "nothing";
     empty.bounds_max = glm::ivec3(0);
-    const dvec3 middle = 0.5 * (model_source_->pose.low + model_source_->pose.high);
-    empty.index_to_world[3] = glm::dvec4(middle, 1.0);
+    const auto all = box();
+    empty.index_to_world[3] = glm::dvec4(all ? 0.5 * (all->min + all->max) : dvec3(0.0), 1.0);
     empty_volume_ = std::make_shared<const VolumeAsset>(std::move(empty));
   }
   return empty_volume_;
@@ -989,8 +1111,7 @@ void Viewer::keep_to_one_march(std::vector<scene::Volume>& volumes) const {
 
 scene::SnapshotPtr Viewer::snapshot() {
   show_volumes();
-  scene_.models.clear();
-  if (model_source_) scene_.models.push_back({model_source_});
+  scene_.models = models();
   scene_.view.set(view_ ? std::optional<scene::Viewpoint>(*view_) : std::nullopt);
   scene_.ground.set(ground());
   if (!snapshot_ || *snapshot_ != scene_) snapshot_ = std::make_shared<const scene::Snapshot>(scene_);

@@ -24,6 +24,7 @@
 #include "viewer/grid_shelf.hpp"
 #include "viewer/instance.hpp"
 #include "viewer/navigation.hpp"
+#include "viewer/pose_shelf.hpp"
 #include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_builder.hpp"
@@ -91,6 +92,10 @@ class Viewer {
   void add_instance(std::shared_ptr<Instance> instance);
   /// Throws Error(invalid_argument) where the viewer does not show it.
   void remove_instance(const Instance& instance);
+  /// Shows it beside the surfaces from now on, as it is at any time. Throws Error(invalid_argument) where it does.
+  void add_model(std::shared_ptr<ModelInstance> model);
+  /// Throws Error(invalid_argument) where the viewer does not show it.
+  void remove_model(const ModelInstance& model);
   void rebuild();
   void cancel();
   /// Throws how the last job ended, or Error(timeout).
@@ -238,6 +243,23 @@ class Viewer {
     }
     [[nodiscard]] bool is_seen() const { return settings.volume && !settings.hidden; }
   };
+  // A model that is shown, likewise.
+  struct ShownModel {
+    std::shared_ptr<ModelInstance> model;
+    std::uint64_t id = 0;
+    std::shared_ptr<void> listener;
+    std::uint64_t revision = 0;
+    ModelSettings settings;
+    std::optional<PoseShelf::Wish> wish;
+    std::optional<PoseShelf::Wish> begun;  // the last before it that was being posed
+    scene::ModelSourcePtr source;          // the newest; null: none yet
+    [[nodiscard]] bool is_wanted() const { return settings.surfaces && !settings.hidden; }
+    [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
+  };
+  std::vector<ShownModel>::iterator find(const ModelInstance& model);
+  void follow_models();
+  // All that are there, the viewer's own among them.
+  [[nodiscard]] std::vector<scene::Model> models() const;
   std::vector<Shown>::iterator find(const Instance& instance);
   void follow_instances();
   // Where grids depend on the view, there has to be one.
@@ -259,6 +281,7 @@ class Viewer {
   Shot shot();
   [[nodiscard]] std::optional<Bounds> box() const;
   [[nodiscard]] bool shows_triangles() const;
+  [[nodiscard]] bool shows_models() const;
   [[nodiscard]] std::optional<scene::Ground> ground() const;
   /// What cameras fit; good for as long as nothing changes.
   [[nodiscard]] std::optional<Subject> subject() const;
@@ -305,6 +328,9 @@ class Viewer {
   std::vector<scene::Place> places_{1};             // of the volume; one at least
   scene::Part<scene::Medium> shown_medium_;         // its own
   std::vector<Shown> shown_;                        // in the order in which they were added
+  std::vector<ShownModel> shown_models_;            // likewise
+  std::uint64_t posed_ = 0;  // of poses_, when it was last looked at
+  bool poses_due_ = false;   // what is wished of it is to be told anew
   std::uint64_t last_id_ = 0;
   std::uint64_t shelved_ = 0;   // of shelf_, when it was last looked at
   bool wishes_due_ = false;     // what is wished of it is to be told anew
@@ -353,6 +379,7 @@ class Viewer {
   SurfaceBuilder surface_builder_;
   EnvironmentBuilder environment_builder_;
   GridShelf shelf_;
+  PoseShelf poses_;
   FrameShelf frames_;
 };
 

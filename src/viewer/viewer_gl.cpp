@@ -90,10 +90,10 @@ void Viewer::prepare(const Frame& frame) {
 
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
   const bool others = std::ranges::any_of(shown_, &Shown::is_seen);
-  const bool scene = facts_ || model_source_ || others;
+  const bool scene = facts_ || shows_models() || others;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
-  if (!facts_ && model_source_ && !shows_instances() && !built_.source && !builder_.busy()) {
+  if (!facts_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
     Progress progress;
     built_ = build_grid(log_, empty_volume(), grid_.build, progress);
   }
@@ -226,6 +226,8 @@ Pick Viewer::pick(double x, double y) {
   with_gl([&](Context& g) { pick = g.pick(shot(), x, y); });
   const auto met = std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.id == pick.volume; });
   if (pick.volume != 0 && met != shown_.end()) pick.tag = met->settings.tag;
+  const auto model = std::ranges::find(shown_models_, pick.model, &ShownModel::id);
+  if (pick.model != 0 && model != shown_models_.end()) pick.tag = model->settings.tag;
   return pick;
 }
 

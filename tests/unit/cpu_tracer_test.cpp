@@ -161,8 +161,8 @@ class CpuTracerSurfaces : public CpuTracer {
     still_->viewer().show_surfaces(model);
     still_->set_grid(settings);
     const test::Picture picture = test::render(*still_, image);
-    twin.model = model.get();
     twin.cm = still_->viewer().trace_parameters();
+    twin.cm.surfaces = twin.show(std::vector<scene::Model>{{0, model}});
     twin.cm.dispatch.samples = image.samples;
     return same_pixels(twin, picture);
   }

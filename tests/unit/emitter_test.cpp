@@ -246,9 +246,9 @@ TEST(Emitters, AnotherPoseHasAnotherTable) {
   for (std::size_t i = 4; i < 8; ++i)
     pose.vertices[i].position.x = 32.0F + 3.0F * (pose.vertices[i].position.x - 32.0F);
   const auto second = scene::make_model_source(*first, pose, nullptr);
-  EXPECT_NEAR(first->lights.triangle_flux, pi * 400.0 * 2.0, 1e-2);
-  EXPECT_NEAR(second->lights.triangle_flux, pi * 1200.0 * 2.0, 1e-2);
-  const float density = glm::uintBitsToFloat(second->words.at(second->tables.emitters).w);
+  EXPECT_NEAR(first->meshes.at(0).flux, pi * 400.0 * 2.0, 1e-2);
+  EXPECT_NEAR(second->meshes.at(0).flux, pi * 1200.0 * 2.0, 1e-2);
+  const float density = glm::uintBitsToFloat(second->words.at(second->meshes.at(0).emitters).w);
   EXPECT_NEAR(density * 1200.0, 1.0, 1e-5);
 }
 

@@ -199,11 +199,11 @@ TEST(GltfPointers, VisibilityComesAndGoesWithAllThatIsMadeOfIt) {
 
   Progress progress;
   const scene::ModelSourcePtr first = scene::make_model_source(scene, without, &progress);
-  EXPECT_EQ(first->bvh.records().size(), 1U);
+  EXPECT_EQ(first->meshes.at(0).bvh.records().size(), 1U);
   EXPECT_EQ(first->emissive.size(), 1U);
   EXPECT_EQ(first->raster->solid.size(), 1U);
   const scene::ModelSourcePtr then = scene::make_model_source(*first, with, &progress);
-  EXPECT_EQ(then->bvh.records().size(), 2U);
+  EXPECT_EQ(then->meshes.at(0).bvh.records().size(), 2U);
   EXPECT_EQ(then->emissive.size(), 2U);
   EXPECT_EQ(then->raster->solid.size(), 2U);
   EXPECT_EQ(then->raster->pictures, first->raster->pictures);
@@ -269,7 +269,7 @@ TEST(GltfPointers, MaterialsAreThoseOfTheMoment) {
   EXPECT_NE(bright->words, dark->words);
   EXPECT_EQ(bright->raster->material_blocks, fresh->raster->material_blocks);
   EXPECT_EQ(bright->raster->pictures, dark->raster->pictures);
-  EXPECT_EQ(bright->atlas, dark->atlas);
+  EXPECT_EQ(bright->images, dark->images);
 }
 
 TEST(GltfPointers, EachAnimationMovesMaterials) {
@@ -581,17 +581,17 @@ TEST(GltfVariants, MaterialsAreThoseThatAreChosen) {
   const scene::ModelSourcePtr day = shown(1);
   EXPECT_EQ(day->pose.chosen, scene->variants[0].materials);
   EXPECT_EQ(day->emissive.size(), 1U);
-  EXPECT_EQ(day->atlas, none->atlas);
+  EXPECT_EQ(day->images, none->images);
   EXPECT_EQ(day->raster->pictures, none->raster->pictures);
   EXPECT_EQ(triangle_flags(*scene, day->pose)[0], static_cast<std::uint32_t>(TriangleFlags::ask));
   EXPECT_EQ(triangle_flags(*scene, none->pose)[0], static_cast<std::uint32_t>(TriangleFlags::one_sided));
-  EXPECT_EQ(day->words[day->tables.triangles].w, 1U);
-  EXPECT_EQ(day->words[day->tables.triangles + 1].w, 0U);
+  EXPECT_EQ(day->words[day->meshes.at(0).triangles].w, 1U);
+  EXPECT_EQ(day->words[day->meshes.at(0).triangles + 1].w, 0U);
   // As made at once, and back again.
   Pose pose = scene->pose(0.0);
   pose.chosen = scene->variants[0].materials;
   EXPECT_EQ(day->words, scene::make_model_source(scene, pose, &progress)->words);
-  EXPECT_EQ(shown(2)->words[none->tables.triangles].w, 2U);
+  EXPECT_EQ(shown(2)->words[none->meshes.at(0).triangles].w, 2U);
   EXPECT_EQ(shown(0)->words, none->words);
   EXPECT_EQ(shown(3)->words, none->words);  // one that is not there
 }
@@ -742,6 +742,16 @@ GltfModel instanced_model(const std::function<json(GltfModel&)>& attributes, con
   return model;
 }
 
+/// The triangle's, in the world, where that instance stands.
+std::array<glm::vec3, 3> placed_corners(const Scene& scene, const Pose& pose, std::size_t instance) {
+  std::array<glm::vec3, 3> corners{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec4 own(pose.vertices.at(scene.indices.at(i)).position, 1.0);
+    corners[i] = glm::vec3(pose.placings.at(0).at(instance) * own);
+  }
+  return corners;
+}
+
 TEST(GltfInstances, StandWhereTheirAttributesAndTheirNodePutThem) {
   GltfModel model = instanced_model(
       [](GltfModel& m) {
@@ -756,34 +766,33 @@ TEST(GltfInstances, StandWhereTheirAttributesAndTheirNodePutThem) {
   Lines lines;
   const ScenePtr scene = imported(model, lines.log);
   EXPECT_TRUE(lines.warnings.empty());
-  ASSERT_EQ(scene->triangle_count(), 3U);
-  ASSERT_EQ(scene->draws.size(), 3U);
+  EXPECT_EQ(scene->shown_triangles(), 3U);
+  ASSERT_EQ(scene->triangle_count(), 1U);  // in memory once
+  ASSERT_EQ(scene->prototypes.size(), 1U);
   const Pose pose = scene->pose(0.0);
-  test::near(test::corners(*scene, pose, 0)[1], {102, 0, 0});
-  const auto turned = test::corners(*scene, pose, 1);
+  test::near(placed_corners(*scene, pose, 0)[1], {102, 0, 0});
+  const auto turned = placed_corners(*scene, pose, 1);
   test::near(turned[0], {120, 0, 0}, 1e-3F);
   test::near(turned[1], {120, 4, 0}, 1e-3F);  // x, twice and twice as long, is y
   test::near(turned[2], {114, 0, 0}, 1e-3F);  // y is -x
-  test::near(test::corners(*scene, pose, 2)[1], {98, 0, 10});
-  EXPECT_EQ(pose.flipped, (std::vector<std::uint8_t>{0, 0, 1}));
+  test::near(placed_corners(*scene, pose, 2)[1], {98, 0, 10});
+  EXPECT_LT(glm::determinant(glm::dmat3(pose.placings[0][2])), 0.0);
   EXPECT_EQ(pose.low.x, 98.0);
   test::near(glm::vec3(pose.high), {120, 4, 10}, 1e-3F);
-  // A normal keeps its side in the mirrored one.
-  test::near(pose.vertices[scene->indices[6]].normal, {0, 0, 1});
 }
 
 TEST(GltfInstances, MoveWithTheirNode) {
   GltfModel model = instanced_model([](GltfModel& m) { return json{{"TRANSLATION", m.vec3({0, 0, 0, 3, 0, 0})}}; });
   animate(model, {{"/nodes/0/translation", 3, {0, 0, 0, 0, 8, 0}}});
   const ScenePtr scene = imported(model);
-  test::near(test::corners(*scene, scene->pose(1.0), 1)[0], {3, 8, 0});
+  test::near(placed_corners(*scene, scene->pose(1.0), 1)[0], {3, 8, 0});
 }
 
 TEST(GltfInstances, WhatIsNotReadIsTold) {
   Lines lines;
   GltfModel model = instanced_model([](GltfModel& m) { return json{{"_COLOR", m.vec3({1, 0, 0, 0, 1, 0})}}; });
   const ScenePtr scene = imported(model, lines.log);
-  EXPECT_EQ(scene->triangle_count(), 2U);  // both in one place
+  EXPECT_EQ(scene->shown_triangles(), 2U);  // both in one place
   ASSERT_EQ(lines.warnings.size(), 1U);
   EXPECT_TRUE(has(lines.warnings[0], "instances are drawn without _COLOR")) << lines.warnings[0];
   // Of no attribute it is a mesh as any other, of no instance it is none.
@@ -802,22 +811,23 @@ TEST(GltfInstances, HostileOnesAreRefusedInALine) {
   EXPECT_TRUE(has(line([](GltfModel& m) { return json{{"ROTATION", m.vec3({0, 0, 0})}}; }), "wrong type of element"));
   EXPECT_TRUE(has(line([](GltfModel&) { return json{{"SCALE", 77}}; }), "there is no accessor 77"));
   EXPECT_TRUE(has(line([](GltfModel& m) { return json{{"SCALE", m.vec3({1, 1e30F, 1})}}; }), "or too large"));
-  GltfLimits limits;
-  limits.instanced_triangles = 9;
   const auto many = [](std::size_t count) {
     return instanced_model([count](GltfModel& m) {
              return json{{"SCALE", m.vec3(std::vector<float>(3 * count, 1.0F))}};
            })
         .gltf();
   };
-  EXPECT_EQ(imported(many(9), {}, limits)->triangle_count(), 9U);
-  EXPECT_TRUE(has(refused(many(10), ErrorCode::file, limits),
-                  "node 0: instances are copied, and 10 of 1 triangles are more than the 9"));
-  // Each copy takes a draw and a place of its own, of however few triangles; all else of 1000 fits.
+  // Each takes a place of its own.
   GltfLimits small;
   small.memory = 400U << 10U;
-  EXPECT_EQ(imported(many(100), {}, small)->draws.size(), 100U);
-  EXPECT_TRUE(has(refused(many(1000), ErrorCode::file, small), "all instances would need more than the"));
+  EXPECT_EQ(imported(many(100), {}, small)->shown_triangles(), 100U);
+  EXPECT_TRUE(has(refused(many(1000), ErrorCode::file, small), "instances' transforms would need more than the"));
+}
+
+TEST(GltfInstances, FlatOnesAreNotDrawn) {
+  const ScenePtr scene =
+      imported(instanced_model([](GltfModel& m) { return json{{"SCALE", m.vec3({1, 1, 1, 1, 0, 1, 0, 0, 0})}}; }));
+  EXPECT_EQ(scene->pose(0.0).placings.at(0).size(), 1U);
 }
 
 }  // namespace

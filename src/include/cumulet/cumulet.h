@@ -37,8 +37,9 @@
  * library, but for the two exceptions and to retain and release handles: any other call from inside one, for whatever
  * viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while
  * [GL] calls of other viewers with the same programs wait for their turn: take no lock in them that is held around a
- * [GL] call. Calls that change a camera, an instance or a sequence run the update callbacks of the viewers that show it
- * while other calls for the same handle wait for them: nor take a lock that is held around calls for such handles.
+ * [GL] call. Calls that change a camera, an instance, a model or a sequence run the update callbacks of the viewers
+ * that show it while other calls for the same handle wait for them: nor take a lock that is held around calls for such
+ * handles.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -538,9 +539,10 @@ CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* 
  * KHR_texture_transform, KHR_mesh_quantization, KHR_draco_mesh_compression, EXT_meshopt_compression, EXT_texture_webp,
  * KHR_node_visibility (what is hidden neither shows nor counts), KHR_animation_pointer (transforms, weights and
  * visibility of nodes, factors and texture transforms of materials, lights; a warning names what else a file animates),
- * EXT_mesh_gpu_instancing (as copies, which may be 16,777,216 triangles together). Watts per steradian and per square
- * metre stand for KHR_lights_punctual's candela and lux. Emissive triangles are lights, to their front alone where the
- * material is single-sided. Surfaces of alphaMode BLEND cover by chance, ray by ray: any order is right.
+ * EXT_mesh_gpu_instancing (each mesh once in memory, however many instances it has; those that are flat are not drawn).
+ * Watts per steradian and per square metre stand for KHR_lights_punctual's candela and lux. Emissive triangles are
+ * lights, to their front alone where the material is single-sided. Surfaces of alphaMode BLEND cover by chance, ray by
+ * ray: any order is right.
  */
 
 /* Reads a .gltf or .glb file. */
@@ -589,7 +591,7 @@ CUMULET_API void cumulet_surfaces_release(cumulet_surfaces* surfaces);          
 typedef struct cumulet_surfaces_info {
   size_t struct_size;
   char name[128];     /* the path, or what the host named it */
-  uint64_t triangles; /* that are shown: those of a mesh that two nodes place count twice */
+  uint64_t triangles; /* that are shown: those of a mesh that two nodes place count twice, as those of instances */
   uint32_t materials; /* of the file, used or not, as meshes, primitives and textures */
   uint32_t lights;    /* that are shown, as cameras */
   uint32_t cameras;
@@ -1162,6 +1164,44 @@ CUMULET_API cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_
 /* CUMULET_ERROR_INVALID_ARGUMENT if it does not. */
 CUMULET_API cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumulet_instance* instance);
 
+/* ---- Models: surfaces beside the viewer's own ----------------------------------------------------------------------
+ *
+ * Surfaces where a host wants them: each at a place, at a moment of an animation, of a variant. Any number of them may
+ * share surfaces, which are in memory once for each moment and variant, and any viewers may share models. They may be
+ * changed in any thread, by the calls below; a viewer looks at changes in its next call. Another place uploads a
+ * matrix, no triangle; another moment poses them on a worker, and what was posed last is shown until then. They pass
+ * light on as the viewer's own surfaces do, are drawn by previews, and shine: their emissive triangles and lamps stand
+ * where they do (intensities of lamps stay what they are, whatever a place stretches).
+ */
+typedef struct cumulet_model cumulet_model; /* cumulet_model_release */
+
+typedef struct cumulet_model_desc {
+  size_t struct_size;
+  cumulet_surfaces* surfaces; /* shared; NULL: none, and nothing is shown */
+  double to_world[16];        /* affine, no flattening; from the surfaces' own world; zeros: as they stand there */
+  double time;                /* these four: as in cumulet_surface_settings_desc */
+  uint32_t animation;
+  uint32_t variant;
+  int32_t double_sided;
+  int32_t hidden;      /* 1: it is as if it were not there */
+  int32_t shadow_only; /* 1: cameras do not see it, nor do picks and AOVs; other light meets it, and it shines */
+  uint64_t tag;        /* the host's own, which cumulet_pick tells */
+} cumulet_model_desc;
+
+/* error as in cumulet_create. */
+CUMULET_API cumulet_status cumulet_model_create(const cumulet_model_desc* desc, cumulet_model** out, char* error,
+                                                size_t error_size);
+CUMULET_API cumulet_model* cumulet_model_retain(cumulet_model* model); /* returns it; NULL is allowed */
+CUMULET_API void cumulet_model_release(cumulet_model* model);          /* NULL is allowed */
+/* CUMULET_ERROR_INVALID_ARGUMENT, and it stays as it was, for what is refused on creation. */
+CUMULET_API cumulet_status cumulet_model_set(cumulet_model* model, const cumulet_model_desc* desc);
+CUMULET_API cumulet_status cumulet_model_set_to_world(cumulet_model* model, const double to_world[16]);
+CUMULET_API cumulet_status cumulet_model_set_time(cumulet_model* model, double time);
+/* Retains it. CUMULET_ERROR_INVALID_ARGUMENT if the viewer shows it already. */
+CUMULET_API cumulet_status cumulet_add_model(cumulet_viewer* viewer, cumulet_model* model);
+/* CUMULET_ERROR_INVALID_ARGUMENT if it does not. */
+CUMULET_API cumulet_status cumulet_remove_model(cumulet_viewer* viewer, cumulet_model* model);
+
 CUMULET_API cumulet_status cumulet_set_light(cumulet_viewer* viewer, const cumulet_light_desc* desc);
 CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer,
                                                             const cumulet_environment_settings_desc* desc);
@@ -1221,11 +1261,12 @@ typedef enum cumulet_clip {
 } cumulet_clip;
 
 /*
- * A perspective or orthographic camera, of a pinhole or a lens. eye == target: placed once, by the first viewer that renders through it with
- * something to show, so that it fits what is seen from +Z and a little above. Seen are triangles, and the volume where
- * its opacity, at the density scale of that moment, is 5 % or more; where nothing is, the bounds. 6 % of the picture's
- * shorter side, or more, stay free on each side. Near and far plane do not clip the volume: they say what depth buffers
- * mean (d = f (z - n) / (z (f - n)), reversed: 1 - d), and where an orthographic ray begins (at the near plane).
+ * A perspective or orthographic camera, of a pinhole or a lens. eye == target: placed once, by the first viewer that
+ * renders through it with something to show, so that it fits what is seen from +Z and a little above. Seen are
+ * triangles, and the volume where its opacity, at the density scale of that moment, is 5 % or more; where nothing is,
+ * the bounds. 6 % of the picture's shorter side, or more, stay free on each side. Near and far plane do not clip the
+ * volume: they say what depth buffers mean (d = f (z - n) / (z (f - n)), reversed: 1 - d), and where an orthographic
+ * ray begins (at the near plane).
  */
 typedef struct cumulet_camera_desc {
   size_t struct_size;
@@ -1242,10 +1283,10 @@ typedef struct cumulet_camera_desc {
 } cumulet_camera_desc;
 
 /*
- * Depth of field, by a lens: a point at z is a disc of lens_radius x |z - focus| / z, in the plane that is sharp. Traced
- * pictures and AOVs have it. What is rasterised (surfaces of previews, and with CUMULET_SURFACE_LIGHT_NONE), debug
- * views, picks and depths are through the lens' middle, and the host's depth ends rays as if they came from there. A
- * lens is kept by cumulet_camera_set_matrices.
+ * Depth of field, by a lens: a point at z is a disc of lens_radius x |z - focus| / z, in the plane that is sharp.
+ * Traced pictures and AOVs have it. What is rasterised (surfaces of previews, and with CUMULET_SURFACE_LIGHT_NONE),
+ * debug views, picks and depths are through the lens' middle, and the host's depth ends rays as if they came from
+ * there. A lens is kept by cumulet_camera_set_matrices.
  */
 /* Cameras may be shared by viewers. A viewer is made with one of its own. */
 CUMULET_API cumulet_status cumulet_camera_create(const cumulet_camera_desc* desc, cumulet_camera** out);
@@ -1539,17 +1580,23 @@ CUMULET_API const char* cumulet_transmittance_map_glsl(void);
 
 typedef struct cumulet_pick {
   size_t struct_size;
-  int32_t hit;        /* 1: a surface is met, or the volume reaches half opacity, along the pixel's ray */
-  double position[3]; /* world space, where it does */
-  double distance;    /* from the ray's origin */
-  int32_t met_volume; /* 1: it is the volume, 0: a surface, or nothing */
-  uint32_t place;     /* then: of cumulet_set_volume_places, the one with the most extinction there; of one 0 */
-  uint64_t tag;       /* cumulet_instance_desc.tag, if it is one that has the most; of the viewer's own volume 0 */
+  int32_t hit;         /* 1: a surface is met, or the volume reaches half opacity, along the pixel's ray */
+  double position[3];  /* world space, where it does */
+  double distance;     /* from the ray's origin */
+  int32_t met_volume;  /* 1: it is the volume, 0: a surface, or nothing */
+  uint32_t place;      /* then: of cumulet_set_volume_places, the one with the most extinction there; of one 0 */
+  uint64_t tag;        /* cumulet_instance_desc.tag, if it is one that has the most, or cumulet_model_desc.tag, if it is
+                          one that is met; of the viewer's own volume and surfaces 0 */
+  int32_t met_surface; /* 1: a triangle of the viewer's surfaces, or of a model, is met */
+  uint32_t material;   /* then: its number in the file; of a host's triangles that of their mesh */
+  char material_name[128]; /* "" if it has none */
+  double normal[3];        /* unit, world space, as its vertices have it, on the side of the ray */
 } cumulet_pick;
 
 /* [GL] What is at the position x, y of the picture last rendered, in pixels of its frame. */
 CUMULET_API cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumulet_pick* pick);
-/* World bounds of the viewer's volume, its instances and triangles. CUMULET_ERROR_INVALID_ARGUMENT if it has neither.
+/* World bounds of the viewer's volume, its instances, triangles and models. CUMULET_ERROR_INVALID_ARGUMENT if it has
+ * neither.
  */
 CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], double box_max[3]);
 

@@ -682,6 +682,80 @@ class Instance {
   cumulet_instance* handle_ = nullptr;
 };
 
+// ---- Models ---------------------------------------------------------------------------------------------------------
+
+/// What a model is made of: shares the surfaces.
+struct ModelDesc {
+  Surfaces surfaces;
+  std::array<double, 16> to_world{};
+  double time = 0.0;
+  std::uint32_t animation = 0;
+  std::uint32_t variant = 0;
+  bool double_sided = false;
+  bool hidden = false;
+  bool shadow_only = false;
+  std::uint64_t tag = 0;
+};
+
+/// A share in surfaces of scenes: a copy is one more of the same. Any thread.
+class Model {
+ public:
+  Model() noexcept = default;
+  Model(const Model& other) noexcept : handle_(cumulet_model_retain(other.handle_)) {}
+  Model(Model&& other) noexcept : handle_(other.release()) {}
+  Model& operator=(Model other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Model() { cumulet_model_release(handle_); }
+
+  [[nodiscard]] static Result<Model> create(const ModelDesc& desc) noexcept {
+    const cumulet_model_desc c = described(desc);
+    return detail::made<Model>([&](cumulet_model** out, char* error, std::size_t size) {
+      return cumulet_model_create(&c, out, error, size);
+    });
+  }
+  [[nodiscard]] Result<> set(const ModelDesc& desc) const noexcept {
+    const cumulet_model_desc c = described(desc);
+    return detail::result(cumulet_model_set(handle_, &c));
+  }
+  [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
+    return detail::result(cumulet_model_set_to_world(handle_, to_world.data()));
+  }
+  [[nodiscard]] Result<> set_time(double time) const noexcept {
+    return detail::result(cumulet_model_set_time(handle_, time));
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_model* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_model* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Model adopt(cumulet_model* handle) noexcept {
+    Model model;
+    model.handle_ = handle;
+    return model;
+  }
+
+ private:
+  static cumulet_model_desc described(const ModelDesc& desc) noexcept {
+    cumulet_model_desc c{.struct_size = sizeof c,
+                         .surfaces = desc.surfaces.handle(),
+                         .to_world = {},
+                         .time = desc.time,
+                         .animation = desc.animation,
+                         .variant = desc.variant,
+                         .double_sided = desc.double_sided ? 1 : 0,
+                         .hidden = desc.hidden ? 1 : 0,
+                         .shadow_only = desc.shadow_only ? 1 : 0,
+                         .tag = desc.tag};
+    std::ranges::copy(desc.to_world, c.to_world);
+    return c;
+  }
+  cumulet_model* handle_ = nullptr;
+};
+
 // ---- Sequences ------------------------------------------------------------------------------------------------------
 
 struct SequenceDesc {
@@ -1030,6 +1104,12 @@ class Viewer {
     if (auto done = result(cumulet_get_sequence_frame(handle(), frame, cause.data(), cause.size())); !done)
       return done.error();
     return Text<512>(cause.data());
+  }
+  [[nodiscard]] Result<> add_model(const Model& model) noexcept {
+    return result(cumulet_add_model(handle(), model.handle()));
+  }
+  [[nodiscard]] Result<> remove_model(const Model& model) noexcept {
+    return result(cumulet_remove_model(handle(), model.handle()));
   }
   [[nodiscard]] Result<> add_instance(const Instance& instance) noexcept {
     return result(cumulet_add_instance(handle(), instance.handle()));

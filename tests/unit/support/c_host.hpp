@@ -47,6 +47,11 @@ struct ReleaseInstance {
   void operator()(cumulet_instance* instance) const { cumulet_instance_release(instance); }
 };
 using InstanceRef = std::unique_ptr<cumulet_instance, ReleaseInstance>;
+
+struct ReleaseModel {
+  void operator()(cumulet_model* model) const { cumulet_model_release(model); }
+};
+using ModelRef = std::unique_ptr<cumulet_model, ReleaseModel>;
 struct ReleaseSequence {
   void operator()(cumulet_sequence* sequence) const { cumulet_sequence_release(sequence); }
 };

@@ -1,14 +1,17 @@
 #pragma once
 
+#include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
 #include "light/alias_table.hpp"
 #include "light/lamps.hpp"
 #include "render/parameters.hpp"
-#include "scene/model_source.hpp"
+#include "scene/model_table.hpp"
 #include "support/volumes.hpp"
+#include "surface/ggx_albedo.hpp"
 
 // Functions of variants share their signatures; each leaves some of it unused.
 #pragma GCC diagnostic push
@@ -35,22 +38,52 @@ struct CpuTet : CpuTetData {
 };
 
 struct CpuSurfaceData {
-  const scene::ModelSource* model = nullptr;
-  uvec4 cm_words(uint word) const { return model->words.at(word); }
+  const scene::ModelSource* shown_source = nullptr;
+  std::vector<uvec4> shown_words;  // its own, and what models share
+  std::vector<CmModel> cm_models;
+  std::vector<CmInstanceNode> cm_model_nodes;
+  uint cm_model = 0;
+  scene::TextureAtlas shown_atlas;
+
+  // These, all of one source; returns what the parameters are of them.
+  CmSurfaceTables show(std::span<const scene::Model> models) {
+    shown_source = models.front().source.get();
+    shown_words = shown_source->words;
+    shown_atlas = scene::pack_atlas(std::vector<scene::TextureImagesPtr>{shown_source->images});
+    const auto textures = static_cast<uint>(shown_words.size());
+    for (const surface::Texture& texture : shown_source->scene->textures)
+      shown_words.push_back(scene::texture_word(texture, shown_atlas.places[0][texture.image]));
+    const scene::ModelTable table =
+        scene::make_model_table(models, [&](const scene::ModelSource&) { return scene::ModelWords{0, textures}; });
+    cm_models = table.records;
+    cm_model_nodes = table.nodes;
+    CmSurfaceTables tables{};
+    tables.low = table.low;
+    tables.high = table.high;
+    tables.models = static_cast<uint>(cm_models.size());
+    const auto add = [&](const std::vector<uvec4>& more) {
+      const auto first = static_cast<uint>(shown_words.size());
+      shown_words.insert(shown_words.end(), more.begin(), more.end());
+      return first;
+    };
+    tables.ggx_albedo = add(surface::GgxAlbedo::table().cells());
+    tables.ggx_albedo_averages = add(surface::GgxAlbedo::table().average_cells());
+    return tables;
+  }
+
+  uvec4 cm_words(uint word) const { return shown_words.at(word); }
   CmLamp cm_lamp(uint i) const {
-    CmLamp lamp = light::lamp_record(model->pose.lights.at(i), dvec3(0.0));
-    lamp.chance = 1.0F / static_cast<float>(model->pose.lights.size());
+    CmLamp lamp = light::lamp_record(shown_source->pose.lights.at(i), dvec3(0.0));
+    lamp.chance = 1.0F / static_cast<float>(shown_source->pose.lights.size());
     lamp.stays = light::Alias::certain;
     return lamp;
   }
   vec4 cm_atlas_value(ivec3 at) const {
-    const scene::TextureAtlas& atlas = *model->atlas;
-    for (std::size_t i = 0; i < atlas.places.size(); ++i) {
-      const scene::TextureAtlas::Place& place = atlas.places[i];
+    for (std::size_t i = 0; i < shown_atlas.places[0].size(); ++i) {
+      const scene::TextureAtlas::Place& place = shown_atlas.places[0][i];
       const uvec2 texel = uvec2(ivec2(at)) - place.corner;  // beyond any size to the left or above
       if (uint(at.z) != place.layer || texel.x >= place.size.x || texel.y >= place.size.y) continue;
-      const auto& rgba = atlas.smaller[i].empty() ? model->scene->images[i].rgba : atlas.smaller[i];
-      const std::uint8_t* const value = &rgba.at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
+      const std::uint8_t* const value = &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
       return vec4(value[0], value[1], value[2], value[3]) / 255.0F;
     }
     throw std::out_of_range("no image there");

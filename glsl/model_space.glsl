@@ -1,0 +1,49 @@
+// Where models stand. Shared by GLSL and C++; the includer has the tables of model_table.glsl.
+#ifndef CM_MODEL_SPACE_GLSL
+#define CM_MODEL_SPACE_GLSL
+
+// A vector and a point of the world in a model's own space, and back.
+CM_FN vec3 cm_in_model(uint at, vec3 v) {
+  return cm_models[at].to_own_x * v.x + cm_models[at].to_own_y * v.y + cm_models[at].to_own_z * v.z;
+}
+CM_FN vec3 cm_in_model_point(uint at, vec3 p) { return cm_in_model(at, p - cm_models[at].origin); }
+CM_FN vec3 cm_out_of_model(uint at, vec3 v) {
+  return cm_models[at].to_world_x * v.x + cm_models[at].to_world_y * v.y + cm_models[at].to_world_z * v.z;
+}
+CM_FN vec3 cm_out_of_model_point(uint at, vec3 p) { return cm_out_of_model(at, p) + cm_models[at].origin; }
+
+// A normal of a model's own space in the world, unit, on the same side of the surface.
+CM_FN vec3 cm_model_normal(uint at, vec3 n) {
+  // The rows of the inverse are what normals go by.
+  vec3 v = vec3(dot(cm_models[at].to_own_x, n), dot(cm_models[at].to_own_y, n), dot(cm_models[at].to_own_z, n));
+  float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
+  return largest > 0.0f ? normalize(v / largest) : n;
+}
+
+// The area in a model's own space of a unit of area of the world, upright to n (unit).
+CM_FN float cm_own_area(uint at, vec3 n) {
+  vec3 v = vec3(dot(cm_models[at].to_world_x, n), dot(cm_models[at].to_world_y, n), dot(cm_models[at].to_world_z, n));
+  return cm_models[at].own_volume * length(v);
+}
+
+// How far a point of a model's surface may be off it in the world's floats, and a ray off in its own.
+CM_FN float cm_model_room(uint at, vec3 p) {
+  vec3 o = abs(cm_models[at].origin);
+  vec3 from = abs(p);
+  return 5e-7f * (max(max(o.x, o.y), o.z) + max(max(from.x, from.y), from.z));
+}
+
+// The model that has a triangle of this number. O(log models).
+CM_FN uint cm_model_of(uint triangle) {
+  uint low = 0u;
+  uint high = cm.surfaces.models;
+  while (low + 1u < high) {
+    uint middle = (low + high) >> 1u;
+    bool below = cm_models[middle].first <= triangle;
+    low = below ? middle : low;
+    high = below ? high : middle;
+  }
+  return low;
+}
+
+#endif

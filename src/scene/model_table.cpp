@@ -1,0 +1,189 @@
+#include "scene/model_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "base/error.hpp"
+#include "light/alias_table.hpp"
+
+namespace cumulet::scene {
+
+namespace {
+
+using core::CmModel;
+using glm::dmat4;
+using glm::dvec3;
+using glm::vec3;
+
+constexpr float largest = 1e15F;  // of which shaders' products are finite
+
+bool is_sound(const CmModel& m) {
+  const auto sound = [](const vec3& v) { return core::cm_is_within(v, largest); };
+  return sound(m.to_own_x) && sound(m.to_own_y) && sound(m.to_own_z) && sound(m.to_world_x) && sound(m.to_world_y) &&
+         sound(m.to_world_z) && sound(m.origin) && m.own_volume > 0.0F && m.own_volume < 1e30F;
+}
+
+void place(CmModel& record, const dmat4& to_world) {
+  const glm::dmat3 linear(to_world);
+  const glm::dmat3 inverse = glm::inverse(linear);
+  record.to_world_x = vec3(linear[0]);
+  record.to_world_y = vec3(linear[1]);
+  record.to_world_z = vec3(linear[2]);
+  record.to_own_x = vec3(inverse[0]);
+  record.to_own_y = vec3(inverse[1]);
+  record.to_own_z = vec3(inverse[2]);
+  record.origin = vec3(to_world[3]);
+  const double volume = glm::determinant(linear);
+  record.own_volume = static_cast<float>(1.0 / std::abs(volume));
+  if (volume < 0.0) record.flags |= core::CM_MODEL_MIRRORS;
+}
+
+// How likely looks for emissive triangles are for those of each record.
+void share_looks(ModelTable& table, std::vector<double> power) {
+  double sum = 0.0;
+  for (const double of : power) sum += of;
+  if (!(sum > 0.0) || !std::isfinite(sum)) {
+    for (CmModel& record : table.records) record.emitter_count = 0;
+    return;
+  }
+  table.lights.triangle_flux = sum;
+  const std::vector<light::Alias> aliases = light::alias_table(power, sum);
+  // As the table's words give them.
+  std::vector<double> chance(power.size(), 0.0);
+  for (std::size_t i = 0; i < power.size(); ++i) {
+    table.records[i].alias = aliases[i].stays;
+    table.records[i].alias_other = aliases[i].other;
+    const double stays =
+        table.records[i].emitter_count > 0 ? (static_cast<double>(aliases[i].stays) + 1.0) / 4294967296.0 : 0.0;
+    chance[i] += stays;
+    chance[aliases[i].other] += 1.0 - stays;
+  }
+  for (std::size_t i = 0; i < power.size(); ++i) {
+    table.records[i].emitter_chance = static_cast<float>(chance[i] / static_cast<double>(power.size()));
+    table.lights.triangles = std::max(table.lights.triangles, table.records[i].emitter_count);
+  }
+}
+
+}  // namespace
+
+std::pair<dvec3, dvec3> box_of(const surface::Bvh& bvh) {
+  dvec3 low(std::numeric_limits<double>::max());
+  dvec3 high(-low);
+  for (const surface::Bvh::Node::Child& child : bvh.nodes().front().child) {
+    if (!core::cm_is_within(child.low, static_cast<float>(farthest))) continue;  // a child that is not there
+    low = glm::min(low, dvec3(child.low));
+    high = glm::max(high, dvec3(child.high));
+  }
+  return {low, high};
+}
+
+surface::PunctualLight placed(surface::PunctualLight light, const dmat4& to_world) {
+  light.position = vec3(to_world * glm::dvec4(light.position, 1.0));
+  const dvec3 direction = glm::dmat3(to_world) * dvec3(light.direction);
+  light.direction = vec3(glm::normalize(direction));
+  return light;
+}
+
+std::size_t ModelTable::record_of(std::uint32_t triangle) const {
+  const auto after = std::ranges::upper_bound(records, triangle, {}, &CmModel::first);
+  return static_cast<std::size_t>(after - records.begin()) - 1;
+}
+
+ModelBounds bounds_of(const ModelSource& source, const dmat4& to_world) {
+  ModelBounds all;
+  const auto add = [&](const dvec3& low, const dvec3& high) {
+    all.low = all.any ? glm::min(all.low, low) : low;
+    all.high = all.any ? glm::max(all.high, high) : high;
+    all.any = true;
+  };
+  for (const ModelMesh& mesh : source.meshes) {
+    const auto [low, high] = box_of(mesh.bvh);
+    if (!(low.x <= high.x)) continue;
+    for (const dmat4& placing : mesh.placings) {
+      const Block block = block_of(to_world * placing, low, high);
+      const dvec3 reach = reach_of(block);
+      add(block.middle - reach, block.middle + reach);
+    }
+  }
+  return all;
+}
+
+ModelTable make_model_table(std::span<const Model> models, const std::function<ModelWords(const ModelSource&)>& words) {
+  ModelTable table;
+  std::vector<TreeBox> boxes;
+  std::vector<double> power;
+  std::uint64_t triangles = 0;
+  dvec3 low(std::numeric_limits<double>::max());
+  dvec3 high(-low);
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const Model& model = models[m];
+    const auto refuse = [&](ErrorCode code, const char* cause) {
+      throw Error(code, "model " + std::to_string(m) + ": " + cause);
+    };
+    CmModel whole{};
+    place(whole, model.to_world);
+    if (!is_sound(whole)) refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
+    const ModelSource& source = *model.source;
+    const ModelWords at = words(source);
+    for (std::size_t i = 0; i < source.meshes.size(); ++i) {
+      const ModelMesh& mesh = source.meshes[i];
+      const auto [own_low, own_high] = box_of(mesh.bvh);
+      for (const dmat4& placing : mesh.placings) {
+        const dmat4 to_world = model.to_world * placing;
+        const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
+        CmModel record{};
+        record.flags = model.shadow_only ? 0U : core::CM_MODEL_SEEN;
+        place(record, to_world);
+        // What a file scales to nothing is not there.
+        if (!is_sound(record)) continue;
+        record.first = static_cast<std::uint32_t>(triangles);
+        triangles += mesh.triangle_count;
+        if (triangles >= std::numeric_limits<std::uint32_t>::max())
+          refuse(ErrorCode::unsupported, "with it there are more than 2^32 triangles, each counted wherever it stands");
+        record.nodes = at.first + mesh.nodes;
+        record.records = at.first + mesh.records;
+        record.triangles = at.first + mesh.triangles;
+        record.vertices = at.first + source.vertices;
+        record.materials = at.first + source.materials;
+        record.emitters = at.first + mesh.emitters;
+        record.emitter_count = mesh.emitter_count;
+        record.textures = at.textures;
+        const bool solid = own_low.x <= own_high.x;
+        TreeBox box{vec3(0.0F), vec3(0.0F), solid};
+        if (solid) {
+          const Block block = block_of(to_world, own_low, own_high);
+          const dvec3 reach = reach_of(block);
+          const dvec3 most = glm::abs(block.middle) + reach;
+          const double size = std::max({most.x, most.y, most.z});
+          if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the world's origin");
+          // What rays meet in its own space is here, but for what rounding may be.
+          const dvec3 room = reach + 2e-6 * size;
+          box.low = vec3(block.middle - room);
+          box.high = vec3(block.middle + room);
+          low = glm::min(low, block.middle - reach);
+          high = glm::max(high, block.middle + reach);
+        }
+        boxes.push_back(box);
+        power.push_back(mesh.flux * stretch * stretch);
+        table.records.push_back(record);
+        table.parts.push_back({static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(i)});
+      }
+    }
+    for (const surface::PunctualLight& light : source.pose.lights)
+      table.lamps.push_back(placed(light, model.to_world));
+  }
+  if (low.x <= high.x) {
+    table.low = low;
+    table.high = high;
+  }
+  table.lights = light::scene_lights(table.lamps, 0.5 * glm::length(table.high - table.low));
+  share_looks(table, std::move(power));
+  table.nodes = threaded_tree(boxes);
+  if (table.records.empty()) table.records.emplace_back();
+  return table;
+}
+
+}  // namespace cumulet::scene

@@ -1,0 +1,67 @@
+// The C ABI's models. What each call does is in cumulet.h.
+
+#include <memory>
+#include <utility>
+
+#include "viewer/c_handles.hpp"
+#include "viewer/c_support.hpp"
+
+namespace {
+
+using namespace cumulet::c_abi;
+using cumulet::viewer::ModelInstance;
+using cumulet::viewer::ModelSettings;
+
+void require_time(double time) { require(std::isfinite(time), "cumulet_model_desc.time is not finite"); }
+
+ModelSettings settings_of(const cumulet_model_desc* desc) {
+  const cumulet_model_desc d = read_desc(desc, "cumulet_model_desc");
+  const auto flag = [](int32_t value, const char* cause) { require(value == 0 || value == 1, cause); };
+  flag(d.double_sided, "cumulet_model_desc.double_sided is not 0 or 1");
+  flag(d.hidden, "cumulet_model_desc.hidden is not 0 or 1");
+  flag(d.shadow_only, "cumulet_model_desc.shadow_only is not 0 or 1");
+  require_time(d.time);
+  ModelSettings settings;
+  if (d.surfaces != nullptr) settings.surfaces = d.surfaces->asset;
+  settings.to_world = matrix_or_identity(d.to_world);
+  require_place(settings.to_world, "cumulet_model_desc.");
+  settings.choice = {d.time, d.animation, d.double_sided == 1, d.variant};
+  settings.hidden = d.hidden == 1;
+  settings.shadow_only = d.shadow_only == 1;
+  settings.tag = d.tag;
+  return settings;
+}
+
+}  // namespace
+
+cumulet_status cumulet_model_create(const cumulet_model_desc* desc, cumulet_model** out, char* error,
+                                    size_t error_size) {
+  return make_handle(out, error, error_size, [&] { return std::make_shared<ModelInstance>(settings_of(desc)); });
+}
+
+cumulet_model* cumulet_model_retain(cumulet_model* model) { return retain(model); }
+
+void cumulet_model_release(cumulet_model* model) { release(model); }
+
+cumulet_status cumulet_model_set(cumulet_model* model, const cumulet_model_desc* desc) {
+  return on(model, "model", [&](ModelInstance& m) {
+    ModelSettings settings = settings_of(desc);
+    m.edit([&](ModelSettings& old) { std::swap(old, settings); });  // what the old one held ends after the lock
+  });
+}
+
+cumulet_status cumulet_model_set_to_world(cumulet_model* model, const double to_world[16]) {
+  return on(model, "model", [&](ModelInstance& m) {
+    require(to_world != nullptr, "to_world is NULL");
+    const glm::dmat4 place = matrix_or_identity(std::span<const double, 16>(to_world, 16));
+    require_place(place);
+    m.edit([&](ModelSettings& settings) { settings.to_world = place; });
+  });
+}
+
+cumulet_status cumulet_model_set_time(cumulet_model* model, double time) {
+  return on(model, "model", [&](ModelInstance& m) {
+    require_time(time);
+    m.edit([&](ModelSettings& settings) { settings.choice.time = time; });
+  });
+}
