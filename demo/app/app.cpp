@@ -278,6 +278,12 @@ void App::execute(const Command& command) {
       model_.scene.others.emplace_back().volume = command.text;
       spell_out_defaults(model_.scene);
       break;
+    case Action::add_model_dialog:
+      panel_.dialog().open("Add a model", Action::add_model, {".gltf", ".glb"}, model_.preferences.folder);
+      break;
+    case Action::add_model:
+      model_.scene.models.push_back({command.text});
+      break;
     case Action::environment_dialog:
       panel_.dialog().open("Open an environment", Action::open, {".hdr", ".exr"}, model_.preferences.folder);
       break;

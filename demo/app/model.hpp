@@ -24,6 +24,8 @@ enum class Action {
   open,  // a file of any kind: text
   add_volume_dialog,
   add_volume,  // text
+  add_model_dialog,
+  add_model,  // text
   environment_dialog,
   clear_environment,
   save_scene,

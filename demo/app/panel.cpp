@@ -88,6 +88,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   section("Medium", true, [&] { medium(model, commands); });
   section("Volumes", true, [&] { volumes(model, commands); });
   section("Surfaces", true, [&] { surfaces(model); });
+  section("Models", true, [&] { models(model, commands); });
   section("Grid", true, [&] { grid(model); });
   section("Camera", true, [&] { camera(model, commands); });
   section("Sampling", true, [&] { sampling(model); });

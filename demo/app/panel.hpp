@@ -2,6 +2,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,10 @@ class Panel {
   void volumes(Model& model, std::vector<Command>& commands);
   /// Where a volume stands; number: what its controls' labels end with.
   void stand(SceneVolume& volume, const std::string& number);
+  void models(Model& model, std::vector<Command>& commands);
+  // Rows of what is at `place`; another place, where they were moved.
+  std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& place,
+                                                 const std::string& number);
   void lamps(Model& model);
   void sequence(Model& model, std::vector<Command>& commands);
   /// Below the picture: the frames, which of them are ready, and where it stands.
@@ -75,8 +80,9 @@ class Panel {
   double time_ = 0.0;
   Rectangle view_;
   std::string state_;
-  std::map<std::size_t, std::string> names_;  // of volumes, as typed
-  std::string path_;                          // likewise
+  std::map<std::size_t, std::string> names_;        // of volumes, as typed
+  std::map<std::size_t, std::string> model_names_;  // of models, likewise
+  std::string path_;                                // likewise
   std::string path_of_;
 };
 

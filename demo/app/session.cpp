@@ -145,6 +145,7 @@ void Session::follow(const Wish& wish) {
   follow_playback();
   follow_visible();
   if (!std::ranges::equal(known_->others, scene_.others, same_volume)) follow_others();
+  if (known_->models != scene_.models) follow_models();
 }
 
 void Session::follow_visible() {
@@ -159,6 +160,59 @@ void Session::follow_visible() {
     hidden_ = shown();
     check(cumulet_set_volume(viewer_.get(), nullptr));
   }
+}
+
+// Tells that something was opened, also where that throws.
+struct Session::Opened {
+  Shared* shared;
+  bool Shared::*what;
+  ~Opened() {
+    {
+      const std::lock_guard lock(shared->mutex);
+      shared->*what = true;
+    }
+    shared->wake();
+  }
+};
+
+void Session::follow_models() {
+  known_->models = scene_.models;
+  try {
+    models_.show(viewer_.get(), scene_.models);
+  } catch (const std::runtime_error& error) {
+    tell(true, error.what());
+  }
+  if (opening_model_.made.valid() || waiting_for_surfaces_) return;  // what waits may be the same file
+  const std::vector<std::string> missing = models_.missing(scene_.models);
+  if (missing.empty()) return;
+  opening_model_.file = missing.front();
+  SurfacesPtr own;
+  if (opening_model_.file == shown_surfaces_) {
+    cumulet_surfaces* surfaces = nullptr;
+    check(cumulet_get_surfaces(viewer_.get(), &surfaces));
+    own = SurfacesPtr(surfaces, cumulet_surfaces_release);
+  }
+  opening_model_.made = std::async(std::launch::async, [file = opening_model_.file, own, shared = shared_.get()] {
+    const Opened tell{shared, &Shared::opened_model};
+    return own ? own : open_surfaces(file);
+  });
+}
+
+void Session::finish_models() {
+  {
+    const std::lock_guard lock(shared_->mutex);
+    if (!std::exchange(shared_->opened_model, false)) return;
+  }
+  SurfacesPtr surfaces;
+  try {
+    surfaces = opening_model_.made.get();
+    files_.push_back({opening_model_.file, Answer::File::Fate::opened});
+  } catch (const std::runtime_error& error) {
+    tell(true, error.what());
+    files_.push_back({opening_model_.file, Answer::File::Fate::failed});
+  }
+  models_.give(opening_model_.file, std::move(surfaces));
+  follow_models();
 }
 
 void Session::follow_others() {
@@ -177,17 +231,7 @@ void Session::follow_others() {
     own = hidden_ ? std::shared_ptr<cumulet_volume>(cumulet_volume_retain(hidden_.get()), cumulet_volume_release)
                   : std::shared_ptr<cumulet_volume>(shown());
   opening_.made = std::async(std::launch::async, [file = opening_.file, own, shared = shared_.get()] {
-    struct Tell {  // also where it throws
-      Shared* shared;
-      ~Tell() {
-        {
-          const std::lock_guard lock(shared->mutex);
-          shared->opened = true;
-        }
-        shared->wake();
-      }
-    };
-    const Tell tell{shared};
+    const Opened tell{shared, &Shared::opened};
     return own ? look_into(own) : open_volume(file);
   });
 }
@@ -303,7 +347,7 @@ void Session::set_surfaces() {
   try {
     // Of surfaces that are still read it is found once they are there.
     if (known_->surfaces == scene_.surfaces && !waiting_for_surfaces_)
-      settings.variant = variant_number(scene_, status_.variants);
+      settings.variant = variant_number(scene_.surfaces, scene_.surface_variant, status_.variants);
   } catch (const std::runtime_error& error) {
     tell(true, error.what());
   }
@@ -327,7 +371,7 @@ void Session::finish_surfaces() {
     return;
   }
   read_surfaces();
-  const std::string refusal = animation_refusal(scene_, status_.surfaces.animations);
+  const std::string refusal = animation_refusal(scene_.surfaces, scene_.surface.animation, status_.surfaces.animations);
   if (!refusal.empty()) {
     tell(true, refusal);
     files_.push_back({scene_.surfaces, Answer::File::Fate::failed});
@@ -545,11 +589,13 @@ void Session::see_work() {
   see_sequence();
   see_ends();
   finish_others();
-  status_.loading = waiting_                   ? scene_.volume
-                    : waiting_for_surfaces_    ? scene_.surfaces
-                    : waiting_for_environment_ ? scene_.environment
-                    : opening_.made.valid()    ? opening_.file.volume
-                                               : std::string();
+  finish_models();
+  status_.loading = waiting_                      ? scene_.volume
+                    : waiting_for_surfaces_       ? scene_.surfaces
+                    : waiting_for_environment_    ? scene_.environment
+                    : opening_.made.valid()       ? opening_.file.volume
+                    : opening_model_.made.valid() ? opening_model_.file
+                                                  : std::string();
   see_camera();
   measure_noise();
 
@@ -565,9 +611,10 @@ void Session::see_ends() {
     const auto tell_news = [this](cumulet_status status, const char* message, cumulet_status told) {
       if (status != told && status != CUMULET_OK && status != CUMULET_ERROR_CANCELLED) tell(true, message);
     };
-    if (waiting_for_surfaces_)
+    if (waiting_for_surfaces_) {
       finish_surfaces();
-    else
+      follow_models();
+    } else
       tell_news(work.surfaces_status, work.surfaces_message, told_surfaces_);
     if (waiting_) {
       finish_load();
@@ -761,7 +808,7 @@ void Session::move_by_keys(int key) {
 void Session::execute(const Request& request) {
   if (request.type == Request::Type::suggest_density) return suggest_density();
   if (request.type == Request::Type::frame_all) {
-    if (status_.has_volume || !scene_.others.empty() || !shown_surfaces_.empty())
+    if (status_.has_volume || !scene_.others.empty() || !shown_surfaces_.empty() || !scene_.models.empty())
       check(cumulet_frame_all(viewer_.get()));
     return;
   }

@@ -8,6 +8,7 @@
 #include <image.hpp>
 #include <instances.hpp>
 #include <memory>
+#include <models.hpp>
 #include <mutex>
 #include <optional>
 #include <shader_cache.hpp>
@@ -141,6 +142,7 @@ class Session {
     std::vector<std::string> warnings;
     std::optional<ThumbnailPtr> thumbnail;  // made, to be taken
     bool opened = false;                    // one of the other volumes is, or is known not to
+    bool opened_model = false;              // likewise of the models
   };
 
   static void on_log(void* user, cumulet_log_level level, const char* message);
@@ -158,16 +160,21 @@ class Session {
   void see_sequence();
   // Hides the volume, or shows it again.
   void follow_visible();
+  struct Opened;
   // Shows the others that are there, and begins to open the next that is not.
   void follow_others();
   void finish_others();
+  // Likewise of models.
+  void follow_models();
+  void finish_models();
   void follow_environment();
   void finish_environment();
   // Begins a picture of the one that is shown, on a thread of its own.
   void begin_thumbnail();
   void drop_thumbnail();
   [[nodiscard]] bool waits() const {
-    return waiting_ || waiting_for_surfaces_ || waiting_for_environment_ || opening_.made.valid();
+    return waiting_ || waiting_for_surfaces_ || waiting_for_environment_ || opening_.made.valid() ||
+           opening_model_.made.valid();
   }
   void follow_ramps();
   void follow_lamps();
@@ -245,6 +252,11 @@ class Session {
     VolumeFile file;
     std::future<OpenVolume> made;  // while one is opened
   } opening_;
+  Models models_;
+  struct OpeningModel {
+    std::string file;
+    std::future<SurfacesPtr> made;  // while one is opened
+  } opening_model_;
   std::vector<GridInfo> grids_;
   std::vector<Answer::Notice> notices_;
   std::vector<Answer::File> files_;

@@ -1,4 +1,4 @@
-// The panel's volumes: the scene's first, which the rest of the panel is about, and those beside it.
+// The panel's volumes, the scene's first, which the rest of the panel is about, and those beside it; and its models.
 
 #include <imgui.h>
 
@@ -50,7 +50,13 @@ void Panel::stand(SceneVolume& volume, const std::string& number) {
     ui_.fact(("Places" + number).c_str(), std::to_string(volume.places.size()));
     return;
   }
-  std::optional<Stand> now = volume.places.empty() ? Stand{} : stand_of(volume.places.front());
+  std::optional<Matrix> place;
+  if (!volume.places.empty()) place = volume.places.front();
+  if (const auto moved = stand_at(place, number)) volume.places.assign(1, *moved);
+}
+
+std::optional<Matrix> Panel::stand_at(const std::optional<Matrix>& place, const std::string& number) {
+  std::optional<Stand> now = place ? stand_of(*place) : Stand{};
   ImGui::BeginDisabled(!now);
   Stand stand = now.value_or(Stand{});
   const double far = std::hypot(stand.position[0], stand.position[1], stand.position[2]);
@@ -61,7 +67,41 @@ void Panel::stand(SceneVolume& volume, const std::string& number) {
   moved |= ui_.slider(("Scale" + number).c_str(), "How many times as large as its file has it.", stand.scale, 0.01,
                       100.0, "%.3g", ImGuiSliderFlags_Logarithmic);
   ImGui::EndDisabled();
-  if (moved) volume.places.assign(1, matrix_of(stand));
+  if (!moved) return std::nullopt;
+  return matrix_of(stand);
+}
+
+void Panel::models(Model& model, std::vector<Command>& commands) {
+  std::vector<SceneModel>& models = model.scene.models;
+  std::optional<std::size_t> removed;
+  std::optional<std::size_t> copied;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    SceneModel& one = models[i];
+    const std::string number = " of model " + std::to_string(i + 1);
+    if (i > 0) ImGui::Separator();
+    ui_.fact(("Model " + std::to_string(i + 1)).c_str(), one.label());
+    std::string& typed = model_names_[i];
+    if (!ImGui::IsAnyItemActive()) typed = one.name;
+    if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))
+      one.name = typed;
+    ui_.checkbox(("Visible" + number).c_str(), "Whether it is there at all: its shadow goes with it.", one.visible);
+    ui_.checkbox(("Shadow alone" + number).c_str(), "It is not seen, but casts shadows and is in mirrors.",
+                 one.shadow_only);
+    std::optional<Matrix> place;
+    if (one.to_world != Matrix{}) place = one.to_world;
+    if (const auto moved = stand_at(place, number)) one.to_world = *moved;
+    const float spacing = ImGui::GetStyle().ItemSpacing.x;
+    const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
+    const std::string plain = " model " + std::to_string(i + 1);
+    if (ui_.button(("Copy" + plain).c_str(), "Another of it in its place, of the same triangles.", {width, 0.0f}))
+      copied = i;
+    ImGui::SameLine();
+    if (ui_.button(("Remove" + plain).c_str(), "Takes it away.", {width, 0.0f})) removed = i;
+  }
+  if (copied) models.insert(models.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneModel(models[*copied]));
+  if (removed) models.erase(models.begin() + static_cast<std::ptrdiff_t>(*removed));
+  if (ui_.button("Add model", "Opens another model beside those that are there.", {-1.0f, 0.0f}))
+    commands.push_back({Action::add_model_dialog});
 }
 
 void Panel::volumes(Model& model, std::vector<Command>& commands) {

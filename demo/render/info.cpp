@@ -181,6 +181,11 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
     json["other_volumes"].push_back(info);
   }
   if (!scene.surfaces.empty()) json["surfaces"] = surfaces_info(scene.surfaces);
+  for (const SceneModel& model : scene.models) {
+    Json info = {{"name", model.label()}};
+    info.update(surfaces_info(model.file));
+    json["other_models"].push_back(info);
+  }
   if (as_json) {
     // Names may be in any encoding: what is not UTF-8 is replaced. What is not finite is null.
     out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';

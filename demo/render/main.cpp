@@ -35,6 +35,7 @@
 #include "instances.hpp"
 #include "memory.hpp"
 #include "metadata.hpp"
+#include "models.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "settled.hpp"
@@ -270,10 +271,11 @@ cumulet_surface_settings_desc surface_settings(const Viewer& viewer, const Scene
   const std::vector<std::string> variants = cumulet::demo::variant_names(surfaces);
   cumulet_surfaces_release(surfaces);
   check(viewer, status);
-  const std::string refusal = cumulet::demo::animation_refusal(scene, info.animations);
+  const std::string refusal =
+      cumulet::demo::animation_refusal(scene.surfaces, scene.surface.animation, info.animations);
   if (!refusal.empty()) throw std::runtime_error(refusal);
   cumulet_surface_settings_desc settings = scene.surface;
-  settings.variant = cumulet::demo::variant_number(scene, variants);
+  settings.variant = cumulet::demo::variant_number(scene.surfaces, scene.surface_variant, variants);
   return settings;
 }
 
@@ -497,6 +499,7 @@ class Studio {
     }
     wait(viewer_, progress_);
     open_others(scene);
+    open_models(scene);
     fire_ = medium_of_fire(viewer_, scene);
     if (fire_) check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
     wait(viewer_, progress_);
@@ -565,7 +568,8 @@ class Studio {
  private:
   static const std::string& first_file(const SceneOptions& scene) {
     if (!scene.volume.empty()) return scene.volume;
-    return scene.others.empty() ? scene.surfaces : scene.others.front().volume;
+    if (!scene.others.empty()) return scene.others.front().volume;
+    return scene.surfaces.empty() && !scene.models.empty() ? scene.models.front().file : scene.surfaces;
   }
 
   void open_others(const SceneOptions& scene) {
@@ -576,6 +580,18 @@ class Studio {
       check_not_interrupted();
     }
     others_.show(viewer_.get(), scene.others);
+  }
+
+  void open_models(const SceneOptions& scene) {
+    for (const std::string& file : models_.missing(scene.models)) {
+      progress_.stage("loading " + file);
+      cumulet_surfaces* own = nullptr;
+      if (file == scene.surfaces) check(viewer_, cumulet_get_surfaces(viewer_.get(), &own));
+      models_.give(file, own != nullptr ? cumulet::demo::SurfacesPtr(own, cumulet_surfaces_release)
+                                        : cumulet::demo::open_surfaces(file));
+      check_not_interrupted();
+    }
+    models_.show(viewer_.get(), scene.models);
   }
 
   void set_scene(const RenderOptions& options) {
@@ -604,6 +620,7 @@ class Studio {
     display.denoise = CUMULET_DENOISE_OFF;  // what is read is read as it is, and denoised beside that
     check(viewer_, cumulet_set_display(viewer_.get(), &display));
     set_camera(viewer_, scene.camera);
+    if (!scene.models.empty()) check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
     if (!scene.surfaces.empty()) {
       check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
       check(viewer_, cumulet_load_surfaces(viewer_.get(), scene.surfaces.c_str()));
@@ -618,6 +635,7 @@ class Studio {
   Context context_;
   Viewer viewer_;
   cumulet::demo::Instances others_;
+  cumulet::demo::Models models_;
 };
 
 /// That the picture goes on from. Throws where it is another's, or there could be none.
@@ -665,7 +683,7 @@ double ground_below(const Viewer& viewer, const SceneOptions& scene) {
   std::array<double, 3> most{};
   check(viewer, cumulet_get_bounds(viewer.get(), least.data(), most.data()));
   const double size = std::hypot(most[0] - least[0], most[1] - least[1], most[2] - least[2]);
-  return least[1] - (scene.surfaces.empty() ? 0.0 : 1e-4 * size);
+  return least[1] - (scene.surfaces.empty() && scene.models.empty() ? 0.0 : 1e-4 * size);
 }
 
 /// Takes that from the volume that is there: the density scale, how low the ground is, where the camera stands.

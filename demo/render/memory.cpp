@@ -23,7 +23,9 @@ PictureMemory picture_memory(const RenderOptions& options) {
   const std::uint64_t pixels = std::uint64_t{options.scene.width} * options.scene.height;
   // A sum of four floats and four counts a pixel. Surfaces without light between are layers beside it.
   std::uint64_t gl = 32;
-  if (!options.scene.surfaces.empty() && options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE) gl += 24;
+  if ((!options.scene.surfaces.empty() || !options.scene.models.empty()) &&
+      options.scene.surface.light == CUMULET_SURFACE_LIGHT_NONE)
+    gl += 24;
   // Both of these are read back, to measure the noise as well.
   std::uint64_t main = 32;
   if (options.format == OutputFormat::png) main += 4 + 8;  // as displayed; filtered and packed

@@ -649,8 +649,7 @@ void check_part(const RenderOptions& options, bool part) {
 
 // What flags need of each other; part: of a picture.
 void check_together(const RenderOptions& options, bool part) {
-  if (options.scene.volume.empty() && options.scene.others.empty() && options.scene.surfaces.empty())
-    throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
+  if (is_empty(options.scene)) throw UsageError("a file is required: --volume or --gltf, or a --scene that names one");
   if (options.json && !options.info) throw UsageError("--json is for --info");
   if (options.info) return;
   if (options.output.empty()) throw UsageError("--output is required");

@@ -78,6 +78,7 @@ Matrix rotation(std::size_t axis, double degrees) {
 
 constexpr std::size_t most_places = 100'000;
 constexpr std::size_t most_volumes = 10'000;
+constexpr std::size_t most_models = 10'000;
 
 /// Scaled, then turned about x, y and z, then moved.
 struct PlaceParts {
@@ -390,15 +391,21 @@ void read_lamps(Reader& reader, std::vector<cumulet_lamp_desc>& lamps) {
   }
 }
 
-/// Where a volume stands.
-void read_place(Reader& reader, Matrix& to_world) {
-  const bool whole = reader.numbers("volume.to_world", std::span<double>(to_world), "16 numbers");
+/// Where a volume or a model stands; of: "volume." or "models[0]."
+void read_place(Reader& reader, const std::string& of, Matrix& to_world) {
+  const bool whole = reader.numbers(of + "to_world", std::span<double>(to_world), "16 numbers");
   PlaceParts place;
-  bool parts = reader.three("volume.translate", place.translate);
-  parts = reader.three("volume.rotate_degrees", place.degrees) || parts;
-  parts = reader.three("volume.scale", place.scale, settings::above_zero) || parts;
-  if (whole && parts) reader.wrong("volume.to_world", "is given beside translate, rotate_degrees or scale");
+  bool parts = reader.three(of + "translate", place.translate);
+  parts = reader.three(of + "rotate_degrees", place.degrees) || parts;
+  parts = reader.three(of + "scale", place.scale, settings::above_zero) || parts;
+  if (whole && parts) reader.wrong(of + "to_world", "is given beside translate, rotate_degrees or scale");
   if (parts) to_world = place.matrix();
+}
+
+bool read_visible(Reader& reader, const std::string& of) {
+  std::int32_t visible = 1;
+  reader.flag(of + "visible", visible);
+  return visible != 0;
 }
 
 SceneFormat read_version(Reader& reader) {
@@ -423,12 +430,48 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   volume.auto_density_scale = reader.word("medium.density_scale", "auto");
   for (std::size_t i = 0; i < volume.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, volume.ramps[i]);
   if (format == SceneFormat::first) return;
-  read_place(reader, volume.to_world);
+  read_place(reader, "volume.", volume.to_world);
   reader.places("volume.places", volume.places);
   reader.text("volume.name", volume.name);
-  std::int32_t visible = 1;
-  reader.flag("volume.visible", visible);
-  volume.visible = visible != 0;
+  volume.visible = read_visible(reader, "volume.");
+}
+
+/// Of one beside the surfaces, of: "models[1]."
+SceneModel read_model(Reader& reader, const std::string& of) {
+  SceneModel model;
+  if (!reader.has(of + "file")) reader.wrong(of + "file", "is missing");
+  reader.text(of + "file", model.file);
+  if (model.file.empty()) reader.wrong(of + "file", "is empty");
+  reader.text(of + "name", model.name);
+  read_place(reader, of, model.to_world);
+  model.visible = read_visible(reader, of);
+  std::int32_t flag = 0;
+  reader.flag(of + "shadow_only", flag);
+  model.shadow_only = flag != 0;
+  reader.number(of + "time", model.time, {});
+  reader.integer(of + "animation", model.animation, 0.0, max_u32);
+  reader.text(of + "variant", model.variant);
+  flag = 0;
+  reader.flag(of + "double_sided", flag);
+  model.double_sided = flag != 0;
+  return model;
+}
+
+/// The first is the scene's surfaces where it stands as its file has it, and no more is said of it than version 1 can.
+bool is_placed(Reader& reader, const std::string& of) {
+  constexpr std::array keys{"name", "to_world", "translate", "rotate_degrees", "scale", "visible", "shadow_only"};
+  return std::ranges::any_of(keys, [&](const char* key) { return reader.has(of + key); });
+}
+
+void read_models(Reader& reader, SceneOptions& scene) {
+  const std::size_t count = reader.list("models", most_models);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string of = "models[" + std::to_string(i) + "].";
+    if (i == 0 && !is_placed(reader, of)) continue;
+    if (i == 0 && reader.has(of + "camera"))
+      reader.wrong(of + "camera", "is of a model that stands as its file has it");
+    scene.models.push_back(read_model(reader, of));
+  }
 }
 
 void read_sequence(Reader& reader, SceneSequence& sequence) {
@@ -450,7 +493,7 @@ void read_sequence(Reader& reader, SceneSequence& sequence) {
 void read_second(Reader& reader, SceneOptions& scene) {
   reader.set_format(SceneFormat::second);
   const std::size_t volumes = reader.list("volumes", most_volumes);
-  reader.list("models", 1);
+  read_models(reader, scene);
   read_lamps(reader, scene.lamps);
   for (std::size_t i = 1; i < volumes; ++i) {
     SceneVolume& volume = scene.others.emplace_back();
@@ -606,6 +649,20 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
   }
 }
 
+void put_model(Writer& writer, std::size_t number, const SceneModel& model, const std::string& file) {
+  const std::string of = "models[" + std::to_string(number) + "].";
+  // What is said makes the first one of these, whatever it leaves to its file.
+  if (!model.name.empty() || number == 0) writer.put(of + "name", model.name);
+  writer.put(of + "file", file);
+  if (model.to_world != Matrix{}) writer.put(of + "to_world", model.to_world);
+  if (!model.visible) writer.put(of + "visible", false);
+  if (model.shadow_only) writer.put(of + "shadow_only", true);
+  if (model.time != 0.0 || number == 0) writer.put(of + "time", model.time);
+  if (model.animation != 0 || number == 0) writer.put(of + "animation", model.animation);
+  if (!model.variant.empty()) writer.put(of + "variant", model.variant);
+  if (model.double_sided || number == 0) writer.put(of + "double_sided", model.double_sided);
+}
+
 void put_sequence(Writer& writer, const SceneSequence& sequence) {
   const bool unsaid = settings::same(sequence.playback, SceneOptions().sequence.playback);
   if (!unsaid) writer.put_settings(sequence.playback);
@@ -631,8 +688,11 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
     writer.put("surfaces.file", named(scene.surfaces));
     if (!scene.surface_variant.empty()) writer.put("surfaces.variant", scene.surface_variant);
     if (scene.surface_camera >= 0) writer.put("surfaces.camera", scene.surface_camera);
-    writer.put_settings(scene.surface);
   }
+  const bool models = second && !scene.models.empty();
+  if (!scene.surfaces.empty() || models) writer.put_settings(scene.surface);
+  for (std::size_t i = 0; models && i < scene.models.size(); ++i)
+    put_model(writer, i + (scene.surfaces.empty() ? 0 : 1), scene.models[i], named(scene.models[i].file));
 
   Json camera = Json::object();
   const auto& view = scene.camera;
@@ -686,6 +746,8 @@ std::string portable_file(const std::string& file, const std::string& path) {
 
 SceneVolume::SceneVolume() { medium.struct_size = sizeof medium; }
 
+std::string SceneModel::label() const { return name.empty() ? fs::path(file).filename().string() : name; }
+
 std::string SceneVolume::label() const { return name.empty() ? fs::path(volume).filename().string() : name; }
 
 SceneOptions::SceneOptions() {
@@ -715,15 +777,13 @@ cumulet_volume_file_desc volume_file(const VolumeFile& file) {
   return desc;
 }
 
-std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations) {
-  const std::uint32_t wanted = scene.surface.animation;
+std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations) {
   if (wanted == 0 || wanted < animations) return {};  // 0: the default, of a file without any
-  return scene.surfaces + ": there is no animation " + std::to_string(wanted) + ": the file has " +
-         std::to_string(animations);
+  return file + ": there is no animation " + std::to_string(wanted) + ": the file has " + std::to_string(animations);
 }
 
-std::uint32_t variant_number(const SceneOptions& scene, const std::vector<std::string>& names) {
-  const std::string& wanted = scene.surface_variant;
+std::uint32_t variant_number(const std::string& file, const std::string& wanted,
+                             const std::vector<std::string>& names) {
   if (wanted.empty()) return 0;
   const auto named = std::ranges::find(names, wanted);
   if (named != names.end()) return static_cast<std::uint32_t>(named - names.begin()) + 1;
@@ -733,7 +793,7 @@ std::uint32_t variant_number(const SceneOptions& scene, const std::vector<std::s
   if (error == std::errc() && rest == end && number < names.size()) return number + 1;
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "\"" : ", \"") + name + "\"";
-  throw std::runtime_error(scene.surfaces + ": there is no variant \"" + wanted + "\": the file has " +
+  throw std::runtime_error(file + ": there is no variant \"" + wanted + "\": the file has " +
                            (list.empty() ? "none" : list));
 }
 
@@ -790,6 +850,7 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
   find(scene.volume);
   for (SceneVolume& other : scene.others) find(other.volume);
   find(scene.surfaces);
+  for (SceneModel& model : scene.models) find(model.file);
   find(scene.environment);
   return scene;
 }
@@ -841,6 +902,7 @@ std::string scene_hash(const SceneOptions& scene) {
   };
   shown.name.clear();
   for (SceneVolume& other : shown.others) other.name.clear();
+  for (SceneModel& model : shown.models) model.name.clear();
   const std::string text =
       to_json(shown, SceneFormat::second, named).dump(-1, ' ', false, Json::error_handler_t::replace);
   std::array<char, 17> digits{};

@@ -45,6 +45,23 @@ struct SceneVolume : VolumeFile {
   [[nodiscard]] bool is_shown() const { return visible && !volume.empty(); }
 };
 
+/// A model in a scene, beside its surfaces.
+struct SceneModel {
+  std::string file;                   // a glTF file
+  std::string name = {};              // "": its file's
+  std::array<double, 16> to_world{};  // where it stands, column by column; all 0: as its file has it
+  bool visible = true;
+  bool shadow_only = false;  // cameras do not see it
+  double time = 0.0;         // seconds into its animation
+  std::uint32_t animation = 0;
+  std::string variant = {};  // of its materials, by name or number; "": none
+  bool double_sided = false;
+
+  bool operator==(const SceneModel&) const = default;
+  /// Its name, or its file's.
+  [[nodiscard]] std::string label() const;
+};
+
 /// How a scene's first volume plays, where its file's name has a place for a frame's number (demo/sequence).
 struct SceneSequence {
   cumulet_playback_desc playback{};         // but for its frames, which are those from...
@@ -60,6 +77,7 @@ struct SceneOptions : SceneVolume {
   std::string surfaces;              // a glTF file; "": none
   std::string surface_variant;       // of the surfaces' materials, by name or number; "": none
   std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera
+  std::vector<SceneModel> models;    // beside the surfaces, which stand as their file has them
   std::uint32_t width = 1280;
   std::uint32_t height = 720;
   cumulet_grid_desc grid{};
@@ -103,9 +121,14 @@ void for_each_group(Scene& scene, Visit&& visit) {
   return cumulet_set_volume_places(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
 }
 
-/// Why surfaces with so many animations cannot be shown as the scene has it; empty if they can. The library shows a
-/// scene at rest whose animation is not there: whoever named it meant another.
-[[nodiscard]] std::string animation_refusal(const SceneOptions& scene, std::uint32_t animations);
+/// Whether there is anything to be seen.
+[[nodiscard]] inline bool is_empty(const SceneOptions& scene) {
+  return scene.volume.empty() && scene.others.empty() && scene.surfaces.empty() && scene.models.empty();
+}
+
+/// Why a file with so many animations cannot be shown with this one; empty if it can. The library shows a scene at rest
+/// whose animation is not there: whoever named it meant another.
+[[nodiscard]] std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations);
 
 /// Names of the surfaces' variants of materials.
 [[nodiscard]] inline std::vector<std::string> variant_names(const cumulet_surfaces* surfaces) {
@@ -117,9 +140,10 @@ void for_each_group(Scene& scene, Visit&& visit) {
   return names;
 }
 
-/// cumulet_surface_settings_desc::variant for the scene's choice among these; 0 where it makes none. Throws
+/// cumulet_surface_settings_desc::variant for a choice among a file's; 0 where there is none. Throws
 /// std::runtime_error, one line that lists them, where it is not among them.
-[[nodiscard]] std::uint32_t variant_number(const SceneOptions& scene, const std::vector<std::string>& names);
+[[nodiscard]] std::uint32_t variant_number(const std::string& file, const std::string& wanted,
+                                           const std::vector<std::string>& names);
 
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
 /// volume is taken from its folder. What the text does not say is as in SceneOptions(), on a clear day; of version

@@ -27,9 +27,9 @@ std::vector<EmissiveTriangle> emissive_triangles(const surface::Scene& scene, co
 
 /// Picks triangles in proportion to their power (light/alias_table.hpp).
 struct EmitterTable {
-  /// One a triangle that has an area, in ascending order of x: x: triangle, from the first; y: entry i, drawn evenly, stands for itself
-  /// where a random word is at most y, z: else for this entry; w: a float, the chance to be picked per area, negative
-  /// where the triangle's front is where its vertices turn clockwise.
+  /// One a triangle that has an area, in ascending order of x: x: triangle, from the first; y: entry i, drawn evenly,
+  /// stands for itself where a random word is at most y, z: else for this entry; w: a float, the chance to be picked
+  /// per area, negative where the triangle's front is where its vertices turn clockwise.
   std::vector<glm::uvec4> entries;
   double flux = 0.0;  ///< luminance of all that they emit: pi x radiance x area x sides
 };

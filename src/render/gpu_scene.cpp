@@ -229,8 +229,8 @@ void GpuScene::place_raster() {
     for (const scene::Model& model : placed_.of().models) {
       const auto source = std::ranges::find(raster_.of(), model.source);
       if (source == raster_.of().end()) continue;
-      items.push_back({(*raster_)[static_cast<std::size_t>(source - raster_.of().begin())], model.to_world,
-                       model.shadow_only});
+      items.push_back(
+          {(*raster_)[static_cast<std::size_t>(source - raster_.of().begin())], model.to_world, model.shadow_only});
     }
   }
   surface_pass_.show(std::move(items));

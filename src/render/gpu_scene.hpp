@@ -139,10 +139,10 @@ class GpuScene {
     ModelDataPtr data;
     bool operator==(const PlacedOf&) const = default;
   };
-  Slot<PlacedModels, PlacedOf> placed_;                 // where there are any
-  Slot<RasterContents, ModelData::Sources> raster_;     // where it is of use
-  SurfaceRaster surface_pass_;                          // shows that
-  std::optional<ModelsUnderWay> model_upload_;          // of what both will be
+  Slot<PlacedModels, PlacedOf> placed_;              // where there are any
+  Slot<RasterContents, ModelData::Sources> raster_;  // where it is of use
+  SurfaceRaster surface_pass_;                       // shows that
+  std::optional<ModelsUnderWay> model_upload_;       // of what both will be
   struct EnvironmentUnderWay {
     light::EnvironmentPtr of;
     std::uint64_t settings = 0;

@@ -128,7 +128,7 @@ class Progressive {
     Revision<MarchData> data;
     Revision<InstanceData> instances;
     std::uint32_t divisor = 1;              // of the resolution
-    std::shared_ptr<const void> scene;  // PlacedModels::numbering() of the triangles that its paths meet
+    std::shared_ptr<const void> scene;      // PlacedModels::numbering() of the triangles that its paths meet
     Revision<EnvironmentData> environment;  // that they escape to
     std::optional<scene::SequenceFrame> frame;
     std::uint64_t wish = 0;    // that it is of

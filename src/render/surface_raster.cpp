@@ -272,8 +272,8 @@ void SurfaceRaster::add_places(Shown& shown, std::vector<glm::dmat4> places) {
   std::erase_if(places, [&](const glm::dmat4& place) { return !(std::abs(volume(place)) > 0.0); });
   const auto mirrored = std::ranges::stable_partition(places, [&](const glm::dmat4& p) { return volume(p) > 0.0; });
   const auto count = static_cast<std::uint32_t>(mirrored.size());
-  shown.sets.push_back({static_cast<std::uint32_t>(places_.size()), static_cast<std::uint32_t>(places.size()) - count,
-                        count});
+  shown.sets.push_back(
+      {static_cast<std::uint32_t>(places_.size()), static_cast<std::uint32_t>(places.size()) - count, count});
   places_.insert(places_.end(), places.begin(), places.end());
 }
 
@@ -334,8 +334,7 @@ void SurfaceRaster::sort_blended(const SurfaceView& view) {
     const Batch& batch = source.blended[triangle.number];
     if (sorted_.empty() || sorted_.back().batch.draw != batch.draw || sorted_.back().shown != triangle.shown ||
         sorted_.back().place != triangle.place) {
-      sorted_.push_back(
-          {triangle.shown, triangle.place, {static_cast<std::uint32_t>(indices.size()), 0, batch.draw}});
+      sorted_.push_back({triangle.shown, triangle.place, {static_cast<std::uint32_t>(indices.size()), 0, batch.draw}});
     }
     sorted_.back().batch.count += 3;
     const auto first = source.scene->indices.begin() + batch.first;
@@ -371,10 +370,11 @@ void SurfaceRaster::upload_places(const SurfaceView& view) {
   for (const glm::dmat4& place : places_) {
     const glm::dvec3 from_eye = glm::dvec3(place[3]) - view.eye;
     const glm::vec3 high(from_eye);
-    records.push_back({glm::vec3(place[0]), glm::vec3(place[1]), glm::vec3(place[2]), high,
-                       glm::vec3(from_eye - glm::dvec3(high))});
+    records.push_back(
+        {glm::vec3(place[0]), glm::vec3(place[1]), glm::vec3(place[2]), high, glm::vec3(from_eye - glm::dvec3(high))});
   }
-  fill(place_buffer_, place_bytes_, records.data(), records.size() * sizeof(PlaceRecord), "creating the surfaces' places");
+  fill(place_buffer_, place_bytes_, records.data(), records.size() * sizeof(PlaceRecord),
+       "creating the surfaces' places");
 }
 
 void SurfaceRaster::make_targets(glm::uvec2 size, unsigned layers, SurfaceLayers& into) {
@@ -424,7 +424,8 @@ void SurfaceRaster::make_fixtures() {
 }
 
 std::uint64_t SurfaceRaster::bytes() const {
-  std::uint64_t bytes = light_bytes_ + place_bytes_ + sorted_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
+  std::uint64_t bytes =
+      light_bytes_ + place_bytes_ + sorted_bytes_ + std::uint64_t{depth_test_size_.x} * depth_test_size_.y * 4;
   if (gloss_) bytes += std::uint64_t{core::CM_GLOSS_WIDTH} * core::CM_GLOSS_HEIGHT * core::CM_GLOSS_LEVELS * 16;
   if (!view_block_) return bytes;
   const std::uint64_t table = std::uint64_t(surface::GgxAlbedo::width()) * surface::GgxAlbedo::height() * 4;
@@ -446,8 +447,8 @@ void SurfaceRaster::upload_gloss(const light::GlossPtr& gloss) {
 void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& lighting) {
   const glm::dmat3 matrix = to_view(view);
   const std::optional<Bounds> bounds = bounds_of(items_);
-  const glm::dvec2 depth = bounds ? depth_of(view, matrix, bounds->low, bounds->high)
-                                  : depth_of(view, matrix, view.eye, view.eye);
+  const glm::dvec2 depth =
+      bounds ? depth_of(view, matrix, bounds->low, bounds->high) : depth_of(view, matrix, view.eye, view.eye);
   CmSurfaceView block{};
   block.to_view_x = glm::vec4(glm::vec3(matrix[0]), 0.0F);
   block.to_view_y = glm::vec4(glm::vec3(matrix[1]), 0.0F);

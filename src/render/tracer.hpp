@@ -224,7 +224,7 @@ class Tracer {
   bool trace_depth(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline);
   /// One pixel of a picture with these parameters.
   struct Picked {
-    float z = 0.0F;           ///< view depth at half opacity, or of a triangle; 0: neither is there
+    float z = 0.0F;                         ///< view depth at half opacity, or of a triangle; 0: neither is there
     std::optional<std::uint32_t> place;     ///< where it is the first: of which volume there is most
     std::optional<std::uint32_t> triangle;  ///< where it is the second: its number among those of all models
   };

@@ -96,7 +96,8 @@ dvec3 origin_of(std::span<const Instance> instances) {
   dvec3 high(-low);
   for (const Instance& instance : instances) {
     if (!is_solid(instance.grid)) continue;
-    const Block block = block_of(instance.place * instance.source->cube.to_world, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max));
+    const Block block = block_of(instance.place * instance.source->cube.to_world, dvec3(instance.grid.box_min),
+                                 dvec3(instance.grid.box_max));
     const dvec3 reach = reach_of(block);
     low = glm::min(low, block.middle - reach);
     high = glm::max(high, block.middle + reach);
@@ -127,7 +128,8 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
                    (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U);
     glow.push_back(glow_of(instance.source->glow, cube.to_world, instance.place));
-    const Block& block = blocks.emplace_back(block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max)));
+    const Block& block =
+        blocks.emplace_back(block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max)));
     const dvec3 reach = reach_of(block);
     const dvec3 most = glm::abs(block.middle) + reach;
     const double size = std::max({most.x, most.y, most.z});

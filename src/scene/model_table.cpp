@@ -172,8 +172,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         table.parts.push_back({static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(i)});
       }
     }
-    for (const surface::PunctualLight& light : source.pose.lights)
-      table.lamps.push_back(placed(light, model.to_world));
+    for (const surface::PunctualLight& light : source.pose.lights) table.lamps.push_back(placed(light, model.to_world));
   }
   if (low.x <= high.x) {
     table.low = low;

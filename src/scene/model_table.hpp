@@ -32,11 +32,12 @@ struct ModelPart {
   std::uint32_t mesh = 0;
 };
 
-/// Records and nodes go into buffers as they are; of a scene without triangles there is one record, which nothing meets.
+/// Records and nodes go into buffers as they are; of a scene without triangles there is one record, which nothing
+/// meets.
 struct ModelTable {
-  std::vector<core::CmModel> records;       ///< one for each place of each mesh
-  std::vector<core::CmInstanceNode> nodes;  ///< at least one
-  std::vector<ModelPart> parts;             ///< of the records
+  std::vector<core::CmModel> records;         ///< one for each place of each mesh
+  std::vector<core::CmInstanceNode> nodes;    ///< at least one
+  std::vector<ModelPart> parts;               ///< of the records
   std::vector<surface::PunctualLight> lamps;  ///< of all models, where they stand
   light::SceneLights lights;
   glm::dvec3 low{0.0};  ///< of all triangles; of none both are 0
@@ -60,9 +61,9 @@ struct ModelBounds {
 };
 ModelBounds bounds_of(const ModelSource& source, const glm::dmat4& to_world);
 
-/// words: of each source. Throws Error(invalid_argument) for a place that is not finite or makes things flat or endless,
-/// Error(unsupported) for one 1e12 or more from the origin of the world, and for more than 2^32 triangles, each counted
-/// wherever it stands; the message counts models from 0. O(n log n).
+/// words: of each source. Throws Error(invalid_argument) for a place that is not finite or makes things flat or
+/// endless, Error(unsupported) for one 1e12 or more from the origin of the world, and for more than 2^32 triangles,
+/// each counted wherever it stands; the message counts models from 0. O(n log n).
 ModelTable make_model_table(std::span<const Model> models, const std::function<ModelWords(const ModelSource&)>& words);
 
 }  // namespace cumulet::scene

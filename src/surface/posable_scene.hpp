@@ -37,7 +37,7 @@ class PosableScene final : public Scene {
   Rig rig;
   std::vector<MeshPart> parts;
   std::vector<Instance> instances;
-  std::vector<Placings> placings;  ///< a prototype each
+  std::vector<Placings> placings;        ///< a prototype each
   std::vector<MovableMaterial> movable;  ///< the materials; empty: no animation moves any
   std::vector<PlacedLight> lights;
   std::vector<std::pair<std::uint32_t, SceneCamera>> cameras;  ///< with their nodes

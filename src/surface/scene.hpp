@@ -141,8 +141,8 @@ struct Draw {
   std::uint32_t node = 0;
 };
 
-/// Draws that a pose places together any number of times (EXT_mesh_gpu_instancing), of vertices in a space of their own.
-/// One after another in the draws and in the indices, as prototypes are.
+/// Draws that a pose places together any number of times (EXT_mesh_gpu_instancing), of vertices in a space of their
+/// own. One after another in the draws and in the indices, as prototypes are.
 struct Prototype {
   std::uint32_t first_draw = 0;
   std::uint32_t draw_count = 0;
@@ -170,7 +170,7 @@ struct Pose {
   std::vector<std::uint8_t> flipped;  ///< a Draw each: 1 where the node mirrors, so that the winding is clockwise
   std::vector<std::uint8_t> hidden;   ///< a Draw each: 1 where it is not there at this time; empty: none
   std::vector<std::vector<glm::dmat4>> placings;  ///< a Prototype each: to the world
-  std::vector<Material> materials;    ///< as they are at this time; empty: the scene's
+  std::vector<Material> materials;                ///< as they are at this time; empty: the scene's
   std::vector<std::uint32_t>
       chosen;                 ///< a Draw each: its material in the variant that is chosen; empty: the Draw's own
   bool double_sided = false;  ///< all materials count as double sided, whatever they say

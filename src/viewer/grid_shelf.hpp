@@ -15,9 +15,12 @@ struct GridWish {
 class GridShelf : public Shelf<GridWish, Built> {
  public:
   GridShelf(const Log& log, std::function<void()> notify, Trace trace = {})
-      : Shelf("building the grids of several volumes", Progress::Stage::refining,
-              [log](const Wish& wish, Progress& progress) { return build_grid(log, wish.volume, wish.settings, progress); },
-              std::move(notify), trace) {}
+      : Shelf(
+            "building the grids of several volumes", Progress::Stage::refining,
+            [log](const Wish& wish, Progress& progress) {
+              return build_grid(log, wish.volume, wish.settings, progress);
+            },
+            std::move(notify), trace) {}
 };
 
 }  // namespace cumulet::viewer

@@ -15,9 +15,10 @@ struct PoseWish {
 class PoseShelf : public Shelf<PoseWish, scene::ModelSourcePtr> {
  public:
   explicit PoseShelf(std::function<void()> notify, Trace trace = {})
-      : Shelf("posing several models", Progress::Stage::loading,
-              [](const Wish& wish, Progress& progress) { return wish.surfaces->posed(wish.choice, progress); },
-              std::move(notify), trace) {}
+      : Shelf(
+            "posing several models", Progress::Stage::loading,
+            [](const Wish& wish, Progress& progress) { return wish.surfaces->posed(wish.choice, progress); },
+            std::move(notify), trace) {}
 };
 
 }  // namespace cumulet::viewer

@@ -95,8 +95,8 @@ void meet(Pick& pick, const render::PlacedModels& models, std::uint32_t triangle
   const std::uint32_t material =
       surface::material_of(scene, source.pose, static_cast<std::size_t>(draw - scene.draws.begin()));
   pick.model = model.id;
-  pick.surface = Pick::Surface{glm::dot(normal, ray) > 0.0 ? -normal : normal, material,
-                               scene.materials.at(material).name};
+  pick.surface =
+      Pick::Surface{glm::dot(normal, ray) > 0.0 ? -normal : normal, material, scene.materials.at(material).name};
 }
 
 }  // namespace

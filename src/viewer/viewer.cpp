@@ -380,7 +380,8 @@ std::vector<Viewer::Shown>::iterator Viewer::find(const Instance& instance) {
 
 void Viewer::add_model(std::shared_ptr<ModelInstance> model) {
   sync();
-  if (find(*model) != shown_models_.end()) throw Error(ErrorCode::invalid_argument, "the viewer shows the model already");
+  if (find(*model) != shown_models_.end())
+    throw Error(ErrorCode::invalid_argument, "the viewer shows the model already");
   ShownModel shown;
   shown.id = ++last_id_;
   shown.listener = model->listen([this] { notify(); });
@@ -438,7 +439,8 @@ void Viewer::follow_models() {
       if (!shown.wish) continue;
       auto source = poses_.built(*shown.wish);
       // Of wishes that change faster than they are posed, one that was begun.
-      if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces) source = poses_.built(*shown.begun);
+      if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces)
+        source = poses_.built(*shown.begun);
       if (source) shown.source = std::move(*source);
     }
     if (std::exchange(poses_due_, false)) poses_.wish(std::move(wishes));
@@ -935,9 +937,7 @@ std::optional<Bounds> Viewer::box() const {
   return box;
 }
 
-bool Viewer::shows_models() const {
-  return model_source_ || std::ranges::any_of(shown_models_, &ShownModel::is_shown);
-}
+bool Viewer::shows_models() const { return model_source_ || std::ranges::any_of(shown_models_, &ShownModel::is_shown); }
 
 bool Viewer::shows_triangles() const {
   return std::ranges::any_of(models(), [](const scene::Model& m) { return m.source->scene->triangle_count() > 0; });

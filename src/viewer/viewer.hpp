@@ -329,8 +329,8 @@ class Viewer {
   scene::Part<scene::Medium> shown_medium_;         // its own
   std::vector<Shown> shown_;                        // in the order in which they were added
   std::vector<ShownModel> shown_models_;            // likewise
-  std::uint64_t posed_ = 0;  // of poses_, when it was last looked at
-  bool poses_due_ = false;   // what is wished of it is to be told anew
+  std::uint64_t posed_ = 0;                         // of poses_, when it was last looked at
+  bool poses_due_ = false;                          // what is wished of it is to be told anew
   std::uint64_t last_id_ = 0;
   std::uint64_t shelved_ = 0;   // of shelf_, when it was last looked at
   bool wishes_due_ = false;     // what is wished of it is to be told anew

@@ -363,6 +363,8 @@ void Caller::call_all() {
   cumulet_programs* new_programs = nullptr;
   cumulet_instance* new_instance = nullptr;
   auto instance = make_desc<cumulet_instance_desc>();
+  cumulet_model* new_model = nullptr;
+  const auto model = make_desc<cumulet_model_desc>();
   cumulet_sequence* new_sequence = nullptr;
   const auto sequence = make_desc<cumulet_sequence_desc>();
   const auto playback = make_desc<cumulet_playback_desc>();
@@ -378,13 +380,28 @@ void Caller::call_all() {
     answer("cumulet_get_progress", cumulet_get_progress(v, &progress), CUMULET_OK);
     cumulet_cancel(v);
   }
-  names.insert({"cumulet_cancel",           "cumulet_status_text",           "cumulet_version",
-                "cumulet_volume_retain",    "cumulet_volume_release",        "cumulet_surfaces_retain",
-                "cumulet_surfaces_release", "cumulet_programs_retain",       "cumulet_programs_release",
-                "cumulet_camera_release",   "cumulet_environment_retain",    "cumulet_environment_release",
-                "cumulet_instance_retain",  "cumulet_instance_release",      "cumulet_sequence_retain",
-                "cumulet_sequence_release", "cumulet_inspection_release",    "cumulet_destroy",
-                "cumulet_last_error",       "cumulet_transmittance_map_glsl"});
+  names.insert({"cumulet_cancel",
+                "cumulet_status_text",
+                "cumulet_version",
+                "cumulet_volume_retain",
+                "cumulet_volume_release",
+                "cumulet_surfaces_retain",
+                "cumulet_surfaces_release",
+                "cumulet_programs_retain",
+                "cumulet_programs_release",
+                "cumulet_camera_release",
+                "cumulet_environment_retain",
+                "cumulet_environment_release",
+                "cumulet_instance_retain",
+                "cumulet_instance_release",
+                "cumulet_model_retain",
+                "cumulet_model_release",
+                "cumulet_sequence_retain",
+                "cumulet_sequence_release",
+                "cumulet_inspection_release",
+                "cumulet_destroy",
+                "cumulet_last_error",
+                "cumulet_transmittance_map_glsl"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
@@ -392,6 +409,7 @@ void Caller::call_all() {
   cumulet_environment_release(cumulet_environment_retain(nullptr));
   cumulet_inspection_release(nullptr);
   cumulet_instance_release(cumulet_instance_retain(nullptr));
+  cumulet_model_release(cumulet_model_retain(nullptr));
   cumulet_sequence_release(cumulet_sequence_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
   if (cumulet_transmittance_map_glsl() == nullptr) wrong.push_back("glsl");
@@ -425,6 +443,10 @@ void Caller::call_all() {
   CALL(cumulet_surfaces_get_info, surfaces, &surfaces_info);
   CALL(cumulet_surfaces_get_animation, surfaces, 0, &animation);
   CALL(cumulet_surfaces_get_variant, surfaces, 0, &variant);
+  CALL(cumulet_model_create, &model, &new_model, nullptr, 0);
+  CALL(cumulet_model_set, new_model, &model);
+  CALL(cumulet_model_set_to_world, new_model, matrix.data());
+  CALL(cumulet_model_set_time, new_model, 1.0);
   CALL(cumulet_sequence_create, &sequence, &new_sequence, nullptr, 0);
   CALL(cumulet_sequence_set_playback, new_sequence, &playback);
   CALL(cumulet_sequence_set_time, new_sequence, 0.0);
@@ -456,6 +478,8 @@ void Caller::call_all() {
     CALL(cumulet_set_volume, v, nullptr);
     CALL(cumulet_set_volume_places, v, nullptr, 0);
     CALL(cumulet_get_volume, v, &new_volume);
+    CALL(cumulet_add_model, v, new_model);
+    CALL(cumulet_remove_model, v, new_model);
     CALL(cumulet_add_instance, v, new_instance);
     CALL(cumulet_remove_instance, v, new_instance);
     CALL(cumulet_set_sequence, v, nullptr);

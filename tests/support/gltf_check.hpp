@@ -88,6 +88,12 @@ inline std::string broken(const surface::Scene& scene, const surface::Pose& pose
   for (const surface::Material& m : pose.materials) {
     if (const std::string what = broken(scene, m); !what.empty()) return what;
   }
+  if (pose.placings.size() != scene.prototypes.size()) return "there are not as many placings as prototypes";
+  for (const std::vector<glm::dmat4>& placings : pose.placings) {
+    for (const glm::dmat4& placing : placings) {
+      if (!(std::abs(glm::determinant(glm::dmat3(placing))) > 0.0)) return "a placing is flat";
+    }
+  }
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
     const surface::Draw& draw = scene.draws[d];
     const auto has_map = [&](std::uint32_t m) {
@@ -98,7 +104,7 @@ inline std::string broken(const surface::Scene& scene, const surface::Pose& pose
     for (std::size_t i = draw.first_index; i < std::size_t{draw.first_index} + draw.index_count; ++i) {
       const surface::PosedVertex& v = pose.vertices[scene.indices[i]];
       if (!finite(v.position)) return "a position is not finite";
-      for (int c = 0; c < 3 && !surface::is_hidden(pose, d); ++c) {
+      for (int c = 0; c < 3 && !surface::is_hidden(pose, d) && d < scene.first_prototype_draw(); ++c) {
         if (v.position[c] < pose.low[c] || v.position[c] > pose.high[c]) return "a position is out of bounds";
       }
       if (!unit(v.normal)) return "a normal is not of unit length";

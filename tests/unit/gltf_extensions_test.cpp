@@ -825,8 +825,9 @@ TEST(GltfInstances, HostileOnesAreRefusedInALine) {
 }
 
 TEST(GltfInstances, FlatOnesAreNotDrawn) {
-  const ScenePtr scene =
-      imported(instanced_model([](GltfModel& m) { return json{{"SCALE", m.vec3({1, 1, 1, 1, 0, 1, 0, 0, 0})}}; }));
+  const ScenePtr scene = imported(instanced_model([](GltfModel& m) {
+    return json{{"SCALE", m.vec3({1, 1, 1, 1, 0, 1, 0, 0, 0})}};
+  }));
   EXPECT_EQ(scene->pose(0.0).placings.at(0).size(), 1U);
 }
 

@@ -51,8 +51,8 @@ Met brute_force(const std::vector<scene::Model>& models, const dvec3& o, const d
     for (std::size_t i = 0; i < source.scene->indices.size(); i += 3) {
       std::array<dvec3, 3> p;
       for (std::size_t k = 0; k < 3; ++k)
-        p.at(k) = dvec3(models[m].to_world *
-                        glm::dvec4(source.pose.vertices[source.scene->indices[i + k]].position, 1.0));
+        p.at(k) =
+            dvec3(models[m].to_world * glm::dvec4(source.pose.vertices[source.scene->indices[i + k]].position, 1.0));
       const dvec3 a = p[1] - p[0];
       const dvec3 b = p[2] - p[0];
       const dvec3 h = glm::cross(d, b);

@@ -386,7 +386,16 @@ TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
             start + "volumes[1].medium.max_bounces: is the first volume's, for all of them");
   EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "places": [7]}])"),
             start + "volumes[1].places[0]: is neither 16 numbers nor an object");
-  EXPECT_EQ(told(R"("models": [{}, {}, {}])"), start + "models: are 3: this program shows 1");
+  EXPECT_EQ(told(R"("models": [{}, {}, {}])"), start + "models[1].file: is missing");
+  EXPECT_EQ(told(R"("models": [{}, {"file": ""}])"), start + "models[1].file: is empty");
+  EXPECT_EQ(told(R"("models": [{}, {"file": "a.glb", "light": "none"}])"),
+            start + "models[1].light: there is no such setting");
+  EXPECT_EQ(told(R"("models": [{"file": "a.glb", "translate": [1, 2]}])"),
+            start + "models[0].translate: is not three numbers");
+  EXPECT_EQ(told(R"("models": [{"file": "a.glb", "visible": false, "camera": 0}])"),
+            start + "models[0].camera: is of a model that stands as its file has it");
+  EXPECT_EQ(told(R"("models": [{"shadow_only": true}])"), start + "models[0].file: is missing");
+  EXPECT_EQ(told(R"("models": [{}, {"file": "a.glb", "scale": [1, 0, 1]}])").rfind(start + "models[1].scale: ", 0), 0U);
   EXPECT_EQ(told(R"("volumes": {})"), start + "volumes: is not a list");
   EXPECT_EQ(told(R"("volumes": [3])"), start + "volumes[0] is not an object");
   EXPECT_EQ(told(R"("volumes": [{"visible": 0}])"), start + "volumes[0].visible: is neither true nor false");
@@ -479,7 +488,7 @@ TEST(SceneFile, VariantsAreFoundByNameThenByNumber) {
   scene.surfaces = "shoe.glb";
   const auto number = [&](const std::string& wanted, const std::vector<std::string>& names) {
     scene.surface_variant = wanted;
-    return variant_number(scene, names);
+    return variant_number(scene.surfaces, scene.surface_variant, names);
   };
   const std::vector<std::string> names = {"beach", "1", "street"};
   EXPECT_EQ(number("", names), 0U);
@@ -540,6 +549,65 @@ TEST(SceneFile, ASequenceIsKept) {
   EXPECT_EQ(refused(R"({"first_frame": 9, "last_frame": 8})"),
             "scene.json: sequence.last_frame: comes before sequence.first_frame");
   EXPECT_EQ(refused(R"({"speed": 2})"), "scene.json: sequence.speed: there is no such setting");
+}
+
+TEST(SceneFile, ModelsAreKept) {
+  SceneOptions scene;
+  scene.surfaces = "/data/town.glb";
+  scene.surface.light = CUMULET_SURFACE_LIGHT_SHADOWS;
+  scene.models.push_back({"/data/tree.glb"});
+  SceneModel& fox = scene.models.emplace_back();
+  fox.file = "/elsewhere/fox.glb";
+  fox.name = "a fox";
+  fox.to_world = {2, 0, 0, 0, 0, -2, 0, 0, 0, 0.5, 2, 0, 1, 2, 3, 1};
+  fox.visible = false;
+  fox.shadow_only = true;
+  fox.time = 1.25;
+  fox.animation = 2;
+  fox.variant = "red";
+  fox.double_sided = true;
+  const std::string path = "/data/scene.json";
+  const SceneOptions read = parse_scene(scene_text(scene, path), path);
+  EXPECT_EQ(read.surfaces, scene.surfaces);
+  EXPECT_EQ(read.models, scene.models);
+  EXPECT_TRUE(same_scene(read, scene));
+  // Of the first version none are written, and it reads.
+  const SceneOptions first = parse_scene(scene_text(scene, path, SceneFormat::first), path);
+  EXPECT_EQ(first.surfaces, scene.surfaces);
+  EXPECT_TRUE(first.models.empty());
+  // Each of them counts, and its name for the scene, but not for the picture.
+  for (const auto& change : std::vector<std::function<void(SceneModel&)>>{
+           [](SceneModel& m) { m.file = "/data/other.glb"; }, [](SceneModel& m) { m.to_world[12] = 9; },
+           [](SceneModel& m) { m.visible = true; }, [](SceneModel& m) { m.shadow_only = false; },
+           [](SceneModel& m) { m.time = 0; }, [](SceneModel& m) { m.variant = "blue"; }}) {
+    SceneOptions other = scene;
+    change(other.models[1]);
+    EXPECT_FALSE(same_scene(scene, other));
+    EXPECT_NE(scene_hash(scene), scene_hash(other));
+  }
+  SceneOptions renamed = scene;
+  renamed.models[1].name = "another fox";
+  EXPECT_FALSE(same_scene(scene, renamed));
+  EXPECT_EQ(scene_hash(scene), scene_hash(renamed));
+  // Without surfaces the first of them is the file's first, with how surfaces are lit.
+  scene.surfaces.clear();
+  const SceneOptions alone = parse_scene(scene_text(scene, path), path);
+  EXPECT_TRUE(alone.surfaces.empty());
+  EXPECT_EQ(alone.models, scene.models);
+  EXPECT_EQ(alone.surface.light, CUMULET_SURFACE_LIGHT_SHADOWS);
+}
+
+TEST(SceneFile, AModelStandsByItsParts) {
+  const SceneOptions scene = parse_scene(
+      R"({"cumulet_scene": 2, "models": [{"file": "a.glb", "translate": [1, 2, 3], "rotate_degrees": [0, 90, 0],
+          "scale": [2, 2, 2]}, {"file": "b.glb", "translate": [4, 0, 0]}]})",
+      "/data/scene.json");
+  EXPECT_EQ(scene.surfaces, "");
+  ASSERT_EQ(scene.models.size(), 2U);
+  EXPECT_EQ(scene.models[0].file, "/data/a.glb");
+  constexpr std::array<double, 16> turned{0, 0, -2, 0, 0, 2, 0, 0, 2, 0, 0, 0, 1, 2, 3, 1};
+  for (std::size_t i = 0; i < 16; ++i) EXPECT_NEAR(scene.models[0].to_world.at(i), turned.at(i), 1e-12) << i;
+  EXPECT_EQ(scene.models[1].to_world[12], 4.0);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@
  *     Calls for one viewer must not overlap, from whatever thread they come, with two exceptions that are safe at any
  *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
  *     objects with it, current on the calling thread: without, they are CUMULET_ERROR_GL each time and change nothing,
- *     and the next call with it goes on. No other call touches GL. Camera, volume, sequence, surfaces and programs
+ *     and the next call with it goes on. No other call touches GL. Camera, volume, sequence, surfaces, model and programs
  *     handles may be used from any thread at any time. Files are read, grids are built, surfaces are posed and physical
  * skies are computed on worker threads of the viewer's own; cumulet_render uploads what they made, within its time
  * budget, and shows the last good picture until then. The newest wish wins and none starves: what changes faster than

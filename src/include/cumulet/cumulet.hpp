@@ -711,9 +711,8 @@ class Model {
 
   [[nodiscard]] static Result<Model> create(const ModelDesc& desc) noexcept {
     const cumulet_model_desc c = described(desc);
-    return detail::made<Model>([&](cumulet_model** out, char* error, std::size_t size) {
-      return cumulet_model_create(&c, out, error, size);
-    });
+    return detail::made<Model>(
+        [&](cumulet_model** out, char* error, std::size_t size) { return cumulet_model_create(&c, out, error, size); });
   }
   [[nodiscard]] Result<> set(const ModelDesc& desc) const noexcept {
     const cumulet_model_desc c = described(desc);

@@ -53,8 +53,9 @@ struct CpuSurfaceData {
     const auto textures = static_cast<uint>(shown_words.size());
     for (const surface::Texture& texture : shown_source->scene->textures)
       shown_words.push_back(scene::texture_word(texture, shown_atlas.places[0][texture.image]));
-    const scene::ModelTable table =
-        scene::make_model_table(models, [&](const scene::ModelSource&) { return scene::ModelWords{0, textures}; });
+    const scene::ModelTable table = scene::make_model_table(models, [&](const scene::ModelSource&) {
+      return scene::ModelWords{0, textures};
+    });
     cm_models = table.records;
     cm_model_nodes = table.nodes;
     CmSurfaceTables tables{};
@@ -83,7 +84,8 @@ struct CpuSurfaceData {
       const scene::TextureAtlas::Place& place = shown_atlas.places[0][i];
       const uvec2 texel = uvec2(ivec2(at)) - place.corner;  // beyond any size to the left or above
       if (uint(at.z) != place.layer || texel.x >= place.size.x || texel.y >= place.size.y) continue;
-      const std::uint8_t* const value = &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
+      const std::uint8_t* const value =
+          &shown_source->images->rgba(i).at(4 * (std::size_t{texel.y} * place.size.x + texel.x));
       return vec4(value[0], value[1], value[2], value[3]) / 255.0F;
     }
     throw std::out_of_range("no image there");

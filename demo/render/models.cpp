@@ -1,0 +1,105 @@
+#include "models.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <utility>
+
+namespace cumulet::demo {
+namespace {
+
+void check(cumulet_status status, const char* cause) {
+  if (status != CUMULET_OK) throw std::runtime_error(*cause != '\0' ? cause : cumulet_status_text(status));
+}
+
+/// Throws where the surfaces have not what it asks for.
+cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, std::uint64_t tag) {
+  cumulet_surfaces_info info{};
+  info.struct_size = sizeof info;
+  check(cumulet_surfaces_get_info(surfaces, &info), "");
+  const std::string refusal = animation_refusal(scene.file, scene.animation, info.animations);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+  cumulet_model_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.surfaces = surfaces;
+  std::ranges::copy(scene.to_world, desc.to_world);
+  desc.time = scene.time;
+  desc.animation = scene.animation;
+  desc.variant = variant_number(scene.file, scene.variant, variant_names(surfaces));
+  desc.double_sided = scene.double_sided ? 1 : 0;
+  desc.hidden = scene.visible ? 0 : 1;
+  desc.shadow_only = scene.shadow_only ? 1 : 0;
+  desc.tag = tag;
+  return desc;
+}
+
+}  // namespace
+
+SurfacesPtr open_surfaces(const std::string& file) {
+  cumulet_surfaces* opened = nullptr;
+  std::array<char, 1024> error{};
+  check(cumulet_surfaces_open(file.c_str(), &opened, error.data(), error.size()), error.data());
+  return {opened, cumulet_surfaces_release};
+}
+
+const Models::Given* Models::find(const std::string& file) const {
+  const auto found = std::ranges::find(given_, file, &Given::file);
+  return found == given_.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> Models::missing(const std::vector<SceneModel>& models) const {
+  std::vector<std::string> files;
+  for (const SceneModel& model : models) {
+    if (model.visible && find(model.file) == nullptr && std::ranges::find(files, model.file) == files.end())
+      files.push_back(model.file);
+  }
+  return files;
+}
+
+void Models::give(const std::string& file, SurfacesPtr surfaces) { given_.push_back({file, std::move(surfaces)}); }
+
+void Models::show(cumulet_viewer* viewer, const std::vector<SceneModel>& models) {
+  std::erase_if(given_, [&](const Given& given) {
+    return std::ranges::none_of(models, [&](const SceneModel& model) { return model.file == given.file; });
+  });
+  std::string refusal;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const SceneModel& scene = models[i];
+    const Given* given = find(scene.file);
+    if (given == nullptr || !given->surfaces) continue;
+    if (count < shown_.size() && shown_[count].scene == scene && shown_[count].surfaces == given->surfaces) {
+      ++count;
+      continue;
+    }
+    cumulet_model_desc desc{};
+    try {
+      desc = desc_of(scene, given->surfaces.get(), i + 1);
+    } catch (const std::runtime_error& error) {
+      refusal = error.what();
+      continue;
+    }
+    if (count == shown_.size()) {
+      cumulet_model* made = nullptr;
+      std::array<char, 1024> error{};
+      check(cumulet_model_create(&desc, &made, error.data(), error.size()), error.data());
+      std::shared_ptr<cumulet_model> model(made, cumulet_model_release);
+      check(cumulet_add_model(viewer, made), cumulet_last_error(viewer));
+      shown_.push_back({std::move(model), {}, nullptr});
+    } else {
+      check(cumulet_model_set(shown_[count].model.get(), &desc), (scene.file + ": its place cannot be").c_str());
+    }
+    shown_[count].scene = scene;
+    shown_[count].surfaces = given->surfaces;
+    ++count;
+  }
+  while (shown_.size() > count) {
+    check(cumulet_remove_model(viewer, shown_.back().model.get()), cumulet_last_error(viewer));
+    shown_.pop_back();
+  }
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+}
+
+}  // namespace cumulet::demo
