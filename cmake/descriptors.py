@@ -9,12 +9,14 @@ import re
 import c_header
 
 DESCRIPTORS = ["grid", "medium", "light", "lamp", "environment_settings", "ground", "surface_settings", "sampling",
-               "display", "camera", "navigation", "frame", "transmittance_map", "volume_file", "denoise", "playback"]
+               "display", "camera", "navigation", "frame", "transmittance_map", "volume_file", "denoise", "playback",
+               "live", "limits"]
 # Descriptors that C functions fill as well.
 FILLED = {"camera"}
 # What C functions fill alone.
 TOLD = ["volume_info", "values_info", "volume_file_info", "grid_info", "metadata", "surfaces_info", "animation_info",
-        "variant_info", "environment_info", "progress", "warm_up_result", "pick", "transmittance_map", "sequence_info", "stats"]
+        "variant_info", "environment_info", "progress", "warm_up_result", "pick", "transmittance_map", "sequence_info",
+        "live_info", "stats"]
 COUNTED = {"default_grid"}  # int32_t that is no switch: a number, or -1
 ENUMS_BY_HAND = {"cumulet_status", "cumulet_key"}
 RENAMED = {"auto": "automatic"}  # a keyword

@@ -351,7 +351,9 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
     const MarchUpload::Sources of = upload_->of;
     try {
       if (!upload_->work) {
-        upload_->work = std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels);
+        auto work = std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels);
+        require_room(work->bytes(), wanted.most_bytes);
+        upload_->work = std::move(work);
       }
       const bool done = upload_->work->advance(deadline);
       took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
@@ -367,6 +369,16 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
       throw;
     }
   }
+}
+
+void GpuScene::require_room(std::uint64_t bytes, std::uint64_t most_bytes) const {
+  // What was here stays until all of it has come; what is free of the pages serves.
+  const std::uint64_t held = data_bytes() + other_bytes() - std::min(heap_.free_bytes(), bytes);
+  const std::uint64_t room = most_bytes - std::min(most_bytes, held);
+  if (bytes <= room) return;
+  throw Error(ErrorCode::out_of_memory, "uploading the volume needs " + std::to_string(bytes) +
+                                            " bytes of GL memory; " + std::to_string(room) +
+                                            " are left of those allowed");
 }
 
 double GpuScene::progress() const {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -32,6 +33,8 @@ class GpuScene {
     bool raster = true;            // the surface pass as well
     std::uint64_t settings = 0;    // another after each change of a setting: what failed is tried again
     std::int64_t page_texels = 0;  // where pages of cell records end; 0: at the driver's limit
+    // Of all that is here: no volume is brought beyond that.
+    std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max();
   };
   /// Brings what differs from the snapshot, until about the deadline. Throws Error(out_of_memory, unsupported, gl) for
   /// a part that cannot be brought; what there is of it stays.
@@ -88,6 +91,7 @@ class GpuScene {
   // What is drawn stands where what paths meet does.
   void place_raster();
   void drop_data();
+  void require_room(std::uint64_t bytes, std::uint64_t most_bytes) const;
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.
   void find_present(const scene::Snapshot& snapshot);

@@ -86,6 +86,8 @@ class MarchUpload {
   /// As Upload has them.
   bool advance(Deadline deadline) { return upload_.advance(deadline); }
   [[nodiscard]] double progress() const { return upload_.progress(); }
+  /// Of GL memory, of what will be there.
+  [[nodiscard]] std::uint64_t bytes() const { return data_.bytes(); }
   /// Only after advance returned true.
   MarchData take() { return std::move(data_); }
 

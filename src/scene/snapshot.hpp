@@ -54,9 +54,9 @@ struct Place {
   bool operator==(const Place&) const = default;
 };
 
-/// Which of a sequence's frames a source is.
+/// Which of a sequence's frames, or of a live volume's states, a source is.
 struct SequenceFrame {
-  std::uint32_t number = 0;
+  std::uint64_t number = 0;
   std::uint64_t sequence = 0;  ///< another each time that one is set
   std::uint64_t taken = 0;     ///< another for each source
   bool operator==(const SequenceFrame&) const = default;
@@ -69,7 +69,7 @@ struct Volume {
   MarchSourcePtr source;  ///< not null; all are of one march
   Part<Medium> medium;
   Place place;
-  std::optional<SequenceFrame> frame = {};  ///< where it is a sequence's
+  std::optional<SequenceFrame> frame = {};  ///< where it is a sequence's or a live volume's
   bool operator==(const Volume&) const = default;
 };
 

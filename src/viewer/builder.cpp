@@ -30,7 +30,36 @@ bool suits(const BuildSettings& made, const BuildSettings& wanted) {
          !apart(grid::hiding(a.density_scale, a.anisotropy), grid::hiding(b.density_scale, b.anisotropy));
 }
 
-Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress) {
+std::uint64_t Built::bytes() const {
+  // A march over voxels reads the volume's own.
+  const std::uint64_t read = source && source->volume && volume ? source->volume->bytes() : 0;
+  const std::uint64_t statistics = source && source->statistics && volume ? source->statistics->bytes() : 0;
+  const std::uint64_t channels = source && volume ? source->channels.bytes() : 0;
+  return (volume ? volume->bytes() : 0) + (source ? source->bytes() : 0) - read - statistics - channels;
+}
+
+namespace {
+
+// With its node of the tree, and what glows of it.
+std::uint64_t bytes_a_cell(const grid::Channels& channels) {
+  std::uint64_t bytes = sizeof(grid::CellRecord) + sizeof(std::uint32_t);
+  if (channels.emission) bytes += sizeof(grid::EmissionRecord) + sizeof(scene::GlowingCell);
+  if (channels.scattering) bytes += sizeof(std::uint32_t);
+  if (channels.forward) bytes += sizeof(std::int16_t);
+  if (channels.momentum) bytes += sizeof(glm::uvec2);
+  return bytes;
+}
+
+std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held, const Allowance& allowance) {
+  constexpr std::uint64_t tables = 4096;  // of whatever size the grid is
+  const std::uint64_t most = allowance.memory_bytes();
+  return (most - std::min(most, held + tables)) / bytes_a_cell(channels);
+}
+
+}  // namespace
+
+Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress,
+                 const Allowance& allowance) {
   Built built;
   built.volume = volume;
   built.settings = settings;
@@ -45,10 +74,13 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     scene::MarchSource source = scene::make_voxel_source(settings.march, voxels, statistics, channels);
     source.optical_depth = statistics->mean_optical_depth();
     built.source = std::make_shared<const scene::MarchSource>(std::move(source));
+    allowance.require(built.bytes(), volume->name());
     built.seconds.records = watch.lap();
     return built;
   }
-  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, settings.refine, &progress);
+  grid::RefineSettings refine = settings.refine;
+  refine.max_cells = std::min(refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance));
+  const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
   built.seconds.refine = watch.lap();
@@ -61,12 +93,13 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.levels = grid->levels;
   built.limited = grid->limited;
   if (grid->limited) {
-    log.info("max_cells (" + std::to_string(settings.refine.max_cells) + ") ended the refinement before the threshold");
+    log.info("max_cells (" + std::to_string(refine.max_cells) + ") ended the refinement before the threshold");
   }
   scene::MarchSource source =
       scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress);
   source.optical_depth = statistics->mean_optical_depth();
   built.source = std::make_shared<const scene::MarchSource>(std::move(source));
+  allowance.require(built.bytes(), volume->name());
   return built;
 }
 
@@ -94,6 +127,7 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
                      if (file.suggested_density_scale)
                        loaded.density_scale = loaded.volume->coarse().suggest_density_scale();
                      const double seconds = watch.lap();
+                     allowance_->require(loaded.volume->bytes(), file.path);
                      {
                        const std::scoped_lock handing(mutex_);
                        progress.check();
@@ -168,7 +202,7 @@ bool Builder::busy() const {
 
 void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds,
                        Progress& progress) {
-  Built built = build_grid(log_, volume, settings, progress);
+  Built built = build_grid(log_, volume, settings, progress, *allowance_);
   built.seconds.load = load_seconds;
   const std::scoped_lock lock(mutex_);
   progress.check();

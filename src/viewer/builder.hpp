@@ -67,11 +67,15 @@ struct Built {
   std::uint32_t levels = 0;
   bool limited = false;
   BuildSeconds seconds;
+
+  /// Main memory, with what others may hold as well.
+  [[nodiscard]] std::uint64_t bytes() const;
 };
 
 /// Of a volume, on this thread. Throws Error(cancelled), and what its parts throw.
+/// Cells are as coarse as the allowance's memory takes; where it does not do for the coarsest, Error(out_of_memory).
 [[nodiscard]] Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings,
-                               Progress& progress);
+                               Progress& progress, const Allowance& allowance = {});
 
 /// Loads volumes and builds what marches need on a thread of its own, one job at a time. The newest wish wins, and none
 /// starves: a build under way is finished first, and of loads under way at least every second, so that volumes and
@@ -80,8 +84,9 @@ struct Built {
 class Builder {
  public:
   /// notify: called on the worker after a job ended.
-  Builder(Log log, std::function<void()> notify, Trace trace = {})
-      : log_(std::move(log)), worker_(std::move(notify), trace) {}
+  Builder(Log log, std::function<void()> notify, Trace trace = {},
+          AllowancePtr allowance = std::make_shared<const Allowance>())
+      : log_(std::move(log)), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
 
   /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way, as Worker::replace()
   /// does: another file is another subject, and files may take minutes.
@@ -118,6 +123,7 @@ class Builder {
   void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress);
 
   Log log_;
+  AllowancePtr allowance_;
   mutable std::mutex mutex_;
   std::weak_ptr<Load> load_;  // held by its job
   std::optional<LoadedVolume> loaded_;

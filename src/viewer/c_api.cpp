@@ -206,7 +206,7 @@ cumulet_status cumulet_get_sequence_info(cumulet_viewer* viewer, cumulet_sequenc
     out.ready_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::ready));
     out.failed_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::failed));
     out.asked_frame = status.asked;
-    out.drawn_frame = status.drawn.value_or(0);
+    out.drawn_frame = static_cast<uint32_t>(status.drawn.value_or(0));
     out.is_drawn = status.drawn ? 1 : 0;
     out.bytes = status.frames.bytes;
     out.suggested_density_scale = status.density_scale.value_or(0.0);
@@ -221,6 +221,36 @@ cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame
     require(cause != nullptr && size > 0, "there is no room for the cause");
     const std::optional<cumulet::Error> failure = v.frame_failure(frame);
     copy_text(failure ? failure->what() : "", cause, size);
+  });
+}
+
+cumulet_status cumulet_set_live(cumulet_viewer* viewer, cumulet_live* live) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_live(live == nullptr ? nullptr : live->asset); });
+}
+
+cumulet_status cumulet_get_live_info(cumulet_viewer* viewer, cumulet_live_info* info) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    read_desc(info, "cumulet_live_info");
+    const core::Viewer::LiveStatus status = v.live();
+    cumulet_live_info out{};
+    out.handed_state = status.handed;
+    out.ready_state = status.ready;
+    out.drawn_state = status.drawn;
+    out.ready_count = status.ready_count;
+    out.drawn_count = status.drawn_count;
+    write_desc(info, out, "cumulet_live_info");
+  });
+}
+
+cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_desc* desc) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    const cumulet_limits_desc d = read_desc(desc, "cumulet_limits_desc");
+    require(d.threads <= 1024, "cumulet_limits_desc.threads is above 1024");
+    core::Viewer::Limits limits;
+    limits.threads = d.threads;
+    if (d.memory_bytes != 0) limits.memory_bytes = d.memory_bytes;
+    if (d.gl_bytes != 0) limits.gl_bytes = d.gl_bytes;
+    v.set_limits(limits);
   });
 }
 
@@ -592,6 +622,7 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.limited = had.limited ? 1 : 0;
     s.cell_bytes = had.cell_bytes;
     s.gl_bytes = had.gl_bytes;
+    s.memory_bytes = had.memory_bytes;
     s.active_voxels = had.active_voxels;
     const auto& seconds = had.build_seconds;
     s.build_seconds_load = seconds.load;

@@ -10,6 +10,7 @@
 #include "viewer/builder.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/instance.hpp"
+#include "viewer/live.hpp"
 #include "viewer/sequence.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
@@ -44,6 +45,11 @@ struct cumulet_sequence {
   std::atomic<int> references = 1;
 };
 
+struct cumulet_live {
+  std::shared_ptr<cumulet::viewer::Live> asset;
+  std::atomic<int> references = 1;
+};
+
 struct cumulet_programs {
   std::shared_ptr<cumulet::gl::ProgramPool> asset;
   std::atomic<int> references = 1;
@@ -59,7 +65,11 @@ struct cumulet_camera {
 
 namespace cumulet::c_abi {
 
-/// A host's descriptor, checked.
+/// A host's descriptors, checked.
+volume::DenseVoxels to_dense(const cumulet_dense_desc* desc, const std::string& name);
+volume::SparseVoxels to_sparse(const cumulet_sparse_desc* desc, const std::string& name);
+/// name: that is told of it.
+viewer::VolumeAssetPtr asset_of(const std::string& name, volume::VolumeFrame frame);
 viewer::VolumeFile to_volume_file(const cumulet_volume_file_desc* desc);
 
 /// Runs a call on what a handle is of; what: that, for messages.

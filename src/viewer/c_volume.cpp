@@ -17,17 +17,39 @@ struct cumulet_inspection {
   volume::Inspection file;
 };
 
-namespace {
-
-viewer::VolumeAssetPtr asset_of(const std::string& name, volume::ScalarVolume volume) {
+viewer::VolumeAssetPtr c_abi::asset_of(const std::string& name, volume::VolumeFrame frame) {
   try {
-    return std::make_shared<const viewer::VolumeAsset>(std::move(volume));
+    return std::make_shared<const viewer::VolumeAsset>(std::move(frame));
   } catch (const Error& e) {
     throw Error(e.code(), name + ": " + e.what());
   }
 }
 
-}  // namespace
+volume::DenseVoxels c_abi::to_dense(const cumulet_dense_desc* desc, const std::string& name) {
+  const cumulet_dense_desc d = read_desc(desc, "cumulet_dense_desc");
+  return {.values = array_of(d.values, d.value_count, 1, name + ": values"),
+          .size = {d.size[0], d.size[1], d.size[2]},
+          .index_to_world = matrix_or_identity(d.index_to_world)};
+}
+
+volume::SparseVoxels c_abi::to_sparse(const cumulet_sparse_desc* desc, const std::string& name) {
+  const cumulet_sparse_desc d = read_desc(desc, "cumulet_sparse_desc");
+  volume::SparseVoxels voxels{
+      .brick_origins = array_of(d.brick_origins, d.brick_count, 3, name + ": brick_origins"),
+      .brick_values = array_of(d.brick_values, d.brick_count, volume::brick_voxels, name + ": brick_values"),
+      .brick_active = array_of(d.brick_active, d.brick_active == nullptr ? 0 : d.brick_count, volume::brick_size,
+                               name + ": brick_active"),
+      .tiles = {},
+      .background = d.background,
+      .index_to_world = matrix_or_identity(d.index_to_world)};
+  const auto tiles = array_of(d.tiles, d.tile_count, 1, name + ": tiles");
+  voxels.tiles.reserve(tiles.size());
+  for (const cumulet_tile& t : tiles) {
+    if (t.active != 0 && t.active != 1) refuse(name + ": a tile's active is " + std::to_string(t.active));
+    voxels.tiles.push_back({{{t.min[0], t.min[1], t.min[2]}, {t.max[0], t.max[1], t.max[2]}, t.value}, t.active == 1});
+  }
+  return voxels;
+}
 
 viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
   const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
@@ -61,36 +83,16 @@ cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cu
 cumulet_status cumulet_volume_from_dense(const cumulet_dense_desc* desc, cumulet_volume** out, char* error,
                                          size_t error_size) {
   return make_handle(out, error, error_size, [&] {
-    const cumulet_dense_desc d = read_desc(desc, "cumulet_dense_desc");
-    const std::string name = name_or(d.name, "dense");
-    const volume::DenseVoxels voxels{.values = array_of(d.values, d.value_count, 1, name + ": values"),
-                                     .size = {d.size[0], d.size[1], d.size[2]},
-                                     .index_to_world = matrix_or_identity(d.index_to_world)};
-    return asset_of(name, volume::import_dense(voxels, name, {}));
+    const std::string name = name_or(read_desc(desc, "cumulet_dense_desc").name, "dense");
+    return asset_of(name, {.density = volume::import_dense(to_dense(desc, name), name, {})});
   });
 }
 
 cumulet_status cumulet_volume_from_sparse(const cumulet_sparse_desc* desc, cumulet_volume** out, char* error,
                                           size_t error_size) {
   return make_handle(out, error, error_size, [&] {
-    const cumulet_sparse_desc d = read_desc(desc, "cumulet_sparse_desc");
-    const std::string name = name_or(d.name, "sparse");
-    volume::SparseVoxels voxels{
-        .brick_origins = array_of(d.brick_origins, d.brick_count, 3, name + ": brick_origins"),
-        .brick_values = array_of(d.brick_values, d.brick_count, volume::brick_voxels, name + ": brick_values"),
-        .brick_active = array_of(d.brick_active, d.brick_active == nullptr ? 0 : d.brick_count, volume::brick_size,
-                                 name + ": brick_active"),
-        .tiles = {},
-        .background = d.background,
-        .index_to_world = matrix_or_identity(d.index_to_world)};
-    const auto tiles = array_of(d.tiles, d.tile_count, 1, name + ": tiles");
-    voxels.tiles.reserve(tiles.size());
-    for (const cumulet_tile& t : tiles) {
-      if (t.active != 0 && t.active != 1) refuse(name + ": a tile's active is " + std::to_string(t.active));
-      voxels.tiles.push_back(
-          {{{t.min[0], t.min[1], t.min[2]}, {t.max[0], t.max[1], t.max[2]}, t.value}, t.active == 1});
-    }
-    return asset_of(name, volume::import_sparse(std::move(voxels), name, {}));
+    const std::string name = name_or(read_desc(desc, "cumulet_sparse_desc").name, "sparse");
+    return asset_of(name, {.density = volume::import_sparse(to_sparse(desc, name), name, {})});
   });
 }
 

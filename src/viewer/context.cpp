@@ -53,13 +53,15 @@ render::Deadline Context::deadline_of(const Frame& frame, render::Deadline begun
   return deadline_after(frame.budget_ms - keep - drawing + milliseconds_until(begun));
 }
 
-void Context::upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline) {
+void Context::upload(const Shot& shot, const UploadLimits& limits, render::Deadline deadline) {
   if (std::exchange(tried_, shot.settings) != shot.settings) programs_->try_again();
   // What another context of the group has under way may read memory that is written now.
   progressive_.tracer().order();
   if (scene_.data() != nullptr && shot.scene->volumes.empty()) progressive_.reset();
   const bool raster = shot.sampling.preview || shot.surfaces.light == SurfaceLight::none;
-  const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, page_texels}, deadline); };
+  const std::uint64_t others = bytes() - scene_.data_bytes() - scene_.other_bytes();
+  const std::uint64_t room = limits.most_bytes - std::min(limits.most_bytes, others);
+  const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, limits.page_texels, room}, deadline); };
   if (scene_.uploading()) {
     upload_timer_.run(update);
   } else {

@@ -72,8 +72,11 @@ class Context {
   [[nodiscard]] bool shares_cores() const;
   /// When tracing ends of a call that was begun then: what drawing will take is the budget's, too.
   [[nodiscard]] render::Deadline deadline_of(const Frame& frame, render::Deadline begun, bool shares) const;
-  /// page_texels: as GpuScene's.
-  void upload(const Shot& shot, std::int64_t page_texels, render::Deadline deadline);
+  struct UploadLimits {
+    std::int64_t page_texels = 0;  ///< as GpuScene's
+    std::uint64_t most_bytes = 0;  ///< of all GL memory: no volume is brought beyond that
+  };
+  void upload(const Shot& shot, const UploadLimits& limits, render::Deadline deadline);
   void trace(const Shot& shot, const Frame& frame, render::Deadline deadline);
   /// The surfaces need not wait for the volume.
   void draw_surfaces_alone(const Shot& shot, const Frame& frame);

@@ -19,8 +19,9 @@ namespace cumulet::viewer {
 class EnvironmentBuilder {
  public:
   /// notify: called on a worker after a job ended.
-  explicit EnvironmentBuilder(const std::function<void()>& notify, Trace trace = {})
-      : files_(notify, trace), skies_(notify, trace) {}
+  explicit EnvironmentBuilder(const std::function<void()>& notify, Trace trace = {},
+                              const AllowancePtr& allowance = nullptr)
+      : files_(notify, trace, allowance), skies_(notify, trace, allowance) {}
 
   /// Reads a file. Replaces what is under way, as Worker::replace() does.
   void load(const std::string& path);

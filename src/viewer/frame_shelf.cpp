@@ -31,8 +31,12 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
 
 }  // namespace
 
-FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace)
-    : log_(std::move(log)), notify_(std::move(notify)), trace_(trace), worker_([this] { tell(); }, trace) {}
+FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
+    : log_(std::move(log)),
+      notify_(std::move(notify)),
+      trace_(trace),
+      allowance_(allowance),
+      worker_([this] { tell(); }, trace, allowance) {}
 
 void FrameShelf::wish(Wish wish) {
   std::vector<Shelved> old;  // ends after the lock, as all that may be large
@@ -377,7 +381,7 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, Progre
       made.volume = file.read(log, &progress);
       load_seconds = watch.lap();
     }
-    made.built = build_grid(log, made.volume, settings, progress);
+    made.built = build_grid(log, made.volume, settings, progress, *allowance_);
     made.built->seconds.load = load_seconds;
     made.built->volume = nullptr;
     made.grid_bytes = made.built->source->bytes();

@@ -51,7 +51,8 @@ class FrameShelf {
   };
 
   /// notify: called on a worker after each frame, and when a job ended.
-  FrameShelf(Log log, std::function<void()> notify, Trace trace = {});
+  FrameShelf(Log log, std::function<void()> notify, Trace trace = {},
+             AllowancePtr allowance = std::make_shared<const Allowance>());
 
   /// In place of the wish before. Frames under way are finished, so that of wishes that change faster than frames are
   /// built every one that is begun can be seen. Other files: all that there was goes.
@@ -122,6 +123,7 @@ class FrameShelf {
   Log log_;
   std::function<void()> notify_;
   Trace trace_;
+  AllowancePtr allowance_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Wish> wish_;

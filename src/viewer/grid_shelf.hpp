@@ -14,13 +14,14 @@ struct GridWish {
 /// Grids of several volumes.
 class GridShelf : public Shelf<GridWish, Built> {
  public:
-  GridShelf(const Log& log, std::function<void()> notify, Trace trace = {})
+  GridShelf(const Log& log, std::function<void()> notify, Trace trace = {},
+            AllowancePtr allowance = std::make_shared<const Allowance>())
       : Shelf(
             "building the grids of several volumes", Progress::Stage::refining,
             [log](const Wish& wish, Progress& progress) {
               return build_grid(log, wish.volume, wish.settings, progress);
             },
-            std::move(notify), trace) {}
+            std::move(notify), trace, std::move(allowance)) {}
 };
 
 }  // namespace cumulet::viewer

@@ -14,11 +14,12 @@ struct PoseWish {
 /// Poses of several models.
 class PoseShelf : public Shelf<PoseWish, scene::ModelSourcePtr> {
  public:
-  explicit PoseShelf(std::function<void()> notify, Trace trace = {})
+  explicit PoseShelf(std::function<void()> notify, Trace trace = {},
+                     AllowancePtr allowance = std::make_shared<const Allowance>())
       : Shelf(
             "posing several models", Progress::Stage::loading,
             [](const Wish& wish, Progress& progress) { return wish.surfaces->posed(wish.choice, progress); },
-            std::move(notify), trace) {}
+            std::move(notify), trace, std::move(allowance)) {}
 };
 
 }  // namespace cumulet::viewer

@@ -23,8 +23,13 @@ class Shelf {
 
   /// what, stage: of the work, as failures and Worker::status() tell. notify: called on the worker after each, and when
   /// a job ended.
-  Shelf(const char* what, Progress::Stage stage, Make make, std::function<void()> notify, Trace trace = {})
-      : what_(what), stage_(stage), make_(std::move(make)), notify_(notify), worker_(std::move(notify), trace) {}
+  Shelf(const char* what, Progress::Stage stage, Make make, std::function<void()> notify, Trace trace = {},
+        AllowancePtr allowance = std::make_shared<const Allowance>())
+      : what_(what),
+        stage_(stage),
+        make_(std::move(make)),
+        notify_(notify),
+        worker_(std::move(notify), trace, std::move(allowance)) {}
 
   /// In place of all wishes before. What is under way is finished, and is there until the next wishes, so that of
   /// wishes that change faster than they are built every one that is begun can be seen. What failed is not tried again.

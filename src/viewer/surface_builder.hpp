@@ -26,8 +26,8 @@ struct PosedModel {
 class SurfaceBuilder {
  public:
   /// notify: called on the worker after a job ended.
-  SurfaceBuilder(Log log, std::function<void()> notify, Trace trace = {})
-      : log_(std::move(log)), worker_(std::move(notify), trace) {}
+  SurfaceBuilder(Log log, std::function<void()> notify, Trace trace = {}, AllowancePtr allowance = nullptr)
+      : log_(std::move(log)), worker_(std::move(notify), trace, std::move(allowance)) {}
 
   /// Reads a file, then poses it. Replaces what is under way, as Worker::replace() does.
   void load(const std::string& path, SurfaceChoice choice);

@@ -57,6 +57,19 @@ void join(BuildSettings& a, const BuildSettings& b) {
                                    b.refine.camera->places.end());
 }
 
+// Of what is anywhere in a box.
+VolumeFactsPtr facts_of(const Bounds& bounds) {
+  volume::ScalarVolume box;
+  box.bounds_max = box.bounds_min;
+  for (int axis = 0; axis < 3; ++axis) box.index_to_world[axis][axis] = bounds.max[axis] - bounds.min[axis];
+  box.index_to_world[3] = glm::dvec4(0.5 * (bounds.min + bounds.max), 1.0);
+  return std::make_shared<const VolumeFacts>(VolumeFacts{.empty = false,
+                                                         .may_emit = true,
+                                                         .index_to_world = box.index_to_world,
+                                                         .anisotropy_grid = {},
+                                                         .coarse = volume::CoarseVolume(box)});
+}
+
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
@@ -75,15 +88,17 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
       restore_state_(restore_state),
       programs_(programs ? std::move(programs) : std::make_shared<gl::ProgramPool>()),
       builder_(
-          log_, [this] { notify(); }, trace),
+          log_, [this] { notify(); }, trace, allowance_),
       surface_builder_(
-          log_, [this] { notify(); }, trace),
-      environment_builder_([this] { notify(); }, trace),
+          log_, [this] { notify(); }, trace, allowance_),
+      environment_builder_([this] { notify(); }, trace, allowance_),
       shelf_(
-          log_, [this] { notify(); }, trace),
-      poses_([this] { notify(); }, trace),
+          log_, [this] { notify(); }, trace, allowance_),
+      poses_([this] { notify(); }, trace, allowance_),
       frames_(
-          log_, [this] { notify(); }, trace) {
+          log_, [this] { notify(); }, trace, allowance_),
+      lives_(
+          log_, [this] { notify(); }, trace, allowance_) {
   set_medium({});
   set_light({});
   set_camera(std::make_shared<Camera>());
@@ -114,7 +129,7 @@ void Viewer::sync() {
     take_volume(std::move(loaded->volume));
     suggested_density_scale_ = loaded->density_scale;
     if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
-    if (followed_) {
+    if (followed_ || watched_) {
       leave_sequence();
       take_medium();
     }
@@ -130,6 +145,7 @@ void Viewer::sync() {
     if (built_.volume == volume_) take_suggestion();
   }
   follow_sequence();
+  follow_live();
   follow_instances();
   follow_models();
   if (auto surfaces = surface_builder_.take()) {
@@ -159,20 +175,25 @@ void Viewer::take_volume(VolumeAssetPtr volume) {
   wishes_due_ = true;  // of it, or no longer
 }
 
-void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
-  if (!sequence && !followed_) return;
+bool Viewer::begin_anew(bool shows, bool showed) {
+  if (!shows && !showed) return false;
   builder_.forget();
   sync();
   leave_sequence();
-  if (!sequence) {
+  if (!shows) {
     take_volume(nullptr);
     built_ = {};
     touch();
-    return;
+    return false;
   }
   suggested_density_scale_.reset();
   take_medium();
   built_for_.reset();
+  return true;
+}
+
+void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
+  if (!begin_anew(sequence != nullptr, followed_.has_value())) return;
   Followed followed;
   followed.listener = sequence->listen([this] { notify(); });
   followed.sequence = std::move(sequence);
@@ -186,6 +207,60 @@ void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
 void Viewer::leave_sequence() {
   followed_.reset();
   frames_.clear();
+  watched_.reset();
+  lives_.follow(nullptr, std::nullopt);
+}
+
+void Viewer::set_live(std::shared_ptr<Live> live) {
+  if (!begin_anew(live != nullptr, watched_.has_value())) return;
+  Watched watched;
+  watched.id = ++last_followed_;
+  if (const auto& bounds = live->bounds()) watched.facts = facts_of(*bounds);
+  watched.listener = live->listen([this] {
+    lives_.look();
+    notify();
+  });
+  watched.live = std::move(live);
+  watched_ = std::move(watched);
+  lives_.follow(watched_->live, settings_at_once());
+  touch();
+}
+
+bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
+  return !gl_ || !sampling_.preview || !taken || (is_rendered && !gl_->owes(*taken));
+}
+
+void Viewer::follow_live(bool unseen) {
+  if (!watched_) return;
+  Watched& w = *watched_;
+  // However fast states come, one that was taken is seen.
+  w.waits = !unseen && !is_seen(w.state, w.is_rendered);
+  if (w.waits) return;
+  auto ready = lives_.take();
+  if (!ready) return;
+  const bool other_volume = !w.facts || w.told.ready == 0;
+  volume_ = ready->built.volume;
+  built_ = std::move(ready->built);
+  facts_ = w.facts ? w.facts : volume_->facts();
+  w.state = scene::SequenceFrame{ready->number, w.id, ++last_taken_};
+  w.is_rendered = false;
+  w.told.ready = ready->number;
+  ++w.told.ready_count;
+  if (other_volume) remark_on_anisotropy();
+  if (!shown_.empty()) wishes_due_ = true;
+}
+
+Viewer::Watched& Viewer::watched() {
+  sync();
+  if (!watched_) throw Error(ErrorCode::invalid_argument, "the viewer shows no live volume");
+  return *watched_;
+}
+
+Viewer::LiveStatus Viewer::live() {
+  const Watched& w = watched();
+  LiveStatus status = w.told;
+  status.handed = w.live->newest();
+  return status;
 }
 
 void Viewer::follow_sequence() {
@@ -211,7 +286,7 @@ void Viewer::follow_sequence() {
   }
   if (f.wish_due) {
     frames_.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), f.settings,
-                  f.state.memory_bytes});
+                  std::min(f.state.memory_bytes, allowance_->memory_bytes())});
     f.wish_due = false;
     f.take_due = true;
     f.is_wanted = false;
@@ -226,7 +301,7 @@ void Viewer::follow_sequence() {
 void Viewer::take_frame() {
   Followed& f = *followed_;
   // However fast frames come, one that was taken is seen.
-  if (gl_ && sampling_.preview && f.frame && (!f.is_rendered || gl_->owes(*f.frame))) return;
+  if (!is_seen(f.frame, f.is_rendered)) return;
   f.take_due = false;
   auto ready = frames_.nearest();
   if (!ready) return;
@@ -281,9 +356,15 @@ bool Viewer::built_for_another() const { return grid_.camera_adaptive && view_ &
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   const bool loads = builder_.configure_load(settings_at_once());
-  if (loads && !followed_) return;
+  if (loads && !followed_ && !watched_) return;
   sync();
   const auto settings = settings_at_once();
+  if (watched_) {
+    if (!loads) builder_.forget_failure();
+    built_for_.reset();
+    lives_.configure(settings);
+    return;
+  }
   if (followed_) {
     if (!loads) builder_.forget_failure();  // of a load that was to end the sequence
     // Each frame may have what the one that is shown has not.
@@ -303,8 +384,8 @@ void Viewer::load_volume(const VolumeFile& file) {
   const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
   take_medium();
   builder_.load(file, settings_at_once());
-  // A sequence goes on until the volume is there.
-  if (followed_) {
+  // A sequence, or a live volume, goes on until the volume is there.
+  if (followed_ || watched_) {
     suggested_density_scale_ = suggested;
     take_medium();
   }
@@ -584,8 +665,16 @@ void Viewer::rebuild() {
   poses_.forget_failures();
   poses_due_ = true;
   frames_.rebuild();
+  lives_.rebuild();
   take_medium();
   request_build();
+  touch();
+}
+
+void Viewer::set_limits(const Limits& limits) {
+  allowance_->set(limits.threads, limits.memory_bytes);
+  most_gl_bytes_ = limits.gl_bytes;
+  if (followed_) followed_->wish_due = true;
   touch();
 }
 
@@ -596,6 +685,7 @@ void Viewer::cancel() {
   shelf_.cancel();
   poses_.cancel();
   frames_.cancel();
+  lives_.cancel();
 }
 
 bool Viewer::busy() const {
@@ -606,7 +696,8 @@ bool Viewer::busy() const {
 bool Viewer::builds() const {
   const bool frame_comes = followed_ && !followed_->is_wanted &&
                            (followed_->wish_due || frames_.busy() || frames_.revision() != followed_->shelved);
-  return frame_comes || builder_.busy() || shelf_.busy() || shelf_.revision() != shelved_;
+  return frame_comes || (watched_ && lives_.busy()) || builder_.busy() || shelf_.busy() ||
+         shelf_.revision() != shelved_;
 }
 
 void Viewer::load_surfaces(const std::string& path) {
@@ -685,12 +776,14 @@ void Viewer::wait(double timeout_ms) {
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   const auto idle = [&] {
     return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
-           shelf_.wait(until) && poses_.wait(until) && frames_.wait(until);
+           shelf_.wait(until) && poses_.wait(until) && frames_.wait(until) && lives_.wait(until);
   };
   // What comes of one may be work for another.
   do {
     sync();
     if (!idle()) throw Error(ErrorCode::timeout, "not ready in time");
+    // The newest is waited for: what is newer than what was drawn is not kept back for that.
+    follow_live(true);
     sync();
   } while (busy());
   if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
@@ -699,6 +792,7 @@ void Viewer::wait(double timeout_ms) {
   if (const auto failure = environment_builder_.status().failure) throw Error(*failure);
   if (const auto failure = shelf_.status().failure) throw Error(*failure);
   if (const auto failure = frames_.status().failure) throw Error(*failure);
+  if (const auto failure = lives_.status().failure) throw Error(*failure);
 }
 
 Viewer::Status Viewer::status() const {
@@ -708,11 +802,13 @@ Viewer::Status Viewer::status() const {
   const Worker::Status environment = environment_builder_.status();
   const Worker::Status grids = shelf_.status();
   const Worker::Status frames = frames_.status();
+  const Worker::Status lives = lives_.status();
   const Worker::Status poses = poses_.status();
-  const auto& own = volume.failure ? volume.failure : frames.failure;
+  const auto& sequences = frames.failure ? frames.failure : lives.failure;
+  const auto& own = volume.failure ? volume.failure : sequences;
   Status status{volume.stage, volume.fraction, own ? own : grids.failure,
                 surfaces.failure ? surfaces.failure : poses.failure, environment.failure};
-  for (const Worker::Status& other : {frames, grids, surfaces, poses, environment}) {
+  for (const Worker::Status& other : {frames, lives, grids, surfaces, poses, environment}) {
     if (status.stage != Progress::Stage::idle) break;
     status.stage = other.stage;
     status.fraction = other.fraction;
@@ -1074,7 +1170,7 @@ void Viewer::show_volumes() {
   std::vector<scene::Volume> volumes;
   // What surfaces alone are in stands aside.
   if (built_.source && (facts_ || !shows_instances())) {
-    const auto frame = followed_ ? followed_->frame : std::nullopt;
+    const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
     for (const scene::Place& place : places_) volumes.push_back({0, built_.source, shown_medium_, place, frame});
   }
   for (const Shown& shown : shown_) {

@@ -23,6 +23,7 @@
 #include "viewer/frame_shelf.hpp"
 #include "viewer/grid_shelf.hpp"
 #include "viewer/instance.hpp"
+#include "viewer/live_builder.hpp"
 #include "viewer/navigation.hpp"
 #include "viewer/pose_shelf.hpp"
 #include "viewer/sequence.hpp"
@@ -37,6 +38,7 @@ struct Stats {
   bool limited = false;
   std::uint64_t cell_bytes = 0;
   std::uint64_t gl_bytes = 0;
+  std::uint64_t memory_bytes = 0;  ///< of volumes and grids
   std::uint64_t active_voxels = 0;
   BuildSeconds build_seconds;
   double trace_seconds = 0.0;
@@ -83,6 +85,17 @@ class Viewer {
   SequenceStatus sequence();
   /// Why a frame cannot be shown.
   std::optional<Error> frame_failure(std::uint32_t frame);
+  /// Shows, in place of the volume, the newest state of it; null: none, and of one before nothing.
+  void set_live(std::shared_ptr<Live> live);
+  struct LiveStatus {
+    std::uint64_t handed = 0;       ///< the newest state's number; 0: none
+    std::uint64_t ready = 0;        ///< of the one that was taken last
+    std::uint64_t drawn = 0;        ///< that is to be seen
+    std::uint64_t ready_count = 0;  ///< how many were taken
+    std::uint64_t drawn_count = 0;  ///< how many of these were to be seen
+  };
+  /// Throws Error(invalid_argument) where the viewer shows no live volume.
+  LiveStatus live();
   /// Where the volume stands, whichever it is: affine, from its own world, and once in each of these places, which are
   /// one at least. Moves what is there; a grid that suits a volume of that size no longer is built anew.
   void set_places(const std::vector<scene::Place>& places);
@@ -97,6 +110,13 @@ class Viewer {
   /// Throws Error(invalid_argument) where the viewer does not show it.
   void remove_model(const ModelInstance& model);
   void rebuild();
+  struct Limits {
+    unsigned threads = 0;                              ///< that work at a time; 0: as many as there are
+    std::uint64_t memory_bytes = Allowance::no_limit;  ///< of volumes and grids in main memory
+    std::uint64_t gl_bytes = Allowance::no_limit;      ///< beyond which no volume is uploaded
+  };
+  /// Of what is begun from now on.
+  void set_limits(const Limits& limits);
   void cancel();
   /// Throws how the last job ended, or Error(timeout).
   void wait(double timeout_ms);
@@ -195,7 +215,14 @@ class Viewer {
   // The sequence's newest wish, and what came of it.
   void follow_sequence();
   void take_frame();
+  // Those of a sequence, and of a live volume: neither is shown any more.
   void leave_sequence();
+  // Takes a state that is ready; unseen: though the one before was not seen yet.
+  void follow_live(bool unseen = false);
+  // Whether what was taken last was seen, where pictures are to be seen at all.
+  [[nodiscard]] bool is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const;
+  // Before a sequence or a live volume is shown, or is not any more. Returns whether one is to be.
+  bool begin_anew(bool shows, bool showed);
   // It is this one, or none, from now on.
   void take_volume(VolumeAssetPtr volume);
   // The density scale that was suggested is the medium's, with the first grid that was made for it.
@@ -225,6 +252,8 @@ class Viewer {
   void prepare(const Frame& frame);
   // What status() and stats() tell of it.
   void follow_upload(const Context& g);
+  // Of the live volume, what this frame's picture is of.
+  void note_drawn(const Context& g);
   // An instance that is shown, as it was when it was last looked at.
   struct Shown {
     std::shared_ptr<Instance> instance;
@@ -371,9 +400,25 @@ class Viewer {
   };
   [[nodiscard]] Followed& followed();
   std::optional<Followed> followed_;
+  // A live volume that is.
+  struct Watched {
+    std::shared_ptr<Live> live;
+    std::shared_ptr<void> listener;
+    VolumeFactsPtr facts;                       // of all states, if bounds are known
+    std::uint64_t id = 0;                       // of this watching
+    std::optional<scene::SequenceFrame> state;  // that was taken last
+    bool is_rendered = false;                   // by a frame, since
+    bool waits = false;                         // another is ready, and not taken until it is seen
+    std::uint64_t seen_last = 0;                // as scene::SequenceFrame::taken
+    LiveStatus told;
+  };
+  [[nodiscard]] Watched& watched();
+  std::optional<Watched> watched_;
   std::uint64_t last_followed_ = 0;
   std::uint64_t last_taken_ = 0;
 
+  std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
+  std::uint64_t most_gl_bytes_ = Allowance::no_limit;
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;
@@ -381,6 +426,7 @@ class Viewer {
   GridShelf shelf_;
   PoseShelf poses_;
   FrameShelf frames_;
+  LiveBuilder lives_;
 };
 
 }  // namespace cumulet::viewer

@@ -90,7 +90,7 @@ void Viewer::prepare(const Frame& frame) {
 
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
   const bool others = std::ranges::any_of(shown_, &Shown::is_seen);
-  const bool scene = facts_ || shows_models() || others;
+  const bool scene = facts_ || shows_models() || others || watched_;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
   if (!facts_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
@@ -108,11 +108,13 @@ void Viewer::prepare(const Frame& frame) {
 
   last_view_ = std::exchange(traced_view_, view_);
   const bool places_rest = !std::exchange(places_changed_, false);
-  if ((facts_ || others) && built_for_another()) {
+  if ((facts_ || others || watched_) && built_for_another()) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
     if (rests) {
       take_medium();
-      if (followed_) {
+      if (watched_) {
+        lives_.configure(settings_for_view());
+      } else if (followed_) {
         followed_->settings = settings_for_view();
         followed_->wish_due = true;
         follow_sequence();
@@ -129,6 +131,15 @@ void Viewer::prepare(const Frame& frame) {
 void Viewer::follow_upload(const Context& g) {
   upload_progress_ = g.scene().progress();
   if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
+}
+
+void Viewer::note_drawn(const Context& g) {
+  Watched& w = *watched_;
+  const auto shown = g.shown_frame();
+  if (!shown || shown->sequence != w.id || shown->taken == w.seen_last) return;
+  w.seen_last = shown->taken;
+  w.told.drawn = shown->number;
+  ++w.told.drawn_count;
 }
 
 FrameResult Viewer::render(const Frame& frame) {
@@ -157,9 +168,10 @@ FrameResult Viewer::render(const Frame& frame) {
     const render::Deadline deadline = g.deadline_of(frame, begun, shares);
     attempt("cumulet: upload", [&] {
       prepare(frame);
-      if (frame.budget_ms >= 0.0) g.upload(shot(), page_texels_, deadline);
+      if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
     });
     if (followed_) followed_->is_rendered = true;
+    if (watched_) watched_->is_rendered = true;
     follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
@@ -171,7 +183,8 @@ FrameResult Viewer::render(const Frame& frame) {
       result.loading = true;
       result.converged = false;
     }
-    if (followed_ && followed_->take_due) {
+    if (watched_) note_drawn(g);
+    if ((followed_ && followed_->take_due) || (watched_ && watched_->waits)) {
       result.more = true;
       result.converged = false;
     }
@@ -179,7 +192,8 @@ FrameResult Viewer::render(const Frame& frame) {
       return status.failure && status.failure->code() != ErrorCode::cancelled;
     };
     result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
-                    failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status());
+                    failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status()) ||
+                    failed(lives_.status());
     result.more = result.more || navigation_.moving() || built_for_another();
     if (failure && !g.is_news(shot, *failure)) failure.reset();
   });
@@ -194,7 +208,7 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
     prepare(frame);
-    g.upload(shot(), page_texels_, deadline);
+    g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
     follow_upload(g);
     result = g.warm_up(shot(), frame, all, busy(), deadline);
   });
@@ -317,6 +331,7 @@ Stats Viewer::stats() {
     s.limited = s.limited || shown.built->limited;
   }
   s.build_seconds = built_.seconds;
+  s.memory_bytes = followed_ ? frames_.frames().bytes : built_.bytes();
   s.steps = totals_.steps;
   s.noise = totals_.noise;
   if (gl_) {

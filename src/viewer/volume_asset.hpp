@@ -47,6 +47,7 @@ class VolumeAsset {
   [[nodiscard]] const volume::VolumeFrame& frame() const { return *frame_; }
   /// Its density; of fire alone the flame, or the temperature.
   [[nodiscard]] const volume::ScalarVolume& main_field() const;
+  [[nodiscard]] const std::string& name() const { return main_field().name; }
   /// They may outlive it.
   [[nodiscard]] const VolumeFactsPtr& facts() const { return facts_; }
   [[nodiscard]] bool may_emit() const { return facts_->may_emit; }

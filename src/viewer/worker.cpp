@@ -7,9 +7,13 @@ namespace cumulet::viewer {
 
 namespace {
 
-std::optional<Error> failure_of(const Worker::Job& job, Progress& progress) {
+std::optional<Error> failure_of(const Worker::Job& job, const AllowancePtr& allowance, Progress& progress) {
   try {
-    job.work(progress);
+    if (allowance) {
+      allowance->run([&] { job.work(progress); });
+    } else {
+      job.work(progress);
+    }
     return std::nullopt;
   } catch (...) {
     return caught(job.what);
@@ -126,7 +130,7 @@ void Worker::run() {
     std::optional<Error> failure;
     {
       const Trace::Span span(trace_, job->what);
-      failure = failure_of(*job, *progress);
+      failure = failure_of(*job, allowance_, *progress);
     }
     job.reset();
     lock.lock();

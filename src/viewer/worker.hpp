@@ -12,6 +12,7 @@
 #include "base/error.hpp"
 #include "base/progress.hpp"
 #include "base/trace.hpp"
+#include "viewer/allowance.hpp"
 
 namespace cumulet::viewer {
 
@@ -38,7 +39,9 @@ class Worker {
   };
 
   /// notify: called on the thread after a job ended.
-  explicit Worker(std::function<void()> notify, Trace trace = {}) : notify_(std::move(notify)), trace_(trace) {}
+  /// allowance: what jobs may take; null: whatever there is.
+  explicit Worker(std::function<void()> notify, Trace trace = {}, AllowancePtr allowance = nullptr)
+      : notify_(std::move(notify)), trace_(trace), allowance_(std::move(allowance)) {}
   /// Cancels and waits.
   ~Worker();
   Worker(const Worker&) = delete;
@@ -82,6 +85,7 @@ class Worker {
 
   std::function<void()> notify_;
   Trace trace_;
+  AllowancePtr allowance_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Job> next_;

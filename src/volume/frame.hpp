@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "volume/memory.hpp"
 #include "volume/volume.hpp"
 
 namespace cumulet::volume {
@@ -86,5 +87,10 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 /// three grids that is not read, and of temperatures that seem to be kelvin, degrees Celsius, or from 0 to 1.
 VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& names, const Log& log,
                          Progress* progress = nullptr);
+
+/// The same of fields in memory, which check_fields() accepts and which are copied. Velocities are world units a second
+/// along the world's axes. name begins every message. Throws Error(file), also of a velocity that cannot be had.
+VolumeFrame import_fields(std::span<const MemoryField> fields, const std::string& name, const Log& log,
+                          Progress* progress = nullptr);
 
 }  // namespace cumulet::volume

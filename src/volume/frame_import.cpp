@@ -195,22 +195,85 @@ class FrameImport {
       remark(LogLevel::warning, file_, remark_on_choice(reader.grids(), *chosen.density, chosen.all()));
     }
     if (by_name(names.colour) && chosen.colour.empty()) remark_on_colour(reader.grids());
-    constexpr double reading = 0.8;
     const Portion whole{reader.opened(), 1.0};
     velocity_is_named_ = !by_name(names.velocity);
     read(reader, chosen, whole.part(0.0, reading));
+    return finish(chosen.density.has_value(), whole.part(reading, 1.0));
+  }
+
+  VolumeFrame run(std::span<const MemoryField> fields) {
+    velocity_is_named_ = true;
+    bool has_density = false;
+    Shares shares(Portion{}.part(0.0, reading), fields.size());
+    for (const MemoryField& field : fields) {
+      has_density = has_density || field.channel == Channel::density;
+      const Portion share = shares.next();
+      naming(file_ + ": " + cumulet::volume::name_of(field.channel), [&] { take(field, share); });
+    }
+    return finish(has_density, Portion{}.part(reading, 1.0));
+  }
+
+ private:
+  static constexpr double reading = 0.8;  // of what an import takes
+
+  VolumeFrame finish(bool has_density, Portion portion) {
     const auto any = [](const std::optional<ScalarVolume>& field) { return field && !field->empty(); };
-    if (!chosen.density || (out_.density.empty() && (any(out_.flame) || any(out_.temperature)))) {
+    if (!has_density || (out_.density.empty() && (any(out_.flame) || any(out_.temperature)))) {
       const bool comparable = any(out_.flame) == any(out_.temperature) && out_.flame && out_.temperature;
       const bool by_flame = comparable ? finer(*out_.flame, *out_.temperature) : any(out_.flame) || !out_.temperature;
       out_.density.index_to_world = (by_flame ? *out_.flame : *out_.temperature).index_to_world;
       out_.density.bounds_max = out_.density.bounds_min;
     }
-    place(whole.part(reading, 1.0));
+    place(portion);
     return std::move(out_);
   }
 
- private:
+  void take(const MemoryField& field, Portion portion) {
+    constexpr double finding = 0.3;
+    SourceGrid source = source_of(field, progress_, portion.part(0.0, finding));
+    const std::string name = cumulet::volume::name_of(field.channel);
+    const std::string prefix = one_line(file_ + ": " + name + ": ");
+    const auto numbers = [&] {
+      ScalarVolume volume = assemble(std::move(source), log_, prefix, progress_, portion.part(finding, 1.0));
+      volume.name = name;
+      return volume;
+    };
+    const auto signs = [&] {
+      return assemble_signed(std::move(source), name, log_, prefix, progress_, portion.part(finding, 1.0));
+    };
+    const auto component = [&](Channel first) {
+      return static_cast<std::size_t>(field.channel) - static_cast<std::size_t>(first);
+    };
+    switch (field.channel) {
+      case Channel::density:
+        out_.density = numbers();
+        break;
+      case Channel::temperature:
+        out_.temperature = numbers();
+        break;
+      case Channel::flame:
+        out_.flame = numbers();
+        break;
+      case Channel::red:
+      case Channel::green:
+      case Channel::blue:
+        if (!out_.colour) out_.colour.emplace();
+        out_.colour->at(component(Channel::red)) = numbers();
+        break;
+      case Channel::anisotropy:
+        out_.anisotropy = signs();
+        clamp_anisotropy();
+        break;
+      case Channel::velocity_x:
+      case Channel::velocity_y:
+      case Channel::velocity_z:
+        if (!out_.velocity) out_.velocity.emplace();
+        std::ranges::move(
+            signs(), out_.velocity->parts.begin() + static_cast<std::ptrdiff_t>(2 * component(Channel::velocity_x)));
+        break;
+    }
+  }
+
   /// Equal shares of a load's fraction.
   class Shares {
    public:
@@ -450,6 +513,11 @@ VolumeFrame import_frame(const std::filesystem::path& file, const GridNames& nam
                          Progress* progress) {
   return naming(file.string(),
                 [&] { return FrameImport(file.string(), log, progress).run(*open(file, progress), names); });
+}
+
+VolumeFrame import_fields(std::span<const MemoryField> fields, const std::string& name, const Log& log,
+                          Progress* progress) {
+  return naming(name, [&] { return FrameImport(name, log, progress).run(fields); });
 }
 
 }  // namespace cumulet::volume

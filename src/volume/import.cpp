@@ -341,7 +341,9 @@ std::vector<std::size_t> sorted_leaves(const LeafSource& leaves, const Progress*
   return order;
 }
 
-void check_transform(const glm::dmat4& m) {
+}  // namespace
+
+void detail::check_transform(const glm::dmat4& m) {
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
       if (!std::isfinite(m[column][row])) fail("its transform is not finite");
@@ -354,8 +356,6 @@ void check_transform(const glm::dmat4& m) {
   const double volume = std::abs(glm::dot(glm::cross(x / glm::length(x), y / glm::length(y)), z / glm::length(z)));
   if (!(volume > 1e-9)) fail("its transform is singular");
 }
-
-}  // namespace
 
 ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::string& log_prefix, Progress* progress,
                               Portion portion) {
@@ -586,8 +586,11 @@ class OneSign final : public LeafSource {
   float sign_;
 };
 
-std::array<ScalarVolume, 2> assemble_signed(SourceGrid whole, const std::string& grid_name, const Log& log,
-                                            const std::string& log_prefix, Progress* progress, Portion portion) {
+}  // namespace
+
+std::array<ScalarVolume, 2> detail::assemble_signed(SourceGrid whole, const std::string& grid_name, const Log& log,
+                                                    const std::string& log_prefix, Progress* progress,
+                                                    Portion portion) {
   const std::shared_ptr<const LeafSource> leaves = std::move(whole.leaves);
   const auto part = [&](float sign, const Log& heard, Portion of_load) {
     auto signed_leaves = std::make_unique<OneSign>(leaves, sign);
@@ -602,8 +605,6 @@ std::array<ScalarVolume, 2> assemble_signed(SourceGrid whole, const std::string&
   ScalarVolume above = part(1.0F, log, portion.part(0.0, 0.5));
   return {std::move(above), part(-1.0F, Log(), portion.part(0.5, 1.0))};
 }
-
-}  // namespace
 
 std::array<ScalarVolume, 2> detail::import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                        const Log& log, Progress* progress, Portion portion) {

@@ -161,6 +161,16 @@ ScalarVolume import_grid(Reader& reader, std::size_t grid, const std::string& fi
 std::array<ScalarVolume, 3> import_vector_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                const Log& log, Progress* progress, Portion portion);
 
+/// Whether all are numbers. O(values).
+bool all_finite(std::span<const float> values);
+/// The tree of a host's voxels, which it reads from. Throws runtime_error for bricks and tiles out of place.
+SourceGrid source_of(const MemoryField& field, Progress* progress, Portion portion);
+/// Throws for one that is not affine, finite and invertible.
+void check_transform(const glm::dmat4& m);
+/// A source in two: by how much its values are above 0, and by how much below.
+std::array<ScalarVolume, 2> assemble_signed(SourceGrid whole, const std::string& name, const Log& log,
+                                            const std::string& log_prefix, Progress* progress, Portion portion);
+
 /// One scalar grid in two: by how much its values are above 0, and by how much below.
 std::array<ScalarVolume, 2> import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                const Log& log, Progress* progress, Portion portion);

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <array>
 #include <span>
+#include <string>
+#include <variant>
+#include <vector>
 
 #include "volume/volume.hpp"
 
@@ -34,5 +38,25 @@ struct SparseVoxels {
 ScalarVolume import_dense(const DenseVoxels& voxels, const std::string& name, const Log& log,
                           Progress* progress = nullptr);
 ScalarVolume import_sparse(SparseVoxels voxels, const std::string& name, const Log& log, Progress* progress = nullptr);
+
+/// What a field's voxels are; vectors are three fields.
+enum class Channel { density, temperature, flame, red, green, blue, anisotropy, velocity_x, velocity_y, velocity_z };
+inline constexpr std::size_t channel_count = 10;
+const char* name_of(Channel channel);
+
+/// One channel's voxels in memory.
+struct MemoryField {
+  Channel channel;
+  std::variant<DenseVoxels, SparseVoxels> voxels;
+};
+
+/// Throws what can be refused without looking at values: Error(invalid_argument) for channels that come twice or lack
+/// others, and for spans and sizes that do not agree, Error(file) for transforms, bricks and tiles; name begins the
+/// line.
+void check_fields(std::span<const MemoryField> fields, const std::string& name);
+/// Of each field's voxels alone.
+void check_voxels(std::span<const MemoryField> fields, const std::string& name);
+/// Throws Error(file) for a value that is not finite, with the field and the voxel. O(values), in parallel.
+void require_finite(const MemoryField& field, const std::string& name);
 
 }  // namespace cumulet::volume

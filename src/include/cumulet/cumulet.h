@@ -28,18 +28,18 @@
  *     Calls for one viewer must not overlap, from whatever thread they come, with two exceptions that are safe at any
  *     time: cumulet_cancel and cumulet_get_progress. Calls marked [GL] need the attached context, or one that shares
  *     objects with it, current on the calling thread: without, they are CUMULET_ERROR_GL each time and change nothing,
- *     and the next call with it goes on. No other call touches GL. Camera, volume, sequence, surfaces, model and programs
- *     handles may be used from any thread at any time. Files are read, grids are built, surfaces are posed and physical
- * skies are computed on worker threads of the viewer's own; cumulet_render uploads what they made, within its time
- * budget, and shows the last good picture until then. The newest wish wins and none starves: what changes faster than
- * it is read, built, posed or uploaded is shown as often as it can be, and the newest last. The update callback comes
- * from any thread, a worker's included, and not after cumulet_destroy. Neither it nor the log callback may call the
- * library, but for the two exceptions and to retain and release handles: any other call from inside one, for whatever
- * viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may come while
- * [GL] calls of other viewers with the same programs wait for their turn: take no lock in them that is held around a
- * [GL] call. Calls that change a camera, an instance, a model or a sequence run the update callbacks of the viewers
- * that show it while other calls for the same handle wait for them: nor take a lock that is held around calls for such
- * handles.
+ *     and the next call with it goes on. No other call touches GL. Camera, volume, sequence, live, surfaces, model and
+ * programs handles may be used from any thread at any time. Files are read, grids are built, surfaces are posed and
+ * physical skies are computed on worker threads of the viewer's own; cumulet_render uploads what they made, within its
+ * time budget, and shows the last good picture until then. The newest wish wins and none starves: what changes faster
+ * than it is read, built, posed or uploaded is shown as often as it can be, and the newest last. The update callback
+ * comes from any thread, a worker's included, and not after cumulet_destroy. Neither it nor the log callback may call
+ * the library, but for the two exceptions and to retain and release handles: any other call from inside one, for
+ * whatever viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may
+ * come while [GL] calls of other viewers with the same programs wait for their turn: take no lock in them that is held
+ * around a [GL] call. Calls that change a camera, an instance, a model or a sequence run the update callbacks of the
+ * viewers that show it while other calls for the same handle wait for them: nor take a lock that is held around calls
+ * for such handles.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -120,6 +120,7 @@ typedef struct cumulet_camera cumulet_camera;           /* cumulet_camera_releas
 typedef struct cumulet_programs cumulet_programs;       /* cumulet_programs_release */
 typedef struct cumulet_environment cumulet_environment; /* cumulet_environment_release */
 typedef struct cumulet_sequence cumulet_sequence;       /* cumulet_sequence_release */
+typedef struct cumulet_live cumulet_live;               /* cumulet_live_release */
 
 typedef enum cumulet_status {
   CUMULET_OK = 0,
@@ -349,6 +350,54 @@ typedef struct cumulet_sparse_desc {
 CUMULET_API cumulet_status cumulet_volume_from_sparse(const cumulet_sparse_desc* desc, cumulet_volume** out,
                                                       char* error, size_t error_size);
 
+/* What the voxels of a field are. Of a colour all three are there or none, and so of a velocity. */
+typedef enum cumulet_channel {
+  CUMULET_CHANNEL_DENSITY = 0,
+  CUMULET_CHANNEL_TEMPERATURE = 1, /* as cumulet_medium_desc has it */
+  CUMULET_CHANNEL_FLAME = 2,
+  CUMULET_CHANNEL_RED = 3, /* of what scatters: linear Rec. 709 */
+  CUMULET_CHANNEL_GREEN = 4,
+  CUMULET_CHANNEL_BLUE = 5,
+  CUMULET_CHANNEL_ANISOTROPY = 6, /* -1 to 1, as cumulet_volume_file_desc.anisotropy_grid */
+  CUMULET_CHANNEL_VELOCITY_X = 7, /* world units a second along the world's axes, as velocity_grid there */
+  CUMULET_CHANNEL_VELOCITY_Y = 8,
+  CUMULET_CHANNEL_VELOCITY_Z = 9
+} cumulet_channel;
+
+/* One channel's voxels. Its desc's name is of no meaning here. */
+typedef struct cumulet_field {
+  size_t struct_size; /* of all fields of an array the same: the distance between them */
+  cumulet_channel channel;
+  const cumulet_dense_desc* dense; /* one of the two, and the other NULL */
+  const cumulet_sparse_desc* sparse;
+} cumulet_field;
+
+/* From any thread. Do not call the library, but to retain and release handles. */
+typedef void (*cumulet_release_fn)(void* user);
+
+/*
+ * All that a simulation has at one moment: any of the channels, each once, in any order; one of density, temperature
+ * and flame at least. A field of other voxels than density's is resampled to these, as a file's grid is
+ * (docs/grids.md): hosts that step often give all fields the same size and index_to_world.
+ */
+typedef struct cumulet_state_desc {
+  size_t struct_size;
+  const cumulet_field* fields;
+  uint64_t field_count;
+  const char* name; /* for messages; NULL: "state" */
+  /*
+   * NULL: voxels are copied within the call. Else they are read later, where they are, and must stay as they are until
+   * this is called with release_user: once, when they were read or nobody wants them any more, perhaps within the call;
+   * not if the call fails. For cumulet_live_set alone, and updates cannot follow (cumulet_live_update).
+   */
+  cumulet_release_fn release;
+  void* release_user;
+} cumulet_state_desc;
+
+/* A volume of several channels; they are copied. */
+CUMULET_API cumulet_status cumulet_volume_from_state(const cumulet_state_desc* desc, cumulet_volume** out, char* error,
+                                                     size_t error_size);
+
 CUMULET_API cumulet_volume* cumulet_volume_retain(cumulet_volume* volume); /* returns it; NULL is allowed */
 CUMULET_API void cumulet_volume_release(cumulet_volume* volume);           /* NULL is allowed */
 
@@ -521,6 +570,65 @@ CUMULET_API cumulet_status cumulet_sequence_get_frame_at(const cumulet_sequence*
  * not what that would be if it were. */
 CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* sequence, uint32_t frame,
                                                         double* seconds);
+
+/* ---- Live volumes ---------------------------------------------------------------------------------------------- */
+
+/*
+ * A volume that goes on changing: a host hands over state after state, as its simulation steps, and viewers that show
+ * it (cumulet_set_live) show the newest. Counted, free of GL, for any number of viewers. Volumes never change, which is
+ * what lets viewers, instances and workers share them; so this is a handle of its own, behind which one volume follows
+ * another. These calls are for any thread, also while others are in calls for the same handle; error as in
+ * cumulet_create.
+ *
+ * None of them waits for a build: a call copies what it is given and returns (or does not copy, see
+ * cumulet_state_desc.release). A state that nobody began to build when the next one comes is not built: there is one
+ * under way and one that waits, however fast they come. In numbers: states count from 1 on, updates among them.
+ */
+
+typedef struct cumulet_live_desc {
+  size_t struct_size;
+  /*
+   * World bounds of all that the simulation will ever fill, for what must not jump from state to state: where a camera
+   * that fits is placed, a ground below, bounds that are told. Zero: those of the state that is shown.
+   */
+  double bounds_min[3];
+  double bounds_max[3];
+} cumulet_live_desc;
+
+CUMULET_API cumulet_status cumulet_live_create(const cumulet_live_desc* desc, cumulet_live** out, char* error,
+                                               size_t error_size);
+CUMULET_API cumulet_live* cumulet_live_retain(cumulet_live* live); /* returns it; NULL is allowed */
+CUMULET_API void cumulet_live_release(cumulet_live* live);         /* NULL is allowed */
+
+/*
+ * The whole of the next state, of whatever channels and sizes: what it has not is gone. As a volume alone of the same
+ * fields it is the same grid, bit for bit, and of the same samples the same picture.
+ *
+ * A number that is not finite is refused, CUMULET_ERROR_FILE with one line that names state, channel and voxel, and so
+ * is all else that cumulet_volume_from_state refuses; negative ones count as 0, but for anisotropy and velocity. The
+ * state before stays, and the next may be handed over. Where voxels are read later (release) so is what is in them:
+ * that it is refused is told by a warning in the log, cumulet_get_progress and CUMULET_RENDER_FAILED, as of a file.
+ */
+CUMULET_API cumulet_status cumulet_live_set(cumulet_live* live, const cumulet_state_desc* desc, char* error,
+                                            size_t error_size);
+/*
+ * The next state is the last one handed over but for some bricks: sparse fields alone, of which brick_origins,
+ * brick_values and brick_active are looked at. A brick takes the place of the one that is there, or is added; one whose
+ * voxels are all inactive, or 0 without brick_active, is empty from then on. A dense field's bricks begin at voxel 0.
+ * What is not named stays. It is the same, bit for bit, as if all of it had been handed over.
+ *
+ * CUMULET_ERROR_INVALID_ARGUMENT before the first cumulet_live_set, for a channel that the state has not (give it with
+ * no bricks), or has with tiles, and after one with release, of which the library keeps no voxels.
+ */
+CUMULET_API cumulet_status cumulet_live_update(cumulet_live* live, const cumulet_state_desc* desc, char* error,
+                                               size_t error_size);
+/*
+ * The newest state as a volume, retained for the caller, who releases it: for what is told of volumes, and for
+ * instances. *out is NULL before the first state. Reads the state if nobody did yet, which takes as long as
+ * cumulet_volume_from_state.
+ */
+CUMULET_API cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_volume** out, char* error,
+                                                   size_t error_size);
 
 /* ---- Surfaces -------------------------------------------------------------------------------------------------- */
 
@@ -754,8 +862,36 @@ typedef enum cumulet_frame_state {
 } cumulet_frame_state;
 /* Why a frame failed, in one line that names the file; "" if it did not. Cut to fit, zero-terminated. */
 CUMULET_API cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame, char* cause, size_t size);
+/*
+ * Shows, in place of a volume, the newest state of this, from now on; retains it. What was shown before stays until a
+ * state is there. NULL: none, and if there was one, nothing. cumulet_set_volume and cumulet_set_sequence end it, too,
+ * and so does what cumulet_load_volume and cumulet_load_volume_file read, once it is there.
+ *
+ * States are read and built on a worker of the viewer's, which begins with the newest as soon as it is handed over, or
+ * as soon as the one before is taken up by cumulet_render: that one is then uploaded and traced while the next is
+ * built. Each that was begun ends and is shown; while previews are on it stays until there is a picture of it. So a
+ * host that hands over faster than that sees motion at the rate at which states are built and drawn, and the newest
+ * last. A state that cannot be shown leaves the last good one. cumulet_wait waits until the newest is there;
+ * cumulet_cancel stops building until another is handed over or a setting changes. The first state of other channels
+ * than those before compiles the programs that it needs (cumulet_warm_up). cumulet_stats has what a state took, reading
+ * as build_seconds_load.
+ */
+CUMULET_API cumulet_status cumulet_set_live(cumulet_viewer* viewer, cumulet_live* live);
+
+typedef struct cumulet_live_info {
+  size_t struct_size;
+  uint64_t handed_state; /* the newest, 0: none yet */
+  uint64_t ready_state;  /* that was taken up last, to be uploaded and traced */
+  uint64_t drawn_state;  /* of the picture that the last cumulet_render drew; 0: none */
+  uint64_t ready_count;  /* how many were taken up since the live volume was set */
+  uint64_t drawn_count;  /* how many of these have been drawn */
+} cumulet_live_info;
+
+/* Of the viewer's live volume; CUMULET_ERROR_INVALID_ARGUMENT if it shows none. */
+CUMULET_API cumulet_status cumulet_get_live_info(cumulet_viewer* viewer, cumulet_live_info* info);
+
 /* The volume last loaded or set, retained for the caller, who releases it; NULL if there is none. Of a sequence that of
- * the frame that was taken last, or NULL where its voxels are not kept. */
+ * the frame that was taken last, or NULL where its voxels are not kept; of a live volume that of the state. */
 CUMULET_API cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out);
 /* Stops loading and building, within some 20 ms (see cumulet_destroy); what was shown stays, with the settings it was
  * built with. Any thread, any time. */
@@ -863,6 +999,36 @@ CUMULET_API cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_
 CUMULET_API cumulet_status cumulet_wait(cumulet_viewer* viewer, double timeout_ms);
 /* Builds the grid anew though nothing asks for it. */
 CUMULET_API cumulet_status cumulet_rebuild(cumulet_viewer* viewer);
+
+/*
+ * What a viewer may take of the machine. Zeros, and at first: no limit.
+ */
+typedef struct cumulet_limits_desc {
+  size_t struct_size;
+  /*
+   * How many threads work for the viewer at a time, in all that its workers do: reading, building, posing, skies;
+   * 1 to 1024. From the next piece of work on, not the one under way. What is not counted: threads that sleep, the
+   * thread that calls, those that free memory or end what cannot be interrupted (cumulet_destroy), and the driver's.
+   * Calls on handles work for their caller, on all processors.
+   */
+  uint32_t threads;
+  /*
+   * Main memory for volumes and grids: the voxels of the volume that is shown, what is computed of them once and kept,
+   * and the cells (cumulet_stats.memory_bytes); of a sequence all frames that are ready, its own memory_bytes if that
+   * is less. Cells are as coarse as it takes (cumulet_stats.limited tells). Where not even the coarsest fit, the load
+   * or build is refused with CUMULET_ERROR_OUT_OF_MEMORY and one line, and what was shown stays. Not counted: what
+   * building takes while it is under way, surfaces, environments, instances, and what the host retains.
+   */
+  uint64_t memory_bytes;
+  /*
+   * All GL memory of the viewer (cumulet_stats.gl_bytes), but for what frames of a size need: what would not fit beside
+   * what is there is not uploaded, cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once, and the picture before stays.
+   */
+  uint64_t gl_bytes;
+} cumulet_limits_desc;
+
+/* Holds for what is begun from now on; what is there stays. */
+CUMULET_API cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_desc* desc);
 
 /* ---- Settings --------------------------------------------------------------------------------------------------- */
 
@@ -1721,7 +1887,8 @@ typedef struct cumulet_stats {
   double pass_seconds_trace;
   double pass_seconds_inspect; /* debug views, and the volume's depth */
   double pass_seconds_display;
-  double noise; /* as cumulet_measure_noise told it, or a readback of the picture, last; 0 before the first */
+  double noise;          /* as cumulet_measure_noise told it, or a readback of the picture, last; 0 before the first */
+  uint64_t memory_bytes; /* main memory that cumulet_limits_desc.memory_bytes counts */
 } cumulet_stats;
 
 CUMULET_API cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats);

@@ -823,6 +823,119 @@ class Sequence {
   cumulet_sequence* handle_ = nullptr;
 };
 
+// ---- Live volumes ---------------------------------------------------------------------------------------------------
+
+/// One channel's voxels: of a dense array, or of bricks.
+class Field {
+ public:
+  Field(Channel channel, const DenseDesc& dense) noexcept : channel_(channel), dense_(dense), is_dense_(true) {}
+  Field(Channel channel, const SparseDesc& sparse) noexcept : channel_(channel), sparse_(sparse) {}
+
+  /// Good for as long as this is.
+  operator cumulet_field() const noexcept {
+    return {.struct_size = sizeof(cumulet_field),
+            .channel = static_cast<cumulet_channel>(channel_),
+            .dense = is_dense_ ? &dense_ : nullptr,
+            .sparse = is_dense_ ? nullptr : &sparse_};
+  }
+
+ private:
+  Channel channel_;
+  cumulet_dense_desc dense_{};
+  cumulet_sparse_desc sparse_{};
+  bool is_dense_ = false;
+};
+
+/// A simulation's state; fields are good for the time of a call.
+struct StateDesc {
+  std::span<const Field> fields{};
+  const char* name = nullptr;
+  cumulet_release_fn release = nullptr;
+  void* release_user = nullptr;
+};
+
+namespace detail {
+
+/// Calls with C's descriptor of it.
+template <class Call>
+auto with_state(const StateDesc& desc, Call&& call) {
+  // As many as there are channels: more are refused by the second of one.
+  constexpr std::size_t most = CUMULET_CHANNEL_VELOCITY_Z + 2;
+  std::array<cumulet_field, most> fields{};
+  const std::size_t count = std::min(desc.fields.size(), most);
+  for (std::size_t i = 0; i < count; ++i) fields[i] = desc.fields[i];
+  const cumulet_state_desc c{.struct_size = sizeof c,
+                             .fields = fields.data(),
+                             .field_count = count,
+                             .name = desc.name,
+                             .release = desc.release,
+                             .release_user = desc.release_user};
+  return call(c);
+}
+
+} /* namespace detail */
+
+/// A volume of several channels, copied.
+[[nodiscard]] inline Result<Volume> volume_from_state(const StateDesc& desc) noexcept {
+  return detail::with_state(desc, [](const cumulet_state_desc& c) {
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_from_state(&c, out, error, size);
+    });
+  });
+}
+
+/// A share in a volume that goes on changing: a copy is one more of the same. Any thread.
+class Live {
+ public:
+  Live() noexcept = default;
+  Live(const Live& other) noexcept : handle_(cumulet_live_retain(other.handle_)) {}
+  Live(Live&& other) noexcept : handle_(other.release()) {}
+  Live& operator=(Live other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Live() { cumulet_live_release(handle_); }
+
+  [[nodiscard]] static Result<Live> create(const LiveDesc& desc = {}) noexcept {
+    const cumulet_live_desc c = desc;
+    return detail::made<Live>(
+        [&](cumulet_live** out, char* error, std::size_t size) { return cumulet_live_create(&c, out, error, size); });
+  }
+  /// The whole of the next state.
+  [[nodiscard]] Result<> set(const StateDesc& desc) const noexcept { return hand_over(desc, cumulet_live_set); }
+  /// The next state is the last one but for these bricks.
+  [[nodiscard]] Result<> update(const StateDesc& desc) const noexcept { return hand_over(desc, cumulet_live_update); }
+  /// Empty before the first state.
+  [[nodiscard]] Result<Volume> get_volume() const noexcept {
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_live_get_volume(handle_, out, error, size);
+    });
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_live* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_live* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Live adopt(cumulet_live* handle) noexcept {
+    Live live;
+    live.handle_ = handle;
+    return live;
+  }
+
+ private:
+  template <class Call>
+  Result<> hand_over(const StateDesc& desc, Call* call) const noexcept {
+    return detail::with_state(desc, [&](const cumulet_state_desc& c) {
+      std::array<char, 512> cause{};
+      const cumulet_status status = call(handle_, &c, cause.data(), cause.size());
+      return detail::result(status, cause.data());
+    });
+  }
+  cumulet_live* handle_ = nullptr;
+};
+
 // ---- Camera and input -----------------------------------------------------------------------------------------------
 
 struct CameraMatrices {
@@ -1109,6 +1222,20 @@ class Viewer {
   }
   [[nodiscard]] Result<> remove_model(const Model& model) noexcept {
     return result(cumulet_remove_model(handle(), model.handle()));
+  }
+  /// An empty one: shows none.
+  [[nodiscard]] Result<> set_live(const Live& live) noexcept {
+    return result(cumulet_set_live(handle(), live.handle()));
+  }
+  [[nodiscard]] Result<LiveInfo> get_live_info() noexcept {
+    auto c = detail::sized<cumulet_live_info>();
+    if (auto done = result(cumulet_get_live_info(handle(), &c)); !done) return done.error();
+    return LiveInfo::of(c);
+  }
+  /// What it may take of the machine from now on.
+  [[nodiscard]] Result<> set_limits(const LimitsDesc& desc) noexcept {
+    const cumulet_limits_desc c = desc;
+    return result(cumulet_set_limits(handle(), &c));
   }
   [[nodiscard]] Result<> add_instance(const Instance& instance) noexcept {
     return result(cumulet_add_instance(handle(), instance.handle()));

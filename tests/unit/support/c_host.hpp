@@ -56,6 +56,10 @@ struct ReleaseSequence {
   void operator()(cumulet_sequence* sequence) const { cumulet_sequence_release(sequence); }
 };
 using SequenceRef = std::unique_ptr<cumulet_sequence, ReleaseSequence>;
+struct ReleaseLive {
+  void operator()(cumulet_live* live) const { cumulet_live_release(live); }
+};
+using LiveRef = std::unique_ptr<cumulet_live, ReleaseLive>;
 struct ReleasePrograms {
   void operator()(cumulet_programs* programs) const { cumulet_programs_release(programs); }
 };

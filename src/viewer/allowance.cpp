@@ -1,0 +1,40 @@
+#include "viewer/allowance.hpp"
+
+#include "base/error.hpp"
+#include "base/one_line.hpp"
+
+namespace cumulet::viewer {
+
+void Allowance::set(unsigned threads, std::uint64_t memory_bytes) {
+  std::shared_ptr<tbb::task_arena> arena;  // the one before ends after the lock
+  if (threads > 0) arena = std::make_shared<tbb::task_arena>(static_cast<int>(threads));
+  memory_bytes_ = memory_bytes;
+  const std::scoped_lock lock(mutex_);
+  if (threads == threads_) return;
+  threads_ = threads;
+  std::swap(arena_, arena);
+}
+
+void Allowance::require(std::uint64_t bytes, const std::string& what) const {
+  const std::uint64_t most = memory_bytes_;
+  if (bytes <= most) return;
+  throw Error(ErrorCode::out_of_memory, one_line(what + " takes " + std::to_string(bytes) + " bytes of memory; " +
+                                                 std::to_string(most) + " are allowed"));
+}
+
+void Allowance::run(const std::function<void()>& work) const {
+  std::shared_ptr<tbb::task_arena> arena;
+  {
+    const std::scoped_lock lock(mutex_);
+    arena = arena_;
+  }
+  if (!arena) {
+    work();
+    return;
+  }
+  // Isolated: a thread that waits inside of it for a part must not take up another's work meanwhile, which may wait for
+  // what this one holds.
+  arena->execute([&] { tbb::this_task_arena::isolate(work); });
+}
+
+}  // namespace cumulet::viewer

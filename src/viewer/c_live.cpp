@@ -1,0 +1,141 @@
+// The C ABI's live volumes. What each call does is in cumulet.h.
+
+#include <memory>
+#include <vector>
+
+#include "base/callback_scope.hpp"
+#include "viewer/c_handles.hpp"
+#include "viewer/c_support.hpp"
+#include "viewer/live.hpp"
+
+namespace {
+
+using namespace cumulet::c_abi;
+using cumulet::viewer::Live;
+using cumulet::volume::Channel;
+using cumulet::volume::MemoryField;
+
+static_assert(static_cast<unsigned>(Channel::velocity_z) == CUMULET_CHANNEL_VELOCITY_Z);
+
+// A host's memory, given back in the end.
+class HostMemory {
+ public:
+  HostMemory(cumulet_release_fn release, void* user) : release_(release), user_(user) {}
+  ~HostMemory() {
+    const cumulet::CallbackScope inside;
+    release_(user_);
+  }
+  HostMemory(const HostMemory&) = delete;
+  HostMemory& operator=(const HostMemory&) = delete;
+
+ private:
+  cumulet_release_fn release_;
+  void* user_;
+};
+
+struct HandedState {
+  cumulet_state_desc desc{};
+  std::string name;
+  std::vector<MemoryField> fields;
+};
+
+MemoryField field_of(const cumulet_field& field, const std::string& what) {
+  const cumulet_field f = read_desc(&field, "cumulet_field");
+  if (number(f.channel) > CUMULET_CHANNEL_VELOCITY_Z) refuse(what + ": its channel is unknown");
+  if ((f.dense == nullptr) == (f.sparse == nullptr)) refuse(what + ": it has not one of dense and sparse");
+  const auto channel = static_cast<Channel>(number(f.channel));
+  if (f.dense != nullptr) return {channel, to_dense(f.dense, what)};
+  return {channel, to_sparse(f.sparse, what)};
+}
+
+HandedState state_of(const cumulet_state_desc* desc) {
+  HandedState state;
+  state.desc = read_desc(desc, "cumulet_state_desc");
+  state.name = name_or(state.desc.name, "state");
+  for_each_desc(
+      state.desc.fields, state.desc.field_count, "cumulet_field", state.name + ": field",
+      [&](const cumulet_field& field, const std::string& what) { state.fields.push_back(field_of(field, what)); });
+  return state;
+}
+
+void require_no_release(const HandedState& state) {
+  require(state.desc.release == nullptr, "cumulet_state_desc.release is for cumulet_live_set alone");
+}
+
+std::shared_ptr<Live> live_of(const cumulet_live_desc* desc) {
+  const cumulet_live_desc d = read_desc(desc, "cumulet_live_desc");
+  require(all_finite(d.bounds_min) && all_finite(d.bounds_max), "cumulet_live_desc's bounds are not finite");
+  const cumulet::viewer::Bounds bounds{to_dvec3(d.bounds_min), to_dvec3(d.bounds_max)};
+  if (bounds.min == glm::dvec3(0.0) && bounds.max == glm::dvec3(0.0)) return std::make_shared<Live>(std::nullopt);
+  require(glm::all(glm::lessThan(bounds.min, bounds.max)), "cumulet_live_desc.bounds_min is not below bounds_max");
+  return std::make_shared<Live>(bounds);
+}
+
+// As on(), for calls that tell why.
+template <class Call>
+cumulet_status on_live(cumulet_live* live, char* error, size_t error_size, Call&& call) noexcept {
+  return guarded(error, error_size, [&] {
+    require(live != nullptr, "the live volume is NULL");
+    const auto kept = live->asset;  // the callbacks of this call may release the handle
+    call(*kept);
+  });
+}
+
+}  // namespace
+
+cumulet_status cumulet_volume_from_state(const cumulet_state_desc* desc, cumulet_volume** out, char* error,
+                                         size_t error_size) {
+  return make_handle(out, error, error_size, [&] {
+    const HandedState state = state_of(desc);
+    require_no_release(state);
+    cumulet::volume::check_fields(state.fields, state.name);
+    return asset_of(state.name, cumulet::volume::import_fields(state.fields, state.name, {}));
+  });
+}
+
+cumulet_status cumulet_live_create(const cumulet_live_desc* desc, cumulet_live** out, char* error, size_t error_size) {
+  return make_handle(out, error, error_size, [&] { return live_of(desc); });
+}
+
+cumulet_live* cumulet_live_retain(cumulet_live* live) { return retain(live); }
+
+void cumulet_live_release(cumulet_live* live) { release(live); }
+
+cumulet_status cumulet_live_set(cumulet_live* live, const cumulet_state_desc* desc, char* error, size_t error_size) {
+  return on_live(live, error, error_size, [&](Live& l) {
+    HandedState state = state_of(desc);
+    cumulet::viewer::MakeLease lease;
+    if (state.desc.release != nullptr)
+      lease = [&d = state.desc] { return std::make_shared<HostMemory>(d.release, d.release_user); };
+    l.set(state.fields, std::move(state.name), lease);
+  });
+}
+
+cumulet_status cumulet_live_update(cumulet_live* live, const cumulet_state_desc* desc, char* error, size_t error_size) {
+  return on_live(live, error, error_size, [&](Live& l) {
+    HandedState state = state_of(desc);
+    require_no_release(state);
+    for (MemoryField& field : state.fields) {
+      auto* sparse = std::get_if<cumulet::volume::SparseVoxels>(&field.voxels);
+      if (sparse == nullptr) continue;  // refused below
+      *sparse = {.brick_origins = sparse->brick_origins,
+                 .brick_values = sparse->brick_values,
+                 .brick_active = sparse->brick_active,
+                 .tiles = {}};
+    }
+    l.update(state.fields, state.name);
+  });
+}
+
+cumulet_status cumulet_live_get_volume(cumulet_live* live, cumulet_volume** out, char* error, size_t error_size) {
+  if (out != nullptr) *out = nullptr;
+  return on_live(live, error, error_size, [&](Live& l) {
+    require(out != nullptr, "out is NULL");
+    cumulet::Progress progress;
+    Live::State state = l.read(progress);
+    if (!state.volume) return;
+    auto handle = std::make_unique<cumulet_volume>();
+    handle->asset = std::move(state.volume);
+    *out = handle.release();
+  });
+}

@@ -1,0 +1,148 @@
+#include "viewer/live.hpp"
+
+#include <algorithm>
+
+#include "base/error.hpp"
+#include "base/one_line.hpp"
+#include "viewer/patient_lock.hpp"
+
+namespace cumulet::viewer {
+
+namespace {
+
+using volume::MemoryField;
+
+[[noreturn]] void refuse(const std::string& name, const std::string& cause) {
+  throw Error(ErrorCode::invalid_argument, one_line(name + ": " + cause));
+}
+
+bool has_tiles(const MemoryField& field) {
+  const auto* sparse = std::get_if<volume::SparseVoxels>(&field.voxels);
+  return sparse != nullptr && !sparse->tiles.empty();
+}
+
+}  // namespace
+
+std::vector<MemoryField> Live::Whole::view() const {
+  if (const auto* held = std::get_if<std::vector<MemoryField>>(&fields)) return *held;
+  std::vector<MemoryField> views;
+  for (const volume::FieldCopy& copy : std::get<std::vector<volume::FieldCopy>>(fields)) views.push_back(copy.view());
+  return views;
+}
+
+void Live::set(const std::vector<MemoryField>& fields, std::string name, const MakeLease& lease) {
+  volume::check_fields(fields, name);
+  const bool copies = !lease;
+  Next next;
+  next.whole.emplace();
+  if (copies) {
+    std::vector<volume::FieldCopy> made;
+    for (const MemoryField& field : fields) made.push_back(volume::FieldCopy::of(field, name));
+    next.whole->fields = std::move(made);
+  } else {
+    next.whole->fields = fields;
+  }
+  next.whole->name = std::move(name);
+  std::vector<Handed> handed;
+  for (const MemoryField& field : fields) {
+    const bool dense = std::holds_alternative<volume::DenseVoxels>(field.voxels);
+    const Takes takes = !copies || has_tiles(field) ? Takes::nothing : dense ? Takes::zeros : Takes::bricks;
+    handed.push_back({field.channel, takes});
+  }
+  // Last of what may fail: who is refused keeps the memory.
+  if (lease) next.whole->lease = lease();
+  {
+    const std::scoped_lock lock(mutex_);
+    std::swap(next_, next);  // what nobody read ends after the lock
+    std::swap(handed_, handed);
+    ++newest_;
+  }
+  listeners_.tell();
+}
+
+void Live::update(const std::vector<MemoryField>& fields, const std::string& name) {
+  for (const MemoryField& field : fields) {
+    if (!std::holds_alternative<volume::SparseVoxels>(field.voxels))
+      refuse(name, std::string(name_of(field.channel)) + " is dense: an update has bricks");
+    if (std::ranges::count(fields, field.channel, &MemoryField::channel) > 1)
+      refuse(name, std::string("has ") + name_of(field.channel) + " twice");
+  }
+  volume::check_voxels(fields, name);
+  std::vector<Handed> handed;
+  {
+    const std::scoped_lock lock(mutex_);
+    handed = handed_;
+  }
+  if (handed.empty()) refuse(name, "there is no state to update");
+  volume::Changes changes;
+  for (const MemoryField& field : fields) {
+    const auto there = std::ranges::find(handed, field.channel, &Handed::channel);
+    if (there == handed.end()) refuse(name, std::string("there is no ") + name_of(field.channel) + " to update");
+    if (there->takes == Takes::nothing) {
+      refuse(name, std::string(name_of(field.channel)) +
+                       " takes no bricks: it was handed over with tiles, or with a release");
+    }
+    volume::require_finite(field, name);
+    const auto& sparse = std::get<volume::SparseVoxels>(field.voxels);
+    changes.fields.push_back({field.channel, volume::BrickCopy(sparse, there->takes == Takes::zeros)});
+  }
+  {
+    const std::scoped_lock lock(mutex_);
+    const auto same = [](const Handed& a, const Handed& b) { return a.channel == b.channel && a.takes == b.takes; };
+    if (!std::ranges::equal(handed, handed_, same)) refuse(name, "another state came between");
+    next_.changes.put(std::move(changes));
+    ++newest_;
+  }
+  listeners_.tell();
+}
+
+void Live::take_next() {
+  Next next;
+  {
+    const std::scoped_lock lock(mutex_);
+    next = std::exchange(next_, {});
+    base_number_ = newest_;
+  }
+  if (next.whole) base_ = std::move(next.whole);
+  if (!base_) return;
+  auto* copies = std::get_if<std::vector<volume::FieldCopy>>(&base_->fields);
+  for (const volume::Changes::Bricks& change : next.changes.fields) {
+    const auto field = std::ranges::find(*copies, change.channel, &volume::FieldCopy::channel);
+    field->put(change.bricks);
+  }
+}
+
+void Live::refuse_base() {
+  base_.reset();
+  Next next;
+  const std::scoped_lock lock(mutex_);
+  // Updates that came meanwhile are of what was refused.
+  if (next_.whole) return;
+  std::swap(next_, next);
+  handed_.clear();
+  base_number_ = newest_;
+}
+
+Live::State Live::read(Progress& progress) {
+  progress.begin(Progress::Stage::loading);
+  const auto lock = patient_lock(reading_, progress);
+  if (newest_ != base_number_) take_next();
+  if (!base_ || base_number_ == state_.number) return state_;
+  try {
+    const std::vector<MemoryField> fields = base_->view();
+    if (base_->lease) {
+      for (const MemoryField& field : fields) volume::require_finite(field, base_->name);
+    }
+    state_.volume =
+        std::make_shared<const VolumeAsset>(volume::import_fields(fields, base_->name, {}, &progress), &progress);
+    state_.number = base_number_;
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::cancelled) refuse_base();
+    throw;
+  }
+  // What is held goes back, and what is copied is what the next may change.
+  if (base_->lease) base_.reset();
+  return state_;
+}
+
+}  // namespace cumulet::viewer

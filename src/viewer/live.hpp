@@ -1,0 +1,91 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "base/listeners.hpp"
+#include "base/progress.hpp"
+#include "viewer/bounds.hpp"
+#include "viewer/volume_asset.hpp"
+#include "volume/state.hpp"
+
+namespace cumulet::viewer {
+
+/// Memory of a host's, which it gets back with the last copy of this.
+using Lease = std::shared_ptr<void>;
+using MakeLease = std::function<Lease()>;
+
+/// A volume whose states a host hands over one after another; the newest is read by whoever wants it first. All calls
+/// are safe from any thread. Those of a host wait for no reading.
+class Live {
+ public:
+  explicit Live(std::optional<Bounds> bounds) : bounds_(std::move(bounds)) {}
+
+  /// The whole of the next state. lease: called where nothing can fail any more, and voxels are read where they are
+  /// until it goes; null: they are copied. Throws what check_fields does, and of voxels that are copied what
+  /// require_finite does; then it is not handed over.
+  void set(const std::vector<volume::MemoryField>& fields, std::string name, const MakeLease& lease = nullptr);
+  /// The next state is the last one but for these bricks. Throws likewise, and Error(invalid_argument) for fields that
+  /// take none.
+  void update(const std::vector<volume::MemoryField>& fields, const std::string& name);
+
+  /// How many states were handed over; the newest has this number.
+  [[nodiscard]] std::uint64_t newest() const { return newest_; }
+  struct State {
+    VolumeAssetPtr volume;     ///< null: there is none yet
+    std::uint64_t number = 0;  ///< 0: none
+  };
+  /// The newest, read by this caller if nobody did; others wait. Throws Error(cancelled) if this caller's progress is,
+  /// and of a state that was refused, once, what import_fields, require_finite and VolumeAsset throw: then the last
+  /// good one is still the newest.
+  [[nodiscard]] State read(Progress& progress);
+  /// Of all that there will ever be, if it is known.
+  [[nodiscard]] const std::optional<Bounds>& bounds() const { return bounds_; }
+  /// Listeners::listen() to states that are handed over; must not hand over any.
+  [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
+    return listeners_.listen(std::move(changed));
+  }
+
+ private:
+  // Voxels of a whole state: copies, or as long as the lease holds the host's.
+  struct Whole {
+    std::variant<std::vector<volume::FieldCopy>, std::vector<volume::MemoryField>> fields;
+    std::string name;
+    Lease lease;
+    [[nodiscard]] std::vector<volume::MemoryField> view() const;
+  };
+  // What was handed over, and nobody read yet.
+  struct Next {
+    std::optional<Whole> whole;
+    volume::Changes changes;  // on top of that, or of what was read
+  };
+  // What bricks may be put into: of the state that was handed over last.
+  enum class Takes { zeros, bricks, nothing };
+  struct Handed {
+    volume::Channel channel;
+    Takes takes;
+  };
+  void take_next();
+  void refuse_base();
+
+  std::optional<Bounds> bounds_;
+  std::atomic<std::uint64_t> newest_ = 0;
+  std::mutex mutex_;  // of these two, held for moments
+  Next next_;
+  std::vector<Handed> handed_;
+  std::mutex reading_;         // of all below, held while a state is read
+  std::optional<Whole> base_;  // of the state that was taken last, to be read or changed; none where it was refused
+  std::uint64_t base_number_ = 0;
+  State state_;
+  Listeners listeners_;
+};
+
+}  // namespace cumulet::viewer

@@ -1,0 +1,123 @@
+#include "viewer/live_builder.hpp"
+
+#include <utility>
+
+#include "viewer/stopwatch.hpp"
+
+namespace cumulet::viewer {
+
+namespace {
+
+constexpr const char* what = "building a live volume";
+
+}  // namespace
+
+void LiveBuilder::follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings) {
+  std::optional<Ready> old;  // ends after the lock, as all that may be large
+  const std::scoped_lock lock(mutex_);
+  worker_.drop();
+  job_.reset();
+  begun_.reset();
+  old = std::exchange(ready_, std::nullopt);
+  std::swap(live_, live);
+  settings_ = std::move(settings);
+  begin();
+}
+
+void LiveBuilder::configure(std::optional<BuildSettings> settings) {
+  const std::scoped_lock lock(mutex_);
+  settings_ = std::move(settings);
+  begin();
+}
+
+void LiveBuilder::look() {
+  const std::scoped_lock lock(mutex_);
+  begin();
+}
+
+void LiveBuilder::rebuild() {
+  const std::scoped_lock lock(mutex_);
+  begun_.reset();
+  begin();
+}
+
+void LiveBuilder::cancel() {
+  const std::scoped_lock lock(mutex_);
+  worker_.cancel();
+  job_.reset();
+  // As if it had been built: what comes is another state, or other settings.
+  if (is_due()) begun_ = Begun{live_->newest(), *settings_};
+}
+
+std::optional<LiveBuilder::Ready> LiveBuilder::take() {
+  const std::scoped_lock lock(mutex_);
+  auto ready = std::exchange(ready_, std::nullopt);
+  if (ready) begin();
+  return ready;
+}
+
+bool LiveBuilder::busy() const {
+  const std::scoped_lock lock(mutex_);
+  return job_ || ready_ || is_due();
+}
+
+bool LiveBuilder::is_due() const {
+  if (!live_ || !settings_ || live_->newest() == 0) return false;
+  return !begun_ || begun_->number < live_->newest() || !suits(begun_->settings, *settings_);
+}
+
+void LiveBuilder::begin() {
+  if (job_ || ready_ || !is_due()) return;
+  job_ = ++last_job_;
+  worker_.post({what, Progress::Stage::loading, [this, job = *job_](Progress& progress) {
+                  while (!build(job, progress)) {
+                  }
+                }});
+}
+
+bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
+  std::shared_ptr<Live> live;
+  Begun begun;
+  {
+    const std::scoped_lock lock(mutex_);
+    progress.check();
+    // They may have been taken back meanwhile; then the next wish begins anew.
+    if (job_ != job || !live_ || !settings_) {
+      if (job_ == job) job_.reset();
+      return true;
+    }
+    live = live_;
+    begun = {live->newest(), *settings_};
+    begun_ = begun;
+  }
+  Ready ready;
+  std::optional<Error> failure;
+  try {
+    Stopwatch watch;
+    const Live::State state = live->read(progress);
+    const double load_seconds = watch.lap();
+    if (state.volume) {
+      ready = {build_grid(log_, state.volume, begun.settings, progress, *allowance_), state.number};
+      ready.built.seconds.load = load_seconds;
+    }
+    progress.check();
+  } catch (...) {
+    failure = caught(what);
+  }
+  const bool cancelled = failure && failure->code() == ErrorCode::cancelled;
+  if (failure && !cancelled) log_.warning(std::string(failure->what()) + ": the state before it stays");
+  const std::scoped_lock lock(mutex_);
+  if (job_ != job || cancelled) {
+    if (job_ == job) job_.reset();
+    if (failure) throw Error(*failure);
+    return true;
+  }
+  if (!failure && ready.built.source) ready_ = std::move(ready);
+  // What failed is old news where there is another.
+  if (failure && is_due()) return false;
+  job_.reset();
+  if (failure) throw Error(*failure);
+  return true;
+}
+
+}  // namespace cumulet::viewer
