@@ -1,0 +1,216 @@
+// How long it takes from a state's hand-over to its picture, and where that goes: of a plume in a dense array of so many
+// voxels a side, which is copied or held, of its bricks, and of a tenth of its bricks. A picture is there when a frame
+// draws it, coarse where the budget makes it so. By hand:
+//
+//     cumulet-bench-live [SIDE [STATES]]...
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/c_host.hpp"
+#include "support/simulated.hpp"
+
+namespace {
+
+using cumulet::headless::Context;
+using cumulet::test::make_desc;
+using cumulet::test::Sides;
+using cumulet::test::State;
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return 1e3 * std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void must(cumulet_viewer* viewer, cumulet_status status) {
+  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+}
+
+// A column that widens and winds, with lumps of a few voxels: about a sixth of the box.
+std::vector<float> plume(int side, int step) {
+  std::vector<float> values(static_cast<std::size_t>(side) * static_cast<std::size_t>(side) *
+                            static_cast<std::size_t>(side));
+  const auto slices = [&](int first, int last) {
+    for (int z = first; z < last; ++z) {
+      for (int y = 0; y < side; ++y) {
+        const float height = static_cast<float>(y) / static_cast<float>(side);
+        const float turn = 7.0F * height - 0.15F * static_cast<float>(step);
+        const float middle = 0.5F * static_cast<float>(side);
+        const float x0 = middle + 0.12F * static_cast<float>(side) * std::sin(turn);
+        const float z0 = middle + 0.12F * static_cast<float>(side) * std::cos(turn);
+        const float radius = static_cast<float>(side) * (0.08F + 0.22F * height);
+        for (int x = 0; x < side; ++x) {
+          const float dx = static_cast<float>(x) - x0;
+          const float dz = static_cast<float>(z) - z0;
+          const float in = 1.0F - (dx * dx + dz * dz) / (radius * radius);
+          if (in <= 0.0F) continue;
+          const float lumps = std::sin(0.31F * static_cast<float>(x)) *
+                              std::sin(0.27F * static_cast<float>(y) - static_cast<float>(step)) *
+                              std::sin(0.23F * static_cast<float>(z));
+          values[State::at({x, y, z}, {side, side, side})] = std::max(0.0F, in * (0.5F + 0.5F * lumps));
+        }
+      }
+    }
+  };
+  std::thread half(slices, 0, side / 2);
+  slices(side / 2, side);
+  half.join();
+  return values;
+}
+
+struct Spent {
+  double copy = 0.0, read = 0.0, statistics = 0.0, refine = 0.0, records = 0.0, upload = 0.0, rest = 0.0, all = 0.0;
+};
+
+double median(std::vector<Spent>& spent, double Spent::* part) {
+  std::ranges::sort(spent, {}, part);
+  return spent[spent.size() / 2].*part;
+}
+
+class Bench {
+ public:
+  explicit Bench(double density_scale)
+      : gl_(cumulet::test::load_gl(Context::get_proc, &context_)), target_(gl_, 640, 360) {
+    auto create = make_desc<cumulet_create_desc>();
+    create.get_proc = Context::get_proc;
+    create.get_proc_user = &context_;
+    viewer_ = cumulet::test::make_plain_viewer(create);
+    auto light = make_desc<cumulet_light_desc>();
+    light.sun_elevation_degrees = 40.0F;
+    for (float& value : light.sun_irradiance) value = 2.5F;
+    for (float& value : light.sky_radiance) value = 0.3F;
+    must(viewer_.get(), cumulet_set_light(viewer_.get(), &light));
+    auto medium = make_desc<cumulet_medium_desc>();
+    medium.density_scale = density_scale;
+    must(viewer_.get(), cumulet_set_medium(viewer_.get(), &medium));
+    auto sampling = make_desc<cumulet_sampling_desc>();
+    sampling.samples = 1;  // so that nothing else is under way when the next comes
+    must(viewer_.get(), cumulet_set_sampling(viewer_.get(), &sampling));
+    auto desc = make_desc<cumulet_live_desc>();
+    for (double& x : desc.bounds_min) x = -8.0;
+    for (double& x : desc.bounds_max) x = 8.0;
+    live_ = cumulet::test::make_live(desc);
+    must(viewer_.get(), cumulet_set_live(viewer_.get(), live_.get()));
+    frame_ = target_.frame();
+    frame_.budget_ms = 16.0;
+  }
+
+  void warm_up(const State& state) {
+    hand_over(state, cumulet_live_set, false);
+    must(viewer_.get(), cumulet_wait(viewer_.get(), -1.0));
+    auto result = make_desc<cumulet_warm_up_result>();
+    do must(viewer_.get(), cumulet_warm_up(viewer_.get(), &frame_, CUMULET_WARM_UP_SCENE, &result));
+    while (result.more != 0);
+    settle();
+  }
+
+  Spent show(const State& state, decltype(cumulet_live_set)* how, bool held) {
+    const auto begun = Clock::now();
+    hand_over(state, how, held);
+    Spent spent;
+    spent.copy = milliseconds_since(begun);
+    auto info = make_desc<cumulet_live_info>();
+    for (;;) {
+      must(viewer_.get(), cumulet_render(viewer_.get(), &frame_, nullptr));
+      must(viewer_.get(), cumulet_get_live_info(viewer_.get(), &info));
+      if (info.drawn_state == info.handed_state) break;
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
+    }
+    spent.all = milliseconds_since(begun);
+    auto stats = make_desc<cumulet_stats>();
+    must(viewer_.get(), cumulet_get_stats(viewer_.get(), &stats));
+    spent.read = 1e3 * stats.build_seconds_load;
+    spent.statistics = 1e3 * stats.build_seconds_statistics;
+    spent.refine = 1e3 * stats.build_seconds_refine;
+    spent.records = 1e3 * stats.build_seconds_records;
+    spent.upload = 1e3 * stats.build_seconds_upload;
+    spent.rest = spent.all - spent.copy - spent.read - spent.statistics - spent.refine - spent.records - spent.upload;
+    cells_ = stats.cells;
+    settle();
+    return spent;
+  }
+  [[nodiscard]] std::uint64_t cells() const { return cells_; }
+
+ private:
+  void hand_over(const State& state, decltype(cumulet_live_set)* how, bool held) {
+    auto desc = state.desc("plume");
+    if (held) desc.release = [](void*) {};
+    char error[256];
+    if (how(live_.get(), &desc, error, sizeof error) != CUMULET_OK) throw std::runtime_error(error);
+  }
+  void settle() {
+    auto result = make_desc<cumulet_frame_result>();
+    do must(viewer_.get(), cumulet_render(viewer_.get(), &frame_, &result));
+    while ((result.flags & CUMULET_RENDER_CONVERGED) == 0);
+  }
+
+  Context context_ = Context::create(cumulet::headless::Backend::automatic);
+  GladGLContext gl_;
+  cumulet::test::HostTarget target_;
+  cumulet_frame_desc frame_{};
+  cumulet::test::ViewerPtr viewer_;
+  cumulet::test::LiveRef live_;
+  std::uint64_t cells_ = 0;
+};
+
+void measure(int side, int count) {
+  const Sides size{side, side, side};
+  const std::vector<float> values[] = {plume(side, 0), plume(side, 1)};
+  const auto sparse = [&](const std::vector<float>& of, const std::vector<Sides>& bricks) {
+    return std::move(State().sparse(CUMULET_CHANNEL_DENSITY, size, of, bricks));
+  };
+  const auto dense = [&](int i) { return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, values[i])); };
+  Bench bench(3.0);
+  const auto row = [&](const char* what, const State (&states)[2], decltype(cumulet_live_set)* how, bool held) {
+    std::vector<Spent> spent;
+    for (int i = 0; i < count; ++i) spent.push_back(bench.show(states[i % 2], how, held));
+    std::printf("| %d^3 | %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %.1f | %llu |\n", side, what,
+                median(spent, &Spent::copy), median(spent, &Spent::read), median(spent, &Spent::statistics),
+                median(spent, &Spent::refine), median(spent, &Spent::records), median(spent, &Spent::upload),
+                median(spent, &Spent::rest), median(spent, &Spent::all),
+                static_cast<unsigned long long>(bench.cells()));
+    std::fflush(stdout);
+  };
+  {
+    const State states[] = {dense(0), dense(1)};
+    bench.warm_up(states[0]);
+    row("dense, copied", states, cumulet_live_set, false);
+    row("dense, held", states, cumulet_live_set, true);
+  }
+  const auto bricks = [&](int i) { return State::bricks(size, values[i]); };
+  const State states[] = {sparse(values[0], bricks(0)), sparse(values[1], bricks(1))};
+  row("bricks", states, cumulet_live_set, false);
+  // Those about the middle of the height.
+  std::vector<Sides> tenth = bricks(0);
+  std::erase_if(tenth, [&](const Sides& origin) { return std::abs(origin[1] - side / 2) > side / 20; });
+  const State parts[] = {sparse(values[1], tenth), sparse(values[0], tenth)};
+  row("a tenth of the bricks", parts, cumulet_live_update, false);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    std::printf(
+        "| voxels | handed over | copy | reading | statistics | refinement | cells | upload | samples, waiting | all | "
+        "cells |\n|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+    if (argc < 2) {
+      for (const int side : {64, 128, 256}) measure(side, 9);
+      measure(512, 3);
+    }
+    for (int i = 1; i < argc; i += 2) measure(std::atoi(argv[i]), i + 1 < argc ? std::atoi(argv[i + 1]) : 9);
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "cumulet-bench-live: %s\n", error.what());
+    return 1;
+  }
+}
