@@ -1,13 +1,19 @@
 #include "viewer/allowance.hpp"
 
+#include <tbb/info.h>
+
+#include <algorithm>
+
 #include "base/error.hpp"
 #include "base/one_line.hpp"
 
 namespace cumulet::viewer {
 
 void Allowance::set(unsigned threads, std::uint64_t memory_bytes) {
-  std::shared_ptr<tbb::task_arena> arena;  // the one before ends after the lock
-  if (threads > 0) arena = std::make_shared<tbb::task_arena>(static_cast<int>(threads));
+  std::shared_ptr<Arena> arena;  // the one before ends after the lock
+  // More than there are would be told of on standard error.
+  if (threads > 0)
+    arena = std::make_shared<Arena>(std::min(static_cast<int>(threads), tbb::info::default_concurrency()));
   memory_bytes_ = memory_bytes;
   const std::scoped_lock lock(mutex_);
   if (threads == threads_) return;
@@ -23,7 +29,7 @@ void Allowance::require(std::uint64_t bytes, const std::string& what) const {
 }
 
 void Allowance::run(const std::function<void()>& work) const {
-  std::shared_ptr<tbb::task_arena> arena;
+  std::shared_ptr<Arena> arena;
   {
     const std::scoped_lock lock(mutex_);
     arena = arena_;
@@ -32,9 +38,11 @@ void Allowance::run(const std::function<void()>& work) const {
     work();
     return;
   }
+  std::unique_lock alone(arena->alone, std::defer_lock);
+  if (arena->threads == 1) alone.lock();
   // Isolated: a thread that waits inside of it for a part must not take up another's work meanwhile, which may wait for
   // what this one holds.
-  arena->execute([&] { tbb::this_task_arena::isolate(work); });
+  arena->arena.execute([&] { tbb::this_task_arena::isolate(work); });
 }
 
 }  // namespace cumulet::viewer

@@ -27,9 +27,15 @@ class Allowance {
   void run(const std::function<void()>& work) const;
 
  private:
+  struct Arena {
+    explicit Arena(int count) : threads(count), arena(count) {}
+    int threads;
+    tbb::task_arena arena;
+    std::mutex alone;  // of one thread: a second job's would bring another with it
+  };
   mutable std::mutex mutex_;
   unsigned threads_ = 0;
-  std::shared_ptr<tbb::task_arena> arena_;  // null: no limit
+  std::shared_ptr<Arena> arena_;  // null: no limit
   std::atomic<std::uint64_t> memory_bytes_ = no_limit;
 };
 using AllowancePtr = std::shared_ptr<const Allowance>;

@@ -105,6 +105,7 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
 }
 
 Viewer::~Viewer() {
+  cancel();  // all at once: where threads are few, jobs wait for each other
   // Without a context nothing can be deleted, and in a stranger's the names are of other objects.
   if (gl_ && !gl_->group().is_current()) context_lost();
 }

@@ -790,4 +790,26 @@ TEST_F(CppViewer, SharesSurfaces) {
   EXPECT_EQ(one.load_environment({}).error().status, StatusCode::invalid_argument);
 }
 
+TEST(CppLive, StatesAreHandedOver) {
+  const std::vector<float> values(8 * 8 * 8, 0.5F);
+  const cumulet::DenseDesc dense{.values = values, .size = {8, 8, 8}};
+  const std::array<cumulet::Field, 2> fields{cumulet::Field(cumulet::Channel::density, dense),
+                                             cumulet::Field(cumulet::Channel::flame, dense)};
+  const auto volume = cumulet::volume_from_state({.fields = fields, .name = "fire"});
+  ASSERT_TRUE(volume);
+  EXPECT_EQ(volume.value().info().value().active_voxels, 512U);
+  const auto live = cumulet::Live::create();
+  ASSERT_TRUE(live);
+  EXPECT_FALSE(live.value().get_volume().value());
+  ASSERT_TRUE(live.value().set({.fields = fields}));
+  const std::array<std::int32_t, 3> origin{8, 0, 0};
+  const cumulet::Field brick(cumulet::Channel::density,
+                             cumulet::SparseDesc{.brick_origins = origin, .brick_values = values});
+  ASSERT_TRUE(live.value().update({.fields = {&brick, 1}}));
+  EXPECT_EQ(live.value().get_volume().value().info().value().active_voxels, 1024U);
+  const auto twice = live.value().set({.fields = std::vector<cumulet::Field>(40, fields[0]), .name = "fire"});
+  ASSERT_FALSE(twice);
+  EXPECT_STREQ(twice.error().message.c_str(), "fire: has density twice");
+}
+
 }  // namespace

@@ -710,4 +710,40 @@ TEST(VolumeHandle, IsCountedByManyThreads) {
   EXPECT_TRUE(asset.expired());
 }
 
+// Grids of a host's own OpenVDB as a live volume's state: the density is that of the volume by itself.
+TEST(LiveOpenVdb, IsTheVolume) {
+  const auto density = openvdb::FloatGrid::create();
+  const auto heat = openvdb::DoubleGrid::create();
+  for (int i = 0; i < 600; ++i) {
+    density->tree().setValue(Coord(i % 13, i / 13 % 17, i / 200), 0.1F + 0.01F * static_cast<float>(i));
+    heat->tree().setValue(Coord(i % 11, i / 11 % 15, i / 170), 1.0 + 0.002 * i);
+  }
+  density->fill(openvdb::CoordBBox(Coord(32), Coord(47)), 0.5F);
+  density->setName("smoke");
+  const auto desc = cumulet_live_desc{.struct_size = sizeof(cumulet_live_desc), .bounds_min = {}, .bounds_max = {}};
+  cumulet_live* live = nullptr;
+  ASSERT_EQ(cumulet_live_create(&desc, &live, nullptr, 0), CUMULET_OK);
+  const std::unique_ptr<cumulet_live, decltype(&cumulet_live_release)> owner(live, cumulet_live_release);
+  char error[256] = "";
+  ASSERT_EQ(cumulet::live_set_openvdb(live, {{CUMULET_CHANNEL_TEMPERATURE, heat}, {CUMULET_CHANNEL_DENSITY, density}},
+                                      "fire", error, sizeof error),
+            CUMULET_OK)
+      << error;
+  const Volume state =
+      made([&](auto** out, char* line, std::size_t size) { return cumulet_live_get_volume(live, out, line, size); });
+  const Volume alone = made(
+      [&](auto** out, char* line, std::size_t size) { return cumulet::volume_from_openvdb(density, out, line, size); });
+  ScalarVolume wanted = inside(alone);
+  wanted.name = "density";
+  cumulet::test::expect_same_voxels(inside(state), wanted);
+  ASSERT_TRUE(state->asset->frame().temperature);
+  EXPECT_EQ(value_at(*state->asset->frame().temperature, {3, 1, 0}), static_cast<float>(1.0 + 0.002 * 14));
+  const auto level_set = openvdb::FloatGrid::create();
+  level_set->setGridClass(openvdb::GRID_LEVEL_SET);
+  level_set->setName("surface");
+  EXPECT_EQ(cumulet::live_set_openvdb(live, {{CUMULET_CHANNEL_DENSITY, level_set}}, "fire", error, sizeof error),
+            CUMULET_ERROR_FILE);
+  EXPECT_STREQ(error, "fire: surface: is a level set, not a fog volume");
+}
+
 }  // namespace

@@ -368,8 +368,8 @@ typedef enum cumulet_channel {
 typedef struct cumulet_field {
   size_t struct_size; /* of all fields of an array the same: the distance between them */
   cumulet_channel channel;
-  const cumulet_dense_desc* dense; /* one of the two, and the other NULL */
-  const cumulet_sparse_desc* sparse;
+  const cumulet_dense_desc* dense;   /* one of the two, and the other NULL */
+  const cumulet_sparse_desc* sparse; /* cumulet_openvdb.hpp makes it of an OpenVDB grid */
 } cumulet_field;
 
 /* From any thread. Do not call the library, but to retain and release handles. */
@@ -1021,8 +1021,9 @@ typedef struct cumulet_limits_desc {
    */
   uint64_t memory_bytes;
   /*
-   * All GL memory of the viewer (cumulet_stats.gl_bytes), but for what frames of a size need: what would not fit beside
-   * what is there is not uploaded, cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once, and the picture before stays.
+   * GL memory. A volume whose cells or voxels, beside what is there until all of them have come, would bring
+   * cumulet_stats.gl_bytes above this is not uploaded: cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once, and the
+   * picture before stays. Surfaces, environments and pictures count, and are not refused.
    */
   uint64_t gl_bytes;
 } cumulet_limits_desc;

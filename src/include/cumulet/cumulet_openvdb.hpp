@@ -74,6 +74,56 @@ bool flatten_if(const openvdb::TreeBase& tree, Flat& flat) {
   return true;
 }
 
+/* A grid as cumulet.h takes it. */
+struct Sparse {
+  std::string name = "openvdb";
+  Flat flat;
+  cumulet_sparse_desc desc{}; /* of the above, where they are */
+};
+
+/* "" or why the grid cannot be had; status: what that is. Throws what OpenVDB does. */
+inline std::string flatten_grid(const openvdb::GridBase::ConstPtr& grid, Sparse& sparse, cumulet_status& status) {
+  status = CUMULET_ERROR_INVALID_ARGUMENT;
+  if (!grid) return "grid is NULL";
+  status = CUMULET_ERROR_FILE;
+  if (!grid->getName().empty()) sparse.name = grid->getName();
+  const openvdb::GridClass grid_class = grid->getGridClass();
+  if (grid_class != openvdb::GRID_FOG_VOLUME && grid_class != openvdb::GRID_UNKNOWN)
+    return "is a " + openvdb::GridBase::gridClassToString(grid_class) + ", not a fog volume";
+  if (!grid->transform().isLinear()) return "has a frustum transform, which is not affine";
+  const openvdb::TreeBase& tree = grid->constBaseTree();
+  Flat& flat = sparse.flat;
+  using HalfTree = openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type;
+  if (!flatten_if<openvdb::FloatTree>(tree, flat) && !flatten_if<openvdb::DoubleTree>(tree, flat) &&
+      !flatten_if<HalfTree>(tree, flat))
+    return "is of type " + grid->valueType() + ", not a float or half scalar";
+  cumulet_sparse_desc& desc = sparse.desc;
+  desc.struct_size = sizeof desc;
+  desc.brick_origins = flat.origins.data();
+  desc.brick_values = flat.values.get();
+  desc.brick_active = flat.active.get();
+  desc.brick_count = flat.origins.size() / 3;
+  desc.tiles = flat.tiles.data();
+  desc.tile_count = flat.tiles.size();
+  desc.background = flat.background;
+  desc.name = sparse.name.c_str();
+  /* OpenVDB multiplies row vectors from the left: its rows are columns here. */
+  const openvdb::Mat4d matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
+  for (int i = 0; i < 16; ++i) desc.index_to_world[i] = matrix(i / 4, i % 4);
+  return std::string();
+}
+
+inline cumulet_status refuse(cumulet_status status, const std::string& name, const std::string& cause, char* error,
+                             size_t error_size) {
+  if (error == nullptr || error_size == 0) return status;
+  std::string line = name + ": " + cause;
+  for (char& c : line) c = static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+  const size_t length = line.size() < error_size ? line.size() : error_size - 1;
+  std::memcpy(error, line.data(), length);
+  error[length] = '\0';
+  return status;
+}
+
 } /* namespace openvdb_detail */
 
 /*
@@ -83,50 +133,56 @@ bool flatten_if(const openvdb::TreeBase& tree, Flat& flat) {
  */
 inline cumulet_status volume_from_openvdb(const openvdb::GridBase::ConstPtr& grid, cumulet_volume** out,
                                           char* error = nullptr, size_t error_size = 0) {
-  std::string name = "openvdb";
+  openvdb_detail::Sparse sparse;
   const auto refuse = [&](cumulet_status status, const std::string& cause) {
     if (out != nullptr) *out = nullptr;
-    if (error == nullptr || error_size == 0) return status;
-    std::string line = name + ": " + cause;
-    for (char& c : line) c = static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-    const size_t length = line.size() < error_size ? line.size() : error_size - 1;
-    std::memcpy(error, line.data(), length);
-    error[length] = '\0';
-    return status;
+    return openvdb_detail::refuse(status, sparse.name, cause, error, error_size);
   };
   try {
-    if (!grid) return refuse(CUMULET_ERROR_INVALID_ARGUMENT, "grid is NULL");
-    if (!grid->getName().empty()) name = grid->getName();
-    const openvdb::GridClass grid_class = grid->getGridClass();
-    if (grid_class != openvdb::GRID_FOG_VOLUME && grid_class != openvdb::GRID_UNKNOWN) {
-      return refuse(CUMULET_ERROR_FILE,
-                    "is a " + openvdb::GridBase::gridClassToString(grid_class) + ", not a fog volume");
+    cumulet_status status = CUMULET_OK;
+    const std::string cause = openvdb_detail::flatten_grid(grid, sparse, status);
+    if (!cause.empty()) return refuse(status, cause);
+    return cumulet_volume_from_sparse(&sparse.desc, out, error, error_size);
+  } catch (const std::bad_alloc&) {
+    return refuse(CUMULET_ERROR_OUT_OF_MEMORY, "not enough memory to copy it");
+  } catch (const std::exception& e) {
+    return refuse(CUMULET_ERROR_FILE, e.what());
+  }
+}
+
+/* A grid, and what it is of. */
+struct OpenVdbField {
+  cumulet_channel channel;
+  openvdb::GridBase::ConstPtr grid;
+};
+
+/*
+ * cumulet_live_set of grids, each refused as above. They are copied flat, and again by that; what of it is tiles stays
+ * tiles, and takes no updates. name: for messages. Any thread.
+ */
+inline cumulet_status live_set_openvdb(cumulet_live* live, const std::vector<OpenVdbField>& fields, const char* name,
+                                       char* error = nullptr, size_t error_size = 0) {
+  std::string what = name != nullptr && *name != '\0' ? name : "openvdb";
+  const auto refuse = [&](cumulet_status status, const std::string& cause) {
+    return openvdb_detail::refuse(status, what, cause, error, error_size);
+  };
+  try {
+    std::vector<openvdb_detail::Sparse> sparse(fields.size());
+    std::vector<cumulet_field> given(fields.size());
+    for (size_t i = 0; i < fields.size(); ++i) {
+      cumulet_status status = CUMULET_OK;
+      const std::string cause = openvdb_detail::flatten_grid(fields[i].grid, sparse[i], status);
+      if (!cause.empty()) return refuse(status, sparse[i].name + ": " + cause);
+      given[i].struct_size = sizeof given[i];
+      given[i].channel = fields[i].channel;
+      given[i].sparse = &sparse[i].desc;
     }
-    if (!grid->transform().isLinear()) {
-      return refuse(CUMULET_ERROR_FILE, "has a frustum transform, which is not affine");
-    }
-    const openvdb::TreeBase& tree = grid->constBaseTree();
-    openvdb_detail::Flat flat;
-    using HalfTree = openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type;
-    if (!openvdb_detail::flatten_if<openvdb::FloatTree>(tree, flat) &&
-        !openvdb_detail::flatten_if<openvdb::DoubleTree>(tree, flat) &&
-        !openvdb_detail::flatten_if<HalfTree>(tree, flat)) {
-      return refuse(CUMULET_ERROR_FILE, "is of type " + grid->valueType() + ", not a float or half scalar");
-    }
-    cumulet_sparse_desc desc{};
+    cumulet_state_desc desc{};
     desc.struct_size = sizeof desc;
-    desc.brick_origins = flat.origins.data();
-    desc.brick_values = flat.values.get();
-    desc.brick_active = flat.active.get();
-    desc.brick_count = flat.origins.size() / 3;
-    desc.tiles = flat.tiles.data();
-    desc.tile_count = flat.tiles.size();
-    desc.background = flat.background;
-    desc.name = name.c_str();
-    /* OpenVDB multiplies row vectors from the left: its rows are columns here. */
-    const openvdb::Mat4d matrix = grid->transform().baseMap()->getAffineMap()->getMat4();
-    for (int i = 0; i < 16; ++i) desc.index_to_world[i] = matrix(i / 4, i % 4);
-    return cumulet_volume_from_sparse(&desc, out, error, error_size);
+    desc.fields = given.data();
+    desc.field_count = given.size();
+    desc.name = what.c_str();
+    return cumulet_live_set(live, &desc, error, error_size);
   } catch (const std::bad_alloc&) {
     return refuse(CUMULET_ERROR_OUT_OF_MEMORY, "not enough memory to copy it");
   } catch (const std::exception& e) {

@@ -1,0 +1,575 @@
+// A live simulation: smoke that the mouse stirs, computed in the host's own context, handed over step by step and path
+// traced as it moves.
+//
+//     cumulet-embed-smoke [--voxels N] [--record FILE]
+//     cumulet-embed-smoke --mouse FILE --test OUT_DIR [--voxels N]
+//
+// Left button stirs, the others move the camera, as does the wheel; Escape quits. --record writes what the mouse does,
+// a line a change: frame, x, y (0 to 1, from the top left), pressed. --test plays that without a window, checks that
+// pictures follow the smoke and that no state starves, and writes OUT_DIR/smoke.ppm.
+#include <cumulet/cumulet.hpp>
+
+#define GL_GLEXT_PROTOTYPES
+#include <GL/glcorearb.h>
+#define GLFW_INCLUDE_NONE
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace {
+
+[[noreturn]] void fail(const std::string& cause) {
+  std::fprintf(stderr, "cumulet-embed-smoke: %s\n", cause.c_str());
+  std::exit(1);
+}
+
+template <class T>
+T must(cumulet::Result<T> result) {
+  if (!result) fail(result.error().message.c_str());
+  return std::move(result).value();
+}
+
+void must(const cumulet::Result<>& result) {
+  if (!result) fail(result.error().message.c_str());
+}
+
+using Point = std::array<double, 3>;
+
+// ---- the solver: stable fluids (Stam 1999) in a cube from -1 to 1, lengths and speeds in voxels ----
+
+constexpr const char* kernels = R"(
+layout(local_size_x = 4, local_size_y = 4, local_size_z = 4) in;
+layout(binding = 0) uniform sampler3D velocity;
+layout(binding = 1) uniform sampler3D other;
+layout(binding = 0, rgba32f) uniform writeonly image3D to_velocity;
+layout(binding = 1, r32f) uniform writeonly image3D to_number;
+layout(binding = 0, std430) writeonly buffer State { float state[]; };
+layout(location = 0) uniform float dt;
+layout(location = 1) uniform vec3 stirred;
+layout(location = 2) uniform vec3 push;
+const float fade = 0.25, buoyancy = 26.0, reach = 0.09;
+
+ivec3 cell = ivec3(gl_GlobalInvocationID);
+int n = textureSize(velocity, 0).x;
+vec3 from() { return (vec3(cell) + 0.5 - dt * texelFetch(velocity, cell, 0).xyz) / n; }
+vec4 at(sampler3D field, ivec3 p) { return texelFetch(field, clamp(p, ivec3(0), ivec3(n - 1)), 0); }
+// Of the place where smoke comes in.
+float source() {
+  vec3 away = (vec3(cell) + 0.5) / n - vec3(0.5, 0.1, 0.5);
+  return max(0.0, 1.0 - dot(away, away) / 0.008);
+}
+
+#if STEP == 0  // velocities move themselves, smoke lifts and the mouse pushes
+void main() {
+  vec3 v = texture(velocity, from()).xyz;
+  v.y += dt * buoyancy * texelFetch(other, cell, 0).x;
+  vec3 away = ((vec3(cell) + 0.5) / n - stirred) / reach;
+  v += push * exp(-dot(away, away));
+  bool wall = any(equal(cell, ivec3(0))) || any(equal(cell, ivec3(n - 1)));
+  imageStore(to_velocity, cell, vec4(wall ? vec3(0.0) : v, 0.0));
+}
+#elif STEP == 1  // what flows out of a voxel
+void main() {
+  float sum = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    ivec3 step = ivec3(0);
+    step[axis] = 1;
+    sum += at(velocity, cell + step)[axis] - at(velocity, cell - step)[axis];
+  }
+  imageStore(to_velocity, cell, vec4(0.5 * sum));
+}
+#elif STEP == 2  // a pressure that stops that, by Jacobi; velocity is here the divergence
+void main() {
+  float sum = -texelFetch(velocity, cell, 0).x;
+  for (int axis = 0; axis < 3; ++axis) {
+    ivec3 step = ivec3(0);
+    step[axis] = 1;
+    sum += at(other, cell + step).x + at(other, cell - step).x;
+  }
+  imageStore(to_number, cell, vec4(sum / 6.0));
+}
+#elif STEP == 3  // and what it does
+void main() {
+  vec3 v = texelFetch(velocity, cell, 0).xyz;
+  for (int axis = 0; axis < 3; ++axis) {
+    ivec3 step = ivec3(0);
+    step[axis] = 1;
+    v[axis] -= 0.5 * (at(other, cell + step).x - at(other, cell - step).x);
+  }
+  imageStore(to_velocity, cell, vec4(v, 0.0));
+}
+#else  // smoke moves along, fades, and comes in
+void main() {
+  float smoke = texture(other, from()).x * (1.0 - fade * dt) + 3.0 * dt * source();
+  if (smoke < 1e-3) smoke = 0.0;
+  imageStore(to_number, cell, vec4(smoke));
+  state[(cell.z * n + cell.y) * n + cell.x] = smoke;
+}
+#endif
+)";
+
+GLuint program_of(int step) {
+  const std::string source = "#version 450\n#define STEP " + std::to_string(step) + "\n" + kernels;
+  const char* text = source.c_str();
+  const GLuint program = glCreateShaderProgramv(GL_COMPUTE_SHADER, 1, &text);
+  GLint linked = 0;
+  glGetProgramiv(program, GL_LINK_STATUS, &linked);
+  std::array<char, 1024> log{};
+  glGetProgramInfoLog(program, static_cast<GLsizei>(log.size()), nullptr, log.data());
+  if (linked == 0) fail(std::string("a kernel does not compile: ") + log.data());
+  return program;
+}
+
+class Solver {
+ public:
+  explicit Solver(int voxels) : n_(voxels) {
+    for (int step = 0; step < 5; ++step) programs_[std::size_t(step)] = program_of(step);
+    for (Pair* pair : {&velocity_, &divergence_}) *pair = make(GL_RGBA32F);
+    for (Pair* pair : {&pressure_, &smoke_}) *pair = make(GL_R32F);
+  }
+  Solver(const Solver&) = delete;
+  Solver& operator=(const Solver&) = delete;
+  ~Solver() {
+    for (const GLuint program : programs_) glDeleteProgram(program);
+    for (const Pair& pair : {velocity_, divergence_, pressure_, smoke_}) glDeleteTextures(2, pair.data());
+  }
+
+  struct Stir {
+    Point at{};    ///< in parts of the cube
+    Point push{};  ///< voxels a second
+  };
+  /// Into this buffer, n^3 floats.
+  void step(float dt, const Stir& stir, GLuint state) {
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, state);
+    for (const GLuint program : programs_) {
+      glProgramUniform1f(program, 0, dt);
+      glProgramUniform3f(program, 1, float(stir.at[0]), float(stir.at[1]), float(stir.at[2]));
+      glProgramUniform3f(program, 2, float(stir.push[0]), float(stir.push[1]), float(stir.push[2]));
+    }
+    run(0, velocity_[0], smoke_[0], velocity_[1], 0);
+    std::swap(velocity_[0], velocity_[1]);
+    run(1, velocity_[0], 0, divergence_[0], 0);
+    for (int i = 0; i < 24; ++i) {
+      run(2, divergence_[0], pressure_[0], 0, pressure_[1]);
+      std::swap(pressure_[0], pressure_[1]);
+    }
+    run(3, velocity_[0], pressure_[0], velocity_[1], 0);
+    std::swap(velocity_[0], velocity_[1]);
+    run(4, velocity_[0], smoke_[0], 0, smoke_[1]);
+    std::swap(smoke_[0], smoke_[1]);
+  }
+
+ private:
+  using Pair = std::array<GLuint, 2>;
+  [[nodiscard]] Pair make(GLenum format) const {
+    Pair pair{};
+    glCreateTextures(GL_TEXTURE_3D, 2, pair.data());
+    for (const GLuint texture : pair) {
+      glTextureStorage3D(texture, 1, format, n_, n_, n_);
+      glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+      for (const GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
+        glTextureParameteri(texture, axis, GL_CLAMP_TO_EDGE);
+      glClearTexImage(texture, 0, format == GL_R32F ? GL_RED : GL_RGBA, GL_FLOAT, nullptr);
+    }
+    return pair;
+  }
+  void run(int step, GLuint velocity, GLuint other, GLuint to_velocity, GLuint to_number) const {
+    glUseProgram(programs_[std::size_t(step)]);
+    glBindTextureUnit(0, velocity);
+    glBindTextureUnit(1, other);
+    if (to_velocity != 0) glBindImageTexture(0, to_velocity, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+    if (to_number != 0) glBindImageTexture(1, to_number, 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_R32F);
+    const auto groups = static_cast<GLuint>((n_ + 3) / 4);
+    glDispatchCompute(groups, groups, groups);
+    glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+  }
+
+  int n_;
+  std::array<GLuint, 5> programs_{};
+  Pair velocity_{}, divergence_{}, pressure_{}, smoke_{};
+};
+
+// ---- buffers that the device writes, and the library reads where they are ----
+
+struct Buffer {
+  GLuint name = 0;
+  const float* values = nullptr;
+  GLsync written = nullptr;           // under way
+  std::atomic<bool> is_held = false;  // by the library
+};
+
+/// Nothing waits: the device writes into one while the library reads another, and which one that still is it tells from
+/// whatever thread.
+class Ring {
+ public:
+  explicit Ring(int voxels) : count_(std::size_t(voxels) * std::size_t(voxels) * std::size_t(voxels)) {
+    constexpr GLbitfield mapped = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+    const auto bytes = static_cast<GLsizeiptr>(count_ * sizeof(float));
+    for (Buffer& buffer : buffers_) {
+      glCreateBuffers(1, &buffer.name);
+      glNamedBufferStorage(buffer.name, bytes, nullptr, mapped | GL_CLIENT_STORAGE_BIT);
+      buffer.values = static_cast<const float*>(glMapNamedBufferRange(buffer.name, 0, bytes, mapped));
+      if (buffer.values == nullptr) fail("a buffer cannot be mapped");
+    }
+  }
+  Ring(const Ring&) = delete;
+  Ring& operator=(const Ring&) = delete;
+  /// Once the library holds none any more.
+  ~Ring() {
+    for (Buffer& buffer : buffers_) glDeleteBuffers(1, &buffer.name);
+  }
+
+  Buffer* free() {
+    const auto found = std::ranges::find_if(
+        buffers_, [](const Buffer& buffer) { return buffer.written == nullptr && !buffer.is_held; });
+    return found == buffers_.end() ? nullptr : &*found;
+  }
+  void begin(Buffer& buffer) {
+    glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
+    buffer.written = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    under_way_.push_back(&buffer);
+  }
+  /// The oldest that is under way, if it is written by now.
+  Buffer* written(bool wait) {
+    if (under_way_.empty()) return nullptr;
+    Buffer& buffer = *under_way_.front();
+    constexpr GLuint64 second = 1'000'000'000;
+    const GLenum state = glClientWaitSync(buffer.written, GL_SYNC_FLUSH_COMMANDS_BIT, wait ? 10 * second : 0);
+    if (state == GL_TIMEOUT_EXPIRED) return nullptr;
+    glDeleteSync(std::exchange(buffer.written, nullptr));
+    under_way_.erase(under_way_.begin());
+    return &buffer;
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+ private:
+  std::size_t count_;
+  std::array<Buffer, 4> buffers_;  // written, waiting, read, and one to begin with
+  std::vector<Buffer*> under_way_;
+};
+
+// ---- the host ----
+
+struct Mouse {
+  double x = 0.0;  // of the picture, 0 to 1, from its top left
+  double y = 0.0;
+  bool stirs = false;
+};
+
+class Host {
+ public:
+  Host(cumulet::GetProc get_proc, int voxels, bool test)
+      : voxels_(voxels),
+        solver_(voxels),
+        ring_(voxels),
+        viewer_(must(cumulet::Viewer::create({.get_proc = get_proc}))) {
+    must(viewer_.set_light({.sun_azimuth_degrees = 60.0F,
+                            .sun_elevation_degrees = 50.0F,
+                            .sun_irradiance = {3.0F, 2.8F, 2.5F},
+                            .sky_radiance = {0.25F, 0.35F, 0.5F}}));
+    must(viewer_.set_medium({.density_scale = 9.0, .coalbedo = {0.03F, 0.03F, 0.03F}}));
+    must(viewer_.set_ground({.place = cumulet::Ground::below}));
+    must(viewer_.set_display({.denoise = cumulet::Denoise::fast}));
+    must(viewer_.set_sampling({.samples = test ? 8U : 64U}));
+    // The box is known, so that neither the camera nor the ground jumps as the smoke rises.
+    live_ = must(cumulet::Live::create({.bounds_min = {-1.0, -1.0, -1.0}, .bounds_max = {1.0, 1.0, 1.0}}));
+    must(viewer_.set_live(live_));
+  }
+
+  [[nodiscard]] cumulet::Viewer& viewer() { return viewer_; }
+
+  /// A step of the simulation, if there is room for it, and over with what is written by now.
+  void advance(const Mouse& mouse, double aspect, bool wait) {
+    if (Buffer* buffer = ring_.free()) {
+      solver_.step(1.0F / 30.0F, stir(mouse, aspect), buffer->name);
+      ring_.begin(*buffer);
+    }
+    while (Buffer* buffer = ring_.written(wait)) hand_over(*buffer);
+  }
+
+  /// Where the smoke of the newest state is, in the picture: 0 to 1, from its top left.
+  [[nodiscard]] std::array<double, 2> middle_of_smoke(double aspect) {
+    double mass = 0.0;
+    Point sum{};
+    for (std::size_t i = 0; i < ring_.count(); ++i) {
+      const double value = newest_[i];
+      mass += value;
+      const auto n = static_cast<std::size_t>(voxels_);
+      const std::array<std::size_t, 3> p{i % n, i / n % n, i / n / n};
+      for (std::size_t axis = 0; axis < 3; ++axis) sum[axis] += value * (2.0 * (double(p[axis]) + 0.5) / voxels_ - 1.0);
+    }
+    const Seen seen = look(aspect);
+    const auto along = [&](std::size_t row) {
+      double value = seen.view[12 + row];
+      for (std::size_t axis = 0; axis < 3; ++axis) value += seen.view[4 * axis + row] * sum[axis] / mass;
+      return value;
+    };
+    return {0.5 + 0.5 * along(0) / seen.half_width / -along(2), 0.5 - 0.5 * along(1) / seen.half_height / -along(2)};
+  }
+
+ private:
+  struct Seen {
+    cumulet::Matrix view{};
+    double half_width = 0.0;  // of the picture, at distance 1
+    double half_height = 0.0;
+  };
+  [[nodiscard]] Seen look(double aspect) {
+    const auto matrices = must(must(viewer_.get_camera()).get_matrices(aspect, cumulet::Clip::negative_one_to_one));
+    return {matrices.view, 1.0 / matrices.projection[0], 1.0 / matrices.projection[5]};
+  }
+
+  // Where the mouse is in the plane through the middle of the box that faces the camera, and how it moved there.
+  Solver::Stir stir(const Mouse& mouse, double aspect) {
+    const std::optional<Mouse> before = std::exchange(mouse_, mouse.stirs ? std::optional(mouse) : std::nullopt);
+    if (!mouse.stirs) return {};
+    const Seen seen = look(aspect);
+    const double distance = -seen.view[14];
+    Solver::Stir stir;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double right = seen.view[4 * axis] * seen.half_width * distance;
+      const double up = seen.view[4 * axis + 1] * seen.half_height * distance;
+      stir.at[axis] = 0.5 + 0.5 * ((2.0 * mouse.x - 1.0) * right + (1.0 - 2.0 * mouse.y) * up);
+      if (!before) continue;
+      constexpr double strength = 8.0;  // steps in a second, times how much is dragged along
+      const double moved = (mouse.x - before->x) * right - (mouse.y - before->y) * up;
+      stir.push[axis] = strength * moved * voxels_;
+    }
+    return stir;
+  }
+
+  void hand_over(Buffer& buffer) {
+    newest_ = buffer.values;
+    buffer.is_held = true;
+    const double voxel = 2.0 / voxels_;
+    const double first = -1.0 + 0.5 * voxel;
+    const cumulet::Field smoke(
+        cumulet::Channel::density,
+        cumulet::DenseDesc{.values = {buffer.values, ring_.count()},
+                           .size = {voxels_, voxels_, voxels_},
+                           .index_to_world = {voxel, 0, 0, 0, 0, voxel, 0, 0, 0, 0, voxel, 0, first, first, first, 1}});
+    must(live_.set({.fields = {&smoke, 1},
+                    .name = "smoke",
+                    .release = [](void* user) { static_cast<Buffer*>(user)->is_held = false; },
+                    .release_user = &buffer}));
+  }
+
+  int voxels_;
+  Solver solver_;
+  Ring ring_;  // before those that may hold its buffers
+  const float* newest_ = nullptr;
+  std::optional<Mouse> mouse_;  // of the last frame, while it stirs
+  cumulet::Live live_;
+  cumulet::Viewer viewer_;
+};
+
+// ---- without a window, by a record of the mouse ----
+
+struct Moved {
+  int frame = 0;
+  Mouse mouse;
+};
+
+std::vector<Moved> read_mouse(const std::string& path) {
+  std::ifstream file(path);
+  std::vector<Moved> moves;
+  Moved move;
+  while (file >> move.frame >> move.mouse.x >> move.mouse.y >> move.mouse.stirs) moves.push_back(move);
+  if (moves.empty() || !file.eof()) fail(path + ": is no record of a mouse");
+  return moves;
+}
+
+void make_headless_context() {
+  const auto query = reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
+  std::array<EGLDeviceEXT, 16> devices{};
+  EGLint count = 0;
+  if (query == nullptr || query(EGLint(devices.size()), devices.data(), &count) == EGL_FALSE)
+    fail("EGL has no devices");
+  constexpr std::array<EGLint, 7> attributes = {
+      EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+      EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+  for (int i = 0; i < count; ++i) {
+    EGLDisplay display = eglGetPlatformDisplay(EGL_PLATFORM_DEVICE_EXT, devices[std::size_t(i)], nullptr);
+    if (eglInitialize(display, nullptr, nullptr) == EGL_FALSE || eglBindAPI(EGL_OPENGL_API) == EGL_FALSE) continue;
+    EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes.data());
+    if (context != EGL_NO_CONTEXT && eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context) == EGL_TRUE)
+      return;
+  }
+  fail("no EGL device has OpenGL 4.5 core");
+}
+
+void write_ppm(const std::string& path, const std::vector<std::uint8_t>& rgba, std::uint32_t width,
+               std::uint32_t height) {
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  if (file == nullptr) fail(path + ": cannot be written");
+  std::fprintf(file, "P6\n%u %u\n255\n", width, height);
+  for (std::size_t i = 0; i < rgba.size(); i += 4) std::fwrite(&rgba[i], 1, 3, file);
+  if (std::fclose(file) != 0) fail(path + ": cannot be written");
+}
+
+/// Each frame: a step, its state, and a picture within a budget. What may not happen ends it.
+void play(const std::string& record, const std::string& folder, int voxels) {
+  make_headless_context();
+  const std::vector<Moved> moves = read_mouse(record);
+  constexpr std::uint32_t width = 240, height = 240;
+  Host host([](const char* name) { return reinterpret_cast<void*>(eglGetProcAddress(name)); }, voxels, true);
+  cumulet::Viewer& viewer = host.viewer();
+  const cumulet::FrameDesc frame{
+      .budget_ms = 30.0, .target = cumulet::Target::texture, .width = width, .height = height};
+  Mouse mouse;
+  std::size_t next = 0;
+  std::uint64_t drawn = 0;
+  const int frames = moves.back().frame + 1;
+  const auto follow = [&] {
+    const auto info = must(viewer.get_live_info());
+    if (info.drawn_state < drawn) fail("a state was drawn after a newer one");
+    if (info.ready_count > info.drawn_count + 1) fail("a state was built and never drawn");
+    drawn = info.drawn_state;
+    return info;
+  };
+  for (int i = 0; i < frames; ++i) {
+    for (; next < moves.size() && moves[next].frame <= i; ++next) mouse = moves[next].mouse;
+    host.advance(mouse, 1.0, true);
+    must(viewer.render(frame));
+    follow();
+  }
+  for (int more = 0; follow().drawn_state != follow().handed_state; ++more) {
+    if (more == 1000) fail("the newest state is never drawn");
+    must(viewer.render(frame));
+  }
+  const auto info = follow();
+  std::printf("%d frames, %llu states, %llu drawn\n", frames, static_cast<unsigned long long>(info.handed_state),
+              static_cast<unsigned long long>(info.drawn_count));
+  if (info.drawn_count * 20 < info.handed_state) fail("states starve");
+
+  // The picture is of the newest state: its smoke is where that has it.
+  must(viewer.set_ground({}));
+  must(viewer.set_sampling({.samples = 16, .preview = cumulet::Preview::off}));
+  while (!must(viewer.render(frame)).has(cumulet::RenderFlags::converged)) {
+  }
+  std::vector<float> linear(std::size_t{4} * width * height);
+  must(viewer.read_linear(linear));
+  double mass = 0.0, x = 0.0, y = 0.0;
+  for (std::size_t i = 0; i < std::size_t{width} * height; ++i) {
+    // As the depth of what is in front of the sky, not its opacity: that is even where there is more.
+    const double depth = -std::log(1.0 - std::min(0.999, double{linear[4 * i + 3]}));
+    mass += depth;
+    x += depth * (double(i % width) + 0.5) / width;
+    y += depth * (double(i / width) + 0.5) / height;
+  }
+  const auto expected = host.middle_of_smoke(1.0);
+  std::printf("smoke at %.3f, %.3f; in the picture at %.3f, %.3f\n", expected[0], expected[1], x / mass, y / mass);
+  if (!(std::abs(x / mass - expected[0]) < 0.03 && std::abs(y / mass - expected[1]) < 0.03))
+    fail("the picture is not of the newest state");
+  must(viewer.set_ground({.place = cumulet::Ground::below}));
+  while (!must(viewer.render(frame)).has(cumulet::RenderFlags::converged)) {
+  }
+  std::vector<std::uint8_t> picture(std::size_t{4} * width * height);
+  must(viewer.read_display(picture));
+  write_ppm(folder + "/smoke.ppm", picture, width, height);
+}
+
+// ---- in a window ----
+
+Host& host_of(GLFWwindow* window) { return *static_cast<Host*>(glfwGetWindowUserPointer(window)); }
+
+Mouse mouse_of(GLFWwindow* window) {
+  int width = 0, height = 0;
+  Mouse mouse;
+  glfwGetCursorPos(window, &mouse.x, &mouse.y);
+  glfwGetWindowSize(window, &width, &height);
+  mouse.x /= std::max(width, 1);
+  mouse.y /= std::max(height, 1);
+  mouse.stirs = glfwGetMouseButton(window, GLFW_MOUSE_BUTTON_LEFT) == GLFW_PRESS;
+  return mouse;
+}
+
+/// What moves the camera; orbiting is on the right button, as the left one stirs.
+void feed(GLFWwindow* window, cumulet::Event event) {
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window, &width, &height);
+  const Mouse mouse = mouse_of(window);
+  event.x = mouse.x * width;
+  event.y = mouse.y * height;
+  must(host_of(window).viewer().input(event));
+}
+
+void on_button(GLFWwindow* window, int button, int action, int) {
+  if (button == GLFW_MOUSE_BUTTON_LEFT || button > GLFW_MOUSE_BUTTON_MIDDLE) return;
+  feed(window, {.type = action == GLFW_PRESS ? cumulet::EventType::button_down : cumulet::EventType::button_up,
+                .button = button == GLFW_MOUSE_BUTTON_RIGHT ? cumulet::Button::left : cumulet::Button::middle});
+}
+
+void run(GLFWwindow* window, Host& host, const std::string& record) {
+  glfwSetWindowUserPointer(window, &host);
+  glfwSetMouseButtonCallback(window, on_button);
+  glfwSetCursorPosCallback(window,
+                           [](GLFWwindow* w, double, double) { feed(w, {.type = cumulet::EventType::pointer_move}); });
+  glfwSetScrollCallback(window, [](GLFWwindow* w, double, double steps) {
+    feed(w, {.type = cumulet::EventType::wheel, .wheel = steps});
+  });
+  glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int, int) {
+    if (key == GLFW_KEY_ESCAPE) glfwSetWindowShouldClose(w, GLFW_TRUE);
+  });
+  std::ofstream file;
+  if (!record.empty()) file.open(record);
+  Mouse last;
+  for (int i = 0; glfwWindowShouldClose(window) == GLFW_FALSE; ++i) {
+    int width = 0, height = 0;
+    glfwGetFramebufferSize(window, &width, &height);
+    const Mouse mouse = mouse_of(window);
+    if (file && (mouse.x != last.x || mouse.y != last.y || mouse.stirs != last.stirs))
+      file << i << ' ' << mouse.x << ' ' << mouse.y << ' ' << mouse.stirs << '\n';
+    last = mouse;
+    host.advance(mouse, height > 0 ? double(width) / height : 1.0, false);
+    must(host.viewer().render(
+        {.budget_ms = 12.0, .width = static_cast<std::uint32_t>(width), .height = static_cast<std::uint32_t>(height)}));
+    glfwSwapBuffers(window);
+    glfwPollEvents();
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string record, mouse, folder;
+  int voxels = 64;
+  for (int i = 1; i + 1 < argc; i += 2) {
+    if (std::strcmp(argv[i], "--record") == 0) record = argv[i + 1];
+    if (std::strcmp(argv[i], "--mouse") == 0) mouse = argv[i + 1];
+    if (std::strcmp(argv[i], "--test") == 0) folder = argv[i + 1];
+    if (std::strcmp(argv[i], "--voxels") == 0) voxels = std::atoi(argv[i + 1]);
+  }
+  if (argc % 2 == 0 || folder.empty() != mouse.empty() || voxels < 8 || voxels > 256)
+    fail("usage: cumulet-embed-smoke [--voxels 8..256] [--record FILE | --mouse FILE --test OUT_DIR]");
+  if (!folder.empty()) {
+    play(mouse, folder, voxels);
+    return 0;
+  }
+  if (glfwInit() == GLFW_FALSE) fail("GLFW finds no display");
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  GLFWwindow* window = glfwCreateWindow(900, 900, "Cumulet: live smoke", nullptr, nullptr);
+  if (window == nullptr) fail("no window with OpenGL 4.5");
+  glfwMakeContextCurrent(window);
+  {
+    Host host(glfwGetProcAddress, voxels, false);
+    run(window, host, record);
+  }
+  glfwDestroyWindow(window);
+  glfwTerminate();
+  return 0;
+}

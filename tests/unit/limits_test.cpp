@@ -1,0 +1,237 @@
+// What a viewer may take of the machine: threads, main memory and GL memory, and what becomes of what would take more.
+
+#include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/c_host.hpp"
+#include "support/simulated.hpp"
+#include "viewer/allowance.hpp"
+#include "viewer/worker.hpp"
+
+namespace {
+
+using cumulet::Progress;
+using cumulet::headless::Backend;
+using cumulet::headless::Context;
+using cumulet::test::converge;
+using cumulet::test::difference;
+using cumulet::test::HostTarget;
+using cumulet::test::load_gl;
+using cumulet::test::make_ball;
+using cumulet::test::make_desc;
+using cumulet::test::make_viewer;
+using cumulet::test::picture_of;
+using cumulet::test::ViewerPtr;
+using cumulet::test::VolumeRef;
+using cumulet::viewer::Allowance;
+using cumulet::viewer::Worker;
+
+// How many threads are in here at a time, at most.
+class Crowd {
+ public:
+  void visit() {
+    const int now = ++inside_;
+    int most = most_;
+    while (now > most && !most_.compare_exchange_weak(most, now)) {
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+    --inside_;
+  }
+  [[nodiscard]] int most() const { return most_; }
+
+ private:
+  std::atomic<int> inside_ = 0;
+  std::atomic<int> most_ = 0;
+};
+
+// Of all workers of a viewer together, whatever a job splits into.
+TEST(Allowance, ThreadsAreThoseOfAllWorkers) {
+  for (const unsigned threads : {1U, 2U, 3U}) {
+    const auto allowance = std::make_shared<Allowance>();
+    allowance->set(threads, Allowance::no_limit);
+    Crowd crowd;
+    std::atomic<int> visits = 0;
+    std::vector<std::unique_ptr<Worker>> workers;
+    for (int i = 0; i < 4; ++i) {
+      workers.push_back(std::make_unique<Worker>([] {}, cumulet::Trace(), allowance));
+      workers.back()->post({"crowding", Progress::Stage::refining, [&](Progress&) {
+                              tbb::parallel_for(0, 40, [&](int) {
+                                crowd.visit();
+                                ++visits;
+                              });
+                            }});
+    }
+    for (const auto& worker : workers) EXPECT_TRUE(worker->wait(std::nullopt));
+    EXPECT_EQ(visits, 160);
+    EXPECT_LE(crowd.most(), static_cast<int>(threads));
+  }
+}
+
+// A part of a job that waits for its other parts does not take up another job, which may want what this one holds.
+TEST(Allowance, JobsDoNotNest) {
+  const auto allowance = std::make_shared<Allowance>();
+  allowance->set(1, Allowance::no_limit);
+  std::mutex mutex;
+  std::vector<std::unique_ptr<Worker>> workers;
+  for (int i = 0; i < 4; ++i) {
+    workers.push_back(std::make_unique<Worker>([] {}, cumulet::Trace(), allowance));
+    workers.back()->post({"holding", Progress::Stage::refining, [&](Progress&) {
+                            const std::scoped_lock lock(mutex);
+                            tbb::parallel_for(
+                                0, 40, [&](int) { std::this_thread::sleep_for(std::chrono::microseconds(100)); });
+                          }});
+  }
+  for (const auto& worker : workers)
+    EXPECT_TRUE(worker->wait(std::chrono::steady_clock::now() + std::chrono::seconds(60)));
+}
+
+// A job's failure comes through.
+TEST(Allowance, FailuresAreTheJobs) {
+  const auto allowance = std::make_shared<Allowance>();
+  allowance->set(2, Allowance::no_limit);
+  Worker worker([] {}, cumulet::Trace(), allowance);
+  worker.post({"failing", Progress::Stage::refining,
+               [](Progress&) { throw cumulet::Error(cumulet::ErrorCode::file, "a.vdb: is empty"); }});
+  EXPECT_TRUE(worker.wait(std::nullopt));
+  ASSERT_TRUE(worker.status().failure);
+  EXPECT_STREQ(worker.status().failure->what(), "a.vdb: is empty");
+}
+
+class Limits : public testing::Test {
+ protected:
+  [[nodiscard]] ViewerPtr make() {
+    return make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 2});
+  }
+  static void limit(const ViewerPtr& viewer, std::uint64_t memory, std::uint64_t gl = 0, std::uint32_t threads = 0) {
+    auto desc = make_desc<cumulet_limits_desc>();
+    desc.threads = threads;
+    desc.memory_bytes = memory;
+    desc.gl_bytes = gl;
+    ASSERT_EQ(cumulet_set_limits(viewer.get(), &desc), CUMULET_OK);
+  }
+  static cumulet_stats stats_of(const ViewerPtr& viewer) {
+    auto stats = make_desc<cumulet_stats>();
+    EXPECT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+    return stats;
+  }
+
+  Context context_ = Context::create(Backend::automatic);
+  GladGLContext gl_ = load_gl(Context::get_proc, &context_);
+  HostTarget target_{gl_, 32, 32};
+};
+
+TEST_F(Limits, AreRefusedInOneLine) {
+  const ViewerPtr viewer = make();
+  auto desc = make_desc<cumulet_limits_desc>();
+  desc.threads = 1025;
+  EXPECT_EQ(cumulet_set_limits(viewer.get(), &desc), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "cumulet_limits_desc.threads is above 1024");
+  EXPECT_EQ(cumulet_set_limits(viewer.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+// However few threads, it is the same picture.
+TEST_F(Limits, ThreadsChangeNoPicture) {
+  const VolumeRef ball = make_ball(40);
+  const ViewerPtr free = make();
+  const auto wanted = picture_of(free.get(), ball.get(), target_);
+  for (const std::uint32_t threads : {1U, 2U}) {
+    const ViewerPtr viewer = make();
+    limit(viewer, 0, 0, threads);
+    EXPECT_EQ(difference(picture_of(viewer.get(), ball.get(), target_), wanted), "") << threads;
+  }
+}
+
+// Cells are as coarse as it takes, and what does not fit at all is refused, while what was there stays.
+TEST_F(Limits, MemoryIsKept) {
+  const VolumeRef ball = make_ball(40);
+  const ViewerPtr viewer = make();
+  picture_of(viewer.get(), ball.get(), target_);
+  const cumulet_stats all = stats_of(viewer);
+  ASSERT_GT(all.cells, 2000U);
+  ASSERT_EQ(all.limited, 0);
+  ASSERT_GT(all.memory_bytes, all.cells * 32);
+
+  const std::uint64_t some = all.memory_bytes - all.cells * 18;
+  limit(viewer, some);
+  EXPECT_EQ(stats_of(viewer).cells, all.cells);  // what is there stays
+  const auto coarse = picture_of(viewer.get(), ball.get(), target_);
+  const cumulet_stats fewer = stats_of(viewer);
+  EXPECT_LE(fewer.memory_bytes, some);
+  EXPECT_GT(fewer.memory_bytes, some - some / 5);
+  EXPECT_LT(fewer.cells, all.cells);
+  EXPECT_EQ(fewer.limited, 1);
+
+  const VolumeRef larger = make_ball(80);
+  ASSERT_EQ(cumulet_set_volume(viewer.get(), larger.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_OUT_OF_MEMORY);
+  const std::string line = cumulet_last_error(viewer.get());
+  EXPECT_EQ(line.rfind("ball takes ", 0), 0U) << line;
+  EXPECT_NE(line.find(" bytes of memory; " + std::to_string(some) + " are allowed"), std::string::npos) << line;
+  auto result = make_desc<cumulet_frame_result>();
+  const auto frame = target_.frame();
+  target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+  ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
+  EXPECT_NE(result.flags & CUMULET_RENDER_FAILED, 0U);
+  EXPECT_EQ(difference(target_.pixels(), coarse), "");
+  // With room again, it is there.
+  limit(viewer, 0);
+  picture_of(viewer.get(), larger.get(), target_);
+  EXPECT_EQ(stats_of(viewer).limited, 0);
+}
+
+// A march over voxels needs them all.
+TEST_F(Limits, MemoryOfVoxelsIsKept) {
+  const VolumeRef ball = make_ball(40);
+  const ViewerPtr viewer = make();
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.march = CUMULET_MARCH_BRICK;
+  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+  picture_of(viewer.get(), ball.get(), target_);
+  const std::uint64_t all = stats_of(viewer).memory_bytes;
+  limit(viewer, all);
+  ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  limit(viewer, all - 1);
+  ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_OUT_OF_MEMORY);
+}
+
+TEST_F(Limits, GlMemoryIsKept) {
+  const VolumeRef small = make_ball(12);
+  const VolumeRef large = make_ball(96);
+  const ViewerPtr viewer = make();
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.march = CUMULET_MARCH_DENSE;  // bytes by the voxel
+  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+  const auto before = picture_of(viewer.get(), small.get(), target_);
+  const std::uint64_t room = stats_of(viewer).gl_bytes + 100'000;
+  limit(viewer, 0, room);
+  ASSERT_EQ(cumulet_set_volume(viewer.get(), large.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  const auto frame = target_.frame();
+  target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+  EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_ERROR_OUT_OF_MEMORY);
+  const std::string line = cumulet_last_error(viewer.get());
+  EXPECT_EQ(line.rfind("uploading the volume needs ", 0), 0U) << line;
+  // Once; and the picture before stays.
+  target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
+  EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK);
+  EXPECT_EQ(difference(target_.pixels(), before), "");
+  EXPECT_LE(stats_of(viewer).gl_bytes, room);
+  // With room again, it is there.
+  limit(viewer, 0, 0);
+  auto whole = target_.frame();
+  whole.target = CUMULET_TARGET_NONE;
+  converge(viewer.get(), whole);
+  EXPECT_GT(stats_of(viewer).gl_bytes, room);
+}
+
+}  // namespace
