@@ -85,7 +85,7 @@ class Builder {
  public:
   /// notify: called on the worker after a job ended.
   Builder(Log log, std::function<void()> notify, Trace trace = {},
-          AllowancePtr allowance = std::make_shared<const Allowance>())
+          const AllowancePtr& allowance = std::make_shared<const Allowance>())
       : log_(std::move(log)), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
 
   /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way, as Worker::replace()

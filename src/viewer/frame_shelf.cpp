@@ -31,7 +31,7 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
 
 }  // namespace
 
-FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
+FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, const AllowancePtr& allowance)
     : log_(std::move(log)),
       notify_(std::move(notify)),
       trace_(trace),

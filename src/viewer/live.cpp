@@ -37,6 +37,7 @@ void Live::set(const std::vector<MemoryField>& fields, std::string name, const M
   next.whole.emplace();
   if (copies) {
     std::vector<volume::FieldCopy> made;
+    made.reserve(fields.size());
     for (const MemoryField& field : fields) made.push_back(volume::FieldCopy::of(field, name));
     next.whole->fields = std::move(made);
   } else {

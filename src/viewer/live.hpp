@@ -27,7 +27,7 @@ using MakeLease = std::function<Lease()>;
 /// are safe from any thread. Those of a host wait for no reading.
 class Live {
  public:
-  explicit Live(std::optional<Bounds> bounds) : bounds_(std::move(bounds)) {}
+  explicit Live(const std::optional<Bounds>& bounds) : bounds_(bounds) {}
 
   /// The whole of the next state. lease: called where nothing can fail any more, and voxels are read where they are
   /// until it goes; null: they are copied. Throws what check_fields does, and of voxels that are copied what

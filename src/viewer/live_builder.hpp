@@ -18,7 +18,7 @@ class LiveBuilder {
  public:
   /// notify: called on the worker after each state, and when a job ended.
   LiveBuilder(Log log, std::function<void()> notify, Trace trace = {},
-              AllowancePtr allowance = std::make_shared<const Allowance>())
+              const AllowancePtr& allowance = std::make_shared<const Allowance>())
       : log_(std::move(log)), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
 
   /// Of this from now on; what there was goes. Null: of none.

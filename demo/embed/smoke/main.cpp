@@ -233,7 +233,7 @@ class Ring {
   }
 
   Buffer* free() {
-    const auto found = std::ranges::find_if(
+    auto* const found = std::ranges::find_if(
         buffers_, [](const Buffer& buffer) { return buffer.written == nullptr && !buffer.is_held; });
     return found == buffers_.end() ? nullptr : &*found;
   }
@@ -271,7 +271,7 @@ struct Mouse {
 
 class Host {
  public:
-  Host(cumulet::GetProc get_proc, int voxels, bool test)
+  Host(const cumulet::GetProc& get_proc, int voxels, bool test)
       : voxels_(voxels),
         solver_(voxels),
         ring_(voxels),
@@ -467,7 +467,8 @@ void play(const std::string& record, const std::string& folder, int voxels) {
     const double depth = -std::log(1.0 - std::min(0.999, double{linear[4 * i + 3]}));
     mass += depth;
     x += depth * (double(i % width) + 0.5) / width;
-    y += depth * (double(i / width) + 0.5) / height;
+    const std::size_t row = i / width;
+    y += depth * (double(row) + 0.5) / height;
   }
   const auto expected = host.middle_of_smoke(1.0);
   std::printf("smoke at %.3f, %.3f; in the picture at %.3f, %.3f\n", expected[0], expected[1], x / mass, y / mass);
