@@ -445,7 +445,7 @@ void Caller::call_all() {
   CALL(cumulet_surfaces_get_variant, surfaces, 0, &variant);
   CALL(cumulet_model_create, &model, &new_model, nullptr, 0);
   CALL(cumulet_model_set, new_model, &model);
-  CALL(cumulet_model_set_to_world, new_model, matrix.data());
+  CALL(cumulet_model_set_to_world, new_model, m.data());
   CALL(cumulet_model_set_time, new_model, 1.0);
   CALL(cumulet_sequence_create, &sequence, &new_sequence, nullptr, 0);
   CALL(cumulet_sequence_set_playback, new_sequence, &playback);

@@ -44,7 +44,7 @@ TEST(SurfaceAsset, ViewersOfOneMomentShareItsPose) {
   EXPECT_NE(second, first);
   EXPECT_EQ(second->pose.high.y, 2.0);
   EXPECT_EQ(first->pose.high.y, 1.0);
-  EXPECT_EQ(second->built_cost, first->built_cost);  // a refit
+  EXPECT_EQ(second->meshes.at(0).built_cost, first->meshes.at(0).built_cost);  // a refit
   EXPECT_EQ(scene->poses, 2);
 }
 
