@@ -28,13 +28,7 @@ void main() {
 #if CM_RICH
   cm_store_flight(p, lane);  // of which what it went through has taken its share
 #endif
-  if (cm.medium.emits != 0u) {
-    // Loaded again: the rest of it would be in registers while the tree is asked.
-    CmPath ray = cm_begin_path();
-    cm_load_ray(ray, lane);
-    ray.reach = p.reach;  // it ends there
-    cm_store_ray(ray, lane);
-  }
+  if (cm.medium.emits != 0u) cm_store_ray(p, lane);  // which ends there
   cm_store_ends(p, lane);
   cm_send_on(p, lane);
 }
