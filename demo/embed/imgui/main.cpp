@@ -68,7 +68,7 @@ void main() {
   gl_Position = to_clip * vec4(position, 1);
 })";
 
-// Between these stands cumulet_transmittance(), of cumulet_transmittance_map_glsl().
+// Between these stands cumulet_transmittance(), of cumulet::transmittance_map_glsl().
 constexpr const char* fragment_version = "#version 450 core\n";
 constexpr const char* box_fragment = R"(
 uniform vec3 colour;
@@ -89,7 +89,7 @@ void main() {
 GLuint make_program() {
   const GLuint program = glCreateProgram();
   const std::array<const char*, 1> vertex{box_vertex};
-  const std::array<const char*, 3> fragment{fragment_version, cumulet_transmittance_map_glsl(), box_fragment};
+  const std::array<const char*, 3> fragment{fragment_version, cumulet::transmittance_map_glsl(), box_fragment};
   using Sources = std::span<const char* const>;
   for (const auto& [type, sources] :
        {std::pair<GLenum, Sources>(GL_VERTEX_SHADER, vertex), {GL_FRAGMENT_SHADER, fragment}}) {

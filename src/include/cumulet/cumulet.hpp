@@ -210,6 +210,8 @@ class [[nodiscard]] Result<void> {
 }
 /// The library's, as major * 10000 + minor * 100 + patch.
 [[nodiscard]] inline std::uint32_t version() noexcept { return cumulet_version(); }
+/// GLSL for the host's shaders, zero-terminated.
+[[nodiscard]] inline const char* transmittance_map_glsl() noexcept { return cumulet_transmittance_map_glsl(); }
 
 namespace detail {
 
