@@ -12,6 +12,13 @@ CM_FN vec3 cm_out_of_model(uint at, vec3 v) {
 }
 CM_FN vec3 cm_out_of_model_point(uint at, vec3 p) { return cm_out_of_model(at, p) + cm_models[at].origin; }
 
+// A direction of a model's own space in the world, unit.
+CM_FN vec3 cm_model_direction(uint at, vec3 d) {
+  vec3 v = cm_out_of_model(at, d);
+  float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
+  return largest > 0.0f ? normalize(v / largest) : d;
+}
+
 // A normal of a model's own space in the world, unit, on the same side of the surface.
 CM_FN vec3 cm_model_normal(uint at, vec3 n) {
   // The rows of the inverse are what normals go by.

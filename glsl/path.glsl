@@ -172,7 +172,8 @@ CM_FN CmLook cm_look(CM_INOUT(CmPath) p, CmVertex vertex, bool arrived) {
   if (look.looks) {
     float chance = cm_look_chance(p, look.light.kind, cm_scattered(p, look.light.direction), look.light.density);
     look.looks = look.draw.way < chance;
-    look.draw.way = look.looks ? look.draw.way / chance : (look.draw.way - chance) / (1.0f - chance);
+    float rest = look.looks ? look.draw.way / chance : (look.draw.way - chance) / (1.0f - chance);
+    look.draw.way = min(rest, 0.99999994f);  // below 1, however a driver divides
     look.light.density *= chance;
     if (!look.looks) {
       // The chance may depend on the light's direction, and so on the numbers that it was drawn with.

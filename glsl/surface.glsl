@@ -354,7 +354,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
     uvec4 last = cm_words(m.corner[i] + CM_VERTEX_REST);
     normal += m.weight[i] * corners.normal[i];
     float hand = uintBitsToFloat(last.y);
-    if (hand != 0.0f) tangent += m.weight[i] * vec4(cm_out_of_model(model, cm_octahedral(last.x)), hand);
+    if (hand != 0.0f) tangent += m.weight[i] * vec4(cm_model_direction(model, cm_octahedral(last.x)), hand);
   }
   if (cm_mirrors(model)) tangent.w = -tangent.w;
   point.position = m.weight.x * corners.position[0] + m.weight.y * corners.position[1] +

@@ -74,22 +74,23 @@ void Models::show(cumulet_viewer* viewer, const std::vector<SceneModel>& models)
       ++count;
       continue;
     }
-    cumulet_model_desc desc{};
+    // One that is refused keeps none of the others from it.
     try {
-      desc = desc_of(scene, given->surfaces.get(), i + 1);
+      const cumulet_model_desc desc = desc_of(scene, given->surfaces.get(), i + 1);
+      if (count == shown_.size()) {
+        cumulet_model* made = nullptr;
+        std::array<char, 1024> error{};
+        check(cumulet_model_create(&desc, &made, error.data(), error.size()),
+              (scene.file + ": " + error.data()).c_str());
+        std::shared_ptr<cumulet_model> model(made, cumulet_model_release);
+        check(cumulet_add_model(viewer, made), cumulet_last_error(viewer));
+        shown_.push_back({std::move(model), {}, nullptr});
+      } else {
+        check(cumulet_model_set(shown_[count].model.get(), &desc), (scene.file + ": its place cannot be").c_str());
+      }
     } catch (const std::runtime_error& error) {
       refusal = error.what();
       continue;
-    }
-    if (count == shown_.size()) {
-      cumulet_model* made = nullptr;
-      std::array<char, 1024> error{};
-      check(cumulet_model_create(&desc, &made, error.data(), error.size()), error.data());
-      std::shared_ptr<cumulet_model> model(made, cumulet_model_release);
-      check(cumulet_add_model(viewer, made), cumulet_last_error(viewer));
-      shown_.push_back({std::move(model), {}, nullptr});
-    } else {
-      check(cumulet_model_set(shown_[count].model.get(), &desc), (scene.file + ": its place cannot be").c_str());
     }
     shown_[count].scene = scene;
     shown_[count].surfaces = given->surfaces;

@@ -175,6 +175,7 @@ void GpuScene::upload_models(const ModelData::Sources& sources, const std::vecto
       if (!upload.work->advance(deadline)) return;
       finish_models();
     } catch (const Error&) {
+      if (!model_upload_) throw;  // it came, and cannot stand where it shall
       if (upload.work && upload.work->done()) {
         finish_models();
       } else {
@@ -193,13 +194,15 @@ void GpuScene::finish_models() {
   if (auto data = upload.work->take_data()) {
     model_.put(upload.of, std::move(data));
     models_of_ = upload.models;
-    place_models(upload.models, {.settings = upload.settings});
   }
-  if (upload.parts == ModelParts::paths) return;
-  RasterContents raster = upload.work->take_raster();
-  const bool failed = raster.empty();
-  show_raster(upload.of, std::move(raster));  // where it failed rays meet the triangles
-  if (failed) raster_.fail(upload.of, upload.settings);
+  if (upload.parts != ModelParts::paths) {
+    RasterContents raster = upload.work->take_raster();
+    const bool failed = raster.empty();
+    show_raster(upload.of, std::move(raster));  // where it failed rays meet the triangles
+    if (failed) raster_.fail(upload.of, upload.settings);
+  }
+  // Last, as it may fail.
+  if (upload.parts != ModelParts::raster) place_models(upload.models, {.settings = upload.settings});
 }
 
 void GpuScene::place_models(std::vector<scene::Model> models, const Wanted& wanted) {

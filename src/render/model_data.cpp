@@ -158,9 +158,10 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
   for (const scene::ModelPart& part : table.parts)
     numbering.emplace_back(models[part.model].source->scene,
                            models[part.model].source->meshes[part.mesh].first_triangle);
-  placed.numbering_ = last != nullptr && *last->numbering_ == numbering
-                          ? last->numbering_
-                          : std::make_shared<const Numbering>(std::move(numbering));
+  // Paths within glass know its material by a word of the data.
+  const bool lasts = last != nullptr && *last->numbering_ == numbering &&
+                     (last->data_ == data || (placed.tables_.rich | last->tables_.rich) == 0U);
+  placed.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));
   placed.models_ = std::move(models);
   placed.data_ = std::move(data);
   return placed;

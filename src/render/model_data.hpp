@@ -71,7 +71,8 @@ class PlacedModels {
   [[nodiscard]] const light::SceneLights& lights() const { return table_.lights; }
   [[nodiscard]] const scene::ModelTable& table() const { return table_; }
   [[nodiscard]] const std::vector<scene::Model>& models() const { return models_; }
-  /// The same where a number of a triangle means the same one, however it is posed and wherever it stands.
+  /// The same where what paths keep means the same: a number of a triangle the same one, however it is posed and
+  /// wherever it stands, and of rich ones a word the same material.
   [[nodiscard]] std::shared_ptr<const void> numbering() const { return numbering_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 

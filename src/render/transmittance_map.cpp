@@ -12,7 +12,6 @@ namespace cumulet::render {
 
 namespace {
 
-constexpr unsigned most_coarser = 3;
 constexpr std::uint32_t least_size = 16;
 
 struct Axes {
@@ -167,15 +166,24 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
   if (whole) coarser_ = 0;  // it rests
   if (under_way_ && under_way_->of != of) {
     under_way_.reset();
-    coarser_ = std::min(coarser_ + 1, most_coarser);
+    if (request.size >> coarser_ > least_size) ++coarser_;
   }
   const Obstacles met = scene.obstacles(snapshot, false);
   const gl::Program& program = programs_->ask({"transmittance.comp", data->defines(met.instances != nullptr)});
   if (!program.usable()) return;
-  if (!under_way_) begin(std::move(of), snapshot, scene);
+  if (failed_ == of) return;
+  if (!under_way_) {
+    try {
+      begin(of, snapshot, scene);
+    } catch (const Error&) {
+      failed_ = std::move(of);  // told once
+      throw;
+    }
+  }
   if (!uniforms_)
     uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
   UnderWay& work = *under_way_;
+  failed_.reset();
   flights_.order();
   data->bind(*gl_);
   if (met.instances != nullptr) met.instances->bind(*gl_);

@@ -87,7 +87,8 @@ class TransmittanceMap {
   Made shown_;
   std::optional<Of> shown_of_;
   std::optional<UnderWay> under_way_;
-  unsigned coarser_ = 0;  // by this power of two
+  std::optional<Of> failed_;  // what last could not be begun
+  unsigned coarser_ = 0;      // by this power of two
   bool newest_ = false;
 };
 

@@ -111,6 +111,12 @@ ModelBounds bounds_of(const ModelSource& source, const dmat4& to_world) {
   return all;
 }
 
+bool can_stand(const dmat4& to_world) {
+  CmModel whole{};
+  place(whole, to_world);
+  return is_sound(whole);
+}
+
 ModelTable make_model_table(std::span<const Model> models, const std::function<ModelWords(const ModelSource&)>& words) {
   ModelTable table;
   std::vector<TreeBox> boxes;
@@ -123,9 +129,8 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
     const auto refuse = [&](ErrorCode code, const char* cause) {
       throw Error(code, "model " + std::to_string(m) + ": " + cause);
     };
-    CmModel whole{};
-    place(whole, model.to_world);
-    if (!is_sound(whole)) refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
+    if (!can_stand(model.to_world))
+      refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
     const ModelSource& source = *model.source;
     const ModelWords at = words(source);
     for (std::size_t i = 0; i < source.meshes.size(); ++i) {

@@ -61,6 +61,9 @@ struct ModelBounds {
 };
 ModelBounds bounds_of(const ModelSource& source, const glm::dmat4& to_world);
 
+/// Whether a model may have that place: affine, and neither flat nor endless as floats go.
+bool can_stand(const glm::dmat4& to_world);
+
 /// words: of each source. Throws Error(invalid_argument) for a place that is not finite or makes things flat or
 /// endless, Error(unsupported) for one 1e12 or more from the origin of the world, and for more than 2^32 triangles,
 /// each counted wherever it stands; the message counts models from 0. O(n log n).

@@ -64,7 +64,9 @@ void require_no_release(const HandedState& state) {
 
 std::shared_ptr<Live> live_of(const cumulet_live_desc* desc) {
   const cumulet_live_desc d = read_desc(desc, "cumulet_live_desc");
-  require(all_finite(d.bounds_min) && all_finite(d.bounds_max), "cumulet_live_desc's bounds are not finite");
+  const auto moderate = [](double x) { return in_range(x, -1e15, 1e15); };
+  require(std::ranges::all_of(d.bounds_min, moderate) && std::ranges::all_of(d.bounds_max, moderate),
+          "cumulet_live_desc's bounds are not within +-1e15");
   const cumulet::viewer::Bounds bounds{to_dvec3(d.bounds_min), to_dvec3(d.bounds_max)};
   if (bounds.min == glm::dvec3(0.0) && bounds.max == glm::dvec3(0.0)) return std::make_shared<Live>(std::nullopt);
   require(glm::all(glm::lessThan(bounds.min, bounds.max)), "cumulet_live_desc.bounds_min is not below bounds_max");

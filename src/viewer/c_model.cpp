@@ -25,6 +25,7 @@ ModelSettings settings_of(const cumulet_model_desc* desc) {
   if (d.surfaces != nullptr) settings.surfaces = d.surfaces->asset;
   settings.to_world = matrix_or_identity(d.to_world);
   require_place(settings.to_world, "cumulet_model_desc.");
+  require(cumulet::scene::can_stand(settings.to_world), "cumulet_model_desc.to_world makes things flat or endless");
   settings.choice = {d.time, d.animation, d.double_sided == 1, d.variant};
   settings.hidden = d.hidden == 1;
   settings.shadow_only = d.shadow_only == 1;
@@ -55,6 +56,7 @@ cumulet_status cumulet_model_set_to_world(cumulet_model* model, const double to_
     require(to_world != nullptr, "to_world is NULL");
     const glm::dmat4 place = matrix_or_identity(std::span<const double, 16>(to_world, 16));
     require_place(place);
+    require(cumulet::scene::can_stand(place), "to_world makes things flat or endless");
     m.edit([&](ModelSettings& settings) { settings.to_world = place; });
   });
 }

@@ -36,7 +36,7 @@ FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, const
       notify_(std::move(notify)),
       trace_(trace),
       allowance_(allowance),
-      worker_([this] { tell(); }, trace, allowance) {}
+      worker_([this] { tell(); }, trace) {}
 
 void FrameShelf::wish(Wish wish) {
   std::vector<Shelved> old;  // ends after the lock, as all that may be large
@@ -288,11 +288,14 @@ void FrameShelf::work(Progress& progress) {
         return;
       }
     }
-    if (to_judge) {
-      judge(to_judge, progress);
-    } else {
-      build(*frame, settings, progress);
-    }
+    // Of each by itself: where threads are few, others have their turn between two.
+    allowance_->run([&] {
+      if (to_judge) {
+        judge(to_judge, progress);
+      } else {
+        build(*frame, settings, progress);
+      }
+    });
     tell();
   }
 }

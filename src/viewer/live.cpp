@@ -97,14 +97,14 @@ void Live::update(const std::vector<MemoryField>& fields, const std::string& nam
   listeners_.tell();
 }
 
-void Live::take_next() {
+void Live::take_next(std::optional<Whole>& old) {
   Next next;
   {
     const std::scoped_lock lock(mutex_);
     next = std::exchange(next_, {});
     base_number_ = newest_;
   }
-  if (next.whole) base_ = std::move(next.whole);
+  if (next.whole) old = std::exchange(base_, std::move(next.whole));
   if (!base_) return;
   auto* copies = std::get_if<std::vector<volume::FieldCopy>>(&base_->fields);
   for (const volume::Changes::Bricks& change : next.changes.fields) {
@@ -113,8 +113,8 @@ void Live::take_next() {
   }
 }
 
-void Live::refuse_base() {
-  base_.reset();
+void Live::refuse_base(std::optional<Whole>& old) {
+  old = std::exchange(base_, std::nullopt);
   Next next;
   const std::scoped_lock lock(mutex_);
   // Updates that came meanwhile are of what was refused.
@@ -126,10 +126,13 @@ void Live::refuse_base() {
 
 Live::State Live::read(Progress& progress) {
   progress.begin(Progress::Stage::loading);
+  // What is held goes back after the lock: the host is called then.
+  std::optional<Whole> before;
+  std::optional<Whole> after;
   const auto lock = patient_lock(reading_, progress);
-  if (newest_ != base_number_) take_next();
-  if (!base_ || base_number_ == state_.number) return state_;
   try {
+    if (newest_ != base_number_) take_next(before);
+    if (!base_ || base_number_ == state_.number) return state_;
     const std::vector<MemoryField> fields = base_->view();
     if (base_->lease) {
       for (const MemoryField& field : fields) volume::require_finite(field, base_->name);
@@ -138,11 +141,14 @@ Live::State Live::read(Progress& progress) {
         std::make_shared<const VolumeAsset>(volume::import_fields(fields, base_->name, {}, &progress), &progress);
     state_.number = base_number_;
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::cancelled) refuse_base();
+    if (error.code() != ErrorCode::cancelled) refuse_base(after);
+    throw;
+  } catch (...) {
+    refuse_base(after);  // an update may be in it by half
     throw;
   }
   // What is held goes back, and what is copied is what the next may change.
-  if (base_->lease) base_.reset();
+  if (base_->lease) after = std::exchange(base_, std::nullopt);
   return state_;
 }
 

@@ -73,8 +73,9 @@ class Live {
     volume::Channel channel;
     Takes takes;
   };
-  void take_next();
-  void refuse_base();
+  // old: what it held before.
+  void take_next(std::optional<Whole>& old);
+  void refuse_base(std::optional<Whole>& old);
 
   std::optional<Bounds> bounds_;
   std::atomic<std::uint64_t> newest_ = 0;

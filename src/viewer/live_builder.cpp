@@ -1,5 +1,6 @@
 #include "viewer/live_builder.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "viewer/stopwatch.hpp"
@@ -30,9 +31,13 @@ void LiveBuilder::configure(std::optional<BuildSettings> settings) {
   begin();
 }
 
-void LiveBuilder::look() {
-  const std::scoped_lock lock(mutex_);
-  begin();
+void LiveBuilder::look() noexcept {
+  try {
+    const std::scoped_lock lock(mutex_);
+    begin();
+  } catch (...) {
+    log_.warning(caught(what).what());  // who hands a state over has done so; the next look tries again
+  }
 }
 
 void LiveBuilder::rebuild() {
@@ -68,11 +73,12 @@ bool LiveBuilder::is_due() const {
 
 void LiveBuilder::begin() {
   if (job_ || ready_ || !is_due()) return;
-  job_ = ++last_job_;
-  worker_.post({what, Progress::Stage::loading, [this, job = *job_](Progress& progress) {
+  const std::uint64_t job = ++last_job_;
+  worker_.post({what, Progress::Stage::loading, [this, job](Progress& progress) {
                   while (!build(job, progress)) {
                   }
                 }});
+  job_ = job;  // not where there is no thread for it
 }
 
 bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
@@ -93,13 +99,15 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
   Ready ready;
   std::optional<Error> failure;
   try {
-    Stopwatch watch;
-    const Live::State state = live->read(progress);
-    const double load_seconds = watch.lap();
-    if (state.volume) {
+    // Of each by itself: where threads are few, others have their turn between two.
+    allowance_->run([&] {
+      Stopwatch watch;
+      const Live::State state = live->read(progress);
+      const double load_seconds = watch.lap();
+      if (!state.volume) return;
       ready = {build_grid(log_, state.volume, begun.settings, progress, *allowance_), state.number};
       ready.built.seconds.load = load_seconds;
-    }
+    });
     progress.check();
   } catch (...) {
     failure = caught(what);
@@ -112,9 +120,14 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
     if (failure) throw Error(*failure);
     return true;
   }
-  if (!failure && ready.built.source) ready_ = std::move(ready);
-  // What failed is old news where there is another.
-  if (failure && is_due()) return false;
+  const bool made = !failure && ready.built.source != nullptr;
+  if (made) {
+    // It may be newer than what it was begun for.
+    if (begun_) begun_->number = std::max(begun_->number, ready.number);
+    ready_ = std::move(ready);
+  }
+  // What failed, or was refused elsewhere, is old news where there is another.
+  if (!made && is_due()) return false;
   job_.reset();
   if (failure) throw Error(*failure);
   return true;

@@ -19,14 +19,14 @@ class LiveBuilder {
   /// notify: called on the worker after each state, and when a job ended.
   LiveBuilder(Log log, std::function<void()> notify, Trace trace = {},
               const AllowancePtr& allowance = std::make_shared<const Allowance>())
-      : log_(std::move(log)), allowance_(allowance), worker_(std::move(notify), trace, allowance) {}
+      : log_(std::move(log)), allowance_(allowance), worker_(std::move(notify), trace) {}
 
   /// Of this from now on; what there was goes. Null: of none.
   void follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings);
   /// Other settings; what is under way goes on. None: the next state waits for them.
   void configure(std::optional<BuildSettings> settings);
   /// Another state may be there.
-  void look();
+  void look() noexcept;
   /// The newest is built anew.
   void rebuild();
   /// Ends what is under way until the next state or other settings.

@@ -29,7 +29,8 @@ class Shelf {
         stage_(stage),
         make_(std::move(make)),
         notify_(notify),
-        worker_(std::move(notify), trace, std::move(allowance)) {}
+        allowance_(std::move(allowance)),
+        worker_(std::move(notify), trace) {}
 
   /// In place of all wishes before. What is under way is finished, and is there until the next wishes, so that of
   /// wishes that change faster than they are built every one that is begun can be seen. What failed is not tried again.
@@ -68,7 +69,8 @@ class Shelf {
   std::vector<Shelved> shelf_;
   std::optional<Wish> under_way_;
   std::atomic<std::uint64_t> revision_ = 0;
-  Worker worker_;  // last: its thread uses all of the above
+  AllowancePtr allowance_;  // of each by itself: where threads are few, others have their turn between two
+  Worker worker_;           // last: its thread uses all of the above
 };
 
 template <class Wish, class Made>
@@ -142,7 +144,7 @@ void Shelf<Wish, Made>::build_missing(Progress& progress) {
     std::optional<Error> failure;
     try {
       progress.begin(stage_);
-      built = make_(*next, progress);
+      allowance_->run([&] { built = make_(*next, progress); });
       progress.check();
     } catch (...) {
       failure = caught(what_);

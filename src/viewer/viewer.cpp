@@ -105,7 +105,8 @@ Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace 
 }
 
 Viewer::~Viewer() {
-  cancel();  // all at once: where threads are few, jobs wait for each other
+  watched_.reset();  // what states tell is of the builder, which ends before
+  cancel();          // all at once: where threads are few, jobs wait for each other
   // Without a context nothing can be deleted, and in a stranger's the names are of other objects.
   if (gl_ && !gl_->group().is_current()) context_lost();
 }
@@ -520,6 +521,7 @@ void Viewer::follow_models() {
     for (ShownModel& shown : shown_models_) {
       if (!shown.wish) continue;
       auto source = poses_.built(*shown.wish);
+      if (source) shown.begun.reset();  // what is older than that is not shown again
       // Of wishes that change faster than they are posed, one that was begun.
       if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces)
         source = poses_.built(*shown.begun);

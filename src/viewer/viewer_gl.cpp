@@ -193,7 +193,7 @@ FrameResult Viewer::render(const Frame& frame) {
     };
     result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
                     failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status()) ||
-                    failed(lives_.status());
+                    failed(lives_.status()) || failed(poses_.status());
     result.more = result.more || navigation_.moving() || built_for_another();
     if (failure && !g.is_news(shot, *failure)) failure.reset();
   });

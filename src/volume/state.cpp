@@ -30,6 +30,12 @@ bool copy_finite(std::span<const float> from, std::span<float> to) {
   return finite;
 }
 
+// For so many more, twice as much as there was.
+template <class Vector>
+void make_room(Vector& vector, std::size_t more) {
+  if (vector.capacity() - vector.size() < more) vector.reserve(std::max(vector.size() + more, 2 * vector.size()));
+}
+
 }  // namespace
 
 // ---- bricks ----
@@ -94,8 +100,13 @@ void BrickCopy::put(const BrickCopy& other) {
   index();
   for (std::size_t from = 0; from < other.count(); ++from) {
     const glm::ivec3 origin(other.origins_[3 * from], other.origins_[3 * from + 1], other.origins_[3 * from + 2]);
-    const auto [place, added] = places_.emplace(origin, count());
-    if (added) {
+    auto place = places_.find(origin);
+    if (place == places_.end()) {
+      // All that may fail before anything changes.
+      make_room(origins_, 3);
+      make_room(values_, brick_voxels);
+      make_room(active_, brick_size);
+      place = places_.emplace(origin, count()).first;
       for (int axis = 0; axis < 3; ++axis) origins_.push_back(origin[axis]);
       values_.resize(values_.size() + brick_voxels);
       active_.resize(active_.size() + brick_size);

@@ -226,7 +226,10 @@ constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
                                  "arrived && cm.lights.any != 0u && cm.lights.cell_chance < 1.0f;"};
 constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_chance,",
                            "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_chance),"};
-constexpr Edit flights_have_all = {"flight.glsl", "p.bounces > 0u ? cm.lights.cell_chance : 0.0f", "0.0f"};
+constexpr Edit flights_have_all = {"flight.glsl", "cm.lights.cell_chance * cm_look_chance(", "0.0f * cm_look_chance("};
+// None left out by roulette.
+constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return 1.0f;\n",
+                            "  if (p.steps >= 0u) return 1.0f;\n"};
 
 // Lamps, each as likely as the others.
 constexpr Edit any_lamp = {"light.glsl", "  if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;\n", ""};
@@ -343,6 +346,12 @@ void measure_costs(headless::Context& context, const Input& input, const Options
         .show_surfaces(emitter_at(place, side, power / static_cast<float>(4.0 * side * side)));
     if (plain->may_emit()) rows.add("its own fire", plain, Burns::both, dark);
     print_costs("Light", rows.get(), options);
+
+    const EditedShaders all(std::array{all_looks});
+    Rows looks(context, density_scale);
+    looks.add("all made", plain, Burns::no, daylight, all.programs());
+    looks.add("those that tell", plain, Burns::no, daylight);
+    print_costs("Looks for sun and sky", looks.get(), options);
 
     const EditedShaders alike(std::array{any_lamp, all_alike});
     const light::Lamps sixteen = sixteen_lamps(plain->bounds(), place, power);

@@ -363,6 +363,11 @@ void Caller::call_all() {
   cumulet_programs* new_programs = nullptr;
   cumulet_instance* new_instance = nullptr;
   auto instance = make_desc<cumulet_instance_desc>();
+  cumulet_live* new_live = nullptr;
+  const auto live = make_desc<cumulet_live_desc>();
+  const auto state = make_desc<cumulet_state_desc>();
+  auto live_info = make_desc<cumulet_live_info>();
+  const auto limits = make_desc<cumulet_limits_desc>();
   cumulet_model* new_model = nullptr;
   const auto model = make_desc<cumulet_model_desc>();
   cumulet_sequence* new_sequence = nullptr;
@@ -380,28 +385,14 @@ void Caller::call_all() {
     answer("cumulet_get_progress", cumulet_get_progress(v, &progress), CUMULET_OK);
     cumulet_cancel(v);
   }
-  names.insert({"cumulet_cancel",
-                "cumulet_status_text",
-                "cumulet_version",
-                "cumulet_volume_retain",
-                "cumulet_volume_release",
-                "cumulet_surfaces_retain",
-                "cumulet_surfaces_release",
-                "cumulet_programs_retain",
-                "cumulet_programs_release",
-                "cumulet_camera_release",
-                "cumulet_environment_retain",
-                "cumulet_environment_release",
-                "cumulet_instance_retain",
-                "cumulet_instance_release",
-                "cumulet_model_retain",
-                "cumulet_model_release",
-                "cumulet_sequence_retain",
-                "cumulet_sequence_release",
-                "cumulet_inspection_release",
-                "cumulet_destroy",
-                "cumulet_last_error",
-                "cumulet_transmittance_map_glsl"});
+  names.insert({"cumulet_cancel",           "cumulet_status_text",        "cumulet_version",
+                "cumulet_volume_retain",    "cumulet_volume_release",     "cumulet_surfaces_retain",
+                "cumulet_surfaces_release", "cumulet_programs_retain",    "cumulet_programs_release",
+                "cumulet_camera_release",   "cumulet_environment_retain", "cumulet_environment_release",
+                "cumulet_instance_retain",  "cumulet_instance_release",   "cumulet_live_retain",
+                "cumulet_live_release",     "cumulet_model_retain",       "cumulet_model_release",
+                "cumulet_sequence_retain",  "cumulet_sequence_release",   "cumulet_inspection_release",
+                "cumulet_destroy",          "cumulet_last_error",         "cumulet_transmittance_map_glsl"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
@@ -409,6 +400,7 @@ void Caller::call_all() {
   cumulet_environment_release(cumulet_environment_retain(nullptr));
   cumulet_inspection_release(nullptr);
   cumulet_instance_release(cumulet_instance_retain(nullptr));
+  cumulet_live_release(cumulet_live_retain(nullptr));
   cumulet_model_release(cumulet_model_retain(nullptr));
   cumulet_sequence_release(cumulet_sequence_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
@@ -447,6 +439,11 @@ void Caller::call_all() {
   CALL(cumulet_model_set, new_model, &model);
   CALL(cumulet_model_set_to_world, new_model, m.data());
   CALL(cumulet_model_set_time, new_model, 1.0);
+  CALL(cumulet_volume_from_state, &state, &new_volume, nullptr, 0);
+  CALL(cumulet_live_create, &live, &new_live, nullptr, 0);
+  CALL(cumulet_live_set, new_live, &state, nullptr, 0);
+  CALL(cumulet_live_update, new_live, &state, nullptr, 0);
+  CALL(cumulet_live_get_volume, new_live, &new_volume, nullptr, 0);
   CALL(cumulet_sequence_create, &sequence, &new_sequence, nullptr, 0);
   CALL(cumulet_sequence_set_playback, new_sequence, &playback);
   CALL(cumulet_sequence_set_time, new_sequence, 0.0);
@@ -483,6 +480,9 @@ void Caller::call_all() {
     CALL(cumulet_add_instance, v, new_instance);
     CALL(cumulet_remove_instance, v, new_instance);
     CALL(cumulet_set_sequence, v, nullptr);
+    CALL(cumulet_set_live, v, nullptr);
+    CALL(cumulet_get_live_info, v, &live_info);
+    CALL(cumulet_set_limits, v, &limits);
     CALL(cumulet_get_sequence_info, v, &sequence_info, nullptr, 0);
     CALL(cumulet_get_sequence_frame, v, 0, nullptr, 0);
     CALL(cumulet_load_surfaces, v, "none.glb");

@@ -140,6 +140,8 @@ TEST_F(CModel, IsRefusedInOneLine) {
   };
   refused([](auto& d) { d.to_world[0] = NAN; }, "cumulet_model_desc.to_world is not finite");
   refused([](auto& d) { d.to_world[0] = d.to_world[15] = 1.0; }, "cumulet_model_desc.to_world flattens space");
+  refused([](auto& d) { d.to_world[0] = d.to_world[5] = d.to_world[10] = 1e-11, d.to_world[15] = 1.0; },
+          "cumulet_model_desc.to_world makes things flat or endless");
   refused([](auto& d) { d.hidden = 2; }, "cumulet_model_desc.hidden is not 0 or 1");
   refused([](auto& d) { d.shadow_only = -1; }, "cumulet_model_desc.shadow_only is not 0 or 1");
   refused([](auto& d) { d.double_sided = 7; }, "cumulet_model_desc.double_sided is not 0 or 1");

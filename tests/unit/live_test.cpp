@@ -165,6 +165,12 @@ TEST_F(CLive, IsRefusedInOneLine) {
   EXPECT_EQ(cumulet_live_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(error.data(), "cumulet_live_desc.bounds_min is not below bounds_max");
   EXPECT_EQ(out, nullptr);
+  for (int i = 0; i < 3; ++i) {
+    desc.bounds_min[i] = -1e308;
+    desc.bounds_max[i] = 1e308;
+  }
+  EXPECT_EQ(cumulet_live_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "cumulet_live_desc's bounds are not within +-1e15");
 
   const LiveRef live = make_live();
   const auto refused = [&](const State& state, const char* cause) {
@@ -429,6 +435,47 @@ TEST_F(CLive, MemoryGoesBackWithTheHandle) {
   desc.release_user = &releases;
   ASSERT_EQ(cumulet_live_set(make_live().get(), &desc, nullptr, 0), CUMULET_OK);
   EXPECT_EQ(releases.count, 1);
+}
+
+// A host has a lock of its own around its memory, which it holds as well while it asks for the newest state.
+TEST_F(CLive, MemoryGoesBackUnderNoLock) {
+  static std::recursive_mutex pool;
+  const LiveRef live = make_live();
+  const State state = smoke(small, 0);
+  auto desc = state.desc();
+  desc.release = [](void*) { const std::scoped_lock lock(pool); };
+  std::atomic<bool> stop = false;
+  const auto reads = [&](bool locks) {
+    while (!stop) {
+      std::unique_lock lock(pool, std::defer_lock);
+      if (locks) lock.lock();
+      cumulet_volume* out = nullptr;
+      EXPECT_EQ(cumulet_live_get_volume(live.get(), &out, nullptr, 0), CUMULET_OK);
+      cumulet_volume_release(out);
+    }
+  };
+  std::thread first(reads, true);
+  std::thread second(reads, false);
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(cumulet_live_set(live.get(), &desc, nullptr, 0), CUMULET_OK);
+  stop = true;
+  first.join();
+  second.join();
+}
+
+TEST_F(CLive, ViewersGoWhileStatesCome) {
+  const LiveRef live = make_live();
+  std::atomic<bool> stop = false;
+  std::thread host([&] {
+    const State state = smoke(small, 0);
+    while (!stop) hand_over(live, state);
+  });
+  for (int i = 0; i < 30; ++i) {
+    const ViewerPtr viewer = make();
+    EXPECT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+    std::this_thread::sleep_for(std::chrono::milliseconds(i % 5));
+  }
+  stop = true;
+  host.join();
 }
 
 // A host that hands over far faster than states are built and drawn: states are seen in their order, each that was

@@ -174,9 +174,10 @@ TEST_P(SkyPicture, IsLitByItsSunAndByAPictureOfIt) {
   }));
   still->set_camera(test::camera_at({9.5, 9.5, 60.0}, {9.5, 9.5, 9.5}, 25.0));
   still->set_medium({0.15, vec3(0.9F), {0.3F}, 0});
-  const auto seen = [&] { return dvec3(test::render(*still, {24, 24, 16, 1}).mean()); };
+  // Paths are others: how bright a texel is beside the mean decides which looks are made.
+  const auto seen = [&] { return dvec3(test::render(*still, {24, 24, 512, 1}).mean()); };
   const auto expect_same = [](const dvec3& a, const dvec3& b) {
-    EXPECT_LT(glm::distance(a, b), 1e-3 * glm::length(b));
+    EXPECT_LT(glm::distance(a, b), 4e-3 * glm::length(b));
   };
 
   still->set_light(physical);

@@ -37,9 +37,9 @@
  * the library, but for the two exceptions and to retain and release handles: any other call from inside one, for
  * whatever viewer or handle, is refused with CUMULET_ERROR_INVALID_ARGUMENT (cumulet_destroy does nothing). They may
  * come while [GL] calls of other viewers with the same programs wait for their turn: take no lock in them that is held
- * around a [GL] call. Calls that change a camera, an instance, a model or a sequence run the update callbacks of the
- * viewers that show it while other calls for the same handle wait for them: nor take a lock that is held around calls
- * for such handles.
+ * around a [GL] call. Calls that change a camera, an instance, a model, a sequence or a live volume run the update
+ * callbacks of the viewers that show it while other calls for the same handle wait for them: nor take a lock that is
+ * held around calls for such handles.
  *
  * OpenGL state
  *     Version 4.5 core. With CUMULET_GL_STATE_RESTORE (the default) a [GL] call leaves all state as it found it. It
@@ -613,12 +613,13 @@ CUMULET_API cumulet_status cumulet_live_set(cumulet_live* live, const cumulet_st
                                             size_t error_size);
 /*
  * The next state is the last one handed over but for some bricks: sparse fields alone, of which brick_origins,
- * brick_values and brick_active are looked at. A brick takes the place of the one that is there, or is added; one whose
- * voxels are all inactive, or 0 without brick_active, is empty from then on. A dense field's bricks begin at voxel 0.
- * What is not named stays. It is the same, bit for bit, as if all of it had been handed over.
+ * brick_values and brick_active are looked at. A brick takes the place of the one that is there, or is added; give one
+ * that is empty from then on zeros, and no active voxels. It still takes 2 KiB. A dense field's bricks begin at voxel
+ * 0. What is not named stays. It is the same, bit for bit, as if all of it had been handed over.
  *
  * CUMULET_ERROR_INVALID_ARGUMENT before the first cumulet_live_set, for a channel that the state has not (give it with
- * no bricks), or has with tiles, and after one with release, of which the library keeps no voxels.
+ * no bricks), or has with tiles, after one with release, of which the library keeps no voxels, or one refused when it
+ * was read.
  */
 CUMULET_API cumulet_status cumulet_live_update(cumulet_live* live, const cumulet_state_desc* desc, char* error,
                                                size_t error_size);
@@ -1006,10 +1007,10 @@ CUMULET_API cumulet_status cumulet_rebuild(cumulet_viewer* viewer);
 typedef struct cumulet_limits_desc {
   size_t struct_size;
   /*
-   * How many threads work for the viewer at a time, in all that its workers do: reading, building, posing, skies;
-   * 1 to 1024. From the next piece of work on, not the one under way. What is not counted: threads that sleep, the
-   * thread that calls, those that free memory or end what cannot be interrupted (cumulet_destroy), and the driver's.
-   * Calls on handles work for their caller, on all processors.
+   * How many threads work for the viewer at a time, in all that its workers do: reading, building, posing;
+   * 1 to 1024. From the next piece of work on, not the one under way. What is not counted: physical skies, the
+   * thread that calls, those that sleep, free memory or end what cannot be interrupted (cumulet_destroy), and the
+   * driver's. Calls on handles work for their caller, on all processors.
    */
   uint32_t threads;
   /*
@@ -1017,7 +1018,7 @@ typedef struct cumulet_limits_desc {
    * and the cells (cumulet_stats.memory_bytes); of a sequence all frames that are ready, its own memory_bytes if that
    * is less. Cells are as coarse as it takes (cumulet_stats.limited tells). Where not even the coarsest fit, the load
    * or build is refused with CUMULET_ERROR_OUT_OF_MEMORY and one line, and what was shown stays. Not counted: what
-   * building takes while it is under way, surfaces, environments, instances, and what the host retains.
+   * building takes, surfaces, environments, instances, what a live volume keeps for updates, what the host retains.
    */
   uint64_t memory_bytes;
   /*
@@ -1729,7 +1730,7 @@ typedef struct cumulet_transmittance_map {
  * Call it once a frame and light, after cumulet_render, whose newest upload it is of. While nothing changes that costs
  * nothing. A map is made within the budget, over some calls if need be, the last one being told meanwhile; before the
  * first, and without a volume, it is one texel of 1: all light. In a scene that changes before a map is done the next
- * is coarser, down to an eighth, so that it follows; once it rests the map is made in full. 2 bytes a texel, twice
+ * is coarser, down to 16 texels, so that it follows; once it rests the map is made in full. 2 bytes a texel, twice
  * while one is being made (256 x 256 x 32: 4 MiB), counted in cumulet_stats.gl_bytes. Fails as cumulet_render; map then
  * stays as it was.
  */
