@@ -28,7 +28,7 @@ std::vector<scene::TextureImagesPtr> images_of(const ModelData::Sources& sources
 
 std::shared_ptr<ModelData> ModelData::plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, gl::WordHeap& heap,
                                            Upload& upload, const Sources& sources,
-                                           std::shared_ptr<const ModelData> last) {
+                                           const std::shared_ptr<const ModelData>& last) {
   auto data = std::make_shared<ModelData>();
   ModelData* const to = data.get();
   std::uint64_t words = 0;

@@ -21,7 +21,8 @@ class ModelData {
   /// may be null: what that has is copied from there, and images are shared where the scenes are the same. Throws
   /// Error(unsupported).
   static std::shared_ptr<ModelData> plan(const gl::FunctionsPtr& gl, const gl::Limits& limits, gl::WordHeap& heap,
-                                         Upload& upload, const Sources& sources, std::shared_ptr<const ModelData> last);
+                                         Upload& upload, const Sources& sources,
+                                         const std::shared_ptr<const ModelData>& last);
   void bind(const gl::Functions& gl) const;
   /// Of one that it is of.
   [[nodiscard]] scene::ModelWords words_of(const scene::ModelSource& source) const;

@@ -7,12 +7,12 @@
 namespace cumulet::render {
 
 ModelUpload::ModelUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits,
-                         gl::WordHeap& heap, const ModelData::Sources& sources, ModelParts parts,
+                         gl::WordHeap& heap, ModelData::Sources sources, ModelParts parts,
                          const ModelDataPtr& last_data, RasterContents last_raster)
     : gl_(gl),
       programs_(std::move(programs)),
       limits_(limits),
-      sources_(sources),
+      sources_(std::move(sources)),
       last_raster_(std::move(last_raster)),
       paths_(gl, "uploading the surfaces"),
       raster_(gl, "uploading the surfaces of previews"),

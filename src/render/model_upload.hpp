@@ -18,8 +18,7 @@ class ModelUpload {
   /// What is shared with the last of each, which may be null and empty, is taken from there. Throws Error(unsupported)
   /// for what paths need; allocates nothing yet.
   ModelUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr programs, const gl::Limits& limits, gl::WordHeap& heap,
-              const ModelData::Sources& sources, ModelParts parts, const ModelDataPtr& last_data,
-              RasterContents last_raster);
+              ModelData::Sources sources, ModelParts parts, const ModelDataPtr& last_data, RasterContents last_raster);
   /// Works until the deadline, one piece at least. Returns whether all is there. Throws Error(out_of_memory, gl,
   /// unsupported): then nothing is to be had, unless done().
   bool advance(Deadline deadline);

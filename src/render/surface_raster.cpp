@@ -270,8 +270,9 @@ bool SurfaceRaster::blends() const {
 void SurfaceRaster::add_places(Shown& shown, std::vector<glm::dmat4> places) {
   const auto volume = [](const glm::dmat4& place) { return glm::determinant(glm::dmat3(place)); };
   std::erase_if(places, [&](const glm::dmat4& place) { return !(std::abs(volume(place)) > 0.0); });
-  const auto mirrored = std::ranges::stable_partition(places, [&](const glm::dmat4& p) { return volume(p) > 0.0; });
-  const auto count = static_cast<std::uint32_t>(mirrored.size());
+  const auto mirrored =
+      std::stable_partition(places.begin(), places.end(), [&](const glm::dmat4& p) { return volume(p) > 0.0; });
+  const auto count = static_cast<std::uint32_t>(places.end() - mirrored);
   shown.sets.push_back(
       {static_cast<std::uint32_t>(places_.size()), static_cast<std::uint32_t>(places.size()) - count, count});
   places_.insert(places_.end(), places.begin(), places.end());

@@ -71,7 +71,9 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
   scene::Viewpoint view;
   if (request.light.kind == MapLight::Kind::parallel) {
     const glm::dvec3 forward = -request.light.towards;
-    const auto [right, up] = axes_about(forward);
+    const Axes axes = axes_about(forward);
+    const glm::dvec3 right = axes.right;
+    const glm::dvec3 up = axes.up;
     const auto seen = [&](const glm::dvec3& p) {
       return glm::dvec3(glm::dot(p, right), glm::dot(p, up), glm::dot(p, forward));
     };

@@ -42,7 +42,7 @@ void place(CmModel& record, const dmat4& to_world) {
 }
 
 // How likely looks for emissive triangles are for those of each record.
-void share_looks(ModelTable& table, std::vector<double> power) {
+void share_looks(ModelTable& table, const std::vector<double>& power) {
   double sum = 0.0;
   for (const double of : power) sum += of;
   if (!(sum > 0.0) || !std::isfinite(sum)) {
@@ -184,7 +184,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
     table.high = high;
   }
   table.lights = light::scene_lights(table.lamps, 0.5 * glm::length(table.high - table.low));
-  share_looks(table, std::move(power));
+  share_looks(table, power);
   table.nodes = threaded_tree(boxes);
   if (table.records.empty()) table.records.emplace_back();
   return table;

@@ -31,11 +31,11 @@ std::vector<std::uint32_t> by_size(const FrameFiles& files) {
 
 }  // namespace
 
-FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, const AllowancePtr& allowance)
+FrameShelf::FrameShelf(Log log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
     : log_(std::move(log)),
       notify_(std::move(notify)),
       trace_(trace),
-      allowance_(allowance),
+      allowance_(std::move(allowance)),
       worker_([this] { tell(); }, trace) {}
 
 void FrameShelf::wish(Wish wish) {

@@ -52,7 +52,7 @@ class FrameShelf {
 
   /// notify: called on a worker after each frame, and when a job ended.
   FrameShelf(Log log, std::function<void()> notify, Trace trace = {},
-             const AllowancePtr& allowance = std::make_shared<const Allowance>());
+             AllowancePtr allowance = std::make_shared<const Allowance>());
 
   /// In place of the wish before. Frames under way are finished, so that of wishes that change faster than frames are
   /// built every one that is begun can be seen. Other files: all that there was goes.

@@ -18,8 +18,8 @@ class LiveBuilder {
  public:
   /// notify: called on the worker after each state, and when a job ended.
   LiveBuilder(Log log, std::function<void()> notify, Trace trace = {},
-              const AllowancePtr& allowance = std::make_shared<const Allowance>())
-      : log_(std::move(log)), allowance_(allowance), worker_(std::move(notify), trace) {}
+              AllowancePtr allowance = std::make_shared<const Allowance>())
+      : log_(std::move(log)), allowance_(std::move(allowance)), worker_(std::move(notify), trace) {}
 
   /// Of this from now on; what there was goes. Null: of none.
   void follow(std::shared_ptr<Live> live, std::optional<BuildSettings> settings);

@@ -70,6 +70,30 @@ VolumeFactsPtr facts_of(const Bounds& bounds) {
                                                          .coarse = volume::CoarseVolume(box)});
 }
 
+using Add = std::function<void(const dvec3&)>;
+
+void add_corners(const Bounds& box, const Add& add) {
+  for (int i = 0; i < 8; ++i)
+    add({(i & 1) != 0 ? box.max.x : box.min.x, (i & 2) != 0 ? box.max.y : box.min.y,
+         (i & 4) != 0 ? box.max.z : box.min.z});
+}
+
+// Its vertices, or the corners of its box where that stands.
+void add_mesh(const scene::ModelSource& source, const scene::ModelMesh& mesh, const glm::dmat4& to_world, bool as_box,
+              const Add& add) {
+  if (as_box) {
+    const auto [low, high] = scene::box_of(mesh.bvh);
+    const scene::Block block = scene::block_of(to_world, low, high);
+    const auto side = [](int i, int bit) { return (i & bit) != 0 ? 1.0 : -1.0; };
+    for (int i = 0; i < 8; ++i)
+      add(block.middle + side(i, 1) * block.half[0] + side(i, 2) * block.half[1] + side(i, 4) * block.half[2]);
+    return;
+  }
+  const auto first = source.scene->indices.begin() + 3 * std::ptrdiff_t{mesh.first_triangle};
+  for (auto i = first; i != first + 3 * std::ptrdiff_t{mesh.triangle_count}; ++i)
+    add(dvec3(to_world * glm::dvec4(source.pose.vertices[*i].position, 1.0)));
+}
+
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
@@ -502,33 +526,36 @@ void Viewer::follow_models() {
     poses_due_ = true;
     ++settings_revision_;
   }
-  if (const std::uint64_t posed = poses_.revision(); posed != posed_ || poses_due_) {
-    posed_ = posed;
-    std::vector<PoseShelf::Wish> wishes;
-    for (ShownModel& shown : shown_models_) {
-      if (!shown.is_wanted()) {
-        shown.wish.reset();
-        continue;
-      }
-      PoseShelf::Wish wish{shown.settings.surfaces, shown.settings.choice};
-      if (shown.wish != wish) {
-        if (shown.wish && poses_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
-        shown.wish = wish;
-      }
-      if (std::ranges::find(wishes, wish) == wishes.end()) wishes.push_back(std::move(wish));
+  follow_poses();
+}
+
+void Viewer::follow_poses() {
+  const std::uint64_t posed = poses_.revision();
+  if (posed == posed_ && !poses_due_) return;
+  posed_ = posed;
+  std::vector<PoseShelf::Wish> wishes;
+  for (ShownModel& shown : shown_models_) {
+    if (!shown.is_wanted()) {
+      shown.wish.reset();
+      continue;
     }
-    // Before the wishes, with which what was begun for others goes.
-    for (ShownModel& shown : shown_models_) {
-      if (!shown.wish) continue;
-      auto source = poses_.built(*shown.wish);
-      if (source) shown.begun.reset();  // what is older than that is not shown again
-      // Of wishes that change faster than they are posed, one that was begun.
-      if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces)
-        source = poses_.built(*shown.begun);
-      if (source) shown.source = std::move(*source);
+    PoseShelf::Wish wish{shown.settings.surfaces, shown.settings.choice};
+    if (shown.wish != wish) {
+      if (shown.wish && poses_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
+      shown.wish = wish;
     }
-    if (std::exchange(poses_due_, false)) poses_.wish(std::move(wishes));
+    if (std::ranges::find(wishes, wish) == wishes.end()) wishes.push_back(std::move(wish));
   }
+  // Before the wishes, with which what was begun for others goes.
+  for (ShownModel& shown : shown_models_) {
+    if (!shown.wish) continue;
+    auto source = poses_.built(*shown.wish);
+    if (source) shown.begun.reset();  // what is older than that is not shown again
+    // Of wishes that change faster than they are posed, one that was begun.
+    if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces) source = poses_.built(*shown.begun);
+    if (source) shown.source = std::move(*source);
+  }
+  if (std::exchange(poses_due_, false)) poses_.wish(std::move(wishes));
 }
 
 std::vector<scene::Model> Viewer::models() const {
@@ -1076,11 +1103,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   const std::size_t count = (facts_ ? places_.size() : 0) + shown_.size();
   const auto add_volume = [&](const VolumeFacts& volume, const glm::dmat4& to_world, const Medium& medium) {
     const Bounds box = volume.bounds(to_world);
-    const auto add_box = [&] {
-      for (int i = 0; i < 8; ++i)
-        add({(i & 1) != 0 ? box.max.x : box.min.x, (i & 2) != 0 ? box.max.y : box.min.y,
-             (i & 4) != 0 ? box.max.z : box.min.z});
-    };
+    const auto add_box = [&] { add_corners(box, add); };
     // Of many one does not stick out of the picture by much.
     if (count > most_looked_at) {
       add_box();
@@ -1094,22 +1117,6 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     if (volume.may_emit) add_box();
   };
   std::size_t vertices = 0;
-  const auto add_mesh = [&](const scene::Model& model, const scene::ModelMesh& mesh, const glm::dmat4& to_world) {
-    const surface::Scene& scene = *model.source->scene;
-    // Of many copies what sticks out of one is their boxes'.
-    vertices += mesh.triangle_count;
-    if (vertices > most_vertices) {
-      const auto [low, high] = scene::box_of(mesh.bvh);
-      const scene::Block block = scene::block_of(to_world, low, high);
-      for (int i = 0; i < 8; ++i)
-        add(block.middle + ((i & 1) != 0 ? 1.0 : -1.0) * block.half[0] + ((i & 2) != 0 ? 1.0 : -1.0) * block.half[1] +
-            ((i & 4) != 0 ? 1.0 : -1.0) * block.half[2]);
-      return;
-    }
-    const auto first = scene.indices.begin() + 3 * std::ptrdiff_t{mesh.first_triangle};
-    for (auto i = first; i != first + 3 * std::ptrdiff_t{mesh.triangle_count}; ++i)
-      add(dvec3(to_world * glm::dvec4(model.source->pose.vertices[*i].position, 1.0)));
-  };
   for (const scene::Place& place : places_) {
     if (facts_) add_volume(*facts_, place.to_world, medium_);
   }
@@ -1118,7 +1125,11 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   }
   for (const scene::Model& model : models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
-      for (const glm::dmat4& placing : mesh.placings) add_mesh(model, mesh, model.to_world * placing);
+      for (const glm::dmat4& placing : mesh.placings) {
+        // Of many copies what sticks out of one is their boxes'.
+        vertices += mesh.triangle_count;
+        add_mesh(*model.source, mesh, model.to_world * placing, vertices > most_vertices, add);
+      }
     }
   }
   return reach;

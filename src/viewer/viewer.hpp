@@ -287,6 +287,8 @@ class Viewer {
   };
   std::vector<ShownModel>::iterator find(const ModelInstance& model);
   void follow_models();
+  // Their poses, as far as they are there.
+  void follow_poses();
   // All that are there, the viewer's own among them.
   [[nodiscard]] std::vector<scene::Model> models() const;
   std::vector<Shown>::iterator find(const Instance& instance);
@@ -321,8 +323,8 @@ class Viewer {
   Trace trace_;
   std::function<void()> update_;
   std::atomic<bool> update_pending_ = false;
-  std::atomic<double> upload_progress_ = 1.0;
   bool restore_state_;
+  std::atomic<double> upload_progress_ = 1.0;
   std::shared_ptr<gl::ProgramPool> programs_;
   std::int64_t page_texels_ = 0;
 
@@ -359,18 +361,18 @@ class Viewer {
   std::vector<Shown> shown_;                        // in the order in which they were added
   std::vector<ShownModel> shown_models_;            // likewise
   std::uint64_t posed_ = 0;                         // of poses_, when it was last looked at
-  bool poses_due_ = false;                          // what is wished of it is to be told anew
   std::uint64_t last_id_ = 0;
-  std::uint64_t shelved_ = 0;   // of shelf_, when it was last looked at
-  bool wishes_due_ = false;     // what is wished of it is to be told anew
-  bool waits_for_own_ = false;  // the volume's own grid, which is being built, may serve for others
+  std::uint64_t shelved_ = 0;    // of shelf_, when it was last looked at
+  bool poses_due_ = false;       // what is wished of poses_ is to be told anew
+  bool wishes_due_ = false;      // likewise of shelf_
+  bool waits_for_own_ = false;   // the volume's own grid, which is being built, may serve for others
+  bool places_changed_ = false;  // since the last frame that traced
   std::uint64_t settings_revision_ = 1;
   glm::uvec2 frame_size_{0U};  // of the last frame's picture
   // Of its own world; volume_ was loaded with it; the medium's once its grid is there.
   std::optional<double> suggested_density_scale_;
   std::optional<ViewFrame> view_;         // of the last frame
   std::optional<ViewFrame> traced_view_;  // of the last frame that traced
-  bool places_changed_ = false;           // since the last frame that traced
   std::optional<ViewFrame> last_view_;    // of the one before it
   struct BuildView {
     ViewFrame view;
