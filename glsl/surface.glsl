@@ -7,6 +7,7 @@
 #define CM_SURFACE_GLSL
 #include "ggx.glsl"
 #include "luminance.glsl"
+#include "octahedron.glsl"
 #include "surface_tables.glsl"
 #include "model_space.glsl"
 
@@ -63,15 +64,8 @@ CM_FN float cm_sheen_albedo_average(float roughness) {
 
 #include "bsdf.glsl"
 
-// Unit vector of two signed 16-bit octahedral coordinates (Cigolle et al., "A Survey of Efficient Representations for
-// Independent Unit Vectors", JCGT 3(2), 2014).
-CM_FN vec3 cm_octahedral(uint word) {
-  vec2 e = unpackSnorm2x16(word);
-  vec3 v = vec3(e, 1.0f - abs(e.x) - abs(e.y));
-  vec2 over = (1.0f - abs(vec2(e.y, e.x))) * mix(vec2(-1.0f), vec2(1.0f), greaterThanEqual(e, vec2(0.0f)));
-  if (v.z < 0.0f) v = vec3(over, v.z);
-  return normalize(v);
-}
+// Unit vector of two signed 16-bit coordinates.
+CM_FN vec3 cm_octahedral(uint word) { return cm_from_octahedron(unpackSnorm2x16(word)); }
 
 struct CmVertexMix {
   uint model;

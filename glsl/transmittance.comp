@@ -2,8 +2,8 @@
 // A light's transmittance map (cumulet_update_transmittance_map): what of it comes through all volumes to the points of
 // a lattice, slice behind slice along its rays. A deep shadow map (Lokovic and Veach 2000) at even depths; without
 // noise, in closed form from cell to cell. Parallel rays are those of an orthographic view from the light; those of a
-// point are by octahedra (Meyer et al., "On Floating-Point Normal Vectors", 2010), whose folds texels lie on, so that
-// what is filtered across one is of the same rays.
+// point are by octahedra (octahedron.glsl), whose folds texels lie on, so that what is filtered across one is of the same
+// rays.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -14,6 +14,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "buffers.glsl"
 #include "march.glsl"
 #include "ray.glsl"
+#include "octahedron.glsl"
 // Who is hidden from cameras has its shadow.
 #define CM_WALK_FLAGS 0u
 #include "walk.glsl"
@@ -29,10 +30,7 @@ void main() {
   vec3 w;
   cm_camera_ray(texel, vec2(0.5), o, w);
   if (cm_from_point) {
-    vec2 place = 2.0 * vec2(texel) / vec2(cm.dispatch.tile_size - 1u) - 1.0;
-    w = vec3(place, 1.0 - abs(place.x) - abs(place.y));
-    if (w.z < 0.0) w.xy = (1.0 - abs(place.yx)) * vec2(place.x < 0.0 ? -1.0 : 1.0, place.y < 0.0 ? -1.0 : 1.0);
-    w = normalize(w);
+    w = cm_from_octahedron(2.0 * vec2(texel) / vec2(cm.dispatch.tile_size - 1u) - 1.0);
   }
   int slices = imageSize(cm_map).z;
   float step_t = (cm_range.y - cm_range.x) / float(slices - 1);

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "base/corners.hpp"
 #include "base/error.hpp"
 #include "light/light_table.hpp"
 #include "scene/space.hpp"
@@ -279,10 +280,8 @@ std::vector<glm::dvec3> GpuScene::corners() const {
   for (const scene::Volume& volume : present_) {
     const glm::dmat4 to_world = volume.place.to_world * volume.source->cube.to_world;
     const core::CmGrid& grid = *data_->grid(*volume.source);
-    for (unsigned i = 0; i < 8; ++i) {
-      const glm::bvec3 high((i & 1U) != 0, (i & 2U) != 0, (i & 4U) != 0);
-      corners.emplace_back(to_world * glm::dvec4(glm::mix(grid.box_min, grid.box_max, high), 1.0));
-    }
+    for (const glm::dvec3& corner : corners_of(grid.box_min, grid.box_max))
+      corners.emplace_back(to_world * glm::dvec4(corner, 1.0));
   }
   return corners;
 }

@@ -281,6 +281,11 @@ double Flights::expected_ms() const {
 
 void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
 
+void learn_rows(const Flights::Landed& landed) {
+  const double ms = landed.ms.value_or(landed.at_most_ms);
+  if (landed.what.cost) landed.what.cost->learn(landed.what.slots, landed.ms ? ms : 0.0, ms);
+}
+
 void send_rows(Flights& flights, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size, std::uint32_t& row,
                Clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
                const std::function<void()>& collect) {

@@ -199,6 +199,8 @@ class Flights {
 /// While there is nothing to do but to wait for the device: no call into GL waits.
 void pass_time();
 
+/// What a dispatch of rows that has landed tells of its cost, if it has one.
+void learn_rows(const Flights::Landed& landed);
 /// Sends rows, from row on, of what is a round for each of its pixels, until all are sent or about the deadline; what
 /// follows in GL comes after them. send gets the first row and the one after the last, and dispatches them; collect
 /// takes up what has landed, and teaches cost.

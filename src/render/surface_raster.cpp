@@ -8,6 +8,7 @@
 #include <string>
 #include <tuple>
 
+#include "base/corners.hpp"
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
 #include "light/lamps.hpp"
@@ -44,9 +45,7 @@ glm::dmat3 to_view(const SurfaceView& view) {
 glm::dvec2 depth_of(const SurfaceView& view, const glm::dmat3& matrix, const glm::dvec3& low, const glm::dvec3& high) {
   double nearest = std::numeric_limits<double>::infinity();
   double farthest = -nearest;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    const glm::dvec3 p((corner & 1U) != 0 ? high.x : low.x, (corner & 2U) != 0 ? high.y : low.y,
-                       (corner & 4U) != 0 ? high.z : low.z);
+  for (const glm::dvec3& p : corners_of(low, high)) {
     const double z = (matrix * (p - view.eye)).z;
     nearest = std::min(nearest, z);
     farthest = std::max(farthest, z);

@@ -540,7 +540,7 @@ void Tracer::collect() {
     const double ms = landed->ms.value_or(landed->at_most_ms);
     (landed->words.empty() ? seconds_.inspect : seconds_.trace) += 1e-3 * landed->ms.value_or(0.0);
     if (landed->words.empty()) {
-      if (what.cost) what.cost->learn(what.slots, landed->ms ? ms : 0.0, ms);
+      learn_rows(*landed);
       continue;
     }
     if (what.error) {

@@ -94,10 +94,10 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
     view.right = half.x * right;
     view.up = half.y * up;
     view.eye = middle.x * right + middle.y * up + (middle.z - half.z) * forward;
-    next.made.range = {0.0, 2.0 * half.z};
+    next.slices_at = {0.0, 2.0 * half.z};
   } else {
     view.eye = request.light.position;
-    next.made.range = distances(view.eye, corners);
+    next.slices_at = distances(view.eye, corners);
   }
   scene::Snapshot seen = snapshot;
   seen.view.set(view);
@@ -107,20 +107,19 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
   next.parameters.grid = picture.grid;
   next.parameters.medium = picture.medium;
   next.parameters.dispatch.tile_size = glm::uvec2(size);
-  const glm::dvec2 range = next.made.range;
   next.made = make(gl_, size, request.slices);
-  next.made.range = range;
   if (view.orthographic) {
     // Rows of texels go down, slices have their middles from near to far.
     const glm::dvec3 u = view.right / glm::dot(view.right, view.right) * 0.5;
     const glm::dvec3 v = view.up / glm::dot(view.up, view.up) * -0.5;
     const double inner = (request.slices - 1.0) / request.slices;
-    const glm::dvec3 w = view.forward * (inner / range.y);
+    const glm::dvec3 w = view.forward * (inner / next.slices_at.y);
     const glm::dvec3 offset(0.5 - glm::dot(u, view.eye), 0.5 - glm::dot(v, view.eye),
                             0.5 / request.slices - glm::dot(w, view.eye));
     next.made.to_map = glm::transpose(glm::dmat4(glm::dvec4(u, offset.x), glm::dvec4(v, offset.y),
                                                  glm::dvec4(w, offset.z), glm::dvec4(0.0, 0.0, 0.0, 1.0)));
   } else {
+    next.made.range = next.slices_at;
     next.made.to_map[3] = glm::dvec4(-view.eye, 1.0);
   }
   next.of = std::move(of);
@@ -128,30 +127,28 @@ void TransmittanceMap::begin(Of of, const scene::Snapshot& snapshot, GpuScene& s
 }
 
 void TransmittanceMap::collect() {
-  while (const auto landed = flights_.land()) {
-    const double ms = landed->ms.value_or(landed->at_most_ms);
-    if (landed->what.cost) landed->what.cost->learn(landed->what.slots, landed->ms ? ms : 0.0, ms);
-  }
+  while (const auto landed = flights_.land()) learn_rows(*landed);
+}
+
+void TransmittanceMap::show_clear() {
+  Made clear = make(gl_, 1, 1);
+  const float all = 1.0F;
+  gl_->ClearTexImage(clear.texture.name(), 0, GL_RED, GL_FLOAT, &all);
+  gl::check(*gl_, "clearing a map of transmittances");
+  shown_ = std::move(clear);
+  shown_of_.reset();
 }
 
 void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot& snapshot, GpuScene& scene,
                                Deadline deadline) {
-  if (!shown_.texture) {
-    Made clear = make(gl_, 1, 1);
-    const float all = 1.0F;
-    gl_->ClearTexImage(clear.texture.name(), 0, GL_RED, GL_FLOAT, &all);
-    gl::check(*gl_, "clearing a map of transmittances");
-    shown_ = std::move(clear);
-  }
+  if (!shown_.texture) show_clear();
   collect();
   const MarchData* const data = scene.data();
   if (data == nullptr || scene.volumes().empty()) {
-    if (shown_of_) shown_ = {};
-    shown_of_.reset();
+    if (shown_of_) show_clear();
     under_way_.reset();
     coarser_ = 0;
     newest_ = true;
-    if (!shown_.texture) advance(request, snapshot, scene, deadline);
     return;
   }
   Of of{request, scene.volumes(), scene.data_revision(), scene.instances_revision()};
@@ -194,8 +191,7 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
                         GL_R16F);
   const bool point = work.of.request.light.kind == MapLight::Kind::point;
   gl_->ProgramUniform1i(program.name(), 0, point ? 1 : 0);
-  gl_->ProgramUniform2f(program.name(), 1, static_cast<float>(work.made.range.x),
-                        static_cast<float>(work.made.range.y));
+  gl_->ProgramUniform2f(program.name(), 1, static_cast<float>(work.slices_at.x), static_cast<float>(work.slices_at.y));
   program.use(*gl_);
   const glm::uvec2 size(work.made.size);
   const auto send = [&](glm::uvec2 rows) {
@@ -207,7 +203,6 @@ void TransmittanceMap::advance(const MapRequest& request, const scene::Snapshot&
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   gl::check(*gl_, "making a map of transmittances");
   if (work.row < size.y) return;
-  if (!point) work.made.range = glm::dvec2(0.0);
   shown_ = std::move(work.made);
   shown_of_ = std::move(work.of);
   under_way_.reset();

@@ -73,9 +73,12 @@ class TransmittanceMap {
     Of of;
     Made made;
     core::CmParameters parameters{};
+    glm::dvec2 slices_at{0.0};  // along a ray, of the first and the last
     std::uint32_t row = 0;
   };
   void begin(Of of, const scene::Snapshot& snapshot, GpuScene& scene);
+  // One texel through which all light comes.
+  void show_clear();
   void collect();
   static Made make(const gl::FunctionsPtr& gl, std::uint32_t size, std::uint32_t slices);
 

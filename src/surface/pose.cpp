@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 
+#include "base/corners.hpp"
 #include "base/progress_part.hpp"
 #include "surface/posable_scene.hpp"
 
@@ -231,9 +232,7 @@ void PosableScene::bound(Pose& pose) const {
         own_low = glm::min(own_low, vertex.position);
         own_high = glm::max(own_high, vertex.position);
       }
-      for (unsigned c = 0; c < 8; ++c)
-        points.emplace_back((c & 1U) != 0 ? own_high.x : own_low.x, (c & 2U) != 0 ? own_high.y : own_low.y,
-                            (c & 4U) != 0 ? own_high.z : own_low.z);
+      for (const glm::dvec3& corner : corners_of(own_low, own_high)) points.emplace_back(corner);
     }
     for (const glm::dmat4& to_world : placed) {
       for (const glm::vec3& p : points) add(glm::vec3(to_world * glm::dvec4(p, 1.0)));

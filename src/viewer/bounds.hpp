@@ -1,6 +1,9 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <limits>
+
+#include "base/corners.hpp"
 
 namespace cumulet::viewer {
 
@@ -12,13 +15,12 @@ struct Bounds {
 
 /// Of the voxels from first to last, both inclusive.
 inline Bounds world_bounds(const glm::ivec3& first, const glm::ivec3& last, const glm::dmat4& index_to_world) {
-  Bounds bounds;
-  for (int corner = 0; corner < 8; ++corner) {
-    glm::dvec3 p(first);
-    for (int axis = 0; axis < 3; ++axis) p[axis] = ((corner >> axis) & 1) != 0 ? last[axis] + 0.5 : first[axis] - 0.5;
-    const glm::dvec3 world(index_to_world * glm::dvec4(p, 1.0));
-    bounds.min = corner == 0 ? world : glm::min(bounds.min, world);
-    bounds.max = corner == 0 ? world : glm::max(bounds.max, world);
+  Bounds bounds{glm::dvec3(std::numeric_limits<double>::infinity()),
+                -glm::dvec3(std::numeric_limits<double>::infinity())};
+  for (const glm::dvec3& corner : corners_of(glm::dvec3(first) - 0.5, glm::dvec3(last) + 0.5)) {
+    const glm::dvec3 world(index_to_world * glm::dvec4(corner, 1.0));
+    bounds.min = glm::min(bounds.min, world);
+    bounds.max = glm::max(bounds.max, world);
   }
   return bounds;
 }

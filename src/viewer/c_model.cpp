@@ -14,6 +14,14 @@ using cumulet::viewer::ModelSettings;
 
 void require_time(double time) { require(std::isfinite(time), "cumulet_model_desc.time is not finite"); }
 
+// what: before the cause.
+glm::dmat4 place_of(std::span<const double, 16> to_world, const std::string& what = "") {
+  const glm::dmat4 place = matrix_or_identity(to_world);
+  require_place(place, what);
+  if (!cumulet::scene::can_stand(place)) refuse(what + "to_world makes things flat or endless");
+  return place;
+}
+
 ModelSettings settings_of(const cumulet_model_desc* desc) {
   const cumulet_model_desc d = read_desc(desc, "cumulet_model_desc");
   const auto flag = [](int32_t value, const char* cause) { require(value == 0 || value == 1, cause); };
@@ -23,9 +31,7 @@ ModelSettings settings_of(const cumulet_model_desc* desc) {
   require_time(d.time);
   ModelSettings settings;
   if (d.surfaces != nullptr) settings.surfaces = d.surfaces->asset;
-  settings.to_world = matrix_or_identity(d.to_world);
-  require_place(settings.to_world, "cumulet_model_desc.");
-  require(cumulet::scene::can_stand(settings.to_world), "cumulet_model_desc.to_world makes things flat or endless");
+  settings.to_world = place_of(d.to_world, "cumulet_model_desc.");
   settings.choice = {d.time, d.animation, d.double_sided == 1, d.variant};
   settings.hidden = d.hidden == 1;
   settings.shadow_only = d.shadow_only == 1;
@@ -54,9 +60,7 @@ cumulet_status cumulet_model_set(cumulet_model* model, const cumulet_model_desc*
 cumulet_status cumulet_model_set_to_world(cumulet_model* model, const double to_world[16]) {
   return on(model, "model", [&](ModelInstance& m) {
     require(to_world != nullptr, "to_world is NULL");
-    const glm::dmat4 place = matrix_or_identity(std::span<const double, 16>(to_world, 16));
-    require_place(place);
-    require(cumulet::scene::can_stand(place), "to_world makes things flat or endless");
+    const glm::dmat4 place = place_of(std::span<const double, 16>(to_world, 16));
     m.edit([&](ModelSettings& settings) { settings.to_world = place; });
   });
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/callback_scope.hpp"
+#include "base/corners.hpp"
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
@@ -72,21 +73,12 @@ VolumeFactsPtr facts_of(const Bounds& bounds) {
 
 using Add = std::function<void(const dvec3&)>;
 
-void add_corners(const Bounds& box, const Add& add) {
-  for (int i = 0; i < 8; ++i)
-    add({(i & 1) != 0 ? box.max.x : box.min.x, (i & 2) != 0 ? box.max.y : box.min.y,
-         (i & 4) != 0 ? box.max.z : box.min.z});
-}
-
 // Its vertices, or the corners of its box where that stands.
 void add_mesh(const scene::ModelSource& source, const scene::ModelMesh& mesh, const glm::dmat4& to_world, bool as_box,
               const Add& add) {
   if (as_box) {
     const auto [low, high] = scene::box_of(mesh.bvh);
-    const scene::Block block = scene::block_of(to_world, low, high);
-    const auto side = [](int i, int bit) { return (i & bit) != 0 ? 1.0 : -1.0; };
-    for (int i = 0; i < 8; ++i)
-      add(block.middle + side(i, 1) * block.half[0] + side(i, 2) * block.half[1] + side(i, 4) * block.half[2]);
+    for (const dvec3& corner : corners_of(low, high)) add(dvec3(to_world * glm::dvec4(corner, 1.0)));
     return;
   }
   const auto first = source.scene->indices.begin() + 3 * std::ptrdiff_t{mesh.first_triangle};
@@ -1103,7 +1095,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
   const std::size_t count = (facts_ ? places_.size() : 0) + shown_.size();
   const auto add_volume = [&](const VolumeFacts& volume, const glm::dmat4& to_world, const Medium& medium) {
     const Bounds box = volume.bounds(to_world);
-    const auto add_box = [&] { add_corners(box, add); };
+    const auto add_box = [&] { std::ranges::for_each(corners_of(box.min, box.max), add); };
     // Of many one does not stick out of the picture by much.
     if (count > most_looked_at) {
       add_box();

@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/corners.hpp"
 #include "base/progress_part.hpp"
 
 namespace cumulet::volume {
@@ -183,9 +184,7 @@ CoarseVolume::Sheet CoarseVolume::sheet(const Box& box, const glm::dvec3& direct
   sheet.v = glm::cross(direction, sheet.u);
   sheet.least = glm::dvec2(std::numeric_limits<double>::max());
   glm::dvec2 most(std::numeric_limits<double>::lowest());
-  for (int corner = 0; corner < 8; ++corner) {
-    glm::dvec3 p;
-    for (int axis = 0; axis < 3; ++axis) p[axis] = ((corner >> axis) & 1) != 0 ? box.high[axis] + 1 : box.low[axis];
+  for (const glm::dvec3& p : corners_of(box.low, box.high + 1)) {
     const glm::dvec3 world(to_world_ * glm::dvec4(p, 1.0));
     const glm::dvec2 at(glm::dot(world, sheet.u), glm::dot(world, sheet.v));
     sheet.least = glm::min(sheet.least, at);

@@ -16,11 +16,12 @@
 #include <thread>
 #include <vector>
 
-#include "support/c_host.hpp"
+#include "c_viewer.hpp"
 #include "support/simulated.hpp"
 
 namespace {
 
+using cumulet::bench::must;
 using cumulet::headless::Context;
 using cumulet::test::make_desc;
 using cumulet::test::Sides;
@@ -29,10 +30,6 @@ using Clock = std::chrono::steady_clock;
 
 double milliseconds_since(Clock::time_point start) {
   return 1e3 * std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-void must(cumulet_viewer* viewer, cumulet_status status) {
-  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
 }
 
 // A column that widens and winds, with lumps of a few voxels: about a sixth of the box.
@@ -80,15 +77,7 @@ class Bench {
  public:
   explicit Bench(double density_scale)
       : gl_(cumulet::test::load_gl(Context::get_proc, &context_)), target_(gl_, 640, 360) {
-    auto create = make_desc<cumulet_create_desc>();
-    create.get_proc = Context::get_proc;
-    create.get_proc_user = &context_;
-    viewer_ = cumulet::test::make_plain_viewer(create);
-    auto light = make_desc<cumulet_light_desc>();
-    light.sun_elevation_degrees = 40.0F;
-    for (float& value : light.sun_irradiance) value = 2.5F;
-    for (float& value : light.sky_radiance) value = 0.3F;
-    must(viewer_.get(), cumulet_set_light(viewer_.get(), &light));
+    viewer_ = cumulet::bench::make_viewer(context_);
     auto medium = make_desc<cumulet_medium_desc>();
     medium.density_scale = density_scale;
     must(viewer_.get(), cumulet_set_medium(viewer_.get(), &medium));

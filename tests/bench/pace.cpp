@@ -14,20 +14,17 @@
 #include <stdexcept>
 #include <vector>
 
+#include "c_viewer.hpp"
 #include "support/busy_host.hpp"
-#include "support/c_host.hpp"
 
 namespace {
 
+using cumulet::bench::must;
 using cumulet::headless::Context;
 using Clock = std::chrono::steady_clock;
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-void must(cumulet_viewer* viewer, cumulet_status status) {
-  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
 }
 
 struct Scenario {
@@ -82,10 +79,7 @@ class Bench {
 
   void pace(const Scenario& scenario, double budget_ms) {
     const auto viewer = open(4096, scenario.preview);
-    auto light = cumulet::test::make_desc<cumulet_light_desc>();
-    for (float& value : light.sun_irradiance) value = 2.5F;
-    for (float& value : light.sky_radiance) value = 0.3F;
-    light.sun_elevation_degrees = 40.0F;
+    cumulet_light_desc light = cumulet::bench::daylight();
     const std::vector<double> taken = times(scenario.busy, [&](int i) {
       if (scenario.drags) {
         light.sun_azimuth_degrees = static_cast<float>(i);

@@ -15,10 +15,11 @@
 #include <thread>
 #include <vector>
 
-#include "support/c_host.hpp"
+#include "c_viewer.hpp"
 
 namespace {
 
+using cumulet::bench::must;
 using cumulet::headless::Context;
 using cumulet::test::make_desc;
 using Clock = std::chrono::steady_clock;
@@ -26,10 +27,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double refresh = 1.0 / 60.0;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-void must(cumulet_viewer* viewer, cumulet_status status) {
-  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
-}
 
 double at_part(std::vector<double> values, double part) {
   if (values.empty()) return 0.0;
@@ -41,15 +38,7 @@ class Bench {
  public:
   Bench(double rate, double budget_ms, bool upright, const std::vector<const char*>& paths)
       : gl_(cumulet::test::load_gl(Context::get_proc, &context_)), target_(gl_, 640, 360), rate_(rate) {
-    auto create = make_desc<cumulet_create_desc>();
-    create.get_proc = Context::get_proc;
-    create.get_proc_user = &context_;
-    viewer_ = cumulet::test::make_plain_viewer(create);
-    auto light = make_desc<cumulet_light_desc>();
-    light.sun_elevation_degrees = 40.0F;
-    for (float& value : light.sun_irradiance) value = 2.5F;
-    for (float& value : light.sky_radiance) value = 0.3F;
-    must(viewer_.get(), cumulet_set_light(viewer_.get(), &light));
+    viewer_ = cumulet::bench::make_viewer(context_);
     auto file = make_desc<cumulet_volume_file_desc>();
     file.suggested_density_scale = 1;
     if (!upright) {

@@ -15,6 +15,7 @@ namespace {
 
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
+using cumulet::test::at;
 using cumulet::test::converge;
 using cumulet::test::difference;
 using cumulet::test::FakeGl;
@@ -26,8 +27,6 @@ using cumulet::test::make_viewer;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
 using Picture = std::vector<std::uint8_t>;
-
-std::array<double, 16> at(double x, double y, double z) { return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1}; }
 
 InstanceRef make_instance(cumulet_volume* volume, const std::array<double, 16>& place = {}) {
   auto desc = make_desc<cumulet_instance_desc>();

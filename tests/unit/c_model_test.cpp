@@ -17,6 +17,7 @@ namespace {
 
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
+using cumulet::test::at;
 using cumulet::test::converge;
 using cumulet::test::difference;
 using cumulet::test::FakeGl;
@@ -30,7 +31,6 @@ using cumulet::test::ViewerPtr;
 using Picture = std::vector<std::uint8_t>;
 using Matrix = std::array<double, 16>;
 
-Matrix at(double x, double y, double z) { return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1}; }
 // Sheared, stretched and mirrored.
 constexpr Matrix askew{-1.5, 0.2, 0, 0, 0.4, 0.8, 0, 0, 0.3, -0.2, 1.2, 0, 5, 1, -2, 1};
 

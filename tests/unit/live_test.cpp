@@ -22,8 +22,8 @@ namespace {
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
 using cumulet::test::CameraRef;
-using cumulet::test::converge;
 using cumulet::test::difference;
+using cumulet::test::drawn_once;
 using cumulet::test::expect_same_voxels;
 using cumulet::test::HostTarget;
 using cumulet::test::LiveRef;
@@ -115,15 +115,7 @@ class CLive : public testing::Test {
     return make_viewer(
         {.get_proc = Context::get_proc, .user = &context_, .log = Lines::add, .log_user = &lines_, .samples = 2});
   }
-  Picture picture(cumulet_viewer* of) {
-    auto frame = target_.frame();
-    frame.target = CUMULET_TARGET_NONE;
-    converge(of, frame);
-    frame.target = CUMULET_TARGET_FRAMEBUFFER;
-    target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
-    EXPECT_EQ(cumulet_render(of, &frame, nullptr), CUMULET_OK) << cumulet_last_error(of);
-    return target_.pixels();
-  }
+  Picture picture(cumulet_viewer* of) { return drawn_once(of, target_); }
   // Of a viewer of its own, which never showed another.
   Picture picture_alone(const State& state) {
     const ViewerPtr viewer = make();

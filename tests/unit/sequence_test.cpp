@@ -22,8 +22,8 @@ using cumulet::headless::Backend;
 using cumulet::headless::Context;
 using cumulet::test::CameraRef;
 using cumulet::test::Clip;
-using cumulet::test::converge;
 using cumulet::test::difference;
+using cumulet::test::drawn_once;
 using cumulet::test::HostTarget;
 using cumulet::test::load_gl;
 using cumulet::test::make_desc;
@@ -64,15 +64,7 @@ class CSequence : public testing::Test {
     return make_viewer(
         {.get_proc = Context::get_proc, .user = &context_, .log = Lines::add, .log_user = &lines_, .samples = 2});
   }
-  Picture picture(cumulet_viewer* of) {
-    auto frame = target_.frame();
-    frame.target = CUMULET_TARGET_NONE;
-    converge(of, frame);
-    frame.target = CUMULET_TARGET_FRAMEBUFFER;
-    target_.clear({0.0F, 0.0F, 0.0F, 0.0F});
-    EXPECT_EQ(cumulet_render(of, &frame, nullptr), CUMULET_OK) << cumulet_last_error(of);
-    return target_.pixels();
-  }
+  Picture picture(cumulet_viewer* of) { return drawn_once(of, target_); }
   static cumulet_sequence_info info_of(cumulet_viewer* viewer) {
     auto info = make_desc<cumulet_sequence_info>();
     EXPECT_EQ(cumulet_get_sequence_info(viewer, &info, nullptr, 0), CUMULET_OK) << cumulet_last_error(viewer);

@@ -69,6 +69,11 @@ struct ReleaseCamera {
 };
 using CameraRef = std::unique_ptr<cumulet_camera, ReleaseCamera>;
 
+/// The place that moves things so far.
+inline std::array<double, 16> at(double x, double y, double z) {
+  return {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1};
+}
+
 /// A lumpy ball of size^3 voxels centred on the origin, as a dense array.
 inline VolumeRef make_ball(int size, float density = 0.4F) {
   std::vector<float> values;
@@ -298,10 +303,9 @@ inline std::string difference(const std::vector<std::uint8_t>& a, const std::vec
   return std::to_string(bytes) + " of " + std::to_string(a.size()) + " bytes, by at most " + std::to_string(largest);
 }
 
-/// Sets the volume and renders all of the picture. The bytes of the target, into which it is drawn once: frames that
-/// are drawn while it comes would show through where it is transparent, and their number is a matter of timing.
-inline std::vector<std::uint8_t> picture_of(cumulet_viewer* viewer, cumulet_volume* volume, const HostTarget& target) {
-  if (cumulet_set_volume(viewer, volume) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+/// Renders all of the picture. The bytes of the target, into which it is drawn once: frames that are drawn while it
+/// comes would show through where it is transparent, and their number is a matter of timing.
+inline std::vector<std::uint8_t> drawn_once(cumulet_viewer* viewer, const HostTarget& target) {
   auto frame = target.frame();
   frame.target = CUMULET_TARGET_NONE;
   converge(viewer, frame);
@@ -309,6 +313,11 @@ inline std::vector<std::uint8_t> picture_of(cumulet_viewer* viewer, cumulet_volu
   target.clear({0.0F, 0.0F, 0.0F, 0.0F});
   if (cumulet_render(viewer, &frame, nullptr) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
   return target.pixels();
+}
+/// The same of this volume.
+inline std::vector<std::uint8_t> picture_of(cumulet_viewer* viewer, cumulet_volume* volume, const HostTarget& target) {
+  if (cumulet_set_volume(viewer, volume) != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+  return drawn_once(viewer, target);
 }
 
 }  // namespace cumulet::test

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <stdexcept>
+
+#include "support/c_host.hpp"
+
+/// Viewers of benchmarks that are hosts by cumulet.h alone.
+namespace cumulet::bench {
+
+/// Throws std::runtime_error.
+inline void must(cumulet_viewer* viewer, cumulet_status status) {
+  if (status != CUMULET_OK) throw std::runtime_error(cumulet_last_error(viewer));
+}
+
+inline cumulet_light_desc daylight() {
+  auto light = test::make_desc<cumulet_light_desc>();
+  light.sun_elevation_degrees = 40.0F;
+  for (float& value : light.sun_irradiance) value = 2.5F;
+  for (float& value : light.sky_radiance) value = 0.3F;
+  return light;
+}
+
+/// By daylight, with the library's defaults.
+inline test::ViewerPtr make_viewer(headless::Context& context) {
+  auto create = test::make_desc<cumulet_create_desc>();
+  create.get_proc = headless::Context::get_proc;
+  create.get_proc_user = &context;
+  test::ViewerPtr viewer = test::make_plain_viewer(create);
+  const cumulet_light_desc light = daylight();
+  must(viewer.get(), cumulet_set_light(viewer.get(), &light));
+  return viewer;
+}
+
+}  // namespace cumulet::bench
