@@ -48,8 +48,9 @@ layout(rgba32f, binding = CM_IMAGE_VELOCITY) uniform writeonly image2D cm_veloci
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
 
 void main() {
-  uvec2 pixel = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
-  if (pixel.x >= cm.dispatch.tile_size.x || pixel.y >= cm.dispatch.rows.y) return;
+  uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
+  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
+  uvec2 pixel = cm.dispatch.tile_corner + local;
   vec3 normal = vec3(0.0);
   float transmittance = 0.0;
   vec3 albedo = vec3(0.0);

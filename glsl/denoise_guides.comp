@@ -16,17 +16,19 @@ layout(rgba32f, binding = CM_IMAGE_GUIDE_COLOUR) uniform writeonly image2D cm_co
 layout(rgba32f, binding = CM_IMAGE_GUIDE_ALBEDO) uniform writeonly image2D cm_albedo_out;
 layout(rgba32f, binding = CM_IMAGE_GUIDE_NORMAL) uniform writeonly image2D cm_normal_out;
 layout(location = 0) uniform vec3 cm_medium_albedo;
+layout(location = 1) uniform ivec2 cm_first;  // pixel of the picture
 
 void main() {
-  ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(texel, textureSize(cm_sum, 0)))) return;
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(at, imageSize(cm_colour_out)))) return;
+  ivec2 texel = cm_first + at;
   vec4 colour = texelFetch(cm_sum, texel, 0) / max(float(texelFetch(cm_counts, texel, 0).x), 1.0);
 #if CM_BACKGROUND
   colour.rgb += texelFetch(cm_background, texel, 0).rgb;
 #endif
   float transmittance = texelFetch(cm_transmittance, texel, 0).x;
   vec3 albedo = mix(cm_medium_albedo, texelFetch(cm_albedo, texel, 0).rgb, transmittance);
-  imageStore(cm_colour_out, texel, colour);
-  imageStore(cm_albedo_out, texel, vec4(albedo, 0.0));
-  imageStore(cm_normal_out, texel, vec4(transmittance * texelFetch(cm_normal, texel, 0).xyz, 0.0));
+  imageStore(cm_colour_out, at, colour);
+  imageStore(cm_albedo_out, at, vec4(albedo, 0.0));
+  imageStore(cm_normal_out, at, vec4(transmittance * texelFetch(cm_normal, texel, 0).xyz, 0.0));
 }

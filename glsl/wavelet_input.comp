@@ -13,6 +13,7 @@ layout(binding = CM_UNIT_GUIDE_SURFACE_Z) uniform sampler2D cm_surface_z;
 layout(binding = CM_UNIT_GUIDE_VOLUME_Z) uniform sampler2D cm_volume_z;
 layout(binding = CM_UNIT_GUIDE_EMISSION) uniform sampler2D cm_emission;
 layout(location = 3) uniform float cm_surfaces;  // 0: surfaces are drawn beneath, by another
+layout(location = 4) uniform ivec4 cm_box;       // pixels that are made: the first, and the one after the last
 layout(rgba32f, binding = CM_IMAGE_WAVELET_FRONT) uniform writeonly image2D cm_front_out;
 layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_spread_out;
 layout(rgba32ui, binding = CM_IMAGE_WAVELET_GUIDES) uniform writeonly uimage2D cm_guides_out;
@@ -44,7 +45,8 @@ void main() {
   float part = clamp(1.0 - mean.front.a, 0.0, 1.0);
   guides.finite = cm_is_within(mean.front.rgb, CM_SQUARABLE) && cm_is_within(mean.background, CM_SQUARABLE) &&
                   cm_is_within(mean.front.a, CM_SQUARABLE) && cm_is_within(emission, CM_SQUARABLE) &&
-                  cm_is_within(1e-15 * square, CM_SQUARABLE);
+                  cm_is_within(1e-15 * square, CM_SQUARABLE) && all(greaterThanEqual(texel, cm_box.xy)) &&
+                  all(lessThan(texel, cm_box.zw));
   // A sample is covered or it is not: of its square, what is behind can be taken off.
   float behind = cm_luminance(mean.background);
   float luminance = cm_luminance(front);

@@ -134,6 +134,7 @@ void App::frame() {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   viewport_ = Panel::viewport(model_, static_cast<double>(screen.x), static_cast<double>(screen.y), ui_scale_);
   handle(events);
+  if (const auto region = region_drag_.taken(viewport_)) std::ranges::copy(*region, model_.scene.sampling.region);
 
   model_.can_undo = history_->can_undo(model_.scene);
   model_.can_redo = history_->can_redo();
@@ -170,6 +171,8 @@ void App::frame() {
 
 void App::handle(const std::vector<Event>& events) {
   for (const Event& event : events) {
+    const bool over_picture = !ImGui::GetIO().WantCaptureMouse;
+    if (region_drag_.take(event, window_->input().x(), window_->input().y(), over_picture)) continue;
     switch (event.type) {
       case Event::Type::key:
         handle_key(event);
@@ -398,6 +401,12 @@ void App::execute(const Command& command) {
     case Action::end_here:
       if (model_.status.play) model_.scene.sequence.last = model_.status.play->frame();
       break;
+    case Action::draw_region:
+      region_drag_.arm();
+      break;
+    case Action::clear_region:
+      std::ranges::fill(model_.scene.sampling.region, 0.0f);
+      break;
     case Action::quit:
       quit_ = true;
       break;
@@ -405,6 +414,7 @@ void App::execute(const Command& command) {
 }
 
 void App::cancel() {
+  if (region_drag_.cancel()) return;
   if (model_.help)
     model_.help = false;
   else if (!model_.messages.empty())
@@ -690,6 +700,11 @@ bool App::draw() {
     behind.AddCallback(cover, gl_.get());
     behind.AddImage(texture, low, high, {0.0f, 1.0f}, {1.0f, 0.0f});
     behind.AddCallback(ImDrawCallback_ResetRenderState, nullptr);
+  }
+  if (const auto drawn = region_drag_.drawn()) {
+    const ImVec2 low(static_cast<float>(drawn->x), static_cast<float>(drawn->y));
+    const ImVec2 high(low.x + static_cast<float>(drawn->width), low.y + static_cast<float>(drawn->height));
+    ImGui::GetForegroundDrawList()->AddRect(low, high, IM_COL32(255, 160, 40, 255), 0.0f, 0, ui_scale_);
   }
   // A hand that drags moves sixty times a second, and on software drivers a window costs as much as a picture: what
   // would look as before is not drawn, and what changes beside the picture that a hand is at waits for the next one.

@@ -12,6 +12,7 @@
 #include "model.hpp"
 #include "panel.hpp"
 #include "preferences.hpp"
+#include "region_drag.hpp"
 #include "replay.hpp"
 #include "session.hpp"
 #include "window.hpp"
@@ -102,6 +103,7 @@ class App {
   Player::Order order_;
   float ui_scale_ = 0.0f;
   Rectangle viewport_;
+  RegionDrag region_drag_;
   unsigned viewport_buttons_ = 0;  // pressed in the picture, a bit each
   bool held_ = false;              // a change is still going on
   bool quit_ = false;

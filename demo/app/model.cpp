@@ -60,6 +60,8 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_PERIOD, 0, {Action::step, "", 1}, "", ""},
       {GLFW_KEY_I, 0, {Action::begin_here}, "I  O", "Play from this frame, to this frame"},
       {GLFW_KEY_O, 0, {Action::end_here}, "", ""},
+      {GLFW_KEY_B, ctrl, {Action::draw_region}, "Ctrl+B", "Make a part of the picture alone: drag it out"},
+      {GLFW_KEY_B, ctrl | modifier_alt, {Action::clear_region}, "Ctrl+Alt+B", "Make all of the picture"},
       {GLFW_KEY_LEFT_BRACKET, 0, {Action::darker}, "[  ]", "Exposure, a third of a stop"},
       {GLFW_KEY_RIGHT_BRACKET, 0, {Action::brighter}, "", ""},
       {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel"},

@@ -60,6 +60,8 @@ enum class Action {
   go_to,         // value: a frame's place in the row
   begin_here,    // the frame is the first that is played
   end_here,
+  draw_region,   // the next drag over the picture
+  clear_region,  // all of it is made
   quit
 };
 

@@ -81,6 +81,18 @@ bool Rows::draw(const settings::Facts& facts, float (&value)[3]) {
   return true;
 }
 
+bool Rows::draw(const settings::Facts& facts, float (&value)[4]) {
+  const settings::Row& row = facts.row;
+  if (!shown(row)) return false;
+  constexpr float a_pixel = 0.002f;
+  std::array<double, 4> numbers{};
+  std::ranges::copy(value, numbers.begin());
+  if (!ui_.numbers(row.label, row.tip, numbers, a_pixel)) return false;
+  std::ranges::transform(numbers, value,
+                         [&](double number) { return static_cast<float>(std::clamp(number, row.least, row.most)); });
+  return true;
+}
+
 bool Rows::choose(const settings::Facts& facts, int& value) {
   if (!shown(facts.row)) return false;
   std::vector<Choice> choices;

@@ -25,6 +25,8 @@ class Rows {
   bool draw(const settings::Facts& facts, double& value);
   /// A light's colour and strength, the largest of the three; or a colour alone.
   bool draw(const settings::Facts& facts, float (&value)[3]);
+  /// A rectangle's numbers.
+  bool draw(const settings::Facts& facts, float (&value)[4]);
   template <settings::Enumerated Enum>
   bool draw(const settings::Facts& facts, Enum& value) {
     int number = static_cast<int>(value);

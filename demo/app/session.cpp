@@ -818,7 +818,9 @@ void Session::execute(const Request& request) {
     } else {
       image::PngOptions png;
       png.tone_mapping = image::ToneMapping::none;
-      png.keep_alpha = scene_.display.background == CUMULET_BACKGROUND_TRANSPARENT;
+      const float(&region)[4] = scene_.sampling.region;
+      const bool part = std::ranges::any_of(region, [](float value) { return value != 0.0f; });
+      png.keep_alpha = part || scene_.display.background == CUMULET_BACKGROUND_TRANSPARENT;
       image::write_png(request.path, read_display(), png);
     }
     files_.push_back({request.path, Answer::File::Fate::saved});
@@ -840,8 +842,8 @@ void Session::write_exr(const std::string& path) {
                             CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
                             CUMULET_AOV_VELOCITY};
   const bool shaded = scene_.sampling.view == CUMULET_VIEW_SHADED;
-  demo::write_exr(viewer_.get(), path, width, height, {rgba}, std::span(aovs).first(shaded ? aovs.size() : 0),
-                  metadata_of(viewer_.get(), scene_, width, height));
+  demo::write_exr(viewer_.get(), path, windows_of(scene_.sampling.region, width, height), {rgba},
+                  std::span(aovs).first(shaded ? aovs.size() : 0), metadata_of(viewer_.get(), scene_, width, height));
 }
 
 image::Image Session::read_display() {

@@ -104,6 +104,23 @@ std::array<std::uint32_t, 2> size_of(const Imf::Header& header) {
   return {static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
 }
 
+/// Throws where they are none that write_exr writes.
+Windows windows_of(const Imf::Header& header) {
+  const auto [width, height] = size_of(header);
+  const Imath::Box2i& data = header.dataWindow();
+  const Imath::Box2i& whole = header.displayWindow();
+  if (!whole.intersects(data.min) || !whole.intersects(data.max) || whole.max.x - whole.min.x >= max_side ||
+      whole.max.y - whole.min.y >= max_side)
+    throw std::runtime_error("its data window is not within its display window");
+  const auto number = [](int value) { return static_cast<std::uint32_t>(value); };
+  return {width,
+          height,
+          number(data.min.x - whole.min.x),
+          number(data.min.y - whole.min.y),
+          number(whole.max.x - whole.min.x + 1),
+          number(whole.max.y - whole.min.y + 1)};
+}
+
 /// Calls read with the open file; gives what it gives. Throws, one line with the path.
 template <class Read>
 auto read_exr_file(const std::string& path, const Read& read) {
@@ -144,10 +161,16 @@ Pixels read_layer(const std::string& path, const LayerName& layer, std::span<con
 
 }  // namespace
 
-void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers,
+void write_exr(const std::string& path, const Windows& windows, std::span<const Layer> layers,
                std::span<const Attribute> attributes) {
-  check_size(path, width, height);
-  Imf::Header header(static_cast<int>(width), static_cast<int>(height));
+  const std::size_t width = windows.width;
+  const std::size_t height = windows.height;
+  check_size(path, windows.width, windows.height);
+  check_size(path, windows.whole_width, windows.whole_height);
+  const Imath::V2i first(static_cast<int>(windows.left), static_cast<int>(windows.top));
+  const Imath::V2i size(static_cast<int>(width), static_cast<int>(height));
+  Imf::Header header(static_cast<int>(windows.whole_width), static_cast<int>(windows.whole_height));
+  header.dataWindow() = {first, first + size - Imath::V2i(1)};
   header.compression() = Imf::ZIP_COMPRESSION;
   Imf::addChromaticities(header, Imf::Chromaticities());  // the default is Rec. 709
   for (const Attribute& attribute : attributes) insert(header, attribute);
@@ -157,9 +180,10 @@ void write_exr(const std::string& path, std::uint32_t width, std::uint32_t heigh
     if (layer.values.size() != channels * width * height)
       throw std::logic_error(path + ": the picture's size and the pixels of layer \"" + std::string(layer.name.name) +
                              "\" disagree");
-    // The library asks for a mutable pointer and only reads.
-    char* base = const_cast<char*>(reinterpret_cast<const char*>(layer.values.data()));
+    // The library asks for a mutable pointer and only reads. Its base is where pixel (0, 0) would be.
     const std::size_t stride = channels * sizeof(float);
+    const std::size_t origin = (windows.top * width + windows.left) * stride;
+    char* base = const_cast<char*>(reinterpret_cast<const char*>(layer.values.data())) - origin;
     for (std::size_t c = 0; c < channels; ++c) {
       const std::string name = full_name(layer.name, c);
       if (header.channels().findChannel(name) != nullptr)
@@ -186,8 +210,7 @@ void write_exr(const std::string& path, const Image& image) {
 
 Contents read_contents(const std::string& path) {
   return read_exr_file(path, [](const Imf::InputFile& file) {
-    const auto [width, height] = size_of(file.header());
-    Contents contents{width, height, {}, {}};
+    Contents contents{windows_of(file.header()), {}, {}};
     const Imf::ChannelList& channels = file.header().channels();
     for (auto channel = channels.begin(); channel != channels.end(); ++channel)
       contents.channels.emplace_back(channel.name());

@@ -47,16 +47,31 @@ struct Attribute {
   std::variant<std::string, float, double, std::array<float, 2>, std::array<double, 3>, std::array<float, 16>> value;
 };
 
+/// Where a file's pixels are: OpenEXR's data window, within its display window, which begins at 0.
+struct Windows {
+  std::uint32_t width = 0;  // of the pixels
+  std::uint32_t height = 0;
+  std::uint32_t left = 0;  // of the picture that they are of
+  std::uint32_t top = 0;
+  std::uint32_t whole_width = width;  // of that
+  std::uint32_t whole_height = height;
+  bool operator==(const Windows&) const = default;
+};
+
 /// OpenEXR, one part, scanlines, ZIP, 32-bit float channels with the layers' values untouched; Rec. 709 primaries.
 /// Replaces the file and throws as write_exr(path, image) does; std::logic_error for values that do not match the size,
 /// for two channels of one name and for a name that no attribute may have.
-void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers,
+void write_exr(const std::string& path, const Windows& windows, std::span<const Layer> layers,
                std::span<const Attribute> attributes = {});
+/// Of a whole picture.
+inline void write_exr(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const Layer> layers,
+                      std::span<const Attribute> attributes = {}) {
+  write_exr(path, Windows{width, height}, layers, attributes);
+}
 
 /// What a file says of its picture beside the pixels.
 struct Contents {
-  std::uint32_t width = 0;
-  std::uint32_t height = 0;
+  Windows windows;
   std::vector<std::string> channels;  // full names, in the order of their letters
   std::vector<Attribute> attributes;  // of the types that Attribute has; not those that OpenEXR itself needs
 };

@@ -72,10 +72,13 @@ void check_same(const Part& a, const Part& b, std::string_view name, const char*
 }
 
 void check_together(const Part& a, const Part& b) {
-  const auto size = [](const Part& part) {
-    return std::to_string(part.contents.width) + "x" + std::to_string(part.contents.height);
+  const image::Windows& of_a = a.contents.windows;
+  const image::Windows& of_b = b.contents.windows;
+  const auto size = [](const image::Windows& windows) {
+    return std::to_string(windows.width) + "x" + std::to_string(windows.height);
   };
-  if (size(a) != size(b)) refuse(b.path, "is of " + size(b) + " pixels, and " + a.path + " of " + size(a));
+  if (size(of_a) != size(of_b)) refuse(b.path, "is of " + size(of_b) + " pixels, and " + a.path + " of " + size(of_a));
+  if (of_a != of_b) refuse(b.path, "is of another region than " + a.path);
   check_same<std::string>(a, b, attributes::version, "another version of Cumulet");
   check_same<double>(a, b, attributes::seed, "another seed");
   check_same<std::string>(a, b, attributes::march, "another march");
@@ -116,7 +119,9 @@ bool has(const image::Contents& contents, const image::LayerName& layer) {
   });
 }
 
-std::size_t pixels_of(const Part& part) { return std::size_t{part.contents.width} * part.contents.height; }
+std::size_t pixels_of(const Part& part) {
+  return std::size_t{part.contents.windows.width} * part.contents.windows.height;
+}
 
 /// Means over all samples: those of the parts, weighed.
 std::vector<float> mean(const std::vector<Part>& parts, const image::LayerName& layer) {
@@ -220,7 +225,7 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
   std::vector<image::Layer> written;
   written.reserve(made.size());
   for (const auto& [name, values] : made) written.push_back({name, values});
-  image::write_exr(output, first.width, first.height, written, said);
+  image::write_exr(output, first.windows, written, said);
   return merged;
 }
 

@@ -30,25 +30,64 @@ image::LayerName layer_of(cumulet_aov aov) {
   return image::layers::beauty;
 }
 
-void write_exr(cumulet_viewer* viewer, const std::string& path, std::uint32_t width, std::uint32_t height,
+namespace {
+
+/// The region's pixels of a picture.
+std::vector<float> cut(const image::Windows& windows, std::span<const float> whole) {
+  const std::size_t channels = whole.size() / (std::size_t{windows.whole_width} * windows.whole_height);
+  std::vector<float> part;
+  part.reserve(channels * windows.width * windows.height);
+  for (std::size_t y = 0; y < windows.height; ++y) {
+    const std::size_t row = ((windows.top + y) * windows.whole_width + windows.left) * channels;
+    const std::span<const float> pixels = whole.subspan(row, channels * windows.width);
+    part.insert(part.end(), pixels.begin(), pixels.end());
+  }
+  return part;
+}
+
+}  // namespace
+
+image::Windows windows_of(const float (&region)[4], std::uint32_t width, std::uint32_t height) {
+  std::uint32_t pixels[4] = {};
+  if (cumulet_region_pixels(region, width, height, pixels) != CUMULET_OK)
+    throw std::logic_error("a region or a size that is none");
+  return {pixels[2], pixels[3], pixels[0], pixels[1], width, height};
+}
+
+void clear_around(const image::Windows& windows, std::span<std::uint8_t> rgba) {
+  for (std::size_t i = 0; i < rgba.size(); ++i) {
+    const std::size_t x = i / 4 % windows.whole_width;
+    const std::size_t y = i / 4 / windows.whole_width;
+    const bool inside =
+        x >= windows.left && x < windows.left + windows.width && y >= windows.top && y < windows.top + windows.height;
+    if (!inside) rgba[i] = 0;
+  }
+}
+
+void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Windows& windows,
                const WrittenPicture& picture, std::span<const cumulet_aov> aovs,
                std::span<const image::Attribute> attributes) {
   std::vector<std::vector<float>> values;
-  std::vector<image::Layer> layers{{image::layers::beauty, picture.beauty}};
-  if (!picture.denoised.empty()) layers.push_back({image::layers::denoised, picture.denoised});
-  values.reserve(aovs.size());
+  std::vector<image::Layer> layers;
+  values.reserve(2 + aovs.size());
+  const auto add = [&](const image::LayerName& name, std::span<const float> pixels) {
+    layers.push_back({name, values.emplace_back(cut(windows, pixels))});
+  };
+  add(image::layers::beauty, picture.beauty);
+  if (!picture.denoised.empty()) add(image::layers::denoised, picture.denoised);
+  std::vector<float> pixels;
   for (const cumulet_aov aov : aovs) {
     const image::LayerName name = layer_of(aov);
-    std::vector<float>& pixels = values.emplace_back(std::size_t{width} * height * name.channels.size());
+    pixels.resize(std::size_t{windows.whole_width} * windows.whole_height * name.channels.size());
     if (cumulet_read_aov(viewer, aov, pixels.data(), pixels.size()) != CUMULET_OK) {
       throw std::runtime_error(path + ": " + cumulet_last_error(viewer));
     }
     if (aov == CUMULET_AOV_SURFACE_DEPTH || aov == CUMULET_AOV_VOLUME_DEPTH) {
       for (float& z : pixels) z = std::isfinite(z) ? z : image::no_depth;
     }
-    layers.push_back({name, pixels});
+    add(name, pixels);
   }
-  image::write_exr(path, width, height, layers, attributes);
+  image::write_exr(path, windows, layers, attributes);
 }
 
 }  // namespace cumulet::demo

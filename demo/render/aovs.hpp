@@ -12,16 +12,21 @@ namespace cumulet::demo {
 /// What an AOV is called in a file.
 [[nodiscard]] image::LayerName layer_of(cumulet_aov aov);
 
-/// A picture's pixels, 4 floats each.
+/// A picture's pixels, 4 floats each; of a region as of the whole, which has the others as 0.
 struct WrittenPicture {
   std::span<const float> beauty;
   std::span<const float> denoised{};  ///< a layer beside it; empty: none
 };
 
-/// Writes an OpenEXR file of the picture that the viewer has, width x height, with a layer an AOV and with the
-/// attributes. Infinite depths become image::no_depth. Throws std::runtime_error, one line, for what the viewer
-/// refuses, and as image::write_exr.
-void write_exr(cumulet_viewer* viewer, const std::string& path, std::uint32_t width, std::uint32_t height,
+/// The pixels of a region (cumulet_region_pixels) of a picture, whose sizes and region are good.
+[[nodiscard]] image::Windows windows_of(const float (&region)[4], std::uint32_t width, std::uint32_t height);
+/// What is not of the region is made transparent.
+void clear_around(const image::Windows& windows, std::span<std::uint8_t> rgba);
+
+/// Writes an OpenEXR file of the picture that the viewer has, with a layer an AOV and with the attributes; its data
+/// window is the region. Infinite depths become image::no_depth. Throws std::runtime_error, one line, for what the
+/// viewer refuses, and as image::write_exr.
+void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Windows& windows,
                const WrittenPicture& picture, std::span<const cumulet_aov> aovs,
                std::span<const image::Attribute> attributes);
 

@@ -301,10 +301,13 @@ std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, c
 void write_picture(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised) {
   cumulet::image::Image image{options.scene.width, options.scene.height, {}};
   const std::size_t count = std::size_t{4} * image.width * image.height;
+  const cumulet::image::Windows windows =
+      cumulet::demo::windows_of(options.scene.sampling.region, image.width, image.height);
   if (options.format == OutputFormat::png) {
     std::vector<std::uint8_t> bytes(count);
     check(viewer, denoised.empty() ? cumulet_read_display(viewer.get(), bytes.data(), bytes.size())
                                    : cumulet_encode_display(viewer.get(), denoised.data(), bytes.data(), bytes.size()));
+    cumulet::demo::clear_around(windows, bytes);
     cumulet::image::write_png(options.output, image.width, image.height, bytes);
     return;
   }
@@ -316,8 +319,7 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const std
   image.rgba.resize(count);
   check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
   if (options.format == OutputFormat::exr) {
-    cumulet::demo::write_exr(viewer.get(), options.output, image.width, image.height, {image.rgba, denoised},
-                             options.aovs,
+    cumulet::demo::write_exr(viewer.get(), options.output, windows, {image.rgba, denoised}, options.aovs,
                              cumulet::demo::metadata_of(viewer.get(), options.scene, image.width, image.height));
   } else {
     cumulet::image::write_pfm(options.output, image);
@@ -549,8 +551,10 @@ class Studio {
   /// How the picture that is written ended. Throws if somebody stopped it.
   void tell_end(const RenderOptions& options, Traced traced) {
     const cumulet_stats stats = stats_of(viewer_);
-    const double pixels = static_cast<double>(options.scene.width) * options.scene.height;
     const cumulet_sampling_desc& sampling = options.scene.sampling;
+    const cumulet::image::Windows windows =
+        cumulet::demo::windows_of(sampling.region, options.scene.width, options.scene.height);
+    const double pixels = static_cast<double>(windows.width) * windows.height;
     if (traced == Traced::stopped) {
       std::array<char, 128> text{};
       std::snprintf(text.data(), text.size(), "%llu of %.0f samples", static_cast<unsigned long long>(stats.samples),

@@ -12,6 +12,8 @@
 #include <string_view>
 #include <utility>
 
+#include "aovs.hpp"
+
 namespace cumulet::demo {
 
 namespace {
@@ -77,7 +79,8 @@ std::vector<image::Attribute> metadata_of(cumulet_viewer* viewer, const SceneOpt
   cumulet_stats stats{};
   stats.struct_size = sizeof stats;
   check(viewer, cumulet_get_stats(viewer, &stats));
-  const double samples = static_cast<double>(stats.samples) / (double(width) * height);
+  const image::Windows windows = windows_of(scene.sampling.region, width, height);
+  const double samples = static_cast<double>(stats.samples) / (double(windows.width) * windows.height);
 
   std::vector<image::Attribute> attributes = camera_metadata(view.data(), projection.data());
   const auto add = [&attributes](std::string_view name, auto value) {

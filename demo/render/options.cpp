@@ -123,6 +123,16 @@ void parse_triple(const settings::Setting<Desc, Value>& setting, const std::stri
     value[i] = static_cast<std::remove_extent_t<Value>>(complement ? 1.0 - given[i] : given[i]);
 }
 
+/// x, y, width and height that the field can hold.
+template <class Desc, class Value>
+void parse_rectangle(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
+  const std::vector<double> given = parse_numbers(text, 4);
+  for (const double number : given)
+    if (!setting.given_range().holds(number))
+      throw UsageError(in_quotes(text) + " has a number that " + setting.given_range().refusal());
+  std::ranges::transform(given, value, [](double number) { return static_cast<std::remove_extent_t<Value>>(number); });
+}
+
 template <class Desc, class Value>
 void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc, Value>& setting, Value& value,
                  const TakeWord& take_word) {
@@ -149,6 +159,8 @@ void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc,
     });
   } else if constexpr (settings::Real<Value>) {
     add_parsed([&value, setting](const std::string& text) { value = parse_real(setting, text); });
+  } else if constexpr (settings::Rectangle<Value>) {
+    add_parsed([&value, setting](const std::string& text) { parse_rectangle(setting, text, value); });
   } else {
     add_parsed([&value, setting](const std::string& text) { parse_triple(setting, text, value); });
   }

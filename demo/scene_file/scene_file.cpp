@@ -362,6 +362,8 @@ void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting,
   } else if constexpr (settings::Real<Value>) {
     const bool given = reader.number(key, value, range);
     if (given && setting.spelling == Spelling::zero_is_negative && value == 0.0) value = -1.0;
+  } else if constexpr (settings::Rectangle<Value>) {
+    reader.numbers(key, std::span<float>(value), "four numbers", range);
   } else if (setting.spelling == Spelling::complement) {
     double complement[3];
     if (!reader.three(key, complement, range)) return;
@@ -570,6 +572,11 @@ std::optional<Json> json_of(const settings::Setting<Desc, Value>& setting, const
     return name_of(setting.choices, value);
   } else if constexpr (settings::Switch<Value>) {
     return value != 0;
+  } else if constexpr (settings::Rectangle<Value>) {
+    Json numbers = Json::array();
+    for (const float number : value) numbers.push_back(shortest(number));
+    if (std::ranges::all_of(value, [](float number) { return number == 0.0f; })) return std::nullopt;
+    return numbers;
   } else if constexpr (settings::Triple<Value>) {
     if (setting.zero != 0.0 && settings::all_zero(value)) return std::nullopt;
     const bool complement = setting.spelling == Spelling::complement;

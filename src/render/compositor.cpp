@@ -284,6 +284,14 @@ void Compositor::aim(const FrameTarget& target, const Display& display) const {
   const glm::vec4 viewport(target.viewport);
   gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target.framebuffer);
   gl.ViewportIndexedf(0, viewport.x, viewport.y, viewport.z, viewport.w);
+  if (!target.region.is_whole()) {
+    const PixelBox box = target.region.pixels({target.viewport.z, target.viewport.w});
+    const glm::ivec2 first(box.first);
+    const glm::ivec2 size(box.size);
+    const int bottom = target.flip_y ? first.y : target.viewport.w - first.y - size.y;
+    gl.Enablei(GL_SCISSOR_TEST, 0);
+    gl.ScissorIndexed(0, target.viewport.x + first.x, target.viewport.y + bottom, size.x, size.y);
+  }
   if (display.encoding == ColourEncoding::srgb_framebuffer) {
     gl.Enable(GL_FRAMEBUFFER_SRGB);
   } else {
@@ -420,6 +428,7 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
     draw_colour({means, shown, layered}, picture, display, target);
   }
   if (target.write_depth && picture.volume_z != 0) draw_depth(picture, target);
+  if (!target.region.is_whole()) gl.Disablei(GL_SCISSOR_TEST, 0);
   if (resolved && gl.dispatches_in_call) means->drawn = gl::Fence(gl_);
   draw_ms_ += 0.3 * (milliseconds(Clock::now() - begun) - draw_ms_);
   gl::check(gl, "drawing the picture");

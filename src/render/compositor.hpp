@@ -12,6 +12,7 @@
 #include "gl/programs.hpp"
 #include "render/display.hpp"
 #include "render/picture_textures.hpp"
+#include "render/region.hpp"
 #include "render/wavelet.hpp"
 
 namespace cumulet::render {
@@ -26,6 +27,7 @@ enum class Wait {
 struct FrameTarget {
   GLuint framebuffer = 0;
   glm::ivec4 viewport{0};  // as glViewport
+  Region region;           // of it, that is drawn: the rest stays as it is
   bool flip_y = false;     // true: the picture's top row at y = 0
   bool blend_over = true;
   Wait wait = Wait::to_show;
@@ -121,7 +123,7 @@ class Compositor {
     const gl::Program* program = nullptr;
     bool layered = false;
   };
-  // A rectangle of a framebuffer, and how it takes colours.
+  // A rectangle of a framebuffer, and how it takes colours; with a region, until the draw ends nothing else is written.
   void aim(const FrameTarget& target, const Display& display) const;
   static void place(const gl::Functions& gl, const gl::Program& program, const FrameTarget& target);
   void draw_colour(const Shown& shown, const PictureTextures& picture, const Display& display,

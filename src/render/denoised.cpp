@@ -15,7 +15,7 @@ constexpr double step_multiply_adds = 2e9;
 gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const Picture& picture,
                     const Denoising& denoising) {
   const gl::DebugGroup group(*gl, "cumulet: denoised picture");
-  const glm::uvec2 size = picture.size();
+  const glm::uvec2 size = picture.box().size;
   const auto make = [&](const char* what) {
     return gl::make_texture_2d(gl, GL_RGBA32F, static_cast<int>(size.x), static_cast<int>(size.y), what);
   };
@@ -43,7 +43,9 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   write(core::CM_IMAGE_GUIDE_ALBEDO, albedo);
   write(core::CM_IMAGE_GUIDE_NORMAL, normal);
   const glm::vec3 medium = denoising.medium_albedo;
+  const glm::ivec2 first(picture.box().first);
   gl->ProgramUniform3f(program.name(), 0, medium.x, medium.y, medium.z);
+  gl->ProgramUniform2i(program.name(), 1, first.x, first.y);
   program.use(*gl);
   gl->DispatchCompute((size.x + 7) / 8, (size.y + 7) / 8, 1);
   gl::memory_barrier(*gl, GL_TEXTURE_FETCH_BARRIER_BIT);

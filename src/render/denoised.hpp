@@ -14,9 +14,9 @@ struct Denoising {
   std::uint64_t most_bytes = 0;   ///< of denoise::Denoiser's buffers
 };
 
-/// Its radiance denoised, and its alpha as it is: GL_RGBA32F, row 0 the top. The picture has its facts
-/// (Tracer::find_facts). Waits for the driver's compiler, never for the device. Needs the context current and a
-/// StateGuard around. Throws Error(out_of_memory, gl).
+/// Its radiance denoised, and its alpha as it is: GL_RGBA32F, of the size of its box, row 0 the top. The picture has
+/// its facts (Tracer::find_facts). Waits for the driver's compiler, never for the device. Needs the context current and
+/// a StateGuard around. Throws Error(out_of_memory, gl).
 gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs, const Picture& picture,
                     const Denoising& denoising);
 

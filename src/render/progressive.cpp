@@ -52,6 +52,7 @@ bool PictureWish::Content::shows_same(const Content& other) const {
   seen.host_depth = host_depth;
   seen.programs = programs;
   seen.size = size;
+  seen.region = region;
   seen.preview = preview;
   seen.volume_alone = volume_alone;
   seen.stops_by_noise = stops_by_noise;
@@ -68,16 +69,23 @@ std::uint32_t Progressive::enough(std::uint32_t divisor) const {
 
 glm::uvec2 Progressive::size_of(std::uint32_t divisor) const { return (wish_.content.size + divisor - 1U) / divisor; }
 
+double Progressive::pixels_of(std::uint32_t divisor) const {
+  return static_cast<double>(wish_.content.region.pixels(size_of(divisor), margin_of(divisor)).area());
+}
+
+unsigned Progressive::margin_of(std::uint32_t divisor) const {
+  return divisor > 1 && !wish_.content.region.is_whole() ? 1 : 0;
+}
+
 bool Progressive::is_enough() const {
   const Picture& picture = *working_->picture;
-  const glm::u64vec2 size(picture.size());
-  const auto wanted = static_cast<double>(size.x * size.y * picture.target_samples());
+  const auto wanted = static_cast<double>(picture.box().area() * picture.target_samples());
   return picture.done() || (picture.complete() && static_cast<double>(picture.samples()) >= nearly_all * wanted);
 }
 
 std::uint32_t Progressive::coarsest(double budget_ms) const {
   if (!wish_.content.preview) return 1;
-  const double pixels = double(wish_.content.size.x) * wish_.content.size.y;
+  const double pixels = pixels_of(1);
   std::uint32_t divisor = finest_;
   while (divisor < coarsest_divisor && pixels / (double(divisor) * divisor) > answer_frames * answer_rate_ * budget_ms)
     divisor *= 2;
@@ -120,6 +128,8 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Obstacles& ob
   }
   settings.view = wish_.content.view;
   settings.hasty = wish_.content.preview;
+  settings.region = wish_.content.region;
+  settings.margin = margin_of(divisor);
   settings.volume_alone = wish_.content.volume_alone && divisor == finest_;
   if (divisor == finest_) settings.noise_target = wish_.noise_target;
   return settings;
@@ -271,8 +281,8 @@ void Progressive::work(const MarchData& data, const Obstacles& obstacles, Deadli
   if (!was_complete) answer_seconds_ += seconds;
   if (picture.complete()) {
     if (!was_complete && wish_.content.view == View::shaded) {
-      const glm::dvec2 size(picture.size());
-      answer_rate_ += 0.3 * (size.x * size.y / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
+      const auto pixels = static_cast<double>(picture.box().area());
+      answer_rate_ += 0.3 * (pixels / std::max(1e-5, 1e3 * answer_seconds_) - answer_rate_);
     }
     if (shown() != &picture) before_ = shown_ ? shown_->picture : nullptr;
     shown_ = working_;
@@ -319,8 +329,7 @@ double Progressive::progress() const {
   double all = 0.0;
   double done = 0.0;
   for (std::uint32_t divisor = std::max(first_divisor_, working_->divisor); divisor >= finest_; divisor /= 2) {
-    const glm::dvec2 size(size_of(divisor));
-    const double work = size.x * size.y * enough(divisor);
+    const double work = pixels_of(divisor) * enough(divisor);
     all += work;
     if (divisor > working_->divisor) done += work;
     if (divisor == working_->divisor) done += work * std::min(1.0, working_->picture->progress());

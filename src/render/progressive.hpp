@@ -35,6 +35,7 @@ struct PictureWish {
     Revision<gl::Programs> programs;
     core::CmIntegrator integrator{};
     glm::uvec2 size{0U};  // full resolution
+    Region region;        // that is made of it
     View view = View::shaded;
     bool surfaces_traced = true;  // paths meet triangles
     bool preview = true;          // coarse first; else at full resolution only
@@ -121,6 +122,9 @@ class Progressive {
   // Samples a pixel of a picture with that divisor that take it to the next.
   [[nodiscard]] std::uint32_t enough(std::uint32_t divisor) const;
   [[nodiscard]] glm::uvec2 size_of(std::uint32_t divisor) const;
+  // That are made of a picture with that divisor; and how many beyond the region, for those that are enlarged.
+  [[nodiscard]] double pixels_of(std::uint32_t divisor) const;
+  [[nodiscard]] unsigned margin_of(std::uint32_t divisor) const;
   [[nodiscard]] bool is_enough() const;
   // A picture, and what it is of.
   struct Work {

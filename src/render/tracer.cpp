@@ -46,6 +46,19 @@ void describe(const Obstacles& obstacles, core::CmParameters& parameters) {
   parameters.lamps.count = obstacles.lamps_met();
 }
 
+// How a layer goes to and fro.
+struct Transfer {
+  GLenum format;
+  GLenum type;
+};
+
+Transfer transfer_of(const FilmLayer& layer) {
+  if (layer.format == GL_RGBA32F) return {GL_RGBA, GL_FLOAT};
+  if (layer.format == GL_RG32UI) return {GL_RG_INTEGER, GL_UNSIGNED_INT};
+  if (layer.format == GL_RG32F) return {GL_RG, GL_FLOAT};
+  return {GL_RED, GL_FLOAT};
+}
+
 constexpr const char* noise_kernel = "noise.comp";
 constexpr const char* channels_macro = "CM_CHANNELS 1";
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
@@ -73,8 +86,9 @@ core::CmParameters assemble(const PictureParameters& picture, const Obstacles& o
 
 double Picture::progress() const {
   if (done_) return 1.0;
-  if (view_ != View::shaded) return size_.y > 0 ? double(view_row_) / size_.y : 0.0;
-  const double wanted = double(expected_samples_) * size_.x * size_.y - static_cast<double>(samples_before_);
+  if (view_ != View::shaded) return box_.size.y > 0 ? double(view_row_) / box_.size.y : 0.0;
+  const double wanted =
+      double(expected_samples_) * static_cast<double>(box_.area()) - static_cast<double>(samples_before_);
   const double part = wanted > 0.0 ? static_cast<double>(samples() - samples_before_) / wanted : 0.0;
   // Of noise nobody knows when it will be low enough.
   return progress_before_ + (1.0 - progress_before_) * std::min(noise_target_ ? nearly_done : 1.0, part);
@@ -205,7 +219,7 @@ void Picture::end_pass() {
   ++pass_;
   const ErrorSums error = std::exchange(pass_error_, {});
   // Not where a noise target came in the middle of the pass: of some tiles only.
-  if (measures() && error.pixels == double(size_.x) * size_.y) {
+  if (measures() && error.pixels == static_cast<double>(box_.area())) {
     const double noise = error.noise();
     noise_ = noise;
     progress_before_ = progress();
@@ -379,8 +393,12 @@ void Tracer::empty(Picture& picture, const glm::vec3& background, std::uint32_t 
     const glm::vec4 zero(0.0F);
     const glm::vec4 behind(background, 0.0F);
     const glm::uvec2 count(samples, 0U);
+    const glm::ivec2 first(picture.box_.first);
+    const glm::ivec2 extent(picture.box_.size);
+    const GLuint layer = film.texture(film_layers::background);
     gl_->ClearTexImage(film.texture(film_layers::radiance), 0, GL_RGBA, GL_FLOAT, &zero);
-    gl_->ClearTexImage(film.texture(film_layers::background), 0, GL_RGBA, GL_FLOAT, &behind);
+    gl_->ClearTexImage(layer, 0, GL_RGBA, GL_FLOAT, &zero);
+    gl_->ClearTexSubImage(layer, 0, first.x, first.y, 0, extent.x, extent.y, 1, GL_RGBA, GL_FLOAT, &behind);
     gl_->ClearTexImage(film.texture(film_layers::moments), 0, GL_RED, GL_FLOAT, &zero);
     gl_->ClearTexImage(film.texture(film_layers::counts), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &count);
     if (picture.volume_alone_) gl_->ClearTexImage(film.texture(film_layers::volume), 0, GL_RGBA, GL_FLOAT, &zero);
@@ -453,10 +471,13 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   const glm::uvec2 size = parameters.view.size;
   const bool shaded = settings.view == View::shaded;
   make_shared_objects();
-  const glm::uvec2 tile = glm::min(size, glm::uvec2(tile_edge));
+  const PixelBox box = settings.region.pixels(size, settings.margin);
+  const glm::uvec2 tile = glm::min(box.size, glm::uvec2(tile_edge));
   const std::size_t lanes = std::size_t{tile.x} * tile.y;
   picture.complete_ = false;
   picture.size_ = size;
+  picture.region_ = settings.region;
+  picture.box_ = box;
   picture.film_.begin(size);
   classify(picture, parameters, obstacles, settings);
   if (picture.layered_ != Layered::no) {
@@ -478,7 +499,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   }
   if (!shaded) picture.parameters_.dispatch.view = static_cast<std::uint32_t>(settings.view);
   picture.tile_size_ = tile;
-  picture.tiles_ = (size + tile - 1U) / tile;
+  picture.tiles_ = (box.size + tile - 1U) / tile;
   picture.tile_ = 0;
   picture.hasty_ = settings.hasty;
   picture.pass_ = 0;
@@ -503,6 +524,8 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
 
 void Tracer::clear(Picture& picture) {
   picture.size_ = glm::uvec2(1U);
+  picture.region_ = {};
+  picture.box_ = {glm::uvec2(0U), picture.size_};
   picture.film_.begin(picture.size_);
   picture.layered_ = Layered::no;
   picture.layers_.reset();
@@ -625,7 +648,7 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
     picture.revision_ = ++revision_;
     picture.done_ = picture.complete_ = inspect(picture, parameters, program, picture.view_row_, deadline);
     picture.holes_ = !picture.done_;
-    *picture.samples_ = std::uint64_t{picture.size_.x} * std::min(picture.view_row_, picture.size_.y);
+    *picture.samples_ = std::uint64_t{picture.box_.size.x} * std::min(picture.view_row_, picture.box_.size.y);
     return picture.done_;
   }
   std::optional<StagePrograms> stages;
@@ -728,17 +751,27 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
 bool Tracer::inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program,
                      std::uint32_t& row, Deadline deadline) {
   core::CmParameters p = parameters;
-  p.dispatch.tile_size = picture.size_;
+  const glm::uvec2 size = picture.box_.size;
+  p.dispatch.tile_corner = picture.box_.first;
+  p.dispatch.tile_size = size;
   const auto send = [&](glm::uvec2 rows) {
     p.dispatch.rows = rows;
     gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(p), &p);
-    gl_->DispatchCompute((picture.size_.x + 7) / 8, (rows.y - rows.x + 7) / 8, 1);
+    gl_->DispatchCompute((size.x + 7) / 8, (rows.y - rows.x + 7) / 8, 1);
   };
-  send_rows(flights_, program.cost, picture.size_, row, deadline, send, [&] { collect(); });
+  send_rows(flights_, program.cost, size, row, deadline, send, [&] { collect(); });
   gl::memory_barrier(*gl_, GL_TEXTURE_FETCH_BARRIER_BIT | GL_TEXTURE_UPDATE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT |
                                GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
   gl::check(*gl_, "looking at the pixels");
-  return row >= picture.size_.y;
+  return row >= size.y;
+}
+
+void Tracer::empty_around(const Picture& picture, std::span<const FilmLayer> layers) const {
+  if (picture.box_.size == picture.size_) return;
+  for (const FilmLayer& layer : layers) {
+    const Transfer transfer = transfer_of(layer);
+    gl_->ClearTexImage(picture.film_.texture(layer), 0, transfer.format, transfer.type, nullptr);
+  }
 }
 
 bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline) {
@@ -756,6 +789,7 @@ bool Tracer::trace_depth(Picture& picture, const MarchData& data, const Obstacle
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
     parameters.dispatch.view = view_depth;
+    if (picture.depth_row_ == 0) empty_around(picture, std::array{film_layers::depth});
     return inspect(picture, parameters, program, picture.depth_row_, until);
   };
   return run(gl_, picture.film_, {"cumulet: depth", {}, {film_layers::depth}, work}, deadline);
@@ -774,9 +808,11 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
     picture.facts_rays_ = std::max(picture.facts_rays_, rays);
     picture.facts_ = std::max(picture.facts_, facts);
     picture.facts_row_ = 0;
-  } else if (picture.facts_row_ >= picture.size_.y && picture.film_.has(normal)) {
+  } else if (picture.facts_row_ >= picture.box_.size.y && picture.film_.has(normal)) {
     return true;
   }
+  std::vector<FilmLayer> written{normal, albedo, transmittance, surface_z, volume_z, emission};
+  if (picture.facts_ == PixelFacts::all) written.push_back(velocity);
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
     flights_.order();
@@ -793,11 +829,10 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
     parameters.dispatch.samples = picture.facts_rays_;
+    if (picture.facts_row_ == 0) empty_around(picture, written);
     return inspect(picture, parameters, program, picture.facts_row_, until);
   };
-  Pass pass{"cumulet: facts", {}, {normal, albedo, transmittance, surface_z, volume_z, emission}, work};
-  if (picture.facts_ == PixelFacts::all) pass.writes.push_back(velocity);
-  return run(gl_, picture.film_, pass, deadline);
+  return run(gl_, picture.film_, {"cumulet: facts", {}, written, work}, deadline);
 }
 
 void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) const {
@@ -881,24 +916,25 @@ namespace {
 /// What stands before the layers that were saved.
 struct SavedHeader {
   std::uint32_t what = 0x41434d43;  // "CMCA"
-  std::uint32_t format = 1;
+  std::uint32_t format = 2;
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::uint32_t layers = 0;
-  std::array<std::uint32_t, 3> spare{};
+  std::array<std::uint16_t, 4> box{};  // x, y, width and height of the pixels that are made
+  std::uint32_t spare = 0;
   bool operator==(const SavedHeader&) const = default;
 };
 static_assert(sizeof(SavedHeader) == 32);
 
-struct Transfer {
-  GLenum format;
-  GLenum type;
-};
-
-Transfer transfer_of(const FilmLayer& layer) {
-  if (layer.format == GL_RGBA32F) return {GL_RGBA, GL_FLOAT};
-  if (layer.format == GL_RG32UI) return {GL_RG_INTEGER, GL_UNSIGNED_INT};
-  return {GL_RED, GL_FLOAT};
+SavedHeader header_of(const Picture& picture, std::size_t layers) {
+  const glm::u16vec2 first(picture.box().first);
+  const glm::u16vec2 extent(picture.box().size);
+  SavedHeader header;
+  header.width = picture.size().x;
+  header.height = picture.size().y;
+  header.layers = static_cast<std::uint32_t>(layers);
+  header.box = {first.x, first.y, extent.x, extent.y};
+  return header;
 }
 
 }  // namespace
@@ -920,10 +956,7 @@ std::size_t Tracer::saved_bytes(const Picture& picture) {
 }
 
 void Tracer::save(const Picture& picture, std::span<std::byte> bytes) const {
-  SavedHeader header;
-  header.width = picture.size_.x;
-  header.height = picture.size_.y;
-  header.layers = static_cast<std::uint32_t>(accumulated(picture).size());
+  const SavedHeader header = header_of(picture, accumulated(picture).size());
   std::memcpy(bytes.data(), &header, sizeof header);
   for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t size) {
     const Transfer transfer = transfer_of(layer);
@@ -934,23 +967,24 @@ void Tracer::save(const Picture& picture, std::span<std::byte> bytes) const {
 }
 
 void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
-  SavedHeader wanted;
-  wanted.width = picture.size_.x;
-  wanted.height = picture.size_.y;
-  wanted.layers = static_cast<std::uint32_t>(accumulated(picture).size());
+  const SavedHeader wanted = header_of(picture, accumulated(picture).size());
   SavedHeader header;
   if (saved.size() >= sizeof header) std::memcpy(&header, saved.data(), sizeof header);
   if (saved.size() != saved_bytes(picture) || header != wanted)
-    throw Error(ErrorCode::invalid_argument, "these bytes are no accumulation of a picture of this size");
+    throw Error(ErrorCode::invalid_argument, "these bytes are no accumulation of a picture of this size and region");
   std::vector<glm::uvec2> counts(std::size_t{picture.size_.x} * picture.size_.y);
   for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t size) {
     if (layer == film_layers::counts) std::memcpy(counts.data(), saved.data() + at, size);
   });
   Accumulated told;
-  for (const glm::uvec2& count : counts) {
-    told.least = std::min(told.least, count.x);
-    told.most = std::max(told.most, count.x);
-    told.all += count.x;
+  const PixelBox& box = picture.box_;
+  for (std::uint32_t y = box.first.y; y < box.first.y + box.size.y; ++y) {
+    for (std::uint32_t x = box.first.x; x < box.first.x + box.size.x; ++x) {
+      const std::uint32_t count = counts[std::size_t{y} * picture.size_.x + x].x;
+      told.least = std::min(told.least, count);
+      told.most = std::max(told.most, count);
+      told.all += count;
+    }
   }
   if (told.most > picture.target_samples_) {
     throw Error(ErrorCode::invalid_argument, "the accumulation has pixels of " + std::to_string(told.most) +

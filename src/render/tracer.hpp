@@ -22,6 +22,7 @@
 #include "render/parameters.hpp"
 #include "render/pass_timer.hpp"
 #include "render/path_kernels.hpp"
+#include "render/region.hpp"
 #include "render/surface_raster.hpp"
 
 namespace cumulet::render {
@@ -74,6 +75,9 @@ struct PictureSettings {
   bool volume_alone = false;
   /// The picture is done once its noise (Totals::noise) is no more than this; none: once it has its samples.
   std::optional<double> noise_target;
+  /// The part of it that is made, and so many pixels around that. What follows is of this part.
+  Region region;
+  unsigned margin = 0;
 };
 
 /// What is known of a pixel without light: glsl/aovs.comp says of each what it is.
@@ -104,6 +108,9 @@ struct Accumulated {
 class Picture {
  public:
   [[nodiscard]] glm::uvec2 size() const { return size_; }
+  /// The part of it that is made, and its pixels: others have no samples.
+  [[nodiscard]] const Region& region() const { return region_; }
+  [[nodiscard]] const PixelBox& box() const { return box_; }
   [[nodiscard]] const core::CmParameters& parameters() const { return parameters_; }
   /// That each pixel shall have.
   [[nodiscard]] std::uint32_t target_samples() const { return target_samples_; }
@@ -145,6 +152,8 @@ class Picture {
   std::uint32_t target_samples_ = 1;
   View view_ = View::shaded;
   glm::uvec2 size_{0U};
+  Region region_;
+  PixelBox box_;
   Film film_;
   std::uint64_t begun_ = 0;
   std::uint64_t revision_ = 0;
@@ -159,8 +168,10 @@ class Picture {
   bool equiangular_ = false;  // and from points of flights
   bool several_ = false;      // volumes
   bool rich_ = false;         // materials that need CM_RICH
-  [[nodiscard]] glm::uvec2 tile_corner() const { return glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_; }
-  [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, size_ - tile_corner()); }
+  [[nodiscard]] glm::uvec2 tile_corner() const {
+    return box_.first + glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_;
+  }
+  [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, box_.first + box_.size - tile_corner()); }
   // Samples of each pixel after a pass that ends with so many.
   [[nodiscard]] std::uint32_t pass_after(std::uint32_t samples) const;
   // Whether the pass under way ends with a look at the noise.
@@ -323,6 +334,8 @@ class Tracer {
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);
   void make_shared_objects();
+  // What a pass by rows will write is 0 where it does not come to.
+  void empty_around(const Picture& picture, std::span<const FilmLayer> layers) const;
   // The pass that empties what samples are added to, and what all is that.
   void empty(Picture& picture, const glm::vec3& background, std::uint32_t samples);
   static std::vector<FilmLayer> accumulated(const Picture& picture);

@@ -21,6 +21,7 @@ constexpr std::uint64_t bytes_a_pixel = 112;
 constexpr GLint rows_at = 0;
 constexpr GLint footprint_at = 2;
 constexpr GLint own_at = 3;        // surfaces, or the level's stride
+constexpr GLint box_at = 4;        // wavelet_input.comp
 constexpr GLint most_at = 3;       // wavelet_merge.comp
 constexpr GLint to_before_at = 3;  // wavelet_reproject.comp
 constexpr GLint moved_at = 4;
@@ -237,6 +238,9 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_VOLUME_Z, guides.volume_z);
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_EMISSION, guides.emission);
     gl.ProgramUniform1f(program.name(), own_at, guides.surfaces ? 1.0F : 0.0F);
+    const glm::ivec2 first(picture.box.first);
+    const glm::ivec2 end(picture.box.first + picture.box.size);
+    gl.ProgramUniform4i(program.name(), box_at, first.x, first.y, end.x, end.y);
     write(core::CM_IMAGE_WAVELET_GUIDES, guides_, GL_RGBA32UI);
   } else {
     if (stage_ == Stage::reproject || stage_ == Stage::merge) bind_history(picture, program);

@@ -126,7 +126,12 @@ concept Count = std::unsigned_integral<Value>;
 template <class Value>
 concept Real = std::floating_point<Value>;
 template <class Value>
-concept Triple = std::is_array_v<Value>;
+concept Triple = std::is_array_v<Value> && std::extent_v<Value>
+== 3;
+/// x, y, width, height; a width or height of 0 reaches to the end.
+template <class Value>
+concept Rectangle = std::is_array_v<Value> && std::extent_v<Value>
+== 4;
 
 /// Whether all three are 0.
 template <class Three>
@@ -161,7 +166,7 @@ template <class Desc>
   for_each<Desc>([&](const auto& setting) {
     const auto& x = a.*setting.field;
     const auto& y = b.*setting.field;
-    if constexpr (Triple<std::remove_cvref_t<decltype(x)>>) {
+    if constexpr (std::is_array_v<std::remove_cvref_t<decltype(x)>>) {
       for (std::size_t i = 0; i < std::size(x); ++i) all = all && x[i] == y[i];
     } else {
       all = all && x == y;

@@ -428,7 +428,15 @@ struct Table<cumulet_sampling_desc> {
                 .tip = "The picture, or a look at the grid that makes it (keys 1 to 5)."}}),
       Setting(&Desc::preview, {.name = "preview", .choices = preview_choices}),
       Setting(&Desc::volume_alone, {.name = "volume_alone"}),
-      Setting(&Desc::first_sample, {.name = "first_sample"})};
+      Setting(&Desc::first_sample, {.name = "first_sample"}),
+      Setting(&Desc::region, {.name = "region", .range = {0.0, 1.0},
+        .key = "picture.region", .flag = "--region", .type = "X,Y,W,H",
+        .help = "Make only this part of the picture, in fractions of it from its upper left; W or H 0: to its end "
+                "(default: 0,0,0,0, all of it)",
+        .row = {.label = "Region",
+                .tip = "The part of the picture that is made: left, top, width, height, as fractions (Ctrl+B, and "
+                       "drag). Width or height 0: to the end.",
+                .most = 1.0, .format = "%.3f"}})};
 };
 
 template <>

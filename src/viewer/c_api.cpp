@@ -431,6 +431,20 @@ cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampli
   return guarded(viewer, [&](core::Viewer& v) { v.set_sampling(core::Sampling::of(read_settings(desc))); });
 }
 
+cumulet_status cumulet_region_pixels(const float region[4], uint32_t width, uint32_t height, uint32_t pixels[4]) {
+  if (region == nullptr || pixels == nullptr || width == 0 || height == 0 || width > 16384 || height > 16384)
+    return CUMULET_ERROR_INVALID_ARGUMENT;
+  if (!std::all_of(region, region + 4, [](float value) { return in_range(value, 0.0, 1.0); }))
+    return CUMULET_ERROR_INVALID_ARGUMENT;
+  const render::Region of{{region[0], region[1]}, {region[2], region[3]}};
+  const render::PixelBox box = of.pixels({width, height});
+  for (int axis = 0; axis < 2; ++axis) {
+    pixels[axis] = box.first[axis];
+    pixels[2 + axis] = box.size[axis];
+  }
+  return CUMULET_OK;
+}
+
 cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc) {
   return guarded(viewer, [&](core::Viewer& v) { v.set_display(core::DisplaySettings::of(read_settings(desc))); });
 }

@@ -19,7 +19,7 @@ std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& d
     return std::ranges::any_of(setting.choices, is) ? "" : "is unknown";
   } else if constexpr (settings::Switch<Value>) {
     return value == 0 || value == 1 ? "" : "is not 0 or 1";
-  } else if constexpr (settings::Triple<Value>) {
+  } else if constexpr (settings::Triple<Value> || settings::Rectangle<Value>) {
     const bool holds = std::ranges::all_of(value, [&](auto v) { return setting.range.holds(v); });
     const bool light = setting.range.most == settings::light_range.most;
     return holds ? "" : (light ? "is negative or not finite" : setting.range.refusal());

@@ -144,6 +144,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.content.programs = programs_->revision();
   wish.content.integrator = wish.parameters.integrator;
   wish.content.size = shot.size;
+  wish.content.region = shot.sampling.region;
   wish.content.view = shot.sampling.view;
   wish.content.surfaces_traced = met.traced;
   wish.content.preview = shot.sampling.preview;
@@ -242,6 +243,7 @@ render::PictureTextures Context::textures_of(const render::Picture& picture, con
   textures.background = film.texture(render::film_layers::background);
   textures.counts = film.texture(render::film_layers::counts);
   textures.size = picture.size();
+  textures.box = picture.box();
   textures.holes = picture.has_holes();
   if (film.has(render::film_layers::depth)) textures.volume_z = film.texture(render::film_layers::depth);
   textures.picture = picture.begun();
@@ -300,10 +302,11 @@ render::Display Context::display(const Shot& shot, const Frame& frame, const ren
   return display;
 }
 
-render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const render::Picture& shown) {
+render::FrameTarget Context::target(const Shot& shot, const Frame& frame, const render::Picture& shown) const {
   render::FrameTarget target;
   target.framebuffer = frame.framebuffer;
   target.viewport = frame.viewport;
+  target.region = &shown == progressive_.shown() ? shown.region() : shot.sampling.region;
   target.flip_y = frame.flip_y;
   target.blend_over = frame.blend_over;
   target.filter_ms = part_to_filter * std::max(0.0, frame.budget_ms);

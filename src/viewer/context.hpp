@@ -161,7 +161,7 @@ class Context {
   void take_host_depth(const Shot& shot, const Frame& frame);
   [[nodiscard]] render::PictureWish wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const;
   [[nodiscard]] static render::Display display(const Shot& shot, const Frame& frame, const render::Picture& shown);
-  [[nodiscard]] static render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown);
+  [[nodiscard]] render::FrameTarget target(const Shot& shot, const Frame& frame, const render::Picture& shown) const;
   // Whether all programs are warm.
   bool rehearse(const Shot& shot, const Frame& frame, bool all, render::Deadline deadline);
   // Those of such a frame.

@@ -1,5 +1,7 @@
 // What a context gives back of its pictures.
 
+#include <algorithm>
+#include <cstring>
 #include <optional>
 #include <span>
 #include <string>
@@ -57,12 +59,14 @@ std::size_t require_room(const render::Picture& picture, const float* rgba, std:
   return floats;
 }
 
-// Before the display's backdrop, where it has one.
-void put_before(const render::Display& display, std::span<float> rgba) {
+// Before the display's backdrop, where it has one; what is not made stays 0.
+void put_before(const render::Display& display, const render::Picture& picture, std::span<float> rgba) {
   if (display.transparent || !display.backdrop) return;
   for (std::size_t i = 0; i < rgba.size(); ++i) {
     const std::size_t c = i % 4;
-    if (c != 3) rgba[i] += (1.0F - rgba[i - c + 3]) * (*display.backdrop)[static_cast<int>(c)];
+    const std::size_t pixel = i / 4;
+    const bool made = picture.box().holds({pixel % picture.size().x, pixel / picture.size().x});
+    if (c != 3 && made) rgba[i] += (1.0F - rgba[i - c + 3]) * (*display.backdrop)[static_cast<int>(c)];
   }
 }
 
@@ -155,12 +159,14 @@ void Context::read_composite(render::Picture& picture, bool transparent, float* 
   const glm::ivec2 size(picture.size());
   const gl::Object flat = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the texture to read");
   const gl::TransientFramebuffer framebuffer(functions_, flat.name(), 0);
+  functions_->ClearTexImage(flat.name(), 0, GL_RGBA, GL_FLOAT, nullptr);
   render::Display display;
   display.transparent = transparent;
   display.encoding = render::ColourEncoding::hdr;
   render::FrameTarget target;
   target.framebuffer = framebuffer.name();
   target.viewport = {0, 0, size};
+  target.region = picture.region();
   target.flip_y = true;  // the first row is the top
   target.blend_over = false;
   target.wait = render::Wait::always;
@@ -227,9 +233,17 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
   const gl::Object denoised =
       network != nullptr ? by_network(shot, picture, network) : filtered(picture, display.shows_background());
   const glm::uvec2 size = picture.size();
-  functions_->GetTextureImage(denoised.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(size.x * size.y * 16), rgba);
+  const render::PixelBox box = network != nullptr ? picture.box() : render::PixelBox{glm::uvec2(0U), size};
+  std::vector<glm::vec4> pixels(box.area());
+  functions_->GetTextureImage(denoised.name(), 0, GL_RGBA, GL_FLOAT,
+                              static_cast<GLsizei>(pixels.size() * sizeof(glm::vec4)), pixels.data());
   gl::check(*functions_, "reading the denoised picture back");
-  put_before(display, {rgba, std::size_t{size.x} * size.y * 4});
+  std::fill_n(rgba, std::size_t{4} * size.x * size.y, 0.0F);
+  for (std::size_t y = 0; y < box.size.y; ++y) {
+    const std::size_t to = 4 * ((box.first.y + y) * size.x + box.first.x);
+    std::memcpy(rgba + to, &pixels[y * box.size.x], box.size.x * sizeof(glm::vec4));
+  }
+  put_before(display, picture, {rgba, std::size_t{size.x} * size.y * 4});
 }
 
 gl::Object Context::by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network) {
@@ -262,7 +276,7 @@ void Context::read_linear(const DisplaySettings& settings, float* rgba, std::siz
   const std::size_t floats = require_room(picture, rgba, count);
   const render::Display display = settings.shown(picture.view() != render::View::shaded);
   read_means(picture, display.shows_background(), rgba);
-  put_before(display, {rgba, floats});
+  put_before(display, picture, {rgba, floats});
 }
 
 render::Picture& Context::accumulating() {

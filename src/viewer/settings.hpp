@@ -139,12 +139,14 @@ struct Sampling {
   bool volume_alone = false;
   std::optional<double> noise_target = std::nullopt;  ///< relative
   std::uint32_t first_sample = 0;
+  render::Region region = {};
 
   static Sampling of(const cumulet_sampling_desc& d) {
     Sampling sampling{d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
                       d.volume_alone == 1};
     if (d.noise_target_percent > 0.0F) sampling.noise_target = 0.01 * double(d.noise_target_percent);
     sampling.first_sample = d.first_sample;
+    sampling.region = {{d.region[0], d.region[1]}, {d.region[2], d.region[3]}};
     return sampling;
   }
 };

@@ -273,10 +273,14 @@ void Viewer::encode_display(std::span<const float> linear, std::span<std::uint8_
 
 void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
   std::size_t pixels = 0;
+  std::size_t width = 0;
+  render::PixelBox box;
   bool legend = false;
   bool filtered = false;
   with_gl([&](Context& g) {
     const render::Picture& picture = g.readable();
+    width = picture.size().x;
+    box = picture.box();
     pixels = std::size_t{picture.size().x} * picture.size().y;
     legend = picture.view() != render::View::shaded;
     filtered = display_.denoise && g.can_denoise(picture);
@@ -290,6 +294,9 @@ void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
     read_linear(linear.data(), linear.size());
   }
   render::to_display(linear, display_.shown(legend), {rgba, pixels * 4});
+  for (std::size_t i = 0; i < pixels; ++i) {
+    if (!box.holds({i % width, i / width})) std::fill_n(rgba + 4 * i, 4, std::uint8_t{0});
+  }
 }
 
 double Viewer::measure_noise() {

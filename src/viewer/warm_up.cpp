@@ -88,6 +88,7 @@ bool Context::rehearse_frame(const Shot& shot, const Frame& frame, render::Deadl
 void Context::rehearse_drawing(const Shot& shot, const Frame& frame, const render::Picture& shown) {
   const render::PictureTextures picture = textures_of(shown, nullptr);
   render::FrameTarget target = Context::target(shot, frame, shown);
+  target.region = {};  // its own is none
   if (frame.target == Target::framebuffer) {
     rehearsal_->draw(picture, display(shot, frame, shown), target);
     return;

@@ -10,6 +10,7 @@
 #include <cumulet/cumulet.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <layers.hpp>
@@ -101,8 +102,8 @@ class Exr : public testing::TestWithParam<Backend> {
     std::vector<float> rgba(std::size_t{4} * width * height);
     EXPECT_EQ(cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
     const std::string file = (folder_ / name).string();
-    cumulet::demo::write_exr(viewer_.get(), file, width, height, {rgba}, aovs_,
-                             cumulet::demo::metadata_of(viewer_.get(), scene_, width, height));
+    cumulet::demo::write_exr(viewer_.get(), file, cumulet::demo::windows_of(scene_.sampling.region, width, height),
+                             {rgba}, aovs_, cumulet::demo::metadata_of(viewer_.get(), scene_, width, height));
     return file;
   }
 
@@ -223,6 +224,42 @@ TEST_P(Exr, SevenMergedPartsAreTheWhole) {
   aovs_ = {};
   render();
   EXPECT_THROW(cumulet::demo::merge({parts[0], write("other.exr")}, merged), std::runtime_error);
+}
+
+// Of a region the pixels are those of the whole, where they are in it; and its parts are merged.
+TEST_P(Exr, OfARegionIsThatWindowOfTheWhole) {
+  namespace layers = cumulet::image::layers;
+  aovs_ = {CUMULET_AOV_VOLUME_DEPTH};
+  render();
+  const std::string whole = write("whole.exr");
+  constexpr std::array region{0.25F, 0.5F, 0.5F, 0.25F};
+  std::ranges::copy(region, scene_.sampling.region);
+  render();
+  const std::string part = write("part.exr");
+  const cumulet::image::Windows windows = cumulet::image::read_contents(part).windows;
+  EXPECT_EQ(windows, (cumulet::image::Windows{width / 2, height / 4, width / 4, height / 2, width, height}));
+  for (const cumulet::image::LayerName& layer : {layers::beauty, layers::volume_depth}) {
+    const std::vector<float> all = cumulet::image::read_exr(whole, layer).values;
+    const std::vector<float> made = cumulet::image::read_exr(part, layer).values;
+    const std::size_t channels = layer.channels.size();
+    ASSERT_EQ(made.size(), channels * windows.width * windows.height);
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      const std::size_t x = windows.left + i / channels % windows.width;
+      const std::size_t y = windows.top + i / channels / windows.width;
+      ASSERT_EQ(made[i], all[(y * width + x) * channels + i % channels]) << layer.name << ' ' << x << ", " << y;
+    }
+  }
+  const auto samples = [](const std::string& file) {
+    const auto said = cumulet::image::read_contents(file).attributes;
+    return std::get<double>(std::ranges::find(said, "cumulet:samples", &cumulet::image::Attribute::name)->value);
+  };
+  EXPECT_EQ(samples(part), samples(whole));
+  scene_.sampling.first_sample = scene_.sampling.samples;
+  render();
+  const std::string merged = (folder_ / "merged.exr").string();
+  EXPECT_EQ(cumulet::demo::merge({part, write("next.exr")}, merged).samples, 2U * scene_.sampling.samples);
+  EXPECT_EQ(cumulet::image::read_contents(merged).windows, windows);
+  EXPECT_THROW(cumulet::demo::merge({whole, write("next.exr")}, merged), std::runtime_error);
 }
 
 TEST_P(Exr, ItsMatricesFindTheVolumeInThePicture) {

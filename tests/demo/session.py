@@ -144,6 +144,30 @@ def test_orbit_undo(s):
     assert distance(near) < 0.8 * distance(far), "the wheel comes closer"
 
 
+def test_region(s):
+    s.play("replay", [*SETTLE, *shot("whole"), "key ctrl+b", "drag viewport 0.25 0.25 to viewport 0.75 0.75", *SETTLE,
+                      *shot("part"), "key ctrl+alt+b", *SETTLE, *shot("again"), "key ctrl+z", *SETTLE, *shot("undone"),
+                      "key ctrl+b", "key escape", "drag viewport 0.4 0.5 to viewport 0.7 0.4", *SETTLE, *shot("given_up")],
+           "--volume", s.cumulus)
+    whole, report, (x, y, width, height) = look(s, "whole")
+    assert "region" not in report["scene"]["picture"], report["scene"]["picture"]
+    part, report, _ = look(s, "part")
+    region = report["scene"]["picture"]["region"]
+    assert all(abs(a - b) < 0.02 for a, b in zip(region, [0.25, 0.25, 0.5, 0.5])), region
+    assert report["scene"]["camera"] == s.report("whole")["scene"]["camera"], "the drag is not the camera's"
+    samples = report["samples"] / s.report("whole")["samples"]
+    assert 0.2 < samples < 0.3, samples
+    inside = (x + width // 4 + 8, y + height // 4 + 8, width // 2 - 16, height // 2 - 16)
+    assert_alike(whole, part, inside)
+    assert_differ(whole, part, (x, y, width, height // 4 - 8))
+    again, report, area = look(s, "again")
+    assert "region" not in report["scene"]["picture"]
+    assert_alike(whole, again, area)
+    assert s.report("undone")["scene"]["picture"]["region"] == region
+    assert s.report("given_up")["scene"]["picture"]["region"] == region
+    assert s.report("given_up")["scene"]["camera"] != s.report("whole")["scene"]["camera"]
+
+
 def test_change(s):
     s.play("replay", [*SETTLE, *shot("first"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.3 0.5', *SETTLE,
                       *shot("thin"), "key ctrl+z", *SETTLE, *shot("thick"), "key n", *SETTLE, *shot("wide"), "key n",

@@ -112,6 +112,22 @@ TEST_F(ImageIo, ExrLayersRoundTripIsExact) {
   EXPECT_EQ(count(), 1u);
 }
 
+TEST_F(ImageIo, ExrOfAPartOfAPictureSaysWhich) {
+  const Rendered rendered;
+  const Windows windows{Rendered::width, Rendered::height, 4, 7, 100, 50};
+  write_exr(path("a.exr"), windows, rendered.all);
+  EXPECT_EQ(read_contents(path("a.exr")).windows, windows);
+  const Imf::InputFile file(path("a.exr").c_str());
+  EXPECT_EQ(file.header().displayWindow(), Imath::Box2i({0, 0}, {99, 49}));
+  EXPECT_EQ(file.header().dataWindow(),
+            Imath::Box2i({4, 7}, {3 + static_cast<int>(Rendered::width), 6 + static_cast<int>(Rendered::height)}));
+  for (const Layer& layer : rendered.all) {
+    const Pixels back = read_exr(path("a.exr"), layer.name);
+    EXPECT_TRUE(std::equal(back.values.begin(), back.values.end(), layer.values.begin(), layer.values.end()))
+        << layer.name.name;
+  }
+}
+
 TEST_F(ImageIo, ExrLayersAreWhatOpenExrSaysTheyAre) {
   const Rendered rendered;
   write_exr(path("a.exr"), Rendered::width, Rendered::height, rendered.all);

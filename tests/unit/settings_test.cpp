@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
@@ -47,6 +48,9 @@ void set_sample(const Setting<Desc, Value>& setting, Value& value) {
     value[0] = 0.25f;
     value[1] = 0.5f;
     value[2] = 0.125f;
+  } else if constexpr (settings::Rectangle<Value>) {
+    constexpr std::array sample{0.25f, 0.5f, 0.125f, 0.375f};
+    std::ranges::copy(sample, value);
   } else if constexpr (settings::Switch<Value>) {
     value = 1;
   } else if constexpr (settings::Count<Value>) {
@@ -65,6 +69,8 @@ std::string sample_text(const Setting<Desc, Value>& setting, const Value& value)
     return "";
   } else if constexpr (settings::Triple<Value>) {
     return setting.spelling == settings::Spelling::complement ? "0.75,0.5,0.875" : "0.25,0.5,0.125";
+  } else if constexpr (settings::Rectangle<Value>) {
+    return "0.25,0.5,0.125,0.375";
   } else if constexpr (settings::Switch<Value>) {
     return "on";
   } else if constexpr (settings::Count<Value>) {
@@ -80,7 +86,7 @@ bool set_bad(const Setting<Desc, Value>&, Value& value) {
   if constexpr (settings::Enumerated<Value> || settings::Switch<Value>) {
     const int bad = 99;
     std::memcpy(&value, &bad, sizeof value);
-  } else if constexpr (settings::Triple<Value>) {
+  } else if constexpr (std::is_array_v<Value>) {
     value[1] = std::numeric_limits<float>::quiet_NaN();
   } else if constexpr (settings::Count<Value>) {
     return false;
@@ -92,7 +98,7 @@ bool set_bad(const Setting<Desc, Value>&, Value& value) {
 
 template <class Value>
 bool equal(const Value& a, const Value& b) {
-  if constexpr (settings::Triple<Value>)
+  if constexpr (std::is_array_v<Value>)
     return std::equal(std::begin(a), std::end(a), std::begin(b));
   else
     return a == b;

@@ -1212,6 +1212,14 @@ typedef struct cumulet_sampling_desc {
    * for rounding. Numbers beyond 2^32 - 1 begin again at 0.
    */
   uint32_t first_sample;
+  /*
+   * The part of the picture that is made: x, y, width and height as fractions of it from its upper left corner, so that
+   * it is the same part at any size; of the pixels those whose middles are within (cumulet_region_pixels), with the
+   * bits that they have in the whole picture. A width or height of 0 reaches to the end: zeros, the default, are the
+   * whole picture. Frames leave the rest of their target as it is; what is read back is 0 there, transparent, and where
+   * an error or a depth would be infinite, too. Denoising knows no other pixels. Progress, noise and samples are of it.
+   */
+  float region[4];
 } cumulet_sampling_desc;
 
 typedef enum cumulet_tone_map {
@@ -1414,6 +1422,12 @@ typedef struct cumulet_lamp_desc {
 CUMULET_API cumulet_status cumulet_set_lamps(cumulet_viewer* viewer, const cumulet_lamp_desc* lamps, uint64_t count);
 
 CUMULET_API cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc);
+/*
+ * Which pixels of a picture of width x height a region (of cumulet_sampling_desc) is: x, y, width and height, one pixel
+ * at least. Regions that share an edge share no pixel and leave none out. Any thread.
+ */
+CUMULET_API cumulet_status cumulet_region_pixels(const float region[4], uint32_t width, uint32_t height,
+                                                 uint32_t pixels[4]);
 CUMULET_API cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc);
 
 /* ---- Camera and input ------------------------------------------------------------------------------------------- */

@@ -248,6 +248,16 @@ template <class Desc>
 
 }  // namespace detail
 
+/// The pixels of a region: x, y, width and height.
+[[nodiscard]] inline Result<std::array<std::uint32_t, 4>> region_pixels(const std::array<float, 4>& region,
+                                                                        std::uint32_t width,
+                                                                        std::uint32_t height) noexcept {
+  std::array<std::uint32_t, 4> pixels{};
+  if (auto done = detail::result(cumulet_region_pixels(region.data(), width, height, pixels.data())); !done)
+    return done.error();
+  return pixels;
+}
+
 // ---- Volumes --------------------------------------------------------------------------------------------------------
 
 struct DenseDesc {

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/glm.hpp>
+
+namespace cumulet::render {
+
+/// Pixels of a picture, first pixel top left.
+struct PixelBox {
+  glm::uvec2 first{0U};
+  glm::uvec2 size{0U};
+  bool operator==(const PixelBox&) const = default;
+  [[nodiscard]] std::uint64_t area() const { return std::uint64_t{size.x} * size.y; }
+  [[nodiscard]] bool holds(glm::uvec2 pixel) const {
+    return glm::all(glm::greaterThanEqual(pixel, first)) && glm::all(glm::lessThan(pixel, first + size));
+  }
+};
+
+/// A part of a picture, in fractions of it from its upper left corner; an extent of 0 reaches to its end.
+struct Region {
+  glm::vec2 corner{0.0F};
+  glm::vec2 extent{0.0F};
+  bool operator==(const Region&) const = default;
+
+  [[nodiscard]] bool is_whole() const { return *this == Region{}; }
+  /// Those of a picture of this size, not 0, whose middles it holds, and `margin` more to each side; one at least.
+  [[nodiscard]] PixelBox pixels(glm::uvec2 size, std::uint32_t margin = 0) const {
+    PixelBox box;
+    for (int axis = 0; axis < 2; ++axis) {
+      // An edge of two regions falls between the same two middles for both.
+      const auto before = [&](double edge) {
+        return static_cast<std::uint32_t>(std::clamp(std::ceil(edge * size[axis] - 0.5), 0.0, double(size[axis])));
+      };
+      const double low = corner[axis];
+      const double high = extent[axis] > 0.0F ? low + double(extent[axis]) : 1.0;
+      const std::uint32_t first = std::min(before(low), size[axis] - 1U);
+      const std::uint32_t last = std::max(before(high), first + 1U);
+      box.first[axis] = first - std::min(first, margin);
+      box.size[axis] = std::min(last + margin, size[axis]) - box.first[axis];
+    }
+    return box;
+  }
+};
+
+}  // namespace cumulet::render
