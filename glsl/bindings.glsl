@@ -81,6 +81,7 @@ const int CM_IMAGE_COUNTS = 1;
 const int CM_IMAGE_VOLUME_SUM = 2;
 const int CM_IMAGE_BACKGROUND = 3;
 const int CM_IMAGE_MOMENTS = 4;
+const int CM_IMAGE_GROUPS = 5;
 const int CM_IMAGE_VOLUME_Z = 2;  // inspect.comp, aovs.comp
 const int CM_IMAGE_NORMAL = 0;    // aovs.comp
 const int CM_IMAGE_ALBEDO = 1;

@@ -21,6 +21,9 @@ struct CmPassed {
   vec3 direction;   // world, unit: to the lamp
   float distance;
   float way;        // of its free path
+#if CM_GROUPS
+  uint group;       // of lights, that it is in
+#endif
 };
 
 // The angle at which a point sees a part of a line, `across` away from it, from `before` to `behind`, both counted from
@@ -62,10 +65,16 @@ CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   passed.direction = p.w;
   passed.distance = 0.0f;
   passed.way = 0.0f;
+#if CM_GROUPS
+  passed.group = 0u;
+#endif
   if (p.ray != CM_RAY_FLIGHT || cm_is_dark(p) || !cm_is_passed(p, p.bounces)) return passed;
   vec2 range = cm_box_range(p.o, p.d);
   range.y = min(range.y, cm_flight_end(p, vertex));
   CmLamp lamp = cm_pick_lamp(p, 0x51ed270bu);
+#if CM_GROUPS
+  passed.group = lamp.group;
+#endif
   if (!(range.x < range.y) || lamp.kind == CM_LAMP_DISTANT) return passed;
   vec2 u;
   vec2 on_lamp;
@@ -119,6 +128,9 @@ CM_FN void cm_look_back(CM_INOUT(CmPath) p, CmPassed passed, bool finished) {
   p.o = passed.o;
   p.d = cm_to_cube(passed.direction);
   p.light = passed.light;
+#if CM_GROUPS
+  p.group = passed.group;
+#endif
   p.reach = passed.distance;
   p.ray = CM_RAY_EQUIANGULAR;
   p.density = 0.0f;

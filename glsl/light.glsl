@@ -25,6 +25,19 @@
 #define CM_LIGHT_ENVIRONMENT 6u  // a picture of all that is far away, instead of the sky
 #define CM_LIGHT_CELL 7u  // a cell that gives off light
 
+#if CM_GROUPS
+uint cm_look_group = 0u;           // of the lamp, triangle or cell that was picked last
+uint cm_group_lane = 0u;           // glsl/groups.glsl
+void cm_add_to_group(uint group, vec3 radiance);
+
+// Of lights of that kind, which a look has picked last where each has its own.
+uint cm_group_of(uint kind) {
+  if (kind == CM_LIGHT_SUN) return cm.integrator.sun_group;
+  if (kind == CM_LIGHT_SKY || kind == CM_LIGHT_ENVIRONMENT) return cm.integrator.sky_group;
+  return cm_look_group;
+}
+#endif
+
 // What a look has found.
 struct CmLightSample {
   uint kind;
@@ -160,6 +173,9 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   light.distance = sqrt(length_2);
   light.density = cm_glow_pdf_of(mean, distance);
   light.radiance = mean * (cm_emission_at(record, cell_class, point) * CM_GLOW.extent * least * least / length_2);
+#if CM_GROUPS
+  cm_look_group = CM_MEDIUM.group;
+#endif
 #if CM_INSTANCES
   cm_here = stood;
 #endif
@@ -179,6 +195,9 @@ CM_FN CmLamp cm_pick_lamp(CmPath p, uint salt) {
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, salt)));
   uint i = cm_below(pick.x, max(cm.lamps.count, 1u));
   if (pick.y > cm_lamp(i).stays) i = cm_lamp(i).other;
+#if CM_GROUPS
+  cm_look_group = cm_lamp(i).group;
+#endif
   return cm_lamp(i);
 }
 
@@ -232,6 +251,9 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   if (which.y > cm_models[model].alias || cm_models[model].emitter_count == 0u) model = cm_models[model].alias_other;
   uvec2 pick = uvec2(cm_hash3(uvec3(p.random, p.stream, 0x1b56c4e9u)));
   uvec4 entry = cm_emitter(model, cm_below(pick.x, cm_models[model].emitter_count));
+#if CM_GROUPS
+  cm_look_group = cm_models[model].group;
+#endif
   if (pick.y > entry.y) entry = cm_emitter(model, entry.z);
   float root = sqrt(u.x);
   CmVertexMix m = cm_vertex_mix(model, entry.x, vec2(root * (1.0f - u.y), root * u.y));
@@ -398,11 +420,22 @@ CM_FN float cm_look_pdf(CmPath p, CmLightHit hit) {
 }
 
 // What a flight brings that escapes with that transmittance.
+#if CM_GROUPS
+#define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)                                         \
+  of_kind = RADIANCE(p.w) * cm_balance(transmittance * p.density,                                \
+                                       cm_look_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.density))); \
+  brought += of_kind;                                                                            \
+  cm_add_to_group(cm_group_of(NUMBER), p.throughput * of_kind);
+#else
 #define CM_ESCAPED(NUMBER, CHANCE, SAMPLE, PDF, RADIANCE)           \
   brought += RADIANCE(p.w) * cm_balance(transmittance * p.density, \
                                         cm_look_pdf(p, cm_light_hit(NUMBER, p.o, p.w, p.density)));
+#endif
 CM_FN vec3 cm_far_light(CmPath p, float transmittance) {
   vec3 brought = vec3(0.0f, 0.0f, 0.0f);
+#if CM_GROUPS
+  vec3 of_kind;
+#endif
   CM_FAR_LIGHTS(CM_ESCAPED)
   CM_ESCAPED(CM_LIGHT_SUN, unused, unused, unused, cm_sun_radiance)
   return brought;

@@ -32,6 +32,7 @@ CM_BLOCK(CmModel) {
   uint flags;
   uint alias;        // of an entry, drawn evenly: looks for emissive triangles are for its where a random word is at most
   uint alias_other;  // this, else for that one's
+  uint group;        // of lights, that they are in
 };
 
 #endif

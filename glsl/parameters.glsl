@@ -36,6 +36,10 @@
 #ifndef CM_RICH
 #define CM_RICH 0
 #endif
+// Whether radiance is added up by groups of lights as well (glsl/groups.glsl).
+#ifndef CM_GROUPS
+#define CM_GROUPS 0
+#endif
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
 #endif
@@ -124,6 +128,7 @@ CM_BLOCK(CmMedium) {
   uint emits;     // 1: its cells give off light; this one and the next two only with CM_CHANNELS
   uint coloured;  // 1: what scatters has a colour a cell
   uint anisotropic;  // 1: and an anisotropy in place of this one
+  uint group;        // of what it gives off; only with CM_GROUPS
   CM_EQUALITY(CmMedium)
 };
 
@@ -203,6 +208,9 @@ CM_BLOCK(CmIntegrator) {
   float blurred_roughness;  // least roughness of surfaces that blurred paths meet
   uint light_among_surfaces;  // 1: surfaces pass light on to each other and to the volume
   uint first_sample;          // the number of each pixel's first
+  uint groups;                // of lights, that are gathered; these three only with CM_GROUPS
+  uint sun_group;
+  uint sky_group;             // or the environment's
   CM_EQUALITY(CmIntegrator)
 };
 

@@ -22,6 +22,10 @@
 #include "path_state.glsl"
 #include "light.glsl"
 #include "path_vertex.glsl"
+#if CM_GROUPS  // glsl/groups.glsl
+void cm_begin_groups();
+void cm_finish_groups(CmPath p, uvec2 at);
+#endif
 #if CM_EQUIANGULAR
 #include "equiangular.glsl"
 #endif
@@ -102,6 +106,10 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   if (p.to_ground != 0u) p.at_layer = 0u;
   p.reach = min(p.reach, ground);
   p.stage = CM_STAGE_AIM;
+#if CM_GROUPS
+  p.group = 0u;
+  cm_begin_groups();
+#endif
 }
 
 // A ray has left the box, or come to its end: what it brings. A flight that escapes with transmittance T may have been
@@ -114,6 +122,9 @@ CM_FN void cm_escape(CM_INOUT(CmPath) p) {
   } else {
     float survival = min(1.0f, exp(CM_SHADOW_DEPTH - depth));
     p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.density)));
+#if CM_GROUPS
+    cm_add_to_group(p.group, p.light * (transmittance / (survival * (1.0f + transmittance * p.density))));
+#endif
   }
 }
 
@@ -125,6 +136,9 @@ CM_FN void cm_glow(CM_INOUT(CmPath) p, bool ended, bool collided) {
   float glow = collided ? 1.0f : 0.0f;
   if (CM_SURFACES == 0 && CM_INSTANCES == 0) glow = (collided ? 2.0f : (ended ? 1.0f : 0.0f)) * (1.0f - exp(max(0.0f, p.depth) - p.depth_0));
   p.radiance += p.throughput * (glow * CM_MEDIUM.source);
+#if CM_GROUPS
+  cm_add_to_group(CM_MEDIUM.group, p.throughput * (glow * CM_MEDIUM.source));
+#endif
 }
 
 // The path goes on from where it collided or met a triangle or the ground, unless Russian roulette or the limit ends it:
@@ -235,6 +249,9 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmLook look) {
     float rare = 1.0f / max(light.density, 1e-30f);
     p.light = p.throughput * light.radiance * (turn.share * rare);
     p.density = cm_is_far(light) ? turn.density * rare : 0.0f;
+#if CM_GROUPS
+    p.group = cm_group_of(light.kind);
+#endif
   } else {
     p.throughput *= turn.weight;
     p.w = light.direction;

@@ -68,6 +68,7 @@
 //   to_ground       1: a flight comes to the ground if nothing stops it
 //   finishes        with CM_EQUIANGULAR, of such a ray, 1: the path ends with it
 //   seen            likewise, 1: the flight was a camera ray
+//   group           with CM_GROUPS, of the light that a shadow ray looks for
 // CM_PATH_VISIT, only with CM_INSTANCES, and only for kernels that march:
 //   instance        that the ray marches through, or has entered last; of a collision the one that it is with
 //   entry           where it entered that; -1 of the one that it started in
@@ -95,10 +96,15 @@
   UINT(triangle) VEC2(weights) BITS(stage, 3) BITS(event, 2) BITS(ray, 2) BITS(start, 2) BITS(found, 2) BITS(behind, 1)            \
   BITS(back, 1) BITS(blurred, 1) BITS(in_volume, 1) BITS(at_layer, 1) BITS(lifted, 1) BITS(to_ground, 1) CM_PATH_PASSED(BITS)
 
-#if CM_EQUIANGULAR || defined(CM_KEEPS_EQUIANGULAR)
-#define CM_PATH_PASSED(BITS) BITS(finishes, 1) BITS(seen, 1)
+#if CM_EQUIANGULAR || defined(CM_KEEPS_EQUIANGULAR) || CM_GROUPS
+#define CM_PATH_PASSED(BITS) BITS(finishes, 1) BITS(seen, 1) CM_PATH_GROUP(BITS)
 #else
 #define CM_PATH_PASSED(BITS)
+#endif
+#if CM_GROUPS
+#define CM_PATH_GROUP(BITS) BITS(group, 3)
+#else
+#define CM_PATH_GROUP(BITS)
 #endif
 
 #define CM_PATH_VISIT(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                          \

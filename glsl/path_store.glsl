@@ -89,6 +89,9 @@ void cm_store_within(CmPath p, uint lane) { CM_STORE(CM_PATH_WITHIN, CM_WITHIN_Q
 void cm_load_within(inout CmPath p, uint lane) {}
 void cm_store_within(CmPath p, uint lane) {}
 #endif
+// What groups of lights have come to, a quad each, behind both.
+#define CM_FIRST_GROUPS (CM_FIRST_WITHIN + CM_WITHIN_QUADS)
+
 void cm_begin_within(uint lane) {
   if (cm.surfaces.rich == 0u) return;
   for (int i = 0; i < CM_WITHIN_QUADS; ++i) cm_paths[lane + uint(CM_FIRST_WITHIN + i) * cm_lanes()] = uvec4(0u);

@@ -338,6 +338,9 @@ CM_FN void cm_see(CM_INOUT(CmPath) p, CmVertex vertex) {
     emission *= p.lifted != 0u ? 0.0f : cm_balance(p.density, cm_look_pdf(p, hit));
   }
   p.radiance += p.throughput * emission;
+#if CM_GROUPS
+  cm_add_to_group(cm_models[cm_model_of(p.triangle)].group, p.throughput * emission);
+#endif
 }
 
 // The path is on the triangle that it has met, after cm_arrive. Whether it ends there.

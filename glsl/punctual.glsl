@@ -21,7 +21,7 @@ struct CmLamp {
   float chance;  // to be the one that is looked for
   uint stays;    // drawn evenly, it is looked for where a random word is at most this, else the other
   uint other;
-  uint unused_0;
+  uint group;    // of lights
 };
 
 // From its middle to a point of it, each as likely by area.

@@ -21,6 +21,9 @@ CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rou
     }
     marches += cm_travel(p);
     if (p.stage == CM_STAGE_FINISH) {
+#if CM_GROUPS
+      cm_finish_groups(p, at);
+#endif
       CmPixel pixel = cm_load_pixel(at);
       cm_finish(p, pixel);
       cm_store_pixel(pixel, at);

@@ -2,7 +2,7 @@
 // The path tracer as one kernel, where paths meet no triangles. One lane a pixel of some blocks of the tile: loads its
 // path, runs it for a bounded number of rounds, stores it.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
-// variants: - or CM_LAYERS=1 or CM_AOVS=1 or CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 or CM_LAMPS=1 CM_LAYERS=1 or CM_LAMPS=1 CM_AOVS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1
+// variants: - or CM_LAYERS=1 or CM_AOVS=1 or CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 or CM_LAMPS=1 CM_LAYERS=1 or CM_LAMPS=1 CM_AOVS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1 or CM_LAMPS=1 CM_LAYERS=1 CM_GROUPS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 CM_GROUPS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1 CM_GROUPS=1
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
@@ -20,6 +20,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path_store.glsl"
 #include "pixel_store.glsl"
 #include "run.glsl"
+#include "groups.glsl"
 
 // What paths have of triangles takes no registers where there are none.
 void cm_forget_triangles(inout CmPath p) {
@@ -41,6 +42,9 @@ void main() {
   uint before = cm_pixel_samples(at);
   if (before >= cm.dispatch.samples) return;
   uint lane = cm_lane_of(local);
+#if CM_GROUPS
+  cm_group_lane = lane;
+#endif
   CmPath p = cm_begin_path();
   if (!cm_block_begins()) {
     p = cm_load_path(lane);

@@ -5,6 +5,7 @@
 // variants: - or CM_AOVS=1
 // variants: CM_DENSE=0,1
 // variants: - or CM_ENVIRONMENT=1
+// variants: - or CM_GROUPS=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"
@@ -19,6 +20,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path_store.glsl"
 #include "pixel_store.glsl"
 #include "path_queue.glsl"
+#include "groups.glsl"
 
 #if CM_DENSE
 void main() {
@@ -28,6 +30,9 @@ void main() {
   uint samples = cm_pixel_samples(at);
   if (samples >= cm.dispatch.samples) return;
   uint lane = cm_lane_of(local);
+#if CM_GROUPS
+  cm_group_lane = lane;
+#endif
   if (cm_block_begins()) {
     CmPath p = cm_begin_path();
     cm_camera(p, samples, at);
@@ -46,6 +51,10 @@ void main() {
   uvec2 at = cm.dispatch.tile_corner + local;
   CmPixel pixel = cm_load_pixel(at);
   CmPath p = cm_load_path(lane);
+#if CM_GROUPS
+  cm_group_lane = lane;
+  cm_finish_groups(p, at);
+#endif
   cm_finish(p, pixel);
   cm_store_pixel(pixel, at);
   uint block = cm_block_of(local);

@@ -2,6 +2,7 @@
 // Asks the tree for paths that wait for it: glsl/path_queue.glsl.
 // variants: CM_SURFACES=1
 // variants: - or CM_RICH=1
+// variants: - or CM_GROUPS=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #define CM_KEEPS_EQUIANGULAR  // what kernels before and behind this one have of a path
@@ -18,6 +19,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path.glsl"
 #include "path_store.glsl"
 #include "path_queue.glsl"
+#include "groups.glsl"
 
 void main() {
   if (cm_queue_place() >= cm_queue_count(CM_QUEUE_MEET)) return;

@@ -1,6 +1,6 @@
 #version 450
 // What happens on the triangles that paths have met, or whose shadow rays have ended: glsl/path_queue.glsl.
-// variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_RICH=1
+// variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_RICH=1 or CM_SURFACES=2 CM_GROUPS=1 or CM_SURFACES=2 CM_EQUIANGULAR=1 CM_GROUPS=1 or CM_SURFACES=2 CM_RICH=1 CM_GROUPS=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1
 // variants: - or CM_ENVIRONMENT=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -16,6 +16,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path.glsl"
 #include "path_store.glsl"
 #include "path_queue.glsl"
+#include "groups.glsl"
 
 // What has ended with the ray takes no registers.
 void cm_forget_ray(inout CmPath p) {
@@ -39,6 +40,9 @@ void main() {
   if (cm_queue_place() >= cm_queue_count(CM_QUEUE_SHADE)) return;
   uint lane = cm_queue_lane(CM_QUEUE_SHADE);
   CmPath p = cm_begin_path();
+#if CM_GROUPS
+  cm_group_lane = lane;
+#endif
   cm_load_flight(p, lane);
   cm_load_ends(p, lane);
 #if CM_RICH

@@ -1,7 +1,7 @@
 #version 450
 // The medium's part of paths among triangles: glsl/path_queue.glsl.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1
-// variants: CM_SURFACES=1,2
+// variants: CM_SURFACES=1,2 or CM_SURFACES=2 CM_GROUPS=1
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
@@ -24,12 +24,16 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "flight.glsl"
 #include "path_store.glsl"
 #include "path_queue.glsl"
+#include "groups.glsl"
 
 void main() {
   uint count = cm_queue_count(CM_QUEUE_TRAVEL);
   if (cm_queue_place() >= count) return;
   if (cm_queue_place() == 0u) atomicAdd(cm_total.x, count);
   uint lane = cm_queue_lane(CM_QUEUE_TRAVEL);
+#if CM_GROUPS
+  cm_group_lane = lane;
+#endif
   CmPath p = cm_load_path(lane);
   cm_load_visit(p, lane);
   cm_travel(p);

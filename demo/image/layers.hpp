@@ -29,6 +29,9 @@ inline constexpr LayerName normal{"normal", "XYZ"};
 inline constexpr LayerName albedo{"albedo", "RGB"};
 inline constexpr LayerName error{"error", "Y"};
 inline constexpr LayerName velocity{"velocity", "XYZ"};
+/// Of a group of lights, before its name: as Blender calls them.
+inline constexpr std::string_view light_group_prefix = "Combined_";
+inline constexpr std::string_view light_group_channels = "RGB";
 }  // namespace layers
 
 /// In a depth layer: nothing there. Blender's own; finite, so that filters of a compositor make no NaN of it.

@@ -208,6 +208,12 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
   std::vector<std::pair<image::LayerName, std::vector<float>>> made;
   for (const image::LayerName& layer : {layers::beauty, layers::volume})
     if (has(first, layer)) made.emplace_back(layer, mean(parts, layer));
+  for (const std::string& channel : first.channels) {
+    const std::string_view name = std::string_view(channel).substr(0, channel.rfind('.'));
+    if (!name.starts_with(layers::light_group_prefix) || !channel.ends_with(".R")) continue;
+    const image::LayerName layer{name, layers::light_group_channels};
+    made.emplace_back(layer, mean(parts, layer));
+  }
   for (const image::LayerName& layer :
        {layers::transmittance, layers::depth, layers::volume_depth, layers::normal, layers::albedo, layers::velocity})
     if (has(first, layer)) made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);

@@ -69,19 +69,28 @@ void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Win
                std::span<const image::Attribute> attributes) {
   std::vector<std::vector<float>> values;
   std::vector<image::Layer> layers;
-  values.reserve(2 + aovs.size());
+  std::vector<std::string> names;  // of layers, whose own they are
+  values.reserve(2 + picture.light_groups.size() + aovs.size());
+  names.reserve(picture.light_groups.size());
   const auto add = [&](const image::LayerName& name, std::span<const float> pixels) {
     layers.push_back({name, values.emplace_back(cut(windows, pixels))});
   };
   add(image::layers::beauty, picture.beauty);
   if (!picture.denoised.empty()) add(image::layers::denoised, picture.denoised);
   std::vector<float> pixels;
+  const auto check = [&](cumulet_status status) {
+    if (status != CUMULET_OK) throw std::runtime_error(path + ": " + cumulet_last_error(viewer));
+  };
+  for (std::uint32_t group = 0; group < picture.light_groups.size(); ++group) {
+    const std::string& name = names.emplace_back(image::layers::light_group_prefix) += picture.light_groups[group];
+    pixels.resize(std::size_t{3} * windows.whole_width * windows.whole_height);
+    check(cumulet_read_light_group(viewer, group, pixels.data(), pixels.size()));
+    add({name, image::layers::light_group_channels}, pixels);
+  }
   for (const cumulet_aov aov : aovs) {
     const image::LayerName name = layer_of(aov);
     pixels.resize(std::size_t{windows.whole_width} * windows.whole_height * name.channels.size());
-    if (cumulet_read_aov(viewer, aov, pixels.data(), pixels.size()) != CUMULET_OK) {
-      throw std::runtime_error(path + ": " + cumulet_last_error(viewer));
-    }
+    check(cumulet_read_aov(viewer, aov, pixels.data(), pixels.size()));
     if (aov == CUMULET_AOV_SURFACE_DEPTH || aov == CUMULET_AOV_VOLUME_DEPTH) {
       for (float& z : pixels) z = std::isfinite(z) ? z : image::no_depth;
     }

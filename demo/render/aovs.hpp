@@ -16,6 +16,8 @@ namespace cumulet::demo {
 struct WrittenPicture {
   std::span<const float> beauty;
   std::span<const float> denoised{};  ///< a layer beside it; empty: none
+  /// Names of groups of lights, a layer each; the viewer gathers as many.
+  std::span<const std::string> light_groups{};
 };
 
 /// The pixels of a region (cumulet_region_pixels) of a picture, whose sizes and region are good.

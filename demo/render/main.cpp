@@ -319,7 +319,8 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const std
   image.rgba.resize(count);
   check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
   if (options.format == OutputFormat::exr) {
-    cumulet::demo::write_exr(viewer.get(), options.output, windows, {image.rgba, denoised}, options.aovs,
+    cumulet::demo::write_exr(viewer.get(), options.output, windows, {image.rgba, denoised, options.scene.light_groups},
+                             options.aovs,
                              cumulet::demo::metadata_of(viewer.get(), options.scene, image.width, image.height));
   } else {
     cumulet::image::write_pfm(options.output, image);
@@ -603,6 +604,8 @@ class Studio {
     cumulet_sampling_desc sampling = scene.sampling;
     sampling.preview = CUMULET_PREVIEW_OFF;
     if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.volume_alone = 1;
+    if (options.format == OutputFormat::exr)
+      sampling.light_groups = static_cast<std::uint32_t>(scene.light_groups.size());
     check(viewer_, cumulet_set_grid(viewer_.get(), &scene.grid));
     check(viewer_, cumulet_set_medium(viewer_.get(), &scene.medium));
     for (std::size_t i = 0; i < scene.ramps.size(); ++i) {

@@ -32,6 +32,11 @@ PictureMemory picture_memory(const RenderOptions& options) {
   if (options.format == OutputFormat::pfm) main += 12;
   if (options.format == OutputFormat::exr) main += 16;  // the file
   main += options.aovs.size() * 2 * 4 * sizeof(float);  // read, and in the file
+  if (const std::uint64_t groups = options.scene.light_groups.size();
+      groups > 0 && options.format == OutputFormat::exr) {
+    gl += 16 * (groups + 2);
+    main += 24 * groups;
+  }
   if (!options.aovs.empty()) {
     gl += 16 + 36;
     main += 16;

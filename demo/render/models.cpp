@@ -30,6 +30,7 @@ cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, 
   desc.variant = variant_number(scene.file, scene.variant, variant_names(surfaces));
   desc.double_sided = scene.double_sided ? 1 : 0;
   desc.hidden = scene.visible ? 0 : 1;
+  desc.group = scene.group;
   desc.shadow_only = scene.shadow_only ? 1 : 0;
   desc.tag = tag;
   return desc;

@@ -113,6 +113,16 @@ Value parse_real(const settings::Setting<Desc, Value>& setting, const std::strin
   return negative ? Value{-1} : value;
 }
 
+/// A whole number that the field can hold and that people may give.
+template <class Desc, class Value>
+Value parse_count(const settings::Setting<Desc, Value>& setting, const std::string& text) {
+  const settings::Range range = setting.given_range();
+  constexpr auto most = static_cast<double>(std::numeric_limits<Value>::max());
+  return static_cast<Value>(parse_integer(
+      text, static_cast<std::uint64_t>(std::max(range.least, 0.0)),
+      range.most < most ? static_cast<std::uint64_t>(range.most) : std::uint64_t{std::numeric_limits<Value>::max()}));
+}
+
 /// Three numbers that the field can hold and that people may give.
 template <class Desc, class Value>
 void parse_triple(const settings::Setting<Desc, Value>& setting, const std::string& text, Value& value) {
@@ -153,10 +163,7 @@ void add_setting(CLI::App& app, const char* group, const settings::Setting<Desc,
           ->group(group);
     }
   } else if constexpr (settings::Count<Value>) {
-    const auto least = static_cast<std::uint64_t>(std::max(setting.given_range().least, 0.0));
-    add_parsed([&value, least](const std::string& text) {
-      value = static_cast<Value>(parse_integer(text, least, std::numeric_limits<Value>::max()));
-    });
+    add_parsed([&value, setting](const std::string& text) { value = parse_count(setting, text); });
   } else if constexpr (settings::Real<Value>) {
     add_parsed([&value, setting](const std::string& text) { value = parse_real(setting, text); });
   } else if constexpr (settings::Rectangle<Value>) {
@@ -239,6 +246,14 @@ settings::RampPoints parse_ramp(std::string_view text) {
   return points;
 }
 
+std::vector<std::string> parse_light_groups(std::string_view text) {
+  std::vector<std::string> names;
+  if (text == "none") return names;
+  for (const std::string_view name : split(text, ',')) names.emplace_back(name);
+  if (const std::string why = light_groups_refusal(names); !why.empty()) throw UsageError(in_quotes(text) + " " + why);
+  return names;
+}
+
 /// One key of a lamp, as scene files have it; returns whether there is such.
 bool take_lamp_key(cumulet_lamp_desc& lamp, std::string_view key, const std::string& text) {
   bool known = false;
@@ -248,6 +263,9 @@ bool take_lamp_key(cumulet_lamp_desc& lamp, std::string_view key, const std::str
     if (key != setting.key) return;
     if constexpr (settings::Real<Value>) {
       value = parse_real(setting, text);
+      known = true;
+    } else if constexpr (settings::Count<Value>) {
+      value = parse_count(setting, text);
       known = true;
     } else if constexpr (settings::Triple<Value>) {
       parse_triple(setting, text, value);
@@ -308,7 +326,8 @@ void add_lamps(CLI::App& app, const char* group, std::vector<cumulet_lamp_desc>&
          "--lamp", take,
          "A lamp, as often as there are lamps: a point, spot, disc, rectangle or sun, such as \"disc position=0,30,10 "
          "power=20000 width=4\"; the keys are those of a scene file's lights: position, direction, across, color, "
-         "power (watts; of a sun W/m2), width, height, angle_degrees, blend. Beside a scene's own; none: without "
+         "power (watts; of a sun W/m2), width, height, angle_degrees, blend, group. Beside a scene's own; none: "
+         "without "
          "those before")
       ->type_name("\"KIND KEY=VALUE ...\"|none")
       ->group(group)
@@ -524,6 +543,11 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--size", "WxH", [&](const std::string& text) { parse_size(text, scene); },
       "Pixels (default: 1280x720)");
   add_settings(app, group, scene.sampling);
+  add(
+      app, group, "--light-groups", "NAME,...|none",
+      [&](const std::string& text) { scene.light_groups = parse_light_groups(text); },
+      "Keep what groups of lights bring apart, named from group 0 on, up to 8: layers Combined_NAME of an .exr, which "
+      "together are the picture; lights of other groups count in the first (default: none)");
   const auto choose_color = [&scene](std::string_view flag, const std::string&) {
     if (flag == "--background-color") scene.display.background = CUMULET_BACKGROUND_COLOR;
     return false;
@@ -834,6 +858,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   const bool stops = options.time_limit || options.scene.sampling.noise_target_percent > 0.0f;
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
+  if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
+    throw UsageError("--light-groups needs an .exr to write to");
   check_together(options, app.count("--first-sample") > 0);
   // As all flags of the scene's: files of pictures that differ in it have another scene's hash.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;

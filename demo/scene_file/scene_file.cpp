@@ -221,6 +221,17 @@ class Reader {
     }
   }
 
+  void names(const std::string& key, std::vector<std::string>& out) {
+    const std::optional<Json> value = take(key);
+    if (!value) return;
+    if (!value->is_array()) wrong(key, "is not a list of names");
+    out.clear();
+    for (const Json& name : *value) {
+      if (!name.is_string()) wrong(key, "has a name that is not a text");
+      out.push_back(name.get<std::string>());
+    }
+  }
+
   void ramp(const std::string& key, settings::RampPoints& out) {
     const std::optional<Json> value = take(key);
     if (!value) return;
@@ -357,7 +368,7 @@ void read_setting(Reader& reader, const settings::Setting<Desc, Value>& setting,
   } else if constexpr (settings::Switch<Value>) {
     reader.flag(key, value);
   } else if constexpr (settings::Count<Value>) {
-    const double most = std::min(static_cast<double>(std::numeric_limits<Value>::max()), max_integer);
+    const double most = std::min({static_cast<double>(std::numeric_limits<Value>::max()), max_integer, range.most});
     reader.integer(key, value, std::max(range.least, 0.0), most);
   } else if constexpr (settings::Real<Value>) {
     const bool given = reader.number(key, value, range);
@@ -456,6 +467,7 @@ SceneModel read_model(Reader& reader, const std::string& of) {
   flag = 0;
   reader.flag(of + "double_sided", flag);
   model.double_sided = flag != 0;
+  reader.integer(of + "group", model.group, 0.0, settings::group_range.most);
   return model;
 }
 
@@ -527,6 +539,9 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   }
   reader.integer("picture.width", scene.width, 1.0, 16384.0);
   reader.integer("picture.height", scene.height, 1.0, 16384.0);
+  reader.names("picture.light_groups", scene.light_groups);
+  if (const std::string why = light_groups_refusal(scene.light_groups); !why.empty())
+    reader.wrong("picture.light_groups", why);
   const bool names_criterion = reader.has("grid.criterion");
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
   if (names_criterion) settings::name_criterion(scene.grid);
@@ -668,6 +683,7 @@ void put_model(Writer& writer, std::size_t number, const SceneModel& model, cons
   if (model.animation != 0 || number == 0) writer.put(of + "animation", model.animation);
   if (!model.variant.empty()) writer.put(of + "variant", model.variant);
   if (model.double_sided || number == 0) writer.put(of + "double_sided", model.double_sided);
+  if (model.group != 0) writer.put(of + "group", model.group);
 }
 
 void put_sequence(Writer& writer, const SceneSequence& sequence) {
@@ -726,6 +742,7 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   writer.put("picture.width", scene.width);
   writer.put("picture.height", scene.height);
   writer.put_settings(scene.sampling);
+  if (!scene.light_groups.empty()) writer.put("picture.light_groups", scene.light_groups);
   writer.put_settings(scene.display);
   Json json = writer.take();
   if (settings::criterion_of(scene.grid) != scene.grid.criterion) json["grid"].erase("criterion");
@@ -782,6 +799,19 @@ cumulet_volume_file_desc volume_file(const VolumeFile& file) {
   }
   std::ranges::copy(to_world, desc.to_world);
   return desc;
+}
+
+std::string light_groups_refusal(const std::vector<std::string>& names) {
+  if (names.size() > CUMULET_LIGHT_GROUPS)
+    return "are more than " + std::to_string(int{CUMULET_LIGHT_GROUPS}) + " names";
+  std::set<std::string_view> known;
+  for (const std::string& name : names) {
+    constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
+    if (name.empty() || name.find_first_not_of(letters) != std::string::npos)
+      return "has a name that is not of letters, digits, _ and -";
+    if (!known.insert(name).second) return "has a name twice";
+  }
+  return "";
 }
 
 std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations) {

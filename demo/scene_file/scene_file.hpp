@@ -56,6 +56,7 @@ struct SceneModel {
   std::uint32_t animation = 0;
   std::string variant = {};  // of its materials, by name or number; "": none
   bool double_sided = false;
+  std::uint32_t group = 0;  // of lights
 
   bool operator==(const SceneModel&) const = default;
   /// Its name, or its file's.
@@ -90,6 +91,7 @@ struct SceneOptions : SceneVolume {
   cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
   cumulet_display_desc display{};
+  std::vector<std::string> light_groups;  // names of those that are kept apart, from group 0 on
 
   SceneOptions();
   /// A clear day, what is lit when nothing says how: a sun from the right of a default camera, above and before it.
@@ -144,6 +146,10 @@ void for_each_group(Scene& scene, Visit&& visit) {
 /// std::runtime_error, one line that lists them, where it is not among them.
 [[nodiscard]] std::uint32_t variant_number(const std::string& file, const std::string& wanted,
                                            const std::vector<std::string>& names);
+
+/// Why these cannot be the names of a scene's groups of lights, after what they are; empty if they can: layers of files
+/// are called so.
+[[nodiscard]] std::string light_groups_refusal(const std::vector<std::string>& names);
 
 /// A scene file's text (JSON: docs/scene_file.md). path is the file's name: errors name it, and a relative name of a
 /// volume is taken from its folder. What the text does not say is as in SceneOptions(), on a clear day; of version

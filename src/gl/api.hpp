@@ -42,11 +42,15 @@ struct Functions : GladGLContext {
 
   void PixelStorei(GLenum name, GLint value) const;
   void ClearTexImage(GLuint texture, GLint level, GLenum format, GLenum type, const void* data) const;
+  void ClearTexSubImage(GLuint texture, GLint level, GLint x, GLint y, GLint z, GLsizei width, GLsizei height,
+                        GLsizei depth, GLenum format, GLenum type, const void* data) const;
   void TextureSubImage2D(GLuint texture, GLint level, GLint x, GLint y, GLsizei width, GLsizei height, GLenum format,
                          GLenum type, const void* pixels) const;
   void TextureSubImage3D(GLuint texture, GLint level, GLint x, GLint y, GLint z, GLsizei width, GLsizei height,
                          GLsizei depth, GLenum format, GLenum type, const void* pixels) const;
   void GetTextureImage(GLuint texture, GLint level, GLenum format, GLenum type, GLsizei bytes, void* pixels) const;
+  void GetTextureSubImage(GLuint texture, GLint level, GLint x, GLint y, GLint z, GLsizei width, GLsizei height,
+                          GLsizei depth, GLenum format, GLenum type, GLsizei bytes, void* pixels) const;
 
   void Enable(GLenum capability) const;
   void Disable(GLenum capability) const;

@@ -613,6 +613,12 @@ void Functions::ClearTexImage(GLuint texture, GLint level, GLenum format, GLenum
   GladGLContext::ClearTexImage(texture, level, format, type, data);
 }
 
+void Functions::ClearTexSubImage(GLuint texture, GLint level, GLint x, GLint y, GLint z, GLsizei width, GLsizei height,
+                                 GLsizei depth, GLenum format, GLenum type, const void* data) const {
+  if (guard != nullptr) guard->pixels(false);
+  GladGLContext::ClearTexSubImage(texture, level, x, y, z, width, height, depth, format, type, data);
+}
+
 void Functions::TextureSubImage2D(GLuint texture, GLint level, GLint x, GLint y, GLsizei width, GLsizei height,
                                   GLenum format, GLenum type, const void* pixels) const {
   if (guard != nullptr) guard->pixels(false);
@@ -629,6 +635,13 @@ void Functions::GetTextureImage(GLuint texture, GLint level, GLenum format, GLen
                                 void* pixels) const {
   if (guard != nullptr) guard->pixels(true);
   GladGLContext::GetTextureImage(texture, level, format, type, bytes, pixels);
+}
+
+void Functions::GetTextureSubImage(GLuint texture, GLint level, GLint x, GLint y, GLint z, GLsizei width,
+                                   GLsizei height, GLsizei depth, GLenum format, GLenum type, GLsizei bytes,
+                                   void* pixels) const {
+  if (guard != nullptr) guard->pixels(true);
+  GladGLContext::GetTextureSubImage(texture, level, x, y, z, width, height, depth, format, type, bytes, pixels);
 }
 
 void Functions::Enable(GLenum capability) const {

@@ -50,6 +50,7 @@ core::CmLamp lamp_record(const surface::PunctualLight& light, const glm::dvec3& 
 
 core::CmLamp lamp_record(const Lamp& lamp, const glm::dvec3& origin) {
   core::CmLamp record{};
+  record.group = lamp.group;
   record.position = glm::vec3(lamp.position - origin);
   record.direction = glm::vec3(lamp.direction);
   record.intensity = lamp.power;

@@ -29,8 +29,9 @@ struct Lamp {
   glm::vec3 power{0.0F};                 ///< W; of a sun W/m2 on a plane that faces it
   double width = 1.0;                    ///< of a rectangle, or a disc's diameter; world units
   double height = 1.0;                   ///< of a rectangle
-  double angle = 0.0;  ///< radians: the whole cone of a spot; what a sun's disc covers of the sky, less than pi
-  double blend = 0.0;  ///< of a spot: the part of the half angle over which it dims, from 0 to 1
+  double angle = 0.0;       ///< radians: the whole cone of a spot; what a sun's disc covers of the sky, less than pi
+  double blend = 0.0;       ///< of a spot: the part of the half angle over which it dims, from 0 to 1
+  std::uint32_t group = 0;  ///< of lights
   bool operator==(const Lamp&) const = default;
 };
 using Lamps = std::vector<Lamp>;

@@ -31,13 +31,18 @@ GLuint Film::texture(const FilmLayer& layer) const {
 
 void Film::make(const gl::FunctionsPtr& gl, const FilmLayer& layer) {
   if (const auto found = std::ranges::find(held_, layer, &Held::layer); found != held_.end()) {
-    found->asked = true;
-    return;
+    if (found->layer.slices == layer.slices) {
+      found->asked = true;
+      return;
+    }
+    held_.erase(found);
   }
   const std::string what = std::string("creating the picture's layer ") + layer.name;
-  held_.push_back(
-      {layer, gl::make_texture_2d(gl, layer.format, static_cast<int>(size_.x), static_cast<int>(size_.y), what.c_str()),
-       false, true});
+  const glm::ivec2 size(size_);
+  gl::Object texture = layer.slices > 0 ? gl::make_texture_2d_array(gl, layer.format, size.x, size.y,
+                                                                    static_cast<int>(layer.slices), what.c_str())
+                                        : gl::make_texture_2d(gl, layer.format, size.x, size.y, what.c_str());
+  held_.push_back({layer, std::move(texture), false, true});
 }
 
 void Film::drop(const FilmLayer& layer) {
@@ -51,7 +56,8 @@ std::uint64_t Film::bytes() const {
 }
 
 void Film::bind(const gl::Functions& gl, GLuint unit, const FilmLayer& layer, GLenum access) const {
-  gl.BindImageTexture(unit, texture(layer), 0, GL_FALSE, 0, access, layer.format);
+  const GLboolean all = layer.slices > 0 ? GL_TRUE : GL_FALSE;
+  gl.BindImageTexture(unit, texture(layer), 0, all, 0, access, layer.format);
 }
 
 bool run(const gl::FunctionsPtr& gl, Film& film, const Pass& pass, std::chrono::steady_clock::time_point deadline) {

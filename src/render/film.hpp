@@ -11,11 +11,12 @@
 
 namespace cumulet::render {
 
-/// A texture of a picture, by its name: a texel a pixel, row 0 the top.
+/// A texture of a picture, by its name: a texel a pixel, row 0 the top; an array where it has slices.
 struct FilmLayer {
   const char* name;
   GLenum format;
-  unsigned pixel_bytes;
+  unsigned pixel_bytes;  ///< of all slices together
+  unsigned slices = 0;
   bool operator==(const FilmLayer& other) const { return std::string_view(name) == other.name; }
 };
 
@@ -42,6 +43,8 @@ inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
 inline constexpr FilmLayer volume_z{"volume z", GL_RG32F, 8};
 inline constexpr FilmLayer emission{"emission", GL_RGBA32F, 16};
 inline constexpr FilmLayer velocity{"velocity", GL_RGBA32F, 16};
+/// As radiance, of so many groups of lights; then of what cameras see of the sky and of the sun.
+constexpr FilmLayer light_groups(unsigned count) { return {"light groups", GL_RGBA32F, 16 * (count + 2), count + 2}; }
 }  // namespace film_layers
 
 /// What passes leave for each other, of one picture. Layers are there from the first pass that writes them on.

@@ -22,6 +22,7 @@ core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& 
   m.albedo = medium.albedo;
   m.extinction = static_cast<float>(std::min(1e30, medium.density_scale * std::max(source.max_value, 1e-30F)));
   m.source = medium.emission;
+  m.group = medium.group;
   m.anisotropy = medium.phase.anisotropy;
   m.second_anisotropy = medium.phase.second_anisotropy;
   m.second_bend = medium.phase.second_bend;
@@ -317,12 +318,14 @@ void GpuScene::update_lamps(const scene::Snapshot& snapshot, const Wanted& wante
   const auto make = [&](Slot<LampData, LampsOf>& lamps, const PlacedModels* models) {
     const auto of_scene =
         models != nullptr ? std::span(models->table().lamps) : std::span<const surface::PunctualLight>();
+    const auto groups = models != nullptr ? std::span(models->table().lamp_groups) : std::span<const std::uint32_t>();
     LampsOf of{snapshot.lamps, {}, {}};
     // What no lamp shines on makes no other table.
     if (!of_scene.empty()) of.models = models->models();
     if (!of_scene.empty() || !snapshot.lamps->empty()) of.lit = lit();
     if (!lamps.wants(of, wanted.settings)) return;
-    lamps.make(of, wanted.settings, [&] { return LampData::make(gl_, limits_, *snapshot.lamps, of_scene, of.lit); });
+    lamps.make(of, wanted.settings,
+               [&] { return LampData::make(gl_, limits_, *snapshot.lamps, of_scene, groups, of.lit); });
   };
   if (placed_) {
     make(host_lamps_, nullptr);

@@ -8,8 +8,10 @@
 namespace cumulet::render {
 
 LampData LampData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
-                        std::span<const surface::PunctualLight> of_scene, std::span<const light::Lit> lit) {
+                        std::span<const surface::PunctualLight> of_scene, std::span<const std::uint32_t> groups,
+                        std::span<const light::Lit> lit) {
   std::vector<core::CmLamp> records = light::lamp_records(of_host, of_scene, glm::dvec3(0.0));
+  for (std::size_t i = 0; i < groups.size(); ++i) records[of_host.size() + i].group = groups[i];
   LampData data;
   data.arrives_ = light::share_looks(records, lit);
   if (!lit.empty()) data.nearest_ = light::nearest_lamp(records, lit.front());

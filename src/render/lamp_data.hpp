@@ -12,9 +12,11 @@ namespace cumulet::render {
 /// The lamps that paths look for, on the GPU. All calls need the context current and a StateGuard around.
 class LampData {
  public:
-  /// lit: what they may light. Throws Error(unsupported) for more than the driver binds.
+  /// groups: those of lights that the scene's are in. lit: what they may light. Throws Error(unsupported) for more than
+  /// the driver binds.
   static LampData make(const gl::FunctionsPtr& gl, const gl::Limits& limits, const light::Lamps& of_host,
-                       std::span<const surface::PunctualLight> of_scene, std::span<const light::Lit> lit);
+                       std::span<const surface::PunctualLight> of_scene, std::span<const std::uint32_t> groups,
+                       std::span<const light::Lit> lit);
 
   void bind(const gl::Functions& gl) const;
   /// Of both.

@@ -17,9 +17,12 @@ namespace cumulet::render {
 
 namespace {
 
-// visits: of paths among several volumes; within: of what they are within, which lies behind that in any case.
-constexpr std::size_t lane_bytes(bool visits, bool within) {
-  return std::size_t{16} * (CM_PATH_QUADS + (visits || within ? CM_VISIT_QUADS : 0) + (within ? CM_WITHIN_QUADS : 0));
+// visits: of paths among several volumes; within: of what they are within, which lies behind that in any case; groups:
+// of lights, which lie behind both.
+constexpr std::size_t lane_bytes(bool visits, bool within, std::uint32_t groups) {
+  const bool both = groups > 0;
+  return std::size_t{16} * (CM_PATH_QUADS + (visits || within || both ? CM_VISIT_QUADS : 0) +
+                            (within || both ? CM_WITHIN_QUADS : 0) + groups);
 }
 
 // A head is what glDispatchComputeIndirect reads, and how many paths wait.
@@ -33,12 +36,12 @@ std::uint32_t groups_across(std::uint32_t tile_width) {
 
 }  // namespace
 
-void PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within) {
+void PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
   if (!blocks_) {
     blocks_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
                               "creating the counters");
   }
-  const std::size_t path_bytes = lanes * lane_bytes(visits, within);
+  const std::size_t path_bytes = lanes * lane_bytes(visits, within, groups);
   if (path_bytes > path_bytes_) {
     paths_ = {};
     path_bytes_ = 0;

@@ -29,8 +29,9 @@ class PathKernels {
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
   /// Makes room for the paths of a tile, with queues if they are to be run by stages, with what paths among several
-  /// volumes keep of their visits, and with what they keep of the glass that they are within. Throws on a GL error.
-  void reserve(std::size_t lanes, bool stages, bool visits, bool within);
+  /// volumes keep of their visits, with what they keep of the glass that they are within, and with sums of so many
+  /// groups of lights. Throws on a GL error.
+  void reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups);
   /// Binds all that reserve made.
   void bind() const;
   /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).

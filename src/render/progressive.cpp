@@ -55,6 +55,7 @@ bool PictureWish::Content::shows_same(const Content& other) const {
   seen.region = region;
   seen.preview = preview;
   seen.volume_alone = volume_alone;
+  seen.light_groups = light_groups;
   seen.stops_by_noise = stops_by_noise;
   return seen == *this;
 }
@@ -131,6 +132,7 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Obstacles& ob
   settings.region = wish_.content.region;
   settings.margin = margin_of(divisor);
   settings.volume_alone = wish_.content.volume_alone && divisor == finest_;
+  if (divisor == finest_) settings.light_groups = wish_.content.light_groups;
   if (divisor == finest_) settings.noise_target = wish_.noise_target;
   return settings;
 }

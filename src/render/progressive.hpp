@@ -37,10 +37,11 @@ struct PictureWish {
     glm::uvec2 size{0U};  // full resolution
     Region region;        // that is made of it
     View view = View::shaded;
-    bool surfaces_traced = true;  // paths meet triangles
-    bool preview = true;          // coarse first; else at full resolution only
-    bool volume_alone = false;    // at full resolution, sum what met the volume first apart as well
-    bool stops_by_noise = false;  // there is a noise target
+    bool surfaces_traced = true;     // paths meet triangles
+    bool preview = true;             // coarse first; else at full resolution only
+    bool volume_alone = false;       // at full resolution, sum what met the volume first apart as well
+    std::uint32_t light_groups = 0;  // likewise, the radiance of so many groups of lights
+    bool stops_by_noise = false;     // there is a noise target
     bool operator==(const Content&) const = default;
     /// Whether but the view, the host's depth and how pictures are made are the same.
     [[nodiscard]] bool shows_same(const Content& other) const;

@@ -64,6 +64,7 @@ constexpr const char* channels_macro = "CM_CHANNELS 1";
 constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
 constexpr const char* equiangular_macro = "CM_EQUIANGULAR 1";
 constexpr const char* rich_macro = "CM_RICH 1";
+constexpr const char* groups_macro = "CM_GROUPS 1";
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
@@ -253,21 +254,29 @@ void Tracer::add_medium(const Picture& picture, std::vector<std::string>& define
   if (picture.channels_) defines.emplace_back(channels_macro);
 }
 
+void Tracer::add_groups(const Picture& picture, std::vector<std::string>& defines) {
+  if (picture.light_groups_ > 0) defines.emplace_back(groups_macro);
+}
+
 const Tracer::Program& Tracer::trace_program(const Picture& picture, const MarchData& data) {
   if (picture.traced_ > 0) {
     std::vector<std::string> more{surfaces_macro(picture.traced_)};
     add_medium(picture, more);
     if (picture.environment_) more.emplace_back(environment_macro);
     if (picture.equiangular_) more.emplace_back(equiangular_macro);
+    add_groups(picture, more);
     return program(data.defines(picture.several_), "trace_travel.comp", more);
   }
+  // With groups of lights there are few variants: they know of layers and lamps that are not there.
+  const bool groups = picture.light_groups_ > 0;
   std::vector<std::string> more;
-  if (picture.layered_ != Layered::no) more.emplace_back("CM_LAYERS 1");
+  if (picture.layered_ != Layered::no || (groups && !picture.equiangular_)) more.emplace_back("CM_LAYERS 1");
   if (picture.volume_alone_) more.emplace_back("CM_AOVS 1");
   add_medium(picture, more);
   if (picture.environment_) more.emplace_back(environment_macro);
-  if (picture.lamps_) more.emplace_back("CM_LAMPS 1");
+  if (picture.lamps_ || groups) more.emplace_back("CM_LAMPS 1");
   if (picture.equiangular_) more.emplace_back(equiangular_macro);
+  add_groups(picture, more);
   return program(data.defines(picture.several_), "trace.comp", more);
 }
 
@@ -287,6 +296,7 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
   if (picture.environment_) camera.emplace_back(environment_macro);
+  for (std::vector<std::string>* defines : {&shade, &meet, &camera}) add_groups(picture, *defines);
   std::vector<std::string> begin = camera;
   begin[1] = "CM_DENSE 1";
   StagePrograms programs;
@@ -346,6 +356,8 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.several_ = obstacles.instances != nullptr;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
+  picture.light_groups_ = shaded ? settings.light_groups : 0;
+  if (picture.light_groups_ > 0 && picture.traced_ > 0) picture.traced_ = 2;
   // What the volume alone has is told by what a path first met, and such light may lie before a surface; and a layer's
   // colour waits in the place of such a look's light.
   picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ && !picture.rich_ &&
@@ -385,6 +397,7 @@ std::vector<FilmLayer> Tracer::accumulated(const Picture& picture) {
   std::vector<FilmLayer> layers{film_layers::radiance, film_layers::background, film_layers::moments,
                                 film_layers::counts};
   if (picture.volume_alone_) layers.push_back(film_layers::volume);
+  if (picture.light_groups_ > 0) layers.push_back(film_layers::light_groups(picture.light_groups_));
   return layers;
 }
 
@@ -402,6 +415,8 @@ void Tracer::empty(Picture& picture, const glm::vec3& background, std::uint32_t 
     gl_->ClearTexImage(film.texture(film_layers::moments), 0, GL_RED, GL_FLOAT, &zero);
     gl_->ClearTexImage(film.texture(film_layers::counts), 0, GL_RG_INTEGER, GL_UNSIGNED_INT, &count);
     if (picture.volume_alone_) gl_->ClearTexImage(film.texture(film_layers::volume), 0, GL_RGBA, GL_FLOAT, &zero);
+    if (const FilmLayer groups = film_layers::light_groups(picture.light_groups_); picture.light_groups_ > 0)
+      gl_->ClearTexImage(film.texture(groups), 0, GL_RGBA, GL_FLOAT, &zero);
     gl::check(*gl_, "clearing the accumulation");
     return true;
   };
@@ -487,10 +502,12 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
     drop_unused_layers();
   }
   if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
+  if (picture.light_groups_ == 0) picture.film_.drop(film_layers::light_groups(0));
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
-  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0, picture.several_, picture.rich_);
+  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0, picture.several_, picture.rich_, picture.light_groups_);
   find_programs(picture, data, obstacles);
   picture.parameters_ = assemble(parameters, obstacles);
+  picture.parameters_.integrator.groups = picture.light_groups_;
   picture.target_samples_ = samples;
   if (picture.layered_ != Layered::no) {
     const SurfaceLayers& layers = *picture.layers_;
@@ -642,6 +659,8 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   // What is bound shall fit the format, though nothing writes it: inspect.comp has the depth there.
   film.bind(*gl_, core::CM_IMAGE_VOLUME_SUM, picture.volume_alone_ ? film_layers::volume : film_layers::depth,
             GL_READ_WRITE);
+  if (picture.light_groups_ > 0)
+    film.bind(*gl_, core::CM_IMAGE_GROUPS, film_layers::light_groups(picture.light_groups_), GL_READ_WRITE);
   if (!shaded) {
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
@@ -909,6 +928,30 @@ void Tracer::read_means(const Picture& picture, const FilmLayer& sum, float* rgb
   }
 }
 
+void Tracer::read_light_group(const Picture& picture, std::uint32_t group, bool with_background, float* rgb) const {
+  const std::vector<glm::uvec2> counts = read_counts(picture);
+  const glm::ivec2 size(picture.size_);
+  const std::uint32_t groups = picture.light_groups_;
+  const GLuint layer = picture.film_.texture(film_layers::light_groups(groups));
+  std::vector<glm::vec3> sums(counts.size(), glm::vec3(0.0F));
+  std::vector<glm::vec3> slice(counts.size());
+  const auto add = [&](std::uint32_t number) {
+    gl_->GetTextureSubImage(layer, 0, 0, 0, static_cast<GLint>(number), size.x, size.y, 1, GL_RGB, GL_FLOAT,
+                            static_cast<GLsizei>(slice.size() * sizeof(glm::vec3)), slice.data());
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += slice[i];
+  };
+  add(group);
+  const core::CmIntegrator& integrator = picture.parameters_.integrator;
+  const auto is_of = [&](std::uint32_t other) { return group == (other < groups ? other : 0); };
+  if (with_background && is_of(integrator.sky_group)) add(groups);
+  if (with_background && is_of(integrator.sun_group)) add(groups + 1);
+  gl::check(*gl_, "reading a group of lights back");
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const glm::vec3 mean = sums[i] / static_cast<float>(std::max(1U, counts[i].x));
+    std::memcpy(rgb + 3 * i, &mean, sizeof mean);
+  }
+}
+
 void Tracer::read_volume(const Picture& picture, float* rgba) const { read_means(picture, film_layers::volume, rgba); }
 
 namespace {
@@ -994,8 +1037,15 @@ void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
   if (picture.done_) return;
   for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t) {
     const Transfer transfer = transfer_of(layer);
-    gl_->TextureSubImage2D(picture.film_.texture(layer), 0, 0, 0, static_cast<GLsizei>(picture.size_.x),
-                           static_cast<GLsizei>(picture.size_.y), transfer.format, transfer.type, saved.data() + at);
+    const GLuint texture = picture.film_.texture(layer);
+    const glm::ivec2 size(picture.size_);
+    const std::byte* bytes = saved.data() + at;
+    if (layer.slices > 0) {
+      gl_->TextureSubImage3D(texture, 0, 0, 0, 0, size.x, size.y, static_cast<GLsizei>(layer.slices), transfer.format,
+                             transfer.type, bytes);
+    } else {
+      gl_->TextureSubImage2D(texture, 0, 0, 0, size.x, size.y, transfer.format, transfer.type, bytes);
+    }
   });
   gl::check(*gl_, "restoring the accumulation");
   picture.revision_ = ++revision_;

@@ -75,6 +75,8 @@ struct PictureSettings {
   bool volume_alone = false;
   /// The picture is done once its noise (Totals::noise) is no more than this; none: once it has its samples.
   std::optional<double> noise_target;
+  /// That are gathered apart; 0: none.
+  std::uint32_t light_groups = 0;
   /// The part of it that is made, and so many pixels around that. What follows is of this part.
   Region region;
   unsigned margin = 0;
@@ -132,6 +134,8 @@ class Picture {
   [[nodiscard]] const SurfaceLayers& layers() const { return *layers_; }
   [[nodiscard]] Layered layered() const { return layered_; }
   [[nodiscard]] bool volume_alone() const { return volume_alone_; }
+  /// How many groups of lights are gathered apart.
+  [[nodiscard]] std::uint32_t light_groups() const { return light_groups_; }
   /// Whether facts are there that a filter can do with (Tracer::find_facts).
   [[nodiscard]] bool has_facts() const;
   /// Asks for this many samples, if that is more, and of a picture with a noise target for this noise: goes on where it
@@ -158,6 +162,7 @@ class Picture {
   std::uint64_t begun_ = 0;
   std::uint64_t revision_ = 0;
   bool volume_alone_ = false;
+  std::uint32_t light_groups_ = 0;
   std::shared_ptr<const SurfaceLayers> layers_;  // of Tracer::drawn_layers_
   Layered layered_ = Layered::no;
   unsigned traced_ = 0;       // 1: paths meet triangles; 2: and look for those that emit
@@ -252,6 +257,9 @@ class Tracer {
   void read(const Picture& picture, bool with_background, float* rgba) const;
   /// The same without background of samples that met the volume before any surface; alpha is their share.
   void read_volume(const Picture& picture, float* rgba) const;
+  /// width * height * 3 floats: mean radiance of a group of lights that the picture has, with what of the background is
+  /// of it or without.
+  void read_light_group(const Picture& picture, std::uint32_t group, bool with_background, float* rgb) const;
   /// How many bytes save writes.
   [[nodiscard]] static std::size_t saved_bytes(const Picture& picture);
   /// All that a shaded picture's samples have come to, for restore. Nothing of it may be under way.
@@ -323,6 +331,7 @@ class Tracer {
   static unsigned traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
                             const PictureSettings& settings);
   // The one kernel, or what the paths' time goes by where they are run by stages.
+  static void add_groups(const Picture& picture, std::vector<std::string>& defines);
   static void add_medium(const Picture& picture, std::vector<std::string>& defines);
   const Program& trace_program(const Picture& picture, const MarchData& data);
   StagePrograms stage_programs(const Picture& picture, const MarchData& data);

@@ -156,6 +156,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         record.emitters = at.first + mesh.emitters;
         record.emitter_count = mesh.emitter_count;
         record.textures = at.textures;
+        record.group = model.group;
         const bool solid = own_low.x <= own_high.x;
         TreeBox box{vec3(0.0F), vec3(0.0F), solid};
         if (solid) {
@@ -177,7 +178,10 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         table.parts.push_back({static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(i)});
       }
     }
-    for (const surface::PunctualLight& light : source.pose.lights) table.lamps.push_back(placed(light, model.to_world));
+    for (const surface::PunctualLight& light : source.pose.lights) {
+      table.lamps.push_back(placed(light, model.to_world));
+      table.lamp_groups.push_back(model.group);
+    }
   }
   if (low.x <= high.x) {
     table.low = low;

@@ -39,6 +39,7 @@ struct ModelTable {
   std::vector<core::CmInstanceNode> nodes;    ///< at least one
   std::vector<ModelPart> parts;               ///< of the records
   std::vector<surface::PunctualLight> lamps;  ///< of all models, where they stand
+  std::vector<std::uint32_t> lamp_groups;     ///< of these, each one's group of lights
   light::SceneLights lights;
   glm::dvec3 low{0.0};  ///< of all triangles; of none both are 0
   glm::dvec3 high{0.0};

@@ -22,6 +22,7 @@ struct Medium {
   glm::vec3 albedo{1.0F};
   Phase phase;
   glm::vec3 emission{0.0F};
+  std::uint32_t group = 0;  ///< of lights, of what it gives off
   bool operator==(const Medium&) const = default;
 };
 
@@ -79,6 +80,7 @@ struct Model {
   ModelSourcePtr source;     ///< not null
   glm::dmat4 to_world{1.0};  ///< affine, from the world that it was posed in
   bool shadow_only = false;  ///< no camera ray meets it; others do
+  std::uint32_t group = 0;   ///< of lights, that it is in
   bool operator==(const Model&) const = default;
 };
 

@@ -80,6 +80,9 @@ inline constexpr std::array lamp_choices = {
     Choice{"rectangle", CUMULET_LAMP_RECTANGLE, "Rectangle", "An area that shines to one side."},
     Choice{"sun", CUMULET_LAMP_SUN, "Sun", "Far away: the same everywhere."}};
 
+/// Numbers of groups of lights.
+inline constexpr Range group_range = {0.0, CUMULET_LIGHT_GROUPS - 1.0};
+
 // One setting, one row.
 // clang-format off
 
@@ -174,7 +177,10 @@ struct Table<cumulet_medium_desc> {
       Setting(&Desc::blackbody_tint, {.name = "blackbody_tint", .range = light_range, .zero = 1.0,
         .key = "medium.blackbody_tint", .flag = "--blackbody-tint", .type = "R,G,B",
         .help = "Its tint (default: 1,1,1)",
-        .row = {.label = "Black body tint", .tip = "Multiplies the black body's colour."}})};
+        .row = {.label = "Black body tint", .tip = "Multiplies the black body's colour."}}),
+      Setting(&Desc::group, {.name = "group", .range = group_range,
+        .key = "medium.group", .flag = "--medium-group", .type = "N",
+        .help = "Group of lights that what it gives off is in, from 0 to 7 (default: 0); see --light-groups"})};
 };
 
 template <>
@@ -227,7 +233,13 @@ struct Table<cumulet_light_desc> {
         .help = "That the sun's disc takes, up to 180; 0: none, and hard shadows (default: 0, of a --sky-model 0.53)",
         .row = {.label = "Sun angle",
                 .tip = "That the sun's disc takes: larger is softer.",
-                .most = 30.0, .format = "%.2f°"}})};
+                .most = 30.0, .format = "%.2f°"}}),
+      Setting(&Desc::sun_group, {.name = "sun_group", .range = group_range,
+        .key = "light.sun.group", .flag = "--sun-group", .type = "N",
+        .help = "Group of lights that the sun is in, from 0 to 7 (default: 0); see --light-groups"}),
+      Setting(&Desc::sky_group, {.name = "sky_group", .range = group_range,
+        .key = "light.sky.group", .flag = "--sky-group", .type = "N",
+        .help = "Likewise, of the sky or the environment"})};
 };
 
 /// Of one lamp of many: keys are those of its object in a scene file's list.
@@ -275,7 +287,9 @@ struct Table<cumulet_lamp_desc> {
         .key = "blend",
         .row = {.label = "Blend",
                 .tip = "The part of a spot's cone in which it dims.",
-                .most = 1.0}})};
+                .most = 1.0}}),
+      Setting(&Desc::group, {.name = "group", .range = group_range,
+        .key = "group"})};
 };
 
 template <>
@@ -351,7 +365,11 @@ struct Table<cumulet_surface_settings_desc> {
         .help = "Show both sides of all surfaces, for files that are wound inside out",
         .row = {.label = "Double sided",
                 .tip = "Shows both sides of all surfaces, for models that are wound inside out."}}),
-      Setting(&Desc::variant, {.name = "variant"})};
+      Setting(&Desc::variant, {.name = "variant"}),
+      Setting(&Desc::group, {.name = "group", .range = group_range,
+        .key = "surfaces.group", .flag = "--gltf-group", .type = "N",
+        .help = "Group of lights that what its surfaces and lamps give off is in, from 0 to 7 (default: 0); see "
+                "--light-groups"})};
 };
 
 template <>
@@ -436,7 +454,8 @@ struct Table<cumulet_sampling_desc> {
         .row = {.label = "Region",
                 .tip = "The part of the picture that is made: left, top, width, height, as fractions (Ctrl+B, and "
                        "drag). Width or height 0: to the end.",
-                .most = 1.0, .format = "%.3f"}})};
+                .most = 1.0, .format = "%.3f"}}),
+      Setting(&Desc::light_groups, {.name = "light_groups", .range = {0.0, CUMULET_LIGHT_GROUPS}})};
 };
 
 template <>

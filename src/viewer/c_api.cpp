@@ -603,6 +603,10 @@ cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* 
   });
 }
 
+cumulet_status cumulet_read_light_group(cumulet_viewer* viewer, uint32_t group, float* rgb, size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) { v.read_light_group(group, rgb, count); });
+}
+
 cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(noise != nullptr, "noise is NULL");

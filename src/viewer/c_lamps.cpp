@@ -38,6 +38,7 @@ light::Lamp lamp_of(const cumulet_lamp_desc& d) {
   const double degrees = d.kind == CUMULET_LAMP_SPOT && d.angle_degrees == 0.0 ? 45.0 : d.angle_degrees;
   lamp.angle = degrees * std::numbers::pi / 180.0;
   lamp.blend = d.blend;
+  lamp.group = d.group;
   return lamp;
 }
 

@@ -36,6 +36,8 @@ ModelSettings settings_of(const cumulet_model_desc* desc) {
   settings.hidden = d.hidden == 1;
   settings.shadow_only = d.shadow_only == 1;
   settings.tag = d.tag;
+  require(d.group < CUMULET_LIGHT_GROUPS, "cumulet_model_desc.group is not below CUMULET_LIGHT_GROUPS");
+  settings.group = d.group;
   return settings;
 }
 

@@ -28,7 +28,7 @@ std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& d
     return stands_for_another || setting.range.holds(value) ? "" : setting.range.refusal();
   } else {
     static_assert(settings::Count<Value>);
-    return "";
+    return setting.range.holds(static_cast<double>(value)) ? "" : setting.range.refusal();
   }
 }
 

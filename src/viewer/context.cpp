@@ -84,6 +84,8 @@ render::PictureParameters Context::parameters(const Shot& shot, const render::Ob
   integrator.seed = shot.sampling.seed;
   integrator.first_sample = shot.sampling.first_sample;
   integrator.max_bounces = shot.max_bounces;
+  integrator.sun_group = shot.sun_group;
+  integrator.sky_group = shot.sky_group;
   integrator.blurred_roughness = shot.surfaces.indirect_roughness;
   integrator.light_among_surfaces = shot.surfaces.light == SurfaceLight::full ? 1U : 0U;
   return scene_.parameters(*shot.scene, obstacles, integrator, shot.size);
@@ -149,6 +151,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.content.surfaces_traced = met.traced;
   wish.content.preview = shot.sampling.preview;
   wish.content.volume_alone = shot.sampling.volume_alone;
+  wish.content.light_groups = shot.sampling.light_groups;
   wish.samples = std::max(1U, shot.sampling.samples);
   wish.noise_target = shot.sampling.noise_target;
   wish.content.stops_by_noise = shot.sampling.noise_target.has_value();

@@ -42,6 +42,8 @@ struct Shot {
   bool view_rests = false;  // as it was in the last frame that traced
   bool held = false;        // a hand is at the view
   std::uint32_t max_bounces = 0;
+  std::uint32_t sun_group = 0;
+  std::uint32_t sky_group = 0;
   Sampling sampling;
   SurfaceSettings surfaces;
   DisplaySettings display;
@@ -112,6 +114,7 @@ class Context {
   [[nodiscard]] Pick pick(const Shot& shot, double x, double y);
   /// Throws Error(invalid_argument) for too few values, or what was not gathered.
   void read_aov(const Shot& shot, Aov aov, float* values, std::size_t count);
+  void read_light_group(const DisplaySettings& settings, std::uint32_t group, float* rgb, std::size_t count);
   void read_linear(const DisplaySettings& settings, float* rgba, std::size_t count);
   /// Whether read_denoised can give this picture.
   [[nodiscard]] bool can_denoise(const render::Picture& picture) const;

@@ -31,7 +31,8 @@ struct ModelSettings {
   glm::dmat4 to_world{1.0};
   bool hidden = false;
   bool shadow_only = false;
-  std::uint64_t tag = 0;  ///< the host's own
+  std::uint32_t group = 0;  ///< of lights
+  std::uint64_t tag = 0;    ///< the host's own
 };
 
 /// What several viewers may show. All calls are safe from any thread.

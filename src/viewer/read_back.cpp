@@ -206,6 +206,19 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   }
 }
 
+void Context::read_light_group(const DisplaySettings& settings, std::uint32_t group, float* rgb, std::size_t count) {
+  const render::Picture& picture = readable();
+  if (group >= picture.light_groups()) {
+    throw Error(ErrorCode::invalid_argument,
+                "the picture has " + std::to_string(picture.light_groups()) +
+                    " groups of lights: set light_groups of cumulet_sampling_desc, and wait for the full resolution");
+  }
+  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 3;
+  if (rgb == nullptr || count < floats)
+    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+  progressive_.tracer().read_light_group(picture, group, settings.shown(false).shows_background(), rgb);
+}
+
 void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts) {
   if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
     throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");

@@ -51,6 +51,7 @@ struct Medium {
   std::uint32_t max_bounces = 0;
   glm::vec3 emission{0.0F};
   scene::Emission field_emission = {};  // of what its grids give off
+  std::uint32_t group = 0;              // of lights
 
   static Medium of(const cumulet_medium_desc& d) {
     return {d.density_scale,
@@ -59,7 +60,8 @@ struct Medium {
             d.max_bounces,
             glm::make_vec3(d.emission),
             {d.flame_strength, glm::make_vec3(d.flame_color), d.temperature_scale, d.temperature_offset, d.blackbody,
-             glm::make_vec3(d.blackbody_tint)}};
+             glm::make_vec3(d.blackbody_tint)},
+            d.group};
   }
   static scene::Phase phase_of(const cumulet_medium_desc& d) {
     switch (d.phase) {
@@ -87,6 +89,8 @@ struct Light {
   glm::vec3 sky_radiance{0.0F};
   std::optional<light::SkyModel> sky = std::nullopt;  ///< then neither of the two before is meant
   float sun_angle_degrees = 0.0F;
+  std::uint32_t sun_group = 0;  ///< of lights
+  std::uint32_t sky_group = 0;  ///< of the sky, or the environment
 
   static Light of(const cumulet_light_desc& d) {
     Light light{d.sun_azimuth_degrees, d.sun_elevation_degrees, glm::make_vec3(d.sun_irradiance),
@@ -94,6 +98,8 @@ struct Light {
     if (d.sky == CUMULET_SKY_PHYSICAL) light.sky = {.turbidity = d.turbidity, .ground_albedo = d.ground_albedo};
     light.sun_angle_degrees =
         d.sun_angle_degrees != 0.0F ? std::max(0.0F, d.sun_angle_degrees) : settings::default_sun_angle(d.sky);
+    light.sun_group = d.sun_group;
+    light.sky_group = d.sky_group;
     return light;
   }
 };
@@ -123,11 +129,13 @@ struct SurfaceSettings {
   SurfaceChoice choice;
   SurfaceLight light = SurfaceLight::full;
   float indirect_roughness = 0.0F;
+  std::uint32_t group = 0;  ///< of lights
 
   static SurfaceSettings of(const cumulet_surface_settings_desc& d) {
     return {{d.time, d.animation, d.double_sided == 1, d.variant},
             static_cast<SurfaceLight>(d.light),
-            d.indirect_roughness};
+            d.indirect_roughness,
+            d.group};
   }
 };
 
@@ -140,6 +148,7 @@ struct Sampling {
   std::optional<double> noise_target = std::nullopt;  ///< relative
   std::uint32_t first_sample = 0;
   render::Region region = {};
+  std::uint32_t light_groups = 0;
 
   static Sampling of(const cumulet_sampling_desc& d) {
     Sampling sampling{d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
@@ -147,6 +156,7 @@ struct Sampling {
     if (d.noise_target_percent > 0.0F) sampling.noise_target = 0.01 * double(d.noise_target_percent);
     sampling.first_sample = d.first_sample;
     sampling.region = {{d.region[0], d.region[1]}, {d.region[2], d.region[3]}};
+    sampling.light_groups = d.light_groups;
     return sampling;
   }
 };

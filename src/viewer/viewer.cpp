@@ -38,7 +38,7 @@ scene::Emission emission_of(const Medium& medium, const Ramps& ramps) {
 }
 
 scene::Medium shown_medium(const Medium& medium) {
-  return {medium.density_scale, medium.albedo, medium.phase, medium.emission};
+  return {medium.density_scale, medium.albedo, medium.phase, medium.emission, medium.group};
 }
 
 // Whether but for how much hides and from where it is seen the same is made.
@@ -552,10 +552,15 @@ void Viewer::follow_poses() {
 
 std::vector<scene::Model> Viewer::models() const {
   std::vector<scene::Model> models;
-  if (model_source_) models.push_back({0, model_source_});
+  if (model_source_) {
+    scene::Model& own = models.emplace_back();
+    own.source = model_source_;
+    own.group = surface_settings_.group;
+  }
   for (const ShownModel& shown : shown_models_) {
     if (shown.is_shown())
-      models.push_back({shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only});
+      models.push_back(
+          {shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only, shown.settings.group});
   }
   return models;
 }
@@ -1231,6 +1236,8 @@ Shot Viewer::shot() {
   shot.view_rests = view_ == last_view_;
   shot.held = navigation_.dragging();
   shot.max_bounces = medium_.max_bounces;
+  shot.sun_group = light_.sun_group;
+  shot.sky_group = light_.sky_group;
   shot.sampling = sampling_;
   shot.surfaces = surface_settings_;
   shot.display = display_;

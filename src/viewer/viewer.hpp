@@ -170,6 +170,7 @@ class Viewer {
   void drop_map(std::uint32_t slot);
   /// Throws Error(invalid_argument) without a volume.
   Bounds bounds();
+  void read_light_group(std::uint32_t group, float* rgb, std::size_t count);
   void read_linear(float* rgba, std::size_t count);
   void read_display(std::uint8_t* rgba, std::size_t count);
   /// By the network in this file, which stays in memory. Throws Error(file) if it is none.

@@ -249,6 +249,10 @@ void Viewer::read_aov(Aov aov, float* values, std::size_t count) {
   with_gl([&](Context& g) { g.read_aov(shot(), aov, values, count); });
 }
 
+void Viewer::read_light_group(std::uint32_t group, float* rgb, std::size_t count) {
+  with_gl([&](Context& g) { g.read_light_group(display_, group, rgb, count); });
+}
+
 void Viewer::read_linear(float* rgba, std::size_t count) {
   with_gl([&](Context& g) {
     g.read_linear(display_, rgba, count);

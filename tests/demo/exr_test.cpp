@@ -103,7 +103,8 @@ class Exr : public testing::TestWithParam<Backend> {
     EXPECT_EQ(cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
     const std::string file = (folder_ / name).string();
     cumulet::demo::write_exr(viewer_.get(), file, cumulet::demo::windows_of(scene_.sampling.region, width, height),
-                             {rgba}, aovs_, cumulet::demo::metadata_of(viewer_.get(), scene_, width, height));
+                             {.beauty = rgba, .light_groups = scene_.light_groups}, aovs_,
+                             cumulet::demo::metadata_of(viewer_.get(), scene_, width, height));
     return file;
   }
 
@@ -224,6 +225,30 @@ TEST_P(Exr, SevenMergedPartsAreTheWhole) {
   aovs_ = {};
   render();
   EXPECT_THROW(cumulet::demo::merge({parts[0], write("other.exr")}, merged), std::runtime_error);
+}
+
+TEST_P(Exr, GroupsOfLightsAreLayersWhoseSumIsThePicture) {
+  scene_.light.sun_group = 1;
+  for (float& value : scene_.light.sun_irradiance) value = 2.0F;
+  scene_.sampling.light_groups = 2;
+  scene_.light_groups = {"sky", "key_light"};
+  render();
+  const std::string whole = write("whole.exr");
+  scene_.sampling.first_sample = scene_.sampling.samples;
+  render();
+  const std::string merged = (folder_ / "merged.exr").string();
+  cumulet::demo::merge({whole, write("next.exr")}, merged);
+  for (const std::string& file : {whole, merged}) {
+    const std::vector<float> sky = cumulet::image::read_exr(file, {"Combined_sky", "RGB"}).values;
+    const std::vector<float> key = cumulet::image::read_exr(file, {"Combined_key_light", "RGB"}).values;
+    const std::vector<float> all = cumulet::image::read_exr(file, cumulet::image::layers::beauty).values;
+    double sun = 0.0;
+    for (std::size_t i = 0; i < sky.size(); ++i) {
+      ASSERT_NEAR(sky[i] + key[i], all[i / 3 * 4 + i % 3], 1e-5) << file << ' ' << i;
+      sun += double{key[i]};
+    }
+    EXPECT_GT(sun, 1.0);
+  }
 }
 
 // Of a region the pixels are those of the whole, where they are in it; and its parts are merged.

@@ -162,7 +162,7 @@ TEST(Settings, SceneFilesKeepEach) {
     });
   });
   // What a picture's file has no say in, or says by name (surfaces.variant).
-  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "preview", "variant", "volume_alone"}));
+  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "light_groups", "preview", "variant", "volume_alone"}));
 }
 
 TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
@@ -195,6 +195,7 @@ TEST(Settings, ThePageOfSceneFilesHasEachKeyAndNoOther) {
                                 "camera.focus_distance",
                                 "picture.width",
                                 "picture.height",
+                                "picture.light_groups",
                                 "environment.file",
                                 "sequence.first_frame",
                                 "sequence.last_frame",
@@ -234,9 +235,9 @@ TEST(Settings, AFlagSetsEach) {
     });
   });
   // --sun and --sky-model set three at once.
-  EXPECT_EQ(without,
-            (std::set<std::string>{"first_sample", "ground_albedo", "preview", "sky", "sun_azimuth_degrees",
-                                   "sun_elevation_degrees", "sun_irradiance", "turbidity", "variant", "volume_alone"}));
+  EXPECT_EQ(without, (std::set<std::string>{"first_sample", "ground_albedo", "light_groups", "preview", "sky",
+                                            "sun_azimuth_degrees", "sun_elevation_degrees", "sun_irradiance",
+                                            "turbidity", "variant", "volume_alone"}));
 }
 
 TEST(Settings, TheLibraryTakesEachAndNamesWhatItRefuses) {

@@ -957,6 +957,7 @@ typedef struct cumulet_surface_settings_desc {
                            that are wound inside out (a warning tells of those). 0: as the file says */
   uint32_t variant;     /* of the file's variants of materials the one of index variant - 1 (see
                            cumulet_surfaces_get_variant); 0, or one that is not there: the materials without a choice */
+  uint32_t group;       /* of lights, that their emissive triangles and lamps are in */
 } cumulet_surface_settings_desc;
 
 /* How this viewer shows its surfaces. Poses them on the worker if the moment, double_sided or the variant changed; the
@@ -1034,6 +1035,12 @@ CUMULET_API cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumu
 
 /* ---- Settings --------------------------------------------------------------------------------------------------- */
 
+/*
+ * Lights are in groups, of which a picture may keep the radiance apart (light_groups of cumulet_sampling_desc), so that
+ * whoever composites it dims or colours them anew: numbers below this; 0, where nothing is said.
+ */
+enum { CUMULET_LIGHT_GROUPS = 8 };
+
 typedef enum cumulet_march {
   CUMULET_MARCH_TET = 0,   /* the adaptive tetrahedral grid */
   CUMULET_MARCH_DENSE = 1, /* 3D DDA over every voxel of the bounds (the paper's reference) */
@@ -1110,6 +1117,7 @@ typedef struct cumulet_medium_desc {
   float temperature_offset; /* kelvin */
   float blackbody;          /* intensity; 0: none, but 1 for a volume of a temperature without density and flame */
   float blackbody_tint[3];  /* all 0: white */
+  uint32_t group;           /* of lights, that all it gives off is in */
 } cumulet_medium_desc;
 
 /* The grid whose values a ramp changes. */
@@ -1149,6 +1157,8 @@ typedef struct cumulet_light_desc {
    * 0: none, but 0.53 of a physical sky; negative: none.
    */
   float sun_angle_degrees;
+  uint32_t sun_group; /* of lights */
+  uint32_t sky_group; /* or of the environment that is there instead */
 } cumulet_light_desc;
 
 /* How a viewer is surrounded by its environment (cumulet_set_environment). Restarts accumulation. */
@@ -1220,6 +1230,12 @@ typedef struct cumulet_sampling_desc {
    * an error or a depth would be infinite, too. Denoising knows no other pixels. Progress, noise and samples are of it.
    */
   float region[4];
+  /*
+   * At full resolution also keep what each of so many groups of lights brings, for cumulet_read_light_group: 8 at most;
+   * 0: none. Lights of groups beyond these count in group 0, so that the groups together are the picture. The same
+   * samples make the same picture with groups and without. It takes 16 bytes a pixel of GL memory a group, and 32 more.
+   */
+  uint32_t light_groups;
 } cumulet_sampling_desc;
 
 typedef enum cumulet_tone_map {
@@ -1362,6 +1378,7 @@ typedef struct cumulet_model_desc {
   int32_t hidden;      /* 1: it is as if it were not there */
   int32_t shadow_only; /* 1: cameras do not see it, nor do picks and AOVs; other light meets it, and it shines */
   uint64_t tag;        /* the host's own, which cumulet_pick tells */
+  uint32_t group;      /* of lights, that its emissive triangles and lamps are in */
 } cumulet_model_desc;
 
 /* error as in cumulet_create. */
@@ -1412,6 +1429,7 @@ typedef struct cumulet_lamp_desc {
   double height;        /* of a rectangle; 0: 1 */
   double angle_degrees; /* of a spot the whole cone's, up to 180, 0: 45; of a sun what it covers of the sky, up to 90 */
   double blend;         /* of a spot: the part of the cone, from its edge inwards, in which it dims; 0 to 1 */
+  uint32_t group;       /* of lights */
 } cumulet_lamp_desc;
 
 /*
@@ -1847,6 +1865,15 @@ typedef enum cumulet_aov {
  * for a picture that is still of the volume before.
  */
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
+/*
+ * [GL] What lights of a group bring to the picture so far, as if no others were there: width x height (of the result) x
+ * 3 floats, linear radiance, first pixel top left; the sky, the sun's disc or an environment counted in that are the
+ * background, unless that is transparent or a colour. The groups' sum is cumulet_read_linear's radiance but for
+ * rounding (and a background's colour). What is rasterised (CUMULET_SURFACE_LIGHT_NONE) counts in group 0. count is the
+ * number of floats at rgb. CUMULET_ERROR_INVALID_ARGUMENT for a group that is not gathered, and for debug views; of
+ * previews there are none.
+ */
+CUMULET_API cumulet_status cumulet_read_light_group(cumulet_viewer* viewer, uint32_t group, float* rgb, size_t count);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
  * their luminance (CUMULET_AOV_ERROR), over the mean luminance; of the pixels that have two samples, and 0 where none
  * has. Samples count as independent: what they spread more evenly than chance makes the true error less. Reads the
@@ -1855,9 +1882,10 @@ CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double*
 
 /*
  * [GL] All that the samples of the picture under way have come to, for another process to go on with. size: in, the
- * bytes that there is room for; out, those that there are: 32 + 44 a pixel, 60 with volume_alone. bytes NULL: these
- * alone. Their order is the library's own, and of its version; they say nothing of the scene. Of shaded pictures
- * without previews. CUMULET_ERROR_INVALID_ARGUMENT for others, for too little room and before the first cumulet_render.
+ * bytes that there is room for; out, those that there are: 32 + 44 a pixel, 60 with volume_alone, and 16 for each group
+ * of lights and two more. bytes NULL: these alone. Their order is the library's own, and of its version; they say
+ * nothing of the scene. Of shaded pictures without previews. CUMULET_ERROR_INVALID_ARGUMENT for others, for too little
+ * room and before the first cumulet_render.
  */
 CUMULET_API cumulet_status cumulet_read_accumulation(cumulet_viewer* viewer, void* bytes, size_t* size);
 /*

@@ -1403,6 +1403,9 @@ class Viewer {
   [[nodiscard]] Result<> read_aov(Aov aov, std::span<float> values) noexcept {
     return result(cumulet_read_aov(handle(), static_cast<cumulet_aov>(aov), values.data(), values.size()));
   }
+  [[nodiscard]] Result<> read_light_group(std::uint32_t group, std::span<float> rgb) noexcept {
+    return result(cumulet_read_light_group(handle(), group, rgb.data(), rgb.size()));
+  }
   [[nodiscard]] Result<double> measure_noise() noexcept {
     double noise = 0.0;
     if (auto done = result(cumulet_measure_noise(handle(), &noise)); !done) return done.error();
