@@ -10,6 +10,9 @@
 //                 it the nearest surface, none behind the ground; mean
 //   velocity      of the volume where it scatters light for the first time, world units a second; mean, 0 where nothing
 //                 scatters
+//   motion        from where it is seen to where it was a frame ago, pixels, y up: of what is solid (the ground too), or
+//                 else the background, at the pixel's centre, as if there were no volume; and of the volume where it
+//                 scatters light for the first time, mean, 0 where nothing scatters
 // and, as a filter that follows what moves asks for them, beside the normal the view depth of what is solid at the
 // pixel's centre, the ground counted in, and beside the albedo the mean view depth at which the volume scatters light
 // for the first time, infinity where there is none; beside the transmittance the share that surfaces cover, beside the
@@ -43,6 +46,70 @@ layout(rg32f, binding = CM_IMAGE_VOLUME_Z) uniform writeonly image2D cm_volume_z
 layout(rgba32f, binding = CM_IMAGE_EMISSION) uniform writeonly image2D cm_emission_out;
 #if CM_VELOCITY
 layout(rgba32f, binding = CM_IMAGE_VELOCITY) uniform writeonly image2D cm_velocity;
+layout(rgba32f, binding = CM_IMAGE_MOTION) uniform writeonly image2D cm_motion;
+
+#include "motion.glsl"
+layout(std140, binding = CM_STORAGE_MOTION) readonly buffer CmMotions {
+  CmMotionFrame cm_motion_frame;
+  CmMotion cm_motions[];
+};
+#define CM_MOTION_NOW 0u
+#define CM_MOTION_STILL 1u
+#define CM_MOTION_VOLUMES 2u
+
+vec3 cm_move(uint map, vec3 v) { return cm_motions[map].x * v.x + cm_motions[map].y * v.y + cm_motions[map].z * v.z; }
+vec3 cm_move_point(uint map, vec3 p) { return cm_move(map, p) + cm_motions[map].origin; }
+
+// Pixels between two places in views; none where one of them is behind the eye.
+vec2 cm_backward(vec3 now, vec3 then) {
+  bool parallel_now = cm_motion_frame.orthographic_now != 0u;
+  bool parallel_then = cm_motion_frame.orthographic_then != 0u;
+  if ((!parallel_now && now.z <= 0.0) || (!parallel_then && then.z <= 0.0)) return vec2(0.0);
+  vec2 to = parallel_then ? then.xy : then.xy / then.z;
+  vec2 from = parallel_now ? now.xy : now.xy / now.z;
+  return 0.5 * vec2(cm.view.size) * (to - from);
+}
+
+// Of a point of the space that rays are in, that a map moves.
+vec2 cm_backward_point(vec3 now, vec3 then, uint map) {
+  return cm_backward(cm_move_point(CM_MOTION_NOW, now), cm_move_point(map, then));
+}
+
+// Of what is far away, in that direction.
+vec2 cm_backward_far(vec3 d) {
+  if (cm_motion_frame.orthographic_now != 0u || cm_motion_frame.orthographic_then != 0u) return vec2(0.0);
+  return cm_backward(cm_move(CM_MOTION_NOW, d), cm_move(CM_MOTION_STILL, d));
+}
+
+#if CM_SURFACES
+// Of a point of a triangle, which is at p now.
+vec2 cm_backward_surface(CmHit hit, vec3 p) {
+  uint model = cm_model_of(hit.triangle);
+  CmVertexMix m = cm_vertex_mix(model, hit.triangle - cm_models[model].first, hit.barycentrics);
+  uint map = cm_motion_frame.first_model + model;
+  vec3 then = vec3(0.0);
+  for (int i = 0; i < 3; ++i)
+    then += m.weight[i] * vec3(cm_floats(cm_motions[map].vertices + m.corner[i] - cm_models[model].vertices));
+  return cm_backward(cm_move_point(CM_MOTION_NOW, cm_to_cube_point(p)), cm_move_point(map, then));
+}
+#endif
+
+// Of the media in a part of a ray up to t_1, of whose scattering p is the middle.
+vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
+  vec2 motion = vec2(0.0);
+  float sum = 0.0;
+  for (int k = 0; k < walk.count; ++k) {
+    CmFront front = walk.front[k];
+    cm_stand_at(front);
+    float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
+    vec3 then = p;
+    if (CM_GRID.moves != 0u)
+      then -= cm_motion_frame.seconds * cm_to_cube(cm_out_of_volume(cm_march_velocity(front.cell.xy)));
+    motion += extinction * cm_backward_point(p, then, CM_MOTION_VOLUMES + front.volume);
+    sum += extinction;
+  }
+  return sum > 0.0 ? motion / sum : vec2(0.0);
+}
 #endif
 
 #define CM_INFINITE uintBitsToFloat(0x7f800000u)
@@ -62,7 +129,9 @@ void main() {
   vec2 covered = vec2(0.0);  // by surfaces, by the ground
   vec3 emission = vec3(0.0);
 #if CM_VELOCITY
-  vec3 velocity = vec3(0.0);  // sum
+  vec3 velocity = vec3(0.0);  // sums
+  vec2 volume_motion = vec2(0.0);
+  vec2 motion = vec2(0.0);
 #endif
   float share = 1.0 / float(cm.dispatch.samples);
   for (int i = 0; i < int(cm.dispatch.samples); ++i) {
@@ -86,6 +155,9 @@ void main() {
       albedo += point.material.base_color;
       covered.x += 1.0;
       of_surface = point.emission;
+#if CM_VELOCITY
+      if (i == 0) motion = cm_backward_surface(hit, point.position);
+#endif
     }
 #endif
     if (i == 0 && surface_t < 1e37) surface_z = surface_t / t_per_z;
@@ -93,6 +165,11 @@ void main() {
     float solid_t = min(surface_t, ground_t);
     if (ground_t < min(surface_t, CM_NO_GROUND)) covered.y += 1.0;
     if (i == 0 && solid_t < 1e37) solid_z = solid_t / t_per_z;
+#if CM_VELOCITY
+    if (i == 0 && (covered.x == 0.0 || ground_t < surface_t)) {
+      motion = solid_t < 1e37 ? cm_backward_point(o + solid_t * d, o + solid_t * d, CM_MOTION_STILL) : cm_backward_far(d);
+    }
+#endif
     float used = 0.0;
     float clear = 1.0;
     CmWalk walk = cm_walk(o, d, surface_t);
@@ -120,6 +197,8 @@ void main() {
       scattered += clear * chance;
 #if CM_VELOCITY
       velocity += clear * chance * cm_walk_velocity(walk, t_1);
+      vec3 middle = o + (t + within_part * min(span, walk.t_end - t)) * d;
+      volume_motion += clear * chance * cm_walk_backward(walk, t_1, middle);
 #endif
       clear -= clear * chance;
       cm_walk_on(walk, t_1);
@@ -135,6 +214,7 @@ void main() {
   imageStore(cm_albedo, ivec2(pixel), vec4(share * albedo, scattered > 0.0 ? scattered_z / scattered : CM_INFINITE));
 #if CM_VELOCITY
   imageStore(cm_velocity, ivec2(pixel), vec4(scattered > 0.0 ? velocity / scattered : vec3(0.0), 0.0));
+  imageStore(cm_motion, ivec2(pixel), vec4(motion, scattered > 0.0 ? volume_motion / scattered : vec2(0.0)));
 #endif
   imageStore(cm_emission_out, ivec2(pixel), vec4(share * emission, 0.0));
   imageStore(cm_transmittance, ivec2(pixel), share * vec4(transmittance, covered.x, 0.0, 0.0));

@@ -840,7 +840,7 @@ void Session::write_exr(const std::string& path) {
   // All but the volume alone, which would cost every frame something.
   constexpr std::array aovs{CUMULET_AOV_TRANSMITTANCE, CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_VOLUME_DEPTH,
                             CUMULET_AOV_NORMAL,        CUMULET_AOV_ALBEDO,        CUMULET_AOV_ERROR,
-                            CUMULET_AOV_VELOCITY};
+                            CUMULET_AOV_VELOCITY,      CUMULET_AOV_MOTION,        CUMULET_AOV_VOLUME_MOTION};
   const bool shaded = scene_.sampling.view == CUMULET_VIEW_SHADED;
   demo::write_exr(viewer_.get(), path, windows_of(scene_.sampling.region, width, height), {rgba},
                   std::span(aovs).first(shaded ? aovs.size() : 0), metadata_of(viewer_.get(), scene_, width, height));

@@ -29,6 +29,8 @@ inline constexpr LayerName normal{"normal", "XYZ"};
 inline constexpr LayerName albedo{"albedo", "RGB"};
 inline constexpr LayerName error{"error", "Y"};
 inline constexpr LayerName velocity{"velocity", "XYZ"};
+inline constexpr LayerName backward{"backward", "uv"};
+inline constexpr LayerName volume_backward{"volume_backward", "uv"};
 /// Of a group of lights, before its name: as Blender calls them.
 inline constexpr std::string_view light_group_prefix = "Combined_";
 inline constexpr std::string_view light_group_channels = "RGB";

@@ -214,8 +214,8 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
     const image::LayerName layer{name, layers::light_group_channels};
     made.emplace_back(layer, mean(parts, layer));
   }
-  for (const image::LayerName& layer :
-       {layers::transmittance, layers::depth, layers::volume_depth, layers::normal, layers::albedo, layers::velocity})
+  for (const image::LayerName& layer : {layers::transmittance, layers::depth, layers::volume_depth, layers::normal,
+                                        layers::albedo, layers::velocity, layers::backward, layers::volume_backward})
     if (has(first, layer)) made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
 
   std::vector<image::Attribute> said = first.attributes;

@@ -24,6 +24,10 @@ image::LayerName layer_of(cumulet_aov aov) {
       return image::layers::error;
     case CUMULET_AOV_VELOCITY:
       return image::layers::velocity;
+    case CUMULET_AOV_MOTION:
+      return image::layers::backward;
+    case CUMULET_AOV_VOLUME_MOTION:
+      return image::layers::volume_backward;
     case CUMULET_AOV_BEAUTY:
       break;
   }

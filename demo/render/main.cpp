@@ -622,6 +622,9 @@ class Studio {
       check(viewer_, cumulet_load_environment(viewer_.get(), scene.environment.c_str()));
       check(viewer_, cumulet_set_environment_settings(viewer_.get(), &scene.environment_settings));
     }
+    const double rate = scene.sequence.playback.frames_per_second;
+    constexpr double usual_rate = 24.0;
+    check(viewer_, cumulet_set_previous_camera(viewer_.get(), nullptr, 1.0 / (rate > 0.0 ? rate : usual_rate)));
     check(viewer_, cumulet_set_sampling(viewer_.get(), &sampling));
     cumulet_display_desc display = scene.display;
     display.denoise = CUMULET_DENOISE_OFF;  // what is read is read as it is, and denoised beside that

@@ -780,7 +780,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         }
       },
       "Layers that an .exr gets beside the picture: volume, transmittance, depth, volume_depth, normal, albedo, "
-      "error");
+      "error, velocity, backward, volume_backward");
   add(
       app, group, "--stats", "FILE.json",
       [&](const std::string& text) {

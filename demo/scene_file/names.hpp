@@ -22,7 +22,8 @@ inline constexpr std::array aov_names = {
     Name{"volume", CUMULET_AOV_VOLUME},       Name{"transmittance", CUMULET_AOV_TRANSMITTANCE},
     Name{"depth", CUMULET_AOV_SURFACE_DEPTH}, Name{"volume_depth", CUMULET_AOV_VOLUME_DEPTH},
     Name{"normal", CUMULET_AOV_NORMAL},       Name{"albedo", CUMULET_AOV_ALBEDO},
-    Name{"error", CUMULET_AOV_ERROR},         Name{"velocity", CUMULET_AOV_VELOCITY}};
+    Name{"error", CUMULET_AOV_ERROR},         Name{"velocity", CUMULET_AOV_VELOCITY},
+    Name{"backward", CUMULET_AOV_MOTION},     Name{"volume_backward", CUMULET_AOV_VOLUME_MOTION}};
 /// The names, for a message or a help text.
 template <class Names>
 [[nodiscard]] std::string list_names(const Names& names, const char* separator) {

@@ -43,6 +43,8 @@ inline constexpr FilmLayer surface_z{"surface z", GL_R32F, 4};
 inline constexpr FilmLayer volume_z{"volume z", GL_RG32F, 8};
 inline constexpr FilmLayer emission{"emission", GL_RGBA32F, 16};
 inline constexpr FilmLayer velocity{"velocity", GL_RGBA32F, 16};
+/// Of what is solid, or else the background; and of the volume.
+inline constexpr FilmLayer motion{"motion", GL_RGBA32F, 16};
 /// As radiance, of so many groups of lights; then of what cameras see of the sky and of the sun.
 constexpr FilmLayer light_groups(unsigned count) { return {"light groups", GL_RGBA32F, 16 * (count + 2), count + 2}; }
 }  // namespace film_layers

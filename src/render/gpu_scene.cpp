@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <span>
 #include <utility>
 
@@ -127,6 +128,7 @@ std::vector<scene::Model> GpuScene::present_models(const scene::Snapshot& snapsh
       if (was == before.end() || !is_here(was->source)) continue;
       shown.source = was->source;
     }
+    if (shown.previous_source && !is_here(shown.previous_source)) shown.previous_source = nullptr;
     present.push_back(std::move(shown));
   }
   return present;
@@ -135,7 +137,9 @@ std::vector<scene::Model> GpuScene::present_models(const scene::Snapshot& snapsh
 void GpuScene::update_models(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline) {
   ModelData::Sources sources;
   for (const scene::Model& model : snapshot.models) {
-    if (std::ranges::find(sources, model.source) == sources.end()) sources.push_back(model.source);
+    for (const scene::ModelSourcePtr& source : {model.source, model.previous_source}) {
+      if (source && std::ranges::find(sources, source) == sources.end()) sources.push_back(source);
+    }
   }
   if (sources.empty()) {
     if (!model_.empty()) model_revision_.advance();
@@ -444,6 +448,17 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   obstacles.lamps = !placed_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
   obstacles.instances = instances_.get();
   return obstacles;
+}
+
+scene::MotionTable GpuScene::motion(const scene::Snapshot& snapshot) const {
+  const scene::Volume& first = present_.front();
+  const glm::dmat4 ray_to_world = instances_ ? glm::translate(glm::dmat4(1.0), instances_->origin())
+                                             : first.place.to_world * first.source->cube.to_world;
+  if (!placed_) return scene::make_motion(snapshot, ray_to_world, present_, {}, nullptr, {});
+  const ModelData& data = *placed_.of().data;
+  return scene::make_motion(
+      snapshot, ray_to_world, present_, placed_->models(), &placed_->table(),
+      [&](const scene::ModelSource& source) { return data.words_of(source).first + source.vertices; });
 }
 
 PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Obstacles& obstacles,

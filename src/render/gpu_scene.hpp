@@ -75,6 +75,8 @@ class GpuScene {
   [[nodiscard]] light::DistantLights lights(const scene::Snapshot& snapshot) const;
   /// What paths end at, but for the host's depth. traced: they meet triangles, if there is a surface pass, too.
   [[nodiscard]] Obstacles obstacles(const scene::Snapshot& snapshot, bool traced);
+  /// Where what is here was a frame ago. Only with data and view.
+  [[nodiscard]] scene::MotionTable motion(const scene::Snapshot& snapshot) const;
   /// Of a picture of that size of what is here, as the snapshot has it seen and lit. Only with data and view.
   [[nodiscard]] PictureParameters parameters(const scene::Snapshot& snapshot, const Obstacles& obstacles,
                                              const core::CmIntegrator& integrator, glm::uvec2 size) const;

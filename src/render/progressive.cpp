@@ -49,6 +49,7 @@ std::shared_ptr<const void> scene_met(const Obstacles& obstacles) {
 bool PictureWish::Content::shows_same(const Content& other) const {
   Content seen = other;
   seen.viewpoint = viewpoint;
+  seen.previous = previous;
   seen.host_depth = host_depth;
   seen.programs = programs;
   seen.size = size;

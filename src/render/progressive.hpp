@@ -22,6 +22,7 @@ struct PictureWish {
   /// GL by and by is known by its revision there.
   struct Content {
     scene::Part<std::optional<scene::Viewpoint>> viewpoint;
+    scene::Part<scene::Previous> previous;
     scene::Part<light::DistantLights> lights;
     scene::Part<light::Surroundings> surroundings;
     scene::Part<light::Lamps> lamps;

@@ -831,7 +831,7 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
     return true;
   }
   std::vector<FilmLayer> written{normal, albedo, transmittance, surface_z, volume_z, emission};
-  if (picture.facts_ == PixelFacts::all) written.push_back(velocity);
+  if (picture.facts_ == PixelFacts::all) written.insert(written.end(), {velocity, motion});
   const auto work = [&](const Film& film, Deadline until) {
     make_shared_objects();
     flights_.order();
@@ -844,7 +844,12 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
     film.bind(*gl_, core::CM_IMAGE_SURFACE_Z, surface_z, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_VOLUME_Z, volume_z, GL_WRITE_ONLY);
     film.bind(*gl_, core::CM_IMAGE_EMISSION, emission, GL_WRITE_ONLY);
-    if (picture.facts_ == PixelFacts::all) film.bind(*gl_, core::CM_IMAGE_VELOCITY, velocity, GL_WRITE_ONLY);
+    if (picture.facts_ == PixelFacts::all) {
+      film.bind(*gl_, core::CM_IMAGE_VELOCITY, velocity, GL_WRITE_ONLY);
+      film.bind(*gl_, core::CM_IMAGE_MOTION, motion, GL_WRITE_ONLY);
+      upload_motion(*obstacles.motion);
+      gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MOTION, motion_.name());
+    }
     core::CmParameters parameters = picture.parameters_;
     describe(obstacles, parameters);
     parameters.dispatch.samples = picture.facts_rays_;
@@ -854,10 +859,25 @@ bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles
   return run(gl_, picture.film_, {"cumulet: facts", {}, written, work}, deadline);
 }
 
+void Tracer::upload_motion(const scene::MotionTable& motion) {
+  std::vector<std::byte> bytes(sizeof motion.frame + motion.maps.size() * sizeof(core::CmMotion));
+  std::memcpy(bytes.data(), &motion.frame, sizeof motion.frame);
+  std::memcpy(bytes.data() + sizeof motion.frame, motion.maps.data(), bytes.size() - sizeof motion.frame);
+  motion_ = gl::make_buffer(gl_, bytes.size(), bytes.data(), 0, "creating the table of motions");
+}
+
 void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) const {
-  const std::array<FilmLayer, 6> layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
-                                        film_layers::normal,        film_layers::albedo,    film_layers::velocity};
+  const std::array layers{film_layers::transmittance, film_layers::surface_z, film_layers::volume_z,
+                          film_layers::normal,        film_layers::albedo,    film_layers::velocity,
+                          film_layers::motion,        film_layers::motion};
   const FilmLayer& layer = layers.at(static_cast<std::size_t>(fact));
+  if (layer == film_layers::motion) {
+    for (const glm::vec4& both : texels<glm::vec4>(picture, layer, GL_RGBA, GL_FLOAT)) {
+      *values++ = fact == PixelFact::motion ? both.x : both.z;
+      *values++ = fact == PixelFact::motion ? both.y : both.w;
+    }
+    return;
+  }
   const std::size_t channels = channels_of(fact);
   const std::size_t floats = std::size_t{picture.size_.x} * picture.size_.y * channels;
   gl_->GetTextureImage(picture.film_.texture(layer), 0, channels == 1 ? GL_RED : GL_RGB, GL_FLOAT,

@@ -24,6 +24,7 @@
 #include "render/path_kernels.hpp"
 #include "render/region.hpp"
 #include "render/surface_raster.hpp"
+#include "scene/motion.hpp"
 
 namespace cumulet::render {
 
@@ -51,6 +52,7 @@ struct Obstacles {
   const EnvironmentData* environment = nullptr;  // of those that escape
   const LampData* lamps = nullptr;               // that paths look for: a scene's where they meet it, and the host's
   const InstanceData* instances = nullptr;       // where the volume is several; else it is the only one
+  const scene::MotionTable* motion = nullptr;    // what facts of motion go by: not null where they are asked for
 
   /// The scene whose triangles paths meet; null: they meet none.
   [[nodiscard]] const PlacedModels* met() const { return traced ? scene : nullptr; }
@@ -83,11 +85,12 @@ struct PictureSettings {
 };
 
 /// What is known of a pixel without light: glsl/aovs.comp says of each what it is.
-enum class PixelFact { transmittance, surface_z, volume_z, normal, albedo, velocity };
+enum class PixelFact { transmittance, surface_z, volume_z, normal, albedo, velocity, motion, volume_motion };
 constexpr std::size_t channels_of(PixelFact fact) {
+  if (fact == PixelFact::motion || fact == PixelFact::volume_motion) return 2;
   return fact == PixelFact::normal || fact == PixelFact::albedo || fact == PixelFact::velocity ? 3 : 1;
 }
-/// Those of a pixel that are found together: what a filter asks for, or velocity as well.
+/// Those of a pixel that are found together: what a filter asks for, or velocity and motion as well.
 enum class PixelFacts { guides, all };
 
 /// Rays a pixel that facts are means of, where they are read; a filter does with few.
@@ -343,6 +346,7 @@ class Tracer {
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);
   void make_shared_objects();
+  void upload_motion(const scene::MotionTable& motion);
   // What a pass by rows will write is 0 where it does not come to.
   void empty_around(const Picture& picture, std::span<const FilmLayer> layers) const;
   // The pass that empties what samples are added to, and what all is that.
@@ -379,6 +383,7 @@ class Tracer {
   gl::Object uniforms_;
   gl::Object pick_;        // its depth...
   gl::Object pick_place_;  // ...and what has been met
+  gl::Object motion_;      // Obstacles::motion, as facts under way have it
   Flights flights_;
   Flights rasters_;
   std::vector<DispatchRecord>* log_ = nullptr;

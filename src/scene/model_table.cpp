@@ -136,8 +136,8 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
     for (std::size_t i = 0; i < source.meshes.size(); ++i) {
       const ModelMesh& mesh = source.meshes[i];
       const auto [own_low, own_high] = box_of(mesh.bvh);
-      for (const dmat4& placing : mesh.placings) {
-        const dmat4 to_world = model.to_world * placing;
+      for (std::size_t k = 0; k < mesh.placings.size(); ++k) {
+        const dmat4 to_world = model.to_world * mesh.placings[k];
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
         CmModel record{};
         record.flags = model.shadow_only ? 0U : core::CM_MODEL_SEEN;
@@ -175,7 +175,8 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         boxes.push_back(box);
         power.push_back(mesh.flux * stretch * stretch);
         table.records.push_back(record);
-        table.parts.push_back({static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(i)});
+        table.parts.push_back(
+            {static_cast<std::uint32_t>(m), static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(k)});
       }
     }
     for (const surface::PunctualLight& light : source.pose.lights) {

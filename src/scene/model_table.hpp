@@ -30,6 +30,7 @@ struct ModelWords {
 struct ModelPart {
   std::uint32_t model = 0;
   std::uint32_t mesh = 0;
+  std::uint32_t placing = 0;  // of that
 };
 
 /// Records and nodes go into buffers as they are; of a scene without triangles there is one record, which nothing

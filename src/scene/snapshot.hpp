@@ -71,17 +71,27 @@ struct Volume {
   Part<Medium> medium;
   Place place;
   std::optional<SequenceFrame> frame = {};  ///< where it is a sequence's or a live volume's
+  std::optional<Place> previous = {};       ///< where it stood a frame ago; none: there as well
   bool operator==(const Volume&) const = default;
 };
 
 /// Surfaces in a pose, and where they stand.
 struct Model {
-  std::uint64_t id = 0;      ///< of what stays the same model, whatever it is of
-  ModelSourcePtr source;     ///< not null
-  glm::dmat4 to_world{1.0};  ///< affine, from the world that it was posed in
-  bool shadow_only = false;  ///< no camera ray meets it; others do
-  std::uint32_t group = 0;   ///< of lights, that it is in
+  std::uint64_t id = 0;                     ///< of what stays the same model, whatever it is of
+  ModelSourcePtr source;                    ///< not null
+  glm::dmat4 to_world{1.0};                 ///< affine, from the world that it was posed in
+  bool shadow_only = false;                 ///< no camera ray meets it; others do
+  std::uint32_t group = 0;                  ///< of lights, that it is in
+  std::optional<glm::dmat4> previous = {};  ///< where it stood a frame ago; none: there as well
+  ModelSourcePtr previous_source = {};      ///< and how it was posed; null: likewise
   bool operator==(const Model&) const = default;
+};
+
+/// A frame ago, for what tells of motion.
+struct Previous {
+  std::optional<Viewpoint> view;  ///< none: as now
+  double seconds = 0.0;           ///< since then
+  bool operator==(const Previous&) const = default;
 };
 
 /// All that a picture can show, as it is at one moment. Sources are values that never change: another one is another
@@ -94,6 +104,7 @@ struct Snapshot {
   Part<light::Lamps> lamps;  ///< the host's; models have their own beside them
   Part<std::optional<Ground>> ground;
   Part<std::optional<Viewpoint>> view;  ///< none: nothing is to be seen
+  Part<Previous> previous;
   /// O(volumes + models).
   bool operator==(const Snapshot&) const = default;
 };

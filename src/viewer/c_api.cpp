@@ -16,6 +16,16 @@ namespace render = cumulet::render;
 
 void require_bool(std::int32_t value, const char* what) { require(value == 0 || value == 1, what); }
 
+std::vector<cumulet::scene::Place> places_of(const double* to_world, uint32_t count) {
+  const std::span<const double> values = array_of(to_world, count, 16, "places");
+  std::vector<cumulet::scene::Place> places(count);
+  for (size_t i = 0; i < count; ++i) {
+    places[i].to_world = matrix_or_identity(values.subspan(16 * i).first<16>());
+    require_place(places[i].to_world, "place " + std::to_string(i) + ": ");
+  }
+  return places;
+}
+
 core::Frame read_frame(const cumulet_frame_desc* desc) {
   const cumulet_frame_desc d = read_desc(desc, "cumulet_frame_desc");
   require(std::isfinite(d.budget_ms) && d.budget_ms <= 1e9, "cumulet_frame_desc.budget_ms is not up to 1e9");
@@ -256,14 +266,14 @@ cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_d
 
 cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    const std::span<const double> values = array_of(to_world, count, 16, "places");
-    std::vector<cumulet::scene::Place> places(std::max(count, 1U));
-    for (size_t i = 0; i < count; ++i) {
-      places[i].to_world = matrix_or_identity(values.subspan(16 * i).first<16>());
-      require_place(places[i].to_world, "place " + std::to_string(i) + ": ");
-    }
+    std::vector<cumulet::scene::Place> places = places_of(to_world, count);
+    if (places.empty()) places.emplace_back();
     v.set_places(places);
   });
+}
+
+cumulet_status cumulet_set_previous_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
+  return guarded(viewer, [&](core::Viewer& v) { v.set_previous_places(places_of(to_world, count)); });
 }
 
 cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) {
@@ -451,6 +461,13 @@ cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display
 
 // ---- camera and input ----
 
+cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, cumulet_camera* camera, double seconds) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(in_range(seconds, -1e9, 1e9), "seconds are not within 1e9");
+    v.set_previous_camera(camera != nullptr ? camera->asset : nullptr, seconds);
+  });
+}
+
 cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_camera* camera) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(camera != nullptr, "camera is NULL");
@@ -598,7 +615,7 @@ cumulet_status cumulet_encode_display(cumulet_viewer* viewer, const float* linea
 
 cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
-    require(number(aov) <= CUMULET_AOV_VELOCITY, "the AOV is unknown");
+    require(number(aov) <= CUMULET_AOV_VOLUME_MOTION, "the AOV is unknown");
     v.read_aov(static_cast<core::Aov>(aov), values, count);
   });
 }

@@ -68,3 +68,14 @@ cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ram
     i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.place, read.ramp); });
   });
 }
+
+cumulet_status cumulet_instance_set_previous(cumulet_instance* instance, const double* to_world) {
+  return on(instance, "instance", [&](Instance& i) {
+    std::optional<cumulet::scene::Place> place;
+    if (to_world != nullptr) {
+      place.emplace(cumulet::scene::Place{matrix_or_identity(std::span<const double, 16>(to_world, 16))});
+      require_place(place->to_world);
+    }
+    i.edit([&](InstanceSettings& settings) { settings.previous = place; });
+  });
+}

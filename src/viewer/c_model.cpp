@@ -73,3 +73,19 @@ cumulet_status cumulet_model_set_time(cumulet_model* model, double time) {
     m.edit([&](ModelSettings& settings) { settings.choice.time = time; });
   });
 }
+
+cumulet_status cumulet_model_set_previous(cumulet_model* model, const double* to_world, const double* time) {
+  return on(model, "model", [&](ModelInstance& m) {
+    std::optional<glm::dmat4> place;
+    std::optional<double> moment;
+    if (to_world != nullptr) place = place_of(std::span<const double, 16>(to_world, 16));
+    if (time != nullptr) {
+      require(std::isfinite(*time), "time is not finite");
+      moment = *time;
+    }
+    m.edit([&](ModelSettings& settings) {
+      settings.previous = place;
+      settings.previous_time = moment;
+    });
+  });
+}

@@ -128,6 +128,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   render::PictureWish wish;
   wish.parameters = parameters(shot, met);
   wish.content.viewpoint = shot.scene->view;
+  wish.content.previous = shot.scene->previous;
   wish.content.lights = shot.scene->lights;
   wish.content.surroundings = shot.scene->surroundings;
   wish.content.lamps = shot.scene->lamps;

@@ -100,7 +100,9 @@ enum class Aov {
   normal = 5,
   albedo = 6,
   error = 7,
-  velocity = 8
+  velocity = 8,
+  motion = 9,
+  volume_motion = 10
 };
 
 }  // namespace cumulet::viewer

@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "base/listeners.hpp"
@@ -21,7 +22,8 @@ struct InstanceSettings {
   Medium medium = {};
   Ramps ramps = {};
   bool hidden = false;
-  std::uint64_t tag = 0;  ///< the host's own
+  std::uint64_t tag = 0;                      ///< the host's own
+  std::optional<scene::Place> previous = {};  ///< where it was a frame ago; none: where it is
 };
 
 /// Surfaces in scenes, likewise.
@@ -31,8 +33,10 @@ struct ModelSettings {
   glm::dmat4 to_world{1.0};
   bool hidden = false;
   bool shadow_only = false;
-  std::uint32_t group = 0;  ///< of lights
-  std::uint64_t tag = 0;    ///< the host's own
+  std::uint32_t group = 0;                   ///< of lights
+  std::uint64_t tag = 0;                     ///< the host's own
+  std::optional<glm::dmat4> previous = {};   ///< where it was a frame ago; none: where it is
+  std::optional<double> previous_time = {};  ///< and at which moment; none: at this
 };
 
 /// What several viewers may show. All calls are safe from any thread.

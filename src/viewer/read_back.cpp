@@ -42,6 +42,10 @@ std::optional<render::PixelFact> fact_of(Aov aov) {
       return PixelFact::albedo;
     case Aov::velocity:
       return PixelFact::velocity;
+    case Aov::motion:
+      return PixelFact::motion;
+    case Aov::volume_motion:
+      return PixelFact::volume_motion;
     case Aov::beauty:
     case Aov::volume:
     case Aov::error:
@@ -200,7 +204,7 @@ void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t cou
   } else if (aov == Aov::error) {
     progressive_.tracer().read_error(picture, values);
   } else {
-    const bool moves = fact == PixelFact::velocity;
+    const bool moves = fact == PixelFact::velocity || fact == PixelFact::motion || fact == PixelFact::volume_motion;
     find_facts(shot, picture, moves ? render::PixelFacts::all : render::PixelFacts::guides);
     progressive_.tracer().read_fact(picture, fact.value(), values);
   }
@@ -223,7 +227,9 @@ void Context::find_facts(const Shot& shot, render::Picture& picture, render::Pix
   if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
     throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
   }
-  const render::Obstacles met = obstacles(shot);
+  render::Obstacles met = obstacles(shot);
+  const scene::MotionTable motion = scene_.motion(*shot.scene);
+  met.motion = &motion;
   compositor_.begin_denoising_anew();
   while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0), render::fact_rays,
                                            facts)) {

@@ -521,6 +521,14 @@ void Viewer::follow_models() {
   follow_poses();
 }
 
+std::optional<PoseShelf::Wish> Viewer::previous_pose(const ShownModel& shown) {
+  const ModelSettings& settings = shown.settings;
+  if (!settings.previous_time || *settings.previous_time == settings.choice.time) return std::nullopt;
+  SurfaceChoice choice = settings.choice;
+  choice.time = *settings.previous_time;
+  return PoseShelf::Wish{settings.surfaces, choice};
+}
+
 void Viewer::follow_poses() {
   const std::uint64_t posed = poses_.revision();
   if (posed == posed_ && !poses_due_) return;
@@ -536,7 +544,9 @@ void Viewer::follow_poses() {
       if (shown.wish && poses_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
       shown.wish = wish;
     }
-    if (std::ranges::find(wishes, wish) == wishes.end()) wishes.push_back(std::move(wish));
+    if (std::ranges::find(wishes, wish) == wishes.end()) wishes.push_back(wish);
+    const std::optional<PoseShelf::Wish> then = previous_pose(shown);
+    if (then && std::ranges::find(wishes, *then) == wishes.end()) wishes.push_back(*then);
   }
   // Before the wishes, with which what was begun for others goes.
   for (ShownModel& shown : shown_models_) {
@@ -546,6 +556,8 @@ void Viewer::follow_poses() {
     // Of wishes that change faster than they are posed, one that was begun.
     if (!source && shown.begun && shown.begun->surfaces == shown.settings.surfaces) source = poses_.built(*shown.begun);
     if (source) shown.source = std::move(*source);
+    const std::optional<PoseShelf::Wish> then = previous_pose(shown);
+    shown.previous_source = then ? poses_.built(*then).value_or(nullptr) : nullptr;
   }
   if (std::exchange(poses_due_, false)) poses_.wish(std::move(wishes));
 }
@@ -559,8 +571,8 @@ std::vector<scene::Model> Viewer::models() const {
   }
   for (const ShownModel& shown : shown_models_) {
     if (shown.is_shown())
-      models.push_back(
-          {shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only, shown.settings.group});
+      models.push_back({shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only,
+                        shown.settings.group, shown.settings.previous, shown.previous_source});
   }
   return models;
 }
@@ -1014,6 +1026,19 @@ void Viewer::set_camera(std::shared_ptr<Camera> camera) {
   touch();
 }
 
+void Viewer::set_previous_camera(std::shared_ptr<Camera> camera, double seconds) {
+  previous_listener_.reset();
+  previous_camera_ = std::move(camera);
+  if (previous_camera_) previous_listener_ = previous_camera_->listen([this] { notify(); });
+  previous_seconds_ = seconds;
+  touch();
+}
+
+void Viewer::set_previous_places(std::vector<scene::Place> places) {
+  previous_places_ = std::move(places);
+  touch();
+}
+
 void Viewer::set_navigation(const NavigationSettings& settings) {
   navigation_.set(settings);
   touch();
@@ -1183,10 +1208,13 @@ void Viewer::show_volumes() {
   if (built_.source && (facts_ || !shows_instances())) {
     const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
     for (const scene::Place& place : places_) volumes.push_back({0, built_.source, shown_medium_, place, frame});
+    for (std::size_t i = 0; i < std::min(volumes.size(), previous_places_.size()); ++i)
+      volumes[i].previous = previous_places_[i];
   }
   for (const Shown& shown : shown_) {
     if (shown.is_seen() && shown.built)
-      volumes.push_back({shown.id, shown.built->source, shown.medium, {shown.settings.to_world}});
+      volumes.push_back(
+          {shown.id, shown.built->source, shown.medium, {shown.settings.to_world}, {}, shown.settings.previous});
   }
   const auto differs = [&](const scene::Volume& volume) {
     const scene::MarchSource& first = *volumes.front().source;
@@ -1220,6 +1248,8 @@ scene::SnapshotPtr Viewer::snapshot() {
   show_volumes();
   scene_.models = models();
   scene_.view.set(view_ ? std::optional<scene::Viewpoint>(*view_) : std::nullopt);
+  scene_.previous.set(
+      {previous_view_ ? std::optional<scene::Viewpoint>(*previous_view_) : std::nullopt, previous_seconds_});
   scene_.ground.set(ground());
   if (!snapshot_ || *snapshot_ != scene_) snapshot_ = std::make_shared<const scene::Snapshot>(scene_);
   return snapshot_;

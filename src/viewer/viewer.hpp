@@ -158,6 +158,10 @@ class Viewer {
   void set_display(const DisplaySettings& display);
   void set_camera(std::shared_ptr<Camera> camera);
   [[nodiscard]] const std::shared_ptr<Camera>& camera() const { return camera_; }
+  /// Where the camera was a frame ago, so many seconds; null: where it is.
+  void set_previous_camera(std::shared_ptr<Camera> camera, double seconds);
+  /// And where the volume's first places were.
+  void set_previous_places(std::vector<scene::Place> places);
   void set_navigation(const NavigationSettings& settings);
   bool input(const InputEvent& event);
   void frame_all();
@@ -281,8 +285,9 @@ class Viewer {
     std::uint64_t revision = 0;
     ModelSettings settings;
     std::optional<PoseShelf::Wish> wish;
-    std::optional<PoseShelf::Wish> begun;  // the last before it that was being posed
-    scene::ModelSourcePtr source;          // the newest; null: none yet
+    std::optional<PoseShelf::Wish> begun;   // the last before it that was being posed
+    scene::ModelSourcePtr source;           // the newest; null: none yet
+    scene::ModelSourcePtr previous_source;  // of a frame ago; null: as this
     [[nodiscard]] bool is_wanted() const { return settings.surfaces && !settings.hidden; }
     [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
   };
@@ -290,6 +295,8 @@ class Viewer {
   void follow_models();
   // Their poses, as far as they are there.
   void follow_poses();
+  // What it was a frame ago; none: as now.
+  [[nodiscard]] static std::optional<PoseShelf::Wish> previous_pose(const ShownModel& shown);
   // All that are there, the viewer's own among them.
   [[nodiscard]] std::vector<scene::Model> models() const;
   std::vector<Shown>::iterator find(const Instance& instance);
@@ -372,9 +379,14 @@ class Viewer {
   glm::uvec2 frame_size_{0U};  // of the last frame's picture
   // Of its own world; volume_ was loaded with it; the medium's once its grid is there.
   std::optional<double> suggested_density_scale_;
-  std::optional<ViewFrame> view_;         // of the last frame
-  std::optional<ViewFrame> traced_view_;  // of the last frame that traced
-  std::optional<ViewFrame> last_view_;    // of the one before it
+  std::shared_ptr<Camera> previous_camera_;
+  std::shared_ptr<void> previous_listener_;
+  double previous_seconds_ = 0.0;
+  std::vector<scene::Place> previous_places_;
+  std::optional<ViewFrame> previous_view_;  // by that camera
+  std::optional<ViewFrame> view_;           // of the last frame
+  std::optional<ViewFrame> traced_view_;    // of the last frame that traced
+  std::optional<ViewFrame> last_view_;      // of the one before it
   struct BuildView {
     ViewFrame view;
     glm::uvec2 size{0U};

@@ -103,6 +103,9 @@ void Viewer::prepare(const Frame& frame) {
   // Without a scene the camera may wait for its bounds.
   if (frame_size_.x > 0 && frame_size_.y > 0 && scene)
     view_ = camera_->view(double(frame_size_.x) / frame_size_.y, subject());
+  previous_view_.reset();
+  if (view_ && previous_camera_)
+    previous_view_ = previous_camera_->view(double(frame_size_.x) / frame_size_.y, subject());
   if (wishes_due_) follow_instances();  // they waited for a view
   if (frame.budget_ms < 0.0) return;
 

@@ -230,7 +230,7 @@ TEST_P(Scramble, EveryCallWithSurfacesToo) {
       render(name + " view " + std::to_string(view), target.frame());
     }
     converge(v, target.frame());
-    for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VELOCITY; ++aov) {
+    for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VOLUME_MOTION; ++aov) {
       expect_kept(host, ++seed, name + " aov " + std::to_string(aov),
                   [&] { return cumulet_read_aov(v, static_cast<cumulet_aov>(aov), rgba.data(), rgba.size()); });
     }

@@ -660,10 +660,10 @@ TEST_F(Contract, AovsAreReadThroughTheAbi) {
   sampling.volume_alone = 1;
   ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
   picture_of(v_, volume_.get(), target_);
-  for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VELOCITY; ++aov) {
+  for (int aov = CUMULET_AOV_BEAUTY; aov <= CUMULET_AOV_VOLUME_MOTION; ++aov) {
     EXPECT_EQ(cumulet_read_aov(v_, static_cast<cumulet_aov>(aov), values.data(), values.size()), CUMULET_OK) << aov;
   }
-  EXPECT_EQ(cumulet_read_aov(v_, std::bit_cast<cumulet_aov>(9), values.data(), values.size()),
+  EXPECT_EQ(cumulet_read_aov(v_, std::bit_cast<cumulet_aov>(11), values.data(), values.size()),
             CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, nullptr, values.size()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_read_aov(v_, CUMULET_AOV_NORMAL, values.data(), 3), CUMULET_ERROR_INVALID_ARGUMENT);

@@ -1496,6 +1496,25 @@ CUMULET_API cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_ca
 /* The viewer's camera; the caller releases it. */
 CUMULET_API cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_camera** out);
 
+/*
+ * Where things were a frame ago, for CUMULET_AOV_MOTION and CUMULET_AOV_VOLUME_MOTION, and nothing else: what is not
+ * said to have been elsewhere stood still. A host gives each frame what it gave as the present one before; a change
+ * begins the picture anew.
+ *
+ * The viewer's camera was where this one is, whose changes it follows; retained. NULL: it stood where it is. seconds,
+ * to 1e9: from then to now, in which velocities carried media.
+ */
+CUMULET_API cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, cumulet_camera* camera, double seconds);
+/* The first count places of the viewer's volume (cumulet_set_volume_places) were there, the others where they are.
+ * Errors as there. */
+CUMULET_API cumulet_status cumulet_set_previous_volume_places(cumulet_viewer* viewer, const double* to_world,
+                                                              uint32_t count);
+/* An instance was there, until cumulet_instance_set. NULL: where it is. */
+CUMULET_API cumulet_status cumulet_instance_set_previous(cumulet_instance* instance, const double* to_world);
+/* A model was there, until cumulet_model_set, and at that moment of its animation, in which it is posed as well. NULL:
+ * where it is, at this moment. */
+CUMULET_API cumulet_status cumulet_model_set_previous(cumulet_model* model, const double* to_world, const double* time);
+
 CUMULET_API cumulet_status cumulet_camera_set(cumulet_camera* camera, const cumulet_camera_desc* desc);
 /* A camera that fits the scene is told as where it came to stand, if a viewer has placed it. */
 CUMULET_API cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumulet_camera_desc* desc);
@@ -1847,22 +1866,33 @@ typedef enum cumulet_aov {
   CUMULET_AOV_NORMAL = 5,        /* 3 floats: mean shading normal of our surfaces in the pixel, world space, towards the
                                     eye, as if there were no volume; 0 where there is none */
   CUMULET_AOV_ALBEDO = 6,        /* 3 floats: mean linear base colour, likewise */
-  CUMULET_AOV_ERROR = 7,   /* 1 float: estimated standard error of the pixel's luminance, with the sky's behind it:
-                              sqrt((<L^2> - <L>^2) / (n - 1)) of the luminances L of its n samples. Infinite where
-                              it has fewer than two */
-  CUMULET_AOV_VELOCITY = 8 /* 3 floats: mean velocity of the volume where it scatters the camera's rays for the first
+  CUMULET_AOV_ERROR = 7,    /* 1 float: estimated standard error of the pixel's luminance, with the sky's behind it:
+                               sqrt((<L^2> - <L>^2) / (n - 1)) of the luminances L of its n samples. Infinite where
+                               it has fewer than two */
+  CUMULET_AOV_VELOCITY = 8, /* 3 floats: mean velocity of the volume where it scatters the camera's rays for the first
                               time, before the nearest surface; world space, world units a second. 0 where it does
                               nowhere, and where it has no velocities (velocity_grid); surfaces have none. In voxel
                               marches 0, too, of a volume whose box has more than 2^27 voxels or is longer than
                               GL_MAX_3D_TEXTURE_SIZE */
+  /*
+   * 2 floats, pixels, x to the right and y up: from where something is seen now to where it was seen a frame ago, as
+   * Nuke's backward and the first half of Blender's Vector have it. 0 where it was behind the eye, and where nothing is
+   * known to have moved (cumulet_set_previous_camera).
+   */
+  CUMULET_AOV_MOTION = 9,        /* of the nearest surface at the pixel's centre, ours, the host's or the ground, as if
+                                    there were no volume, by the camera, the model's place and its pose; where there is
+                                    none of what is far away, by the camera's turn (orthographic: 0) */
+  CUMULET_AOV_VOLUME_MOTION = 10 /* of the volume, mean over where it scatters the camera's rays for the first time,
+                                    before the nearest surface, by the camera, its place and its velocity; 0 where it
+                                    does nowhere */
 } cumulet_aov;
 
 /*
  * [GL] One of these, of the picture so far: width x height (of the result) pixels, first pixel top left. count is the
- * number of floats at values. Transmittance, depths, normal, albedo and velocity are found when first asked for, by 16
- * rays a pixel (the depths by the one through its middle), without noise but where surfaces cover or transmit a part of
- * the light, which is a chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for debug views, and
- * for a picture that is still of the volume before.
+ * number of floats at values. Transmittance, depths, normal, albedo, velocity and motion are found when first asked
+ * for, by 16 rays a pixel (the depths by the one through its middle), without noise but where surfaces cover or
+ * transmit a part of the light, which is a chance; asking again costs the readback. CUMULET_ERROR_INVALID_ARGUMENT for
+ * debug views, and for a picture that is still of the volume before.
  */
 CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* values, size_t count);
 /*

@@ -663,6 +663,10 @@ class Instance {
   [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
     return detail::result(cumulet_instance_set_to_world(handle_, to_world.data()));
   }
+  /// Null: it stood where it is.
+  [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world) const noexcept {
+    return detail::result(cumulet_instance_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr));
+  }
   [[nodiscard]] Result<> set_ramp(Ramp ramp, std::span<const std::array<float, 2>> points) const noexcept {
     const float* first = points.empty() ? nullptr : points.front().data();
     return detail::result(cumulet_instance_set_ramp(handle_, static_cast<cumulet_ramp>(ramp), first, points.size()));
@@ -735,6 +739,10 @@ class Model {
   }
   [[nodiscard]] Result<> set_time(double time) const noexcept {
     return detail::result(cumulet_model_set_time(handle_, time));
+  }
+  /// Null: it stood where it is, and at this moment.
+  [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world, const double* time) const noexcept {
+    return detail::result(cumulet_model_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr, time));
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
@@ -1327,6 +1335,14 @@ class Viewer {
 
   [[nodiscard]] Result<> set_camera(const Camera& camera) noexcept {
     return result(cumulet_set_camera(handle(), camera.handle()));
+  }
+  /// Empty: it stood where it is.
+  [[nodiscard]] Result<> set_previous_camera(const Camera& camera, double seconds) noexcept {
+    return result(cumulet_set_previous_camera(handle(), camera.handle(), seconds));
+  }
+  [[nodiscard]] Result<> set_previous_volume_places(std::span<const std::array<double, 16>> to_world) noexcept {
+    const double* first = to_world.empty() ? nullptr : to_world.front().data();
+    return result(cumulet_set_previous_volume_places(handle(), first, static_cast<std::uint32_t>(to_world.size())));
   }
   [[nodiscard]] Result<Camera> get_camera() noexcept {
     cumulet_camera* out = nullptr;
