@@ -224,6 +224,9 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   // Where another volume may yet end the ray before here, once that is known.
   takes = takes && (p.gathers != 0u || (cm_instances[cm_here].flags & CM_INSTANCE_OVERLAPS) == 0u);
 #endif
+#if CM_HOLDOUT
+  takes = takes && !(p.bounces == 0u && CM_MEDIUM.holdout != 0u);
+#endif
   if (takes) p.radiance += p.throughput * emitted;
 #if CM_GROUPS
   if (takes) cm_add_to_group(CM_MEDIUM.group, p.throughput * emitted);

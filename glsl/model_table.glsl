@@ -8,6 +8,7 @@
 // Of a record's flags.
 const uint CM_MODEL_SEEN = 1u;      // by camera rays; others meet it in any case
 const uint CM_MODEL_MIRRORS = 2u;   // what turns clockwise in its own space turns the other way in the world
+const uint CM_MODEL_HOLDOUT = 4u;   // cameras see a hole
 
 // One standing of a mesh. Words: of the tables of surface_tables.glsl, which meshes share wherever they stand.
 CM_BLOCK(CmModel) {

@@ -43,6 +43,10 @@
 #ifndef CM_ENVIRONMENT
 #define CM_ENVIRONMENT 0
 #endif
+// Whether there is what cameras see as a hole.
+#ifndef CM_HOLDOUT
+#define CM_HOLDOUT 0
+#endif
 // Whether there are several volumes (glsl/instance.glsl).
 #ifndef CM_INSTANCES
 #define CM_INSTANCES 0
@@ -129,6 +133,7 @@ CM_BLOCK(CmMedium) {
   uint coloured;  // 1: what scatters has a colour a cell
   uint anisotropic;  // 1: and an anisotropy in place of this one
   uint group;        // of what it gives off; only with CM_GROUPS
+  uint holdout;      // 1: cameras see a hole; only with CM_HOLDOUT
   CM_EQUALITY(CmMedium)
 };
 

@@ -299,6 +299,18 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
 #if CM_INSTANCES
   cm_here = collided ? p.instance : p.start_instance;
 #endif
+#if CM_HOLDOUT
+  // What a camera ray has taken up before it stays; behind it there is nothing, not even the background.
+  bool cut = collided && CM_MEDIUM.holdout != 0u;
+#if CM_SURFACES
+  cut = cut || (met && (cm_models[cm_model_of(p.triangle)].flags & CM_MODEL_HOLDOUT) != 0u);
+#endif
+  if (cut && p.bounces == 0u) {
+    p.light = vec3(0.0f, 0.0f, 0.0f);
+    arrived = false;
+    return true;
+  }
+#endif
   if (escaped) cm_escape(p);
   bool finished = escaped && flight;
   if (met) cm_see(p, vertex);

@@ -3,6 +3,7 @@
 // variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_RICH=1 or CM_SURFACES=2 CM_GROUPS=1 or CM_SURFACES=2 CM_EQUIANGULAR=1 CM_GROUPS=1 or CM_SURFACES=2 CM_RICH=1 CM_GROUPS=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1
 // variants: - or CM_ENVIRONMENT=1
+// variants: - or CM_HOLDOUT=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

@@ -87,6 +87,7 @@ void Panel::models(Model& model, std::vector<Command>& commands) {
     ui_.checkbox(("Visible" + number).c_str(), "Whether it is there at all: its shadow goes with it.", one.visible);
     ui_.checkbox(("Shadow alone" + number).c_str(), "It is not seen, but casts shadows and is in mirrors.",
                  one.shadow_only);
+    ui_.checkbox(("Holdout" + number).c_str(), "The picture has a hole in its place, without alpha.", one.holdout);
     std::optional<Matrix> place;
     if (one.to_world != Matrix{}) place = one.to_world;
     if (const auto moved = stand_at(place, number)) one.to_world = *moved;

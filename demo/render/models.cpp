@@ -32,6 +32,7 @@ cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, 
   desc.hidden = scene.visible ? 0 : 1;
   desc.group = scene.group;
   desc.shadow_only = scene.shadow_only ? 1 : 0;
+  desc.holdout = scene.holdout ? 1 : 0;
   desc.tag = tag;
   return desc;
 }

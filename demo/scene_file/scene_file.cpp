@@ -461,6 +461,9 @@ SceneModel read_model(Reader& reader, const std::string& of) {
   std::int32_t flag = 0;
   reader.flag(of + "shadow_only", flag);
   model.shadow_only = flag != 0;
+  flag = 0;
+  reader.flag(of + "holdout", flag);
+  model.holdout = flag != 0;
   reader.number(of + "time", model.time, {});
   reader.integer(of + "animation", model.animation, 0.0, max_u32);
   reader.text(of + "variant", model.variant);
@@ -679,6 +682,7 @@ void put_model(Writer& writer, std::size_t number, const SceneModel& model, cons
   if (model.to_world != Matrix{}) writer.put(of + "to_world", model.to_world);
   if (!model.visible) writer.put(of + "visible", false);
   if (model.shadow_only) writer.put(of + "shadow_only", true);
+  if (model.holdout) writer.put(of + "holdout", true);
   if (model.time != 0.0 || number == 0) writer.put(of + "time", model.time);
   if (model.animation != 0 || number == 0) writer.put(of + "animation", model.animation);
   if (!model.variant.empty()) writer.put(of + "variant", model.variant);

@@ -52,6 +52,7 @@ struct SceneModel {
   std::array<double, 16> to_world{};  // where it stands, column by column; all 0: as its file has it
   bool visible = true;
   bool shadow_only = false;  // cameras do not see it
+  bool holdout = false;      // cameras see a hole
   double time = 0.0;         // seconds into its animation
   std::uint32_t animation = 0;
   std::string variant = {};  // of its materials, by name or number; "": none

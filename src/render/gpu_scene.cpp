@@ -24,6 +24,7 @@ core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& 
   m.extinction = static_cast<float>(std::min(1e30, medium.density_scale * std::max(source.max_value, 1e-30F)));
   m.source = medium.emission;
   m.group = medium.group;
+  m.holdout = medium.holdout ? 1U : 0U;
   m.anisotropy = medium.phase.anisotropy;
   m.second_anisotropy = medium.phase.second_anisotropy;
   m.second_bend = medium.phase.second_bend;
@@ -76,7 +77,9 @@ void GpuScene::find_present(const scene::Snapshot& snapshot) {
 }
 
 void GpuScene::update_instances(const Wanted& wanted) {
-  if (present_.size() < 2) {
+  // What is a hole is known of those of a table alone.
+  const auto cuts = [](const scene::Volume& volume) { return (*volume.medium).holdout; };
+  if (present_.size() < 2 && std::ranges::none_of(present_, cuts)) {
     if (instances_) {
       data_revision_.advance();
       instances_revision_.advance();
@@ -238,8 +241,8 @@ void GpuScene::place_raster() {
     for (const scene::Model& model : placed_.of().models) {
       const auto source = std::ranges::find(raster_.of(), model.source);
       if (source == raster_.of().end()) continue;
-      items.push_back(
-          {(*raster_)[static_cast<std::size_t>(source - raster_.of().begin())], model.to_world, model.shadow_only});
+      items.push_back({(*raster_)[static_cast<std::size_t>(source - raster_.of().begin())], model.to_world,
+                       model.shadow_only || model.holdout});
     }
   }
   surface_pass_.show(std::move(items));
@@ -447,6 +450,10 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   // Chances are of a table as a whole.
   obstacles.lamps = !placed_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
   obstacles.instances = instances_.get();
+  const auto cuts = [](const scene::Volume& volume) { return (*volume.medium).holdout; };
+  obstacles.volume_holdout = instances_ && std::ranges::any_of(present_, cuts);
+  obstacles.model_holdout =
+      obstacles.met() != nullptr && std::ranges::any_of(placed_->models(), &scene::Model::holdout);
   return obstacles;
 }
 

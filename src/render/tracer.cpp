@@ -65,6 +65,7 @@ constexpr const char* environment_macro = "CM_ENVIRONMENT 1";
 constexpr const char* equiangular_macro = "CM_EQUIANGULAR 1";
 constexpr const char* rich_macro = "CM_RICH 1";
 constexpr const char* groups_macro = "CM_GROUPS 1";
+constexpr const char* holdout_macro = "CM_HOLDOUT 1";
 
 const char* surfaces_macro(unsigned traced) { return traced > 1 ? "CM_SURFACES 2" : "CM_SURFACES 1"; }
 
@@ -254,6 +255,11 @@ void Tracer::add_medium(const Picture& picture, std::vector<std::string>& define
   if (picture.channels_) defines.emplace_back(channels_macro);
 }
 
+void Tracer::add_march(const Picture& picture, std::vector<std::string>& defines) {
+  if (picture.volume_holdout_) defines.emplace_back(holdout_macro);
+  add_groups(picture, defines);
+}
+
 void Tracer::add_groups(const Picture& picture, std::vector<std::string>& defines) {
   if (picture.light_groups_ > 0) defines.emplace_back(groups_macro);
 }
@@ -264,7 +270,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
     add_medium(picture, more);
     if (picture.environment_) more.emplace_back(environment_macro);
     if (picture.equiangular_) more.emplace_back(equiangular_macro);
-    add_groups(picture, more);
+    add_march(picture, more);
     return program(data.defines(picture.several_), "trace_travel.comp", more);
   }
   // With groups of lights there are few variants: they know of layers and lamps that are not there.
@@ -276,7 +282,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   if (picture.environment_) more.emplace_back(environment_macro);
   if (picture.lamps_ || groups) more.emplace_back("CM_LAMPS 1");
   if (picture.equiangular_) more.emplace_back(equiangular_macro);
-  add_groups(picture, more);
+  add_march(picture, more);
   return program(data.defines(picture.several_), "trace.comp", more);
 }
 
@@ -288,6 +294,7 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
   }
   if (picture.environment_) shade.emplace_back(environment_macro);
   if (picture.equiangular_) shade.emplace_back(equiangular_macro);
+  if (picture.model_holdout_) shade.emplace_back(holdout_macro);
   std::vector<std::string> meet{"CM_SURFACES 1"};
   if (picture.rich_) {
     shade.emplace_back(rich_macro);
@@ -354,6 +361,8 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.environment_ = obstacles.environment != nullptr;
   picture.lamps_ = obstacles.lamps_met() > 0;
   picture.several_ = obstacles.instances != nullptr;
+  picture.volume_holdout_ = shaded && obstacles.volume_holdout;
+  picture.model_holdout_ = shaded && picture.traced_ > 0 && obstacles.model_holdout;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
   picture.light_groups_ = shaded ? settings.light_groups : 0;
@@ -361,7 +370,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   // What the volume alone has is told by what a path first met, and such light may lie before a surface; and a layer's
   // colour waits in the place of such a look's light.
   picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ && !picture.rich_ &&
-                         (picture.traced_ > 0 || picture.layered_ == Layered::no);
+                         !picture.volume_holdout_ && (picture.traced_ > 0 || picture.layered_ == Layered::no);
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
 }
 

@@ -52,6 +52,8 @@ struct Obstacles {
   const EnvironmentData* environment = nullptr;  // of those that escape
   const LampData* lamps = nullptr;               // that paths look for: a scene's where they meet it, and the host's
   const InstanceData* instances = nullptr;       // where the volume is several; else it is the only one
+  bool volume_holdout = false;                   // one of those is a hole to cameras
+  bool model_holdout = false;                    // likewise of what they meet of the scene
   const scene::MotionTable* motion = nullptr;    // what facts of motion go by: not null where they are asked for
 
   /// The scene whose triangles paths meet; null: they meet none.
@@ -176,6 +178,8 @@ class Picture {
   bool equiangular_ = false;  // and from points of flights
   bool several_ = false;      // volumes
   bool rich_ = false;         // materials that need CM_RICH
+  bool volume_holdout_ = false;
+  bool model_holdout_ = false;
   [[nodiscard]] glm::uvec2 tile_corner() const {
     return box_.first + glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_;
   }
@@ -334,6 +338,7 @@ class Tracer {
   static unsigned traced_of(const PictureParameters& parameters, const Obstacles& obstacles,
                             const PictureSettings& settings);
   // The one kernel, or what the paths' time goes by where they are run by stages.
+  static void add_march(const Picture& picture, std::vector<std::string>& defines);
   static void add_groups(const Picture& picture, std::vector<std::string>& defines);
   static void add_medium(const Picture& picture, std::vector<std::string>& defines);
   const Program& trace_program(const Picture& picture, const MarchData& data);

@@ -140,7 +140,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         const dmat4 to_world = model.to_world * mesh.placings[k];
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
         CmModel record{};
-        record.flags = model.shadow_only ? 0U : core::CM_MODEL_SEEN;
+        record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U);
         place(record, to_world);
         // What a file scales to nothing is not there.
         if (!is_sound(record)) continue;

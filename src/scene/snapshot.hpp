@@ -23,6 +23,7 @@ struct Medium {
   Phase phase;
   glm::vec3 emission{0.0F};
   std::uint32_t group = 0;  ///< of lights, of what it gives off
+  bool holdout = false;     ///< cameras see a hole
   bool operator==(const Medium&) const = default;
 };
 
@@ -84,6 +85,7 @@ struct Model {
   std::uint32_t group = 0;                  ///< of lights, that it is in
   std::optional<glm::dmat4> previous = {};  ///< where it stood a frame ago; none: there as well
   ModelSourcePtr previous_source = {};      ///< and how it was posed; null: likewise
+  bool holdout = false;                     ///< cameras see a hole
   bool operator==(const Model&) const = default;
 };
 

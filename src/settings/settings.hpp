@@ -180,7 +180,10 @@ struct Table<cumulet_medium_desc> {
         .row = {.label = "Black body tint", .tip = "Multiplies the black body's colour."}}),
       Setting(&Desc::group, {.name = "group", .range = group_range,
         .key = "medium.group", .flag = "--medium-group", .type = "N",
-        .help = "Group of lights that what it gives off is in, from 0 to 7 (default: 0); see --light-groups"})};
+        .help = "Group of lights that what it gives off is in, from 0 to 7 (default: 0); see --light-groups"}),
+      Setting(&Desc::holdout, {.name = "holdout",
+        .key = "medium.holdout", .flag = "--medium-holdout",
+        .help = "The camera sees a hole in place of the volume, without alpha"})};
 };
 
 template <>
@@ -369,7 +372,10 @@ struct Table<cumulet_surface_settings_desc> {
       Setting(&Desc::group, {.name = "group", .range = group_range,
         .key = "surfaces.group", .flag = "--gltf-group", .type = "N",
         .help = "Group of lights that what its surfaces and lamps give off is in, from 0 to 7 (default: 0); see "
-                "--light-groups"})};
+                "--light-groups"}),
+      Setting(&Desc::holdout, {.name = "holdout",
+        .key = "surfaces.holdout", .flag = "--gltf-holdout",
+        .help = "The camera sees a hole in place of the model, without alpha"})};
 };
 
 template <>

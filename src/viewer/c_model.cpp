@@ -35,6 +35,8 @@ ModelSettings settings_of(const cumulet_model_desc* desc) {
   settings.choice = {d.time, d.animation, d.double_sided == 1, d.variant};
   settings.hidden = d.hidden == 1;
   settings.shadow_only = d.shadow_only == 1;
+  flag(d.holdout, "cumulet_model_desc.holdout is not 0 or 1");
+  settings.holdout = d.holdout == 1;
   settings.tag = d.tag;
   require(d.group < CUMULET_LIGHT_GROUPS, "cumulet_model_desc.group is not below CUMULET_LIGHT_GROUPS");
   settings.group = d.group;

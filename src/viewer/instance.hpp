@@ -33,6 +33,7 @@ struct ModelSettings {
   glm::dmat4 to_world{1.0};
   bool hidden = false;
   bool shadow_only = false;
+  bool holdout = false;
   std::uint32_t group = 0;                   ///< of lights
   std::uint64_t tag = 0;                     ///< the host's own
   std::optional<glm::dmat4> previous = {};   ///< where it was a frame ago; none: where it is

@@ -52,6 +52,7 @@ struct Medium {
   glm::vec3 emission{0.0F};
   scene::Emission field_emission = {};  // of what its grids give off
   std::uint32_t group = 0;              // of lights
+  bool holdout = false;
 
   static Medium of(const cumulet_medium_desc& d) {
     return {d.density_scale,
@@ -61,7 +62,8 @@ struct Medium {
             glm::make_vec3(d.emission),
             {d.flame_strength, glm::make_vec3(d.flame_color), d.temperature_scale, d.temperature_offset, d.blackbody,
              glm::make_vec3(d.blackbody_tint)},
-            d.group};
+            d.group,
+            d.holdout == 1};
   }
   static scene::Phase phase_of(const cumulet_medium_desc& d) {
     switch (d.phase) {
@@ -130,12 +132,14 @@ struct SurfaceSettings {
   SurfaceLight light = SurfaceLight::full;
   float indirect_roughness = 0.0F;
   std::uint32_t group = 0;  ///< of lights
+  bool holdout = false;
 
   static SurfaceSettings of(const cumulet_surface_settings_desc& d) {
     return {{d.time, d.animation, d.double_sided == 1, d.variant},
             static_cast<SurfaceLight>(d.light),
             d.indirect_roughness,
-            d.group};
+            d.group,
+            d.holdout == 1};
   }
 };
 

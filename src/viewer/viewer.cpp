@@ -38,7 +38,7 @@ scene::Emission emission_of(const Medium& medium, const Ramps& ramps) {
 }
 
 scene::Medium shown_medium(const Medium& medium) {
-  return {medium.density_scale, medium.albedo, medium.phase, medium.emission, medium.group};
+  return {medium.density_scale, medium.albedo, medium.phase, medium.emission, medium.group, medium.holdout};
 }
 
 // Whether but for how much hides and from where it is seen the same is made.
@@ -568,11 +568,12 @@ std::vector<scene::Model> Viewer::models() const {
     scene::Model& own = models.emplace_back();
     own.source = model_source_;
     own.group = surface_settings_.group;
+    own.holdout = surface_settings_.holdout;
   }
   for (const ShownModel& shown : shown_models_) {
     if (shown.is_shown())
       models.push_back({shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only,
-                        shown.settings.group, shown.settings.previous, shown.previous_source});
+                        shown.settings.group, shown.settings.previous, shown.previous_source, shown.settings.holdout});
   }
   return models;
 }

@@ -77,6 +77,7 @@ const std::array fields{
     CM_FIELD(medium, coloured),
     CM_FIELD(medium, anisotropic),
     CM_FIELD(medium, group),
+    CM_FIELD(medium, holdout),
     CM_FIELD(lights, sun_direction),
     CM_FIELD(lights, any),
     CM_FIELD(lights, sky_chance),

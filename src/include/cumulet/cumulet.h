@@ -958,6 +958,8 @@ typedef struct cumulet_surface_settings_desc {
   uint32_t variant;     /* of the file's variants of materials the one of index variant - 1 (see
                            cumulet_surfaces_get_variant); 0, or one that is not there: the materials without a choice */
   uint32_t group;       /* of lights, that their emissive triangles and lamps are in */
+  int32_t holdout; /* 1: what cameras see of them is a hole, as of a medium: cumulet_medium_desc. What is rasterised
+                      leaves them out */
 } cumulet_surface_settings_desc;
 
 /* How this viewer shows its surfaces. Poses them on the worker if the moment, double_sided or the variant changed; the
@@ -1118,6 +1120,12 @@ typedef struct cumulet_medium_desc {
   float blackbody;          /* intensity; 0: none, but 1 for a volume of a temperature without density and flame */
   float blackbody_tint[3];  /* all 0: white */
   uint32_t group;           /* of lights, that all it gives off is in */
+  /*
+   * 1: what cameras see of it is a hole: where a camera's ray would be scattered first by it, that is black and without
+   * alpha, and no background shows; what stands before it stays. Other light goes through it as it does. So a picture
+   * leaves room for what it is composited with. AOVs know it as it is; of previews it is a part once they are traced.
+   */
+  int32_t holdout;
 } cumulet_medium_desc;
 
 /* The grid whose values a ramp changes. */
@@ -1379,6 +1387,8 @@ typedef struct cumulet_model_desc {
   int32_t shadow_only; /* 1: cameras do not see it, nor do picks and AOVs; other light meets it, and it shines */
   uint64_t tag;        /* the host's own, which cumulet_pick tells */
   uint32_t group;      /* of lights, that its emissive triangles and lamps are in */
+  int32_t holdout;     /* 1: what cameras see of it is a hole, as of a medium: cumulet_medium_desc. What is rasterised
+                          leaves it out */
 } cumulet_model_desc;
 
 /* error as in cumulet_create. */

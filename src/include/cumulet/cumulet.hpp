@@ -711,6 +711,8 @@ struct ModelDesc {
   bool hidden = false;
   bool shadow_only = false;
   std::uint64_t tag = 0;
+  std::uint32_t group = 0;
+  bool holdout = false;
 };
 
 /// A share in surfaces of scenes: a copy is one more of the same. Any thread.
@@ -768,7 +770,9 @@ class Model {
                          .double_sided = desc.double_sided ? 1 : 0,
                          .hidden = desc.hidden ? 1 : 0,
                          .shadow_only = desc.shadow_only ? 1 : 0,
-                         .tag = desc.tag};
+                         .tag = desc.tag,
+                         .group = desc.group,
+                         .holdout = desc.holdout ? 1 : 0};
     std::ranges::copy(desc.to_world, c.to_world);
     return c;
   }
