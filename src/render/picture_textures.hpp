@@ -39,7 +39,7 @@ struct PictureTextures {
                           // is to show where there are no samples
   GLuint counts = 0;      // .x is the number of samples summed
   glm::uvec2 size{0U};
-  PixelBox box;         // that samples are of: others are no neighbours of theirs
+  std::optional<PixelBox> box{};  // that samples are of: others are no neighbours of theirs; without, all
   bool holes = false;   // some pixels may have no sample yet: they take after those around them, else show what was
                         // there before
   GLuint volume_z = 0;  // r32f, same size, or 0: view depth z at half opacity, 0 where the volume is not so opaque

@@ -238,8 +238,9 @@ void Wavelet::bind(const PictureTextures& picture, const gl::Program& program) {
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_VOLUME_Z, guides.volume_z);
     gl.BindTextureUnit(core::CM_UNIT_GUIDE_EMISSION, guides.emission);
     gl.ProgramUniform1f(program.name(), own_at, guides.surfaces ? 1.0F : 0.0F);
-    const glm::ivec2 first(picture.box.first);
-    const glm::ivec2 end(picture.box.first + picture.box.size);
+    const PixelBox box = picture.box.value_or(PixelBox{glm::uvec2(0U), picture.size});
+    const glm::ivec2 first(box.first);
+    const glm::ivec2 end(box.first + box.size);
     gl.ProgramUniform4i(program.name(), box_at, first.x, first.y, end.x, end.y);
     write(core::CM_IMAGE_WAVELET_GUIDES, guides_, GL_RGBA32UI);
   } else {

@@ -29,7 +29,7 @@ core::CmMotion map_of(const dmat4& matrix, std::uint32_t vertices = 0) {
 MotionTable make_motion(const Snapshot& snapshot, const dmat4& ray_to_world, std::span<const Volume> volumes,
                         std::span<const Model> models, const ModelTable* table,
                         const std::function<std::uint32_t(const ModelSource&)>& vertices_of) {
-  const Viewpoint& now = **snapshot.view;
+  const Viewpoint now = (*snapshot.view).value_or(Viewpoint{});
   const Viewpoint then = snapshot.previous->view.value_or(now);
   MotionTable made;
   made.frame.orthographic_now = now.orthographic ? 1U : 0U;

@@ -81,7 +81,7 @@ inline constexpr std::array lamp_choices = {
     Choice{"sun", CUMULET_LAMP_SUN, "Sun", "Far away: the same everywhere."}};
 
 /// Numbers of groups of lights.
-inline constexpr Range group_range = {0.0, CUMULET_LIGHT_GROUPS - 1.0};
+inline constexpr Range group_range = {0.0, double{CUMULET_LIGHT_GROUPS} - 1.0};
 
 // One setting, one row.
 // clang-format off

@@ -72,7 +72,9 @@ class LightGroups : public testing::TestWithParam<Backend> {
     medium_.emission[2] = on(glow) ? 0.2F : 0.0F;
     medium_.group = glow;
     ASSERT_EQ(cumulet_set_medium(v_, &medium_), CUMULET_OK);
-    if (shines_ != nullptr) ASSERT_EQ(cumulet_set_surfaces(v_, on(pane) ? shines_ : dark_), CUMULET_OK);
+    if (shines_ != nullptr) {
+      ASSERT_EQ(cumulet_set_surfaces(v_, on(pane) ? shines_ : dark_), CUMULET_OK);
+    }
   }
 
   void set(std::uint32_t samples, std::uint32_t seed, std::uint32_t light_groups) {
@@ -183,7 +185,7 @@ class LightGroups : public testing::TestWithParam<Backend> {
   }();
 };
 INSTANTIATE_TEST_SUITE_P(Gl, LightGroups, testing::Values(Backend::egl, Backend::osmesa),
-                         [](const auto& info) { return info.param == Backend::egl ? "egl" : "osmesa"; });
+                         [](const auto& backend) { return backend.param == Backend::egl ? "egl" : "osmesa"; });
 
 // A pane that shines, and the same dark.
 SurfacesRef make_pane(float emission) {
@@ -222,7 +224,9 @@ TEST_P(LightGroups, MakeNoOtherPicture) {
       for (float& value : far.sun_irradiance) value = 2.0F;
       for (float& value : far.sky_radiance) value = 0.4F;
       ASSERT_EQ(cumulet_set_light(v_, &far), CUMULET_OK);
-      if (!lamps) ASSERT_EQ(cumulet_set_lamps(v_, nullptr, 0), CUMULET_OK);
+      if (!lamps) {
+        ASSERT_EQ(cumulet_set_lamps(v_, nullptr, 0), CUMULET_OK);
+      }
       set(8, 3, 0);
       make();
       const Rgb without = linear();

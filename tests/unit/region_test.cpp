@@ -152,7 +152,7 @@ class RegionPicture : public testing::TestWithParam<Backend> {
   }();
 };
 INSTANTIATE_TEST_SUITE_P(Gl, RegionPicture, testing::Values(Backend::egl, Backend::osmesa),
-                         [](const auto& info) { return info.param == Backend::egl ? "egl" : "osmesa"; });
+                         [](const auto& backend) { return backend.param == Backend::egl ? "egl" : "osmesa"; });
 
 TEST_P(RegionPicture, HasTheBitsOfTheWhole) {
   const SurfacesRef panes = make_panes(3.0F);

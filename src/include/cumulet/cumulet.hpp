@@ -210,6 +210,8 @@ class [[nodiscard]] Result<void> {
 }
 /// The library's, as major * 10000 + minor * 100 + patch.
 [[nodiscard]] inline std::uint32_t version() noexcept { return cumulet_version(); }
+/// How many groups lights may be in.
+inline constexpr std::uint32_t light_group_count = CUMULET_LIGHT_GROUPS;
 /// GLSL for the host's shaders, zero-terminated.
 [[nodiscard]] inline const char* transmittance_map_glsl() noexcept { return cumulet_transmittance_map_glsl(); }
 
