@@ -311,4 +311,5 @@ def main():
     sys.exit(1 if options.within and failed else 0)
 
 
-main()
+if __name__ == "__main__":
+    main()
