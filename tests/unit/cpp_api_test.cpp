@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -788,6 +789,88 @@ TEST_F(CppViewer, SharesSurfaces) {
   EXPECT_EQ(one.use_surface_camera(0).error().status, StatusCode::invalid_argument);
   EXPECT_EQ(one.load_surfaces({}).error().status, StatusCode::invalid_argument);
   EXPECT_EQ(one.load_environment({}).error().status, StatusCode::invalid_argument);
+}
+
+TEST(CppModel, IsSharedByCopies) {
+  const std::array<float, 9> positions = {0, 0, 0, 2, 0, 0, 0, 1, 0};
+  const std::array<MeshDesc, 1> meshes = {MeshDesc{.positions = positions}};
+  const Surfaces surfaces = Surfaces::from_triangles({.meshes = meshes}).value();
+  std::array<double, 16> place{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 2, 1, 1};
+  Model model = Model::create({.surfaces = surfaces, .to_world = place, .tag = 5}).value();
+  const Model copy = model;
+  EXPECT_EQ(copy.handle(), model.handle());
+  Model moved = std::move(model);
+  EXPECT_FALSE(model);  // NOLINT(bugprone-use-after-move): that is what is tested
+  model = Model::adopt(moved.release());
+  EXPECT_EQ(model.handle(), copy.handle());
+  EXPECT_FALSE(moved);  // NOLINT(bugprone-use-after-move)
+  EXPECT_TRUE(model.set_time(0.5));
+  EXPECT_FALSE(model.set_time(std::numeric_limits<double>::quiet_NaN()));
+  place[0] = 0.0;
+  EXPECT_FALSE(model.set_to_world(place)) << "flat";
+  const auto flat = Model::create({.surfaces = surfaces, .to_world = place});
+  ASSERT_FALSE(flat);
+  EXPECT_EQ(flat.error().status, StatusCode::invalid_argument);
+  EXPECT_FALSE(flat.error().message.empty());
+  place[0] = 2.0;
+  EXPECT_TRUE(copy.set_to_world(place));
+  EXPECT_TRUE(model.set({.surfaces = surfaces, .hidden = true}));
+  EXPECT_EQ(Model().set({}).error().status, StatusCode::invalid_argument);
+  EXPECT_EQ(Model().set_time(0.0).error().status, StatusCode::invalid_argument);
+}
+
+TEST_F(CppViewer, ShowsModels) {
+  const std::array<float, 12> positions = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+  const std::array<std::uint32_t, 6> indices = {0, 1, 2, 0, 2, 3};
+  const std::array<MeshDesc, 1> meshes = {MeshDesc{.positions = positions, .indices = indices, .emission = {1, 0, 0}}};
+  const Surfaces surfaces = Surfaces::from_triangles({.meshes = meshes}).value();
+  std::array<double, 16> place{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  Model model = Model::create({.surfaces = surfaces, .to_world = place, .tag = 7}).value();
+  Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
+  viewer.set_sampling({.samples = 4, .preview = Preview::off}).value();
+  viewer.get_camera()->set({.eye = {0, 0, 5}, .target = {0, 0, 0}}).value();
+  EXPECT_FALSE(viewer.remove_model(model)) << "it is not shown yet";
+  viewer.add_model(model).value();
+  EXPECT_FALSE(viewer.add_model(model)) << "it is shown already";
+  const auto picked = [&] {
+    EXPECT_TRUE(converge(viewer, 16, 16).has(RenderFlags::converged));
+    return viewer.pick_at(8, 8).value();
+  };
+  const Pick pick = picked();
+  EXPECT_TRUE(pick.hit);
+  EXPECT_TRUE(pick.met_surface);
+  EXPECT_EQ(pick.tag, 7U);
+  EXPECT_NEAR(pick.distance, 5.0, 1e-2);
+  EXPECT_EQ(viewer.get_bounds()->max, (Vector{1, 1, 0}));
+  place[14] = 2.0;
+  model.set_to_world(place).value();
+  EXPECT_NEAR(picked().distance, 3.0, 1e-2);
+  EXPECT_EQ(viewer.get_bounds()->max, (Vector{1, 1, 2}));
+  model.set({.surfaces = surfaces, .to_world = place, .shadow_only = true}).value();
+  EXPECT_FALSE(picked().hit) << "cameras do not see it";
+  // The viewer's share is its own.
+  model = Model();
+  EXPECT_TRUE(viewer.get_bounds());
+}
+
+TEST(CppLive, IsSharedByCopies) {
+  Live live = Live::create({.bounds_min = {0, 0, 0}, .bounds_max = {4, 4, 4}}).value();
+  const Live copy = live;
+  Live moved = std::move(live);
+  EXPECT_FALSE(live);  // NOLINT(bugprone-use-after-move): that is what is tested
+  live = Live::adopt(moved.release());
+  EXPECT_EQ(live.handle(), copy.handle());
+  EXPECT_EQ(Live().get_volume().error().status, StatusCode::invalid_argument);
+  Viewer viewer = Viewer::create({}).value();
+  EXPECT_FALSE(viewer.get_live_info()) << "none is shown";
+  viewer.set_live(copy).value();
+  const std::vector<float> values(4 * 4 * 4, 0.5F);
+  const Field field(Channel::density, DenseDesc{.values = values, .size = {4, 4, 4}});
+  live.set({.fields = {&field, 1}}).value();
+  viewer.wait().value();
+  EXPECT_EQ(viewer.get_live_info()->handed_state, 1U);
+  viewer.set_live({}).value();
+  EXPECT_FALSE(viewer.get_live_info());
 }
 
 TEST(CppLive, StatesAreHandedOver) {
