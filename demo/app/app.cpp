@@ -40,6 +40,7 @@ constexpr double motion_rest = 0.4;  // seconds without motion that end a step o
 constexpr double replay_frame = 1.0 / 60.0;
 constexpr double least_frame = 1.0 / 60.0;  // seconds from one frame to the next
 constexpr double picture_frame = 0.15;      // that a window may wait for a picture that is under way
+constexpr double click_reach = 4.0;         // pixels at scale 1 that a hand may slip
 
 }  // namespace
 
@@ -123,6 +124,8 @@ void App::frame() {
     host.viewport = viewport_;
     host.find = [this](const std::string& label) {
       auto place = panel_.ui().find(label);
+      const auto seen = sight();
+      if (!place && seen) place = Handles::find(label, model_, *seen, ui_scale_);
       if (!place) panel_.ui().bring_into_view(label);
       return place;
     };
@@ -135,6 +138,8 @@ void App::frame() {
   viewport_ = Panel::viewport(model_, static_cast<double>(screen.x), static_cast<double>(screen.y), ui_scale_);
   handle(events);
   if (const auto region = region_drag_.taken(viewport_)) std::ranges::copy(*region, model_.scene.sampling.region);
+  drag_handle();
+  if (model_.chosen && !place_of(model_.scene, *model_.chosen)) model_.chosen.reset();
 
   model_.can_undo = history_->can_undo(model_.scene);
   model_.can_redo = history_->can_redo();
@@ -185,6 +190,8 @@ void App::handle(const std::vector<Event>& events) {
         break;
       case Event::Type::focus_lost:
         viewport_buttons_ = 0;
+        handles_.release();
+        clicked_.reset();
         to_viewer(event);
         break;
       case Event::Type::button: {
@@ -192,10 +199,17 @@ void App::handle(const std::vector<Event>& events) {
         const bool ours = event.down ? !ImGui::GetIO().WantCaptureMouse : (viewport_buttons_ & bit) != 0;
         if (!ours) break;
         viewport_buttons_ = event.down ? viewport_buttons_ | bit : viewport_buttons_ & ~bit;
-        to_viewer(event);
+        if (event.down)
+          press(event);
+        else
+          let_go(event);
         break;
       }
       case Event::Type::move:
+        if (clicked_ && glm::distance(*clicked_, pointer()) > click_reach * static_cast<double>(ui_scale_))
+          clicked_.reset();
+        if (handles_.holds()) break;
+        [[fallthrough]];
       case Event::Type::wheel:
         if (viewport_buttons_ != 0 || !ImGui::GetIO().WantCaptureMouse) to_viewer(event);
         break;
@@ -213,13 +227,69 @@ void App::handle_key(const Event& event) {
     const auto command = command_of(event.code, event.modifiers, io.WantTextInput);
     // Space is the control's where the keyboard is at one.
     const bool presses = event.code == GLFW_KEY_SPACE && io.NavVisible;
-    if (command && !presses && !(escape && ImGui::IsAnyItemActive())) {
+    // Flying has keys of its own.
+    const bool flies = command && command->action == Action::tool && model_.navigation.fly != 0;
+    if (command && !presses && !flies && !(escape && ImGui::IsAnyItemActive())) {
       execute(*command);
       return;
     }
   }
   if (event.down && (io.WantCaptureKeyboard || io.WantTextInput)) return;
   to_viewer(event);
+}
+
+void App::press(const Event& event) {
+  clicked_.reset();
+  const bool plain = (event.modifiers & (modifier_shift | modifier_alt)) == 0;
+  if (event.code == GLFW_MOUSE_BUTTON_LEFT && plain && model_.navigation.fly == 0) {
+    const auto seen = sight();
+    if (seen && handles_.press(model_, *seen, pointer(), ui_scale_)) return;
+    if ((event.modifiers & modifier_ctrl) == 0) clicked_ = pointer();
+  }
+  if (!handles_.holds()) to_viewer(event);
+}
+
+void App::let_go(const Event& event) {
+  if (event.code != GLFW_MOUSE_BUTTON_LEFT || !handles_.holds()) {
+    to_viewer(event);
+    if (event.code == GLFW_MOUSE_BUTTON_LEFT && clicked_) choose_at(*std::exchange(clicked_, std::nullopt));
+    return;
+  }
+  drag_handle();
+  handles_.release();
+}
+
+void App::choose_at(const glm::dvec2& pixel) {
+  const auto seen = sight();
+  if (!seen) return;
+  if (const auto lamp = Handles::lamp_at(model_, *seen, pixel, ui_scale_)) {
+    model_.chosen = lamp;
+    return;
+  }
+  requests_.push_back({Request::Type::pick, {}, pixel.x - viewport_.x, pixel.y - viewport_.y});
+}
+
+std::optional<Sight> App::sight() const {
+  if (is_unplaced(model_.scene.camera) || !(viewport_.width > 0.0 && viewport_.height > 0.0)) return std::nullopt;
+  return Sight(model_.scene.camera, viewport_);
+}
+
+void App::drag_handle() {
+  if (!handles_.holds()) return;
+  if (const auto seen = sight())
+    handles_.drag(model_, *seen, pointer(), (window_->input().modifiers() & modifier_ctrl) != 0);
+}
+
+void App::draw_handles() {
+  const auto seen = sight();
+  if (!seen || model_.navigation.fly != 0) return;
+  const bool free = viewport_buttons_ == 0 && !ImGui::GetIO().WantCaptureMouse;
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  const auto corner = [](double x, double y) { return ImVec2(static_cast<float>(x), static_cast<float>(y)); };
+  list.PushClipRect(corner(viewport_.x, viewport_.y),
+                    corner(viewport_.x + viewport_.width, viewport_.y + viewport_.height));
+  handles_.draw(list, model_, *seen, free ? std::optional(pointer()) : std::nullopt, ui_scale_);
+  list.PopClipRect();
 }
 
 void App::to_viewer(const Event& event) {
@@ -353,6 +423,14 @@ void App::execute(const Command& command) {
     case Action::toggle_turntable:
       navigation.turntable_degrees_per_second = navigation.turntable_degrees_per_second != 0.0 ? 0.0 : turn_speed;
       break;
+    case Action::tool:
+      handles_.release();
+      model_.tool = static_cast<Tool>(command.value);
+      break;
+    case Action::toggle_axes:
+      handles_.release();
+      model_.axes = model_.axes == Axes::world ? Axes::local : Axes::world;
+      break;
     case Action::brighter:
       display.exposure_stops = std::min(display.exposure_stops + third, 10.0f);
       break;
@@ -415,12 +493,16 @@ void App::execute(const Command& command) {
 
 void App::cancel() {
   if (region_drag_.cancel()) return;
-  if (model_.help)
+  if (handles_.holds())
+    handles_.cancel(model_);
+  else if (model_.help)
     model_.help = false;
   else if (!model_.messages.empty())
     model_.messages.pop_back();
   else if (model_.status.busy || waiting())
     renderer_->cancel();
+  else if (model_.chosen)
+    model_.chosen.reset();
   else
     ImGui::SetWindowFocus(nullptr);
 }
@@ -636,6 +718,7 @@ void App::accept(const Answer& answer) {
     look_ = answer.look;
     model_.scene.medium = *look_;
   }
+  if (answer.picked) model_.chosen = answer.picked->item;
   // What the program begins with is no change of the user's.
   if (starting_ && (answer.density_scale || answer.look)) history_.emplace(model_.scene);
   model_.status = answer.status;
@@ -677,6 +760,7 @@ void App::remember_files(const Answer& answer) {
 }
 
 void App::step_history(bool back) {
+  handles_.release();
   const auto scene = back ? history_->undo(model_.scene) : history_->redo(model_.scene);
   if (!scene) return;
   const cumulet_camera_desc camera = model_.scene.camera;
@@ -700,6 +784,7 @@ bool App::draw() {
     behind.AddCallback(cover, gl_.get());
     behind.AddImage(texture, low, high, {0.0f, 1.0f}, {1.0f, 0.0f});
     behind.AddCallback(ImDrawCallback_ResetRenderState, nullptr);
+    draw_handles();
   }
   if (const auto drawn = region_drag_.drawn()) {
     const ImVec2 low(static_cast<float>(drawn->x), static_cast<float>(drawn->y));
@@ -846,10 +931,14 @@ void App::write_report(const std::string& path) const {
   json["messages"] = Json::array();
   for (const Message& message : model_.messages)
     json["messages"].push_back({{"error", message.error}, {"text", message.text}});
+  json["tool"] = static_cast<int>(model_.tool);
+  json["local_axes"] = model_.axes == Axes::local;
+  json["chosen"] = model_.chosen ? Json(title_of(model_.scene, *model_.chosen)) : Json();
   json["turntable"] = model_.navigation.turntable_degrees_per_second;
   json["fly"] = model_.navigation.fly != 0;
   json["scene"] = Json::parse(scene_text(model_.scene, path, SceneFormat::first));
-  json["lights"] = Json::parse(scene_text(model_.scene, path)).value("lights", Json::array());  // not of that version
+  const Json second = Json::parse(scene_text(model_.scene, path));
+  for (const char* key : {"volumes", "models", "lights"}) json[key] = second.value(key, Json::array());  // not of that
   image::replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

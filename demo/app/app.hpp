@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "demo_options.hpp"
+#include "handles.hpp"
 #include "history.hpp"
 #include "model.hpp"
 #include "panel.hpp"
@@ -45,6 +46,15 @@ class App {
   void handle(const std::vector<Event>& events);
   void handle_key(const Event& event);
   void to_viewer(const Event& event);
+  /// A button in the picture: a handle's, a click's or the camera's.
+  void press(const Event& event);
+  void let_go(const Event& event);
+  void choose_at(const glm::dvec2& pixel);
+  [[nodiscard]] glm::dvec2 pointer() const { return {window_->input().x(), window_->input().y()}; }
+  /// How the picture sees the scene; nothing before the camera has a place.
+  [[nodiscard]] std::optional<Sight> sight() const;
+  void drag_handle();
+  void draw_handles();
 
   void execute(const std::vector<Command>& commands);
   void execute(const Command& command);
@@ -105,7 +115,9 @@ class App {
   Rectangle viewport_;
   RegionDrag region_drag_;
   unsigned viewport_buttons_ = 0;  // pressed in the picture, a bit each
-  bool held_ = false;              // a change is still going on
+  Handles handles_;
+  std::optional<glm::dvec2> clicked_;  // where the left button went down, while that may be a click
+  bool held_ = false;                  // a change is still going on
   bool quit_ = false;
   bool reload_ = false;  // the volume, though it is the same
   bool fit_next_ = false;

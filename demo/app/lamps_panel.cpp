@@ -69,9 +69,13 @@ void Panel::lamps(Model& model) {
     if (lamp.kind == CUMULET_LAMP_SUN) lamp.angle_degrees = std::min(lamp.angle_degrees, 90.0);
     if (ui_.button(("Remove lamp" + number).c_str(), "Takes this lamp away.", {-1.0f, 0.0f})) removed = i;
   }
-  if (removed) lamps.erase(lamps.begin() + static_cast<std::ptrdiff_t>(*removed));
-  if (ui_.button("Add lamp", "A point of light above what the camera looks at.", {-1.0f, 0.0f}))
-    lamps.push_back(new_lamp(model.scene.camera));
+  if (removed) {
+    lamps.erase(lamps.begin() + static_cast<std::ptrdiff_t>(*removed));
+    forget(model.chosen, Item::Kind::lamp, *removed);
+  }
+  if (!ui_.button("Add lamp", "A point of light above what the camera looks at.", {-1.0f, 0.0f})) return;
+  lamps.push_back(new_lamp(model.scene.camera));
+  model.chosen = Item{Item::Kind::lamp, lamps.size() - 1, 0};
 }
 
 }  // namespace cumulet::demo

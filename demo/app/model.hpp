@@ -13,8 +13,10 @@
 #include <vector>
 
 #include "environment_view.hpp"
+#include "gizmo.hpp"
 #include "preferences.hpp"
 #include "replay.hpp"
+#include "scene_items.hpp"
 
 namespace cumulet::demo {
 
@@ -46,6 +48,8 @@ enum class Action {
   toggle_help,
   toggle_fly,
   toggle_turntable,
+  tool,         // value: a Tool, of the handles
+  toggle_axes,  // of the world, or of the thing
   brighter,
   darker,
   next_march,
@@ -169,6 +173,7 @@ struct Status {
   std::string grid;                                        // of the file, that is shown
   double noise = 0.0;                                      // relative standard error, 0: not known
   std::array<FieldValues, settings::ramps.size()> fields;  // each ramp's
+  Boxes boxes;                                             // of the files that are there
 };
 
 /// What of it is drawn over time.
@@ -192,6 +197,9 @@ struct Model {
   bool adaptive_resolution = true;
   bool panel = true;
   bool help = false;
+  Tool tool = Tool::move;      // none: no handles, outlines and lamps' marks in the picture
+  Axes axes = Axes::world;     // of handles
+  std::optional<Item> chosen;  // of the scene's
   bool playing = false;
   double clock = 0.0;  // seconds, of the sequence and of the model's animation beside it
   bool can_undo = false;

@@ -81,6 +81,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   };
   section("File", true, [&] { file(model, commands); });
   if (model.status.play || model.status.neighbours) section("Sequence", true, [&] { sequence(model, commands); });
+  section("Scene", true, [&] { items(model); });
   section("Display", true, [&] { display(model); });
   section("Light", true, [&] { light(model); });
   section("Environment", true, [&] { environment(model, commands); });
@@ -586,6 +587,7 @@ void Panel::help(Model& model) {
     row("Right", "Dolly");
   }
   row("Wheel", "Dolly");
+  row("Click", "Choose what is there, for its handles;  Ctrl: by steps");
   row("Ctrl+click", "Type a number into a slider");
   ImGui::End();
 }

@@ -41,9 +41,11 @@ class Panel {
   void display(Model& model);
   void light(Model& model);
   void environment(Model& model, std::vector<Command>& commands);
+  /// All that stands in the scene, to be chosen, and what handles do to it.
+  void items(Model& model);
   void volumes(Model& model, std::vector<Command>& commands);
-  /// Where a volume stands; number: what its controls' labels end with.
-  void stand(SceneVolume& volume, const std::string& number);
+  /// Where a volume stands, of several places that which is chosen; number: what its controls' labels end with.
+  void stand(SceneVolume& volume, std::optional<std::size_t> place, const std::string& number);
   void models(Model& model, std::vector<Command>& commands);
   // Rows of what is at `place`; another place, where they were moved.
   std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& place,

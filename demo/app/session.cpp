@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <glm/gtc/type_ptr.hpp>
 #include <program.hpp>
 #include <settings.hpp>
 #include <span>
@@ -30,6 +31,25 @@ bool same_volume(const SceneVolume& a, const SceneVolume& b) {
     return std::tie(volume.name, volume.visible, volume.places, volume.ramps, volume.auto_density_scale);
   };
   return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
+}
+
+template <class Info>
+Box box_of(const Info& info) {
+  return {glm::make_vec3(info.bounds_min), glm::make_vec3(info.bounds_max)};
+}
+
+/// Of what is there.
+template <class Info, class Handle, class Get>
+std::optional<Box> box_of(Handle* handle, Get get) {
+  Info info{};
+  info.struct_size = sizeof info;
+  if (handle == nullptr || get(handle, &info) != CUMULET_OK) return std::nullopt;
+  return box_of(info);
+}
+
+std::optional<Item> item_of(const std::optional<Instances::Placed>& placed) {
+  if (!placed) return std::nullopt;
+  return Item{Item::Kind::volume, placed->volume + 1, placed->place};  // the scene's first is the viewer's own
 }
 
 }  // namespace
@@ -497,6 +517,7 @@ void Session::follow_volume() {
   if (scene_.volume.empty()) {
     check(cumulet_set_volume(viewer_.get(), nullptr));
     shown_volume_ = {};
+    shown_box_.reset();
     hidden_.reset();
     sequence_.reset();
     before_.reset();
@@ -597,6 +618,7 @@ void Session::see_work() {
                     : opening_model_.made.valid() ? opening_model_.file
                                                   : std::string();
   see_camera();
+  see_boxes();
   measure_noise();
 
   const std::lock_guard lock(shared_->mutex);
@@ -653,6 +675,19 @@ void Session::see_camera() {
   scene_.camera = known_->camera = now;
 }
 
+void Session::see_boxes() {
+  // A sequence's frames are as large as they are: what stands in its own place is told as it is now.
+  if (sequence_ && scene_.places.empty() && status_.has_volume) shown_box_ = box_of(status_.stats);
+  status_.boxes = {};
+  if (shown_box_) status_.boxes.volumes.emplace_back(shown_volume_, *shown_box_);
+  for (const VolumeFile& file : scene_.others)
+    if (const auto box = box_of<cumulet_volume_info>(others_.volume(file), cumulet_volume_get_info))
+      status_.boxes.volumes.emplace_back(file, *box);
+  for (const SceneModel& model : scene_.models)
+    if (const auto box = box_of<cumulet_surfaces_info>(models_.surfaces(model.file), cumulet_surfaces_get_info))
+      status_.boxes.models.emplace_back(model.file, *box);
+}
+
 bool Session::more() const {
   const bool compiles =
       status_.compiled && (status_.work.stage == CUMULET_STAGE_IDLE || status_.work.stage == CUMULET_STAGE_UPLOADING);
@@ -683,6 +718,7 @@ Answer Session::answer() {
   answer.camera_moved = std::exchange(camera_moved_, false);
   answer.density_scale = std::exchange(density_scale_, std::nullopt);
   answer.look = std::exchange(look_, std::nullopt);
+  answer.picked = std::exchange(picked_, std::nullopt);
   answer.notices = std::exchange(notices_, {});
   answer.files = std::exchange(files_, {});
   return answer;
@@ -713,7 +749,11 @@ void Session::finish_load() {
   cumulet_volume_info info{};
   info.struct_size = sizeof info;
   const VolumePtr volume = shown();
-  if (volume && cumulet_volume_get_info(volume.get(), &info) == CUMULET_OK) status_.grid = info.name;
+  shown_box_.reset();
+  if (volume && cumulet_volume_get_info(volume.get(), &info) == CUMULET_OK) {
+    status_.grid = info.name;
+    shown_box_ = box_of(info);
+  }
   status_.fields = {};
   for (std::size_t i = 0; volume && i < status_.fields.size(); ++i) {
     cumulet_values_info values{};
@@ -768,6 +808,20 @@ void Session::suggest_density() {
   check(cumulet_set_medium(viewer_.get(), &known_->medium));
 }
 
+void Session::pick(double x, double y) {
+  cumulet_pick pick{};
+  pick.struct_size = sizeof pick;
+  picked_ = Picked{};
+  // Before the first picture nothing is met.
+  if (cumulet_pick_at(viewer_.get(), x, y, &pick) != CUMULET_OK || pick.hit == 0) return;
+  if (pick.met_surface != 0 && pick.tag > 0)
+    picked_->item = Item{Item::Kind::model, static_cast<std::size_t>(pick.tag) - 1, 0};
+  else if (pick.met_volume != 0 && pick.tag == 0)
+    picked_->item = Item{Item::Kind::volume, 0, pick.place};
+  else if (pick.met_volume != 0)
+    picked_->item = item_of(others_.find_tag(pick.tag));
+}
+
 void Session::suggest_look() {
   suggest_density();
   const VolumePtr volume = shown();
@@ -807,6 +861,7 @@ void Session::move_by_keys(int key) {
 
 void Session::execute(const Request& request) {
   if (request.type == Request::Type::suggest_density) return suggest_density();
+  if (request.type == Request::Type::pick) return pick(request.x, request.y);
   if (request.type == Request::Type::frame_all) {
     if (status_.has_volume || !scene_.others.empty() || !shown_surfaces_.empty() || !scene_.models.empty())
       check(cumulet_frame_all(viewer_.get()));

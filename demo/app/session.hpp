@@ -28,9 +28,16 @@ struct ViewerInput {
 
 /// What is asked for once, beside what is wished all the time.
 struct Request {
-  enum class Type { frame_all, save_png, save_exr, suggest_density };
+  enum class Type { frame_all, save_png, save_exr, suggest_density, pick };
   Type type = Type::frame_all;
   std::string path = {};
+  double x = 0.0;  // pick: pixels of the picture
+  double y = 0.0;
+};
+
+/// What was met where somebody clicked.
+struct Picked {
+  std::optional<Item> item;  // nothing that can be chosen
 };
 
 /// All that the window wants to see: a value, sent to the viewer's thread.
@@ -74,6 +81,7 @@ struct Answer {
   bool camera_moved = false;                // by whatever
   std::optional<double> density_scale;      // that suits the volume
   std::optional<cumulet_medium_desc> look;  // a volume's that was wished with nothing said of its medium
+  std::optional<Picked> picked;             // by the last of such requests
   struct Notice {
     bool error = false;
     std::string text;
@@ -196,11 +204,14 @@ class Session {
   /// Told, if it did not succeed.
   bool load_failed(cumulet_status status, const char* message, const std::string& path);
   void see_camera();
+  // What files' volumes and models take up.
+  void see_boxes();
   void move_by_keys(int key);
   void measure_noise();
   /// The viewer's volume, or none.
   VolumePtr shown();
   void suggest_density();
+  void pick(double x, double y);
   // With it the medium, where nothing is said of that.
   void suggest_look();
   /// As it is displayed, but as linear values that the sRGB curve takes back to the same bytes.
@@ -220,6 +231,7 @@ class Session {
   std::uint32_t drawn_height_ = 0;
   cumulet_display_desc drawn_display_{};
   VolumeFile shown_volume_;
+  std::optional<Box> shown_box_;  // of that, where it is known
   std::string shown_surfaces_;
   std::string shown_environment_;
   bool warm_ = false;                 // the first scene's programs are there
@@ -234,6 +246,7 @@ class Session {
   bool suggest_ = false;
   std::optional<double> density_scale_;
   std::optional<cumulet_medium_desc> look_;
+  std::optional<Picked> picked_;
   bool camera_moved_ = false;
   double last_noise_ = 0.0;
   std::uint64_t noise_samples_ = 0;

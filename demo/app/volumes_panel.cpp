@@ -45,30 +45,37 @@ std::optional<Stand> stand_of(const Matrix& m) {
 
 }  // namespace
 
-void Panel::stand(SceneVolume& volume, const std::string& number) {
-  if (volume.places.size() > 1) {
-    ui_.fact(("Places" + number).c_str(), std::to_string(volume.places.size()));
+void Panel::stand(SceneVolume& volume, std::optional<std::size_t> place, const std::string& number) {
+  auto& places = volume.places;
+  if (places.size() > 1) {
+    ui_.fact(("Places" + number).c_str(), std::to_string(places.size()));
+    if (!place || *place >= places.size()) return;
+    if (const auto moved = stand_at(places[*place], number)) places[*place] = *moved;
     return;
   }
-  std::optional<Matrix> place;
-  if (!volume.places.empty()) place = volume.places.front();
-  if (const auto moved = stand_at(place, number)) volume.places.assign(1, *moved);
+  std::optional<Matrix> only;
+  if (!places.empty()) only = places.front();
+  if (const auto moved = stand_at(only, number)) places.assign(1, *moved);
 }
 
 std::optional<Matrix> Panel::stand_at(const std::optional<Matrix>& place, const std::string& number) {
-  std::optional<Stand> now = place ? stand_of(*place) : Stand{};
-  ImGui::BeginDisabled(!now);
-  Stand stand = now.value_or(Stand{});
+  const Matrix now = place.value_or(matrix_of({}));
+  const std::optional<Stand> upright = stand_of(now);
+  Stand stand = upright.value_or(Stand{{now[12], now[13], now[14]}});
   const double far = std::hypot(stand.position[0], stand.position[1], stand.position[2]);
   bool moved = ui_.numbers(("Position" + number).c_str(), "How far it stands from where its file has it.",
                            stand.position, static_cast<float>(0.01 * std::max(1.0, far)));
+  ImGui::BeginDisabled(!upright);
   moved |=
       ui_.slider(("Turn" + number).c_str(), "Degrees about the vertical.", stand.turn_degrees, -180.0, 180.0, "%.1f");
   moved |= ui_.slider(("Scale" + number).c_str(), "How many times as large as its file has it.", stand.scale, 0.01,
                       100.0, "%.3g", ImGuiSliderFlags_Logarithmic);
   ImGui::EndDisabled();
   if (!moved) return std::nullopt;
-  return matrix_of(stand);
+  if (upright) return matrix_of(stand);
+  Matrix other = now;
+  std::ranges::copy(stand.position, other.begin() + 12);
+  return other;
 }
 
 void Panel::models(Model& model, std::vector<Command>& commands) {
@@ -99,14 +106,20 @@ void Panel::models(Model& model, std::vector<Command>& commands) {
     ImGui::SameLine();
     if (ui_.button(("Remove" + plain).c_str(), "Takes it away.", {width, 0.0f})) removed = i;
   }
-  if (copied) models.insert(models.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneModel(models[*copied]));
-  if (removed) models.erase(models.begin() + static_cast<std::ptrdiff_t>(*removed));
+  if (copied) {
+    models.insert(models.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneModel(models[*copied]));
+    model.chosen = Item{Item::Kind::model, *copied + 1, 0};
+  }
+  if (removed) {
+    models.erase(models.begin() + static_cast<std::ptrdiff_t>(*removed));
+    forget(model.chosen, Item::Kind::model, *removed);
+  }
   if (ui_.button("Add model", "Opens another model beside those that are there.", {-1.0f, 0.0f}))
     commands.push_back({Action::add_model_dialog});
 }
 
 void Panel::volumes(Model& model, std::vector<Command>& commands) {
-  const auto row = [this](SceneVolume& volume, std::size_t i) {
+  const auto row = [this, &model](SceneVolume& volume, std::size_t i) {
     const std::string number = std::string(" ").append(std::to_string(i));
     if (i > 1) ImGui::Separator();
     ui_.fact(("Volume" + number).c_str(), volume.label());
@@ -115,7 +128,9 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     if (ui_.text(("Name" + number).c_str(), "What the scene file calls it. Enter takes it.", "as its file", typed))
       volume.name = typed;
     ui_.checkbox(("Visible" + number).c_str(), "Whether it is there at all: its shadow goes with it.", volume.visible);
-    stand(volume, number);
+    const auto& chosen = model.chosen;
+    const bool is_chosen = chosen && chosen->kind == Item::Kind::volume && chosen->index + 1 == i;
+    stand(volume, is_chosen ? std::optional(chosen->place) : std::nullopt, number);
   };
   if (!model.scene.volume.empty()) row(model.scene, 1);
 
@@ -141,8 +156,15 @@ void Panel::volumes(Model& model, std::vector<Command>& commands) {
     ImGui::SameLine();
     if (ui_.button(("Remove volume" + number).c_str(), "Takes it away.", {width, 0.0f})) removed = i;
   }
-  if (copied) others.insert(others.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneVolume(others[*copied]));
-  if (removed) others.erase(others.begin() + static_cast<std::ptrdiff_t>(*removed));
+  // The scene's first is none of these.
+  if (copied) {
+    others.insert(others.begin() + static_cast<std::ptrdiff_t>(*copied) + 1, SceneVolume(others[*copied]));
+    model.chosen = Item{Item::Kind::volume, *copied + 2, 0};
+  }
+  if (removed) {
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(*removed));
+    forget(model.chosen, Item::Kind::volume, *removed + 1);
+  }
   if (ui_.button("Add volume", "Opens another volume beside those that are there.", {-1.0f, 0.0f}))
     commands.push_back({Action::add_volume_dialog});
 }

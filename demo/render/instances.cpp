@@ -63,6 +63,16 @@ std::vector<VolumeFile> Instances::missing(const std::vector<SceneVolume>& volum
   return files;
 }
 
+cumulet_volume* Instances::volume(const VolumeFile& file) const {
+  const Given* given = find(file);
+  return given == nullptr ? nullptr : given->volume.volume.get();
+}
+
+std::optional<Instances::Placed> Instances::find_tag(std::uint64_t tag) const {
+  if (tag == 0 || tag > shown_.size()) return std::nullopt;
+  return shown_[static_cast<std::size_t>(tag) - 1].placed;
+}
+
 void Instances::give(const VolumeFile& file, OpenVolume volume) { given_.push_back({file, std::move(volume)}); }
 
 void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& volumes) {
@@ -70,14 +80,16 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     return std::ranges::none_of(volumes, [&](const VolumeFile& file) { return file == given.file; });
   });
   std::size_t count = 0;
-  const auto place = [&](const SceneVolume& scene, const OpenVolume& open, const cumulet_instance_desc& desc) {
+  const auto place = [&](const SceneVolume& scene, const OpenVolume& open, cumulet_instance_desc desc,
+                         const Placed& placed) {
+    desc.tag = count + 1;
     if (count == shown_.size()) {
       cumulet_instance* made = nullptr;
       std::array<char, 1024> error{};
       check(cumulet_instance_create(&desc, &made, error.data(), error.size()), error.data());
       std::shared_ptr<cumulet_instance> instance(made, cumulet_instance_release);
       check(cumulet_add_instance(viewer, made), cumulet_last_error(viewer));
-      shown_.push_back({std::move(instance), desc, open.volume, *desc.medium, {}});
+      shown_.push_back({std::move(instance), desc, open.volume, *desc.medium, {}, placed});
     }
     Shown& shown = shown_[count++];
     if (shown.volume != open.volume || !settings::same(shown.medium, *desc.medium) || !same_place(shown.desc, desc))
@@ -86,6 +98,7 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     shown.desc.medium = nullptr;  // it lives as long as the call; below is what it said
     shown.volume = open.volume;
     shown.medium = *desc.medium;
+    shown.placed = placed;
     for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
       if (shown.ramps[i] == scene.ramps[i]) continue;
       check(cumulet_instance_set_ramp(shown.instance.get(), static_cast<cumulet_ramp>(i),
@@ -104,11 +117,10 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     desc.volume = given->volume.volume.get();
     desc.medium = &medium;
     desc.hidden = scene.visible ? 0 : 1;
-    desc.tag = i + 1;
-    if (scene.places.empty()) place(scene, given->volume, desc);
-    for (const auto& to_world : scene.places) {
-      std::ranges::copy(to_world, desc.to_world);
-      place(scene, given->volume, desc);
+    if (scene.places.empty()) place(scene, given->volume, desc, {i, 0});
+    for (std::size_t at = 0; at < scene.places.size(); ++at) {
+      std::ranges::copy(scene.places[at], desc.to_world);
+      place(scene, given->volume, desc, {i, at});
     }
   }
   while (shown_.size() > count) {

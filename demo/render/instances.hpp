@@ -2,6 +2,8 @@
 
 #include <cumulet/cumulet.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <scene_file.hpp>
@@ -30,9 +32,19 @@ class Instances {
   [[nodiscard]] std::vector<VolumeFile> missing(const std::vector<SceneVolume>& volumes) const;
   /// Without a volume: it cannot be had, and is not asked for again while a scene names it.
   void give(const VolumeFile& file, OpenVolume volume);
-  /// Shows those that were given, and forgets the files that are named no more. An instance's tag is its volume's
-  /// number from 1 on. Throws std::runtime_error with the library's cause.
+  /// A file's volume, if it was given.
+  [[nodiscard]] cumulet_volume* volume(const VolumeFile& file) const;
+  /// Shows those that were given, and forgets the files that are named no more. Throws std::runtime_error with the
+  /// library's cause.
   void show(cumulet_viewer* viewer, const std::vector<SceneVolume>& volumes);
+
+  /// Which of the volumes an instance shows, and in which of its places.
+  struct Placed {
+    std::size_t volume = 0;
+    std::size_t place = 0;
+  };
+  /// That of an instance that is shown, by the tag that it was given.
+  [[nodiscard]] std::optional<Placed> find_tag(std::uint64_t tag) const;
 
  private:
   struct Given {
@@ -45,6 +57,7 @@ class Instances {
     std::shared_ptr<cumulet_volume> volume;  // the descriptor's
     cumulet_medium_desc medium{};            // likewise
     decltype(SceneVolume::ramps) ramps;
+    Placed placed;
   };
 
   [[nodiscard]] const Given* find(const VolumeFile& file) const;

@@ -60,6 +60,11 @@ std::vector<std::string> Models::missing(const std::vector<SceneModel>& models) 
   return files;
 }
 
+cumulet_surfaces* Models::surfaces(const std::string& file) const {
+  const Given* given = find(file);
+  return given == nullptr ? nullptr : given->surfaces.get();
+}
+
 void Models::give(const std::string& file, SurfacesPtr surfaces) { given_.push_back({file, std::move(surfaces)}); }
 
 void Models::show(cumulet_viewer* viewer, const std::vector<SceneModel>& models) {

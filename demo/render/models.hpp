@@ -22,6 +22,8 @@ class Models {
   [[nodiscard]] std::vector<std::string> missing(const std::vector<SceneModel>& models) const;
   /// Null: they cannot be had, and are not asked for again while a scene names them.
   void give(const std::string& file, SurfacesPtr surfaces);
+  /// A file's surfaces, if they were given.
+  [[nodiscard]] cumulet_surfaces* surfaces(const std::string& file) const;
   /// Shows those that were given, and forgets the files that are named no more. A model's tag is its number from 1 on.
   /// Throws std::runtime_error with the cause, in the end, where one has not the animation or variant that it is to
   /// show: it is then not there.

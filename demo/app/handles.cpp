@@ -1,0 +1,272 @@
+#include "handles.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace cumulet::demo {
+namespace {
+
+using glm::dmat4;
+using glm::dvec2;
+using glm::dvec3;
+using glm::dvec4;
+
+// Pixels, of a screen at scale 1.
+constexpr double handle_reach = 92.0;
+constexpr double grasp_tolerance = 8.0;
+constexpr double mark_radius = 7.0;
+constexpr float thick = 2.6f;
+constexpr float thin = 1.4f;
+constexpr float tip = 10.0f;
+
+constexpr std::array all_handles = {Handle::x, Handle::y, Handle::z, Handle::yz, Handle::zx, Handle::xy, Handle::free};
+constexpr std::array handle_names = {"X", "Y", "Z", "YZ", "ZX", "XY", "free"};  // as Handle numbers them
+constexpr ImU32 shade = IM_COL32(0, 0, 0, 110);
+constexpr ImU32 chosen_colour = IM_COL32(255, 176, 64, 230);
+constexpr ImU32 lamp_colour = IM_COL32(255, 238, 170, 200);
+constexpr ImU32 hot_colour = IM_COL32(255, 226, 72, 255);
+
+ImVec2 vec(const dvec2& p) { return {static_cast<float>(p.x), static_cast<float>(p.y)}; }
+
+ImU32 faded(ImU32 colour, double part) {
+  const double alpha = part * static_cast<double>((colour >> IM_COL32_A_SHIFT) & 0xFFU);
+  return (colour & ~IM_COL32_A_MASK) | static_cast<ImU32>(alpha) << IM_COL32_A_SHIFT;
+}
+
+ImU32 colour_of(Handle handle) {
+  constexpr std::array<ImU32, 3> colours = {IM_COL32(238, 78, 90, 255), IM_COL32(126, 204, 58, 255),
+                                            IM_COL32(74, 144, 246, 255)};
+  return handle == Handle::free ? IM_COL32(236, 236, 236, 235) : colours[static_cast<std::size_t>(axis_of(handle))];
+}
+
+/// A stroke of the list's, on a wider dark one: pictures are bright and dark.
+class Pen {
+ public:
+  Pen(ImDrawList& list, const Sight& sight, float scale) : list_(&list), sight_(&sight), scale_(scale) {}
+
+  void line(const dvec2& a, const dvec2& b, ImU32 colour, float width) const {
+    list_->AddLine(vec(a), vec(b), faded(shade, alpha(colour)), (width + 2.0f) * scale_);
+    list_->AddLine(vec(a), vec(b), colour, width * scale_);
+  }
+  void line(const dvec3& a, const dvec3& b, ImU32 colour, float width) const {
+    if (const auto ends = sight_->project(a, b)) line((*ends)[0], (*ends)[1], colour, width);
+  }
+  void lines(const std::vector<dvec2>& points, bool closed, ImU32 colour, float width) const {
+    std::vector<ImVec2> all;
+    for (const dvec2& point : points) all.push_back(vec(point));
+    const ImDrawFlags flags = closed ? ImDrawFlags_Closed : ImDrawFlags_None;
+    const int count = static_cast<int>(all.size());
+    list_->AddPolyline(all.data(), count, faded(shade, alpha(colour)), flags, (width + 2.0f) * scale_);
+    list_->AddPolyline(all.data(), count, colour, flags, width * scale_);
+  }
+  void fill(const std::vector<dvec2>& points, ImU32 colour) const {
+    std::vector<ImVec2> all;
+    for (const dvec2& point : points) all.push_back(vec(point));
+    list_->AddConvexPolyFilled(all.data(), static_cast<int>(all.size()), colour);
+  }
+  /// The end of an axis: an arrow's, or a block's.
+  void end(const dvec2& from, const dvec2& to, bool arrow, ImU32 colour) const {
+    const dvec2 along = glm::normalize(to - from) * static_cast<double>(tip * scale_);
+    const dvec2 across(-0.45 * along.y, 0.45 * along.x);
+    if (arrow)
+      fill({to + along, to - across, to + across}, colour);
+    else
+      fill({to - across + 0.45 * along, to - across - 0.45 * along, to + across - 0.45 * along,
+            to + across + 0.45 * along},
+           colour);
+  }
+  void text(const dvec2& at, const std::string& words) const {
+    const ImVec2 size = ImGui::CalcTextSize(words.c_str());
+    const float margin = 5.0f * scale_;
+    const ImVec2 low = vec(at);
+    list_->AddRectFilled({low.x - margin, low.y - margin}, {low.x + size.x + margin, low.y + size.y + margin},
+                         IM_COL32(20, 22, 26, 205), 4.0f * scale_);
+    list_->AddText(low, IM_COL32(240, 240, 240, 255), words.c_str());
+  }
+  [[nodiscard]] float scale() const { return scale_; }
+  [[nodiscard]] const Sight& sight() const { return *sight_; }
+
+ private:
+  static double alpha(ImU32 colour) { return static_cast<double>((colour >> IM_COL32_A_SHIFT) & 0xFFU) / 255.0; }
+
+  ImDrawList* list_;
+  const Sight* sight_;
+  float scale_;
+};
+
+void draw_box(const Pen& pen, const dmat4& place, const Box& box) {
+  const auto corner = [&](unsigned i) {
+    const dvec3 at((i & 1U) != 0 ? box.most.x : box.least.x, (i & 2U) != 0 ? box.most.y : box.least.y,
+                   (i & 4U) != 0 ? box.most.z : box.least.z);
+    return dvec3(place * dvec4(at, 1.0));
+  };
+  for (unsigned i = 0; i < 8; ++i)
+    for (unsigned bit = 1; bit < 8; bit *= 2)
+      if ((i & bit) == 0) pen.line(corner(i), corner(i | bit), chosen_colour, thin);
+}
+
+/// What a lamp is like: how wide, and where it shines.
+void draw_lamp(const Pen& pen, const cumulet_lamp_desc& lamp, const dmat4& place) {
+  const auto at = [&](double x, double y, double z) { return dvec3(place * dvec4(x, y, z, 1.0)); };
+  const double far = handle_reach * static_cast<double>(pen.scale()) * pen.sight().pixel_at(at(0.0, 0.0, 0.0));
+  const auto round = [&](double radius, double z) {
+    constexpr int parts = 32;
+    const auto point = [&](int i) {
+      const double angle = 2.0 * std::numbers::pi * i / parts;
+      return at(radius * std::cos(angle), radius * std::sin(angle), z);
+    };
+    for (int i = 0; i < parts; ++i) pen.line(point(i), point(i + 1), chosen_colour, thin);
+  };
+  if (lamp.kind == CUMULET_LAMP_SPOT) {
+    // As much of the cone as a screen shows.
+    const double half = std::min(0.5 * lamp.angle_degrees, 85.0) * std::numbers::pi / 180.0;
+    const double radius = far * std::sin(half);
+    const double depth = far * std::cos(half);
+    round(radius, depth);
+    for (const auto& [x, y] : {std::pair(1.0, 0.0), std::pair(-1.0, 0.0), std::pair(0.0, 1.0), std::pair(0.0, -1.0)})
+      pen.line(at(0.0, 0.0, 0.0), at(radius * x, radius * y, depth), chosen_colour, thin);
+    return;
+  }
+  if (lamp.kind == CUMULET_LAMP_DISC) round(0.5 * lamp.width, 0.0);
+  if (lamp.kind == CUMULET_LAMP_RECTANGLE) {
+    const double x = 0.5 * lamp.width;
+    const double y = 0.5 * lamp.height;
+    pen.line(at(-x, -y, 0.0), at(x, -y, 0.0), chosen_colour, thin);
+    pen.line(at(x, -y, 0.0), at(x, y, 0.0), chosen_colour, thin);
+    pen.line(at(x, y, 0.0), at(-x, y, 0.0), chosen_colour, thin);
+    pen.line(at(-x, y, 0.0), at(-x, -y, 0.0), chosen_colour, thin);
+  }
+  if (lamp.kind != CUMULET_LAMP_POINT) pen.line(at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.7 * far), chosen_colour, thin);
+}
+
+void draw_handle(const Pen& pen, const Gizmo& gizmo, Handle handle, ImU32 colour) {
+  const std::vector<dvec2> shape = shape_of(gizmo, handle, pen.sight());
+  if (shape.empty()) return;
+  const bool closed = is_closed(gizmo, handle);
+  const bool turns = gizmo.tool == Tool::rotate;
+  if (closed && !turns) pen.fill(shape, faded(colour, handle == Handle::free ? 0.6 : 0.4));
+  pen.lines(shape, closed, colour, is_axis(handle) ? thick : thin);
+  if (is_axis(handle) && !turns) pen.end(shape[0], shape[1], gizmo.tool == Tool::move, colour);
+}
+
+std::optional<Gizmo> gizmo_of(const Model& model, float scale) {
+  if (!model.chosen || model.tool == Tool::none) return std::nullopt;
+  const auto place = place_of(model.scene, *model.chosen);
+  if (!place) return std::nullopt;
+  const glm::dvec3 pivot = pivot_of(*place, box_of(model.scene, model.status.boxes, *model.chosen));
+  return gizmo_of(model.tool, model.axes, *place, pivot, handle_reach * static_cast<double>(scale));
+}
+
+}  // namespace
+
+bool Handles::press(const Model& model, const Sight& sight, const dvec2& pixel, float scale) {
+  const auto gizmo = gizmo_of(model, scale);
+  if (!gizmo) return false;
+  const auto handle = handle_at(*gizmo, sight, pixel, grasp_tolerance * static_cast<double>(scale));
+  if (!handle) return false;
+  held_.emplace(Held{Drag(*gizmo, *handle, sight, pixel), *model.chosen, model.scene,
+                     *place_of(model.scene, *model.chosen), pixel});
+  return true;
+}
+
+void Handles::drag(Model& model, const Sight& sight, const dvec2& pixel, bool snapped) {
+  if (!held_) return;
+  if (!place_of(model.scene, held_->item)) {
+    held_.reset();
+    return;
+  }
+  // A hand that has only taken it changes nothing.
+  if (pixel == held_->pixel && snapped == held_->snapped) return;
+  held_->pixel = pixel;
+  held_->snapped = snapped;
+  set_place(model.scene, held_->item, held_->drag.to(sight, pixel, snapped) * held_->place);
+}
+
+void Handles::cancel(Model& model) {
+  if (held_ && place_of(model.scene, held_->item)) restore_place(model.scene, held_->item, held_->before);
+  held_.reset();
+}
+
+std::optional<Item> Handles::lamp_at(const Model& model, const Sight& sight, const dvec2& pixel, float scale) {
+  if (model.tool == Tool::none) return std::nullopt;
+  std::optional<Item> found;
+  double least = (mark_radius + 3.0) * static_cast<double>(scale);
+  for (const Item& item : items_of(model.scene)) {
+    if (item.kind != Item::Kind::lamp) continue;
+    const auto at = sight.project(pivot_of(*place_of(model.scene, item), std::nullopt));
+    if (!at || !(glm::distance(*at, pixel) <= least)) continue;
+    least = glm::distance(*at, pixel);
+    found = item;
+  }
+  return found;
+}
+
+std::optional<Rectangle> Handles::find(const std::string& label, const Model& model, const Sight& sight, float scale) {
+  const auto gizmo = gizmo_of(model, scale);
+  if (!gizmo) return std::nullopt;
+  for (const Handle handle : all_handles) {
+    if (label != std::string("Handle ") + handle_names[static_cast<std::size_t>(handle)]) continue;
+    const std::vector<dvec2> shape = shape_of(*gizmo, handle, sight);
+    if (shape.empty()) return std::nullopt;
+    const bool turns = gizmo->tool == Tool::rotate;
+    dvec2 at(0.0);
+    if (turns)
+      at = shape[shape.size() / 3];
+    else if (is_axis(handle))
+      at = glm::mix(shape[0], shape[1], 0.85);
+    else
+      for (const dvec2& point : shape) at += point / static_cast<double>(shape.size());
+    return Rectangle{at.x, at.y, 0.0, 0.0};
+  }
+  return std::nullopt;
+}
+
+void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, const std::optional<dvec2>& pixel,
+                   float scale) const {
+  if (model.tool == Tool::none) return;
+  const Pen pen(list, sight, scale);
+  for (const Item& item : items_of(model.scene)) {
+    const bool is_chosen = item == model.chosen;
+    const dmat4 place = *place_of(model.scene, item);
+    if (item.kind == Item::Kind::lamp) {
+      const auto at = sight.project(pivot_of(place, std::nullopt));
+      const double radius = mark_radius * static_cast<double>(scale);
+      if (at) {
+        const ImU32 colour = is_chosen ? chosen_colour : lamp_colour;
+        list.AddCircle(vec(*at), static_cast<float>(radius), shade, 0, (thin + 2.0f) * scale);
+        list.AddCircle(vec(*at), static_cast<float>(radius), colour, 0, thin * scale);
+        list.AddCircleFilled(vec(*at), static_cast<float>(0.3 * radius), colour);
+      }
+      if (is_chosen) draw_lamp(pen, model.scene.lamps[item.index], place);
+    } else if (is_chosen) {
+      if (const auto box = box_of(model.scene, model.status.boxes, item)) draw_box(pen, place, *box);
+    }
+  }
+  const auto gizmo = gizmo_of(model, scale);
+  if (!gizmo) return;
+  std::optional<Handle> hot;
+  if (held_)
+    hot = held_->drag.handle();
+  else if (pixel)
+    hot = handle_at(*gizmo, sight, *pixel, grasp_tolerance * static_cast<double>(scale));
+  constexpr double back = 0.3;  // of those that are not held
+  for (const Handle handle : all_handles)
+    if (handle != hot) draw_handle(pen, *gizmo, handle, faded(colour_of(handle), held_ ? back : 1.0));
+  if (!hot) return;
+  if (held_ && is_axis(*hot) && gizmo->tool != Tool::rotate) {
+    // The way it goes.
+    constexpr double long_way = 20.0;
+    const dvec3 way = long_way * gizmo->reach * sight.pixel_at(gizmo->pivot) * gizmo->axes[axis_of(*hot)];
+    pen.line(gizmo->pivot - way, gizmo->pivot + way, faded(colour_of(*hot), 0.6), 1.0f);
+  }
+  draw_handle(pen, *gizmo, *hot, hot_colour);
+  const auto pivot = sight.project(gizmo->pivot);
+  if (held_ && pivot) pen.text(*pivot + dvec2(0.3, 0.35) * gizmo->reach, held_->drag.told());
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,221 @@
+#include "scene_items.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <type_traits>
+
+namespace cumulet::demo {
+namespace {
+
+using glm::dmat4;
+using glm::dvec3;
+using glm::dvec4;
+using Numbers = std::array<double, 16>;
+
+/// A scene's, of one that it has.
+template <class Scene>
+auto& volume_at(Scene& scene, std::size_t index) {
+  using Volume = std::conditional_t<std::is_const_v<Scene>, const SceneVolume, SceneVolume>;
+  return index == 0 ? static_cast<Volume&>(scene) : scene.others[index - 1];
+}
+
+bool has(const SceneOptions& scene, const Item& item) {
+  switch (item.kind) {
+    case Item::Kind::volume:
+      if (item.index > scene.others.size() || volume_at(scene, item.index).volume.empty()) return false;
+      return item.place < std::max<std::size_t>(1, volume_at(scene, item.index).places.size());
+    case Item::Kind::model:
+      return item.index < scene.models.size();
+    case Item::Kind::lamp:
+      return item.index < scene.lamps.size() && scene.lamps[item.index].kind != CUMULET_LAMP_SUN;
+  }
+  return false;
+}
+
+dmat4 matrix_of(const Numbers& numbers) { return numbers == Numbers{} ? dmat4(1.0) : glm::make_mat4(numbers.data()); }
+
+Numbers numbers_of(const dmat4& matrix) {
+  Numbers numbers{};
+  std::copy_n(glm::value_ptr(matrix), numbers.size(), numbers.begin());
+  return numbers;
+}
+
+dmat4 place_of(const cumulet_lamp_desc& lamp) {
+  dmat4 place(1.0);
+  const dvec3 down(0.0, -1.0, 0.0);
+  const dvec3 shines = glm::make_vec3(lamp.direction);
+  const dvec3 direction = glm::length(shines) > 0.0 ? glm::normalize(shines) : down;
+  dvec3 across = glm::make_vec3(lamp.across);
+  across -= glm::dot(across, direction) * direction;
+  constexpr double least = 1e-9;
+  // As cumulet_lamp_desc has it: level with the ground, or +X.
+  if (!(glm::length(across) > least)) across = glm::cross(-down, direction);
+  if (!(glm::length(across) > least)) across = dvec3(1.0, 0.0, 0.0);
+  across = glm::normalize(across);
+  place[0] = dvec4(across, 0.0);
+  place[1] = dvec4(glm::cross(direction, across), 0.0);
+  place[2] = dvec4(direction, 0.0);
+  place[3] = dvec4(glm::make_vec3(lamp.position), 1.0);
+  return place;
+}
+
+void set_place(cumulet_lamp_desc& lamp, const dmat4& place) {
+  const dmat4 before = place_of(lamp);
+  std::copy_n(glm::value_ptr(place[3]), 3, lamp.position);
+  // What is as it was keeps its words.
+  if (place[2] != before[2]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[2]))), 3, lamp.direction);
+  if (place[0] != before[0]) std::copy_n(glm::value_ptr(glm::normalize(dvec3(place[0]))), 3, lamp.across);
+  const auto stretched = [](double length, double by) {
+    double longer = length;
+    if (std::abs(by - 1.0) > 1e-9) longer *= by;
+    return longer;
+  };
+  const double wider = glm::length(dvec3(place[0]));
+  const double higher = glm::length(dvec3(place[1]));
+  const bool is_disc = lamp.kind == CUMULET_LAMP_DISC;
+  lamp.width = stretched(lamp.width, is_disc ? std::sqrt(wider * higher) : wider);
+  if (!is_disc) lamp.height = stretched(lamp.height, higher);
+}
+
+const char* kind_name(cumulet_lamp_kind kind) {
+  switch (kind) {
+    case CUMULET_LAMP_POINT:
+      return "point";
+    case CUMULET_LAMP_SPOT:
+      return "spot";
+    case CUMULET_LAMP_DISC:
+      return "disc";
+    case CUMULET_LAMP_RECTANGLE:
+      return "rectangle";
+    case CUMULET_LAMP_SUN:
+      break;
+  }
+  return "sun";
+}
+
+}  // namespace
+
+std::vector<Item> items_of(const SceneOptions& scene) {
+  std::vector<Item> items;
+  const auto add = [&](const Item& item) {
+    if (has(scene, item)) items.push_back(item);
+  };
+  for (std::size_t i = 0; i <= scene.others.size(); ++i) {
+    const std::size_t places = volume_at(scene, i).places.size();
+    for (std::size_t place = 0; place < std::max<std::size_t>(1, places); ++place) add({Item::Kind::volume, i, place});
+  }
+  for (std::size_t i = 0; i < scene.models.size(); ++i) add({Item::Kind::model, i, 0});
+  for (std::size_t i = 0; i < scene.lamps.size(); ++i) add({Item::Kind::lamp, i, 0});
+  return items;
+}
+
+std::string title_of(const SceneOptions& scene, const Item& item) {
+  const std::string number = std::to_string(item.index + 1);
+  switch (item.kind) {
+    case Item::Kind::volume:
+      if (volume_at(scene, item.index).places.size() < 2) return "Volume " + number;
+      return "Volume " + number + ", place " + std::to_string(item.place + 1);
+    case Item::Kind::model:
+      return "Model " + number;
+    case Item::Kind::lamp:
+      break;
+  }
+  return "Lamp " + number;
+}
+
+std::string name_of(const SceneOptions& scene, const Item& item) {
+  const std::string title = title_of(scene, item) + ": ";
+  switch (item.kind) {
+    case Item::Kind::volume:
+      return title + volume_at(scene, item.index).label();
+    case Item::Kind::model:
+      return title + scene.models[item.index].label();
+    case Item::Kind::lamp:
+      break;
+  }
+  return title + kind_name(scene.lamps[item.index].kind);
+}
+
+void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index) {
+  if (!chosen || chosen->kind != kind || chosen->index < index) return;
+  if (chosen->index == index)
+    chosen.reset();
+  else
+    --chosen->index;
+}
+
+std::optional<dmat4> place_of(const SceneOptions& scene, const Item& item) {
+  if (!has(scene, item)) return std::nullopt;
+  switch (item.kind) {
+    case Item::Kind::volume: {
+      const auto& places = volume_at(scene, item.index).places;
+      return places.empty() ? dmat4(1.0) : matrix_of(places[item.place]);
+    }
+    case Item::Kind::model:
+      return matrix_of(scene.models[item.index].to_world);
+    case Item::Kind::lamp:
+      break;
+  }
+  return place_of(scene.lamps[item.index]);
+}
+
+void set_place(SceneOptions& scene, const Item& item, const dmat4& place) {
+  switch (item.kind) {
+    case Item::Kind::volume: {
+      auto& places = volume_at(scene, item.index).places;
+      if (places.empty()) places.emplace_back();
+      places[item.place] = numbers_of(place);
+      break;
+    }
+    case Item::Kind::model:
+      scene.models[item.index].to_world = numbers_of(place);
+      break;
+    case Item::Kind::lamp:
+      set_place(scene.lamps[item.index], place);
+      break;
+  }
+}
+
+void restore_place(SceneOptions& scene, const Item& item, const SceneOptions& from) {
+  switch (item.kind) {
+    case Item::Kind::volume:
+      volume_at(scene, item.index).places = volume_at(from, item.index).places;
+      break;
+    case Item::Kind::model:
+      scene.models[item.index].to_world = from.models[item.index].to_world;
+      break;
+    case Item::Kind::lamp:
+      scene.lamps[item.index] = from.lamps[item.index];
+      break;
+  }
+}
+
+std::optional<Box> box_of(const SceneOptions& scene, const Boxes& boxes, const Item& item) {
+  const auto found = [](const auto& all, const auto& file) -> std::optional<Box> {
+    const auto known = std::ranges::find_if(all, [&](const auto& one) { return one.first == file; });
+    if (known == all.end()) return std::nullopt;
+    return known->second;
+  };
+  switch (item.kind) {
+    case Item::Kind::volume:
+      return found(boxes.volumes, static_cast<const VolumeFile&>(volume_at(scene, item.index)));
+    case Item::Kind::model:
+      return found(boxes.models, scene.models[item.index].file);
+    case Item::Kind::lamp:
+      break;
+  }
+  const cumulet_lamp_desc& lamp = scene.lamps[item.index];
+  const bool is_disc = lamp.kind == CUMULET_LAMP_DISC;
+  if (!is_disc && lamp.kind != CUMULET_LAMP_RECTANGLE) return std::nullopt;
+  const dvec3 half = 0.5 * dvec3(lamp.width, is_disc ? lamp.width : lamp.height, 0.0);
+  return Box{-half, half};
+}
+
+dvec3 pivot_of(const dmat4& place, const std::optional<Box>& box) {
+  const dvec3 middle = box ? 0.5 * (box->least + box->most) : dvec3(0.0);
+  return dvec3(place * dvec4(middle, 1.0));
+}
+
+}  // namespace cumulet::demo
