@@ -15,6 +15,7 @@
 
 #include "base/callback_scope.hpp"
 #include "base/error.hpp"
+#include "base/one_line.hpp"
 #include "cumulet/cumulet.h"
 #include "viewer/c_fields.hpp"
 
@@ -95,7 +96,8 @@ cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
   return status;
 }
 
-[[noreturn]] inline void refuse(const std::string& why) { throw Error(ErrorCode::invalid_argument, why); }
+/// In one line, whatever a host calls its things.
+[[noreturn]] inline void refuse(const std::string& why) { throw Error(ErrorCode::invalid_argument, one_line(why)); }
 
 inline void require(bool condition, const char* what) {
   if (!condition) refuse(what);

@@ -3,11 +3,13 @@
 
 #include <fuzzer/FuzzedDataProvider.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,8 @@ using cumulet::headless::Context;
 using cumulet::test::CameraRef;
 using cumulet::test::EnvironmentRef;
 using cumulet::test::InstanceRef;
+using cumulet::test::LiveRef;
+using cumulet::test::ModelRef;
 using cumulet::test::ProgramsRef;
 using cumulet::test::SequenceRef;
 using cumulet::test::SurfacesRef;
@@ -151,10 +155,11 @@ class Program {
     programs_.reset(programs);
   }
 
-  void make_dense() {
+  /// Whose values are kept there.
+  cumulet_dense_desc dense(std::vector<float>& values) {
     auto desc = described<cumulet_dense_desc>();
     const std::size_t count = data_.ConsumeIntegralInRange<std::size_t>(0, 600);
-    std::vector<float> values(count);
+    values.resize(count);
     for (float& value : values) value = bits<float>(static_cast<std::uint32_t>(number()));
     if (data_.ConsumeBool()) {
       desc.size[0] = data_.ConsumeIntegralInRange(1, 9);
@@ -165,24 +170,38 @@ class Program {
     desc.values = values.data();
     desc.value_count = values.size();
     desc.name = data_.ConsumeBool() ? "dense\nthing" : nullptr;
+    return desc;
+  }
+
+  void make_dense() {
+    std::vector<float> values;
+    const cumulet_dense_desc desc = dense(values);
     cumulet_volume* volume = nullptr;
     made([&](char* error, std::size_t size) { return cumulet_volume_from_dense(&desc, &volume, error, size); });
     if (volume != nullptr) volume_.reset(volume);
   }
 
-  void make_sparse() {
+  struct Sparse {
+    std::vector<std::int32_t> origins;
+    std::vector<float> values;
+    std::vector<std::uint64_t> active;
+    std::vector<cumulet_tile> tiles;
+  };
+
+  /// Whose bricks and tiles are kept there.
+  cumulet_sparse_desc sparse(Sparse& kept) {
     auto desc = described<cumulet_sparse_desc>();
     const std::size_t bricks = data_.ConsumeIntegralInRange<std::size_t>(0, 3);
-    std::vector<std::int32_t> origins;
+    auto& [origins, values, active, tiles] = kept;
     for (std::size_t i = 0; i < 3 * bricks; ++i) {
       origins.push_back(data_.ConsumeBool() ? 8 * data_.ConsumeIntegralInRange(-4, 4)
                                             : data_.ConsumeIntegral<std::int32_t>());
     }
-    std::vector<float> values(512 * bricks, 0.5F);
+    values.assign(512 * bricks, 0.5F);
     for (std::size_t i = 0; i < values.size(); i += 61) values[i] = bits<float>(static_cast<std::uint32_t>(number()));
-    std::vector<std::uint64_t> active(8 * bricks);
+    active.resize(8 * bricks);
     for (std::uint64_t& word : active) word = number();
-    std::vector<cumulet_tile> tiles(data_.ConsumeIntegralInRange<std::size_t>(0, 3));
+    tiles.resize(data_.ConsumeIntegralInRange<std::size_t>(0, 3));
     for (cumulet_tile& tile : tiles) {
       for (int axis = 0; axis < 3; ++axis) {
         tile.min[axis] =
@@ -200,6 +219,12 @@ class Program {
     desc.tiles = tiles.data();
     desc.tile_count = tiles.size();
     desc.name = nullptr;
+    return desc;
+  }
+
+  void make_sparse() {
+    Sparse kept;
+    const cumulet_sparse_desc desc = sparse(kept);
     cumulet_volume* volume = nullptr;
     made([&](char* error, std::size_t size) { return cumulet_volume_from_sparse(&desc, &volume, error, size); });
     if (volume != nullptr) volume_.reset(volume);
@@ -262,6 +287,152 @@ class Program {
     }
   }
 
+  void change_models() {
+    std::array<cumulet_model_desc, 2> desc{};
+    desc[0] = described<cumulet_model_desc>();
+    desc[0].surfaces = surfaces_.get();
+    switch (data_.ConsumeIntegralInRange(0, 6)) {
+      case 0:
+        cumulet_model_set(model_.get(), desc.data());
+        return;
+      case 1:
+        cumulet_model_set_to_world(model_.get(), desc[0].to_world);
+        return;
+      case 2:
+        cumulet_model_set_time(model_.get(), bits<double>(number()));
+        return;
+      case 3:
+        return told(cumulet_add_model(viewer_.get(), model_.get()));
+      case 4:
+        return told(cumulet_remove_model(viewer_.get(), model_.get()));
+      case 5: {
+        const ModelRef again(cumulet_model_retain(model_.get()));
+        if (again.get() != model_.get()) fail("a model that is another once it is retained");
+        return;
+      }
+      default: {
+        cumulet_model* model = nullptr;
+        made([&](char* error, std::size_t size) { return cumulet_model_create(desc.data(), &model, error, size); });
+        if (model != nullptr) model_.reset(model);
+      }
+    }
+  }
+
+  /// A state of some fields, which are kept until nobody wants them.
+  struct State {
+    std::array<std::vector<float>, 3> dense_values;
+    std::array<Sparse, 3> sparse_values;
+    std::array<cumulet_dense_desc, 3> dense{};
+    std::array<cumulet_sparse_desc, 3> sparse{};
+    std::array<cumulet_field, 3> fields{};
+    cumulet_state_desc desc{};
+  };
+
+  std::unique_ptr<State> make_state() {
+    auto state = std::make_unique<State>();
+    state->desc = described<cumulet_state_desc>();
+    const std::size_t count = data_.ConsumeIntegralInRange<std::size_t>(0, 3);
+    for (std::size_t i = 0; i < count; ++i) {
+      cumulet_field& field = state->fields[i];
+      field.struct_size = sizeof field;
+      field.channel = static_cast<cumulet_channel>(data_.ConsumeIntegralInRange(0, 10));
+      const int kind = data_.ConsumeIntegralInRange(0, 7);
+      // Nearly always one of the two.
+      if (kind < 4 || kind == 7) {
+        state->dense[i] = dense(state->dense_values[i]);
+        field.dense = &state->dense[i];
+      }
+      if (kind >= 4 && kind < 7) {
+        state->sparse[i] = sparse(state->sparse_values[i]);
+        field.sparse = &state->sparse[i];
+      }
+      if (kind == 7) field.sparse = &state->sparse[i];
+    }
+    state->desc.fields = state->fields.data();
+    state->desc.field_count = count;
+    state->desc.name = data_.ConsumeBool() ? "a state\nof lines" : nullptr;
+    state->desc.release = nullptr;
+    state->desc.release_user = nullptr;
+    return state;
+  }
+
+  void set_live() {
+    auto state = make_state();
+    if (data_.ConsumeBool()) {
+      // Read later, where it is: that it is let go of once and no more is the sanitizer's to see.
+      state->desc.release = [](void* user) { delete static_cast<State*>(user); };
+      state->desc.release_user = state.get();
+    }
+    const cumulet_state_desc desc = state->desc;
+    std::array<char, 256> error{};
+    if (cumulet_live_set(live_.get(), &desc, error.data(), error.size()) != CUMULET_OK)
+      check_line(error.data());
+    else if (desc.release != nullptr)
+      static_cast<void>(state.release());  // now the library's, or gone
+  }
+
+  void change_live() {
+    switch (data_.ConsumeIntegralInRange(0, 9)) {
+      case 0:
+      case 1:
+      case 2:
+        return set_live();
+      case 3:
+      case 4: {
+        const auto state = make_state();
+        return made(
+            [&](char* error, std::size_t size) { return cumulet_live_update(live_.get(), &state->desc, error, size); });
+      }
+      case 5: {
+        cumulet_volume* volume = nullptr;
+        made([&](char* error, std::size_t size) { return cumulet_live_get_volume(live_.get(), &volume, error, size); });
+        if (volume != nullptr) volume_.reset(volume);
+        return;
+      }
+      case 6:
+        return told(cumulet_set_live(viewer_.get(), data_.ConsumeBool() ? live_.get() : nullptr));
+      case 7:
+        return get<cumulet_live_info>(cumulet_get_live_info);
+      case 8: {
+        const auto state = make_state();
+        cumulet_volume* volume = nullptr;
+        made([&](char* error, std::size_t size) {
+          return cumulet_volume_from_state(&state->desc, &volume, error, size);
+        });
+        if (volume != nullptr) volume_.reset(volume);
+        return;
+      }
+      default: {
+        const auto desc = described<cumulet_live_desc>();
+        cumulet_live* live = nullptr;
+        made([&](char* error, std::size_t size) {
+          return cumulet_live_create(data_.ConsumeBool() ? &desc : nullptr, &live, error, size);
+        });
+        if (live != nullptr) live_.reset(live);
+      }
+    }
+  }
+
+  /// A camera that is right but for its lens, and at times that too.
+  void focus() {
+    cumulet_camera* raw = nullptr;
+    told(cumulet_get_camera(viewer_.get(), &raw));
+    const CameraRef camera(raw);
+    auto desc = cumulet::test::make_desc<cumulet_camera_desc>();
+    if (cumulet_camera_get(camera.get(), &desc) != CUMULET_OK) fail("a camera that cannot be told");
+    const bool right = data_.ConsumeBool();
+    desc.lens_radius = right ? data_.ConsumeFloatingPointInRange(0.0, 2.0) : bits<double>(number());
+    desc.focus_distance = right ? data_.ConsumeFloatingPointInRange(0.0, 50.0) : bits<double>(number());
+    if (cumulet_camera_set(camera.get(), &desc) != CUMULET_OK) {
+      if (right) fail("a lens that is right is refused");
+      return;
+    }
+    auto seen = cumulet::test::make_desc<cumulet_camera_desc>();
+    if (cumulet_camera_get(camera.get(), &seen) != CUMULET_OK || seen.lens_radius != desc.lens_radius ||
+        seen.focus_distance != desc.focus_distance)
+      fail("a lens that is not what it was set to");
+  }
+
   void change_sequence() {
     auto playback = described<cumulet_playback_desc>();
     std::uint32_t frame = 0;
@@ -293,7 +464,8 @@ class Program {
         std::array<char, 64> cause{};
         told(cumulet_get_sequence_frame(viewer_.get(), data_.ConsumeIntegralInRange(0U, 4U), cause.data(),
                                         cause.size()));
-        return check_line(cause.data());
+        if (cause.front() != '\0') check_line(cause.data());  // it failed, as far as that is known
+        return;
       }
       default: {
         constexpr std::array paths = {"/dev/null", "/dev/null/nowhere.vdb", ""};
@@ -499,7 +671,7 @@ class Program {
 
   void call() {
     cumulet_viewer* viewer = viewer_.get();
-    switch (data_.ConsumeIntegralInRange(0, 30)) {
+    switch (data_.ConsumeIntegralInRange(0, 36)) {
       case 0:
         return make_dense();
       case 1:
@@ -566,6 +738,15 @@ class Program {
         return change_instances();
       case 29:
         return change_sequence();
+      case 30:
+      case 31:
+        return change_models();
+      case 32:
+      case 33:
+      case 34:
+        return change_live();
+      case 35:
+        return focus();
       default:
         told(cumulet_detach(viewer));
         if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));
@@ -579,6 +760,8 @@ class Program {
   SurfacesRef surfaces_;
   EnvironmentRef environment_;
   InstanceRef instance_;
+  ModelRef model_;
+  LiveRef live_;
   SequenceRef sequence_;
   ViewerPtr viewer_;
 };

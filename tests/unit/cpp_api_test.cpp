@@ -893,6 +893,10 @@ TEST(CppLive, StatesAreHandedOver) {
   const auto twice = live.value().set({.fields = std::vector<cumulet::Field>(40, fields[0]), .name = "fire"});
   ASSERT_FALSE(twice);
   EXPECT_STREQ(twice.error().message.c_str(), "fire: has density twice");
+  const cumulet::Field unknown(Channel{99}, dense);
+  const auto lines = live.value().set({.fields = {&unknown, 1}, .name = "a fire\nof lines"});
+  ASSERT_FALSE(lines);
+  EXPECT_EQ(lines.error().message.view().find('\n'), std::string_view::npos) << lines.error().message.c_str();
 }
 
 }  // namespace
