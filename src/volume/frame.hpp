@@ -36,6 +36,9 @@ struct VolumeFrame {
   /// All that the fields beside density are made of.
   [[nodiscard]] std::vector<const ScalarVolume*> beside_density() const;
   [[nodiscard]] std::vector<ScalarVolume*> beside_density();
+  /// Density, and these.
+  [[nodiscard]] std::vector<const ScalarVolume*> fields() const;
+  [[nodiscard]] std::vector<ScalarVolume*> fields();
 };
 
 /// Which grids of a file are which field. "none" leaves a field out. Empty: the grid whose name, in whatever case,

@@ -489,6 +489,17 @@ std::vector<const ScalarVolume*> VolumeFrame::beside_density() const {
 }
 std::vector<ScalarVolume*> VolumeFrame::beside_density() { return fields_beside_density<ScalarVolume>(*this); }
 
+std::vector<const ScalarVolume*> VolumeFrame::fields() const {
+  std::vector<const ScalarVolume*> fields = beside_density();
+  fields.insert(fields.begin(), &density);
+  return fields;
+}
+std::vector<ScalarVolume*> VolumeFrame::fields() {
+  std::vector<ScalarVolume*> fields = beside_density();
+  fields.insert(fields.begin(), &density);
+  return fields;
+}
+
 std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids) {
   std::vector<std::string> channels(grids.size());
   for (const std::size_t grid : choose_velocity(grids, {}, {})) channels[grid] = "velocity";
