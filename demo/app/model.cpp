@@ -123,15 +123,6 @@ double device_seconds(const cumulet_stats& stats) {
          stats.pass_seconds_trace + stats.pass_seconds_inspect + stats.pass_seconds_display;
 }
 
-cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row) {
-  cumulet_playback_desc desc = sequence.playback;
-  const std::uint32_t first = sequence.first ? row.index_of(*sequence.first) : 0;
-  const std::uint32_t last = sequence.last ? row.index_of(*sequence.last) : row.count() - 1;
-  desc.first_frame = std::min(first, last);
-  desc.frame_count = last - desc.first_frame + 1;
-  return desc;
-}
-
 Model::Model() {
   navigation.struct_size = sizeof navigation;
   navigation.speed = 1.0;

@@ -152,9 +152,6 @@ struct Play {
   [[nodiscard]] Frame frame() const { return row.number(info.asked_frame); }
 };
 
-/// As the library takes it, of these files.
-[[nodiscard]] cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row);
-
 /// What the viewer has told last.
 struct Status {
   cumulet_frame_result frame{};

@@ -28,7 +28,8 @@ constexpr double patience = 1.0;  // seconds without a picture, where there coul
 
 bool same_volume(const SceneVolume& a, const SceneVolume& b) {
   const auto rest = [](const SceneVolume& volume) {
-    return std::tie(volume.name, volume.visible, volume.places, volume.ramps, volume.auto_density_scale);
+    return std::tie(volume.name, volume.visible, volume.places, volume.ramps, volume.auto_density_scale,
+                    volume.sequence);
   };
   return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
 }
@@ -467,9 +468,9 @@ bool Session::begin_volume() {
   }
   std::shared_ptr<cumulet_sequence> sequence(made, cumulet_sequence_release);
   const cumulet_playback_desc playback = playback_of(scene_.sequence, *row);
-  const Frame frame = scene_.sequence.frame.value_or(row->number(playback.first_frame));
+  const Moment moment = scene_.sequence.frame.value_or(row->number(playback.first_frame));
   static_cast<void>(cumulet_sequence_set_playback(made, &playback));
-  static_cast<void>(cumulet_sequence_set_frame(made, row->index_of(frame)));
+  static_cast<void>(cumulet_sequence_set_frame(made, row->position_of(moment)));
   VolumePtr volume = sequence_ || !known_->visible ? nullptr : shown();
   if (!check(cumulet_set_sequence(viewer_.get(), made))) return false;
   if (!before_) before_ = Before{sequence_, row_, std::move(volume)};
@@ -508,6 +509,10 @@ void Session::see_sequence() {
   std::array<char, 512> cause{};
   static_cast<void>(cumulet_get_sequence_frame(viewer_.get(), play.info.asked_frame, cause.data(), cause.size()));
   play.failure = cause.data();
+  // The others share its clock.
+  const cumulet_playback_desc playback = playback_of(scene_.sequence, *row_);
+  others_.go_to(playback.offset_seconds +
+                (play.info.asked_position - playback.first_frame) / playback.frames_per_second);
   status_.play = std::move(play);
 }
 

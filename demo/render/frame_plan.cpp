@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <frame_pattern.hpp>
+#include <numeric>
+#include <settings.hpp>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -43,12 +45,51 @@ class Written {
                        path.extension().string());
     }
   }
-  [[nodiscard]] std::string of(Frame frame) const { return pattern_ ? pattern_->file(frame) : name_; }
+  [[nodiscard]] std::string of(const Moment& moment) const { return pattern_ ? pattern_->file(moment) : name_; }
 
  private:
   std::string name_;
   std::optional<FramePattern> pattern_;
 };
+
+/// Files that are so many frames apart, from the first that is there on.
+struct Grid {
+  Frame first = 0;
+  Frame step = 1;
+
+  explicit Grid(const std::vector<Frame>& there) : first(there.front()) {
+    Frame common = 0;
+    for (const Frame frame : there) common = std::gcd(common, frame - first);
+    step = std::max(common, Frame{1});
+  }
+  /// The last file's number that is not behind a frame.
+  [[nodiscard]] Frame before(Frame frame) const { return frame < first ? frame : frame - (frame - first) % step; }
+};
+
+constexpr std::uint32_t thousand = 1000;
+
+/// Of what is between two files.
+PlannedFrame::Next next_of(const Moment& moment, const FramePattern& volume, const Grid& grid) {
+  constexpr std::uint32_t most_parts = 1000;  // the library's
+  const Frame before = grid.before(moment.frame);
+  const std::uint64_t way = std::uint64_t{moment.frame - before} * thousand + moment.thousandths;
+  const std::uint64_t length = std::uint64_t{grid.step} * thousand;
+  const std::uint64_t common = std::gcd(way, length);
+  if (length / common > most_parts)
+    throw UsageError("frame " + moment.text() + ": the files are " + std::to_string(grid.step) +
+                     " frames apart, of which this is no thousandth");
+  return {volume.file(before + grid.step), static_cast<std::uint32_t>(way / common),
+          static_cast<std::uint32_t>(length / common), grid.step};
+}
+
+/// By the scene's clock.
+double seconds_of(const Moment& moment, const SceneSequence& sequence, const Grid& grid) {
+  cumulet_playback_desc playback = sequence.playback;
+  settings::spell_out_zeros(playback);
+  const double frames = double{moment.frame} - sequence.first.value_or(grid.first);
+  return playback.offset_seconds +
+         (frames + double{moment.thousandths} / thousand) / (grid.step * playback.frames_per_second);
+}
 
 }  // namespace
 
@@ -62,21 +103,27 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   if (options.info) throw UsageError("--info is of one file, and '" + volume->text() + "' are many");
   const std::vector<Frame> there = volume->frames_there();
   if (there.empty()) throw std::runtime_error(volume->text() + ": no file of such a name is there");
-  std::vector<Frame> frames = options.frames;
+  std::vector<Moment> frames = options.frames;
   if (frames.empty() && options.scene.sequence.frame) frames = {*options.scene.sequence.frame};
-  if (frames.empty()) frames = there;
+  if (frames.empty()) frames.assign(there.begin(), there.end());
   const Written output("--output", options.output, frames.size());
   const Written stats("--stats", options.stats, frames.size());
   const Written checkpoint("--checkpoint", options.checkpoint, frames.size());
 
+  const Grid grid(there);
   FramePlan plan;
-  for (const Frame frame : frames) {
-    plan.frames.push_back({frame, volume->file(frame), output.of(frame), stats.of(frame), checkpoint.of(frame)});
-    const PlannedFrame& planned = plan.frames.back();
+  for (const Moment& frame : frames) {
+    PlannedFrame& planned = plan.frames.emplace_back();
+    planned.number = frame;
+    planned.volume = volume->file(frame.is_between() ? grid.before(frame.frame) : frame.frame);
+    if (frame.is_between()) planned.next = next_of(frame, *volume, grid);
+    planned.seconds = seconds_of(frame, options.scene.sequence, grid);
+    planned.output = output.of(frame);
+    planned.stats = stats.of(frame);
+    planned.checkpoint = checkpoint.of(frame);
     if (same_file(planned.checkpoint, planned.output) || same_file(planned.checkpoint, planned.stats) ||
         same_file(planned.stats, planned.output)) {
-      throw UsageError("frame " + std::to_string(frame) +
-                       ": --output, --stats and --checkpoint shall be files of their own");
+      throw UsageError("frame " + frame.text() + ": --output, --stats and --checkpoint shall be files of their own");
     }
   }
   std::vector<std::pair<std::uintmax_t, std::string>> sized;
@@ -96,12 +143,13 @@ bool is_made(const std::string& output) {
   return fs::is_regular_file(output, error) && fs::file_size(output, error) > 0 && !error;
 }
 
-std::string frame_line(Frame number, std::size_t place, std::size_t count, FrameState state, const std::string& what) {
+std::string frame_line(const Moment& number, std::size_t place, std::size_t count, FrameState state,
+                       const std::string& what) {
   const char* word = "failed";
   if (state == FrameState::done) word = "done";
   if (state == FrameState::kept) word = "kept";
-  return one_line("frame " + std::to_string(number) + " (" + std::to_string(place) + " of " + std::to_string(count) +
-                  ") " + word + " " + what);
+  return one_line("frame " + number.text() + " (" + std::to_string(place) + " of " + std::to_string(count) + ") " +
+                  word + " " + what);
 }
 
 }  // namespace cumulet::demo

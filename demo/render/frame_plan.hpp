@@ -9,10 +9,19 @@
 
 namespace cumulet::demo {
 
-/// One frame of a sequence: which files it reads and writes.
+/// One frame of a sequence, or what is between two: which files it reads and writes.
 struct PlannedFrame {
-  Frame number = 0;
+  Moment number;
   std::string volume;
+  /// Where it is between two.
+  struct Next {
+    std::string volume;      ///< of the frame behind
+    std::uint32_t part = 0;  ///< so many parts of the way to it
+    std::uint32_t parts = 1;
+    std::uint32_t frames = 1;  ///< that it is away
+  };
+  std::optional<Next> next;
+  double seconds = 0.0;  ///< of the scene's clock
   std::string output;
   std::string stats;       ///< empty: none
   std::string checkpoint;  ///< likewise
@@ -37,7 +46,7 @@ enum class FrameState { done, kept, failed };
 
 /// What a queue reads of a frame, a line each: "frame 12 (3 of 20) done out.0012.exr in 8.21 s", "frame 13 (4 of 20)
 /// kept out.0013.exr", "frame 14 (5 of 20) failed fire.0014.vdb: it is not there".
-[[nodiscard]] std::string frame_line(Frame number, std::size_t place, std::size_t count, FrameState state,
+[[nodiscard]] std::string frame_line(const Moment& number, std::size_t place, std::size_t count, FrameState state,
                                      const std::string& what);
 
 }  // namespace cumulet::demo

@@ -33,7 +33,7 @@ bool same_place(const cumulet_instance_desc& a, const cumulet_instance_desc& b) 
 }  // namespace
 
 OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
-  OpenVolume open{std::move(volume), 0.0, std::nullopt};
+  OpenVolume open{std::move(volume), std::nullopt, 0.0, std::nullopt};
   open.fire = medium_of_fire(open.volume.get(), SceneVolume().medium);
   if (cumulet_volume_suggest_density_scale(open.volume.get(), &open.density_scale) != CUMULET_OK)
     open.density_scale = 0.0;
@@ -41,6 +41,22 @@ OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
 }
 
 OpenVolume open_volume(const VolumeFile& file) {
+  if (auto row = FrameRow::of_name(file.volume)) {
+    std::string failure;
+    for (std::string& name : row->by_size()) {
+      VolumeFile frame = file;
+      frame.volume = std::move(name);
+      try {
+        OpenVolume open = open_volume(frame);
+        open.volume.reset();
+        open.row = std::move(row);
+        return open;
+      } catch (const std::runtime_error& error) {
+        if (failure.empty()) failure = error.what();
+      }
+    }
+    throw std::runtime_error(failure);
+  }
   const cumulet_volume_file_desc desc = volume_file(file);
   cumulet_volume* opened = nullptr;
   std::array<char, 1024> error{};
@@ -75,12 +91,50 @@ std::optional<Instances::Placed> Instances::find_tag(std::uint64_t tag) const {
 
 void Instances::give(const VolumeFile& file, OpenVolume volume) { given_.push_back({file, std::move(volume)}); }
 
+std::shared_ptr<cumulet_sequence> Instances::sequence_of(const SceneVolume& scene, const FrameRow& row) {
+  const auto found = std::ranges::find_if(playing_, [&](const Playing& playing) {
+    return playing.file == static_cast<const VolumeFile&>(scene) && playing.as == scene.sequence;
+  });
+  if (found != playing_.end()) return found->sequence;
+  std::vector<std::string> names;
+  names.reserve(row.count());
+  for (std::uint32_t i = 0; i < row.count(); ++i) names.push_back(row.file(i));
+  std::vector<const char*> paths;
+  paths.reserve(names.size());
+  for (const std::string& name : names) paths.push_back(name.c_str());
+  const cumulet_volume_file_desc file = volume_file(scene);
+  cumulet_sequence_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.paths = paths.data();
+  desc.count = paths.size();
+  desc.file = &file;
+  cumulet_sequence* made = nullptr;
+  std::array<char, 1024> error{};
+  check(cumulet_sequence_create(&desc, &made, error.data(), error.size()), error.data());
+  std::shared_ptr<cumulet_sequence> sequence(made, cumulet_sequence_release);
+  const cumulet_playback_desc playback = playback_of(scene.sequence, row);
+  check(cumulet_sequence_set_playback(made, &playback), "");
+  const Moment moment = scene.sequence.frame.value_or(row.number(playback.first_frame));
+  check(
+      seconds_ ? cumulet_sequence_set_time(made, *seconds_) : cumulet_sequence_set_frame(made, row.position_of(moment)),
+      "");
+  playing_.push_back({scene, scene.sequence, sequence});
+  return sequence;
+}
+
+void Instances::go_to(double seconds) {
+  if (seconds_ == seconds) return;
+  seconds_ = seconds;
+  for (const Playing& playing : playing_) check(cumulet_sequence_set_time(playing.sequence.get(), seconds), "");
+}
+
 void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& volumes) {
   std::erase_if(given_, [&](const Given& given) {
     return std::ranges::none_of(volumes, [&](const VolumeFile& file) { return file == given.file; });
   });
   std::size_t count = 0;
-  const auto place = [&](const SceneVolume& scene, const OpenVolume& open, cumulet_instance_desc desc,
+  const auto place = [&](const SceneVolume& scene, const OpenVolume& open,
+                         const std::shared_ptr<cumulet_sequence>& sequence, cumulet_instance_desc desc,
                          const Placed& placed) {
     desc.tag = count + 1;
     if (count == shown_.size()) {
@@ -89,14 +143,16 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
       check(cumulet_instance_create(&desc, &made, error.data(), error.size()), error.data());
       std::shared_ptr<cumulet_instance> instance(made, cumulet_instance_release);
       check(cumulet_add_instance(viewer, made), cumulet_last_error(viewer));
-      shown_.push_back({std::move(instance), desc, open.volume, *desc.medium, {}, placed});
+      shown_.push_back({std::move(instance), desc, open.volume, sequence, *desc.medium, {}, placed});
     }
     Shown& shown = shown_[count++];
-    if (shown.volume != open.volume || !settings::same(shown.medium, *desc.medium) || !same_place(shown.desc, desc))
+    if (shown.volume != open.volume || shown.sequence != sequence || !settings::same(shown.medium, *desc.medium) ||
+        !same_place(shown.desc, desc))
       check(cumulet_instance_set(shown.instance.get(), &desc), "");
     shown.desc = desc;
     shown.desc.medium = nullptr;  // it lives as long as the call; below is what it said
     shown.volume = open.volume;
+    shown.sequence = sequence;
     shown.medium = *desc.medium;
     shown.placed = placed;
     for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
@@ -110,19 +166,27 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const SceneVolume& scene = volumes[i];
     const Given* given = find(scene);
-    if (given == nullptr || !given->volume.volume) continue;
+    if (given == nullptr || (!given->volume.volume && !given->volume.row)) continue;
+    std::shared_ptr<cumulet_sequence> sequence;
+    if (given->volume.row) sequence = sequence_of(scene, *given->volume.row);
     const cumulet_medium_desc medium = medium_of(scene, given->volume);
     cumulet_instance_desc desc{};
     desc.struct_size = sizeof desc;
     desc.volume = given->volume.volume.get();
+    desc.sequence = sequence.get();
     desc.medium = &medium;
     desc.hidden = scene.visible ? 0 : 1;
-    if (scene.places.empty()) place(scene, given->volume, desc, {i, 0});
+    if (scene.places.empty()) place(scene, given->volume, sequence, desc, {i, 0});
     for (std::size_t at = 0; at < scene.places.size(); ++at) {
       std::ranges::copy(scene.places[at], desc.to_world);
-      place(scene, given->volume, desc, {i, at});
+      place(scene, given->volume, sequence, desc, {i, at});
     }
   }
+  std::erase_if(playing_, [&](const Playing& playing) {
+    return std::ranges::none_of(volumes, [&](const SceneVolume& scene) {
+      return playing.file == static_cast<const VolumeFile&>(scene) && playing.as == scene.sequence;
+    });
+  });
   while (shown_.size() > count) {
     check(cumulet_remove_instance(viewer, shown_.back().instance.get()), cumulet_last_error(viewer));
     shown_.pop_back();

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <frame_row.hpp>
 #include <memory>
 #include <optional>
 #include <scene_file.hpp>
@@ -11,9 +12,11 @@
 
 namespace cumulet::demo {
 
-/// A file's volume, and what it is shown with where a scene leaves that to it.
+/// A file's volume, and what it is shown with where a scene leaves that to it. Of a sequence that is of its largest
+/// file.
 struct OpenVolume {
-  std::shared_ptr<cumulet_volume> volume;
+  std::shared_ptr<cumulet_volume> volume;   // none of a sequence
+  std::optional<FrameRow> row;              // its files
   double density_scale = 0.0;               // that suits it; 0: it shows nothing at any
   std::optional<cumulet_medium_desc> fire;  // of one that burns
 };
@@ -23,8 +26,8 @@ struct OpenVolume {
 /// Likewise. Throws std::runtime_error with the library's cause.
 [[nodiscard]] OpenVolume open_volume(const VolumeFile& file);
 
-/// A scene's further volumes (SceneOptions::others) in a viewer: an instance for each of their places. In the thread
-/// that has the viewer.
+/// A scene's further volumes (SceneOptions::others) in a viewer: an instance for each of their places. Those that are
+/// sequences share their frames where the scene says the same of how they play. In the thread that has the viewer.
 class Instances {
  public:
   /// The files of those to be shown that were not given yet, each once. One that the viewer shows itself is best given
@@ -37,6 +40,10 @@ class Instances {
   /// Shows those that were given, and forgets the files that are named no more. Throws std::runtime_error with the
   /// library's cause.
   void show(cumulet_viewer* viewer, const std::vector<SceneVolume>& volumes);
+  /// Sequences go to this moment of the scene's clock; until then each stands where the scene says.
+  void go_to(double seconds);
+  /// Whether there is a sequence.
+  [[nodiscard]] bool plays() const { return !playing_.empty(); }
 
   /// Which of the volumes an instance shows, and in which of its places.
   struct Placed {
@@ -51,18 +58,28 @@ class Instances {
     VolumeFile file;
     OpenVolume volume;
   };
+  struct Playing {
+    VolumeFile file;
+    SceneSequence as;
+    std::shared_ptr<cumulet_sequence> sequence;
+  };
   struct Shown {
     std::shared_ptr<cumulet_instance> instance;
     cumulet_instance_desc desc{};
-    std::shared_ptr<cumulet_volume> volume;  // the descriptor's
-    cumulet_medium_desc medium{};            // likewise
+    std::shared_ptr<cumulet_volume> volume;      // the descriptor's
+    std::shared_ptr<cumulet_sequence> sequence;  // likewise
+    cumulet_medium_desc medium{};                // likewise
     decltype(SceneVolume::ramps) ramps;
     Placed placed;
   };
 
   [[nodiscard]] const Given* find(const VolumeFile& file) const;
+  // The one that plays so.
+  std::shared_ptr<cumulet_sequence> sequence_of(const SceneVolume& scene, const FrameRow& row);
 
   std::vector<Given> given_;
+  std::vector<Playing> playing_;
+  std::optional<double> seconds_;  // of the clock
   std::vector<Shown> shown_;
 };
 

@@ -43,11 +43,12 @@
 namespace {
 
 using cumulet::demo::Checkpoint;
-using cumulet::demo::Frame;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
+using cumulet::demo::Moment;
 using cumulet::demo::one_line;
 using cumulet::demo::OutputFormat;
+using cumulet::demo::PlannedFrame;
 using cumulet::demo::Progress;
 using cumulet::demo::RenderOptions;
 using cumulet::demo::SceneOptions;
@@ -492,20 +493,29 @@ class Studio {
   [[nodiscard]] Progress& progress() { return progress_; }
   [[nodiscard]] const Viewer& viewer() const { return viewer_; }
 
-  /// Until the scene's volume, and all else, is there. Throws why it cannot be.
-  void load(const SceneOptions& scene) {
+  /// Until the scene's volume, and all else, is there. frame: of a sequence, the one that it is. Throws why it cannot
+  /// be.
+  void load(const SceneOptions& scene, const PlannedFrame* frame = nullptr) {
+    const auto next = frame != nullptr ? frame->next : std::nullopt;
     if (scene.is_shown()) {
       progress_.stage("loading " + scene.volume);
       cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
       file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
-      check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
+      if (next) {
+        set_between(scene, file, *next);
+      } else {
+        check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
+      }
     }
     wait(viewer_, progress_);
+    if (scene.is_shown() && next) require_both();
+    if (frame != nullptr) others_.go_to(frame->seconds);
     open_others(scene);
     open_models(scene);
     fire_ = medium_of_fire(viewer_, scene);
     if (fire_) check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
     wait(viewer_, progress_);
+    if (others_.plays()) cumulet_cancel(viewer_.get());  // frames that are ahead
   }
 
   /// What is to be said once, of a volume that is loaded.
@@ -575,6 +585,44 @@ class Studio {
     if (!scene.volume.empty()) return scene.volume;
     if (!scene.others.empty()) return scene.others.front().volume;
     return scene.surfaces.empty() && !scene.models.empty() ? scene.models.front().file : scene.surfaces;
+  }
+
+  void set_between(const SceneOptions& scene, const cumulet_volume_file_desc& file, const PlannedFrame::Next& next) {
+    const std::array<const char*, 2> paths{scene.volume.c_str(), next.volume.c_str()};
+    cumulet_sequence_desc desc{};
+    desc.struct_size = sizeof desc;
+    desc.paths = paths.data();
+    desc.count = paths.size();
+    desc.file = &file;
+    desc.memory_bytes = std::uint64_t{1} << 40U;  // what little there is
+    cumulet_playback_desc playback = scene.sequence.playback;
+    cumulet::settings::spell_out_zeros(playback);
+    playback.frames_per_second /= next.frames;
+    playback.first_frame = 0;
+    playback.frame_count = 0;
+    playback.subframes = next.parts;
+    if (playback.between == CUMULET_BETWEEN_NONE) playback.between = CUMULET_BETWEEN_ADVECT;
+    cumulet_sequence* made = nullptr;
+    std::array<char, 1024> error{};
+    if (cumulet_sequence_create(&desc, &made, error.data(), error.size()) != CUMULET_OK)
+      throw std::runtime_error(error.data());
+    const std::unique_ptr<cumulet_sequence, void (*)(cumulet_sequence*)> sequence(made, cumulet_sequence_release);
+    const double position = static_cast<double>(next.part) / next.parts;
+    if (cumulet_sequence_set_playback(made, &playback) != CUMULET_OK ||
+        cumulet_sequence_set_frame(made, position) != CUMULET_OK) {
+      throw std::runtime_error(scene.volume + ": cannot be played");
+    }
+    check(viewer_, cumulet_set_sequence(viewer_.get(), made));
+  }
+
+  /// Nothing stands in for what is between two frames, nor comes after it.
+  void require_both() const {
+    cumulet_cancel(viewer_.get());
+    for (const std::uint32_t frame : {0U, 1U}) {
+      std::array<char, 1024> cause{};
+      check(viewer_, cumulet_get_sequence_frame(viewer_.get(), frame, cause.data(), cause.size()));
+      if (cause.front() != '\0') throw std::runtime_error(cause.data());
+    }
   }
 
   void open_others(const SceneOptions& scene) {
@@ -757,14 +805,14 @@ class Report {
  public:
   explicit Report(const FramePlan& plan) : plan_(plan) {}
   void say(std::size_t place, FrameState state, const std::string& what, Progress* progress) {
-    const Frame number = plan_.frames[place].number;
+    const Moment number = plan_.frames[place].number;
     if (progress != nullptr) progress->clear();
     std::cout << cumulet::demo::frame_line(number, place + 1, plan_.frames.size(), state, what) << std::endl;
     if (state == FrameState::failed) failed_.push_back(number);
   }
   /// From that one on.
   [[nodiscard]] std::string not_made(std::size_t place) const {
-    std::vector<Frame> rest;
+    std::vector<Moment> rest;
     for (std::size_t i = place; i < plan_.frames.size(); ++i) rest.push_back(plan_.frames[i].number);
     return (rest.size() > 1 ? "frames " : "frame ") + cumulet::demo::frames_text(rest) + " not made";
   }
@@ -777,16 +825,17 @@ class Report {
 
  private:
   const FramePlan& plan_;
-  std::vector<Frame> failed_;
+  std::vector<Moment> failed_;
 };
 
 /// Makes a frame: loads its volume, traces, writes.
-void render_frame_of(Studio& studio, const RenderOptions& picture, Report& report, std::size_t place) {
+void render_frame_of(Studio& studio, const RenderOptions& picture, const PlannedFrame& frame, Report& report,
+                     std::size_t place) {
   const auto start = Clock::now();
   Traced traced = Traced::stopped;
   try {
     const std::optional<Checkpoint> from = checkpoint_for(picture);
-    studio.load(picture.scene);
+    studio.load(picture.scene, &frame);
     traced = studio.trace(picture, from);
   } catch (const std::runtime_error& error) {
     if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(place));
@@ -817,7 +866,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
   std::unique_ptr<Studio> studio;
   Report report(plan);
   for (std::size_t i = 0; i < plan.frames.size(); ++i) {
-    const cumulet::demo::PlannedFrame& frame = plan.frames[i];
+    const PlannedFrame& frame = plan.frames[i];
     if (!options.overwrite && cumulet::demo::is_made(frame.output)) {
       forget_checkpoint(frame.checkpoint);  // of a run that was killed before it could
       report.say(i, FrameState::kept, frame.output, studio ? &studio->progress() : nullptr);
@@ -826,13 +875,14 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
     cumulet::image::check_writable(frame.output);
     if (!frame.stats.empty()) cumulet::image::check_writable(frame.stats);
     if (!studio) studio = open_studio(options, plan);
-    studio->progress().of("frame " + std::to_string(frame.number));
+    studio->progress().of("frame " + frame.number.text());
     RenderOptions picture = options;
     picture.scene.volume = frame.volume;
     picture.output = frame.output;
     picture.stats = frame.stats;
     picture.checkpoint = frame.checkpoint;
-    render_frame_of(*studio, picture, report, i);
+    if (frame.next) picture.scene.sequence.frame = frame.number;  // of its files alone nobody could tell which it is
+    render_frame_of(*studio, picture, frame, report, i);
   }
   if (studio) studio->write_trace(options);
   report.end();

@@ -45,7 +45,7 @@ struct RenderOptions {
   std::string stats;                 // empty: none
   std::string trace;                 // likewise
   std::string shader_cache;          // a folder; empty: none
-  std::vector<Frame> frames;         // of the volume's sequence; empty: all, where its name is a sequence's
+  std::vector<Moment> frames;        // of the volume's sequence; empty: all, where its name is a sequence's
   bool overwrite = false;            // frames that are there already
   std::string settled;               // what frames have in common; empty: found in each run
   bool info = false;                 // tell what is in the files, render nothing

@@ -48,6 +48,7 @@ constexpr std::array moved = {Moved{"volume", "volumes[]"}, Moved{"medium", "vol
 /// A setting's key, which is of version 1, as a version has it; what is a volume's, of that one.
 std::string key_in(SceneFormat format, const std::string& key, std::size_t volume) {
   const std::string section = key.substr(0, key.find('.'));
+  if (section == "sequence" && volume > 0) return "volumes[" + std::to_string(volume) + "]." + key;
   const auto* const found = std::ranges::find(moved, section, &Moved::first);
   if (format == SceneFormat::first || found == moved.end()) return key;
   std::string path(found->second);
@@ -501,7 +502,11 @@ void read_sequence(Reader& reader, SceneSequence& sequence) {
   };
   frame("sequence.first_frame", sequence.first);
   frame("sequence.last_frame", sequence.last);
-  frame("sequence.frame", sequence.frame);
+  double position = 0.0;
+  if (reader.number("sequence.frame", position, {0.0, double{last_frame}})) {
+    const auto thousandths = static_cast<std::uint64_t>(std::llround(1000.0 * position));
+    sequence.frame = Moment(static_cast<Frame>(thousandths / 1000), static_cast<std::uint32_t>(thousandths % 1000));
+  }
   if (sequence.first && sequence.last && *sequence.first > *sequence.last)
     reader.wrong("sequence.last_frame", "comes before sequence.first_frame");
 }
@@ -520,6 +525,7 @@ void read_second(Reader& reader, SceneOptions& scene) {
     if (volume.volume.empty()) reader.wrong("volume.file", "is empty");
     read_settings(reader, volume.medium);
     if (volume.medium.max_bounces != 0) reader.wrong("medium.max_bounces", "is the first volume's, for all of them");
+    read_sequence(reader, volume.sequence);
   }
   reader.of_volume(0);
   read_sequence(reader, scene.sequence);
@@ -695,7 +701,13 @@ void put_sequence(Writer& writer, const SceneSequence& sequence) {
   if (!unsaid) writer.put_settings(sequence.playback);
   if (sequence.first) writer.put("sequence.first_frame", *sequence.first);
   if (sequence.last) writer.put("sequence.last_frame", *sequence.last);
-  if (sequence.frame) writer.put("sequence.frame", *sequence.frame);
+  if (!sequence.frame) return;
+  const Moment& moment = *sequence.frame;
+  if (moment.is_between()) {
+    writer.put("sequence.frame", (1000.0 * moment.frame + moment.thousandths) / 1000.0);
+  } else {
+    writer.put("sequence.frame", moment.frame);
+  }
 }
 
 /// named: a file's name as it is to be written.
@@ -707,6 +719,7 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   for (std::size_t i = 0; second && i < scene.others.size(); ++i) {
     writer.of_volume(i + 1);
     put_volume(writer, format, scene.others[i], named(scene.others[i].volume));
+    put_sequence(writer, scene.others[i].sequence);
   }
   writer.of_volume(0);
   if (second) put_sequence(writer, scene.sequence);
@@ -781,9 +794,17 @@ std::string SceneVolume::label() const { return name.empty() ? fs::path(volume).
 SceneOptions::SceneOptions() {
   for_each_group(*this, [](auto& group) { group.struct_size = sizeof group; });
   camera.struct_size = sizeof camera;
-  sequence.playback.struct_size = sizeof sequence.playback;
   sampling.samples = 64;
   display.denoise = CUMULET_DENOISE_FAST;
+}
+
+cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row) {
+  cumulet_playback_desc desc = sequence.playback;
+  const std::uint32_t first = sequence.first ? row.index_of(*sequence.first) : 0;
+  const std::uint32_t last = sequence.last ? row.index_of(*sequence.last) : row.count() - 1;
+  desc.first_frame = std::min(first, last);
+  desc.frame_count = last - desc.first_frame + 1;
+  return desc;
 }
 
 cumulet_volume_file_desc volume_file(const VolumeFile& file) {

@@ -5,8 +5,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <frame_row.hpp>
+#include <frames.hpp>
 #include <optional>
 #include <ramp.hpp>
+#include <settings.hpp>
 #include <string>
 #include <vector>
 
@@ -30,6 +33,23 @@ struct VolumeFile {
   bool operator==(const VolumeFile&) const = default;
 };
 
+/// How a volume plays, where its file's name has a place for a frame's number (demo/sequence).
+struct SceneSequence {
+  cumulet_playback_desc playback{};         // but for its frames, which are those from...
+  std::optional<std::uint32_t> first = {};  // ...this one's number on: else from the first that is there...
+  std::optional<std::uint32_t> last = {};   // ...to this one's: else to the last
+  std::optional<Moment> frame = {};         // where it stands, as long as no clock says
+
+  SceneSequence() { playback.struct_size = sizeof playback; }
+  bool operator==(const SceneSequence& other) const {
+    return settings::same(playback, other.playback) && first == other.first && last == other.last &&
+           frame == other.frame;
+  }
+};
+
+/// As the library takes it, of these files.
+[[nodiscard]] cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row);
+
 /// A volume in a scene, as the library's own descriptors with struct_size set. Zero is the library's default, as there.
 struct SceneVolume : VolumeFile {
   std::string name;  // "": its file's
@@ -37,6 +57,7 @@ struct SceneVolume : VolumeFile {
   std::vector<std::array<double, 16>> places;  // where it then stands, once in each; none: there alone
   cumulet_medium_desc medium{};
   std::array<settings::RampPoints, settings::ramps.size()> ramps;  // as cumulet_ramp numbers them
+  SceneSequence sequence;                                          // where it is one
   bool auto_density_scale = true;  // medium.density_scale is the one that suits the volume, once one is loaded
 
   SceneVolume();
@@ -64,18 +85,9 @@ struct SceneModel {
   [[nodiscard]] std::string label() const;
 };
 
-/// How a scene's first volume plays, where its file's name has a place for a frame's number (demo/sequence).
-struct SceneSequence {
-  cumulet_playback_desc playback{};         // but for its frames, which are those from...
-  std::optional<std::uint32_t> first = {};  // ...this one's number on: else from the first that is there...
-  std::optional<std::uint32_t> last = {};   // ...to this one's: else to the last
-  std::optional<std::uint32_t> frame = {};  // where it stands
-};
-
 /// What every demo program can show. Its first volume is what flags and the demo's panel set, and may be none.
 struct SceneOptions : SceneVolume {
   std::vector<SceneVolume> others;   // beside the first; their max_bounces are 0: the first one's counts
-  SceneSequence sequence;            // of the first
   std::string surfaces;              // a glTF file; "": none
   std::string surface_variant;       // of the surfaces' materials, by name or number; "": none
   std::int32_t surface_camera = -1;  // of the surfaces' own; below 0: camera

@@ -93,9 +93,11 @@ std::optional<FramePattern> FramePattern::of_file(const std::string& path) {
   return zeros ? padded : plain;
 }
 
-std::string FramePattern::file(Frame frame) const {
-  const std::string number = std::to_string(frame);
-  return head_ + std::string(digits_ - std::min(digits_, number.size()), '0') + number + tail_;
+std::string FramePattern::file(Frame frame) const { return file(Moment(frame)); }
+
+std::string FramePattern::file(const Moment& moment) const {
+  const std::string number = std::to_string(moment.frame);
+  return head_ + std::string(digits_ - std::min(digits_, number.size()), '0') + number + moment.part_text() + tail_;
 }
 
 std::optional<Frame> FramePattern::frame_of(std::string_view path) const {

@@ -50,4 +50,23 @@ std::uint32_t FrameRow::index_of(Frame number) const {
   return std::min((number - first_ + step_ / 2) / step_, count_ - 1);
 }
 
+std::vector<std::string> FrameRow::by_size() const {
+  std::vector<std::pair<std::uintmax_t, std::string>> sized;
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(file(i), error);
+    sized.emplace_back(error ? 0 : size, file(i));
+  }
+  std::ranges::stable_sort(sized, [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::string> files;
+  for (auto& [size, name] : sized) files.push_back(std::move(name));
+  return files;
+}
+
+double FrameRow::position_of(const Moment& moment) const {
+  if (!moment.is_between()) return index_of(moment.frame);
+  const double from_first = double{moment.frame} - first_ + moment.thousandths / 1000.0;
+  return std::clamp(from_first / step_, 0.0, count_ - 1.0);
+}
+
 }  // namespace cumulet::demo

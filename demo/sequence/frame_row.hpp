@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "frame_pattern.hpp"
 #include "frames.hpp"
@@ -23,7 +24,11 @@ class FrameRow {
   [[nodiscard]] Frame number(std::uint32_t index) const { return first_ + index * step_; }
   /// The nearest.
   [[nodiscard]] std::uint32_t index_of(Frame number) const;
+  /// Between its frames, too: the third of 40, 42, 44 and what follows is at 1, and 41 at 0.5.
+  [[nodiscard]] double position_of(const Moment& moment) const;
   [[nodiscard]] std::string file(std::uint32_t index) const { return pattern_.file(number(index)); }
+  /// All, the largest file first; those that are not there last.
+  [[nodiscard]] std::vector<std::string> by_size() const;
   [[nodiscard]] const FramePattern& pattern() const { return pattern_; }
 
  private:

@@ -12,13 +12,34 @@ namespace {
   throw UsageError("'" + std::string(text) + "' " + why);
 }
 
-Frame parse_frame(std::string_view digits, std::string_view whole) {
-  Frame frame = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), frame);
-  const bool number = !digits.empty() && end == digits.data() + digits.size();
-  if (!number || error == std::errc::invalid_argument) refuse(whole, "is not a frame or a range, such as 5 or 1-100x2");
-  if (error != std::errc{} || frame > last_frame) refuse(whole, "goes beyond frame " + std::to_string(last_frame));
-  return frame;
+constexpr std::uint64_t whole = 1000;  // thousandths
+
+std::uint64_t parse_digits(std::string_view digits, std::string_view part) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  const bool is_number = !digits.empty() && end == digits.data() + digits.size();
+  if (!is_number || error == std::errc::invalid_argument)
+    refuse(part, "is not a frame or a range, such as 5, 1-100x2 or 1-10x0.5");
+  if (error != std::errc{} || number > last_frame) refuse(part, "goes beyond frame " + std::to_string(last_frame));
+  return number;
+}
+
+/// In thousandths.
+std::uint64_t parse_moment(std::string_view text, std::string_view part) {
+  const auto point = text.find('.');
+  std::uint64_t moment = whole * parse_digits(text.substr(0, point), part);
+  if (point == std::string_view::npos) return moment;
+  const std::string_view decimals = text.substr(point + 1);
+  if (decimals.size() > 3) refuse(part, "has more than three decimals");
+  std::uint64_t thousandths = parse_digits(decimals, part);
+  for (std::size_t i = decimals.size(); i < 3; ++i) thousandths *= 10;
+  moment += thousandths;
+  if (moment > whole * last_frame) refuse(part, "goes beyond frame " + std::to_string(last_frame));
+  return moment;
+}
+
+Moment moment_of(std::uint64_t thousandths) {
+  return {static_cast<Frame>(thousandths / whole), static_cast<std::uint32_t>(thousandths % whole)};
 }
 
 /// What stands before the character, and what behind it; all and nothing, where it is not.
@@ -30,9 +51,19 @@ std::pair<std::string_view, std::string_view> cut(std::string_view text, char at
 
 }  // namespace
 
-std::vector<Frame> parse_frames(std::string_view text) {
-  std::vector<Frame> frames;
-  std::unordered_set<Frame> known;
+std::string Moment::part_text() const {
+  if (!is_between()) return "";
+  std::string digits = std::to_string(whole + thousandths);
+  digits.front() = '.';
+  while (digits.back() == '0') digits.pop_back();
+  return digits;
+}
+
+std::string Moment::text() const { return std::to_string(frame) + part_text(); }
+
+std::vector<Moment> parse_frames(std::string_view text) {
+  std::vector<Moment> moments;
+  std::unordered_set<std::uint64_t> known;
   for (bool more = true; more;) {
     const auto comma = text.find(',');
     const std::string_view part = text.substr(0, comma);
@@ -44,27 +75,30 @@ std::vector<Frame> parse_frames(std::string_view text) {
     const bool ranges = range.find('-') != std::string_view::npos;
     const auto [first_text, last_text] = cut(range, '-');
     if (steps && !ranges) refuse(part, "has a step, but is no range");
-    const Frame first = parse_frame(first_text, part);
-    const Frame last = ranges ? parse_frame(last_text, part) : first;
-    const Frame step = steps ? parse_frame(step_text, part) : 1;
+    const std::uint64_t first = parse_moment(first_text, part);
+    const std::uint64_t last = ranges ? parse_moment(last_text, part) : first;
+    const std::uint64_t step = steps ? parse_moment(step_text, part) : whole;
     if (last < first) refuse(part, "runs backwards");
     if (step == 0) refuse(part, "has a step of 0");
-    for (Frame frame = first; frame <= last; frame += step)
-      if (known.insert(frame).second) frames.push_back(frame);
+    for (std::uint64_t moment = first; moment <= last; moment += step)
+      if (known.insert(moment).second) moments.push_back(moment_of(moment));
   }
-  return frames;
+  return moments;
 }
 
-std::string frames_text(const std::vector<Frame>& frames) {
-  std::vector<Frame> sorted = frames;
+std::string frames_text(const std::vector<Moment>& moments) {
+  std::vector<Moment> sorted = moments;
   std::ranges::sort(sorted);
   std::string text;
+  const auto follows = [&](std::size_t i) {
+    return !sorted[i].is_between() && !sorted[i - 1].is_between() && sorted[i].frame == sorted[i - 1].frame + 1;
+  };
   for (std::size_t i = 0; i < sorted.size();) {
     std::size_t end = i + 1;
-    while (end < sorted.size() && sorted[end] == sorted[end - 1] + 1) ++end;
+    while (end < sorted.size() && follows(end)) ++end;
     if (!text.empty()) text += ", ";
-    text += std::to_string(sorted[i]);
-    if (end - i > 1) text += (end - i > 2 ? "-" : ", ") + std::to_string(sorted[end - 1]);
+    text += sorted[i].text();
+    if (end - i > 1) text += (end - i > 2 ? "-" : ", ") + sorted[end - 1].text();
     i = end;
   }
   return text;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -13,11 +14,26 @@ using Frame = std::uint32_t;
 /// The largest that there is.
 inline constexpr Frame last_frame = 9'999'999;
 
-/// "5", "1-100", "1-100x2" (1, 3, 5, ... up to 100) and several of them between commas, in the order they are named in,
-/// each frame once. Throws UsageError, which quotes what it cannot read.
-[[nodiscard]] std::vector<Frame> parse_frames(std::string_view text);
+/// A frame, or what is so many thousandths of the way from it to the next.
+struct Moment {
+  Frame frame = 0;
+  std::uint32_t thousandths = 0;  // below 1000
 
-/// The same in few words, of frames in any order: "1-3, 7, 10-20".
-[[nodiscard]] std::string frames_text(const std::vector<Frame>& frames);
+  constexpr Moment() = default;
+  constexpr Moment(Frame whole, std::uint32_t part = 0) : frame(whole), thousandths(part) {}
+  auto operator<=>(const Moment&) const = default;
+  [[nodiscard]] bool is_between() const { return thousandths != 0; }
+  /// "5", "5.25".
+  [[nodiscard]] std::string text() const;
+  /// ".25"; "" of a frame.
+  [[nodiscard]] std::string part_text() const;
+};
+
+/// "5", "1-100", "1-100x2" (1, 3, 5, ... up to 100), "1-2x0.25" (1, 1.25, ... 2; three decimals at most) and several of
+/// them between commas, in the order they are named in, each once. Throws UsageError, which quotes what it cannot read.
+[[nodiscard]] std::vector<Moment> parse_frames(std::string_view text);
+
+/// The same in few words, of moments in any order: "1-3, 7, 10-20, 20.5".
+[[nodiscard]] std::string frames_text(const std::vector<Moment>& moments);
 
 }  // namespace cumulet::demo

@@ -172,7 +172,7 @@ void Progressive::start(std::uint32_t divisor, const MarchData& data, const Obst
                   divisor,
                   scene_met(obstacles),
                   wish_.content.environment,
-                  wish_.frame,
+                  wish_.frames,
                   wishes_,
                   scenes_};
   answer_seconds_ = 0.0;

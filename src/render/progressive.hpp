@@ -48,13 +48,13 @@ struct PictureWish {
     [[nodiscard]] bool shows_same(const Content& other) const;
   };
   Content content;
-  PictureParameters parameters;               // of the content, at full resolution
-  std::optional<scene::SequenceFrame> frame;  // that the data are of
-  std::uint32_t samples = 1;                  // a pixel
-  std::optional<double> noise_target;         // at full resolution: enough, whatever the samples
-  bool depth = false;                         // find the volume's depth at half opacity as well
-  bool guides = false;                        // and facts of pixels, for a filter
-  bool held = false;                          // a hand is at what changes it: another change is likely
+  PictureParameters parameters;        // of the content, at full resolution
+  scene::SequenceFrames frames;        // that the data are of
+  std::uint32_t samples = 1;           // a pixel
+  std::optional<double> noise_target;  // at full resolution: enough, whatever the samples
+  bool depth = false;                  // find the volume's depth at half opacity as well
+  bool guides = false;                 // and facts of pixels, for a filter
+  bool held = false;                   // a hand is at what changes it: another change is likely
 };
 
 /// Keeps the newest whole picture to show while the next is under way: after a change a coarse one that fits the time
@@ -83,10 +83,8 @@ class Progressive {
   [[nodiscard]] Picture* shown() const { return shown_ ? shown_->picture : nullptr; }
   /// The same for all pictures of what was wished when it was begun.
   [[nodiscard]] std::uint64_t shown_wish() const { return shown_ ? shown_->wish : 0; }
-  /// Of a sequence, the frame that it shows.
-  [[nodiscard]] std::optional<scene::SequenceFrame> shown_frame() const {
-    return shown_ ? shown_->frame : std::nullopt;
-  }
+  /// Of sequences, the frames that it shows.
+  [[nodiscard]] scene::SequenceFrames shown_frames() const { return shown_ ? shown_->frames : scene::SequenceFrames(); }
   /// The same for all pictures of the same scene, from wherever.
   [[nodiscard]] std::uint64_t shown_scene() const { return shown_ ? shown_->scenes : 0; }
   /// What was shown before, where that may have pixels without a sample; else null.
@@ -136,7 +134,7 @@ class Progressive {
     std::uint32_t divisor = 1;              // of the resolution
     std::shared_ptr<const void> scene;      // PlacedModels::numbering() of the triangles that its paths meet
     Revision<EnvironmentData> environment;  // that they escape to
-    std::optional<scene::SequenceFrame> frame;
+    scene::SequenceFrames frames;
     std::uint64_t wish = 0;    // that it is of
     std::uint64_t scenes = 0;  // that there had been
   };

@@ -41,24 +41,32 @@ double time_of(const Playback& playback, double position) {
   return playback.offset_seconds + (position - playback.first) / playback.frames_per_second;
 }
 
+std::uint32_t step_of(const Playback& playback, const Moment& moment) {
+  const double x = at_whole(moment.position * playback.steps);
+  const auto step = static_cast<std::uint32_t>(std::max(0.0, moment.forward ? std::floor(x) : std::ceil(x)));
+  const std::uint32_t last = (playback.first + playback.count - 1) * playback.steps;
+  const bool around = playback.repeat == Repeat::loop && step > last && step < last + playback.steps;
+  return around ? last : step;
+}
+
 std::vector<std::uint32_t> upcoming(const Playback& playback, const Moment& moment, bool forward) {
-  const std::int64_t now = moment.frame();
-  const std::int64_t first = playback.first;
-  const std::int64_t last = first + playback.count - 1;
+  const std::int64_t now = step_of(playback, moment);
+  const std::int64_t first = std::int64_t{playback.first} * playback.steps;
+  const std::int64_t last = first + std::int64_t{playback.count - 1} * playback.steps;
   std::vector<std::uint32_t> order;
-  std::vector<bool> known(playback.count);
-  const auto add = [&](std::int64_t frame) {
-    if (frame < first || frame > last || known[static_cast<std::size_t>(frame - first)]) return;
-    known[static_cast<std::size_t>(frame - first)] = true;
-    order.push_back(static_cast<std::uint32_t>(frame));
+  std::vector<bool> known(static_cast<std::size_t>(last - first + 1));
+  const auto add = [&](std::int64_t step) {
+    if (step < first || step > last || known[static_cast<std::size_t>(step - first)]) return;
+    known[static_cast<std::size_t>(step - first)] = true;
+    order.push_back(static_cast<std::uint32_t>(step));
   };
   const auto run = [&](std::int64_t from, std::int64_t to) {
-    const std::int64_t step = from <= to ? 1 : -1;
-    for (std::int64_t frame = from; frame != to + step; frame += step) add(frame);
+    const std::int64_t by = from <= to ? 1 : -1;
+    for (std::int64_t step = from; step != to + by; step += by) add(step);
   };
   // From outside it goes on at the nearer end.
   const std::int64_t begin = std::clamp(now, first, last);
-  if (now != begin) order.push_back(moment.frame());
+  if (now != begin) order.push_back(static_cast<std::uint32_t>(now));
   const bool ascending = moment.forward == forward;
   run(begin, ascending ? last : first);
   if (playback.repeat == Repeat::loop) run(ascending ? first : last, begin);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
@@ -61,8 +62,15 @@ struct SequenceFrame {
   std::uint64_t number = 0;
   std::uint64_t sequence = 0;  ///< another each time that one is set
   std::uint64_t taken = 0;     ///< another for each source
+  double part = 0.0;           ///< of the way to the next frame
   bool operator==(const SequenceFrame&) const = default;
 };
+
+/// All that a picture is of, each once.
+using SequenceFrames = std::vector<SequenceFrame>;
+[[nodiscard]] inline bool holds(const SequenceFrames& frames, const SequenceFrame& frame) {
+  return std::ranges::find(frames, frame) != frames.end();
+}
 
 /// A lattice in the world that its source has, which stands at its place. Units of length are those of the scene,
 /// whatever a place stretches: extinction and emission are a unit there.

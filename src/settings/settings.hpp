@@ -46,6 +46,11 @@ inline constexpr std::array repeat_choices = {
     Choice{"hold", CUMULET_REPEAT_HOLD, "Hold", "The first and the last frame stay."},
     Choice{"loop", CUMULET_REPEAT_LOOP, "Loop", "After the last frame the first."},
     Choice{"ping-pong", CUMULET_REPEAT_PING_PONG, "Ping-pong", "Back, and forth again."}};
+inline constexpr std::array between_choices = {
+    Choice{"none", CUMULET_BETWEEN_NONE, "Nothing", "The frame that came last stays until the next."},
+    Choice{"blend", CUMULET_BETWEEN_BLEND, "Blended", "A frame fades into the next."},
+    Choice{"advect", CUMULET_BETWEEN_ADVECT, "Advected",
+           "Frames move along their velocity; those without fade into the next."}};
 inline constexpr std::array view_choices = {
     Choice{"shaded", CUMULET_VIEW_SHADED, "Shaded", "The path-traced picture."},
     Choice{"cells", CUMULET_VIEW_CELLS, "Cells", "The cells on a cut through the middle, coloured by level."},
@@ -517,7 +522,22 @@ struct Table<cumulet_playback_desc> {
         .key = "sequence.repeat",
         .row = {.label = "Repeat", .tip = "What follows the last frame."}}),
       Setting(&Desc::first_frame, {.name = "first_frame"}),
-      Setting(&Desc::frame_count, {.name = "frame_count"})};
+      Setting(&Desc::frame_count, {.name = "frame_count"}),
+      Setting(&Desc::between, {.name = "between", .choices = between_choices,
+        .key = "sequence.between", .flag = "--between",
+        .help = "What --frames 1-10x0.5 makes between two frames (default: advect)",
+        .row = {.label = "In between", .tip = "What is shown between two frames."}}),
+      Setting(&Desc::subframes, {.name = "subframes", .given = Range{1.0, 1000.0}, .zero = 4.0,
+        .key = "sequence.subframes",
+        .row = {.label = "Sub-frames",
+                .tip = "From a frame to the next: each is made, and kept, as frames are.",
+                .least = 1.0, .most = 32.0}}),
+      Setting(&Desc::velocity_scale, {.name = "velocity_scale", .range = {-1e6, 1e6}, .zero = 1.0,
+        .key = "sequence.velocity_scale", .flag = "--velocity-scale", .type = "K",
+        .help = "By which velocities are multiplied between frames (default: 1: units a second)",
+        .row = {.label = "Velocity x",
+                .tip = "Of what moves between frames: another where a file's velocities are not units a second.",
+                .least = -4.0, .most = 4.0, .format = "%.3g"}})};
 };
 
 template <>

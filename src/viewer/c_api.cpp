@@ -203,26 +203,36 @@ cumulet_status cumulet_set_sequence(cumulet_viewer* viewer, cumulet_sequence* se
   return guarded(viewer, [&](core::Viewer& v) { v.set_sequence(sequence == nullptr ? nullptr : sequence->asset); });
 }
 
+namespace {
+
+void tell_sequence(const core::Viewer::SequenceStatus& status, cumulet_sequence_info* info, uint8_t* states,
+                   size_t count) {
+  const auto& frames = status.frames.frames;
+  if (states != nullptr && count < frames.size())
+    refuse("the sequence has " + std::to_string(frames.size()) + " frames");
+  cumulet_sequence_info out{};
+  out.frames = static_cast<uint32_t>(frames.size());
+  out.ready_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::ready));
+  out.failed_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::failed));
+  out.asked_frame = status.asked;
+  out.drawn_frame = static_cast<uint32_t>(status.drawn.value_or(0.0));
+  out.is_drawn = status.drawn ? 1 : 0;
+  out.bytes = status.frames.bytes;
+  out.suggested_density_scale = status.density_scale.value_or(0.0);
+  out.asked_position = status.asked_position;
+  out.drawn_position = status.drawn.value_or(0.0);
+  write_desc(info, out, "cumulet_sequence_info");
+  if (states == nullptr) return;
+  std::ranges::transform(frames, states, [](core::FrameShelf::State state) { return static_cast<uint8_t>(state); });
+}
+
+}  // namespace
+
 cumulet_status cumulet_get_sequence_info(cumulet_viewer* viewer, cumulet_sequence_info* info, uint8_t* states,
                                          size_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     read_desc(info, "cumulet_sequence_info");
-    const core::Viewer::SequenceStatus status = v.sequence();
-    const auto& frames = status.frames.frames;
-    if (states != nullptr && count < frames.size())
-      refuse("the sequence has " + std::to_string(frames.size()) + " frames");
-    cumulet_sequence_info out{};
-    out.frames = static_cast<uint32_t>(frames.size());
-    out.ready_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::ready));
-    out.failed_frames = static_cast<uint32_t>(std::ranges::count(frames, core::FrameShelf::State::failed));
-    out.asked_frame = status.asked;
-    out.drawn_frame = static_cast<uint32_t>(status.drawn.value_or(0));
-    out.is_drawn = status.drawn ? 1 : 0;
-    out.bytes = status.frames.bytes;
-    out.suggested_density_scale = status.density_scale.value_or(0.0);
-    write_desc(info, out, "cumulet_sequence_info");
-    if (states == nullptr) return;
-    std::ranges::transform(frames, states, [](core::FrameShelf::State state) { return static_cast<uint8_t>(state); });
+    tell_sequence(v.sequence(), info, states, count);
   });
 }
 
@@ -230,6 +240,25 @@ cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame
   return guarded(viewer, [&](core::Viewer& v) {
     require(cause != nullptr && size > 0, "there is no room for the cause");
     const std::optional<cumulet::Error> failure = v.frame_failure(frame);
+    copy_text(failure ? failure->what() : "", cause, size);
+  });
+}
+
+cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* viewer, cumulet_instance* instance,
+                                                  cumulet_sequence_info* info, uint8_t* states, size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(instance != nullptr, "the instance is NULL");
+    read_desc(info, "cumulet_sequence_info");
+    tell_sequence(v.sequence(*instance->asset), info, states, count);
+  });
+}
+
+cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumulet_instance* instance, uint32_t frame,
+                                                   char* cause, size_t size) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(instance != nullptr, "the instance is NULL");
+    require(cause != nullptr && size > 0, "there is no room for the cause");
+    const std::optional<cumulet::Error> failure = v.frame_failure(*instance->asset, frame);
     copy_text(failure ? failure->what() : "", cause, size);
   });
 }

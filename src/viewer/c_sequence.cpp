@@ -16,8 +16,10 @@ using cumulet::viewer::Sequence;
 using cumulet::viewer::SequenceState;
 
 constexpr std::uint64_t most_frames = 1'000'000;
+constexpr std::uint32_t most_subframes = 1000;
 constexpr std::uint64_t default_memory = std::uint64_t{2} << 30U;
 constexpr double most_seconds = 1e9;
+constexpr std::uint64_t most_steps = 4'000'000;
 
 Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   const cumulet_playback_desc d = read_settings(desc);
@@ -25,8 +27,18 @@ Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   if (d.first_frame >= frames) refuse("the sequence has no frame " + there(d.first_frame));
   const std::uint32_t rest = frames - d.first_frame;
   if (d.frame_count > rest) refuse("the sequence has fewer frames from " + there(d.first_frame));
-  return {d.frames_per_second, d.offset_seconds, static_cast<cumulet::scene::Repeat>(d.repeat), d.first_frame,
-          d.frame_count == 0 ? rest : d.frame_count};
+  const bool steps = d.between != CUMULET_BETWEEN_NONE;
+  require(d.subframes <= most_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
+  if (steps && std::uint64_t{frames} * d.subframes > most_steps)
+    refuse("cumulet_playback_desc.subframes makes more than 4000000 of " + std::to_string(frames) + " frames");
+  return {.frames_per_second = d.frames_per_second,
+          .offset_seconds = d.offset_seconds,
+          .repeat = static_cast<cumulet::scene::Repeat>(d.repeat),
+          .first = d.first_frame,
+          .count = d.frame_count == 0 ? rest : d.frame_count,
+          .between = static_cast<cumulet::scene::Between>(d.between),
+          .steps = steps ? d.subframes : 1,
+          .velocity_scale = d.velocity_scale};
 }
 
 Playback default_playback(std::uint32_t frames) {

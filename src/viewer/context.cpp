@@ -112,16 +112,17 @@ void Context::take_host_depth(const Shot& shot, const Frame& frame) {
   }
 }
 
-std::optional<scene::SequenceFrame> Context::uploaded_frame() const {
+scene::SequenceFrames Context::uploaded_frames() const {
+  scene::SequenceFrames frames;
   for (const scene::Volume& volume : scene_.volumes()) {
-    if (volume.frame) return volume.frame;
+    if (volume.frame && !scene::holds(frames, *volume.frame)) frames.push_back(*volume.frame);
   }
-  return std::nullopt;
+  return frames;
 }
 
 bool Context::owes(const scene::SequenceFrame& frame) const {
-  if (shown_frame() == frame) return false;
-  return uploaded_frame() == frame ? progressive_.owes_picture() : scene_.uploading_volumes();
+  if (scene::holds(shown_frames(), frame)) return false;
+  return scene::holds(uploaded_frames(), frame) ? progressive_.owes_picture() : scene_.uploading_volumes();
 }
 
 render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const render::Obstacles& met) const {
@@ -138,7 +139,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
     volume.source = nullptr;
     volume.frame.reset();
   }
-  wish.frame = uploaded_frame();
+  wish.frames = uploaded_frames();
   wish.content.data = scene_.data_revision();
   wish.content.instances = scene_.instances_revision();
   wish.content.model = scene_.model_revision();

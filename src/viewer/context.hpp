@@ -85,8 +85,8 @@ class Context {
   void draw(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Goes on with what a frame that draws will show.
   void denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown);
-  /// Of a sequence, the frame that is drawn.
-  [[nodiscard]] std::optional<scene::SequenceFrame> shown_frame() const { return progressive_.shown_frame(); }
+  /// Of sequences, the frames that are drawn.
+  [[nodiscard]] scene::SequenceFrames shown_frames() const { return progressive_.shown_frames(); }
   /// Whether that frame, which was uploaded last, or is being uploaded, is still to be seen, and will be.
   [[nodiscard]] bool owes(const scene::SequenceFrame& frame) const;
   /// What is known after the frame.
@@ -156,7 +156,7 @@ class Context {
   };
 
   // Of what has been uploaded.
-  [[nodiscard]] std::optional<scene::SequenceFrame> uploaded_frame() const;
+  [[nodiscard]] scene::SequenceFrames uploaded_frames() const;
   // Whether there is a target of any size.
   [[nodiscard]] static bool draws(const Shot& shot, const Frame& frame);
   [[nodiscard]] render::Obstacles obstacles(const Shot& shot);

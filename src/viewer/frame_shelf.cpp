@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "viewer/stopwatch.hpp"
+#include "volume/between.hpp"
 
 namespace cumulet::viewer {
 
@@ -44,10 +45,14 @@ void FrameShelf::wish(Wish wish) {
     const std::scoped_lock lock(mutex_);
     if (!is_wished(wish.files)) {
       worker_.cancel();
-      old = std::exchange(shelf_, std::vector<Shelved>(wish.files->count()));
+      const std::size_t steps = std::size_t{wish.files->count() - 1} * wish.steps.a_frame + 1;
+      old = std::exchange(shelf_, std::vector<Shelved>(steps));
       judging_ = Judging::due;
       judged_.reset();
       said_.clear();
+    } else if (wish.steps != wish_->steps) {
+      worker_.cancel();
+      old = take_other_steps(wish.steps);
     }
     const bool suggested = wish.files->shown.suggested_density_scale;
     if (suggested && judged_ && judged_->density_scale && wish.settings)
@@ -108,12 +113,14 @@ std::optional<FrameShelf::Ready> FrameShelf::nearest() const {
   const auto wanted = first();
   const std::int64_t target = wanted.value_or(wish_->order.front());
   std::optional<std::uint32_t> found;
-  const auto away = [&](std::uint32_t frame) { return std::abs(frame - target); };
-  for (std::uint32_t frame = 0; frame < shelf_.size(); ++frame) {
-    if (shelf_[frame].built && (!found || away(frame) < away(*found))) found = frame;
+  const auto away = [&](std::uint32_t step) { return std::abs(step - target); };
+  for (std::uint32_t step = 0; step < shelf_.size(); ++step) {
+    if (shelf_[step].built && (!found || away(step) < away(*found))) found = step;
   }
   if (!found) return std::nullopt;
-  Ready ready{*found, *shelf_[*found].built, found == wanted && is_ready(shelf_[*found])};
+  const Steps& steps = wish_->steps;
+  Ready ready{steps.frame(*found), steps.part(*found), *shelf_[*found].built,
+              found == wanted && is_ready(shelf_[*found])};
   ready.built.volume = shelf_[*found].volume;
   return ready;
 }
@@ -121,8 +128,10 @@ std::optional<FrameShelf::Ready> FrameShelf::nearest() const {
 FrameShelf::Status FrameShelf::frames() const {
   const std::scoped_lock lock(mutex_);
   Status status;
-  for (const Shelved& shelved : shelf_) {
-    status.frames.push_back(shelved.failure ? State::failed : is_ready(shelved) ? State::ready : State::waiting);
+  for (std::uint32_t step = 0; step < shelf_.size(); ++step) {
+    const Shelved& shelved = shelf_[step];
+    if (!wish_->steps.is_between(step))
+      status.frames.push_back(shelved.failure ? State::failed : is_ready(shelved) ? State::ready : State::waiting);
     status.bytes += (shelved.built ? shelved.grid_bytes : 0) + (shelved.volume ? shelved.volume_bytes : 0);
   }
   return status;
@@ -130,7 +139,7 @@ FrameShelf::Status FrameShelf::frames() const {
 
 std::optional<Error> FrameShelf::failure_of(std::uint32_t frame) const {
   const std::scoped_lock lock(mutex_);
-  return frame < shelf_.size() ? shelf_[frame].failure : std::nullopt;
+  return wish_ && frame < wish_->files->count() ? own(frame).failure : std::nullopt;
 }
 
 bool FrameShelf::busy() const {
@@ -146,7 +155,7 @@ Worker::Status FrameShelf::status() const {
   status.failure.reset();
   if (!wish_) return status;
   if (is_judged() && !first()) {
-    status.failure = shelf_[wish_->order.front()].failure;
+    status.failure = own(wish_->steps.frame(wish_->order.front())).failure;
   } else if (work.failure && work.failure->code() != ErrorCode::cancelled) {
     status.failure = work.failure;  // of no file's: what there was to build is not
   }
@@ -183,16 +192,31 @@ bool FrameShelf::is_ready(const Shelved& shelved) const {
   return shelved.built && !shelved.stale && wish_->settings && suits(shelved.built->settings, *wish_->settings);
 }
 
+bool FrameShelf::is_possible(std::uint32_t step) const {
+  const Steps& steps = wish_->steps;
+  const std::uint32_t frame = steps.frame(step);
+  if (shelf_[step].failure || own(frame).failure) return false;
+  return !steps.is_between(step) || !own(frame + 1).failure;
+}
+
 std::vector<std::optional<std::uint32_t>> FrameShelf::stand_ins() const {
   std::vector<std::optional<std::uint32_t>> of(shelf_.size());
-  const auto good = std::ranges::find_if(shelf_, [](const Shelved& shelved) { return !shelved.failure; });
-  if (good == shelf_.end()) return of;
-  auto last = static_cast<std::uint32_t>(good - shelf_.begin());
-  for (std::uint32_t frame = 0; frame < shelf_.size(); ++frame) {
-    if (!shelf_[frame].failure) last = frame;
-    of[frame] = last;
+  std::uint32_t last = 0;
+  while (last < shelf_.size() && shelf_[last].failure) last += wish_->steps.a_frame;
+  if (last >= shelf_.size()) return of;
+  for (std::uint32_t step = 0; step < shelf_.size(); ++step) {
+    const bool possible = is_possible(step);
+    if (possible && !wish_->steps.is_between(step)) last = step;
+    of[step] = possible ? step : last;
   }
   return of;
+}
+
+std::vector<FrameShelf::Shelved> FrameShelf::take_other_steps(const Steps& steps) {
+  std::vector<Shelved> other(std::size_t{wish_->files->count() - 1} * steps.a_frame + 1);
+  for (std::uint32_t frame = 0; frame < wish_->files->count(); ++frame)
+    std::swap(other[std::size_t{frame} * steps.a_frame], own(frame));
+  return std::exchange(shelf_, std::move(other));
 }
 
 std::vector<std::uint32_t> FrameShelf::kept() const {
@@ -272,8 +296,9 @@ std::vector<FrameShelf::Shelved> FrameShelf::take_excess() {
 // ---- on the worker ----
 
 void FrameShelf::work(Progress& progress) {
+  std::optional<Ends> ends;
   for (;;) {
-    std::optional<Which> frame;
+    std::optional<Which> step;
     BuildSettings settings;
     FrameFilesPtr to_judge;
     {
@@ -282,7 +307,7 @@ void FrameShelf::work(Progress& progress) {
       if (judging_ == Judging::due) {
         to_judge = wish_->files;
       } else if (const auto found = next()) {
-        frame = Which{wish_->files, *found};
+        step = Which{wish_->files, wish_->steps, *found};
         settings = *wish_->settings;
       } else {
         return;
@@ -293,7 +318,7 @@ void FrameShelf::work(Progress& progress) {
       if (to_judge) {
         judge(to_judge, progress);
       } else {
-        build(*frame, settings, progress);
+        build(*step, settings, ends, progress);
       }
     });
     tell();
@@ -312,12 +337,13 @@ Log FrameShelf::log_of(const std::string& path) {
   });
 }
 
-void FrameShelf::fail(const Which& which, const Error& failure, const Progress& progress) {
+void FrameShelf::fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure,
+                      const Progress& progress) {
   {
     const std::scoped_lock lock(mutex_);
     progress.check();  // who wants it anew asks under the lock, too
-    if (!is_wished(which.files)) return;
-    shelf_[which.frame].failure = failure;
+    if (!is_wished(which)) return;
+    (frame ? own(*frame) : shelf_[which.step]).failure = failure;
     ++revision_;
   }
   log_.warning(std::string(failure.what()) + ": another frame of the sequence is shown instead");
@@ -325,6 +351,12 @@ void FrameShelf::fail(const Which& which, const Error& failure, const Progress& 
 
 void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
   Judged judged;
+  Steps steps;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!is_wished(files)) return;
+    steps = wish_->steps;
+  }
   const auto end = [&](Judging how) {
     const std::scoped_lock lock(mutex_);
     if (!is_wished(files)) return;
@@ -347,15 +379,15 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
         {
           const std::scoped_lock lock(mutex_);
           if (!is_wished(files)) throw Error(ErrorCode::cancelled, "cancelled");
-          shelf_[frame].volume = volume;
-          shelf_[frame].volume_bytes = bytes;
+          own(frame).volume = volume;
+          own(frame).volume_bytes = bytes;
         }
         if (!judged.facts || !volume->empty()) judged.facts = volume->facts();
         if (!volume->empty()) break;
       } catch (...) {
         const Error failure = caught(what);
         if (failure.code() == ErrorCode::cancelled) throw Error(failure);
-        fail({files, frame}, failure, progress);
+        fail({files, steps, 0}, frame, failure, progress);
       }
     }
     if (judged.facts) judged.density_scale = judged.facts->coarse.suggest_density_scale();
@@ -366,25 +398,76 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
   end(judged.facts ? Judging::done : Judging::in_vain);
 }
 
-void FrameShelf::build(const Which& which, const BuildSettings& settings, Progress& progress) {
-  const VolumeFile file = which.files->file(which.frame);
-  const Trace::Span span(trace_, file.path);
-  const Log log = log_of(file.path);
+VolumeAssetPtr FrameShelf::read_frame(const Which& which, std::uint32_t frame, Progress& progress) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_wished(which) && own(frame).volume) return own(frame).volume;
+  }
+  const VolumeFile file = which.files->file(frame);
+  progress.begin(Progress::Stage::loading);
+  VolumeAssetPtr volume = file.read(log_of(file.path), &progress);
+  const std::uint64_t bytes = volume->bytes();
+  std::vector<Shelved> old;
+  const std::scoped_lock lock(mutex_);
+  progress.check();
+  if (is_wished(which)) {
+    own(frame).volume = volume;
+    own(frame).volume_bytes = bytes;
+    old = take_excess();
+  }
+  return volume;
+}
+
+VolumeAssetPtr FrameShelf::read(const Which& which, std::optional<Ends>& ends, std::optional<std::uint32_t>& reading,
+                                Progress& progress) {
+  const auto frame_there = [&](std::uint32_t frame) {
+    reading = frame;
+    return read_frame(which, frame, progress);
+  };
+  const std::uint32_t frame = which.steps.frame(which.step);
+  if (!which.steps.is_between(which.step)) return frame_there(frame);
+  if (!ends || ends->files != which.files || ends->frame != frame) {
+    // One that was the end before is the beginning now.
+    VolumeAssetPtr before;
+    if (ends && ends->files == which.files && ends->frame + 1 == frame) before = ends->after;
+    ends.reset();
+    if (!before) before = frame_there(frame);
+    VolumeAssetPtr after = frame_there(frame + 1);
+    ends = Ends{which.files, frame, std::move(before), std::move(after)};
+  }
+  reading.reset();
+  {
+    const std::scoped_lock lock(mutex_);
+    if (is_wished(which) && shelf_[which.step].volume) return shelf_[which.step].volume;
+  }
+  progress.begin(Progress::Stage::loading);
+  const double part = which.steps.part(which.step);
+  const volume::VolumeFrame& before = ends->before->frame();
+  const volume::VolumeFrame& after = ends->after->frame();
+  try {
+    return std::make_shared<const VolumeAsset>(
+        which.steps.between == scene::Between::advect
+            ? volume::between(before, after, part, which.steps.seconds, &progress)
+            : volume::blend(before, after, part, &progress),
+        &progress);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::cancelled) throw;
+    throw Error(error.code(), which.files->paths[frame] + ": what follows it cannot be made: " + error.what());
+  }
+}
+
+void FrameShelf::build(const Which& which, const BuildSettings& settings, std::optional<Ends>& ends,
+                       Progress& progress) {
+  const std::string& path = which.files->paths[which.steps.frame(which.step)];
+  const Trace::Span span(trace_, path);
   Shelved made;
   std::optional<Error> failure;
+  std::optional<std::uint32_t> reading;
   try {
-    {
-      const std::scoped_lock lock(mutex_);
-      if (is_wished(which.files)) made.volume = shelf_[which.frame].volume;
-    }
     Stopwatch watch;
-    double load_seconds = 0.0;
-    if (!made.volume) {
-      progress.begin(Progress::Stage::loading);
-      made.volume = file.read(log, &progress);
-      load_seconds = watch.lap();
-    }
-    made.built = build_grid(log, made.volume, settings, progress, *allowance_);
+    made.volume = read(which, ends, reading, progress);
+    const double load_seconds = watch.lap();
+    made.built = build_grid(log_of(path), made.volume, settings, progress, *allowance_);
     made.built->seconds.load = load_seconds;
     made.built->volume = nullptr;
     made.grid_bytes = made.built->source->bytes();
@@ -395,13 +478,13 @@ void FrameShelf::build(const Which& which, const BuildSettings& settings, Progre
   }
   const bool cancelled = failure && failure->code() == ErrorCode::cancelled;
   // First: nobody begins it again in between.
-  if (failure && !cancelled) fail(which, *failure, progress);
+  if (failure && !cancelled) fail(which, reading, *failure, progress);
   std::vector<Shelved> old;
   {
     const std::scoped_lock lock(mutex_);
     if (!failure) progress.check();
-    if (!failure && is_wished(which.files)) {
-      old.push_back(std::exchange(shelf_[which.frame], std::move(made)));
+    if (!failure && is_wished(which)) {
+      old.push_back(std::exchange(shelf_[which.step], std::move(made)));
       ++revision_;
       std::ranges::move(take_excess(), std::back_inserter(old));
     }

@@ -20,16 +20,38 @@ namespace cumulet::viewer {
 /// Grids of a sequence's frames, read and built ahead on a thread of its own, as many as fit a memory: those that come
 /// soonest. All calls are safe from any thread; none waits for a frame but wait().
 ///
+/// What there is between two frames is of the shelf, too: a frame has so many steps, of which the first is the file's
+/// own, and the others are made of both files. Where one of these cannot be, the frame before stands in.
+///
 /// First it judges the sequence by the largest file that can be read and shows something: what cameras and grounds go
 /// by, and the density scale that all frames have, so that nothing jumps. Frames that cannot be read are told once, and
 /// the nearest earlier one that can stands in for them; without one, the nearest later.
 class FrameShelf {
  public:
+  struct Steps {
+    scene::Between between = scene::Between::none;
+    std::uint32_t a_frame = 1;  ///< 1 where there is nothing between
+    double seconds = 0.0;       ///< from a frame to the next, of their velocities
+    bool operator==(const Steps&) const = default;
+
+    /// Of a playback.
+    static Steps of(const scene::Playback& playback) {
+      const bool moves = playback.between == scene::Between::advect;
+      const double seconds = moves ? playback.velocity_scale / playback.frames_per_second : 0.0;
+      return {playback.between, playback.steps, seconds};
+    }
+    [[nodiscard]] std::uint32_t frame(std::uint32_t step) const { return step / a_frame; }
+    [[nodiscard]] bool is_between(std::uint32_t step) const { return step % a_frame != 0; }
+    /// How far it is from its frame to the next.
+    [[nodiscard]] double part(std::uint32_t step) const { return static_cast<double>(step % a_frame) / a_frame; }
+    [[nodiscard]] double position(std::uint32_t step) const { return frame(step) + part(step); }
+  };
   struct Wish {
     FrameFilesPtr files;
-    std::vector<std::uint32_t> order;       ///< frames that are needed, the soonest first; one at least, each once
+    std::vector<std::uint32_t> order;       ///< steps that are needed, the soonest first; one at least, each once
     std::optional<BuildSettings> settings;  ///< none yet: the sequence is judged, and nothing is built
-    std::uint64_t memory_bytes = 0;         ///< of main memory; the first frame is there at any
+    std::uint64_t memory_bytes = 0;         ///< of main memory; the first is there at any
+    Steps steps = {};
   };
 
   /// What the whole sequence goes by.
@@ -40,14 +62,15 @@ class FrameShelf {
 
   struct Ready {
     std::uint32_t frame = 0;
+    double part = 0.0;   ///< of the way to the next
     Built built;         ///< its volume is null where there was no memory for voxels
-    bool wanted = true;  ///< nothing better comes: it is the frame, or stands in for it, as it is to be
+    bool wanted = true;  ///< nothing better comes: it is the step, or stands in for it, as it is to be
   };
 
   enum class State { waiting = 0, ready = 1, failed = 2 };
   struct Status {
-    std::vector<State> frames;
-    std::uint64_t bytes = 0;  ///< main memory of what is ready
+    std::vector<State> frames;  ///< of files' own
+    std::uint64_t bytes = 0;    ///< main memory of what is ready, between them, too
   };
 
   /// notify: called on a worker after each frame, and when a job ended.
@@ -66,7 +89,7 @@ class FrameShelf {
 
   /// What is known of the sequence, once.
   std::optional<Judged> take_judged();
-  /// What there is of the first frame that is wished for, or of the nearest one of which there is something.
+  /// What there is of the first step that is wished for, or of the nearest one of which there is something.
   [[nodiscard]] std::optional<Ready> nearest() const;
   /// Another after each frame that was built, or failed.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
@@ -92,27 +115,50 @@ class FrameShelf {
   };
   struct Which {
     FrameFilesPtr files;
+    Steps steps;
+    std::uint32_t step = 0;
+  };
+  // Of a step between two frames: theirs, kept for the next one between the same.
+  struct Ends {
+    FrameFilesPtr files;
     std::uint32_t frame = 0;
+    VolumeAssetPtr before, after;
   };
   enum class Judging { due, done, in_vain };
 
   void work(Progress& progress);
   void judge(const FrameFilesPtr& files, Progress& progress);
-  void build(const Which& which, const BuildSettings& settings, Progress& progress);
+  void build(const Which& which, const BuildSettings& settings, std::optional<Ends>& ends, Progress& progress);
+  // What a step shows. reading: whose file is at fault where it fails; none: what is between two.
+  VolumeAssetPtr read(const Which& which, std::optional<Ends>& ends, std::optional<std::uint32_t>& reading,
+                      Progress& progress);
+  // What a frame's own step shows, from the shelf or the file.
+  VolumeAssetPtr read_frame(const Which& which, std::uint32_t frame, Progress& progress);
   // That tells once a sequence what it is told of each file.
   [[nodiscard]] Log log_of(const std::string& path);
-  void fail(const Which& which, const Error& failure, const Progress& progress);
+  void fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure, const Progress& progress);
   void tell();
 
   // All of these under the lock.
   void start();
   [[nodiscard]] bool is_wished(const FrameFilesPtr& files) const { return wish_ && wish_->files == files; }
+  [[nodiscard]] bool is_wished(const Which& which) const {
+    return is_wished(which.files) && wish_->steps == which.steps;
+  }
+  // Of a frame's own.
+  [[nodiscard]] Shelved& own(std::uint32_t frame) { return shelf_[std::size_t{frame} * wish_->steps.a_frame]; }
+  [[nodiscard]] const Shelved& own(std::uint32_t frame) const {
+    return shelf_[std::size_t{frame} * wish_->steps.a_frame];
+  }
+  [[nodiscard]] bool is_possible(std::uint32_t step) const;
+  // The shelf of other steps: what is files' own stays. What is returned is to be freed without the lock.
+  [[nodiscard]] std::vector<Shelved> take_other_steps(const Steps& steps);
   [[nodiscard]] bool is_ready(const Shelved& shelved) const;
   [[nodiscard]] bool is_judged() const { return judging_ != Judging::due; }
-  // Of each frame the one that is shown for it: itself unless it failed; nothing if all did. O(frames).
+  // Of each step the one that is shown for it: itself unless it cannot be; nothing if no frame can. O(steps).
   [[nodiscard]] std::vector<std::optional<std::uint32_t>> stand_ins() const;
   [[nodiscard]] std::optional<std::uint32_t> first() const { return stand_ins()[wish_->order.front()]; }
-  // Frames that are to be there: as many as the memory holds, by what they are known or likely to take.
+  // Steps that are to be there: as many as the memory holds, by what they are known or likely to take.
   [[nodiscard]] std::vector<std::uint32_t> kept() const;
   [[nodiscard]] std::optional<std::uint32_t> next() const;
   [[nodiscard]] bool waits() const;
@@ -127,7 +173,7 @@ class FrameShelf {
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Wish> wish_;
-  std::vector<Shelved> shelf_;  // one a frame
+  std::vector<Shelved> shelf_;  // one a step
   Judging judging_ = Judging::due;
   std::optional<Judged> judged_;  // that nobody took
   std::set<std::string> said_;    // by the log, but for files' names

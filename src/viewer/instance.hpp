@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/listeners.hpp"
+#include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_asset.hpp"
 #include "viewer/volume_asset.hpp"
@@ -17,7 +18,8 @@ namespace cumulet::viewer {
 
 /// A volume in scenes, as its host has it.
 struct InstanceSettings {
-  VolumeAssetPtr volume;  ///< null: nothing
+  VolumeAssetPtr volume;               ///< null: none
+  std::shared_ptr<Sequence> sequence;  ///< in its place; null: none
   glm::dmat4 to_world{1.0};
   Medium medium = {};
   Ramps ramps = {};

@@ -4,11 +4,11 @@ namespace cumulet::viewer {
 
 namespace {
 
-// Whether it is another frame, or others come next.
+// Whether it is another step, or others come next.
 bool go(SequenceState& state, const scene::Moment& to, bool forward) {
   const scene::Moment from = std::exchange(state.moment, to);
   const bool turned = std::exchange(state.forward, forward) != forward || from.forward != to.forward;
-  return turned || from.frame() != to.frame();
+  return turned || scene::step_of(state.playback, from) != scene::step_of(state.playback, to);
 }
 
 }  // namespace

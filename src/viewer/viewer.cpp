@@ -86,6 +86,11 @@ void add_mesh(const scene::ModelSource& source, const scene::ModelMesh& mesh, co
     add(dvec3(to_world * glm::dvec4(source.pose.vertices[*i].position, 1.0)));
 }
 
+void require_frame(const Sequence& sequence, std::uint32_t frame) {
+  if (frame >= sequence.files()->count())
+    throw Error(ErrorCode::invalid_argument, "the sequence has no frame " + std::to_string(frame));
+}
+
 double radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 
 dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
@@ -212,14 +217,18 @@ bool Viewer::begin_anew(bool shows, bool showed) {
 
 void Viewer::set_sequence(std::shared_ptr<Sequence> sequence) {
   if (!begin_anew(sequence != nullptr, followed_.has_value())) return;
+  followed_ = follow(std::move(sequence), settings_at_once());
+  follow_sequence();
+  touch();
+}
+
+Viewer::Followed Viewer::follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings) {
   Followed followed;
   followed.listener = sequence->listen([this] { notify(); });
   followed.sequence = std::move(sequence);
-  followed.settings = settings_at_once();
+  followed.settings = std::move(settings);
   followed.id = ++last_followed_;
-  followed_ = std::move(followed);
-  follow_sequence();
-  touch();
+  return followed;
 }
 
 void Viewer::leave_sequence() {
@@ -297,38 +306,53 @@ void Viewer::follow_sequence() {
       f.wish_due = true;
     }
   }
+  tell_wish(f, frames_);
+  if (f.take_due) take_frame();
+}
+
+void Viewer::tell_wish(Followed& f, FrameShelf& shelf) const {
   if (const std::uint64_t revision = f.sequence->revision(); revision != f.revision) {
     f.revision = revision;
     f.state = f.sequence->get();
     f.wish_due = true;
   }
   if (f.wish_due) {
-    frames_.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), f.settings,
-                  std::min(f.state.memory_bytes, allowance_->memory_bytes())});
+    shelf.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), f.settings,
+                std::min(f.state.memory_bytes, allowance_->memory_bytes()), FrameShelf::Steps::of(f.state.playback)});
     f.wish_due = false;
     f.take_due = true;
     f.is_wanted = false;
   }
-  if (const std::uint64_t shelved = frames_.revision(); shelved != f.shelved) {
+  if (const std::uint64_t shelved = shelf.revision(); shelved != f.shelved) {
     f.shelved = shelved;
     f.take_due = true;
   }
-  if (f.take_due) take_frame();
+}
+
+std::optional<FrameShelf::Ready> Viewer::take(Followed& f, const FrameShelf& shelf) const {
+  // However fast frames come, one that was taken is seen.
+  if (!is_seen(f.frame, f.is_rendered)) return std::nullopt;
+  f.take_due = false;
+  auto ready = shelf.nearest();
+  if (ready) f.is_wanted = ready->wanted;
+  return ready;
+}
+
+bool Viewer::note_taken(Followed& f, const FrameShelf::Ready& ready, const scene::MarchSourcePtr& before) {
+  const bool same = f.frame && ready.frame == f.frame->number && ready.part == f.frame->part;
+  if (same && ready.built.source == before) return false;
+  f.frame = scene::SequenceFrame{ready.frame, f.id, ++last_taken_, ready.part};
+  f.is_rendered = false;
+  return true;
 }
 
 void Viewer::take_frame() {
   Followed& f = *followed_;
-  // However fast frames come, one that was taken is seen.
-  if (!is_seen(f.frame, f.is_rendered)) return;
-  f.take_due = false;
-  auto ready = frames_.nearest();
+  auto ready = take(f, frames_);
   if (!ready) return;
-  f.is_wanted = ready->wanted;
   volume_ = ready->built.volume;
-  if (f.frame && ready->frame == f.frame->number && ready->built.source == built_.source) return;
+  if (!note_taken(f, *ready, built_.source)) return;
   built_ = std::move(ready->built);
-  f.frame = scene::SequenceFrame{ready->frame, f.id, ++last_taken_};
-  f.is_rendered = false;
   if (!shown_.empty()) wishes_due_ = true;
   take_suggestion();
 }
@@ -339,22 +363,43 @@ Viewer::Followed& Viewer::followed() {
   return *followed_;
 }
 
-Viewer::SequenceStatus Viewer::sequence() {
-  const Followed& f = followed();
+Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameShelf& shelf) const {
   SequenceStatus status;
   status.asked = f.state.moment.frame();
+  const std::uint32_t step = scene::step_of(f.state.playback, f.state.moment);
+  status.asked_position = FrameShelf::Steps::of(f.state.playback).position(step);
   // What was there before may be another's.
-  if (const auto shown = gl_ ? gl_->shown_frame() : std::nullopt; shown && shown->sequence == f.id)
-    status.drawn = shown->number;
-  status.frames = frames_.frames();
+  if (const auto shown = gl_ ? frame_of(*gl_, f.id) : std::nullopt)
+    status.drawn = static_cast<double>(shown->number) + shown->part;
+  status.frames = shelf.frames();
   status.density_scale = f.density_scale;
   return status;
 }
 
+Viewer::SequenceStatus Viewer::sequence() { return status_of(followed(), frames_); }
+
 std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
-  if (frame >= followed().sequence->files()->count())
-    throw Error(ErrorCode::invalid_argument, "the sequence has no frame " + std::to_string(frame));
+  require_frame(*followed().sequence, frame);
   return frames_.failure_of(frame);
+}
+
+const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
+  sync();
+  const auto shown = find(instance);
+  if (shown == shown_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the instance");
+  if (!shown->played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
+  return *shown;
+}
+
+Viewer::SequenceStatus Viewer::sequence(const Instance& instance) {
+  const Played& played = *shown_sequence(instance).played;
+  return status_of(played.followed, played.shelf);
+}
+
+std::optional<Error> Viewer::frame_failure(const Instance& instance, std::uint32_t frame) {
+  const Played& played = *shown_sequence(instance).played;
+  require_frame(*played.followed.sequence, frame);
+  return played.shelf.failure_of(frame);
 }
 
 std::optional<BuildSettings> Viewer::settings_at_once() const {
@@ -585,10 +630,17 @@ void Viewer::follow_instances() {
     shown.settings = shown.instance->get();
     shown.revision = revision;
     shown.medium.set(shown_medium(shown.settings.medium));
-    if (!shown.settings.volume) shown.forget();
+    const bool other_sequence = shown.played && shown.played->followed.sequence != shown.settings.sequence;
+    if (other_sequence || (!shown.settings.volume && !shown.settings.sequence)) shown.forget();
+    if (shown.settings.sequence) {
+      shown.wish.reset();
+      shown.begun.reset();
+    }
     wishes_due_ = true;
     ++settings_revision_;
   }
+  if (wishes_due_) wish_for_sequences();
+  follow_played();
   const std::uint64_t built = shelf_.revision();
   if (built != shelved_) take_grids();
   shelved_ = built;
@@ -598,6 +650,73 @@ void Viewer::follow_instances() {
   wishes_due_ = false;
   wish_for_grids();
   take_grids();
+}
+
+void Viewer::wish_for_sequences() {
+  struct Wanted {
+    std::optional<BuildSettings> settings;
+    std::vector<Shown*> by;
+  };
+  std::vector<Wanted> all;
+  for (Shown& shown : shown_) {
+    if (!shown.settings.sequence || !shown.is_seen()) {
+      shown.played.reset();
+      continue;
+    }
+    std::optional<BuildSettings> settings;
+    if (!grid_.camera_adaptive || view_) settings = settings_of(shown);
+    const auto same = std::ranges::find_if(all, [&](const Wanted& wanted) {
+      const bool alike =
+          settings && wanted.settings ? same_but_view(*wanted.settings, *settings) : !settings && !wanted.settings;
+      return alike && wanted.by.front()->settings.sequence == shown.settings.sequence;
+    });
+    if (same == all.end()) {
+      all.push_back({settings, {&shown}});
+    } else {
+      if (settings) join(*same->settings, *settings);
+      same->by.push_back(&shown);
+    }
+  }
+  // Each goes on with what one of its instances had.
+  std::vector<PlayedPtr> played;
+  for (Wanted& wanted : all) {
+    const auto& sequence = wanted.by.front()->settings.sequence;
+    const auto suits_it = [&](const PlayedPtr& p) {
+      return p && p->followed.sequence == sequence && std::ranges::find(played, p) == played.end();
+    };
+    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->played); });
+    const auto any = std::ranges::find_if(played_, suits_it);
+    PlayedPtr p = had != wanted.by.end() ? (*had)->played : any != played_.end() ? *any : nullptr;
+    if (!p) {
+      p = std::make_shared<Played>(
+          follow(sequence, wanted.settings), log_, [this] { notify(); }, trace_, allowance_);
+    } else if (p->followed.settings != wanted.settings) {
+      p->followed.settings = wanted.settings;
+      p->followed.wish_due = true;
+    }
+    for (Shown* shown : wanted.by) shown->played = p;
+    played.push_back(std::move(p));
+  }
+  const std::scoped_lock lock(played_mutex_);
+  played_.swap(played);  // what nobody follows any more ends after the lock
+}
+
+void Viewer::follow_played() {
+  for (const PlayedPtr& played : played_) {
+    Followed& f = played->followed;
+    if (auto judged = played->shelf.take_judged()) {
+      played->facts = std::move(judged->facts);
+      f.density_scale = judged->density_scale;
+    }
+    tell_wish(f, played->shelf);
+    if (!f.take_due) continue;
+    auto ready = take(f, played->shelf);
+    if (!ready || !note_taken(f, *ready, played->built ? played->built->source : nullptr)) continue;
+    played->built = std::move(ready->built);
+  }
+  for (Shown& shown : shown_) {
+    if (shown.played && shown.played->built) shown.built = shown.played->built;
+  }
 }
 
 std::optional<Built> Viewer::grid_of(const GridShelf::Wish& wish) const {
@@ -662,7 +781,7 @@ void Viewer::wish_for_grids() {
   std::vector<std::optional<std::size_t>> wish_of(shown_.size());
   for (std::size_t i = 0; i < shown_.size(); ++i) {
     const Shown& shown = shown_[i];
-    if (!shown.is_seen()) continue;
+    if (!shown.is_seen() || !shown.settings.volume) continue;
     const BuildSettings settings = settings_of(shown);
     const auto same = std::ranges::find_if(wishes, [&](const GridShelf::Wish& wish) {
       return wish.volume == shown.settings.volume && same_but_view(wish.settings, settings);
@@ -705,6 +824,7 @@ void Viewer::rebuild() {
   poses_.forget_failures();
   poses_due_ = true;
   frames_.rebuild();
+  for (const PlayedPtr& played : played_) played->shelf.rebuild();
   lives_.rebuild();
   take_medium();
   request_build();
@@ -715,6 +835,7 @@ void Viewer::set_limits(const Limits& limits) {
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
   if (followed_) followed_->wish_due = true;
+  for (const PlayedPtr& played : played_) played->followed.wish_due = true;
   touch();
 }
 
@@ -726,6 +847,8 @@ void Viewer::cancel() {
   poses_.cancel();
   frames_.cancel();
   lives_.cancel();
+  const std::scoped_lock lock(played_mutex_);
+  for (const PlayedPtr& played : played_) played->shelf.cancel();
 }
 
 bool Viewer::busy() const {
@@ -734,8 +857,8 @@ bool Viewer::busy() const {
 }
 
 bool Viewer::builds() const {
-  const bool frame_comes = followed_ && !followed_->is_wanted &&
-                           (followed_->wish_due || frames_.busy() || frames_.revision() != followed_->shelved);
+  const auto waits = [](const PlayedPtr& played) { return played->followed.waits(played->shelf); };
+  const bool frame_comes = (followed_ && followed_->waits(frames_)) || std::ranges::any_of(played_, waits);
   return frame_comes || (watched_ && lives_.busy()) || builder_.busy() || shelf_.busy() ||
          shelf_.revision() != shelved_;
 }
@@ -816,7 +939,8 @@ void Viewer::wait(double timeout_ms) {
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   const auto idle = [&] {
     return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
-           shelf_.wait(until) && poses_.wait(until) && frames_.wait(until) && lives_.wait(until);
+           shelf_.wait(until) && poses_.wait(until) && frames_.wait(until) && lives_.wait(until) &&
+           std::ranges::all_of(played_, [&](const PlayedPtr& played) { return played->shelf.wait(until); });
   };
   // What comes of one may be work for another.
   do {
@@ -833,6 +957,9 @@ void Viewer::wait(double timeout_ms) {
   if (const auto failure = shelf_.status().failure) throw Error(*failure);
   if (const auto failure = frames_.status().failure) throw Error(*failure);
   if (const auto failure = lives_.status().failure) throw Error(*failure);
+  for (const PlayedPtr& played : played_) {
+    if (const auto failure = played->shelf.status().failure) throw Error(*failure);
+  }
 }
 
 Viewer::Status Viewer::status() const {
@@ -844,11 +971,20 @@ Viewer::Status Viewer::status() const {
   const Worker::Status frames = frames_.status();
   const Worker::Status lives = lives_.status();
   const Worker::Status poses = poses_.status();
+  std::vector<Worker::Status> played;
+  {
+    const std::scoped_lock lock(played_mutex_);
+    for (const PlayedPtr& p : played_) played.push_back(p->shelf.status());
+  }
   const auto& sequences = frames.failure ? frames.failure : lives.failure;
   const auto& own = volume.failure ? volume.failure : sequences;
   Status status{volume.stage, volume.fraction, own ? own : grids.failure,
                 surfaces.failure ? surfaces.failure : poses.failure, environment.failure};
-  for (const Worker::Status& other : {frames, lives, grids, surfaces, poses, environment}) {
+  for (const Worker::Status& one : played) {
+    if (!status.volume_failure) status.volume_failure = one.failure;
+  }
+  played.insert(played.begin(), {frames, lives, grids, surfaces, poses, environment});
+  for (const Worker::Status& other : played) {
     if (status.stage != Progress::Stage::idle) break;
     status.stage = other.stage;
     status.fraction = other.fraction;
@@ -1074,7 +1210,7 @@ std::optional<Bounds> Viewer::box() const {
   if (facts_ && !facts_->empty) box = bounds_of(*facts_);
   const auto add = [&](const Bounds& other) { box = box ? both(*box, other) : other; };
   for (const Shown& shown : shown_) {
-    if (shown.is_seen() && !shown.settings.volume->empty()) add(shown.settings.volume->bounds(shown.settings.to_world));
+    if (shown.is_there() && !shown.facts()->empty) add(shown.facts()->bounds(shown.settings.to_world));
   }
   if (model_source_ && model_source_->scene->triangle_count() > 0)
     add({model_source_->pose.low, model_source_->pose.high});
@@ -1144,7 +1280,7 @@ std::vector<double> Viewer::seen_reach(const dvec3& direction, std::span<const d
     if (facts_) add_volume(*facts_, place.to_world, medium_);
   }
   for (const Shown& shown : shown_) {
-    if (shown.is_seen()) add_volume(*shown.settings.volume->facts(), shown.settings.to_world, shown.settings.medium);
+    if (shown.is_there()) add_volume(*shown.facts(), shown.settings.to_world, shown.settings.medium);
   }
   for (const scene::Model& model : models()) {
     for (const scene::ModelMesh& mesh : model.source->meshes) {
@@ -1214,8 +1350,12 @@ void Viewer::show_volumes() {
   }
   for (const Shown& shown : shown_) {
     if (shown.is_seen() && shown.built)
-      volumes.push_back(
-          {shown.id, shown.built->source, shown.medium, {shown.settings.to_world}, {}, shown.settings.previous});
+      volumes.push_back({shown.id,
+                         shown.built->source,
+                         shown.medium,
+                         {shown.settings.to_world},
+                         shown.frame(),
+                         shown.settings.previous});
   }
   const auto differs = [&](const scene::Volume& volume) {
     const scene::MarchSource& first = *volumes.front().source;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -76,8 +77,9 @@ class Viewer {
   /// Shows, in place of the volume, frames of it, as it stands at any time; null: none, and of one before nothing.
   void set_sequence(std::shared_ptr<Sequence> sequence);
   struct SequenceStatus {
-    std::uint32_t asked = 0;             ///< the frame at which it stands
-    std::optional<std::uint32_t> drawn;  ///< that is to be seen
+    std::uint32_t asked = 0;      ///< the frame at which it stands
+    double asked_position = 0.0;  ///< and the step, in frames
+    std::optional<double> drawn;  ///< the step that is to be seen, likewise
     FrameShelf::Status frames;
     std::optional<double> density_scale;  ///< that suits all of them
   };
@@ -85,6 +87,10 @@ class Viewer {
   SequenceStatus sequence();
   /// Why a frame cannot be shown.
   std::optional<Error> frame_failure(std::uint32_t frame);
+  /// The same of an instance's. Both throw Error(invalid_argument) of one that the viewer does not show, or that
+  /// follows no sequence.
+  SequenceStatus sequence(const Instance& instance);
+  std::optional<Error> frame_failure(const Instance& instance, std::uint32_t frame);
   /// Shows, in place of the volume, the newest state of it; null: none, and of one before nothing.
   void set_live(std::shared_ptr<Live> live);
   struct LiveStatus {
@@ -220,6 +226,9 @@ class Viewer {
   // The sequence's newest wish, and what came of it.
   void follow_sequence();
   void take_frame();
+  // Those of instances.
+  void wish_for_sequences();
+  void follow_played();
   // Those of a sequence, and of a live volume: neither is shown any more.
   void leave_sequence();
   // Takes a state that is ready; unseen: though the one before was not seen yet.
@@ -259,6 +268,47 @@ class Viewer {
   void follow_upload(const Context& g);
   // Of the live volume, what this frame's picture is of.
   void note_drawn(const Context& g);
+  // Of what is shown, this sequence's.
+  [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
+  // A sequence that is followed: what was asked for, and taken.
+  struct Followed {
+    std::shared_ptr<Sequence> sequence;
+    std::shared_ptr<void> listener;
+    std::uint64_t revision = 0;             // of what was wished last
+    std::optional<BuildSettings> settings;  // none: they wait for a view
+    SequenceState state;
+    std::optional<double> density_scale;  // that suits it, once it is judged
+    bool wish_due = true;
+    std::uint64_t shelved = 0;  // of its shelf, when it was last looked at
+    bool take_due = false;
+    std::uint64_t id = 0;                       // of this following
+    std::optional<scene::SequenceFrame> frame;  // that was taken last
+    bool is_wanted = false;                     // that one is all that there is to come
+    bool is_rendered = false;                   // by a frame, since
+
+    // Whether there is something to come for it.
+    [[nodiscard]] bool waits(const FrameShelf& shelf) const {
+      return !is_wanted && (wish_due || shelf.busy() || shelf.revision() != shelved);
+    }
+  };
+  [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);
+  // Tells the shelf of its newest wish, and looks what is there.
+  void tell_wish(Followed& f, FrameShelf& shelf) const;
+  // What is to be shown of it now, if that may change.
+  [[nodiscard]] std::optional<FrameShelf::Ready> take(Followed& f, const FrameShelf& shelf) const;
+  // It is this from now on. Returns false if it was.
+  bool note_taken(Followed& f, const FrameShelf::Ready& ready, const scene::MarchSourcePtr& before);
+  [[nodiscard]] SequenceStatus status_of(const Followed& f, const FrameShelf& shelf) const;
+  // One that instances follow, those of one whose grids are the same.
+  struct Played {
+    Played(Followed wished, const Log& log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
+        : followed(std::move(wished)), shelf(log, std::move(notify), trace, std::move(allowance)) {}
+    Followed followed;
+    VolumeFactsPtr facts;        // once it is judged
+    std::optional<Built> built;  // of the frame that was taken last
+    FrameShelf shelf;
+  };
+  using PlayedPtr = std::shared_ptr<Played>;
   // An instance that is shown, as it was when it was last looked at.
   struct Shown {
     std::shared_ptr<Instance> instance;
@@ -270,12 +320,25 @@ class Viewer {
     std::optional<GridShelf::Wish> wish;
     std::optional<GridShelf::Wish> begun;  // the last before it that was being built
     std::optional<Built> built;            // the newest
+    PlayedPtr played;                      // of a sequence; null: of none
     void forget() {
       wish.reset();
       begun.reset();
       built.reset();
+      played.reset();
     }
-    [[nodiscard]] bool is_seen() const { return settings.volume && !settings.hidden; }
+    [[nodiscard]] bool is_seen() const { return (settings.volume || settings.sequence) && !settings.hidden; }
+    // Null: nothing is known of it yet.
+    [[nodiscard]] VolumeFactsPtr facts() const {
+      if (settings.volume) return settings.volume->facts();
+      return played ? played->facts : nullptr;
+    }
+    [[nodiscard]] bool is_there() const { return is_seen() && facts(); }
+    // Of a sequence, that its grid is of.
+    [[nodiscard]] std::optional<scene::SequenceFrame> frame() const {
+      const bool current = played && played->built && built && built->source == played->built->source;
+      return current ? played->followed.frame : std::nullopt;
+    }
   };
   // A model that is shown, likewise.
   struct ShownModel {
@@ -397,24 +460,10 @@ class Viewer {
   std::optional<BuildView> built_for_;  // camera-adaptive: what the grid was last asked for
   render::Totals totals_;
 
-  // A sequence that is shown in place of a volume.
-  struct Followed {
-    std::shared_ptr<Sequence> sequence;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;             // of what was wished last
-    std::optional<BuildSettings> settings;  // none: they wait for a view
-    SequenceState state;
-    std::optional<double> density_scale;  // that suits it, once it is judged
-    bool wish_due = true;
-    std::uint64_t shelved = 0;  // of frames_, when it was last looked at
-    bool take_due = false;
-    std::uint64_t id = 0;                       // of this following
-    std::optional<scene::SequenceFrame> frame;  // that was taken last
-    bool is_wanted = false;                     // that one is all that there is to come
-    bool is_rendered = false;                   // by a frame, since
-  };
   [[nodiscard]] Followed& followed();
-  std::optional<Followed> followed_;
+  // Throws Error(invalid_argument) for an instance that the viewer does not show, or that follows no sequence.
+  [[nodiscard]] const Shown& shown_sequence(const Instance& instance);
+  std::optional<Followed> followed_;  // that is shown in place of a volume
   // A live volume that is.
   struct Watched {
     std::shared_ptr<Live> live;
@@ -442,6 +491,8 @@ class Viewer {
   PoseShelf poses_;
   FrameShelf frames_;
   LiveBuilder lives_;
+  mutable std::mutex played_mutex_;  // between the host's thread, which alone changes them, and others that look
+  std::vector<PlayedPtr> played_;
 };
 
 }  // namespace cumulet::viewer

@@ -89,7 +89,7 @@ void Viewer::prepare(const Frame& frame) {
   navigation_.advance(std::min(since, 0.25), *camera_, box);
 
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
-  const bool others = std::ranges::any_of(shown_, &Shown::is_seen);
+  const bool others = std::ranges::any_of(shown_, &Shown::is_there);
   const bool scene = facts_ || shows_models() || others || watched_;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
@@ -136,10 +136,16 @@ void Viewer::follow_upload(const Context& g) {
   if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
 }
 
+std::optional<scene::SequenceFrame> Viewer::frame_of(const Context& g, std::uint64_t sequence) {
+  const scene::SequenceFrames shown = g.shown_frames();
+  const auto found = std::ranges::find(shown, sequence, &scene::SequenceFrame::sequence);
+  return found == shown.end() ? std::nullopt : std::optional(*found);
+}
+
 void Viewer::note_drawn(const Context& g) {
   Watched& w = *watched_;
-  const auto shown = g.shown_frame();
-  if (!shown || shown->sequence != w.id || shown->taken == w.seen_last) return;
+  const auto shown = frame_of(g, w.id);
+  if (!shown || shown->taken == w.seen_last) return;
   w.seen_last = shown->taken;
   w.told.drawn = shown->number;
   ++w.told.drawn_count;
@@ -174,6 +180,7 @@ FrameResult Viewer::render(const Frame& frame) {
       if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
     });
     if (followed_) followed_->is_rendered = true;
+    for (const PlayedPtr& played : played_) played->followed.is_rendered = true;
     if (watched_) watched_->is_rendered = true;
     follow_upload(g);
     const Shot shot = this->shot();
@@ -187,7 +194,8 @@ FrameResult Viewer::render(const Frame& frame) {
       result.converged = false;
     }
     if (watched_) note_drawn(g);
-    if ((followed_ && followed_->take_due) || (watched_ && watched_->waits)) {
+    const auto is_due = [](const PlayedPtr& played) { return played->followed.take_due; };
+    if ((followed_ && followed_->take_due) || (watched_ && watched_->waits) || std::ranges::any_of(played_, is_due)) {
       result.more = true;
       result.converged = false;
     }
@@ -196,6 +204,7 @@ FrameResult Viewer::render(const Frame& frame) {
     };
     result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
                     failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status()) ||
+                    std::ranges::any_of(played_, [&](const PlayedPtr& p) { return failed(p->shelf.status()); }) ||
                     failed(lives_.status()) || failed(poses_.status());
     result.more = result.more || navigation_.moving() || built_for_another();
     if (failure && !g.is_news(shot, *failure)) failure.reset();
@@ -338,14 +347,17 @@ Stats Viewer::stats() {
   std::set<VolumeAssetPtr> volumes{volume_};
   for (const Shown& shown : shown_) {
     if (!shown.is_seen()) continue;
-    if (volumes.insert(shown.settings.volume).second) s.active_voxels += shown.settings.volume->volume().active_voxels;
+    const VolumeAssetPtr& volume = shown.settings.volume;
+    if (volume && volumes.insert(volume).second) s.active_voxels += volume->volume().active_voxels;
     if (!shown.built || !grids.insert(shown.built->source).second) continue;
+    if (!volume) s.active_voxels += shown.built->active_voxels;
     s.cells += shown.built->cells;
     s.levels = std::max(s.levels, shown.built->levels);
     s.limited = s.limited || shown.built->limited;
   }
   s.build_seconds = built_.seconds;
   s.memory_bytes = followed_ ? frames_.frames().bytes : built_.bytes();
+  for (const PlayedPtr& played : played_) s.memory_bytes += played->shelf.frames().bytes;
   s.steps = totals_.steps;
   s.noise = totals_.noise;
   if (gl_) {

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "support/clip.hpp"
+#include "volume/between.hpp"
 
 namespace {
 
@@ -325,6 +326,99 @@ TEST_F(Shelf, WishesMayChangeAllTheTime) {
   looks.join();
   EXPECT_EQ(shelf_.nearest()->frame, 4U);
   EXPECT_EQ(shelf_.nearest()->built.settings, BuildSettings{});
+}
+
+// Every fourth of a frame, from this step on, and those before last.
+Frames steps_from(std::uint32_t first, std::uint32_t last) {
+  Frames order(last + 1);
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::rotate(order, order.begin() + first);
+  return order;
+}
+
+TEST_F(Shelf, BetweenFramesIsWhatBothMake) {
+  using cumulet::scene::Between;
+  const FrameFilesPtr all = files();
+  for (const Between how : {Between::blend, Between::advect}) {
+    const FrameShelf::Steps steps{how, 4, how == Between::advect ? 1.0 / 24.0 : 0.0};
+    const std::uint32_t last = 4 * (count - 1);
+    for (const std::uint32_t step : {9U, 10U, 12U}) {
+      SCOPED_TRACE(step);
+      shelf_.wish({all, steps_from(step, last), BuildSettings{}, plenty, steps});
+      ASSERT_TRUE(shelf_.wait(std::nullopt));
+      const auto ready = shelf_.nearest();
+      ASSERT_TRUE(ready && ready->wanted);
+      EXPECT_EQ(ready->frame, step / 4);
+      EXPECT_EQ(ready->part, 0.25 * (step % 4));
+      cumulet::Progress progress;
+      const auto before = all->file(step / 4).read({}, nullptr);
+      auto volume = before;
+      if (step % 4 != 0) {
+        const auto after = all->file(step / 4 + 1).read({}, nullptr);
+        const double part = 0.25 * (step % 4);
+        // The balls have no velocity.
+        volume = std::make_shared<const cumulet::viewer::VolumeAsset>(
+            cumulet::volume::blend(before->frame(), after->frame(), part));
+      }
+      expect_same_grid(ready->built, cumulet::viewer::build_grid({}, volume, BuildSettings{}, progress));
+    }
+    ASSERT_TRUE(comes([&] { return number(State::ready) == count; }));
+  }
+  // Other steps keep what is files' own.
+  const std::uint64_t revision = shelf_.revision();
+  shelf_.wish({all, from(3), BuildSettings{}, plenty});
+  EXPECT_EQ(number(State::ready), static_cast<std::size_t>(count));
+  ASSERT_TRUE(shelf_.wait(std::nullopt));
+  EXPECT_EQ(shelf_.nearest()->frame, 3U);
+  EXPECT_TRUE(shelf_.nearest()->wanted);
+  EXPECT_LE(shelf_.revision(), revision + 1);  // one may have been under way
+}
+
+TEST_F(Shelf, BesideWhatIsBrokenNothingIsBetween) {
+  clip_.remove(0);
+  clip_.corrupt(4);
+  const FrameFilesPtr all = files();
+  const FrameShelf::Steps steps{cumulet::scene::Between::blend, 2, 0.0};
+  const std::uint32_t last = 2 * (count - 1);
+  shelf_.wish({all, steps_from(0, last), BuildSettings{}, plenty, steps});
+  ASSERT_TRUE(comes([&] { return number(State::ready) == count - 2 && number(State::failed) == 2; }));
+  struct Case {
+    std::uint32_t step;
+    std::uint32_t frame;
+    double part;
+  };
+  const std::vector<Case> cases = {{0, 1, 0.0}, {1, 1, 0.0}, {3, 1, 0.5},  {6, 3, 0.0}, {7, 3, 0.0},
+                                   {8, 3, 0.0}, {9, 3, 0.0}, {10, 5, 0.0}, {11, 5, 0.5}};
+  for (const Case& one : cases) {
+    SCOPED_TRACE(one.step);
+    shelf_.wish({all, steps_from(one.step, last), BuildSettings{}, plenty, steps});
+    ASSERT_TRUE(shelf_.wait(std::nullopt));
+    const auto ready = shelf_.nearest();
+    ASSERT_TRUE(ready && ready->wanted);
+    EXPECT_EQ(ready->frame, one.frame);
+    EXPECT_EQ(ready->part, one.part);
+  }
+  EXPECT_EQ(warnings().size(), 2U);  // of files alone
+}
+
+TEST_F(Shelf, StepsKeepToTheMemory) {
+  const FrameFilesPtr all = files();
+  const FrameShelf::Steps steps{cumulet::scene::Between::blend, 8, 0.0};
+  const std::uint32_t last = 8 * (count - 1);
+  shelf_.wish({all, steps_from(3, last), BuildSettings{}, 0, steps});
+  ASSERT_TRUE(shelf_.wait(std::nullopt));
+  EXPECT_EQ(shelf_.nearest()->part, 0.375);
+  EXPECT_EQ(number(State::ready), 0U);
+  const std::uint64_t one = shelf_.frames().bytes;
+  const std::uint64_t room = 4 * one;
+  shelf_.wish({all, steps_from(20, last), BuildSettings{}, room, steps});
+  ASSERT_TRUE(comes([&] { return shelf_.nearest()->frame == 2 && !shelf_.busy(); }));
+  EXPECT_LE(shelf_.frames().bytes, room);
+  // What is under way ends, and nothing follows.
+  shelf_.wish({all, steps_from(40, last), BuildSettings{}, plenty, steps});
+  shelf_.cancel();
+  ASSERT_TRUE(shelf_.wait(std::nullopt));
+  EXPECT_FALSE(shelf_.status().failure);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ namespace {
 
 using namespace cumulet::demo;
 using Frames = std::vector<Frame>;
+using Moments = std::vector<Moment>;
 using cumulet::test::Folder;
 
 /// What is said of something that is refused; "" where it is not.
@@ -41,30 +42,46 @@ std::string neighbour(const std::string& path, Frame frame) {
 void write(const std::filesystem::path& path, const std::string& text) { std::ofstream(path) << text; }
 
 TEST(Frames, RangesAreReadInTheirOrder) {
-  EXPECT_EQ(parse_frames("5"), (Frames{5}));
-  EXPECT_EQ(parse_frames("0"), (Frames{0}));
-  EXPECT_EQ(parse_frames("0012"), (Frames{12}));
-  EXPECT_EQ(parse_frames("1-4"), (Frames{1, 2, 3, 4}));
-  EXPECT_EQ(parse_frames("3-3"), (Frames{3}));
-  EXPECT_EQ(parse_frames("1-10x3"), (Frames{1, 4, 7, 10}));
-  EXPECT_EQ(parse_frames("1-9x3"), (Frames{1, 4, 7}));
-  EXPECT_EQ(parse_frames("1-3,7"), (Frames{1, 2, 3, 7}));
-  EXPECT_EQ(parse_frames("7,1-3"), (Frames{7, 1, 2, 3}));
-  EXPECT_EQ(parse_frames("1-20x10,1-3"), (Frames{1, 11, 2, 3})) << "each once";
-  EXPECT_EQ(parse_frames("9999998-9999999"), (Frames{9999998, 9999999}));
+  EXPECT_EQ(parse_frames("5"), (Moments{5}));
+  EXPECT_EQ(parse_frames("0"), (Moments{0}));
+  EXPECT_EQ(parse_frames("0012"), (Moments{12}));
+  EXPECT_EQ(parse_frames("1-4"), (Moments{1, 2, 3, 4}));
+  EXPECT_EQ(parse_frames("3-3"), (Moments{3}));
+  EXPECT_EQ(parse_frames("1-10x3"), (Moments{1, 4, 7, 10}));
+  EXPECT_EQ(parse_frames("1-9x3"), (Moments{1, 4, 7}));
+  EXPECT_EQ(parse_frames("1-3,7"), (Moments{1, 2, 3, 7}));
+  EXPECT_EQ(parse_frames("7,1-3"), (Moments{7, 1, 2, 3}));
+  EXPECT_EQ(parse_frames("1-20x10,1-3"), (Moments{1, 11, 2, 3})) << "each once";
+  EXPECT_EQ(parse_frames("9999998-9999999"), (Moments{9999998, 9999999}));
 }
 
 TEST(Frames, WhatIsNoRangeIsRefusedByItsOwnName) {
   EXPECT_EQ(refusal([] { return parse_frames("10-1"); }), "'10-1' runs backwards");
   EXPECT_EQ(refusal([] { return parse_frames("1-3,9-8"); }), "'9-8' runs backwards");
   EXPECT_EQ(refusal([] { return parse_frames("1-9x0"); }), "'1-9x0' has a step of 0");
+  EXPECT_EQ(refusal([] { return parse_frames("1-9x0.000"); }), "'1-9x0.000' has a step of 0");
+  EXPECT_EQ(refusal([] { return parse_frames("1-9x0.0625"); }), "'1-9x0.0625' has more than three decimals");
+  EXPECT_EQ(refusal([] { return parse_frames("9999999.5"); }), "'9999999.5' goes beyond frame 9999999");
   EXPECT_EQ(refusal([] { return parse_frames("5x2"); }), "'5x2' has a step, but is no range");
   EXPECT_EQ(refusal([] { return parse_frames("1-10000000"); }), "'1-10000000' goes beyond frame 9999999");
   EXPECT_EQ(refusal([] { return parse_frames("99999999999999999999"); }),
             "'99999999999999999999' goes beyond frame 9999999");
-  for (const char* text :
-       {"", "a", "1-", "-5", "1--3", "1,", ",1", "1-2-3", "1-3x", "1-3x2x2", "1.5", " 1", "1:5", "+1"})
+  for (const char* text : {"", "a", "1-", "-5", "1--3", "1,", ",1", "1-2-3", "1-3x", "1-3x2x2", "1.", ".5", "1.5.5",
+                           "1-2x.5", "1.0005", " 1", "1:5", "+1"})
     EXPECT_NE(refusal([&] { return parse_frames(text); }), "") << text;
+}
+
+TEST(Frames, WhatIsBetweenThemIsReadInDecimals) {
+  EXPECT_EQ(parse_frames("1-3x0.5"), (Moments{1, {1, 500}, 2, {2, 500}, 3}));
+  EXPECT_EQ(parse_frames("1.5"), (Moments{{1, 500}}));
+  EXPECT_EQ(parse_frames("0.9-1.3x0.1"), (Moments{{0, 900}, 1, {1, 100}, {1, 200}, {1, 300}}));
+  EXPECT_EQ(parse_frames("7,7.0,7.125"), (Moments{7, {7, 125}})) << "each once";
+  EXPECT_EQ(parse_frames("1-2x0.333"), (Moments{1, {1, 333}, {1, 666}, {1, 999}}));
+  EXPECT_EQ(Moment(3, 50).text(), "3.05");
+  EXPECT_EQ(Moment(3, 500).text(), "3.5");
+  EXPECT_EQ(Moment(3).text(), "3");
+  EXPECT_EQ(frames_text({1, 2, 3, {3, 500}, 4, {1, 500}}), "1, 1.5, 2, 3, 3.5, 4");
+  EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(12, 250)), "out.0012.25.exr");
 }
 
 TEST(Frames, AreToldInFewWords) {
@@ -236,6 +253,31 @@ TEST_F(Plan, ASceneThatStandsAtAFrameIsThatFrame) {
   EXPECT_EQ(plan->frames.size(), 2U);
 }
 
+TEST_F(Plan, WhatIsBetweenTwoFilesIsOfBoth) {
+  for (const char* name : {"f.0010.vdb", "f.0012.vdb", "f.0014.vdb"}) there(name, 10);
+  options.scene.volume = folder / "f.####.vdb";
+  options.scene.sequence.playback.frames_per_second = 10.0;
+  options.frames = {10, {10, 500}, {11, 250}, {14, 500}};
+  ASSERT_EQ(said(), "");
+  ASSERT_EQ(plan->frames.size(), 4U);
+  EXPECT_FALSE(plan->frames[0].next);
+  const auto& quarter = plan->frames[1];
+  EXPECT_EQ(quarter.volume, folder / "f.0010.vdb");
+  EXPECT_EQ(quarter.output, "out.0010.5.exr");
+  ASSERT_TRUE(quarter.next);
+  EXPECT_EQ(quarter.next->volume, folder / "f.0012.vdb");
+  EXPECT_EQ(quarter.next->part, 1U);
+  EXPECT_EQ(quarter.next->parts, 4U);
+  EXPECT_EQ(quarter.next->frames, 2U);
+  EXPECT_DOUBLE_EQ(quarter.seconds, 0.025);
+  EXPECT_EQ(plan->frames[2].next->part, 5U);
+  EXPECT_EQ(plan->frames[2].next->parts, 8U);
+  EXPECT_EQ(plan->frames[3].volume, folder / "f.0014.vdb");
+  EXPECT_EQ(plan->frames[3].next->volume, folder / "f.0016.vdb") << "missing, which its turn tells";
+  options.frames = {{10, 333}};
+  EXPECT_EQ(said(), "frame 10.333: the files are 2 frames apart, of which this is no thousandth");
+}
+
 TEST_F(Plan, ARowHasGapsAndEqualSteps) {
   for (const char* name : {"f.0010.vdb", "f.0014.vdb", "f.0012.vdb", "f.0020.vdb", "other.0011.vdb"}) there(name, 10);
   const auto row = FrameRow::of_name(folder / "f.####.vdb");
@@ -246,6 +288,10 @@ TEST_F(Plan, ARowHasGapsAndEqualSteps) {
   EXPECT_EQ(row->index_of(12), 1U);
   EXPECT_EQ(row->index_of(3), 0U);
   EXPECT_EQ(row->index_of(99), 5U);
+  EXPECT_EQ(row->position_of(12), 1.0);
+  EXPECT_EQ(row->position_of({12, 500}), 1.25);
+  EXPECT_EQ(row->position_of({20, 500}), 5.0);
+  EXPECT_EQ(row->by_size().size(), 6U);
   EXPECT_EQ(FrameRow::around(folder / "f.0012.vdb")->count(), 6U);
   EXPECT_FALSE(FrameRow::around(folder / "other.0011.vdb")) << "it is alone";
   EXPECT_FALSE(FrameRow::of_name(folder / "f.0012.vdb"));

@@ -449,8 +449,11 @@ TEST(Options, APartHasItsSamplesAndIsAnExr) {
 
 TEST(Options, FramesOfASequence) {
   const RenderOptions options = parse({"--frames", "1-5x2", "--overwrite"});
-  EXPECT_EQ(options.frames, (std::vector<Frame>{1, 3, 5}));
+  EXPECT_EQ(options.frames, (std::vector<Moment>{1, 3, 5}));
   EXPECT_TRUE(options.overwrite);
+  EXPECT_EQ(parse({"--frames", "1-2x0.5"}).frames, (std::vector<Moment>{1, {1, 500}, 2}));
+  EXPECT_EQ(parse({"--between", "blend"}).scene.sequence.playback.between, CUMULET_BETWEEN_BLEND);
+  EXPECT_EQ(parse({"--velocity-scale", "24"}).scene.sequence.playback.velocity_scale, 24.0);
   EXPECT_TRUE(parse({}).frames.empty());
   EXPECT_EQ(usage_error(with({"--frames", "9-1"})), "--frames: '9-1' runs backwards");
 }

@@ -8,10 +8,12 @@
 
 namespace {
 
+using cumulet::scene::Between;
 using cumulet::scene::Moment;
 using cumulet::scene::moment_at;
 using cumulet::scene::Playback;
 using cumulet::scene::Repeat;
+using cumulet::scene::step_of;
 using cumulet::scene::time_of;
 using cumulet::scene::upcoming;
 using Frames = std::vector<std::uint32_t>;
@@ -112,6 +114,38 @@ TEST(Upcoming, AreAllThatArePlayedEachOnce) {
         EXPECT_EQ(order, (Frames{3, 4, 5, 6}));
       }
     }
+  }
+}
+
+TEST(Playback, StepsBetweenFramesComeInTheirOrder) {
+  const Playback hold{.first = 2, .count = 3, .between = Between::blend, .steps = 4};
+  const auto at = [&](const Playback& playback, double frames) {
+    return step_of(playback, moment_at(playback, frames / playback.frames_per_second));
+  };
+  EXPECT_EQ(at(hold, -1.0), 8U);
+  EXPECT_EQ(at(hold, 0.0), 8U);
+  EXPECT_EQ(at(hold, 0.24), 8U);
+  EXPECT_EQ(at(hold, 0.25), 9U);
+  EXPECT_EQ(at(hold, 1.99), 15U);
+  EXPECT_EQ(at(hold, 5.0), 16U);
+  EXPECT_EQ(upcoming(hold, moment_at(hold, 1.5 / 24.0), true), (Frames{14, 15, 16, 13, 12, 11, 10, 9, 8}));
+  EXPECT_EQ(upcoming(hold, moment_at(hold, 1.5 / 24.0), false), (Frames{14, 13, 12, 11, 10, 9, 8, 15, 16}));
+  // Back again each is there as long as the next takes to come.
+  Playback back = hold;
+  back.repeat = Repeat::ping_pong;
+  EXPECT_EQ(at(back, 2.25), 15U);
+  EXPECT_EQ(at(back, 2.3), 15U);
+  // From the last of a loop to the first there is nothing.
+  Playback loop = hold;
+  loop.repeat = Repeat::loop;
+  EXPECT_EQ(at(loop, 2.0), 16U);
+  EXPECT_EQ(at(loop, 2.75), 16U);
+  EXPECT_EQ(at(loop, 3.0), 8U);
+  // Any part of a frame that is named is its own.
+  for (const std::uint32_t steps : {3U, 7U, 10U, 1000U}) {
+    Playback fine{.count = 20, .between = Between::advect, .steps = steps};
+    for (std::uint32_t step = 0; step < 19 * steps; ++step)
+      ASSERT_EQ(step_of(fine, {static_cast<double>(step) / steps, true}), step) << steps;
   }
 }
 

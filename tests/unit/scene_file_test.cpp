@@ -551,6 +551,32 @@ TEST(SceneFile, ASequenceIsKept) {
   EXPECT_EQ(refused(R"({"speed": 2})"), "scene.json: sequence.speed: there is no such setting");
 }
 
+TEST(SceneFile, EachVolumeMayPlay) {
+  const auto read = [](const std::string& sequence) {
+    return parse_scene(R"({"cumulet_scene": 2, "volumes": [{"file": "a.vdb"}, {"file": "fire.####.vdb", "sequence": )" +
+                           sequence + "}]}",
+                       "/folder/scene.json");
+  };
+  const SceneOptions scene = read(R"({"frames_per_second": 12, "between": "advect", "subframes": 8, "frame": 3.5})");
+  ASSERT_EQ(scene.others.size(), 1U);
+  const SceneSequence& sequence = scene.others[0].sequence;
+  EXPECT_EQ(sequence.playback.frames_per_second, 12.0);
+  EXPECT_EQ(sequence.playback.between, CUMULET_BETWEEN_ADVECT);
+  EXPECT_EQ(sequence.playback.subframes, 8U);
+  EXPECT_EQ(sequence.frame, Moment(3, 500));
+  EXPECT_EQ(scene.sequence, SceneSequence());
+  const SceneOptions again = parse_scene(scene_text(scene, "/folder/scene.json"), "/folder/scene.json");
+  EXPECT_TRUE(same_scene(scene, again));
+  EXPECT_EQ(again.others[0].sequence, sequence);
+  try {
+    static_cast<void>(read(R"({"repeat": "bounce"})"));
+    FAIL() << "it was taken";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(std::string(error.what()).rfind("/folder/scene.json: volumes[1].sequence.repeat: ", 0), 0U)
+        << error.what();
+  }
+}
+
 TEST(SceneFile, ModelsAreKept) {
   SceneOptions scene;
   scene.surfaces = "/data/town.glb";

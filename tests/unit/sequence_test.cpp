@@ -25,6 +25,7 @@ using cumulet::test::Clip;
 using cumulet::test::difference;
 using cumulet::test::drawn_once;
 using cumulet::test::HostTarget;
+using cumulet::test::InstanceRef;
 using cumulet::test::load_gl;
 using cumulet::test::make_desc;
 using cumulet::test::make_viewer;
@@ -159,6 +160,54 @@ TEST_F(CSequence, IsRefusedInOneLine) {
   EXPECT_EQ(cumulet_get_sequence_frame(viewer.get(), count, error.data(), error.size()),
             CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_get_sequence_frame(viewer.get(), 0, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+TEST_F(CSequence, WhatIsBetweenFramesIsSetByThePlayback) {
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  auto playback = make_desc<cumulet_playback_desc>();
+  const auto refused = [&](const char* what) {
+    EXPECT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_ERROR_INVALID_ARGUMENT) << what;
+  };
+  playback.between = static_cast<cumulet_between>(7);
+  refused("an unknown way");
+  playback.between = CUMULET_BETWEEN_BLEND;
+  playback.subframes = 1001;
+  refused("too many");
+  playback.subframes = 4;
+  playback.velocity_scale = NAN;
+  refused("no number");
+  playback.velocity_scale = 0.0;
+  ASSERT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
+
+  const ViewerPtr viewer = make();
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  const auto at = [&](double position) {
+    EXPECT_EQ(cumulet_sequence_set_frame(sequence.get(), position), CUMULET_OK);
+    return picture(viewer.get());
+  };
+  const Picture second = at(2.0);
+  EXPECT_EQ(difference(second, alone(2)), "");
+  const Picture half = at(2.5);
+  EXPECT_NE(difference(half, second), "");
+  cumulet_sequence_info info = info_of(viewer.get());
+  EXPECT_EQ(info.asked_frame, 2U);
+  EXPECT_EQ(info.asked_position, 2.5);
+  EXPECT_EQ(info.drawn_frame, 2U);
+  EXPECT_EQ(info.drawn_position, 2.5);
+  // The same until the next step, and played, scrubbed to or made anew.
+  EXPECT_EQ(difference(at(2.7), half), "");
+  EXPECT_EQ(info_of(viewer.get()).asked_position, 2.5);
+  EXPECT_NE(difference(at(2.75), half), "");
+  ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), 2.5 / 24.0), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), half), "");
+  ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), half), "");
+  // Frames' own stay what they are.
+  for (const int frame : {0, 3, 6}) EXPECT_EQ(difference(at(frame), alone(frame)), "") << frame;
+  playback.between = CUMULET_BETWEEN_NONE;
+  ASSERT_EQ(cumulet_sequence_set_playback(sequence.get(), &playback), CUMULET_OK);
+  EXPECT_EQ(difference(at(2.5), second), "");
+  EXPECT_EQ(info_of(viewer.get()).asked_position, 2.0);
 }
 
 // Played, scrubbed to, or loaded by itself: to the last bit.
@@ -501,6 +550,175 @@ TEST_F(CSequence, MovesInAnyThread) {
   const Picture found = picture(viewer.get());
   EXPECT_EQ(difference(found, alone(4)), "");
   EXPECT_EQ(difference(picture(other.get()), found), "");
+}
+
+// ---- of instances ----
+
+InstanceRef make_instance(cumulet_sequence* sequence, double x = 0.0, double density_scale = 0.0) {
+  auto medium = make_desc<cumulet_medium_desc>();
+  medium.density_scale = density_scale;
+  auto desc = make_desc<cumulet_instance_desc>();
+  desc.sequence = sequence;
+  desc.medium = &medium;
+  for (int i = 0; i < 16; i += 5) desc.to_world[i] = 1.0;
+  desc.to_world[12] = x;
+  cumulet_instance* out = nullptr;
+  std::array<char, 256> error{};
+  if (cumulet_instance_create(&desc, &out, error.data(), error.size()) != CUMULET_OK)
+    throw std::runtime_error(error.data());
+  return InstanceRef(out);
+}
+
+class PlayedInstances : public CSequence {
+ protected:
+  // Of instances of this file's volume.
+  Picture still(int frame, const std::vector<double>& places) {
+    auto file = make_desc<cumulet_volume_file_desc>();
+    file.path = clip_.path(frame).c_str();
+    cumulet_volume* volume = nullptr;
+    EXPECT_EQ(cumulet_volume_open_file(&file, &volume, nullptr, 0), CUMULET_OK);
+    const VolumeRef owner(volume);
+    const ViewerPtr viewer = make();
+    std::vector<InstanceRef> instances;
+    for (const double x : places) {
+      auto desc = make_desc<cumulet_instance_desc>();
+      desc.volume = volume;
+      for (int i = 0; i < 16; i += 5) desc.to_world[i] = 1.0;
+      desc.to_world[12] = x;
+      cumulet_instance* out = nullptr;
+      EXPECT_EQ(cumulet_instance_create(&desc, &out, nullptr, 0), CUMULET_OK);
+      instances.emplace_back(out);
+      EXPECT_EQ(cumulet_add_instance(viewer.get(), out), CUMULET_OK);
+    }
+    see_all(viewer.get());
+    return picture(viewer.get());
+  }
+  // However large each frame is.
+  static void see_all(cumulet_viewer* viewer) {
+    cumulet_camera* camera = nullptr;
+    auto desc = make_desc<cumulet_camera_desc>();
+    desc.eye[0] = 10.0;
+    desc.eye[2] = 90.0;
+    desc.target[0] = 10.0;
+    EXPECT_EQ(cumulet_camera_create(&desc, &camera), CUMULET_OK);
+    const CameraRef owner(camera);
+    EXPECT_EQ(cumulet_set_camera(viewer, camera), CUMULET_OK);
+  }
+  static cumulet_sequence_info instance_info(cumulet_viewer* viewer, cumulet_instance* instance) {
+    auto info = make_desc<cumulet_sequence_info>();
+    EXPECT_EQ(cumulet_get_instance_sequence_info(viewer, instance, &info, nullptr, 0), CUMULET_OK)
+        << cumulet_last_error(viewer);
+    return info;
+  }
+};
+
+TEST_F(PlayedInstances, AFrameIsTheVolumesAlone) {
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  see_all(viewer.get());
+  const InstanceRef first = make_instance(sequence.get());
+  const InstanceRef second = make_instance(sequence.get(), 25.0);
+  ASSERT_EQ(cumulet_add_instance(viewer.get(), first.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_add_instance(viewer.get(), second.get()), CUMULET_OK);
+  for (const int frame : {3, 0, 6, 2}) {
+    ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), frame / 24.0), CUMULET_OK);
+    EXPECT_EQ(difference(picture(viewer.get()), still(frame, {0.0, 25.0})), "") << frame;
+    const cumulet_sequence_info info = instance_info(viewer.get(), second.get());
+    EXPECT_EQ(info.drawn_frame, std::uint32_t(frame));
+    EXPECT_EQ(info.is_drawn, 1);
+  }
+  // Both are one: a grid each would be twice the cells.
+  auto stats = make_desc<cumulet_stats>();
+  ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+  const std::uint64_t shared = stats.cells;
+  ASSERT_EQ(cumulet_remove_instance(viewer.get(), second.get()), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), still(2, {0.0})), "");
+  ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+  EXPECT_EQ(stats.cells, shared);
+}
+
+TEST_F(PlayedInstances, EachAtItsOwnMomentBesideTheViewersOwn) {
+  const SequenceRef early = make_sequence(clip_.paths());
+  const SequenceRef late = make_sequence(clip_.paths());
+  ASSERT_EQ(cumulet_sequence_set_frame(early.get(), 1.0), CUMULET_OK);
+  ASSERT_EQ(cumulet_sequence_set_frame(late.get(), 5.0), CUMULET_OK);
+  const ViewerPtr viewer = make();
+  see_all(viewer.get());
+  const InstanceRef instance = make_instance(late.get(), 25.0);
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), early.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_add_instance(viewer.get(), instance.get()), CUMULET_OK);
+  const Picture both = picture(viewer.get());
+  EXPECT_EQ(info_of(viewer.get()).drawn_frame, 1U);
+  EXPECT_EQ(instance_info(viewer.get(), instance.get()).drawn_frame, 5U);
+  EXPECT_NE(difference(both, still(1, {0.0})), "");
+  // Hidden it is not followed, and nothing is known of it.
+  auto desc = make_desc<cumulet_instance_desc>();
+  desc.sequence = late.get();
+  desc.hidden = 1;
+  ASSERT_EQ(cumulet_instance_set(instance.get(), &desc), CUMULET_OK);
+  EXPECT_NE(difference(picture(viewer.get()), both), "");
+  auto info = make_desc<cumulet_sequence_info>();
+  EXPECT_EQ(cumulet_get_instance_sequence_info(viewer.get(), instance.get(), &info, nullptr, 0),
+            CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the instance shows no sequence");
+}
+
+TEST_F(PlayedInstances, GapsAreNamedAndPlayedOver) {
+  clip_.remove(2);
+  clip_.corrupt(3);
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const ViewerPtr viewer = make();
+  see_all(viewer.get());
+  const InstanceRef instance = make_instance(sequence.get());
+  ASSERT_EQ(cumulet_add_instance(viewer.get(), instance.get()), CUMULET_OK);
+  const Picture before = still(1, {0.0});
+  for (const int frame : {1, 2, 3}) {
+    ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), frame), CUMULET_OK);
+    EXPECT_EQ(difference(picture(viewer.get()), before), "") << frame;
+    EXPECT_EQ(instance_info(viewer.get(), instance.get()).drawn_frame, 1U);
+  }
+  std::array<char, 512> cause{};
+  ASSERT_EQ(cumulet_get_instance_sequence_frame(viewer.get(), instance.get(), 3, cause.data(), cause.size()),
+            CUMULET_OK);
+  EXPECT_EQ(std::string(cause.data()).rfind(clip_.path(3) + ": ", 0), 0U) << cause.data();
+  EXPECT_EQ(cumulet_get_instance_sequence_frame(viewer.get(), instance.get(), count, cause.data(), cause.size()),
+            CUMULET_ERROR_INVALID_ARGUMENT);
+  // With none that can be shown the load has failed.
+  const SequenceRef none = make_sequence({"not-there.1.vdb"});
+  const InstanceRef lost = make_instance(none.get());
+  ASSERT_EQ(cumulet_add_instance(viewer.get(), lost.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_FILE);
+  EXPECT_EQ(std::string(cumulet_last_error(viewer.get())).rfind("not-there.1.vdb: ", 0), 0U);
+  ASSERT_EQ(cumulet_remove_instance(viewer.get(), lost.get()), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), before), "");
+}
+
+TEST_F(PlayedInstances, AVolumeAndASequenceAreNotBothOfOne) {
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  const VolumeRef ball = cumulet::test::make_ball(8, 1.0F);
+  auto desc = make_desc<cumulet_instance_desc>();
+  desc.sequence = sequence.get();
+  desc.volume = ball.get();
+  cumulet_instance* out = nullptr;
+  std::array<char, 256> error{};
+  EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "cumulet_instance_desc has both a volume and a sequence");
+  // From one to the other, and to neither.
+  const ViewerPtr viewer = make();
+  see_all(viewer.get());
+  const InstanceRef instance = make_instance(sequence.get());
+  ASSERT_EQ(cumulet_add_instance(viewer.get(), instance.get()), CUMULET_OK);
+  const Picture plays = picture(viewer.get());
+  desc.sequence = nullptr;
+  ASSERT_EQ(cumulet_instance_set(instance.get(), &desc), CUMULET_OK);
+  EXPECT_NE(difference(picture(viewer.get()), plays), "");
+  desc.volume = nullptr;
+  desc.sequence = sequence.get();
+  ASSERT_EQ(cumulet_instance_set(instance.get(), &desc), CUMULET_OK);
+  EXPECT_EQ(difference(picture(viewer.get()), plays), "");
+  desc.sequence = nullptr;
+  ASSERT_EQ(cumulet_instance_set(instance.get(), &desc), CUMULET_OK);
+  EXPECT_NE(difference(picture(viewer.get()), plays), "");
 }
 
 }  // namespace

@@ -541,6 +541,23 @@ typedef enum cumulet_repeat {
   CUMULET_REPEAT_PING_PONG = 2 /* they run back, and forth again; neither end comes twice */
 } cumulet_repeat;
 
+/*
+ * What is shown between two frames. Both ways make a volume of each moment, which is built as a frame is, on the same
+ * worker and within the same memory, and so is there only as fast as that goes. What cannot be made, for one of the two
+ * files cannot be read, is the frame before it.
+ */
+typedef enum cumulet_between {
+  CUMULET_BETWEEN_NONE = 0, /* the frame that came last */
+  /* Both frames, each by its share, field by field; colour, anisotropy and velocity by how much smoke has them. */
+  CUMULET_BETWEEN_BLEND = 1,
+  /*
+   * Both frames carried to that moment along their own velocity, one on, the other back (semi-Lagrangian, midpoint
+   * rule), and then blended: smoke moves, where blending would fade it from one place to the other. Velocity as the
+   * fields of a file have it (docs/grids.md): world units a second. Where one of both has none, blended alone.
+   */
+  CUMULET_BETWEEN_ADVECT = 2
+} cumulet_between;
+
 /* How a clock runs through the frames. */
 typedef struct cumulet_playback_desc {
   size_t struct_size;
@@ -549,6 +566,19 @@ typedef struct cumulet_playback_desc {
   cumulet_repeat repeat;
   uint32_t first_frame; /* that is played */
   uint32_t frame_count; /* how many are; 0: all from the first on */
+  cumulet_between between;
+  /*
+   * Moments from a frame to the next, the frame's own among them, at which another picture may be: each is there until
+   * the next comes, so that what was made serves again. 1 to 1000, and 4,000,000 in the whole sequence at most; 0: 4.
+   * CUMULET_BETWEEN_NONE: not looked at.
+   */
+  uint32_t subframes;
+  /*
+   * By which velocities are multiplied, -1e6 to 1e6; 0: 1. The time between two frames is 1 / frames_per_second: of a
+   * simulation of 24 frames a second that is played at 12, and whose velocities are units a second, it is 0.5; of
+   * velocities that are units a frame it is frames_per_second.
+   */
+  double velocity_scale;
 } cumulet_playback_desc;
 
 /*
@@ -561,7 +591,10 @@ CUMULET_API cumulet_status cumulet_sequence_set_playback(cumulet_sequence* seque
  * two of these calls, tells viewers which frames are next.
  */
 CUMULET_API cumulet_status cumulet_sequence_set_time(cumulet_sequence* sequence, double seconds);
-/* To this frame, 0 to count - 1, played or not; of 2.25, frame 2 is shown. */
+/*
+ * To this frame, 0 to count - 1, played or not; of 2.25 frame 2 is shown, or where something is between frames, what is
+ * a quarter of the way to frame 3. Between the last frame of a loop and its first the last one stays.
+ */
 CUMULET_API cumulet_status cumulet_sequence_set_frame(cumulet_sequence* sequence, double frame);
 /* Which frame cumulet_sequence_set_time would come to; it stays where it is. */
 CUMULET_API cumulet_status cumulet_sequence_get_frame_at(const cumulet_sequence* sequence, double seconds,
@@ -848,6 +881,8 @@ typedef struct cumulet_sequence_info {
   int32_t is_drawn;               /* 0: none of its frames */
   uint64_t bytes;                 /* of main memory, of those that are ready */
   double suggested_density_scale; /* cumulet_volume_suggest_density_scale, of the largest; 0: not known yet, or none */
+  double asked_position;          /* as asked_frame, in frames: 2.25 is a quarter of the way from frame 2 to frame 3 */
+  double drawn_position;          /* as drawn_frame, likewise */
 } cumulet_sequence_info;
 
 /*
@@ -1346,6 +1381,13 @@ typedef struct cumulet_instance_desc {
       medium;     /* read in the call; NULL: its defaults. max_bounces is the viewer's own medium's */
   int32_t hidden; /* 1: it is as if it were not there */
   uint64_t tag;   /* the host's own, which cumulet_pick tells */
+  /*
+   * In place of a volume: the frame at which this stands, from now on and as it moves; NULL: none. Not both. What
+   * cumulet_set_sequence says of reading ahead, gaps and bounds holds for it; instances of one sequence whose media
+   * build the same share its frames and their grids, others have them a second time. The medium's density_scale is
+   * taken as it is given: suggested_density_scale of the sequence's file is not looked at.
+   */
+  cumulet_sequence* sequence;
 } cumulet_instance_desc;
 
 /* error as in cumulet_create. */
@@ -1363,6 +1405,16 @@ CUMULET_API cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance,
 CUMULET_API cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_instance* instance);
 /* CUMULET_ERROR_INVALID_ARGUMENT if it does not. */
 CUMULET_API cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumulet_instance* instance);
+/*
+ * As cumulet_get_sequence_info and cumulet_get_sequence_frame, of an instance's sequence in this viewer: what is ready is
+ * that of all that share it. CUMULET_ERROR_INVALID_ARGUMENT for one that the viewer does not show, or hides, or that
+ * shows no sequence.
+ */
+CUMULET_API cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* viewer, cumulet_instance* instance,
+                                                              cumulet_sequence_info* info, uint8_t* states,
+                                                              size_t count);
+CUMULET_API cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumulet_instance* instance,
+                                                               uint32_t frame, char* cause, size_t size);
 
 /* ---- Models: surfaces beside the viewer's own ----------------------------------------------------------------------
  *

@@ -627,15 +627,84 @@ class Environment {
   cumulet_environment* handle_ = nullptr;
 };
 
+// ---- Sequences ------------------------------------------------------------------------------------------------------
+
+struct SequenceDesc {
+  std::span<const char* const> paths{};
+  VolumeFileDesc file = {};
+  std::uint64_t memory_bytes = 0;
+};
+
+/// A share in volumes that follow each other: a copy is one more of the same. Any thread.
+class Sequence {
+ public:
+  Sequence() noexcept = default;
+  Sequence(const Sequence& other) noexcept : handle_(cumulet_sequence_retain(other.handle_)) {}
+  Sequence(Sequence&& other) noexcept : handle_(other.release()) {}
+  Sequence& operator=(Sequence other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Sequence() { cumulet_sequence_release(handle_); }
+
+  [[nodiscard]] static Result<Sequence> create(const SequenceDesc& desc) noexcept {
+    const cumulet_volume_file_desc file = desc.file;
+    const cumulet_sequence_desc c{.struct_size = sizeof c,
+                                  .paths = desc.paths.data(),
+                                  .count = desc.paths.size(),
+                                  .file = &file,
+                                  .memory_bytes = desc.memory_bytes};
+    return detail::made<Sequence>([&](cumulet_sequence** out, char* error, std::size_t size) {
+      return cumulet_sequence_create(&c, out, error, size);
+    });
+  }
+  [[nodiscard]] Result<> set_playback(const PlaybackDesc& desc) const noexcept {
+    const cumulet_playback_desc c = desc;
+    return detail::result(cumulet_sequence_set_playback(handle_, &c));
+  }
+  [[nodiscard]] Result<> set_time(double seconds) const noexcept {
+    return detail::result(cumulet_sequence_set_time(handle_, seconds));
+  }
+  [[nodiscard]] Result<> set_frame(double frame) const noexcept {
+    return detail::result(cumulet_sequence_set_frame(handle_, frame));
+  }
+  [[nodiscard]] Result<std::uint32_t> get_frame_at(double seconds) const noexcept {
+    std::uint32_t frame = 0;
+    if (auto done = detail::result(cumulet_sequence_get_frame_at(handle_, seconds, &frame)); !done) return done.error();
+    return frame;
+  }
+  [[nodiscard]] Result<double> get_time_of(std::uint32_t frame) const noexcept {
+    double seconds = 0.0;
+    if (auto done = detail::result(cumulet_sequence_get_time_of(handle_, frame, &seconds)); !done) return done.error();
+    return seconds;
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_sequence* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_sequence* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Sequence adopt(cumulet_sequence* handle) noexcept {
+    Sequence sequence;
+    sequence.handle_ = handle;
+    return sequence;
+  }
+
+ private:
+  cumulet_sequence* handle_ = nullptr;
+};
+
 // ---- Instances ------------------------------------------------------------------------------------------------------
 
-/// What an instance is made of: shares the volume.
+/// What an instance is made of: shares the volume, or the sequence.
 struct InstanceDesc {
   Volume volume;
   std::array<double, 16> to_world{};
   MediumDesc medium = {};
   bool hidden = false;
   std::uint64_t tag = 0;
+  Sequence sequence = {};
 };
 
 /// A share in a volume of scenes: a copy is one more of the same. Any thread.
@@ -693,7 +762,8 @@ class Instance {
                             .to_world = {},
                             .medium = &medium,
                             .hidden = desc.hidden ? 1 : 0,
-                            .tag = desc.tag};
+                            .tag = desc.tag,
+                            .sequence = desc.sequence.handle()};
     std::ranges::copy(desc.to_world, c.to_world);
     return c;
   }
@@ -779,74 +849,6 @@ class Model {
     return c;
   }
   cumulet_model* handle_ = nullptr;
-};
-
-// ---- Sequences ------------------------------------------------------------------------------------------------------
-
-struct SequenceDesc {
-  std::span<const char* const> paths{};
-  VolumeFileDesc file = {};
-  std::uint64_t memory_bytes = 0;
-};
-
-/// A share in volumes that follow each other: a copy is one more of the same. Any thread.
-class Sequence {
- public:
-  Sequence() noexcept = default;
-  Sequence(const Sequence& other) noexcept : handle_(cumulet_sequence_retain(other.handle_)) {}
-  Sequence(Sequence&& other) noexcept : handle_(other.release()) {}
-  Sequence& operator=(Sequence other) noexcept {
-    std::swap(handle_, other.handle_);
-    return *this;
-  }
-  ~Sequence() { cumulet_sequence_release(handle_); }
-
-  [[nodiscard]] static Result<Sequence> create(const SequenceDesc& desc) noexcept {
-    const cumulet_volume_file_desc file = desc.file;
-    const cumulet_sequence_desc c{.struct_size = sizeof c,
-                                  .paths = desc.paths.data(),
-                                  .count = desc.paths.size(),
-                                  .file = &file,
-                                  .memory_bytes = desc.memory_bytes};
-    return detail::made<Sequence>([&](cumulet_sequence** out, char* error, std::size_t size) {
-      return cumulet_sequence_create(&c, out, error, size);
-    });
-  }
-  [[nodiscard]] Result<> set_playback(const PlaybackDesc& desc) const noexcept {
-    const cumulet_playback_desc c = desc;
-    return detail::result(cumulet_sequence_set_playback(handle_, &c));
-  }
-  [[nodiscard]] Result<> set_time(double seconds) const noexcept {
-    return detail::result(cumulet_sequence_set_time(handle_, seconds));
-  }
-  [[nodiscard]] Result<> set_frame(double frame) const noexcept {
-    return detail::result(cumulet_sequence_set_frame(handle_, frame));
-  }
-  [[nodiscard]] Result<std::uint32_t> get_frame_at(double seconds) const noexcept {
-    std::uint32_t frame = 0;
-    if (auto done = detail::result(cumulet_sequence_get_frame_at(handle_, seconds, &frame)); !done) return done.error();
-    return frame;
-  }
-  [[nodiscard]] Result<double> get_time_of(std::uint32_t frame) const noexcept {
-    double seconds = 0.0;
-    if (auto done = detail::result(cumulet_sequence_get_time_of(handle_, frame, &seconds)); !done) return done.error();
-    return seconds;
-  }
-
-  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
-  [[nodiscard]] cumulet_sequence* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
-  [[nodiscard]] cumulet_sequence* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
-  [[nodiscard]] static Sequence adopt(cumulet_sequence* handle) noexcept {
-    Sequence sequence;
-    sequence.handle_ = handle;
-    return sequence;
-  }
-
- private:
-  cumulet_sequence* handle_ = nullptr;
 };
 
 // ---- Live volumes ---------------------------------------------------------------------------------------------------
@@ -1268,6 +1270,26 @@ class Viewer {
   }
   [[nodiscard]] Result<> remove_instance(const Instance& instance) noexcept {
     return result(cumulet_remove_instance(handle(), instance.handle()));
+  }
+  /// As get_sequence_info and get_sequence_frame, of an instance's.
+  [[nodiscard]] Result<SequenceInfo> get_instance_sequence_info(const Instance& instance,
+                                                                std::span<std::uint8_t> states = {}) noexcept {
+    auto c = detail::sized<cumulet_sequence_info>();
+    std::uint8_t* const first = states.empty() ? nullptr : states.data();
+    if (auto done = result(cumulet_get_instance_sequence_info(handle(), instance.handle(), &c, first, states.size()));
+        !done) {
+      return done.error();
+    }
+    return SequenceInfo::of(c);
+  }
+  [[nodiscard]] Result<Text<512>> get_instance_sequence_frame(const Instance& instance, std::uint32_t frame) noexcept {
+    std::array<char, 512> cause{};
+    if (auto done =
+            result(cumulet_get_instance_sequence_frame(handle(), instance.handle(), frame, cause.data(), cause.size()));
+        !done) {
+      return done.error();
+    }
+    return Text<512>(cause.data());
   }
   /// Empty if there is none.
   [[nodiscard]] Result<Volume> get_volume() noexcept {
