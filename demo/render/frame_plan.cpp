@@ -86,9 +86,9 @@ PlannedFrame::Next next_of(const Moment& moment, const FramePattern& volume, con
 double seconds_of(const Moment& moment, const SceneSequence& sequence, const Grid& grid) {
   cumulet_playback_desc playback = sequence.playback;
   settings::spell_out_zeros(playback);
-  const double frames = double{moment.frame} - sequence.first.value_or(grid.first);
+  const double frames = double(moment.frame) - sequence.first.value_or(grid.first);
   return playback.offset_seconds +
-         (frames + double{moment.thousandths} / thousand) / (grid.step * playback.frames_per_second);
+         (frames + double(moment.thousandths) / thousand) / (grid.step * playback.frames_per_second);
 }
 
 }  // namespace
@@ -111,12 +111,16 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   const Written checkpoint("--checkpoint", options.checkpoint, frames.size());
 
   const Grid grid(there);
+  const bool moments = std::ranges::any_of(frames, &Moment::is_between);
   FramePlan plan;
   for (const Moment& frame : frames) {
     PlannedFrame& planned = plan.frames.emplace_back();
     planned.number = frame;
-    planned.volume = volume->file(frame.is_between() ? grid.before(frame.frame) : frame.frame);
-    if (frame.is_between()) planned.next = next_of(frame, *volume, grid);
+    // With moments in the list, whole numbers are such, too, where files are farther apart.
+    const Frame before = grid.before(frame.frame);
+    const bool between = frame.is_between() || (moments && before != frame.frame);
+    planned.volume = volume->file(between ? before : frame.frame);
+    if (between) planned.next = next_of(frame, *volume, grid);
     planned.seconds = seconds_of(frame, options.scene.sequence, grid);
     planned.output = output.of(frame);
     planned.stats = stats.of(frame);

@@ -548,6 +548,17 @@ class Studio {
     return ::trace(viewer_, options, from, progress_);
   }
 
+  /// Of what is between two frames, that was traced: nothing stands in for it.
+  void require_drawn(const PlannedFrame::Next& next) const {
+    cumulet_sequence_info info{};
+    info.struct_size = sizeof info;
+    check(viewer_, cumulet_get_sequence_info(viewer_.get(), &info, nullptr, 0));
+    const double position = static_cast<double>(next.part) / next.parts;
+    if (info.is_drawn == 0 || std::abs(info.drawn_position - position) > 0.5 / next.parts)
+      throw std::runtime_error(next.volume +
+                               ": the moment before it could not be made, and another would stand for it");
+  }
+
   void write(const RenderOptions& options) {
     const std::vector<float> denoised = denoise(viewer_, options, network_, progress_);
     progress_.stage("writing " + options.output);
@@ -837,6 +848,7 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
     const std::optional<Checkpoint> from = checkpoint_for(picture);
     studio.load(picture.scene, &frame);
     traced = studio.trace(picture, from);
+    if (frame.next && picture.scene.is_shown() && traced != Traced::stopped) studio.require_drawn(*frame.next);
   } catch (const std::runtime_error& error) {
     if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(place));
     return report.say(place, FrameState::failed, error.what(), &studio.progress());

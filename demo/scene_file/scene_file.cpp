@@ -804,6 +804,11 @@ cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow&
   const std::uint32_t last = sequence.last ? row.index_of(*sequence.last) : row.count() - 1;
   desc.first_frame = std::min(first, last);
   desc.frame_count = last - desc.first_frame + 1;
+  // From file to file is a frame of playback, whatever their numbers say; what moves has gone that far.
+  if (row.count() > 1) {
+    settings::spell_out_zeros(desc);
+    desc.velocity_scale *= row.number(1) - row.number(0);
+  }
   return desc;
 }
 

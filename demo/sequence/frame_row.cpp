@@ -64,8 +64,7 @@ std::vector<std::string> FrameRow::by_size() const {
 }
 
 double FrameRow::position_of(const Moment& moment) const {
-  if (!moment.is_between()) return index_of(moment.frame);
-  const double from_first = double{moment.frame} - first_ + moment.thousandths / 1000.0;
+  const double from_first = double(moment.frame) - first_ + moment.thousandths / 1000.0;
   return std::clamp(from_first / step_, 0.0, count_ - 1.0);
 }
 

@@ -13,6 +13,7 @@ namespace {
 }
 
 constexpr std::uint64_t whole = 1000;  // thousandths
+constexpr std::uint64_t most_moments = last_frame + 1;
 
 std::uint64_t parse_digits(std::string_view digits, std::string_view part) {
   std::uint64_t number = 0;
@@ -80,6 +81,8 @@ std::vector<Moment> parse_frames(std::string_view text) {
     const std::uint64_t step = steps ? parse_moment(step_text, part) : whole;
     if (last < first) refuse(part, "runs backwards");
     if (step == 0) refuse(part, "has a step of 0");
+    if ((last - first) / step + moments.size() >= most_moments)
+      refuse(part, "makes more than " + std::to_string(most_moments) + " frames");
     for (std::uint64_t moment = first; moment <= last; moment += step)
       if (known.insert(moment).second) moments.push_back(moment_of(moment));
   }

@@ -102,6 +102,11 @@ class Progressive {
   [[nodiscard]] bool newest_is_of(Revision<MarchData> data, Revision<InstanceData> instances) const {
     return newest_work() && newest_work()->data == data && newest_work()->instances == instances;
   }
+  /// Whether it is of the view, and of where things were before it, that the scene has now.
+  [[nodiscard]] bool newest_is_seen_as(const scene::Snapshot& scene) const {
+    return newest_work() && newest_work()->wish == wishes_ && wish_.content.viewpoint == scene.view &&
+           wish_.content.previous == scene.previous;
+  }
   [[nodiscard]] Schedule::State state() const { return schedule_.state(); }
   /// Whether pictures may come coarse first, and need not be the same whatever was before.
   [[nodiscard]] bool previews() const { return wish_.content.preview; }

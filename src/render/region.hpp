@@ -29,9 +29,11 @@ struct Region {
   [[nodiscard]] PixelBox pixels(glm::uvec2 size, std::uint32_t margin = 0) const {
     PixelBox box;
     for (int axis = 0; axis < 2; ++axis) {
-      // An edge of two regions falls between the same two middles for both.
+      // An edge of two regions falls between the same two middles for both, whatever floats make of where it is.
+      constexpr double rounding = 2e-3;  // pixels
       const auto before = [&](double edge) {
-        return static_cast<std::uint32_t>(std::clamp(std::ceil(edge * size[axis] - 0.5), 0.0, double(size[axis])));
+        const double middles = std::ceil(edge * size[axis] - 0.5 - rounding);
+        return static_cast<std::uint32_t>(std::clamp(middles, 0.0, double(size[axis])));
       };
       const double low = corner[axis];
       const double high = extent[axis] > 0.0F ? low + double(extent[axis]) : 1.0;

@@ -367,10 +367,11 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.volume_alone_ = shaded && settings.volume_alone;
   picture.light_groups_ = shaded ? settings.light_groups : 0;
   if (picture.light_groups_ > 0 && picture.traced_ > 0) picture.traced_ = 2;
-  // What the volume alone has is told by what a path first met, and such light may lie before a surface; and a layer's
-  // colour waits in the place of such a look's light.
+  // What the volume alone has is told by what a path first met, and such light may lie before a surface; a layer's
+  // colour waits in the place of such a look's light, and a hole has none.
   picture.equiangular_ = picture.lamps_ && parameters.equiangular && !picture.volume_alone_ && !picture.rich_ &&
-                         !picture.volume_holdout_ && (picture.traced_ > 0 || picture.layered_ == Layered::no);
+                         !picture.volume_holdout_ && !picture.model_holdout_ &&
+                         (picture.traced_ > 0 || picture.layered_ == Layered::no);
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
 }
 
@@ -832,6 +833,8 @@ bool Picture::has_facts() const { return film_.has(film_layers::normal); }
 bool Tracer::find_facts(Picture& picture, const MarchData& data, const Obstacles& obstacles, Deadline deadline,
                         std::uint32_t rays, PixelFacts facts) {
   using namespace film_layers;
+  // A reading that failed may have left more to find.
+  if (obstacles.motion == nullptr && !picture.film_.has(motion)) picture.facts_ = PixelFacts::guides;
   if (picture.facts_rays_ < rays || picture.facts_ < facts) {
     picture.facts_rays_ = std::max(picture.facts_rays_, rays);
     picture.facts_ = std::max(picture.facts_, facts);

@@ -49,7 +49,8 @@ MotionTable make_motion(const Snapshot& snapshot, const dmat4& ray_to_world, std
     const Model& model = models[part.model];
     // A scene that shows other meshes then is as it is now.
     const ModelSourcePtr& then_posed = model.previous_source;
-    const bool alike = then_posed && then_posed->meshes.size() == model.source->meshes.size();
+    const bool alike = then_posed && then_posed->meshes.size() == model.source->meshes.size() &&
+                       then_posed->meshes[part.mesh].placings.size() == model.source->meshes[part.mesh].placings.size();
     const ModelSource& source = alike ? *then_posed : *model.source;
     const dmat4 placing = source.meshes.at(part.mesh).placings.at(part.placing);
     made.maps.push_back(map_of(into_then * model.previous.value_or(model.to_world) * placing, vertices_of(source)));

@@ -19,7 +19,7 @@ constexpr std::uint64_t most_frames = 1'000'000;
 constexpr std::uint32_t most_subframes = 1000;
 constexpr std::uint64_t default_memory = std::uint64_t{2} << 30U;
 constexpr double most_seconds = 1e9;
-constexpr std::uint64_t most_steps = 4'000'000;
+constexpr std::uint64_t most_steps = 1'000'000;
 
 Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   const cumulet_playback_desc d = read_settings(desc);
@@ -30,7 +30,7 @@ Playback playback_of(const cumulet_playback_desc* desc, std::uint32_t frames) {
   const bool steps = d.between != CUMULET_BETWEEN_NONE;
   require(d.subframes <= most_subframes, "cumulet_playback_desc.subframes is not from 0 to 1000");
   if (steps && std::uint64_t{frames} * d.subframes > most_steps)
-    refuse("cumulet_playback_desc.subframes makes more than 4000000 of " + std::to_string(frames) + " frames");
+    refuse("cumulet_playback_desc.subframes makes more than 1000000 of " + std::to_string(frames) + " frames");
   return {.frames_per_second = d.frames_per_second,
           .offset_seconds = d.offset_seconds,
           .repeat = static_cast<cumulet::scene::Repeat>(d.repeat),

@@ -54,7 +54,7 @@ void FrameShelf::wish(Wish wish) {
       worker_.cancel();
       old = take_other_steps(wish.steps);
     }
-    const bool suggested = wish.files->shown.suggested_density_scale;
+    const bool suggested = wish.takes_suggested && wish.files->shown.suggested_density_scale;
     if (suggested && judged_ && judged_->density_scale && wish.settings)
       wish.settings->refine.density_scale = *judged_->density_scale;
     wish_ = std::move(wish);
@@ -363,7 +363,7 @@ void FrameShelf::judge(const FrameFilesPtr& files, Progress& progress) {
     if (how != Judging::due) progress.check();
     judging_ = how;
     if (how != Judging::done) return;
-    if (files->shown.suggested_density_scale && judged.density_scale && wish_->settings)
+    if (wish_->takes_suggested && files->shown.suggested_density_scale && judged.density_scale && wish_->settings)
       wish_->settings->refine.density_scale = *judged.density_scale;
     judged_ = judged;
     ++revision_;

@@ -52,6 +52,7 @@ class FrameShelf {
     std::optional<BuildSettings> settings;  ///< none yet: the sequence is judged, and nothing is built
     std::uint64_t memory_bytes = 0;         ///< of main memory; the first is there at any
     Steps steps = {};
+    bool takes_suggested = true;  ///< the density scale that suits the sequence, where its file asks for that
   };
 
   /// What the whole sequence goes by.

@@ -224,12 +224,18 @@ void Context::read_light_group(const DisplaySettings& settings, std::uint32_t gr
 }
 
 void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts) {
-  if (scene_.data() == nullptr || !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
+  // Motion is told from now on.
+  const bool of_now = facts != render::PixelFacts::all || progressive_.newest_is_seen_as(*shot.scene);
+  if (scene_.data() == nullptr || !of_now ||
+      !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
     throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
   }
   render::Obstacles met = obstacles(shot);
-  const scene::MotionTable motion = scene_.motion(*shot.scene);
-  met.motion = &motion;
+  scene::MotionTable motion;
+  if (facts == render::PixelFacts::all) {
+    motion = scene_.motion(*shot.scene);
+    met.motion = &motion;
+  }
   compositor_.begin_denoising_anew();
   while (!progressive_.tracer().find_facts(picture, *scene_.data(), met, deadline_after(1000.0), render::fact_rays,
                                            facts)) {

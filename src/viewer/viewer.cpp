@@ -318,7 +318,8 @@ void Viewer::tell_wish(Followed& f, FrameShelf& shelf) const {
   }
   if (f.wish_due) {
     shelf.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), f.settings,
-                std::min(f.state.memory_bytes, allowance_->memory_bytes()), FrameShelf::Steps::of(f.state.playback)});
+                std::min(f.state.memory_bytes, allowance_->memory_bytes()), FrameShelf::Steps::of(f.state.playback),
+                &shelf == &frames_});
     f.wish_due = false;
     f.take_due = true;
     f.is_wanted = false;

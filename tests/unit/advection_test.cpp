@@ -7,6 +7,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <glm/gtc/type_ptr.hpp>
 #include <numbers>
 #include <numeric>
 
@@ -14,6 +15,7 @@
 #include "support/folder.hpp"
 #include "support/vdb_files.hpp"
 #include "support/volumes.hpp"
+#include "volume/bricks.hpp"
 
 namespace {
 
@@ -120,9 +122,10 @@ TEST(Advection, ABlobTurnsAsASolid) {
   // Interpolation alone takes 3 h^2 / (8 width^2) of the top.
   EXPECT_LT(farthest_off(after.density, low, low + size - 1, [&](const dvec3& p) { return gauss(p, there, width); }),
             0.06);
-  EXPECT_NEAR(mass(after.density) / mass(frame.density), 1.0, 0.002);
-  // Back again.
-  const VolumeFrame back = advect(after, -1.0);
+  EXPECT_NEAR(mass(after.density) / mass(frame.density), 1.0, 0.005);
+  // Back again, by the same velocity: what was carried along points elsewhere.
+  const VolumeFrame turned{.density = after.density, .velocity = frame.velocity};
+  const VolumeFrame back = advect(turned, -1.0);
   EXPECT_LT(farthest_off(back.density, low, low + size - 1, [&](const dvec3& p) { return gauss(p, middle, width); }),
             0.12);
 }
@@ -138,7 +141,8 @@ TEST(Advection, AFlowWithoutSourcesKeepsMass) {
   });
   double before = mass(frame.density);
   for (int step = 0; step < 4; ++step) {
-    frame = advect(frame, 1.0 / 24.0);
+    // The flow stays; a velocity that was carried along has sources.
+    frame.density = advect(frame, 1.0 / 24.0).density;
     EXPECT_NEAR(mass(frame.density) / before, 1.0, 0.01) << step;
   }
 }
@@ -159,13 +163,13 @@ TEST(Advection, StaggeredAndCentredVelocitiesAreTheSameFlow) {
       const openvdb::Coord at(p.x, p.y, p.z);
       density->tree().setValue(at, static_cast<float>(gauss(dvec3(p), dvec3(5.0, -3.0, 0.0), width)));
       const dvec3 where = dvec3(p) - (staggered ? 0.5 : 0.0);
-      flow->tree().setValue(at, openvdb::Vec3s(0.1 * grows * where));  // world units
+      flow->tree().setValue(at, openvdb::Vec3s(glm::value_ptr(glm::vec3(0.1 * grows * where))));  // world units
     }
     density->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
     flow->setTransform(density->transformPtr()->copy());
     const auto path = folder / "frame.vdb";
     openvdb::io::File(path.string()).write({density, flow});
-    const VolumeFrame frame = import_frame(path, {}, {});
+    const VolumeFrame frame = volume::import_frame(path, {}, {});
     const double seconds = 0.4;
     const VolumeFrame after = advect(frame, seconds);
     const double off = farthest_off(after.density, ivec3(-18), ivec3(18), [&](const dvec3& p) {

@@ -536,7 +536,7 @@ TEST(Options, AovsAreListedOrAll) {
   };
   EXPECT_TRUE(parse({}).aovs.empty());
   EXPECT_EQ(aovs_of("depth,normal,depth"), (std::vector<cumulet_aov>{CUMULET_AOV_SURFACE_DEPTH, CUMULET_AOV_NORMAL}));
-  EXPECT_EQ(aovs_of("albedo,all").size(), 8U);
+  EXPECT_EQ(aovs_of("albedo,all").size(), 10U);
   EXPECT_EQ(aovs_of("error"), std::vector<cumulet_aov>{CUMULET_AOV_ERROR});
   EXPECT_EQ(aovs_of("velocity"), std::vector<cumulet_aov>{CUMULET_AOV_VELOCITY});
 }

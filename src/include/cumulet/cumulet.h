@@ -1269,8 +1269,8 @@ typedef struct cumulet_sampling_desc {
    * The part of the picture that is made: x, y, width and height as fractions of it from its upper left corner, so that
    * it is the same part at any size; of the pixels those whose middles are within (cumulet_region_pixels), with the
    * bits that they have in the whole picture. A width or height of 0 reaches to the end: zeros, the default, are the
-   * whole picture. Frames leave the rest of their target as it is; what is read back is 0 there, transparent, and where
-   * an error or a depth would be infinite, too. Denoising knows no other pixels. Progress, noise and samples are of it.
+   * whole picture. Frames leave the rest of their target as it is; what is read back is 0 there, transparent, of
+   * depths, too; errors are infinite. Denoising knows no other pixels. Progress, noise and samples are of it.
    */
   float region[4];
   /*
@@ -1564,7 +1564,7 @@ CUMULET_API cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_ca
  * begins the picture anew.
  *
  * The viewer's camera was where this one is, whose changes it follows; retained. NULL: it stood where it is. seconds,
- * to 1e9: from then to now, in which velocities carried media.
+ * 1e9 at most: from then to now, in which velocities carried media; less than 0: then is yet to come.
  */
 CUMULET_API cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, cumulet_camera* camera, double seconds);
 /* The first count places of the viewer's volume (cumulet_set_volume_places) were there, the others where they are.
