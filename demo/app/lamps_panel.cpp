@@ -53,7 +53,7 @@ void Panel::lamps(Model& model) {
     Desc& lamp = lamps[i];
     const std::string number = std::string(" ").append(std::to_string(i + 1));
     settings::for_each<Desc>([&](auto setting) {
-      if (!has(setting, lamp.kind)) return;
+      if (*setting.row.label == '\0' || !has(setting, lamp.kind)) return;  // Scene files alone know the untitled.
       const std::string label = setting.row.label + number;
       setting.row.label = label.c_str();
       auto& value = lamp.*setting.field;
