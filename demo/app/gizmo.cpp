@@ -173,7 +173,10 @@ Sight::Sight(const cumulet_camera_desc& camera, const Rectangle& place) : place_
   nearest_ = perspective_ ? 1e-3 * distance : -std::numeric_limits<double>::infinity();
 }
 
-dvec3 Sight::in_eye_space(const dvec3& point) const { return dvec3(to_eye_ * dvec4(point, 1.0)); }
+dvec3 Sight::in_eye_space(const dvec3& point) const {
+  const dvec4 seen = to_eye_ * dvec4(point, 1.0);
+  return {seen.x, seen.y, seen.z};
+}
 
 dvec2 Sight::pixel_of(const dvec3& in_eye_space) const {
   const dvec4 clip = projection_ * dvec4(in_eye_space, 1.0);

@@ -58,6 +58,7 @@ class Pen {
   }
   void lines(const std::vector<dvec2>& points, bool closed, ImU32 colour, float width) const {
     std::vector<ImVec2> all;
+    all.reserve(points.size());
     for (const dvec2& point : points) all.push_back(vec(point));
     const ImDrawFlags flags = closed ? ImDrawFlags_Closed : ImDrawFlags_None;
     const int count = static_cast<int>(all.size());
@@ -66,6 +67,7 @@ class Pen {
   }
   void fill(const std::vector<dvec2>& points, ImU32 colour) const {
     std::vector<ImVec2> all;
+    all.reserve(points.size());
     for (const dvec2& point : points) all.push_back(vec(point));
     list_->AddConvexPolyFilled(all.data(), static_cast<int>(all.size()), colour);
   }

@@ -215,7 +215,8 @@ std::optional<Box> box_of(const SceneOptions& scene, const Boxes& boxes, const I
 
 dvec3 pivot_of(const dmat4& place, const std::optional<Box>& box) {
   const dvec3 middle = box ? 0.5 * (box->least + box->most) : dvec3(0.0);
-  return dvec3(place * dvec4(middle, 1.0));
+  const dvec4 at = place * dvec4(middle, 1.0);
+  return {at.x, at.y, at.z};
 }
 
 }  // namespace cumulet::demo
