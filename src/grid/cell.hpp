@@ -1,10 +1,15 @@
 #pragma once
 
-// glsl/cell.glsl and channels.glsl as C++: shapes, records, children and faces of cells, and what they give off.
+// What glsl/ has of cells as C++: shapes, records, children and faces (cell.glsl), linear fits over them
+// (cell_fit.glsl), their faces when they split (cell_split.glsl), what they give off (channels.glsl), and the lattice
+// of their splits (lattice.glsl).
 
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
 #include "cell.glsl"
+#include "cell_fit.glsl"
+#include "cell_split.glsl"
 #include "channels.glsl"
+#include "lattice.glsl"
 }  // namespace cumulet::core

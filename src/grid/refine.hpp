@@ -9,6 +9,7 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/progress_part.hpp"
@@ -60,10 +61,15 @@ struct RefineSettings {
   double density_scale = 1.0;
   double anisotropy = 0.0;
   std::uint64_t max_cells = 5'400'000;
-  std::optional<RefineCamera> camera;  ///< set: no split outside its frustum or under pixel_size
-  double pixel_size = 1.0;             ///< pixels that a cell's longest edge must cover to be split
+  std::optional<RefineCamera> camera;  ///< set: no split outside its frustum or under pixel_size (ViewLevels)
+  double pixel_size = 1.0;             ///< pixels that the longest edge of a cell's level must cover to be split
   bool operator==(const RefineSettings&) const = default;
 };
+
+class Evaluation;
+class Evaluations;
+struct OwnPriorities;
+class ViewLevels;
 
 /// The set of diamonds to split, each named by the vertex that its split makes.
 ///
@@ -85,12 +91,20 @@ class DiamondSet {
   DiamondSet(const Statistics& statistics, const RefineSettings& settings, Progress* progress = nullptr)
       : DiamondSet(statistics, {}, settings, progress) {}
 
+  /// Of priorities that were kept: what the constructor above makes of the settings that they were made with, with
+  /// this camera and budget. levels: OwnPriorities::levels() of a view.
+  DiamondSet(const OwnPriorities& own, std::span<const std::uint8_t> levels, std::uint64_t max_cells,
+             Progress* progress = nullptr);
+
   static constexpr double progress_part = 0.6;
 
   /// How many cells the grid has.
   [[nodiscard]] std::uint64_t cell_count() const { return cells_; }
   /// Whether max_cells, not the threshold, ended the refinement.
   [[nodiscard]] bool limited() const { return limited_; }
+  /// The blocks of 8^3 lattice points that hold all whose priority is not 0, as glsl/lattice.glsl has them; in no
+  /// order.
+  [[nodiscard]] std::vector<glm::uvec2> blocks(const Progress* progress = nullptr) const;
 
  private:
   friend class DiamondCursor;
@@ -117,7 +131,6 @@ class DiamondSet {
     glm::ivec3 corner;
   };
   static Address address(const glm::ivec3& vertex);
-  class Evaluation;
   /// Raises vertices; remembers the last block.
   class Raiser {
    public:
@@ -129,9 +142,10 @@ class DiamondSet {
     std::uint64_t key_ = ~std::uint64_t{0};
     Block* block_ = nullptr;
   };
-  using Evaluations = std::vector<std::unique_ptr<const Evaluation>>;
-  void evaluate(const Evaluations& evaluations, double floor_squared, Progress* progress, double from, double to);
-  void evaluate(const Evaluation& evaluation, double floor_squared, ProgressPart& part);
+  void evaluate(const Evaluations& evaluations, const ViewLevels& view, double floor_squared, Progress* progress,
+                double from, double to);
+  // Of nodes of one size.
+  void evaluate(const Evaluation& evaluation, const ViewLevels& view, int size, float floor, ProgressPart& part);
   void close(Progress* progress, double from, double to);
   void close_octave(int octave, int odd_coordinates, const std::vector<Block*>& blocks, const Progress* progress);
   void close_block(const Block& block, int octave, int odd_coordinates);
@@ -139,7 +153,6 @@ class DiamondSet {
   void raise_parents(Raiser& raise, const glm::ivec3& v, const glm::ivec3& odd, int octave,
                      std::uint16_t priority) const;
   void choose_cut(std::uint64_t max_cells, const Progress* progress);
-  [[nodiscard]] unsigned cells_around(const glm::ivec3& vertex, int octave) const;
   [[nodiscard]] std::vector<Block*> blocks_of(int scale, const Progress* progress) const;
 
   int log2_size_;

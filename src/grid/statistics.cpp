@@ -98,24 +98,6 @@ struct BrickTrees {
   }
 };
 
-// The inverse covariance matrices of the three reference tetrahedra: cov = sum (v - c)(v - c)^T / 20.
-struct ClassConstants {
-  std::array<glm::mat3, 3> inverse_covariance;
-  std::array<std::array<vec3, 4>, 3> vertex_offsets;  // from the centroid
-  ClassConstants() {
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      glm::dmat3 covariance(0.0);
-      const dvec3 centroid = core::cm_frame_centroid(k);
-      for (std::uint32_t i = 0; i < 4; ++i) {
-        const dvec3 v = dvec3(core::cm_frame_vertex(k, i)) - centroid;
-        covariance += glm::outerProduct(v, v) / 20.0;
-        vertex_offsets[k][i] = vec3(v);
-      }
-      inverse_covariance[k] = glm::mat3(glm::inverse(covariance));
-    }
-  }
-};
-
 }  // namespace
 
 Moments& Moments::operator+=(const Moments& other) {
@@ -140,13 +122,8 @@ vec3 frame_covariance(const Moments& moments, std::uint32_t shape, const dvec3& 
 }
 
 LinearFit fit_linear(std::uint32_t cell_class, const vec3& covariance, float mean) {
-  static const ClassConstants constants;
-  const vec3 gradient = constants.inverse_covariance[cell_class] * covariance;
-  float lowest = 0.0F;
-  for (const vec3& offset : constants.vertex_offsets[cell_class]) lowest = std::min(lowest, glm::dot(gradient, offset));
-  const float scale = lowest < 0.0F && mean < -lowest ? mean / -lowest : 1.0F;
-  // Residual of the scaled fit: var - (2 s - s^2) g.cov
-  return {scale * gradient, (2.0F - scale) * scale * glm::dot(gradient, covariance)};
+  const core::CmFit fit = core::cm_fit_linear(cell_class, covariance, mean);
+  return {fit.gradient, fit.explained};
 }
 
 std::uint32_t permutation_of(std::uint32_t shape) {
@@ -233,6 +210,11 @@ const float* Statistics::values(const Node& node, volume::BrickValues::Brick& ro
   const auto count = static_cast<std::int32_t>(brick_values_->size() / volume::brick_voxels);
   return node.values < count ? brick_values_->brick(std::size_t(node.values), room)
                              : extra_values_.data() + std::size_t(node.values - count) * volume::brick_voxels;
+}
+
+bool Statistics::values_are_halves() const {
+  return brick_values_->are_halves() &&
+         std::ranges::all_of(extra_values_, [](float value) { return volume::exact_half(value).has_value(); });
 }
 
 namespace {

@@ -36,7 +36,7 @@ struct LinearFit {
 };
 
 /// covariance: as frame_covariance has it.
-/// Normal equations with the tetrahedron's own covariance matrix, a constant of its class.
+/// Normal equations with the tetrahedron's own covariance matrix, a constant of its class (glsl/cell_fit.glsl).
 LinearFit fit_linear(std::uint32_t cell_class, const glm::vec3& covariance, float mean);
 
 /// How a brick's Kuhn tetrahedron (class B, unit 8) falls into 512 sixths of voxels; one table for each of the 48
@@ -91,6 +91,8 @@ class Statistics {
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
   /// The 512 values of a brick node, which may be in `room`.
   const float* values(const Node& node, volume::BrickValues::Brick& room) const;
+  /// Whether halves are exactly what all values of bricks are.
+  [[nodiscard]] bool values_are_halves() const;
   /// Exact moments of any cell no smaller than a brick's Kuhn tetrahedron, or in a uniform part.
   [[nodiscard]] Moments moments(const glm::vec3& v0, std::uint32_t shape) const;
   /// The smallest node that holds voxel p of the cube.

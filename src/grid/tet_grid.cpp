@@ -46,53 +46,42 @@ std::uint32_t pack_colour(const vec3& colour) {
   return whole(colour.x, 2047.0F) | (whole(colour.y, 2047.0F) << 11U) | (whole(colour.z, 1023.0F) << 22U);
 }
 
-// Vertex opposite to each face (faces 0 to 3), by class: see the frame of glsl/cell.glsl.
-constexpr std::array<std::array<std::uint32_t, 4>, 3> opposite{{{3, 1, 2, 0}, {1, 3, 2, 0}, {3, 2, 1, 0}}};
-
-// How a split hands faces down. whole[class][child]: the child's face that is a whole face of the parent, and which.
-struct WholeFace {
-  unsigned face;
-  unsigned parent_face;
-};
-constexpr std::array<std::array<WholeFace, 2>, 3> whole_face{
-    {{{{1, 1}, {1, 3}}}, {{{0, 0}, {0, 3}}}, {{{2, 2}, {2, 3}}}}};
-// half_face[class][child][k]: the two faces that are halves of the parent's faces at the refinement edge.
-constexpr std::array<std::array<std::array<WholeFace, 2>, 2>, 3> half_face{{
-    {{{{{0, 0}, {2, 2}}}, {{{0, 0}, {2, 2}}}}},
-    {{{{{1, 1}, {2, 2}}}, {{{1, 2}, {2, 1}}}}},
-    {{{{{0, 0}, {1, 1}}}, {{{0, 0}, {1, 1}}}}},
-}};
-
 }  // namespace
 
 GridBuilder::GridBuilder(const Statistics& statistics, const DiamondSet& diamonds)
     : statistics_(&statistics), diamonds_(&diamonds) {}
 
-void GridBuilder::make_roots() {
+std::array<RootCell, 24> root_cells(int log2_size) {
+  std::array<RootCell, 24> roots;
   std::array<std::array<vec3, 4>, 24> vertices;
   for (unsigned root = 0; root < 24; ++root) {
-    vec3 v0;
-    std::uint32_t shape = 0;
-    core::cm_root_cell(root, static_cast<std::uint32_t>(statistics_->cube().log2_size - 1), v0, shape);
-    nodes_[root] = {.links = {CM_NONE, CM_NONE, CM_NONE, CM_NONE},
-                    .child = 0,
-                    .v0 = pack_v0(v0),
-                    .shape = static_cast<std::uint16_t>(shape),
-                    .heap = 0,
-                    .permutation = 0};
-    for (unsigned i = 0; i < 4; ++i) vertices[root][i] = core::cm_cell_vertex(v0, shape, i);
+    core::cm_root_cell(root, static_cast<std::uint32_t>(log2_size - 1), roots[root].v0, roots[root].shape);
+    for (unsigned i = 0; i < 4; ++i) vertices[root][i] = core::cm_cell_vertex(roots[root].v0, roots[root].shape, i);
   }
   for (unsigned a = 0; a < 24; ++a) {
     for (unsigned face = 0; face < 4; ++face) {
       for (unsigned b = 0; b < 24; ++b) {
         unsigned shared = 0;
         for (unsigned i = 0; i < 4; ++i) {
-          if (i == opposite[0][face]) continue;
+          if (i == core::cm_opposite(0, face)) continue;
           shared += std::count(vertices[b].begin(), vertices[b].end(), vertices[a][i]) > 0 ? 1U : 0U;
         }
-        if (a != b && shared == 3) nodes_[a].links[face] = b;
+        if (a != b && shared == 3) roots[a].links[face] = b;
       }
     }
+  }
+  return roots;
+}
+
+void GridBuilder::make_roots() {
+  const std::array<RootCell, 24> roots = root_cells(statistics_->cube().log2_size);
+  for (unsigned root = 0; root < 24; ++root) {
+    nodes_[root] = {.links = roots[root].links,
+                    .child = 0,
+                    .v0 = pack_v0(roots[root].v0),
+                    .shape = static_cast<std::uint16_t>(roots[root].shape),
+                    .heap = 0,
+                    .permutation = 0};
   }
 }
 
@@ -149,23 +138,24 @@ void GridBuilder::make_child(std::uint32_t parent, unsigned side) {
     child.permutation = static_cast<std::uint16_t>(permutation_of(shape));
   }
   child.links[3] = node.child + 1 - side;
-  for (const auto& [face, parent_face] : half_face[cell_class][side]) {
-    const std::uint32_t other = node.links[parent_face];
+  for (unsigned k = 0; k < 2; ++k) {
+    const glm::uvec2 faces = core::cm_half_face(cell_class, side, k);
+    const std::uint32_t other = node.links[faces.y];
     if (other == CM_NONE) {
-      child.links[face] = CM_NONE;
+      child.links[faces.x] = CM_NONE;
       continue;
     }
     // The neighbour is of the same diamond and splits too: its child at the same end of the edge.
     const Node& neighbour = nodes_[other];
-    child.links[face] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
+    child.links[faces.x] = neighbour.child + (neighbour.v0 == child.v0 ? 0 : 1);
   }
-  const auto [face, parent_face] = whole_face[cell_class][side];
-  std::uint32_t whole = node.links[parent_face];
+  const glm::uvec2 faces = core::cm_whole_face(cell_class, side);
+  std::uint32_t whole = node.links[faces.y];
   if (whole != CM_NONE && nodes_[whole].child != 0) {
     // It splits in this round too, elsewhere: its cap (face 3) goes to child 1, its other whole face to child 0.
     whole = nodes_[whole].child + (nodes_[whole].links[3] == parent ? 1 : 0);
   }
-  child.links[face] = whole;
+  child.links[faces.x] = whole;
 }
 
 void GridBuilder::split_level(std::uint32_t first, std::uint32_t last, ProgressPart& part) {
@@ -214,7 +204,7 @@ std::uint32_t GridBuilder::resolve(std::uint32_t from, unsigned face) const {
     const vec3 end = v0_of(nodes_[other].v0);
     bool has_end = false;
     for (std::uint32_t i = 0; i < 4; ++i) {
-      if (i == opposite[core::cm_shape_class(node.shape)][face]) continue;
+      if (i == core::cm_opposite(core::cm_shape_class(node.shape), face)) continue;
       has_end = has_end || core::cm_cell_vertex(v0_of(node.v0), node.shape, i) == end;
     }
     other = nodes_[other].child + (has_end ? 0 : 1);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/progress_part.hpp"
+#include "grid/cell.hpp"
 #include "grid/refine.hpp"
 #include "grid/statistics.hpp"
 
@@ -38,6 +39,14 @@ struct RootEntry {
   std::uint32_t first_leaf = 0;
   std::uint32_t first_internal = 0;
 };
+
+/// A cell that is there before any split; the control cube has 24. links: as a record's, of the others.
+struct RootCell {
+  glm::vec3 v0{0.0F};
+  std::uint32_t shape = 0;
+  std::array<std::uint32_t, 4> links{CM_NONE, CM_NONE, CM_NONE, CM_NONE};
+};
+std::array<RootCell, 24> root_cells(int log2_size);
 
 /// The adaptive grid: a conforming tetrahedral partition of the control cube, in bisection (depth-first) order.
 struct TetGrid {

@@ -1,0 +1,80 @@
+// The lattice of a grid's splits (src/grid/lattice.hpp): where things are in it. Shared by GLSL and C++.
+//
+// A vertex is of octave o if 2^o is the largest power of two that divides its coordinates. Octaves 3 m to 3 m + 2 are of
+// scale m, whose lattice has the spacing 8^m; blocks are of 8^3 of its points. A block at corner c, counted in blocks,
+// stands at the point c of the next scale: so blocks are a tree, of which each one of scale 1 and up has a place for 512
+// others.
+#ifndef CM_LATTICE_GLSL
+#define CM_LATTICE_GLSL
+
+#define CM_BLOCK_POINTS 512u
+#define CM_TOP_BLOCK 1u  // block 0 is that of places that have none
+// How many points of a brick's 9^3 the cells of its first 0 to 9 levels split at.
+#define CM_POINTS_OF_LEVELS 0u, 1u, 7u, 19u, 27u, 63u, 117u, 181u, 421u, 721u
+#define CM_BRICK_POINTS 721u
+// Parts of cells within bricks: voxel by voxel, of the ten shapes from a brick's Kuhn tetrahedron to a voxel's.
+#define CM_PARTS_OF_LEVELS 0u, 120u, 190u, 230u, 250u, 263u, 271u, 275u, 278u, 280u, 281u
+#define CM_CELL_PARTS 281u
+#define CM_COARSE_CELLS 42u
+#define CM_COARSE_WORDS 86u  // two each, and two of bits
+
+CM_FN uint cm_octave(ivec3 vertex) { return uint(findLSB(vertex.x | vertex.y | vertex.z)); }
+CM_FN uint cm_in_block(ivec3 point) {
+  ivec3 p = point & ivec3(7);
+  return uint(p.x * 64 + p.y * 8 + p.z);
+}
+
+// Of a block, two words: its corner and its scale.
+CM_FN ivec3 cm_block_corner(uvec2 block) {
+  return ivec3(int(block.x & 0xffffu), int(block.x >> 16), int(block.y & 0xffffu));
+}
+CM_FN uint cm_block_scale(uvec2 block) { return block.y >> 16; }
+
+// Of a cube of the octree whose cells split, three words: its corner, its log2 size, how many levels of its own cells
+// have priorities, and where these begin.
+CM_FN ivec3 cm_node_corner(uvec3 node) {
+  return ivec3(int(node.x & 0xffffu), int(node.x >> 16), int(node.y & 0xffffu));
+}
+CM_FN uint cm_node_size(uvec3 node) { return (node.y >> 16) & 15u; }
+CM_FN uint cm_node_levels(uvec3 node) { return node.y >> 20; }
+
+// Of a vertex that is an odd multiple of 2^octave in `odd` of its coordinates: how many cells split there, in a cube of
+// 2^log2_size voxels.
+CM_FN uint cm_cells_around(ivec3 vertex, uint octave, uint log2_size) {
+  ivec3 odd = (vertex >> ivec3(int(octave))) & ivec3(1);
+  ivec3 size = ivec3(1 << int(log2_size));
+  uint outside = 0u;
+  if (vertex.x == 0 || vertex.x == size.x) ++outside;
+  if (vertex.y == 0 || vertex.y == size.y) ++outside;
+  if (vertex.z == 0 || vertex.z == size.z) ++outside;
+  int count = odd.x + odd.y + odd.z;
+  uint inside = count == 1 ? 8u : (count == 2 ? 4u : 6u);
+  return inside >> outside;
+}
+
+// The level of the cells that split there; the roots' is 0.
+CM_FN uint cm_split_level(ivec3 vertex, uint octave, uint log2_size) {
+  ivec3 odd = (vertex >> ivec3(int(octave))) & ivec3(1);
+  return 3u * (log2_size - 1u - octave) + uint(1 - (odd.x + odd.y + odd.z));
+}
+
+// Which of a cube's cells this is, above bricks: of a cube of the octree at this corner six Kuhn tetrahedra (B), their
+// 12 halves (C), each on a face, and 24 quarters (A), each on an edge and a face; of the whole cube the roots alone.
+CM_FN uint cm_coarse_cell(vec3 v0, uint shape, vec3 corner) {
+  uint px = (shape >> 3) & 3u;
+  uint py = (shape >> 5) & 3u;
+  uint pz = (shape >> 7) & 3u;
+  uint second = py < pz ? 0u : 1u;
+  uint cell_class = cm_shape_class(shape);
+  if (cell_class == 1u) return 2u * px + second;
+  if (cell_class == 2u) {
+    uint side = cm_pick(v0, pz) > cm_pick(corner, pz) ? 1u : 0u;
+    return 6u + 4u * pz + 2u * side + (px < py ? 0u : 1u);
+  }
+  uint low = min(py, pz);
+  uint high = max(py, pz);
+  uint edge = (cm_pick(v0, low) > cm_pick(corner, low) ? 1u : 0u) + (cm_pick(v0, high) > cm_pick(corner, high) ? 2u : 0u);
+  return 18u + 8u * px + 2u * edge + second;
+}
+
+#endif

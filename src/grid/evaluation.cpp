@@ -1,0 +1,122 @@
+#include "grid/evaluation.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "base/luminance.hpp"
+
+namespace cumulet::grid {
+
+namespace {
+
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+double mass_of(const Statistics& statistics) {
+  double mass = 0.0;
+  for (unsigned root = 0; root < 24; ++root) {
+    vec3 v0;
+    std::uint32_t shape = 0;
+    core::cm_root_cell(root, static_cast<std::uint32_t>(statistics.cube().log2_size - 1), v0, shape);
+    mass += statistics.moments(v0, shape).mass;
+  }
+  return mass;
+}
+
+// Of all that scatters.
+double mean_anisotropy(const Statistics& density, const Channels& channels) {
+  double scattering = mass_of(density);
+  if (const RgbField* coloured = channels.scattering.get()) {
+    scattering = luminance(
+        dvec3(mass_of(coloured->component(0)), mass_of(coloured->component(1)), mass_of(coloured->component(2))));
+  }
+  return scattering > 0.0 ? 2.0 * mass_of(channels.forward->statistics()) / scattering - 1.0 : 0.0;
+}
+
+}  // namespace
+
+Weights Weights::of_density(double depth, const RefineSettings& settings) {
+  if (!(depth > 0.0)) return {};
+  if (settings.criterion != Criterion::transmittance) return {.per_depth = 1.0 / depth};
+  const double scale = settings.density_scale;
+  return {.per_depth = scale / -std::expm1(-scale * depth), .own_hiding = hiding(scale, settings.anisotropy)};
+}
+
+// A deviation counts by the strongest, or by what it does to the luminance where that is more: most of a red fire's is
+// green. And by a fifth more than density's, which scattering blurs: fires are so within the image error that clouds
+// are (tests/bench/README.md, Grids by default).
+Weights Weights::of_emission(const dvec3& depth, int component, const RefineSettings& settings) {
+  const double most = std::max({depth.r, depth.g, depth.b});
+  if (!(most > 0.0)) return {};
+  dvec3 only(0.0);
+  only[component] = 1.0;
+  const double sharp = settings.criterion == Criterion::transmittance ? 1.2 : 1.0;
+  return {.per_depth = sharp * std::max(1.0 / most, luminance(only) / luminance(depth)), .there_and_back = false};
+}
+
+float Measure::bound(float min, float max, float edge_squared, float lit) const {
+  if (criterion_ == Criterion::range_mean) return std::numeric_limits<float>::infinity();
+  return 0.25F * (max - min) * (max - min) * edge_squared * scale_ * seen_squared(lit);
+}
+
+float Measure::squared(std::uint32_t cell_class, float mean, float variance, const vec3& covariance, float min,
+                       float max, float edge_squared, float lit, float floor) const {
+  if (min >= max) return 0.0F;
+  if (criterion_ == Criterion::range_mean) {
+    const float ratio = (max - min) / mean;
+    return ratio * ratio;
+  }
+  const float own = 1.0F + own_hiding_ * mean * std::sqrt(edge_squared);
+  const float weight = edge_squared * scale_ * seen_squared(lit) / (own * own);
+  const float value = variance * weight;
+  if (value <= floor || cells_ == CellKind::constant) return value;
+  const float explained = fit_linear(cell_class, covariance, mean).explained;
+  return std::max(0.0F, variance - explained) * weight;
+}
+
+Evaluation::Evaluation(const Statistics& statistics, const Weights& weights, const Transmittance* transmittance,
+                       const RefineSettings& settings)
+    : statistics_(&statistics),
+      transmittance_(transmittance),
+      measure_(weights, settings),
+      edge_length_(statistics.cube().to_world) {
+  for (std::uint32_t signs = 0; signs < 8; ++signs) {
+    for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+      const ivec3 corner(8 * static_cast<int>(signs & 1U), 8 * static_cast<int>((signs >> 1U) & 1U),
+                         8 * static_cast<int>(signs >> 2U));
+      const BrickTree& tree = brick_tree(kuhn_frame(corner, 8, permutation));
+      auto& edges = edge_squared_[signs * 6 + permutation];
+      for (unsigned h = 1; h < 512; ++h) {
+        const double edge = edge_length_(tree.shape[h]);
+        edges[h] = static_cast<float>(edge * edge);
+        float& longest = longest_[std::bit_width(h) - 1];
+        longest = std::max(longest, edges[h]);
+      }
+    }
+  }
+}
+
+Evaluations::Evaluations(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
+                         const Progress* progress) {
+  RefineSettings used = settings;
+  if (channels.forward) used.anisotropy = std::max(used.anisotropy, mean_anisotropy(statistics, channels));
+  if (settings.criterion == Criterion::transmittance) {
+    transmittance_ =
+        std::make_unique<const Transmittance>(statistics, hiding(used.density_scale, used.anisotropy), progress);
+  }
+  const auto add = [&](const Statistics& field, const Weights& weights) {
+    all_.emplace_back(field, weights, transmittance_.get(), used);
+  };
+  const Weights of_density = Weights::of_density(statistics.mean_optical_depth(), used);
+  add(statistics, of_density);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (channels.emission)
+      add(channels.emission->component(i),
+          Weights::of_emission(channels.emission->mean_depth(), static_cast<int>(i), used));
+    if (channels.scattering) add(channels.scattering->component(i), of_density);
+  }
+  if (channels.forward) add(channels.forward->statistics(), of_density);
+}
+
+}  // namespace cumulet::grid

@@ -1,0 +1,244 @@
+#include "grid/lattice.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+#include <unordered_map>
+
+#include "base/progress_part.hpp"
+#include "grid/cell.hpp"
+#include "grid/evaluation.hpp"
+
+namespace cumulet::grid {
+
+namespace {
+
+using glm::ivec3;
+using glm::uvec2;
+using glm::vec3;
+
+uvec2 pack_block(const ivec3& corner, std::uint32_t scale) {
+  const glm::uvec3 c(corner);
+  return {c.x | (c.y << 16U), c.z | (scale << 16U)};
+}
+
+// Coarse scales first, then by place.
+bool before(const uvec2& a, const uvec2& b) {
+  const auto key = [](const uvec2& block) {
+    return std::make_tuple(~core::cm_block_scale(block), block.x, block.y & 0xffffU);
+  };
+  return key(a) < key(b);
+}
+
+// What a record has of a cell above bricks.
+uvec2 coefficients_of(const Moments& m, const vec3& v0, std::uint32_t shape, CellKind cells, double to_relative) {
+  const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
+  vec3 gradient(0.0F);
+  if (cells == CellKind::linear && m.min < m.max) {
+    gradient = fit_linear(core::cm_shape_class(shape), frame_covariance(m, shape, centroid_of(v0, shape)),
+                          static_cast<float>(mean))
+                   .gradient *
+               static_cast<float>(to_relative);
+  }
+  return {glm::packHalf2x16({static_cast<float>(mean * to_relative), gradient.x}),
+          glm::packHalf2x16({gradient.y, gradient.z})};
+}
+
+// Calls visit(v0, shape) for the cells of an octree's cube: its Kuhn tetrahedra, their halves and quarters; the roots.
+template <class Visit>
+void for_coarse_cells(const Statistics::Node& node, int log2_size, Visit visit) {
+  if (node.log2_size == log2_size) {
+    for (unsigned root = 0; root < 24; ++root) {
+      vec3 v0;
+      std::uint32_t shape = 0;
+      core::cm_root_cell(root, static_cast<std::uint32_t>(log2_size - 1), v0, shape);
+      visit(v0, shape);
+    }
+    return;
+  }
+  const int size = 1 << node.log2_size;
+  for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+    vec3 v0(node.corner);
+    for (int axis = 0; axis < 3; ++axis) v0[axis] += static_cast<float>(node.corner[axis] & size);
+    const std::uint32_t shape =
+        kuhn_frame(node.corner, size, permutation) | (1U << 9U) | (static_cast<std::uint32_t>(node.log2_size) << 11U);
+    visit(v0, shape);
+    for (unsigned a = 0; a < 2; ++a) {
+      const std::uint32_t half = core::cm_child_shape(shape, a);
+      const vec3 half_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
+      visit(half_v0, half);
+      for (unsigned b = 0; b < 2; ++b)
+        visit(b == 0 ? half_v0 : core::cm_cell_vertex(half_v0, half, 1), core::cm_child_shape(half, b));
+    }
+  }
+}
+
+}  // namespace
+
+Lattice::Lattice(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
+                 float max_value, Progress* progress)
+    : cube(statistics.cube()),
+      own(statistics, channels, settings, progress),
+      density_unit(max_value > 0.0F ? max_value : 1.0F),
+      cells(settings.cells) {
+  find_blocks(statistics, progress);
+  fill_places(statistics, progress);
+  fill_coarse(statistics, progress);
+}
+
+void Lattice::find_blocks(const Statistics& statistics, Progress* progress) {
+  std::vector<std::uint8_t> all;
+  resize(all, own.nodes.size(), progress);
+  std::ranges::transform(own.nodes, all.begin(),
+                         [](const auto& node) { return static_cast<std::uint8_t>(core::cm_node_levels(node)); });
+  // Whatever the view, what is raised is raised here, too.
+  const DiamondSet everywhere(own, all, std::numeric_limits<std::uint64_t>::max(), progress);
+  blocks = everywhere.blocks(progress);
+  // Whoever is found from the top needs all between.
+  const auto pair_less = [](const uvec2& a, const uvec2& b) { return before(a, b); };
+  std::set<uvec2, decltype(pair_less)> above(pair_less);
+  const auto add_above = [&](ivec3 corner, std::uint32_t scale) {
+    while (scale < top_scale()) {
+      corner >>= 3;
+      if (!above.insert(pack_block(corner, ++scale)).second) return;
+    }
+  };
+  above.insert(pack_block(ivec3(0), top_scale()));
+  for (const uvec2& block : blocks) add_above(core::cm_block_corner(block), core::cm_block_scale(block));
+  for (const std::uint32_t n : statistics.nodes_of_size(3)) add_above(statistics.nodes()[n].corner >> 3, 0);
+  blocks.insert(blocks.end(), above.begin(), above.end());
+  std::ranges::sort(blocks, before);
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  blocks.insert(blocks.begin(), uvec2(0U));
+  for (std::uint32_t scale = 0; scale < first.size(); ++scale) {
+    const auto begin = std::partition_point(blocks.begin() + 1, blocks.end(),
+                                            [&](const uvec2& block) { return core::cm_block_scale(block) > scale; });
+    first[scale] = static_cast<std::uint32_t>(begin - blocks.begin());
+  }
+}
+
+std::uint32_t Lattice::block_at(const ivec3& corner, std::uint32_t scale) const {
+  const uvec2 block = pack_block(corner, scale);
+  const auto found = std::lower_bound(blocks.begin() + 1, blocks.end(), block, before);
+  return found != blocks.end() && *found == block ? static_cast<std::uint32_t>(found - blocks.begin()) : 0;
+}
+
+void Lattice::fill_places(const Statistics& statistics, const Progress* progress) {
+  resize(places, std::size_t{first[0]} * CM_BLOCK_POINTS, progress);
+  even_bricks.push_back(0.0F);
+  std::unordered_map<float, std::uint32_t> even{{0.0F, 0}};
+  struct Brick {
+    std::size_t place;
+    std::uint32_t number;
+  };
+  std::vector<Brick> with_values;
+  for (std::uint32_t b = 1; b < first[0]; ++b) {
+    check(progress);
+    const int scale = static_cast<int>(core::cm_block_scale(blocks[b]));
+    for (int i = 0; i < static_cast<int>(CM_BLOCK_POINTS); ++i) {
+      const ivec3 point = core::cm_block_corner(blocks[b]) * 8 + ivec3(i / 64, i / 8 % 8, i % 8);
+      const std::size_t index = std::size_t{b} * CM_BLOCK_POINTS + static_cast<std::size_t>(i);
+      places[index].block = block_at(point, static_cast<std::uint32_t>(scale - 1));
+      const ivec3 corner = point << (3 * scale);
+      if (std::max({corner.x, corner.y, corner.z}) >= cube.size()) continue;
+      const Statistics::Node& node = statistics.node_at(corner, 3 * scale);
+      if (node.is_uniform()) {
+        const auto [found, added] = even.emplace(node.uniform, static_cast<std::uint32_t>(even_bricks.size()));
+        if (added) even_bricks.push_back(node.uniform);
+        places[index].brick = found->second;
+      } else if (scale == 1) {
+        with_values.push_back({index, node.moments / 6});
+      }
+    }
+  }
+  for (const Brick& brick : with_values)
+    places[brick.place].brick = static_cast<std::uint32_t>(even_bricks.size()) + brick.number;
+  bricks = even_bricks.size() + statistics.nodes_of_size(3).size();
+  halves = statistics.values_are_halves() &&
+           std::ranges::all_of(even_bricks, [](float value) { return volume::exact_half(value).has_value(); });
+}
+
+void Lattice::fill_coarse(const Statistics& statistics, const Progress* progress) {
+  std::vector<const Statistics::Node*> nodes;
+  for (int size = 4; size <= cube.log2_size; ++size) {
+    for (const std::uint32_t n : statistics.nodes_of_size(size)) nodes.push_back(&statistics.nodes()[n]);
+  }
+  resize(coarse, nodes.size() + 1, progress);
+  const double to_relative = 1.0 / density_unit;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), 16), [&](const auto& range) {
+    check(progress);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const Statistics::Node& node = *nodes[i];
+      CoarseCells& made = coarse[i + 1];
+      for_coarse_cells(node, cube.log2_size, [&](const vec3& v0, std::uint32_t shape) {
+        const std::uint32_t cell = core::cm_coarse_cell(v0, shape, vec3(node.corner));
+        const Moments m = statistics.moments(v0, shape);
+        made.coefficients[cell] = coefficients_of(m, v0, shape, cells, to_relative);
+        if (m.max > 0.0F) made.dense[cell / 32] |= 1U << (cell % 32);
+      });
+      // About its middle, of the scale that this is a point of.
+      const ivec3 middle = node.corner + (1 << (node.log2_size - 1));
+      const std::uint32_t scale = core::cm_octave(middle) / 3;
+      const ivec3 point = middle >> static_cast<int>(3 * scale);
+      const std::uint32_t block = block_at(point >> 3, scale);
+      places[std::size_t{block} * CM_BLOCK_POINTS + core::cm_in_block(point)].coarse =
+          static_cast<std::uint32_t>(i + 1);
+    }
+  });
+}
+
+namespace {
+
+// Of a voxel: sixths, and the sum of their middles.
+struct Sixths {
+  unsigned count = 0;
+  glm::dvec3 sum{0.0};
+};
+using Voxels = std::map<std::tuple<int, int, int>, Sixths>;
+
+void collect(const vec3& v0, std::uint32_t shape, Voxels& voxels) {
+  if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 0) {
+    const glm::dvec3 middle = centroid_of(v0, shape);
+    const ivec3 voxel(glm::floor(middle));
+    Sixths& sixths = voxels[{voxel.x, voxel.y, voxel.z}];
+    ++sixths.count;
+    sixths.sum += middle;
+    return;
+  }
+  collect(v0, core::cm_child_shape(shape, 0), voxels);
+  collect(core::cm_cell_vertex(v0, shape, 1), core::cm_child_shape(shape, 1), voxels);
+}
+
+CellParts make_cell_parts() {
+  CellParts all{};
+  std::size_t count = 0;
+  // In the frame whose axes are the cube's.
+  std::uint32_t shape = (1U << 5U) | (2U << 7U) | (1U << 9U) | (3U << 11U);
+  for (unsigned level = 0; level <= brick_levels; ++level) {
+    Voxels voxels;
+    collect(vec3(0.0F), shape, voxels);
+    const glm::dvec3 centroid = centroid_of(vec3(0.0F), shape);
+    for (const auto& [voxel, sixths] : voxels) {
+      const auto [x, y, z] = voxel;
+      const glm::dvec3 middle = sixths.sum / double(sixths.count);
+      all[count++] = {vec3((middle - centroid) * double(core::cm_shape_inverse_unit(shape))),
+                      static_cast<std::uint32_t>(x | (y << 4) | (z << 8)) | (sixths.count << 12U)};
+    }
+    shape = core::cm_child_shape(shape, 0);
+  }
+  return all;
+}
+
+}  // namespace
+
+const CellParts& cell_parts() {
+  static const CellParts all = make_cell_parts();
+  return all;
+}
+
+}  // namespace cumulet::grid

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "base/progress.hpp"
+#include "grid/cell.hpp"
+#include "grid/refine.hpp"
+#include "grid/statistics.hpp"
+#include "grid/view_levels.hpp"
+
+namespace cumulet::grid {
+
+/// Levels of cells inside a brick that may split, its Kuhn tetrahedra the first. Of cells of larger cubes the first
+/// three are the cube's own.
+inline constexpr unsigned brick_levels = 9;
+/// How many points of a brick's 9^3 the cells of its first levels split at.
+inline constexpr std::array<unsigned, brick_levels + 1> points_of_levels{CM_POINTS_OF_LEVELS};
+/// Those points, level by level; of a larger cube they are larger by as much.
+using BrickPoints = std::array<glm::u8vec3, CM_BRICK_POINTS>;
+const BrickPoints& brick_points();
+
+/// What does not depend on the view of which splits are worth it: of each cube of the octree in which any is, the
+/// priorities that its own cells give the vertices that they split at, 16 bits each, as far down as there are any. A
+/// view says how many levels of each cube count. 2 bytes a point of 9^3 a brick at most.
+struct OwnPriorities {
+  /// As shaders read it: glsl/lattice.glsl.
+  using Node = glm::uvec3;
+
+  /// Of all that is above the settings' threshold; not of their camera nor of their budget. In parallel. progress: as
+  /// for DiamondSet.
+  OwnPriorities(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
+                Progress* progress = nullptr);
+
+  int log2_size;
+  std::vector<Node> nodes;
+  std::vector<std::uint16_t> values;
+
+  /// Of each node, how many levels of its cells may split and have priorities: 0 to brick_levels. O(nodes).
+  [[nodiscard]] std::vector<std::uint8_t> levels(const ViewLevels& view, const Progress* progress = nullptr) const;
+  /// The same in motion: no less than these settings want, and what there was before as far as with_slack() allows it.
+  [[nodiscard]] std::vector<std::uint8_t> levels(const Cube& cube, const RefineSettings& settings,
+                                                 std::span<const std::uint8_t> before,
+                                                 const Progress* progress = nullptr) const;
+  /// Calls visit(vertex, priority) for what a node's cells of that many levels give.
+  template <class Visit>
+  void for_each(const Node& node, unsigned levels, Visit&& visit) const;
+  [[nodiscard]] std::uint64_t bytes() const { return nodes.size() * sizeof(Node) + values.size() * 2; }
+};
+
+template <class Visit>
+void OwnPriorities::for_each(const Node& node, unsigned levels, Visit&& visit) const {
+  const BrickPoints& points = brick_points();
+  const glm::ivec3 corner = core::cm_node_corner(node);
+  const int finer = static_cast<int>(core::cm_node_size(node)) - 3;
+  for (unsigned i = 0; i < points_of_levels[levels]; ++i) {
+    if (values[node.z + i] != 0) visit(corner + (glm::ivec3(points[i]) << finer), values[node.z + i]);
+  }
+}
+
+}  // namespace cumulet::grid

@@ -1,0 +1,187 @@
+// What a view does not change of a grid, kept: priorities that give the same splits as the criterion evaluated anew,
+// and coefficients that are the records'.
+
+#include "grid/lattice.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <set>
+
+#include "grid/tet_grid.hpp"
+#include "support/view_cameras.hpp"
+#include "support/volumes.hpp"
+
+namespace {
+
+using namespace cumulet;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+grid::TetGrid grid_of(const grid::Statistics& statistics, const grid::DiamondSet& diamonds) {
+  grid::GridBuilder builder(statistics, diamonds);
+  builder.bisect();
+  return builder.records(grid::CellKind::linear, 1.0F);
+}
+
+TEST(ViewLevels, AreThoseWhoseLongestEdgeCoversThePixels) {
+  // Edges counted by hand: a lattice sheared and stretched, seen from far.
+  volume::ScalarVolume volume = test::noise_volume({60, 45, 50}, ivec3(0), 1);
+  volume.index_to_world = glm::dmat4(1.0);
+  volume.index_to_world[0] = {0.5, 0.0, 0.0, 0.0};
+  volume.index_to_world[1] = {0.3, 1.0, 0.0, 0.0};
+  volume.index_to_world[2] = {0.0, 0.2, 2.0, 0.0};
+  const grid::Cube cube = grid::fit_cube(volume);
+  ASSERT_EQ(cube.log2_size, 6);
+  grid::RefineSettings settings;
+  EXPECT_EQ(grid::ViewLevels(cube, settings).in(ivec3(0), 3), 16U) << "no camera";
+  grid::RefineCamera camera;
+  camera.eye = {16.0, 24.0, 5000.0};
+  camera.tan_half_x = camera.tan_half_y = 1.0;
+  for (const double pixel_length : {0.1, 0.5, 1.0, 1.9, 2.7, 3.9, 4.2, 9.0, 17.0, 35.0, 1000.0}) {
+    // About 5000 away, less the ball about the brick.
+    camera.pixels_per_radian = 1.0;
+    settings.pixel_size = pixel_length / 5000.0;
+    settings.camera = camera;
+    const ivec3 corner(24, 16, 16);
+    const dvec3 centre(cube.to_world * glm::dvec4(dvec3(corner) + 4.0, 1.0));
+    double radius = 0.0;
+    for (int i = 0; i < 4; ++i) {
+      const dvec3 diagonal(4.0, (i & 1) != 0 ? -4.0 : 4.0, (i & 2) != 0 ? -4.0 : 4.0);
+      radius = std::max(radius, glm::length(glm::dmat3(cube.to_world) * diagonal));
+    }
+    const double shortest = settings.pixel_size * (glm::distance(centre, camera.eye) - radius);
+    // The longest edge of each level: along axes (A), diagonals of cubes (B), of faces (C).
+    const glm::dmat3 m(cube.to_world);
+    const auto longest = [&](int level) {
+      const double unit = std::exp2(5 - level / 3);
+      double most = 0.0;
+      for (int a = -1; a <= 1; ++a) {
+        for (int b = -1; b <= 1; ++b) {
+          for (int c = -1; c <= 1; ++c) {
+            const int kind = std::abs(a) + std::abs(b) + std::abs(c);
+            if (kind != std::array{1, 3, 2}[level % 3]) continue;
+            most = std::max(most, (level % 3 == 0 ? 2.0 : 1.0) * unit * glm::length(m * dvec3(a, b, c)));
+          }
+        }
+      }
+      return most;
+    };
+    unsigned expected = 0;
+    for (int level = 0; level < 16; ++level) {
+      if (longest(level) >= shortest) expected = static_cast<unsigned>(level) + 1;
+    }
+    EXPECT_EQ(grid::ViewLevels(cube, settings).in(corner, 3), expected) << pixel_length;
+  }
+  settings.camera->forward = {0.0, 0.0, 1.0};
+  EXPECT_EQ(grid::ViewLevels(cube, settings).in(ivec3(24, 16, 16), 3), 0U) << "behind the eye";
+}
+
+TEST(OwnPriorities, GiveTheSplitsThatEvaluatingAnewGives) {
+  test::Cameras cameras(3);
+  for (const test::SmallVolume& small : test::small_volumes()) {
+    const grid::Statistics statistics(small.volume, grid::fit_cube(small.volume));
+    grid::RefineSettings settings = small.settings;
+    const grid::OwnPriorities own(statistics, {}, settings);
+    for (int i = 0; i < 12; ++i) {
+      settings.camera.reset();
+      if (i % 4 != 0) settings.camera = cameras.about(statistics.cube());
+      settings.max_cells = i % 3 == 2 ? 300 * (i + 1) : 5'400'000;
+      const grid::DiamondSet anew(statistics, settings);
+      const grid::DiamondSet kept(own, own.levels(grid::ViewLevels(statistics.cube(), settings)), settings.max_cells);
+      EXPECT_EQ(kept.cell_count(), anew.cell_count()) << small.name << i;
+      EXPECT_EQ(kept.limited(), anew.limited()) << small.name << i;
+      const grid::TetGrid a = grid_of(statistics, kept);
+      const grid::TetGrid b = grid_of(statistics, anew);
+      ASSERT_EQ(a.cells.size(), b.cells.size()) << small.name << i;
+      EXPECT_EQ(std::memcmp(a.cells.data(), b.cells.data(), a.cells.size() * sizeof(grid::CellRecord)), 0)
+          << small.name << i;
+    }
+  }
+}
+
+// Each place of the 42 is of one cell; what it has is what records have.
+TEST(Lattice, CoarseCellsHaveTheirRecords) {
+  for (const test::SmallVolume& small : test::small_volumes()) {
+    const grid::Statistics statistics(small.volume, grid::fit_cube(small.volume));
+    const grid::Lattice lattice(statistics, {}, small.settings, 1.0F);
+    std::size_t found = 0;
+    const auto look_up = [&](const grid::CellRecord& cell) {
+      const std::uint32_t shape = core::cm_record_shape(cell.data);
+      const vec3 v0 = core::cm_record_v0(cell.data);
+      const std::uint32_t cell_class = core::cm_shape_class(shape);
+      const int size = static_cast<int>(core::cm_shape_exponent(shape)) + (cell_class == 1 ? 0 : 1);
+      if (size <= 3) return;
+      vec3 middle(0.0F);
+      for (std::uint32_t i = 0; i < 4; ++i) middle += 0.25F * core::cm_cell_vertex(v0, shape, i);
+      const ivec3 corner = (ivec3(middle) >> size) << size;
+      const grid::Statistics::Node& node = statistics.node_at(corner, size);
+      if (node.is_uniform()) return;
+      ASSERT_EQ(node.log2_size, size);
+      // From the top down, as kernels do.
+      const ivec3 centre = corner + (1 << (size - 1));
+      const auto scale = static_cast<std::uint32_t>((size - 1) / 3);
+      std::uint32_t block = CM_TOP_BLOCK;
+      for (std::uint32_t s = lattice.top_scale(); s > scale; --s)
+        block = lattice.places[block * CM_BLOCK_POINTS + core::cm_in_block(centre >> static_cast<int>(3 * s))].block;
+      const auto place =
+          lattice.places[block * CM_BLOCK_POINTS + core::cm_in_block(centre >> static_cast<int>(3 * scale))];
+      ASSERT_NE(place.coarse, 0U);
+      const std::uint32_t index = core::cm_coarse_cell(v0, shape, vec3(corner));
+      EXPECT_EQ(lattice.coarse[place.coarse].coefficients[index], glm::uvec2(cell.data.z, cell.data.w));
+      ++found;
+    };
+    for (const double threshold : {1e9, 1.0, 0.3, 0.1}) {
+      grid::RefineSettings settings = small.settings;
+      settings.threshold = threshold;
+      const grid::TetGrid grid = grid_of(statistics, grid::DiamondSet(statistics, settings));
+      for (const grid::CellRecord& cell : grid.cells) look_up(cell);
+    }
+    if (small.volume.max_value == 0.0F) continue;
+    EXPECT_GT(found, 20U) << small.name;
+  }
+  // All places of a cube, each once.
+  std::set<std::uint32_t> places;
+  for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
+    const ivec3 corner(16, 48, 32);
+    const std::uint32_t shape = grid::kuhn_frame(corner, 16, permutation) | (1U << 9U) | (4U << 11U);
+    vec3 v0(corner);
+    for (int axis = 0; axis < 3; ++axis) v0[axis] += static_cast<float>(corner[axis] & 16);
+    places.insert(core::cm_coarse_cell(v0, shape, vec3(corner)));
+    for (unsigned a = 0; a < 2; ++a) {
+      const vec3 half_v0 = a == 0 ? v0 : core::cm_cell_vertex(v0, shape, 1);
+      const std::uint32_t half = core::cm_child_shape(shape, a);
+      places.insert(core::cm_coarse_cell(half_v0, half, vec3(corner)));
+      for (unsigned b = 0; b < 2; ++b) {
+        places.insert(core::cm_coarse_cell(b == 0 ? half_v0 : core::cm_cell_vertex(half_v0, half, 1),
+                                           core::cm_child_shape(half, b), vec3(corner)));
+      }
+    }
+  }
+  EXPECT_EQ(places.size(), std::size_t{CM_COARSE_CELLS});
+  EXPECT_EQ(*places.rbegin(), CM_COARSE_CELLS - 1);
+}
+
+TEST(Lattice, PartsOfCellsFillThem) {
+  // In units of sixths of voxels each shape has half of the one before; middles balance about the centroid.
+  const grid::CellParts& parts = grid::cell_parts();
+  for (unsigned level = 0; level <= grid::brick_levels; ++level) {
+    unsigned sixths = 0;
+    vec3 moment(0.0F);
+    for (unsigned i = grid::parts_of_levels[level]; i < grid::parts_of_levels[level + 1]; ++i) {
+      const unsigned count = parts[i].packed >> 12U;
+      EXPECT_GE(count, 1U);
+      EXPECT_LE(count, 6U);
+      sixths += count;
+      moment += static_cast<float>(count) * parts[i].from_centroid;
+    }
+    EXPECT_EQ(sixths, 512U >> level);
+    EXPECT_LT(glm::length(moment), 1e-4F) << level;
+  }
+}
+
+}  // namespace
