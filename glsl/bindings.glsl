@@ -59,6 +59,8 @@ const int CM_UNIT_GLOSS = 11;
 const int CM_UNIFORM_PARAMETERS = 0;
 const int CM_UNIFORM_SURFACE_VIEW = 0;
 const int CM_UNIFORM_MATERIAL = 1;
+const int CM_UNIFORM_BRICK_POINTS = 0;  // grid_lattice.comp
+const int CM_UNIFORM_CELL_PARTS = 0;    // grid_cells.comp
 
 // Storage buffers.
 const int CM_STORAGE_PATHS = 0;
@@ -75,6 +77,21 @@ const int CM_STORAGE_SIGN = 0;           // sign.comp
 const int CM_STORAGE_DENOISE_BINS = 0;   // denoise_*.comp
 const int CM_STORAGE_DENOISE_CHANNELS = 1;
 const int CM_STORAGE_DENOISE_WEIGHTS = 2;
+const int CM_STORAGE_GRID_STATE = 0;  // grid_*.comp
+const int CM_STORAGE_GRID_PRIORITIES = 1;
+const int CM_STORAGE_GRID_PLACES = 2;
+const int CM_STORAGE_GRID_BLOCKS = 3;
+const int CM_STORAGE_GRID_NODES = 4;
+const int CM_STORAGE_GRID_LEVELS = 5;
+const int CM_STORAGE_GRID_OWN = 6;
+const int CM_STORAGE_GRID_BINS = 7;
+const int CM_STORAGE_GRID_COARSE = 1;
+const int CM_STORAGE_GRID_CELLS = 3;
+const int CM_STORAGE_GRID_LINKS = 4;
+const int CM_STORAGE_GRID_ORDER = 5;
+const int CM_STORAGE_GRID_RECORDS = 6;
+const int CM_STORAGE_GRID_BRICKS = 7;
+const int CM_STORAGE_GRID_TREE = 7;
 
 // Images.
 const int CM_IMAGE_SUM = 0;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -347,6 +348,7 @@ void GpuScene::drop_data() {
   data_.clear();
   data_of_.clear();
   upload_.reset();
+  grids_.clear();
   took_ = {};  // and what it holds in main memory
 }
 
@@ -363,7 +365,9 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
     const MarchUpload::Sources of = upload_->of;
     try {
       if (!upload_->work) {
-        auto work = std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels);
+        if (!build_grids(of, deadline)) break;
+        auto work =
+            std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels, &grids_.built());
         require_room(work->bytes(), wanted.most_bytes);
         upload_->work = std::move(work);
       }
@@ -371,6 +375,7 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
       took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
       if (!done) break;
       data_.put(of, upload_->work->take());
+      grids_.clear_built();
       data_of_ = std::move(upload_->volumes);
       present_ = data_of_;  // should what follows fail
       upload_.reset();
@@ -378,9 +383,21 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
     } catch (const Error&) {
       data_.fail(of, upload_->settings);
       upload_.reset();
+      grids_.clear_built();
       throw;
     }
   }
+}
+
+bool GpuScene::build_grids(const MarchUpload::Sources& of, Deadline deadline) {
+  const auto begun = Clock::now();
+  // Those that are here are copied.
+  MarchUpload::Sources missing;
+  std::ranges::copy_if(of, std::back_inserter(missing),
+                       [&](const scene::MarchSourcePtr& source) { return !data_ || data_->grid(*source) == nullptr; });
+  const bool done = grids_.advance(missing, of, deadline);
+  if (!done) took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
+  return done;
 }
 
 void GpuScene::require_room(std::uint64_t bytes, std::uint64_t most_bytes) const {
@@ -395,6 +412,7 @@ void GpuScene::require_room(std::uint64_t bytes, std::uint64_t most_bytes) const
 
 double GpuScene::progress() const {
   if (upload_ && upload_->work) return upload_->work->progress();
+  if (upload_) return grids_.progress();
   if (model_upload_ && model_upload_->work) return model_upload_->work->progress();
   return environment_upload_ && environment_upload_->work ? environment_upload_->work->progress() : 1.0;
 }
@@ -411,7 +429,7 @@ std::uint64_t GpuScene::other_bytes() const {
   }
   return (model_ ? (*model_)->bytes() : 0) + (placed_ ? placed_->bytes() : 0) + raster +
          (environment_ ? environment_->bytes() : 0) + (instances_ ? instances_->bytes() : 0) + surface_pass_.bytes() +
-         heap_.free_bytes();
+         grids_.bytes() + heap_.free_bytes();
 }
 
 light::Surroundings GpuScene::surroundings(const scene::Snapshot& snapshot) const {

@@ -27,6 +27,7 @@ class GpuScene {
         programs_(std::move(programs)),
         limits_(limits),
         heap_(gl_, {.largest_page = static_cast<std::size_t>(limits.texture_buffer_texels) * 16}),
+        grids_(gl_, programs_, limits),
         surface_pass_(gl_) {}
 
   struct Wanted {
@@ -63,6 +64,10 @@ class GpuScene {
   /// Of that volume, if it is the last that came, or is coming.
   [[nodiscard]] std::optional<double> upload_seconds(const scene::MarchSourcePtr& of) const;
   [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? data_->bytes() : 0; }
+  /// Of tetrahedra that are here; null: they are not.
+  [[nodiscard]] const MarchData::Cells* cells(const scene::MarchSourcePtr& of) const {
+    return data_ && of ? data_->cells(*of) : nullptr;
+  }
   /// Of surfaces, of what draws them, and of what is kept for more.
   [[nodiscard]] std::uint64_t other_bytes() const;
 
@@ -93,6 +98,8 @@ class GpuScene {
   // What is drawn stands where what paths meet does.
   void place_raster();
   void drop_data();
+  // Of those that GL builds and that are not here. Returns whether all are built.
+  bool build_grids(const MarchUpload::Sources& of, Deadline deadline);
   void require_room(std::uint64_t bytes, std::uint64_t most_bytes) const;
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.
@@ -113,6 +120,7 @@ class GpuScene {
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
   gl::WordHeap heap_;
+  GridBuilds grids_;  // of volumes under way
   // Under way, and with which settings it was begun.
   struct VolumeUnderWay {
     MarchUpload::Sources of;

@@ -82,13 +82,13 @@ std::vector<float> scattering_slab(const scene::MarchSource& source, std::size_t
 
 core::CmGrid grid_of(const scene::MarchSource& source) {
   core::CmGrid grid{};
-  if (source.grid) {
+  if (source.march != March::tet) {
+    grid.box_min = vec3(source.box_low);
+    grid.box_max = vec3(source.box_low + source.box_size);
+  } else if (source.grid) {
     grid.box_min = source.grid->content_min;
     grid.box_max = source.grid->content_max;
     grid.levels = source.grid->levels;
-  } else {
-    grid.box_min = vec3(source.box_low);
-    grid.box_max = vec3(source.box_low + source.box_size);
   }
   grid.moves = source.moves() ? 1U : 0U;
   grid.root_exponent = static_cast<std::uint32_t>(source.cube.log2_size - 1);
@@ -99,15 +99,17 @@ core::CmGrid grid_of(const scene::MarchSource& source) {
 using Roots = std::array<grid::RootEntry, 26>;
 static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 
-// What a grid's cells have in channels, one after another.
+// What a grid's cells have in channels, one after another; nothing of one that GL builds.
 struct ChannelBytes {
   explicit ChannelBytes(const scene::MarchSource& source)
-      : emission(source.grid->emission.size() * sizeof(grid::EmissionRecord)),
-        glow(source.glow.cells.size() * sizeof(scene::GlowingCell)),
-        velocity(source.grid->velocity.size() * sizeof(glm::uvec2)),
-        colour(source.grid->colour.size() * sizeof(std::uint32_t)),
-        anisotropy(source.grid->anisotropy.size() * sizeof(std::int16_t)) {}
-  std::size_t emission, glow, velocity, colour, anisotropy;
+      : glow(source.glow.cells.size() * sizeof(scene::GlowingCell)) {
+    if (!source.grid) return;
+    emission = source.grid->emission.size() * sizeof(grid::EmissionRecord);
+    velocity = source.grid->velocity.size() * sizeof(glm::uvec2);
+    colour = source.grid->colour.size() * sizeof(std::uint32_t);
+    anisotropy = source.grid->anisotropy.size() * sizeof(std::int16_t);
+  }
+  std::size_t emission = 0, glow = 0, velocity = 0, colour = 0, anisotropy = 0;
   [[nodiscard]] std::size_t glow_at() const { return emission; }
   [[nodiscard]] std::size_t velocity_at() const { return glow_at() + glow; }
   [[nodiscard]] std::size_t colour_at() const { return velocity_at() + velocity; }
@@ -121,6 +123,11 @@ struct ChannelBytes {
 const core::CmGrid* MarchData::grid(const scene::MarchSource& source) const {
   const Part* part = part_of(source);
   return part == nullptr ? nullptr : &part->grid;
+}
+
+const MarchData::Cells* MarchData::cells(const scene::MarchSource& source) const {
+  const Part* part = part_of(source);
+  return part == nullptr ? nullptr : &part->cells;
 }
 
 const MarchData::Part* MarchData::part_of(const scene::MarchSource& source) const {
@@ -140,10 +147,11 @@ Upload::Place MarchData::place_of(const Run& run) const {
 }
 
 MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap, const Sources& sources,
-                         const MarchData* before, std::int64_t page_texels)
+                         const MarchData* before, std::int64_t page_texels, const BuiltGrids* built)
     : gl_(std::move(gl)),
       limits_(limits),
       before_(before),
+      built_(built),
       source_(sources.at(0)),
       upload_(gl_, "uploading the volume") {
   data_.march_ = source_->march;
@@ -154,7 +162,7 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
     }
     MarchData::Part& part = data_.parts_.emplace_back();
     part.source = source;
-    part.grid = grid_of(*source);
+    describe(part);
   }
   if (source_->march == March::tet) {
     plan_tets(heap, page_texels);
@@ -167,6 +175,28 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
   }
   source_->march == March::dense ? plan_dense() : plan_brick();
   plan_channel_voxels();
+}
+
+void MarchUpload::describe(MarchData::Part& part) const {
+  const scene::MarchSource& source = *part.source;
+  part.grid = grid_of(source);
+  if (source.grid) {
+    part.cells = {source.grid->cells.size(), source.grid->limited};
+    part.inner = source.grid->tree.size();
+  }
+  if (!source.plan) return;
+  if (const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(source)) {
+    part.grid = old->grid;
+    part.cells = old->cells;
+    part.inner = old->inner;
+    return;
+  }
+  const BuiltGrid& made = built_->at(part.source);
+  part.grid.box_min = made.content_min;
+  part.grid.box_max = made.content_max;
+  part.grid.levels = made.levels;
+  part.cells = {made.count, made.limited};
+  part.inner = made.count - 24;  // each split makes a cell more
 }
 
 void MarchUpload::add_copy(const PlaceOf& to, const PlaceOf& from, std::size_t bytes) {
@@ -189,7 +219,7 @@ void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
   std::size_t all = 0;
   for (MarchData::Part& part : data_.parts_) {
     part.cell = all;
-    all += part.source->grid->cells.size();
+    all += part.cells.count;
   }
   const auto cells = static_cast<std::int64_t>(all);
   std::int64_t page_cells = texels / 2;
@@ -222,17 +252,21 @@ void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
   });
   for (const MarchData::Part& part : data_.parts_) {
     const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
-    const std::vector<grid::CellRecord>& records = part.source->grid->cells;
-    for (std::size_t done = 0; done < records.size();) {
-      MarchData::Run to = data_.run(part.cell + done, records.size() - done);
+    for (std::size_t done = 0; done < part.cells.count;) {
+      MarchData::Run to = data_.run(part.cell + done, part.cells.count - done);
       const PlaceOf place = [this, to] { return data_.place_of(to); };
-      if (old == nullptr) {
-        upload_.add_bytes(place, &records[done], to.count * sizeof(grid::CellRecord));
-      } else {
+      if (old != nullptr) {
         const MarchData::Run from = before_->run(old->cell + done, to.count);
         to.count = from.count;
         add_copy(
             place, [this, from] { return before_->place_of(from); }, to.count * sizeof(grid::CellRecord));
+      } else if (part.source->grid) {
+        upload_.add_bytes(place, &part.source->grid->cells[done], to.count * sizeof(grid::CellRecord));
+      } else {
+        const auto from = [buffer = built_->at(part.source).cells.name(), done] {
+          return Upload::Place{buffer, done * sizeof(grid::CellRecord)};
+        };
+        add_copy(place, from, to.count * sizeof(grid::CellRecord));
       }
       done += to.count;
     }
@@ -248,7 +282,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
   if (bytes == 0) return;
   if (static_cast<std::int64_t>(bytes / 16) >= texels) {
     std::size_t cells = 0;
-    for (const MarchData::Part& part : data_.parts_) cells += part.source->grid->cells.size();
+    for (const MarchData::Part& part : data_.parts_) cells += part.cells.count;
     throw Error(ErrorCode::unsupported, "the channels of " + std::to_string(cells) +
                                             " cells need more than one texture buffer of this driver's "
                                             "GL_MAX_TEXTURE_BUFFER_SIZE, " +
@@ -283,6 +317,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       add_copy(place_at(0), from, channels.all());
       continue;
     }
+    if (!part.source->grid) continue;
     const grid::TetGrid& grid = *part.source->grid;
     upload_.add_bytes(place_at(0), grid.emission.data(), channels.emission);
     upload_.add_bytes(place_at(channels.glow_at()), part.source->glow.cells.data(), channels.glow);
@@ -293,9 +328,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
 }
 
 void MarchUpload::plan_trees(gl::WordHeap& heap) {
-  const auto bytes_of = [](const MarchData::Part& part) {
-    return sizeof(Roots) + part.source->grid->tree.size() * sizeof(std::uint32_t);
-  };
+  const auto bytes_of = [](const MarchData::Part& part) { return sizeof(Roots) + part.inner * sizeof(std::uint32_t); };
   std::size_t bytes = 0;
   for (MarchData::Part& part : data_.parts_) {
     part.tree = bytes;
@@ -317,6 +350,11 @@ void MarchUpload::plan_trees(gl::WordHeap& heap) {
       const auto from = [this, first = old->tree] {
         return Upload::Place{before_->trees_.buffer(), before_->trees_.offset() + first};
       };
+      add_copy(place_at(0), from, bytes_of(part));
+      continue;
+    }
+    if (!part.source->grid) {
+      const auto from = [buffer = built_->at(part.source).tree.name()] { return Upload::Place{buffer, 0}; };
       add_copy(place_at(0), from, bytes_of(part));
       continue;
     }

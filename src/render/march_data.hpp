@@ -10,6 +10,7 @@
 
 #include "gl/objects.hpp"
 #include "gl/word_heap.hpp"
+#include "render/grid_build.hpp"
 #include "render/parameters.hpp"
 #include "render/upload.hpp"
 #include "scene/march_source.hpp"
@@ -33,6 +34,13 @@ class MarchData {
   [[nodiscard]] const core::CmGrid& grid(std::size_t i = 0) const { return parts_.at(i).grid; }
   /// Null: it is not here. O(grids).
   [[nodiscard]] const core::CmGrid* grid(const scene::MarchSource& source) const;
+  /// Of tetrahedra: how many there are, and whether max_cells ended their refinement.
+  struct Cells {
+    std::size_t count = 0;
+    bool limited = false;
+  };
+  /// Null: it is not here. O(grids).
+  [[nodiscard]] const Cells* cells(const scene::MarchSource& source) const;
 
  private:
   friend class MarchUpload;
@@ -40,6 +48,8 @@ class MarchData {
   struct Part {
     scene::MarchSourcePtr source;
     core::CmGrid grid{};
+    Cells cells;
+    std::size_t inner = 0;     // nodes of its tree
     std::size_t cell = 0;      // among those of all
     std::size_t tree = 0;      // bytes into the trees: its roots, then its own
     std::size_t channels = 0;  // bytes into those
@@ -77,10 +87,11 @@ class MarchUpload {
   using Sources = std::vector<scene::MarchSourcePtr>;
   /// sources: one at least, each another, of one march; of tetrahedra there may be several. before: what was here,
   /// whose grids are copied from there where they are among these, or null; it has to live until the last step is made.
-  /// page_texels: where a page of records ends; 0: where the driver's limit is. Throws Error(unsupported) that names
-  /// the limit that does not suffice; allocates nothing yet.
+  /// page_texels: where a page of records ends; 0: where the driver's limit is. built: the grids of sources with a
+  /// plan, unless they are in `before`; likewise. Throws Error(unsupported) that names the limit that does not suffice;
+  /// allocates nothing yet.
   MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap, const Sources& sources,
-              const MarchData* before = nullptr, std::int64_t page_texels = 0);
+              const MarchData* before = nullptr, std::int64_t page_texels = 0, const BuiltGrids* built = nullptr);
   MarchUpload(const MarchUpload&) = delete;
   MarchUpload& operator=(const MarchUpload&) = delete;
   /// As Upload has them.
@@ -92,6 +103,8 @@ class MarchUpload {
   MarchData take() { return std::move(data_); }
 
  private:
+  // What is known of a part before it comes.
+  void describe(MarchData::Part& part) const;
   void plan_tets(gl::WordHeap& heap, std::int64_t page_texels);
   void plan_cells(gl::WordHeap& heap, std::int64_t texels);
   void plan_channels(gl::WordHeap& heap, std::int64_t texels);
@@ -117,6 +130,7 @@ class MarchUpload {
   gl::FunctionsPtr gl_;
   gl::Limits limits_;
   const MarchData* before_;
+  const BuiltGrids* built_;
   scene::MarchSourcePtr source_;  // the first; of voxels the only one
   MarchData data_;
   Upload upload_;  // its steps use the above

@@ -2,6 +2,7 @@
 
 #include <glm/gtc/packing.hpp>
 #include <unordered_map>
+#include <utility>
 
 namespace cumulet::scene {
 
@@ -55,6 +56,18 @@ MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool line
   source.glow = glow_table(*grid, progress);
   source.grid = std::move(grid);
   source.linear = linear;
+  return source;
+}
+
+MarchSource make_planned_source(GridPlan plan, std::shared_ptr<const volume::ScalarVolume> volume,
+                                std::shared_ptr<const grid::Statistics> statistics) {
+  MarchSource source;
+  source.cube = statistics->cube();
+  source.max_value = volume->max_value;
+  source.linear = plan.lattice->cells == grid::CellKind::linear;
+  source.plan = std::make_shared<const GridPlan>(std::move(plan));
+  source.volume = std::move(volume);
+  source.statistics = std::move(statistics);
   return source;
 }
 

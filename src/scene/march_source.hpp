@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "grid/lattice.hpp"
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
 #include "scene/glow.hpp"
@@ -13,6 +14,14 @@ namespace cumulet::scene {
 
 enum class March { tet = 0, dense = 1, brick = 2 };
 
+/// How a grid of tetrahedra is built in GL: the lattice of its splits, and what one view allows of it.
+struct GridPlan {
+  grid::LatticePtr lattice;
+  std::vector<std::uint8_t> levels;  ///< grid::OwnPriorities::levels() of the view
+  std::uint64_t max_cells = 0;
+};
+using GridPlanPtr = std::shared_ptr<const GridPlan>;
+
 /// What one march needs of the volume, in main memory: all that a new context needs too.
 struct MarchSource {
   March march = March::tet;
@@ -20,8 +29,9 @@ struct MarchSource {
   float max_value = 0.0F;      // grid value of density 1
   double optical_depth = 0.0;  // a unit of density scale, as grid::Statistics has the mean
 
-  // tet
+  // tet: the grid, or how GL builds it, then with the volume and its statistics
   std::shared_ptr<const grid::TetGrid> grid;
+  GridPlanPtr plan;
   bool linear = false;
   GlowTable glow;
   // dense: read from these; brick: as packed by make_voxel_source
@@ -44,7 +54,8 @@ struct MarchSource {
   [[nodiscard]] bool moves() const { return channels.momentum || (grid && !grid->velocity.empty()); }
   /// Main memory that it holds, voxels among it that others may hold as well.
   [[nodiscard]] std::uint64_t bytes() const {
-    return (grid ? grid->bytes() : 0) + glow.cells.size() * sizeof(GlowingCell) + (volume ? volume->bytes() : 0) +
+    return (grid ? grid->bytes() : 0) + (plan ? plan->lattice->bytes() + plan->levels.size() : 0) +
+           glow.cells.size() * sizeof(GlowingCell) + (volume ? volume->bytes() : 0) +
            (statistics ? statistics->bytes() : 0) + brick_values.size() * 2 + brick_slots.size() * 4 + channels.bytes();
   }
   /// From grid values to density 0 to 1.
@@ -55,6 +66,9 @@ using MarchSourcePtr = std::shared_ptr<const MarchSource>;
 /// Throws Error(cancelled).
 MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value,
                             const Progress* progress = nullptr);
+/// Of tetrahedra that GL builds. statistics: of the volume's density, that the lattice is of.
+MarchSource make_planned_source(GridPlan plan, std::shared_ptr<const volume::ScalarVolume> volume,
+                                std::shared_ptr<const grid::Statistics> statistics);
 /// dense and brick. O(voxels of the bounds) only when uploaded; brick: O(bricks) memory.
 MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
                               std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels = {});

@@ -26,6 +26,9 @@ inline constexpr std::array criterion_choices = {
     Choice{"range-mean", CUMULET_CRITERION_RANGE_MEAN, "Range / mean", "(max - min) / mean, as in the paper."},
     Choice{"deviation", CUMULET_CRITERION_DEVIATION, "Deviation",
            "Standard deviation x edge length, against the mean depth."}};
+inline constexpr std::array build_choices = {
+    Choice{"cpu", CUMULET_BUILD_CPU, "CPU", "A worker builds the cells."},
+    Choice{"gpu", CUMULET_BUILD_GPU, "GPU", "Compute shaders build the cells, within frames' budgets."}};
 inline constexpr std::array surface_light_choices = {
     Choice{"full", CUMULET_SURFACE_LIGHT_FULL, "Full", "To each other and to the volume, and back."},
     Choice{"shadows", CUMULET_SURFACE_LIGHT_SHADOWS, "Shadows",
@@ -425,7 +428,12 @@ struct Table<cumulet_grid_desc> {
         .help = "Pixels that a split cell's longest edge must cover (default: 1)",
         .row = {.label = "Pixel size",
                 .tip = "Pixels that a cell's longest edge must cover to be split.",
-                .least = 0.25, .most = 32.0, .format = "%.2f", .logarithmic = true}})};
+                .least = 0.25, .most = 32.0, .format = "%.2f", .logarithmic = true}}),
+      Setting(&Desc::build, {.name = "build", .choices = build_choices,
+        .key = "grid.build", .flag = "--build",
+        .help = "Who builds the cells (default: cpu); those of volumes with more than density the CPU does",
+        .row = {.label = "Built by",
+                .tip = "Who builds the cells. On the GPU a camera that moves has its cells sooner."}})};
 };
 
 template <>

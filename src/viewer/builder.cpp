@@ -56,10 +56,18 @@ std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held,
   return (most - std::min(most, held + tables)) / bytes_a_cell(channels);
 }
 
+bool any(const grid::Channels& channels) {
+  return channels.emission || channels.scattering || channels.forward || channels.momentum;
+}
+
 }  // namespace
 
+void log_limited(const Log& log, std::uint64_t max_cells) {
+  log.info("max_cells (" + std::to_string(max_cells) + ") ended the refinement before the threshold");
+}
+
 Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress,
-                 const Allowance& allowance) {
+                 const Allowance& allowance, const scene::GridPlanPtr& before) {
   Built built;
   built.volume = volume;
   built.settings = settings;
@@ -78,6 +86,22 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     built.seconds.records = watch.lap();
     return built;
   }
+  if (settings.on == BuildOn::gpu && !any(channels)) {
+    const grid::LatticePtr lattice = volume->lattice(settings.density_ramp, settings.refine, progress);
+    std::vector<std::uint8_t> levels =
+        before && before->lattice == lattice
+            ? lattice->own.levels(lattice->cube, settings.refine, before->levels, &progress)
+            : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
+    scene::MarchSource source =
+        scene::make_planned_source({lattice, std::move(levels), settings.refine.max_cells}, voxels, statistics);
+    source.optical_depth = statistics->mean_optical_depth();
+    built.source = std::make_shared<const scene::MarchSource>(std::move(source));
+    allowance.require(built.bytes(), volume->name());
+    built.seconds.refine = watch.lap();
+    return built;
+  }
+  if (settings.on == BuildOn::gpu)
+    log.info(volume->name() + ": it has more than density, so its grid is built on the CPU");
   grid::RefineSettings refine = settings.refine;
   refine.max_cells = std::min(refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance));
   const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
@@ -92,9 +116,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.cells = grid->cells.size();
   built.levels = grid->levels;
   built.limited = grid->limited;
-  if (grid->limited) {
-    log.info("max_cells (" + std::to_string(refine.max_cells) + ") ended the refinement before the threshold");
-  }
+  if (grid->limited) log_limited(log, refine.max_cells);
   scene::MarchSource source =
       scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress);
   source.optical_depth = statistics->mean_optical_depth();
@@ -142,12 +164,12 @@ void Builder::load(const VolumeFile& file, std::optional<BuildSettings> settings
                    true});
 }
 
-void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings) {
+void Builder::build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before) {
   const std::scoped_lock lock(mutex_);
   load_.reset();  // in place of a load that waits
   worker_.post({"building the grid", Progress::Stage::refining,
-                [this, volume = std::move(volume), settings](Progress& progress) {
-                  build_of(volume, settings, 0.0, progress);
+                [this, volume = std::move(volume), settings, before = std::move(before)](Progress& progress) {
+                  build_of(volume, settings, 0.0, progress, before);
                 }});
 }
 
@@ -201,8 +223,8 @@ bool Builder::busy() const {
 }
 
 void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds,
-                       Progress& progress) {
-  Built built = build_grid(log_, volume, settings, progress, *allowance_);
+                       Progress& progress, const scene::GridPlanPtr& before) {
+  Built built = build_grid(log_, volume, settings, progress, *allowance_, before);
   built.seconds.load = load_seconds;
   const std::scoped_lock lock(mutex_);
   progress.check();

@@ -36,9 +36,13 @@ struct LoadedVolume {
   std::optional<double> density_scale;  ///< of the medium, from now on
 };
 
+/// Who makes the cells of tetrahedra.
+enum class BuildOn { cpu = 0, gpu = 1 };
+
 /// What a march is made with.
 struct BuildSettings {
   scene::March march = scene::March::tet;
+  BuildOn on = BuildOn::cpu;
   grid::RefineSettings refine;
   volume::Ramp density_ramp;
   scene::Emission emission;
@@ -63,6 +67,7 @@ struct Built {
   scene::MarchSourcePtr source;
   BuildSettings settings;
   std::uint64_t active_voxels = 0;
+  // Of a grid that GL builds known once it is there.
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
   bool limited = false;
@@ -72,10 +77,17 @@ struct Built {
   [[nodiscard]] std::uint64_t bytes() const;
 };
 
+/// Of a grid whose refinement max_cells ended.
+void log_limited(const Log& log, std::uint64_t max_cells);
+
 /// Of a volume, on this thread. Throws Error(cancelled), and what its parts throw.
+/// What GL builds is planned: the job is done once GL can begin. Volumes with channels beside density are built here,
+/// which the log is told.
 /// Cells are as coarse as the allowance's memory takes; where it does not do for the coarsest, Error(out_of_memory).
+/// before: of a camera in motion the plan that is shown, whose cells do not come and go without need.
 [[nodiscard]] Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings,
-                               Progress& progress, const Allowance& allowance = {});
+                               Progress& progress, const Allowance& allowance = {},
+                               const scene::GridPlanPtr& before = nullptr);
 
 /// Loads volumes and builds what marches need on a thread of its own, one job at a time. The newest wish wins, and none
 /// starves: a build under way is finished first, and of loads under way at least every second, so that volumes and
@@ -91,8 +103,8 @@ class Builder {
   /// Reads a file; then builds, unless settings are not known yet. Replaces what is under way, as Worker::replace()
   /// does: another file is another subject, and files may take minutes.
   void load(const VolumeFile& file, std::optional<BuildSettings> settings);
-  /// Builds of this volume, after what is under way.
-  void build(VolumeAssetPtr volume, const BuildSettings& settings);
+  /// Builds of this volume, after what is under way. before: as build_grid() has it.
+  void build(VolumeAssetPtr volume, const BuildSettings& settings, scene::GridPlanPtr before = nullptr);
   /// Other settings for a load under way. Returns false if there is none: then take what it read, and call build.
   bool configure_load(const std::optional<BuildSettings>& settings);
   void cancel();
@@ -120,7 +132,8 @@ class Builder {
     std::optional<BuildSettings> settings;
     bool open = true;
   };
-  void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress);
+  void build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds, Progress& progress,
+                const scene::GridPlanPtr& before = nullptr);
 
   Log log_;
   AllowancePtr allowance_;

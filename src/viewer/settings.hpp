@@ -25,6 +25,8 @@ namespace cumulet::viewer {
 static_assert(static_cast<int>(grid::Criterion::range_mean) == CUMULET_CRITERION_RANGE_MEAN);
 static_assert(static_cast<int>(grid::Criterion::transmittance) == CUMULET_CRITERION_TRANSMITTANCE);
 
+static_assert(static_cast<int>(BuildOn::gpu) == CUMULET_BUILD_GPU);
+
 struct GridSettings {
   BuildSettings build;  // refine.camera is filled from the viewer's
   bool camera_adaptive = false;
@@ -32,6 +34,7 @@ struct GridSettings {
   static GridSettings of(const cumulet_grid_desc& d) {
     GridSettings s;
     s.build.march = static_cast<scene::March>(d.march);
+    s.build.on = static_cast<BuildOn>(d.build);
     grid::RefineSettings& refine = s.build.refine;
     refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
     const cumulet_criterion criterion = settings::criterion_of(d);

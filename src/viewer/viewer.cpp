@@ -416,7 +416,9 @@ BuildSettings Viewer::settings_for_view() const {
   return settings;
 }
 
-bool Viewer::built_for_another() const { return grid_.camera_adaptive && view_ && built_for_ != build_view(); }
+bool Viewer::built_for_another() const {
+  return grid_.camera_adaptive && view_ && (built_in_motion_ || built_for_ != build_view());
+}
 
 void Viewer::request_build(bool (*concerned)(const VolumeAsset&)) {
   const bool loads = builder_.configure_load(settings_at_once());

@@ -266,6 +266,8 @@ class Viewer {
   void prepare(const Frame& frame);
   // What status() and stats() tell of it.
   void follow_upload(const Context& g);
+  // Of grids that GL built, once they are there.
+  void take_cells(const Context& g);
   // Of the live volume, what this frame's picture is of.
   void note_drawn(const Context& g);
   // Of what is shown, this sequence's.
@@ -458,6 +460,7 @@ class Viewer {
   };
   [[nodiscard]] BuildView build_view() const { return {*view_, frame_size_, places_}; }
   std::optional<BuildView> built_for_;  // camera-adaptive: what the grid was last asked for
+  bool built_in_motion_ = false;        // for that, with cells that were there before
   render::Totals totals_;
 
   [[nodiscard]] Followed& followed();

@@ -113,7 +113,10 @@ void Viewer::prepare(const Frame& frame) {
   const bool places_rest = !std::exchange(places_changed_, false);
   if ((facts_ || others || watched_) && built_for_another()) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
-    if (rests) {
+    // What GL builds follows a camera in motion, one grid after another.
+    const bool follows = volume_ && !followed_ && !watched_ && built_.source && built_.source->plan &&
+                         grid_.build.on == BuildOn::gpu && !builder_.busy() && gl_ && !gl_->scene().uploading_volumes();
+    if (rests || follows) {
       take_medium();
       if (watched_) {
         lives_.configure(settings_for_view());
@@ -122,11 +125,12 @@ void Viewer::prepare(const Frame& frame) {
         followed_->wish_due = true;
         follow_sequence();
       } else if (volume_) {
-        builder_.build(volume_, settings_for_view());
+        builder_.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
       }
       wishes_due_ = true;
       follow_instances();
       built_for_ = build_view();
+      built_in_motion_ = !rests;
     }
   }
 }
@@ -134,6 +138,23 @@ void Viewer::prepare(const Frame& frame) {
 void Viewer::follow_upload(const Context& g) {
   upload_progress_ = g.scene().progress();
   if (const auto seconds = g.scene().upload_seconds(built_.source)) built_.seconds.upload = *seconds;
+  take_cells(g);
+}
+
+void Viewer::take_cells(const Context& g) {
+  const auto take = [&](Built& built) {
+    if (!built.source || !built.source->plan || built.cells != 0) return;
+    const render::MarchData::Cells* cells = g.scene().cells(built.source);
+    if (cells == nullptr) return;
+    built.cells = cells->count;
+    built.levels = g.scene().data()->grid(*built.source)->levels;
+    built.limited = cells->limited;
+    if (built.limited) log_limited(log_, built.source->plan->max_cells);
+  };
+  take(built_);
+  for (Shown& shown : shown_) {
+    if (shown.built) take(*shown.built);
+  }
 }
 
 std::optional<scene::SequenceFrame> Viewer::frame_of(const Context& g, std::uint64_t sequence) {
@@ -339,9 +360,15 @@ const core::CmParameters& Viewer::trace_parameters() { return gl().readable().pa
 Stats Viewer::stats() {
   sync();
   Stats s;
-  s.cells = built_.cells;
-  s.levels = built_.levels;
-  s.limited = built_.limited;
+  const auto add = [&](std::uint64_t cells, std::uint32_t levels, bool limited) {
+    s.cells += cells;
+    s.levels = std::max(s.levels, levels);
+    s.limited = s.limited || limited;
+  };
+  const auto add_built = [&](const Built& built) {
+    if (!built.source || !built.source->plan) add(built.cells, built.levels, built.limited);
+  };
+  add_built(built_);
   s.active_voxels = volume_ ? volume_->volume().active_voxels : (followed_ ? built_.active_voxels : 0);
   std::set<scene::MarchSourcePtr> grids{built_.source};
   std::set<VolumeAssetPtr> volumes{volume_};
@@ -351,9 +378,16 @@ Stats Viewer::stats() {
     if (volume && volumes.insert(volume).second) s.active_voxels += volume->volume().active_voxels;
     if (!shown.built || !grids.insert(shown.built->source).second) continue;
     if (!volume) s.active_voxels += shown.built->active_voxels;
-    s.cells += shown.built->cells;
-    s.levels = std::max(s.levels, shown.built->levels);
-    s.limited = s.limited || shown.built->limited;
+    add_built(*shown.built);
+  }
+  if (gl_) {
+    // Of those that GL builds what is there.
+    std::set<scene::MarchSourcePtr> there;
+    for (const scene::Volume& volume : gl_->scene().volumes()) {
+      if (!volume.source->plan || !there.insert(volume.source).second) continue;
+      const render::MarchData::Cells& cells = *gl_->scene().cells(volume.source);
+      add(cells.count, gl_->scene().data()->grid(*volume.source)->levels, cells.limited);
+    }
   }
   s.build_seconds = built_.seconds;
   s.memory_bytes = followed_ ? frames_.frames().bytes : built_.bytes();

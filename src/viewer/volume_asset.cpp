@@ -58,6 +58,7 @@ std::uint64_t VolumeAsset::bytes() const {
   const std::scoped_lock lock(mutex_);
   if (statistics_) bytes += statistics_->bytes();
   if (ramped_) bytes += ramped_->density.voxels->bytes() + ramped_->density.statistics->bytes();
+  if (latticed_) bytes += latticed_->lattice->bytes();
   grid::Channels made;
   if (glowing_) made.emission = glowing_->emission;
   if (weighted_) {
@@ -96,6 +97,27 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
     ramped_ = Ramped{ramp, {voxels, statistics_of(*voxels)}};
   }
   return ramped_->density;
+}
+
+grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::RefineSettings& refine,
+                                      Progress& progress) const {
+  // The same for all views and budgets.
+  const grid::RefineSettings any_view;
+  grid::RefineSettings of = refine;
+  of.camera.reset();
+  of.pixel_size = any_view.pixel_size;
+  of.max_cells = any_view.max_cells;
+  double seconds = 0.0;
+  const Density field = density(ramp, progress, seconds);
+  progress.begin(Progress::Stage::refining);
+  const auto lock = patient_lock(mutex_, progress);
+  if (!latticed_ || latticed_->ramp != ramp || latticed_->refine != of) {
+    latticed_.reset();
+    latticed_ = Latticed{
+        ramp, of,
+        make_left<const grid::Lattice>(*field.statistics, grid::Channels{}, of, field.voxels->max_value, &progress)};
+  }
+  return latticed_->lattice;
 }
 
 grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,

@@ -8,6 +8,7 @@
 
 #include "base/log.hpp"
 #include "base/progress.hpp"
+#include "grid/lattice.hpp"
 #include "grid/statistics.hpp"
 #include "scene/channels.hpp"
 #include "viewer/bounds.hpp"
@@ -66,6 +67,10 @@ class VolumeAsset {
   /// without a ramp and the last with one. seconds receives what computing took, 0 if it was there. Throws
   /// Error(cancelled) if this caller's progress is.
   [[nodiscard]] Density density(const volume::Ramp& ramp, Progress& progress, double& seconds) const;
+  /// Of density alone, with that ramp: what grids of any view are built from. The last is kept. Throws as density()
+  /// does.
+  [[nodiscard]] grid::LatticePtr lattice(const volume::Ramp& ramp, const grid::RefineSettings& refine,
+                                         Progress& progress) const;
   /// What it has beside density; anisotropic: its anisotropy, too. The last that were asked for are kept: another
   /// threshold or camera asks for the same. log hears of what is left out, when it is made.
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
@@ -82,6 +87,12 @@ class VolumeAsset {
     Density density;
   };
   mutable std::optional<Ramped> ramped_;
+  struct Latticed {
+    volume::Ramp ramp;
+    grid::RefineSettings refine;
+    grid::LatticePtr lattice;
+  };
+  mutable std::optional<Latticed> latticed_;
   struct Glowing {
     scene::Emission settings;
     decltype(grid::Channels::emission) emission;

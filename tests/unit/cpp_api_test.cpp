@@ -104,7 +104,8 @@ TEST(CppDescs, BecomeTheirCounterparts) {
                                           .threshold = 1.5,
                                           .max_cells = 7,
                                           .camera_adaptive = true,
-                                          .pixel_size = 2.5};
+                                          .pixel_size = 2.5,
+                                          .build = Build::gpu};
   EXPECT_EQ(grid.struct_size, sizeof grid);
   EXPECT_EQ(grid.march, CUMULET_MARCH_BRICK);
   EXPECT_EQ(grid.cells, CUMULET_CELLS_CONSTANT);
@@ -113,6 +114,7 @@ TEST(CppDescs, BecomeTheirCounterparts) {
   EXPECT_EQ(grid.max_cells, 7U);
   EXPECT_EQ(grid.camera_adaptive, 1);
   EXPECT_EQ(grid.pixel_size, 2.5);
+  EXPECT_EQ(grid.build, CUMULET_BUILD_GPU);
 
   const cumulet_medium_desc medium = MediumDesc{
       .density_scale = 2, .coalbedo = {0.1F, 0.2F, 0.3F}, .anisotropy = 0.5F, .max_bounces = 9, .emission = {4, 5, 6}};

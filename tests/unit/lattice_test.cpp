@@ -104,6 +104,38 @@ TEST(OwnPriorities, GiveTheSplitsThatEvaluatingAnewGives) {
   }
 }
 
+// A camera that trembles changes cells where each view has its own, and none where those that there were may stay.
+TEST(OwnPriorities, InMotionKeepWhatMayStay) {
+  const auto volume = test::noise_volume({120, 100, 110}, ivec3(0), 1);
+  const grid::Statistics statistics(volume, grid::fit_cube(volume));
+  grid::RefineSettings settings;
+  const grid::OwnPriorities own(statistics, {}, settings);
+  grid::RefineCamera camera;
+  camera.tan_half_x = camera.tan_half_y = 0.2;
+  camera.pixels_per_radian = 100.0;
+  std::vector<std::uint8_t> kept;
+  std::vector<std::uint8_t> before;
+  std::size_t others = 0;
+  std::size_t kept_others = 0;
+  for (int i = 0; i < 40; ++i) {
+    camera.eye = {60.0 + 2.0 * std::sin(2.1 * i), 50.0 + 2.0 * std::cos(3.7 * i), 300.0 + 3.0 * std::sin(1.3 * i)};
+    settings.camera = camera;
+    const auto wanted = own.levels(grid::ViewLevels(statistics.cube(), settings));
+    const auto most = own.levels(grid::ViewLevels(statistics.cube(), grid::with_slack(settings)));
+    const auto next = i == 0 ? most : own.levels(statistics.cube(), settings, kept);
+    for (std::size_t n = 0; n < next.size(); ++n) {
+      ASSERT_GE(next[n], wanted[n]) << "no coarser than the view wants";
+      ASSERT_LE(next[n], most[n]) << "and not much finer";
+      if (i > 0 && next[n] != kept[n]) ++kept_others;
+      if (i > 0 && wanted[n] != before[n]) ++others;
+    }
+    kept = next;
+    before = wanted;
+  }
+  EXPECT_GT(others, 200U);
+  EXPECT_LT(kept_others, others / 10);
+}
+
 // Each place of the 42 is of one cell; what it has is what records have.
 TEST(Lattice, CoarseCellsHaveTheirRecords) {
   for (const test::SmallVolume& small : test::small_volumes()) {

@@ -1102,6 +1102,16 @@ typedef enum cumulet_criterion {
   CUMULET_CRITERION_TRANSMITTANCE = 2
 } cumulet_criterion;
 
+typedef enum cumulet_build {
+  CUMULET_BUILD_CPU = 0, /* by a worker, with all that a volume has */
+  /* By compute shaders, within frames' budgets, the old cells being shown meanwhile: the same cells, whose densities
+     differ by a rounding at most. A worker computes once, a volume and medium, what does not depend on the view; a
+     camera that moves then costs the device's passes alone. Volumes with more than density (what glows, is coloured,
+     turns light by its own anisotropy or moves) are built by a worker, which the log says; grids that are larger than
+     the driver's storage blocks are an error that names the limit */
+  CUMULET_BUILD_GPU = 1
+} cumulet_build;
+
 /* How the cells are made. A change rebuilds them on the worker; the old ones are shown meanwhile. */
 typedef struct cumulet_grid_desc {
   size_t struct_size;
@@ -1113,6 +1123,7 @@ typedef struct cumulet_grid_desc {
   int32_t camera_adaptive; /* 1: do not split cells outside the frustum or under pixel_size pixels; 0: off. Needs the
                               size of a frame; built anew when the camera comes to rest elsewhere */
   double pixel_size;       /* pixels a cell's longest edge must cover to be split; 0: 1 */
+  cumulet_build build;     /* who makes them, of CUMULET_MARCH_TET */
 } cumulet_grid_desc;
 
 /* Where light goes that a medium scatters. */

@@ -1,0 +1,45 @@
+// What stands where in a lattice, found from its top (src/grid/lattice.hpp): for the kernels that build a grid.
+#ifndef CM_GRID_PLACES_GLSL
+#define CM_GRID_PLACES_GLSL
+
+struct CmPlace {
+  uint block;
+  uint brick;
+  uint coarse;
+};
+layout(std430, binding = CM_STORAGE_GRID_PLACES) readonly buffer CmPlaces { CmPlace cm_places[]; };
+layout(location = 2) uniform uint cm_log2_size;  // of the cube
+
+// The block of that scale at a corner; 0: none.
+uint cm_block_at(ivec3 corner, uint scale) {
+  uint block = CM_TOP_BLOCK;
+  for (uint s = cm_log2_size / 3u; s > scale; --s) {
+    ivec3 point = corner >> ivec3(int(3u * (s - 1u - scale)));
+    block = cm_places[block * CM_BLOCK_POINTS + cm_in_block(point)].block;
+  }
+  return block;
+}
+
+// Where the lattice has a vertex; in block 0, if it has not.
+uint cm_slot_of(ivec3 vertex) {
+  uint scale = cm_octave(vertex) / 3u;
+  ivec3 point = vertex >> ivec3(int(3u * scale));
+  return cm_block_at(point >> ivec3(3), scale) * CM_BLOCK_POINTS + cm_in_block(point);
+}
+
+// Whose values a voxel has.
+uint cm_brick_at(ivec3 voxel) {
+  CmPlace place;
+  place.block = CM_TOP_BLOCK;
+  for (uint scale = cm_log2_size / 3u; scale > 0u && place.block != 0u; --scale)
+    place = cm_places[place.block * CM_BLOCK_POINTS + cm_in_block(voxel >> ivec3(int(3u * scale)))];
+  return place.brick;
+}
+
+// The cells of the octree's cube of 2^size voxels at this corner; 0: it has one value.
+uint cm_coarse_at(ivec3 corner, uint size) {
+  ivec3 point = (corner + ivec3(1 << int(size - 1u))) >> ivec3(int(3u * ((size - 1u) / 3u)));
+  return cm_places[cm_block_at(point >> ivec3(3), (size - 1u) / 3u) * CM_BLOCK_POINTS + cm_in_block(point)].coarse;
+}
+
+#endif

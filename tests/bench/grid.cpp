@@ -1,0 +1,219 @@
+// How long grids take, on the CPU and by compute shaders: from a volume's statistics, and again for another view. By
+// hand:
+//
+//     cumulet-bench-grid [--threshold T] [--max-cells N] [--density-scale D] FILE...
+//
+// The views are those of --camera-adaptive, on a circle about the volume from far to within it, 1280 x 720. Seconds of
+// GL are until a fence after all passes has passed, on whatever driver there is; on Mesa's llvmpipe they are of the
+// same cores. Bytes are what passes read and write at least, each word once a pass that needs it.
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <headless.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/milliseconds.hpp"
+#include "gl/state_guard.hpp"
+#include "grid/tet_grid.hpp"
+#include "render/grid_build.hpp"
+#include "volume/volume.hpp"
+
+namespace {
+
+using namespace cumulet;
+using Clock = std::chrono::steady_clock;
+using render::Deadline;
+
+constexpr int repeats = 5;
+
+double since(Clock::time_point start) { return milliseconds(Clock::now() - start); }
+
+grid::RefineCamera camera_about(const grid::Statistics& statistics, const volume::ScalarVolume& volume, double turn) {
+  const glm::dmat4& to_world = statistics.cube().to_world;
+  const glm::dvec3 low(volume.bounds_min - statistics.cube().origin);
+  const glm::dvec3 high(volume.bounds_max + 1 - statistics.cube().origin);
+  const glm::dvec3 centre(to_world * glm::dvec4(0.5 * (low + high), 1.0));
+  const double radius = 0.5 * glm::length(glm::dmat3(to_world) * (high - low));
+  grid::RefineCamera camera;
+  const double distance = radius * (0.4 + 2.1 * std::abs(std::cos(turn)));
+  camera.eye = centre + distance * glm::dvec3(std::sin(2.0 * turn), 0.2, std::cos(2.0 * turn));
+  camera.forward = glm::normalize(centre - camera.eye);
+  camera.right = glm::normalize(glm::cross(camera.forward, glm::dvec3(0.0, 1.0, 0.0)));
+  camera.up = glm::cross(camera.right, camera.forward);
+  camera.tan_half_y = 0.3;
+  camera.tan_half_x = camera.tan_half_y * 1280.0 / 720.0;
+  camera.pixels_per_radian = 720.0 / (2.0 * camera.tan_half_y);
+  return camera;
+}
+
+struct Times {
+  double splits = 0.0, cells = 0.0, records = 0.0;
+  std::size_t count = 0;
+  [[nodiscard]] double all() const { return splits + cells + records; }
+};
+
+Times build_on_cpu(const grid::Statistics& statistics, const volume::ScalarVolume& volume,
+                   const grid::RefineSettings& settings) {
+  Times times;
+  auto start = Clock::now();
+  const grid::DiamondSet diamonds(statistics, settings);
+  times.splits = since(start);
+  start = Clock::now();
+  grid::GridBuilder builder(statistics, diamonds);
+  builder.bisect();
+  times.cells = since(start);
+  start = Clock::now();
+  times.count = builder.records(settings.cells, volume.max_value).cells.size();
+  times.records = since(start);
+  return times;
+}
+
+class Gpu {
+ public:
+  Gpu()
+      : context_(headless::Context::create(headless::Backend::automatic)),
+        gl_(gl::load_functions(headless::Context::get_proc, &context_)),
+        programs_(std::make_shared<gl::Programs>(*gl_, nullptr)),
+        limits_(gl::query_limits(*gl_)) {
+    const gl::StateGuard guard(*gl_);
+    gl::find_out_dispatches(gl_, *programs_);
+    for (const gl::ProgramKey& key : gl::all_programs()) {
+      if (key.name.starts_with("grid_")) programs_->get(key);
+    }
+    std::printf("driver: %s\n", gl::string_of(*gl_, GL_RENDERER).c_str());
+  }
+
+  double upload(const grid::LatticePtr& lattice, const std::shared_ptr<const grid::Statistics>& statistics) {
+    const gl::StateGuard guard(*gl_);
+    const auto start = Clock::now();
+    render::LatticeUpload work(gl_, limits_, lattice, statistics);
+    while (!work.advance(Deadline::max())) {
+    }
+    gl::Fence(gl_).wait();
+    data_ = work.take();
+    return since(start);
+  }
+
+  struct Built {
+    double levels_ms = 0.0, ms = 0.0;
+    std::size_t count = 0;
+    std::uint64_t scratch = 0;
+  };
+  Built build(const grid::RefineSettings& settings) {
+    const gl::StateGuard guard(*gl_);
+    Built built;
+    auto start = Clock::now();
+    const grid::Lattice& lattice = data_->lattice();
+    auto levels = lattice.own.levels(grid::ViewLevels(lattice.cube, settings));
+    built.levels_ms = since(start);
+    start = Clock::now();
+    render::GridBuild work(gl_, programs_, limits_, data_, std::move(levels), settings.max_cells);
+    while (!work.advance(Deadline::max())) {
+    }
+    const render::BuiltGrid grid = work.take();
+    gl::Fence(gl_).wait();
+    built.ms = since(start);
+    built.count = grid.count;
+    built.scratch = work.bytes();
+    return built;
+  }
+  [[nodiscard]] const render::LatticeData& data() const { return *data_; }
+
+ private:
+  headless::Context context_;
+  gl::FunctionsPtr gl_;
+  gl::ProgramsPtr programs_;
+  gl::Limits limits_;
+  render::LatticeDataPtr data_;
+};
+
+// What passes read and write: of the lattice, and of a cell.
+void print_bytes(const grid::Lattice& lattice, std::size_t cells) {
+  // Cleared, raised (its own priorities read), closed (read once, and its parents), counted twice.
+  const double points = static_cast<double>(lattice.blocks.size()) * CM_BLOCK_POINTS * 4.0;
+  const double splits = 4.0 * points + static_cast<double>(lattice.own.bytes());
+  // Of a node of the tree (two a cell): marking reads 16 and the priority, writes 4; children read 16 + 16 and three
+  // neighbours' 16 a parent, write 32 a child; leaves 4 read a child, 4 written; order 8 + 4 read, 8 + 4 written; the
+  // record reads 16 + 16 + 8 and four neighbours' 24, writes 32.
+  const double cell = 2.0 * (16.0 + 4.0 + 4.0) + (32.0 + 48.0 + 64.0) + 2.0 * 8.0 + (12.0 + 20.0) + 40.0 + 96.0 + 32.0;
+  std::printf("  bytes moved: %.1f MB to decide, %.0f a cell; of a cell %.0f in all\n", splits * 1e-6, cell,
+              splits / static_cast<double>(std::max<std::size_t>(cells, 1)) + cell);
+}
+
+void measure(Gpu& gpu, const std::string& file, grid::RefineSettings settings) {
+  const auto volume = std::make_shared<const volume::ScalarVolume>(volume::import_volume(file, "", Log()));
+  const auto statistics = std::make_shared<const grid::Statistics>(*volume, grid::fit_cube(*volume));
+  std::printf("%s: %.2fM active voxels, %zu bricks\n", std::filesystem::path(file).filename().c_str(),
+              static_cast<double>(volume->active_voxels) * 1e-6, statistics->nodes_of_size(3).size());
+  const auto start = Clock::now();
+  const auto lattice =
+      std::make_shared<const grid::Lattice>(*statistics, grid::Channels{}, settings, volume->max_value);
+  const double lattice_ms = since(start);
+  const double upload_ms = gpu.upload(lattice, statistics);
+  std::printf("  lattice: %.0f ms, %.1f MB in main memory, %zu blocks; uploaded in %.0f ms, %.1f MB of GL's\n",
+              lattice_ms, static_cast<double>(lattice->bytes()) * 1e-6, lattice->blocks.size(), upload_ms,
+              static_cast<double>(gpu.data().bytes()) * 1e-6);
+  const auto compare = [&](const char* what) {
+    // In turn; of each the fastest, as others may have the cores.
+    Times cpu = build_on_cpu(*statistics, *volume, settings);
+    Gpu::Built built = gpu.build(settings);
+    for (int i = 1; i < repeats; ++i) {
+      const Times again = build_on_cpu(*statistics, *volume, settings);
+      if (again.all() < cpu.all()) cpu = again;
+      const Gpu::Built anew = gpu.build(settings);
+      if (anew.ms < built.ms) built = anew;
+    }
+    std::printf(
+        "  %-12s %8zu cells: CPU %7.0f ms (splits %.0f, cells %.0f, records %.0f); GL %7.0f ms and %.1f for the "
+        "levels, %.0f ns a cell, %.0f MB of scratch%s\n",
+        what, cpu.count, cpu.all(), cpu.splits, cpu.cells, cpu.records, built.ms, built.levels_ms,
+        1e6 * built.ms / static_cast<double>(built.count), static_cast<double>(built.scratch) * 1e-6,
+        built.count == cpu.count ? "" : " NOT THE SAME");
+    return built.count;
+  };
+  print_bytes(*lattice, compare("everywhere"));
+  for (int i = 0; i < 5; ++i) {
+    settings.camera = camera_about(*statistics, *volume, 0.35 * i);
+    compare(("view " + std::to_string(i)).c_str());
+  }
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  openvdb::initialize();
+  grid::RefineSettings settings;
+  settings.criterion = grid::Criterion::transmittance;
+  settings.threshold = 0.15;
+  std::vector<std::string> files;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const bool more = i + 1 < argc;
+    if (argument == "--threshold" && more) {
+      settings.threshold = std::atof(argv[++i]);
+    } else if (argument == "--max-cells" && more) {
+      settings.max_cells = std::strtoull(argv[++i], nullptr, 10);
+    } else if (argument == "--density-scale" && more) {
+      settings.density_scale = std::atof(argv[++i]);
+    } else {
+      files.push_back(argument);
+    }
+  }
+  if (files.empty()) {
+    std::fputs("usage: cumulet-bench-grid [--threshold T] [--max-cells N] [--density-scale D] FILE...\n", stderr);
+    return 2;
+  }
+  Gpu gpu;
+  for (const std::string& file : files) measure(gpu, file, settings);
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "cumulet-bench-grid: %s\n", error.what());
+  return 1;
+}

@@ -1,0 +1,161 @@
+// Viewers whose grids GL builds show what those show whose grids the CPU builds.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "support/gl_viewer.hpp"
+#include "support/volumes.hpp"
+#include "viewer/builder.hpp"
+
+namespace {
+
+using namespace cumulet;
+using viewer::BuildOn;
+
+viewer::GridSettings settings_on(BuildOn on, bool adaptive = false) {
+  viewer::GridSettings settings;
+  settings.build.on = on;
+  settings.build.refine.threshold = 0.01;
+  settings.build.refine.pixel_size = 2.0;
+  settings.camera_adaptive = adaptive;
+  return settings;
+}
+
+class GpuGrid : public test::StillTest {
+ protected:
+  void SetUp() override {
+    StillTest::SetUp();
+    if (IsSkipped()) return;
+    show(*still_);
+  }
+  static void show(test::Still& still) {
+    still.set_light({30.0F, 30.0F, glm::vec3(3.0F), glm::vec3(0.3F)});
+    still.set_volume(test::noise_volume({60, 45, 50}, glm::ivec3(-3, 2, 5), 3));
+    still.viewer().set_medium({0.3, glm::vec3(0.95F), {0.4F}, 0});
+    look(still, 0.0);
+  }
+  static void look(test::Still& still, double turn) {
+    const glm::dvec3 centre(27.0, 24.0, 30.0);
+    still.set_camera(
+        test::camera_at(centre + (90.0 + 60.0 * turn) * glm::dvec3(std::sin(turn), 0.1, std::cos(turn)), centre, 40.0));
+  }
+};
+CUMULET_ON_BACKENDS(GpuGrid);
+
+// Of all values, beside their mean.
+double difference(const test::Picture& a, const test::Picture& b) {
+  double square = 0.0;
+  double mean = 0.0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      square += std::pow(double(a.pixels[i][c]) - double(b.pixels[i][c]), 2.0);
+      mean += double(b.pixels[i][c]);
+    }
+  }
+  const double values = 3.0 * static_cast<double>(a.pixels.size());
+  return std::sqrt(square / values) / (mean / values);
+}
+
+TEST_P(GpuGrid, PicturesAreThoseOfTheCpusGrid) {
+  const test::Image image{40, 30, 32, 5, render::View::shaded};
+  const auto other = make();
+  show(*other);
+  for (const bool adaptive : {false, true}) {
+    for (const double turn : {0.0, 1.0, 2.5}) {
+      if (!adaptive && turn > 0.0) continue;
+      look(*still_, turn);
+      look(*other, turn);
+      still_->set_grid(settings_on(BuildOn::gpu, adaptive));
+      other->set_grid(settings_on(BuildOn::cpu, adaptive));
+      const test::Picture a = test::render(*still_, image);
+      const test::Picture b = test::render(*other, image);
+      EXPECT_EQ(viewer().stats().cells, other->viewer().stats().cells);
+      EXPECT_EQ(viewer().stats().levels, other->viewer().stats().levels);
+      EXPECT_GT(viewer().stats().cells, 1000U);
+      EXPECT_EQ(viewer().stats().cell_bytes, other->viewer().stats().cell_bytes);
+      // The same paths, but where a density that was rounded otherwise decides.
+      test::Image seeded = image;
+      seeded.seed = 77;
+      const double other_paths = difference(test::render(*other, seeded), b);
+      EXPECT_LT(difference(a, b), 0.3 * other_paths) << adaptive << turn;
+      EXPECT_LT(std::abs(a.mean().y / b.mean().y - 1.0), 0.002) << adaptive << turn;
+    }
+  }
+}
+
+TEST_P(GpuGrid, BudgetsEndTheRefinementThere) {
+  viewer::GridSettings settings = settings_on(BuildOn::gpu);
+  settings.build.refine.max_cells = 2000;
+  still_->set_grid(settings);
+  test::render(*still_, {8, 8, 1, 0, render::View::shaded});
+  EXPECT_TRUE(viewer().stats().limited);
+  EXPECT_LE(viewer().stats().cells, 2000U);
+  EXPECT_GT(viewer().stats().cells, 1500U);
+}
+
+// While a camera moves there is always a picture, of the grid before until the next is whole.
+TEST_P(GpuGrid, TheGridBeforeIsShownUntilTheNextIsWhole) {
+  still_->set_grid(settings_on(BuildOn::gpu, true));
+  test::render(*still_, {40, 30, 1, 0, render::View::shaded});
+  std::uint64_t before = viewer().stats().cells;
+  std::size_t kept = 0;
+  std::size_t others = 0;
+  for (int i = 1; i <= 4; ++i) {
+    look(*still_, 0.6 * i);
+    for (int f = 0; f < 4000; ++f) {
+      const viewer::FrameResult result = viewer().render(frame(40, 30, 0.5));
+      ASSERT_GT(viewer().stats().cell_bytes, 0U);
+      if (viewer().stats().cells == before) ++kept;
+      if (result.converged) break;
+      viewer().wait(1e-3);
+    }
+    if (viewer().stats().cells != before) ++others;
+    before = viewer().stats().cells;
+  }
+  EXPECT_GT(kept, 4U);
+  EXPECT_GE(others, 3U) << "each view has its own";
+}
+
+TEST(GpuGridBuild, OfMoreThanDensityIsTheCpus) {
+  volume::VolumeFrame frame;
+  frame.density = test::noise_volume({30, 30, 30}, glm::ivec3(0), 1);
+  frame.density.name = "smoke";
+  frame.flame = test::noise_volume({30, 30, 30}, glm::ivec3(0), 2);
+  const auto asset = std::make_shared<const viewer::VolumeAsset>(std::move(frame));
+  std::vector<std::string> lines;
+  const Log log([&](LogLevel /*level*/, const char* line) { lines.emplace_back(line); });
+  Progress progress;
+  viewer::BuildSettings settings;
+  settings.on = BuildOn::gpu;
+  const viewer::Built built = viewer::build_grid(log, asset, settings, progress);
+  EXPECT_TRUE(built.source->grid);
+  EXPECT_FALSE(built.source->plan);
+  EXPECT_TRUE(built.source->emits());
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0], "smoke: it has more than density, so its grid is built on the CPU");
+  settings.on = BuildOn::cpu;
+  EXPECT_EQ(built.cells, viewer::build_grid(log, asset, settings, progress).cells);
+}
+
+// What a view does not change is computed once.
+TEST(GpuGridBuild, ViewsShareALattice) {
+  const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({30, 30, 30}, glm::ivec3(0), 1));
+  Progress progress;
+  viewer::BuildSettings settings;
+  settings.on = BuildOn::gpu;
+  const viewer::Built everywhere = viewer::build_grid(Log(), asset, settings, progress);
+  settings.refine.camera = grid::RefineCamera{};
+  settings.refine.pixel_size = 3.0;
+  settings.refine.max_cells = 1000;
+  const viewer::Built seen = viewer::build_grid(Log(), asset, settings, progress);
+  EXPECT_EQ(seen.source->plan->lattice, everywhere.source->plan->lattice);
+  EXPECT_NE(seen.source->plan->levels, everywhere.source->plan->levels);
+  settings.refine.threshold *= 2.0;
+  EXPECT_NE(viewer::build_grid(Log(), asset, settings, progress).source->plan->lattice,
+            everywhere.source->plan->lattice);
+}
+
+}  // namespace
