@@ -35,7 +35,8 @@ std::uint64_t Built::bytes() const {
   const std::uint64_t read = source && source->volume && volume ? source->volume->bytes() : 0;
   const std::uint64_t statistics = source && source->statistics && volume ? source->statistics->bytes() : 0;
   const std::uint64_t channels = source && volume ? source->channels.bytes() : 0;
-  return (volume ? volume->bytes() : 0) + (source ? source->bytes() : 0) - read - statistics - channels;
+  const std::uint64_t lattice = source && source->plan && volume ? source->plan->lattice->bytes() : 0;
+  return (volume ? volume->bytes() : 0) + (source ? source->bytes() : 0) - read - statistics - channels - lattice;
 }
 
 namespace {

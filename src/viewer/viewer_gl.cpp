@@ -113,9 +113,11 @@ void Viewer::prepare(const Frame& frame) {
   const bool places_rest = !std::exchange(places_changed_, false);
   if ((facts_ || others || watched_) && built_for_another()) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
-    // What GL builds follows a camera in motion, one grid after another.
-    const bool follows = volume_ && !followed_ && !watched_ && built_.source && built_.source->plan &&
-                         grid_.build.on == BuildOn::gpu && !builder_.busy() && gl_ && !gl_->scene().uploading_volumes();
+    // What GL builds follows a camera in motion, one grid after another, each of which is seen.
+    const bool follows =
+        volume_ && !followed_ && !watched_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
+        !builder_.busy() && gl_ && !gl_->scene().uploading_volumes() &&
+        gl_->progressive().newest_is_of(gl_->scene().data_revision(), gl_->scene().instances_revision());
     if (rests || follows) {
       take_medium();
       if (watched_) {
@@ -385,8 +387,9 @@ Stats Viewer::stats() {
     std::set<scene::MarchSourcePtr> there;
     for (const scene::Volume& volume : gl_->scene().volumes()) {
       if (!volume.source->plan || !there.insert(volume.source).second) continue;
-      const render::MarchData::Cells& cells = *gl_->scene().cells(volume.source);
-      add(cells.count, gl_->scene().data()->grid(*volume.source)->levels, cells.limited);
+      // An upload that failed may have taken it away.
+      const render::MarchData::Cells* cells = gl_->scene().cells(volume.source);
+      if (cells != nullptr) add(cells->count, gl_->scene().data()->grid(*volume.source)->levels, cells->limited);
     }
   }
   s.build_seconds = built_.seconds;
