@@ -569,7 +569,7 @@ typedef struct cumulet_playback_desc {
   cumulet_between between;
   /*
    * Moments from a frame to the next, the frame's own among them, at which another picture may be: each is there until
-   * the next comes, so that what was made serves again. 1 to 1000, and 4,000,000 in the whole sequence at most; 0: 4.
+   * the next comes, so that what was made serves again. 1 to 1000, and 1,000,000 in the whole sequence at most; 0: 4.
    * CUMULET_BETWEEN_NONE: not looked at.
    */
   uint32_t subframes;
