@@ -18,8 +18,8 @@ namespace cumulet::viewer {
 
 /// A volume in scenes, as its host has it.
 struct InstanceSettings {
-  VolumeAssetPtr volume;               ///< null: none
-  std::shared_ptr<Sequence> sequence;  ///< in its place; null: none
+  VolumeAssetPtr volume;                    ///< null: none
+  std::shared_ptr<Sequence> sequence = {};  ///< in its place; null: none
   glm::dmat4 to_world{1.0};
   Medium medium = {};
   Ramps ramps = {};
