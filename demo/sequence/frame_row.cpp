@@ -59,6 +59,7 @@ std::vector<std::string> FrameRow::by_size() const {
   }
   std::ranges::stable_sort(sized, [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<std::string> files;
+  files.reserve(sized.size());
   for (auto& [size, name] : sized) files.push_back(std::move(name));
   return files;
 }

@@ -91,7 +91,7 @@ std::vector<Moment> parse_frames(std::string_view text) {
 
 std::string frames_text(const std::vector<Moment>& moments) {
   std::vector<Moment> sorted = moments;
-  std::ranges::sort(sorted);
+  std::sort(sorted.begin(), sorted.end());
   std::string text;
   const auto follows = [&](std::size_t i) {
     return !sorted[i].is_between() && !sorted[i - 1].is_between() && sorted[i].frame == sorted[i - 1].frame + 1;

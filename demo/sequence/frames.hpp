@@ -1,6 +1,5 @@
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -21,7 +20,10 @@ struct Moment {
 
   constexpr Moment() = default;
   constexpr Moment(Frame whole, std::uint32_t part = 0) : frame(whole), thousandths(part) {}
-  auto operator<=>(const Moment&) const = default;
+  bool operator==(const Moment&) const = default;
+  bool operator<(const Moment& other) const {
+    return frame != other.frame ? frame < other.frame : thousandths < other.thousandths;
+  }
   [[nodiscard]] bool is_between() const { return thousandths != 0; }
   /// "5", "5.25".
   [[nodiscard]] std::string text() const;

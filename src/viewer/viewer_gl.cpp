@@ -19,6 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+bool failed(const Worker::Status& status) { return status.failure && status.failure->code() != ErrorCode::cancelled; }
+
 }  // namespace
 
 Context& Viewer::gl() const {
@@ -222,9 +224,6 @@ FrameResult Viewer::render(const Frame& frame) {
       result.more = true;
       result.converged = false;
     }
-    const auto failed = [](const Worker::Status& status) {
-      return status.failure && status.failure->code() != ErrorCode::cancelled;
-    };
     result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
                     failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status()) ||
                     std::ranges::any_of(played_, [&](const PlayedPtr& p) { return failed(p->shelf.status()); }) ||
