@@ -244,12 +244,15 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
 }
 
 std::vector<ProgramKey> all_programs() {
+  // They would be half of all.
+  const auto rare = [](const ShaderMacro& macro) { return macro.name == "CM_GROUPS" || macro.name == "CM_HOLDOUT"; };
   std::vector<ProgramKey> all;
   for (const Shader& shader : shaders()) {
     if (shader.name.ends_with(".vert")) continue;
     const std::string name(shader.name);
     const std::string vertex = name.ends_with(".frag") ? vertex_shader_of(name) : "";
     for (const std::span<const ShaderMacro> macros : shader.variants) {
+      if (std::ranges::any_of(macros, rare)) continue;
       std::vector<ProgramKey> keys{{name, {}, vertex}};
       for (const ShaderMacro& macro : macros) {
         std::vector<ProgramKey> longer;

@@ -702,6 +702,8 @@ TEST_P(GlInstances, LieWhereTheDriverHasThem) {
                                    CM_RECORD(medium.emits),
                                    CM_RECORD(medium.coloured),
                                    CM_RECORD(medium.anisotropic),
+                                   CM_RECORD(medium.group),
+                                   CM_RECORD(medium.holdout),
                                    CM_RECORD(flags),
                                    CM_RECORD(alias),
                                    CM_RECORD(alias_other)};
