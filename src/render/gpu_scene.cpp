@@ -36,6 +36,8 @@ core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& 
   return m;
 }
 
+bool is_hole(const scene::Volume& volume) { return (*volume.medium).holdout; }
+
 // Each once.
 MarchUpload::Sources sources_of(const std::vector<scene::Volume>& volumes) {
   MarchUpload::Sources sources;
@@ -79,8 +81,7 @@ void GpuScene::find_present(const scene::Snapshot& snapshot) {
 
 void GpuScene::update_instances(const Wanted& wanted) {
   // What is a hole is known of those of a table alone.
-  const auto cuts = [](const scene::Volume& volume) { return (*volume.medium).holdout; };
-  if (present_.size() < 2 && std::ranges::none_of(present_, cuts)) {
+  if (present_.size() < 2 && std::ranges::none_of(present_, is_hole)) {
     if (instances_) {
       data_revision_.advance();
       instances_revision_.advance();
@@ -468,8 +469,7 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   // Chances are of a table as a whole.
   obstacles.lamps = !placed_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
   obstacles.instances = instances_.get();
-  const auto cuts = [](const scene::Volume& volume) { return (*volume.medium).holdout; };
-  obstacles.volume_holdout = instances_ && std::ranges::any_of(present_, cuts);
+  obstacles.volume_holdout = instances_ && std::ranges::any_of(present_, is_hole);
   obstacles.model_holdout =
       obstacles.met() != nullptr && std::ranges::any_of(placed_->models(), &scene::Model::holdout);
   return obstacles;
