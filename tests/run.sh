@@ -2,8 +2,9 @@
 # Every test: installs the Debian packages that are missing, builds, and runs the tests, the unit tests again under
 # AddressSanitizer and UndefinedBehaviorSanitizer, and the checks of format, scripts and (clang-tidy) code.
 # The last line is "N passed, N failed" (", N skipped"); the exit status is 0 if none failed.
-# --quick: the release build's tests alone, without those labelled slow. --long: everything, then the tests of threads
-# under ThreadSanitizer, the soak, all drivers' pictures and a minute of each fuzzer (an hour more).
+# --quick: the release build's tests alone, without those labelled slow. --long: everything, clang-tidy with the static
+# analyzer, then the tests of threads under ThreadSanitizer, the soak, light behind OSMesa's door, all drivers' pictures
+# and a minute of each fuzzer (an hour and a half more).
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
 
@@ -14,7 +15,7 @@ for argument in "$@"; do
     --long) tier=long ;;
     -h | --help)
       echo "usage: tests/run.sh [--quick | --long]"
-      echo "  --quick: the release build's tests, but for slow ones; --long: soak, ThreadSanitizer and fuzzers, too"
+      echo "  --quick: the release build's tests, but for slow ones; --long: soak, analyzer, ThreadSanitizer and fuzzers, too"
       exit 0
       ;;
     *)
@@ -101,9 +102,9 @@ script_check() {
 # shellcheck disable=SC2317 # called by xargs
 tidy_one() { # STAMP SOURCE
   local log
-  # A tenth of the analyzer's default budget a function.
-  if log=$(clang-tidy --quiet -p build/release --extra-arg=-Wno-unknown-warning-option --extra-arg=-Xclang \
-    --extra-arg=-analyzer-config --extra-arg=-Xclang --extra-arg=max-nodes=22500 "$2" 2>&1); then
+  # A tenth of the analyzer's default budget a function, where it runs.
+  if log=$(clang-tidy --quiet -p build/release --checks="$tidy_checks" --extra-arg=-Wno-unknown-warning-option \
+    --extra-arg=-Xclang --extra-arg=-analyzer-config --extra-arg=-Xclang --extra-arg=max-nodes=22500 "$2" 2>&1); then
     : >"$1"
     echo "  ok      $2"
   else
@@ -111,6 +112,10 @@ tidy_one() { # STAMP SOURCE
   fi
 }
 export -f tidy_one
+# The static analyzer, a third of the time, is for the long tier: sanitizers look for the same at each run.
+tidy_checks=
+[ "$tier" = long ] || tidy_checks='-clang-analyzer-*'
+export tidy_checks
 
 # clang-tidy of src/ and demo/, but for the files that include OpenVDB (a minute each and more). Each file is a check;
 # one that passed is not looked at again until it, a header or the rules change.
@@ -131,7 +136,7 @@ tidy() {
   files=${#sources[@]}
   [ "$files" -gt 0 ] || { say "clang-tidy: found no files"; count 0 1 0; return; }
 
-  common=$({ cat .clang-tidy; clang-tidy --version; find src demo glsl -name '*.h' -o -name '*.hpp' -o -name '*.glsl' |
+  common=$({ cat .clang-tidy; echo "$tidy_checks"; clang-tidy --version; find src demo glsl -name '*.h' -o -name '*.hpp' -o -name '*.glsl' |
     LC_ALL=C sort | xargs cat; } | sha256sum)
   for source in "${sources[@]}"; do
     key=$stamps/$({ echo "$common $source"; cat "$source"; } | sha256sum | cut -c1-32)
@@ -180,8 +185,7 @@ tidy
 export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_get_addr=0
 export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
-# What is ours is the same behind both of Mesa's doors.
-build_and_test sanitize tests/unit/all tests/unit --exclude-regex /osmesa
+build_and_test sanitize tests/unit/all tests/unit
 if [ "$tier" = long ]; then
   run_ctest release-long build/release --label-regex long
   # What TSan cannot see into is left out. TBB has one thread (of one core), or its own ways of waiting would count as
