@@ -205,6 +205,16 @@ cumulet_status cumulet_set_sequence(cumulet_viewer* viewer, cumulet_sequence* se
 
 namespace {
 
+void tell_live(const core::Viewer::LiveStatus& status, cumulet_live_info* info) {
+  cumulet_live_info out{};
+  out.handed_state = status.handed;
+  out.ready_state = status.ready;
+  out.drawn_state = status.drawn;
+  out.ready_count = status.ready_count;
+  out.drawn_count = status.drawn_count;
+  write_desc(info, out, "cumulet_live_info");
+}
+
 void tell_sequence(const core::Viewer::SequenceStatus& status, cumulet_sequence_info* info, uint8_t* states,
                    size_t count) {
   const auto& frames = status.frames.frames;
@@ -270,14 +280,16 @@ cumulet_status cumulet_set_live(cumulet_viewer* viewer, cumulet_live* live) {
 cumulet_status cumulet_get_live_info(cumulet_viewer* viewer, cumulet_live_info* info) {
   return guarded(viewer, [&](core::Viewer& v) {
     read_desc(info, "cumulet_live_info");
-    const core::Viewer::LiveStatus status = v.live();
-    cumulet_live_info out{};
-    out.handed_state = status.handed;
-    out.ready_state = status.ready;
-    out.drawn_state = status.drawn;
-    out.ready_count = status.ready_count;
-    out.drawn_count = status.drawn_count;
-    write_desc(info, out, "cumulet_live_info");
+    tell_live(v.live(), info);
+  });
+}
+
+cumulet_status cumulet_get_instance_live_info(cumulet_viewer* viewer, cumulet_instance* instance,
+                                              cumulet_live_info* info) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(instance != nullptr, "the instance is NULL");
+    read_desc(info, "cumulet_live_info");
+    tell_live(v.live(*instance->asset), info);
   });
 }
 

@@ -20,9 +20,11 @@ InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   const cumulet_instance_desc d = read_desc(desc, "cumulet_instance_desc");
   require(d.hidden == 0 || d.hidden == 1, "cumulet_instance_desc.hidden is not 0 or 1");
   InstanceSettings settings;
-  require(d.volume == nullptr || d.sequence == nullptr, "cumulet_instance_desc has both a volume and a sequence");
+  require((d.volume != nullptr) + (d.sequence != nullptr) + (d.live != nullptr) <= 1,
+          "cumulet_instance_desc has more than one of a volume, a sequence and a live volume");
   if (d.volume != nullptr) settings.volume = d.volume->asset;
   if (d.sequence != nullptr) settings.sequence = d.sequence->asset;
+  if (d.live != nullptr) settings.live = d.live->asset;
   settings.to_world = matrix_or_identity(d.to_world);
   require_place(settings.to_world, "cumulet_instance_desc.");
   cumulet_medium_desc medium{};

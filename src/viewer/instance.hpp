@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/listeners.hpp"
+#include "viewer/live.hpp"
 #include "viewer/sequence.hpp"
 #include "viewer/settings.hpp"
 #include "viewer/surface_asset.hpp"
@@ -20,6 +21,7 @@ namespace cumulet::viewer {
 struct InstanceSettings {
   VolumeAssetPtr volume;                    ///< null: none
   std::shared_ptr<Sequence> sequence = {};  ///< in its place; null: none
+  std::shared_ptr<Live> live = {};          ///< likewise
   glm::dmat4 to_world{1.0};
   Medium medium = {};
   Ramps ramps = {};

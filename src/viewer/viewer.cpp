@@ -169,6 +169,7 @@ void Viewer::sync() {
   }
   follow_sequence();
   follow_live();
+  follow_watching();
   follow_instances();
   follow_models();
   if (auto surfaces = surface_builder_.take()) {
@@ -240,39 +241,49 @@ void Viewer::leave_sequence() {
 
 void Viewer::set_live(std::shared_ptr<Live> live) {
   if (!begin_anew(live != nullptr, watched_.has_value())) return;
+  watched_ = watch(std::move(live), lives_);
+  lives_.follow(watched_->live, settings_at_once());
+  touch();
+}
+
+Viewer::Watched Viewer::watch(std::shared_ptr<Live> live, LiveBuilder& builder) {
   Watched watched;
   watched.id = ++last_followed_;
   if (const auto& bounds = live->bounds()) watched.facts = facts_of(*bounds);
-  watched.listener = live->listen([this] {
-    lives_.look();
+  watched.listener = live->listen([this, &builder] {
+    builder.look();
     notify();
   });
   watched.live = std::move(live);
-  watched_ = std::move(watched);
-  lives_.follow(watched_->live, settings_at_once());
-  touch();
+  return watched;
 }
 
 bool Viewer::is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const {
   return !gl_ || !sampling_.preview || !taken || (is_rendered && !gl_->owes(*taken));
 }
 
-void Viewer::follow_live(bool unseen) {
-  if (!watched_) return;
-  Watched& w = *watched_;
+std::optional<LiveBuilder::Ready> Viewer::take_state(Watched& w, LiveBuilder& builder, bool unseen) {
   // However fast states come, one that was taken is seen.
   w.waits = !unseen && !is_seen(w.state, w.is_rendered);
-  if (w.waits) return;
-  auto ready = lives_.take();
-  if (!ready) return;
-  const bool other_volume = !w.facts || w.told.ready == 0;
-  volume_ = ready->built.volume;
-  built_ = std::move(ready->built);
-  facts_ = w.facts ? w.facts : volume_->facts();
+  if (w.waits) return std::nullopt;
+  auto ready = builder.take();
+  if (!ready) return std::nullopt;
   w.state = scene::SequenceFrame{ready->number, w.id, ++last_taken_};
   w.is_rendered = false;
   w.told.ready = ready->number;
   ++w.told.ready_count;
+  return ready;
+}
+
+void Viewer::follow_live(bool unseen) {
+  if (!watched_) return;
+  Watched& w = *watched_;
+  auto ready = take_state(w, lives_, unseen);
+  if (!ready) return;
+  const bool other_volume = !w.facts || w.told.ready_count == 1;
+  volume_ = ready->built.volume;
+  built_ = std::move(ready->built);
+  facts_ = w.facts ? w.facts : volume_->facts();
   if (other_volume) remark_on_anisotropy();
   if (!shown_.empty()) wishes_due_ = true;
 }
@@ -283,11 +294,18 @@ Viewer::Watched& Viewer::watched() {
   return *watched_;
 }
 
-Viewer::LiveStatus Viewer::live() {
-  const Watched& w = watched();
-  LiveStatus status = w.told;
-  status.handed = w.live->newest();
+Viewer::LiveStatus Viewer::Watched::status() const {
+  LiveStatus status = told;
+  status.handed = live->newest();
   return status;
+}
+
+Viewer::LiveStatus Viewer::live() { return watched().status(); }
+
+Viewer::LiveStatus Viewer::live(const Instance& instance) {
+  const Shown& shown = look_up(instance);
+  if (!shown.watching) throw Error(ErrorCode::invalid_argument, "the instance shows no live volume");
+  return shown.watching->watched.status();
 }
 
 void Viewer::follow_sequence() {
@@ -384,12 +402,17 @@ std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
   return frames_.failure_of(frame);
 }
 
-const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
+const Viewer::Shown& Viewer::look_up(const Instance& instance) {
   sync();
   const auto shown = find(instance);
   if (shown == shown_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the instance");
-  if (!shown->played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
   return *shown;
+}
+
+const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
+  const Shown& shown = look_up(instance);
+  if (!shown.played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
+  return shown;
 }
 
 Viewer::SequenceStatus Viewer::sequence(const Instance& instance) {
@@ -633,9 +656,10 @@ void Viewer::follow_instances() {
     shown.settings = shown.instance->get();
     shown.revision = revision;
     shown.medium.set(shown_medium(shown.settings.medium));
-    const bool other_sequence = shown.played && shown.played->followed.sequence != shown.settings.sequence;
-    if (other_sequence || (!shown.settings.volume && !shown.settings.sequence)) shown.forget();
-    if (shown.settings.sequence) {
+    const bool other_sequence = shown.played && shown.played->source() != shown.settings.sequence;
+    const bool other_live = shown.watching && shown.watching->source() != shown.settings.live;
+    if (other_sequence || other_live || !shown.has_anything()) shown.forget();
+    if (!shown.settings.volume) {
       shown.wish.reset();
       shown.begun.reset();
     }
@@ -655,15 +679,44 @@ void Viewer::follow_instances() {
   take_grids();
 }
 
-void Viewer::wish_for_sequences() {
+void Viewer::Played::configure(const std::optional<BuildSettings>& wanted) {
+  if (followed.settings == wanted) return;
+  followed.settings = wanted;
+  followed.wish_due = true;
+}
+
+void Viewer::Watching::configure(const std::optional<BuildSettings>& wanted) {
+  if (settings == wanted) return;
+  settings = wanted;
+  builder.configure(wanted);
+}
+
+Viewer::PlayedPtr Viewer::player_of(const std::shared_ptr<Sequence>& sequence,
+                                    const std::optional<BuildSettings>& settings) {
+  return std::make_shared<Played>(
+      follow(sequence, settings), log_, [this] { notify(); }, trace_, allowance_);
+}
+
+Viewer::WatchingPtr Viewer::player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings) {
+  auto watching = std::make_shared<Watching>(
+      log_, [this] { notify(); }, trace_, allowance_);
+  watching->watched = watch(live, watching->builder);
+  watching->settings = settings;
+  watching->builder.follow(live, settings);
+  return watching;
+}
+
+template <class Player>
+void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*place) {
   struct Wanted {
     std::optional<BuildSettings> settings;
     std::vector<Shown*> by;
+    [[nodiscard]] const auto& source() const { return Player::source_of(by.front()->settings); }
   };
   std::vector<Wanted> all;
   for (Shown& shown : shown_) {
-    if (!shown.settings.sequence || !shown.is_seen()) {
-      shown.played.reset();
+    if (!Player::source_of(shown.settings) || !shown.is_seen()) {
+      (shown.*place).reset();
       continue;
     }
     std::optional<BuildSettings> settings;
@@ -671,7 +724,7 @@ void Viewer::wish_for_sequences() {
     const auto same = std::ranges::find_if(all, [&](const Wanted& wanted) {
       const bool alike =
           settings && wanted.settings ? same_but_view(*wanted.settings, *settings) : !settings && !wanted.settings;
-      return alike && wanted.by.front()->settings.sequence == shown.settings.sequence;
+      return alike && wanted.source() == Player::source_of(shown.settings);
     });
     if (same == all.end()) {
       all.push_back({settings, {&shown}});
@@ -680,28 +733,36 @@ void Viewer::wish_for_sequences() {
       same->by.push_back(&shown);
     }
   }
-  // Each goes on with what one of its instances had.
-  std::vector<PlayedPtr> played;
+  std::vector<std::shared_ptr<Player>> next;
   for (Wanted& wanted : all) {
-    const auto& sequence = wanted.by.front()->settings.sequence;
-    const auto suits_it = [&](const PlayedPtr& p) {
-      return p && p->followed.sequence == sequence && std::ranges::find(played, p) == played.end();
+    const auto suits_it = [&](const std::shared_ptr<Player>& p) {
+      return p && p->source() == wanted.source() && std::ranges::find(next, p) == next.end();
     };
-    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->played); });
-    const auto any = std::ranges::find_if(played_, suits_it);
-    PlayedPtr p = had != wanted.by.end() ? (*had)->played : any != played_.end() ? *any : nullptr;
-    if (!p) {
-      p = std::make_shared<Played>(
-          follow(sequence, wanted.settings), log_, [this] { notify(); }, trace_, allowance_);
-    } else if (p->followed.settings != wanted.settings) {
-      p->followed.settings = wanted.settings;
-      p->followed.wish_due = true;
+    const auto had = std::ranges::find_if(wanted.by, [&](const Shown* shown) { return suits_it(shown->*place); });
+    const auto any = std::ranges::find_if(players, suits_it);
+    std::shared_ptr<Player> p = had != wanted.by.end() ? (*had)->*place : any != players.end() ? *any : nullptr;
+    if (p) {
+      p->configure(wanted.settings);
+    } else {
+      p = player_of(wanted.source(), wanted.settings);
     }
-    for (Shown* shown : wanted.by) shown->played = p;
-    played.push_back(std::move(p));
+    for (Shown* shown : wanted.by) shown->*place = p;
+    next.push_back(std::move(p));
   }
   const std::scoped_lock lock(played_mutex_);
-  played_.swap(played);  // what nobody follows any more ends after the lock
+  players.swap(next);  // what nobody follows any more ends after the lock
+}
+
+void Viewer::wish_for_sequences() {
+  share(played_, &Shown::played);
+  share(watching_, &Shown::watching);
+}
+
+void Viewer::follow_watching(bool unseen) {
+  for (const WatchingPtr& watching : watching_) {
+    if (auto ready = take_state(watching->watched, watching->builder, unseen))
+      watching->built = std::move(ready->built);
+  }
 }
 
 void Viewer::follow_played() {
@@ -719,6 +780,7 @@ void Viewer::follow_played() {
   }
   for (Shown& shown : shown_) {
     if (shown.played && shown.played->built) shown.built = shown.played->built;
+    if (shown.watching && shown.watching->built) shown.built = shown.watching->built;
   }
 }
 
@@ -828,6 +890,7 @@ void Viewer::rebuild() {
   poses_due_ = true;
   frames_.rebuild();
   for (const PlayedPtr& played : played_) played->shelf.rebuild();
+  for (const WatchingPtr& watching : watching_) watching->builder.rebuild();
   lives_.rebuild();
   take_medium();
   request_build();
@@ -852,6 +915,7 @@ void Viewer::cancel() {
   lives_.cancel();
   const std::scoped_lock lock(played_mutex_);
   for (const PlayedPtr& played : played_) played->shelf.cancel();
+  for (const WatchingPtr& watching : watching_) watching->builder.cancel();
 }
 
 bool Viewer::busy() const {
@@ -861,9 +925,10 @@ bool Viewer::busy() const {
 
 bool Viewer::builds() const {
   const auto waits = [](const PlayedPtr& played) { return played->followed.waits(played->shelf); };
+  const bool state_comes = (watched_ && lives_.busy()) ||
+                           std::ranges::any_of(watching_, [](const WatchingPtr& w) { return w->builder.busy(); });
   const bool frame_comes = (followed_ && followed_->waits(frames_)) || std::ranges::any_of(played_, waits);
-  return frame_comes || (watched_ && lives_.busy()) || builder_.busy() || shelf_.busy() ||
-         shelf_.revision() != shelved_;
+  return frame_comes || state_comes || builder_.busy() || shelf_.busy() || shelf_.revision() != shelved_;
 }
 
 void Viewer::load_surfaces(const std::string& path) {
@@ -943,7 +1008,8 @@ void Viewer::wait(double timeout_ms) {
   const auto idle = [&] {
     return builder_.wait(until) && surface_builder_.wait(until) && environment_builder_.wait(until) &&
            shelf_.wait(until) && poses_.wait(until) && frames_.wait(until) && lives_.wait(until) &&
-           std::ranges::all_of(played_, [&](const PlayedPtr& played) { return played->shelf.wait(until); });
+           std::ranges::all_of(played_, [&](const PlayedPtr& played) { return played->shelf.wait(until); }) &&
+           std::ranges::all_of(watching_, [&](const WatchingPtr& w) { return w->builder.wait(until); });
   };
   // What comes of one may be work for another.
   do {
@@ -951,6 +1017,7 @@ void Viewer::wait(double timeout_ms) {
     if (!idle()) throw Error(ErrorCode::timeout, "not ready in time");
     // The newest is waited for: what is newer than what was drawn is not kept back for that.
     follow_live(true);
+    follow_watching(true);
     sync();
   } while (busy());
   if (const auto failure = surface_builder_.status().failure) throw Error(*failure);
@@ -962,6 +1029,9 @@ void Viewer::wait(double timeout_ms) {
   if (const auto failure = lives_.status().failure) throw Error(*failure);
   for (const PlayedPtr& played : played_) {
     if (const auto failure = played->shelf.status().failure) throw Error(*failure);
+  }
+  for (const WatchingPtr& watching : watching_) {
+    if (const auto failure = watching->builder.status().failure) throw Error(*failure);
   }
 }
 
@@ -978,6 +1048,7 @@ Viewer::Status Viewer::status() const {
   {
     const std::scoped_lock lock(played_mutex_);
     for (const PlayedPtr& p : played_) played.push_back(p->shelf.status());
+    for (const WatchingPtr& w : watching_) played.push_back(w->builder.status());
   }
   const auto& sequences = frames.failure ? frames.failure : lives.failure;
   const auto& own = volume.failure ? volume.failure : sequences;

@@ -102,6 +102,8 @@ class Viewer {
   };
   /// Throws Error(invalid_argument) where the viewer shows no live volume.
   LiveStatus live();
+  /// Of an instance's; throws likewise, for one that the viewer does not show, or that shows none.
+  LiveStatus live(const Instance& instance);
   /// Where the volume stands, whichever it is: affine, from its own world, and once in each of these places, which are
   /// one at least. Moves what is there; a grid that suits a volume of that size no longer is built anew.
   void set_places(const std::vector<scene::Place>& places);
@@ -226,13 +228,14 @@ class Viewer {
   // The sequence's newest wish, and what came of it.
   void follow_sequence();
   void take_frame();
-  // Those of instances.
+  // Those of instances, and their live volumes.
   void wish_for_sequences();
   void follow_played();
   // Those of a sequence, and of a live volume: neither is shown any more.
   void leave_sequence();
-  // Takes a state that is ready; unseen: though the one before was not seen yet.
+  // Takes states that are ready; unseen: though those before were not seen yet.
   void follow_live(bool unseen = false);
+  void follow_watching(bool unseen = false);
   // Whether what was taken last was seen, where pictures are to be seen at all.
   [[nodiscard]] bool is_seen(const std::optional<scene::SequenceFrame>& taken, bool is_rendered) const;
   // Before a sequence or a live volume is shown, or is not any more. Returns whether one is to be.
@@ -268,8 +271,6 @@ class Viewer {
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.
   void take_cells(const Context& g);
-  // Of the live volume, what this frame's picture is of.
-  void note_drawn(const Context& g);
   // Of what is shown, this sequence's.
   [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
   // A sequence that is followed: what was asked for, and taken.
@@ -309,8 +310,56 @@ class Viewer {
     VolumeFactsPtr facts;        // once it is judged
     std::optional<Built> built;  // of the frame that was taken last
     FrameShelf shelf;
+
+    static const std::shared_ptr<Sequence>& source_of(const InstanceSettings& settings) { return settings.sequence; }
+    [[nodiscard]] const std::shared_ptr<Sequence>& source() const { return followed.sequence; }
+    void configure(const std::optional<BuildSettings>& wanted);
   };
   using PlayedPtr = std::shared_ptr<Played>;
+  struct Shown;
+  // A live volume that is followed: what was taken of it, and seen.
+  struct Watched {
+    std::shared_ptr<Live> live;
+    std::shared_ptr<void> listener;
+    VolumeFactsPtr facts;                       // of all states, if bounds are known
+    std::uint64_t id = 0;                       // of this watching
+    std::optional<scene::SequenceFrame> state;  // that was taken last
+    bool is_rendered = false;                   // by a frame, since
+    bool waits = false;                         // another is ready, and not taken until it is seen
+    std::uint64_t seen_last = 0;                // as scene::SequenceFrame::taken
+    LiveStatus told;
+
+    [[nodiscard]] LiveStatus status() const;
+  };
+  // The builder is told of states as long as the watching lasts.
+  [[nodiscard]] Watched watch(std::shared_ptr<Live> live, LiveBuilder& builder);
+  [[nodiscard]] std::optional<LiveBuilder::Ready> take_state(Watched& w, LiveBuilder& builder, bool unseen);
+  // What this frame's picture is of.
+  static void note_drawn(const Context& g, Watched& w);
+  // One that instances follow, those of one whose grids are the same.
+  struct Watching {
+    Watching(const Log& log, std::function<void()> notify, Trace trace, AllowancePtr allowance)
+        : builder(log, std::move(notify), trace, std::move(allowance)) {}
+    LiveBuilder builder;
+    Watched watched;  // whose listener tells the builder
+    std::optional<BuildSettings> settings;
+    std::optional<Built> built;  // of the state that was taken last
+
+    static const std::shared_ptr<Live>& source_of(const InstanceSettings& settings) { return settings.live; }
+    [[nodiscard]] const std::shared_ptr<Live>& source() const { return watched.live; }
+    void configure(const std::optional<BuildSettings>& wanted);
+    [[nodiscard]] VolumeFactsPtr facts() const {
+      if (watched.facts) return watched.facts;
+      return built ? built->volume->facts() : nullptr;
+    }
+  };
+  using WatchingPtr = std::shared_ptr<Watching>;
+  // Who plays it, or watches it, from now on.
+  PlayedPtr player_of(const std::shared_ptr<Sequence>& sequence, const std::optional<BuildSettings>& settings);
+  WatchingPtr player_of(const std::shared_ptr<Live>& live, const std::optional<BuildSettings>& settings);
+  // One for all instances that can share it: each goes on with what one of them had.
+  template <class Player>
+  void share(std::vector<std::shared_ptr<Player>>& players, std::shared_ptr<Player> Shown::*place);
   // An instance that is shown, as it was when it was last looked at.
   struct Shown {
     std::shared_ptr<Instance> instance;
@@ -323,23 +372,30 @@ class Viewer {
     std::optional<GridShelf::Wish> begun;  // the last before it that was being built
     std::optional<Built> built;            // the newest
     PlayedPtr played;                      // of a sequence; null: of none
+    WatchingPtr watching;                  // of a live volume; likewise
     void forget() {
       wish.reset();
       begun.reset();
       built.reset();
       played.reset();
+      watching.reset();
     }
-    [[nodiscard]] bool is_seen() const { return (settings.volume || settings.sequence) && !settings.hidden; }
+    [[nodiscard]] bool has_anything() const { return settings.volume || settings.sequence || settings.live; }
+    [[nodiscard]] bool is_seen() const { return has_anything() && !settings.hidden; }
     // Null: nothing is known of it yet.
     [[nodiscard]] VolumeFactsPtr facts() const {
       if (settings.volume) return settings.volume->facts();
+      if (watching) return watching->facts();
       return played ? played->facts : nullptr;
     }
     [[nodiscard]] bool is_there() const { return is_seen() && facts(); }
-    // Of a sequence, that its grid is of.
+    // Of a sequence, or a live volume, that its grid is of.
     [[nodiscard]] std::optional<scene::SequenceFrame> frame() const {
-      const bool current = played && played->built && built && built->source == played->built->source;
-      return current ? played->followed.frame : std::nullopt;
+      const auto current = [&](const auto& player) {
+        return player && player->built && built && built->source == player->built->source;
+      };
+      if (current(watching)) return watching->watched.state;
+      return current(played) ? played->followed.frame : std::nullopt;
     }
   };
   // A model that is shown, likewise.
@@ -464,23 +520,12 @@ class Viewer {
   render::Totals totals_;
 
   [[nodiscard]] Followed& followed();
-  // Throws Error(invalid_argument) for an instance that the viewer does not show, or that follows no sequence.
+  // Throw Error(invalid_argument) for an instance that the viewer does not show, or that follows no sequence.
+  [[nodiscard]] const Shown& look_up(const Instance& instance);
   [[nodiscard]] const Shown& shown_sequence(const Instance& instance);
   std::optional<Followed> followed_;  // that is shown in place of a volume
-  // A live volume that is.
-  struct Watched {
-    std::shared_ptr<Live> live;
-    std::shared_ptr<void> listener;
-    VolumeFactsPtr facts;                       // of all states, if bounds are known
-    std::uint64_t id = 0;                       // of this watching
-    std::optional<scene::SequenceFrame> state;  // that was taken last
-    bool is_rendered = false;                   // by a frame, since
-    bool waits = false;                         // another is ready, and not taken until it is seen
-    std::uint64_t seen_last = 0;                // as scene::SequenceFrame::taken
-    LiveStatus told;
-  };
   [[nodiscard]] Watched& watched();
-  std::optional<Watched> watched_;
+  std::optional<Watched> watched_;  // a live volume that is
   std::uint64_t last_followed_ = 0;
   std::uint64_t last_taken_ = 0;
 
@@ -496,6 +541,7 @@ class Viewer {
   LiveBuilder lives_;
   mutable std::mutex played_mutex_;  // between the host's thread, which alone changes them, and others that look
   std::vector<PlayedPtr> played_;
+  std::vector<WatchingPtr> watching_;
 };
 
 }  // namespace cumulet::viewer

@@ -92,7 +92,8 @@ void Viewer::prepare(const Frame& frame) {
 
   // Where nothing is left, the last picture goes as well. What has no triangles is still a scene: of sky alone.
   const bool others = std::ranges::any_of(shown_, &Shown::is_there);
-  const bool scene = facts_ || shows_models() || others || watched_;
+  const bool watches = watched_ || !watching_.empty();  // what its states are of may not be known yet
+  const bool scene = facts_ || shows_models() || others || watches;
   if (!scene) built_ = {};
   // Surfaces alone are surfaces in an empty volume: the least of grids, and no job, for how the last one ended stands.
   if (!facts_ && shows_models() && !shows_instances() && !built_.source && !builder_.busy()) {
@@ -113,7 +114,7 @@ void Viewer::prepare(const Frame& frame) {
 
   last_view_ = std::exchange(traced_view_, view_);
   const bool places_rest = !std::exchange(places_changed_, false);
-  if ((facts_ || others || watched_) && built_for_another()) {
+  if ((facts_ || others || watches) && built_for_another()) {
     const bool rests = !sampling_.preview || !built_for_ || (view_ == last_view_ && places_rest);
     // What GL builds follows a camera in motion, one grid after another, each of which is seen.
     const bool follows =
@@ -167,8 +168,7 @@ std::optional<scene::SequenceFrame> Viewer::frame_of(const Context& g, std::uint
   return found == shown.end() ? std::nullopt : std::optional(*found);
 }
 
-void Viewer::note_drawn(const Context& g) {
-  Watched& w = *watched_;
+void Viewer::note_drawn(const Context& g, Watched& w) {
   const auto shown = frame_of(g, w.id);
   if (!shown || shown->taken == w.seen_last) return;
   w.seen_last = shown->taken;
@@ -207,6 +207,7 @@ FrameResult Viewer::render(const Frame& frame) {
     if (followed_) followed_->is_rendered = true;
     for (const PlayedPtr& played : played_) played->followed.is_rendered = true;
     if (watched_) watched_->is_rendered = true;
+    for (const WatchingPtr& watching : watching_) watching->watched.is_rendered = true;
     follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
@@ -218,15 +219,19 @@ FrameResult Viewer::render(const Frame& frame) {
       result.loading = true;
       result.converged = false;
     }
-    if (watched_) note_drawn(g);
+    if (watched_) note_drawn(g, *watched_);
+    for (const WatchingPtr& watching : watching_) note_drawn(g, watching->watched);
     const auto is_due = [](const PlayedPtr& played) { return played->followed.take_due; };
-    if ((followed_ && followed_->take_due) || (watched_ && watched_->waits) || std::ranges::any_of(played_, is_due)) {
+    const auto waits = [](const WatchingPtr& watching) { return watching->watched.waits; };
+    if ((followed_ && followed_->take_due) || (watched_ && watched_->waits) || std::ranges::any_of(played_, is_due) ||
+        std::ranges::any_of(watching_, waits)) {
       result.more = true;
       result.converged = false;
     }
     result.failed = failed(builder_.status()) || failed(surface_builder_.status()) ||
                     failed(environment_builder_.status()) || failed(shelf_.status()) || failed(frames_.status()) ||
                     std::ranges::any_of(played_, [&](const PlayedPtr& p) { return failed(p->shelf.status()); }) ||
+                    std::ranges::any_of(watching_, [&](const WatchingPtr& w) { return failed(w->builder.status()); }) ||
                     failed(lives_.status()) || failed(poses_.status());
     result.more = result.more || navigation_.moving() || built_for_another();
     if (failure && !g.is_news(shot, *failure)) failure.reset();

@@ -493,6 +493,7 @@ void Caller::call_all() {
     CALL(cumulet_get_sequence_frame, v, 0, nullptr, 0);
     CALL(cumulet_get_instance_sequence_info, v, new_instance, &sequence_info, nullptr, 0);
     CALL(cumulet_get_instance_sequence_frame, v, new_instance, 0, nullptr, 0);
+    CALL(cumulet_get_instance_live_info, v, new_instance, &live_info);
     CALL(cumulet_load_surfaces, v, "none.glb");
     CALL(cumulet_set_surfaces, v, nullptr);
     CALL(cumulet_get_surfaces, v, &new_surfaces);

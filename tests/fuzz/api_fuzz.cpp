@@ -265,6 +265,7 @@ class Program {
     desc[0] = described<cumulet_instance_desc>();
     desc[0].volume = volume_.get();
     desc[0].sequence = volume_ ? nullptr : sequence_.get();
+    desc[0].live = volume_ || sequence_ ? nullptr : live_.get();
     desc[0].medium = data_.ConsumeBool() ? &medium : nullptr;
     if (medium.struct_size > sizeof medium) medium.struct_size = sizeof medium;
     switch (data_.ConsumeIntegralInRange(0, 4)) {

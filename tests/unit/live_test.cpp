@@ -10,6 +10,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <variant>
 #include <vector>
 
 #include "support/c_host.hpp"
@@ -21,11 +22,13 @@ namespace {
 
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
+using cumulet::test::at;
 using cumulet::test::CameraRef;
 using cumulet::test::difference;
 using cumulet::test::drawn_once;
 using cumulet::test::expect_same_voxels;
 using cumulet::test::HostTarget;
+using cumulet::test::InstanceRef;
 using cumulet::test::LiveRef;
 using cumulet::test::load_gl;
 using cumulet::test::make_ball;
@@ -530,6 +533,128 @@ TEST_F(CLive, EachIsSeenIfThereIsTime) {
     show(viewer, state);
     EXPECT_EQ(info_of(viewer).drawn_count, state);
   }
+}
+
+InstanceRef stand(const ViewerPtr& viewer, const std::variant<cumulet_volume*, cumulet_live*>& of, double x) {
+  auto desc = make_desc<cumulet_instance_desc>();
+  if (of.index() == 0) {
+    desc.volume = std::get<0>(of);
+  } else {
+    desc.live = std::get<1>(of);
+  }
+  std::ranges::copy(at(x, 0, 0), desc.to_world);
+  std::array<char, 256> error{};
+  cumulet_instance* out = nullptr;
+  EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_OK) << error.data();
+  EXPECT_EQ(cumulet_add_instance(viewer.get(), out), CUMULET_OK) << cumulet_last_error(viewer.get());
+  return InstanceRef(out);
+}
+
+cumulet_live_info told_of(const ViewerPtr& viewer, const InstanceRef& instance) {
+  auto info = make_desc<cumulet_live_info>();
+  EXPECT_EQ(cumulet_get_instance_live_info(viewer.get(), instance.get(), &info), CUMULET_OK)
+      << cumulet_last_error(viewer.get());
+  return info;
+}
+
+// Instances of it show what instances of the state's own volume would, beside the viewer's own live volume.
+TEST_F(CLive, InstancesShowItsNewestState) {
+  const LiveRef live = make_live();
+  const LiveRef own = make_live();
+  const ViewerPtr viewer = make();
+  hand_over(own, smoke(small, 5));
+  ASSERT_EQ(cumulet_set_live(viewer.get(), own.get()), CUMULET_OK);
+  const InstanceRef left = stand(viewer, live.get(), -20.0);
+  const InstanceRef right = stand(viewer, live.get(), 30.0);
+  EXPECT_EQ(told_of(viewer, left).ready_state, 0U);
+  for (std::uint64_t number = 1; number < 4; ++number) {
+    SCOPED_TRACE(number);
+    const State state = fire(odd, static_cast<int>(number));
+    hand_over(live, state);
+    const Picture shown = picture(viewer.get());
+    for (const InstanceRef* instance : {&left, &right}) {
+      const cumulet_live_info info = told_of(viewer, *instance);
+      EXPECT_EQ(info.handed_state, number);
+      EXPECT_EQ(info.drawn_state, number);
+      EXPECT_EQ(info.drawn_count, number) << "one grid for both";
+    }
+    const ViewerPtr other = make();
+    const VolumeRef beside = alone(smoke(small, 5));
+    ASSERT_EQ(cumulet_set_volume(other.get(), beside.get()), CUMULET_OK);
+    const VolumeRef volume = alone(state);
+    const InstanceRef a = stand(other, volume.get(), -20.0);
+    const InstanceRef b = stand(other, volume.get(), 30.0);
+    EXPECT_EQ(difference(shown, picture(other.get())), "");
+  }
+  // Hidden and shown again it is the newest.
+  auto hidden = make_desc<cumulet_instance_desc>();
+  hidden.live = live.get();
+  std::ranges::copy(at(-20, 0, 0), hidden.to_world);
+  hidden.hidden = 1;
+  const Picture both = picture(viewer.get());
+  ASSERT_EQ(cumulet_instance_set(left.get(), &hidden), CUMULET_OK);
+  EXPECT_NE(difference(both, picture(viewer.get())), "");
+  hidden.hidden = 0;
+  ASSERT_EQ(cumulet_instance_set(left.get(), &hidden), CUMULET_OK);
+  EXPECT_EQ(difference(both, picture(viewer.get())), "");
+}
+
+TEST_F(CLive, InstancesOfItAreRefusedInOneLine) {
+  const LiveRef live = make_live();
+  hand_over(live, smoke(small, 1));
+  const ViewerPtr viewer = make();
+  auto desc = make_desc<cumulet_instance_desc>();
+  const VolumeRef volume = alone(smoke(small, 1));
+  desc.volume = volume.get();
+  desc.live = live.get();
+  std::array<char, 256> error{};
+  cumulet_instance* out = nullptr;
+  EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a live volume");
+  const InstanceRef still = stand(viewer, volume.get(), 0.0);
+  auto info = make_desc<cumulet_live_info>();
+  EXPECT_EQ(cumulet_get_instance_live_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the instance shows no live volume");
+  ASSERT_EQ(cumulet_remove_instance(viewer.get(), still.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_get_instance_live_info(viewer.get(), still.get(), &info), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer does not show the instance");
+}
+
+// However fast states come, each that an instance takes up is seen, and the newest last; while it comes and goes.
+TEST_F(CLive, NoneOfAnInstancesStarves) {
+  const LiveRef live = make_live();
+  const ViewerPtr viewer = make();
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 2;
+  ASSERT_EQ(cumulet_set_sampling(viewer.get(), &sampling), CUMULET_OK);
+  InstanceRef instance = stand(viewer, live.get(), 0.0);
+  std::atomic<bool> stop = false;
+  std::thread host([&] {
+    for (int i = 0; !stop; ++i) {
+      hand_over(live, smoke(small, i % 8));
+      std::this_thread::sleep_for(std::chrono::microseconds(300));
+    }
+  });
+  const auto frame = target_.frame();
+  for (int round = 0; round < 3; ++round) {
+    std::vector<std::uint64_t> seen;
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (seen.size() < 4 && std::chrono::steady_clock::now() < until) {
+      EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
+      const cumulet_live_info info = told_of(viewer, instance);
+      if (seen.empty() || seen.back() != info.drawn_state) seen.push_back(info.drawn_state);
+      EXPECT_LE(info.ready_count - info.drawn_count, 1U);
+    }
+    EXPECT_GE(seen.size(), 4U);
+    EXPECT_TRUE(std::ranges::is_sorted(seen));
+    ASSERT_EQ(cumulet_remove_instance(viewer.get(), instance.get()), CUMULET_OK);
+    instance = stand(viewer, live.get(), round);
+  }
+  stop = true;
+  host.join();
+  picture(viewer.get());
+  const cumulet_live_info info = told_of(viewer, instance);
+  EXPECT_EQ(info.drawn_state, info.handed_state);
 }
 
 TEST_F(CLive, SeveralViewersAndThreads) {

@@ -608,10 +608,10 @@ CUMULET_API cumulet_status cumulet_sequence_get_time_of(const cumulet_sequence* 
 
 /*
  * A volume that goes on changing: a host hands over state after state, as its simulation steps, and viewers that show
- * it (cumulet_set_live) show the newest. Counted, free of GL, for any number of viewers. Volumes never change, which is
- * what lets viewers, instances and workers share them; so this is a handle of its own, behind which one volume follows
- * another. These calls are for any thread, also while others are in calls for the same handle; error as in
- * cumulet_create.
+ * it (cumulet_set_live, cumulet_instance_desc.live) show the newest. Counted, free of GL, for any number of viewers.
+ * Volumes never change, which is what lets viewers, instances and workers share them; so this is a handle of its own,
+ * behind which one volume follows another. These calls are for any thread, also while others are in calls for the same
+ * handle; error as in cumulet_create.
  *
  * None of them waits for a build: a call copies what it is given and returns (or does not copy, see
  * cumulet_state_desc.release). A state that nobody began to build when the next one comes is not built: there is one
@@ -1393,12 +1393,18 @@ typedef struct cumulet_instance_desc {
   int32_t hidden; /* 1: it is as if it were not there */
   uint64_t tag;   /* the host's own, which cumulet_pick tells */
   /*
-   * In place of a volume: the frame at which this stands, from now on and as it moves; NULL: none. Not both. What
+   * In place of a volume: the frame at which this stands, from now on and as it moves; NULL: none. One at most. What
    * cumulet_set_sequence says of reading ahead, gaps and bounds holds for it; instances of one sequence whose media
    * build the same share its frames and their grids, others have them a second time. The medium's density_scale is
    * taken as it is given: suggested_density_scale of the sequence's file is not looked at.
    */
   cumulet_sequence* sequence;
+  /*
+   * In place of both: its newest state, from now on; NULL: none. What cumulet_set_live says of states that come fast,
+   * of bounds and of failures holds for it; instances of one live volume whose media build the same share its grids,
+   * others have them built a second time.
+   */
+  cumulet_live* live;
 } cumulet_instance_desc;
 
 /* error as in cumulet_create. */
@@ -1426,6 +1432,9 @@ CUMULET_API cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* vi
                                                               size_t count);
 CUMULET_API cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumulet_instance* instance,
                                                                uint32_t frame, char* cause, size_t size);
+/* As cumulet_get_live_info, of an instance's live volume, likewise. */
+CUMULET_API cumulet_status cumulet_get_instance_live_info(cumulet_viewer* viewer, cumulet_instance* instance,
+                                                          cumulet_live_info* info);
 
 /* ---- Models: surfaces beside the viewer's own ----------------------------------------------------------------------
  *

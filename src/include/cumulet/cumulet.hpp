@@ -695,162 +695,6 @@ class Sequence {
   cumulet_sequence* handle_ = nullptr;
 };
 
-// ---- Instances ------------------------------------------------------------------------------------------------------
-
-/// What an instance is made of: shares the volume, or the sequence.
-struct InstanceDesc {
-  Volume volume;
-  std::array<double, 16> to_world{};
-  MediumDesc medium = {};
-  bool hidden = false;
-  std::uint64_t tag = 0;
-  Sequence sequence = {};
-};
-
-/// A share in a volume of scenes: a copy is one more of the same. Any thread.
-class Instance {
- public:
-  Instance() noexcept = default;
-  Instance(const Instance& other) noexcept : handle_(cumulet_instance_retain(other.handle_)) {}
-  Instance(Instance&& other) noexcept : handle_(other.release()) {}
-  Instance& operator=(Instance other) noexcept {
-    std::swap(handle_, other.handle_);
-    return *this;
-  }
-  ~Instance() { cumulet_instance_release(handle_); }
-
-  [[nodiscard]] static Result<Instance> create(const InstanceDesc& desc) noexcept {
-    const cumulet_medium_desc medium = desc.medium;
-    const cumulet_instance_desc c = described(desc, medium);
-    return detail::made<Instance>([&](cumulet_instance** out, char* error, std::size_t size) {
-      return cumulet_instance_create(&c, out, error, size);
-    });
-  }
-  [[nodiscard]] Result<> set(const InstanceDesc& desc) const noexcept {
-    const cumulet_medium_desc medium = desc.medium;
-    const cumulet_instance_desc c = described(desc, medium);
-    return detail::result(cumulet_instance_set(handle_, &c));
-  }
-  [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
-    return detail::result(cumulet_instance_set_to_world(handle_, to_world.data()));
-  }
-  /// Null: it stood where it is.
-  [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world) const noexcept {
-    return detail::result(cumulet_instance_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr));
-  }
-  [[nodiscard]] Result<> set_ramp(Ramp ramp, std::span<const std::array<float, 2>> points) const noexcept {
-    const float* first = points.empty() ? nullptr : points.front().data();
-    return detail::result(cumulet_instance_set_ramp(handle_, static_cast<cumulet_ramp>(ramp), first, points.size()));
-  }
-
-  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
-  [[nodiscard]] cumulet_instance* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
-  [[nodiscard]] cumulet_instance* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
-  [[nodiscard]] static Instance adopt(cumulet_instance* handle) noexcept {
-    Instance instance;
-    instance.handle_ = handle;
-    return instance;
-  }
-
- private:
-  static cumulet_instance_desc described(const InstanceDesc& desc, const cumulet_medium_desc& medium) noexcept {
-    cumulet_instance_desc c{.struct_size = sizeof c,
-                            .volume = desc.volume.handle(),
-                            .to_world = {},
-                            .medium = &medium,
-                            .hidden = desc.hidden ? 1 : 0,
-                            .tag = desc.tag,
-                            .sequence = desc.sequence.handle()};
-    std::ranges::copy(desc.to_world, c.to_world);
-    return c;
-  }
-  cumulet_instance* handle_ = nullptr;
-};
-
-// ---- Models ---------------------------------------------------------------------------------------------------------
-
-/// What a model is made of: shares the surfaces.
-struct ModelDesc {
-  Surfaces surfaces;
-  std::array<double, 16> to_world{};
-  double time = 0.0;
-  std::uint32_t animation = 0;
-  std::uint32_t variant = 0;
-  bool double_sided = false;
-  bool hidden = false;
-  bool shadow_only = false;
-  std::uint64_t tag = 0;
-  std::uint32_t group = 0;
-  bool holdout = false;
-};
-
-/// A share in surfaces of scenes: a copy is one more of the same. Any thread.
-class Model {
- public:
-  Model() noexcept = default;
-  Model(const Model& other) noexcept : handle_(cumulet_model_retain(other.handle_)) {}
-  Model(Model&& other) noexcept : handle_(other.release()) {}
-  Model& operator=(Model other) noexcept {
-    std::swap(handle_, other.handle_);
-    return *this;
-  }
-  ~Model() { cumulet_model_release(handle_); }
-
-  [[nodiscard]] static Result<Model> create(const ModelDesc& desc) noexcept {
-    const cumulet_model_desc c = described(desc);
-    return detail::made<Model>(
-        [&](cumulet_model** out, char* error, std::size_t size) { return cumulet_model_create(&c, out, error, size); });
-  }
-  [[nodiscard]] Result<> set(const ModelDesc& desc) const noexcept {
-    const cumulet_model_desc c = described(desc);
-    return detail::result(cumulet_model_set(handle_, &c));
-  }
-  [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
-    return detail::result(cumulet_model_set_to_world(handle_, to_world.data()));
-  }
-  [[nodiscard]] Result<> set_time(double time) const noexcept {
-    return detail::result(cumulet_model_set_time(handle_, time));
-  }
-  /// Null: it stood where it is, and at this moment.
-  [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world, const double* time) const noexcept {
-    return detail::result(cumulet_model_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr, time));
-  }
-
-  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
-  /// Still this object's.
-  [[nodiscard]] cumulet_model* handle() const noexcept { return handle_; }
-  /// The caller's from now on.
-  [[nodiscard]] cumulet_model* release() noexcept { return std::exchange(handle_, nullptr); }
-  /// Takes the caller's share.
-  [[nodiscard]] static Model adopt(cumulet_model* handle) noexcept {
-    Model model;
-    model.handle_ = handle;
-    return model;
-  }
-
- private:
-  static cumulet_model_desc described(const ModelDesc& desc) noexcept {
-    cumulet_model_desc c{.struct_size = sizeof c,
-                         .surfaces = desc.surfaces.handle(),
-                         .to_world = {},
-                         .time = desc.time,
-                         .animation = desc.animation,
-                         .variant = desc.variant,
-                         .double_sided = desc.double_sided ? 1 : 0,
-                         .hidden = desc.hidden ? 1 : 0,
-                         .shadow_only = desc.shadow_only ? 1 : 0,
-                         .tag = desc.tag,
-                         .group = desc.group,
-                         .holdout = desc.holdout ? 1 : 0};
-    std::ranges::copy(desc.to_world, c.to_world);
-    return c;
-  }
-  cumulet_model* handle_ = nullptr;
-};
-
 // ---- Live volumes ---------------------------------------------------------------------------------------------------
 
 /// One channel's voxels: of a dense array, or of bricks.
@@ -962,6 +806,164 @@ class Live {
     });
   }
   cumulet_live* handle_ = nullptr;
+};
+
+// ---- Instances ------------------------------------------------------------------------------------------------------
+
+/// What an instance is made of: shares the volume, the sequence or the live volume.
+struct InstanceDesc {
+  Volume volume;
+  std::array<double, 16> to_world{};
+  MediumDesc medium = {};
+  bool hidden = false;
+  std::uint64_t tag = 0;
+  Sequence sequence = {};
+  Live live = {};
+};
+
+/// A share in a volume of scenes: a copy is one more of the same. Any thread.
+class Instance {
+ public:
+  Instance() noexcept = default;
+  Instance(const Instance& other) noexcept : handle_(cumulet_instance_retain(other.handle_)) {}
+  Instance(Instance&& other) noexcept : handle_(other.release()) {}
+  Instance& operator=(Instance other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Instance() { cumulet_instance_release(handle_); }
+
+  [[nodiscard]] static Result<Instance> create(const InstanceDesc& desc) noexcept {
+    const cumulet_medium_desc medium = desc.medium;
+    const cumulet_instance_desc c = described(desc, medium);
+    return detail::made<Instance>([&](cumulet_instance** out, char* error, std::size_t size) {
+      return cumulet_instance_create(&c, out, error, size);
+    });
+  }
+  [[nodiscard]] Result<> set(const InstanceDesc& desc) const noexcept {
+    const cumulet_medium_desc medium = desc.medium;
+    const cumulet_instance_desc c = described(desc, medium);
+    return detail::result(cumulet_instance_set(handle_, &c));
+  }
+  [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
+    return detail::result(cumulet_instance_set_to_world(handle_, to_world.data()));
+  }
+  /// Null: it stood where it is.
+  [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world) const noexcept {
+    return detail::result(cumulet_instance_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr));
+  }
+  [[nodiscard]] Result<> set_ramp(Ramp ramp, std::span<const std::array<float, 2>> points) const noexcept {
+    const float* first = points.empty() ? nullptr : points.front().data();
+    return detail::result(cumulet_instance_set_ramp(handle_, static_cast<cumulet_ramp>(ramp), first, points.size()));
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_instance* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_instance* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Instance adopt(cumulet_instance* handle) noexcept {
+    Instance instance;
+    instance.handle_ = handle;
+    return instance;
+  }
+
+ private:
+  static cumulet_instance_desc described(const InstanceDesc& desc, const cumulet_medium_desc& medium) noexcept {
+    cumulet_instance_desc c{.struct_size = sizeof c,
+                            .volume = desc.volume.handle(),
+                            .to_world = {},
+                            .medium = &medium,
+                            .hidden = desc.hidden ? 1 : 0,
+                            .tag = desc.tag,
+                            .sequence = desc.sequence.handle(),
+                            .live = desc.live.handle()};
+    std::ranges::copy(desc.to_world, c.to_world);
+    return c;
+  }
+  cumulet_instance* handle_ = nullptr;
+};
+
+// ---- Models ---------------------------------------------------------------------------------------------------------
+
+/// What a model is made of: shares the surfaces.
+struct ModelDesc {
+  Surfaces surfaces;
+  std::array<double, 16> to_world{};
+  double time = 0.0;
+  std::uint32_t animation = 0;
+  std::uint32_t variant = 0;
+  bool double_sided = false;
+  bool hidden = false;
+  bool shadow_only = false;
+  std::uint64_t tag = 0;
+  std::uint32_t group = 0;
+  bool holdout = false;
+};
+
+/// A share in surfaces of scenes: a copy is one more of the same. Any thread.
+class Model {
+ public:
+  Model() noexcept = default;
+  Model(const Model& other) noexcept : handle_(cumulet_model_retain(other.handle_)) {}
+  Model(Model&& other) noexcept : handle_(other.release()) {}
+  Model& operator=(Model other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Model() { cumulet_model_release(handle_); }
+
+  [[nodiscard]] static Result<Model> create(const ModelDesc& desc) noexcept {
+    const cumulet_model_desc c = described(desc);
+    return detail::made<Model>(
+        [&](cumulet_model** out, char* error, std::size_t size) { return cumulet_model_create(&c, out, error, size); });
+  }
+  [[nodiscard]] Result<> set(const ModelDesc& desc) const noexcept {
+    const cumulet_model_desc c = described(desc);
+    return detail::result(cumulet_model_set(handle_, &c));
+  }
+  [[nodiscard]] Result<> set_to_world(const std::array<double, 16>& to_world) const noexcept {
+    return detail::result(cumulet_model_set_to_world(handle_, to_world.data()));
+  }
+  [[nodiscard]] Result<> set_time(double time) const noexcept {
+    return detail::result(cumulet_model_set_time(handle_, time));
+  }
+  /// Null: it stood where it is, and at this moment.
+  [[nodiscard]] Result<> set_previous(const std::array<double, 16>* to_world, const double* time) const noexcept {
+    return detail::result(cumulet_model_set_previous(handle_, to_world != nullptr ? to_world->data() : nullptr, time));
+  }
+
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// Still this object's.
+  [[nodiscard]] cumulet_model* handle() const noexcept { return handle_; }
+  /// The caller's from now on.
+  [[nodiscard]] cumulet_model* release() noexcept { return std::exchange(handle_, nullptr); }
+  /// Takes the caller's share.
+  [[nodiscard]] static Model adopt(cumulet_model* handle) noexcept {
+    Model model;
+    model.handle_ = handle;
+    return model;
+  }
+
+ private:
+  static cumulet_model_desc described(const ModelDesc& desc) noexcept {
+    cumulet_model_desc c{.struct_size = sizeof c,
+                         .surfaces = desc.surfaces.handle(),
+                         .to_world = {},
+                         .time = desc.time,
+                         .animation = desc.animation,
+                         .variant = desc.variant,
+                         .double_sided = desc.double_sided ? 1 : 0,
+                         .hidden = desc.hidden ? 1 : 0,
+                         .shadow_only = desc.shadow_only ? 1 : 0,
+                         .tag = desc.tag,
+                         .group = desc.group,
+                         .holdout = desc.holdout ? 1 : 0};
+    std::ranges::copy(desc.to_world, c.to_world);
+    return c;
+  }
+  cumulet_model* handle_ = nullptr;
 };
 
 // ---- Camera and input -----------------------------------------------------------------------------------------------
@@ -1290,6 +1292,12 @@ class Viewer {
       return done.error();
     }
     return Text<512>(cause.data());
+  }
+  /// As get_live_info, of an instance's.
+  [[nodiscard]] Result<LiveInfo> get_instance_live_info(const Instance& instance) noexcept {
+    auto c = detail::sized<cumulet_live_info>();
+    if (auto done = result(cumulet_get_instance_live_info(handle(), instance.handle(), &c)); !done) return done.error();
+    return LiveInfo::of(c);
   }
   /// Empty if there is none.
   [[nodiscard]] Result<Volume> get_volume() noexcept {
