@@ -304,7 +304,8 @@ Viewer::LiveStatus Viewer::live() { return watched().status(); }
 
 Viewer::LiveStatus Viewer::live(const Instance& instance) {
   const Shown& shown = look_up(instance);
-  if (!shown.watching) throw Error(ErrorCode::invalid_argument, "the instance shows no live volume");
+  if (!shown.is_seen() || !shown.watching)
+    throw Error(ErrorCode::invalid_argument, "the instance shows no live volume");
   return shown.watching->watched.status();
 }
 
@@ -411,7 +412,7 @@ const Viewer::Shown& Viewer::look_up(const Instance& instance) {
 
 const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
   const Shown& shown = look_up(instance);
-  if (!shown.played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
+  if (!shown.is_seen() || !shown.played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
   return shown;
 }
 
@@ -715,10 +716,9 @@ void Viewer::share(std::vector<std::shared_ptr<Player>>& players, std::shared_pt
   };
   std::vector<Wanted> all;
   for (Shown& shown : shown_) {
-    if (!Player::source_of(shown.settings) || !shown.is_seen()) {
-      (shown.*place).reset();
-      continue;
-    }
+    if (!Player::source_of(shown.settings)) (shown.*place).reset();
+    // What a hidden one has is there when it is seen again.
+    if (!Player::source_of(shown.settings) || !shown.is_seen()) continue;
     std::optional<BuildSettings> settings;
     if (!grid_.camera_adaptive || view_) settings = settings_of(shown);
     const auto same = std::ranges::find_if(all, [&](const Wanted& wanted) {
