@@ -704,7 +704,7 @@ TEST_F(PlayedInstances, AVolumeAndASequenceAreNotBothOfOne) {
   cumulet_instance* out = nullptr;
   std::array<char, 256> error{};
   EXPECT_EQ(cumulet_instance_create(&desc, &out, error.data(), error.size()), CUMULET_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(error.data(), "cumulet_instance_desc has both a volume and a sequence");
+  EXPECT_STREQ(error.data(), "cumulet_instance_desc has more than one of a volume, a sequence and a live volume");
   // From one to the other, and to neither.
   const ViewerPtr viewer = make();
   see_all(viewer.get());
