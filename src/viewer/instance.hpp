@@ -21,6 +21,7 @@ struct InstanceSettings {
   VolumeAssetPtr volume;                    ///< null: none
   std::shared_ptr<Sequence> sequence = {};  ///< in its place; null: none
   glm::dmat4 to_world{1.0};
+  std::optional<scene::PlaceEnds> ends = {};  ///< as the shutter opens, and as it closes; nothing: it stands still
   Medium medium = {};
   Ramps ramps = {};
   bool hidden = false;
@@ -33,6 +34,7 @@ struct ModelSettings {
   SurfaceAssetPtr surfaces;  ///< null: nothing
   SurfaceChoice choice;
   glm::dmat4 to_world{1.0};
+  std::optional<scene::PlaceEnds> ends = {};  ///< likewise
   bool hidden = false;
   bool shadow_only = false;
   bool holdout = false;
