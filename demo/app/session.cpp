@@ -442,37 +442,21 @@ bool Session::begin_volume() {
   cumulet_volume_file_desc file = volume_file(scene_);
   file.suggested_density_scale = suggest_ ? 1 : 0;
   std::optional<FrameRow> row;
+  std::shared_ptr<cumulet_sequence> sequence;
   try {
     row = FrameRow::of_name(scene_.volume);
+    if (row) sequence = open_sequence(row->files(), file);
   } catch (const std::exception& error) {
     tell(true, error.what());
     return false;
   }
   if (!row) return check(cumulet_load_volume_file(viewer_.get(), &file));
-  std::vector<std::string> names;
-  names.reserve(row->count());
-  for (std::uint32_t i = 0; i < row->count(); ++i) names.push_back(row->file(i));
-  std::vector<const char*> paths;
-  paths.reserve(names.size());
-  for (const std::string& name : names) paths.push_back(name.c_str());
-  cumulet_sequence_desc desc{};
-  desc.struct_size = sizeof desc;
-  desc.paths = paths.data();
-  desc.count = paths.size();
-  desc.file = &file;
-  cumulet_sequence* made = nullptr;
-  std::array<char, 512> error{};
-  if (cumulet_sequence_create(&desc, &made, error.data(), error.size()) != CUMULET_OK) {
-    tell(true, error.data());
-    return false;
-  }
-  std::shared_ptr<cumulet_sequence> sequence(made, cumulet_sequence_release);
   const cumulet_playback_desc playback = playback_of(scene_.sequence, *row);
   const Moment moment = scene_.sequence.frame.value_or(row->number(playback.first_frame));
-  static_cast<void>(cumulet_sequence_set_playback(made, &playback));
-  static_cast<void>(cumulet_sequence_set_frame(made, row->position_of(moment)));
+  static_cast<void>(cumulet_sequence_set_playback(sequence.get(), &playback));
+  static_cast<void>(cumulet_sequence_set_frame(sequence.get(), row->position_of(moment)));
   VolumePtr volume = sequence_ || !known_->visible ? nullptr : shown();
-  if (!check(cumulet_set_sequence(viewer_.get(), made))) return false;
+  if (!check(cumulet_set_sequence(viewer_.get(), sequence.get()))) return false;
   if (!before_) before_ = Before{sequence_, row_, std::move(volume)};
   sequence_ = std::move(sequence);
   row_ = std::move(row);

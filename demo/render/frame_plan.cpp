@@ -54,14 +54,10 @@ class Written {
 
 /// Files that are so many frames apart, from the first that is there on.
 struct Grid {
-  Frame first = 0;
-  Frame step = 1;
+  Frame first;
+  Frame step;
 
-  explicit Grid(const std::vector<Frame>& there) : first(there.front()) {
-    Frame common = 0;
-    for (const Frame frame : there) common = std::gcd(common, frame - first);
-    step = std::max(common, Frame{1});
-  }
+  explicit Grid(const std::vector<Frame>& there) : first(there.front()), step(step_of(there)) {}
   /// The last file's number that is not behind a frame.
   [[nodiscard]] Frame before(Frame frame) const { return frame < first ? frame : frame - (frame - first) % step; }
 };
@@ -130,15 +126,10 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
       throw UsageError("frame " + frame.text() + ": --output, --stats and --checkpoint shall be files of their own");
     }
   }
-  std::vector<std::pair<std::uintmax_t, std::string>> sized;
-  for (const Frame frame : there) {
-    std::string file = volume->file(frame);
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(file, error);
-    sized.emplace_back(error ? 0 : size, std::move(file));
-  }
-  std::ranges::stable_sort(sized, [](const auto& a, const auto& b) { return a.first > b.first; });
-  for (auto& [size, file] : sized) plan.judged_by.push_back(std::move(file));
+  std::vector<std::string> files;
+  files.reserve(there.size());
+  for (const Frame frame : there) files.push_back(volume->file(frame));
+  plan.judged_by = by_size(files);
   return plan;
 }
 

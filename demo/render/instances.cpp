@@ -45,9 +45,9 @@ OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
 OpenVolume open_volume(const VolumeFile& file) {
   if (auto row = FrameRow::of_name(file.volume)) {
     std::string failure;
-    for (std::string& name : row->by_size()) {
+    for (const std::string& name : by_size(row->files())) {
       VolumeFile frame = file;
-      frame.volume = std::move(name);
+      frame.volume = name;
       try {
         OpenVolume open = open_volume(frame);
         open.volume.reset();
@@ -64,6 +64,23 @@ OpenVolume open_volume(const VolumeFile& file) {
   std::array<char, 1024> error{};
   check(cumulet_volume_open_file(&desc, &opened, error.data(), error.size()), error.data());
   return look_into({opened, cumulet_volume_release});
+}
+
+std::shared_ptr<cumulet_sequence> open_sequence(const std::vector<std::string>& files,
+                                                const cumulet_volume_file_desc& file, std::uint64_t memory_bytes) {
+  std::vector<const char*> paths;
+  paths.reserve(files.size());
+  for (const std::string& name : files) paths.push_back(name.c_str());
+  cumulet_sequence_desc desc{};
+  desc.struct_size = sizeof desc;
+  desc.paths = paths.data();
+  desc.count = paths.size();
+  desc.file = &file;
+  desc.memory_bytes = memory_bytes;
+  cumulet_sequence* made = nullptr;
+  std::array<char, 1024> error{};
+  check(cumulet_sequence_create(&desc, &made, error.data(), error.size()), error.data());
+  return {made, cumulet_sequence_release};
 }
 
 const Instances::Given* Instances::find(const VolumeFile& file) const {
@@ -98,28 +115,13 @@ std::shared_ptr<cumulet_sequence> Instances::sequence_of(const SceneVolume& scen
     return playing.file == static_cast<const VolumeFile&>(scene) && playing.as == scene.sequence;
   });
   if (found != playing_.end()) return found->sequence;
-  std::vector<std::string> names;
-  names.reserve(row.count());
-  for (std::uint32_t i = 0; i < row.count(); ++i) names.push_back(row.file(i));
-  std::vector<const char*> paths;
-  paths.reserve(names.size());
-  for (const std::string& name : names) paths.push_back(name.c_str());
-  const cumulet_volume_file_desc file = volume_file(scene);
-  cumulet_sequence_desc desc{};
-  desc.struct_size = sizeof desc;
-  desc.paths = paths.data();
-  desc.count = paths.size();
-  desc.file = &file;
-  cumulet_sequence* made = nullptr;
-  std::array<char, 1024> error{};
-  check(cumulet_sequence_create(&desc, &made, error.data(), error.size()), error.data());
-  std::shared_ptr<cumulet_sequence> sequence(made, cumulet_sequence_release);
+  std::shared_ptr<cumulet_sequence> sequence = open_sequence(row.files(), volume_file(scene));
   const cumulet_playback_desc playback = playback_of(scene.sequence, row);
-  check(cumulet_sequence_set_playback(made, &playback), "");
+  check(cumulet_sequence_set_playback(sequence.get(), &playback), "");
   const Moment moment = scene.sequence.frame.value_or(row.number(playback.first_frame));
-  check(
-      seconds_ ? cumulet_sequence_set_time(made, *seconds_) : cumulet_sequence_set_frame(made, row.position_of(moment)),
-      "");
+  check(seconds_ ? cumulet_sequence_set_time(sequence.get(), *seconds_)
+                 : cumulet_sequence_set_frame(sequence.get(), row.position_of(moment)),
+        "");
   playing_.push_back({scene, scene.sequence, sequence});
   return sequence;
 }

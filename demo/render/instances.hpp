@@ -25,6 +25,11 @@ struct OpenVolume {
 [[nodiscard]] OpenVolume look_into(std::shared_ptr<cumulet_volume> volume);
 /// Likewise. Throws std::runtime_error with the library's cause.
 [[nodiscard]] OpenVolume open_volume(const VolumeFile& file);
+/// Of a file a frame. file: what all of them are read as; its path is not looked at. memory_bytes: 0 is the library's
+/// default. Reads nothing yet. Throws std::runtime_error with the library's cause.
+[[nodiscard]] std::shared_ptr<cumulet_sequence> open_sequence(const std::vector<std::string>& files,
+                                                              const cumulet_volume_file_desc& file,
+                                                              std::uint64_t memory_bytes = 0);
 
 /// A scene's further volumes (SceneOptions::others) in a viewer: an instance for each of their places. Those that are
 /// sequences share their frames where the scene says the same of how they play. In the thread that has the viewer.

@@ -599,13 +599,7 @@ class Studio {
   }
 
   void set_between(const SceneOptions& scene, const cumulet_volume_file_desc& file, const PlannedFrame::Next& next) {
-    const std::array<const char*, 2> paths{scene.volume.c_str(), next.volume.c_str()};
-    cumulet_sequence_desc desc{};
-    desc.struct_size = sizeof desc;
-    desc.paths = paths.data();
-    desc.count = paths.size();
-    desc.file = &file;
-    desc.memory_bytes = std::uint64_t{1} << 40U;  // what little there is
+    constexpr std::uint64_t what_it_takes = std::uint64_t{1} << 40U;
     cumulet_playback_desc playback = scene.sequence.playback;
     cumulet::settings::spell_out_zeros(playback);
     playback.frames_per_second /= next.frames;
@@ -613,17 +607,13 @@ class Studio {
     playback.frame_count = 0;
     playback.subframes = next.parts;
     if (playback.between == CUMULET_BETWEEN_NONE) playback.between = CUMULET_BETWEEN_ADVECT;
-    cumulet_sequence* made = nullptr;
-    std::array<char, 1024> error{};
-    if (cumulet_sequence_create(&desc, &made, error.data(), error.size()) != CUMULET_OK)
-      throw std::runtime_error(error.data());
-    const std::unique_ptr<cumulet_sequence, void (*)(cumulet_sequence*)> sequence(made, cumulet_sequence_release);
+    const auto sequence = cumulet::demo::open_sequence({scene.volume, next.volume}, file, what_it_takes);
     const double position = static_cast<double>(next.part) / next.parts;
-    if (cumulet_sequence_set_playback(made, &playback) != CUMULET_OK ||
-        cumulet_sequence_set_frame(made, position) != CUMULET_OK) {
+    if (cumulet_sequence_set_playback(sequence.get(), &playback) != CUMULET_OK ||
+        cumulet_sequence_set_frame(sequence.get(), position) != CUMULET_OK) {
       throw std::runtime_error(scene.volume + ": cannot be played");
     }
-    check(viewer_, cumulet_set_sequence(viewer_.get(), made));
+    check(viewer_, cumulet_set_sequence(viewer_.get(), sequence.get()));
   }
 
   /// Nothing stands in for what is between two frames, nor comes after it.

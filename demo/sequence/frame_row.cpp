@@ -14,11 +14,28 @@ constexpr std::uint32_t most_played = 1'000'000;  // the library's
 
 }  // namespace
 
-FrameRow::FrameRow(FramePattern pattern, const std::vector<Frame>& there)
-    : pattern_(std::move(pattern)), first_(there.front()) {
+Frame step_of(const std::vector<Frame>& there) {
   Frame step = 0;
-  for (const Frame frame : there) step = std::gcd(step, frame - first_);
-  step_ = std::max(step, Frame{1});
+  for (const Frame frame : there) step = std::gcd(step, frame - there.front());
+  return std::max(step, Frame{1});
+}
+
+std::vector<std::string> by_size(const std::vector<std::string>& files) {
+  std::vector<std::pair<std::uintmax_t, std::string>> sized;
+  for (const std::string& file : files) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(file, error);
+    sized.emplace_back(error ? 0 : size, file);
+  }
+  std::ranges::stable_sort(sized, [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::string> sorted;
+  sorted.reserve(sized.size());
+  for (auto& [size, file] : sized) sorted.push_back(std::move(file));
+  return sorted;
+}
+
+FrameRow::FrameRow(FramePattern pattern, const std::vector<Frame>& there)
+    : pattern_(std::move(pattern)), first_(there.front()), step_(step_of(there)) {
   count_ = (there.back() - first_) / step_ + 1;
 }
 
@@ -50,18 +67,11 @@ std::uint32_t FrameRow::index_of(Frame number) const {
   return std::min((number - first_ + step_ / 2) / step_, count_ - 1);
 }
 
-std::vector<std::string> FrameRow::by_size() const {
-  std::vector<std::pair<std::uintmax_t, std::string>> sized;
-  for (std::uint32_t i = 0; i < count_; ++i) {
-    std::error_code error;
-    const std::uintmax_t size = std::filesystem::file_size(file(i), error);
-    sized.emplace_back(error ? 0 : size, file(i));
-  }
-  std::ranges::stable_sort(sized, [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<std::string> files;
-  files.reserve(sized.size());
-  for (auto& [size, name] : sized) files.push_back(std::move(name));
-  return files;
+std::vector<std::string> FrameRow::files() const {
+  std::vector<std::string> all;
+  all.reserve(count_);
+  for (std::uint32_t i = 0; i < count_; ++i) all.push_back(file(i));
+  return all;
 }
 
 double FrameRow::position_of(const Moment& moment) const {

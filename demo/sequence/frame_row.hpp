@@ -10,6 +10,13 @@
 
 namespace cumulet::demo {
 
+/// How far files are apart: what divides all the ways from the first to another; 1 of a single one. there: not empty,
+/// ascending.
+[[nodiscard]] Frame step_of(const std::vector<Frame>& there);
+
+/// The largest file first; those that are not there last, in the order in which they were.
+[[nodiscard]] std::vector<std::string> by_size(const std::vector<std::string>& files);
+
 /// Numbered files as they play: a frame each, from the first that is there to the last, in equal steps. One that is not
 /// there is a gap, and takes its time.
 class FrameRow {
@@ -27,8 +34,7 @@ class FrameRow {
   /// Between its frames, too: the third of 40, 42, 44 and what follows is at 1, and 41 at 0.5.
   [[nodiscard]] double position_of(const Moment& moment) const;
   [[nodiscard]] std::string file(std::uint32_t index) const { return pattern_.file(number(index)); }
-  /// All, the largest file first; those that are not there last.
-  [[nodiscard]] std::vector<std::string> by_size() const;
+  [[nodiscard]] std::vector<std::string> files() const;
   [[nodiscard]] const FramePattern& pattern() const { return pattern_; }
 
  private:
@@ -37,7 +43,7 @@ class FrameRow {
 
   FramePattern pattern_;
   Frame first_;
-  Frame step_ = 1;
+  Frame step_;
   std::uint32_t count_ = 1;
 };
 

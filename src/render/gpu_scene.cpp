@@ -85,6 +85,8 @@ core::CmShutter shutter_of(const scene::ViewEnds& ends, const std::function<glm:
 
 bool moves(const scene::Volume& volume) { return volume.place.ends || volume.source->changes(); }
 
+bool is_hole(const scene::Volume& volume) { return (*volume.medium).holdout; }
+
 // Each once.
 MarchUpload::Sources sources_of(const std::vector<scene::Volume>& volumes) {
   MarchUpload::Sources sources;
@@ -133,9 +135,8 @@ bool GpuScene::anything_moves(const scene::Snapshot& snapshot) const {
 
 void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& wanted) {
   // Where anything moves, a single one is a table, too: fewer programs. And what is a hole is known of those alone.
-  const auto cuts = [](const scene::Volume& volume) { return (*volume.medium).holdout; };
   if (present_.empty() ||
-      (present_.size() < 2 && std::ranges::none_of(present_, cuts) && !anything_moves(snapshot))) {
+      (present_.size() < 2 && std::ranges::none_of(present_, is_hole) && !anything_moves(snapshot))) {
     if (instances_) {
       data_revision_.advance();
       instances_revision_.advance();
@@ -524,8 +525,7 @@ Obstacles GpuScene::obstacles(const scene::Snapshot& snapshot, bool traced) {
   // Chances are of a table as a whole.
   obstacles.lamps = !placed_ || obstacles.met() != nullptr ? lamps_.get() : host_lamps_.get();
   obstacles.instances = instances_.get();
-  const auto cuts = [](const scene::Volume& volume) { return (*volume.medium).holdout; };
-  obstacles.volume_holdout = instances_ && std::ranges::any_of(present_, cuts);
+  obstacles.volume_holdout = instances_ && std::ranges::any_of(present_, is_hole);
   obstacles.model_holdout =
       obstacles.met() != nullptr && std::ranges::any_of(placed_->models(), &scene::Model::holdout);
   return obstacles;

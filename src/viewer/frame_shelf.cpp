@@ -45,8 +45,7 @@ void FrameShelf::wish(Wish wish) {
     const std::scoped_lock lock(mutex_);
     if (!is_wished(wish.files)) {
       worker_.cancel();
-      const std::size_t steps = std::size_t{wish.files->count() - 1} * wish.steps.a_frame + 1;
-      old = std::exchange(shelf_, std::vector<Shelved>(steps));
+      old = std::exchange(shelf_, std::vector<Shelved>(wish.steps.count(wish.files->count())));
       judging_ = Judging::due;
       judged_.reset();
       said_.clear();
@@ -213,9 +212,8 @@ std::vector<std::optional<std::uint32_t>> FrameShelf::stand_ins() const {
 }
 
 std::vector<FrameShelf::Shelved> FrameShelf::take_other_steps(const Steps& steps) {
-  std::vector<Shelved> other(std::size_t{wish_->files->count() - 1} * steps.a_frame + 1);
-  for (std::uint32_t frame = 0; frame < wish_->files->count(); ++frame)
-    std::swap(other[std::size_t{frame} * steps.a_frame], own(frame));
+  std::vector<Shelved> other(steps.count(wish_->files->count()));
+  for (std::uint32_t frame = 0; frame < wish_->files->count(); ++frame) std::swap(other[steps.own(frame)], own(frame));
   return std::exchange(shelf_, std::move(other));
 }
 

@@ -40,6 +40,10 @@ class FrameShelf {
       const double seconds = moves ? playback.velocity_scale / playback.frames_per_second : 0.0;
       return {playback.between, playback.steps, seconds};
     }
+    /// Of so many frames, one at least.
+    [[nodiscard]] std::size_t count(std::uint32_t frames) const { return own(frames - 1) + 1; }
+    /// A frame's own.
+    [[nodiscard]] std::size_t own(std::uint32_t frame) const { return std::size_t{frame} * a_frame; }
     [[nodiscard]] std::uint32_t frame(std::uint32_t step) const { return step / a_frame; }
     [[nodiscard]] bool is_between(std::uint32_t step) const { return step % a_frame != 0; }
     /// How far it is from its frame to the next.
@@ -147,10 +151,8 @@ class FrameShelf {
     return is_wished(which.files) && wish_->steps == which.steps;
   }
   // Of a frame's own.
-  [[nodiscard]] Shelved& own(std::uint32_t frame) { return shelf_[std::size_t{frame} * wish_->steps.a_frame]; }
-  [[nodiscard]] const Shelved& own(std::uint32_t frame) const {
-    return shelf_[std::size_t{frame} * wish_->steps.a_frame];
-  }
+  [[nodiscard]] Shelved& own(std::uint32_t frame) { return shelf_[wish_->steps.own(frame)]; }
+  [[nodiscard]] const Shelved& own(std::uint32_t frame) const { return shelf_[wish_->steps.own(frame)]; }
   [[nodiscard]] bool is_possible(std::uint32_t step) const;
   // The shelf of other steps: what is files' own stays. What is returned is to be freed without the lock.
   [[nodiscard]] std::vector<Shelved> take_other_steps(const Steps& steps);

@@ -102,9 +102,9 @@ class Gathering {
   using Bricks = std::vector<std::deque<Placed>>;  // one of each field
   class Leaves;
 
-  [[nodiscard]] Box box_of(std::size_t source, std::uint32_t item) const;
+  [[nodiscard]] Box box_of(std::size_t i, std::uint32_t item) const;
   // The value all over a box of a source, if that is known without looking at voxels.
-  [[nodiscard]] std::optional<float> value_all_over(std::size_t source, const Box& box, const Items& items) const;
+  [[nodiscard]] std::optional<float> value_all_over(std::size_t i, const Box& box, const Items& items) const;
   // A cube of the lattice, of the items of each source that may meet what it is made of.
   void refine(glm::ivec3 origin, int size, int depth, std::span<const Items> candidates);
   void make_brick(const glm::ivec3& origin, std::span<const Box> needed, std::span<const Items> items,

@@ -157,6 +157,10 @@ def test_region(s):
     assert report["scene"]["camera"] == s.report("whole")["scene"]["camera"], "the drag is not the camera's"
     samples = report["samples"] / s.report("whole")["samples"]
     assert 0.2 < samples < 0.3, samples
+    # Of the whole viewport, which the line of text is a part of.
+    left, top, across, down = report["viewport"]
+    inside = (left + across // 4 + 8, top + down // 4 + 8, across // 2 - 16, down // 2 - 16)
+    assert_alike(whole, part, inside)
     assert_differ(whole, part, (x, y, width, height // 4 - 8))
     again, report, area = look(s, "again")
     assert "region" not in report["scene"]["picture"]

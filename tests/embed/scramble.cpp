@@ -400,6 +400,6 @@ TEST_P(Scramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   gl_->DebugMessageCallback(nullptr, nullptr);
 }
 
-CUMULET_GL_ON_BACKENDS(Scramble);
+CUMULET_ON_BACKENDS(Scramble);
 
 }  // namespace

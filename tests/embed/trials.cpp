@@ -385,6 +385,9 @@ void Caller::call_all() {
     answer("cumulet_get_progress", cumulet_get_progress(v, &progress), CUMULET_OK);
     cumulet_cancel(v);
   }
+  const std::array<float, 4> region{};
+  std::array<std::uint32_t, 4> pixels{};
+  answer("cumulet_region_pixels", cumulet_region_pixels(region.data(), 1, 1, pixels.data()), CUMULET_OK);
   names.insert({"cumulet_cancel",           "cumulet_status_text",        "cumulet_version",
                 "cumulet_volume_retain",    "cumulet_volume_release",     "cumulet_surfaces_retain",
                 "cumulet_surfaces_release", "cumulet_programs_retain",    "cumulet_programs_release",
@@ -439,6 +442,7 @@ void Caller::call_all() {
   CALL(cumulet_model_set, new_model, &model);
   CALL(cumulet_model_set_to_world, new_model, m.data());
   CALL(cumulet_model_set_time, new_model, 1.0);
+  CALL(cumulet_model_set_previous, new_model, nullptr, nullptr);
   CALL(cumulet_volume_from_state, &state, &new_volume, nullptr, 0);
   CALL(cumulet_live_create, &live, &new_live, nullptr, 0);
   CALL(cumulet_live_set, new_live, &state, nullptr, 0);
@@ -453,6 +457,7 @@ void Caller::call_all() {
   CALL(cumulet_instance_create, &instance, &new_instance, nullptr, 0);
   CALL(cumulet_instance_set, new_instance, &instance);
   CALL(cumulet_instance_set_to_world, new_instance, m.data());
+  CALL(cumulet_instance_set_previous, new_instance, nullptr);
   CALL(cumulet_instance_set_ramp, new_instance, CUMULET_RAMP_DENSITY, nullptr, 0);
   CALL(cumulet_camera_create, &pose, &new_camera);
   CALL(cumulet_camera_set, camera, &pose);
@@ -474,6 +479,7 @@ void Caller::call_all() {
     CALL(cumulet_load_volume_file, v, &volume_file);
     CALL(cumulet_set_volume, v, nullptr);
     CALL(cumulet_set_volume_places, v, nullptr, 0);
+    CALL(cumulet_set_previous_volume_places, v, nullptr, 0);
     CALL(cumulet_get_volume, v, &new_volume);
     CALL(cumulet_add_model, v, new_model);
     CALL(cumulet_remove_model, v, new_model);
@@ -485,6 +491,8 @@ void Caller::call_all() {
     CALL(cumulet_set_limits, v, &limits);
     CALL(cumulet_get_sequence_info, v, &sequence_info, nullptr, 0);
     CALL(cumulet_get_sequence_frame, v, 0, nullptr, 0);
+    CALL(cumulet_get_instance_sequence_info, v, new_instance, &sequence_info, nullptr, 0);
+    CALL(cumulet_get_instance_sequence_frame, v, new_instance, 0, nullptr, 0);
     CALL(cumulet_load_surfaces, v, "none.glb");
     CALL(cumulet_set_surfaces, v, nullptr);
     CALL(cumulet_get_surfaces, v, &new_surfaces);
@@ -505,6 +513,7 @@ void Caller::call_all() {
     CALL(cumulet_set_sampling, v, &sampling);
     CALL(cumulet_set_display, v, &display);
     CALL(cumulet_set_camera, v, camera);
+    CALL(cumulet_set_previous_camera, v, camera, 0.0);
     CALL(cumulet_get_camera, v, &new_camera);
     CALL(cumulet_frame_all, v);
     CALL(cumulet_set_navigation, v, &navigation);
@@ -520,6 +529,7 @@ void Caller::call_all() {
     CALL(cumulet_encode_display, v, one.data(), bytes.data(), bytes.size());
     CALL(cumulet_read_denoised, v, &denoise, one.data(), one.size());
     CALL(cumulet_read_aov, v, CUMULET_AOV_BEAUTY, one.data(), one.size());
+    CALL(cumulet_read_light_group, v, 0, one.data(), one.size());
     CALL(cumulet_measure_noise, v, &number);
     CALL(cumulet_read_accumulation, v, bytes.data(), &room);
     CALL(cumulet_restore_accumulation, v, bytes.data(), bytes.size());

@@ -264,6 +264,7 @@ class Program {
     std::array<cumulet_instance_desc, 2> desc{};
     desc[0] = described<cumulet_instance_desc>();
     desc[0].volume = volume_.get();
+    desc[0].sequence = volume_ ? nullptr : sequence_.get();
     desc[0].medium = data_.ConsumeBool() ? &medium : nullptr;
     if (medium.struct_size > sizeof medium) medium.struct_size = sizeof medium;
     switch (data_.ConsumeIntegralInRange(0, 4)) {
@@ -569,7 +570,7 @@ class Program {
       case 1:
         return told(cumulet_read_display(viewer_.get(), bytes.data(), bytes.size()));
       case 2:
-        return told(cumulet_read_aov(viewer_.get(), static_cast<cumulet_aov>(data_.ConsumeIntegralInRange(0, 8)),
+        return told(cumulet_read_aov(viewer_.get(), static_cast<cumulet_aov>(data_.ConsumeIntegralInRange(0, 10)),
                                      values.data(), values.size()));
       case 3:
         return told(cumulet_measure_noise(viewer_.get(), &noise));

@@ -15,6 +15,7 @@
 #include <random>
 
 #include "base/error.hpp"
+#include "support/backends.hpp"
 #include "support/gl_rays.hpp"
 #include "support/meshes.hpp"
 #include "support/osmesa_leaks.hpp"
@@ -545,19 +546,8 @@ TEST(Bvh, OriginsLeaveTheirSurface) {
   }
 }
 
-class BvhGl : public testing::TestWithParam<headless::Backend> {
- protected:
-  void SetUp() override {
-    try {
-      context_ = std::make_unique<headless::Context>(headless::Context::create(GetParam()));
-    } catch (const std::exception& error) {
-      GTEST_SKIP() << error.what();
-    }
-  }
-  std::unique_ptr<headless::Context> context_;
-};
-INSTANTIATE_TEST_SUITE_P(Gl, BvhGl, testing::Values(headless::Backend::egl, headless::Backend::osmesa),
-                         [](const auto& of) { return of.param == headless::Backend::egl ? "egl" : "osmesa"; });
+class BvhGl : public test::BackendTest {};
+CUMULET_ON_BACKENDS(BvhGl);
 
 TEST_P(BvhGl, ShadersHitWhatTheCpuHits) {
   const test::GlRays gl(*context_, "");

@@ -330,7 +330,7 @@ class Compositing : public cumulet::test::GlTest {
   glm::vec4 before{0.25F, 0.5F, 0.125F, 0.75F};
   std::optional<render::Compositor> compositor_;
 };
-CUMULET_GL_ON_BACKENDS(Compositing);
+CUMULET_ON_BACKENDS(Compositing);
 
 TEST_P(Compositing, EveryEncodingCurveAndBackground) {
   const Picture picture(gl_, 21, 13, false);

@@ -127,7 +127,7 @@ class Denoise : public test::GlTest {
   mutable int steps_ = 0;
   mutable std::uint64_t bytes_ = 0;
 };
-CUMULET_GL_ON_BACKENDS(Denoise);
+CUMULET_ON_BACKENDS(Denoise);
 
 // What takes longer, on one driver.
 class DenoiseMore : public Denoise {};

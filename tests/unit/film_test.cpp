@@ -138,6 +138,6 @@ TEST_P(Films, ANewLayerTakesALineAndThePassThatWritesIt) {
   EXPECT_EQ(film_.bytes(), 4U * 2U * 32U);
 }
 
-CUMULET_GL_ON_BACKENDS(Films);
+CUMULET_ON_BACKENDS(Films);
 
 }  // namespace

@@ -291,7 +291,7 @@ TEST_F(Plan, ARowHasGapsAndEqualSteps) {
   EXPECT_EQ(row->position_of(12), 1.0);
   EXPECT_EQ(row->position_of({12, 500}), 1.25);
   EXPECT_EQ(row->position_of({20, 500}), 5.0);
-  EXPECT_EQ(row->by_size().size(), 6U);
+  EXPECT_EQ(by_size(row->files()).size(), 6U);
   EXPECT_EQ(FrameRow::around(folder / "f.0012.vdb")->count(), 6U);
   EXPECT_FALSE(FrameRow::around(folder / "other.0011.vdb")) << "it is alone";
   EXPECT_FALSE(FrameRow::of_name(folder / "f.0012.vdb"));

@@ -73,7 +73,7 @@ class GridBuilds : public test::GlTest {
 
   gl::Limits limits_;
 };
-CUMULET_GL_ON_BACKENDS(GridBuilds);
+CUMULET_ON_BACKENDS(GridBuilds);
 
 struct Reference {
   std::shared_ptr<const volume::ScalarVolume> volume;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "support/c_host.hpp"
+#include "support/c_viewer.hpp"
 
 namespace {
 
@@ -18,43 +18,22 @@ using cumulet::headless::Context;
 constexpr std::uint32_t side = 16;
 constexpr std::size_t count = std::size_t{side} * side;
 
-class Holdout : public testing::TestWithParam<Backend> {
+class Holdout : public CViewerTest {
  protected:
+  Holdout() : CViewerTest(side, side) {}
   void SetUp() override {
-    try {
-      context_.emplace(Context::create(GetParam()));
-    } catch (const std::exception& error) {
-      GTEST_SKIP() << error.what();
-    }
-    viewer_ = make_viewer({.get_proc = Context::get_proc, .user = &*context_});
-    v_ = viewer_.get();
+    CViewerTest::SetUp();
+    if (IsSkipped()) return;
     ASSERT_EQ(cumulet_set_volume(v_, ball_.get()), CUMULET_OK);
   }
 
-  void samples(std::uint32_t number, std::uint32_t light_groups = 0) {
+  void samples(std::uint32_t number, std::uint32_t light_groups = 0, bool volume_alone = true) {
     auto sampling = make_desc<cumulet_sampling_desc>();
     sampling.samples = number;
     sampling.preview = CUMULET_PREVIEW_OFF;
-    sampling.volume_alone = 1;
+    sampling.volume_alone = volume_alone ? 1 : 0;
     sampling.light_groups = light_groups;
     ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
-  }
-  void make() {
-    auto frame = make_desc<cumulet_frame_desc>();
-    frame.target = CUMULET_TARGET_NONE;
-    frame.width = frame.height = side;
-    frame.budget_ms = 50.0;
-    converge(v_, frame);
-  }
-  std::vector<float> aov(cumulet_aov which) {
-    std::vector<float> rgba(4 * count);
-    EXPECT_EQ(cumulet_read_aov(v_, which, rgba.data(), rgba.size()), CUMULET_OK) << cumulet_last_error(v_);
-    return rgba;
-  }
-  std::vector<float> linear() {
-    std::vector<float> rgba(4 * count);
-    EXPECT_EQ(cumulet_read_linear(v_, rgba.data(), rgba.size()), CUMULET_OK) << cumulet_last_error(v_);
-    return rgba;
   }
   void hold_out_surfaces(bool holdout) {
     auto settings = make_desc<cumulet_surface_settings_desc>();
@@ -69,16 +48,12 @@ class Holdout : public testing::TestWithParam<Backend> {
     ASSERT_EQ(cumulet_set_medium(v_, &medium), CUMULET_OK);
   }
 
-  std::optional<Context> context_;
   VolumeRef ball_ = make_ball(16, 1.0F);
-  ViewerPtr viewer_;
-  cumulet_viewer* v_ = nullptr;
 };
-INSTANTIATE_TEST_SUITE_P(Gl, Holdout, testing::Values(Backend::egl, Backend::osmesa),
-                         [](const auto& backend) { return backend.param == Backend::egl ? "egl" : "osmesa"; });
+CUMULET_ON_BACKENDS(Holdout);
 
-// A wall through the ball and all that is seen: what is left is the volume before it, sample by sample.
-TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
+// Across z = 0, through the ball and all that is seen.
+SurfacesRef make_wall(float emission) {
   constexpr float far = 400.0F;
   const std::array<float, 18> corners{-far, -far, 0, far, -far, 0, far,  far, 0,
                                       -far, -far, 0, far, far,  0, -far, far, 0};
@@ -86,17 +61,22 @@ TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
   mesh.positions = corners.data();
   mesh.vertex_count = 6;
   mesh.double_sided = 1;
-  mesh.emission[0] = 3.0F;
-  const SurfacesRef wall = make_surfaces({&mesh, 1});
+  mesh.emission[0] = emission;
+  return make_surfaces({&mesh, 1});
+}
+
+// What is left is the volume before it, sample by sample.
+TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
+  const SurfacesRef wall = make_wall(3.0F);
   ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
   set_medium(0.2, false);
   samples(16);
   make();
-  const std::vector<float> alone = aov(CUMULET_AOV_VOLUME);
+  const std::vector<float> alone = aov(CUMULET_AOV_VOLUME, 4);
   const std::vector<float> whole = linear();
   hold_out_surfaces(true);
   make();
-  EXPECT_EQ(aov(CUMULET_AOV_BEAUTY), alone);
+  EXPECT_EQ(aov(CUMULET_AOV_BEAUTY, 4), alone);
   EXPECT_EQ(linear(), alone) << "no background behind it";
   double red = 0.0;
   double alpha = 0.0;
@@ -121,6 +101,33 @@ TEST_P(Holdout, OfAWallLeavesTheVolumeBeforeIt) {
   EXPECT_EQ(linear(), alone);
   desc.holdout = 2;
   EXPECT_EQ(cumulet_model_set(made, &desc), CUMULET_ERROR_INVALID_ARGUMENT);
+}
+
+// A lamp in a thin medium is looked for along the way, too; the sky behind the hole comes back by none of that.
+TEST_P(Holdout, OfAWallShowsNoSkyWhereThereAreLamps) {
+  const SurfacesRef wall = make_wall(0.0F);
+  ASSERT_EQ(cumulet_set_surfaces(v_, wall.get()), CUMULET_OK);
+  hold_out_surfaces(true);
+  set_medium(0.005, false);
+  auto light = make_desc<cumulet_light_desc>();
+  for (float& value : light.sky_radiance) value = 1000.0F;
+  ASSERT_EQ(cumulet_set_light(v_, &light), CUMULET_OK);
+  samples(64, 0, false);
+  const auto mean = [&] {
+    make();
+    const std::vector<float> rgba = linear();
+    double sum = 0.0;
+    for (std::size_t i = 0; i < count; ++i) sum += double(rgba[4 * i]) / double(count);
+    return sum;
+  };
+  const double without = mean();
+  auto lamp = make_desc<cumulet_lamp_desc>();
+  lamp.kind = CUMULET_LAMP_POINT;
+  lamp.position[2] = 4.0;
+  lamp.power = 1e-3F;
+  ASSERT_EQ(cumulet_set_lamps(v_, &lamp, 1), CUMULET_OK);
+  EXPECT_GT(without, 1.0) << "the medium before it is lit by the sky";
+  EXPECT_NEAR(mean() / without, 1.0, 0.2);
 }
 
 // What is not behind it has its shadow as before, bit for bit.

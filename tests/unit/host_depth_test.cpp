@@ -281,7 +281,7 @@ class HostDepths : public cumulet::test::GlTest {
   }
   std::optional<DepthScene> scene_;
 };
-CUMULET_GL_ON_BACKENDS(HostDepths);
+CUMULET_ON_BACKENDS(HostDepths);
 
 double step_of(GLenum format) {
   if (format == GL_DEPTH_COMPONENT16) return 1.0 / 65535.0;

@@ -600,7 +600,7 @@ class GlInstances : public test::GlTest {
            test::glsl_file("instance.glsl");
   }
 };
-CUMULET_GL_ON_BACKENDS(GlInstances);
+CUMULET_ON_BACKENDS(GlInstances);
 
 constexpr std::size_t most_visits = 32;
 

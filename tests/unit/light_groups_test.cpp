@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "support/c_host.hpp"
+#include "support/c_viewer.hpp"
 
 namespace {
 
@@ -28,18 +28,12 @@ constexpr std::uint32_t groups = 5;
 
 using Rgb = std::vector<float>;
 
-class LightGroups : public testing::TestWithParam<Backend> {
+class LightGroups : public CViewerTest {
  protected:
+  LightGroups() : CViewerTest(side, side) {}
   void SetUp() override {
-    try {
-      context_.emplace(Context::create(GetParam()));
-    } catch (const std::exception& error) {
-      GTEST_SKIP() << error.what();
-    }
-    gl_ = load_gl(Context::get_proc, &*context_);
-    target_.emplace(gl_, side, side);
-    viewer_ = make_viewer({.get_proc = Context::get_proc, .user = &*context_});
-    v_ = viewer_.get();
+    CViewerTest::SetUp();
+    if (IsSkipped()) return;
     ASSERT_EQ(cumulet_set_volume(v_, ball_.get()), CUMULET_OK);
     auto display = make_desc<cumulet_display_desc>();
     ASSERT_EQ(cumulet_set_display(v_, &display), CUMULET_OK);
@@ -83,14 +77,8 @@ class LightGroups : public testing::TestWithParam<Backend> {
     sampling_.light_groups = light_groups;
     ASSERT_EQ(cumulet_set_sampling(v_, &sampling_), CUMULET_OK) << cumulet_last_error(v_);
   }
-  void make() {
-    auto frame = target_->frame();
-    frame.target = CUMULET_TARGET_NONE;
-    converge(v_, frame);
-  }
-  Rgb linear() {
-    std::vector<float> rgba(4 * count);
-    EXPECT_EQ(cumulet_read_linear(v_, rgba.data(), rgba.size()), CUMULET_OK) << cumulet_last_error(v_);
+  Rgb rgb_linear() {
+    const std::vector<float> rgba = linear();
     Rgb rgb;
     for (std::size_t i = 0; i < rgba.size(); ++i)
       if (i % 4 != 3) rgb.push_back(rgba[i]);
@@ -139,7 +127,7 @@ class LightGroups : public testing::TestWithParam<Backend> {
       set(samples, seed, groups);
       make();
       const std::vector<Rgb> parts = all_groups();
-      expect_sum(parts, linear());
+      expect_sum(parts, rgb_linear());
       for (std::uint32_t i = 0; i < groups; ++i) together.at(i).push_back(sum_of(parts[i]));
     }
     for (std::uint32_t i = 0; i < groups; ++i) {
@@ -152,7 +140,7 @@ class LightGroups : public testing::TestWithParam<Backend> {
       for (std::uint32_t seed = 0; seed < seeds; ++seed) {
         set(samples, 100 + seed, 0);
         make();
-        alone.push_back(sum_of(linear()));
+        alone.push_back(sum_of(rgb_linear()));
       }
       const Mean a = mean_of(together.at(i));
       const Mean b = mean_of(alone);
@@ -162,12 +150,7 @@ class LightGroups : public testing::TestWithParam<Backend> {
     light();
   }
 
-  std::optional<Context> context_;
-  GladGLContext gl_{};
-  std::optional<HostTarget> target_;
   VolumeRef ball_ = make_ball(16, 1.0F);
-  ViewerPtr viewer_;
-  cumulet_viewer* v_ = nullptr;
   cumulet_surfaces* shines_ = nullptr;
   cumulet_surfaces* dark_ = nullptr;
   float sun_angle_ = 0.0F;
@@ -184,8 +167,7 @@ class LightGroups : public testing::TestWithParam<Backend> {
     return desc;
   }();
 };
-INSTANTIATE_TEST_SUITE_P(Gl, LightGroups, testing::Values(Backend::egl, Backend::osmesa),
-                         [](const auto& backend) { return backend.param == Backend::egl ? "egl" : "osmesa"; });
+CUMULET_ON_BACKENDS(LightGroups);
 
 // A pane that shines, and the same dark.
 SurfacesRef make_pane(float emission) {
@@ -229,10 +211,10 @@ TEST_P(LightGroups, MakeNoOtherPicture) {
       }
       set(8, 3, 0);
       make();
-      const Rgb without = linear();
+      const Rgb without = rgb_linear();
       set(8, 3, groups);
       make();
-      EXPECT_EQ(linear(), without) << (surfaces ? "surfaces" : "volume") << (lamps ? ", lamps" : "");
+      EXPECT_EQ(rgb_linear(), without) << (surfaces ? "surfaces" : "volume") << (lamps ? ", lamps" : "");
       light();
     }
   }
@@ -246,7 +228,7 @@ TEST_P(LightGroups, HaveTheBackgroundThatIsTheirs) {
   auto display = make_desc<cumulet_display_desc>();
   display.background = CUMULET_BACKGROUND_TRANSPARENT;
   ASSERT_EQ(cumulet_set_display(v_, &display), CUMULET_OK);
-  expect_sum(all_groups(), linear());
+  expect_sum(all_groups(), rgb_linear());
   const Rgb without_sky = group(sky);
   std::vector<float> rgba(4 * count);
   ASSERT_EQ(cumulet_read_linear(v_, rgba.data(), rgba.size()), CUMULET_OK);
@@ -262,7 +244,7 @@ TEST_P(LightGroups, BeyondThoseThatAreGatheredCountInTheFirst) {
   set(8, 0, 2);
   make();
   const std::vector<Rgb> two = all_groups();
-  expect_sum(two, linear());
+  expect_sum(two, rgb_linear());
   EXPECT_EQ(two[1], all[1]);
   expect_sum({all[0], all[2], all[3], all[4]}, two[0]);
   Rgb rgb(3 * count);
@@ -290,7 +272,7 @@ TEST_P(LightGroups, OfInstancesAreTheirMedias) {
   set(16, 0, groups);
   make();
   const std::vector<Rgb> all = all_groups();
-  expect_sum(all, linear());
+  expect_sum(all, rgb_linear());
   double green = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
     EXPECT_EQ(all[glow][3 * i + 1], 0.0F) << "red and blue alone";
@@ -317,8 +299,7 @@ TEST_P(LightGroups, GoOnWithMoreSamplesAndFromWhatWasKept) {
   set(9, 0, groups);
   make();
   EXPECT_EQ(all_groups(), wanted);
-  auto frame = target_->frame();
-  frame.target = CUMULET_TARGET_NONE;
+  auto frame = undrawn();
   frame.budget_ms = 0.01;
   set(9, 1, groups);
   ASSERT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK);

@@ -499,7 +499,7 @@ TEST_P(Sun, OfAnyAngleSendsWhatItsSettingSaysAndHalfOfItAtAnEdge) {
 }
 
 class NewLightShader : public test::GlTest {};
-CUMULET_GL_ON_BACKENDS(NewLightShader);
+CUMULET_ON_BACKENDS(NewLightShader);
 
 // The same source among the shader's own.
 TEST_P(NewLightShader, IsOneForDriversToo) {

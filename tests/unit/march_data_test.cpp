@@ -183,7 +183,7 @@ class GridSets : public test::GlTest {
   const MarchSourcePtr other_ = source_of({.cells = 333, .colour = 333, .tree = 55}, 4);
   const Sources three_{plain_, coloured_, glowing_};
 };
-CUMULET_GL_ON_BACKENDS(GridSets);
+CUMULET_ON_BACKENDS(GridSets);
 
 constexpr std::int64_t one_page = 0;
 constexpr std::int64_t three_pages = 2048;  // of 1024 cells

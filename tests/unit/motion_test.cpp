@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "support/c_host.hpp"
+#include "support/c_viewer.hpp"
 #include "support/gltf_model.hpp"
 
 namespace {
@@ -121,16 +121,12 @@ SurfacesRef make_wall() {
   return make_surfaces({&mesh, 1});
 }
 
-class Motion : public testing::TestWithParam<Backend> {
+class Motion : public CViewerTest {
  protected:
+  Motion() : CViewerTest(width, height, 1) {}
   void SetUp() override {
-    try {
-      context_.emplace(Context::create(GetParam()));
-    } catch (const std::exception& error) {
-      GTEST_SKIP() << error.what();
-    }
-    viewer_ = make_viewer({.get_proc = Context::get_proc, .user = &*context_, .samples = 1});
-    v_ = viewer_.get();
+    CViewerTest::SetUp();
+    if (IsSkipped()) return;
     now();
   }
 
@@ -153,16 +149,9 @@ class Motion : public testing::TestWithParam<Backend> {
     }
     ASSERT_EQ(cumulet_set_previous_camera(v_, owner.get(), seconds), CUMULET_OK) << cumulet_last_error(v_);
   }
-  std::vector<float> read(cumulet_aov aov) {
-    auto frame = make_desc<cumulet_frame_desc>();
-    frame.target = CUMULET_TARGET_NONE;
-    frame.width = width;
-    frame.height = height;
-    frame.budget_ms = 50.0;
-    converge(v_, frame);
-    std::vector<float> values(2 * count);
-    EXPECT_EQ(cumulet_read_aov(v_, aov, values.data(), values.size()), CUMULET_OK) << cumulet_last_error(v_);
-    return values;
+  std::vector<float> read(cumulet_aov which) {
+    make();
+    return aov(which, 2);
   }
   // before: of what is seen along a ray now, where it was; none: it is not looked at.
   using Before = std::function<std::optional<glm::dvec4>(const Eye::Ray&, glm::dvec4& now)>;
@@ -211,14 +200,10 @@ class Motion : public testing::TestWithParam<Backend> {
     for (const float value : read(aov)) ASSERT_EQ(value, 0.0F);
   }
 
-  std::optional<Context> context_;
-  ViewerPtr viewer_;
-  cumulet_viewer* v_ = nullptr;
   Eye eye_;
   Eye then_;
 };
-INSTANTIATE_TEST_SUITE_P(Gl, Motion, testing::Values(Backend::egl, Backend::osmesa),
-                         [](const auto& backend) { return backend.param == Backend::egl ? "egl" : "osmesa"; });
+CUMULET_ON_BACKENDS(Motion);
 
 const dmat4 turned =
     glm::translate(glm::rotate(dmat4(1.0), 0.12, glm::normalize(dvec3(0.3, 0.2, 1.0))), dvec3(0.7, -0.4, 1.5));

@@ -70,7 +70,7 @@ TEST(Numbers, EveryKindOfFloatIsKnownInCpp) {
 }
 
 class NumbersShader : public test::GlTest {};
-CUMULET_GL_ON_BACKENDS(NumbersShader);
+CUMULET_ON_BACKENDS(NumbersShader);
 
 TEST_P(NumbersShader, KnowsEveryKindOfFloat) {
   const std::string text = "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("numbers.glsl") + R"(

@@ -153,7 +153,7 @@ const std::array fields{
 };
 
 class Parameters : public test::GlTest {};
-CUMULET_GL_ON_BACKENDS(Parameters);
+CUMULET_ON_BACKENDS(Parameters);
 
 // A uint or float, or a vector of them, as one word by its index.
 std::string word_of(const Field& field, std::size_t i) {

@@ -45,7 +45,7 @@ TEST(Shaders, DefineTheirMacrosAfterTheVersion) {
 }
 
 class Programs : public cumulet::test::GlTest {};
-CUMULET_GL_ON_BACKENDS(Programs);
+CUMULET_ON_BACKENDS(Programs);
 
 TEST_P(Programs, AreOfTheTableAlone) {
   gl::Programs programs(*gl_, nullptr);

@@ -29,7 +29,7 @@ namespace gl = cumulet::gl;
 namespace render = cumulet::render;
 
 class State : public cumulet::test::GlTest {};
-CUMULET_GL_ON_BACKENDS(State);
+CUMULET_ON_BACKENDS(State);
 
 /// Changes all that the contract lets a call change.
 class Scribbler {

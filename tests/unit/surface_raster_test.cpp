@@ -195,7 +195,7 @@ class SurfaceRasters : public cumulet::test::GlTest {
   std::unique_ptr<SurfaceRaster> raster_;
   SurfaceLayers layers_;
 };
-CUMULET_GL_ON_BACKENDS(SurfaceRasters);
+CUMULET_ON_BACKENDS(SurfaceRasters);
 
 void expect_colour(glm::vec4 got, glm::vec4 expected, float relative = 2e-3F) {
   for (int c = 0; c < 4; ++c) EXPECT_NEAR(got[c], expected[c], relative * std::abs(expected[c]) + 1e-4F) << c;

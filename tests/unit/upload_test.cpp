@@ -28,7 +28,7 @@ using render::Deadline;
 using render::Upload;
 
 class Uploads : public test::GlTest {};
-CUMULET_GL_ON_BACKENDS(Uploads);
+CUMULET_ON_BACKENDS(Uploads);
 
 TEST_P(Uploads, PiecesAreOfWholeUnitsAndMissNothing) {
   Upload upload(gl_, "uploading");

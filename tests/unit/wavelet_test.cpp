@@ -651,7 +651,7 @@ TEST_P(History, WithoutMemoryForItPicturesAreFilteredAlone) {
   }
 }
 
-CUMULET_GL_ON_BACKENDS(Wavelets);
-CUMULET_GL_ON_BACKENDS(History);
+CUMULET_ON_BACKENDS(Wavelets);
+CUMULET_ON_BACKENDS(History);
 
 }  // namespace

@@ -93,7 +93,7 @@ class Heaps : public test::GlTest {
     ASSERT_EQ(values, std::vector<std::uint32_t>(words, value));
   }
 };
-CUMULET_GL_ON_BACKENDS(Heaps);
+CUMULET_ON_BACKENDS(Heaps);
 
 TEST_P(Heaps, SpansDoNotTouchEachOther) {
   WordHeap heap(gl_, {.page_bytes = 1U << 16U});

@@ -1438,8 +1438,8 @@ CUMULET_API cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_
 /* CUMULET_ERROR_INVALID_ARGUMENT if it does not. */
 CUMULET_API cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumulet_instance* instance);
 /*
- * As cumulet_get_sequence_info and cumulet_get_sequence_frame, of an instance's sequence in this viewer: what is ready is
- * that of all that share it. CUMULET_ERROR_INVALID_ARGUMENT for one that the viewer does not show, or hides, or that
+ * As cumulet_get_sequence_info and cumulet_get_sequence_frame, of an instance's sequence in this viewer: what is ready
+ * is that of all that share it. CUMULET_ERROR_INVALID_ARGUMENT for one that the viewer does not show, or hides, or that
  * shows no sequence.
  */
 CUMULET_API cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* viewer, cumulet_instance* instance,

@@ -13,19 +13,16 @@
 #include <vector>
 
 #include "gl/programs.hpp"
-#include "headless.hpp"
+#include "support/backends.hpp"
 
 namespace cumulet::test {
 
 /// A context and its functions, on each backend, without a viewer.
-class GlTest : public testing::TestWithParam<headless::Backend> {
+class GlTest : public BackendTest {
  protected:
   void SetUp() override {
-    try {
-      context_ = std::make_unique<headless::Context>(headless::Context::create(GetParam()));
-    } catch (const std::exception& error) {
-      GTEST_SKIP() << error.what();
-    }
+    BackendTest::SetUp();
+    if (IsSkipped()) return;
     gl_ = gl::load_functions(headless::Context::get_proc, context_.get());
     programs_ = std::make_shared<gl::Programs>(*gl_, nullptr);
   }
@@ -35,18 +32,9 @@ class GlTest : public testing::TestWithParam<headless::Backend> {
     }
   }
 
-  std::unique_ptr<headless::Context> context_;
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
 };
-
-/// Instantiates a suite of GlTest.
-#define CUMULET_GL_ON_BACKENDS(suite)                                                                                 \
-  INSTANTIATE_TEST_SUITE_P(Gl, suite,                                                                                 \
-                           testing::Values(cumulet::headless::Backend::egl, cumulet::headless::Backend::osmesa),      \
-                           [](const testing::TestParamInfo<cumulet::headless::Backend>& backend) {                    \
-                             return std::string(backend.param == cumulet::headless::Backend::egl ? "egl" : "osmesa"); \
-                           })
 
 /// One value of the state, by its name (with unit or index).
 struct GlValue {

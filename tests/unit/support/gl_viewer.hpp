@@ -6,25 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "headless.hpp"
+#include "support/backends.hpp"
 #include "support/still.hpp"
 
 namespace cumulet::test {
 
 /// A viewer in a context of its own, on each backend.
-class ViewerTest : public testing::TestWithParam<headless::Backend> {
+class ViewerTest : public BackendTest {
  protected:
-  void SetUp() override {
-    try {
-      context_ = std::make_unique<headless::Context>(headless::Context::create(GetParam()));
-    } catch (const std::exception& error) {
-      GTEST_SKIP() << error.what();
-    }
-  }
-
   std::unique_ptr<Still> make() const { return std::make_unique<Still>(*context_); }
-
-  std::unique_ptr<headless::Context> context_;
 };
 
 /// A viewer in daylight, in a context of its own, on each backend.
@@ -88,14 +78,4 @@ inline Picture render(Still& still, const Image& image, double budget_ms = 1e9) 
   return picture;
 }
 
-inline std::string backend_name(const testing::TestParamInfo<headless::Backend>& info) {
-  return info.param == headless::Backend::egl ? "egl" : "osmesa";
-}
-
 }  // namespace cumulet::test
-
-/// Runs a ViewerTest suite on both backends.
-#define CUMULET_ON_BACKENDS(suite)                                                                               \
-  INSTANTIATE_TEST_SUITE_P(Gl, suite,                                                                            \
-                           testing::Values(cumulet::headless::Backend::egl, cumulet::headless::Backend::osmesa), \
-                           cumulet::test::backend_name)
