@@ -317,7 +317,9 @@ void Viewer::tell_wish(Followed& f, FrameShelf& shelf) const {
     f.wish_due = true;
   }
   if (f.wish_due) {
-    shelf.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), f.settings,
+    std::optional<BuildSettings> settings = f.settings;
+    if (settings) settings->shutter_seconds *= f.state.playback.velocity_scale;
+    shelf.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), settings,
                 std::min(f.state.memory_bytes, allowance_->memory_bytes()), FrameShelf::Steps::of(f.state.playback),
                 &shelf == &frames_});
     f.wish_due = false;

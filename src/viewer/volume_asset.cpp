@@ -155,7 +155,7 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
 }
 
 std::shared_ptr<const VolumeAsset> VolumeAsset::while_open(double seconds, Progress& progress) const {
-  if (!(seconds > 0.0) || !moves()) return nullptr;
+  if (seconds == 0.0 || !moves()) return nullptr;
   progress.begin(Progress::Stage::statistics);
   const auto lock = patient_lock(exposing_, progress);
   if (exposed_ && exposed_->seconds == seconds) return exposed_->asset;

@@ -59,7 +59,8 @@ class VolumeAsset {
   /// Whether anything of it has a velocity.
   [[nodiscard]] bool moves() const { return scene::fastest_of(*frame_) > 0.0; }
   /// What it is from half of these seconds before its moment to half of them after it, by its velocity
-  /// (volume/advection.hpp); null where nothing moves. Kept is the last. Throws Error(cancelled), and Error(file).
+  /// (volume/advection.hpp), backwards where they are negative; null where nothing moves. Kept is the last. Throws
+  /// Error(cancelled), and Error(file).
   [[nodiscard]] std::shared_ptr<const VolumeAsset> while_open(double seconds, Progress& progress) const;
   [[nodiscard]] bool empty() const { return facts_->empty; }
   [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const { return facts_->bounds(place); }

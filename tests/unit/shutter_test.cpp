@@ -32,7 +32,7 @@ dmat4 moved(double x, double y, double z) { return glm::translate(dmat4(1.0), dv
 // Straight from one to the other, as the library has it.
 dmat4 between(const dmat4& a, const dmat4& b, double t) { return a + (b - a) * t; }
 
-class Motion : public test::StillTest {
+class Shutter : public test::StillTest {
  protected:
   static constexpr std::uint32_t edge = 16;
 
@@ -103,10 +103,10 @@ class Motion : public test::StillTest {
 
   viewer::Medium medium_;
 };
-CUMULET_ON_BACKENDS(Motion);
+CUMULET_ON_BACKENDS(Shutter);
 
 // A ray is within the box for a part of the time.
-TEST_P(Motion, ABoxThatPassesCoversForItsPartOfTheTime) {
+TEST_P(Shutter, ABoxThatPassesCoversForItsPartOfTheTime) {
   only_absorb(0.1);
   show(test::make_volume({8, 64, 16}, ivec3(0), [](const ivec3&) { return 1.0F; }));
   const double clear = std::exp(-0.1 * 16.0);
@@ -125,7 +125,7 @@ TEST_P(Motion, ABoxThatPassesCoversForItsPartOfTheTime) {
 }
 
 // Its thickness grows evenly: the mean of e^-(a t + b) is a difference of exponentials.
-TEST_P(Motion, ABoxThatGrowsIsTheMeanOfItsTransmittances) {
+TEST_P(Shutter, ABoxThatGrowsIsTheMeanOfItsTransmittances) {
   only_absorb(0.05);
   show(test::make_volume({16, 16, 16}, ivec3(0), [](const ivec3&) { return 1.0F; }));
   const dmat4 thrice = glm::scale(dmat4(1.0), dvec3(1.0, 1.0, 3.0));
@@ -136,7 +136,7 @@ TEST_P(Motion, ABoxThatGrowsIsTheMeanOfItsTransmittances) {
 }
 
 // The two bits of a pixel's own time are the path's: of what does not move nothing changes, to the bit.
-TEST_P(Motion, WithoutAnyPicturesAreAsBefore) {
+TEST_P(Shutter, WithoutAnyPicturesAreAsBefore) {
   show(cloud(), flames());
   const test::Image image{edge, edge, 8, 3, render::View::shaded};
   test::Image open = image;
@@ -151,7 +151,7 @@ TEST_P(Motion, WithoutAnyPicturesAreAsBefore) {
   EXPECT_EQ(test::render(*still_, image).pixels, before.pixels) << "closed again";
 }
 
-TEST_P(Motion, ATurningVolumeIsTheMeanOfStills) {
+TEST_P(Shutter, ATurningVolumeIsTheMeanOfStills) {
   show(cloud());
   const dmat4 about = moved(12, 10, 11);
   const auto turned = [&](double degrees, const dvec3& axis) {
@@ -160,7 +160,7 @@ TEST_P(Motion, ATurningVolumeIsTheMeanOfStills) {
   expect_as_stills(turned(-30.0, {0, 1, 0}) * moved(-3, 1, 0), turned(50.0, {0.3, 0.9, 0.1}) * moved(2, 0, 4));
 }
 
-TEST_P(Motion, AFireThatMovesShinesAsStillsDo) {
+TEST_P(Shutter, AFireThatMovesShinesAsStillsDo) {
   medium_.field_emission.flame_strength = 0.5;
   still_->set_medium(medium_);
   show(cloud(), flames());
@@ -168,7 +168,7 @@ TEST_P(Motion, AFireThatMovesShinesAsStillsDo) {
   expect_as_stills(moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.7)), moved(4, 3, 0));
 }
 
-TEST_P(Motion, VoxelsMoveAsCellsDo) {
+TEST_P(Shutter, VoxelsMoveAsCellsDo) {
   show(cloud());
   for (const render::March march : {render::March::dense, render::March::brick}) {
     still_->set_grid(test::settings_of({march, grid::CellKind::constant}));
@@ -176,7 +176,7 @@ TEST_P(Motion, VoxelsMoveAsCellsDo) {
   }
 }
 
-TEST_P(Motion, AmongOthersThatStand) {
+TEST_P(Shutter, AmongOthersThatStand) {
   show(cloud());
   const std::vector<dmat4> stand{moved(14, 3, 0), moved(-10, -6, 8)};
   const auto places = [&](const scene::Place& place) {
@@ -188,7 +188,7 @@ TEST_P(Motion, AmongOthersThatStand) {
 }
 
 // It turns and moves: its axes evenly about one axis, its eye straight.
-TEST_P(Motion, APanIsTheMeanOfStills) {
+TEST_P(Shutter, APanIsTheMeanOfStills) {
   show(cloud());
   const dvec3 from(40.0, 22.0, 50.0);
   const dvec3 to(44.0, 14.0, 46.0);
@@ -204,7 +204,7 @@ TEST_P(Motion, APanIsTheMeanOfStills) {
 }
 
 // A roll of a right angle about the look: straight between matrices would be halfway a zoom.
-TEST_P(Motion, ARollKeepsItsFieldOfView) {
+TEST_P(Shutter, ARollKeepsItsFieldOfView) {
   show(cloud(), flames());
   medium_.field_emission.flame_strength = 0.2;
   still_->set_medium(medium_);
@@ -227,7 +227,7 @@ TEST_P(Motion, ARollKeepsItsFieldOfView) {
                      }));
 }
 
-TEST_P(Motion, ACamerasShutterEndsWithItsNextMove) {
+TEST_P(Shutter, ACamerasShutterEndsWithItsNextMove) {
   show(cloud());
   const test::Image image{edge, edge, 4, 3, render::View::shaded, 1.0};
   const viewer::CameraPose pose = test::camera_at({40.0, 34.0, 50.0}, {12.0, 10.0, 11.0}, 32.0);
@@ -247,7 +247,7 @@ TEST_P(Motion, ACamerasShutterEndsWithItsNextMove) {
 }
 
 // A square that shines passes over the middle of the picture, and casts its light on a floor.
-TEST_P(Motion, AModelThatMovesIsTheMeanOfStills) {
+TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
   auto scene = std::make_shared<test::StillScene>();
   surface::Material glow = test::diffuse(vec3(0.3F));
   glow.emission = {3.0F, 2.0F, 1.0F};
@@ -279,7 +279,7 @@ TEST_P(Motion, AModelThatMovesIsTheMeanOfStills) {
 }
 
 // It moves by its own width: where it is at one end alone its depth is linear in time, from nothing to all of it.
-TEST_P(Motion, ASlabMovesByItsVelocity) {
+TEST_P(Shutter, ASlabMovesByItsVelocity) {
   only_absorb(0.1);
   const ivec3 size(16, 64, 16);
   volume::VolumeFrame frame{.density = test::make_volume(size, ivec3(0), [](const ivec3&) { return 1.0F; })};
@@ -305,7 +305,7 @@ TEST_P(Motion, ASlabMovesByItsVelocity) {
   }
 }
 
-TEST(MotionBetween, WhatIsFlatHalfwayIsKnown) {
+TEST(ShutterEnds, WhatIsFlatHalfwayIsKnown) {
   const auto turned = [](double degrees) {
     return glm::rotate(dmat4(1.0), glm::radians(degrees), glm::normalize(dvec3(1.0, 2.0, 0.5)));
   };

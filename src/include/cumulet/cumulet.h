@@ -1299,6 +1299,7 @@ typedef struct cumulet_sampling_desc {
    * samples make the same picture with groups and without. It takes 16 bytes a pixel of GL memory a group, and 32 more.
    */
   uint32_t light_groups;
+  /*
    * Motion blur: how long the shutter is open, half of it before the frame's moment and half after, as Blender's
    * default has it; 0: all stands still. Each path is of one moment of that time, evenly (Cook, Porter and Carpenter,
    * "Distributed Ray Tracing", 1984). What moves is what a host says of cameras (cumulet_camera_set_shutter), of places
@@ -1810,7 +1811,8 @@ typedef enum cumulet_warm_up_scope {
   CUMULET_WARM_UP_ALL = 1    /* these, and all others of the library are compiled (not used: a driver that compiles more
                                 in the first use does so then), but for rare ones: for grids beyond the driver's limit
                                 of a texture buffer, sets of maps that the scene's materials do not have, groups of
-                                lights and holdouts. One that does not build is told once all others are there */
+                                lights, holdouts and motion blur. One that does not build is told once all others are
+                                there */
 } cumulet_warm_up_scope;
 
 typedef struct cumulet_warm_up_result {
