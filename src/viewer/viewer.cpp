@@ -1363,7 +1363,7 @@ void Viewer::show_volumes() {
   // What surfaces alone are in stands aside.
   if (built_.source && (facts_ || !shows_instances())) {
     const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
-    for (const scene::Place& place : places_) 
+    for (const scene::Place& place : places_)
       volumes.push_back({0, built_.source, shown_medium_, {place.to_world, while_open(place.ends)}, frame});
     for (std::size_t i = 0; i < std::min(volumes.size(), previous_places_.size()); ++i)
       volumes[i].previous = previous_places_[i];

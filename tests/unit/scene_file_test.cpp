@@ -482,7 +482,7 @@ TEST(SceneFile, WhatMovesIsKept) {
   EXPECT_EQ((*scene.others[0].shutter.close)[5], 2.0);
   ASSERT_EQ(scene.models.size(), 1U) << "beside the surfaces, which stand still";
   EXPECT_NEAR((*scene.models[0].shutter.close)[2], -1.0, 1e-15);
-  EXPECT_TRUE(same_scene(scene, parse_scene(scene_text(scene, "/data/s.json"), "s.json")));
+  EXPECT_TRUE(same_scene(scene, parse_scene(scene_text(scene, "s.json"), "s.json")));
   for (const auto change : std::vector<void (*)(SceneOptions&)>{
            [](SceneOptions& s) { s.camera_open.reset(); }, [](SceneOptions& s) { s.camera_close->eye[1] = 7.0; },
            [](SceneOptions& s) { s.shutter.open.reset(); }, [](SceneOptions& s) { s.models[0].shutter = {}; },
