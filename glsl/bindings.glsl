@@ -13,6 +13,7 @@ const int CM_UNIT_CELLS = 0;        // to 5: pages of cell records
 const int CM_UNIT_SCATTERING_VOXELS = 1;
 const int CM_UNIT_ANISOTROPY_VOXELS = 2;
 const int CM_UNIT_VELOCITY_VOXELS = 3;
+const int CM_UNIT_CHANGE_VOXELS = 4;  // or of bricks
 const int CM_UNIT_CHANNELS = 6;     // of cells; or what voxels give off
 const int CM_UNIT_ENVIRONMENT = 7;  // a page of a WordHeap
 const int CM_UNIT_LAYER_COLOUR = 8;

@@ -58,8 +58,15 @@ layout(binding = CM_UNIT_ENVIRONMENT) uniform usamplerBuffer cm_environment_word
 uvec4 cm_environment_word(uint i) { return texelFetch(cm_environment_words, int(cm.environment.words + i)); }
 #endif
 
-#if CM_CELL_LIGHTS
+#ifdef CM_MARCH
+#define CM_CELL_CHANGES (CM_MOTION != 0 && CM_MARCH == 0)
+#else
+#define CM_CELL_CHANGES 0
+#endif
+#if CM_CELL_LIGHTS || CM_CELL_CHANGES
 layout(binding = CM_UNIT_CHANNELS) uniform usamplerBuffer cm_channels;
+#endif
+#if CM_CELL_LIGHTS
 uvec4 cm_glow_word(uint i) { return texelFetch(cm_channels, int(CM_GRID.first_glowing + i)); }
 #endif
 
@@ -100,12 +107,17 @@ uint cm_channel_word(uint word) { return cm_link(texelFetch(cm_channels, int(wor
 uint cm_colour_record(uint cell) { return cm_channel_word(CM_GRID.first_colour + cell); }
 uint cm_anisotropy_record(uint cell) { return cm_channel_word(CM_GRID.first_anisotropy + (cell >> 1)); }
 #endif
-#if CM_VELOCITY
-uvec2 cm_velocity_record(uint cell) {
-  uint word = CM_GRID.first_velocity + 2u * cell;
+#if CM_VELOCITY || CM_MOTION
+uvec2 cm_channel_pair(uint word) {
   uvec4 texel = texelFetch(cm_channels, int(word >> 2));
   return (word & 2u) == 0u ? texel.xy : texel.zw;
 }
+#endif
+#if CM_VELOCITY
+uvec2 cm_velocity_record(uint cell) { return cm_channel_pair(CM_GRID.first_velocity + 2u * cell); }
+#endif
+#if CM_MOTION
+uvec2 cm_change_record(uint cell) { return cm_channel_pair(CM_GRID.first_change + 2u * cell); }
 #endif
 
 uint cm_tree_word(uint word) { return cm_link(texelFetch(cm_tree_words, int(word >> 2)), word & 3u); }
@@ -137,6 +149,10 @@ vec3 cm_velocity_voxel(ivec3 voxel) {
 #if CM_MARCH == 1
 layout(binding = CM_UNIT_VOXELS) uniform sampler3D cm_voxels;
 float cm_voxel(ivec3 voxel) { return texelFetch(cm_voxels, voxel - ivec3(CM_GRID.box_min), 0).x; }
+#if CM_MOTION
+layout(binding = CM_UNIT_CHANGE_VOXELS) uniform sampler3D cm_voxel_changes;
+float cm_voxel_change(ivec3 voxel) { return texelFetch(cm_voxel_changes, voxel - ivec3(CM_GRID.box_min), 0).x; }
+#endif
 #else
 layout(binding = CM_UNIT_VOXELS) uniform samplerBuffer cm_brick_values;
 layout(binding = CM_UNIT_BRICK_SLOTS) uniform usampler3D cm_brick_slots;
@@ -144,6 +160,10 @@ uint cm_brick_slot(ivec3 brick) {
   return texelFetch(cm_brick_slots, brick - (ivec3(CM_GRID.box_min) >> 3), 0).x;
 }
 float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * 512u + index)).x; }
+#if CM_MOTION
+layout(binding = CM_UNIT_CHANGE_VOXELS) uniform samplerBuffer cm_brick_changes;
+float cm_brick_change(uint slot, uint index) { return texelFetch(cm_brick_changes, int(slot * 512u + index)).x; }
+#endif
 #endif
 #endif
 #endif

@@ -188,14 +188,22 @@ CM_FN uint cm_link(uvec4 links, uint face) {
   return face == 0u ? links.x : (face == 1u ? links.y : (face == 2u ? links.z : (face == 3u ? links.w : CM_NONE)));
 }
 
-// Density (relative) at o + t d, as a linear function of t: value at t = 0 in x, slope in y.
-CM_FN vec2 cm_cell_density(uvec4 data, CmFrame f, uint shape) {
-  vec2 low = unpackHalf2x16(data.z);
-  vec2 high = unpackHalf2x16(data.w);
-  float inverse_unit = cm_shape_inverse_unit(shape);
-  vec3 gradient = vec3(low.y, high.x, high.y);
-  vec3 from_centroid = (f.o - f.v0) * inverse_unit - cm_frame_centroid(cm_shape_class(shape));
-  return vec2(low.x + dot(gradient, from_centroid), dot(gradient, f.d) * inverse_unit);
+// Of its second two words, the density at the centroid and the gradient.
+CM_FN vec4 cm_fit(uint low_word, uint high_word) {
+  vec2 low = unpackHalf2x16(low_word);
+  vec2 high = unpackHalf2x16(high_word);
+  return vec4(low.x, low.y, high.x, high.y);
 }
+
+// That at o + t d, as a linear function of t: value at t = 0 in x, slope in y.
+CM_FN vec2 cm_fit_along(vec4 fit, CmFrame f, uint shape) {
+  float inverse_unit = cm_shape_inverse_unit(shape);
+  vec3 gradient = vec3(fit.y, fit.z, fit.w);
+  vec3 from_centroid = (f.o - f.v0) * inverse_unit - cm_frame_centroid(cm_shape_class(shape));
+  return vec2(fit.x + dot(gradient, from_centroid), dot(gradient, f.d) * inverse_unit);
+}
+
+// Density (relative) of a record, likewise.
+CM_FN vec2 cm_cell_density(uvec4 data, CmFrame f, uint shape) { return cm_fit_along(cm_fit(data.z, data.w), f, shape); }
 
 #endif

@@ -6,6 +6,7 @@
 #define CM_HERE_GLSL
 
 #include "numbers.glsl"
+#include "moment.glsl"
 
 #undef CM_GRID
 #undef CM_MEDIUM

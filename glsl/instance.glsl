@@ -10,13 +10,36 @@ layout(std140, binding = CM_STORAGE_INSTANCE_NODES) readonly buffer CmInstanceNo
 };
 #endif
 
+#if CM_MOTION
+CM_FN CmStanding cm_instance_end(uint at) {
+  return CmStanding(cm_instances[at].space.from_cube_x, cm_instances[at].space.from_cube_y,
+                    cm_instances[at].space.from_cube_z, cm_instances[at].space.cube_origin);
+}
+// One that moves: behind the table's records are others, of where all stand as the shutter opens and as it closes.
+CM_FN bool cm_instance_moves(uint at) { return (cm_instances[at].flags & CM_INSTANCE_MOVES) != 0u; }
+CM_FN CmStanding cm_instance_standing(uint at) {
+  return cm_between(cm_instance_end(at + cm.space.volumes), cm_instance_end(at + 2u * cm.space.volumes));
+}
+#endif
+
 // A vector and a point of the scene's frame in an instance's cube space.
 CM_FN vec3 cm_in_instance(uint at, vec3 v) {
+#if CM_MOTION
+  if (cm_instance_moves(at)) return cm_in_standing(cm_instance_standing(at), v);
+#endif
   CM_PRECISE vec3 turned = cm_instances[at].space.to_cube_x * v.x + cm_instances[at].space.to_cube_y * v.y +
                            cm_instances[at].space.to_cube_z * v.z;
   return turned;
 }
-CM_FN vec3 cm_in_instance_point(uint at, vec3 p) { return cm_in_instance(at, p - cm_instances[at].space.cube_origin); }
+CM_FN vec3 cm_in_instance_point(uint at, vec3 p) {
+#if CM_MOTION
+  if (cm_instance_moves(at)) {
+    CmStanding standing = cm_instance_standing(at);
+    return cm_in_standing(standing, p - standing.origin);
+  }
+#endif
+  return cm_in_instance(at, p - cm_instances[at].space.cube_origin);
+}
 
 // One over d, as cm_instance_span takes it: 0 counts as next to 0, so that no product of it is NaN.
 CM_FN vec3 cm_instance_inverse(vec3 d) {

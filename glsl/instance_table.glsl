@@ -9,6 +9,7 @@
 const uint CM_INSTANCE_SEEN = 1u;      // by camera rays; others meet it in any case
 const uint CM_INSTANCE_EMITS = 2u;     // its cells give off light
 const uint CM_INSTANCE_OVERLAPS = 4u;  // there are points in its box and in another's
+const uint CM_INSTANCE_MOVES = 8u;     // it stands elsewhere as the shutter opens, or as it closes (glsl/moment.glsl)
 
 // "World" is here the scene's frame: the world, counted from a point near the scene.
 CM_BLOCK(CmInstance) {

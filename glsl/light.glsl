@@ -176,6 +176,11 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 #if CM_GROUPS
   cm_look_group = CM_MEDIUM.group;
 #endif
+#if CM_INSTANCES && CM_MOTION
+  // The table's chances are of the volumes that cells have at the frame's moment.
+  if (cm_instance_moves(cm_here))
+    light.radiance *= abs(cm_standing_volume(cm_instance_standing(cm_here))) / cm_instances[cm_here].space.unit_volume;
+#endif
 #if CM_INSTANCES
   cm_here = stood;
 #endif

@@ -6,6 +6,8 @@
 //   uvec4 cm_emission_record(uint cell)     glsl/channels.glsl
 //   uint cm_colour_record(uint cell)        likewise
 //   uint cm_anisotropy_record(uint cell)    likewise
+// with CM_MOTION
+//   uvec2 cm_change_record(uint cell)       how the density of its record changes
 // and with CM_VELOCITY
 //   uvec2 cm_velocity_record(uint cell)     likewise
 #ifndef CM_MARCH_TET_GLSL
@@ -39,6 +41,19 @@ CM_FN uvec3 cm_march_enter(vec3 p) {
   return uvec3(leaf, 0u, CM_NONE);
 }
 
+// A cell's density. With CM_MOTION that of cm_now: a record's is in the middle, and the change half of that from one end
+// to the other, so that along a ray it is linear at any moment, and its depth as closed as at rest.
+CM_FN vec4 cm_march_fit(uvec4 data, uint cell) {
+  vec4 fit = cm_fit(data.z, data.w);
+#if CM_MOTION
+  if (CM_MEDIUM.changes != 0u) {
+    uvec2 change = cm_change_record(cell);
+    fit += (2.0f * cm_now - 1.0f) * cm_fit(change.x, change.y);
+  }
+#endif
+  return fit;
+}
+
 CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT(float) t_1, CM_OUT(float) r_0,
                          CM_OUT(float) r_1, CM_OUT(uvec3) next) {
   uvec4 links = cm_record(cell.x, 0u);
@@ -50,11 +65,14 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
   cm_cell_exit(frame, shape, t_exit, face);
   t_1 = max(t, t_exit);
 #if CM_LINEAR
-  vec2 density = cm_cell_density(data, frame, shape);
+  vec2 density = cm_fit_along(cm_march_fit(data, cell.x), frame, shape);
   r_0 = max(0.0f, density.x + density.y * t);
   r_1 = max(0.0f, density.x + density.y * t_1);
 #else
-  r_0 = unpackHalf2x16(data.z).x;
+  r_0 = cm_march_fit(data, cell.x).x;
+#if CM_MOTION
+  r_0 = max(0.0f, r_0);  // as halves are rounded
+#endif
   r_1 = r_0;
 #endif
   next = uvec3(cm_link(links, face), 0u, CM_NONE);

@@ -8,6 +8,8 @@
 //   vec3 cm_emission_voxel(ivec3 voxel)           of the box; nothing in empty bricks
 //   vec3 cm_scattering_voxel(ivec3 voxel)         density x colour
 //   float cm_anisotropy_voxel(ivec3 voxel)
+// with CM_MOTION, half of how density changes from one end of the shutter's time to the other
+//   float cm_voxel_change(ivec3 voxel), float cm_brick_change(uint slot, uint index)
 // and with CM_VELOCITY
 //   vec3 cm_velocity_voxel(ivec3 voxel)           voxels a second
 #ifndef CM_MARCH_VOXEL_GLSL
@@ -40,10 +42,20 @@ CM_FN void cm_march_step(uvec3 cell, vec3 o, vec3 d, vec3 inv_d, float t, CM_OUT
   }
   float density = 0.0f;
   if (!empty) {
-    density = cm_brick_voxel(slot, uint(((voxel.x & 7) << 6) | ((voxel.y & 7) << 3) | (voxel.z & 7)));
+    uint index = uint(((voxel.x & 7) << 6) | ((voxel.y & 7) << 3) | (voxel.z & 7));
+    density = cm_brick_voxel(slot, index);
+#if CM_MOTION
+    if (CM_MEDIUM.changes != 0u) density += (2.0f * cm_now - 1.0f) * cm_brick_change(slot, index);
+#endif
   }
 #else
   float density = cm_voxel(voxel);
+#if CM_MOTION
+  if (CM_MEDIUM.changes != 0u) density += (2.0f * cm_now - 1.0f) * cm_voxel_change(voxel);
+#endif
+#endif
+#if CM_MOTION
+  density = max(0.0f, density);  // as halves are rounded
 #endif
   // The plane that the ray meets on each axis, from the integer, so that both sides agree; axis of the nearest.
   vec3 plane = vec3(float(low.x + (d.x > 0.0f ? size : 0)), float(low.y + (d.y > 0.0f ? size : 0)),

@@ -2,15 +2,40 @@
 #ifndef CM_MODEL_SPACE_GLSL
 #define CM_MODEL_SPACE_GLSL
 
+#if CM_MOTION
+CM_FN CmStanding cm_model_end(uint at) {
+  return CmStanding(cm_models[at].to_world_x, cm_models[at].to_world_y, cm_models[at].to_world_z, cm_models[at].origin);
+}
+// One that moves: behind the table's records are others, of where all stand as the shutter opens and as it closes.
+CM_FN bool cm_model_moves(uint at) { return (cm_models[at].flags & CM_MODEL_MOVES) != 0u; }
+CM_FN CmStanding cm_model_standing(uint at) {
+  return cm_between(cm_model_end(at + cm.surfaces.models), cm_model_end(at + 2u * cm.surfaces.models));
+}
+#endif
+
+// Where the origin of a model's own space is in the world.
+CM_FN vec3 cm_model_origin(uint at) {
+#if CM_MOTION
+  if (cm_model_moves(at)) return cm_model_standing(at).origin;
+#endif
+  return cm_models[at].origin;
+}
+
 // A vector and a point of the world in a model's own space, and back.
 CM_FN vec3 cm_in_model(uint at, vec3 v) {
+#if CM_MOTION
+  if (cm_model_moves(at)) return cm_in_standing(cm_model_standing(at), v);
+#endif
   return cm_models[at].to_own_x * v.x + cm_models[at].to_own_y * v.y + cm_models[at].to_own_z * v.z;
 }
-CM_FN vec3 cm_in_model_point(uint at, vec3 p) { return cm_in_model(at, p - cm_models[at].origin); }
+CM_FN vec3 cm_in_model_point(uint at, vec3 p) { return cm_in_model(at, p - cm_model_origin(at)); }
 CM_FN vec3 cm_out_of_model(uint at, vec3 v) {
+#if CM_MOTION
+  if (cm_model_moves(at)) return cm_out_of_standing(cm_model_standing(at), v);
+#endif
   return cm_models[at].to_world_x * v.x + cm_models[at].to_world_y * v.y + cm_models[at].to_world_z * v.z;
 }
-CM_FN vec3 cm_out_of_model_point(uint at, vec3 p) { return cm_out_of_model(at, p) + cm_models[at].origin; }
+CM_FN vec3 cm_out_of_model_point(uint at, vec3 p) { return cm_out_of_model(at, p) + cm_model_origin(at); }
 
 // A direction of a model's own space in the world, unit.
 CM_FN vec3 cm_model_direction(uint at, vec3 d) {
@@ -23,19 +48,31 @@ CM_FN vec3 cm_model_direction(uint at, vec3 d) {
 CM_FN vec3 cm_model_normal(uint at, vec3 n) {
   // The rows of the inverse are what normals go by.
   vec3 v = vec3(dot(cm_models[at].to_own_x, n), dot(cm_models[at].to_own_y, n), dot(cm_models[at].to_own_z, n));
+#if CM_MOTION
+  if (cm_model_moves(at)) {
+    CmStanding s = cm_model_standing(at);
+    v = (n.x * cross(s.y, s.z) + n.y * cross(s.z, s.x) + n.z * cross(s.x, s.y)) * sign(cm_standing_volume(s));
+  }
+#endif
   float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
   return largest > 0.0f ? normalize(v / largest) : n;
 }
 
 // The area in a model's own space of a unit of area of the world, upright to n (unit).
 CM_FN float cm_own_area(uint at, vec3 n) {
+#if CM_MOTION
+  if (cm_model_moves(at)) {
+    CmStanding s = cm_model_standing(at);
+    return length(vec3(dot(s.x, n), dot(s.y, n), dot(s.z, n))) / abs(cm_standing_volume(s));
+  }
+#endif
   vec3 v = vec3(dot(cm_models[at].to_world_x, n), dot(cm_models[at].to_world_y, n), dot(cm_models[at].to_world_z, n));
   return cm_models[at].own_volume * length(v);
 }
 
 // How far a point of a model's surface may be off it in the world's floats, and a ray off in its own.
 CM_FN float cm_model_room(uint at, vec3 p) {
-  vec3 o = abs(cm_models[at].origin);
+  vec3 o = abs(cm_model_origin(at));
   vec3 from = abs(p);
   return 5e-7f * (max(max(o.x, o.y), o.z) + max(max(from.x, from.y), from.z));
 }

@@ -51,6 +51,10 @@
 #ifndef CM_INSTANCES
 #define CM_INSTANCES 0
 #endif
+// Whether anything moves while the shutter is open (glsl/moment.glsl).
+#ifndef CM_MOTION
+#define CM_MOTION 0
+#endif
 
 #ifdef __cplusplus
 #define CM_ALIGN(bytes) alignas(bytes)
@@ -109,6 +113,7 @@ CM_BLOCK(CmGrid) {
   uint glowing;           // how many it has
   uint first_velocity;    // where the velocities of its cells begin in that page, in 4-byte words
   uint moves;             // 1: it has some
+  uint first_change;      // with CM_MOTION: where begins, likewise, how its cells' densities change (CmMedium.changes)
   CM_EQUALITY(CmGrid)
 };
 
@@ -134,6 +139,7 @@ CM_BLOCK(CmMedium) {
   uint anisotropic;  // 1: and an anisotropy in place of this one
   uint group;        // of what it gives off; only with CM_GROUPS
   uint holdout;      // 1: cameras see a hole; only with CM_HOLDOUT
+  uint changes;      // 1: its density changes while the shutter is open; only with CM_MOTION
   CM_EQUALITY(CmMedium)
 };
 
@@ -231,6 +237,16 @@ CM_BLOCK(CmDispatch) {
   CM_EQUALITY(CmDispatch)
 };
 
+// The camera while the shutter is open, with CM_MOTION (glsl/ray.glsl): GpuScene. Last, so that nothing else moves for it.
+CM_BLOCK(CmShutter) {
+  CmView open;             // as it opens
+  CmView close;            // as it closes, but for the turn
+  CM_ALIGN(16) vec3 axis;  // world, unit: about which all has turned by then,
+  float angle;             // by so many radians
+  uint lasts;              // 1: something moves
+  CM_EQUALITY(CmShutter)
+};
+
 #ifdef __cplusplus
 CM_BLOCK(CmParameters) {
 #else
@@ -250,6 +266,7 @@ layout(std140, binding = CM_UNIFORM_PARAMETERS) uniform CmParameters {
   CmHostDepth host_depth;
   CmIntegrator integrator;
   CmDispatch dispatch;
+  CmShutter shutter;
 #ifdef __cplusplus
   CM_EQUALITY(CmParameters)
 };

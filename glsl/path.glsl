@@ -73,10 +73,17 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.random = cm_hash3(uvec3(number, sample_number, cm.integrator.seed)).x;
   p.stream = pixel.x | 1u;
   p.number = sample_number;
+#if CM_MOTION
+  cm_now = cm_moment(p.number, p.stream);
+#endif
   vec2 within = cm_even_pair(sample_number, p.stream, 0u);
   vec2 along = cm_even_pair(sample_number, p.stream, 1u);
   vec2 lens = vec2(0.0f, 0.0f);
-  if (cm.view.lens_right > 0.0f) lens = cm_on_disc(cm_even_pair(sample_number, p.stream, CM_SET_LENS));
+  bool wide = cm.view.lens_right > 0.0f;
+#if CM_MOTION
+  wide = max(cm.shutter.open.lens_right, cm.shutter.close.lens_right) > 0.0f;
+#endif
+  if (wide) lens = cm_on_disc(cm_even_pair(sample_number, p.stream, CM_SET_LENS));
   float t_per_z = cm_lens_ray(at, within, lens, p.o, p.w);
   p.d = cm_to_cube(p.w);
   p.throughput = vec3(1.0f, 1.0f, 1.0f);

@@ -119,6 +119,9 @@ CmPath cm_load_path(uint lane) {
   cm_load_sum(p, lane);
   cm_load_flight(p, lane);
   cm_load_ends(p, lane);
+#if CM_MOTION
+  cm_now = cm_moment(p.number, p.stream);
+#endif
   return p;
 }
 

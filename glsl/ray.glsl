@@ -12,6 +12,9 @@ CM_FN vec3 cm_to_world(vec3 v) {
 // A vector of the cube space that glsl/here.glsl tells of, in the world.
 CM_FN vec3 cm_out_of_volume(vec3 v) {
 #if CM_INSTANCES
+#if CM_MOTION
+  if (cm_instance_moves(cm_here)) return cm_out_of_standing(cm_instance_standing(cm_here), v);
+#endif
   return cm_instances[cm_here].space.from_cube_x * v.x + cm_instances[cm_here].space.from_cube_y * v.y +
          cm_instances[cm_here].space.from_cube_z * v.z;
 #else
@@ -55,15 +58,41 @@ CM_FN vec2 cm_on_disc(vec2 square) {
   return radius * vec2(cos(angle), sin(angle));
 }
 
+#if CM_MOTION
+CM_FN vec3 cm_turned(vec3 v) {
+  float c = cos(cm.shutter.angle * cm_now);
+  float s = sin(cm.shutter.angle * cm_now);
+  return c * v + s * cross(cm.shutter.axis, v) + ((1.0f - c) * dot(cm.shutter.axis, v)) * cm.shutter.axis;
+}
+// The camera at cm_now: its axes turn evenly about one axis, and all else goes straight from one end to the other.
+CM_FN CmView cm_view() {
+  CmView view = cm.view;
+  view.eye = mix(cm.shutter.open.eye, cm.shutter.close.eye, cm_now);
+  view.forward = cm_turned(mix(cm.shutter.open.forward, cm.shutter.close.forward, cm_now));
+  view.right = cm_turned(mix(cm.shutter.open.right, cm.shutter.close.right, cm_now));
+  view.up = cm_turned(mix(cm.shutter.open.up, cm.shutter.close.up, cm_now));
+  view.inverse_focus = mix(cm.shutter.open.inverse_focus, cm.shutter.close.inverse_focus, cm_now);
+  view.lens_right = mix(cm.shutter.open.lens_right, cm.shutter.close.lens_right, cm_now);
+  view.lens_up = mix(cm.shutter.open.lens_up, cm.shutter.close.lens_up, cm_now);
+  return view;
+}
+#define CM_VIEW view
+#else
+#define CM_VIEW cm.view
+#endif
+
 // The ray through a point of a pixel and one of the lens (unit disc): o in cube space, w a unit vector in world space.
 // Returns the distance along it per unit of view depth.
 CM_FN float cm_lens_ray(uvec2 pixel, vec2 within, vec2 lens, CM_OUT(vec3) o, CM_OUT(vec3) w) {
-  float x = 2.0f * (float(pixel.x) + within.x) / float(cm.view.size.x) - 1.0f;
-  float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(cm.view.size.y);
-  vec3 aside = x * cm.view.right + y * cm.view.up;
-  vec3 off = lens.x * cm.view.lens_right * cm.view.right + lens.y * cm.view.lens_up * cm.view.up;
-  vec3 v = cm.view.forward + (1.0f - float(cm.view.orthographic)) * aside - cm.view.inverse_focus * off;
-  o = cm.view.eye + cm_to_cube(float(cm.view.orthographic) * aside + off);
+#if CM_MOTION
+  CmView view = cm_view();
+#endif
+  float x = 2.0f * (float(pixel.x) + within.x) / float(CM_VIEW.size.x) - 1.0f;
+  float y = 1.0f - 2.0f * (float(pixel.y) + within.y) / float(CM_VIEW.size.y);
+  vec3 aside = x * CM_VIEW.right + y * CM_VIEW.up;
+  vec3 off = lens.x * CM_VIEW.lens_right * CM_VIEW.right + lens.y * CM_VIEW.lens_up * CM_VIEW.up;
+  vec3 v = CM_VIEW.forward + (1.0f - float(CM_VIEW.orthographic)) * aside - CM_VIEW.inverse_focus * off;
+  o = CM_VIEW.eye + cm_to_cube(float(CM_VIEW.orthographic) * aside + off);
   w = normalize(v);
   return length(v);
 }

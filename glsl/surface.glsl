@@ -185,7 +185,12 @@ CM_FN CmCorners cm_corners(CmVertexMix m) {
   return corners;
 }
 
-CM_FN bool cm_mirrors(uint model) { return (cm_models[model].flags & CM_MODEL_MIRRORS) != 0u; }
+CM_FN bool cm_mirrors(uint model) {
+#if CM_MOTION
+  if (cm_model_moves(model)) return cm_standing_volume(cm_model_standing(model)) < 0.0f;
+#endif
+  return (cm_models[model].flags & CM_MODEL_MIRRORS) != 0u;
+}
 
 // The unit normal on the side from which a triangle's vertices turn counter-clockwise in the world.
 CM_FN vec3 cm_turning_normal(vec3 a, vec3 b, vec3 c) {

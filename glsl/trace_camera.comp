@@ -6,6 +6,7 @@
 // variants: CM_DENSE=0,1
 // variants: - or CM_ENVIRONMENT=1
 // variants: - or CM_GROUPS=1
+// variants: - or CM_MOTION=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

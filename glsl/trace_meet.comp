@@ -3,6 +3,7 @@
 // variants: CM_SURFACES=1
 // variants: - or CM_RICH=1
 // variants: - or CM_GROUPS=1
+// variants: - or CM_MOTION=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #define CM_KEEPS_EQUIANGULAR  // what kernels before and behind this one have of a path

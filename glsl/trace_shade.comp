@@ -1,7 +1,7 @@
 #version 450
 // What happens on the triangles that paths have met, or whose shadow rays have ended: glsl/path_queue.glsl.
 // variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_RICH=1 or CM_SURFACES=2 CM_GROUPS=1 or CM_SURFACES=2 CM_EQUIANGULAR=1 CM_GROUPS=1 or CM_SURFACES=2 CM_RICH=1 CM_GROUPS=1
-// variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1
+// variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1 or CM_MOTION=1 or CM_CHANNELS=1 CM_INSTANCES=1 CM_MOTION=1
 // variants: - or CM_ENVIRONMENT=1
 // variants: - or CM_HOLDOUT=1
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -46,8 +46,11 @@ void main() {
 #endif
   cm_load_flight(p, lane);
   cm_load_ends(p, lane);
-#if CM_RICH
+#if CM_RICH || CM_MOTION
   cm_load_sum(p, lane);  // the sample's number
+#endif
+#if CM_MOTION
+  cm_now = cm_moment(p.number, p.stream);
 #endif
   cm_load_within(p, lane);
   CmVertex vertex = cm_on_triangle(p);

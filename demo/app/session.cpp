@@ -28,7 +28,7 @@ constexpr double patience = 1.0;  // seconds without a picture, where there coul
 
 bool same_volume(const SceneVolume& a, const SceneVolume& b) {
   const auto rest = [](const SceneVolume& volume) {
-    return std::tie(volume.name, volume.visible, volume.places, volume.ramps, volume.auto_density_scale,
+    return std::tie(volume.name, volume.visible, volume.places, volume.shutter, volume.ramps, volume.auto_density_scale,
                     volume.sequence);
   };
   return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
@@ -275,8 +275,9 @@ void Session::finish_others() {
 }
 
 void Session::follow_places() {
-  if (known_->places == scene_.places) return;
+  if (known_->places == scene_.places && known_->shutter == scene_.shutter) return;
   known_->places = scene_.places;
+  known_->shutter = scene_.shutter;
   check(set_places(viewer_.get(), scene_));
 }
 

@@ -27,7 +27,9 @@ cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open) 
 }
 
 bool same_place(const cumulet_instance_desc& a, const cumulet_instance_desc& b) {
-  return std::equal(a.to_world, a.to_world + 16, b.to_world) && a.hidden == b.hidden && a.tag == b.tag;
+  const auto same = [](const double(&one)[16], const double(&other)[16]) { return std::ranges::equal(one, other); };
+  return same(a.to_world, b.to_world) && same(a.open_to_world, b.open_to_world) &&
+         same(a.close_to_world, b.close_to_world) && a.hidden == b.hidden && a.tag == b.tag;
 }
 
 }  // namespace
@@ -178,9 +180,11 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     desc.sequence = sequence.get();
     desc.medium = &medium;
     desc.hidden = scene.visible ? 0 : 1;
+    set_shutter(scene.shutter, desc.to_world, desc.open_to_world, desc.close_to_world);
     if (scene.places.empty()) place(scene, given->volume, sequence, desc, {i, 0});
     for (std::size_t at = 0; at < scene.places.size(); ++at) {
       std::ranges::copy(scene.places[at], desc.to_world);
+      set_shutter(scene.shutter, desc.to_world, desc.open_to_world, desc.close_to_world);
       place(scene, given->volume, sequence, desc, {i, at});
     }
   }

@@ -130,10 +130,10 @@ void check_not_interrupted() {
   if (interrupted) throw std::runtime_error("interrupted before the first sample: nothing is written");
 }
 
-void set_camera(const Viewer& viewer, const cumulet_camera_desc& desc) {
+void show_camera(const Viewer& viewer, const SceneOptions& scene) {
   cumulet_camera* camera = nullptr;
   check(viewer, cumulet_get_camera(viewer.get(), &camera));
-  const cumulet_status status = cumulet_camera_set(camera, &desc);
+  const cumulet_status status = set_camera(camera, scene);
   cumulet_camera_release(camera);
   if (status != CUMULET_OK) throw std::runtime_error("the camera is not usable");
 }
@@ -678,7 +678,7 @@ class Studio {
     cumulet_display_desc display = scene.display;
     display.denoise = CUMULET_DENOISE_OFF;  // what is read is read as it is, and denoised beside that
     check(viewer_, cumulet_set_display(viewer_.get(), &display));
-    set_camera(viewer_, scene.camera);
+    show_camera(viewer_, scene);
     if (!scene.models.empty()) check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
     if (!scene.surfaces.empty()) {
       check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));

@@ -25,6 +25,7 @@ cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, 
   desc.struct_size = sizeof desc;
   desc.surfaces = surfaces;
   std::ranges::copy(scene.to_world, desc.to_world);
+  set_shutter(scene.shutter, desc.to_world, desc.open_to_world, desc.close_to_world);
   desc.time = scene.time;
   desc.animation = scene.animation;
   desc.variant = variant_number(scene.file, scene.variant, variant_names(surfaces));

@@ -347,18 +347,36 @@ class Repeats {
   std::string first_;
 };
 
-void read_camera(Reader& reader, cumulet_camera_desc& desc) {
-  const bool eye = reader.three("camera.eye", desc.eye);
-  const bool target = reader.three("camera.target", desc.target);
-  if (eye != target) reader.wrong(eye ? "camera.target" : "camera.eye", "is missing");
+/// of: "camera." or "camera.open." Whether it says where the camera stands.
+bool read_camera(Reader& reader, const std::string& of, cumulet_camera_desc& desc) {
+  const bool eye = reader.three(of + "eye", desc.eye);
+  const bool target = reader.three(of + "target", desc.target);
+  if (eye != target) reader.wrong(of + (eye ? "target" : "eye"), "is missing");
   if (eye && std::equal(desc.eye, desc.eye + 3, desc.target))
-    reader.wrong("camera.target", "is the same point as the eye");
-  if (reader.three("camera.up", desc.up) && std::equal(desc.up, desc.up + 3, std::array{0.0, 0.0, 0.0}.begin()))
-    reader.wrong("camera.up", "has no direction");
-  reader.number("camera.fovy_degrees", desc.fovy_degrees, {0.0, 180.0, true});
-  reader.number("camera.orthographic_height", desc.orthographic_height, settings::not_negative);
-  reader.number("camera.lens_radius", desc.lens_radius, settings::not_negative);
-  reader.number("camera.focus_distance", desc.focus_distance, settings::not_negative);
+    reader.wrong(of + "target", "is the same point as the eye");
+  if (reader.three(of + "up", desc.up) && std::equal(desc.up, desc.up + 3, std::array{0.0, 0.0, 0.0}.begin()))
+    reader.wrong(of + "up", "has no direction");
+  reader.number(of + "fovy_degrees", desc.fovy_degrees, {0.0, 180.0, true});
+  reader.number(of + "orthographic_height", desc.orthographic_height, settings::not_negative);
+  reader.number(of + "lens_radius", desc.lens_radius, settings::not_negative);
+  reader.number(of + "focus_distance", desc.focus_distance, settings::not_negative);
+  return eye;
+}
+
+/// What an end says nothing of is as at the frame's moment.
+void read_cameras(Reader& reader, SceneFormat format, SceneOptions& scene) {
+  const bool placed = read_camera(reader, "camera.", scene.camera);
+  if (format == SceneFormat::first) return;
+  const auto end = [&](const std::string& key, std::optional<cumulet_camera_desc>& out) {
+    if (!reader.has(key)) return;
+    if (!placed) reader.wrong(key, "is of a camera that has no eye and no target");
+    out = scene.camera;
+    read_camera(reader, key + ".", *out);
+    if ((out->orthographic_height > 0.0) != (scene.camera.orthographic_height > 0.0))
+      reader.wrong(key + ".orthographic_height", "is of another projection than the camera's");
+  };
+  end("camera.open", scene.camera_open);
+  end("camera.close", scene.camera_close);
 }
 
 template <class Desc, class Value>
@@ -416,6 +434,19 @@ void read_place(Reader& reader, const std::string& of, Matrix& to_world) {
   if (parts) to_world = place.matrix();
 }
 
+/// How it moves while the shutter is open; of: likewise.
+void read_shutter(Reader& reader, const std::string& of, SceneShutter& shutter) {
+  const auto end = [&](const std::string& key, std::optional<Matrix>& out) {
+    if (!reader.has(key)) return;
+    Matrix step{};
+    read_place(reader, key + ".", step);
+    if (step == Matrix{}) step = PlaceParts().matrix();
+    out = step;
+  };
+  end(of + "open", shutter.open);
+  end(of + "close", shutter.close);
+}
+
 bool read_visible(Reader& reader, const std::string& of) {
   std::int32_t visible = 1;
   reader.flag(of + "visible", visible);
@@ -446,6 +477,7 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   if (format == SceneFormat::first) return;
   read_place(reader, "volume.", volume.to_world);
   reader.places("volume.places", volume.places);
+  read_shutter(reader, "volume.", volume.shutter);
   reader.text("volume.name", volume.name);
   volume.visible = read_visible(reader, "volume.");
 }
@@ -458,6 +490,7 @@ SceneModel read_model(Reader& reader, const std::string& of) {
   if (model.file.empty()) reader.wrong(of + "file", "is empty");
   reader.text(of + "name", model.name);
   read_place(reader, of, model.to_world);
+  read_shutter(reader, of, model.shutter);
   model.visible = read_visible(reader, of);
   std::int32_t flag = 0;
   reader.flag(of + "shadow_only", flag);
@@ -477,7 +510,8 @@ SceneModel read_model(Reader& reader, const std::string& of) {
 
 /// The first is the scene's surfaces where it stands as its file has it, and no more is said of it than version 1 can.
 bool is_placed(Reader& reader, const std::string& of) {
-  constexpr std::array keys{"name", "to_world", "translate", "rotate_degrees", "scale", "visible", "shadow_only"};
+  constexpr std::array keys{"name",    "to_world",    "translate", "rotate_degrees", "scale",
+                            "visible", "shadow_only", "open",      "close"};
   return std::ranges::any_of(keys, [&](const char* key) { return reader.has(of + key); });
 }
 
@@ -539,7 +573,7 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   reader.text("surfaces.file", scene.surfaces);
   reader.text("surfaces.variant", scene.surface_variant);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
-  read_camera(reader, scene.camera);
+  read_cameras(reader, format, scene);
   reader.text("environment.file", scene.environment);
   if (second) {
     if (!reader.has("environment") && !reader.has("lights")) scene.set_daylight();
@@ -656,6 +690,25 @@ class Writer {
   Json json_;
 };
 
+void put_shutter(Writer& writer, const std::string& of, const SceneShutter& shutter) {
+  if (shutter.open) writer.put(of + "open.to_world", *shutter.open);
+  if (shutter.close) writer.put(of + "close.to_world", *shutter.close);
+}
+
+Json camera_json(const cumulet_camera_desc& view) {
+  Json camera = Json::object();
+  if (!std::equal(view.eye, view.eye + 3, view.target)) {
+    camera["eye"] = three(view.eye);
+    camera["target"] = three(view.target);
+  }
+  if (view.up[0] != 0.0 || view.up[1] != 0.0 || view.up[2] != 0.0) camera["up"] = three(view.up);
+  if (view.fovy_degrees > 0.0) camera["fovy_degrees"] = view.fovy_degrees;
+  if (view.orthographic_height > 0.0) camera["orthographic_height"] = view.orthographic_height;
+  if (view.lens_radius > 0.0) camera["lens_radius"] = view.lens_radius;
+  if (view.focus_distance > 0.0) camera["focus_distance"] = view.focus_distance;
+  return camera;
+}
+
 void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, const std::string& file) {
   if (format == SceneFormat::second) writer.put_text("volume.name", volume.name);
   writer.put("volume.file", file);
@@ -664,6 +717,7 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
   if (format == SceneFormat::second) {
     if (volume.to_world != Matrix{}) writer.put("volume.to_world", volume.to_world);
     if (!volume.places.empty()) writer.put("volume.places", volume.places);
+    put_shutter(writer, "volume.", volume.shutter);
     if (!volume.visible) writer.put("volume.visible", false);
   }
   writer.put_text("medium.temperature_grid", volume.temperature_grid);
@@ -686,6 +740,7 @@ void put_model(Writer& writer, std::size_t number, const SceneModel& model, cons
   if (!model.name.empty() || number == 0) writer.put(of + "name", model.name);
   writer.put(of + "file", file);
   if (model.to_world != Matrix{}) writer.put(of + "to_world", model.to_world);
+  put_shutter(writer, of, model.shutter);
   if (!model.visible) writer.put(of + "visible", false);
   if (model.shadow_only) writer.put(of + "shadow_only", true);
   if (model.holdout) writer.put(of + "holdout", true);
@@ -734,18 +789,9 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   for (std::size_t i = 0; models && i < scene.models.size(); ++i)
     put_model(writer, i + (scene.surfaces.empty() ? 0 : 1), scene.models[i], named(scene.models[i].file));
 
-  Json camera = Json::object();
-  const auto& view = scene.camera;
-  if (!std::equal(view.eye, view.eye + 3, view.target)) {
-    camera["eye"] = three(view.eye);
-    camera["target"] = three(view.target);
-  }
-  if (view.up[0] != 0.0 || view.up[1] != 0.0 || view.up[2] != 0.0) camera["up"] = three(view.up);
-  if (view.fovy_degrees > 0.0) camera["fovy_degrees"] = view.fovy_degrees;
-  if (view.orthographic_height > 0.0) camera["orthographic_height"] = view.orthographic_height;
-  if (view.lens_radius > 0.0) camera["lens_radius"] = view.lens_radius;
-  if (view.focus_distance > 0.0) camera["focus_distance"] = view.focus_distance;
-  writer.put("camera", camera);
+  writer.put("camera", camera_json(scene.camera));
+  if (second && scene.camera_open) writer.put("camera.open", camera_json(*scene.camera_open));
+  if (second && scene.camera_close) writer.put("camera.close", camera_json(*scene.camera_close));
 
   writer.put_settings(scene.light);
   if (!scene.environment.empty()) {
@@ -842,6 +888,44 @@ std::string light_groups_refusal(const std::vector<std::string>& names) {
     if (!known.insert(name).second) return "has a name twice";
   }
   return "";
+}
+
+void set_shutter(const SceneShutter& shutter, const double (&to_world)[16], double (&open)[16], double (&close)[16]) {
+  Matrix place{};
+  std::ranges::copy(to_world, place.begin());
+  const auto end = [&](const std::optional<Matrix>& step, double(&out)[16]) {
+    const Matrix at = !step ? Matrix{} : place == Matrix{} ? *step : product(*step, place);
+    std::ranges::copy(at, out);
+  };
+  end(shutter.open, open);
+  end(shutter.close, close);
+}
+
+cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
+  const double* first = scene.places.empty() ? nullptr : scene.places.front().data();
+  const cumulet_status status =
+      cumulet_set_volume_places(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
+  if (status != CUMULET_OK || !scene.shutter.moves()) return status;
+  const std::size_t count = std::max<std::size_t>(scene.places.size(), 1);
+  std::vector<double> open;
+  std::vector<double> close;
+  for (std::size_t i = 0; i < count; ++i) {
+    double place[16] = {};
+    double at_open[16];
+    double at_close[16];
+    if (!scene.places.empty()) std::ranges::copy(scene.places[i], place);
+    set_shutter(scene.shutter, place, at_open, at_close);
+    open.insert(open.end(), at_open, at_open + 16);
+    close.insert(close.end(), at_close, at_close + 16);
+  }
+  return cumulet_set_volume_shutter(viewer, open.data(), close.data(), static_cast<std::uint32_t>(count));
+}
+
+cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene) {
+  const auto end = [](const auto& desc) { return desc ? &*desc : nullptr; };
+  const cumulet_status status = cumulet_camera_set(camera, &scene.camera);
+  if (status != CUMULET_OK || !(scene.camera_open || scene.camera_close)) return status;
+  return cumulet_camera_set_shutter(camera, end(scene.camera_open), end(scene.camera_close));
 }
 
 std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations) {

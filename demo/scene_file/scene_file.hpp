@@ -49,12 +49,24 @@ struct SceneSequence {
 
 /// As the library takes it, of these files.
 [[nodiscard]] cumulet_playback_desc playback_of(const SceneSequence& sequence, const FrameRow& row);
+/// How far something is, as the shutter opens and as it closes, from where it stands in the world: 4x4, column by
+/// column; nothing: it is there.
+struct SceneShutter {
+  std::optional<std::array<double, 16>> open = {};
+  std::optional<std::array<double, 16>> close = {};
+
+  bool operator==(const SceneShutter&) const = default;
+  [[nodiscard]] bool moves() const { return open || close; }
+};
+/// Into a descriptor's open_to_world and close_to_world, of what stands there; all 0: as its file has it.
+void set_shutter(const SceneShutter& shutter, const double (&to_world)[16], double (&open)[16], double (&close)[16]);
 
 /// A volume in a scene, as the library's own descriptors with struct_size set. Zero is the library's default, as there.
 struct SceneVolume : VolumeFile {
   std::string name;  // "": its file's
   bool visible = true;
   std::vector<std::array<double, 16>> places;  // where it then stands, once in each; none: there alone
+  SceneShutter shutter;                        // of all of these
   cumulet_medium_desc medium{};
   std::array<settings::RampPoints, settings::ramps.size()> ramps;  // as cumulet_ramp numbers them
   SceneSequence sequence;                                          // where it is one
@@ -71,6 +83,7 @@ struct SceneModel {
   std::string file;                   // a glTF file
   std::string name = {};              // "": its file's
   std::array<double, 16> to_world{};  // where it stands, column by column; all 0: as its file has it
+  SceneShutter shutter = {};
   bool visible = true;
   bool shadow_only = false;  // cameras do not see it
   bool holdout = false;      // cameras see a hole
@@ -101,6 +114,8 @@ struct SceneOptions : SceneVolume {
   cumulet_environment_settings_desc environment_settings{};
   cumulet_ground_desc ground{};
   cumulet_camera_desc camera{};
+  std::optional<cumulet_camera_desc> camera_open = {};   // as the shutter opens; nothing: as it is
+  std::optional<cumulet_camera_desc> camera_close = {};  // as it closes
   cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
   cumulet_display_desc display{};
@@ -130,11 +145,10 @@ void for_each_group(Scene& scene, Visit&& visit) {
 
 /// As the library takes it; the file must outlive it.
 [[nodiscard]] cumulet_volume_file_desc volume_file(const VolumeFile& file);
-/// Where the first volume stands, in that viewer.
-[[nodiscard]] inline cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
-  const double* first = scene.places.empty() ? nullptr : scene.places.front().data();
-  return cumulet_set_volume_places(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
-}
+/// Where the first volume stands, in that viewer, and how it moves.
+[[nodiscard]] cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene);
+/// The scene's camera, and how it moves.
+[[nodiscard]] cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene);
 
 /// Whether there is anything to be seen.
 [[nodiscard]] inline bool is_empty(const SceneOptions& scene) {

@@ -244,8 +244,10 @@ void Programs::keep(const ProgramKey& key, const Program& program) {
 }
 
 std::vector<ProgramKey> all_programs() {
-  // They would be half of all.
-  const auto rare = [](const ShaderMacro& macro) { return macro.name == "CM_GROUPS" || macro.name == "CM_HOLDOUT"; };
+  // They would be half of all and more.
+  const auto rare = [](const ShaderMacro& macro) {
+    return macro.name == "CM_GROUPS" || macro.name == "CM_HOLDOUT" || macro.name == "CM_MOTION";
+  };
   std::vector<ProgramKey> all;
   for (const Shader& shader : shaders()) {
     if (shader.name.ends_with(".vert")) continue;

@@ -152,8 +152,8 @@ class Programs {
 
 using ProgramsPtr = std::shared_ptr<Programs>;
 
-/// Every variant in the table but those that few pictures need: groups of lights, holdouts. Of macros with a range of
-/// numbers the first.
+/// Every variant in the table but those that few pictures need: groups of lights, holdouts, motion blur. Of macros with
+/// a range of numbers the first.
 std::vector<ProgramKey> all_programs();
 
 /// Finds out Functions::dispatches_in_call, by a small dispatch. Needs a StateGuard around. Throws on a GL error.

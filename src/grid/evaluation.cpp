@@ -109,7 +109,13 @@ Evaluations::Evaluations(const Statistics& statistics, const Channels& channels,
     all_.emplace_back(field, weights, transmittance_.get(), used);
   };
   const Weights of_density = Weights::of_density(statistics.mean_optical_depth(), used);
-  add(statistics, of_density);
+  if (channels.ends) {
+    // What is between two fields deviates no more than one of them.
+    add(channels.ends->open.statistics(), of_density);
+    add(channels.ends->close.statistics(), of_density);
+  } else {
+    add(statistics, of_density);
+  }
   for (std::size_t i = 0; i < 3; ++i) {
     if (channels.emission)
       add(channels.emission->component(i),

@@ -80,6 +80,19 @@ class MomentumField {
   float fastest_;
 };
 
+/// Density as the shutter opens, and as it closes.
+struct DensityEnds {
+  DensityEnds(volume::ScalarVolume at_open, volume::ScalarVolume at_close, const Cube& cube,
+              Progress* progress = nullptr)
+      : open(std::move(at_open), cube, progress), close(std::move(at_close), cube, progress) {}
+
+  ScalarField open;
+  ScalarField close;
+
+  /// Main memory.
+  [[nodiscard]] std::uint64_t bytes() const { return open.bytes() + close.bytes(); }
+};
+
 /// What cells carry beside density; null: nothing.
 struct Channels {
   /// Light that the volume gives off by itself: radiance a world unit of length, linear Rec. 709. It needs no density.
@@ -90,11 +103,13 @@ struct Channels {
   std::shared_ptr<const ScalarField> forward;
   /// Light knows nothing of it: no cell is split for it.
   std::shared_ptr<const MomentumField> momentum;
+  /// Of which the density that goes with these is the mean: cells are split for both in its place.
+  std::shared_ptr<const DensityEnds> ends = nullptr;
 
   /// Main memory.
   [[nodiscard]] std::uint64_t bytes() const {
     return (emission ? emission->bytes() : 0) + (scattering ? scattering->bytes() : 0) +
-           (forward ? forward->bytes() : 0) + (momentum ? momentum->bytes() : 0);
+           (forward ? forward->bytes() : 0) + (momentum ? momentum->bytes() : 0) + (ends ? ends->bytes() : 0);
   }
 };
 

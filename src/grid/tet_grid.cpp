@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "base/error.hpp"
 #include "base/luminance.hpp"
@@ -23,6 +24,7 @@ namespace {
 using glm::dvec3;
 using glm::ivec3;
 using glm::vec3;
+using glm::vec4;
 
 vec3 v0_of(const std::array<std::uint16_t, 3>& v) { return {v[0], v[1], v[2]}; }
 
@@ -300,6 +302,55 @@ class GridBuilder::LeafMoments {
   const BrickTree* tree_ = nullptr;
 };
 
+// The density of leaves: its mean and gradient, in units of the grid's; and, of what changes while the shutter is open,
+// half of how they do.
+class GridBuilder::LeafDensity {
+ public:
+  LeafDensity(const Statistics& density, const Channels& channels, CellKind cells, float unit)
+      : linear_(cells == CellKind::linear), to_relative_(1.0 / unit) {
+    if (channels.ends) {
+      fields_.emplace_back(channels.ends->open.statistics());
+      fields_.emplace_back(channels.ends->close.statistics());
+    } else {
+      fields_.emplace_back(density);
+    }
+  }
+  struct Of {
+    vec4 fit{0.0F};
+    vec4 change{0.0F};
+    double mass = 0.0;
+    bool any = false;
+  };
+  Of operator()(const Node& node, const vec3& centroid) {
+    Of of = one(fields_[0], node, centroid);
+    if (fields_.size() < 2) return of;
+    const Of close = one(fields_[1], node, centroid);
+    of.change = 0.5F * (close.fit - of.fit);
+    of.fit = 0.5F * (of.fit + close.fit);
+    of.mass = 0.5 * (of.mass + close.mass);
+    of.any = of.any || close.any;
+    return of;
+  }
+
+ private:
+  Of one(LeafMoments& moments, const Node& node, const vec3& centroid) const {
+    const Moments m = moments(node, centroid);
+    const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
+    vec3 gradient(0.0F);
+    if (linear_ && m.min < m.max) {
+      gradient = fit_linear(core::cm_shape_class(node.shape), frame_covariance(m, node.shape, centroid),
+                            static_cast<float>(mean))
+                     .gradient *
+                 static_cast<float>(to_relative_);
+    }
+    return {vec4(static_cast<float>(mean * to_relative_), gradient), vec4(0.0F), m.mass, m.max > 0.0F};
+  }
+
+  std::vector<LeafMoments> fields_;  // the one, or both ends
+  bool linear_;
+  double to_relative_;
+};
+
 // What leaves give off: the sum of three components, each fitted.
 class GridBuilder::LeafEmission {
  public:
@@ -438,7 +489,9 @@ glm::uvec2 pack_velocity(const dvec3& momentum, double mass, float fastest) {
   return {glm::packHalf2x16({mean.x, mean.y}), glm::packHalf2x16({mean.z, 0.0F})};
 }
 
-CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& gradient, bool emits) const {
+glm::uvec2 pack_fit(const vec4& fit) { return {glm::packHalf2x16({fit.x, fit.y}), glm::packHalf2x16({fit.z, fit.w})}; }
+
+CellRecord GridBuilder::record(std::uint32_t index, const vec4& fit, bool emits) const {
   const Node& node = nodes_[index];
   CellRecord record{};
   for (unsigned face = 0; face < 4; ++face) {
@@ -447,8 +500,9 @@ CellRecord GridBuilder::record(std::uint32_t index, float mean, const vec3& grad
   }
   record.data.x = node.v0[0] | (std::uint32_t{node.v0[1]} << 16U);
   record.data.y = node.v0[2] | (std::uint32_t{node.shape} << 16U) | (emits ? CM_RECORD_EMITS : 0U);
-  record.data.z = glm::packHalf2x16({mean, gradient.x});
-  record.data.w = glm::packHalf2x16({gradient.y, gradient.z});
+  const glm::uvec2 packed = pack_fit(fit);
+  record.data.z = packed.x;
+  record.data.w = packed.y;
   return record;
 }
 
@@ -465,6 +519,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   if (channels.scattering) places.resize(grid.colour, count);
   if (channels.forward) places.resize(grid.anisotropy, count);
   if (channels.momentum) places.resize(grid.velocity, count);
+  if (channels.ends) places.resize(grid.change, count);
   number_nodes(grid, places);
 
   struct Box {
@@ -472,10 +527,9 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     vec3 high{-3.0e38F};
   };
   tbb::combinable<Box> boxes;
-  const double to_relative = 1.0 / grid.density_unit;
   ProgressPart part(progress, 0.1, 1.0, count);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
-    LeafMoments moments(*statistics_);
+    LeafDensity density(*statistics_, channels, cells, grid.density_unit);
     const auto beside = std::make_unique<LeafChannels>(*statistics_, channels, cells);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
@@ -485,23 +539,17 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
       const std::uint32_t cell_class = core::cm_shape_class(shape);
       const float unit = core::cm_shape_unit(shape);
       const vec3 centroid = v0 + core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape);
-      const Moments m = moments(node, centroid);
-      const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
-      vec3 gradient(0.0F);
-      if (cells == CellKind::linear && m.min < m.max) {
-        const vec3 in_frame = frame_covariance(m, shape, centroid);
-        gradient =
-            fit_linear(cell_class, in_frame, static_cast<float>(mean)).gradient * static_cast<float>(to_relative);
-      }
-      const bool emits = beside->put(node, centroid, m.mass, grid, rank);
-      if (m.max > 0.0F || emits) {
+      const LeafDensity::Of of = density(node, centroid);
+      const bool emits = beside->put(node, centroid, of.mass, grid, rank);
+      if (of.any || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);
           box.low = glm::min(box.low, vertex);
           box.high = glm::max(box.high, vertex);
         }
       }
-      grid.cells[rank] = record(leaf_nodes_[rank], static_cast<float>(mean * to_relative), gradient, emits);
+      grid.cells[rank] = record(leaf_nodes_[rank], of.fit, emits);
+      if (channels.ends) grid.change[rank] = pack_fit(of.change);
     }
     part.add(range.size());
   });

@@ -34,6 +34,9 @@ std::int16_t pack_anisotropy(double forward, double scattering);
 /// momentum: as MomentumField has it, of what has this mass of density. 0 where that is none.
 glm::uvec2 pack_velocity(const glm::dvec3& momentum, double mass, float fastest);
 
+/// A density's mean and gradient as the shaders read them: glsl/cell.glsl has the layout.
+glm::uvec2 pack_fit(const glm::vec4& fit);
+
 /// Where in the leaves and in the tree a root cell's part begins.
 struct RootEntry {
   std::uint32_t first_leaf = 0;
@@ -67,13 +70,16 @@ struct TetGrid {
   std::vector<std::int16_t> anisotropy;
   /// One a cell, pack_velocity(); empty where nothing moves.
   std::vector<glm::uvec2> velocity;
+  /// One a cell, as the second half of a record's data: half of how that changes while the shutter is open, from the
+  /// middle of which the record's is. Empty where nothing does.
+  std::vector<glm::uvec2> change;
   glm::vec3 content_min{0.0F};  ///< cube-space box that holds every cell with density or emission
   glm::vec3 content_max{0.0F};
   bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const {
     return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + colour.size() * 4 +
-           anisotropy.size() * 2 + velocity.size() * 8 + tree.size() * 4 + 200;
+           anisotropy.size() * 2 + velocity.size() * 8 + change.size() * 8 + tree.size() * 4 + 200;
   }
 };
 
@@ -112,12 +118,13 @@ class GridBuilder {
   // The roots and the tree of point location.
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
+  class LeafDensity;
   class LeafEmission;
   class LeafScattering;
   class LeafVelocity;
   class LeafChannels;
-  // mean and gradient: in units of the grid's density_unit.
-  [[nodiscard]] CellRecord record(std::uint32_t index, float mean, const glm::vec3& gradient, bool emits) const;
+  // fit: mean and gradient, in units of the grid's density_unit.
+  [[nodiscard]] CellRecord record(std::uint32_t index, const glm::vec4& fit, bool emits) const;
 
   const Statistics* statistics_;
   const DiamondSet* diamonds_;

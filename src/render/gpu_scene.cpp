@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <iterator>
 #include <span>
 #include <utility>
@@ -33,8 +35,55 @@ core::CmMedium medium_of(const scene::Medium& medium, const scene::MarchSource& 
   m.emits = source.emits() ? 1U : 0U;
   m.coloured = source.coloured() ? 1U : 0U;
   m.anisotropic = source.anisotropic() && medium.phase.may_vary() ? 1U : 0U;
+  m.changes = source.changes() ? 1U : 0U;
   return m;
 }
+
+core::CmView view_of(const scene::Viewpoint& view, const glm::vec3& eye, glm::uvec2 size) {
+  core::CmView v{};
+  v.eye = eye;
+  v.orthographic = view.orthographic ? 1U : 0U;
+  v.forward = glm::vec3(view.forward);
+  v.right = glm::vec3(view.right);
+  v.up = glm::vec3(view.up);
+  if (view.lens_radius > 0.0) {
+    v.inverse_focus = static_cast<float>(1.0 / view.focus);
+    v.lens_right = static_cast<float>(view.lens_radius / glm::length(view.right));
+    v.lens_up = static_cast<float>(view.lens_radius / glm::length(view.up));
+  }
+  v.size = size;
+  return v;
+}
+
+// Its axes, unit and upright to each other; the third is towards it, or, of a mirrored one, away.
+glm::dmat3 axes_of(const scene::Viewpoint& view) {
+  const glm::dvec3 right = glm::normalize(view.right);
+  const glm::dvec3 up = glm::normalize(view.up - right * glm::dot(right, view.up));
+  return {right, up, glm::cross(right, up)};
+}
+
+// eye_of: in the space that rays are in.
+core::CmShutter shutter_of(const scene::ViewEnds& ends, const std::function<glm::vec3(const glm::dvec3&)>& eye_of,
+                           glm::uvec2 size) {
+  core::CmShutter shutter{};
+  const glm::dmat3 turn = axes_of(ends.close) * glm::transpose(axes_of(ends.open));
+  glm::dquat q = glm::quat_cast(turn);
+  if (q.w < 0.0) q = -q;  // the short way round
+  const glm::dvec3 along(q.x, q.y, q.z);
+  const double sine = glm::length(along);
+  shutter.axis = sine > 0.0 ? glm::vec3(along / sine) : glm::vec3(0.0F, 0.0F, 1.0F);
+  shutter.angle = static_cast<float>(2.0 * std::atan2(sine, q.w));
+  scene::Viewpoint close = ends.close;
+  const glm::dmat3 back = sine > 0.0 ? glm::transpose(turn) : glm::dmat3(1.0);
+  close.forward = back * close.forward;
+  close.right = back * close.right;
+  close.up = back * close.up;
+  shutter.open = view_of(ends.open, eye_of(ends.open.eye), size);
+  shutter.close = view_of(close, eye_of(close.eye), size);
+  return shutter;
+}
+
+bool moves(const scene::Volume& volume) { return volume.place.ends || volume.source->changes(); }
 
 bool is_hole(const scene::Volume& volume) { return (*volume.medium).holdout; }
 
@@ -58,7 +107,7 @@ void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Dea
   update_models(snapshot, wanted, deadline);
   if (!sources.empty()) update_data(sources, snapshot.volumes, wanted, deadline);
   find_present(snapshot);
-  update_instances(wanted);
+  update_instances(snapshot, wanted);
   update_lamps(snapshot, wanted);
 }
 
@@ -79,9 +128,15 @@ void GpuScene::find_present(const scene::Snapshot& snapshot) {
   if (present_.empty()) present_ = data_of_;
 }
 
-void GpuScene::update_instances(const Wanted& wanted) {
-  // What is a hole is known of those of a table alone.
-  if (present_.size() < 2 && std::ranges::none_of(present_, is_hole)) {
+bool GpuScene::anything_moves(const scene::Snapshot& snapshot) const {
+  return snapshot.view_ends->has_value() || std::ranges::any_of(present_, moves) ||
+         (placed_ && !placed_->table().ends.empty());
+}
+
+void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& wanted) {
+  // Where anything moves, a single one is a table, too: fewer programs. And what is a hole is known of those alone.
+  if (present_.empty() ||
+      (present_.size() < 2 && std::ranges::none_of(present_, is_hole) && !anything_moves(snapshot))) {
     if (instances_) {
       data_revision_.advance();
       instances_revision_.advance();
@@ -94,7 +149,8 @@ void GpuScene::update_instances(const Wanted& wanted) {
   std::vector<scene::Instance> instances;
   for (const scene::Volume& volume : present_) {
     const core::CmGrid& grid = *data_->grid(*volume.source);
-    instances.push_back({volume.source, volume.place.to_world, grid, medium_of(*volume.medium, *volume.source)});
+    instances.push_back({volume.source, volume.place.to_world, grid, medium_of(*volume.medium, *volume.source), false,
+                         volume.place.ends});
   }
   const bool of_other_data = instances_ && instances_.of().data != data_revision_;
   const auto same = [](const scene::Volume& a, const scene::Volume& b) { return a.id == b.id && a.source == b.source; };
@@ -490,20 +546,11 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
                                        const core::CmIntegrator& integrator, glm::uvec2 size) const {
   const scene::Viewpoint& view = **snapshot.view;
   PictureParameters p;
-  p.view.orthographic = view.orthographic ? 1U : 0U;
-  p.view.forward = glm::vec3(view.forward);
-  p.view.right = glm::vec3(view.right);
-  p.view.up = glm::vec3(view.up);
-  if (view.lens_radius > 0.0) {
-    p.view.inverse_focus = static_cast<float>(1.0 / view.focus);
-    p.view.lens_right = static_cast<float>(view.lens_radius / glm::length(view.right));
-    p.view.lens_up = static_cast<float>(view.lens_radius / glm::length(view.up));
-  }
-  p.view.size = size;
+  std::function<glm::vec3(const glm::dvec3&)> eye_of;
   light::MediumLight own;
   if (instances_) {
     p.space = instances_->space();
-    p.view.eye = glm::vec3(view.eye - instances_->origin());
+    eye_of = [origin = instances_->origin()](const glm::dvec3& eye) { return glm::vec3(eye - origin); };
     own.power = instances_->glow_power();
     own.length = instances_->glow_length();
     p.medium = instances_->medium();
@@ -515,11 +562,19 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
     const glm::dmat4& place = volume.place.to_world;
     const glm::dmat4 to_world = place * source.cube.to_world;
     p.space = scene::space_of(to_world, p.grid.box_min, p.grid.box_max);
-    p.view.eye = glm::vec3(glm::inverse(to_world) * glm::dvec4(view.eye, 1.0));
+    eye_of = [to_cube = glm::inverse(to_world)](const glm::dvec3& eye) {
+      return glm::vec3(to_cube * glm::dvec4(eye, 1.0));
+    };
     const scene::PlacedGlow glow = scene::glow_of(source.glow, source.cube.to_world, place);
     p.glow = glow.looks;
     own.power = glow.power;
     own.length = glow.length;
+  }
+  p.view = view_of(view, eye_of(view.eye), size);
+  const std::optional<scene::ViewEnds>& ends = *snapshot.view_ends;
+  if (instances_ && anything_moves(snapshot)) {
+    p.shutter = shutter_of(ends ? *ends : scene::ViewEnds{view, view}, eye_of, size);
+    p.shutter.lasts = 1U;
   }
   own.radius = lit()[0].radius;
   own.aimed = integrator.light_among_surfaces != 0U && (p.medium.emits != 0U || p.medium.source != glm::vec3(0.0F));

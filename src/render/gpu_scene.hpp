@@ -104,7 +104,9 @@ class GpuScene {
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.
   void find_present(const scene::Snapshot& snapshot);
-  void update_instances(const Wanted& wanted);
+  // While the shutter is open.
+  [[nodiscard]] bool anything_moves(const scene::Snapshot& snapshot) const;
+  void update_instances(const scene::Snapshot& snapshot, const Wanted& wanted);
   [[nodiscard]] light::Lit ball_of(const scene::Volume& volume) const;
   // The mean over rays through the ball of all volumes that are here: of each, by how much of that it takes.
   [[nodiscard]] double optical_depth() const;
@@ -171,7 +173,7 @@ class GpuScene {
     Revision<MarchData> data;
     bool operator==(const InstancesOf&) const = default;
   };
-  Slot<InstanceData, InstancesOf> instances_;  // where there are several volumes
+  Slot<InstanceData, InstancesOf> instances_;  // where there are several volumes, or anything moves
   Revision<InstanceData> instances_revision_;
   struct LampsOf {
     scene::Part<light::Lamps> host;

@@ -12,7 +12,8 @@ namespace cumulet::render {
 
 InstanceData InstanceData::make(const gl::FunctionsPtr& gl, const gl::Limits& limits,
                                 std::span<const scene::Instance> instances, const glm::dvec3& origin) {
-  const scene::InstanceTable table = scene::make_instances(instances, origin);
+  scene::InstanceTable table = scene::make_instances(instances, origin);
+  table.records.insert(table.records.end(), table.ends.begin(), table.ends.end());
   const std::size_t record_bytes = table.records.size() * sizeof(core::CmInstance);
   const std::size_t node_bytes = table.nodes.size() * sizeof(core::CmInstanceNode);
   if (static_cast<std::int64_t>(std::max(record_bytes, node_bytes)) > limits.storage_block_bytes) {
@@ -34,6 +35,7 @@ InstanceData InstanceData::make(const gl::FunctionsPtr& gl, const gl::Limits& li
     data.medium_.emits |= instance.medium.emits;
     data.medium_.coloured |= instance.medium.coloured;
     data.medium_.anisotropic |= instance.medium.anisotropic;
+    data.medium_.changes |= instance.medium.changes;
   }
   data.glow_power_ = table.glow_power;
   data.glow_length_ = table.glow_length;

@@ -106,13 +106,15 @@ struct ChannelBytes {
     if (!source.grid) return;
     emission = source.grid->emission.size() * sizeof(grid::EmissionRecord);
     velocity = source.grid->velocity.size() * sizeof(glm::uvec2);
+    change = source.grid->change.size() * sizeof(glm::uvec2);
     colour = source.grid->colour.size() * sizeof(std::uint32_t);
     anisotropy = source.grid->anisotropy.size() * sizeof(std::int16_t);
   }
-  std::size_t emission = 0, glow = 0, velocity = 0, colour = 0, anisotropy = 0;
+  std::size_t emission = 0, glow = 0, velocity = 0, change = 0, colour = 0, anisotropy = 0;
   [[nodiscard]] std::size_t glow_at() const { return emission; }
   [[nodiscard]] std::size_t velocity_at() const { return glow_at() + glow; }
-  [[nodiscard]] std::size_t colour_at() const { return velocity_at() + velocity; }
+  [[nodiscard]] std::size_t change_at() const { return velocity_at() + velocity; }
+  [[nodiscard]] std::size_t colour_at() const { return change_at() + change; }
   [[nodiscard]] std::size_t anisotropy_at() const { return colour_at() + colour; }
   // Whole texels.
   [[nodiscard]] std::size_t all() const { return (anisotropy_at() + anisotropy + 15) / 16 * 16; }
@@ -297,6 +299,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       part.grid.first_emission = static_cast<std::uint32_t>(first / 16);
       part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.glow_at()) / 16);
       part.grid.first_velocity = static_cast<std::uint32_t>((first + channels.velocity_at()) / 4);
+      part.grid.first_change = static_cast<std::uint32_t>((first + channels.change_at()) / 4);
       part.grid.first_colour = static_cast<std::uint32_t>((first + channels.colour_at()) / 4);
       part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.anisotropy_at()) / 4);
       part.grid.glowing = static_cast<std::uint32_t>(part.source->glow.cells.size());
@@ -322,6 +325,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     upload_.add_bytes(place_at(0), grid.emission.data(), channels.emission);
     upload_.add_bytes(place_at(channels.glow_at()), part.source->glow.cells.data(), channels.glow);
     upload_.add_bytes(place_at(channels.velocity_at()), grid.velocity.data(), channels.velocity);
+    upload_.add_bytes(place_at(channels.change_at()), grid.change.data(), channels.change);
     upload_.add_bytes(place_at(channels.colour_at()), grid.colour.data(), channels.colour);
     upload_.add_bytes(place_at(channels.anisotropy_at()), grid.anisotropy.data(), channels.anisotropy);
   }
@@ -397,6 +401,21 @@ void MarchUpload::plan_channel_voxels() {
                  for_slab(*source_, forward->statistics(), first, last, [&](std::size_t at, float value) {
                    slab[at] = static_cast<std::uint16_t>(grid::pack_anisotropy(value, scattering[at]));
                  });
+               });
+  }
+  if (const grid::DensityEnds* ends = source_->channels.ends.get(); ends != nullptr && source_->march == March::dense) {
+    require_3d(limits_, source_->box_size, "density that changes");
+    plan_slabs(data_.changes_, {GL_R16F, GL_RED, GL_HALF_FLOAT, 1}, "creating how voxels change",
+               [this, ends](std::span<std::uint16_t> slab, int first, int last) {
+                 std::vector<float> changes(slab.size());
+                 const float half = 0.5F * source_->density_a_value();
+                 const auto add = [&](const grid::ScalarField& end, float weight) {
+                   for_slab(*source_, end.statistics(), first, last,
+                            [&](std::size_t at, float value) { changes[at] += weight * value; });
+                 };
+                 add(ends->open, -half);
+                 add(ends->close, half);
+                 std::ranges::transform(changes, slab.begin(), [](float value) { return glm::packHalf1x16(value); });
                });
   }
   const bool shows_motion = holds_motion(limits_, source_->box_size);
@@ -475,6 +494,19 @@ void MarchUpload::plan_brick() {
         return Upload::Place{data_.brick_values_.name(), 0};
       },
       source_->brick_values.data(), bytes);
+  if (const std::size_t changes = source_->brick_changes.size() * 2; changes > 0) {
+    data_.bytes_ += changes;
+    upload_.add([this, changes] {
+      const char* what = "creating the buffer of how bricks change";
+      data_.brick_changes_ = gl::make_buffer(gl_, changes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+      data_.changes_ = gl::make_texture_buffer(gl_, GL_R16F, data_.brick_changes_, what);
+    });
+    upload_.add_bytes(
+        [this] {
+          return Upload::Place{data_.brick_changes_.name(), 0};
+        },
+        source_->brick_changes.data(), changes);
+  }
   data_.bytes_ += source_->brick_slots.size() * 4;
   upload_.add([this, bricks] {
     data_.textures_[1] = gl::make_texture_3d(gl_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
@@ -484,7 +516,7 @@ void MarchUpload::plan_brick() {
   });
 }
 
-std::vector<std::string> MarchData::defines(bool several) const {
+std::vector<std::string> MarchData::defines(bool several, bool motion) const {
   // One, two or as many as there can be: fewer programs.
   std::size_t pages = std::max<std::size_t>(cells_.size(), 1);
   if (pages > 2 || (several && march_ == March::tet)) pages = max_pages;
@@ -492,6 +524,7 @@ std::vector<std::string> MarchData::defines(bool several) const {
                                    std::string("CM_LINEAR ") + (linear_ ? "1" : "0"),
                                    "CM_PAGES " + std::to_string(pages)};
   if (several) defines.emplace_back("CM_INSTANCES 1");
+  if (motion) defines.emplace_back("CM_MOTION 1");
   return defines;
 }
 
@@ -506,6 +539,7 @@ void MarchData::bind(const gl::Functions& gl) const {
   if (scattering_voxels_) gl.BindTextureUnit(core::CM_UNIT_SCATTERING_VOXELS, scattering_voxels_.name());
   if (anisotropy_voxels_) gl.BindTextureUnit(core::CM_UNIT_ANISOTROPY_VOXELS, anisotropy_voxels_.name());
   if (velocity_voxels_) gl.BindTextureUnit(core::CM_UNIT_VELOCITY_VOXELS, velocity_voxels_.name());
+  if (changes_) gl.BindTextureUnit(core::CM_UNIT_CHANGE_VOXELS, changes_.name());
   if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, emission_voxels_.name());
   if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
   if (trees_) gl.BindTextureUnit(core::CM_UNIT_TREE, trees_.texture());

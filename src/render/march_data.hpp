@@ -25,8 +25,9 @@ class MarchData {
  public:
   [[nodiscard]] March march() const { return march_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  /// The macros that select this march in a shader, of one volume or of several (InstanceData).
-  [[nodiscard]] std::vector<std::string> defines(bool several) const;
+  /// The macros that select this march in a shader, of one volume or of several (InstanceData). motion: of what moves
+  /// while the shutter is open.
+  [[nodiscard]] std::vector<std::string> defines(bool several, bool motion = false) const;
   void bind(const gl::Functions& gl) const;
   /// How many grids there are.
   [[nodiscard]] std::size_t size() const { return parts_.size(); }
@@ -68,6 +69,7 @@ class MarchData {
   bool linear_ = false;
   std::vector<Part> parts_;
   gl::Object brick_values_;
+  gl::Object brick_changes_;
   std::vector<gl::WordHeap::Span> cells_;  // a page's records each
   std::uint32_t page_shift_ = 0;
   std::array<gl::Object, 2> textures_;  // voxels, or values of bricks; slots of bricks
@@ -77,6 +79,7 @@ class MarchData {
   gl::Object scattering_voxels_;
   gl::Object anisotropy_voxels_;
   gl::Object velocity_voxels_;
+  gl::Object changes_;  // of voxels, or of bricks
   gl::WordHeap::Span trees_;
   std::uint64_t bytes_ = 0;
 };

@@ -136,14 +136,16 @@ PlacedModels PlacedModels::make(const gl::FunctionsPtr& gl, const gl::Limits& li
   placed.table_ =
       scene::make_model_table(models, [&](const scene::ModelSource& source) { return data->words_of(source); });
   const scene::ModelTable& table = placed.table_;
-  const std::size_t record_bytes = table.records.size() * sizeof(core::CmModel);
+  std::vector<core::CmModel> records = table.records;
+  records.insert(records.end(), table.ends.begin(), table.ends.end());
+  const std::size_t record_bytes = records.size() * sizeof(core::CmModel);
   const std::size_t node_bytes = table.nodes.size() * sizeof(core::CmInstanceNode);
   if (static_cast<std::int64_t>(std::max(record_bytes, node_bytes)) > limits.storage_block_bytes) {
     throw Error(ErrorCode::unsupported, std::to_string(table.records.size()) +
                                             " models are more than this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE, " +
                                             std::to_string(limits.storage_block_bytes) + ", holds");
   }
-  placed.records_ = gl::make_buffer(gl, record_bytes, table.records.data(), 0, "creating the table of models");
+  placed.records_ = gl::make_buffer(gl, record_bytes, records.data(), 0, "creating the table of models");
   placed.nodes_ = gl::make_buffer(gl, node_bytes, table.nodes.data(), 0, "creating the tree of models");
   placed.tables_.low = glm::prevFloat(glm::vec3(table.low));
   placed.tables_.high = glm::nextFloat(glm::vec3(table.high));

@@ -15,6 +15,7 @@ struct PictureParameters {
   core::CmEnvironment environment{};
   core::CmGround ground{};
   core::CmIntegrator integrator{};
+  core::CmShutter shutter{};
   bool equiangular = false;  // lamps are looked for from points that flights have passed, too
   bool operator==(const PictureParameters&) const = default;
 };

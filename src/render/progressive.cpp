@@ -50,6 +50,7 @@ bool PictureWish::Content::shows_same(const Content& other) const {
   Content seen = other;
   seen.viewpoint = viewpoint;
   seen.previous = previous;
+  seen.view_ends = view_ends;
   seen.host_depth = host_depth;
   seen.programs = programs;
   seen.size = size;

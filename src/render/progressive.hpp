@@ -23,6 +23,7 @@ struct PictureWish {
   struct Content {
     scene::Part<std::optional<scene::Viewpoint>> viewpoint;
     scene::Part<scene::Previous> previous;
+    scene::Part<std::optional<scene::ViewEnds>> view_ends;
     scene::Part<light::DistantLights> lights;
     scene::Part<light::Surroundings> surroundings;
     scene::Part<light::Lamps> lamps;

@@ -80,6 +80,7 @@ core::CmParameters assemble(const PictureParameters& picture, const Obstacles& o
   parameters.environment = picture.environment;
   parameters.ground = picture.ground;
   parameters.integrator = picture.integrator;
+  parameters.shutter = picture.shutter;
   describe(obstacles, parameters);
   return parameters;
 }
@@ -256,7 +257,8 @@ void Tracer::add_medium(const Picture& picture, std::vector<std::string>& define
 }
 
 void Tracer::add_march(const Picture& picture, std::vector<std::string>& defines) {
-  if (picture.volume_holdout_) defines.emplace_back(holdout_macro);
+  // There are few variants of what moves: they know of holes.
+  if (picture.volume_holdout_ || picture.motion_) defines.emplace_back(holdout_macro);
   add_groups(picture, defines);
 }
 
@@ -271,7 +273,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
     if (picture.environment_) more.emplace_back(environment_macro);
     if (picture.equiangular_) more.emplace_back(equiangular_macro);
     add_march(picture, more);
-    return program(data.defines(picture.several_), "trace_travel.comp", more);
+    return program(data.defines(picture.several_, picture.motion_), "trace_travel.comp", more);
   }
   // With groups of lights there are few variants: they know of layers and lamps that are not there.
   const bool groups = picture.light_groups_ > 0;
@@ -283,7 +285,7 @@ const Tracer::Program& Tracer::trace_program(const Picture& picture, const March
   if (picture.lamps_ || groups) more.emplace_back("CM_LAMPS 1");
   if (picture.equiangular_) more.emplace_back(equiangular_macro);
   add_march(picture, more);
-  return program(data.defines(picture.several_), "trace.comp", more);
+  return program(data.defines(picture.several_, picture.motion_), "trace.comp", more);
 }
 
 StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& data) {
@@ -301,6 +303,9 @@ StagePrograms Tracer::stage_programs(const Picture& picture, const MarchData& da
     meet.emplace_back(rich_macro);
   }
   std::vector<std::string> camera{"CM_SURFACES 1", "CM_DENSE 0"};
+  if (picture.motion_) {
+    for (auto* defines : {&shade, &meet, &camera}) defines->emplace_back("CM_MOTION 1");
+  }
   if (picture.volume_alone_) camera.emplace_back("CM_AOVS 1");
   if (picture.environment_) camera.emplace_back(environment_macro);
   for (std::vector<std::string>* defines : {&shade, &meet, &camera}) add_groups(picture, *defines);
@@ -363,6 +368,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
   picture.several_ = obstacles.instances != nullptr;
   picture.volume_holdout_ = shaded && obstacles.volume_holdout;
   picture.model_holdout_ = shaded && picture.traced_ > 0 && obstacles.model_holdout;
+  picture.motion_ = shaded && parameters.shutter.lasts != 0U;
   picture.layered_ = shaded && obstacles.raster != nullptr ? settings.layered : Layered::no;
   picture.volume_alone_ = shaded && settings.volume_alone;
   picture.light_groups_ = shaded ? settings.light_groups : 0;

@@ -184,6 +184,7 @@ class Picture {
     return box_.first + glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_;
   }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, box_.first + box_.size - tile_corner()); }
+  bool motion_ = false;  // something moves while the shutter is open
   // Samples of each pixel after a pass that ends with so many.
   [[nodiscard]] std::uint32_t pass_after(std::uint32_t samples) const;
   // Whether the pass under way ends with a look at the noise.

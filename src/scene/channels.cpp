@@ -245,10 +245,67 @@ std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const v
       })[0]);
 }
 
-std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame& frame,
-                                                       const volume::Ramp& density_ramp, const Progress* progress,
-                                                       const Log& log) {
-  if (!frame.velocity || frame.density.empty()) return std::nullopt;
+namespace {
+
+// Of each of so many components.
+template <std::size_t count>
+std::optional<std::array<ScalarVolume, count>> means_of(const std::array<const ScalarVolume*, count>& a,
+                                                        const std::array<const ScalarVolume*, count>& b,
+                                                        const char* what, const Progress* progress) {
+  BrickSet set(what);
+  const ScalarVolume* one = nullptr;
+  for (const auto& fields : {a, b}) {
+    for (const ScalarVolume* field : fields) {
+      if (field == nullptr || field->empty()) continue;
+      set.add(*field);
+      one = field;
+    }
+  }
+  if (one == nullptr) return std::nullopt;
+  struct Both {
+    std::array<std::array<Values, 2>, count> ends{};
+  };
+  auto means = fields_of<static_cast<int>(count), Both>(
+      one->index_to_world, set.take(), one->name, progress,
+      [&](const ivec3& origin, Both& here) {
+        for (std::size_t i = 0; i < count; ++i) {
+          for (std::size_t end = 0; end < 2; ++end) {
+            const ScalarVolume* field = end == 0 ? a[i] : b[i];
+            if (field != nullptr) read(*field, origin, here.ends[i][end]);
+          }
+        }
+      },
+      [](const Both& here, std::size_t v) {
+        glm::vec<static_cast<int>(count), float> mean(0.0F);
+        for (std::size_t i = 0; i < count; ++i)
+          mean[static_cast<int>(i)] = 0.5F * (here.ends[i][0][v] + here.ends[i][1][v]);
+        return mean;
+      });
+  if (means[0].empty()) return std::nullopt;
+  return means;
+}
+
+}  // namespace
+
+std::optional<ScalarVolume> mean_of(const ScalarVolume* a, const ScalarVolume* b, const char* what,
+                                    const Progress* progress) {
+  auto means = means_of<1>({a}, {b}, what, progress);
+  return means ? std::optional(std::move((*means)[0])) : std::nullopt;
+}
+
+std::optional<grid::RgbField::Components> mean_of(const std::optional<grid::RgbField::Components>& a,
+                                                  const std::optional<grid::RgbField::Components>& b, const char* what,
+                                                  const Progress* progress) {
+  const auto fields = [](const std::optional<grid::RgbField::Components>& of) {
+    std::array<const ScalarVolume*, 3> all{};
+    for (std::size_t i = 0; of && i < 3; ++i) all[i] = &(*of)[i];
+    return all;
+  };
+  return means_of<3>(fields(a), fields(b), what, progress);
+}
+
+double fastest_of(const volume::VolumeFrame& frame) {
+  if (!frame.velocity) return 0.0;
   const std::array<ScalarVolume, 6>& parts = frame.velocity->parts;
   const glm::dmat3& to_index = frame.velocity->to_index;
   glm::dvec3 most(0.0);  // along each axis of the lattice
@@ -256,7 +313,16 @@ std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame
     const std::size_t first = 2 * static_cast<std::size_t>(axis);
     most += glm::abs(to_index[axis]) * double{std::max(parts[first].max_value, parts[first + 1].max_value)};
   }
-  const double fastest = std::min(std::max({most.x, most.y, most.z}), volume::fastest_velocity);
+  return std::min(std::max({most.x, most.y, most.z}), volume::fastest_velocity);
+}
+
+std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame& frame,
+                                                       const volume::Ramp& density_ramp, const Progress* progress,
+                                                       const Log& log, double fastest) {
+  if (!frame.velocity || frame.density.empty()) return std::nullopt;
+  const std::array<ScalarVolume, 6>& parts = frame.velocity->parts;
+  const glm::dmat3& to_index = frame.velocity->to_index;
+  fastest = std::max(fastest, fastest_of(frame));
   if (!(fastest > 0.0)) return std::nullopt;
   BrickSet set("density");
   try {

@@ -42,11 +42,23 @@ std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFram
 std::optional<volume::ScalarVolume> forward_of(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp = {},
                                                const Progress* progress = nullptr);
 
+/// The mean of two fields of one lattice, voxel by voxel; null: 0 everywhere. Nothing where that is 0. Throws as
+/// emission_of does; what: for its message.
+std::optional<volume::ScalarVolume> mean_of(const volume::ScalarVolume* a, const volume::ScalarVolume* b,
+                                            const char* what, const Progress* progress = nullptr);
+/// Of each component.
+std::optional<grid::RgbField::Components> mean_of(const std::optional<grid::RgbField::Components>& a,
+                                                  const std::optional<grid::RgbField::Components>& b, const char* what,
+                                                  const Progress* progress = nullptr);
+
 /// The ramp of density x velocity, along the axes of the lattice, voxel by voxel: grid::MomentumField says how. Nothing
-/// if the frame has no velocity but 0, or no density; nor, with a warning, where density without any detail is as much
-/// as emission_of throws for.
+/// if the frame has no velocity but 0, or no density; fastest: at least what the values are in units of; nor, with a
+/// warning, where density without any detail is as much as emission_of throws for.
 std::optional<grid::MomentumField::Values> momentum_of(const volume::VolumeFrame& frame,
                                                        const volume::Ramp& density_ramp = {},
-                                                       const Progress* progress = nullptr, const Log& log = {});
+                                                       const Progress* progress = nullptr, const Log& log = {},
+                                                       double fastest = 0.0);
+/// Voxels a second: along an axis of the lattice nothing of the frame is faster; 0: nothing moves.
+double fastest_of(const volume::VolumeFrame& frame);
 
 }  // namespace cumulet::scene

@@ -57,9 +57,11 @@ bool overlaps_another(const InstanceTable& table, const std::vector<Block>& bloc
     const CmInstanceNode& node = table.nodes[i];
     const bool near =
         glm::all(glm::lessThanEqual(node.low, leaf.high)) && glm::all(glm::lessThanEqual(leaf.low, node.high));
-    if (near && node.instance != core::CM_INSTANCE_NONE && node.instance != leaf.instance &&
-        overlap(blocks[node.instance], blocks[leaf.instance]))
-      return true;
+    if (near && node.instance != core::CM_INSTANCE_NONE && node.instance != leaf.instance) {
+      // Of what moves its way's box counts.
+      const std::uint32_t flags = table.records[node.instance].flags | table.records[leaf.instance].flags;
+      if ((flags & core::CM_INSTANCE_MOVES) != 0 || overlap(blocks[node.instance], blocks[leaf.instance])) return true;
+    }
     i = near ? i + 1 : node.skip;
   }
   return false;
@@ -110,6 +112,9 @@ dvec3 origin_of(std::span<const Instance> instances) {
 
 InstanceTable make_instances(std::span<const Instance> instances, const dvec3& origin) {
   InstanceTable table;
+  const std::size_t count = instances.size();
+  const bool moves = std::ranges::any_of(instances, [](const Instance& i) { return i.ends.has_value(); });
+  if (moves) table.ends.resize(2 * count);
   std::vector<Block> blocks;
   std::vector<PlacedGlow> glow;
   std::vector<TreeBox> boxes;
@@ -118,25 +123,37 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
   };
   for (const Instance& instance : instances) {
     const grid::Cube& cube = instance.source->cube;
-    const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * instance.place * cube.to_world;
+    const auto stand = [&](const glm::dmat4& place, CmInstance& record) {
+      const glm::dmat4 to_scene = glm::translate(glm::dmat4(1.0), -origin) * place * cube.to_world;
+      record.space = space_of(to_scene, instance.grid.box_min, instance.grid.box_max);
+      if (!is_sound(record.space))
+        refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
+      return block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max));
+    };
     CmInstance record{};
-    record.space = space_of(to_scene, instance.grid.box_min, instance.grid.box_max);
-    if (!is_sound(record.space))
-      refuse(ErrorCode::invalid_argument, "its place is not finite, or makes it flat or endless");
+    const Block& block = blocks.emplace_back(stand(instance.place, record));
     record.grid = instance.grid;
     record.medium = instance.medium;
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
-                   (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U);
+                   (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U) |
+                   (instance.ends ? core::CM_INSTANCE_MOVES : 0U);
     glow.push_back(glow_of(instance.source->glow, cube.to_world, instance.place));
-    const Block& block =
-        blocks.emplace_back(block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max)));
-    const dvec3 reach = reach_of(block);
-    const dvec3 most = glm::abs(block.middle) + reach;
+    dvec3 low = block.middle - reach_of(block);
+    dvec3 high = block.middle + reach_of(block);
+    if (instance.ends) {
+      // Corners go straight: where they are in between is between where they are at the ends.
+      const std::size_t at = table.records.size();
+      for (const Block& end :
+           {stand(instance.ends->open, table.ends[at]), stand(instance.ends->close, table.ends[count + at])}) {
+        low = glm::min(low, end.middle - reach_of(end));
+        high = glm::max(high, end.middle + reach_of(end));
+      }
+    }
+    const dvec3 most = glm::max(glm::abs(low), glm::abs(high));
     const double size = std::max({most.x, most.y, most.z});
     if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the scene");
     // A ray that its own box takes for inside is here, but for what rounding may be.
-    const dvec3 room = reach + 2e-6 * size;
-    boxes.push_back({vec3(block.middle - room), vec3(block.middle + room), is_solid(instance.grid)});
+    boxes.push_back({vec3(low - 2e-6 * size), vec3(high + 2e-6 * size), is_solid(instance.grid)});
     table.records.push_back(record);
   }
   table.nodes = threaded_tree(boxes);

@@ -3,11 +3,13 @@
 // A scene's instances of volumes, as shaders are told of them: glsl/instance.glsl. No GL.
 
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "base/parameters.hpp"
 #include "scene/march_source.hpp"
+#include "scene/snapshot.hpp"
 #include "scene/threaded_tree.hpp"
 
 namespace cumulet::core {
@@ -23,11 +25,14 @@ struct Instance {
   core::CmGrid grid{};    ///< where the source's data are, and the box that holds them all
   core::CmMedium medium{};
   bool hidden_from_camera = false;
+  std::optional<PlaceEnds> ends = {};  ///< as the place; nothing: it stands still
 };
 
-/// Both arrays go into buffers as they are.
+/// All arrays go into buffers as they are; ends behind the records.
 struct InstanceTable {
-  std::vector<core::CmInstance> records;    ///< in the order of the instances
+  std::vector<core::CmInstance> records;  ///< in the order of the instances
+  /// Where all stand as the shutter opens, then as it closes: spaces alone. Empty where nothing moves.
+  std::vector<core::CmInstance> ends;
   std::vector<core::CmInstanceNode> nodes;  ///< at least one; the first's box holds all there is
   double glow_power = 0.0;                  ///< of all of them, as GlowTable has both
   double glow_length = 0.0;

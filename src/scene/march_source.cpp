@@ -1,5 +1,6 @@
 #include "scene/march_source.hpp"
 
+#include <array>
 #include <glm/gtc/packing.hpp>
 #include <unordered_map>
 #include <utility>
@@ -10,6 +11,34 @@ namespace {
 
 using glm::ivec3;
 
+// Half of how a brick's values change while the shutter is open.
+class BrickChange {
+ public:
+  BrickChange(const grid::DensityEnds* ends, float scale) : ends_(ends), scale_(0.5F * scale) {}
+  // The one at this corner. Whether it does.
+  bool look_up(const ivec3& corner) {
+    if (ends_ == nullptr) return false;
+    const std::array fields{&ends_->open.statistics(), &ends_->close.statistics()};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const grid::Statistics::Node& node = fields[i]->node_at(corner);
+      values_[i] = node.is_uniform() ? nullptr : fields[i]->values(node, rooms_[i]);
+      uniform_[i] = node.uniform;
+    }
+    return values_[0] != nullptr || values_[1] != nullptr || uniform_[0] != uniform_[1];
+  }
+  [[nodiscard]] float operator[](int i) const { return scale_ * (of(1, i) - of(0, i)); }
+
+ private:
+  [[nodiscard]] float of(std::size_t end, int i) const {
+    return values_[end] == nullptr ? uniform_[end] : values_[end][i];
+  }
+  const grid::DensityEnds* ends_;
+  float scale_;
+  std::array<const float*, 2> values_{};
+  std::array<float, 2> uniform_{};
+  std::array<volume::BrickValues::Brick, 2> rooms_{};
+};
+
 void pack_bricks(MarchSource& source) {
   const grid::Statistics& statistics = *source.statistics;
   const ivec3 first = source.box_low >> 3;
@@ -19,16 +48,19 @@ void pack_bricks(MarchSource& source) {
   const float scale = source.density_a_value();
   std::uint32_t count = 0;
   volume::BrickValues::Brick room;
+  BrickChange change(source.channels.ends.get(), scale);
   for (int z = 0; z < source.brick_count.z; ++z) {
     for (int y = 0; y < source.brick_count.y; ++y) {
       for (int x = 0; x < source.brick_count.x; ++x) {
-        const grid::Statistics::Node& node = statistics.node_at((first + ivec3(x, y, z)) * 8);
-        const bool dark = !source.channels.emission || source.channels.emission->is_zero((first + ivec3(x, y, z)) * 8);
+        const ivec3 corner = (first + ivec3(x, y, z)) * 8;
+        const grid::Statistics::Node& node = statistics.node_at(corner);
+        const bool dark = !source.channels.emission || source.channels.emission->is_zero(corner);
+        const bool changes = change.look_up(corner);
         if (node.is_uniform() && node.uniform == 0.0F && dark) {
           source.brick_slots.push_back(empty);
           continue;
         }
-        if (node.is_uniform()) {
+        if (node.is_uniform() && !changes) {
           const auto [found, added] = uniform_slots.emplace(node.uniform, count);
           source.brick_slots.push_back(found->second);
           if (!added) continue;
@@ -39,11 +71,13 @@ void pack_bricks(MarchSource& source) {
         const float* values = node.is_uniform() ? nullptr : statistics.values(node, room);
         for (int i = 0; i < volume::brick_voxels; ++i) {
           source.brick_values.push_back(glm::packHalf1x16((values == nullptr ? node.uniform : values[i]) * scale));
+          if (source.channels.ends) source.brick_changes.push_back(glm::packHalf1x16(changes ? change[i] : 0.0F));
         }
       }
     }
   }
   if (source.brick_values.empty()) source.brick_values.resize(volume::brick_voxels);
+  if (source.channels.ends) source.brick_changes.resize(source.brick_values.size());
 }
 
 }  // namespace

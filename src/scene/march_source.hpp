@@ -39,7 +39,8 @@ struct MarchSource {
   std::shared_ptr<const grid::Statistics> statistics;
   glm::ivec3 box_low{0};  // voxels, cube space
   glm::ivec3 box_size{0};
-  std::vector<std::uint16_t> brick_values;  // half floats, 512 a slot
+  std::vector<std::uint16_t> brick_values;   // half floats, 512 a slot
+  std::vector<std::uint16_t> brick_changes;  // likewise: half of how they do while the shutter is open, if any does
   std::vector<std::uint32_t> brick_slots;
   glm::ivec3 brick_count{0};
   grid::Channels channels;
@@ -52,11 +53,14 @@ struct MarchSource {
   [[nodiscard]] bool coloured() const { return channels.scattering || (grid && !grid->colour.empty()); }
   [[nodiscard]] bool anisotropic() const { return channels.forward || (grid && !grid->anisotropy.empty()); }
   [[nodiscard]] bool moves() const { return channels.momentum || (grid && !grid->velocity.empty()); }
+  /// Whether its density does while the shutter is open.
+  [[nodiscard]] bool changes() const { return channels.ends || (grid && !grid->change.empty()); }
   /// Main memory that it holds, voxels among it that others may hold as well.
   [[nodiscard]] std::uint64_t bytes() const {
     return (grid ? grid->bytes() : 0) + (plan ? plan->lattice->bytes() + plan->levels.size() : 0) +
            glow.cells.size() * sizeof(GlowingCell) + (volume ? volume->bytes() : 0) +
-           (statistics ? statistics->bytes() : 0) + brick_values.size() * 2 + brick_slots.size() * 4 + channels.bytes();
+           (statistics ? statistics->bytes() : 0) + (brick_values.size() + brick_changes.size()) * 2 +
+           brick_slots.size() * 4 + channels.bytes();
   }
   /// From grid values to density 0 to 1.
   [[nodiscard]] float density_a_value() const { return max_value > 0.0F ? 1.0F / max_value : 1.0F; }

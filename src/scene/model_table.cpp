@@ -122,6 +122,9 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
   std::vector<TreeBox> boxes;
   std::vector<double> power;
   std::uint64_t triangles = 0;
+  const bool moves = std::ranges::any_of(models, [](const Model& model) { return model.ends.has_value(); });
+  std::vector<CmModel> opens;
+  std::vector<CmModel> closes;
   dvec3 low(std::numeric_limits<double>::max());
   dvec3 high(-low);
   for (std::size_t m = 0; m < models.size(); ++m) {
@@ -140,7 +143,8 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         const dmat4 to_world = model.to_world * mesh.placings[k];
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
         CmModel record{};
-        record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U);
+        record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U) |
+                       (model.ends ? core::CM_MODEL_MOVES : 0U);
         place(record, to_world);
         // What a file scales to nothing is not there.
         if (!is_sound(record)) continue;
@@ -157,20 +161,34 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         record.emitter_count = mesh.emitter_count;
         record.textures = at.textures;
         record.group = model.group;
+        std::vector<dmat4> places{to_world};
+        if (model.ends) {
+          places.push_back(model.ends->open * mesh.placings[k]);
+          places.push_back(model.ends->close * mesh.placings[k]);
+        }
+        if (moves) {
+          place(opens.emplace_back(), places[model.ends ? 1 : 0]);
+          place(closes.emplace_back(), places[model.ends ? 2 : 0]);
+        }
         const bool solid = own_low.x <= own_high.x;
         TreeBox box{vec3(0.0F), vec3(0.0F), solid};
         if (solid) {
-          const Block block = block_of(to_world, own_low, own_high);
-          const dvec3 reach = reach_of(block);
-          const dvec3 most = glm::abs(block.middle) + reach;
-          const double size = std::max({most.x, most.y, most.z});
+          // Corners go straight: where they are in between is between where they are at the ends.
+          dvec3 least(std::numeric_limits<double>::max());
+          dvec3 most(-least);
+          for (const dmat4& of : places) {
+            const Block block = block_of(of, own_low, own_high);
+            least = glm::min(least, block.middle - reach_of(block));
+            most = glm::max(most, block.middle + reach_of(block));
+          }
+          const dvec3 farthest_of = glm::max(glm::abs(least), glm::abs(most));
+          const double size = std::max({farthest_of.x, farthest_of.y, farthest_of.z});
           if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the world's origin");
           // What rays meet in its own space is here, but for what rounding may be.
-          const dvec3 room = reach + 2e-6 * size;
-          box.low = vec3(block.middle - room);
-          box.high = vec3(block.middle + room);
-          low = glm::min(low, block.middle - reach);
-          high = glm::max(high, block.middle + reach);
+          box.low = vec3(least - 2e-6 * size);
+          box.high = vec3(most + 2e-6 * size);
+          low = glm::min(low, least);
+          high = glm::max(high, most);
         }
         boxes.push_back(box);
         power.push_back(mesh.flux * stretch * stretch);
@@ -191,6 +209,8 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
   table.lights = light::scene_lights(table.lamps, 0.5 * glm::length(table.high - table.low));
   share_looks(table, power);
   table.nodes = threaded_tree(boxes);
+  table.ends = std::move(opens);
+  table.ends.insert(table.ends.end(), closes.begin(), closes.end());
   if (table.records.empty()) table.records.emplace_back();
   return table;
 }

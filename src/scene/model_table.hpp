@@ -36,7 +36,9 @@ struct ModelPart {
 /// Records and nodes go into buffers as they are; of a scene without triangles there is one record, which nothing
 /// meets.
 struct ModelTable {
-  std::vector<core::CmModel> records;         ///< one for each place of each mesh
+  std::vector<core::CmModel> records;  ///< one for each place of each mesh
+  /// Behind them: where all stand as the shutter opens, then as it closes. Empty where nothing moves.
+  std::vector<core::CmModel> ends;
   std::vector<core::CmInstanceNode> nodes;    ///< at least one
   std::vector<ModelPart> parts;               ///< of the records
   std::vector<surface::PunctualLight> lamps;  ///< of all models, where they stand

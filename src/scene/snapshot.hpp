@@ -43,6 +43,13 @@ struct Viewpoint {
   bool operator==(const Viewpoint&) const = default;
 };
 
+/// What a picture is seen through as the shutter opens, and as it closes: both of one projection.
+struct ViewEnds {
+  Viewpoint open;
+  Viewpoint close;
+  bool operator==(const ViewEnds&) const = default;
+};
+
 /// A level plane that scatters evenly, met from above.
 struct Ground {
   double height = 0.0;
@@ -51,9 +58,17 @@ struct Ground {
   bool operator==(const Ground&) const = default;
 };
 
+/// Where something is as the shutter opens, and as it closes: likewise. In between all goes straight.
+struct PlaceEnds {
+  glm::dmat4 open{1.0};
+  glm::dmat4 close{1.0};
+  bool operator==(const PlaceEnds&) const = default;
+};
+
 /// Where something stands.
 struct Place {
-  glm::dmat4 to_world{1.0};  ///< affine, from the world that it was made in
+  glm::dmat4 to_world{1.0};            ///< affine, from the world that it was made in
+  std::optional<PlaceEnds> ends = {};  ///< nothing: it stands still
   bool operator==(const Place&) const = default;
 };
 
@@ -94,6 +109,7 @@ struct Model {
   std::optional<glm::dmat4> previous = {};  ///< where it stood a frame ago; none: there as well
   ModelSourcePtr previous_source = {};      ///< and how it was posed; null: likewise
   bool holdout = false;                     ///< cameras see a hole
+  std::optional<PlaceEnds> ends = {};       ///< nothing: it stands still
   bool operator==(const Model&) const = default;
 };
 
@@ -113,7 +129,8 @@ struct Snapshot {
   Part<light::Surroundings> surroundings;
   Part<light::Lamps> lamps;  ///< the host's; models have their own beside them
   Part<std::optional<Ground>> ground;
-  Part<std::optional<Viewpoint>> view;  ///< none: nothing is to be seen
+  Part<std::optional<Viewpoint>> view;      ///< none: nothing is to be seen
+  Part<std::optional<ViewEnds>> view_ends;  ///< none: it stands still
   Part<Previous> previous;
   /// O(volumes + models).
   bool operator==(const Snapshot&) const = default;

@@ -1,6 +1,7 @@
 #include "scene/space.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace cumulet::scene {
@@ -39,6 +40,33 @@ core::CmSpace space_of(const glm::dmat4& cube_to_world, const vec3& low, const v
 }
 
 double mean_stretch(const glm::dmat4& place) { return std::cbrt(std::abs(glm::determinant(glm::dmat3(place)))); }
+
+bool stays_solid(const glm::dmat4& open, const glm::dmat4& close) {
+  // The determinant is a cubic of the way; columns of the way's matrix in place of the first one's make its terms.
+  const glm::dmat3 from(open);
+  const glm::dmat3 way = glm::dmat3(close) - from;
+  const auto mixed = [](const glm::dmat3& base, const glm::dmat3& other) {
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      glm::dmat3 m = base;
+      m[i] = other[i];
+      sum += glm::determinant(m);
+    }
+    return sum;
+  };
+  const std::array<double, 4> c{glm::determinant(from), mixed(from, way), mixed(way, from), glm::determinant(way)};
+  const auto volume = [&](double t) { return c[0] + t * (c[1] + t * (c[2] + t * c[3])); };
+  // Where it is least or most: at an end, or where its slope is none.
+  std::array<double, 4> at{0.0, 1.0, 0.0, 1.0};
+  const double root = std::sqrt(std::max(0.0, c[2] * c[2] - 3.0 * c[1] * c[3]));
+  const double q = -(c[2] + std::copysign(root, c[2]));
+  if (c[3] != 0.0) at[2] = std::clamp(q / (3.0 * c[3]), 0.0, 1.0);
+  if (q != 0.0) at[3] = std::clamp(c[1] / q, 0.0, 1.0);
+  constexpr double least = 1e-6;  // of the smaller end's
+  const double bound = least * std::min(std::abs(volume(0.0)), std::abs(volume(1.0)));
+  const double side = volume(0.0) < 0.0 ? -1.0 : 1.0;
+  return std::ranges::all_of(at, [&](double t) { return side * volume(t) > bound; });
+}
 
 PlacedGlow glow_of(const GlowTable& table, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
   if (table.cells.empty()) return {};

@@ -15,6 +15,10 @@ core::CmSpace space_of(const glm::dmat4& cube_to_world, const glm::vec3& low, co
 /// How much a length grows by it, on average: the cube root of how much a volume does.
 double mean_stretch(const glm::dmat4& place);
 
+/// Whether what goes straight from one affine place to the other is solid all the way: it is not where it turns halfway
+/// round, or is mirrored.
+bool stays_solid(const glm::dmat4& open, const glm::dmat4& close);
+
 /// A volume's own table, of it as it stands at that place: what it gives off, and how much of a ray that takes.
 struct PlacedGlow {
   double power = 0.0;  ///< as GlowTable has both

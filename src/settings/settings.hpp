@@ -474,7 +474,13 @@ struct Table<cumulet_sampling_desc> {
                 .tip = "The part of the picture that is made: left, top, width, height, as fractions (Ctrl+B, and "
                        "drag). Width or height 0: to the end.",
                 .most = 1.0, .format = "%.3f"}}),
-      Setting(&Desc::light_groups, {.name = "light_groups", .range = {0.0, CUMULET_LIGHT_GROUPS}})};
+      Setting(&Desc::light_groups, {.name = "light_groups", .range = {0.0, CUMULET_LIGHT_GROUPS}}),
+      Setting(&Desc::shutter_seconds, {.name = "shutter_seconds", .range = {0.0, 1e6},
+        .key = "picture.shutter_seconds", .flag = "--shutter", .type = "S",
+        .help = "Motion blur: seconds that the shutter is open, about the frame's moment; 0: none (default)",
+        .row = {.label = "Shutter",
+                .tip = "Motion blur of what moves while it is open: cameras, places, and volumes by their velocity.",
+                .most = 1.0, .format = "%.4g s", .logarithmic = true, .zero = "Still"}})};
 };
 
 template <>

@@ -48,7 +48,18 @@ std::uint64_t bytes_a_cell(const grid::Channels& channels) {
   if (channels.scattering) bytes += sizeof(std::uint32_t);
   if (channels.forward) bytes += sizeof(std::int16_t);
   if (channels.momentum) bytes += sizeof(glm::uvec2);
+  if (channels.ends) bytes += sizeof(glm::uvec2);
   return bytes;
+}
+
+// What it is while the shutter is open; null where nothing moves.
+VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& progress) {
+  try {
+    return volume->while_open(seconds, progress);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::cancelled) throw;
+    throw Error(error.code(), volume->name() + ", while the shutter is open: " + error.what());
+  }
 }
 
 std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held, const Allowance& allowance) {
@@ -58,7 +69,7 @@ std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held,
 }
 
 bool any(const grid::Channels& channels) {
-  return channels.emission || channels.scattering || channels.forward || channels.momentum;
+  return channels.emission || channels.scattering || channels.forward || channels.momentum || channels.ends;
 }
 
 }  // namespace
@@ -73,11 +84,15 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.volume = volume;
   built.settings = settings;
   built.active_voxels = volume->volume().active_voxels;
-  const auto [voxels, statistics] = volume->density(settings.density_ramp, progress, built.seconds.statistics);
   Stopwatch watch;
+  const VolumeAssetPtr moving = open_of(volume, settings.shutter_seconds, progress);
+  const VolumeAsset& shown = moving ? *moving : *volume;
+  const double taken = watch.lap();
+  const auto [voxels, statistics] = shown.density(settings.density_ramp, progress, built.seconds.statistics);
+  watch.lap();
   const grid::Channels channels =
-      volume->channels(settings.density_ramp, settings.emission, settings.anisotropic, progress, log);
-  built.seconds.statistics += watch.lap();
+      shown.channels(settings.density_ramp, settings.emission, settings.anisotropic, progress, log);
+  built.seconds.statistics += taken + watch.lap();
   progress.begin(Progress::Stage::refining);
   if (settings.march != scene::March::tet) {
     scene::MarchSource source = scene::make_voxel_source(settings.march, voxels, statistics, channels);

@@ -46,7 +46,8 @@ struct BuildSettings {
   grid::RefineSettings refine;
   volume::Ramp density_ramp;
   scene::Emission emission;
-  bool anisotropic = true;  ///< an anisotropy of the volume's stands in place of the medium's
+  bool anisotropic = true;       ///< an anisotropy of the volume's stands in place of the medium's
+  double shutter_seconds = 0.0;  ///< of what moves by its velocity
   bool operator==(const BuildSettings&) const = default;
 };
 

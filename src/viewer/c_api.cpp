@@ -317,6 +317,23 @@ cumulet_status cumulet_set_previous_volume_places(cumulet_viewer* viewer, const 
   return guarded(viewer, [&](core::Viewer& v) { v.set_previous_places(places_of(to_world, count)); });
 }
 
+cumulet_status cumulet_set_volume_shutter(cumulet_viewer* viewer, const double* open, const double* close,
+                                          uint32_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    std::vector<cumulet::scene::Place> places = v.places();
+    require(count == places.size(), "the shutter's places are not as many as the volume has");
+    constexpr std::array<double, 16> as_it_is{};
+    const auto at = [&](const double* matrices, size_t i) {
+      return matrices != nullptr ? std::span<const double, 16>(matrices + 16 * i, 16)
+                                 : std::span<const double, 16>(as_it_is);
+    };
+    for (size_t i = 0; i < count; ++i) {
+      places[i].ends = place_ends(at(open, i), at(close, i), places[i].to_world, "place " + std::to_string(i) + ": ");
+    }
+    v.set_places(places);
+  });
+}
+
 cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");

@@ -2,6 +2,7 @@
 
 #include <glm/gtc/type_ptr.hpp>
 #include <memory>
+#include <optional>
 
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
@@ -107,6 +108,16 @@ cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, const double 
   return on(camera, "camera", [&](Camera& c) {
     require(view != nullptr && projection != nullptr, "view or projection is NULL");
     c.set_matrices(glm::make_mat4(view), glm::make_mat4(projection), clip_of(clip));
+  });
+}
+
+cumulet_status cumulet_camera_set_shutter(cumulet_camera* camera, const cumulet_camera_desc* open,
+                                          const cumulet_camera_desc* close) {
+  return on(camera, "camera", [&](Camera& c) {
+    const auto end = [](const cumulet_camera_desc* desc) {
+      return desc != nullptr ? std::optional(pose_of(desc)) : std::nullopt;
+    };
+    c.set_shutter(end(open), end(close));
   });
 }
 

@@ -27,6 +27,7 @@ InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   if (d.live != nullptr) settings.live = d.live->asset;
   settings.to_world = matrix_or_identity(d.to_world);
   require_place(settings.to_world, "cumulet_instance_desc.");
+  settings.ends = place_ends(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_instance_desc.");
   cumulet_medium_desc medium{};
   medium.struct_size = sizeof medium;
   settings.medium = Medium::of(read_settings(d.medium == nullptr ? &medium : d.medium));
@@ -61,7 +62,10 @@ cumulet_status cumulet_instance_set_to_world(cumulet_instance* instance, const d
     require(to_world != nullptr, "to_world is NULL");
     const glm::dmat4 place = matrix_or_identity(std::span<const double, 16>(to_world, 16));
     require_place(place);
-    i.edit([&](InstanceSettings& settings) { settings.to_world = place; });
+    i.edit([&](InstanceSettings& settings) {
+      settings.to_world = place;
+      settings.ends.reset();
+    });
   });
 }
 

@@ -32,6 +32,10 @@ ModelSettings settings_of(const cumulet_model_desc* desc) {
   ModelSettings settings;
   if (d.surfaces != nullptr) settings.surfaces = d.surfaces->asset;
   settings.to_world = place_of(d.to_world, "cumulet_model_desc.");
+  settings.ends = place_ends(d.open_to_world, d.close_to_world, settings.to_world, "cumulet_model_desc.");
+  if (settings.ends &&
+      !(cumulet::scene::can_stand(settings.ends->open) && cumulet::scene::can_stand(settings.ends->close)))
+    refuse("cumulet_model_desc.open_to_world or close_to_world makes things flat or endless");
   settings.choice = {d.time, d.animation, d.double_sided == 1, d.variant};
   settings.hidden = d.hidden == 1;
   settings.shadow_only = d.shadow_only == 1;
@@ -65,7 +69,10 @@ cumulet_status cumulet_model_set_to_world(cumulet_model* model, const double to_
   return on(model, "model", [&](ModelInstance& m) {
     require(to_world != nullptr, "to_world is NULL");
     const glm::dmat4 place = place_of(std::span<const double, 16>(to_world, 16));
-    m.edit([&](ModelSettings& settings) { settings.to_world = place; });
+    m.edit([&](ModelSettings& settings) {
+      settings.to_world = place;
+      settings.ends.reset();
+    });
   });
 }
 

@@ -8,6 +8,7 @@
 #include <glm/glm.hpp>
 #include <limits>
 #include <new>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,6 +18,8 @@
 #include "base/error.hpp"
 #include "base/one_line.hpp"
 #include "cumulet/cumulet.h"
+#include "scene/snapshot.hpp"
+#include "scene/space.hpp"
 #include "viewer/c_fields.hpp"
 
 namespace cumulet::c_abi {
@@ -171,6 +174,23 @@ inline void require_place(const glm::dmat4& m, const std::string& what = "") {
   const auto moderate = [](double x) { return std::abs(x) <= most; };
   if (!all(m, moderate) || !all(glm::inverse(m), moderate))
     refuse(what + "to_world, or its inverse, has numbers above 1e15");
+}
+
+/// Where something is at both ends of the shutter's time; zeros: where it is at the frame's moment. Nothing where both
+/// are there. Throws as require_place, and for what would be flat in between. what: before the cause.
+inline std::optional<scene::PlaceEnds> place_ends(std::span<const double, 16> open, std::span<const double, 16> close,
+                                                  const glm::dmat4& place, const std::string& what = "") {
+  const auto end = [&](std::span<const double, 16> m, const char* which) {
+    if (std::ranges::all_of(m, [](double value) { return value == 0.0; })) return place;
+    const glm::dmat4 matrix = matrix_or_identity(m);
+    require_place(matrix, what + which);
+    return matrix;
+  };
+  const scene::PlaceEnds ends{end(open, "open_"), end(close, "close_")};
+  if (ends.open == place && ends.close == place) return std::nullopt;
+  if (!scene::stays_solid(ends.open, ends.close))
+    refuse(what + "open_to_world and close_to_world make it flat in between");
+  return ends;
 }
 
 /// A host's array of count x each values.

@@ -381,6 +381,36 @@ void Camera::matrices(double aspect, ClipDepth clip, dmat4& view, dmat4& project
   }
 }
 
+void Camera::set_shutter(const std::optional<CameraPose>& open, const std::optional<CameraPose>& close) {
+  const bool orthographic = [&] {
+    const std::scoped_lock lock(mutex_);
+    return matrices_ ? matrices_frame_.orthographic : pose_.orthographic_height > 0.0;
+  }();
+  for (const auto& end : {open, close}) {
+    if (!end) continue;
+    if (end->eye == end->target) refuse("a camera of the shutter looks nowhere: its eye is its target");
+    if ((end->orthographic_height > 0.0) != orthographic)
+      refuse("a camera of the shutter is not of the camera's kind, perspective or orthographic");
+  }
+  const Edit edit(*this);
+  const bool held = shutter_ && shutter_->revision == revision_;
+  if (held ? shutter_->open == open && shutter_->close == close : !open && !close) return;
+  shutter_.reset();
+  ++revision_;
+  if (open || close) shutter_ = Shutter{open, close, revision_};
+}
+
+std::optional<scene::ViewEnds> Camera::ends(double aspect, const scene::Viewpoint& now) const {
+  const std::scoped_lock lock(mutex_);
+  if (!shutter_ || shutter_->revision != revision_ || !(aspect > 0.0)) return std::nullopt;
+  const auto end = [&](const std::optional<CameraPose>& pose) {
+    return pose ? static_cast<scene::Viewpoint>(frame_of(*pose, aspect)) : now;
+  };
+  const scene::ViewEnds ends{end(shutter_->open), end(shutter_->close)};
+  if (ends.open == now && ends.close == now) return std::nullopt;
+  return ends;
+}
+
 void Camera::change(const CameraPose& pose) {
   if (!in_range(pose.eye) || !in_range(pose.target) || pose.eye == pose.target) {
     refuse("the camera would leave the range of its coordinates");

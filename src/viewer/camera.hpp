@@ -56,6 +56,11 @@ class Camera {
   /// The host's own matrices come back as they are, whatever the aspect ratio; but for their clip depth.
   void matrices(double aspect, ClipDepth clip, glm::dmat4& view, glm::dmat4& projection) const;
 
+  /// Where it is as the shutter opens, and as it closes; nothing: where it is. Until it changes.
+  void set_shutter(const std::optional<CameraPose>& open, const std::optional<CameraPose>& close);
+  /// Likewise, of a picture of this aspect ratio; now: what view() told. Nothing where it stands still.
+  [[nodiscard]] std::optional<scene::ViewEnds> ends(double aspect, const scene::Viewpoint& now) const;
+
   /// Turns about the pose's up and stops just short of it. yaw: anticlockwise as seen from above (an eye on +Z moves
   /// towards +X, a look along -Z turns towards -X); pitch: raises the eye, or the look.
   void orbit(double yaw, double pitch);
@@ -117,7 +122,14 @@ class Camera {
   void scale(double factor, bool keep_orthographic_eye);
   void frame(const Subject& subject, double aspect, double margin);
 
+  struct Shutter {
+    std::optional<CameraPose> open;
+    std::optional<CameraPose> close;
+    std::uint64_t revision = 0;  // with which it holds
+  };
+
   mutable std::mutex mutex_;
+  std::optional<Shutter> shutter_;
   CameraPose pose_;                   // with matrices_: the nearest to them
   std::optional<Matrices> matrices_;  // the host's, until an operation
   ViewFrame matrices_frame_;          // theirs

@@ -130,6 +130,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.parameters = parameters(shot, met);
   wish.content.viewpoint = shot.scene->view;
   wish.content.previous = shot.scene->previous;
+  wish.content.view_ends = shot.scene->view_ends;
   wish.content.lights = shot.scene->lights;
   wish.content.surroundings = shot.scene->surroundings;
   wish.content.lamps = shot.scene->lamps;

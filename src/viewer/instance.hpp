@@ -23,6 +23,7 @@ struct InstanceSettings {
   std::shared_ptr<Sequence> sequence = {};  ///< in its place; null: none
   std::shared_ptr<Live> live = {};          ///< likewise
   glm::dmat4 to_world{1.0};
+  std::optional<scene::PlaceEnds> ends = {};  ///< as the shutter opens, and as it closes; nothing: it stands still
   Medium medium = {};
   Ramps ramps = {};
   bool hidden = false;
@@ -35,6 +36,7 @@ struct ModelSettings {
   SurfaceAssetPtr surfaces;  ///< null: nothing
   SurfaceChoice choice;
   glm::dmat4 to_world{1.0};
+  std::optional<scene::PlaceEnds> ends = {};  ///< likewise
   bool hidden = false;
   bool shadow_only = false;
   bool holdout = false;

@@ -336,7 +336,9 @@ void Viewer::tell_wish(Followed& f, FrameShelf& shelf) const {
     f.wish_due = true;
   }
   if (f.wish_due) {
-    shelf.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), f.settings,
+    std::optional<BuildSettings> settings = f.settings;
+    if (settings) settings->shutter_seconds *= f.state.playback.velocity_scale;
+    shelf.wish({f.sequence->files(), scene::upcoming(f.state.playback, f.state.moment, f.state.forward), settings,
                 std::min(f.state.memory_bytes, allowance_->memory_bytes()), FrameShelf::Steps::of(f.state.playback),
                 &shelf == &frames_});
     f.wish_due = false;
@@ -634,6 +636,10 @@ void Viewer::follow_poses() {
   if (std::exchange(poses_due_, false)) poses_.wish(std::move(wishes));
 }
 
+std::optional<scene::PlaceEnds> Viewer::while_open(const std::optional<scene::PlaceEnds>& ends) const {
+  return sampling_.shutter_seconds > 0.0 ? ends : std::nullopt;
+}
+
 std::vector<scene::Model> Viewer::models() const {
   std::vector<scene::Model> models;
   if (model_source_) {
@@ -645,7 +651,8 @@ std::vector<scene::Model> Viewer::models() const {
   for (const ShownModel& shown : shown_models_) {
     if (shown.is_shown())
       models.push_back({shown.id, shown.source, shown.settings.to_world, shown.settings.shadow_only,
-                        shown.settings.group, shown.settings.previous, shown.previous_source, shown.settings.holdout});
+                        shown.settings.group, shown.settings.previous, shown.previous_source, shown.settings.holdout,
+                        while_open(shown.settings.ends)});
   }
   return models;
 }
@@ -819,8 +826,10 @@ BuildSettings Viewer::settings_of(const Shown& shown) const {
 }
 
 void Viewer::reuse_grid(GridShelf::Wish& wish) const {
-  const auto serves = [&](const VolumeAssetPtr& volume, const BuildSettings& made) {
-    return volume == wish.volume && suits(made, wish.settings);
+  const auto serves = [&](const VolumeAssetPtr& volume, BuildSettings made) {
+    if (volume != wish.volume) return false;
+    if (!volume->moves()) made.shutter_seconds = wish.settings.shutter_seconds;
+    return suits(made, wish.settings);
   };
   if (built_.source && serves(built_.volume, built_.settings)) {
     wish.settings = built_.settings;
@@ -1086,6 +1095,7 @@ void Viewer::take_medium() {
   grid_.build.refine.density_scale = density_scale_to_come();
   grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
   grid_.build.anisotropic = medium_.phase.may_vary();
+  grid_.build.shutter_seconds = sampling_.shutter_seconds;
 }
 
 scene::Emission Viewer::field_emission() const { return emission_of(medium_, ramps_); }
@@ -1221,7 +1231,13 @@ void Viewer::set_ground(const GroundSettings& settings) {
 }
 
 void Viewer::set_sampling(const Sampling& sampling) {
+  sync();
   sampling_ = sampling;
+  if (grid_.build.shutter_seconds != sampling.shutter_seconds) {
+    wishes_due_ = true;
+    take_medium();
+    request_build([](const VolumeAsset& volume) { return volume.moves(); });
+  }
   touch();
 }
 
@@ -1418,7 +1434,8 @@ void Viewer::show_volumes() {
   // What surfaces alone are in stands aside.
   if (built_.source && (facts_ || !shows_instances())) {
     const auto frame = followed_ ? followed_->frame : watched_ ? watched_->state : std::nullopt;
-    for (const scene::Place& place : places_) volumes.push_back({0, built_.source, shown_medium_, place, frame});
+    for (const scene::Place& place : places_)
+      volumes.push_back({0, built_.source, shown_medium_, {place.to_world, while_open(place.ends)}, frame});
     for (std::size_t i = 0; i < std::min(volumes.size(), previous_places_.size()); ++i)
       volumes[i].previous = previous_places_[i];
   }
@@ -1427,7 +1444,7 @@ void Viewer::show_volumes() {
       volumes.push_back({shown.id,
                          shown.built->source,
                          shown.medium,
-                         {shown.settings.to_world},
+                         {shown.settings.to_world, while_open(shown.settings.ends)},
                          shown.frame(),
                          shown.settings.previous});
   }
@@ -1465,6 +1482,9 @@ scene::SnapshotPtr Viewer::snapshot() {
   scene_.view.set(view_ ? std::optional<scene::Viewpoint>(*view_) : std::nullopt);
   scene_.previous.set(
       {previous_view_ ? std::optional<scene::Viewpoint>(*previous_view_) : std::nullopt, previous_seconds_});
+  scene_.view_ends.set(view_ && sampling_.shutter_seconds > 0.0
+                           ? camera_->ends(double(frame_size_.x) / frame_size_.y, *view_)
+                           : std::nullopt);
   scene_.ground.set(ground());
   if (!snapshot_ || *snapshot_ != scene_) snapshot_ = std::make_shared<const scene::Snapshot>(scene_);
   return snapshot_;

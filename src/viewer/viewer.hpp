@@ -107,6 +107,7 @@ class Viewer {
   /// Where the volume stands, whichever it is: affine, from its own world, and once in each of these places, which are
   /// one at least. Moves what is there; a grid that suits a volume of that size no longer is built anew.
   void set_places(const std::vector<scene::Place>& places);
+  [[nodiscard]] const std::vector<scene::Place>& places() const { return places_; }
   /// World bounds of a volume there.
   [[nodiscard]] Bounds bounds_of(const VolumeFacts& volume) const;
   /// Shows it beside the volume from now on, as it is at any time. Throws Error(invalid_argument) where it does.
@@ -418,6 +419,8 @@ class Viewer {
   void follow_poses();
   // What it was a frame ago; none: as now.
   [[nodiscard]] static std::optional<PoseShelf::Wish> previous_pose(const ShownModel& shown);
+  // Where the shutter opens.
+  [[nodiscard]] std::optional<scene::PlaceEnds> while_open(const std::optional<scene::PlaceEnds>& ends) const;
   // All that are there, the viewer's own among them.
   [[nodiscard]] std::vector<scene::Model> models() const;
   std::vector<Shown>::iterator find(const Instance& instance);

@@ -8,6 +8,7 @@
 #include "base/apart.hpp"
 #include "grid/cube.hpp"
 #include "viewer/patient_lock.hpp"
+#include "volume/advection.hpp"
 
 namespace cumulet::viewer {
 
@@ -26,17 +27,45 @@ struct Box {
   [[nodiscard]] bool empty() const { return low.x > high.x; }
 };
 
+// With that of another frame; nothing where either has none.
+std::optional<grid::MomentumField::Values> mean_momentum(std::optional<grid::MomentumField::Values> momentum,
+                                                         const volume::VolumeFrame& other, const volume::Ramp& ramp,
+                                                         const Progress& progress, const Log& log) {
+  if (!momentum) return std::nullopt;
+  const auto second = scene::momentum_of(other, ramp, &progress, log, momentum->fastest);
+  if (!second || second->fastest != momentum->fastest) return std::nullopt;
+  auto mean = scene::mean_of(momentum->components, second->components, "velocity", &progress);
+  if (!mean) return std::nullopt;
+  return grid::MomentumField::Values{std::move(*mean), momentum->fastest};
+}
+
 }  // namespace
 
 VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
     : frame_(make_left<const volume::VolumeFrame>(std::move(frame))) {
+  begin(progress);
+}
+
+VolumeAsset::VolumeAsset(volume::VolumeFrame open, volume::VolumeFrame close, const Progress* progress)
+    : frame_(make_left<const volume::VolumeFrame>(std::move(open))),
+      close_(make_left<const volume::VolumeFrame>(std::move(close))) {
+  begin(progress);
+}
+
+VolumeAsset::Frames VolumeAsset::frames() const { return close_ ? Frames{frame_, close_} : Frames{frame_}; }
+
+void VolumeAsset::begin(const Progress* progress) {
   const volume::ScalarVolume& density = frame_->density;
   const auto is_there = [](const auto& field) { return field && !field->empty(); };
   Box shown;
-  shown.add(density);
-  if (frame_->flame) shown.add(*frame_->flame);
+  Box hot;
+  for (const auto& frame : frames()) {
+    shown.add(frame->density);
+    if (frame->flame) shown.add(*frame->flame);
+    if (frame->temperature) hot.add(*frame->temperature);
+  }
   Box all = shown;
-  if (frame_->temperature) all.add(*frame_->temperature);
+  if (!hot.empty()) all = {glm::min(all.low, hot.low), glm::max(all.high, hot.high)};
   if (shown.empty()) shown = all;
   const bool empty = all.empty();
   if (empty) shown = all = {density.bounds_min, density.bounds_max};
@@ -53,12 +82,20 @@ VolumeAsset::VolumeAsset(volume::VolumeFrame frame, const Progress* progress)
 }
 
 std::uint64_t VolumeAsset::bytes() const {
-  std::uint64_t bytes = frame_->density.bytes();
-  for (const volume::ScalarVolume* field : frame_->beside_density()) bytes += field->bytes();
+  std::uint64_t bytes = 0;
+  for (const auto& frame : frames()) {
+    bytes += frame->density.bytes();
+    for (const volume::ScalarVolume* field : frame->beside_density()) bytes += field->bytes();
+  }
+  {
+    const std::scoped_lock exposing(exposing_);
+    if (exposed_) bytes += exposed_->asset->bytes();
+  }
   const std::scoped_lock lock(mutex_);
   if (statistics_) bytes += statistics_->bytes();
   if (ramped_) bytes += ramped_->density.voxels->bytes() + ramped_->density.statistics->bytes();
   if (latticed_) bytes += latticed_->lattice->bytes();
+  if (ramped_ && ramped_->ends) bytes += ramped_->ends->bytes();
   grid::Channels made;
   if (glowing_) made.emission = glowing_->emission;
   if (weighted_) {
@@ -76,27 +113,57 @@ const volume::ScalarVolume& VolumeAsset::main_field() const {
   return frame_->temperature && !frame_->temperature->empty() ? *frame_->temperature : frame_->density;
 }
 
+const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progress& progress) const {
+  if (ramped_ && ramped_->ramp == ramp) return *ramped_;
+  ramped_.reset();
+  std::shared_ptr<const volume::ScalarVolume> voxels;
+  std::shared_ptr<const grid::DensityEnds> ends;
+  const auto curved = [&](const volume::ScalarVolume& density) { return volume::apply(ramp, density, &progress); };
+  if (close_) {
+    volume::ScalarVolume open = curved(frame_->density);
+    volume::ScalarVolume close = curved(close_->density);
+    // Of fire alone there is none.
+    auto mean = scene::mean_of(&open, &close, "density", &progress);
+    voxels = make_left<const volume::ScalarVolume>(mean ? std::move(*mean) : open);
+    if (mean) ends = make_left<const grid::DensityEnds>(std::move(open), std::move(close), cube_, &progress);
+  } else {
+    voxels = make_left<const volume::ScalarVolume>(curved(frame_->density));
+  }
+  auto statistics = make_left<const grid::Statistics>(*voxels, cube_, &progress);
+  ramped_ = Ramped{ramp, {std::move(voxels), std::move(statistics)}, std::move(ends)};
+  return *ramped_;
+}
+
 VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& progress, double& seconds) const {
   using Clock = std::chrono::steady_clock;
   seconds = 0.0;
   progress.begin(Progress::Stage::statistics);
   const auto lock = patient_lock(mutex_, progress);
   const auto start = Clock::now();
-  const auto statistics_of = [&](const volume::ScalarVolume& voxels) {
-    auto made = make_left<const grid::Statistics>(voxels, cube_, &progress);
-    seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    return made;
-  };
-  if (ramp.empty()) {
-    if (!statistics_) statistics_ = statistics_of(frame_->density);
+  const auto since = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  if (ramp.empty() && !close_) {
+    if (!statistics_) {
+      statistics_ = make_left<const grid::Statistics>(frame_->density, cube_, &progress);
+      seconds = since();
+    }
     return {{frame_, &frame_->density}, statistics_};
   }
-  if (!ramped_ || ramped_->ramp != ramp) {
-    ramped_.reset();
-    const auto voxels = make_left<const volume::ScalarVolume>(volume::apply(ramp, frame_->density, &progress));
-    ramped_ = Ramped{ramp, {voxels, statistics_of(*voxels)}};
-  }
-  return ramped_->density;
+  const bool was_there = ramped_ && ramped_->ramp == ramp;
+  const Density density = ramped(ramp, progress).density;
+  if (!was_there) seconds = since();
+  return density;
+}
+
+std::shared_ptr<const VolumeAsset> VolumeAsset::while_open(double seconds, Progress& progress) const {
+  if (seconds == 0.0 || !moves()) return nullptr;
+  progress.begin(Progress::Stage::statistics);
+  const auto lock = patient_lock(exposing_, progress);
+  if (exposed_ && exposed_->seconds == seconds) return exposed_->asset;
+  exposed_.reset();
+  volume::VolumeFrame open = volume::advect(*frame_, -0.5 * seconds, &progress);
+  volume::VolumeFrame close = volume::advect(*frame_, 0.5 * seconds, &progress);
+  exposed_ = Exposed{seconds, std::make_shared<const VolumeAsset>(std::move(open), std::move(close), &progress)};
+  return exposed_->asset;
 }
 
 grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::RefineSettings& refine,
@@ -133,18 +200,38 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   constexpr std::type_identity<grid::ScalarField> numbers;
   constexpr std::type_identity<grid::MomentumField> motion;
   const auto lock = patient_lock(mutex_, progress);
+  const volume::VolumeFrame& open = *frame_;
+  const volume::VolumeFrame* close = close_.get();
   if (!glowing_ || glowing_->settings != given) {
     glowing_.reset();
-    glowing_ = Glowing{given, field(colours, scene::emission_of(*frame_, given, &progress))};
+    auto glow = scene::emission_of(open, given, &progress);
+    if (close != nullptr)
+      glow = scene::mean_of(glow, scene::emission_of(*close, given, &progress), "temperature or flame", &progress);
+    glowing_ = Glowing{given, field(colours, std::move(glow))};
   }
   if (!weighted_ || weighted_->density_ramp != density_ramp) {
     weighted_.reset();
-    weighted_ = Weighted{density_ramp, field(colours, scene::scattering_of(*frame_, density_ramp, &progress)),
-                         field(motion, scene::momentum_of(*frame_, density_ramp, &progress, log)), std::nullopt};
+    auto scattering = scene::scattering_of(open, density_ramp, &progress);
+    auto momentum =
+        scene::momentum_of(open, density_ramp, &progress, log, close != nullptr ? scene::fastest_of(*close) : 0.0);
+    if (close != nullptr) {
+      scattering =
+          scene::mean_of(scattering, scene::scattering_of(*close, density_ramp, &progress), "density", &progress);
+      momentum = mean_momentum(std::move(momentum), *close, density_ramp, progress, log);
+    }
+    weighted_ =
+        Weighted{density_ramp, field(colours, std::move(scattering)), field(motion, std::move(momentum)), std::nullopt};
   }
-  if (anisotropic && !weighted_->forward)
-    weighted_->forward = field(numbers, scene::forward_of(*frame_, density_ramp, &progress));
-  return {glowing_->emission, weighted_->scattering, anisotropic ? *weighted_->forward : nullptr, weighted_->momentum};
+  if (anisotropic && !weighted_->forward) {
+    auto forward = scene::forward_of(open, density_ramp, &progress);
+    if (close != nullptr) {
+      const auto at_close = scene::forward_of(*close, density_ramp, &progress);
+      forward = scene::mean_of(forward ? &*forward : nullptr, at_close ? &*at_close : nullptr, "density", &progress);
+    }
+    weighted_->forward = field(numbers, std::move(forward));
+  }
+  return {glowing_->emission, weighted_->scattering, anisotropic ? *weighted_->forward : nullptr, weighted_->momentum,
+          close_ ? ramped(density_ramp, progress).ends : nullptr};
 }
 
 }  // namespace cumulet::viewer

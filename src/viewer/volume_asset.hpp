@@ -5,6 +5,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/log.hpp"
 #include "base/progress.hpp"
@@ -40,6 +41,8 @@ class VolumeAsset {
  public:
   /// Throws Error(unsupported) for what no control cube holds.
   explicit VolumeAsset(volume::VolumeFrame frame, const Progress* progress = nullptr);
+  /// As it is while the shutter is open, from one frame to the other, of one lattice: its fields are the means of both.
+  VolumeAsset(volume::VolumeFrame open, volume::VolumeFrame close, const Progress* progress = nullptr);
   explicit VolumeAsset(volume::ScalarVolume density, const Progress* progress = nullptr)
       : VolumeAsset(volume::VolumeFrame{.density = std::move(density)}, progress) {}
 
@@ -53,6 +56,12 @@ class VolumeAsset {
   [[nodiscard]] const VolumeFactsPtr& facts() const { return facts_; }
   [[nodiscard]] bool may_emit() const { return facts_->may_emit; }
   [[nodiscard]] bool has_anisotropy() const { return frame_->anisotropy.has_value(); }
+  /// Whether anything of it has a velocity.
+  [[nodiscard]] bool moves() const { return scene::fastest_of(*frame_) > 0.0; }
+  /// What it is from half of these seconds before its moment to half of them after it, by its velocity
+  /// (volume/advection.hpp), backwards where they are negative; null where nothing moves. Kept is the last. Throws
+  /// Error(cancelled), and Error(file).
+  [[nodiscard]] std::shared_ptr<const VolumeAsset> while_open(double seconds, Progress& progress) const;
   [[nodiscard]] bool empty() const { return facts_->empty; }
   [[nodiscard]] Bounds bounds(const glm::dmat4& place = glm::dmat4(1.0)) const { return facts_->bounds(place); }
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return facts_->coarse; }
@@ -77,7 +86,13 @@ class VolumeAsset {
                                         bool anisotropic, Progress& progress, const Log& log = {}) const;
 
  private:
+  void begin(const Progress* progress);
+  using Frames = std::vector<std::shared_ptr<const volume::VolumeFrame>>;
+  // As it is, or as the shutter opens and as it closes.
+  [[nodiscard]] Frames frames() const;
+
   std::shared_ptr<const volume::VolumeFrame> frame_;
+  std::shared_ptr<const volume::VolumeFrame> close_;  // null: there is no shutter
   VolumeFactsPtr facts_;
   grid::Cube cube_;
   mutable std::mutex mutex_;
@@ -85,7 +100,10 @@ class VolumeAsset {
   struct Ramped {
     volume::Ramp ramp;
     Density density;
+    std::shared_ptr<const grid::DensityEnds> ends;  // of a shutter
   };
+  // Of the last ramp; the mutex is held.
+  const Ramped& ramped(const volume::Ramp& ramp, Progress& progress) const;
   mutable std::optional<Ramped> ramped_;
   struct Latticed {
     volume::Ramp ramp;
@@ -93,6 +111,12 @@ class VolumeAsset {
     grid::LatticePtr lattice;
   };
   mutable std::optional<Latticed> latticed_;
+  struct Exposed {
+    double seconds;
+    std::shared_ptr<const VolumeAsset> asset;
+  };
+  mutable std::mutex exposing_;
+  mutable std::optional<Exposed> exposed_;
   struct Glowing {
     scene::Emission settings;
     decltype(grid::Channels::emission) emission;

@@ -2,7 +2,11 @@
 
 The scene's "volumes" are {"file", "grid", "places": [16 numbers, column by column, ...], "medium": {"density_scale",
 "albedo", "anisotropy"}}, its "models" {"file", "to_world"}. They are there before cycles.py goes on, which makes models'
-materials matte (LAMBERT=1). Extinction is density_scale times the grid, albedo the part of it that scatters."""
+materials matte (LAMBERT=1). Extinction is density_scale times the grid, albedo the part of it that scatters.
+
+With "shutter_seconds" there is motion blur: "open" and "close" of a volume, a model and the camera are {"translate": three
+numbers}, how far it is then from where it stands, and of the camera {"eye", "target"}; a volume's "velocity" is a grid of its
+file. A frame is a second."""
 
 import json
 import math
@@ -10,13 +14,56 @@ import os
 import sys
 
 import bpy
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 FILE = sys.argv[sys.argv.index("--") + 1]
 
 
 def matrix(numbers):
     return Matrix([numbers[i::4] for i in range(4)])
+
+
+def origin_of(scene, one, name):
+    """An object in the world's origin, which moves as that volume or model does, and all whose parent it is."""
+    mover = bpy.data.objects.new(name, None)
+    bpy.context.collection.objects.link(mover)
+    for end, at in (("open", -0.5), ("close", 0.5)):
+        if end in one:
+            mover.location = one[end]["translate"]
+            key(mover, ("location",), scene, at)
+    return mover
+
+
+def key(moved, properties, scene, at):
+    """Where it is now it is at that part of the shutter's time from the frame's moment; from there it goes evenly."""
+    for name in properties:
+        moved.keyframe_insert(name, frame=1 + at * scene["shutter_seconds"])
+    for curve in moved.animation_data.action.fcurves:
+        for point in curve.keyframe_points:
+            point.interpolation = "LINEAR"
+        curve.extrapolation = "LINEAR"
+
+
+def open_shutter(description):
+    """As the picture is begun, when there is a camera."""
+    @bpy.app.handlers.persistent
+    def begin(scene, *_):
+        render = scene.render
+        render.fps, render.fps_base = 1, 1
+        render.use_motion_blur, render.motion_blur_shutter = True, description["shutter_seconds"]
+        scene.cycles.motion_blur_position = "CENTER"
+        camera, view = scene.camera, description["camera"]
+        for end, at in (("open", -0.5), ("close", 0.5)):
+            if end in view:
+                eye, target = Vector(view[end]["eye"]), Vector(view[end]["target"])
+                forward = (target - eye).normalized()
+                right = forward.cross(Vector((0, 1, 0))).normalized()
+                camera.rotation_mode = "QUATERNION"
+                camera.location = eye
+                camera.rotation_quaternion = Matrix((right, right.cross(forward), -forward)).transposed().to_quaternion()
+                key(camera, ("location", "rotation_quaternion"), description, at)
+
+    bpy.app.handlers.render_init.append(begin)
 
 
 def medium(name, grid, settings):
@@ -43,12 +90,16 @@ def place_all(*_):
     with open(FILE) as file:
         scene = json.load(file)
     folder = os.path.dirname(os.path.abspath(FILE))
-    origin = bpy.data.objects.new("origin", None)
-    bpy.context.collection.objects.link(origin)
+    moves = scene.get("shutter_seconds", 0) > 0
+    if moves:
+        open_shutter(scene)
     for number, one in enumerate(scene.get("volumes", [])):
+        origin = origin_of(scene, one, f"origin of volume {number}")
         volume = bpy.data.volumes.new(f"volume {number}")
         volume.filepath = os.path.join(folder, one["file"])
         volume.render.space = "WORLD"  # what is stretched is as dense as before
+        if moves:
+            volume.velocity_grid, volume.velocity_unit = one.get("velocity", ""), "SECOND"
         volume.materials.append(medium(f"medium {number}", one["grid"], one["medium"]))
         # Cycles has voxels half a voxel further along each axis than OpenVDB.
         volume.grids.load()
@@ -61,7 +112,8 @@ def place_all(*_):
             instance.parent = origin
             instance.matrix_parent_inverse = matrix(place) @ shift
     bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
-    for one in scene.get("models", []):
+    for number, one in enumerate(scene.get("models", [])):
+        origin = origin_of(scene, one, f"origin of model {number}")
         before = set(bpy.data.objects)
         bpy.ops.import_scene.gltf(filepath=os.path.join(folder, one["file"]))
         new = [o for o in bpy.data.objects if o not in before]
@@ -69,6 +121,7 @@ def place_all(*_):
         turned = matrix(one["to_world"]) @ Matrix.Rotation(-math.pi / 2, 4, "X")
         for root in [o for o in new if o.parent is None]:
             root.matrix_world = turned @ root.matrix_world
+            root.parent = origin
         for other in [o for o in new if o.type in ("LIGHT", "CAMERA")]:
             bpy.data.objects.remove(other)
 

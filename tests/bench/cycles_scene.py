@@ -1,6 +1,7 @@
 """Renders a scene of three volumes that overlap and two models, which stand in them, with cumulet-render and with Blender's
 Cycles: all materials matte, two seeds each, one run. Prints a row of a Markdown table, which README.md here has, and writes
-scene.png (ours, Cycles', eight times the difference) into the folder --out.
+scene.png (ours, Cycles', eight times the difference) into the folder --out. With --moving some of them and the camera move
+while the shutter is open; with --flow there is a Mantaflow file alone, which moves by its velocity.
 
 The peer is cycles.py, with cycles_objects.py before it for what it does not know; it needs Blender 3.4 and numpy."""
 
@@ -25,6 +26,27 @@ def place(translate, degrees=0.0, scale=(1, 1, 1)):
     s, c = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
     x, y, z = scale
     return [c * x, 0, -s * x, 0, 0, y, 0, 0, s * z, 0, c * z, 0, *translate, 1]
+
+
+def aside(x, y, z):
+    """From there to the other side of where it stands while the shutter is open."""
+    return {"open": {"translate": [-x, -y, -z]}, "close": {"translate": [x, y, z]}}
+
+
+def moving(camera, shown, models):
+    """All of these with some motion in them: of the camera, two of three volumes and both models."""
+    def seen(x):
+        return {"eye": [camera["eye"][0] + x, *camera["eye"][1:]], "target": [camera["target"][0] + 0.7 * x, *camera["target"][1:]]}
+
+    return ({**camera, "open": seen(-1.5), "close": seen(1.5)},
+            [{**shown[0], **aside(5, 0, 0)}, shown[1], {**shown[2], **aside(0, 4, 2)}],
+            [{**models[0], **aside(3, 1, 0)}, {**models[1], **aside(0, 3, 0)}])
+
+
+def flow(file):
+    """Upright, and 40 wide."""
+    return [{"file": file, "grid": "density", "velocity": "velocity", "places": [[20, 0, 0, 0, 0, 0, -20, 0, 0, 20, 0, 0, 5, 24, 0, 1]],
+             "medium": {"density_scale": 0.3, "albedo": [0.9, 0.9, 0.9], "anisotropy": 0.3}}]
 
 
 def volumes(cloud, other):
@@ -112,6 +134,10 @@ def main():
     parser.add_argument("--peer-spp", type=int, default=64)
     parser.add_argument("--step", type=float, default=0.5, help="Cycles' volume step rate: it marches by steps of so many voxels")
     parser.add_argument("--threshold", type=float, help="of our grids")
+    motion = parser.add_mutually_exclusive_group()
+    motion.add_argument("--moving", action="store_true", help="there is motion")
+    motion.add_argument("--flow", type=pathlib.Path, help="a file of Mantaflow's in place of all others")
+    parser.add_argument("--shutter", type=float, help="seconds (default: 1 with --moving, 0.01 with --flow)")
     parser.add_argument("--within", type=float, nargs=2, metavar=("MEAN", "BLOCKS"), help="fail where they differ by more, in %%, beyond the noise")
     options = parser.parse_args()
     for missing, what in ((numpy is None, "numpy"), (not shutil.which("blender", path=PEER_PATH), "Blender"),
@@ -121,16 +147,23 @@ def main():
             print(f"skipped: there is no {what}")
             sys.exit(77)
     options.out.mkdir(parents=True, exist_ok=True)
-    models = []
-    for number, (file, middle, size, degrees) in enumerate(zip(options.models, ([-24, 24, 22], [22, 18, 40]), (40, 22), (25, -40))):
-        out = options.out / f"model{number}.glb"
-        models.append({"file": out.name, "to_world": standing(matte(file, out, options), middle, size, degrees)})
-    shown = volumes(str(options.cloud.resolve()), str(options.other.resolve()))
+    camera, models, shutter = CAMERA, [], 0.0
+    if options.flow:
+        shown = flow(str(options.flow.resolve()))
+        shutter = 0.01 if options.shutter is None else options.shutter
+    else:
+        shown = volumes(str(options.cloud.resolve()), str(options.other.resolve()))
+        for number, (file, middle, size, degrees) in enumerate(zip(options.models, ([-24, 24, 22], [22, 18, 40]), (40, 22), (25, -40))):
+            out = options.out / f"model{number}.glb"
+            models.append({"file": out.name, "to_world": standing(matte(file, out, options), middle, size, degrees)})
+    if options.moving:
+        camera, shown, models = moving(camera, shown, models)
+        shutter = 1.0 if options.shutter is None else options.shutter
     none = dict.fromkeys(("temperature_grid", "flame_grid"), "none")
-    ours = {"cumulet_scene": 2, "camera": CAMERA, "environment": {"sun": SUN, "sky": SKY},
-            "volumes": [{**one, "medium": {**one["medium"], **none}} for one in shown],
+    ours = {"cumulet_scene": 2, "camera": camera, "environment": {"sun": SUN, "sky": SKY}, "picture": {"shutter_seconds": shutter},
+            "volumes": [{**{key: one[key] for key in one if key != "velocity"}, "medium": {**one["medium"], **none}} for one in shown],
             "models": [{**one, "double_sided": True} for one in models]}
-    theirs = {"camera": CAMERA, "light": {"sun": SUN, "sky": SKY}, "volumes": shown, "models": models}
+    theirs = {"camera": camera, "light": {"sun": SUN, "sky": SKY}, "volumes": shown, "models": models, "shutter_seconds": shutter}
     our_files, our_seconds, cells = render_ours(options, ours)
     their_files, their_seconds = render_theirs(options, theirs)
     a, b = ([read_pfm(file) for file in files] for files in (our_files, their_files))

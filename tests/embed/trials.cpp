@@ -463,6 +463,7 @@ void Caller::call_all() {
   CALL(cumulet_camera_set, camera, &pose);
   CALL(cumulet_camera_get, camera, &pose);
   CALL(cumulet_camera_set_matrices, camera, m.data(), m.data(), CUMULET_CLIP_NEGATIVE_ONE_TO_ONE);
+  CALL(cumulet_camera_set_shutter, camera, &pose, nullptr);
   CALL(cumulet_camera_get_matrices, camera, 1.0, CUMULET_CLIP_NEGATIVE_ONE_TO_ONE, m.data(), m.data());
   CALL(cumulet_camera_orbit, camera, 0.1, 0.1);
   CALL(cumulet_camera_look, camera, 0.1, 0.1);
@@ -480,6 +481,7 @@ void Caller::call_all() {
     CALL(cumulet_set_volume, v, nullptr);
     CALL(cumulet_set_volume_places, v, nullptr, 0);
     CALL(cumulet_set_previous_volume_places, v, nullptr, 0);
+    CALL(cumulet_set_volume_shutter, v, nullptr, nullptr, 1);
     CALL(cumulet_get_volume, v, &new_volume);
     CALL(cumulet_add_model, v, new_model);
     CALL(cumulet_remove_model, v, new_model);

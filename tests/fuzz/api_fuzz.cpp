@@ -593,7 +593,7 @@ class Program {
     for (double& value : projection) value = bits<double>(number());
     const auto desc = described<cumulet_camera_desc>();
     const auto clip = static_cast<cumulet_clip>(data_.ConsumeIntegralInRange(0, 1));
-    switch (data_.ConsumeIntegralInRange(0, 9)) {
+    switch (data_.ConsumeIntegralInRange(0, 10)) {
       case 0:
         cumulet_camera_orbit(camera.get(), a, b);
         break;
@@ -620,6 +620,9 @@ class Program {
         break;
       case 8:
         cumulet_camera_get_matrices(camera.get(), a, clip, view.data(), projection.data());
+        break;
+      case 9:
+        cumulet_camera_set_shutter(camera.get(), clip == CUMULET_CLIP_ZERO_TO_ONE ? &desc : nullptr, &desc);
         break;
       default:
         cumulet_camera_frame(camera.get(), view.data(), projection.data(), a);

@@ -17,6 +17,7 @@ struct Image {
   std::uint32_t samples = 64;
   std::uint32_t seed = 0;
   render::View view = render::View::shaded;
+  double shutter_seconds = 0.0;
 };
 
 /// A viewer that makes still pictures in memory, waiting for each step: for tests and benchmarks.
@@ -43,7 +44,9 @@ class Still {
   void set_camera(const viewer::CameraPose& pose) { viewer_->camera()->set(pose); }
   void set_image(const Image& image) {
     image_ = image;
-    viewer_->set_sampling({image.samples, image.seed, image.view, false});
+    viewer::Sampling sampling{image.samples, image.seed, image.view, false};
+    sampling.shutter_seconds = image.shutter_seconds;
+    viewer_->set_sampling(sampling);
   }
 
   /// Builds and uploads what the settings need. Throws what fails.

@@ -72,6 +72,14 @@ TEST_F(CInstance, IsRefusedInOneLine) {
   medium.density_scale = -1.0;
   refused([](auto& d) { d.to_world[0] = NAN; }, "cumulet_instance_desc.to_world is not finite");
   refused([](auto& d) { d.to_world[0] = d.to_world[15] = 1.0; }, "cumulet_instance_desc.to_world flattens space");
+  refused([](auto& d) { d.close_to_world[0] = NAN; }, "cumulet_instance_desc.close_to_world is not finite");
+  // Halfway round: flat in between.
+  refused(
+      [](auto& d) {
+        d.close_to_world[0] = d.close_to_world[5] = -1.0;
+        d.close_to_world[10] = d.close_to_world[15] = 1.0;
+      },
+      "cumulet_instance_desc.open_to_world and close_to_world make it flat in between");
   refused([](auto& d) { d.hidden = 2; }, "cumulet_instance_desc.hidden is not 0 or 1");
   refused([&](auto& d) { d.medium = &medium; }, "cumulet_medium_desc.density_scale is not from 0 to 1e30");
   const InstanceRef one = make_instance(ball_.get());
@@ -142,6 +150,46 @@ TEST_F(CInstance, MovesWithoutItsGrid) {
   ASSERT_EQ(cumulet_instance_set_to_world(one.get(), there.data()), CUMULET_OK);
   EXPECT_LT(uploads(), of_a_medium + 4096);
   EXPECT_GT(stats.cell_bytes, 100'000U);
+}
+
+TEST_F(CInstance, BlursAsItMovesUntilItStands) {
+  const ViewerPtr shows = make();
+  const InstanceRef one = make_instance(ball_.get());
+  ASSERT_EQ(cumulet_add_instance(shows.get(), one.get()), CUMULET_OK);
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 4;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  ASSERT_EQ(cumulet_set_sampling(shows.get(), &sampling), CUMULET_OK);
+  const Picture sharp = picture(shows.get());
+  sampling.shutter_seconds = 0.04F;
+  ASSERT_EQ(cumulet_set_sampling(shows.get(), &sampling), CUMULET_OK);
+  EXPECT_EQ(difference(picture(shows.get()), sharp), "") << "nothing moves";
+  auto desc = make_desc<cumulet_instance_desc>();
+  desc.volume = ball_.get();
+  std::ranges::copy(at(3.0, 0.0, 0.0), desc.close_to_world);
+  ASSERT_EQ(cumulet_instance_set(one.get(), &desc), CUMULET_OK);
+  EXPECT_NE(picture(shows.get()), sharp);
+  const auto here = at(0.0, 0.0, 0.0);
+  ASSERT_EQ(cumulet_instance_set_to_world(one.get(), here.data()), CUMULET_OK);
+  EXPECT_EQ(difference(picture(shows.get()), sharp), "");
+}
+
+TEST_F(CInstance, AVolumesPlacesMoveTillTheyAreSet) {
+  const ViewerPtr shows = make();
+  ASSERT_EQ(cumulet_set_volume(shows.get(), ball_.get()), CUMULET_OK);
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 4;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  sampling.shutter_seconds = 1.0F;
+  ASSERT_EQ(cumulet_set_sampling(shows.get(), &sampling), CUMULET_OK);
+  const Picture sharp = picture(shows.get());
+  const auto there = at(0.0, 2.0, 0.0);
+  ASSERT_EQ(cumulet_set_volume_shutter(shows.get(), nullptr, there.data(), 1), CUMULET_OK);
+  EXPECT_NE(picture(shows.get()), sharp);
+  EXPECT_EQ(cumulet_set_volume_shutter(shows.get(), nullptr, there.data(), 2), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(cumulet_last_error(shows.get()), "the shutter's places are not as many as the volume has");
+  ASSERT_EQ(cumulet_set_volume_places(shows.get(), nullptr, 0), CUMULET_OK);
+  EXPECT_EQ(difference(picture(shows.get()), sharp), "");
 }
 
 // To the last bit: nothing is left of where it was.

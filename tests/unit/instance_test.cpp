@@ -689,6 +689,7 @@ TEST_P(GlInstances, LieWhereTheDriverHasThem) {
                                    CM_RECORD(grid.glowing),
                                    CM_RECORD(grid.first_velocity),
                                    CM_RECORD(grid.moves),
+                                   CM_RECORD(grid.first_change),
                                    CM_RECORD(glow.density),
                                    CM_RECORD(glow.extent),
                                    CM_RECORD(glow.least_stretch),
@@ -704,6 +705,7 @@ TEST_P(GlInstances, LieWhereTheDriverHasThem) {
                                    CM_RECORD(medium.anisotropic),
                                    CM_RECORD(medium.group),
                                    CM_RECORD(medium.holdout),
+                                   CM_RECORD(medium.changes),
                                    CM_RECORD(flags),
                                    CM_RECORD(alias),
                                    CM_RECORD(alias_other)};

@@ -462,6 +462,59 @@ TEST(SceneFile, AVolumeIsPlacedByItsPartsOrAsAWhole) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(file.to_world[8 + i], expected[4 + i], 1e-12) << i;
 }
 
+TEST(SceneFile, WhatMovesIsKept) {
+  const SceneOptions scene = parse_scene(
+      R"({"cumulet_scene": 2, "picture": {"shutter_seconds": 0.02},
+          "camera": {"eye": [1, 2, 9], "target": [0, 1, 0], "fovy_degrees": 30,
+                     "open": {"eye": [0.5, 2, 9], "target": [0, 1, 0]}, "close": {"fovy_degrees": 33}},
+          "volumes": [{"file": "a.vdb", "open": {"translate": [-1, 0, 0]}},
+                      {"file": "b.vdb", "close": {"to_world": [1,0,0,0, 0,2,0,0, 0,0,1,0, 3,4,5,1]}}],
+          "models": [{"file": "m.glb", "close": {"rotate_degrees": [0, 90, 0]}}]})",
+      "s.json");
+  EXPECT_EQ(scene.sampling.shutter_seconds, 0.02F);
+  ASSERT_TRUE(scene.camera_open && scene.camera_close);
+  EXPECT_EQ(scene.camera_open->eye[0], 0.5);
+  EXPECT_EQ(scene.camera_open->fovy_degrees, 30.0) << "the camera's";
+  EXPECT_EQ(scene.camera_close->eye[0], 1.0);
+  EXPECT_EQ(scene.camera_close->fovy_degrees, 33.0);
+  EXPECT_EQ((*scene.shutter.open)[12], -1.0);
+  EXPECT_FALSE(scene.shutter.close);
+  EXPECT_EQ((*scene.others[0].shutter.close)[5], 2.0);
+  ASSERT_EQ(scene.models.size(), 1U) << "beside the surfaces, which stand still";
+  EXPECT_NEAR((*scene.models[0].shutter.close)[2], -1.0, 1e-15);
+  EXPECT_TRUE(same_scene(scene, parse_scene(scene_text(scene, "s.json"), "s.json")));
+  for (const auto change : std::vector<void (*)(SceneOptions&)>{
+           [](SceneOptions& s) { s.camera_open.reset(); }, [](SceneOptions& s) { s.camera_close->eye[1] = 7.0; },
+           [](SceneOptions& s) { s.shutter.open.reset(); }, [](SceneOptions& s) { s.models[0].shutter = {}; },
+           [](SceneOptions& s) { s.sampling.shutter_seconds = 1.0F; }}) {
+    SceneOptions other = scene;
+    change(other);
+    EXPECT_FALSE(same_scene(scene, other));
+  }
+  const auto told = [](const std::string& keys) {
+    try {
+      static_cast<void>(parse_scene(R"({"cumulet_scene": 2, )" + keys + "}", "s.json"));
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(told(R"("camera": {"open": {"eye": [1, 2, 3], "target": [0, 0, 0]}})"),
+            "s.json: camera.open: is of a camera that has no eye and no target");
+  EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"orthographic_height": 3}})"),
+            "s.json: camera.close.orthographic_height: is of another projection than the camera's");
+  EXPECT_EQ(told(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
+            "s.json: volumes[0].open.turn: there is no such setting");
+  // Of what stands somewhere, from there.
+  double place[16] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1};
+  double open[16];
+  double close[16];
+  set_shutter(scene.shutter, place, open, close);
+  EXPECT_EQ(open[0], 2.0);
+  EXPECT_EQ(open[12], 4.0);
+  EXPECT_EQ(close[15], 0.0) << "where it stands";
+}
+
 TEST(SceneFile, WithoutAWordOnLightItIsDay) {
   const auto lit = [](const std::string& more) {
     const SceneOptions scene = parse_scene(R"({"cumulet_scene": 2)" + more + "}", "s.json");

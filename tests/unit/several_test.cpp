@@ -7,6 +7,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "base/error.hpp"
+#include "support/blocks.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
@@ -51,27 +52,6 @@ std::vector<scene::Place> places_of(const Offsets& offsets) {
   return places;
 }
 
-// Means of blocks of 4 x 4 pixels, of several pictures; and how sure each is.
-struct Blocks {
-  std::vector<dvec3> mean;
-  std::vector<dvec3> variance;  // of the mean
-};
-
-// Apart, of pairs of blocks: none by more than some standard errors, and their sum by few.
-void expect_alike(const Blocks& a, const Blocks& b) {
-  dvec3 apart(0.0);
-  dvec3 spread(0.0);
-  for (std::size_t i = 0; i < a.mean.size(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      const double sigma = std::sqrt(a.variance[i][c] + b.variance[i][c]);
-      EXPECT_NEAR(a.mean[i][c], b.mean[i][c], 7.0 * sigma + 2e-3) << "block " << i << ", component " << c;
-    }
-    apart += a.mean[i] - b.mean[i];
-    spread += a.variance[i] + b.variance[i];
-  }
-  for (int c = 0; c < 3; ++c) EXPECT_LT(std::abs(apart[c]), 4.5 * std::sqrt(spread[c]) + 1e-3) << "component " << c;
-}
-
 class Several : public test::StillTest {
  protected:
   static constexpr std::uint32_t edge = 16;
@@ -92,23 +72,10 @@ class Several : public test::StillTest {
     still_->set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
     viewer().set_places(places_of(places));
   }
-  Blocks blocks(std::uint32_t samples = 64, unsigned pictures = 6) {
-    constexpr std::uint32_t across = edge / 4;
-    Blocks blocks{std::vector<dvec3>(across * across), std::vector<dvec3>(across * across)};
-    std::vector<dvec3> square(across * across);
-    for (unsigned k = 0; k < pictures; ++k) {
-      const test::Picture picture = test::render(*still_, {edge, edge, samples, 100 + k, render::View::shaded});
-      std::vector<dvec3> of_this(across * across);
-      for (std::uint32_t i = 0; i < picture.pixels.size(); ++i)
-        of_this[i / edge / 4 * across + i % edge / 4] += dvec3(picture.pixels[i]) / 16.0;
-      for (std::size_t i = 0; i < of_this.size(); ++i) {
-        blocks.mean[i] += of_this[i] / double(pictures);
-        square[i] += of_this[i] * of_this[i] / double(pictures);
-      }
-    }
-    for (std::size_t i = 0; i < square.size(); ++i)
-      blocks.variance[i] = glm::max(square[i] - blocks.mean[i] * blocks.mean[i], 1e-12) / double(pictures - 1);
-    return blocks;
+  test::Blocks blocks(std::uint32_t samples = 64, unsigned pictures = 6) {
+    return test::blocks_of(pictures, [&](unsigned k) {
+      return test::render(*still_, {edge, edge, samples, 100 + k, render::View::shaded});
+    });
   }
   // Under a sky of 1: pictures are of transmittance.
   void only_absorb(double density_scale) {
@@ -122,9 +89,9 @@ class Several : public test::StillTest {
   void expect_same_as_merged(const Offsets& offsets, bool burns = false) {
     const auto flame = burns ? std::optional(flames()) : std::nullopt;
     show(cloud(), flame, offsets);
-    const Blocks several = blocks();
+    const test::Blocks several = blocks();
     show(merged(cloud(), offsets), burns ? std::optional(merged(*flame, offsets)) : std::nullopt, {ivec3(0)});
-    expect_alike(several, blocks());
+    test::expect_alike(several, blocks());
   }
 
   viewer::Medium medium_;
@@ -200,11 +167,11 @@ TEST_P(Several, TwiceAtHalfTheDensityIsOne) {
                     dvec4(3.0, -2.0, 11.0, 1));
   show(cloud(), std::nullopt, {ivec3(0)});
   viewer().set_places({{place}});
-  const Blocks once = blocks();
+  const test::Blocks once = blocks();
   medium_.density_scale *= 0.5;
   still_->set_medium(medium_);
   viewer().set_places({{place}, {place}});
-  expect_alike(once, blocks());
+  test::expect_alike(once, blocks());
 }
 
 TEST_P(Several, APictureDependsOnNoTime) {
@@ -399,13 +366,13 @@ CUMULET_ON_BACKENDS(Instances);
 TEST_P(Instances, OfOtherVolumesAreThoseOfTheirSum) {
   const ivec3 aside(9, 3, 4);
   show(sum_of(cloud(), ivec3(0), other_cloud(), aside), std::nullopt, {ivec3(0)});
-  const Blocks one = blocks();
+  const test::Blocks one = blocks();
   show(cloud(), std::nullopt, {ivec3(0)});
   const auto other = add(asset_of(other_cloud()), dvec3(aside));
-  expect_alike(blocks(), one);
+  test::expect_alike(blocks(), one);
   still_->set_volume(nullptr);
   const auto first = add(asset_of(cloud()), dvec3(0.0));
-  expect_alike(blocks(), one);
+  test::expect_alike(blocks(), one);
 }
 
 // One has flames, the other none: what either lacks is not read.
@@ -414,12 +381,12 @@ TEST_P(Instances, MayBeFiresOrNot) {
   still_->set_medium(medium_);
   const ivec3 aside(9, 3, 4);
   show(sum_of(cloud(), aside, other_cloud(), ivec3(0)), merged(flames(), {aside}), {ivec3(0)});
-  const Blocks one = blocks();
+  const test::Blocks one = blocks();
   still_->set_volume(asset_of(other_cloud()));
   volume::VolumeFrame fire{.density = cloud()};
   fire.flame = flames();
   const auto burning = add(std::make_shared<const viewer::VolumeAsset>(std::move(fire)), dvec3(aside));
-  expect_alike(blocks(), one);
+  test::expect_alike(blocks(), one);
 }
 
 TEST_P(Instances, HaveMediaOfTheirOwn) {
@@ -463,7 +430,7 @@ TEST_P(Instances, HaveRampsOfTheirOwn) {
 
 TEST_P(Instances, OfAVolumeShareItsGrid) {
   still_->set_volume(asset_of(cloud()));
-  const Blocks in_places = [&] {
+  const test::Blocks in_places = [&] {
     viewer().set_places(places_of(overlapping));
     return blocks();
   }();
@@ -472,7 +439,7 @@ TEST_P(Instances, OfAVolumeShareItsGrid) {
   const viewer::Stats alone = viewer().stats();
   std::vector<std::shared_ptr<viewer::Instance>> held;
   for (std::size_t i = 1; i < overlapping.size(); ++i) held.push_back(add(viewer().volume(), dvec3(overlapping[i])));
-  expect_alike(blocks(), in_places);
+  test::expect_alike(blocks(), in_places);
   EXPECT_EQ(viewer().stats().cells, alone.cells);
   EXPECT_EQ(viewer().stats().cell_bytes, alone.cell_bytes);
   // Once the viewer has another, they keep theirs.

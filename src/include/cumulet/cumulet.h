@@ -846,6 +846,15 @@ CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_vo
  */
 CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, const double* to_world, uint32_t count);
 /*
+ * Where these places are as the shutter opens and as it closes (cumulet_sampling_desc.shutter_seconds), until
+ * cumulet_set_volume_places says where they are again: as many matrices each as there are places, as there. Each point
+ * goes straight from the one to the other. Either may be NULL, and any of its matrices zeros: that is then where it is
+ * at the frame's moment. CUMULET_ERROR_INVALID_ARGUMENT, too, for another count, and for what would be flat in between,
+ * as what turns halfway round.
+ */
+CUMULET_API cumulet_status cumulet_set_volume_shutter(cumulet_viewer* viewer, const double* open, const double* close,
+                                                      uint32_t count);
+/*
  * Shows, in place of a volume, the frame at which the sequence stands, from now on and as it moves; retains it. What
  * was shown before stays until a frame is there. NULL: no sequence, and if there was one, nothing. cumulet_set_volume
  * ends it, too, and so does what cumulet_load_volume and cumulet_load_volume_file read, once it is there: if that fails
@@ -1290,6 +1299,15 @@ typedef struct cumulet_sampling_desc {
    * samples make the same picture with groups and without. It takes 16 bytes a pixel of GL memory a group, and 32 more.
    */
   uint32_t light_groups;
+  /*
+   * Motion blur: how long the shutter is open, half of it before the frame's moment and half after, as Blender's
+   * default has it; 0: all stands still. Each path is of one moment of that time, evenly (Cook, Porter and Carpenter,
+   * "Distributed Ray Tracing", 1984). What moves is what a host says of cameras (cumulet_camera_set_shutter), of places
+   * (cumulet_set_volume_shutter, cumulet_instance_desc, cumulet_model_desc), and by their velocities, in world units a
+   * second, volumes that have some: docs/motion_blur.md. The frame's moment alone have AOVs, picks, views, maps, what
+   * is rasterised (so CUMULET_SURFACE_LIGHT_NONE's surfaces), models' lamps and the host's depth.
+   */
+  float shutter_seconds;
 } cumulet_sampling_desc;
 
 typedef enum cumulet_tone_map {
@@ -1405,6 +1423,9 @@ typedef struct cumulet_instance_desc {
    * others have them built a second time.
    */
   cumulet_live* live;
+  /* Where it is as the shutter opens and as it closes: as in cumulet_set_volume_shutter; zeros: as at to_world. */
+  double open_to_world[16];
+  double close_to_world[16];
 } cumulet_instance_desc;
 
 /* error as in cumulet_create. */
@@ -1414,6 +1435,7 @@ CUMULET_API cumulet_instance* cumulet_instance_retain(cumulet_instance* instance
 CUMULET_API void cumulet_instance_release(cumulet_instance* instance);             /* NULL is allowed */
 /* All of it but its ramps. CUMULET_ERROR_INVALID_ARGUMENT, and it stays as it was, for what is refused on creation. */
 CUMULET_API cumulet_status cumulet_instance_set(cumulet_instance* instance, const cumulet_instance_desc* desc);
+/* Where it stands still: what was said of a shutter ends. */
 CUMULET_API cumulet_status cumulet_instance_set_to_world(cumulet_instance* instance, const double to_world[16]);
 /* cumulet_set_ramp, of the instance alone. */
 CUMULET_API cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ramp ramp, const float* points,
@@ -1461,6 +1483,10 @@ typedef struct cumulet_model_desc {
   uint32_t group;      /* of lights, that its emissive triangles and lamps are in */
   int32_t holdout;     /* 1: what cameras see of it is a hole, as of a medium: cumulet_medium_desc. What is rasterised
                           leaves it out */
+  /* Where it is as the shutter opens and as it closes: as in cumulet_set_volume_shutter; zeros: as at to_world. Its
+   * pose is that of its time throughout. */
+  double open_to_world[16];
+  double close_to_world[16];
 } cumulet_model_desc;
 
 /* error as in cumulet_create. */
@@ -1470,6 +1496,7 @@ CUMULET_API cumulet_model* cumulet_model_retain(cumulet_model* model); /* return
 CUMULET_API void cumulet_model_release(cumulet_model* model);          /* NULL is allowed */
 /* CUMULET_ERROR_INVALID_ARGUMENT, and it stays as it was, for what is refused on creation. */
 CUMULET_API cumulet_status cumulet_model_set(cumulet_model* model, const cumulet_model_desc* desc);
+/* Where it stands still: what was said of a shutter ends. */
 CUMULET_API cumulet_status cumulet_model_set_to_world(cumulet_model* model, const double to_world[16]);
 CUMULET_API cumulet_status cumulet_model_set_time(cumulet_model* model, double time);
 /* Retains it. CUMULET_ERROR_INVALID_ARGUMENT if the viewer shows it already. */
@@ -1607,6 +1634,14 @@ CUMULET_API cumulet_status cumulet_camera_get(const cumulet_camera* camera, cumu
  */
 CUMULET_API cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, const double view[16],
                                                        const double projection[16], cumulet_clip clip);
+/*
+ * Where it is as the shutter opens and as it closes (cumulet_sampling_desc.shutter_seconds), until any other call moves
+ * it. In between the eye goes straight, the axes turn evenly about one axis (a quaternion's slerp), and field of view,
+ * height and lens change evenly. Either may be NULL: that is then where it is at the frame's moment. Both are of the
+ * camera's own kind, perspective or orthographic, and look somewhere; depth planes are the camera's own.
+ */
+CUMULET_API cumulet_status cumulet_camera_set_shutter(cumulet_camera* camera, const cumulet_camera_desc* open,
+                                                      const cumulet_camera_desc* close);
 /* The matrices for a picture of this aspect ratio (width / height), for the host's own drawing and gizmos. */
 CUMULET_API cumulet_status cumulet_camera_get_matrices(const cumulet_camera* camera, double aspect, cumulet_clip clip,
                                                        double view[16], double projection[16]);
@@ -1785,7 +1820,8 @@ typedef enum cumulet_warm_up_scope {
   CUMULET_WARM_UP_ALL = 1    /* these, and all others of the library are compiled (not used: a driver that compiles more
                                 in the first use does so then), but for rare ones: for grids beyond the driver's limit
                                 of a texture buffer, sets of maps that the scene's materials do not have, groups of
-                                lights and holdouts. One that does not build is told once all others are there */
+                                lights, holdouts and motion blur. One that does not build is told once all others are
+                                there */
 } cumulet_warm_up_scope;
 
 typedef struct cumulet_warm_up_result {

@@ -819,6 +819,8 @@ struct InstanceDesc {
   std::uint64_t tag = 0;
   Sequence sequence = {};
   Live live = {};
+  std::array<double, 16> open_to_world{};
+  std::array<double, 16> close_to_world{};
 };
 
 /// A share in a volume of scenes: a copy is one more of the same. Any thread.
@@ -878,8 +880,12 @@ class Instance {
                             .hidden = desc.hidden ? 1 : 0,
                             .tag = desc.tag,
                             .sequence = desc.sequence.handle(),
-                            .live = desc.live.handle()};
+                            .live = desc.live.handle(),
+                            .open_to_world = {},
+                            .close_to_world = {}};
     std::ranges::copy(desc.to_world, c.to_world);
+    std::ranges::copy(desc.open_to_world, c.open_to_world);
+    std::ranges::copy(desc.close_to_world, c.close_to_world);
     return c;
   }
   cumulet_instance* handle_ = nullptr;
@@ -900,6 +906,8 @@ struct ModelDesc {
   std::uint64_t tag = 0;
   std::uint32_t group = 0;
   bool holdout = false;
+  std::array<double, 16> open_to_world{};
+  std::array<double, 16> close_to_world{};
 };
 
 /// A share in surfaces of scenes: a copy is one more of the same. Any thread.
@@ -959,8 +967,12 @@ class Model {
                          .shadow_only = desc.shadow_only ? 1 : 0,
                          .tag = desc.tag,
                          .group = desc.group,
-                         .holdout = desc.holdout ? 1 : 0};
+                         .holdout = desc.holdout ? 1 : 0,
+                         .open_to_world = {},
+                         .close_to_world = {}};
     std::ranges::copy(desc.to_world, c.to_world);
+    std::ranges::copy(desc.open_to_world, c.open_to_world);
+    std::ranges::copy(desc.close_to_world, c.close_to_world);
     return c;
   }
   cumulet_model* handle_ = nullptr;
@@ -998,6 +1010,13 @@ class Camera {
   [[nodiscard]] Result<> set_matrices(const CameraMatrices& matrices, Clip clip) noexcept {
     return detail::result(cumulet_camera_set_matrices(handle(), matrices.view.data(), matrices.projection.data(),
                                                       static_cast<cumulet_clip>(clip)));
+  }
+  /// Null: where it is at the frame's moment.
+  [[nodiscard]] Result<> set_shutter(const CameraDesc* open, const CameraDesc* close) noexcept {
+    const cumulet_camera_desc at_open = open != nullptr ? *open : CameraDesc();
+    const cumulet_camera_desc at_close = close != nullptr ? *close : CameraDesc();
+    return detail::result(cumulet_camera_set_shutter(handle(), open != nullptr ? &at_open : nullptr,
+                                                     close != nullptr ? &at_close : nullptr));
   }
   [[nodiscard]] Result<CameraMatrices> get_matrices(double aspect, Clip clip) const noexcept {
     CameraMatrices matrices;
@@ -1228,6 +1247,14 @@ class Viewer {
   [[nodiscard]] Result<> set_volume_places(std::span<const std::array<double, 16>> to_world) noexcept {
     const double* first = to_world.empty() ? nullptr : to_world.front().data();
     return result(cumulet_set_volume_places(handle(), first, static_cast<uint32_t>(to_world.size())));
+  }
+  /// Of as many places each; empty: as at the frame's moment.
+  [[nodiscard]] Result<> set_volume_shutter(std::span<const std::array<double, 16>> open,
+                                            std::span<const std::array<double, 16>> close) noexcept {
+    const auto first = [](const auto& matrices) { return matrices.empty() ? nullptr : matrices.front().data(); };
+    const std::size_t count = open.empty() ? close.size() : open.size();
+    if (!close.empty() && close.size() != count) return result(CUMULET_ERROR_INVALID_ARGUMENT);
+    return result(cumulet_set_volume_shutter(handle(), first(open), first(close), static_cast<uint32_t>(count)));
   }
   /// An empty sequence: shows none.
   [[nodiscard]] Result<> set_sequence(const Sequence& sequence) noexcept {

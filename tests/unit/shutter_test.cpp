@@ -1,0 +1,323 @@
+// Motion blur: against closed forms, and against means of many pictures of what stands still.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+#include <vector>
+
+#include "base/error.hpp"
+#include "scene/space.hpp"
+#include "support/blocks.hpp"
+#include "support/gl_viewer.hpp"
+#include "support/marches.hpp"
+#include "support/osmesa_leaks.hpp"
+#include "support/surfaces.hpp"
+#include "support/volumes.hpp"
+#include "viewer/instance.hpp"
+
+namespace {
+
+using namespace cumulet;
+using glm::dmat4;
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+using test::Blocks;
+
+dmat4 moved(double x, double y, double z) { return glm::translate(dmat4(1.0), dvec3(x, y, z)); }
+
+// Straight from one to the other, as the library has it.
+dmat4 between(const dmat4& a, const dmat4& b, double t) { return a + (b - a) * t; }
+
+class Shutter : public test::StillTest {
+ protected:
+  static constexpr std::uint32_t edge = 16;
+
+  void SetUp() override {
+    test::StillTest::SetUp();
+    if (IsSkipped()) return;
+    medium_.density_scale = 0.15;
+    medium_.albedo = {0.95F, 0.8F, 0.5F};
+    medium_.phase.anisotropy = 0.4F;
+    still_->set_medium(medium_);
+    still_->set_camera(test::camera_at({40.0, 34.0, 50.0}, {12.0, 10.0, 11.0}, 32.0));
+  }
+  // Under a sky of 1: pictures are of transmittance.
+  void only_absorb(double density_scale) {
+    medium_ = {};
+    medium_.albedo = vec3(0.0F);
+    medium_.density_scale = density_scale;
+    still_->set_medium(medium_);
+    still_->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
+  }
+  void show(volume::ScalarVolume density, std::optional<volume::ScalarVolume> flame = {}) {
+    volume::VolumeFrame frame{.density = std::move(density)};
+    frame.flame = std::move(flame);
+    still_->set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+  }
+  static volume::ScalarVolume cloud() { return test::noise_volume({24, 20, 22}, ivec3(0), 2); }
+  static volume::ScalarVolume flames() {
+    return test::make_volume({12, 10, 12}, {5, 4, 5}, [](const ivec3& p) { return p.x < 8 ? 1.5F : 0.25F; });
+  }
+  // The mean transmittance along the lines near (x, y), and how sure it is of two values at most.
+  double along_z(double x, double y, double shutter = 1.0) {
+    viewer::CameraPose pose = test::camera_at({x, y, 300.0}, {x, y, 0.0});
+    pose.orthographic_height = 1e-3;
+    still_->set_camera(pose);
+    return test::render(*still_, {8, 8, samples, 1, render::View::shaded, shutter}).mean().x;
+  }
+  static constexpr std::uint32_t samples = 256;
+  static double sigma(double transmittance) {
+    return std::sqrt(transmittance * (1.0 - transmittance) / (64.0 * samples));
+  }
+  Blocks blurred() {
+    return test::blocks_of(6, [&](unsigned k) {
+      return test::render(*still_, {edge, edge, 48, 100 + k, render::View::shaded, 1.0});
+    });
+  }
+  // The mean of still pictures over the shutter's time; set(t) makes it stand as it does then.
+  template <class Set>
+  Blocks still_mean(const Set& set) {
+    constexpr unsigned pictures = 6;
+    constexpr unsigned moments = 6;
+    return test::blocks_of(pictures, [&](unsigned k) {
+      test::Picture sum;
+      for (unsigned i = 0; i < moments; ++i) {
+        // Of each interval another moment each time.
+        set((i + (k + 0.5) / pictures) / moments);
+        const test::Picture one = test::render(*still_, {edge, edge, 8, 1000 * k + i, render::View::shaded});
+        sum.width = one.width;
+        sum.pixels.resize(one.pixels.size());
+        for (std::size_t p = 0; p < sum.pixels.size(); ++p)
+          sum.pixels[p] += one.pixels[p] / static_cast<float>(moments);
+      }
+      return sum;
+    });
+  }
+  void expect_as_stills(const dmat4& open, const dmat4& close) {
+    viewer().set_places({{dmat4(1.0), scene::PlaceEnds{open, close}}});
+    const Blocks swept = blurred();
+    test::expect_alike(swept, still_mean([&](double t) { viewer().set_places({{between(open, close, t)}}); }));
+  }
+
+  viewer::Medium medium_;
+};
+// Numbers alone are looked at here, in one driver's.
+INSTANTIATE_TEST_SUITE_P(Gl, Shutter, testing::Values(headless::Backend::egl), test::backend_name);
+
+// A ray is within the box for a part of the time.
+TEST_P(Shutter, ABoxThatPassesCoversForItsPartOfTheTime) {
+  only_absorb(0.1);
+  show(test::make_volume({8, 64, 16}, ivec3(0), [](const ivec3&) { return 1.0F; }));
+  const double clear = std::exp(-0.1 * 16.0);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    still_->set_grid(test::settings_of(kind));
+    // From x in [-0.5, 7.5] by 20 to each side: over x = 3.5 for 8 of 40.
+    viewer().set_places({{dmat4(1.0), scene::PlaceEnds{moved(-20, 0, 0), moved(20, 0, 0)}}});
+    const double covered = 8.0 / 40.0;
+    const double expected = 1.0 - covered * (1.0 - clear);
+    EXPECT_NEAR(along_z(3.5, 31.5), expected, 4.5 * sigma(expected));
+    // Over x = 23 for what is left of the way once it gets there: [-0.5, 7.5] + 40 t - 20 holds it from t = 0.8875 on.
+    const double late = 1.0 - (1.0 - 0.8875) * (1.0 - clear);
+    EXPECT_NEAR(along_z(23.0, 31.5), late, 4.5 * sigma(late));
+    EXPECT_NEAR(along_z(3.5, 31.5, 0.0), clear, 4.5 * sigma(clear)) << "the shutter is closed";
+  }
+}
+
+// Its thickness grows evenly: the mean of e^-(a t + b) is a difference of exponentials.
+TEST_P(Shutter, ABoxThatGrowsIsTheMeanOfItsTransmittances) {
+  only_absorb(0.05);
+  show(test::make_volume({16, 16, 16}, ivec3(0), [](const ivec3&) { return 1.0F; }));
+  const dmat4 thrice = glm::scale(dmat4(1.0), dvec3(1.0, 1.0, 3.0));
+  viewer().set_places({{dmat4(1.0), scene::PlaceEnds{dmat4(1.0), thrice}}});
+  const double thin = 0.05 * 16.0;
+  const double expected = (std::exp(-thin) - std::exp(-3.0 * thin)) / (2.0 * thin);
+  EXPECT_NEAR(along_z(7.5, 7.5), expected, 4.5 * sigma(expected));
+}
+
+// The two bits of a pixel's own time are the path's: of what does not move nothing changes, to the bit.
+TEST_P(Shutter, WithoutAnyPicturesAreAsBefore) {
+  show(cloud(), flames());
+  const test::Image image{edge, edge, 8, 3, render::View::shaded};
+  test::Image open = image;
+  open.shutter_seconds = 0.5;
+  const test::Picture before = test::render(*still_, image);
+  EXPECT_EQ(test::render(*still_, open).pixels, before.pixels) << "nothing moves";
+  viewer().set_places({{dmat4(1.0), scene::PlaceEnds{moved(-1, 0, 0), moved(1, 0, 0)}}});
+  EXPECT_EQ(test::render(*still_, image).pixels, before.pixels) << "it is closed";
+  const test::Picture swept = test::render(*still_, open);
+  EXPECT_NE(swept.pixels, before.pixels);
+  EXPECT_EQ(test::render(*still_, open, 0.5).pixels, swept.pixels) << "in bounded steps";
+  EXPECT_EQ(test::render(*still_, image).pixels, before.pixels) << "closed again";
+}
+
+TEST_P(Shutter, ATurningVolumeIsTheMeanOfStills) {
+  show(cloud());
+  const dmat4 about = moved(12, 10, 11);
+  const auto turned = [&](double degrees, const dvec3& axis) {
+    return about * glm::rotate(dmat4(1.0), glm::radians(degrees), axis) * glm::inverse(about);
+  };
+  expect_as_stills(turned(-30.0, {0, 1, 0}) * moved(-3, 1, 0), turned(50.0, {0.3, 0.9, 0.1}) * moved(2, 0, 4));
+}
+
+TEST_P(Shutter, AFireThatMovesShinesAsStillsDo) {
+  medium_.field_emission.flame_strength = 0.5;
+  still_->set_medium(medium_);
+  show(cloud(), flames());
+  // It grows, too: cells' volumes are others than at the frame's moment.
+  expect_as_stills(moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.7)), moved(4, 3, 0));
+}
+
+TEST_P(Shutter, VoxelsMoveAsCellsDo) {
+  show(cloud());
+  for (const render::March march : {render::March::dense, render::March::brick}) {
+    still_->set_grid(test::settings_of({march, grid::CellKind::constant}));
+    expect_as_stills(moved(-6, 0, 0), moved(6, 2, 0));
+  }
+}
+
+TEST_P(Shutter, AmongOthersThatStand) {
+  show(cloud());
+  const std::vector<dmat4> stand{moved(14, 3, 0), moved(-10, -6, 8)};
+  const auto places = [&](const scene::Place& place) {
+    return std::vector<scene::Place>{{stand[0]}, place, {stand[1]}};
+  };
+  viewer().set_places(places({dmat4(1.0), scene::PlaceEnds{moved(-12, 0, 0), moved(12, 0, 0)}}));
+  const Blocks swept = blurred();
+  test::expect_alike(swept, still_mean([&](double t) { viewer().set_places(places({moved(24 * t - 12, 0, 0)})); }));
+}
+
+// It turns and moves: its axes evenly about one axis, its eye straight.
+TEST_P(Shutter, APanIsTheMeanOfStills) {
+  show(cloud());
+  const dvec3 from(40.0, 22.0, 50.0);
+  const dvec3 to(44.0, 14.0, 46.0);
+  const auto pose_at = [&](double t) {
+    const double yaw = glm::radians(-150.0 + 14.0 * t);  // level, so that +Y is the axis
+    const dvec3 eye = from + (to - from) * t;
+    return test::camera_at(eye, eye + 60.0 * dvec3(std::sin(yaw), 0.0, std::cos(yaw)), 40.0);
+  };
+  still_->set_camera(pose_at(0.5));
+  viewer().camera()->set_shutter(pose_at(0.0), pose_at(1.0));
+  const Blocks swept = blurred();
+  test::expect_alike(swept, still_mean([&](double t) { still_->set_camera(pose_at(t)); }));
+}
+
+// A roll of a right angle about the look: straight between matrices would be halfway a zoom.
+TEST_P(Shutter, ARollKeepsItsFieldOfView) {
+  show(cloud(), flames());
+  medium_.field_emission.flame_strength = 0.2;
+  still_->set_medium(medium_);
+  const auto pose_at = [&](double t) {
+    viewer::CameraPose pose = test::camera_at({11.0, 9.0, 70.0}, {11.0, 9.0, 11.0}, 30.0 + 6.0 * t);
+    const double angle = glm::radians(90.0 * t);
+    pose.up = {std::sin(angle), std::cos(angle), 0.0};
+    return pose;
+  };
+  still_->set_camera(pose_at(0.25));
+  viewer().camera()->set_shutter(pose_at(0.0), pose_at(1.0));
+  const auto tangent = [](double fovy) { return std::tan(0.5 * glm::radians(fovy)); };
+  const Blocks swept = blurred();
+  test::expect_alike(swept, still_mean([&](double t) {
+                       viewer::CameraPose pose = pose_at(t);
+                       // What is even is the picture's height at a distance.
+                       const double height = tangent(30.0) + t * (tangent(36.0) - tangent(30.0));
+                       pose.fovy_degrees = 2.0 * glm::degrees(std::atan(height));
+                       still_->set_camera(pose);
+                     }));
+}
+
+TEST_P(Shutter, ACamerasShutterEndsWithItsNextMove) {
+  show(cloud());
+  const test::Image image{edge, edge, 4, 3, render::View::shaded, 1.0};
+  const viewer::CameraPose pose = test::camera_at({40.0, 34.0, 50.0}, {12.0, 10.0, 11.0}, 32.0);
+  viewer::CameraPose aside = pose;
+  aside.eye.x += 5.0;
+  const test::Picture still = test::render(*still_, image);
+  viewer().camera()->set_shutter(std::nullopt, aside);
+  EXPECT_NE(test::render(*still_, image).pixels, still.pixels);
+  still_->set_camera(aside);
+  still_->set_camera(pose);
+  EXPECT_EQ(test::render(*still_, image).pixels, still.pixels);
+  viewer::CameraPose flat = aside;
+  flat.orthographic_height = 20.0;
+  EXPECT_THROW(viewer().camera()->set_shutter(flat, std::nullopt), Error) << "of another kind";
+  aside.target = aside.eye;
+  EXPECT_THROW(viewer().camera()->set_shutter(aside, std::nullopt), Error) << "looks nowhere";
+}
+
+// A square that shines passes over the middle of the picture, and casts its light on a floor.
+TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
+  auto scene = std::make_shared<test::StillScene>();
+  surface::Material glow = test::diffuse(vec3(0.3F));
+  glow.emission = {3.0F, 2.0F, 1.0F};
+  scene->add_quad({{{6, 14, 4}, {14, 14, 4}, {14, 14, 12}, {6, 14, 12}}}, scene->add(glow));
+  scene->add_sphere({10.0F, 20.0F, 8.0F}, 3.0F, scene->add(test::diffuse(vec3(0.7F, 0.5F, 0.3F))), 8);
+  auto floor = std::make_shared<test::StillScene>();
+  floor->add_quad({{{-30, -2, 40}, {60, -2, 40}, {60, -2, -30}, {-30, -2, -30}}},
+                  floor->add(test::diffuse(vec3(0.6F))));
+  viewer().show_surfaces(test::source_of(floor));
+  medium_.density_scale = 0.02;
+  still_->set_medium(medium_);
+  show(cloud());
+  const dmat4 open = moved(-8, 0, 0);
+  const dmat4 close = moved(8, 2, 0) * glm::rotate(dmat4(1.0), glm::radians(40.0), dvec3(0, 0, 1));
+  viewer::ModelSettings settings;
+  settings.surfaces = std::make_shared<const viewer::SurfaceAsset>(scene, std::string("glow"));
+  settings.ends = scene::PlaceEnds{open, close};
+  const auto model = std::make_shared<viewer::ModelInstance>(settings);
+  viewer().add_model(model);
+  const Blocks swept = blurred();
+  test::expect_alike(swept, still_mean([&](double t) {
+                       model->edit([&](viewer::ModelSettings& of) {
+                         of.ends.reset();
+                         of.to_world = between(open, close, t);
+                       });
+                     }));
+}
+
+// It moves by its own width: where it is at one end alone its depth is linear in time, from nothing to all of it.
+TEST_P(Shutter, ASlabMovesByItsVelocity) {
+  only_absorb(0.1);
+  const ivec3 size(16, 64, 16);
+  volume::VolumeFrame frame{.density = test::make_volume(size, ivec3(0), [](const ivec3&) { return 1.0F; })};
+  volume::Velocity velocity;
+  for (std::size_t part = 0; part < velocity.parts.size(); ++part)
+    velocity.parts[part] = test::make_volume(size, ivec3(0), [=](const ivec3&) { return part == 0 ? 16.0F : 0.0F; });
+  frame.velocity = std::move(velocity);
+  still_->set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+  const double depth = 0.1 * 16.0;
+  const double passing = (1.0 - std::exp(-depth)) / depth;
+  const double held = std::exp(-depth);
+  for (const test::MarchKind& kind : test::march_kinds) {
+    still_->set_grid(test::settings_of(kind));
+    // From [-8.5, 7.5] to [7.5, 23.5] in a second.
+    EXPECT_NEAR(along_z(0.0, 31.5), passing, 4.5 * sigma(passing)) << "it leaves";
+    EXPECT_NEAR(along_z(16.0, 31.5), passing, 4.5 * sigma(passing)) << "it comes";
+    EXPECT_NEAR(along_z(30.0, 31.5), 1.0, 1e-6) << "it never is there";
+    // In half of the time from [-4.5, 11.5] to [3.5, 19.5].
+    EXPECT_NEAR(along_z(8.0, 31.5, 0.5), held, 4.5 * sigma(held)) << "it stays";
+    EXPECT_NEAR(along_z(14.0, 31.5, 0.5), passing, 4.5 * sigma(passing)) << "less far in less time";
+    EXPECT_NEAR(along_z(0.0, 31.5, 0.0), held, 4.5 * sigma(held)) << "the shutter is closed";
+    EXPECT_NEAR(along_z(18.0, 31.5, 0.0), 1.0, 1e-6) << "the shutter is closed";
+  }
+}
+
+TEST(ShutterEnds, WhatIsFlatHalfwayIsKnown) {
+  const auto turned = [](double degrees) {
+    return glm::rotate(dmat4(1.0), glm::radians(degrees), glm::normalize(dvec3(1.0, 2.0, 0.5)));
+  };
+  const dmat4 one(1.0);
+  EXPECT_TRUE(scene::stays_solid(one, one));
+  EXPECT_TRUE(scene::stays_solid(one, turned(170.0)));
+  EXPECT_FALSE(scene::stays_solid(one, turned(180.0)));
+  EXPECT_FALSE(scene::stays_solid(one, glm::scale(one, dvec3(-1.0, 1.0, 1.0)))) << "mirrored";
+  EXPECT_FALSE(scene::stays_solid(one, glm::scale(one, dvec3(-1.0, -1.0, 1.0)))) << "flat in the middle alone";
+  EXPECT_TRUE(scene::stays_solid(glm::scale(one, dvec3(-2.0, 1.0, 1.0)), glm::scale(one, dvec3(-1.0, 3.0, 1.0))));
+  EXPECT_TRUE(scene::stays_solid(glm::scale(one, dvec3(1e-3)), glm::scale(one, dvec3(1e3))));
+}
+
+}  // namespace
