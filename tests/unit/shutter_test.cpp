@@ -262,9 +262,10 @@ TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
                   floor->add(test::diffuse(vec3(0.6F))));
   viewer().show_surfaces(test::source_of(floor));
   medium_.density_scale = 0.02;
-  medium_.field_emission.flame_strength = 2.0;
+  medium_.field_emission.flame_strength = 20.0;
   still_->set_medium(medium_);
-  show(cloud(), flames());
+  // So small that looks are aimed at its cells.
+  show(cloud(), test::make_volume({2, 2, 2}, {11, 3, 10}, [](const ivec3&) { return 1.5F; }));
   const scene::PlaceEnds growth{moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.5)), dmat4(1.0)};
   viewer().set_places({{dmat4(1.0), growth}});
   const dmat4 about = moved(12, 20, 14);
