@@ -468,7 +468,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       "Its anisotropy, in place of --anisotropy (default: by name; none)");
   add(
       app, group, "--velocity-grid", "NAME", [&](const std::string& text) { scene.velocity_grid = text; },
-      "How it moves, for --aovs velocity (default: by name; none)");
+      "How it moves, for --aovs velocity and --shutter (default: by name; none)");
   add_choice(app, group, "--up", up_names, scene.up, "The volume's up axis (default: y; Blender's and Mantaflow's: z)");
   add(
       app, group, "--gltf", "FILE",

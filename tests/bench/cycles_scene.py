@@ -44,9 +44,9 @@ def moving(camera, shown, models):
 
 
 def flow(file):
-    """Upright, and 40 wide."""
-    return [{"file": file, "grid": "density", "velocity": "velocity", "places": [[20, 0, 0, 0, 0, 0, -20, 0, 0, 20, 0, 0, 5, 24, 0, 1]],
-             "medium": {"density_scale": 0.3, "albedo": [0.9, 0.9, 0.9], "anisotropy": 0.3}}]
+    """Upright, 88 wide, dark before the sky."""
+    return [{"file": file, "grid": "density", "velocity": "velocity", "places": [[45, 0, 0, 0, 0, 0, -45, 0, 0, 45, 0, 0, -40, -14, 46, 1]],
+             "medium": {"density_scale": 1, "albedo": [0.5, 0.5, 0.5], "anisotropy": 0.3}}]
 
 
 def volumes(cloud, other):
@@ -125,9 +125,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("render", type=pathlib.Path, help="cumulet-render")
     parser.add_argument("peer", type=pathlib.Path, help="folder of cycles.py, lambert.py and compare.py")
-    parser.add_argument("cloud", type=pathlib.Path, help="cumulet-scene's cumulus.vdb")
-    parser.add_argument("other", type=pathlib.Path, help="cumulet-scene's explosion_0012.vdb")
-    parser.add_argument("models", type=pathlib.Path, nargs=2, help=".gltf or .glb")
+    parser.add_argument("files", type=pathlib.Path, nargs="+",
+                        help="cumulet-scene's cumulus.vdb and explosion_0012.vdb and two models, .gltf or .glb; with --flow one of Mantaflow's")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for scenes and pictures")
     parser.add_argument("--size", default="128x96")
     parser.add_argument("--spp", type=int, default=64, help="samples a pixel and seed")
@@ -136,24 +135,26 @@ def main():
     parser.add_argument("--threshold", type=float, help="of our grids")
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument("--moving", action="store_true", help="there is motion")
-    motion.add_argument("--flow", type=pathlib.Path, help="a file of Mantaflow's in place of all others")
-    parser.add_argument("--shutter", type=float, help="seconds (default: 1 with --moving, 0.01 with --flow)")
+    motion.add_argument("--flow", action="store_true", help="one volume, which moves by its velocity")
+    parser.add_argument("--shutter", type=float, help="seconds (default: 1 with --moving, 0.0005 with --flow)")
     parser.add_argument("--within", type=float, nargs=2, metavar=("MEAN", "BLOCKS"), help="fail where they differ by more, in %%, beyond the noise")
     options = parser.parse_args()
+    if len(options.files) != (1 if options.flow else 4):
+        parser.error("other files are needed")
     for missing, what in ((numpy is None, "numpy"), (not shutil.which("blender", path=PEER_PATH), "Blender"),
                           (not (options.peer / "cycles.py").exists(), f"{options.peer}/cycles.py"),
-                          (not all(model.exists() for model in options.models), "model of that name")):
+                          (not all(file.exists() for file in options.files), "file of that name")):
         if missing:
             print(f"skipped: there is no {what}")
             sys.exit(77)
     options.out.mkdir(parents=True, exist_ok=True)
     camera, models, shutter = CAMERA, [], 0.0
     if options.flow:
-        shown = flow(str(options.flow.resolve()))
-        shutter = 0.01 if options.shutter is None else options.shutter
+        shown = flow(str(options.files[0].resolve()))
+        shutter = 0.0005 if options.shutter is None else options.shutter
     else:
-        shown = volumes(str(options.cloud.resolve()), str(options.other.resolve()))
-        for number, (file, middle, size, degrees) in enumerate(zip(options.models, ([-24, 24, 22], [22, 18, 40]), (40, 22), (25, -40))):
+        shown = volumes(*(str(file.resolve()) for file in options.files[:2]))
+        for number, (file, middle, size, degrees) in enumerate(zip(options.files[2:], ([-24, 24, 22], [22, 18, 40]), (40, 22), (25, -40))):
             out = options.out / f"model{number}.glb"
             models.append({"file": out.name, "to_world": standing(matte(file, out, options), middle, size, degrees)})
     if options.moving:

@@ -249,22 +249,29 @@ TEST_P(Shutter, ACamerasShutterEndsWithItsNextMove) {
   EXPECT_THROW(viewer().camera()->set_shutter(aside, std::nullopt), Error) << "looks nowhere";
 }
 
-// A square that shines passes over the middle of the picture, and casts its light on a floor.
+// A square that shines passes over the middle of the picture, and casts its light on a floor, as a fire does that
+// grows.
 TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
   auto scene = std::make_shared<test::StillScene>();
   surface::Material glow = test::diffuse(vec3(0.3F));
   glow.emission = {3.0F, 2.0F, 1.0F};
   scene->add_quad({{{6, 14, 4}, {14, 14, 4}, {14, 14, 12}, {6, 14, 12}}}, scene->add(glow));
-  scene->add_sphere({10.0F, 20.0F, 8.0F}, 3.0F, scene->add(test::diffuse(vec3(0.7F, 0.5F, 0.3F))), 8);
+  scene->add_sphere({12.0F, 20.0F, 14.0F}, 6.0F, scene->add(test::diffuse(vec3(0.7F, 0.5F, 0.3F))), 8);
   auto floor = std::make_shared<test::StillScene>();
   floor->add_quad({{{-30, -2, 40}, {60, -2, 40}, {60, -2, -30}, {-30, -2, -30}}},
                   floor->add(test::diffuse(vec3(0.6F))));
   viewer().show_surfaces(test::source_of(floor));
   medium_.density_scale = 0.02;
+  medium_.field_emission.flame_strength = 20.0;
   still_->set_medium(medium_);
-  show(cloud());
-  const dmat4 open = moved(-8, 0, 0);
-  const dmat4 close = moved(8, 2, 0) * glm::rotate(dmat4(1.0), glm::radians(40.0), dvec3(0, 0, 1));
+  // So small that looks are aimed at its cells.
+  show(cloud(), test::make_volume({2, 2, 2}, {11, 3, 10}, [](const ivec3&) { return 1.5F; }));
+  const scene::PlaceEnds growth{moved(-6, 0, 0) * glm::scale(dmat4(1.0), dvec3(0.5)), dmat4(1.0)};
+  viewer().set_places({{dmat4(1.0), growth}});
+  const dmat4 about = moved(12, 20, 14);
+  const dmat4 open = moved(-4, 0, 0);
+  const dmat4 close =
+      moved(4, 2, 0) * about * glm::rotate(dmat4(1.0), glm::radians(80.0), dvec3(0, 0, 1)) * glm::inverse(about);
   viewer::ModelSettings settings;
   settings.surfaces = std::make_shared<const viewer::SurfaceAsset>(scene, std::string("glow"));
   settings.ends = scene::PlaceEnds{open, close};
@@ -272,6 +279,7 @@ TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
   viewer().add_model(model);
   const Blocks swept = blurred();
   test::expect_alike(swept, still_mean([&](double t) {
+                       viewer().set_places({{between(growth.open, growth.close, t)}});
                        model->edit([&](viewer::ModelSettings& of) {
                          of.ends.reset();
                          of.to_world = between(open, close, t);
