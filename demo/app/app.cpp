@@ -696,6 +696,10 @@ void App::accept(const Answer& answer) {
   answered_surfaces_ = answer.surfaces_edit;
   answered_environment_ = answer.environment_edit;
   camera_moved_ |= answer.camera_moved;
+  if (answer.camera_moved) {
+    end_shutter(model_.scene);
+    end_shutter(wish_.scene);
+  }
   // What the user has changed since is newer.
   if (answer.camera_edit == wish_.camera_edit) model_.scene.camera = wish_.scene.camera = answer.camera;
   if (answer.volume_edit == wish_.volume_edit) {

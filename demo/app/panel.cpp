@@ -376,7 +376,9 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
   });
 
   cumulet_camera_desc& view = model.scene.camera;
-  settings::with(&cumulet_camera_desc::fovy_degrees, [&](const auto& fovy) { rows_.draw(fovy, view.fovy_degrees); });
+  bool other = false;
+  settings::with(&cumulet_camera_desc::fovy_degrees,
+                 [&](const auto& fovy) { other |= rows_.draw(fovy, view.fovy_degrees); });
   settings::with(&cumulet_camera_desc::lens_radius, [&](const auto& lens) { rows_.draw(lens, view.lens_radius); });
   ImGui::BeginDisabled(view.lens_radius == 0.0);
   settings::with(&cumulet_camera_desc::focus_distance,
@@ -390,7 +392,9 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
     view.orthographic_height = orthographic ? std::max(2.0 * distance * half, 1e-6) : 0.0;
     // Defaults that depend on the projection.
     view.near_plane = view.far_plane = 0.0;
+    other = true;
   }
+  if (other) end_shutter(model.scene);
   ImGui::BeginDisabled(!model.status.has_volume);
   if (ui_.button("Frame all", "The whole volume in the picture (F, Home).", {-1.0f, 0.0f}))
     commands.push_back({Action::frame_all});

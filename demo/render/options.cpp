@@ -491,8 +491,7 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--camera", "\"ex,ey,ez tx,ty,tz fovy\"",
       [&](const std::string& text) {
         parse_camera(text, scene.camera);
-        scene.camera_open.reset();
-        scene.camera_close.reset();
+        end_shutter(scene);
       },
       "Eye, target and vertical field of view in degrees (default: fit the scene)");
   add_settings(app, group, scene.camera);

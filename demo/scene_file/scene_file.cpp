@@ -347,31 +347,31 @@ class Repeats {
   std::string first_;
 };
 
-/// of: "camera." or "camera.open." Whether it says where the camera stands.
-bool read_camera(Reader& reader, const std::string& of, cumulet_camera_desc& desc) {
+/// of: "camera." or "camera.open." Returns whether it says where the camera stands.
+bool read_pose(Reader& reader, const std::string& of, bool is_end, cumulet_camera_desc& desc) {
   const bool eye = reader.three(of + "eye", desc.eye);
   const bool target = reader.three(of + "target", desc.target);
-  if (eye != target) reader.wrong(of + (eye ? "target" : "eye"), "is missing");
-  if (eye && std::equal(desc.eye, desc.eye + 3, desc.target))
+  if (eye != target && !is_end) reader.wrong(of + (eye ? "target" : "eye"), "is missing");
+  if ((eye || target) && std::equal(desc.eye, desc.eye + 3, desc.target))
     reader.wrong(of + "target", "is the same point as the eye");
   if (reader.three(of + "up", desc.up) && std::equal(desc.up, desc.up + 3, std::array{0.0, 0.0, 0.0}.begin()))
     reader.wrong(of + "up", "has no direction");
   reader.number(of + "fovy_degrees", desc.fovy_degrees, {0.0, 180.0, true});
   reader.number(of + "orthographic_height", desc.orthographic_height, settings::not_negative);
-  reader.number(of + "lens_radius", desc.lens_radius, settings::not_negative);
-  reader.number(of + "focus_distance", desc.focus_distance, settings::not_negative);
   return eye;
 }
 
 /// What an end says nothing of is as at the frame's moment.
 void read_cameras(Reader& reader, SceneFormat format, SceneOptions& scene) {
-  const bool placed = read_camera(reader, "camera.", scene.camera);
+  const bool placed = read_pose(reader, "camera.", false, scene.camera);
+  reader.number("camera.lens_radius", scene.camera.lens_radius, settings::not_negative);
+  reader.number("camera.focus_distance", scene.camera.focus_distance, settings::not_negative);
   if (format == SceneFormat::first) return;
   const auto end = [&](const std::string& key, std::optional<cumulet_camera_desc>& out) {
     if (!reader.has(key)) return;
     if (!placed) reader.wrong(key, "is of a camera that has no eye and no target");
     out = scene.camera;
-    read_camera(reader, key + ".", *out);
+    read_pose(reader, key + ".", true, *out);
     if ((out->orthographic_height > 0.0) != (scene.camera.orthographic_height > 0.0))
       reader.wrong(key + ".orthographic_height", "is of another projection than the camera's");
   };
@@ -695,7 +695,7 @@ void put_shutter(Writer& writer, const std::string& of, const SceneShutter& shut
   if (shutter.close) writer.put(of + "close.to_world", *shutter.close);
 }
 
-Json camera_json(const cumulet_camera_desc& view) {
+Json pose_json(const cumulet_camera_desc& view) {
   Json camera = Json::object();
   if (!std::equal(view.eye, view.eye + 3, view.target)) {
     camera["eye"] = three(view.eye);
@@ -704,8 +704,6 @@ Json camera_json(const cumulet_camera_desc& view) {
   if (view.up[0] != 0.0 || view.up[1] != 0.0 || view.up[2] != 0.0) camera["up"] = three(view.up);
   if (view.fovy_degrees > 0.0) camera["fovy_degrees"] = view.fovy_degrees;
   if (view.orthographic_height > 0.0) camera["orthographic_height"] = view.orthographic_height;
-  if (view.lens_radius > 0.0) camera["lens_radius"] = view.lens_radius;
-  if (view.focus_distance > 0.0) camera["focus_distance"] = view.focus_distance;
   return camera;
 }
 
@@ -789,9 +787,12 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   for (std::size_t i = 0; models && i < scene.models.size(); ++i)
     put_model(writer, i + (scene.surfaces.empty() ? 0 : 1), scene.models[i], named(scene.models[i].file));
 
-  writer.put("camera", camera_json(scene.camera));
-  if (second && scene.camera_open) writer.put("camera.open", camera_json(*scene.camera_open));
-  if (second && scene.camera_close) writer.put("camera.close", camera_json(*scene.camera_close));
+  Json camera = pose_json(scene.camera);
+  if (scene.camera.lens_radius > 0.0) camera["lens_radius"] = scene.camera.lens_radius;
+  if (scene.camera.focus_distance > 0.0) camera["focus_distance"] = scene.camera.focus_distance;
+  writer.put("camera", camera);
+  if (second && scene.camera_open) writer.put("camera.open", pose_json(*scene.camera_open));
+  if (second && scene.camera_close) writer.put("camera.close", pose_json(*scene.camera_close));
 
   writer.put_settings(scene.light);
   if (!scene.environment.empty()) {
@@ -919,6 +920,11 @@ cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
     close.insert(close.end(), at_close, at_close + 16);
   }
   return cumulet_set_volume_shutter(viewer, open.data(), close.data(), static_cast<std::uint32_t>(count));
+}
+
+void end_shutter(SceneOptions& scene) {
+  scene.camera_open.reset();
+  scene.camera_close.reset();
 }
 
 cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene) {

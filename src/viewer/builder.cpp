@@ -6,6 +6,7 @@
 #include "base/apart.hpp"
 #include "grid/tet_grid.hpp"
 #include "viewer/stopwatch.hpp"
+#include "volume/advection.hpp"
 
 namespace cumulet::viewer {
 
@@ -37,6 +38,12 @@ std::uint64_t Built::bytes() const {
   const std::uint64_t channels = source && volume ? source->channels.bytes() : 0;
   const std::uint64_t lattice = source && source->plan && volume ? source->plan->lattice->bytes() : 0;
   return (volume ? volume->bytes() : 0) + (source ? source->bytes() : 0) - read - statistics - channels - lattice;
+}
+
+bool Built::serves(const BuildSettings& wanted) const {
+  BuildSettings made = settings;
+  if (!moves) made.shutter_seconds = wanted.shutter_seconds;
+  return suits(made, wanted);
 }
 
 namespace {
@@ -84,9 +91,13 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.volume = volume;
   built.settings = settings;
   built.active_voxels = volume->volume().active_voxels;
+  built.moves = volume->moves();
   Stopwatch watch;
   const VolumeAssetPtr moving = open_of(volume, settings.shutter_seconds, progress);
   const VolumeAsset& shown = moving ? *moving : *volume;
+  if (moving && 0.5 * settings.shutter_seconds * volume->fastest() > volume::farthest_voxels)
+    log.info(volume->name() +
+             ": what moves further than 64 voxels in half of the shutter's time is blurred by that much");
   const double taken = watch.lap();
   const auto [voxels, statistics] = shown.density(settings.density_ramp, progress, built.seconds.statistics);
   watch.lap();

@@ -68,6 +68,7 @@ struct Built {
   scene::MarchSourcePtr source;
   BuildSettings settings;
   std::uint64_t active_voxels = 0;
+  bool moves = false;  ///< while a shutter is open
   // Of a grid that GL builds known once it is there.
   std::uint64_t cells = 0;
   std::uint32_t levels = 0;
@@ -76,6 +77,8 @@ struct Built {
 
   /// Main memory, with what others may hold as well.
   [[nodiscard]] std::uint64_t bytes() const;
+  /// Whether it does for that of the same volume: what does not move is the same with any shutter.
+  [[nodiscard]] bool serves(const BuildSettings& wanted) const;
 };
 
 /// Of a grid whose refinement max_cells ended.

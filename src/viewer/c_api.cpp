@@ -321,13 +321,14 @@ cumulet_status cumulet_set_volume_shutter(cumulet_viewer* viewer, const double* 
                                           uint32_t count) {
   return guarded(viewer, [&](core::Viewer& v) {
     std::vector<cumulet::scene::Place> places = v.places();
-    require(count == places.size(), "the shutter's places are not as many as the volume has");
+    const bool ends = open != nullptr || close != nullptr;
+    require(!ends || count == places.size(), "the shutter's places are not as many as the volume has");
     constexpr std::array<double, 16> as_it_is{};
     const auto at = [&](const double* matrices, size_t i) {
       return matrices != nullptr ? std::span<const double, 16>(matrices + 16 * i, 16)
                                  : std::span<const double, 16>(as_it_is);
     };
-    for (size_t i = 0; i < count; ++i) {
+    for (size_t i = 0; i < places.size(); ++i) {
       places[i].ends = place_ends(at(open, i), at(close, i), places[i].to_world, "place " + std::to_string(i) + ": ");
     }
     v.set_places(places);

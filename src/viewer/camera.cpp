@@ -382,18 +382,15 @@ void Camera::matrices(double aspect, ClipDepth clip, dmat4& view, dmat4& project
 }
 
 void Camera::set_shutter(const std::optional<CameraPose>& open, const std::optional<CameraPose>& close) {
-  const bool orthographic = [&] {
-    const std::scoped_lock lock(mutex_);
-    return matrices_ ? matrices_frame_.orthographic : pose_.orthographic_height > 0.0;
-  }();
+  const Edit edit(*this);
+  const bool orthographic = matrices_ ? matrices_frame_.orthographic : pose_.orthographic_height > 0.0;
   for (const auto& end : {open, close}) {
     if (!end) continue;
     if (end->eye == end->target) refuse("a camera of the shutter looks nowhere: its eye is its target");
     if ((end->orthographic_height > 0.0) != orthographic)
       refuse("a camera of the shutter is not of the camera's kind, perspective or orthographic");
   }
-  const Edit edit(*this);
-  const bool held = shutter_ && shutter_->revision == revision_;
+  const bool held = shutter_holds();
   if (held ? shutter_->open == open && shutter_->close == close : !open && !close) return;
   shutter_.reset();
   ++revision_;
@@ -402,9 +399,16 @@ void Camera::set_shutter(const std::optional<CameraPose>& open, const std::optio
 
 std::optional<scene::ViewEnds> Camera::ends(double aspect, const scene::Viewpoint& now) const {
   const std::scoped_lock lock(mutex_);
-  if (!shutter_ || shutter_->revision != revision_ || !(aspect > 0.0)) return std::nullopt;
-  const auto end = [&](const std::optional<CameraPose>& pose) {
-    return pose ? static_cast<scene::Viewpoint>(frame_of(*pose, aspect)) : now;
+  if (!shutter_holds() || !(aspect > 0.0)) return std::nullopt;
+  const auto end = [&](const std::optional<CameraPose>& told) {
+    if (!told) return now;
+    CameraPose pose = *told;
+    pose.near_plane = pose_.near_plane;
+    pose.far_plane = pose_.far_plane;
+    pose.depth = pose_.depth;
+    pose.lens_radius = pose_.lens_radius;
+    pose.focus_distance = pose_.focus_distance;
+    return static_cast<scene::Viewpoint>(frame_of(pose, aspect));
   };
   const scene::ViewEnds ends{end(shutter_->open), end(shutter_->close)};
   if (ends.open == now && ends.close == now) return std::nullopt;
@@ -584,8 +588,11 @@ ViewFrame Camera::view(double aspect, const std::optional<Subject>& subject) {
     return frame_of(placed(pose_, std::nullopt, 1.0, 0.0), 1.0);  // no picture
   const CameraPose pose = placed(pose_, subject, aspect, fit_margin);
   if (subject && pose != pose_) {
+    // Where it is placed is where it is, not another move.
+    const bool held = shutter_holds();
     pose_ = pose;
     ++revision_;
+    if (held) shutter_->revision = revision_;
   }
   return frame_of(pose, aspect);
 }

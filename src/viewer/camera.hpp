@@ -130,6 +130,7 @@ class Camera {
 
   mutable std::mutex mutex_;
   std::optional<Shutter> shutter_;
+  [[nodiscard]] bool shutter_holds() const { return shutter_ && shutter_->revision == revision_; }
   CameraPose pose_;                   // with matrices_: the nearest to them
   std::optional<Matrices> matrices_;  // the host's, until an operation
   ViewFrame matrices_frame_;          // theirs

@@ -188,7 +188,7 @@ void FrameShelf::start() {
 }
 
 bool FrameShelf::is_ready(const Shelved& shelved) const {
-  return shelved.built && !shelved.stale && wish_->settings && suits(shelved.built->settings, *wish_->settings);
+  return shelved.built && !shelved.stale && wish_->settings && shelved.built->serves(*wish_->settings);
 }
 
 bool FrameShelf::is_possible(std::uint32_t step) const {

@@ -826,23 +826,19 @@ BuildSettings Viewer::settings_of(const Shown& shown) const {
 }
 
 void Viewer::reuse_grid(GridShelf::Wish& wish) const {
-  const auto serves = [&](const VolumeAssetPtr& volume, BuildSettings made) {
-    if (volume != wish.volume) return false;
-    if (!volume->moves()) made.shutter_seconds = wish.settings.shutter_seconds;
-    return suits(made, wish.settings);
-  };
-  if (built_.source && serves(built_.volume, built_.settings)) {
+  const auto serves = [&](const Built& built) { return built.volume == wish.volume && built.serves(wish.settings); };
+  if (built_.source && serves(built_)) {
     wish.settings = built_.settings;
     return;
   }
   for (const Shown& shown : shown_) {
-    if (shown.built && serves(shown.built->volume, shown.built->settings)) {
+    if (shown.built && serves(*shown.built)) {
       wish.settings = shown.built->settings;
       return;
     }
   }
   for (const Shown& shown : shown_) {
-    if (shown.wish && serves(shown.wish->volume, shown.wish->settings)) {
+    if (shown.wish && shown.wish->volume == wish.volume && suits(shown.wish->settings, wish.settings)) {
       wish.settings = shown.wish->settings;
       return;
     }

@@ -57,7 +57,9 @@ class VolumeAsset {
   [[nodiscard]] bool may_emit() const { return facts_->may_emit; }
   [[nodiscard]] bool has_anisotropy() const { return frame_->anisotropy.has_value(); }
   /// Whether anything of it has a velocity.
-  [[nodiscard]] bool moves() const { return scene::fastest_of(*frame_) > 0.0; }
+  [[nodiscard]] bool moves() const { return fastest() > 0.0; }
+  /// In voxels a second, along the axis where that is most.
+  [[nodiscard]] double fastest() const { return scene::fastest_of(*frame_); }
   /// What it is from half of these seconds before its moment to half of them after it, by its velocity
   /// (volume/advection.hpp), backwards where they are negative; null where nothing moves. Kept is the last. Throws
   /// Error(cancelled), and Error(file).

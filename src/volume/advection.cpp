@@ -11,7 +11,6 @@ using namespace detail;
 
 namespace {
 
-constexpr double farthest = 64.0;     // voxels, along an axis
 constexpr double longest_step = 2.0;  // voxels
 
 /// Fields of the same kinds, of nothing.
@@ -50,8 +49,8 @@ class Advection final : Gathering {
       least_ += glm::min(glm::min(most, least), 0.0);
       most_ += glm::max(glm::max(most, least), 0.0);
     }
-    least_ = glm::max(least_, -farthest);
-    most_ = glm::min(most_, farthest);
+    least_ = glm::max(least_, -farthest_voxels);
+    most_ = glm::min(most_, farthest_voxels);
   }
 
   std::vector<SourceGrid> run() {

@@ -5,6 +5,9 @@
 
 namespace cumulet::volume {
 
+/// What advect() moves anything by at most, along an axis.
+constexpr double farthest_voxels = 64.0;
+
 /// The frame as it is so many seconds later, or before where they are negative: all its fields, carried along its
 /// velocity, which stays as it is meanwhile. Semi-Lagrangian (Stam, "Stable Fluids", 1999): what comes to a voxel's
 /// centre is followed back, by the midpoint rule in steps of two voxels at most, and is there the trilinear

@@ -497,6 +497,42 @@ TEST(CameraFit, IsOfWhatIsSeen) {
   }
 }
 
+TEST(CameraShutter, HasTheCamerasOwnPlanesAndLens) {
+  CameraPose pose = pose_at({0.0, 2.0, 9.0});
+  pose.orthographic_height = 6.0;
+  pose.near_plane = 2.0;
+  pose.far_plane = 50.0;
+  pose.lens_radius = 0.5;
+  pose.focus_distance = 7.0;
+  Camera camera;
+  camera.set(pose);
+  CameraPose open = pose_at({1.0, 2.0, 9.0});
+  open.orthographic_height = 6.0;
+  open.lens_radius = 0.1;
+  camera.set_shutter(open, std::nullopt);
+  const ViewFrame now = camera.view(1.0, std::nullopt);
+  const auto ends = camera.ends(1.0, now);
+  ASSERT_TRUE(ends);
+  EXPECT_EQ(ends->close, now);
+  Camera there;
+  CameraPose same = pose;
+  same.eye = open.eye;
+  same.target = open.target;
+  there.set(same);
+  EXPECT_EQ(ends->open, there.view(1.0, std::nullopt));
+}
+
+TEST(CameraShutter, IsKeptWhereTheCameraFitsTheScene) {
+  Camera camera;
+  const CameraPose aside = pose_at({5.0, 0.0, 9.0});
+  camera.set_shutter(std::nullopt, aside);
+  const Bounds subject{dvec3(-1.0), dvec3(1.0)};
+  const ViewFrame now = camera.view(1.0, subject);
+  EXPECT_TRUE(camera.ends(1.0, now)) << "it is the first time that it is anywhere";
+  camera.orbit(0.1, 0.0);
+  EXPECT_FALSE(camera.ends(1.0, camera.view(1.0, subject)));
+}
+
 TEST(CameraFit, IsForGoodAndCountsAsAChange) {
   const Bounds box{dvec3(-1), dvec3(2)};
   Camera camera;

@@ -466,7 +466,8 @@ TEST(SceneFile, WhatMovesIsKept) {
   const SceneOptions scene = parse_scene(
       R"({"cumulet_scene": 2, "picture": {"shutter_seconds": 0.02},
           "camera": {"eye": [1, 2, 9], "target": [0, 1, 0], "fovy_degrees": 30,
-                     "open": {"eye": [0.5, 2, 9], "target": [0, 1, 0]}, "close": {"fovy_degrees": 33}},
+                     "open": {"eye": [0.5, 2, 9], "target": [0, 1, 0]}, "lens_radius": 0.25,
+                     "close": {"fovy_degrees": 33, "target": [0, 1.5, 0]}},
           "volumes": [{"file": "a.vdb", "open": {"translate": [-1, 0, 0]}},
                       {"file": "b.vdb", "close": {"to_world": [1,0,0,0, 0,2,0,0, 0,0,1,0, 3,4,5,1]}}],
           "models": [{"file": "m.glb", "close": {"rotate_degrees": [0, 90, 0]}}]})",
@@ -477,6 +478,7 @@ TEST(SceneFile, WhatMovesIsKept) {
   EXPECT_EQ(scene.camera_open->fovy_degrees, 30.0) << "the camera's";
   EXPECT_EQ(scene.camera_close->eye[0], 1.0);
   EXPECT_EQ(scene.camera_close->fovy_degrees, 33.0);
+  EXPECT_EQ(scene.camera_close->target[1], 1.5);
   EXPECT_EQ((*scene.shutter.open)[12], -1.0);
   EXPECT_FALSE(scene.shutter.close);
   EXPECT_EQ((*scene.others[0].shutter.close)[5], 2.0);
@@ -503,6 +505,8 @@ TEST(SceneFile, WhatMovesIsKept) {
             "s.json: camera.open: is of a camera that has no eye and no target");
   EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"orthographic_height": 3}})"),
             "s.json: camera.close.orthographic_height: is of another projection than the camera's");
+  EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"lens_radius": 3}})"),
+            "s.json: camera.close.lens_radius: there is no such setting");
   EXPECT_EQ(told(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
             "s.json: volumes[0].open.turn: there is no such setting");
   // Of what stands somewhere, from there.

@@ -849,8 +849,9 @@ CUMULET_API cumulet_status cumulet_set_volume_places(cumulet_viewer* viewer, con
  * Where these places are as the shutter opens and as it closes (cumulet_sampling_desc.shutter_seconds), until
  * cumulet_set_volume_places says where they are again: as many matrices each as there are places, as there. Each point
  * goes straight from the one to the other. Either may be NULL, and any of its matrices zeros: that is then where it is
- * at the frame's moment. CUMULET_ERROR_INVALID_ARGUMENT, too, for another count, and for what would be flat in between,
- * as what turns halfway round.
+ * at the frame's moment; where both are, count is not looked at. CUMULET_ERROR_INVALID_ARGUMENT, too, for another
+ * count, and for what would be flat in between, as what turns halfway round. While a place, an instance or a model
+ * moves, the tables of all that are alike take three times as much, and drivers hold a third as many.
  */
 CUMULET_API cumulet_status cumulet_set_volume_shutter(cumulet_viewer* viewer, const double* open, const double* close,
                                                       uint32_t count);
@@ -1636,9 +1637,10 @@ CUMULET_API cumulet_status cumulet_camera_set_matrices(cumulet_camera* camera, c
                                                        const double projection[16], cumulet_clip clip);
 /*
  * Where it is as the shutter opens and as it closes (cumulet_sampling_desc.shutter_seconds), until any other call moves
- * it. In between the eye goes straight, the axes turn evenly about one axis (a quaternion's slerp), and field of view,
- * height and lens change evenly. Either may be NULL: that is then where it is at the frame's moment. Both are of the
- * camera's own kind, perspective or orthographic, and look somewhere; depth planes are the camera's own.
+ * it. In between the eye goes straight, the axes turn evenly about one axis (a quaternion's slerp), and what the
+ * picture spans at a unit's distance, or its height, changes evenly. Either may be NULL: that is then where it is at
+ * the frame's moment. Both are of the camera's own kind, perspective or orthographic, and look somewhere; depth planes,
+ * lens and focus distance are the camera's own.
  */
 CUMULET_API cumulet_status cumulet_camera_set_shutter(cumulet_camera* camera, const cumulet_camera_desc* open,
                                                       const cumulet_camera_desc* close);

@@ -1252,8 +1252,8 @@ class Viewer {
   [[nodiscard]] Result<> set_volume_shutter(std::span<const std::array<double, 16>> open,
                                             std::span<const std::array<double, 16>> close) noexcept {
     const auto first = [](const auto& matrices) { return matrices.empty() ? nullptr : matrices.front().data(); };
-    const std::size_t count = open.empty() ? close.size() : open.size();
-    if (!close.empty() && close.size() != count) return result(CUMULET_ERROR_INVALID_ARGUMENT);
+    const bool differ = !open.empty() && !close.empty() && open.size() != close.size();  // 0 is refused
+    const std::size_t count = differ ? 0 : std::max(open.size(), close.size());
     return result(cumulet_set_volume_shutter(handle(), first(open), first(close), static_cast<uint32_t>(count)));
   }
   /// An empty sequence: shows none.
