@@ -268,6 +268,8 @@ class Viewer {
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.
   void take_cells(const Context& g);
+  /// Tells builds what cells may take of GL memory.
+  void share_gl();
   // Of the live volume, what this frame's picture is of.
   void note_drawn(const Context& g);
   // Of what is shown, this sequence's.
@@ -486,6 +488,7 @@ class Viewer {
 
   std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
   std::uint64_t most_gl_bytes_ = Allowance::no_limit;
+  std::uint64_t gl_beside_volumes_ = 0;  // by the last frame
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;
