@@ -195,10 +195,9 @@ class OwningTree final : public TreeT {
     };
     const auto unpack = [&](const RunPtr& run) {
       MemoryStream in(run->bytes);
-      const auto settings = std::make_shared<openvdb::io::StreamMetadata>(buffers_->settings);
-      auto pointer = settings;
+      auto settings = std::make_shared<openvdb::io::StreamMetadata>(buffers_->settings);
       settings->transferTo(in);
-      openvdb::io::setStreamMetadataPtr(in, pointer, /*transfer=*/false);
+      openvdb::io::setStreamMetadataPtr(in, settings, /*transfer=*/false);
       for (std::size_t i = run->first; i != run->last && wanted; ++i) {
         read(in, *leaves[i], [&](const LeafT& leaf) {
           if (!take(i, leaf)) wanted = false;
@@ -225,11 +224,11 @@ class OwningTree final : public TreeT {
 
   template <class Work>
   void with_settings(const VdbStream& stream, const Work& work) const {
+    auto settings = std::make_shared<openvdb::io::StreamMetadata>(buffers_->settings);
     struct Restore {
       const VdbStream& stream;
       ~Restore() { openvdb::io::setStreamMetadataPtr(stream.file, stream.metadata, /*transfer=*/false); }
     } const restore{stream};
-    auto settings = std::make_shared<openvdb::io::StreamMetadata>(buffers_->settings);
     openvdb::io::setStreamMetadataPtr(stream.file, settings, /*transfer=*/false);
     work();
   }
