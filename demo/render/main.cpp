@@ -650,6 +650,10 @@ class Studio {
 
   void set_scene(const RenderOptions& options) {
     const auto& scene = options.scene;
+    cumulet_limits_desc limits{};
+    limits.struct_size = sizeof limits;
+    limits.gl_bytes = options.gpu_memory;
+    check(viewer_, cumulet_set_limits(viewer_.get(), &limits));
     cumulet_sampling_desc sampling = scene.sampling;
     sampling.preview = CUMULET_PREVIEW_OFF;
     if (std::ranges::find(options.aovs, CUMULET_AOV_VOLUME) != options.aovs.end()) sampling.volume_alone = 1;

@@ -808,6 +808,13 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       },
       "Stop after this long, loading left out, but not before each pixel has a sample");
   add(
+      app, group, "--gpu-memory", "MIB",
+      [&](const std::string& text) {
+        constexpr unsigned mebibyte = 20;
+        options.gpu_memory = parse_integer(text, 1, std::uint64_t{1} << 40U) << mebibyte;
+      },
+      "GL memory: grids are as coarse as it takes (default: no limit)");
+  add(
       app, group, "--first-sample", "N",
       [&](const std::string& text) {
         options.scene.sampling.first_sample =

@@ -53,6 +53,7 @@ struct RenderOptions {
   std::string checkpoint;            // empty: none
   double checkpoint_every = 300.0;   // seconds
   std::optional<double> time_limit;  // seconds from the first sample on
+  std::uint64_t gpu_memory = 0;      // bytes; 0: no limit
   Denoise denoise = Denoise::off;    // the picture; of an .exr a layer beside it
   std::string denoiser;              // a folder of networks; empty: where the script puts them
   std::vector<cumulet_aov> aovs;     // layers of an .exr beside the picture

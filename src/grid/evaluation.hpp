@@ -164,6 +164,7 @@ void Evaluation::brick(const Statistics::Node& node, unsigned levels, BrickSums&
   const float* blocks = transmittance_ != nullptr ? transmittance_->blocks(node.corner) : nullptr;
   const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_a_brick) : 1.0F;
   const float* values = nullptr;
+  float reference = 0.0F;
   volume::BrickValues::Brick room;
   for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
     const Moments& whole = statistics_->kuhn(node, permutation);
@@ -175,8 +176,11 @@ void Evaluation::brick(const Statistics::Node& node, unsigned levels, BrickSums&
     while (end < last && measure_.bound(whole.min, whole.max, longest_[std::bit_width(end) - 1], most) > floor)
       end *= 2;
     if (end == 1) continue;
-    if (values == nullptr) values = statistics_->values(node, room);
-    sums.compute(values, tree);
+    if (values == nullptr) {
+      values = statistics_->values(node, room);
+      reference = BrickSums::reference_of(values);
+    }
+    sums.compute(values, reference, tree);
     if (blocks != nullptr) lit.compute(blocks, tree);
     for (unsigned h = 1; h < end; ++h) {
       if (sums.min[h] >= sums.max[h]) continue;

@@ -146,10 +146,14 @@ const BrickTree& brick_tree(std::uint32_t frame) {
   return trees->trees[permutation_of(frame) * 8 + signs];
 }
 
-void BrickSums::compute(const float* values, const BrickTree& tree) {
+float BrickSums::reference_of(const float* values) {
   double sum = 0.0;
   for (unsigned i = 0; i < volume::brick_voxels; ++i) sum += values[i];
-  reference = static_cast<float>(sum / volume::brick_voxels);
+  return static_cast<float>(sum / volume::brick_voxels);
+}
+
+void BrickSums::compute(const float* values, float of_brick, const BrickTree& tree) {
+  reference = of_brick;
   for (unsigned i = 0; i < 512; ++i) min[512 + i] = values[tree.voxel[i]];
   std::copy(min.begin() + 512, min.end(), max.begin() + 512);
   // Separate loops: each vectorizes.
@@ -365,9 +369,10 @@ void Statistics::compute_moments(Progress* progress) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Node& node = nodes_[bricks[i]];
       const float* brick = values(node, room);
+      const float reference = BrickSums::reference_of(brick);
       for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
         const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
-        sums->compute(brick, tree);
+        sums->compute(brick, reference, tree);
         moments_[node.moments + permutation] = sums->moments(1, node.corner, tree);
       }
     }

@@ -63,7 +63,10 @@ struct BrickSums {
   std::array<float, 1024> x, y, z;  ///< sum of (f - reference) * leaf centroid, from the brick's low corner
   std::array<float, 1024> min, max;
 
-  void compute(const float* values, const BrickTree& tree);
+  /// What the sums of a brick are relative to: its mean, the same for all of its trees. It takes as long as one of
+  /// them.
+  static float reference_of(const float* values);
+  void compute(const float* values, float of_brick, const BrickTree& tree);
   /// Moments of heap node h of a brick whose low corner is at corner.
   [[nodiscard]] Moments moments(unsigned h, const glm::ivec3& corner, const BrickTree& tree) const;
 };

@@ -288,7 +288,8 @@ class GridBuilder::LeafMoments {
       brick_ = &holder;
       permutation_ = node.permutation;
       tree_ = &brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation));
-      sums_->compute(statistics_->values(holder, room_), *tree_);
+      const float* values = statistics_->values(holder, room_);
+      sums_->compute(values, BrickSums::reference_of(values), *tree_);
     }
     return sums_->moments(node.heap, holder.corner, *tree_);
   }

@@ -59,6 +59,9 @@ std::uint64_t bytes_a_cell(const grid::Channels& channels) {
   return bytes;
 }
 
+// A grid's tables, of whatever size it is.
+constexpr std::uint64_t tables = 4096;
+
 // What it is while the shutter is open; null where nothing moves.
 VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& progress) {
   try {
@@ -70,9 +73,13 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
 }
 
 std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held, const Allowance& allowance) {
-  constexpr std::uint64_t tables = 4096;  // of whatever size the grid is
   const std::uint64_t most = allowance.memory_bytes();
   return (most - std::min(most, held + tables)) / bytes_a_cell(channels);
+}
+
+std::uint64_t cells_that_fit_gl(const grid::Channels& channels, const Allowance& allowance) {
+  const std::uint64_t most = allowance.gl_cell_bytes();
+  return (most - std::min(most, tables)) / bytes_a_cell(channels);
 }
 
 bool any(const grid::Channels& channels) {
@@ -81,8 +88,10 @@ bool any(const grid::Channels& channels) {
 
 }  // namespace
 
-void log_limited(const Log& log, std::uint64_t max_cells) {
-  log.info("max_cells (" + std::to_string(max_cells) + ") ended the refinement before the threshold");
+void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
+  log.info((most < max_cells ? "the memory that is allowed, of " + std::to_string(most) + " cells,"
+                             : "max_cells (" + std::to_string(max_cells) + ")") +
+           " ended the refinement before the threshold");
 }
 
 Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings, Progress& progress,
@@ -119,8 +128,8 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
         before && before->lattice == lattice
             ? lattice->own.levels(lattice->cube, settings.refine, before->levels, &progress)
             : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
-    scene::MarchSource source =
-        scene::make_planned_source({lattice, std::move(levels), settings.refine.max_cells}, voxels, statistics);
+    const std::uint64_t most = std::min(settings.refine.max_cells, cells_that_fit_gl(channels, allowance));
+    scene::MarchSource source = scene::make_planned_source({lattice, std::move(levels), most}, voxels, statistics);
     source.optical_depth = statistics->mean_optical_depth();
     built.source = std::make_shared<const scene::MarchSource>(std::move(source));
     allowance.require(built.bytes(), volume->name());
@@ -130,7 +139,8 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   if (settings.on == BuildOn::gpu)
     log.info(volume->name() + ": it has more than density, so its grid is built on the CPU");
   grid::RefineSettings refine = settings.refine;
-  refine.max_cells = std::min(refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance));
+  refine.max_cells = std::min(
+      {refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance), cells_that_fit_gl(channels, allowance)});
   const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);
   auto builder = make_left<grid::GridBuilder>(*statistics, *diamonds);
   builder->bisect(&progress);
@@ -143,7 +153,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.cells = grid->cells.size();
   built.levels = grid->levels;
   built.limited = grid->limited;
-  if (grid->limited) log_limited(log, refine.max_cells);
+  if (grid->limited) log_limited(log, refine.max_cells, settings.refine.max_cells);
   scene::MarchSource source =
       scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress);
   source.optical_depth = statistics->mean_optical_depth();

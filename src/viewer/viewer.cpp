@@ -902,9 +902,20 @@ void Viewer::rebuild() {
   touch();
 }
 
+void Viewer::share_gl() {
+  if (most_gl_bytes_ == Allowance::no_limit) {
+    allowance_->set_gl_cells(Allowance::no_limit);
+    return;
+  }
+  // What was there stays until all cells have come, and pictures may grow meanwhile.
+  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_);
+  allowance_->set_gl_cells(left / 5 * 2);
+}
+
 void Viewer::set_limits(const Limits& limits) {
   allowance_->set(limits.threads, limits.memory_bytes);
   most_gl_bytes_ = limits.gl_bytes;
+  share_gl();
   if (followed_) followed_->wish_due = true;
   for (const PlayedPtr& played : played_) played->followed.wish_due = true;
   touch();

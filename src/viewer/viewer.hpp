@@ -272,6 +272,8 @@ class Viewer {
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.
   void take_cells(const Context& g);
+  /// Tells builds what cells may take of GL memory.
+  void share_gl();
   // Of what is shown, this sequence's.
   [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
   // A sequence that is followed: what was asked for, and taken.
@@ -534,6 +536,7 @@ class Viewer {
 
   std::shared_ptr<Allowance> allowance_ = std::make_shared<Allowance>();
   std::uint64_t most_gl_bytes_ = Allowance::no_limit;
+  std::uint64_t gl_beside_volumes_ = 0;  // by the last frame
   std::unique_ptr<Context> gl_;
   Builder builder_;  // these last: their threads use the above
   SurfaceBuilder surface_builder_;

@@ -154,7 +154,7 @@ void Viewer::take_cells(const Context& g) {
     built.cells = cells->count;
     built.levels = g.scene().data()->grid(*built.source)->levels;
     built.limited = cells->limited;
-    if (built.limited) log_limited(log_, built.source->plan->max_cells);
+    if (built.limited) log_limited(log_, built.source->plan->max_cells, built.settings.refine.max_cells);
   };
   take(built_);
   for (Shown& shown : shown_) {
@@ -214,6 +214,8 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: surfaces alone", [&] { g.draw_surfaces_alone(shot, frame); });
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
+    gl_beside_volumes_ = g.bytes() - g.scene().data_bytes();
+    share_gl();
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
     if (busy()) {
       result.loading = true;

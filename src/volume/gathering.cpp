@@ -77,7 +77,7 @@ double Window::at(const glm::dvec3& p) const {
 // ---- fields ----
 
 /// Those voxels are active that are not zero.
-class Gathering::Leaves final : public LeafSource {
+class Gathering::Leaves final : public HeldLeaves {
  public:
   explicit Leaves(std::vector<std::deque<Placed>> bricks) : bricks_(std::move(bricks)) {
     for (const std::deque<Placed>& some : bricks_) {

@@ -1,9 +1,11 @@
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cerrno>
 #include <cmath>
@@ -238,6 +240,20 @@ Box box_of_active(const ActiveMask& mask, glm::ivec3 origin) {
 
 }  // namespace
 
+bool detail::HeldLeaves::sweep(const Visit& visit, Progress* progress, Portion portion) const {
+  ProgressPart part(progress, portion.from, portion.to, count());
+  std::atomic<bool> wanted = true;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count(), 64), [&](const tbb::blocked_range<std::size_t>& range) {
+    std::array<float, brick_voxels> room;
+    for (std::size_t i = range.begin(); i != range.end() && wanted; ++i) {
+      values(i, room.data());
+      if (!visit(i, room)) wanted = false;
+    }
+    part.add(range.size());
+  });
+  return wanted;
+}
+
 ActiveRegion detail::active_leaf_region(const LeafSource& leaves, ProgressPart& part) {
   return tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, leaves.count(), 256), ActiveRegion{},
@@ -259,38 +275,50 @@ ActiveRegion detail::active_leaf_region(const LeafSource& leaves, ProgressPart& 
 
 namespace {
 
-/// A leaf's values as the volume keeps them; zero outside bounds.
-struct CleanBrick {
-  std::array<float, brick_voxels> values;
-  std::uint64_t negative = 0;
-  std::uint64_t non_finite = 0;
-  float max = 0.0F;
-  bool constant = true;  ///< all voxels within bounds alike
-  float first = 0.0F;    ///< the first of them
-};
-
 /// A voxel's value as the volume keeps it.
 float counted(float value) { return std::isfinite(value) && value > 0.0F ? value : 0.0F; }  // turns -0 into 0 too
 
-bool is_half(float value) { return exact_half(value).has_value(); }
+/// What is found of a brick's voxels within bounds.
+struct CleanBrick {
+  std::uint32_t negative = 0;
+  std::uint32_t non_finite = 0;
+  float max = 0.0F;
+  bool constant = true;  ///< all alike
+  float first = 0.0F;    ///< the first of them
+};
 
-void clean(const LeafSource& leaves, std::size_t leaf, const Box& bounds, CleanBrick& brick) {
-  leaves.values(leaf, brick.values.data());
-  brick.negative = 0;
-  brick.max = 0.0F;
-  brick.constant = true;
-  brick.non_finite = 0;
-  bool started = false;
-  const glm::ivec3 origin = leaves.origin(leaf);
-  const bool inside = bounds.contains({origin, origin + (brick_size - 1)});
+/// Makes a leaf's values what the volume keeps. In whole numbers, which vectorize.
+CleanBrick clean_inside(std::span<float, brick_voxels> values) {
+  constexpr std::int32_t infinite = 0x7f800000;
+  std::uint32_t negative = 0;
+  std::uint32_t non_finite = 0;
+  std::int32_t most = 0;
+  std::int32_t other = 0;
+  const auto keep = [](std::int32_t bits) { return bits > 0 && bits < infinite ? bits : 0; };
+  const std::int32_t first = keep(std::bit_cast<std::int32_t>(values[0]));
+  for (float& value : values) {
+    const auto bits = std::bit_cast<std::int32_t>(value);
+    const std::int32_t size = bits & std::numeric_limits<std::int32_t>::max();
+    non_finite += size >= infinite ? 1U : 0U;
+    negative += bits < 0 && size > 0 && size < infinite ? 1U : 0U;
+    const std::int32_t kept = keep(bits);
+    most = std::max(most, kept);
+    other |= kept ^ first;
+    value = std::bit_cast<float>(kept);
+  }
+  return {negative, non_finite, std::bit_cast<float>(most), other == 0, std::bit_cast<float>(first)};
+}
+
+/// The same of a leaf that reaches beyond the bounds, where it becomes 0.
+CleanBrick clean_across(std::span<float, brick_voxels> values, const glm::ivec3& origin, const Box& bounds) {
+  CleanBrick brick;
+  std::optional<float> first;
   for (int i = 0; i < brick_voxels; ++i) {
-    float& value = brick.values[static_cast<std::size_t>(i)];
-    if (!inside) {
-      const glm::ivec3 voxel = origin + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7);
-      if (!bounds.contains({voxel, voxel})) {
-        value = 0.0F;
-        continue;
-      }
+    float& value = values[static_cast<std::size_t>(i)];
+    const glm::ivec3 voxel = origin + glm::ivec3(i >> 6, (i >> 3) & 7, i & 7);
+    if (!bounds.contains({voxel, voxel})) {
+      value = 0.0F;
+      continue;
     }
     if (!std::isfinite(value)) {
       ++brick.non_finite;
@@ -299,29 +327,99 @@ void clean(const LeafSource& leaves, std::size_t leaf, const Box& bounds, CleanB
     }
     value = counted(value);
     brick.max = std::max(brick.max, value);
-    if (!started) {
-      brick.first = value;
-      started = true;
-    }
-    brick.constant = brick.constant && value == brick.first;
+    if (!first) first = value;
+    brick.constant = brick.constant && value == *first;
   }
+  brick.first = first.value_or(0.0F);
+  return brick;
+}
+
+CleanBrick clean(std::span<float, brick_voxels> values, const glm::ivec3& origin, const Box& bounds) {
+  return bounds.contains({origin, origin + (brick_size - 1)}) ? clean_inside(values)
+                                                              : clean_across(values, origin, bounds);
+}
+
+/// Keeps a brick's values exactly; returns false where it cannot.
+bool keep(std::span<const float, brick_voxels> values, float* out) {
+  std::ranges::copy(values, out);
+  return true;
+}
+bool keep(std::span<const float, brick_voxels> values, std::uint16_t* out) {
+  // Nearly all are 0 or no small number, which vectorizes.
+  bool plain = true;
+  for (std::size_t i = 0; i < brick_voxels; ++i) {
+    const auto bits = std::bit_cast<std::uint32_t>(values[i]);
+    plain &= bits == 0 || (bits - (113U << 23U) < (30U << 23U) && (bits & 0x1fffU) == 0);
+    out[i] = static_cast<std::uint16_t>(bits == 0 ? 0U : (bits >> 13U) - (112U << 10U));
+  }
+  if (plain) return true;
+  for (std::size_t i = 0; i < brick_voxels; ++i) {
+    const std::optional<std::uint16_t> half = exact_half(values[i]);
+    if (!half) return false;
+    out[i] = *half;
+  }
+  return true;
 }
 
 struct BrickTotals {
   std::uint64_t negative = 0;
   std::uint64_t non_finite = 0;
-  std::uint64_t covered = 0;
   float max = 0.0F;
-  bool halves = true;  ///< their values, but of bricks of one
 
   void add(const BrickTotals& b) {
     negative += b.negative;
     non_finite += b.non_finite;
-    covered += b.covered;
     max = std::max(max, b.max);
-    halves = halves && b.halves;
   }
 };
+
+/// A grid's leaves that meet its bounds, one after another by origin, as a sweep finds them.
+struct Bricks {
+  std::vector<std::size_t> place;  ///< of each leaf; of one beyond the bounds the end
+  std::vector<glm::ivec3> origins;
+  std::vector<char> constant;  ///< 1: all of one value
+  std::vector<float> first;    ///< its first value
+  BrickTotals totals;
+};
+
+/// Fills the values of all that are not constant, at their places. Returns false where a T does not hold one of them
+/// exactly: what was found is then worth nothing.
+template <class T>
+bool fill(const LeafSource& leaves, const Box& bounds, Bricks& bricks, std::vector<T>& values, Progress* progress,
+          Portion portion) {
+  resize(values, bricks.origins.size() * brick_voxels, progress);
+  tbb::enumerable_thread_specific<BrickTotals> totals;
+  const auto take = [&](std::size_t leaf, std::span<float, brick_voxels> found) {
+    const std::size_t place = bricks.place[leaf];
+    if (place == bricks.origins.size()) return true;
+    const CleanBrick brick = clean(found, bricks.origins[place], bounds);
+    totals.local().add({brick.negative, brick.non_finite, brick.max});
+    bricks.constant[place] = brick.constant ? 1 : 0;
+    bricks.first[place] = brick.first;
+    return brick.constant || keep(found, values.data() + place * brick_voxels);
+  };
+  if (!leaves.sweep(take, progress, portion)) return false;
+  bricks.totals = {};
+  for (const BrickTotals& some : totals) bricks.totals.add(some);
+  return true;
+}
+
+/// Closes the gaps that constant bricks left.
+template <class T>
+void close_gaps(const Bricks& bricks, std::vector<T>& values, std::vector<glm::ivec3>& origins,
+                const Progress* progress) {
+  origins.reserve(bricks.origins.size());
+  for (std::size_t i = 0; i < bricks.origins.size(); ++i) {
+    if (i % 4096 == 0) check(progress);
+    if (bricks.constant[i] != 0) continue;
+    if (origins.size() != i)
+      std::copy_n(values.data() + i * brick_voxels, brick_voxels, values.data() + origins.size() * brick_voxels);
+    origins.push_back(bricks.origins[i]);
+  }
+  const std::size_t all = values.size();
+  values.resize(origins.size() * brick_voxels);
+  if (values.size() < all - all / 8) values.shrink_to_fit();
+}
 
 /// Leaf indices by origin; every origin a brick's, none twice.
 std::vector<std::size_t> sorted_leaves(const LeafSource& leaves, const Progress* progress) {
@@ -390,46 +488,32 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   out.bounds_max = bounds.max;
   out.active_voxels = region.voxels;
 
-  // First look at every brick, then allocate exactly, then copy: reading twice is cheaper than
-  // holding the dropped ones.
   const LeafSource& leaves = *source.leaves;
-  std::vector<std::size_t> order = sorted_leaves(leaves, progress);
-  std::erase_if(order, [&](std::size_t leaf) {
-    const glm::ivec3 origin = leaves.origin(leaf);
-    return bounds.clipped({origin, origin + (brick_size - 1)}).empty();
-  });
-  const auto leaf_box = [&](std::size_t leaf) {
-    const glm::ivec3 origin = leaves.origin(leaf);
-    return bounds.clipped({origin, origin + (brick_size - 1)});
+  const auto clipped = [&](const glm::ivec3& origin) { return bounds.clipped({origin, origin + (brick_size - 1)}); };
+  Bricks bricks;
+  {
+    std::vector<std::size_t> order = sorted_leaves(leaves, progress);
+    std::erase_if(order, [&](std::size_t leaf) { return clipped(leaves.origin(leaf)).empty(); });
+    bricks.place.assign(leaves.count(), order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) bricks.place[order[i]] = i;
+    bricks.origins.reserve(order.size());
+    for (const std::size_t leaf : order) bricks.origins.push_back(leaves.origin(leaf));
+    bricks.constant.resize(order.size());
+    bricks.first.resize(order.size());
+  }
+  // Halves first. What they do not hold is found early, but for odd files.
+  const auto sweep = [&](auto values, Portion part) {
+    if (!fill(leaves, bounds, bricks, values, progress, part)) return false;
+    close_gaps(bricks, values, out.brick_origins, progress);
+    out.brick_values = std::move(values);
+    return true;
   };
-  std::vector<char> constant(order.size());
-  std::vector<float> constant_value(order.size());
-  ProgressPart checking(progress, portion.at(0.3), portion.at(0.6), order.size());
-  const BrickTotals bricks = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, order.size(), 64), BrickTotals{},
-      [&](const tbb::blocked_range<std::size_t>& range, BrickTotals sum) {
-        CleanBrick brick;
-        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-          clean(leaves, order[i], bounds, brick);
-          BrickTotals one;
-          one.negative = brick.negative;
-          one.covered = leaf_box(order[i]).voxels();
-          one.non_finite = brick.non_finite;
-          one.max = brick.max;
-          one.halves = brick.constant || !sum.halves || std::ranges::all_of(brick.values, is_half);
-          sum.add(one);
-          constant[i] = brick.constant ? 1 : 0;
-          constant_value[i] = brick.first;
-        }
-        checking.add(range.size());
-        return sum;
-      },
-      [](BrickTotals a, const BrickTotals& b) {
-        a.add(b);
-        return a;
-      });
-  out.negative_voxels = bricks.negative;
-  out.non_finite_voxels = bricks.non_finite;
+  if (!sweep(std::vector<std::uint16_t>(), portion.part(0.3, 1.0))) {
+    const double reached = progress != nullptr ? progress->fraction() : portion.at(0.3);
+    sweep(std::vector<float>(), {reached, portion.to});
+  }
+  out.negative_voxels = bricks.totals.negative;
+  out.non_finite_voxels = bricks.totals.non_finite;
   const auto count_uncounted = [&out](float value, std::uint64_t voxels) {
     if (!std::isfinite(value)) {
       out.non_finite_voxels += voxels;
@@ -437,8 +521,9 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
       out.negative_voxels += voxels;
     }
   };
-  std::uint64_t covered = bricks.covered;
-  out.max_value = bricks.max;
+  std::uint64_t covered = 0;
+  for (const glm::ivec3& origin : bricks.origins) covered += clipped(origin).voxels();
+  out.max_value = bricks.totals.max;
   for (const SourceTile& tile : source.tiles) {
     const Box box = bounds.clipped({tile.box.min, tile.box.max});
     if (box.empty()) continue;
@@ -457,36 +542,10 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
   }
 
   // A brick of one value says no more than a tile, in a seventieth of the memory.
-  std::vector<std::size_t> kept;
-  kept.reserve(order.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    if (constant[i] == 0) {
-      kept.push_back(order[i]);
-    } else if (constant_value[i] != out.background) {
-      const Box box = leaf_box(order[i]);
-      out.tiles.push_back({box.min, box.max, constant_value[i]});
-    }
-  }
-  out.brick_origins.resize(kept.size());
-  ProgressPart copying(progress, portion.at(0.6), portion.to, kept.size());
-  const auto copy = [&]<class T>(std::vector<T> values, const auto& as_kept) {
-    copying.resize(values, kept.size() * brick_voxels);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kept.size(), 64),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                        CleanBrick brick;
-                        for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                          clean(leaves, kept[i], bounds, brick);
-                          out.brick_origins[i] = leaves.origin(kept[i]);
-                          std::ranges::transform(brick.values, values.data() + i * brick_voxels, as_kept);
-                        }
-                        copying.add(range.size());
-                      });
-    out.brick_values = std::move(values);
-  };
-  if (bricks.halves) {
-    copy(std::vector<std::uint16_t>(), [](float value) { return *exact_half(value); });
-  } else {
-    copy(std::vector<float>(), [](float value) { return value; });
+  for (std::size_t i = 0; i < bricks.origins.size(); ++i) {
+    if (bricks.constant[i] == 0 || bricks.first[i] == out.background) continue;
+    const Box box = clipped(bricks.origins[i]);
+    out.tiles.push_back({box.min, box.max, bricks.first[i]});
   }
   tbb::parallel_sort(out.tiles.begin(), out.tiles.end(),
                      [](const Tile& a, const Tile& b) { return lexicographic(a.min, b.min); });
@@ -505,8 +564,6 @@ std::vector<GridInfo> list_grids(const std::filesystem::path& file) {
 
 namespace {
 
-constexpr double reading = 0.7;  // of what an import takes
-
 // What f makes of one grid of an open file: its name, and what messages call it.
 template <class F>
 auto of_grid(Reader& reader, std::size_t grid, const std::string& file, F&& f) {
@@ -518,16 +575,18 @@ auto of_grid(Reader& reader, std::size_t grid, const std::string& file, F&& f) {
 bool is_empty(const ScalarVolume& volume) { return volume.empty(); }
 bool is_empty(const std::array<ScalarVolume, 2>& signs) { return signs[0].empty(); }
 
+constexpr double reading_vectors = 0.7;  // of what an import takes
+
 // What make() makes of each component of a grid of vectors.
 template <class Axis, class Make>
 std::array<Axis, 3> of_axes(Reader& reader, std::size_t grid, const std::string& file, const Log& log, Portion portion,
                             const Make& make) {
   return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
-    std::array<SourceGrid, 3> sources = reader.read_vector(grid, portion.part(0.0, reading), log, name + ": ");
+    std::array<SourceGrid, 3> sources = reader.read_vector(grid, portion.part(0.0, reading_vectors), log, name + ": ");
     std::array<Axis, 3> out;
-    double from = reading;
+    double from = reading_vectors;
     for (int axis = 0; axis < 3; ++axis) {
-      const double to = from + (1.0 - reading) / 3.0;
+      const double to = from + (1.0 - reading_vectors) / 3.0;
       // They are empty together, which is said once.
       const Log& heard = axis > 0 && is_empty(out[0]) ? Log() : log;
       out[axis] =
@@ -543,8 +602,8 @@ std::array<Axis, 3> of_axes(Reader& reader, std::size_t grid, const std::string&
 ScalarVolume detail::import_grid(Reader& reader, std::size_t grid, const std::string& file, const Log& log,
                                  Progress* progress, Portion portion) {
   return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
-    SourceGrid source = reader.read(grid, portion.part(0.0, reading), log, name + ": ");
-    ScalarVolume volume = assemble(std::move(source), log, name + ": ", progress, portion.part(reading, 1.0));
+    SourceGrid source = reader.read(grid, portion.part(0.0, reader.reading()), log, name + ": ");
+    ScalarVolume volume = assemble(std::move(source), log, name + ": ", progress, portion.part(reader.reading(), 1.0));
     volume.name = grid_name;
     return volume;
   });
@@ -576,9 +635,12 @@ class OneSign final : public LeafSource {
   [[nodiscard]] std::size_t count() const override { return leaves_->count(); }
   [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return leaves_->origin(leaf); }
   [[nodiscard]] ActiveMask active(std::size_t leaf) const override { return leaves_->active(leaf); }
-  void values(std::size_t leaf, float* out) const override {
-    leaves_->values(leaf, out);
-    std::transform(out, out + brick_voxels, out, std::ref(*this));
+  bool sweep(const Visit& visit, Progress* progress, Portion portion) const override {
+    const auto signed_visit = [&](std::size_t leaf, std::span<float, brick_voxels> values) {
+      std::ranges::transform(values, values.begin(), std::ref(*this));
+      return visit(leaf, values);
+    };
+    return leaves_->sweep(signed_visit, progress, portion);
   }
 
  private:
@@ -609,8 +671,9 @@ std::array<ScalarVolume, 2> detail::assemble_signed(SourceGrid whole, const std:
 std::array<ScalarVolume, 2> detail::import_signed_grid(Reader& reader, std::size_t grid, const std::string& file,
                                                        const Log& log, Progress* progress, Portion portion) {
   return of_grid(reader, grid, file, [&](const std::string& grid_name, const std::string& name) {
-    SourceGrid whole = reader.read(grid, portion.part(0.0, reading), log, name + ": ");
-    return assemble_signed(std::move(whole), grid_name, log, name + ": ", progress, portion.part(reading, 1.0));
+    SourceGrid whole = reader.read(grid, portion.part(0.0, reader.reading()), log, name + ": ");
+    return assemble_signed(std::move(whole), grid_name, log, name + ": ", progress,
+                           portion.part(reader.reading(), 1.0));
   });
 }
 

@@ -61,19 +61,41 @@ struct Component {
   }
 };
 
-/// The leaves of one grid, still in their library's own memory. Safe to read from many threads.
+/// A span of a load's fraction.
+struct Portion {
+  double from = 0.0;
+  double to = 1.0;
+
+  [[nodiscard]] double at(double part) const { return from + part * (to - from); }
+  [[nodiscard]] Portion part(double a, double b) const { return {at(a), at(b)}; }
+};
+
+/// The leaves of one grid: where they are and what is active of them in memory, their values perhaps still in a file.
 class LeafSource {
  public:
+  /// Of a leaf, all 512 values, active or not, z fastest; it may change them. False: no more are wanted.
+  using Visit = std::function<bool(std::size_t leaf, std::span<float, brick_voxels> values)>;
+
   LeafSource() = default;
   LeafSource(const LeafSource&) = delete;
   LeafSource& operator=(const LeafSource&) = delete;
   virtual ~LeafSource() = default;
 
+  // Safe to call from many threads.
   [[nodiscard]] virtual std::size_t count() const = 0;
   [[nodiscard]] virtual glm::ivec3 origin(std::size_t leaf) const = 0;
   [[nodiscard]] virtual ActiveMask active(std::size_t leaf) const = 0;
-  /// All 512 values, active or not, z fastest.
+  /// Visits every leaf once, in any order and on many threads at a time; one sweep at a time. Returns whether all were
+  /// wanted.
+  virtual bool sweep(const Visit& visit, Progress* progress, Portion portion) const = 0;
+};
+
+/// Those whose values are all in memory, if only their library's own.
+class HeldLeaves : public LeafSource {
+ public:
+  /// Safe to call from many threads.
   virtual void values(std::size_t leaf, float* out) const = 0;
+  bool sweep(const Visit& visit, Progress* progress, Portion portion) const override;
 };
 
 /// One grid as a file or a host has it.
@@ -83,15 +105,6 @@ struct SourceGrid {
   /// Every active tile, and every inactive one that differs from the background.
   std::vector<SourceTile> tiles;
   std::unique_ptr<LeafSource> leaves;
-};
-
-/// A span of a load's fraction.
-struct Portion {
-  double from = 0.0;
-  double to = 1.0;
-
-  [[nodiscard]] double at(double part) const { return from + part * (to - from); }
-  [[nodiscard]] Portion part(double a, double b) const { return {at(a), at(b)}; }
 };
 
 /// One open file. Methods throw whatever their library throws; the caller words it.
@@ -109,7 +122,10 @@ class Reader {
   [[nodiscard]] virtual const std::string& format() const = 0;
   /// What opening took of the load's fraction.
   [[nodiscard]] virtual double opened() const { return 0.0; }
-  /// Reads the tree of the grid at this place of grids(), whose values are not none. log_prefix begins every warning.
+  /// What read() takes of a grid's import.
+  [[nodiscard]] virtual double reading() const = 0;
+  /// Reads the tree of the grid at this place of grids(), whose values are not none; they may be read from the file as
+  /// they are swept, which the reader has to outlive. log_prefix begins every warning.
   virtual SourceGrid read(std::size_t grid, Portion portion, const Log& log, const std::string& log_prefix) = 0;
   /// The components of one whose values are lengths.
   virtual std::array<SourceGrid, 3> read_vector(std::size_t grid, Portion portion, const Log& log,

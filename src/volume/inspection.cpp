@@ -1,7 +1,10 @@
 #include "volume/inspection.hpp"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "volume/bricks.hpp"
@@ -14,17 +17,54 @@ using namespace detail;
 
 namespace {
 
-/// Calls f(value, voxels) for every active voxel of a brick, and every active tile.
-template <typename Call>
-void for_active(const SourceGrid& source, Call&& f) {
-  std::array<float, brick_voxels> values;
-  for (std::size_t leaf = 0; leaf < source.leaves->count(); ++leaf) {
-    const ActiveMask mask = source.leaves->active(leaf);
-    source.leaves->values(leaf, values.data());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (((mask[i / 64] >> (i % 64)) & 1U) != 0) f(values[i], std::uint64_t{1});
+/// What of active values is told beside their histogram.
+struct Sums {
+  float least = std::numeric_limits<float>::max();
+  float most = std::numeric_limits<float>::lowest();
+  double sum = 0.0;
+  std::uint64_t finite = 0;
+  std::uint64_t negative = 0;
+  std::uint64_t non_finite = 0;
+
+  void add(float value, std::uint64_t voxels) {
+    if (!std::isfinite(value)) {
+      non_finite += voxels;
+      return;
     }
+    if (value < 0.0F) negative += voxels;
+    least = std::min(least, value);
+    most = std::max(most, value);
+    sum += double{value} * static_cast<double>(voxels);
+    finite += voxels;
   }
+  void add(const Sums& other) {
+    least = std::min(least, other.least);
+    most = std::max(most, other.most);
+    sum += other.sum;
+    finite += other.finite;
+    negative += other.negative;
+    non_finite += other.non_finite;
+  }
+};
+
+using Histogram = std::array<std::uint64_t, histogram_bins>;
+
+/// Calls f(leaf, value) for every active voxel, on many threads at a time.
+template <typename Call>
+void for_active(const LeafSource& leaves, Call&& f) {
+  const auto visit = [&](std::size_t leaf, std::span<const float, brick_voxels> values) {
+    const ActiveMask mask = leaves.active(leaf);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (((mask[i / 64] >> (i % 64)) & 1U) != 0) f(leaf, values[i]);
+    }
+    return true;
+  };
+  leaves.sweep(visit, nullptr, {});
+}
+
+/// Calls f(value, voxels) for every active tile.
+template <typename Call>
+void for_active_tiles(const SourceGrid& source, Call&& f) {
   for (const SourceTile& tile : source.tiles) {
     if (tile.active) f(tile.box.value, Box{tile.box.min, tile.box.max}.voxels());
   }
@@ -51,31 +91,30 @@ GridValues values_of(const SourceGrid& source) {
       leaves.count() * (brick_voxels * sizeof(float) + sizeof(glm::ivec3)) +
       static_cast<std::uint64_t>(std::ranges::count_if(source.tiles, &SourceTile::active)) * sizeof(Tile);
 
-  float least = std::numeric_limits<float>::max();
-  float most = std::numeric_limits<float>::lowest();
-  double sum = 0.0;
-  std::uint64_t finite = 0;
-  for_active(source, [&](float value, std::uint64_t voxels) {
-    if (!std::isfinite(value)) {
-      out.non_finite_voxels += voxels;
-      return;
-    }
-    if (value < 0.0F) out.negative_voxels += voxels;
-    least = std::min(least, value);
-    most = std::max(most, value);
-    sum += double{value} * static_cast<double>(voxels);
-    finite += voxels;
-  });
-  if (finite == 0) return out;
-  out.min = least;
-  out.max = most;
-  out.mean = sum / static_cast<double>(finite);
-  const double bins_a_unit = most > least ? double{histogram_bins} / (double{most} - double{least}) : 0.0;
-  for_active(source, [&](float value, std::uint64_t voxels) {
+  // A leaf's by itself: sums do not depend on who came first.
+  std::vector<Sums> of_leaves(leaves.count());
+  for_active(leaves, [&](std::size_t leaf, float value) { of_leaves[leaf].add(value, 1); });
+  Sums all;
+  for (const Sums& leaf : of_leaves) all.add(leaf);
+  for_active_tiles(source, [&](float value, std::uint64_t voxels) { all.add(value, voxels); });
+  out.negative_voxels = all.negative;
+  out.non_finite_voxels = all.non_finite;
+  if (all.finite == 0) return out;
+  out.min = all.least;
+  out.max = all.most;
+  out.mean = all.sum / static_cast<double>(all.finite);
+  const double bins_a_unit =
+      all.most > all.least ? double{histogram_bins} / (double{all.most} - double{all.least}) : 0.0;
+  const auto count = [&](Histogram& histogram, float value, std::uint64_t voxels) {
     if (!std::isfinite(value)) return;
-    const auto bin = static_cast<std::size_t>((double{value} - double{least}) * bins_a_unit);
-    out.histogram[std::min(bin, histogram_bins - 1)] += voxels;
-  });
+    const auto bin = static_cast<std::size_t>((double{value} - double{all.least}) * bins_a_unit);
+    histogram[std::min(bin, histogram_bins - 1)] += voxels;
+  };
+  tbb::enumerable_thread_specific<Histogram> histograms([] { return Histogram{}; });
+  for_active(leaves, [&](std::size_t /*leaf*/, float value) { count(histograms.local(), value, 1); });
+  for_active_tiles(source, [&](float value, std::uint64_t voxels) { count(out.histogram, value, voxels); });
+  for (const Histogram& some : histograms)
+    std::transform(some.begin(), some.end(), out.histogram.begin(), out.histogram.begin(), std::plus<>());
   return out;
 }
 
@@ -119,7 +158,8 @@ const GridFacts& Inspection::facts(std::size_t grid) {
   if (grids_[grid].values != Values::none) {
     try {
       // A reader of its own: one that fails leaves its stream in no state to go on from.
-      found.values = values_of(open(file_, nullptr)->read(grid, {}, {}, ""));
+      const std::unique_ptr<Reader> reader = open(file_, nullptr);
+      found.values = values_of(reader->read(grid, {}, {}, ""));
     } catch (const std::bad_alloc&) {
       throw Error(ErrorCode::out_of_memory, one_line(file_.string() + ": not enough memory to read it"));
     } catch (const std::ios_base::failure&) {

@@ -27,7 +27,7 @@ void check_affine(const glm::dmat4& m) {
   if (m[0].w != 0.0 || m[1].w != 0.0 || m[2].w != 0.0 || m[3].w != 1.0) fail("its transform is not affine");
 }
 
-class DenseLeaves final : public LeafSource {
+class DenseLeaves final : public HeldLeaves {
  public:
   DenseLeaves(const DenseVoxels& voxels, std::vector<glm::ivec3> origins)
       : voxels_(voxels), origins_(std::move(origins)) {}
@@ -96,7 +96,7 @@ glm::ivec3 origin_of(std::span<const std::int32_t> origins, std::size_t brick) {
   return {origins[3 * brick], origins[3 * brick + 1], origins[3 * brick + 2]};
 }
 
-class SparseLeaves final : public LeafSource {
+class SparseLeaves final : public HeldLeaves {
  public:
   explicit SparseLeaves(const SparseVoxels& voxels)
       : origins_(voxels.brick_origins), values_(voxels.brick_values), active_(voxels.brick_active) {}

@@ -68,7 +68,7 @@ glm::ivec3 child_offset(std::uint32_t i, unsigned log2_table, unsigned log2_chil
 }
 
 template <typename BuildT, typename Pick>
-class NanoLeaves final : public LeafSource {
+class NanoLeaves final : public HeldLeaves {
  public:
   using LeafT = nanovdb::NanoLeaf<BuildT>;
 
@@ -258,6 +258,7 @@ class NanoReader final : public Reader {
   [[nodiscard]] const std::vector<GridInfo>& grids() const override { return entries_; }
   [[nodiscard]] const std::vector<Metadata>& metadata() const override { return metadata_; }
   [[nodiscard]] const std::string& format() const override { return format_; }
+  [[nodiscard]] double reading() const override { return 0.7; }
 
   SourceGrid read(std::size_t index, Portion portion, const Log& log, const std::string& log_prefix) override {
     std::shared_ptr<const Handle> handle = load_checked(index, portion);

@@ -73,10 +73,13 @@ CoarseVolume::CoarseVolume(const ScalarVolume& volume, const Progress* progress)
       const glm::ivec3 from = glm::max(origin, glm::ivec3(x0, low.y, low.z));
       const glm::ivec3 to =
           glm::min(origin + (brick_size - 1), glm::ivec3(x1, volume.bounds_max.y, volume.bounds_max.z));
+      std::array<std::size_t, brick_size> columns;  // of z
+      for (int z = from.z; z <= to.z; ++z) columns[static_cast<std::size_t>(z & 7)] = at(low.y, z);
       for (int x = from.x; x <= to.x; ++x) {
         for (int y = from.y; y <= to.y; ++y) {
+          const std::size_t row = at(y, low.z);
           for (int z = from.z; z <= to.z; ++z) {
-            const std::size_t cell = at(y, z);
+            const std::size_t cell = row + columns[static_cast<std::size_t>(z & 7)];
             sums[cell] += values[((x & 7) * brick_size + (y & 7)) * brick_size + (z & 7)];
             covered[cell] += 1.0;
           }

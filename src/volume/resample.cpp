@@ -18,7 +18,7 @@ constexpr double far_off = double{max_coordinate} + max_extent;
 constexpr double most_finer = 64.0;
 
 /// Some of a field's own bricks.
-class OwnLeaves final : public LeafSource {
+class OwnLeaves final : public HeldLeaves {
  public:
   OwnLeaves(const ScalarVolume& field, std::vector<std::size_t> bricks) : field_(field), bricks_(std::move(bricks)) {}
   [[nodiscard]] std::size_t count() const override { return bricks_.size(); }

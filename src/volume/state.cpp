@@ -63,14 +63,14 @@ BrickCopy::BrickCopy(const DenseCopy& dense) : index_to_world_(dense.index_to_wo
   origins_.resize(3 * count);
   values_.resize(count * brick_voxels);
   active_.resize(count * brick_size);
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t brick) {
+  const auto take = [&](std::size_t brick, std::span<float, brick_voxels> values) {
     for (int axis = 0; axis < 3; ++axis)
       origins_[3 * brick + static_cast<std::size_t>(axis)] = leaves.origin(brick)[axis];
-    leaves.values(brick, &values_[brick * brick_voxels]);
-    const ActiveMask mask =
-        not_zero(std::span<const float, brick_voxels>(&values_[brick * brick_voxels], brick_voxels));
-    std::ranges::copy(mask, &active_[brick * brick_size]);
-  });
+    std::ranges::copy(values, &values_[brick * brick_voxels]);
+    std::ranges::copy(not_zero(values), &active_[brick * brick_size]);
+    return true;
+  };
+  leaves.sweep(take, nullptr, {});
 }
 
 SparseVoxels BrickCopy::view() const { return {origins_, values_, active_, tiles_, background_, index_to_world_}; }

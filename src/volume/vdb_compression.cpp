@@ -3,6 +3,7 @@
 #include <blosc.h>
 #include <zlib.h>
 
+#include <cstring>
 #include <vector>
 
 #include "volume/import_detail.hpp"
@@ -30,8 +31,22 @@ void unpack_zip(const std::vector<char>& packed, char* data, std::size_t bytes) 
 
 }  // namespace
 
+namespace {
+
+bool is_packed(std::uint32_t compression) {
+  return (compression & (openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ZIP)) != 0;
+}
+
+// As the file says it: negative, or 0, if they are as they are, for compression would not have made them fewer.
+std::int64_t check_length(std::int64_t length, std::size_t bytes) {
+  const auto limit = static_cast<std::int64_t>(bytes);
+  if (length > limit + BLOSC_MAX_OVERHEAD || (length <= 0 && length != -limit)) fail(damaged);
+  return length;
+}
+
+}  // namespace
+
 void read_compressed(std::istream& in, char* data, std::size_t bytes, std::uint32_t compression) {
-  using namespace openvdb::io;
   const auto take = [&](char* to, std::size_t count) {
     if (to != nullptr) {
       in.read(to, static_cast<std::streamsize>(count));
@@ -39,24 +54,37 @@ void read_compressed(std::istream& in, char* data, std::size_t bytes, std::uint3
       in.seekg(static_cast<std::streamoff>(count), std::ios::cur);
     }
   };
-  if ((compression & (COMPRESS_BLOSC | COMPRESS_ZIP)) == 0) {
+  if (!is_packed(compression)) {
     take(data, bytes);
     return;
   }
-  // Negative, or 0: as they are, for compression would not have made them fewer.
   std::int64_t length = 0;
   in.read(reinterpret_cast<char*>(&length), sizeof length);
-  const auto limit = static_cast<std::int64_t>(bytes);
-  if (length > limit + BLOSC_MAX_OVERHEAD || (length <= 0 && length != -limit)) fail(damaged);
-  if (length <= 0) {
+  if (check_length(length, bytes) <= 0) {
     take(data, bytes);
   } else if (data == nullptr) {
     take(nullptr, static_cast<std::size_t>(length));
   } else {
     std::vector<char> packed(static_cast<std::size_t>(length));
     take(packed.data(), packed.size());
-    ((compression & COMPRESS_BLOSC) != 0 ? unpack_blosc : unpack_zip)(packed, data, bytes);
+    ((compression & openvdb::io::COMPRESS_BLOSC) != 0 ? unpack_blosc : unpack_zip)(packed, data, bytes);
   }
+}
+
+void copy_bytes(std::istream& in, std::vector<char>& to, std::size_t count) {
+  to.resize(to.size() + count);
+  in.read(to.data() + to.size() - count, static_cast<std::streamsize>(count));
+}
+
+void copy_compressed(std::istream& in, std::vector<char>& to, std::size_t bytes, std::uint32_t compression) {
+  if (!is_packed(compression)) {
+    copy_bytes(in, to, bytes);
+    return;
+  }
+  std::int64_t length = 0;
+  copy_bytes(in, to, sizeof length);
+  std::memcpy(&length, to.data() + to.size() - sizeof length, sizeof length);
+  copy_bytes(in, to, check_length(length, bytes) <= 0 ? bytes : static_cast<std::size_t>(length));
 }
 
 }  // namespace cumulet::volume::detail

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <istream>
+#include <vector>
 
 namespace cumulet::volume::detail {
 
@@ -15,6 +16,10 @@ namespace cumulet::volume::detail {
 /// before it is believed: OpenVDB writes past its buffer where a damaged length is negative, and allocates whatever a
 /// positive one says. Throws std::runtime_error.
 void read_compressed(std::istream& in, char* data, std::size_t bytes, std::uint32_t compression);
+/// Appends what read_compressed would read, as the file has it. Throws the same of lengths.
+void copy_compressed(std::istream& in, std::vector<char>& to, std::size_t bytes, std::uint32_t compression);
+/// Appends these bytes.
+void copy_bytes(std::istream& in, std::vector<char>& to, std::size_t count);
 
 }  // namespace cumulet::volume::detail
 

@@ -12,6 +12,7 @@
 #include "base/apart.hpp"
 #include "volume/import_detail.hpp"
 #include "volume/source_file.hpp"
+#include "volume/vdb_leaves.hpp"
 
 namespace cumulet::volume::detail {
 namespace {
@@ -34,38 +35,6 @@ std::string class_name(openvdb::GridClass grid_class) {
   }
 }
 
-glm::ivec3 to_glm(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
-
-template <typename TreeT, typename Pick>
-class VdbLeaves final : public LeafSource {
- public:
-  using LeafT = typename TreeT::LeafNodeType;
-  static_assert(LeafT::DIM == brick_size);
-
-  VdbLeaves(typename TreeT::ConstPtr tree, Pick pick) : tree_(std::move(tree)), pick_(pick) {
-    tree_->getNodes(leaves_);
-  }
-
-  [[nodiscard]] std::size_t count() const override { return leaves_.size(); }
-  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return to_glm(leaves_[leaf]->origin()); }
-  [[nodiscard]] ActiveMask active(std::size_t leaf) const override {
-    ActiveMask mask;
-    for (openvdb::Index x = 0; x < brick_size; ++x) {
-      mask[x] = leaves_[leaf]->getValueMask().template getWord<std::uint64_t>(x);
-    }
-    return mask;
-  }
-  void values(std::size_t leaf, float* out) const override {
-    const auto* data = leaves_[leaf]->buffer().data();
-    for (int i = 0; i < brick_voxels; ++i) out[i] = pick_(data[i]);
-  }
-
- private:
-  typename TreeT::ConstPtr tree_;
-  Pick pick_;
-  std::vector<const LeafT*> leaves_;
-};
-
 /// Collects the tiles of a node and of all internal nodes below it.
 template <typename NodeT, typename Pick>
 void collect_tiles(const NodeT& node, Pick pick, float background, std::vector<SourceTile>& tiles) {
@@ -82,11 +51,10 @@ void collect_tiles(const NodeT& node, Pick pick, float background, std::vector<S
   }
 }
 
+/// All but the leaves.
 template <typename GridT, typename Pick>
 SourceGrid take_grid(const openvdb::GridBase& grid, Pick pick) {
-  using TreeT = typename GridT::TreeType;
-  const auto tree = static_cast<const GridT&>(grid).treePtr();
-  const auto& root = tree->root();
+  const auto& root = static_cast<const GridT&>(grid).tree().root();
   SourceGrid out;
   const auto matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
   // OpenVDB multiplies row vectors from the left: its rows are our columns.
@@ -95,66 +63,14 @@ SourceGrid take_grid(const openvdb::GridBase& grid, Pick pick) {
   }
   out.background = pick(root.background());
   collect_tiles(root, pick, out.background, out.tiles);
-  out.leaves = std::make_unique<VdbLeaves<TreeT, Pick>>(tree, pick);
   return out;
 }
 
-/// The same tree, but one that frees what it has read when its stream throws: OpenVDB's own root forgets the child that
-/// it was reading, with all that is below.
-template <typename TreeT>
-class OwningTree final : public TreeT {
- public:
-  void readTopology(std::istream& in, bool from_half) override {
-    using RootT = typename TreeT::RootNodeType;
-    using ChildT = typename RootT::ChildNodeType;
-    using ValueT = typename TreeT::ValueType;
-    const auto read = [&]<typename T>(T& value) { in.read(reinterpret_cast<char*>(&value), sizeof value); };
-    this->clear();
-    std::int32_t buffers = 0;  // of a leaf, which says it again
-    read(buffers);
-    RootT& root = this->root();
-    ValueT background{};
-    read(background);
-    root.setBackground(background, false);
-    openvdb::io::setGridBackgroundValuePtr(in, &root.background());
-    // A node that is not read to its end holds the background where children should be: it can be freed if those are
-    // null pointers. If not, it has to be read to its end, or is lost if the file ends before.
-    const bool frees = std::all_of(reinterpret_cast<const char*>(&background),
-                                   reinterpret_cast<const char*>(&background + 1), [](char c) { return c == 0; });
-    auto& file = dynamic_cast<SourceFile&>(in);
-    openvdb::Index tiles = 0;
-    openvdb::Index children = 0;
-    read(tiles);
-    read(children);
-    const auto read_key = [&] {
-      std::array<std::int32_t, 3> key{};
-      read(key);
-      // A damaged table could hold the same region twice under two keys.
-      if (((key[0] | key[1] | key[2]) & static_cast<int>(ChildT::DIM - 1)) != 0) fail("damaged root node");
-      return openvdb::Coord(key.data());
-    };
-    for (openvdb::Index i = 0; i < tiles; ++i) {
-      const openvdb::Coord key = read_key();
-      ValueT value{};
-      std::uint8_t active = 0;
-      read(value);
-      read(active);
-      root.addTile(key, value, active != 0);
-    }
-    for (openvdb::Index i = 0; i < children; ++i) {
-      auto child = std::make_unique<ChildT>(openvdb::PartialCreate(), read_key(), background);
-      file.hold(!frees);
-      try {
-        child->readTopology(in, from_half);
-      } catch (...) {
-        if (!frees) (void)child.release();
-        throw;
-      }
-      file.hold(false);
-      root.addChild(child.release());
-    }
-  }
-};
+/// The tree of a grid that own_tree() was called for.
+template <typename GridT>
+std::shared_ptr<OwningTree<typename GridT::TreeType>> tree_of(openvdb::GridBase& grid) {
+  return std::static_pointer_cast<OwningTree<typename GridT::TreeType>>(static_cast<GridT&>(grid).treePtr());
+}
 
 /// Calls f<GridT>() for the grid's type, if its voxels can be read.
 template <typename Call>
@@ -193,22 +109,32 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   [[nodiscard]] const std::string& format() const override { return format_; }
 
   [[nodiscard]] double opened() const override { return inputHasGridOffsets() ? 0.0 : 0.35; }
+  [[nodiscard]] double reading() const override { return 0.1; }
 
   SourceGrid read(std::size_t index, Portion portion, const Log& /*log*/, const std::string& /*log_prefix*/) override {
-    const openvdb::GridBase::Ptr grid = read_whole(index, portion);
+    const openvdb::GridBase::Ptr grid = read_topology(index, portion);
     SourceGrid out;
-    with_type(*grid, [&]<typename GridT>() { out = take_grid<GridT>(*grid, Lengths()); });
+    with_type(*grid, [&]<typename GridT>() {
+      out = take_grid<GridT>(*grid, Lengths());
+      out.leaves = std::make_unique<StreamedLeaves<typename GridT::TreeType, Lengths>>(tree_of<GridT>(*grid), Lengths(),
+                                                                                       vdb_stream());
+    });
     if (!out.leaves) fail(unreadable);
     return out;
   }
 
   std::array<SourceGrid, 3> read_vector(std::size_t index, Portion portion, const Log& /*log*/,
                                         const std::string& /*log_prefix*/) override {
-    const openvdb::GridBase::Ptr grid = read_whole(index, portion);
+    const openvdb::GridBase::Ptr grid = read_topology(index, portion);
     std::array<SourceGrid, 3> out;
     with_type(*grid, [&]<typename GridT>() {
       if constexpr (!std::is_arithmetic_v<typename GridT::ValueType>) {
-        for (int axis = 0; axis < 3; ++axis) out[axis] = take_grid<GridT>(*grid, Component{axis});
+        const auto tree = tree_of<GridT>(*grid);
+        tree->fill(vdb_stream());
+        for (int axis = 0; axis < 3; ++axis) {
+          out[axis] = take_grid<GridT>(*grid, Component{axis});
+          out[axis].leaves = std::make_unique<VdbLeaves<typename GridT::TreeType, Component>>(tree, Component{axis});
+        }
       }
     });
     if (!out[0].leaves) fail(unreadable);
@@ -328,6 +254,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
         stream_.hold(!own_tree(*grid));
         readGrid(grid, descriptor, stream_);
         stream_.hold(false);
+        with_type(*grid, [&]<typename GridT>() { tree_of<GridT>(*grid)->pass(vdb_stream()); });
       }
       describe(*grid, descriptor, entry);
     }
@@ -365,8 +292,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     return own;
   }
 
-  /// With the tree that it may share with another.
-  openvdb::GridBase::Ptr read_whole(std::size_t index, Portion portion) {
+  /// With the tree that it may share with another; its leaves' values are still in the file.
+  openvdb::GridBase::Ptr read_topology(std::size_t index, Portion portion) {
     openvdb::GridBase::Ptr grid = read_grid(descriptors_[index], portion);
     if (descriptors_[index].isInstance()) {
       const auto parent = std::find_if(descriptors_.begin(), descriptors_.end(), [&](const auto& d) {
@@ -390,8 +317,12 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
     stream_.seekg(descriptor.getGridPos());
     readGrid(grid, descriptor, stream_);
+    const std::int64_t end = inputHasGridOffsets() ? descriptor.getEndPos() : size_;
+    with_type(*grid, [&]<typename GridT>() { tree_of<GridT>(*grid)->ends_at(end); });
     return grid;
   }
+
+  VdbStream vdb_stream() { return {stream_, metadata_}; }
 
   static constexpr const char* unreadable = "is of a type that cannot be read";
 

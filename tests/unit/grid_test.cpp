@@ -196,7 +196,8 @@ TEST(Statistics, MatchBruteForceOnEveryCellAboveAndInsideBricks) {
     grid::BrickSums sums;
     volume::BrickValues::Brick room;
     const grid::BrickTree& tree = grid::brick_tree(frame);
-    sums.compute(statistics.values(node, room), tree);
+    const float* values = statistics.values(node, room);
+    sums.compute(values, grid::BrickSums::reference_of(values), tree);
     vec3 v0(node.corner);
     for (int axis = 0; axis < 3; ++axis) v0[axis] += ((node.corner[axis] / 8) & 1) != 0 ? 8.0F : 0.0F;
     std::uint32_t shape = frame | (1U << 9U) | (3U << 11U);

@@ -204,6 +204,37 @@ TEST_F(Limits, MemoryOfVoxelsIsKept) {
   EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_OUT_OF_MEMORY);
 }
 
+// A grid is as coarse as it takes, and the one after it finds room, too.
+TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
+  const VolumeRef large = make_ball(96);
+  const ViewerPtr free = make();
+  picture_of(free.get(), large.get(), target_);
+  const cumulet_stats all = stats_of(free);
+  ASSERT_EQ(all.limited, 0);
+
+  const ViewerPtr viewer = make();
+  picture_of(viewer.get(), make_ball(12).get(), target_);
+  const cumulet_stats before = stats_of(viewer);
+  // Two fifths of what is left are a half of what all cells take.
+  const std::uint64_t room = before.gl_bytes - before.cell_bytes + all.cell_bytes * 5 / 4;
+  limit(viewer, 0, room);
+  picture_of(viewer.get(), large.get(), target_);
+  const cumulet_stats cut = stats_of(viewer);
+  EXPECT_EQ(cut.limited, 1);
+  EXPECT_LE(cut.cell_bytes, all.cell_bytes / 2);
+  EXPECT_GT(cut.cell_bytes, all.cell_bytes / 4);
+  ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+  auto whole = target_.frame();
+  whole.target = CUMULET_TARGET_NONE;
+  converge(viewer.get(), whole);
+  EXPECT_GT(stats_of(viewer).cell_bytes, all.cell_bytes / 4);
+  // With room again, all are there.
+  limit(viewer, 0, 0);
+  picture_of(viewer.get(), large.get(), target_);
+  EXPECT_EQ(stats_of(viewer).cells, all.cells);
+}
+
 TEST_F(Limits, GlMemoryIsKept) {
   const VolumeRef small = make_ball(12);
   const VolumeRef large = make_ball(96);

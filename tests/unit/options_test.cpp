@@ -494,6 +494,8 @@ TEST(Options, WhatStopsAPictureHasRoomForSamples) {
   EXPECT_EQ(parse({"--noise-target", "2.5"}).scene.sampling.noise_target_percent, 2.5F);
   EXPECT_EQ(parse({"--noise-target", "2.5"}).scene.sampling.samples, 65536U);
   EXPECT_EQ(parse({"--time-limit", "0.5"}).time_limit, 0.5);
+  EXPECT_EQ(parse({}).gpu_memory, 0U);
+  EXPECT_EQ(parse({"--gpu-memory", "8192"}).gpu_memory, std::uint64_t{8} << 30U);
   EXPECT_EQ(parse({"--time-limit", "0.5"}).scene.sampling.samples, 65536U);
   EXPECT_EQ(parse({"--noise-target", "2.5", "--time-limit", "9", "--spp", "100"}).scene.sampling.samples, 100U);
   EXPECT_EQ(parse({"--noise-target", "0"}).scene.sampling.samples, 64U) << "which asks for nothing";
@@ -591,6 +593,8 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--time-limit", "0"},
                                         {"--time-limit", "-3"},
                                         {"--time-limit", "soon"},
+                                        {"--gpu-memory", "0"},
+                                        {"--gpu-memory", "2G"},
                                         {"--time-limit", "inf"},
                                         {"--seed", "x"},
                                         {"--seed", "4294967296"},

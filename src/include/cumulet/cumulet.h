@@ -1070,9 +1070,9 @@ typedef struct cumulet_limits_desc {
    */
   uint64_t memory_bytes;
   /*
-   * GL memory. A volume whose cells or voxels, beside what is there until all of them have come, would bring
-   * cumulet_stats.gl_bytes above this is not uploaded: cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once, and the
-   * picture before stays. Surfaces, environments and pictures count, and are not refused.
+   * GL memory. Cells, not instances', are as coarse as two fifths of what the rest leaves take (cumulet_stats.limited).
+   * A volume that would yet bring gl_bytes above it, beside the one before, is not uploaded, and that one stays:
+   * cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once. Surfaces and pictures count, and are not refused.
    */
   uint64_t gl_bytes;
 } cumulet_limits_desc;

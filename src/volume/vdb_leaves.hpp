@@ -1,0 +1,324 @@
+#pragma once
+
+// Private to volume/: the leaves of OpenVDB's trees. After vdb_compression.hpp.
+
+#include <openvdb/io/io.h>
+#include <openvdb/openvdb.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <istream>
+#include <memory>
+#include <optional>
+#include <streambuf>
+#include <utility>
+#include <vector>
+
+#include "volume/import_detail.hpp"
+#include "volume/source_file.hpp"
+#include "volume/vdb_compression.hpp"
+
+namespace cumulet::volume::detail {
+
+inline glm::ivec3 to_glm(const openvdb::Coord& c) { return {c.x(), c.y(), c.z()}; }
+
+template <typename LeafT>
+ActiveMask active_of(const LeafT& leaf) {
+  ActiveMask mask;
+  for (openvdb::Index x = 0; x < brick_size; ++x) mask[x] = leaf.getValueMask().template getWord<std::uint64_t>(x);
+  return mask;
+}
+
+/// Bytes as a stream, which throws at their end.
+class MemoryStream final : public std::istream {
+ public:
+  explicit MemoryStream(std::vector<char>& bytes) : std::istream(nullptr), buffer_(bytes) {
+    rdbuf(&buffer_);
+    exceptions(std::ios::failbit | std::ios::badbit);
+  }
+
+ private:
+  class Buffer final : public std::streambuf {
+   public:
+    explicit Buffer(std::vector<char>& bytes) { setg(bytes.data(), bytes.data(), bytes.data() + bytes.size()); }
+
+   protected:
+    pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode which) override {
+      const off_type base = from == std::ios_base::beg   ? 0
+                            : from == std::ios_base::cur ? gptr() - eback()
+                                                         : egptr() - eback();
+      return seekpos(base + offset, which);
+    }
+    pos_type seekpos(pos_type position, std::ios_base::openmode /*which*/) override {
+      const off_type place = position;
+      if (place < 0 || place > egptr() - eback()) return {off_type{-1}};
+      setg(eback(), eback() + place, egptr());
+      return position;
+    }
+  };
+  Buffer buffer_;
+};
+
+/// A file, and what it has for OpenVDB to know of it: the stream points to that.
+struct VdbStream {
+  SourceFile& file;
+  openvdb::io::StreamMetadata::Ptr& metadata;
+};
+
+/// The same tree, but one that leaves its leaves' values in the file, and frees what it has read when its stream
+/// throws: OpenVDB's own root forgets the child that it was reading, with all that is below.
+template <typename TreeT>
+class OwningTree final : public TreeT {
+ public:
+  using LeafT = typename TreeT::LeafNodeType;
+  using ValueT = typename TreeT::ValueType;
+
+  void readTopology(std::istream& in, bool from_half) override {
+    using RootT = typename TreeT::RootNodeType;
+    using ChildT = typename RootT::ChildNodeType;
+    const auto read = [&]<typename T>(T& value) { in.read(reinterpret_cast<char*>(&value), sizeof value); };
+    this->clear();
+    std::int32_t buffers = 0;  // of a leaf, which says it again
+    read(buffers);
+    RootT& root = this->root();
+    ValueT background{};
+    read(background);
+    root.setBackground(background, false);
+    openvdb::io::setGridBackgroundValuePtr(in, &root.background());
+    // A node that is not read to its end holds the background where children should be: it can be freed if those are
+    // null pointers. If not, it has to be read to its end, or is lost if the file ends before.
+    const bool frees = std::all_of(reinterpret_cast<const char*>(&background),
+                                   reinterpret_cast<const char*>(&background + 1), [](char c) { return c == 0; });
+    auto& file = dynamic_cast<SourceFile&>(in);
+    openvdb::Index tiles = 0;
+    openvdb::Index children = 0;
+    read(tiles);
+    read(children);
+    const auto read_key = [&] {
+      std::array<std::int32_t, 3> key{};
+      read(key);
+      // A damaged table could hold the same region twice under two keys.
+      if (((key[0] | key[1] | key[2]) & static_cast<int>(ChildT::DIM - 1)) != 0) fail("damaged root node");
+      return openvdb::Coord(key.data());
+    };
+    for (openvdb::Index i = 0; i < tiles; ++i) {
+      const openvdb::Coord key = read_key();
+      ValueT value{};
+      std::uint8_t active = 0;
+      read(value);
+      read(active);
+      root.addTile(key, value, active != 0);
+    }
+    for (openvdb::Index i = 0; i < children; ++i) {
+      auto child = std::make_unique<ChildT>(openvdb::PartialCreate(), read_key(), background);
+      file.hold(!frees);
+      try {
+        child->readTopology(in, from_half);
+      } catch (...) {
+        if (!frees) (void)child.release();
+        throw;
+      }
+      file.hold(false);
+      root.addChild(child.release());
+    }
+  }
+
+  /// Notes where they are.
+  void readBuffers(std::istream& in, bool from_half) override {
+    buffers_ = Buffers{in.tellg(), from_half, openvdb::io::StreamMetadata(*openvdb::io::getStreamMetadataPtr(in))};
+    // Its index of the file is not believed.
+    buffers_->settings.gridMetadata().clearMetadata();
+  }
+  /// Where the file has nothing more of the grid, or nothing at all: progress is told by it.
+  void ends_at(std::int64_t end) { end_ = end; }
+
+  /// Reads them in where they belong.
+  void fill(const VdbStream& stream) {
+    if (!buffers_) return;
+    std::vector<LeafT*> leaves;
+    this->getNodes(leaves);
+    stream.file.seekg(buffers_->position);
+    with_settings(stream, [&] {
+      for (LeafT* leaf : leaves) leaf->readBuffers(stream.file, buffers_->from_half);
+    });
+  }
+  /// Takes the stream, which is where they are, past them.
+  void pass(const VdbStream& stream) const {
+    if (!buffers_) return;
+    std::vector<const LeafT*> leaves;
+    this->getNodes(leaves);
+    std::vector<char> bytes;
+    with_settings(stream, [&] {
+      for (const LeafT* leaf : leaves) {
+        bytes.clear();
+        is_indexed() ? copy(stream.file, *leaf, bytes) : read(stream.file, *leaf, [](const LeafT&) {});
+      }
+    });
+  }
+  /// Calls take(place in leaves, leaf with its values) for each of these, all that there are, on many threads at a time
+  /// until one returns false. Returns whether none did.
+  template <class Take>
+  bool sweep(const VdbStream& stream, const std::vector<const LeafT*>& leaves, Portion portion,
+             const Take& take) const {
+    if (!buffers_) return true;
+    stream.file.seekg(buffers_->position);
+    stream.file.begin(portion.from, portion.to,
+                      static_cast<std::uint64_t>(std::max(end_, buffers_->position) - buffers_->position));
+    std::atomic<bool> wanted = true;
+    if (!is_indexed()) {
+      with_settings(stream, [&] {
+        for (std::size_t i = 0; i < leaves.size() && wanted; ++i)
+          read(stream.file, *leaves[i], [&](const LeafT& leaf) { wanted = take(i, leaf); });
+      });
+      return wanted;
+    }
+    // One thread reads what is packed, run by run; all unpack.
+    struct Run {
+      std::size_t first, last;
+      std::vector<char> bytes;
+    };
+    using RunPtr = std::shared_ptr<Run>;
+    constexpr std::size_t leaves_a_run = 256;
+    std::size_t next = 0;
+    const auto take_run = [&](tbb::flow_control& flow) -> RunPtr {
+      if (next == leaves.size() || !wanted) {
+        flow.stop();
+        return nullptr;
+      }
+      const auto run = std::make_shared<Run>(Run{next, std::min(next + leaves_a_run, leaves.size()), {}});
+      for (; next != run->last; ++next) copy(stream.file, *leaves[next], run->bytes);
+      return run;
+    };
+    const auto unpack = [&](const RunPtr& run) {
+      MemoryStream in(run->bytes);
+      auto settings = std::make_shared<openvdb::io::StreamMetadata>(buffers_->settings);
+      settings->transferTo(in);
+      openvdb::io::setStreamMetadataPtr(in, settings, /*transfer=*/false);
+      for (std::size_t i = run->first; i != run->last && wanted; ++i) {
+        read(in, *leaves[i], [&](const LeafT& leaf) {
+          if (!take(i, leaf)) wanted = false;
+        });
+      }
+    };
+    const auto at_a_time = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+    tbb::parallel_pipeline(at_a_time, tbb::make_filter<void, RunPtr>(tbb::filter_mode::serial_in_order, take_run) &
+                                          tbb::make_filter<RunPtr, void>(tbb::filter_mode::parallel, unpack));
+    return wanted;
+  }
+
+ private:
+  struct Buffers {
+    std::int64_t position;
+    bool from_half;
+    openvdb::io::StreamMetadata settings;
+  };
+
+  /// Whether a leaf's values are as copy() knows them.
+  [[nodiscard]] bool is_indexed() const {
+    return buffers_->settings.fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
+  }
+
+  template <class Work>
+  void with_settings(const VdbStream& stream, const Work& work) const {
+    auto settings = std::make_shared<openvdb::io::StreamMetadata>(buffers_->settings);
+    struct Restore {
+      const VdbStream& stream;
+      ~Restore() { openvdb::io::setStreamMetadataPtr(stream.file, stream.metadata, /*transfer=*/false); }
+    } const restore{stream};
+    openvdb::io::setStreamMetadataPtr(stream.file, settings, /*transfer=*/false);
+    work();
+  }
+
+  /// Of a leaf without values, one with them; they are gone after the call.
+  template <class Use>
+  void read(std::istream& in, const LeafT& leaf, const Use& use) const {
+    LeafT whole(openvdb::PartialCreate(), leaf.origin());
+    whole.setValueMask(leaf.getValueMask());
+    whole.readBuffers(in, buffers_->from_half);
+    use(whole);
+  }
+
+  /// Appends what LeafNode::readBuffers reads of a leaf, packed as it is.
+  void copy(std::istream& in, const LeafT& leaf, std::vector<char>& to) const {
+    using namespace openvdb::io;
+    using Half = RealToHalf<ValueT>;
+    copy_bytes(in, to, leaf.getValueMask().memUsage());
+    copy_bytes(in, to, 1);
+    const auto inactive = static_cast<std::int8_t>(to.back());
+    const bool two = inactive == MASK_AND_TWO_INACTIVE_VALS;
+    const bool selects = two || inactive == MASK_AND_NO_INACTIVE_VALS || inactive == MASK_AND_ONE_INACTIVE_VAL;
+    if (two || inactive == NO_MASK_AND_ONE_INACTIVE_VAL || inactive == MASK_AND_ONE_INACTIVE_VAL)
+      copy_bytes(in, to, (two ? 2 : 1) * sizeof(ValueT));
+    if (selects) copy_bytes(in, to, leaf.getValueMask().memUsage());
+    const std::uint32_t compression = buffers_->settings.compression();
+    const bool active_alone = (compression & COMPRESS_ACTIVE_MASK) != 0 && inactive != NO_MASK_AND_ALL_VALS;
+    const std::size_t count = active_alone ? leaf.onVoxelCount() : LeafT::SIZE;
+    const bool halves = buffers_->from_half && Half::isReal;
+    if (halves && count == 0) return;
+    copy_compressed(in, to, count * (halves ? sizeof(typename Half::HalfT) : sizeof(ValueT)), compression);
+  }
+
+  std::optional<Buffers> buffers_;
+  std::int64_t end_ = 0;
+};
+
+/// Leaves of a tree that fill() was called for.
+template <typename TreeT, typename Pick>
+class VdbLeaves final : public HeldLeaves {
+ public:
+  using LeafT = typename TreeT::LeafNodeType;
+  static_assert(LeafT::DIM == brick_size);
+
+  VdbLeaves(typename TreeT::ConstPtr tree, Pick pick) : tree_(std::move(tree)), pick_(pick) {
+    tree_->getNodes(leaves_);
+  }
+
+  [[nodiscard]] std::size_t count() const override { return leaves_.size(); }
+  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return to_glm(leaves_[leaf]->origin()); }
+  [[nodiscard]] ActiveMask active(std::size_t leaf) const override { return active_of(*leaves_[leaf]); }
+  void values(std::size_t leaf, float* out) const override {
+    const auto* data = leaves_[leaf]->buffer().data();
+    for (int i = 0; i < brick_voxels; ++i) out[i] = pick_(data[i]);
+  }
+
+ private:
+  typename TreeT::ConstPtr tree_;
+  Pick pick_;
+  std::vector<const LeafT*> leaves_;
+};
+
+/// Leaves whose values are in a file until they are swept. What it is made of has to outlive it.
+template <typename TreeT, typename Pick>
+class StreamedLeaves final : public LeafSource {
+ public:
+  using LeafT = typename TreeT::LeafNodeType;
+  static_assert(LeafT::DIM == brick_size);
+
+  StreamedLeaves(std::shared_ptr<const OwningTree<TreeT>> tree, Pick pick, const VdbStream& stream)
+      : tree_(std::move(tree)), pick_(pick), stream_(stream) {
+    tree_->getNodes(leaves_);
+  }
+
+  [[nodiscard]] std::size_t count() const override { return leaves_.size(); }
+  [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return to_glm(leaves_[leaf]->origin()); }
+  [[nodiscard]] ActiveMask active(std::size_t leaf) const override { return active_of(*leaves_[leaf]); }
+  bool sweep(const Visit& visit, Progress* /*progress*/, Portion portion) const override {
+    return tree_->sweep(stream_, leaves_, portion, [&](std::size_t i, const LeafT& leaf) {
+      std::array<float, brick_voxels> values;
+      std::transform(leaf.buffer().data(), leaf.buffer().data() + brick_voxels, values.begin(), pick_);
+      return visit(i, values);
+    });
+  }
+
+ private:
+  std::shared_ptr<const OwningTree<TreeT>> tree_;
+  Pick pick_;
+  VdbStream stream_;
+  std::vector<const LeafT*> leaves_;
+};
+
+}  // namespace cumulet::volume::detail
