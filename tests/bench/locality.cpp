@@ -74,7 +74,6 @@ constexpr std::uint32_t wave_side = 8;
 constexpr std::size_t units = 4;
 constexpr std::size_t waves_a_unit = 16;
 constexpr std::size_t ways = 16;
-constexpr std::uint64_t record_bytes = sizeof(grid::CellRecord);
 
 struct Options {
   double threshold = settings::default_threshold(CUMULET_CRITERION_TRANSMITTANCE);
@@ -116,7 +115,7 @@ struct Wave {
 };
 
 Traffic simulate(const std::vector<std::vector<Visits>>& waves, const Order& order, std::size_t line,
-                 std::size_t first_bytes, std::size_t second_bytes) {
+                 std::size_t record_bytes, std::size_t first_bytes, std::size_t second_bytes) {
   std::vector<Cache> first(units, Cache(first_bytes, line));
   Cache second(second_bytes, line);
   std::array<std::deque<std::size_t>, units> waiting;
@@ -184,15 +183,92 @@ std::uint64_t spread_bits(std::uint64_t x) {
   return spread;
 }
 
+/// Eighths of a voxel.
+glm::uvec3 middle_of(const grid::CellRecord& record) {
+  const auto v = vertices_of(record);
+  return glm::uvec3(8.0F * 0.25F * (v[0] + v[1] + v[2] + v[3]));
+}
+
+/// The first bits of x first.
+std::uint64_t interleaved(const glm::uvec3& p) {
+  return spread_bits(p.x) << 2U | spread_bits(p.y) << 1U | spread_bits(p.z);
+}
+
 Order morton(const grid::TetGrid& grid) {
   std::vector<std::uint64_t> keys;
+  for (const grid::CellRecord& record : grid.cells) keys.push_back(interleaved(middle_of(record)));
+  return by_key(keys);
+}
+
+/// Hilbert's curve: Skilling, "Programming the Hilbert curve", 2004.
+Order hilbert(const grid::TetGrid& grid) {
+  const std::uint32_t top = 1U << static_cast<unsigned>(grid.cube.log2_size + 2);
+  std::vector<std::uint64_t> keys;
   for (const grid::CellRecord& record : grid.cells) {
-    const auto v = vertices_of(record);
-    const glm::uvec3 middle(8.0F * 0.25F * (v[0] + v[1] + v[2] + v[3]));
-    keys.push_back(spread_bits(middle.x) | spread_bits(middle.y) << 1U | spread_bits(middle.z) << 2U);
+    glm::uvec3 x = middle_of(record);
+    for (std::uint32_t bit = top; bit > 1; bit >>= 1U) {
+      for (int i = 0; i < 3; ++i) {
+        const std::uint32_t turned = (x[0] ^ x[i]) & (bit - 1);
+        if ((x[i] & bit) != 0) {
+          x[0] ^= bit - 1;
+        } else {
+          x[0] ^= turned;
+          x[i] ^= turned;
+        }
+      }
+    }
+    for (int i = 1; i < 3; ++i) x[i] ^= x[i - 1];
+    std::uint32_t rest = 0;
+    for (std::uint32_t bit = top; bit > 1; bit >>= 1U) {
+      if ((x[2] & bit) != 0) rest ^= bit - 1;
+    }
+    keys.push_back(interleaved(x ^ rest));
   }
   return by_key(keys);
 }
+
+/// Depth first as today, but of two children the one first that is nearer to the last cell: a bit a node of the tree.
+class NearerFirst {
+ public:
+  explicit NearerFirst(const grid::TetGrid& grid) : order(grid.cells.size()), grid_(grid) {
+    const auto exponent = static_cast<std::uint32_t>(grid.cube.log2_size - 1);
+    for (std::uint32_t root = 0; root < 24; ++root) {
+      Place place{.leaf = grid.roots[root].first_leaf, .node = grid.roots[root].first_internal};
+      place.inside = grid.roots[root + 1].first_internal - place.node;
+      core::cm_root_cell(root, exponent, place.v0, place.shape);
+      visit(place);
+    }
+  }
+  Order order;
+
+ private:
+  struct Place {
+    glm::vec3 v0{0.0F};
+    std::uint32_t shape = 0, leaf = 0, node = 0, inside = 0;
+  };
+  static glm::vec3 middle(const Place& place) {
+    glm::vec3 sum = place.v0;
+    for (std::uint32_t i = 1; i < 4; ++i) sum += core::cm_cell_vertex(place.v0, place.shape, i);
+    return 0.25F * sum;
+  }
+  void visit(const Place& place) {
+    if (place.inside == 0) {
+      order[place.leaf] = next_++;
+      last_ = middle(place);
+      return;
+    }
+    const std::uint32_t left = grid_.tree[place.node];
+    Place a{place.v0, core::cm_child_shape(place.shape, 0), place.leaf, place.node + 1, left};
+    Place b{core::cm_cell_vertex(place.v0, place.shape, 1), core::cm_child_shape(place.shape, 1), place.leaf + left + 1,
+            place.node + left + 1, place.inside - left - 1};
+    if (glm::distance(middle(b), last_) < glm::distance(middle(a), last_)) std::swap(a, b);
+    visit(a);
+    visit(b);
+  }
+  const grid::TetGrid& grid_;
+  std::uint32_t next_ = 0;
+  glm::vec3 last_{0.0F};
+};
 
 /// All of a level together, in each as today.
 Order by_level(const grid::TetGrid& grid) {
@@ -381,16 +457,24 @@ void measure(headless::Context& context, const std::filesystem::path& file, cons
       "\n| Order | Line | Lines | Misses of 16 KB | of 128 KB | of 512 KB behind 16 | of 4 MB behind 128 |\n"
       "|---|--:|--:|--:|--:|--:|--:|\n");
   for (const std::size_t line : {std::size_t{64}, std::size_t{128}}) {
-    const std::array<std::pair<const char*, Order>, 5> orders{
-        {{"today: depth first", today},
-         {"Morton", morton(grid)},
-         {"level by level", by_level(grid)},
-         {"shuffled", shuffled(grid.cells.size())},
-         {"foreseen", foreseen(waves, grid.cells.size(), line / record_bytes)}}};
-    for (const auto& [name, order] : orders) {
-      const Traffic small = simulate(waves, order, line, 16 << 10, 512 << 10);
-      const Traffic large = simulate(waves, order, line, 128 << 10, 4 << 20);
-      std::printf("| %s | %zu | %.3f | %.3f | %.3f | %.4f | %.4f |\n", name, line, small.lines, small.first_misses,
+    struct Row {
+      const char* name;
+      Order order;
+      std::size_t record_bytes = sizeof(grid::CellRecord);
+    };
+    const std::array<Row, 9> rows{{{"today: depth first", today},
+                                   {"Morton", morton(grid)},
+                                   {"Hilbert", hilbert(grid)},
+                                   {"depth first, nearer child first", NearerFirst(grid).order},
+                                   {"level by level", by_level(grid)},
+                                   {"shuffled", shuffled(grid.cells.size())},
+                                   {"foreseen", foreseen(waves, grid.cells.size(), line / sizeof(grid::CellRecord))},
+                                   {"today, 16 bytes a record", today, 16},
+                                   {"Hilbert, 16 bytes a record", hilbert(grid), 16}}};
+    for (const Row& row : rows) {
+      const Traffic small = simulate(waves, row.order, line, row.record_bytes, 16 << 10, 512 << 10);
+      const Traffic large = simulate(waves, row.order, line, row.record_bytes, 128 << 10, 4 << 20);
+      std::printf("| %s | %zu | %.3f | %.3f | %.3f | %.4f | %.4f |\n", row.name, line, small.lines, small.first_misses,
                   large.first_misses, small.second_misses, large.second_misses);
       std::fflush(stdout);
     }

@@ -41,9 +41,14 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look) {
   return std::make_unique<EditedShaders>(edits, files);
 }
 
-BoundGrid::BoundGrid(gl::FunctionsPtr gl, std::span<const std::uint32_t> words)
-    : gl_(std::move(gl)),
-      buffer_(gl::make_buffer(gl_, words.size_bytes(), words.data(), 0, "creating a NanoVDB grid")) {
+BoundGrid::BoundGrid(gl::FunctionsPtr gl, std::span<const std::uint32_t> words) : gl_(std::move(gl)) {
+  GLint64 most = 0;
+  gl_->GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
+  if (words.size_bytes() > static_cast<std::uint64_t>(most)) {
+    throw std::runtime_error("a NanoVDB grid of " + std::to_string(words.size_bytes()) +
+                             " bytes; this driver's GL_MAX_SHADER_STORAGE_BLOCK_SIZE is " + std::to_string(most));
+  }
+  buffer_ = gl::make_buffer(gl_, words.size_bytes(), words.data(), 0, "creating a NanoVDB grid");
   bind();
 }
 
