@@ -227,47 +227,35 @@ Order hilbert(const grid::TetGrid& grid) {
   return by_key(keys);
 }
 
-/// Depth first as today, but of two children the one first that is nearer to the last cell: a bit a node of the tree.
-class NearerFirst {
+/// Depth first as Sierpinski's curve has it: the child first at whose end of the split edge the curve comes in. Of a
+/// cell that it goes through backwards that is the other one; of two children it goes through the second one backwards.
+/// So it leaves the first where it enters the second, if their own edges meet there.
+class ThereAndBack {
  public:
-  explicit NearerFirst(const grid::TetGrid& grid) : order(grid.cells.size()), grid_(grid) {
-    const auto exponent = static_cast<std::uint32_t>(grid.cube.log2_size - 1);
-    for (std::uint32_t root = 0; root < 24; ++root) {
-      Place place{.leaf = grid.roots[root].first_leaf, .node = grid.roots[root].first_internal};
-      place.inside = grid.roots[root + 1].first_internal - place.node;
-      core::cm_root_cell(root, exponent, place.v0, place.shape);
-      visit(place);
+  explicit ThereAndBack(const grid::TetGrid& grid) : order(grid.cells.size()), grid_(grid) {
+    for (std::size_t root = 0; root < 24; ++root) {
+      const grid::RootEntry& entry = grid.roots[root];
+      visit(entry.first_leaf, entry.first_internal, grid.roots[root + 1].first_internal - entry.first_internal, false);
     }
   }
   Order order;
 
  private:
-  struct Place {
-    glm::vec3 v0{0.0F};
-    std::uint32_t shape = 0, leaf = 0, node = 0, inside = 0;
-  };
-  static glm::vec3 middle(const Place& place) {
-    glm::vec3 sum = place.v0;
-    for (std::uint32_t i = 1; i < 4; ++i) sum += core::cm_cell_vertex(place.v0, place.shape, i);
-    return 0.25F * sum;
-  }
-  void visit(const Place& place) {
-    if (place.inside == 0) {
-      order[place.leaf] = next_++;
-      last_ = middle(place);
+  void visit(std::uint32_t leaf, std::uint32_t node, std::uint32_t inside, bool back) {
+    if (inside == 0) {
+      order[leaf] = next_++;
       return;
     }
-    const std::uint32_t left = grid_.tree[place.node];
-    Place a{place.v0, core::cm_child_shape(place.shape, 0), place.leaf, place.node + 1, left};
-    Place b{core::cm_cell_vertex(place.v0, place.shape, 1), core::cm_child_shape(place.shape, 1), place.leaf + left + 1,
-            place.node + left + 1, place.inside - left - 1};
-    if (glm::distance(middle(b), last_) < glm::distance(middle(a), last_)) std::swap(a, b);
-    visit(a);
-    visit(b);
+    const std::uint32_t left = grid_.tree[node];
+    for (const bool second : {false, true}) {
+      if (second == back)
+        visit(leaf, node + 1, left, second);
+      else
+        visit(leaf + left + 1, node + left + 1, inside - left - 1, second);
+    }
   }
   const grid::TetGrid& grid_;
   std::uint32_t next_ = 0;
-  glm::vec3 last_{0.0F};
 };
 
 /// All of a level together, in each as today.
@@ -465,7 +453,7 @@ void measure(headless::Context& context, const std::filesystem::path& file, cons
     const std::array<Row, 9> rows{{{"today: depth first", today},
                                    {"Morton", morton(grid)},
                                    {"Hilbert", hilbert(grid)},
-                                   {"depth first, nearer child first", NearerFirst(grid).order},
+                                   {"depth first, there and back", ThereAndBack(grid).order},
                                    {"level by level", by_level(grid)},
                                    {"shuffled", shuffled(grid.cells.size())},
                                    {"foreseen", foreseen(waves, grid.cells.size(), line / sizeof(grid::CellRecord))},
