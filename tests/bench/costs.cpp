@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "asset.hpp"
-#include "base/luminance.hpp"
 #include "edited_shaders.hpp"
 #include "light/environment_file.hpp"
 #include "measure.hpp"
@@ -17,6 +16,7 @@
 #include "statistics.hpp"
 #include "subject.hpp"
 #include "support/surfaces.hpp"
+#include "turns.hpp"
 
 namespace cumulet::bench {
 
@@ -32,68 +32,6 @@ struct Row {
   std::vector<Run> runs = {};
 };
 
-/// Of one row's runs.
-struct Cost {
-  std::vector<double> step;                   ///< seconds
-  std::vector<double> sample;                 ///< seconds
-  double steps = 0.0;                         ///< a path
-  double variance = 0.0;                      ///< of one sample, over the mean's square, without the noisiest pixels
-  std::array<std::vector<double>, 2> halves;  ///< luminance of even runs and of odd ones
-};
-
-constexpr double noisiest = 0.005;  // part of the pixels: single paths that found a small light by chance
-
-double luminance_of(const Run& run, std::size_t pixel) {
-  const float* rgba = &run.rgba[4 * pixel];
-  return luminance(glm::dvec3(rgba[0], rgba[1], rgba[2]));
-}
-
-/// The pixels that show the medium.
-std::vector<std::size_t> pixels_of(const Row& row) {
-  std::vector<std::size_t> pixels;
-  for (std::size_t i = 0; 4 * i < row.runs.front().rgba.size(); ++i) {
-    if (std::ranges::any_of(row.runs, [i](const Run& run) { return run.rgba[4 * i + 3] > 0.0F; })) pixels.push_back(i);
-  }
-  return pixels;
-}
-
-double mean_of(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(std::max<std::size_t>(1, values.size()));
-}
-
-Cost cost_of(const Row& row, const std::vector<std::size_t>& pixels, std::uint32_t samples) {
-  Cost cost;
-  for (const Run& run : row.runs) {
-    cost.step.push_back(run.seconds / static_cast<double>(run.steps));
-    cost.sample.push_back(run.seconds / static_cast<double>(run.samples));
-    cost.steps += run.steps_per_sample() / static_cast<double>(row.runs.size());
-  }
-  std::vector<double> variances;
-  std::vector<double> means;
-  for (const std::size_t pixel : pixels) {
-    std::vector<double> values;
-    std::array<double, 2> half{};
-    for (std::size_t k = 0; k < row.runs.size(); ++k) {
-      values.push_back(luminance_of(row.runs[k], pixel));
-      half[k % 2] += values.back();
-    }
-    const double mean = mean_of(values);
-    double square = 0.0;
-    for (const double value : values) square += (value - mean) * (value - mean);
-    variances.push_back(square / static_cast<double>(values.size() - 1));
-    means.push_back(mean);
-    for (std::size_t k = 0; k < 2; ++k)
-      cost.halves[k].push_back(half[k] / static_cast<double>((values.size() + 1 - k) / 2));
-  }
-  std::ranges::sort(variances);
-  variances.resize(variances.size() - static_cast<std::size_t>(noisiest * static_cast<double>(variances.size())));
-  const double mean = mean_of(means);
-  cost.variance = samples * mean_of(variances) / (mean * mean);
-  return cost;
-}
-
 /// Renders all rows in turn, and tells of each.
 std::vector<Cost> take_turns(std::vector<Row>& rows, const Options& options) {
   for (Row& row : rows) {
@@ -106,9 +44,9 @@ std::vector<Cost> take_turns(std::vector<Row>& rows, const Options& options) {
       row.runs.push_back(trace(*row.still, {options.size, options.size, options.fewest_samples, seed}));
     }
   }
-  const std::vector<std::size_t> pixels = pixels_of(rows.front());
+  const std::vector<std::size_t> pixels = pixels_of(rows.front().runs);
   std::vector<Cost> costs;
-  for (const Row& row : rows) costs.push_back(cost_of(row, pixels, options.fewest_samples));
+  for (const Row& row : rows) costs.push_back(cost_of(row.runs, pixels, options.fewest_samples));
   return costs;
 }
 

@@ -17,8 +17,9 @@ std::string text_of(const std::filesystem::path& path) {
 
 }  // namespace
 
-EditedShaders::EditedShaders(std::span<const Edit> edits) {
+EditedShaders::EditedShaders(std::span<const Edit> edits, std::span<const std::filesystem::path> files) {
   std::filesystem::copy(CUMULET_GLSL_DIR, folder_.path());
+  for (const std::filesystem::path& file : files) std::filesystem::copy(file, folder_ / file.filename().string());
   for (const Edit& edit : edits) {
     const std::filesystem::path path = folder_ / edit.file;
     std::string text = text_of(path);

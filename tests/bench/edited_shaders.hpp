@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <span>
 
@@ -19,8 +20,9 @@ struct Edit {
 /// long as programs are made.
 class EditedShaders {
  public:
-  /// Throws std::runtime_error where a text is not there, or more than once.
-  explicit EditedShaders(std::span<const Edit> edits);
+  /// files: stand beside those of glsl/. Throws std::runtime_error where a text is not there, or more than once, and
+  /// std::filesystem::filesystem_error.
+  explicit EditedShaders(std::span<const Edit> edits, std::span<const std::filesystem::path> files = {});
 
   [[nodiscard]] std::shared_ptr<gl::ProgramPool> programs() const { return programs_; }
 

@@ -11,6 +11,7 @@
 #include "defaults.hpp"
 #include "denoise.hpp"
 #include "measure.hpp"
+#include "peers.hpp"
 #include "report.hpp"
 
 namespace {
@@ -36,7 +37,8 @@ void run(const bench::Options& options) {
   if (!options.readme.empty() && !std::ifstream(options.readme)) {
     throw std::runtime_error(options.readme.string() + ": cannot be read");
   }
-  const bool all = !(options.surfaces_threshold > 0.0) && !options.defaults && !options.costs && !options.equal_error;
+  const bool all = !(options.surfaces_threshold > 0.0) && !options.defaults && !options.costs && !options.equal_error &&
+                   !options.peers;
   if (all) std::filesystem::create_directories(options.out);
   headless::Context context = headless::Context::create(options.backend);
   const bench::Machine machine = machine_of(context);
@@ -67,6 +69,10 @@ void run(const bench::Options& options) {
     }
     if (options.equal_error) {
       bench::measure_equal_error(context, input, options);
+      continue;
+    }
+    if (options.peers) {
+      bench::measure_peers(context, bench::load_asset(input), options);
       continue;
     }
     if (!all) {

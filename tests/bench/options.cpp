@@ -74,10 +74,13 @@ ParseResult parse(int argc, char** argv) {
   app.add_option("--environment", o.environment, "With --costs: a .hdr or .exr");
   app.add_flag("--equal-error", o.equal_error,
                "Only what each march takes to --target of a fire's picture, its grid's error and its noise together");
+  app.add_flag("--peers", o.peers,
+               "Only what marches take to equal variance, those through NanoVDB grids among them, on the coarsest of "
+               "--threshold's grids within --target of the voxels' picture");
   auto* few = app.add_option("--samples", o.fewest_samples, "A pixel, at least, in a timed run (default: 8; quick: 4)");
   few->check(CLI::Range(1U, 16U));
   app.add_option("--threshold", o.thresholds,
-                 "With --defaults and --equal-error: these thresholds instead of the default one");
+                 "With --defaults, --equal-error and --peers: these thresholds instead of the default ones");
   app.add_option("--deviation", o.deviations, "With --defaults: these of the deviation criterion too");
   app.add_flag(
       "--denoise", o.denoise,
@@ -136,8 +139,9 @@ ParseResult parse(int argc, char** argv) {
     return result;
   }
   o.backend = backends.at(backend);
-  if ((o.costs || o.equal_error) && !repeats->empty() && o.repeats < 2) {
-    std::fprintf(stderr, "cumulet-bench: --costs and --equal-error take their noise from two --repeats or more\n");
+  if ((o.costs || o.equal_error || o.peers) && !repeats->empty() && o.repeats < 2) {
+    std::fprintf(stderr,
+                 "cumulet-bench: --costs, --equal-error and --peers take their noise from two --repeats or more\n");
     result.status = 2;
     return result;
   }

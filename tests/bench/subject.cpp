@@ -1,5 +1,8 @@
 #include "subject.hpp"
 
+#include <ctime>
+#include <utility>
+
 namespace cumulet::bench {
 
 const char* name_of(Kind kind) {
@@ -38,13 +41,13 @@ viewer::Light bench_light() {
 }
 
 Subject::Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
-                 double density_scale)
+                 double density_scale, std::shared_ptr<gl::ProgramPool> programs)
     : kind_(kind),
       size_(options.size),
       albedo_(options.albedo),
       max_bounces_(options.max_bounces),
       density_scale_(density_scale),
-      still_(context) {
+      still_(context, headless::Context::get_proc, std::move(programs)) {
   still_.viewer().camera()->frame(volume->bounds(), 1.0);
   still_.set_volume(std::move(volume));
   still_.set_light(bench_light());
@@ -94,9 +97,11 @@ Run Subject::trace(double density_scale, std::uint32_t samples, std::uint32_t se
 Run trace(test::Still& still, const test::Image& image) {
   still.set_image(image);
   still.build();
+  const std::clock_t start = std::clock();
   while (!still.render(500.0)) {
   }
   Run run;
+  run.processor_seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   run.rgba = still.read();
   const viewer::Stats stats = still.viewer().stats();
   run.seconds = stats.trace_seconds;

@@ -21,7 +21,8 @@ const char* name_of(viewer::SurfaceLight light);
 
 /// A picture and what it cost.
 struct Run {
-  double seconds = 0.0;  ///< tracing alone: not compiling, building, reading back
+  double seconds = 0.0;            ///< tracing alone: not compiling, building, reading back
+  double processor_seconds = 0.0;  ///< of the process, while it traced
   std::uint64_t samples = 0;
   std::uint64_t steps = 0;
   std::vector<float> rgba;
@@ -32,9 +33,10 @@ struct Run {
 /// One march of one asset: a viewer of its own, so that marches can take turns without rebuilding anything.
 class Subject {
  public:
-  /// density_scale: of the shaded picture. The context must be current, now and until the end.
+  /// density_scale: of the shaded picture. programs: others than the library's. The context must be current, now and
+  /// until the end.
   Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
-          double density_scale);
+          double density_scale, std::shared_ptr<gl::ProgramPool> programs = nullptr);
 
   /// Makes the tetrahedral grid anew; not for dense and brick.
   void refine(grid::Criterion criterion, double threshold, std::uint64_t max_cells);

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "gl/shader_folder.hpp"
 #include "gl/shader_sources.hpp"
 
 namespace cumulet::gpu_cost {
@@ -83,9 +84,18 @@ std::vector<Variant> covering(const gl::Shader& shader) {
   return result;
 }
 
+std::string source_of(const gl::Shader& shader, const std::filesystem::path& folder,
+                      const std::vector<std::string>& defines) {
+  if (folder.empty()) return shader.with(defines);
+  const std::string text = gl::ShaderFolder(folder).source(std::string(shader.name));
+  gl::Shader own = shader;
+  own.source = text;
+  return own.with(defines);
+}
+
 }  // namespace
 
-std::vector<Kernel> kernels() {
+std::vector<Kernel> kernels(const std::filesystem::path& folder) {
   std::vector<Kernel> all;
   for (const gl::Shader& shader : gl::shaders()) {
     if (shader.name.ends_with(".vert")) continue;  // goes with a fragment shader
@@ -97,10 +107,10 @@ std::vector<Kernel> kernels() {
         kernel.name.append(" ").append(name, 3).append("=").append(value);
       }
       if (shader.name.ends_with(".comp")) {
-        kernel.compute = shader.with(defines);
+        kernel.compute = source_of(shader, folder, defines);
       } else {
-        kernel.fragment = shader.with(defines);
-        kernel.vertex = gl::find_shader(gl::vertex_shader_of(shader.name))->with(defines);
+        kernel.fragment = source_of(shader, folder, defines);
+        kernel.vertex = source_of(*gl::find_shader(gl::vertex_shader_of(shader.name)), folder, defines);
       }
       all.push_back(std::move(kernel));
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,7 +16,8 @@ struct Kernel {
 };
 
 /// Of each shader so many variants that each two values of two macros that occur together do so in one of these, ranges
-/// by their ends. A new macro or value is thus among them by itself.
-std::vector<Kernel> kernels();
+/// by their ends. A new macro or value is thus among them by itself. folder: their sources are read there; empty: as
+/// the library has them. Throws Error(file).
+std::vector<Kernel> kernels(const std::filesystem::path& folder = {});
 
 }  // namespace cumulet::gpu_cost

@@ -22,9 +22,11 @@ using cumulet::gpu_cost::Kernel;
 using cumulet::gpu_cost::NullDevice;
 
 constexpr const char* usage =
-    "usage: cumulet-gpu-cost [--family NAME]... [--only TEXT] [--bounds FILE [--update]] [--update-readme FILE]\n"
+    "usage: cumulet-gpu-cost [--family NAME]... [--only TEXT] [--glsl FOLDER] [--bounds FILE [--update]] "
+    "[--update-readme FILE]\n"
     "  --family         one of RADV_FORCE_FAMILY's: navi21, gfx1100, vega10 (default: these three)\n"
     "  --only           kernels whose name has this text\n"
+    "  --glsl           shaders of a folder like glsl/ instead of the library's: what a change would cost\n"
     "  --bounds         exit status 1 if a kernel costs more than this file allows\n"
     "  --update         the file's bounds of these families become today's costs, with a little room\n"
     "  --update-readme  the table between <!-- gpu_cost:begin --> and <!-- gpu_cost:end -->\n";
@@ -32,6 +34,7 @@ constexpr const char* usage =
 struct Options {
   std::vector<std::string> families;
   std::string only;
+  std::string glsl;
   std::string bounds;
   std::string readme;
   bool update = false;
@@ -49,6 +52,8 @@ Options parse(int argc, char** argv) {
       options.families.push_back(value());
     else if (flag == "--only")
       options.only = value();
+    else if (flag == "--glsl")
+      options.glsl = value();
     else if (flag == "--bounds")
       options.bounds = value();
     else if (flag == "--update")
@@ -121,7 +126,7 @@ void update_readme(const std::string& path, const std::string& table) {
 
 int run(const Options& options) {
   std::vector<Kernel> kernels;
-  for (Kernel& kernel : cumulet::gpu_cost::kernels()) {
+  for (Kernel& kernel : cumulet::gpu_cost::kernels(options.glsl)) {
     if (kernel.name.find(options.only) != std::string::npos) kernels.push_back(std::move(kernel));
   }
   std::vector<Row> rows;

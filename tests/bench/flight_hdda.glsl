@@ -1,0 +1,59 @@
+// Flights and looks through a NanoVDB grid by null collisions (Woodcock et al. 1965; Galtier et al. 2013; Novak et al.,
+// "Monte Carlo Methods for Volumetric Light Transport Simulation", EG 2018), below the majorants of march_hdda.glsl: in
+// the place of flight.glsl's cm_fly, of one volume with no light of its own, no triangles and no points looked back at.
+//
+// Flights are delta tracking: a collision is real by the chance of density over majorant. With CM_RATIO looks are ratio
+// tracking: each collision leaves the share that is not real, down to the weight below which flight.glsl, too, goes over
+// to roulette; delta tracking goes on from there. Without CM_RATIO looks are delta tracking as well. As no transmittance
+// is known, looks and flights that may find the same sky weigh each other without.
+//
+// p.depth is what is left of an optical depth below the majorant; p.depth_0 of a look, what it has let pass.
+#ifndef CM_FLIGHT_HDDA_GLSL
+#define CM_FLIGHT_HDDA_GLSL
+
+#define CM_LEAST_PASSED 0.135335283f  // e^-2
+
+// At most CM_CHUNK regions and collisions.
+uint cm_fly(inout CmPath p) {
+  vec3 inv_d = vec3(1.0) / p.d;
+  bool looks = p.ray != CM_RAY_FLIGHT;
+  uint event = CM_EVENT_NONE;
+  uvec3 cell = uvec3(p.cell, p.cache);
+  for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
+    float majorant = cm_nano_majorant(cell);
+    float extinction = cm.medium.extinction * majorant;
+    float t_1;
+    ivec3 axis;
+    cm_nano_exit(cell, p.o, p.d, inv_d, p.t, t_1, axis);
+    float used = extinction * max(0.0, min(t_1, p.t_end) - p.t);
+    p.steps += 1u;
+    if (used > p.depth) {
+      p.t += p.depth / extinction;
+      ivec3 low = cm_nano_corner(cell);
+      ivec3 voxel = clamp(ivec3(floor(p.o + p.t * p.d)), low, low + cm_nano_size(cell) - 1);
+      float real = cm_nano_density(cell, voxel, majorant) / majorant;
+      p.depth = cm_free_depth(cm_random(p.random, p.stream));
+      if (CM_RATIO != 0 && looks && p.depth_0 > CM_LEAST_PASSED) {
+        p.depth_0 *= 1.0 - real;
+        p.light *= 1.0 - real;
+        if (real >= 1.0) event = CM_EVENT_COLLISION;
+      } else if (cm_random(p.random, p.stream) < real) {
+        event = CM_EVENT_COLLISION;
+      }
+    } else {
+      p.depth -= used;
+      p.t = t_1;
+      if (t_1 >= p.t_end) {
+        event = CM_EVENT_ESCAPE;
+      } else {
+        cell = cm_nano_next(cell, p.o, p.d, t_1, axis);
+        if (cell.x == CM_NONE) event = CM_EVENT_ESCAPE;
+      }
+    }
+  }
+  p.cell = cell.xy;
+  p.cache = cell.z;
+  return event;
+}
+
+#endif

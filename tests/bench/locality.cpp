@@ -1,0 +1,506 @@
+// Which order of cell records would serve a GPU's caches best, and what coarse ancestors could save. By hand:
+//
+//     cumulet-bench-locality [--threshold T] [--optical-depth D] [--size PIXELS] [--samples N] FILE...
+//
+// Paths of the shaders' own source on the CPU (tests/unit/support/cpu_tracer.hpp's way) record the cells that they
+// march through. Waves of 8 x 8 pixels march in step, 16 of them in turn on each of four compute units, each with a
+// first-level cache, all with one second-level cache; both are 16 ways wide and forget what is least recently used.
+// Orders are permutations of the same records.
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <deque>
+#include <exception>
+#include <filesystem>
+#include <headless.hpp>
+#include <memory>
+#include <numeric>
+#include <random>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "asset.hpp"
+#include "settings/settings.hpp"
+#include "subject.hpp"
+#include "support/cpu_tracer.hpp"
+#include "support/still.hpp"
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+namespace cumulet::core {
+
+#undef CM_SURFACES
+#define CM_SURFACES 0
+#define CM_MARCH 0
+#define CM_LINEAR 1
+
+struct RecordingData {
+  CmParameters cm{};
+  const grid::TetGrid* grid = nullptr;
+  std::vector<std::uint32_t>* visits = nullptr;
+  float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
+  uvec4 cm_record(uint cell, uint part) const {
+    if (part != 0) return grid->cells[cell].data;
+    visits->push_back(cell);
+    return grid->cells[cell].links;
+  }
+  uint cm_tree(uint node) const { return grid->tree[node]; }
+  uint cm_root_leaf(uint root) const { return grid->roots[root].first_leaf; }
+  uint cm_root_node(uint root) const { return grid->roots[root].first_internal; }
+};
+
+struct Recording : RecordingData {
+#include "support/traced.inc"
+  float density_at(std::uint32_t cell, const vec3& p) const {
+    const uvec4 data = grid->cells[cell].data;
+    const uint shape = cm_record_shape(data);
+    return cm_cell_density(data, cm_cell_frame(cm_record_v0(data), shape, p, vec3(0.0F)), shape).x;
+  }
+};
+
+}  // namespace cumulet::core
+#pragma GCC diagnostic pop
+
+namespace {
+
+using namespace cumulet;
+using Order = std::vector<std::uint32_t>;  // where each cell is
+
+constexpr std::uint32_t wave_side = 8;
+constexpr std::size_t units = 4;
+constexpr std::size_t waves_a_unit = 16;
+constexpr std::size_t ways = 16;
+
+struct Options {
+  double threshold = settings::default_threshold(CUMULET_CRITERION_TRANSMITTANCE);
+  double optical_depth = 10.0;
+  std::uint32_t size = 128;
+  std::uint32_t samples = 2;
+  std::vector<std::filesystem::path> files;
+};
+
+/// Of one pixel's paths, one after the other.
+using Visits = std::vector<std::uint32_t>;
+
+class Cache {
+ public:
+  Cache(std::size_t bytes, std::size_t line) : sets_(std::max<std::size_t>(1, bytes / line / ways)) {}
+  /// Whether the line was there.
+  bool touch(std::uint64_t line) {
+    std::vector<std::uint64_t>& set = sets_[line % sets_.size()];
+    const auto found = std::ranges::find(set, line);
+    const bool hit = found != set.end();
+    if (hit) set.erase(found);
+    set.insert(set.begin(), line);
+    if (set.size() > ways) set.pop_back();
+    return hit;
+  }
+
+ private:
+  std::vector<std::vector<std::uint64_t>> sets_;  // the newest first
+};
+
+struct Traffic {
+  double lines = 0.0, first_misses = 0.0, second_misses = 0.0;  // a step of a path
+};
+
+/// A wave on its way.
+struct Wave {
+  const std::vector<Visits>* lanes = nullptr;
+  std::size_t step = 0;
+};
+
+Traffic simulate(const std::vector<std::vector<Visits>>& waves, const Order& order, std::size_t line,
+                 std::size_t record_bytes, std::size_t first_bytes, std::size_t second_bytes) {
+  std::vector<Cache> first(units, Cache(first_bytes, line));
+  Cache second(second_bytes, line);
+  std::array<std::deque<std::size_t>, units> waiting;
+  for (std::size_t i = 0; i < waves.size(); ++i) waiting[i % units].push_back(i);
+  std::array<std::vector<Wave>, units> resident;
+  Traffic traffic;
+  double steps = 0.0;
+  std::vector<std::uint64_t> lines;
+  for (bool busy = true; busy;) {
+    busy = false;
+    for (std::size_t unit = 0; unit < units; ++unit) {
+      auto& here = resident[unit];
+      std::erase_if(here, [](const Wave& wave) {
+        return std::ranges::all_of(*wave.lanes, [&](const Visits& lane) { return lane.size() <= wave.step; });
+      });
+      while (here.size() < waves_a_unit && !waiting[unit].empty()) {
+        here.push_back({&waves[waiting[unit].front()]});
+        waiting[unit].pop_front();
+      }
+      busy = busy || !here.empty();
+      for (Wave& wave : here) {
+        lines.clear();
+        for (const Visits& lane : *wave.lanes) {
+          if (lane.size() <= wave.step) continue;
+          lines.push_back(order[lane[wave.step]] * record_bytes / line);
+          steps += 1.0;
+        }
+        ++wave.step;
+        std::ranges::sort(lines);
+        lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
+        for (const std::uint64_t at : lines) {
+          traffic.lines += 1.0;
+          if (first[unit].touch(at)) continue;
+          traffic.first_misses += 1.0;
+          if (!second.touch(at)) traffic.second_misses += 1.0;
+        }
+      }
+    }
+  }
+  traffic.lines /= steps;
+  traffic.first_misses /= steps;
+  traffic.second_misses /= steps;
+  return traffic;
+}
+
+Order by_key(const std::vector<std::uint64_t>& keys) {
+  std::vector<std::uint32_t> cells(keys.size());
+  std::iota(cells.begin(), cells.end(), 0U);
+  std::ranges::stable_sort(cells, {}, [&](std::uint32_t cell) { return keys[cell]; });
+  Order order(keys.size());
+  for (std::uint32_t place = 0; place < cells.size(); ++place) order[cells[place]] = place;
+  return order;
+}
+
+std::array<glm::vec3, 4> vertices_of(const grid::CellRecord& record) {
+  const glm::vec3 v0 = core::cm_record_v0(record.data);
+  const std::uint32_t shape = core::cm_record_shape(record.data);
+  return {v0, core::cm_cell_vertex(v0, shape, 1), core::cm_cell_vertex(v0, shape, 2),
+          core::cm_cell_vertex(v0, shape, 3)};
+}
+
+std::uint64_t spread_bits(std::uint64_t x) {
+  std::uint64_t spread = 0;
+  for (unsigned i = 0; i < 21; ++i) spread |= (x >> i & 1U) << (3U * i);
+  return spread;
+}
+
+/// Eighths of a voxel.
+glm::uvec3 middle_of(const grid::CellRecord& record) {
+  const auto v = vertices_of(record);
+  return glm::uvec3(8.0F * 0.25F * (v[0] + v[1] + v[2] + v[3]));
+}
+
+/// The first bits of x first.
+std::uint64_t interleaved(const glm::uvec3& p) {
+  return spread_bits(p.x) << 2U | spread_bits(p.y) << 1U | spread_bits(p.z);
+}
+
+Order morton(const grid::TetGrid& grid) {
+  std::vector<std::uint64_t> keys;
+  for (const grid::CellRecord& record : grid.cells) keys.push_back(interleaved(middle_of(record)));
+  return by_key(keys);
+}
+
+/// Hilbert's curve: Skilling, "Programming the Hilbert curve", 2004.
+Order hilbert(const grid::TetGrid& grid) {
+  const std::uint32_t top = 1U << static_cast<unsigned>(grid.cube.log2_size + 2);
+  std::vector<std::uint64_t> keys;
+  for (const grid::CellRecord& record : grid.cells) {
+    glm::uvec3 x = middle_of(record);
+    for (std::uint32_t bit = top; bit > 1; bit >>= 1U) {
+      for (int i = 0; i < 3; ++i) {
+        const std::uint32_t turned = (x[0] ^ x[i]) & (bit - 1);
+        if ((x[i] & bit) != 0) {
+          x[0] ^= bit - 1;
+        } else {
+          x[0] ^= turned;
+          x[i] ^= turned;
+        }
+      }
+    }
+    for (int i = 1; i < 3; ++i) x[i] ^= x[i - 1];
+    std::uint32_t rest = 0;
+    for (std::uint32_t bit = top; bit > 1; bit >>= 1U) {
+      if ((x[2] & bit) != 0) rest ^= bit - 1;
+    }
+    keys.push_back(interleaved(x ^ rest));
+  }
+  return by_key(keys);
+}
+
+/// Depth first as Sierpinski's curve has it: the child first at whose end of the split edge the curve comes in. Of a
+/// cell that it goes through backwards that is the other one; of two children it goes through the second one backwards.
+/// So it leaves the first where it enters the second, if their own edges meet there.
+class ThereAndBack {
+ public:
+  explicit ThereAndBack(const grid::TetGrid& grid) : order(grid.cells.size()), grid_(grid) {
+    for (std::size_t root = 0; root < 24; ++root) {
+      const grid::RootEntry& entry = grid.roots[root];
+      visit(entry.first_leaf, entry.first_internal, grid.roots[root + 1].first_internal - entry.first_internal, false);
+    }
+  }
+  Order order;
+
+ private:
+  void visit(std::uint32_t leaf, std::uint32_t node, std::uint32_t inside, bool back) {
+    if (inside == 0) {
+      order[leaf] = next_++;
+      return;
+    }
+    const std::uint32_t left = grid_.tree[node];
+    for (const bool second : {false, true}) {
+      if (second == back)
+        visit(leaf, node + 1, left, second);
+      else
+        visit(leaf + left + 1, node + left + 1, inside - left - 1, second);
+    }
+  }
+  const grid::TetGrid& grid_;
+  std::uint32_t next_ = 0;
+};
+
+/// All of a level together, in each as today.
+Order by_level(const grid::TetGrid& grid) {
+  std::vector<std::uint64_t> keys;
+  for (const grid::CellRecord& record : grid.cells) {
+    const auto v = vertices_of(record);
+    const double volume =
+        std::abs(glm::dot(glm::cross(glm::dvec3(v[1] - v[0]), glm::dvec3(v[2] - v[0])), glm::dvec3(v[3] - v[0])));
+    keys.push_back(static_cast<std::uint64_t>(64.0 - std::log2(volume)));
+  }
+  return by_key(keys);
+}
+
+Order shuffled(std::size_t count) {
+  Order order(count);
+  std::iota(order.begin(), order.end(), 0U);
+  std::mt19937 random(1);
+  std::ranges::shuffle(order, random);
+  return order;
+}
+
+/// Cells that these very paths visit one after the other most often are in one line: what no order can know.
+Order foreseen(const std::vector<std::vector<Visits>>& waves, std::size_t count, std::size_t in_line) {
+  std::unordered_map<std::uint64_t, std::uint32_t> often;
+  for (const auto& wave : waves) {
+    for (const Visits& lane : wave) {
+      for (std::size_t i = 1; i < lane.size(); ++i) {
+        const auto [a, b] = std::minmax(lane[i - 1], lane[i]);
+        if (a != b) ++often[std::uint64_t{a} << 32U | b];
+      }
+    }
+  }
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> pairs(often.begin(), often.end());
+  std::ranges::sort(pairs, [](const auto& a, const auto& b) {
+    return a.second != b.second ? a.second > b.second : a.first < b.first;
+  });
+  std::vector<std::uint32_t> group(count);
+  std::iota(group.begin(), group.end(), 0U);
+  std::vector<std::vector<std::uint32_t>> members(count);
+  for (std::uint32_t cell = 0; cell < count; ++cell) members[cell] = {cell};
+  for (const auto& [pair, times] : pairs) {
+    std::uint32_t a = group[pair >> 32U];
+    std::uint32_t b = group[pair & 0xffffffffU];
+    if (a == b || members[a].size() + members[b].size() > in_line) continue;
+    if (a > b) std::swap(a, b);
+    for (const std::uint32_t cell : members[b]) group[cell] = a;
+    members[a].insert(members[a].end(), members[b].begin(), members[b].end());
+    members[b].clear();
+  }
+  // Whole groups first, so that lines hold no parts of others.
+  std::vector<std::uint64_t> keys(count);
+  for (std::uint32_t cell = 0; cell < count; ++cell) {
+    const std::uint64_t missing = in_line - members[group[cell]].size();
+    keys[cell] = missing << 40U | group[cell];
+  }
+  return by_key(keys);
+}
+
+/// The largest ancestors within which density differs by no more than a part of the volume's maximum.
+class Ancestors {
+ public:
+  Ancestors(const core::Recording& recording, float most) : grid_(*recording.grid), most_(most) {
+    region.resize(grid_.cells.size());
+    for (std::uint32_t cell = 0; cell < grid_.cells.size(); ++cell) {
+      Range range;
+      for (const glm::vec3& vertex : vertices_of(grid_.cells[cell])) {
+        const float density = std::max(0.0F, recording.density_at(cell, vertex));
+        range.low = std::min(range.low, density);
+        range.high = std::max(range.high, density);
+      }
+      ranges_.push_back(range);
+    }
+    for (std::size_t root = 0; root < 24; ++root) {
+      const grid::RootEntry& entry = grid_.roots[root];
+      visit(entry.first_leaf, entry.first_internal, grid_.roots[root + 1].first_internal - entry.first_internal);
+    }
+  }
+  std::vector<std::uint32_t> region;  ///< of each cell: the first cell of the ancestor
+
+ private:
+  struct Range {
+    float low = 1e30F, high = -1e30F;
+  };
+  Range visit(std::uint32_t leaf, std::uint32_t node, std::uint32_t inside) {
+    if (inside == 0) {
+      region[leaf] = leaf;
+      return ranges_[leaf];
+    }
+    const std::uint32_t left = grid_.tree[node];
+    const Range a = visit(leaf, node + 1, left);
+    const Range b = visit(leaf + left + 1, node + left + 1, inside - left - 1);
+    const Range all{std::min(a.low, b.low), std::max(a.high, b.high)};
+    if (all.high - all.low <= most_) std::fill_n(region.begin() + leaf, inside + 1, leaf);
+    return all;
+  }
+  const grid::TetGrid& grid_;
+  float most_;
+  std::vector<Range> ranges_;
+};
+
+void print_ancestors(const core::Recording& recording, const std::vector<std::vector<Visits>>& waves) {
+  for (const float most : {0.0F, 1e-3F, 1e-2F}) {
+    const Ancestors ancestors(recording, most);
+    double steps = 0.0;
+    double merged = 0.0;
+    double dark = 0.0;
+    for (const auto& wave : waves) {
+      for (const Visits& lane : wave) {
+        for (std::size_t i = 0; i < lane.size(); ++i) {
+          steps += 1.0;
+          if (i == 0 || ancestors.region[lane[i]] != ancestors.region[lane[i - 1]]) merged += 1.0;
+          const glm::uvec4 data = recording.grid->cells[lane[i]].data;
+          if (data.z == 0U && data.w == 0U) dark += 1.0;
+        }
+      }
+    }
+    std::printf(
+        "Density alike within %g of the maximum: %.1f %% of the steps are within the ancestor of the one "
+        "before; %.1f %% are in empty cells\n",
+        double{most}, 100.0 * (1.0 - merged / steps), 100.0 * dark / steps);
+  }
+}
+
+std::vector<std::vector<Visits>> record(core::Recording& recording, const Options& options) {
+  std::vector<std::vector<Visits>> waves;
+  for (std::uint32_t y = 0; y < options.size; y += wave_side) {
+    for (std::uint32_t x = 0; x < options.size; x += wave_side) {
+      auto& wave = waves.emplace_back();
+      for (std::uint32_t i = 0; i < wave_side * wave_side; ++i) {
+        recording.visits = &wave.emplace_back();
+        recording.traced({x + i % wave_side, y + i / wave_side});
+      }
+    }
+  }
+  return waves;
+}
+
+void measure(headless::Context& context, const std::filesystem::path& file, const Options& options) {
+  bench::Input input;
+  input.file = file;
+  input.grid = "density";
+  const bench::Asset asset = bench::load_asset(input);
+  const double density_scale = asset.density_scale(options.optical_depth);
+  test::Still still(context);
+  still.viewer().camera()->frame(asset.volume->bounds(), 1.0);
+  still.set_volume(asset.volume);
+  still.set_light(bench::bench_light());
+  viewer::Medium medium;
+  medium.density_scale = density_scale;
+  still.set_medium(medium);
+  viewer::GridSettings grid_settings;
+  grid_settings.build.refine.criterion = grid::Criterion::transmittance;
+  grid_settings.build.refine.threshold = options.threshold;
+  still.set_grid(grid_settings);
+  still.set_image({options.size, options.size, 1, 0});
+  still.build();
+  while (!still.render(500.0)) {
+  }
+
+  grid::RefineSettings refine = grid_settings.build.refine;
+  refine.density_scale = density_scale;
+  const volume::ScalarVolume& volume = asset.volume->volume();
+  const grid::Statistics statistics(volume, grid::fit_cube(volume));
+  const grid::DiamondSet diamonds(statistics, refine);
+  grid::GridBuilder builder(statistics, diamonds);
+  builder.bisect();
+  const grid::TetGrid grid = builder.records(refine.cells, volume.max_value);
+  if (grid.cells.size() != still.viewer().stats().cells) throw std::runtime_error("this is not the viewer's grid");
+
+  core::Recording recording;
+  recording.cm = still.viewer().trace_parameters();
+  recording.cm.dispatch.samples = options.samples;
+  recording.grid = &grid;
+  const auto waves = record(recording, options);
+  double steps = 0.0;
+  for (const auto& wave : waves) {
+    for (const Visits& lane : wave) steps += static_cast<double>(lane.size());
+  }
+  std::printf("\n%s: %zu cells, %.1f steps a path\n\n", file.filename().c_str(), grid.cells.size(),
+              steps / options.size / options.size / options.samples);
+  print_ancestors(recording, waves);
+
+  Order today(grid.cells.size());
+  std::iota(today.begin(), today.end(), 0U);
+  std::printf(
+      "\n| Order | Line | Lines | Misses of 16 KB | of 128 KB | of 512 KB behind 16 | of 4 MB behind 128 |\n"
+      "|---|--:|--:|--:|--:|--:|--:|\n");
+  for (const std::size_t line : {std::size_t{64}, std::size_t{128}}) {
+    struct Row {
+      const char* name;
+      Order order;
+      std::size_t record_bytes = sizeof(grid::CellRecord);
+    };
+    const std::array<Row, 9> rows{{{"today: depth first", today},
+                                   {"Morton", morton(grid)},
+                                   {"Hilbert", hilbert(grid)},
+                                   {"depth first, there and back", ThereAndBack(grid).order},
+                                   {"level by level", by_level(grid)},
+                                   {"shuffled", shuffled(grid.cells.size())},
+                                   {"foreseen", foreseen(waves, grid.cells.size(), line / sizeof(grid::CellRecord))},
+                                   {"today, 16 bytes a record", today, 16},
+                                   {"Hilbert, 16 bytes a record", hilbert(grid), 16}}};
+    for (const Row& row : rows) {
+      const Traffic small = simulate(waves, row.order, line, row.record_bytes, 16 << 10, 512 << 10);
+      const Traffic large = simulate(waves, row.order, line, row.record_bytes, 128 << 10, 4 << 20);
+      std::printf("| %s | %zu | %.3f | %.3f | %.3f | %.4f | %.4f |\n", row.name, line, small.lines, small.first_misses,
+                  large.first_misses, small.second_misses, large.second_misses);
+      std::fflush(stdout);
+    }
+  }
+}
+
+Options parse(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string flag = argv[i];
+    const auto value = [&] {
+      if (i + 1 >= argc) throw std::invalid_argument(flag + " needs a value");
+      return std::string(argv[++i]);
+    };
+    if (flag == "--threshold")
+      options.threshold = std::stod(value());
+    else if (flag == "--optical-depth")
+      options.optical_depth = std::stod(value());
+    else if (flag == "--size")
+      options.size = static_cast<std::uint32_t>(std::stoul(value()));
+    else if (flag == "--samples")
+      options.samples = static_cast<std::uint32_t>(std::stoul(value()));
+    else
+      options.files.emplace_back(flag);
+  }
+  return options;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const Options options = parse(argc, argv);
+    headless::Context context = headless::Context::create(headless::Backend::automatic);
+    for (const std::filesystem::path& file : options.files) measure(context, file, options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "cumulet-bench-locality: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
