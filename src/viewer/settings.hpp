@@ -156,6 +156,7 @@ struct Sampling {
   std::uint32_t first_sample = 0;
   render::Region region = {};
   std::uint32_t light_groups = 0;
+  bool adaptive = false;
 
   static Sampling of(const cumulet_sampling_desc& d) {
     Sampling sampling{d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
@@ -164,6 +165,7 @@ struct Sampling {
     sampling.first_sample = d.first_sample;
     sampling.region = {{d.region[0], d.region[1]}, {d.region[2], d.region[3]}};
     sampling.light_groups = d.light_groups;
+    sampling.adaptive = d.adaptive == 1;
     return sampling;
   }
 };
