@@ -73,6 +73,7 @@ const int CM_STORAGE_INSTANCE_NODES = 5;
 const int CM_STORAGE_MODELS = 6;
 const int CM_STORAGE_MODEL_NODES = 7;
 const int CM_STORAGE_MOTION = 0;         // aovs.comp
+const int CM_STORAGE_ERRORS = 1;         // noise.comp
 const int CM_STORAGE_DEPTH_CHANGED = 0;  // host_depth.comp
 const int CM_STORAGE_SIGN = 0;           // sign.comp
 const int CM_STORAGE_DENOISE_BINS = 0;   // denoise_*.comp

@@ -4,13 +4,15 @@
 #define CM_PATH_STORE_GLSL
 
 layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
+#include "path_blocks.glsl"
+
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_total;     // x: rounds that lanes marched: full ones, or visits of trace_travel.comp
-  uvec4 cm_blocks[];  // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block of the tile its
-                      // pixels without their target samples, those without any and its samples finished in this dispatch
+  uvec4 cm_blocks[CM_MOST_BLOCKS];  // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block of
+                                    // the tile its pixels without their target samples, those without any and its
+                                    // samples finished in this dispatch
+  uint cm_live[CM_MOST_BLOCKS];  // of each block of the tile the halves of squares that are sampled, two bits a square
 };
-
-#include "path_blocks.glsl"
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
 #define CM_ZERO_VEC2(name) p.name = vec2(0.0);
@@ -145,6 +147,12 @@ uvec2 cm_block_pixel() {
   uint block = cm_blocks[gl_WorkGroupID.y].x & ~CM_BEGINS;
   uvec2 corner = uvec2(block % cm_blocks_across() * CM_BLOCK_WIDTH, block / cm_blocks_across() * CM_BLOCK_HEIGHT);
   return corner + uvec2(gl_GlobalInvocationID.x, gl_LocalInvocationID.y);
+}
+// Whether it is of the tile, and of a half that is sampled.
+bool cm_is_live(uvec2 local) {
+  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.tile_size.y) return false;
+  uint bit = local.x % CM_BLOCK_WIDTH / CM_SQUARE_EDGE * 2u + (local.y & 1u);
+  return (cm_live[cm_block_of(local)] >> bit & 1u) != 0u;
 }
 bool cm_block_begins() { return (cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u; }
 

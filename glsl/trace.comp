@@ -37,7 +37,7 @@ void cm_forget_triangles(inout CmPath p) {
 
 void main() {
   uvec2 local = cm_block_pixel();
-  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.tile_size.y) return;
+  if (!cm_is_live(local)) return;
   uvec2 at = cm.dispatch.tile_corner + local;
   uint before = cm_pixel_samples(at);
   if (before >= cm.dispatch.samples) return;

@@ -26,7 +26,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #if CM_DENSE
 void main() {
   uvec2 local = cm_block_pixel();
-  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.tile_size.y) return;
+  if (!cm_is_live(local)) return;
   uvec2 at = cm.dispatch.tile_corner + local;
   uint samples = cm_pixel_samples(at);
   if (samples >= cm.dispatch.samples) return;

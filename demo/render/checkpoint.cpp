@@ -82,6 +82,7 @@ CheckpointOf checkpoint_of(const RenderOptions& options) {
           {"first sample", std::to_string(sampling.first_sample)},
           {"number of samples", std::to_string(sampling.samples)},
           {"noise target", number_text(sampling.noise_target_percent)},
+          {"way of sampling", sampling.adaptive == 1 ? "adaptive" : "even"},
           {"choice of the layer volume", volume ? "with" : "without"},
           {"scene", scene_hash(options.scene)}};
 }

@@ -1049,6 +1049,7 @@ std::string scene_hash(const SceneOptions& scene) {
   shown.sampling.samples = 0;
   shown.sampling.seed = 0;
   shown.sampling.noise_target_percent = 0.0f;
+  shown.sampling.adaptive = 0;
   const auto named = [](const std::string& file) {
     if (file.empty()) return file;
     std::error_code error;

@@ -70,11 +70,20 @@ struct ErrorSums {
   [[nodiscard]] double noise() const;
 };
 
+/// Of a square of pixels, those with two samples: ErrorSums, of even and of odd rows apart where they are squared.
+struct SquareError {
+  std::array<double, 2> squared{};
+  double brightness = 0.0;
+  double pixels = 0.0;
+};
+/// A tile's, row by row; empty until they are known.
+using SquareErrors = std::vector<SquareError>;
+
 /// What was dispatched, and what it was thought to take.
 struct Dispatched {
-  std::shared_ptr<Blocks> tile;                     // that it is of
-  std::shared_ptr<std::optional<ErrorSums>> error;  // of the tile, which it finds, and no samples
-  std::shared_ptr<std::uint64_t> samples;           // of the picture
+  std::shared_ptr<Blocks> tile;            // that it is of
+  std::shared_ptr<SquareErrors> errors;    // of the tile, which it finds, and no samples
+  std::shared_ptr<std::uint64_t> samples;  // of the picture
   std::vector<std::uint32_t> blocks;
   std::uint32_t rounds = 1;
   double lanes = 0.0;  // that had something to do
@@ -120,7 +129,7 @@ struct DispatchRecord {
 class Flights {
  public:
   static constexpr std::size_t most = 3;
-  static constexpr std::size_t most_words = 257;  // uvec4, that a dispatch tells
+  static constexpr std::size_t most_words = 4096;  // uvec4, that a dispatch tells: one a square of a tile
 
   explicit Flights(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 

@@ -30,6 +30,9 @@ constexpr std::size_t head_bytes = sizeof(glm::uvec4);
 constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MOST_ROUNDS + 1) * head_bytes;
 constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // a lane
 
+// Behind cm_total and cm_blocks.
+constexpr std::size_t live_at = (1 + CM_MOST_BLOCKS) * sizeof(glm::uvec4);
+
 std::uint32_t groups_across(std::uint32_t tile_width) {
   return (std::min(tile_width, PathKernels::block_width) + 7) / 8;
 }
@@ -38,8 +41,9 @@ std::uint32_t groups_across(std::uint32_t tile_width) {
 
 void PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
   if (!blocks_) {
-    blocks_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::uvec4), nullptr, GL_DYNAMIC_STORAGE_BIT,
+    blocks_ = gl::make_buffer(gl_, live_at + CM_MOST_BLOCKS * sizeof(std::uint32_t), nullptr, GL_DYNAMIC_STORAGE_BIT,
                               "creating the counters");
+    live_.clear();
   }
   const std::size_t path_bytes = lanes * lane_bytes(visits, within, groups);
   if (path_bytes > path_bytes_) {
@@ -65,6 +69,12 @@ void PathKernels::bind() const {
 
 void PathKernels::set_counters(std::span<const glm::uvec4> words) const {
   gl_->NamedBufferSubData(blocks_.name(), 0, static_cast<GLsizeiptr>(words.size_bytes()), words.data());
+}
+
+void PathKernels::set_live(std::span<const std::uint32_t> blocks) {
+  if (std::ranges::equal(blocks, live_)) return;
+  live_.assign(blocks.begin(), blocks.end());
+  gl_->NamedBufferSubData(blocks_.name(), live_at, static_cast<GLsizeiptr>(blocks.size_bytes()), blocks.data());
 }
 
 void PathKernels::run_one(std::uint32_t tile_width, std::size_t blocks) const {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
+#include <vector>
 
 #include "gl/programs.hpp"
 #include "path_blocks.glsl"
@@ -25,6 +26,7 @@ class PathKernels {
   static constexpr std::uint32_t block_width = CM_BLOCK_WIDTH;
   static constexpr std::uint32_t block_height = CM_BLOCK_HEIGHT;
   static constexpr std::uint32_t begins_pass = CM_BEGINS;
+  static constexpr std::uint32_t square_edge = CM_SQUARE_EDGE;
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
@@ -37,6 +39,9 @@ class PathKernels {
   /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).
   [[nodiscard]] GLuint counters() const { return blocks_.name(); }
   void set_counters(std::span<const glm::uvec4> words) const;
+  /// What of each block of the tile is sampled, from the next dispatch on: a square's even and its odd rows are a bit
+  /// each.
+  void set_live(std::span<const std::uint32_t> blocks);
   /// One kernel over so many blocks of a tile of that width; its program is in use.
   void run_one(std::uint32_t tile_width, std::size_t blocks) const;
   /// Rounds of stages over so many blocks.
@@ -53,6 +58,7 @@ class PathKernels {
   gl::Object queues_;
   std::size_t queues_lanes_ = 0;
   gl::Object blocks_;
+  std::vector<std::uint32_t> live_;  // as blocks_ has it
 };
 
 }  // namespace cumulet::render

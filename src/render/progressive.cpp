@@ -59,6 +59,7 @@ bool PictureWish::Content::shows_same(const Content& other) const {
   seen.volume_alone = volume_alone;
   seen.light_groups = light_groups;
   seen.stops_by_noise = stops_by_noise;
+  seen.adaptive = adaptive;
   return seen == *this;
 }
 
@@ -136,6 +137,7 @@ PictureSettings Progressive::settings(std::uint32_t divisor, const Obstacles& ob
   settings.volume_alone = wish_.content.volume_alone && divisor == finest_;
   if (divisor == finest_) settings.light_groups = wish_.content.light_groups;
   if (divisor == finest_) settings.noise_target = wish_.noise_target;
+  settings.adaptive = wish_.content.adaptive;
   return settings;
 }
 
@@ -225,7 +227,8 @@ void Progressive::take(const PictureWish& wish, const Obstacles& obstacles) {
   } else if (working_ && working_->divisor == finest_) {
     const std::optional<double> stops_at = working_->picture->noise_target();
     const bool fewer = wish.samples < working_->picture->target_samples() ||
-                       (stops_at && wish.noise_target && *wish.noise_target > *stops_at);
+                       (stops_at && wish.noise_target && *wish.noise_target > *stops_at) ||
+                       (working_->picture->is_adaptive() && wish.noise_target != stops_at);
     if (!wish.content.preview && fewer) {
       schedule_.drop();
     } else {

@@ -44,6 +44,7 @@ struct PictureWish {
     bool volume_alone = false;       // at full resolution, sum what met the volume first apart as well
     std::uint32_t light_groups = 0;  // likewise, the radiance of so many groups of lights
     bool stops_by_noise = false;     // there is a noise target
+    bool adaptive = false;           // and samples go where there is most noise
     bool operator==(const Content&) const = default;
     /// Whether but the view, the host's depth and how pictures are made are the same.
     [[nodiscard]] bool shows_same(const Content& other) const;

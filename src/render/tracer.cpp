@@ -90,8 +90,7 @@ core::CmParameters assemble(const PictureParameters& picture, const Obstacles& o
 double Picture::progress() const {
   if (done_) return 1.0;
   if (view_ != View::shaded) return box_.size.y > 0 ? double(view_row_) / box_.size.y : 0.0;
-  const double wanted =
-      double(expected_samples_) * static_cast<double>(box_.area()) - static_cast<double>(samples_before_);
+  const double wanted = expected_samples_ - static_cast<double>(samples_before_);
   const double part = wanted > 0.0 ? static_cast<double>(samples() - samples_before_) / wanted : 0.0;
   // Of noise nobody knows when it will be low enough.
   return progress_before_ + (1.0 - progress_before_) * std::min(noise_target_ ? nearly_done : 1.0, part);
@@ -130,43 +129,46 @@ bool Picture::measures() const {
 }
 
 bool Picture::awaits_error() const {
-  return !done_ && view_ == View::shaded && measures() && !tile_error_ &&
+  return !done_ && view_ == View::shaded && measures() && !tile_errors_ &&
          std::ranges::all_of(*blocks_, [](const Block& block) { return block.unfinished == 0; });
 }
 
 void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) {
   if (view_ != View::shaded) return;
   const bool more = samples > target_samples_;
+  const bool retargeted = adaptive_ && noise_target != noise_target_;
   noise_target_ = noise_target;
   target_samples_ = std::max(target_samples_, samples);
   const bool reached = noise_target_ && noise_ && *noise_ <= *noise_target_;
-  if (done_ ? reached || pass_target_ >= target_samples_ : !more) return;
+  if (done_ ? reached || (pass_target_ >= target_samples_ && !retargeted) : !more && !retargeted) return;
+  // What was enough for another target is not.
+  if (retargeted) allotment_.begin(box_.size);
   // Lanes that are done for good begin again; so do the others' present samples, with the same result.
-  if (done_ || (tiles_ == glm::uvec2(1U) && !noise_target_)) {
+  if (done_ || retargeted || (tiles_ == glm::uvec2(1U) && !noise_target_)) {
     tile_ = 0;
-    pass_target_ = pass_after(pass_target_);
+    errors_.assign(errors_.size(), {});
+    if (done_ || !noise_target_) pass_target_ = pass_after(pass_target_);
     begin_tile();
   }
   progress_before_ = 0.0;
   samples_before_ = 0;
-  expected_samples_ = target_samples_;
+  expected_samples_ = allotment_.expected(target_samples_);
   done_ = false;
 }
 
-void Picture::go_on_from(const Accumulated& told) {
+void Picture::go_on_from(const Accumulated& told, std::optional<std::uint32_t> pass) {
   tile_ = 0;
-  tile_error_.reset();
-  pass_error_ = {};
+  errors_.assign(errors_.size(), {});
   noise_.reset();
   samples_ = std::make_shared<std::uint64_t>(told.all);
   progress_before_ = 0.0;
   samples_before_ = 0;
-  expected_samples_ = target_samples_;
+  expected_samples_ = allotment_.expected(target_samples_);
   // The pass that was under way, for its end is where the noise is looked at: the first that ends with no fewer samples
   // than the pixel with the fewest has. Where all have as many as it ends with, its end may not have been looked at.
-  pass_target_ = pass_after(0);
+  pass_target_ = pass.value_or(pass_after(0));
   const auto is_over = [&] {
-    return pass_target_ < told.least || (pass_target_ == told.least && told.most > told.least);
+    return !pass && (pass_target_ < told.least || (pass_target_ == told.least && told.most > told.least));
   };
   while (is_over() && pass_target_ < target_samples_) pass_target_ = pass_after(pass_target_);
   const bool whole = told.least > 0;
@@ -179,14 +181,24 @@ void Picture::go_on_from(const Accumulated& told) {
 void Picture::begin_tile() {
   // What is under way tells the tile it is of, and no one asks that one.
   blocks_ = std::make_shared<Blocks>();
-  tile_error_.reset();
+  live_.clear();
+  tile_errors_.reset();
   block_ = 0;
-  const glm::uvec2 extent = tile_extent();
-  for (std::uint32_t y = 0; y < extent.y; y += block_height) {
-    for (std::uint32_t x = 0; x < extent.x; x += block_width) {
-      const std::uint32_t lanes = std::min(block_width, extent.x - x) * std::min(block_height, extent.y - y);
+  constexpr glm::uvec2 squares_of_block(block_width / Allotment::edge, block_height / Allotment::edge);
+  static_assert(squares_of_block == glm::uvec2(16U, 1U), "two bits each are a word");
+  const glm::uvec2 squares = tile_squares();
+  for (std::uint32_t y = 0; y < squares.y; ++y) {
+    for (std::uint32_t x = 0; x < squares.x; x += squares_of_block.x) {
+      std::uint32_t lanes = 0;
+      std::uint32_t live = 0;
+      for (std::uint32_t i = 0; i < std::min(squares_of_block.x, squares.x - x); ++i) {
+        const glm::uvec2 square = first_square() + glm::uvec2(x + i, y);
+        lanes += allotment_.live_pixels(square);
+        live |= allotment_.live(square) << 2 * i;
+      }
       // Not known of a pass that begins with holes until its blocks tell.
       blocks_->push_back({lanes, lanes, holes_ ? lanes : 0, 0, true});
+      live_.push_back(live);
     }
   }
 }
@@ -209,8 +221,13 @@ void Picture::end_tile() {
   const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
   if (measures()) {
-    if (!tile_error_ || !*tile_error_) return;
-    pass_error_ += **tile_error_;
+    if (!tile_errors_ || tile_errors_->empty()) return;
+    const glm::uvec2 squares = tile_squares();
+    for (std::uint32_t y = 0; y < squares.y; ++y) {
+      const glm::uvec2 first = first_square() + glm::uvec2(0U, y);
+      std::copy_n(tile_errors_->begin() + std::size_t{y} * squares.x, squares.x,
+                  errors_.begin() + std::size_t{first.y} * allotment_.squares().x + first.x);
+    }
   }
   if (++tile_ == tiles_.x * tiles_.y) end_pass();
   if (!done_) begin_tile();
@@ -220,7 +237,9 @@ void Picture::end_pass() {
   tile_ = 0;
   complete_ = true;
   ++pass_;
-  const ErrorSums error = std::exchange(pass_error_, {});
+  ErrorSums error;
+  for (const SquareError& square : errors_)
+    error += {square.squared[0] + square.squared[1], square.brightness, square.pixels};
   // Not where a noise target came in the middle of the pass: of some tiles only.
   if (measures() && error.pixels == static_cast<double>(box_.area())) {
     const double noise = error.noise();
@@ -230,9 +249,15 @@ void Picture::end_pass() {
     // Of noise that falls with the root of the samples; a little more, for it is only likely so.
     const double ratio = noise / *noise_target_;
     const double needed = 1.05 * ratio * ratio * pass_target_;
-    expected_samples_ = needed < target_samples_ ? pass_after(static_cast<std::uint32_t>(needed)) : target_samples_;
-    if (noise <= *noise_target_) done_ = true;
+    const double each = needed < target_samples_ ? pass_after(static_cast<std::uint32_t>(needed)) : target_samples_;
+    if (noise <= *noise_target_) {
+      done_ = true;
+    } else if (adaptive_) {
+      allotment_.decide(errors_, *noise_target_, pass_target_);
+    }
+    expected_samples_ = adaptive_ ? allotment_.expected(target_samples_) : each * static_cast<double>(box_.area());
   }
+  errors_.assign(errors_.size(), {});
   if (pass_target_ >= target_samples_) {
     done_ = true;
   } else if (!done_) {
@@ -379,6 +404,7 @@ void Tracer::classify(Picture& picture, const PictureParameters& parameters, con
                          !picture.volume_holdout_ && !picture.model_holdout_ &&
                          (picture.traced_ > 0 || picture.layered_ == Layered::no);
   picture.noise_target_ = shaded ? settings.noise_target : std::nullopt;
+  picture.adaptive_ = picture.noise_target_ && settings.adaptive;
 }
 
 bool Tracer::able(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,
@@ -538,11 +564,12 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.pass_ = 0;
   picture.holes_ = true;
   picture.pass_target_ = picture.pass_after(0);
-  picture.pass_error_ = {};
+  picture.allotment_.begin(box.size);
+  picture.errors_.assign(std::size_t{picture.allotment_.squares().x} * picture.allotment_.squares().y, {});
   picture.noise_.reset();
   picture.progress_before_ = 0.0;
   picture.samples_before_ = 0;
-  picture.expected_samples_ = picture.target_samples_;
+  picture.expected_samples_ = picture.allotment_.expected(samples);
   picture.samples_ = std::make_shared<std::uint64_t>(0);
   picture.view_row_ = 0;
   picture.complete_ = false;
@@ -599,13 +626,11 @@ void Tracer::collect() {
       learn_rows(*landed);
       continue;
     }
-    if (what.error) {
-      ErrorSums sums;
-      for (std::size_t i = 1; i < landed->words.size(); ++i) {
-        const glm::uvec4& block = landed->words[i];
-        sums += {std::bit_cast<float>(block.x), std::bit_cast<float>(block.y), double(block.z)};
+    if (what.errors) {
+      for (const glm::uvec4& square : landed->words) {
+        const auto error = std::bit_cast<glm::vec4>(square);
+        what.errors->push_back({{error.x, error.y}, error.z, error.w});
       }
-      *what.error = sums;
       continue;
     }
     learn(what, landed->ms, landed->at_most_ms, landed->words[0].x);
@@ -730,12 +755,16 @@ void Tracer::measure(Picture& picture, const Obstacles& obstacles) {
   parameters.dispatch.tile_size = picture.tile_extent();
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
   program({}, noise_kernel).object->use(*gl_);
+  if (!errors_)
+    errors_ = gl::make_buffer(gl_, Flights::most_words * sizeof(glm::vec4), nullptr, 0, "creating the squares' errors");
+  gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_ERRORS, errors_.name());
   Dispatched what;
-  what.error = picture.tile_error_ = std::make_shared<std::optional<ErrorSums>>();
-  const std::size_t blocks = picture.blocks_->size();
+  what.errors = picture.tile_errors_ = std::make_shared<SquareErrors>();
+  const glm::uvec2 squares = picture.tile_squares();
   flights_.begin(Flights::Kind::dispatch);
-  gl_->DispatchCompute(static_cast<GLuint>(blocks), 1, 1);
-  flights_.end(std::move(what), kernels_.counters(), 1 + blocks);
+  gl_->DispatchCompute(squares.x, squares.y, 1);
+  flights_.end(std::move(what), errors_.name(), std::size_t{squares.x} * squares.y);
+  kernels_.bind();
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   gl::check(*gl_, "measuring the noise");
 }
@@ -770,6 +799,7 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   what.samples = picture.samples_;
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
   kernels_.set_counters(words);
+  kernels_.set_live(picture.live_);
   flights_.begin(Flights::Kind::dispatch);
   if (stages) {
     kernels_.run_stages(*stages, extent.x, count, what.rounds);
@@ -1007,6 +1037,34 @@ struct SavedHeader {
 };
 static_assert(sizeof(SavedHeader) == 32);
 
+/// Behind them, of an adaptive picture; then what its allotment has to be kept.
+struct SavedPass {
+  std::uint32_t target = 0;
+};
+
+/// Throws Error(invalid_argument) for what is none of a picture of so many samples.
+std::uint32_t saved_pass(std::span<const std::byte> saved, std::uint32_t target_samples) {
+  SavedPass pass;
+  std::memcpy(&pass, saved.data(), sizeof pass);
+  if (pass.target < 1 || pass.target > target_samples)
+    throw Error(ErrorCode::invalid_argument, "the accumulation is of a pass that the picture does not have");
+  return pass.target;
+}
+
+template <class SamplesOf>
+Accumulated accumulated_of(glm::uvec2 size, SamplesOf&& samples_of) {
+  Accumulated told;
+  for (std::uint32_t y = 0; y < size.y; ++y) {
+    for (std::uint32_t x = 0; x < size.x; ++x) {
+      const std::uint32_t count = samples_of(glm::uvec2(x, y));
+      told.least = std::min(told.least, count);
+      told.most = std::max(told.most, count);
+      told.all += count;
+    }
+  }
+  return told;
+}
+
 SavedHeader header_of(const Picture& picture, std::size_t layers) {
   const glm::u16vec2 first(picture.box().first);
   const glm::u16vec2 extent(picture.box().size);
@@ -1033,7 +1091,7 @@ void Tracer::for_each_saved(const Picture& picture, Visit&& visit) {
 std::size_t Tracer::saved_bytes(const Picture& picture) {
   std::size_t bytes = sizeof(SavedHeader);
   for_each_saved(picture, [&](const FilmLayer&, std::size_t, std::size_t size) { bytes += size; });
-  return bytes;
+  return bytes + (picture.adaptive_ ? sizeof(SavedPass) + picture.allotment_.saved().size() : 0);
 }
 
 void Tracer::save(const Picture& picture, std::span<std::byte> bytes) const {
@@ -1044,6 +1102,12 @@ void Tracer::save(const Picture& picture, std::span<std::byte> bytes) const {
     gl_->GetTextureImage(picture.film_.texture(layer), 0, transfer.format, transfer.type, static_cast<GLsizei>(size),
                          bytes.data() + at);
   });
+  if (picture.adaptive_) {
+    const SavedPass pass{picture.pass_target_};
+    const auto live = std::as_bytes(picture.allotment_.saved());
+    std::ranges::copy(live, bytes.last(live.size()).begin());
+    std::memcpy(bytes.last(live.size() + sizeof pass).data(), &pass, sizeof pass);
+  }
   gl::check(*gl_, "reading the accumulation");
 }
 
@@ -1057,16 +1121,14 @@ void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
   for_each_saved(picture, [&](const FilmLayer& layer, std::size_t at, std::size_t size) {
     if (layer == film_layers::counts) std::memcpy(counts.data(), saved.data() + at, size);
   });
-  Accumulated told;
-  const PixelBox& box = picture.box_;
-  for (std::uint32_t y = box.first.y; y < box.first.y + box.size.y; ++y) {
-    for (std::uint32_t x = box.first.x; x < box.first.x + box.size.x; ++x) {
-      const std::uint32_t count = counts[std::size_t{y} * picture.size_.x + x].x;
-      told.least = std::min(told.least, count);
-      told.most = std::max(told.most, count);
-      told.all += count;
-    }
-  }
+  const auto samples_of = [&](glm::uvec2 pixel) {
+    const glm::uvec2 at = picture.box_.first + pixel;
+    return counts[std::size_t{at.y} * picture.size_.x + at.x].x;
+  };
+  const Accumulated told = accumulated_of(picture.box_.size, samples_of);
+  const std::size_t squares = picture.allotment_.saved().size();
+  std::optional<std::uint32_t> pass;
+  if (picture.adaptive_) pass = saved_pass(saved.last(squares + sizeof(SavedPass)), picture.target_samples_);
   if (told.most > picture.target_samples_) {
     throw Error(ErrorCode::invalid_argument, "the accumulation has pixels of " + std::to_string(told.most) +
                                                  " samples, and the picture shall have " +
@@ -1087,7 +1149,12 @@ void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
   });
   gl::check(*gl_, "restoring the accumulation");
   picture.revision_ = ++revision_;
-  picture.go_on_from(told);
+  if (pass) {
+    std::vector<std::uint8_t> live(squares);
+    std::memcpy(live.data(), saved.last(squares).data(), squares);
+    picture.allotment_.restore(live, samples_of);
+  }
+  picture.go_on_from(told, pass);
 }
 
 template <class Visit>

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "gl/programs.hpp"
+#include "render/allotment.hpp"
 #include "render/environment_data.hpp"
 #include "render/film.hpp"
 #include "render/instance_data.hpp"
@@ -79,6 +80,8 @@ struct PictureSettings {
   bool volume_alone = false;
   /// The picture is done once its noise (Totals::noise) is no more than this; none: once it has its samples.
   std::optional<double> noise_target;
+  /// Up to that, pixels have the samples that they need for it (Allotment); else all the same.
+  bool adaptive = false;
   /// That are gathered apart; 0: none.
   std::uint32_t light_groups = 0;
   /// The part of it that is made, and so many pixels around that. What follows is of this part.
@@ -130,6 +133,7 @@ class Picture {
   /// the time, the same picture ends with the same samples.
   static constexpr std::uint32_t first_measured = 16;
   [[nodiscard]] std::optional<double> noise_target() const { return noise_target_; }
+  [[nodiscard]] bool is_adaptive() const { return adaptive_; }
   /// Whether pixels without a sample may be left.
   [[nodiscard]] bool has_holes() const { return holes_; }
   [[nodiscard]] double progress() const;
@@ -191,8 +195,11 @@ class Picture {
   [[nodiscard]] bool measures() const;
   // Whether it is time to find the tile's error.
   [[nodiscard]] bool awaits_error() const;
-  // It has these samples; what was under way is none of it.
-  void go_on_from(const Accumulated& told);
+  // It has these samples; what was under way is none of it. pass: that it was in, where samples do not tell.
+  void go_on_from(const Accumulated& told, std::optional<std::uint32_t> pass);
+  // A square of the tile, counted among the picture's.
+  [[nodiscard]] glm::uvec2 first_square() const { return (tile_corner() - box_.first) / Allotment::edge; }
+  [[nodiscard]] glm::uvec2 tile_squares() const { return (tile_extent() + Allotment::edge - 1U) / Allotment::edge; }
   void begin_tile();
   void end_tile();
   void end_pass();
@@ -207,14 +214,17 @@ class Picture {
   std::uint32_t view_row_ = 0;              // a debug view is made by rows
   bool hasty_ = false;
   std::optional<double> noise_target_;
-  std::shared_ptr<std::optional<ErrorSums>> tile_error_;  // of the tile under way, once it was asked for
-  ErrorSums pass_error_;                                  // of the tiles before it
-  std::optional<double> noise_;                           // as of the last pass that was looked at
+  bool adaptive_ = false;
+  Allotment allotment_;
+  std::vector<std::uint32_t> live_;            // of each block of the tile under way, of its squares what is sampled
+  std::shared_ptr<SquareErrors> tile_errors_;  // of the tile under way, once it was asked for
+  SquareErrors errors_;                        // of the picture's squares, as far as this pass has come
+  std::optional<double> noise_;                // as of the last pass that was looked at
   // Progress: what it was when it was last known how many samples it would take, and then.
   double progress_before_ = 0.0;
   std::uint64_t samples_before_ = 0;
-  std::uint32_t expected_samples_ = 1;  // a pixel
-  std::uint32_t pass_ = 0;              // the one under way
+  double expected_samples_ = 1.0;  // of all pixels
+  std::uint32_t pass_ = 0;         // the one under way
   bool holes_ = true;
   bool complete_ = false;
   bool done_ = false;
@@ -268,7 +278,7 @@ class Tracer {
   /// width * height * 3 floats: mean radiance of a group of lights that the picture has, with what of the background is
   /// of it or without.
   void read_light_group(const Picture& picture, std::uint32_t group, bool with_background, float* rgb) const;
-  /// How many bytes save writes.
+  /// How many bytes save writes: of an adaptive picture more.
   [[nodiscard]] static std::size_t saved_bytes(const Picture& picture);
   /// All that a shaded picture's samples have come to, for restore. Nothing of it may be under way.
   void save(const Picture& picture, std::span<std::byte> bytes) const;
@@ -390,6 +400,7 @@ class Tracer {
   gl::Object pick_;        // its depth...
   gl::Object pick_place_;  // ...and what has been met
   gl::Object motion_;      // Obstacles::motion, as facts under way have it
+  gl::Object errors_;      // a tile's
   Flights flights_;
   Flights rasters_;
   std::vector<DispatchRecord>* log_ = nullptr;

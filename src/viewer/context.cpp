@@ -158,6 +158,7 @@ render::PictureWish Context::wish(const Shot& shot, const Frame& frame, const re
   wish.samples = std::max(1U, shot.sampling.samples);
   wish.noise_target = shot.sampling.noise_target;
   wish.content.stops_by_noise = shot.sampling.noise_target.has_value();
+  wish.content.adaptive = wish.content.stops_by_noise && shot.sampling.adaptive;
   wish.depth = frame.write_depth;
   wish.guides = shot.display.denoise;
   wish.held = shot.held;

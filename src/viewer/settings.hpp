@@ -157,6 +157,7 @@ struct Sampling {
   render::Region region = {};
   std::uint32_t light_groups = 0;
   double shutter_seconds = 0.0;
+  bool adaptive = false;
 
   static Sampling of(const cumulet_sampling_desc& d) {
     Sampling sampling{d.samples, d.seed, static_cast<render::View>(d.view), d.preview == CUMULET_PREVIEW_AUTO,
@@ -166,6 +167,7 @@ struct Sampling {
     sampling.region = {{d.region[0], d.region[1]}, {d.region[2], d.region[3]}};
     sampling.light_groups = d.light_groups;
     sampling.shutter_seconds = d.shutter_seconds;
+    sampling.adaptive = d.adaptive == 1;
     return sampling;
   }
 };

@@ -261,11 +261,11 @@ std::vector<JudgedScene> judged_scenes(const Options& options, std::vector<std::
   return scenes;
 }
 
-Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size)
+Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size, cumulet_programs* programs)
     : size_(size),
       gl_(test::load_gl(headless::Context::get_proc, &context)),
       target_(gl_, static_cast<int>(size), static_cast<int>(size)),
-      viewer_(test::make_viewer({.get_proc = headless::Context::get_proc, .user = &context})) {
+      viewer_(test::make_viewer({.get_proc = headless::Context::get_proc, .user = &context, .programs = programs})) {
   const Looks looks = recipe_of(scene.name).looks();
   light_ = looks.light;
   display_ = looks.display;
@@ -329,6 +329,16 @@ void Stage::sample(std::uint32_t samples, std::uint32_t seed, cumulet_preview pr
   must(cumulet_set_sampling(viewer(), &desc));
 }
 
+void Stage::sample_to(double noise_target, bool adaptive, std::uint32_t seed) {
+  auto desc = make_desc<cumulet_sampling_desc>();
+  desc.samples = 1U << 20U;
+  desc.seed = seed;
+  desc.preview = CUMULET_PREVIEW_OFF;
+  desc.noise_target_percent = static_cast<float>(100.0 * noise_target);
+  desc.adaptive = adaptive ? 1 : 0;
+  must(cumulet_set_sampling(viewer(), &desc));
+}
+
 void Stage::filter(cumulet_denoise denoise) {
   display_.denoise = denoise;
   must(cumulet_set_display(viewer(), &display_));
@@ -381,6 +391,18 @@ std::vector<float> Stage::linear() {
   std::vector<float> rgba(floats());
   must(cumulet_read_linear(viewer(), rgba.data(), rgba.size()));
   return rgba;
+}
+
+std::vector<float> Stage::errors() {
+  std::vector<float> errors(std::size_t{size_} * size_);
+  must(cumulet_read_aov(viewer(), CUMULET_AOV_ERROR, errors.data(), errors.size()));
+  return errors;
+}
+
+std::uint64_t Stage::samples_taken() {
+  auto stats = make_desc<cumulet_stats>();
+  must(cumulet_get_stats(viewer(), &stats));
+  return stats.samples;
 }
 
 std::vector<std::uint8_t> Stage::drawn() const {

@@ -31,11 +31,14 @@ std::vector<JudgedScene> judged_scenes(const Options& options, std::vector<std::
 /// the end. Throws std::runtime_error.
 class Stage {
  public:
-  Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size);
+  /// programs: its own, where not null.
+  Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t size, cumulet_programs* programs = nullptr);
 
   [[nodiscard]] cumulet_viewer* viewer() { return viewer_.get(); }
   /// Starts anew, but with the same seed and more samples, which goes on.
   void sample(std::uint32_t samples, std::uint32_t seed, cumulet_preview preview = CUMULET_PREVIEW_OFF);
+  /// Until the noise is no more than that, a part of the mean.
+  void sample_to(double noise_target, bool adaptive, std::uint32_t seed);
   void filter(cumulet_denoise denoise);
   /// About the middle of what is seen.
   void orbit(double degrees);
@@ -53,6 +56,10 @@ class Stage {
   [[nodiscard]] std::vector<std::uint8_t> drawn() const;
   /// Radiance as read_linear and read_denoised give it.
   [[nodiscard]] std::vector<float> linear();
+  /// Each pixel's standard error, as the library estimates it.
+  [[nodiscard]] std::vector<float> errors();
+  /// Samples that the picture has.
+  [[nodiscard]] std::uint64_t samples_taken();
   /// That of so many samples in two halves, which have seeds of their own. Leaves the viewer with the second.
   std::array<std::vector<float>, 2> reference(std::uint32_t samples);
   /// As it is displayed.

@@ -13,6 +13,7 @@
 #include "measure.hpp"
 #include "peers.hpp"
 #include "report.hpp"
+#include "sampling.hpp"
 
 namespace {
 
@@ -38,11 +39,14 @@ void run(const bench::Options& options) {
     throw std::runtime_error(options.readme.string() + ": cannot be read");
   }
   const bool all = !(options.surfaces_threshold > 0.0) && !options.defaults && !options.costs && !options.equal_error &&
-                   !options.peers;
+                   !options.peers && !options.adaptive && !options.techniques;
   if (all) std::filesystem::create_directories(options.out);
   headless::Context context = headless::Context::create(options.backend);
   const bench::Machine machine = machine_of(context);
   bench::progress(machine.gl_renderer);
+  if (options.adaptive) bench::measure_adaptive(context, options);
+  if (options.techniques) bench::measure_techniques(context, options);
+  if (options.adaptive || options.techniques) return;
   if (options.denoise || options.settle) {
     std::filesystem::create_directories(options.out);
     if (options.denoise) bench::measure_denoise(context, options);

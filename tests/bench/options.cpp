@@ -88,6 +88,11 @@ ParseResult parse(int argc, char** argv) {
       "what it takes; --input NAME=FILE puts a file into a scene");
   app.add_flag("--settle", o.settle,
                "Only how far what is drawn is from the converged picture after a change, by time; --seconds of it");
+  app.add_flag("--adaptive", o.adaptive,
+               "Only what adaptive sampling takes to each --target of a picture's noise, over even, on these scenes; "
+               "pictures of --repeats seeds against --reference-samples");
+  app.add_flag("--techniques", o.techniques,
+               "Only whether pictures of --reference-samples have the same means with each technique off, on them");
   app.add_option("--scene", o.scenes, "With these: cloud, full, fire, explosion, model, terrain, fog, lamp")
       ->check(CLI::IsMember(judged_names()));
   app.add_option("--oidn-weights", o.oidn_weights, "Folder of Open Image Denoise's networks (as of cumulet-render)");
@@ -157,7 +162,7 @@ ParseResult parse(int argc, char** argv) {
     o.sweep_factor = 4.0;
   }
   o.sample_dir = samples;
-  if (inputs.empty() && !o.denoise && !o.settle) {
+  if (inputs.empty() && !o.denoise && !o.settle && !o.adaptive && !o.techniques) {
     const std::filesystem::path sample_dir(samples);
     o.inputs = {
         {"disney", std::filesystem::path(shared_data) / "vdb/wdas/wdas_cloud_sixteenth.vdb", "density", 0, true},

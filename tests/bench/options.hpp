@@ -51,6 +51,8 @@ struct Options {
   std::filesystem::path environment;  ///< to measure too; empty: none
   bool denoise = false;               ///< only how good pictures of few samples are, raw and denoised
   bool settle = false;                ///< only how soon what is drawn is good after a change
+  bool adaptive = false;              ///< only what adaptive sampling takes to a noise target
+  bool techniques = false;            ///< only whether each technique, off, leaves means as they are
   std::vector<std::string> scenes;    ///< of those that these are judged on; empty: all
   std::filesystem::path sample_dir;   ///< what cumulet-scene --full wrote
   std::filesystem::path usual_dir;    ///< what it wrote without

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "support/still_cloud.hpp"
 
@@ -199,6 +200,101 @@ TEST_P(Stops, GoesOnWhereLessNoiseIsAskedForAndBeginsAnewWhereMoreIs) {
   end(kept);
   kept.noise_target = 0.08;
   EXPECT_EQ(end(kept).samples, fine.samples);
+}
+
+class Adaptive : public Stops {
+ protected:
+  static constexpr glm::uvec2 size{36, 28};  // not whole squares
+
+  static viewer::Sampling adaptive(double noise_target, std::uint32_t samples = most) {
+    viewer::Sampling wish = sampling(noise_target, samples);
+    wish.adaptive = true;
+    return wish;
+  }
+  Ended end_small(const viewer::Sampling& wish, double budget_ms = 1e9) { return end(wish, budget_ms, size); }
+};
+CUMULET_ON_BACKENDS(Adaptive);
+
+TEST_P(Adaptive, ReachesTheTargetWithFewerSamples) {
+  const double target = 0.03;
+  const Ended even = end_small(sampling(target));
+  const Ended ended = end_small(adaptive(target));
+  EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+  EXPECT_LT(ended.samples, 0.8 * even.samples);
+  // The sky has no noise, and is looked at once.
+  EXPECT_GT(ended.samples, 16.0);
+  std::vector<float> error(std::size_t{size.x} * size.y);
+  viewer().read_aov(viewer::Aov::error, error.data(), error.size());
+  EXPECT_EQ(error.front(), 0.0F);
+}
+
+TEST_P(Adaptive, IsTheSamePictureWhateverTheBudget) {
+  const Ended at_once = end_small(adaptive(0.03));
+  for (const double budget_ms : {1.0, 7.0}) {
+    end_small(adaptive(0.2), 20.0);  // so that it begins anew
+    EXPECT_EQ(end_small(adaptive(0.03), budget_ms), at_once) << budget_ms;
+  }
+  EXPECT_NE(end_small(sampling(0.03)), at_once);
+}
+
+TEST_P(Adaptive, GoesOnFromWhatWasSavedAnywhere) {
+  const viewer::Sampling wish = adaptive(0.025);
+  const Ended whole = end_small(wish);
+  const auto one_frame = [&](double budget_ms) { return viewer().render(frame(size.x, size.y, budget_ms)); };
+  const auto begin_anew = [&] {
+    viewer().set_sampling(adaptive(0.5));
+    one_frame(0.01);
+    viewer().set_sampling(wish);
+    one_frame(0.01);
+  };
+  begin_anew();
+  std::size_t kept = 0;
+  double seen = 0.0;
+  // At many places of passes: each time what is saved is taken up again, and must not matter.
+  for (viewer::FrameResult result = one_frame(0.5); !result.converged; result = one_frame(0.5)) {
+    const double samples = double(viewer().stats().samples);
+    if (samples < seen + 900.0) continue;
+    seen = samples;
+    std::vector<std::byte> bytes(viewer().accumulation_bytes());
+    viewer().read_accumulation(bytes);
+    begin_anew();
+    viewer().restore_accumulation(bytes);
+    ++kept;
+  }
+  EXPECT_GT(kept, 10U);
+  Ended ended;
+  ended.samples = double(viewer().stats().samples) / (double(size.x) * size.y);
+  ended.pixels.resize(std::size_t{4} * size.x * size.y);
+  viewer().read_linear(ended.pixels.data(), ended.pixels.size());
+  EXPECT_EQ(ended, whole);
+}
+
+TEST_P(Adaptive, RefusesWhatIsSavedOfAnother) {
+  const auto saved = [&](const viewer::Sampling& wish) {
+    end_small(wish);
+    std::vector<std::byte> bytes(viewer().accumulation_bytes());
+    viewer().read_accumulation(bytes);
+    return bytes;
+  };
+  const std::vector<std::byte> even = saved(sampling(0.1));
+  std::vector<std::byte> own = saved(adaptive(0.1));
+  EXPECT_THROW(viewer().restore_accumulation(even), Error);
+  // A pass beyond the picture's samples.
+  own[even.size() + 3] = std::byte{0xff};
+  EXPECT_THROW(viewer().restore_accumulation(own), Error);
+}
+
+TEST_P(Adaptive, OfSeveralTilesAndOfARegion) {
+  const glm::uvec2 wide(520, 12);
+  end(sampling(std::nullopt, 16), 50.0, wide);
+  const double target = 0.4 * viewer().measure_noise();
+  const Ended ended = end(adaptive(target), 50.0, wide);
+  EXPECT_LE(viewer().measure_noise(), target * 1.0001);
+  EXPECT_LT(ended.samples, 0.8 * end(sampling(target), 50.0, wide).samples);
+  viewer::Sampling part = adaptive(target);
+  part.region = {{0.4F, 0.1F}, {0.5F, 0.8F}};
+  end(part, 50.0, wide);
+  EXPECT_LE(viewer().measure_noise(), target * 1.0001);
 }
 
 }  // namespace

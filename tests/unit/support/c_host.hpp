@@ -234,6 +234,7 @@ struct ViewerOptions {
   void* log_user = nullptr;
   cumulet_gl_state gl_state = CUMULET_GL_STATE_RESTORE;
   std::uint32_t samples = 4;
+  cumulet_programs* programs = nullptr;
 };
 
 /// As the library makes one. Throws std::runtime_error.
@@ -254,6 +255,7 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   create.log = options.log;
   create.log_user = options.log_user;
   create.gl_state = options.gl_state;
+  create.programs = options.programs;
   ViewerPtr viewer = make_plain_viewer(create);
   cumulet_viewer* const out = viewer.get();
   auto light = make_desc<cumulet_light_desc>();

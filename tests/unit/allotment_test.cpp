@@ -1,0 +1,158 @@
+// Which pixels are sampled on: against Neyman's allocation in closed form.
+
+#include "render/allotment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace {
+
+using namespace cumulet;
+using render::Allotment;
+using render::SquareError;
+
+constexpr unsigned rows = 4;  // of a half, of 32 pixels
+
+// Squares in a row, each with a deviation of its own; pixels are as bright as 1.
+class Row {
+ public:
+  explicit Row(std::vector<double> deviations) : deviations_(std::move(deviations)), samples_(deviations_.size(), 0.0) {
+    allotment_.begin({8 * deviations_.size(), 8U});
+  }
+  // Until the noise is down to the target; returns all samples.
+  double run(double target) {
+    double count = 16.0;
+    do {
+      look(std::round(count));
+      if (noise() <= target) break;
+      allotment_.decide(errors(), target, static_cast<std::uint32_t>(std::round(count)));
+      count *= growth_;
+    } while (count < 1e6);
+    double all = 0.0;
+    for (const double samples : samples_) all += 64.0 * samples;
+    return all;
+  }
+  [[nodiscard]] double noise() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < samples_.size(); ++i) sum += deviations_[i] * deviations_[i] / samples_[i];
+    return std::sqrt(sum / double(samples_.size()));
+  }
+  [[nodiscard]] const std::vector<double>& samples() const { return samples_; }
+  Allotment& allotment() { return allotment_; }
+  void look(double count) {
+    for (unsigned i = 0; i < samples_.size(); ++i)
+      if (allotment_.live({i, 0U}) != 0) samples_[i] = count;
+  }
+  [[nodiscard]] std::vector<SquareError> errors() const {
+    std::vector<SquareError> errors;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const double squared = 8.0 * rows * deviations_[i] * deviations_[i] / samples_[i];
+      errors.push_back({{squared, squared}, 64.0, 64.0});
+    }
+    return errors;
+  }
+
+ private:
+  static constexpr double growth_ = 1.05;  // finer than pictures': nearer the closed form
+  std::vector<double> deviations_;
+  std::vector<double> samples_;
+  Allotment allotment_;
+};
+
+TEST(Allotment, HasNeymansSamplesInClosedForm) {
+  const std::vector<double> deviations{1.0, 2.0, 0.0, 8.0, 3.0, 4.0};
+  const double target = 0.1;
+  Row row(deviations);
+  const double all = row.run(target);
+  // Each n = s sum(s) / V with V of all squares; where that is less than the 16 that it has, these, and the rest of V.
+  double left = target * target * double(deviations.size());
+  double sum = 0.0;
+  for (const double s : deviations) sum += s;
+  double best = 0.0;
+  for (std::size_t i = 0; i < deviations.size(); ++i) {
+    const double wanted = std::max(16.0, deviations[i] * sum / left);
+    best += 64.0 * wanted;
+    EXPECT_GE(row.samples()[i], 0.94 * wanted) << i;
+    EXPECT_LE(row.samples()[i], 1.06 * wanted) << i;
+  }
+  EXPECT_LE(row.noise(), target);
+  EXPECT_GE(row.noise(), 0.96 * target);
+  EXPECT_NEAR(all, best, 0.05 * best);
+  // Even samples take sum(s^2) / V each.
+  double even = 0.0;
+  for (const double s : deviations) even += s * s / left;
+  EXPECT_LT(all, 0.65 * 64.0 * double(deviations.size()) * even);
+}
+
+TEST(Allotment, TellsHowManySamplesItTakes) {
+  Row row({1.0, 2.0, 4.0, 8.0});
+  EXPECT_EQ(row.allotment().expected(100.0), 4 * 64 * 100.0);
+  row.look(16.0);
+  row.allotment().decide(row.errors(), 0.2, 16);
+  const double told = row.allotment().expected(1e6);
+  EXPECT_NEAR(row.run(0.2), told, 0.06 * told);
+}
+
+TEST(Allotment, AHalfIsDecidedByTheOther) {
+  Allotment allotment;
+  allotment.begin({16U, 8U});
+  // Even rows of the first square show noise, and none of the second do.
+  const std::array<SquareError, 2> errors{SquareError{{32.0, 0.0}, 64.0, 64.0}, SquareError{{0.0, 0.0}, 64.0, 64.0}};
+  allotment.decide(errors, 0.4, 16);
+  EXPECT_EQ(allotment.live({0U, 0U}), 2U);
+  EXPECT_EQ(allotment.live({1U, 0U}), 0U);
+  EXPECT_FALSE(allotment.is_live({3U, 4U}));
+  EXPECT_TRUE(allotment.is_live({3U, 5U}));
+}
+
+TEST(Allotment, SomethingGoesOnWhereTheTargetIsNotReached) {
+  // The half that shows noise has its share by the other's samples; the target is not reached all the same.
+  Allotment allotment;
+  allotment.begin({8U, 8U});
+  allotment.decide(std::array{SquareError{{32.0, 0.0}, 64.0, 64.0}}, 0.5, 16);
+  EXPECT_EQ(allotment.live({0U, 0U}), 2U);
+  allotment.decide(std::array{SquareError{{32.0, 0.0}, 64.0, 64.0}}, 0.5, 4096);
+  EXPECT_EQ(allotment.live({0U, 0U}), 1U);
+}
+
+TEST(Allotment, CountsPixelsAtTheEdges) {
+  Allotment allotment;
+  allotment.begin({9U, 11U});
+  EXPECT_EQ(allotment.squares(), glm::uvec2(2U, 2U));
+  EXPECT_EQ(allotment.live_pixels({0U, 0U}), 64U);
+  EXPECT_EQ(allotment.live_pixels({1U, 0U}), 8U);
+  EXPECT_EQ(allotment.live_pixels({0U, 1U}), 24U);
+  EXPECT_EQ(allotment.live_pixels({1U, 1U}), 3U);
+  // A single row is decided by itself.
+  allotment.begin({8U, 1U});
+  allotment.decide(std::array{SquareError{{32.0, 0.0}, 8.0, 8.0}}, 0.5, 16);
+  EXPECT_EQ(allotment.live({0U, 0U}), 1U);
+}
+
+TEST(Allotment, GoesOnFromWhatIsSaved) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> value(0.0, 3.0);
+  std::vector<double> deviations(40);
+  for (double& deviation : deviations) deviation = value(random);
+  Row row(deviations);
+  row.look(16.0);
+  row.allotment().decide(row.errors(), 0.1, 16);
+  row.look(64.0);
+  row.allotment().decide(row.errors(), 0.1, 64);
+  row.look(91.0);
+  Allotment other;
+  other.begin({8 * deviations.size(), 8U});
+  const auto saved = row.allotment().saved();
+  const auto samples_of = [&](glm::uvec2 pixel) { return static_cast<std::uint32_t>(row.samples()[pixel.x / 8]); };
+  other.restore(std::vector<std::uint8_t>(saved.begin(), saved.end()), samples_of);
+  row.allotment().decide(row.errors(), 0.1, 91);
+  other.decide(row.errors(), 0.1, 91);
+  for (unsigned i = 0; i < deviations.size(); ++i) EXPECT_EQ(other.live({i, 0U}), row.allotment().live({i, 0U}));
+  EXPECT_EQ(other.expected(1e5), row.allotment().expected(1e5));
+}
+
+}  // namespace
