@@ -1312,9 +1312,9 @@ typedef struct cumulet_sampling_desc {
   /*
    * 1: where there is a noise target, samples go where the picture's noise is: a half of a square of 8 x 8 pixels (its
    * even or its odd rows) is sampled no further once it has its share of those that reach the target with the fewest
-   * samples in all, n ~ sigma (Neyman, "On the Two Different Aspects of the Representative Method", 1934). Looked at when
-   * the noise is; what each half has is decided by the samples of the other, docs/aovs.md. The same settings end with
-   * the same picture, whatever the time. Pixels then have different numbers of samples. 0: all have the same.
+   * samples in all, n ~ sigma (Neyman, "On the Two Different Aspects of the Representative Method", 1934). Looked at
+   * when the noise is; what each half has is decided by the samples of the other, docs/aovs.md. The same settings end
+   * with the same picture, whatever the time. Pixels then have different numbers of samples. 0: all have the same.
    */
   int32_t adaptive;
 } cumulet_sampling_desc;
@@ -2041,9 +2041,9 @@ CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double*
 /*
  * [GL] All that the samples of the picture under way have come to, for another process to go on with. size: in, the
  * bytes that there is room for; out, those that there are: 32 + 44 a pixel, 60 with volume_alone, and 16 for each group
- * of lights and two more; of an adaptive picture 4 more, and 1 for each square of 8 x 8 pixels. bytes NULL: these alone. Their order is the library's own, and of its version; they say
- * nothing of the scene. Of shaded pictures without previews. CUMULET_ERROR_INVALID_ARGUMENT for others, for too little
- * room and before the first cumulet_render.
+ * of lights and two more; of an adaptive picture 4 more, and 1 for each square of 8 x 8 pixels. bytes NULL: these
+ * alone. Their order is the library's own, and of its version; they say nothing of the scene. Of shaded pictures
+ * without previews. CUMULET_ERROR_INVALID_ARGUMENT for others, for too little room and before the first cumulet_render.
  */
 CUMULET_API cumulet_status cumulet_read_accumulation(cumulet_viewer* viewer, void* bytes, size_t* size);
 /*
