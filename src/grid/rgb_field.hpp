@@ -91,6 +91,7 @@ struct Channels {
   /// Light knows nothing of it: no cell is split for it.
   std::shared_ptr<const MomentumField> momentum;
 
+  bool operator==(const Channels&) const = default;
   /// Main memory.
   [[nodiscard]] std::uint64_t bytes() const {
     return (emission ? emission->bytes() : 0) + (scattering ? scattering->bytes() : 0) +

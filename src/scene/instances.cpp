@@ -127,7 +127,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     record.medium = instance.medium;
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
                    (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U);
-    glow.push_back(glow_of(instance.source->glow, cube.to_world, instance.place));
+    glow.push_back(glow_of(instance.glow, cube.to_world, instance.place));
     const Block& block =
         blocks.emplace_back(block_of(to_scene, dvec3(instance.grid.box_min), dvec3(instance.grid.box_max)));
     const dvec3 reach = reach_of(block);

@@ -23,13 +23,14 @@ struct Instance {
   core::CmGrid grid{};    ///< where the source's data are, and the box that holds them all
   core::CmMedium medium{};
   bool hidden_from_camera = false;
+  GlowSum glow{};  ///< of the source's cells
 };
 
 /// Both arrays go into buffers as they are.
 struct InstanceTable {
   std::vector<core::CmInstance> records;    ///< in the order of the instances
   std::vector<core::CmInstanceNode> nodes;  ///< at least one; the first's box holds all there is
-  double glow_power = 0.0;                  ///< of all of them, as GlowTable has both
+  double glow_power = 0.0;                  ///< of all of them, as GlowSum has both
   double glow_length = 0.0;
 };
 

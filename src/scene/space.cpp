@@ -40,10 +40,10 @@ core::CmSpace space_of(const glm::dmat4& cube_to_world, const vec3& low, const v
 
 double mean_stretch(const glm::dmat4& place) { return std::cbrt(std::abs(glm::determinant(glm::dmat3(place)))); }
 
-PlacedGlow glow_of(const GlowTable& table, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
-  if (table.cells.empty()) return {};
-  PlacedGlow glow{.power = table.power * std::abs(glm::determinant(glm::dmat3(place))),
-                  .length = table.length * mean_stretch(place)};
+PlacedGlow glow_of(const GlowSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
+  if (!(sum.power > 0.0)) return {};
+  PlacedGlow glow{.power = sum.power * std::abs(glm::determinant(glm::dmat3(place))),
+                  .length = sum.length * mean_stretch(place)};
   glow.looks.density = static_cast<float>(1.0 / glow.power);
   glow.looks.extent = static_cast<float>(glow.length);
   glow.looks.least_stretch = static_cast<float>(least_stretch(glm::dmat3(place * cube_to_world)));

@@ -57,10 +57,6 @@ std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held,
   return (most - std::min(most, held + tables)) / bytes_a_cell(channels);
 }
 
-bool any(const grid::Channels& channels) {
-  return channels.emission || channels.scattering || channels.forward || channels.momentum;
-}
-
 }  // namespace
 
 void log_limited(const Log& log, std::uint64_t max_cells) {
@@ -87,22 +83,20 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     built.seconds.records = watch.lap();
     return built;
   }
-  if (settings.on == BuildOn::gpu && !any(channels)) {
-    const grid::LatticePtr lattice = volume->lattice(settings.density_ramp, settings.refine, progress);
+  if (settings.on == BuildOn::gpu) {
+    const grid::LatticePtr lattice = volume->lattice(settings.density_ramp, channels, settings.refine, progress);
     std::vector<std::uint8_t> levels =
         before && before->lattice == lattice
             ? lattice->own.levels(lattice->cube, settings.refine, before->levels, &progress)
             : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
-    scene::MarchSource source =
-        scene::make_planned_source({lattice, std::move(levels), settings.refine.max_cells}, voxels, statistics);
+    scene::MarchSource source = scene::make_planned_source({lattice, std::move(levels), settings.refine.max_cells},
+                                                           voxels, statistics, channels);
     source.optical_depth = statistics->mean_optical_depth();
     built.source = std::make_shared<const scene::MarchSource>(std::move(source));
     allowance.require(built.bytes(), volume->name());
     built.seconds.refine = watch.lap();
     return built;
   }
-  if (settings.on == BuildOn::gpu)
-    log.info(volume->name() + ": it has more than density, so its grid is built on the CPU");
   grid::RefineSettings refine = settings.refine;
   refine.max_cells = std::min(refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance));
   const auto diamonds = make_left<const grid::DiamondSet>(*statistics, channels, refine, &progress);

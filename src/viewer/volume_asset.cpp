@@ -80,7 +80,7 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
   using Clock = std::chrono::steady_clock;
   seconds = 0.0;
   progress.begin(Progress::Stage::statistics);
-  const auto lock = patient_lock(mutex_, progress);
+  const auto lock = patient_lock(computing_, progress);
   const auto start = Clock::now();
   const auto statistics_of = [&](const volume::ScalarVolume& voxels) {
     auto made = make_left<const grid::Statistics>(voxels, cube_, &progress);
@@ -88,34 +88,39 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
     return made;
   };
   if (ramp.empty()) {
-    if (!statistics_) statistics_ = statistics_of(frame_->density);
+    if (!statistics_) put(statistics_, statistics_of(frame_->density));
     return {{frame_, &frame_->density}, statistics_};
   }
   if (!ramped_ || ramped_->ramp != ramp) {
-    ramped_.reset();
+    drop(ramped_);
     const auto voxels = make_left<const volume::ScalarVolume>(volume::apply(ramp, frame_->density, &progress));
-    ramped_ = Ramped{ramp, {voxels, statistics_of(*voxels)}};
+    put(ramped_, Ramped{ramp, {voxels, statistics_of(*voxels)}});
   }
   return ramped_->density;
 }
 
-grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::RefineSettings& refine,
-                                      Progress& progress) const {
+grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::Channels& channels,
+                                      const grid::RefineSettings& refine, Progress& progress) const {
   // The same for all views and budgets.
   const grid::RefineSettings any_view;
   grid::RefineSettings of = refine;
   of.camera.reset();
   of.pixel_size = any_view.pixel_size;
   of.max_cells = any_view.max_cells;
+  if (of.criterion != grid::Criterion::transmittance) {
+    // No other knows of the medium.
+    of.density_scale = any_view.density_scale;
+    of.anisotropy = any_view.anisotropy;
+  }
   double seconds = 0.0;
   const Density field = density(ramp, progress, seconds);
   progress.begin(Progress::Stage::refining);
-  const auto lock = patient_lock(mutex_, progress);
-  if (!latticed_ || latticed_->ramp != ramp || latticed_->refine != of) {
-    latticed_.reset();
-    latticed_ = Latticed{
-        ramp, of,
-        make_left<const grid::Lattice>(*field.statistics, grid::Channels{}, of, field.voxels->max_value, &progress)};
+  const auto lock = patient_lock(computing_, progress);
+  if (!latticed_ || latticed_->ramp != ramp || latticed_->channels != channels || latticed_->refine != of) {
+    drop(latticed_);
+    put(latticed_,
+        Latticed{ramp, channels, of,
+                 make_left<const grid::Lattice>(*field.statistics, channels, of, field.voxels->max_value, &progress)});
   }
   return latticed_->lattice;
 }
@@ -132,18 +137,20 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   constexpr std::type_identity<grid::RgbField> colours;
   constexpr std::type_identity<grid::ScalarField> numbers;
   constexpr std::type_identity<grid::MomentumField> motion;
-  const auto lock = patient_lock(mutex_, progress);
+  const auto lock = patient_lock(computing_, progress);
   if (!glowing_ || glowing_->settings != given) {
-    glowing_.reset();
-    glowing_ = Glowing{given, field(colours, scene::emission_of(*frame_, given, &progress))};
+    drop(latticed_);  // it holds them
+    drop(glowing_);
+    put(glowing_, Glowing{given, field(colours, scene::emission_of(*frame_, given, &progress))});
   }
   if (!weighted_ || weighted_->density_ramp != density_ramp) {
-    weighted_.reset();
-    weighted_ = Weighted{density_ramp, field(colours, scene::scattering_of(*frame_, density_ramp, &progress)),
-                         field(motion, scene::momentum_of(*frame_, density_ramp, &progress, log)), std::nullopt};
+    drop(latticed_);
+    drop(weighted_);
+    put(weighted_, Weighted{density_ramp, field(colours, scene::scattering_of(*frame_, density_ramp, &progress)),
+                            field(motion, scene::momentum_of(*frame_, density_ramp, &progress, log)), std::nullopt});
   }
   if (anisotropic && !weighted_->forward)
-    weighted_->forward = field(numbers, scene::forward_of(*frame_, density_ramp, &progress));
+    put(weighted_->forward, field(numbers, scene::forward_of(*frame_, density_ramp, &progress)));
   return {glowing_->emission, weighted_->scattering, anisotropic ? *weighted_->forward : nullptr, weighted_->momentum};
 }
 
