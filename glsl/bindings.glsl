@@ -94,6 +94,8 @@ const int CM_STORAGE_GRID_ORDER = 5;
 const int CM_STORAGE_GRID_RECORDS = 6;
 const int CM_STORAGE_GRID_BRICKS = 7;
 const int CM_STORAGE_GRID_TREE = 7;
+const int CM_STORAGE_GRID_CHANNEL = 4;  // grid_channels.comp, grid_glow.comp
+const int CM_STORAGE_GRID_GLOWING = 7;
 
 // Images.
 const int CM_IMAGE_SUM = 0;

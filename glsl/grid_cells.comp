@@ -14,19 +14,8 @@ layout(local_size_x = 64) in;
 #include "lattice.glsl"
 #include "grid_state.glsl"
 #include "grid_places.glsl"
+#include "grid_leaves.glsl"
 
-struct CmTreeCell {
-  uint child;   // the first of two; 0: a leaf
-  uint leaves;  // below it, itself if it is one
-  uvec2 where;  // v0 and shape, as in a record
-};
-layout(std430, binding = CM_STORAGE_GRID_STATE) buffer CmState { CmGridState cm_state; };
-layout(std430, binding = CM_STORAGE_GRID_CELLS) buffer CmCells { CmTreeCell cm_cells[]; };
-layout(location = 0) uniform uint cm_first;
-layout(location = 1) uniform uint cm_end;
-
-vec3 cm_v0_of(uvec2 where) { return cm_record_v0(uvec4(where, 0u, 0u)); }
-uint cm_shape_of(uvec2 where) { return where.y >> 16; }
 uvec2 cm_where(vec3 v0, uint shape) {
   return uvec2(uint(v0.x) | (uint(v0.y) << 16), uint(v0.z) | (shape << 16));
 }
@@ -161,17 +150,6 @@ float cm_value(uint i) {
 #endif
 }
 
-// The nearest half, of two as near the larger: drivers round as they like.
-uint cm_half(float value) {
-  uint bits = floatBitsToUint(value);
-  uint sign_bit = (bits >> 16) & 0x8000u;
-  bits &= 0x7fffffffu;
-  if (bits >= 0x47800000u) return sign_bit | 0x7c00u;
-  if (bits >= 0x38800000u) return sign_bit | ((bits - 0x38000000u + 0x1000u) >> 13);
-  uint shift = 126u - (bits >> 23);
-  return shift > 24u ? sign_bit : sign_bit | ((((bits & 0x7fffffu) | 0x800000u) + (1u << (shift - 1u))) >> shift);
-}
-
 struct CmLeaf {
   uvec2 coefficients;  // as in a record
   bool dense;          // has any density
@@ -185,12 +163,8 @@ uvec2 cm_pack(float mean, vec3 gradient) {
 // Within a brick: the sum over its voxels.
 CmLeaf cm_fine_leaf(vec3 v0, uint shape, uint level, ivec3 voxel) {
   uint first_value = CM_BLOCK_POINTS * cm_brick_at(voxel);
-  // Voxels are counted along the frame's axes, from the one at v0.
-  ivec3 at_v0 = ivec3(floor(v0 + cm_from_frame(vec3(0.5), shape)));
-  int begin = int(cm_in_block(at_v0));
-  uvec3 axis = uvec3((shape >> 3) & 3u, (shape >> 5) & 3u, (shape >> 7) & 3u);
-  ivec3 stride = ivec3(64) >> ivec3(3u * axis);
-  stride *= ivec3(1) - 2 * ivec3(int(shape & 1u), int((shape >> 1) & 1u), int((shape >> 2) & 1u));
+  int begin = cm_voxel_at_v0(v0, shape);
+  ivec3 steps = cm_voxel_steps(shape);
   uint part = cm_first_part[level];
   uint end = cm_first_part[level + 1u];
   float low = 0.0;
@@ -200,8 +174,7 @@ CmLeaf cm_fine_leaf(vec3 v0, uint shape, uint level, ivec3 voxel) {
   vec3 moment = vec3(0.0);
   for (uint i = part; i < end; ++i) {
     uvec4 words = cm_parts[i];
-    int offset = int(words.w & 15u) * stride.x + int((words.w >> 4) & 15u) * stride.y + int((words.w >> 8) & 15u) * stride.z;
-    float value = cm_value(first_value + uint(begin + offset));
+    float value = cm_value(first_value + uint(begin + cm_voxel_of_part(words.w, steps)));
     if (i == part) low = high = reference = value;
     low = min(low, value);
     high = max(high, value);
@@ -218,7 +191,7 @@ CmLeaf cm_fine_leaf(vec3 v0, uint shape, uint level, ivec3 voxel) {
 
 // Above bricks.
 CmLeaf cm_coarse_leaf(vec3 v0, uint shape, ivec3 voxel) {
-  uint size = cm_shape_exponent(shape) + (cm_shape_class(shape) == 1u ? 0u : 1u);
+  uint size = cm_coarse_size(shape);
   ivec3 corner = (voxel >> ivec3(int(size))) << ivec3(int(size));
   uint coarse = CM_COARSE_WORDS * cm_coarse_at(corner, size);
   if (coarse == 0u) {
@@ -254,26 +227,14 @@ void main() {
   if (cell.child != 0u) return;
   vec3 v0 = cm_v0_of(cell.where);
   uint shape = cm_shape_of(cell.where);
-  uint cell_class = cm_shape_class(shape);
-  uint exponent = cm_shape_exponent(shape);
-  vec3 middle = v0 + cm_from_frame(cm_frame_centroid(cell_class) * cm_shape_unit(shape), shape);
-  ivec3 voxel = ivec3(middle);
+  ivec3 voxel = cm_leaf_voxel(v0, shape);
   CmLeaf leaf;
-  if (exponent + (cell_class == 1u ? 0u : 1u) <= 3u) {
-    leaf = cm_fine_leaf(v0, shape, 3u * (3u - exponent) - (cell_class == 1u ? 0u : (cell_class == 2u ? 2u : 1u)), voxel);
+  if (cm_is_fine(shape)) {
+    leaf = cm_fine_leaf(v0, shape, cm_fine_level(shape), voxel);
   } else {
     leaf = cm_coarse_leaf(v0, shape, voxel);
   }
-  if (leaf.dense) {
-    for (uint k = 0u; k < 4u; ++k) {
-      vec3 vertex = cm_cell_vertex(v0, shape, k);
-      uint at[3] = uint[3](uint(vertex.x), uint(vertex.y), uint(vertex.z));
-      for (uint axis = 0u; axis < 3u; ++axis) {
-        if (at[axis] < cm_state.low[axis]) atomicMin(cm_state.low[axis], at[axis]);
-        if (at[axis] > cm_state.high[axis]) atomicMax(cm_state.high[axis], at[axis]);
-      }
-    }
-  }
+  if (leaf.dense) cm_put_in_box(v0, shape);
   uvec4 links = cm_links[i];
   uint rank = cm_order[i].x;
   cm_records[2u * rank] = uvec4(cm_resolve(links.x, v0, shape, 0u), cm_resolve(links.y, v0, shape, 1u),

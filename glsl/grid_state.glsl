@@ -13,6 +13,7 @@ struct CmGridState {
   uint high[3];
   uint added[CM_SPLIT_LEVELS];   // cells that the splits of a level add
   uint placed[CM_SPLIT_LEVELS];  // pairs of a level's children that have a place
+  uint glowing;                  // cells that give off light
 };
 
 #endif

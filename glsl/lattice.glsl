@@ -18,6 +18,14 @@
 #define CM_COARSE_CELLS 42u
 #define CM_COARSE_WORDS 86u  // two each, and two of bits
 
+// What cells carry beside density.
+#define CM_CHANNEL_EMISSION 0
+#define CM_CHANNEL_COLOUR 1
+#define CM_CHANNEL_ANISOTROPY 2
+#define CM_CHANNEL_VELOCITY 3
+// Of a cube's cells above bricks, whose records of a channel have so many words each: with two words of bits.
+CM_FN uint cm_coarse_channel_words(uint record) { return CM_COARSE_CELLS * record + 2u; }
+
 CM_FN uint cm_octave(ivec3 vertex) { return uint(findLSB(vertex.x | vertex.y | vertex.z)); }
 CM_FN uint cm_in_block(ivec3 point) {
   ivec3 p = point & ivec3(7);

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
+#include <span>
 #include <tuple>
 #include <unordered_map>
 
@@ -51,8 +53,8 @@ uvec2 coefficients_of(const Moments& m, const vec3& v0, std::uint32_t shape, Cel
 
 // Calls visit(v0, shape) for the cells of an octree's cube: its Kuhn tetrahedra, their halves and quarters; the roots.
 template <class Visit>
-void for_coarse_cells(const Statistics::Node& node, int log2_size, Visit visit) {
-  if (node.log2_size == log2_size) {
+void for_coarse_cells(const ivec3& corner, int cube_size, int log2_size, Visit visit) {
+  if (cube_size == log2_size) {
     for (unsigned root = 0; root < 24; ++root) {
       vec3 v0;
       std::uint32_t shape = 0;
@@ -61,12 +63,12 @@ void for_coarse_cells(const Statistics::Node& node, int log2_size, Visit visit) 
     }
     return;
   }
-  const int size = 1 << node.log2_size;
+  const int size = 1 << cube_size;
   for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
-    vec3 v0(node.corner);
-    for (int axis = 0; axis < 3; ++axis) v0[axis] += static_cast<float>(node.corner[axis] & size);
+    vec3 v0(corner);
+    for (int axis = 0; axis < 3; ++axis) v0[axis] += static_cast<float>(corner[axis] & size);
     const std::uint32_t shape =
-        kuhn_frame(node.corner, size, permutation) | (1U << 9U) | (static_cast<std::uint32_t>(node.log2_size) << 11U);
+        kuhn_frame(corner, size, permutation) | (1U << 9U) | (static_cast<std::uint32_t>(cube_size) << 11U);
     visit(v0, shape);
     for (unsigned a = 0; a < 2; ++a) {
       const std::uint32_t half = core::cm_child_shape(shape, a);
@@ -80,18 +82,21 @@ void for_coarse_cells(const Statistics::Node& node, int log2_size, Visit visit) 
 
 }  // namespace
 
-Lattice::Lattice(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
-                 float max_value, Progress* progress)
+Lattice::Lattice(const Statistics& statistics, const Channels& beside, const RefineSettings& settings, float max_value,
+                 Progress* progress)
     : cube(statistics.cube()),
-      own(statistics, channels, settings, progress),
+      own(statistics, beside, settings, progress),
       density_unit(max_value > 0.0F ? max_value : 1.0F),
       cells(settings.cells) {
-  find_blocks(statistics, progress);
+  const std::vector<ChannelFields> fields = fields_of(statistics, beside);
+  find_blocks(statistics, fields, progress);
   fill_places(statistics, progress);
   fill_coarse(statistics, progress);
+  for (const ChannelFields& of : fields) channels.push_back(make_channel(of, progress));
+  if (beside.momentum) channels.back().fastest = beside.momentum->fastest();
 }
 
-void Lattice::find_blocks(const Statistics& statistics, Progress* progress) {
+void Lattice::find_blocks(const Statistics& statistics, const std::vector<ChannelFields>& beside, Progress* progress) {
   std::vector<std::uint8_t> all;
   resize(all, own.nodes.size(), progress);
   std::ranges::transform(own.nodes, all.begin(),
@@ -110,7 +115,12 @@ void Lattice::find_blocks(const Statistics& statistics, Progress* progress) {
   };
   above.insert(pack_block(ivec3(0), top_scale()));
   for (const uvec2& block : blocks) add_above(core::cm_block_corner(block), core::cm_block_scale(block));
-  for (const std::uint32_t n : statistics.nodes_of_size(3)) add_above(statistics.nodes()[n].corner >> 3, 0);
+  const auto add_bricks = [&](const Statistics& field) {
+    for (const std::uint32_t n : field.nodes_of_size(3)) add_above(field.nodes()[n].corner >> 3, 0);
+  };
+  add_bricks(statistics);
+  for (const ChannelFields& fields : beside)
+    std::ranges::for_each(fields.statistics(), [&](const Statistics* field) { add_bricks(*field); });
   blocks.insert(blocks.end(), above.begin(), above.end());
   std::ranges::sort(blocks, before);
   blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
@@ -128,6 +138,27 @@ std::uint32_t Lattice::block_at(const ivec3& corner, std::uint32_t scale) const 
   return found != blocks.end() && *found == block ? static_cast<std::uint32_t>(found - blocks.begin()) : 0;
 }
 
+template <class Visit>
+void Lattice::for_each_place(const Progress* progress, Visit&& visit) const {
+  for (std::uint32_t b = 1; b < first[0]; ++b) {
+    check(progress);
+    const int scale = static_cast<int>(core::cm_block_scale(blocks[b]));
+    for (int i = 0; i < static_cast<int>(CM_BLOCK_POINTS); ++i) {
+      const ivec3 point = core::cm_block_corner(blocks[b]) * 8 + ivec3(i / 64, i / 8 % 8, i % 8);
+      const ivec3 corner = point << (3 * scale);
+      if (std::max({corner.x, corner.y, corner.z}) >= cube.size()) continue;
+      visit(std::size_t{b} * CM_BLOCK_POINTS + static_cast<std::size_t>(i), corner, scale);
+    }
+  }
+}
+
+std::size_t Lattice::place_about(const ivec3& corner, int log2_size) const {
+  const ivec3 middle = corner + (1 << (log2_size - 1));
+  const std::uint32_t scale = core::cm_octave(middle) / 3;
+  const ivec3 point = middle >> static_cast<int>(3 * scale);
+  return std::size_t{block_at(point >> 3, scale)} * CM_BLOCK_POINTS + core::cm_in_block(point);
+}
+
 void Lattice::fill_places(const Statistics& statistics, const Progress* progress) {
   resize(places, std::size_t{first[0]} * CM_BLOCK_POINTS, progress);
   even_bricks.push_back(0.0F);
@@ -137,25 +168,22 @@ void Lattice::fill_places(const Statistics& statistics, const Progress* progress
     std::uint32_t number;
   };
   std::vector<Brick> with_values;
-  for (std::uint32_t b = 1; b < first[0]; ++b) {
-    check(progress);
-    const int scale = static_cast<int>(core::cm_block_scale(blocks[b]));
-    for (int i = 0; i < static_cast<int>(CM_BLOCK_POINTS); ++i) {
-      const ivec3 point = core::cm_block_corner(blocks[b]) * 8 + ivec3(i / 64, i / 8 % 8, i % 8);
-      const std::size_t index = std::size_t{b} * CM_BLOCK_POINTS + static_cast<std::size_t>(i);
-      places[index].block = block_at(point, static_cast<std::uint32_t>(scale - 1));
-      const ivec3 corner = point << (3 * scale);
-      if (std::max({corner.x, corner.y, corner.z}) >= cube.size()) continue;
-      const Statistics::Node& node = statistics.node_at(corner, 3 * scale);
-      if (node.is_uniform()) {
-        const auto [found, added] = even.emplace(node.uniform, static_cast<std::uint32_t>(even_bricks.size()));
-        if (added) even_bricks.push_back(node.uniform);
-        places[index].brick = found->second;
-      } else if (scale == 1) {
-        with_values.push_back({index, node.moments / 6});
-      }
-    }
+  for (std::uint32_t b = 2; b < blocks.size(); ++b) {
+    // By the point of the next coarser scale that it stands at.
+    const ivec3 corner = core::cm_block_corner(blocks[b]);
+    const std::uint32_t above = block_at(corner >> 3, core::cm_block_scale(blocks[b]) + 1);
+    places[std::size_t{above} * CM_BLOCK_POINTS + core::cm_in_block(corner)].block = b;
   }
+  for_each_place(progress, [&](std::size_t index, const ivec3& corner, int scale) {
+    const Statistics::Node& node = statistics.node_at(corner, 3 * scale);
+    if (node.is_uniform()) {
+      const auto [found, added] = even.emplace(node.uniform, static_cast<std::uint32_t>(even_bricks.size()));
+      if (added) even_bricks.push_back(node.uniform);
+      places[index].brick = found->second;
+    } else if (scale == 1) {
+      with_values.push_back({index, node.moments / 6});
+    }
+  });
   for (const Brick& brick : with_values)
     places[brick.place].brick = static_cast<std::uint32_t>(even_bricks.size()) + brick.number;
   bricks = even_bricks.size() + statistics.nodes_of_size(3).size();
@@ -175,21 +203,85 @@ void Lattice::fill_coarse(const Statistics& statistics, const Progress* progress
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Statistics::Node& node = *nodes[i];
       CoarseCells& made = coarse[i + 1];
-      for_coarse_cells(node, cube.log2_size, [&](const vec3& v0, std::uint32_t shape) {
+      for_coarse_cells(node.corner, node.log2_size, cube.log2_size, [&](const vec3& v0, std::uint32_t shape) {
         const std::uint32_t cell = core::cm_coarse_cell(v0, shape, vec3(node.corner));
         const Moments m = statistics.moments(v0, shape);
         made.coefficients[cell] = coefficients_of(m, v0, shape, cells, to_relative);
         if (m.max > 0.0F) made.dense[cell / 32] |= 1U << (cell % 32);
       });
-      // About its middle, of the scale that this is a point of.
-      const ivec3 middle = node.corner + (1 << (node.log2_size - 1));
-      const std::uint32_t scale = core::cm_octave(middle) / 3;
-      const ivec3 point = middle >> static_cast<int>(3 * scale);
-      const std::uint32_t block = block_at(point >> 3, scale);
-      places[std::size_t{block} * CM_BLOCK_POINTS + core::cm_in_block(point)].coarse =
-          static_cast<std::uint32_t>(i + 1);
+      places[place_about(node.corner, node.log2_size)].coarse = static_cast<std::uint32_t>(i + 1);
     }
   });
+}
+
+namespace {
+
+// The octree's cubes above bricks in which the fields vary, each once.
+struct CoarseCube {
+  int log2_size;
+  ivec3 corner;
+  [[nodiscard]] auto key() const { return std::tie(log2_size, corner.x, corner.y, corner.z); }
+};
+std::vector<CoarseCube> coarse_cubes(const ChannelFields& fields, int log2_size, const Progress* progress) {
+  std::vector<CoarseCube> cubes;
+  for (const Statistics* field : fields.statistics()) {
+    for (int size = 4; size <= log2_size; ++size) {
+      check(progress);
+      for (const std::uint32_t n : field->nodes_of_size(size)) cubes.push_back({size, field->nodes()[n].corner});
+    }
+  }
+  std::ranges::sort(cubes, {}, &CoarseCube::key);
+  const auto same = [](const CoarseCube& a, const CoarseCube& b) { return a.key() == b.key(); };
+  cubes.erase(std::unique(cubes.begin(), cubes.end(), same), cubes.end());
+  return cubes;
+}
+
+}  // namespace
+
+LatticeChannel Lattice::make_channel(const ChannelFields& fields, const Progress* progress) const {
+  LatticeChannel made;
+  made.channel = fields.channel();
+  made.numbers = fields.count();
+  fill_bricks(fields, made, progress);
+  const std::size_t words = fields.record_words();
+  const std::size_t cube_words = core::cm_coarse_channel_words(static_cast<std::uint32_t>(words));
+  const std::vector<CoarseCube> cubes = coarse_cubes(fields, cube.log2_size, progress);
+  resize(made.coarse, (cubes.size() + 1) * cube_words, progress);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cubes.size(), 16), [&](const auto& range) {
+    check(progress);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const CoarseCube& at = cubes[i];
+      const std::span<std::uint32_t> records = std::span(made.coarse).subspan((i + 1) * cube_words, cube_words);
+      for_coarse_cells(at.corner, at.log2_size, cube.log2_size, [&](const vec3& v0, std::uint32_t shape) {
+        const std::uint32_t cell = core::cm_coarse_cell(v0, shape, vec3(at.corner));
+        fields.put_record(v0, shape, cells, records.subspan(words * cell, words));
+        if (fields.emits(v0, shape)) records[words * CM_COARSE_CELLS + cell / 32] |= 1U << (cell % 32);
+      });
+      made.places[place_about(at.corner, at.log2_size)].coarse = static_cast<std::uint32_t>(i + 1);
+    }
+  });
+  return made;
+}
+
+void Lattice::fill_bricks(const ChannelFields& fields, LatticeChannel& made, const Progress* progress) const {
+  resize(made.places, places.size(), progress);
+  std::ranges::transform(places, made.places.begin(),
+                         [](const LatticePlace& place) { return LatticePlace{.block = place.block}; });
+  made.even_bricks.push_back({});
+  std::map<ChannelNumbers, std::uint32_t> even{{ChannelNumbers{}, 0}};
+  std::vector<std::size_t> with_values;
+  for_each_place(progress, [&](std::size_t index, const ivec3& corner, int scale) {
+    if (const std::optional<ChannelNumbers> numbers = fields.even(corner, 3 * scale)) {
+      const auto [found, added] = even.emplace(*numbers, static_cast<std::uint32_t>(made.even_bricks.size()));
+      if (added) made.even_bricks.push_back(*numbers);
+      made.places[index].brick = found->second;
+    } else if (scale == 1) {
+      with_values.push_back(index);
+      made.bricks.push_back(corner);
+    }
+  });
+  for (std::size_t i = 0; i < with_values.size(); ++i)
+    made.places[with_values[i]].brick = static_cast<std::uint32_t>(made.even_bricks.size() + i);
 }
 
 namespace {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/progress.hpp"
+#include "grid/lattice_channel.hpp"
 #include "grid/priorities.hpp"
 #include "grid/refine.hpp"
 #include "grid/statistics.hpp"
@@ -28,13 +29,31 @@ struct CoarseCells {
 };
 static_assert(sizeof(CoarseCells) == 4 * CM_COARSE_WORDS);
 
+/// Where what cells have of a channel comes from, as the lattice has it for density: glsl/grid_channels.comp reads it.
+struct LatticeChannel {
+  Channel channel = Channel::emission;
+  std::size_t numbers = 0;           ///< of a voxel
+  std::vector<LatticePlace> places;  ///< as the lattice's, with bricks and coarse cells of its own
+  /// Of each cube's cells above bricks their records, by cm_coarse_cell(); of emission then a bit each: any light. The
+  /// first is of none.
+  std::vector<std::uint32_t> coarse;
+  std::vector<ChannelNumbers> even_bricks;  ///< of one voxel like all others, the very first 0
+  std::vector<glm::ivec3> bricks;           ///< the corners of those that follow
+  float fastest = 0.0F;                     ///< of velocity: voxels a second
+
+  [[nodiscard]] std::uint64_t bytes() const {
+    return places.size() * sizeof(LatticePlace) + coarse.size() * 4 + even_bricks.size() * sizeof(ChannelNumbers) +
+           bricks.size() * sizeof(glm::ivec3);
+  }
+};
+
 /// All that a grid for any view and any budget is made of, packed: the splits' own priorities, the blocks of the
 /// lattice that any of them can ever raise, and where the values of cells come from. Made once a volume and medium;
 /// what a view adds is a byte a node (OwnPriorities::levels).
 struct Lattice {
-  /// Of density; channels count for what splits. settings: but for the camera and the budget. In parallel. progress: as
+  /// settings: but for the camera and the budget. In parallel. progress: as
   /// for Statistics.
-  Lattice(const Statistics& statistics, const Channels& channels, const RefineSettings& settings, float max_value,
+  Lattice(const Statistics& statistics, const Channels& beside, const RefineSettings& settings, float max_value,
           Progress* progress = nullptr);
 
   Cube cube;
@@ -53,18 +72,28 @@ struct Lattice {
   bool halves = false;        ///< what all their values are exactly
   float density_unit = 1.0F;  ///< grid value of a record's density 1
   CellKind cells = CellKind::linear;
+  std::vector<LatticeChannel> channels;  ///< of those that there are
 
   [[nodiscard]] std::uint32_t top_scale() const { return static_cast<std::uint32_t>(cube.log2_size) / 3; }
   /// Main memory, without the volume's.
   [[nodiscard]] std::uint64_t bytes() const {
-    return own.bytes() + blocks.size() * sizeof(glm::uvec2) + places.size() * sizeof(LatticePlace) +
+    std::uint64_t beside = 0;
+    for (const LatticeChannel& channel : channels) beside += channel.bytes();
+    return beside + own.bytes() + blocks.size() * sizeof(glm::uvec2) + places.size() * sizeof(LatticePlace) +
            coarse.size() * sizeof(CoarseCells) + even_bricks.size() * 4;
   }
 
  private:
-  void find_blocks(const Statistics& statistics, Progress* progress);
+  void find_blocks(const Statistics& statistics, const std::vector<ChannelFields>& beside, Progress* progress);
   void fill_places(const Statistics& statistics, const Progress* progress);
   void fill_coarse(const Statistics& statistics, const Progress* progress);
+  [[nodiscard]] LatticeChannel make_channel(const ChannelFields& fields, const Progress* progress) const;
+  void fill_bricks(const ChannelFields& fields, LatticeChannel& made, const Progress* progress) const;
+  // Calls visit(index, corner, scale) for the places of cubes.
+  template <class Visit>
+  void for_each_place(const Progress* progress, Visit&& visit) const;
+  // Of the octree's cube that has its middle there.
+  [[nodiscard]] std::size_t place_about(const glm::ivec3& corner, int log2_size) const;
   // Of a scale; 0: none.
   [[nodiscard]] std::uint32_t block_at(const glm::ivec3& corner, std::uint32_t scale) const;
 };

@@ -106,6 +106,7 @@ struct Channels {
   /// Of which the density that goes with these is the mean: cells are split for both in its place.
   std::shared_ptr<const DensityEnds> ends = nullptr;
 
+  bool operator==(const Channels&) const = default;
   /// Main memory.
   [[nodiscard]] std::uint64_t bytes() const {
     return (emission ? emission->bytes() : 0) + (scattering ? scattering->bytes() : 0) +

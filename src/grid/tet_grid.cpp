@@ -41,13 +41,6 @@ std::uint32_t pack_emission_gradient(const vec3& gradient) {
   return word;
 }
 
-std::uint32_t pack_colour(const vec3& colour) {
-  const auto whole = [](float part, float most) {
-    return static_cast<std::uint32_t>(std::lround(most * std::clamp(part, 0.0F, 1.0F)));
-  };
-  return whole(colour.x, 2047.0F) | (whole(colour.y, 2047.0F) << 11U) | (whole(colour.z, 1023.0F) << 22U);
-}
-
 }  // namespace
 
 GridBuilder::GridBuilder(const Statistics& statistics, const DiamondSet& diamonds)
@@ -358,26 +351,18 @@ class GridBuilder::LeafEmission {
   LeafEmission(const RgbField& emission, CellKind cells)
       : component_{LeafMoments(emission.component(0)), LeafMoments(emission.component(1)),
                    LeafMoments(emission.component(2))},
-        linear_(cells == CellKind::linear) {}
-  EmissionRecord operator()(const Node& node, const vec3& centroid) {
-    const std::uint32_t cell_class = core::cm_shape_class(node.shape);
-    EmissionRecord record{};
-    vec3 slope(0.0F);
-    float sum = 0.0F;
-    for (int i = 0; i < 3; ++i) {
-      const Moments m = component_[static_cast<std::size_t>(i)](node, centroid);
-      record.mean[i] = static_cast<float>(std::clamp(m.mean(), double(m.min), double(m.max)));
-      sum += record.mean[i];
-      if (linear_ && m.min < m.max)
-        slope += fit_linear(cell_class, frame_covariance(m, node.shape, centroid), record.mean[i]).gradient;
-    }
-    if (sum > 0.0F) record.gradient = pack_emission_gradient(slope / sum);
-    return record;
+        cells_(cells) {}
+  // Into record; returns whether it is any light.
+  bool put(const Node& node, const vec3& centroid, EmissionRecord& record) {
+    const std::array<Moments, 3> moments{component_[0](node, centroid), component_[1](node, centroid),
+                                         component_[2](node, centroid)};
+    record = emission_record(moments, node.shape, centroid, cells_);
+    return emits(moments);
   }
 
  private:
   std::array<LeafMoments, 3> component_;
-  bool linear_;
+  CellKind cells_;
 };
 
 // What scatters in leaves: density x colour.
@@ -453,15 +438,11 @@ class GridBuilder::LeafChannels {
   // Into the grid's arrays; mass: of its density. Whether it gives off light.
   bool put(const Node& node, const vec3& centroid, double mass, TetGrid& grid, std::uint32_t rank) {
     bool emits = false;
-    if (emitted_) {
-      const EmissionRecord given = (*emitted_)(node, centroid);
-      emits = glm::any(glm::greaterThan(given.mean, vec3(0.0F)));
-      grid.emission[rank] = given;
-    }
+    if (emitted_) emits = emitted_->put(node, centroid, grid.emission[rank]);
     double scattered = mass;
     if (coloured_) {
       const dvec3 scattering = (*coloured_)(node, centroid);
-      grid.colour[rank] = pack_colour(mass > 0.0 ? vec3(scattering / mass) : vec3(0.0F));
+      grid.colour[rank] = pack_colour(scattering, mass);
       scattered = luminance(scattering);
     }
     if (forward_) grid.anisotropy[rank] = pack_anisotropy((*forward_)(node, centroid).mass, scattered);
@@ -475,6 +456,34 @@ class GridBuilder::LeafChannels {
   std::optional<LeafMoments> forward_;
   std::optional<LeafVelocity> velocity_;
 };
+
+EmissionRecord emission_record(const std::array<Moments, 3>& moments, std::uint32_t shape, const dvec3& centroid,
+                               CellKind cells) {
+  EmissionRecord record{};
+  vec3 slope(0.0F);
+  float sum = 0.0F;
+  for (int i = 0; i < 3; ++i) {
+    const Moments& m = moments[static_cast<std::size_t>(i)];
+    record.mean[i] = static_cast<float>(std::clamp(m.mean(), double(m.min), double(m.max)));
+    sum += record.mean[i];
+    if (cells == CellKind::linear && m.min < m.max)
+      slope += fit_linear(core::cm_shape_class(shape), frame_covariance(m, shape, centroid), record.mean[i]).gradient;
+  }
+  if (sum > 0.0F) record.gradient = pack_emission_gradient(slope / sum);
+  return record;
+}
+
+bool emits(const std::array<Moments, 3>& moments) {
+  return std::ranges::any_of(moments, [](const Moments& m) { return m.max > 0.0F; });
+}
+
+std::uint32_t pack_colour(const dvec3& scattering, double mass) {
+  if (!(mass > 0.0)) return 0;
+  const auto whole = [&](double part, float most) {
+    return static_cast<std::uint32_t>(std::lround(most * std::clamp(static_cast<float>(part / mass), 0.0F, 1.0F)));
+  };
+  return whole(scattering.x, 2047.0F) | (whole(scattering.y, 2047.0F) << 11U) | (whole(scattering.z, 1023.0F) << 22U);
+}
 
 std::int16_t pack_anisotropy(double forward, double scattering) {
   if (!(scattering > 0.0)) return 0;

@@ -26,6 +26,16 @@ struct EmissionRecord {
 };
 static_assert(sizeof(EmissionRecord) == 16);
 
+/// What a cell gives off, by moments of red, green and blue over it. centroid: of the cell, in cube space.
+EmissionRecord emission_record(const std::array<Moments, 3>& moments, std::uint32_t shape, const glm::dvec3& centroid,
+                               CellKind cells);
+/// Whether anything of it gives off light.
+bool emits(const std::array<Moments, 3>& moments);
+
+/// The mean colour of what scatters as the shaders read it: glsl/channels.glsl has the layout. scattering: of density x
+/// colour, of what has this mass of density. Black where that is none.
+std::uint32_t pack_colour(const glm::dvec3& scattering, double mass);
+
 /// The mean cosine of what scatters as the shaders read it, at most 0.999 either way.
 /// forward: of what scatters, times (1 + anisotropy) / 2. 0 where nothing scatters.
 std::int16_t pack_anisotropy(double forward, double scattering);

@@ -149,8 +149,12 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
   std::vector<scene::Instance> instances;
   for (const scene::Volume& volume : present_) {
     const core::CmGrid& grid = *data_->grid(*volume.source);
-    instances.push_back({volume.source, volume.place.to_world, grid, medium_of(*volume.medium, *volume.source), false,
-                         volume.place.ends});
+    instances.push_back({.source = volume.source,
+                         .place = volume.place.to_world,
+                         .grid = grid,
+                         .medium = medium_of(*volume.medium, *volume.source),
+                         .ends = volume.place.ends,
+                         .glow = *data_->glow(*volume.source)});
   }
   const bool of_other_data = instances_ && instances_.of().data != data_revision_;
   const auto same = [](const scene::Volume& a, const scene::Volume& b) { return a.id == b.id && a.source == b.source; };
@@ -422,7 +426,7 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
     const MarchUpload::Sources of = upload_->of;
     try {
       if (!upload_->work) {
-        if (!build_grids(of, deadline)) break;
+        if (!build_grids(of, wanted.most_bytes, deadline)) break;
         auto work =
             std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels, &grids_.built());
         require_room(work->bytes(), wanted.most_bytes);
@@ -446,13 +450,14 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
   }
 }
 
-bool GpuScene::build_grids(const MarchUpload::Sources& of, Deadline deadline) {
+bool GpuScene::build_grids(const MarchUpload::Sources& of, std::uint64_t most_bytes, Deadline deadline) {
   const auto begun = Clock::now();
   // Those that are here are copied.
   MarchUpload::Sources missing;
   std::ranges::copy_if(of, std::back_inserter(missing),
                        [&](const scene::MarchSourcePtr& source) { return !data_ || data_->grid(*source) == nullptr; });
-  const bool done = grids_.advance(missing, of, deadline);
+  const std::uint64_t others = data_bytes() + other_bytes() - grids_.bytes();
+  const bool done = grids_.advance(missing, of, most_bytes - std::min(most_bytes, others), deadline);
   if (!done) took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
   return done;
 }
@@ -565,7 +570,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
     eye_of = [to_cube = glm::inverse(to_world)](const glm::dvec3& eye) {
       return glm::vec3(to_cube * glm::dvec4(eye, 1.0));
     };
-    const scene::PlacedGlow glow = scene::glow_of(source.glow, source.cube.to_world, place);
+    const scene::PlacedGlow glow = scene::glow_of(*data_->glow(source), source.cube.to_world, place);
     p.glow = glow.looks;
     own.power = glow.power;
     own.length = glow.length;

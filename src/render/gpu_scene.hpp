@@ -99,7 +99,7 @@ class GpuScene {
   void place_raster();
   void drop_data();
   // Of those that GL builds and that are not here. Returns whether all are built.
-  bool build_grids(const MarchUpload::Sources& of, Deadline deadline);
+  bool build_grids(const MarchUpload::Sources& of, std::uint64_t most_bytes, Deadline deadline);
   void require_room(std::uint64_t bytes, std::uint64_t most_bytes) const;
   void update_environment(const light::Surroundings& surroundings, const Wanted& wanted, Deadline deadline);
   // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.

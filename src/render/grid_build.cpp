@@ -2,14 +2,21 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
+#include <cmath>
 #include <cstring>
+#include <numeric>
+#include <span>
 #include <string>
 #include <utility>
 
+#include "base/apart.hpp"
 #include "base/error.hpp"
+#include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
 #include "grid/cell.hpp"
 #include "grid/tet_grid.hpp"
+#include "render/pace.hpp"
 #include "volume/brick_values.hpp"
 
 namespace cumulet::render {
@@ -42,16 +49,41 @@ void require_block(const gl::Limits& limits, std::uint64_t bytes, const char* wh
                                           std::to_string(limits.storage_block_bytes));
 }
 
+// As glsl/grid_glow.comp has it: which cell it is, then its place and what it gives off.
+constexpr std::size_t glowing_words = 7;
+
+// Cells that glow, as the grid has them one after another.
+std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
+  const std::size_t count = words.size() / glowing_words;
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return words[i * glowing_words]; });
+  std::vector<scene::GlowingCell> cells;
+  cells.reserve(count);
+  for (const std::uint32_t i : order) {
+    const std::uint32_t* at = &words[i * glowing_words];
+    const glm::uvec4 emission(at[3], at[4], at[5], at[6]);
+    cells.push_back({{}, {at[1], at[2]}, {core::cm_emission_mean(emission), emission.w}});
+  }
+  return cells;
+}
+
+// What a cheap item takes, before any was measured. Where dispatches are over when their call returns, a processor
+// computes them.
+double cost_ms(const gl::Functions& gl) { return std::exp2(gl.dispatches_in_call ? -18.0 : -22.0); }
+
 gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {"CM_STAGE " + std::to_string(stage)}}; }
 gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {"CM_STAGE " + std::to_string(stage)}}; }
 
 }  // namespace
 
 LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, const gl::Limits& limits, grid::LatticePtr lattice,
-                             std::shared_ptr<const grid::Statistics> statistics)
+                             std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels)
     : gl_(gl),
       limits_(limits),
       statistics_(std::move(statistics)),
+      channels_(std::move(channels)),
+      fields_(grid::fields_of(*statistics_, channels_)),
       data_(std::make_shared<LatticeData>()),
       upload_(gl, "uploading the lattice") {
   data_->lattice_ = std::move(lattice);
@@ -62,76 +94,145 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, const gl::Limits& limit
     throw Error(ErrorCode::unsupported,
                 "a lattice of " + std::to_string(l.blocks.size()) + " blocks: the limit is 2^20; raise the threshold");
   }
-  const auto plan = [&]<class T>(gl::Object LatticeData::*buffer, const std::vector<T>& from, const char* what) {
+  const auto plan = [&]<class T>(gl::Object& buffer, const std::vector<T>& from, const char* what) {
     plan_buffer(buffer, from.size() * sizeof(T), from.data(), what);
   };
-  plan(&LatticeData::nodes_, l.own.nodes, "creating the lattice's nodes");
-  plan(&LatticeData::own_, l.own.values, "creating the splits' own priorities");
-  plan(&LatticeData::blocks_, l.blocks, "creating the lattice's blocks");
-  plan(&LatticeData::places_, l.places, "creating the lattice's places");
-  plan(&LatticeData::coarse_, l.coarse, "creating the coefficients of coarse cells");
+  plan(data_->nodes_, l.own.nodes, "creating the lattice's nodes");
+  plan(data_->own_, l.own.values, "creating the splits' own priorities");
+  plan(data_->blocks_, l.blocks, "creating the lattice's blocks");
+  plan(data_->places_, l.places, "creating the lattice's places");
+  plan(data_->coarse_, l.coarse, "creating the coefficients of coarse cells");
   plan_bricks();
-  plan_buffer(&LatticeData::priorities_, l.blocks.size() * CM_BLOCK_POINTS * 4, nullptr, "creating the priorities");
-  plan_buffer(&LatticeData::bins_, std::uint64_t{CM_PRIORITIES} * 4, nullptr, "creating the priorities' histogram");
-  plan_buffer(&LatticeData::state_, sizeof(core::CmGridState), nullptr, "creating the grid's state");
+  plan_channels();
+  plan_buffer(data_->priorities_, l.blocks.size() * CM_BLOCK_POINTS * 4, nullptr, "creating the priorities");
+  plan_buffer(data_->bins_, std::uint64_t{CM_PRIORITIES} * 4, nullptr, "creating the priorities' histogram");
+  plan_buffer(data_->state_, sizeof(core::CmGridState), nullptr, "creating the grid's state");
   static const BrickPointWords points = brick_point_words();
-  plan_buffer(&LatticeData::points_, sizeof points, points.data(), "creating the points of bricks");
-  plan_buffer(&LatticeData::parts_, sizeof(grid::CellParts), grid::cell_parts().data(), "creating the parts of cells");
+  plan_buffer(data_->points_, sizeof points, points.data(), "creating the points of bricks");
+  plan_buffer(data_->parts_, sizeof(grid::CellParts), grid::cell_parts().data(), "creating the parts of cells");
 }
 
-void LatticeUpload::plan_buffer(gl::Object LatticeData::*buffer, std::uint64_t bytes, const void* from,
-                                const char* what) {
+void LatticeUpload::plan_buffer(gl::Object& buffer, std::uint64_t bytes, const void* from, const char* what) {
   const std::uint64_t whole = std::max<std::uint64_t>((bytes + 3) / 4 * 4, 4);
   require_block(limits_, whole, what);
   data_->bytes_ += whole;
-  upload_.add([this, buffer, whole, what] {
-    (*data_).*buffer = gl::make_buffer(gl_, whole, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
-  });
+  upload_.add(
+      [this, &buffer, whole, what] { buffer = gl::make_buffer(gl_, whole, nullptr, GL_DYNAMIC_STORAGE_BIT, what); });
   if (from == nullptr) return;
-  const auto place = [this, buffer] { return Upload::Place{((*data_).*buffer).name(), 0}; };
+  const auto place = [&buffer] { return Upload::Place{buffer.name(), 0}; };
   upload_.add_bytes(place, from, bytes);
+}
+
+void LatticeUpload::plan_values(gl::Object& buffer, std::size_t bricks, std::size_t brick_bytes, const FillBrick& fill,
+                                const char* what) {
+  plan_buffer(buffer, bricks * brick_bytes, nullptr, what);
+  const auto put = [this, &buffer, brick_bytes, fill](std::size_t first, std::size_t bytes) {
+    std::vector<std::byte> piece(bytes);
+    for (std::size_t at = 0; at < bytes; at += brick_bytes) fill((first + at) / brick_bytes, &piece[at]);
+    gl_->NamedBufferSubData(buffer.name(), static_cast<GLintptr>(first), static_cast<GLsizeiptr>(bytes), piece.data());
+  };
+  upload_.add_pieces(bricks * brick_bytes, put, brick_bytes);
 }
 
 void LatticeUpload::plan_bricks() {
   const grid::Lattice& l = *data_->lattice_;
-  const std::size_t value_bytes = l.halves ? 2 : 4;
-  const std::size_t brick_bytes = volume::brick_voxels * value_bytes;
-  plan_buffer(&LatticeData::bricks_, l.bricks * brick_bytes, nullptr, "creating the values of bricks");
-  const auto fill = [this, &l, brick_bytes](std::size_t first, std::size_t bytes) {
-    std::vector<std::byte> piece(bytes);
+  const std::size_t brick_bytes = volume::brick_voxels * (l.halves ? sizeof(std::uint16_t) : sizeof(float));
+  const auto fill = [this, &l, brick_bytes](std::size_t brick, std::byte* to) {
     const std::vector<std::uint32_t>& nodes = statistics_->nodes_of_size(3);
     volume::BrickValues::Brick room;
-    for (std::size_t at = 0; at < bytes; at += brick_bytes) {
-      const std::size_t brick = (first + at) / brick_bytes;
-      const float* values = room.data();
-      if (brick < l.even_bricks.size()) {
-        room.fill(l.even_bricks[brick]);
-      } else {
-        values = statistics_->values(statistics_->nodes()[nodes[brick - l.even_bricks.size()]], room);
-      }
-      if (l.halves) {
-        std::array<std::uint16_t, volume::brick_voxels> halves{};
-        std::transform(values, values + volume::brick_voxels, halves.begin(),
-                       [](float value) { return volume::exact_half(value).value_or(0); });
-        std::memcpy(&piece[at], halves.data(), brick_bytes);
-      } else {
-        std::memcpy(&piece[at], values, brick_bytes);
-      }
+    const float* values = room.data();
+    if (brick < l.even_bricks.size()) {
+      room.fill(l.even_bricks[brick]);
+    } else {
+      values = statistics_->values(statistics_->nodes()[nodes[brick - l.even_bricks.size()]], room);
     }
-    gl_->NamedBufferSubData(data_->bricks_.name(), static_cast<GLintptr>(first), static_cast<GLsizeiptr>(bytes),
-                            piece.data());
+    if (l.halves) {
+      std::array<std::uint16_t, volume::brick_voxels> halves{};
+      std::transform(values, values + volume::brick_voxels, halves.begin(),
+                     [](float value) { return volume::exact_half(value).value_or(0); });
+      std::memcpy(to, halves.data(), brick_bytes);
+    } else {
+      std::memcpy(to, values, brick_bytes);
+    }
   };
-  upload_.add_pieces(l.bricks * brick_bytes, fill, brick_bytes);
+  plan_values(data_->bricks_, l.bricks, brick_bytes, fill, "creating the values of bricks");
+}
+
+void LatticeUpload::plan_channels() {
+  const std::vector<grid::LatticeChannel>& channels = data_->lattice_->channels;
+  data_->channels_.resize(channels.size());
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const grid::LatticeChannel& channel = channels[i];
+    LatticeData::Channel& data = data_->channels_[i];
+    plan_buffer(data.places, channel.places.size() * sizeof(grid::LatticePlace), channel.places.data(),
+                "creating a channel's places");
+    plan_buffer(data.coarse, channel.coarse.size() * 4, channel.coarse.data(), "creating a channel's coarse cells");
+    const auto fill = [&channel, &fields = fields_[i]](std::size_t brick, std::byte* to) {
+      std::vector<float> numbers(volume::brick_voxels * channel.numbers);
+      if (brick < channel.even_bricks.size()) {
+        for (std::size_t n = 0; n < numbers.size(); ++n) numbers[n] = channel.even_bricks[brick][n % channel.numbers];
+      } else {
+        fields.fill(channel.bricks[brick - channel.even_bricks.size()], numbers);
+      }
+      std::memcpy(to, numbers.data(), numbers.size() * sizeof(float));
+    };
+    plan_values(data.bricks, channel.even_bricks.size() + channel.bricks.size(),
+                volume::brick_voxels * channel.numbers * sizeof(float), fill, "creating a channel's values of bricks");
+  }
+}
+
+std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells) {
+  switch (channel) {
+    case grid::Channel::emission:
+      return cells * sizeof(grid::EmissionRecord);
+    case grid::Channel::colour:
+      return cells * sizeof(std::uint32_t);
+    case grid::Channel::anisotropy:
+      return cells * sizeof(std::int16_t);
+    case grid::Channel::velocity:
+      break;
+  }
+  return cells * sizeof(glm::uvec2);
+}
+
+std::uint64_t BuiltGrid::bytes() const {
+  if (grid) return 0;
+  std::uint64_t bytes = std::uint64_t{count} * (sizeof(grid::CellRecord) + 4) + 28 * sizeof(std::uint32_t);
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    if (channels[i]) bytes += channel_bytes(static_cast<grid::Channel>(i), count);
+  }
+  return bytes;
+}
+
+double GridPace::ms(const gl::ProgramKey& key, double cost) const {
+  const auto known = known_.find(key);
+  return known == known_.end() || !known->second.warm ? cost : known->second.ms;
+}
+
+void GridPace::learn(const std::vector<Sent>& sent, double ms) {
+  double expected = 0.0;
+  for (const Sent& s : sent) expected += this->ms(s.key, s.cost) * s.items;
+  // By steps: one may have waited for what else the host has queued.
+  const double ratio = std::clamp(ms / std::max(expected, 1e-6), 0.25, 4.0);
+  for (const Sent& s : sent) {
+    // Few items tell of the dispatch, not of themselves.
+    if (s.items < group) continue;
+    const auto [known, first] = known_.try_emplace(s.key);
+    if (!first) known->second = {this->ms(s.key, s.cost) * std::sqrt(ratio), true};
+  }
 }
 
 GridBuild::GridBuild(gl::FunctionsPtr gl, gl::ProgramsPtr programs, const gl::Limits& limits, LatticeDataPtr data,
-                     std::vector<std::uint8_t> levels, std::uint64_t max_cells)
+                     std::vector<std::uint8_t> levels, std::uint64_t max_cells, std::uint64_t most_bytes,
+                     GridPacePtr pace)
     : gl_(std::move(gl)),
       programs_(std::move(programs)),
       limits_(limits),
       data_(std::move(data)),
       levels_(std::move(levels)),
       max_cells_(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(max_cells, 24, std::uint64_t{1} << 30U))),
+      most_bytes_(most_bytes),
+      pace_(std::move(pace)),
       decision_(gl_, "deciding which cells split") {
   levels_.resize(std::max<std::size_t>((levels_.size() + 3) / 4 * 4, 4));
   plan_decision();
@@ -144,15 +245,21 @@ double GridBuild::progress() const {
 }
 
 bool GridBuild::advance(Deadline deadline) {
+  deadline_ = deadline;
   if (!cells_) {
     if (!decision_.advance(deadline)) return false;
     plan_cells();
   }
-  return cells_->advance(deadline);
+  if (!glow_) {
+    if (!cells_->advance(deadline)) return false;
+    plan_glow();
+  }
+  return glow_->advance(deadline);
 }
 
 gl::Object GridBuild::make_storage(std::uint64_t bytes, const char* what) {
   require_block(limits_, bytes, what);
+  require_room(bytes);
   gl::Object made = gl::make_buffer(gl_, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
   bytes_ += bytes;
   return made;
@@ -163,39 +270,71 @@ void GridBuild::bind_storage(std::initializer_list<std::pair<GLint, const gl::Ob
     gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, static_cast<GLuint>(binding), buffer->name());
 }
 
-bool GridBuild::dispatch(const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind) {
+void GridBuild::require_room(std::uint64_t bytes) const {
+  if (bytes <= most_bytes_ - std::min(most_bytes_, bytes_)) return;
+  throw Error(ErrorCode::out_of_memory, "building the grid needs " + std::to_string(bytes_ + bytes) +
+                                            " bytes of GL memory; " + std::to_string(most_bytes_) +
+                                            " are left of those allowed");
+}
+
+double GridBuild::aim_ms() const {
+  constexpr double least = 0.5;
+  constexpr double most = 2.0;
+  const auto now = std::chrono::steady_clock::now();
+  return now < deadline_ ? std::clamp(part_of_rest * milliseconds(deadline_ - now), least, most) : least;
+}
+
+bool GridBuild::has_room_in_flight() {
   // What is on its way is bounded, whatever the deadline: the host draws, too.
-  constexpr std::uint64_t most_in_flight = std::uint64_t{1} << 25U;
-  if (in_flight_ >= most_in_flight) {
-    if (!fence_.passed()) return false;
-    in_flight_ = 0;
-  }
-  const gl::Program& program = programs_->ask(pass.key);
-  if (!program.usable()) return false;
-  const gl::DebugGroup debug(*gl_, "cumulet: grid");
-  gl_->ProgramUniform1ui(program.name(), 0, first);
-  gl_->ProgramUniform1ui(program.name(), 1, end);
-  gl_->ProgramUniform1ui(program.name(), 2, static_cast<GLuint>(data_->lattice().cube.log2_size));
-  bind(program.name());
-  program.use(*gl_);
-  const std::uint32_t items = end - first;
-  gl_->DispatchCompute(pass.item_a_group ? items : (items + group - 1) / group, 1, 1);
-  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  in_flight_ += std::uint64_t{items} * pass.cost;
-  if (in_flight_ >= most_in_flight) fence_ = gl::Fence(gl_);
+  constexpr double most_in_flight_ms = 8.0;
+  if (in_flight_ms_ < most_in_flight_ms) return true;
+  if (!fence_.passed()) return false;
+  pace_->learn(in_flight_, milliseconds(std::chrono::steady_clock::now() - sent_));
+  in_flight_.clear();
+  in_flight_ms_ = 0.0;
   return true;
 }
 
-void GridBuild::plan_pass(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind) {
-  // Where dispatches are over when their call returns, a processor computes them.
-  const std::uint32_t budget = gl_->dispatches_in_call ? 1U << 18U : 1U << 22U;
+std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t first, std::uint32_t end,
+                                                 const Bind& bind) {
+  if (!has_room_in_flight()) return std::nullopt;
+  const gl::Program& program = programs_->ask(pass.key);
+  if (!program.usable()) return std::nullopt;
   constexpr std::uint32_t most_groups = 65535;  // that every driver takes
-  const std::uint32_t fit = std::max(budget / pass.cost, group);
-  const std::uint32_t chunk = std::min(fit, pass.item_a_group ? most_groups : most_groups * group);
-  for (std::uint32_t at = first; at < end; at += std::min(chunk, end - at)) {
-    upload.add_until(
-        [this, pass, at, to = at + std::min(chunk, end - at), bind] { return dispatch(pass, at, to, bind); });
+  const double ms = pace_->ms(pass.key, pass.cost * cost_ms(*gl_));
+  const double fit = std::clamp(aim_ms() / ms, double{group}, double{most_groups} * (pass.item_a_group ? 1.0 : group));
+  const std::uint32_t items = std::min(static_cast<std::uint32_t>(fit), end - first);
+  const gl::DebugGroup debug(*gl_, "cumulet: grid");
+  gl_->ProgramUniform1ui(program.name(), 0, first);
+  gl_->ProgramUniform1ui(program.name(), 1, first + items);
+  if (pass.of_lattice) gl_->ProgramUniform1ui(program.name(), 2, static_cast<GLuint>(data_->lattice().cube.log2_size));
+  bind(program.name());
+  program.use(*gl_);
+  const auto begun = std::chrono::steady_clock::now();
+  gl_->DispatchCompute(pass.item_a_group ? items : (items + group - 1) / group, 1, 1);
+  gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  const GridPace::Sent sent{pass.key, pass.cost * cost_ms(*gl_), static_cast<double>(items)};
+  if (gl_->dispatches_in_call) {
+    pace_->learn({sent}, milliseconds(std::chrono::steady_clock::now() - begun));
+    return first + items;
   }
+  if (in_flight_.empty()) sent_ = begun;
+  in_flight_.push_back(sent);
+  in_flight_ms_ += ms * items;
+  fence_ = gl::Fence(gl_);
+  return first + items;
+}
+
+void GridBuild::plan_pass(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind) {
+  upload.add_until([this, pass, next = first, end, bind]() mutable {
+    while (next < end) {
+      const std::optional<std::uint32_t> left = dispatch(pass, next, end, bind);
+      if (!left) return false;
+      next = *left;
+      if (std::chrono::steady_clock::now() >= deadline_) break;
+    }
+    return next >= end;
+  });
 }
 
 void GridBuild::plan_read_back(Upload& upload) {
@@ -204,7 +343,8 @@ void GridBuild::plan_read_back(Upload& upload) {
     gl_->CopyNamedBufferSubData(data_->state_.name(), read_back_.name(), 0, 0, sizeof(core::CmGridState));
     gl::memory_barrier(*gl_, GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
     fence_ = gl::Fence(gl_);
-    in_flight_ = 0;
+    in_flight_.clear();
+    in_flight_ms_ = 0.0;
   });
   upload.add_until([this] {
     if (!fence_.passed()) return false;
@@ -213,18 +353,20 @@ void GridBuild::plan_read_back(Upload& upload) {
   });
 }
 
+void GridBuild::plan_clear(Upload& upload, const gl::Object& buffer, std::uint64_t bytes) {
+  const auto clear = [this, &buffer](std::size_t first, std::size_t count) {
+    gl_->ClearNamedBufferSubData(buffer.name(), GL_R32UI, static_cast<GLintptr>(first), static_cast<GLsizeiptr>(count),
+                                 GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+  };
+  upload.add_pieces(bytes, clear, 4);
+}
+
 void GridBuild::plan_decision() {
   const grid::Lattice& l = data_->lattice();
   decision_.add([this] { level_bytes_ = make_storage(levels_.size(), "creating the levels that a view allows"); });
   decision_.add_bytes([this] { return Upload::Place{level_bytes_.name(), 0}; }, levels_.data(), levels_.size());
-  const auto clear = [this](const gl::Object& buffer, std::uint64_t bytes) {
-    decision_.add_pieces(bytes, [this, &buffer](std::size_t first, std::size_t count) {
-      gl_->ClearNamedBufferSubData(buffer.name(), GL_R32UI, static_cast<GLintptr>(first),
-                                   static_cast<GLsizeiptr>(count), GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
-    });
-  };
-  clear(data_->priorities_, std::uint64_t{l.blocks.size()} * CM_BLOCK_POINTS * 4);
-  clear(data_->bins_, std::uint64_t{CM_PRIORITIES} * 4);
+  plan_clear(decision_, data_->priorities_, std::uint64_t{l.blocks.size()} * CM_BLOCK_POINTS * 4);
+  plan_clear(decision_, data_->bins_, std::uint64_t{CM_PRIORITIES} * 4);
   decision_.add([this] {
     core::CmGridState state{};
     std::ranges::fill(state.low, 0xffffffffU);
@@ -282,6 +424,11 @@ void GridBuild::plan_cells() {
   built_.count = state_.cells;
   built_.limited = state_.limited != 0;
   built_.levels = static_cast<std::uint32_t>(level_first.size() - 2);
+  // Before any of it is made.
+  std::uint64_t needs = std::uint64_t{count} * (sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2));
+  for (const grid::LatticeChannel& channel : data_->lattice().channels)
+    needs += channel_bytes(channel.channel, built_.count);
+  require_room(needs + built_.bytes());
   cells_.emplace(gl_, "building the grid");
   cells_->add([this, count] {
     tree_cells_ = make_storage(std::uint64_t{count} * sizeof(TreeCell), "creating the tree's cells");
@@ -321,6 +468,7 @@ void GridBuild::plan_cells() {
   gl::ProgramKey records = cells_key(5);
   records.defines.emplace_back(data_->lattice().halves ? "CM_HALVES 1" : "CM_HALVES 0");
   plan_pass(*cells_, {records, 32}, 0, count, bind);
+  plan_channels(count);
   plan_read_back(*cells_);
   cells_->add([this] {
     if (state_.low[0] <= state_.high[0]) {
@@ -330,6 +478,93 @@ void GridBuild::plan_cells() {
     // What is not the grid's goes.
     for (gl::Object* scratch : {&tree_cells_, &links_, &order_, &level_bytes_}) *scratch = {};
   });
+}
+
+void GridBuild::plan_channels(std::uint32_t count) {
+  for (std::size_t i = 0; i < data_->lattice().channels.size(); ++i) plan_channel(i, count);
+  const gl::Object& emission = built_.channels[static_cast<std::size_t>(grid::Channel::emission)];
+  if (std::ranges::none_of(data_->lattice().channels,
+                           [](const auto& channel) { return channel.channel == grid::Channel::emission; }))
+    return;
+  cells_->add([this] {
+    glowing_ = make_storage(std::uint64_t{built_.count} * glowing_words * 4, "creating the list of cells that glow");
+  });
+  const auto bind = [this, &emission](GLuint /*program*/) {
+    bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
+                  {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
+                  {core::CM_STORAGE_GRID_CHANNEL, &emission},
+                  {core::CM_STORAGE_GRID_GLOWING, &glowing_}});
+  };
+  plan_pass(*cells_, {{"grid_glow.comp", {}}, 2, false, false}, 0, built_.count, bind);
+}
+
+void GridBuild::plan_channel(std::size_t index, std::uint32_t count) {
+  const grid::LatticeChannel& channel = data_->lattice().channels[index];
+  gl::Object& records = built_.channels[static_cast<std::size_t>(channel.channel)];
+  const std::uint64_t bytes = (channel_bytes(channel.channel, built_.count) + 3) / 4 * 4;
+  cells_->add([this, &records, bytes] { records = make_storage(bytes, "creating a channel's records"); });
+  // Two cells share a word.
+  if (channel.channel == grid::Channel::anisotropy) plan_clear(*cells_, records, bytes);
+  const auto bind = [this, &channel, &data = data_->channels_[index], &records](GLuint program) {
+    bind_storage({{core::CM_STORAGE_GRID_STATE, &data_->state_},
+                  {core::CM_STORAGE_GRID_COARSE, &data.coarse},
+                  {core::CM_STORAGE_GRID_PLACES, &data.places},
+                  {core::CM_STORAGE_GRID_CELLS, &tree_cells_},
+                  {core::CM_STORAGE_GRID_CHANNEL, &records},
+                  {core::CM_STORAGE_GRID_ORDER, &order_},
+                  {core::CM_STORAGE_GRID_RECORDS, &built_.cells},
+                  {core::CM_STORAGE_GRID_BRICKS, &data.bricks}});
+    gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_CELL_PARTS, data_->parts_.name());
+    if (channel.channel == grid::Channel::emission)
+      gl_->ProgramUniform1i(program, 3, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
+    if (channel.channel == grid::Channel::velocity) gl_->ProgramUniform1f(program, 3, channel.fastest);
+  };
+  plan_pass(*cells_, {{"grid_channels.comp", {"CM_CHANNEL " + std::to_string(static_cast<int>(channel.channel))}}, 32},
+            0, count, bind);
+}
+
+void GridBuild::plan_glow() {
+  glow_.emplace(gl_, "reading what glows");
+  if (state_.glowing == 0) return;
+  const std::size_t bytes = std::size_t{state_.glowing} * glowing_words * 4;
+  glow_->add([this, bytes] {
+    glow_read_back_ = gl::ReadBack(gl_, bytes, "creating the read-back of what glows");
+    glow_words_.resize(bytes / 4);
+  });
+  glow_->add_pieces(bytes, [this](std::size_t first, std::size_t count) {
+    gl_->CopyNamedBufferSubData(glowing_.name(), glow_read_back_.name(), static_cast<GLintptr>(first),
+                                static_cast<GLintptr>(first), static_cast<GLsizeiptr>(count));
+  });
+  glow_->add([this] {
+    gl::memory_barrier(*gl_, GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
+    fence_ = gl::Fence(gl_);
+  });
+  glow_->add_until([this] { return fence_.passed(); });
+  glow_->add_pieces(
+      bytes,
+      [this](std::size_t first, std::size_t count) {
+        std::memcpy(&glow_words_[first / 4], glow_read_back_.data() + first, count);
+      },
+      4);
+  glow_->add([this] {
+    glow_read_back_ = {};
+    glowing_ = {};
+    begin_glow_table();
+  });
+  glow_->add_until([this] {
+    if (glow_table_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+    built_.glow = glow_table_.get();
+    return true;
+  });
+}
+
+void GridBuild::begin_glow_table() {
+  const auto task = std::make_shared<std::packaged_task<scene::GlowTable()>>(
+      [words = std::move(glow_words_), cube = data_->lattice().cube] {
+        return scene::glow_table(in_order(words), cube);
+      });
+  glow_table_ = task->get_future();
+  leave([task] { (*task)(); });
 }
 
 void GridBuild::plan_tree_cells(const std::vector<std::uint32_t>& level_first) {
@@ -366,7 +601,7 @@ LatticeDataPtr GridBuilds::find(const grid::LatticePtr& lattice) const {
   return found == lattices_.end() ? nullptr : *found;
 }
 
-bool GridBuilds::advance(const Sources& sources, const Sources& kept, Deadline deadline) {
+bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint64_t most_bytes, Deadline deadline) {
   std::erase_if(lattices_, [&](const LatticeDataPtr& data) {
     return std::ranges::none_of(kept, [&](const scene::MarchSourcePtr& source) {
       return source->plan && source->plan->lattice.get() == &data->lattice();
@@ -374,31 +609,63 @@ bool GridBuilds::advance(const Sources& sources, const Sources& kept, Deadline d
   });
   try {
     return std::ranges::all_of(sources, [&](const scene::MarchSourcePtr& source) {
-      return !source->plan || built_.contains(source) || build(source, deadline);
+      return !source->plan || built_.contains(source) || build(source, most_bytes, deadline);
     });
   } catch (const Error&) {
     upload_.reset();
     under_way_.reset();
+    on_cpu_.reset();
     clear_built();
     throw;
   }
 }
 
-bool GridBuilds::build(const scene::MarchSourcePtr& source, Deadline deadline) {
+bool GridBuilds::build(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
+  if (!on_cpu_ || on_cpu_->of() != source) {
+    on_cpu_.reset();
+    try {
+      return build_there(source, most_bytes, deadline);
+    } catch (const Error& error) {
+      upload_.reset();
+      under_way_.reset();
+      if (error.code() != ErrorCode::unsupported && error.code() != ErrorCode::out_of_memory) throw;
+      // What there is no room for leaves it to the cells.
+      if (error.code() == ErrorCode::out_of_memory)
+        std::erase_if(lattices_, [&](const auto& data) { return &data->lattice() == source->plan->lattice.get(); });
+      on_cpu_ = std::make_unique<CpuGridBuild>(source, error.what());
+    }
+  }
+  std::optional<BuiltGrid> made = on_cpu_->take();
+  if (!made) return false;
+  on_cpu_.reset();
+  built_.emplace(source, std::move(*made));
+  return true;
+}
+
+void GridBuilds::begin_upload(const scene::MarchSource& source, std::uint64_t most_bytes) {
+  upload_ = std::make_unique<LatticeUpload>(gl_, limits_, source.plan->lattice, source.statistics, source.channels);
+  const std::uint64_t needs = bytes();
+  if (needs <= most_bytes) return;
+  throw Error(ErrorCode::out_of_memory, "the lattice needs " + std::to_string(needs) + " bytes of GL memory; " +
+                                            std::to_string(most_bytes) + " are left of those allowed");
+}
+
+bool GridBuilds::build_there(const scene::MarchSourcePtr& source, std::uint64_t most_bytes, Deadline deadline) {
   const scene::GridPlan& plan = *source->plan;
   LatticeDataPtr data = find(plan.lattice);
   if (!data) {
     under_way_.reset();
-    if (!upload_ || upload_->lattice() != plan.lattice)
-      upload_ = std::make_unique<LatticeUpload>(gl_, limits_, plan.lattice, source->statistics);
+    if (!upload_ || upload_->lattice() != plan.lattice) begin_upload(*source, most_bytes);
     if (!upload_->advance(deadline)) return false;
     data = upload_->take();
     upload_.reset();
     lattices_.push_back(data);
   }
   if (!under_way_ || under_way_->of != source) {
-    under_way_ = UnderWay{
-        source, std::make_unique<GridBuild>(gl_, programs_, limits_, std::move(data), plan.levels, plan.max_cells)};
+    under_way_.reset();
+    const std::uint64_t room = most_bytes - std::min(most_bytes, bytes());
+    under_way_ = UnderWay{source, std::make_unique<GridBuild>(gl_, programs_, limits_, std::move(data), plan.levels,
+                                                              plan.max_cells, room, pace_)};
   }
   if (!under_way_->work->advance(deadline)) return false;
   built_.emplace(source, under_way_->work->take());
@@ -407,8 +674,40 @@ bool GridBuilds::build(const scene::MarchSourcePtr& source, Deadline deadline) {
 }
 
 double GridBuilds::progress() const {
+  if (on_cpu_) return on_cpu_->progress();
   if (upload_) return 0.5 * upload_->progress();
   return under_way_ ? 0.5 + 0.5 * under_way_->work->progress() : 1.0;
+}
+
+CpuGridBuild::CpuGridBuild(scene::MarchSourcePtr source, std::string why)
+    : source_(std::move(source)), why_(std::move(why)), progress_(std::make_shared<Progress>()) {
+  const auto task = std::make_shared<std::packaged_task<BuiltGrid()>>([of = source_, progress = progress_] {
+    const scene::GridPlan& plan = *of->plan;
+    const grid::DiamondSet diamonds(plan.lattice->own, plan.levels, plan.max_cells, progress.get());
+    grid::GridBuilder builder(*of->statistics, diamonds);
+    builder.bisect(progress.get());
+    BuiltGrid made;
+    made.grid = std::make_shared<const grid::TetGrid>(
+        builder.records(plan.lattice->cells, of->max_value, of->channels, progress.get()));
+    made.glow = scene::glow_table(*made.grid, progress.get());
+    made.count = static_cast<std::uint32_t>(made.grid->cells.size());
+    made.levels = made.grid->levels;
+    made.limited = made.grid->limited;
+    made.content_min = made.grid->content_min;
+    made.content_max = made.grid->content_max;
+    return made;
+  });
+  made_ = task->get_future();
+  leave([task] { (*task)(); });
+}
+
+CpuGridBuild::~CpuGridBuild() { progress_->cancel(); }
+
+std::optional<BuiltGrid> CpuGridBuild::take() {
+  if (made_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
+  BuiltGrid made = made_.get();
+  made.why_not = why_;
+  return made;
 }
 
 void GridBuilds::clear_built() { built_.clear(); }
@@ -416,6 +715,7 @@ void GridBuilds::clear_built() { built_.clear(); }
 void GridBuilds::clear() {
   clear_built();
   under_way_.reset();
+  on_cpu_.reset();
   upload_.reset();
   lattices_.clear();
 }

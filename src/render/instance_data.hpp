@@ -23,7 +23,7 @@ class InstanceData {
   [[nodiscard]] const glm::dvec3& origin() const { return origin_; }
   /// Of the first, but as strong in what decides which programs and lights there are as any is.
   [[nodiscard]] const core::CmMedium& medium() const { return medium_; }
-  /// Of all of them, as scene::GlowTable has both.
+  /// Of all of them, as scene::GlowSum has both.
   [[nodiscard]] double glow_power() const { return glow_power_; }
   [[nodiscard]] double glow_length() const { return glow_length_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }

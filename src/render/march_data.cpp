@@ -80,7 +80,7 @@ std::vector<float> scattering_slab(const scene::MarchSource& source, std::size_t
   return slab;
 }
 
-core::CmGrid grid_of(const scene::MarchSource& source) {
+core::CmGrid parameters_of(const scene::MarchSource& source) {
   core::CmGrid grid{};
   if (source.march != March::tet) {
     grid.box_min = vec3(source.box_low);
@@ -99,16 +99,16 @@ core::CmGrid grid_of(const scene::MarchSource& source) {
 using Roots = std::array<grid::RootEntry, 26>;
 static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 
-// What a grid's cells have in channels, one after another; nothing of one that GL builds.
+// What a grid's cells have in channels, one after another.
 struct ChannelBytes {
-  explicit ChannelBytes(const scene::MarchSource& source)
-      : glow(source.glow.cells.size() * sizeof(scene::GlowingCell)) {
-    if (!source.grid) return;
-    emission = source.grid->emission.size() * sizeof(grid::EmissionRecord);
-    velocity = source.grid->velocity.size() * sizeof(glm::uvec2);
-    change = source.grid->change.size() * sizeof(glm::uvec2);
-    colour = source.grid->colour.size() * sizeof(std::uint32_t);
-    anisotropy = source.grid->anisotropy.size() * sizeof(std::int16_t);
+  ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing)
+      : glow(glowing * sizeof(scene::GlowingCell)) {
+    using grid::Channel;
+    if (source.emits()) emission = channel_bytes(Channel::emission, cells);
+    if (source.moves()) velocity = channel_bytes(Channel::velocity, cells);
+    if (source.changes()) change = source.grid->change.size() * sizeof(glm::uvec2);  // GL makes none
+    if (source.coloured()) colour = channel_bytes(Channel::colour, cells);
+    if (source.anisotropic()) anisotropy = channel_bytes(Channel::anisotropy, cells);
   }
   std::size_t emission = 0, glow = 0, velocity = 0, change = 0, colour = 0, anisotropy = 0;
   [[nodiscard]] std::size_t glow_at() const { return emission; }
@@ -130,6 +130,11 @@ const core::CmGrid* MarchData::grid(const scene::MarchSource& source) const {
 const MarchData::Cells* MarchData::cells(const scene::MarchSource& source) const {
   const Part* part = part_of(source);
   return part == nullptr ? nullptr : &part->cells;
+}
+
+const scene::GlowSum* MarchData::glow(const scene::MarchSource& source) const {
+  const Part* part = part_of(source);
+  return part == nullptr ? nullptr : &part->glow;
 }
 
 const MarchData::Part* MarchData::part_of(const scene::MarchSource& source) const {
@@ -181,24 +186,38 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
 
 void MarchUpload::describe(MarchData::Part& part) const {
   const scene::MarchSource& source = *part.source;
-  part.grid = grid_of(source);
+  part.grid = parameters_of(source);
   if (source.grid) {
     part.cells = {source.grid->cells.size(), source.grid->limited};
     part.inner = source.grid->tree.size();
+    part.glow = source.glow;
+    part.glowing = source.glow.cells.size();
   }
   if (!source.plan) return;
   if (const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(source)) {
     part.grid = old->grid;
     part.cells = old->cells;
     part.inner = old->inner;
+    part.glow = old->glow;
+    part.glowing = old->glowing;
     return;
   }
   const BuiltGrid& made = built_->at(part.source);
   part.grid.box_min = made.content_min;
   part.grid.box_max = made.content_max;
   part.grid.levels = made.levels;
-  part.cells = {made.count, made.limited};
+  part.cells = {made.count, made.limited, made.grid ? std::optional(made.why_not) : std::nullopt};
   part.inner = made.count - 24;  // each split makes a cell more
+  part.glow = made.glow;
+  part.glowing = made.glow.cells.size();
+}
+
+const grid::TetGrid* MarchUpload::grid_of(const MarchData::Part& part) const {
+  return part.source->plan ? built_->at(part.source).grid.get() : part.source->grid.get();
+}
+
+const scene::GlowTable& MarchUpload::glow_of(const MarchData::Part& part) const {
+  return part.source->plan ? built_->at(part.source).glow : part.source->glow;
 }
 
 void MarchUpload::add_copy(const PlaceOf& to, const PlaceOf& from, std::size_t bytes) {
@@ -262,8 +281,8 @@ void MarchUpload::plan_cells(gl::WordHeap& heap, std::int64_t texels) {
         to.count = from.count;
         add_copy(
             place, [this, from] { return before_->place_of(from); }, to.count * sizeof(grid::CellRecord));
-      } else if (part.source->grid) {
-        upload_.add_bytes(place, &part.source->grid->cells[done], to.count * sizeof(grid::CellRecord));
+      } else if (const grid::TetGrid* grid = grid_of(part)) {
+        upload_.add_bytes(place, &grid->cells[done], to.count * sizeof(grid::CellRecord));
       } else {
         const auto from = [buffer = built_->at(part.source).cells.name(), done] {
           return Upload::Place{buffer, done * sizeof(grid::CellRecord)};
@@ -279,7 +298,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
   std::size_t bytes = 0;
   for (MarchData::Part& part : data_.parts_) {
     part.channels = bytes;
-    bytes += ChannelBytes(*part.source).all();
+    bytes += ChannelBytes(*part.source, part.cells.count, part.glowing).all();
   }
   if (bytes == 0) return;
   if (static_cast<std::int64_t>(bytes / 16) >= texels) {
@@ -294,7 +313,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
   upload_.add([this, &heap, bytes] {
     data_.channels_ = heap.take(bytes, "creating the cells' channels");
     for (MarchData::Part& part : data_.parts_) {
-      const ChannelBytes channels(*part.source);
+      const ChannelBytes channels(*part.source, part.cells.count, part.glowing);
       const std::size_t first = data_.channels_.offset() + part.channels;
       part.grid.first_emission = static_cast<std::uint32_t>(first / 16);
       part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.glow_at()) / 16);
@@ -302,11 +321,11 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       part.grid.first_change = static_cast<std::uint32_t>((first + channels.change_at()) / 4);
       part.grid.first_colour = static_cast<std::uint32_t>((first + channels.colour_at()) / 4);
       part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.anisotropy_at()) / 4);
-      part.grid.glowing = static_cast<std::uint32_t>(part.source->glow.cells.size());
+      part.grid.glowing = static_cast<std::uint32_t>(part.glowing);
     }
   });
   for (const MarchData::Part& part : data_.parts_) {
-    const ChannelBytes channels(*part.source);
+    const ChannelBytes channels(*part.source, part.cells.count, part.glowing);
     const MarchData::Part* old = before_ == nullptr ? nullptr : before_->part_of(*part.source);
     const auto place_at = [this, first = part.channels](std::size_t at) {
       return [this, place = first + at] {
@@ -320,14 +339,31 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
       add_copy(place_at(0), from, channels.all());
       continue;
     }
-    if (!part.source->grid) continue;
-    const grid::TetGrid& grid = *part.source->grid;
-    upload_.add_bytes(place_at(0), grid.emission.data(), channels.emission);
-    upload_.add_bytes(place_at(channels.glow_at()), part.source->glow.cells.data(), channels.glow);
-    upload_.add_bytes(place_at(channels.velocity_at()), grid.velocity.data(), channels.velocity);
-    upload_.add_bytes(place_at(channels.change_at()), grid.change.data(), channels.change);
-    upload_.add_bytes(place_at(channels.colour_at()), grid.colour.data(), channels.colour);
-    upload_.add_bytes(place_at(channels.anisotropy_at()), grid.anisotropy.data(), channels.anisotropy);
+    upload_.add_bytes(place_at(channels.glow_at()), glow_of(part).cells.data(), channels.glow);
+    const grid::TetGrid* grid = grid_of(part);
+    if (grid == nullptr) {
+      const BuiltGrid& made = built_->at(part.source);
+      const auto add = [&](grid::Channel channel, std::size_t at, std::size_t channel_bytes) {
+        const gl::Object& records = made.channels[static_cast<std::size_t>(channel)];
+        add_copy(
+            place_at(at),
+            [buffer = records.name()] {
+              return Upload::Place{buffer, 0};
+            },
+            channel_bytes);
+      };
+      using grid::Channel;
+      add(Channel::emission, 0, channels.emission);
+      add(Channel::velocity, channels.velocity_at(), channels.velocity);
+      add(Channel::colour, channels.colour_at(), channels.colour);
+      add(Channel::anisotropy, channels.anisotropy_at(), channels.anisotropy);
+      continue;
+    }
+    upload_.add_bytes(place_at(0), grid->emission.data(), channels.emission);
+    upload_.add_bytes(place_at(channels.velocity_at()), grid->velocity.data(), channels.velocity);
+    upload_.add_bytes(place_at(channels.change_at()), grid->change.data(), channels.change);
+    upload_.add_bytes(place_at(channels.colour_at()), grid->colour.data(), channels.colour);
+    upload_.add_bytes(place_at(channels.anisotropy_at()), grid->anisotropy.data(), channels.anisotropy);
   }
 }
 
@@ -357,19 +393,19 @@ void MarchUpload::plan_trees(gl::WordHeap& heap) {
       add_copy(place_at(0), from, bytes_of(part));
       continue;
     }
-    if (!part.source->grid) {
+    const grid::TetGrid* grid = grid_of(part);
+    if (grid == nullptr) {
       const auto from = [buffer = built_->at(part.source).tree.name()] { return Upload::Place{buffer, 0}; };
       add_copy(place_at(0), from, bytes_of(part));
       continue;
     }
-    const grid::TetGrid& grid = *part.source->grid;
     Roots roots{};
-    std::ranges::copy(grid.roots, roots.begin());
+    std::ranges::copy(grid->roots, roots.begin());
     upload_.add([this, place = place_at(0), roots] {
       const Upload::Place to = place();
       gl_->NamedBufferSubData(to.buffer, static_cast<GLintptr>(to.offset), sizeof roots, roots.data());
     });
-    upload_.add_bytes(place_at(sizeof roots), grid.tree.data(), grid.tree.size() * sizeof(std::uint32_t));
+    upload_.add_bytes(place_at(sizeof roots), grid->tree.data(), grid->tree.size() * sizeof(std::uint32_t));
   }
 }
 

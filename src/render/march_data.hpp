@@ -5,7 +5,9 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "gl/objects.hpp"
@@ -39,9 +41,12 @@ class MarchData {
   struct Cells {
     std::size_t count = 0;
     bool limited = false;
+    std::optional<std::string> on_cpu{};  ///< why GL did not build it that was to
   };
   /// Null: it is not here. O(grids).
   [[nodiscard]] const Cells* cells(const scene::MarchSource& source) const;
+  /// Null: it is not here. O(grids).
+  [[nodiscard]] const scene::GlowSum* glow(const scene::MarchSource& source) const;
 
  private:
   friend class MarchUpload;
@@ -50,6 +55,8 @@ class MarchData {
     scene::MarchSourcePtr source;
     core::CmGrid grid{};
     Cells cells;
+    scene::GlowSum glow;
+    std::size_t glowing = 0;   // cells in the table of those
     std::size_t inner = 0;     // nodes of its tree
     std::size_t cell = 0;      // among those of all
     std::size_t tree = 0;      // bytes into the trees: its roots, then its own
@@ -108,6 +115,9 @@ class MarchUpload {
  private:
   // What is known of a part before it comes.
   void describe(MarchData::Part& part) const;
+  // In main memory; null: GL built it, or it was here before.
+  [[nodiscard]] const grid::TetGrid* grid_of(const MarchData::Part& part) const;
+  [[nodiscard]] const scene::GlowTable& glow_of(const MarchData::Part& part) const;
   void plan_tets(gl::WordHeap& heap, std::int64_t page_texels);
   void plan_cells(gl::WordHeap& heap, std::int64_t texels);
   void plan_channels(gl::WordHeap& heap, std::int64_t texels);

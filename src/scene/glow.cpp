@@ -1,6 +1,7 @@
 #include "scene/glow.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "base/luminance.hpp"
 #include "grid/cell.hpp"
@@ -15,30 +16,41 @@ double frame_volume(std::uint32_t cell_class) {
   return std::abs(glm::dot(vertex(1), glm::cross(vertex(2), vertex(3)))) / 6.0;
 }
 
+double brightness_of(const grid::EmissionRecord& emission) { return luminance(glm::dvec3(emission.mean)); }
+
 }  // namespace
 
-GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress) {
+GlowTable glow_table(std::vector<GlowingCell> cells, const grid::Cube& cube, const Progress* progress) {
   GlowTable table;
-  const double unit_volume = std::abs(glm::determinant(glm::dmat3(grid.cube.to_world)));
+  const double unit_volume = std::abs(glm::determinant(glm::dmat3(cube.to_world)));
+  std::erase_if(cells, [](const GlowingCell& cell) { return !(brightness_of(cell.emission) > 0.0); });
   std::vector<double> power;
   double square = 0.0;
-  for (std::size_t i = 0; i < grid.emission.size(); ++i) {
-    const double bright = luminance(glm::dvec3(grid.emission[i].mean));
-    if (!(bright > 0.0)) continue;
+  for (const GlowingCell& cell : cells) {
     if (power.size() % 65536 == 0) check(progress);
-    const glm::uvec4& data = grid.cells[i].data;
-    const std::uint32_t shape = core::cm_record_shape(data);
+    const double bright = brightness_of(cell.emission);
+    const std::uint32_t shape = core::cm_record_shape({cell.place, 0U, 0U});
     const double unit = core::cm_shape_unit(shape);
     power.push_back(bright * frame_volume(core::cm_shape_class(shape)) * unit * unit * unit * unit_volume);
     square += bright * power.back();
     table.power += power.back();
-    table.cells.push_back({{}, glm::uvec2(data.x, data.y), grid.emission[i]});
   }
+  table.cells = std::move(cells);
   if (!(table.power > 1e-30)) return {};  // a float has its inverse
   table.length = std::cbrt(table.power / square * table.power);
   const std::vector<light::Alias> aliases = light::alias_table(std::move(power), table.power, progress);
   for (std::size_t i = 0; i < aliases.size(); ++i) table.cells[i].alias = aliases[i];
   return table;
+}
+
+GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress) {
+  std::vector<GlowingCell> cells;
+  for (std::size_t i = 0; i < grid.emission.size(); ++i) {
+    if (i % 65536 == 0) check(progress);
+    const glm::uvec4& data = grid.cells[i].data;
+    if (brightness_of(grid.emission[i]) > 0.0) cells.push_back({{}, glm::uvec2(data.x, data.y), grid.emission[i]});
+  }
+  return glow_table(std::move(cells), grid.cube, progress);
 }
 
 }  // namespace cumulet::scene

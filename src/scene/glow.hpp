@@ -20,14 +20,20 @@ struct GlowingCell {
 };
 static_assert(sizeof(GlowingCell) == 32);
 
-/// Picks cells in proportion to the luminance of what they give off (light/alias_table.hpp).
-struct GlowTable {
-  std::vector<GlowingCell> cells;
+/// What all cells of a grid give off.
+struct GlowSum {
   double power = 0.0;   ///< luminance that they give off a steradian: its integral over their volume in the world
   double length = 0.0;  ///< world: the cube root of the volume that would give off as much, were it even
 };
 
-/// O(n). Throws Error(cancelled).
+/// Picks cells in proportion to the luminance of what they give off (light/alias_table.hpp).
+struct GlowTable : GlowSum {
+  std::vector<GlowingCell> cells;
+};
+
+/// Of those of these cells that give off light; what they have for an alias does not count. O(n). Throws
+/// Error(cancelled).
+GlowTable glow_table(std::vector<GlowingCell> cells, const grid::Cube& cube, const Progress* progress = nullptr);
 GlowTable glow_table(const grid::TetGrid& grid, const Progress* progress = nullptr);
 
 }  // namespace cumulet::scene

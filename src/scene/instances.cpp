@@ -137,7 +137,7 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     record.flags = (instance.hidden_from_camera ? 0U : core::CM_INSTANCE_SEEN) |
                    (instance.medium.emits != 0 ? core::CM_INSTANCE_EMITS : 0U) |
                    (instance.ends ? core::CM_INSTANCE_MOVES : 0U);
-    glow.push_back(glow_of(instance.source->glow, cube.to_world, instance.place));
+    glow.push_back(glow_of(instance.glow, cube.to_world, instance.place));
     dvec3 low = block.middle - reach_of(block);
     dvec3 high = block.middle + reach_of(block);
     if (instance.ends) {

@@ -26,6 +26,7 @@ struct Instance {
   core::CmMedium medium{};
   bool hidden_from_camera = false;
   std::optional<PlaceEnds> ends = {};  ///< as the place; nothing: it stands still
+  GlowSum glow{};  ///< of the source's cells
 };
 
 /// All arrays go into buffers as they are; ends behind the records.
@@ -34,7 +35,7 @@ struct InstanceTable {
   /// Where all stand as the shutter opens, then as it closes: spaces alone. Empty where nothing moves.
   std::vector<core::CmInstance> ends;
   std::vector<core::CmInstanceNode> nodes;  ///< at least one; the first's box holds all there is
-  double glow_power = 0.0;                  ///< of all of them, as GlowTable has both
+  double glow_power = 0.0;                  ///< of all of them, as GlowSum has both
   double glow_length = 0.0;
 };
 

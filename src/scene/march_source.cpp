@@ -94,9 +94,10 @@ MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool line
 }
 
 MarchSource make_planned_source(GridPlan plan, std::shared_ptr<const volume::ScalarVolume> volume,
-                                std::shared_ptr<const grid::Statistics> statistics) {
+                                std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels) {
   MarchSource source;
   source.cube = statistics->cube();
+  source.channels = std::move(channels);
   source.max_value = volume->max_value;
   source.linear = plan.lattice->cells == grid::CellKind::linear;
   source.plan = std::make_shared<const GridPlan>(std::move(plan));

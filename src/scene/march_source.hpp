@@ -33,7 +33,7 @@ struct MarchSource {
   std::shared_ptr<const grid::TetGrid> grid;
   GridPlanPtr plan;
   bool linear = false;
-  GlowTable glow;
+  GlowTable glow;  // of the grid; of a plan it is known once that is built
   // dense: read from these; brick: as packed by make_voxel_source
   std::shared_ptr<const volume::ScalarVolume> volume;
   std::shared_ptr<const grid::Statistics> statistics;
@@ -70,9 +70,9 @@ using MarchSourcePtr = std::shared_ptr<const MarchSource>;
 /// Throws Error(cancelled).
 MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool linear, float max_value,
                             const Progress* progress = nullptr);
-/// Of tetrahedra that GL builds. statistics: of the volume's density, that the lattice is of.
+/// Of tetrahedra that GL builds. statistics: of the volume's density; of these and the channels the lattice is.
 MarchSource make_planned_source(GridPlan plan, std::shared_ptr<const volume::ScalarVolume> volume,
-                                std::shared_ptr<const grid::Statistics> statistics);
+                                std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels);
 /// dense and brick. O(voxels of the bounds) only when uploaded; brick: O(bricks) memory.
 MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarVolume> volume,
                               std::shared_ptr<const grid::Statistics> statistics, grid::Channels channels = {});

@@ -68,10 +68,10 @@ bool stays_solid(const glm::dmat4& open, const glm::dmat4& close) {
   return std::ranges::all_of(at, [&](double t) { return side * volume(t) > bound; });
 }
 
-PlacedGlow glow_of(const GlowTable& table, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
-  if (table.cells.empty()) return {};
-  PlacedGlow glow{.power = table.power * std::abs(glm::determinant(glm::dmat3(place))),
-                  .length = table.length * mean_stretch(place)};
+PlacedGlow glow_of(const GlowSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place) {
+  if (!(sum.power > 0.0)) return {};
+  PlacedGlow glow{.power = sum.power * std::abs(glm::determinant(glm::dmat3(place))),
+                  .length = sum.length * mean_stretch(place)};
   glow.looks.density = static_cast<float>(1.0 / glow.power);
   glow.looks.extent = static_cast<float>(glow.length);
   glow.looks.least_stretch = static_cast<float>(least_stretch(glm::dmat3(place * cube_to_world)));

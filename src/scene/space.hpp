@@ -21,10 +21,10 @@ bool stays_solid(const glm::dmat4& open, const glm::dmat4& close);
 
 /// A volume's own table, of it as it stands at that place: what it gives off, and how much of a ray that takes.
 struct PlacedGlow {
-  double power = 0.0;  ///< as GlowTable has both
+  double power = 0.0;  ///< as GlowSum has both
   double length = 0.0;
   core::CmGlow looks{};
 };
-PlacedGlow glow_of(const GlowTable& table, const glm::dmat4& cube_to_world, const glm::dmat4& place);
+PlacedGlow glow_of(const GlowSum& sum, const glm::dmat4& cube_to_world, const glm::dmat4& place);
 
 }  // namespace cumulet::scene

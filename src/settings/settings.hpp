@@ -431,7 +431,7 @@ struct Table<cumulet_grid_desc> {
                 .least = 0.25, .most = 32.0, .format = "%.2f", .logarithmic = true}}),
       Setting(&Desc::build, {.name = "build", .choices = build_choices,
         .key = "grid.build", .flag = "--build",
-        .help = "Who builds the cells (default: cpu); those of volumes with more than density the CPU does",
+        .help = "Who builds the cells (default: cpu); what GL has no room for the CPU does",
         .row = {.label = "Built by",
                 .tip = "Who builds the cells. On the GPU a camera that moves has its cells sooner."}})};
 };

@@ -82,10 +82,6 @@ std::uint64_t cells_that_fit_gl(const grid::Channels& channels, const Allowance&
   return (most - std::min(most, tables)) / bytes_a_cell(channels);
 }
 
-bool any(const grid::Channels& channels) {
-  return channels.emission || channels.scattering || channels.forward || channels.momentum || channels.ends;
-}
-
 }  // namespace
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
@@ -122,22 +118,23 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     built.seconds.records = watch.lap();
     return built;
   }
-  if (settings.on == BuildOn::gpu && !any(channels)) {
-    const grid::LatticePtr lattice = volume->lattice(settings.density_ramp, settings.refine, progress);
+  if (settings.on == BuildOn::gpu && moving)
+    log.info(volume->name() + ": it moves while the shutter is open, so its grid is built on the CPU");
+  if (settings.on == BuildOn::gpu && !moving) {
+    const grid::LatticePtr lattice = volume->lattice(settings.density_ramp, channels, settings.refine, progress);
     std::vector<std::uint8_t> levels =
         before && before->lattice == lattice
             ? lattice->own.levels(lattice->cube, settings.refine, before->levels, &progress)
             : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
     const std::uint64_t most = std::min(settings.refine.max_cells, cells_that_fit_gl(channels, allowance));
-    scene::MarchSource source = scene::make_planned_source({lattice, std::move(levels), most}, voxels, statistics);
+    scene::MarchSource source =
+        scene::make_planned_source({lattice, std::move(levels), most}, voxels, statistics, channels);
     source.optical_depth = statistics->mean_optical_depth();
     built.source = std::make_shared<const scene::MarchSource>(std::move(source));
     allowance.require(built.bytes(), volume->name());
     built.seconds.refine = watch.lap();
     return built;
   }
-  if (settings.on == BuildOn::gpu)
-    log.info(volume->name() + ": it has more than density, so its grid is built on the CPU");
   grid::RefineSettings refine = settings.refine;
   refine.max_cells = std::min(
       {refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance), cells_that_fit_gl(channels, allowance)});

@@ -154,6 +154,11 @@ void Viewer::take_cells(const Context& g) {
     built.cells = cells->count;
     built.levels = g.scene().data()->grid(*built.source)->levels;
     built.limited = cells->limited;
+    // A camera in motion asks for one after another.
+    if (cells->on_cpu && !built_in_motion_) {
+      const std::string& name = built.volume ? built.volume->name() : built.source->volume->name;
+      log_.info(name + ": its grid is built on the CPU: " + *cells->on_cpu);
+    }
     if (built.limited) log_limited(log_, built.source->plan->max_cells, built.settings.refine.max_cells);
   };
   take(built_);

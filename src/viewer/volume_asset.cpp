@@ -87,11 +87,8 @@ std::uint64_t VolumeAsset::bytes() const {
     bytes += frame->density.bytes();
     for (const volume::ScalarVolume* field : frame->beside_density()) bytes += field->bytes();
   }
-  {
-    const std::scoped_lock exposing(exposing_);
-    if (exposed_) bytes += exposed_->asset->bytes();
-  }
   const std::scoped_lock lock(mutex_);
+  if (exposed_) bytes += exposed_->asset->bytes();
   if (statistics_) bytes += statistics_->bytes();
   if (ramped_) bytes += ramped_->density.voxels->bytes() + ramped_->density.statistics->bytes();
   if (latticed_) bytes += latticed_->lattice->bytes();
@@ -115,7 +112,7 @@ const volume::ScalarVolume& VolumeAsset::main_field() const {
 
 const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progress& progress) const {
   if (ramped_ && ramped_->ramp == ramp) return *ramped_;
-  ramped_.reset();
+  drop(ramped_);
   std::shared_ptr<const volume::ScalarVolume> voxels;
   std::shared_ptr<const grid::DensityEnds> ends;
   const auto curved = [&](const volume::ScalarVolume& density) { return volume::apply(ramp, density, &progress); };
@@ -130,7 +127,7 @@ const VolumeAsset::Ramped& VolumeAsset::ramped(const volume::Ramp& ramp, Progres
     voxels = make_left<const volume::ScalarVolume>(curved(frame_->density));
   }
   auto statistics = make_left<const grid::Statistics>(*voxels, cube_, &progress);
-  ramped_ = Ramped{ramp, {std::move(voxels), std::move(statistics)}, std::move(ends)};
+  put(ramped_, Ramped{ramp, {std::move(voxels), std::move(statistics)}, std::move(ends)});
   return *ramped_;
 }
 
@@ -138,12 +135,12 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
   using Clock = std::chrono::steady_clock;
   seconds = 0.0;
   progress.begin(Progress::Stage::statistics);
-  const auto lock = patient_lock(mutex_, progress);
+  const auto lock = patient_lock(computing_, progress);
   const auto start = Clock::now();
   const auto since = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   if (ramp.empty() && !close_) {
     if (!statistics_) {
-      statistics_ = make_left<const grid::Statistics>(frame_->density, cube_, &progress);
+      put(statistics_, make_left<const grid::Statistics>(frame_->density, cube_, &progress));
       seconds = since();
     }
     return {{frame_, &frame_->density}, statistics_};
@@ -159,30 +156,36 @@ std::shared_ptr<const VolumeAsset> VolumeAsset::while_open(double seconds, Progr
   progress.begin(Progress::Stage::statistics);
   const auto lock = patient_lock(exposing_, progress);
   if (exposed_ && exposed_->seconds == seconds) return exposed_->asset;
-  exposed_.reset();
+  drop(exposed_);
   volume::VolumeFrame open = volume::advect(*frame_, -0.5 * seconds, &progress);
   volume::VolumeFrame close = volume::advect(*frame_, 0.5 * seconds, &progress);
-  exposed_ = Exposed{seconds, std::make_shared<const VolumeAsset>(std::move(open), std::move(close), &progress)};
+  put(exposed_,
+      Exposed{seconds, std::make_shared<const VolumeAsset>(std::move(open), std::move(close), &progress)});
   return exposed_->asset;
 }
 
-grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::RefineSettings& refine,
-                                      Progress& progress) const {
+grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::Channels& channels,
+                                      const grid::RefineSettings& refine, Progress& progress) const {
   // The same for all views and budgets.
   const grid::RefineSettings any_view;
   grid::RefineSettings of = refine;
   of.camera.reset();
   of.pixel_size = any_view.pixel_size;
   of.max_cells = any_view.max_cells;
+  if (of.criterion != grid::Criterion::transmittance) {
+    // No other knows of the medium.
+    of.density_scale = any_view.density_scale;
+    of.anisotropy = any_view.anisotropy;
+  }
   double seconds = 0.0;
   const Density field = density(ramp, progress, seconds);
   progress.begin(Progress::Stage::refining);
-  const auto lock = patient_lock(mutex_, progress);
-  if (!latticed_ || latticed_->ramp != ramp || latticed_->refine != of) {
-    latticed_.reset();
-    latticed_ = Latticed{
-        ramp, of,
-        make_left<const grid::Lattice>(*field.statistics, grid::Channels{}, of, field.voxels->max_value, &progress)};
+  const auto lock = patient_lock(computing_, progress);
+  if (!latticed_ || latticed_->ramp != ramp || latticed_->channels != channels || latticed_->refine != of) {
+    drop(latticed_);
+    put(latticed_,
+        Latticed{ramp, channels, of,
+                 make_left<const grid::Lattice>(*field.statistics, channels, of, field.voxels->max_value, &progress)});
   }
   return latticed_->lattice;
 }
@@ -199,18 +202,20 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
   constexpr std::type_identity<grid::RgbField> colours;
   constexpr std::type_identity<grid::ScalarField> numbers;
   constexpr std::type_identity<grid::MomentumField> motion;
-  const auto lock = patient_lock(mutex_, progress);
+  const auto lock = patient_lock(computing_, progress);
   const volume::VolumeFrame& open = *frame_;
   const volume::VolumeFrame* close = close_.get();
   if (!glowing_ || glowing_->settings != given) {
-    glowing_.reset();
+    drop(latticed_);  // it holds them
+    drop(glowing_);
     auto glow = scene::emission_of(open, given, &progress);
     if (close != nullptr)
       glow = scene::mean_of(glow, scene::emission_of(*close, given, &progress), "temperature or flame", &progress);
-    glowing_ = Glowing{given, field(colours, std::move(glow))};
+    put(glowing_, Glowing{given, field(colours, std::move(glow))});
   }
   if (!weighted_ || weighted_->density_ramp != density_ramp) {
-    weighted_.reset();
+    drop(latticed_);
+    drop(weighted_);
     auto scattering = scene::scattering_of(open, density_ramp, &progress);
     auto momentum =
         scene::momentum_of(open, density_ramp, &progress, log, close != nullptr ? scene::fastest_of(*close) : 0.0);
@@ -219,8 +224,8 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
           scene::mean_of(scattering, scene::scattering_of(*close, density_ramp, &progress), "density", &progress);
       momentum = mean_momentum(std::move(momentum), *close, density_ramp, progress, log);
     }
-    weighted_ =
-        Weighted{density_ramp, field(colours, std::move(scattering)), field(motion, std::move(momentum)), std::nullopt};
+    put(weighted_, Weighted{density_ramp, field(colours, std::move(scattering)), field(motion, std::move(momentum)),
+                            std::nullopt});
   }
   if (anisotropic && !weighted_->forward) {
     auto forward = scene::forward_of(open, density_ramp, &progress);
@@ -228,7 +233,7 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
       const auto at_close = scene::forward_of(*close, density_ramp, &progress);
       forward = scene::mean_of(forward ? &*forward : nullptr, at_close ? &*at_close : nullptr, "density", &progress);
     }
-    weighted_->forward = field(numbers, std::move(forward));
+    put(weighted_->forward, field(numbers, std::move(forward)));
   }
   return {glowing_->emission, weighted_->scattering, anisotropic ? *weighted_->forward : nullptr, weighted_->momentum,
           close_ ? ramped(density_ramp, progress).ends : nullptr};

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/log.hpp"
@@ -78,10 +79,10 @@ class VolumeAsset {
   /// without a ramp and the last with one. seconds receives what computing took, 0 if it was there. Throws
   /// Error(cancelled) if this caller's progress is.
   [[nodiscard]] Density density(const volume::Ramp& ramp, Progress& progress, double& seconds) const;
-  /// Of density alone, with that ramp: what grids of any view are built from. The last is kept. Throws as density()
-  /// does.
-  [[nodiscard]] grid::LatticePtr lattice(const volume::Ramp& ramp, const grid::RefineSettings& refine,
-                                         Progress& progress) const;
+  /// Of density with that ramp and what channels() gave: what grids of any view are built from. The last is kept.
+  /// Throws as density() does.
+  [[nodiscard]] grid::LatticePtr lattice(const volume::Ramp& ramp, const grid::Channels& channels,
+                                         const grid::RefineSettings& refine, Progress& progress) const;
   /// What it has beside density; anisotropic: its anisotropy, too. The last that were asked for are kept: another
   /// threshold or camera asks for the same. log hears of what is left out, when it is made.
   [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
@@ -92,11 +93,24 @@ class VolumeAsset {
   using Frames = std::vector<std::shared_ptr<const volume::VolumeFrame>>;
   // As it is, or as the shutter opens and as it closes.
   [[nodiscard]] Frames frames() const;
+  template <class Kept, class Made>
+  void put(Kept& kept, Made&& made) const {
+    const std::scoped_lock lock(mutex_);
+    kept = std::forward<Made>(made);
+  }
+  template <class Kept>
+  void drop(Kept& kept) const {
+    const std::scoped_lock lock(mutex_);
+    kept.reset();
+  }
 
   std::shared_ptr<const volume::VolumeFrame> frame_;
   std::shared_ptr<const volume::VolumeFrame> close_;  // null: there is no shutter
   VolumeFactsPtr facts_;
   grid::Cube cube_;
+  // What is computed is so under the first, one thing at a time, and put here under the second, too: whoever asks how
+  // much there is does not wait for it.
+  mutable std::mutex computing_;
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const grid::Statistics> statistics_;
   struct Ramped {
@@ -104,11 +118,12 @@ class VolumeAsset {
     Density density;
     std::shared_ptr<const grid::DensityEnds> ends;  // of a shutter
   };
-  // Of the last ramp; the mutex is held.
+  // Of the last ramp; computing_ is held.
   const Ramped& ramped(const volume::Ramp& ramp, Progress& progress) const;
   mutable std::optional<Ramped> ramped_;
   struct Latticed {
     volume::Ramp ramp;
+    grid::Channels channels;
     grid::RefineSettings refine;
     grid::LatticePtr lattice;
   };
@@ -117,7 +132,7 @@ class VolumeAsset {
     double seconds;
     std::shared_ptr<const VolumeAsset> asset;
   };
-  mutable std::mutex exposing_;
+  mutable std::mutex exposing_;  // as computing_, of the one that computes itself
   mutable std::optional<Exposed> exposed_;
   struct Glowing {
     scene::Emission settings;

@@ -1,10 +1,11 @@
 // How long grids take, on the CPU and by compute shaders: from a volume's statistics, and again for another view. By
 // hand:
 //
-//     cumulet-bench-grid [--threshold T] [--max-cells N] [--density-scale D] FILE...
+//     cumulet-bench-grid [--threshold T] [--max-cells N] [--density-scale D] [--blackbody B] FILE...
 //
-// The views are those of --camera-adaptive, on a circle about the volume from far to within it, 1280 x 720. Seconds of
-// GL are until a fence after all passes has passed, on whatever driver there is; on Mesa's llvmpipe they are of the
+// With all that cells carry. The views are those of --camera-adaptive, on a circle about the volume from far to within
+// it, 1280 x 720; refits are of as many small steps on it, in calls of a budget, of which the longest are told. Seconds
+// of GL are until a fence after all passes has passed, on whatever driver there is; on Mesa's llvmpipe they are of the
 // same cores. Bytes are what passes read and write at least, each word once a pass that needs it.
 #include <openvdb/openvdb.h>
 
@@ -14,6 +15,7 @@
 #include <exception>
 #include <filesystem>
 #include <headless.hpp>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,7 +24,7 @@
 #include "gl/state_guard.hpp"
 #include "grid/tet_grid.hpp"
 #include "render/grid_build.hpp"
-#include "volume/volume.hpp"
+#include "viewer/volume_asset.hpp"
 
 namespace {
 
@@ -31,6 +33,8 @@ using Clock = std::chrono::steady_clock;
 using render::Deadline;
 
 constexpr int repeats = 5;
+constexpr int refits = 40;
+constexpr double budget_ms = 4.0;
 
 double since(Clock::time_point start) { return milliseconds(Clock::now() - start); }
 
@@ -58,18 +62,19 @@ struct Times {
   [[nodiscard]] double all() const { return splits + cells + records; }
 };
 
-Times build_on_cpu(const grid::Statistics& statistics, const volume::ScalarVolume& volume,
+Times build_on_cpu(const viewer::VolumeAsset::Density& density, const grid::Channels& channels,
                    const grid::RefineSettings& settings) {
+  const grid::Statistics& statistics = *density.statistics;
   Times times;
   auto start = Clock::now();
-  const grid::DiamondSet diamonds(statistics, settings);
+  const grid::DiamondSet diamonds(statistics, channels, settings);
   times.splits = since(start);
   start = Clock::now();
   grid::GridBuilder builder(statistics, diamonds);
   builder.bisect();
   times.cells = since(start);
   start = Clock::now();
-  times.count = builder.records(settings.cells, volume.max_value).cells.size();
+  times.count = builder.records(settings.cells, density.voxels->max_value, channels).cells.size();
   times.records = since(start);
   return times;
 }
@@ -89,10 +94,11 @@ class Gpu {
     std::printf("driver: %s\n", gl::string_of(*gl_, GL_RENDERER).c_str());
   }
 
-  double upload(const grid::LatticePtr& lattice, const std::shared_ptr<const grid::Statistics>& statistics) {
+  double upload(const grid::LatticePtr& lattice, const std::shared_ptr<const grid::Statistics>& statistics,
+                const grid::Channels& channels) {
     const gl::StateGuard guard(*gl_);
     const auto start = Clock::now();
-    render::LatticeUpload work(gl_, limits_, lattice, statistics);
+    render::LatticeUpload work(gl_, limits_, lattice, statistics, channels);
     while (!work.advance(Deadline::max())) {
     }
     gl::Fence(gl_).wait();
@@ -123,6 +129,26 @@ class Gpu {
     built.scratch = work.bytes();
     return built;
   }
+  // As frames do: in calls of a budget.
+  struct Refit {
+    double ms = 0.0, longest_ms = 0.0;
+  };
+  Refit refit(const grid::RefineSettings& settings) {
+    const gl::StateGuard guard(*gl_);
+    const grid::Lattice& lattice = data_->lattice();
+    const auto start = Clock::now();
+    render::GridBuild work(gl_, programs_, limits_, data_, lattice.own.levels(grid::ViewLevels(lattice.cube, settings)),
+                           settings.max_cells, std::numeric_limits<std::uint64_t>::max(), pace_);
+    Refit refit;
+    for (bool done = false; !done;) {
+      const auto call = Clock::now();
+      done = work.advance(call + std::chrono::microseconds(static_cast<int>(1000.0 * budget_ms)));
+      refit.longest_ms = std::max(refit.longest_ms, since(call));
+    }
+    gl::Fence(gl_).wait();
+    refit.ms = since(start);
+    return refit;
+  }
   [[nodiscard]] const render::LatticeData& data() const { return *data_; }
 
  private:
@@ -131,7 +157,18 @@ class Gpu {
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
   render::LatticeDataPtr data_;
+  render::GridPacePtr pace_ = std::make_shared<render::GridPace>();
 };
+
+void print_refits(std::vector<Gpu::Refit> all) {
+  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+  const auto late = all.begin() + static_cast<std::ptrdiff_t>(all.size() * 19 / 20);
+  std::ranges::nth_element(all, middle, {}, &Gpu::Refit::ms);
+  const double ms = middle->ms;
+  std::ranges::nth_element(all, late, {}, &Gpu::Refit::longest_ms);
+  std::printf("  %zu refits in calls of %.0f ms: %.0f ms each (median); the longest call %.1f ms (of 19 in 20)\n",
+              all.size(), budget_ms, ms, late->longest_ms);
+}
 
 // What passes read and write: of the lattice, and of a cell.
 void print_bytes(const grid::Lattice& lattice, std::size_t cells) {
@@ -146,25 +183,28 @@ void print_bytes(const grid::Lattice& lattice, std::size_t cells) {
               splits / static_cast<double>(std::max<std::size_t>(cells, 1)) + cell);
 }
 
-void measure(Gpu& gpu, const std::string& file, grid::RefineSettings settings) {
-  const auto volume = std::make_shared<const volume::ScalarVolume>(volume::import_volume(file, "", Log()));
-  const auto statistics = std::make_shared<const grid::Statistics>(*volume, grid::fit_cube(*volume));
+void measure(Gpu& gpu, const std::string& file, grid::RefineSettings settings, const scene::Emission& emission) {
+  const viewer::VolumeAsset asset(volume::import_frame(file, {}, Log()));
+  Progress progress;
+  double seconds = 0.0;
+  const viewer::VolumeAsset::Density density = asset.density({}, progress, seconds);
+  const grid::Channels channels = asset.channels({}, emission, true, progress);
+  const auto& [volume, statistics] = density;
   std::printf("%s: %.2fM active voxels, %zu bricks\n", std::filesystem::path(file).filename().c_str(),
               static_cast<double>(volume->active_voxels) * 1e-6, statistics->nodes_of_size(3).size());
   const auto start = Clock::now();
-  const auto lattice =
-      std::make_shared<const grid::Lattice>(*statistics, grid::Channels{}, settings, volume->max_value);
+  const auto lattice = std::make_shared<const grid::Lattice>(*statistics, channels, settings, volume->max_value);
   const double lattice_ms = since(start);
-  const double upload_ms = gpu.upload(lattice, statistics);
+  const double upload_ms = gpu.upload(lattice, statistics, channels);
   std::printf("  lattice: %.0f ms, %.1f MB in main memory, %zu blocks; uploaded in %.0f ms, %.1f MB of GL's\n",
               lattice_ms, static_cast<double>(lattice->bytes()) * 1e-6, lattice->blocks.size(), upload_ms,
               static_cast<double>(gpu.data().bytes()) * 1e-6);
   const auto compare = [&](const char* what) {
     // In turn; of each the fastest, as others may have the cores.
-    Times cpu = build_on_cpu(*statistics, *volume, settings);
+    Times cpu = build_on_cpu(density, channels, settings);
     Gpu::Built built = gpu.build(settings);
     for (int i = 1; i < repeats; ++i) {
-      const Times again = build_on_cpu(*statistics, *volume, settings);
+      const Times again = build_on_cpu(density, channels, settings);
       if (again.all() < cpu.all()) cpu = again;
       const Gpu::Built anew = gpu.build(settings);
       if (anew.ms < built.ms) built = anew;
@@ -182,6 +222,12 @@ void measure(Gpu& gpu, const std::string& file, grid::RefineSettings settings) {
     settings.camera = camera_about(*statistics, *volume, 0.35 * i);
     compare(("view " + std::to_string(i)).c_str());
   }
+  std::vector<Gpu::Refit> all;
+  for (int i = 0; i < refits; ++i) {
+    settings.camera = camera_about(*statistics, *volume, 0.01 * i);
+    all.push_back(gpu.refit(settings));
+  }
+  print_refits(std::move(all));
   std::fflush(stdout);
 }
 
@@ -192,6 +238,7 @@ int main(int argc, char** argv) try {
   grid::RefineSettings settings;
   settings.criterion = grid::Criterion::transmittance;
   settings.threshold = 0.15;
+  scene::Emission emission;
   std::vector<std::string> files;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
@@ -202,16 +249,20 @@ int main(int argc, char** argv) try {
       settings.max_cells = std::strtoull(argv[++i], nullptr, 10);
     } else if (argument == "--density-scale" && more) {
       settings.density_scale = std::atof(argv[++i]);
+    } else if (argument == "--blackbody" && more) {
+      emission.blackbody = std::atof(argv[++i]);
     } else {
       files.push_back(argument);
     }
   }
   if (files.empty()) {
-    std::fputs("usage: cumulet-bench-grid [--threshold T] [--max-cells N] [--density-scale D] FILE...\n", stderr);
+    std::fputs(
+        "usage: cumulet-bench-grid [--threshold T] [--max-cells N] [--density-scale D] [--blackbody B] FILE...\n",
+        stderr);
     return 2;
   }
   Gpu gpu;
-  for (const std::string& file : files) measure(gpu, file, settings);
+  for (const std::string& file : files) measure(gpu, file, settings, emission);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "cumulet-bench-grid: %s\n", error.what());

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <string>
@@ -121,25 +122,105 @@ TEST_P(GpuGrid, TheGridBeforeIsShownUntilTheNextIsWhole) {
   EXPECT_GE(others, 3U) << "each view has its own";
 }
 
-TEST(GpuGridBuild, OfMoreThanDensityIsTheCpus) {
+volume::VolumeFrame fire() {
   volume::VolumeFrame frame;
-  frame.density = test::noise_volume({30, 30, 30}, glm::ivec3(0), 1);
+  frame.density = test::noise_volume({30, 40, 30}, glm::ivec3(0), 1);
   frame.density.name = "smoke";
   frame.flame = test::noise_volume({30, 30, 30}, glm::ivec3(0), 2);
-  const auto asset = std::make_shared<const viewer::VolumeAsset>(std::move(frame));
+  const auto colour = [](int seed) { return test::noise_volume({30, 40, 30}, glm::ivec3(0), seed); };
+  frame.colour = {colour(3), colour(4), colour(5)};
+  return frame;
+}
+
+// What burns and has a colour: the same paths, and the same cells that they look for.
+TEST_P(GpuGrid, FiresAreThoseOfTheCpusGrid) {
+  const test::Image image{32, 32, 32, 5, render::View::shaded};
+  const auto other = make();
+  const auto look_at = [](test::Still& still, BuildOn on) {
+    still.set_volume(std::make_shared<const viewer::VolumeAsset>(fire()));
+    viewer::Medium medium;
+    medium.density_scale = 0.3;
+    medium.field_emission.flame_strength = 2.0;
+    medium.field_emission.flame_colour = {1.0F, 0.4F, 0.1F};
+    still.set_medium(medium);
+    still.set_camera(test::camera_at({15.0, 20.0, 110.0}, {15.0, 20.0, 15.0}, 30.0));
+    still.set_light({30.0F, 30.0F, glm::vec3(0.2F), glm::vec3(0.02F)});
+    still.set_grid(settings_on(on));
+  };
+  look_at(*still_, BuildOn::gpu);
+  look_at(*other, BuildOn::cpu);
+  const test::Picture a = test::render(*still_, image);
+  const test::Picture b = test::render(*other, image);
+  EXPECT_EQ(viewer().stats().cells, other->viewer().stats().cells);
+  EXPECT_GT(viewer().stats().cells, 1000U);
+  EXPECT_EQ(viewer().stats().cell_bytes, other->viewer().stats().cell_bytes);
+  test::Image seeded = image;
+  seeded.seed = 77;
+  const double other_paths = difference(test::render(*other, seeded), b);
+  EXPECT_LT(difference(a, b), 0.3 * other_paths);
+  EXPECT_LT(std::abs(a.mean().x / b.mean().x - 1.0), 0.003);
+  EXPECT_GT(b.mean().x, 3.0 * b.mean().z) << "it burns";
+}
+
+TEST(GpuGridBuild, OfAFireIsPlanned) {
+  const auto asset = std::make_shared<const viewer::VolumeAsset>(fire());
   std::vector<std::string> lines;
   const Log log([&](LogLevel /*level*/, const char* line) { lines.emplace_back(line); });
   Progress progress;
   viewer::BuildSettings settings;
   settings.on = BuildOn::gpu;
   const viewer::Built built = viewer::build_grid(log, asset, settings, progress);
-  EXPECT_TRUE(built.source->grid);
-  EXPECT_FALSE(built.source->plan);
+  EXPECT_FALSE(built.source->grid);
+  ASSERT_TRUE(built.source->plan);
+  EXPECT_EQ(built.source->plan->lattice->channels.size(), 2U);
   EXPECT_TRUE(built.source->emits());
-  ASSERT_EQ(lines.size(), 1U);
-  EXPECT_EQ(lines[0], "smoke: it has more than density, so its grid is built on the CPU");
-  settings.on = BuildOn::cpu;
-  EXPECT_EQ(built.cells, viewer::build_grid(log, asset, settings, progress).cells);
+  EXPECT_TRUE(built.source->coloured());
+  EXPECT_TRUE(lines.empty());
+  // Another light is another lattice.
+  settings.emission.flame_strength = 3.0;
+  EXPECT_NE(viewer::build_grid(log, asset, settings, progress).source->plan->lattice, built.source->plan->lattice);
+}
+
+// Whether a medium is denser matters where what hides is told apart, and nowhere else.
+TEST(GpuGridBuild, MediaShareALatticeWhereNoneCounts) {
+  const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({30, 30, 30}, glm::ivec3(0), 1));
+  Progress progress;
+  viewer::BuildSettings settings;
+  settings.on = BuildOn::gpu;
+  for (const auto criterion : {grid::Criterion::deviation, grid::Criterion::transmittance}) {
+    settings.refine.criterion = criterion;
+    settings.refine.density_scale = 1.0;
+    const auto one = viewer::build_grid(Log(), asset, settings, progress).source->plan->lattice;
+    settings.refine.density_scale = 1.5;
+    settings.refine.anisotropy = 0.3;
+    const auto other = viewer::build_grid(Log(), asset, settings, progress).source->plan->lattice;
+    EXPECT_EQ(one == other, criterion == grid::Criterion::deviation);
+  }
+}
+
+// How much there is is told while a lattice is made.
+TEST(GpuGridBuild, NobodyWaitsToBeToldHowMuchThereIs) {
+  const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({120, 110, 100}, glm::ivec3(0), 1));
+  int told = 0;
+  for (int i = 0; i < 10 && told == 0; ++i) {
+    Progress progress;
+    viewer::BuildSettings settings;
+    settings.on = BuildOn::gpu;
+    settings.refine.threshold = 0.01 + 0.001 * i;  // another lattice
+    double seconds = 0.0;
+    static_cast<void>(asset->density({}, progress, seconds));
+    std::atomic<bool> made = false;
+    std::thread maker([&] {
+      static_cast<void>(asset->lattice({}, {}, settings.refine, progress));
+      made = true;
+    });
+    while (progress.stage() != Progress::Stage::refining || (progress.fraction() == 0.0 && !made))
+      std::this_thread::yield();
+    EXPECT_GT(asset->bytes(), 1'000'000U);
+    if (!made) ++told;
+    maker.join();
+  }
+  EXPECT_GT(told, 0);
 }
 
 // What a view does not change is computed once.

@@ -7,14 +7,22 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <limits>
+#include <map>
 #include <optional>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/luminance.hpp"
 #include "gl/state_guard.hpp"
 #include "grid/tet_grid.hpp"
+#include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"
 #include "support/view_cameras.hpp"
 #include "support/volumes.hpp"
@@ -40,8 +48,9 @@ class GridBuilds : public test::GlTest {
   }
 
   [[nodiscard]] render::LatticeDataPtr upload(const grid::LatticePtr& lattice,
-                                              const std::shared_ptr<const grid::Statistics>& statistics) const {
-    render::LatticeUpload work(gl_, limits_, lattice, statistics);
+                                              const std::shared_ptr<const grid::Statistics>& statistics,
+                                              const grid::Channels& channels = {}) const {
+    render::LatticeUpload work(gl_, limits_, lattice, statistics, channels);
     while (!work.advance(Deadline::max())) {
     }
     return work.take();
@@ -68,6 +77,13 @@ class GridBuilds : public test::GlTest {
     gl_->GetNamedBufferSubData(grid.cells.name(), 0, static_cast<GLsizeiptr>(read.cells.size() * 32),
                                read.cells.data());
     gl_->GetNamedBufferSubData(grid.tree.name(), 0, static_cast<GLsizeiptr>(read.tree.size() * 4), read.tree.data());
+    return read;
+  }
+  template <class T>
+  [[nodiscard]] std::vector<T> records(const render::BuiltGrid& grid, grid::Channel channel) const {
+    std::vector<T> read(grid.count);
+    gl_->GetNamedBufferSubData(grid.channels[static_cast<std::size_t>(channel)].name(), 0,
+                               static_cast<GLsizeiptr>(read.size() * sizeof(T)), read.data());
     return read;
   }
 
@@ -212,6 +228,186 @@ Fit fit_of(const volume::ScalarVolume& volume, const grid::Cube& cube, const glm
   return fit;
 }
 
+// Density, and channels of which each is a function of the voxel.
+struct Carrying {
+  static constexpr float fastest = 30.0F;
+  volume::ScalarVolume density;
+  std::shared_ptr<const grid::Statistics> statistics;
+  grid::Channels channels;
+
+  static glm::vec3 emission(const glm::ivec3& p) {
+    const glm::vec3 x(p);
+    const float hot = std::max(
+        0.0F, 1.0F - glm::length((x - glm::vec3(30.0F, 50.0F, 20.0F)) / 24.0F) + 0.3F * glm::simplex(0.13F * x));
+    return 200.0F * glm::vec3(hot, hot * hot, std::pow(hot, 6.0F));
+  }
+  static glm::vec3 colour(const glm::ivec3& p) {
+    return glm::clamp(
+        0.5F + 0.6F * glm::vec3(glm::simplex(0.05F * glm::vec3(p)), glm::simplex(0.21F * glm::vec3(p)), 0.3F),
+        glm::vec3(0.0F), glm::vec3(1.0F));
+  }
+  static float cosine(const glm::ivec3& p) { return glm::simplex(0.09F * glm::vec3(p)); }
+  // In parts of the fastest.
+  static glm::vec3 velocity(const glm::ivec3& p) {
+    const glm::vec3 x(p);
+    return glm::clamp(glm::vec3(0.01F * (x.y - 30.0F), 0.8F * std::sin(0.1F * x.x), 1e-4F), -1.0F, 1.0F);
+  }
+
+  explicit Carrying(bool dense) {
+    constexpr glm::ivec3 size(60, 70, 50);
+    if (dense) density = test::noise_volume({60, 45, 50}, glm::ivec3(0), 1);
+    const grid::Cube cube = grid::fit_cube(density, glm::ivec3(0), size - 1);
+    statistics = std::make_shared<const grid::Statistics>(density, cube);
+    const auto colours = [&](const auto& function) {
+      const auto component = [&](int i) {
+        return test::make_volume(size, glm::ivec3(0), [&](const glm::ivec3& p) { return function(p)[i]; });
+      };
+      return grid::RgbField::Components{component(0), component(1), component(2)};
+    };
+    channels.emission = std::make_shared<const grid::RgbField>(colours(emission), cube);
+    if (!dense) return;
+    const auto there = [&](const glm::ivec3& p) { return test::value_at(density, p); };
+    channels.scattering = std::make_shared<const grid::RgbField>(
+        colours([&](const glm::ivec3& p) { return there(p) * colour(p); }), cube);
+    channels.forward = std::make_shared<const grid::ScalarField>(
+        test::make_volume(
+            size, glm::ivec3(0),
+            [&](const glm::ivec3& p) { return luminance(there(p) * colour(p)) * (0.5F + 0.5F * cosine(p)); }),
+        cube);
+    channels.momentum = std::make_shared<const grid::MomentumField>(
+        grid::MomentumField::Values{
+            colours([&](const glm::ivec3& p) { return there(p) * (0.5F + 0.5F * velocity(p)); }), fastest},
+        cube);
+  }
+  [[nodiscard]] grid::TetGrid grid(const grid::RefineSettings& settings) const {
+    const grid::DiamondSet diamonds(*statistics, channels, settings);
+    grid::GridBuilder builder(*statistics, diamonds);
+    builder.bisect();
+    return builder.records(settings.cells, density.max_value, channels);
+  }
+  [[nodiscard]] grid::LatticePtr lattice(const grid::RefineSettings& settings) const {
+    return std::make_shared<const grid::Lattice>(*statistics, channels, settings, density.max_value);
+  }
+};
+
+std::vector<glm::ivec3> sixths_of(const glm::vec3& v0, std::uint32_t shape) {
+  static const volume::ScalarVolume nothing;
+  std::vector<Sixth> sixths;
+  collect(nothing, {}, v0, shape, sixths);
+  std::vector<glm::ivec3> voxels;
+  for (const Sixth& sixth : sixths) voxels.emplace_back(glm::floor(sixth.middle));
+  return voxels;
+}
+
+// Of what these voxels have in the mean, in double precision: what each channel's record is.
+void expect_means(const Carrying& of, const glm::vec3& v0, std::uint32_t shape, const glm::vec3& emission,
+                  std::uint32_t colour, std::int16_t anisotropy, const glm::uvec2& velocity) {
+  glm::dvec3 light(0.0);
+  glm::dvec3 scattering(0.0);
+  glm::dvec3 momentum(0.0);
+  double mass = 0.0;
+  double scattered = 0.0;
+  double forward = 0.0;
+  const std::vector<glm::ivec3> voxels = sixths_of(v0, shape);
+  for (const glm::ivec3& p : voxels) {
+    if (glm::any(glm::greaterThanEqual(p, glm::ivec3(60, 70, 50)))) continue;
+    light += glm::dvec3(Carrying::emission(p));
+    const double density = test::value_at(of.density, p);
+    const glm::dvec3 coloured = density * glm::dvec3(Carrying::colour(p));
+    scattering += coloured;
+    scattered += luminance(coloured);
+    forward += luminance(coloured) * double(Carrying::cosine(p));
+    momentum += density * glm::dvec3(Carrying::velocity(p));
+    mass += density;
+  }
+  light /= static_cast<double>(voxels.size());
+  for (int i = 0; i < 3; ++i) ASSERT_NEAR(emission[i], light[i], 1e-4 * light[i] + 1e-35) << i;
+  const glm::vec3 shown = core::cm_cell_colour(colour);
+  const glm::vec3 moves = core::cm_cell_velocity(velocity);
+  constexpr std::array<double, 3> steps{1.0 / 2047.0, 1.0 / 2047.0, 1.0 / 1023.0};
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_NEAR(shown[i], mass > 0.0 ? scattering[i] / mass : 0.0, 0.51 * steps[static_cast<std::size_t>(i)]) << i;
+    const double expected = mass > 0.0 ? double{Carrying::fastest} * momentum[i] / mass : 0.0;
+    ASSERT_NEAR(moves[i], expected, 0.5 * ulp_of(static_cast<float>(expected)) + 2e-6 * Carrying::fastest) << i;
+  }
+  const double cosine = scattered > 0.0 ? std::clamp(forward / scattered, -0.999, 0.999) : 0.0;
+  ASSERT_NEAR(anisotropy / 32767.0, cosine, 0.6 / 32767.0);
+}
+
+TEST_P(GridBuilds, CarryWhatTheirVoxelsDo) {
+  const gl::StateGuard guard(*gl_);
+  const Carrying of(true);
+  const grid::RefineSettings any;
+  const auto data = upload(of.lattice(any), of.statistics, of.channels);
+  test::Cameras cameras(5);
+  Rounding rounding;
+  std::size_t glowing = 0;
+  std::size_t others = 0;
+  for (int i = 0; i < 3; ++i) {
+    grid::RefineSettings settings = any;
+    if (i > 0) settings.camera = cameras.about(of.statistics->cube());
+    if (i == 2) settings.max_cells = 3000;
+    const grid::TetGrid expected = of.grid(settings);
+    const render::BuiltGrid built = build(data, settings);
+    const Read read = this->read(built);
+    ASSERT_NO_FATAL_FAILURE(expect_same(expected, built, read, rounding)) << i;
+    const auto emission = records<grid::EmissionRecord>(built, grid::Channel::emission);
+    const auto colour = records<std::uint32_t>(built, grid::Channel::colour);
+    const auto anisotropy = records<std::int16_t>(built, grid::Channel::anisotropy);
+    const auto velocity = records<glm::uvec2>(built, grid::Channel::velocity);
+    for (std::size_t c = 0; c < built.count; ++c) {
+      const glm::uvec4& words = read.cells[c].data;
+      // The processor's sums about a brick's mean lose what is thin beside the brightest, which is 200.
+      for (int k = 0; k < 3; ++k)
+        ASSERT_NEAR(emission[c].mean[k], expected.emission[c].mean[k], 1e-5F * emission[c].mean[k] + 2e-4F) << c;
+      if (emission[c].mean.x > 1.0F) {
+        ++glowing;
+        if (emission[c].gradient != expected.emission[c].gradient || colour[c] != expected.colour[c] ||
+            velocity[c] != expected.velocity[c] || anisotropy[c] != expected.anisotropy[c])
+          ++others;
+        const glm::uvec4 light(glm::floatBitsToUint(emission[c].mean), emission[c].gradient);
+        const glm::uvec4 wanted(glm::floatBitsToUint(expected.emission[c].mean), expected.emission[c].gradient);
+        ASSERT_LT(glm::length(core::cm_emission_gradient(light) - core::cm_emission_gradient(wanted)), 0.015F) << c;
+      }
+      // Those above bricks are the processor's.
+      const std::uint32_t shape = core::cm_record_shape(words);
+      const std::uint32_t size = core::cm_shape_exponent(shape) + (core::cm_shape_class(shape) == 1 ? 0 : 1);
+      if (size > 3 || c % 7 != 0) continue;
+      ASSERT_NO_FATAL_FAILURE(
+          expect_means(of, core::cm_record_v0(words), shape, emission[c].mean, colour[c], anisotropy[c], velocity[c]))
+          << i << ' ' << c;
+    }
+    // The same lights in the same order.
+    const scene::GlowTable wanted = scene::glow_table(expected);
+    ASSERT_EQ(built.glow.cells.size(), wanted.cells.size()) << i;
+    EXPECT_NEAR(built.glow.power, wanted.power, 1e-5 * wanted.power);
+    EXPECT_NEAR(built.glow.length, wanted.length, 1e-5 * wanted.length);
+    for (std::size_t c = 0; c < wanted.cells.size(); ++c)
+      ASSERT_EQ(built.glow.cells[c].place, wanted.cells[c].place) << c;
+  }
+  EXPECT_GT(glowing, 1000U);
+  EXPECT_LT(static_cast<double>(others), 0.02 * static_cast<double>(glowing));
+  RecordProperty("other_records", std::to_string(others));
+  RecordProperty("records", std::to_string(glowing));
+}
+
+// Without any density a fire is one all the same.
+TEST_P(GridBuilds, OfFireAloneAreLight) {
+  const gl::StateGuard guard(*gl_);
+  const Carrying of(false);
+  const grid::RefineSettings settings;
+  const auto data = upload(of.lattice(settings), of.statistics, of.channels);
+  const grid::TetGrid expected = of.grid(settings);
+  const render::BuiltGrid built = build(data, settings);
+  Rounding rounding;
+  expect_same(expected, built, read(built), rounding);
+  EXPECT_GT(built.count, 1000U);
+  EXPECT_EQ(built.glow.cells.size(),
+            expected.cells.size() - static_cast<std::size_t>(std::ranges::count_if(
+                                        expected.emission, [](const auto& e) { return e.mean == glm::vec3(0.0F); })));
+  EXPECT_FALSE(built.channels[static_cast<std::size_t>(grid::Channel::colour)]);
+}
+
 // Half a unit in the last place of a half float, and what floats lose in between.
 TEST_P(GridBuilds, CoefficientsAreLeastSquaresWithinHalfAUnitInTheLastPlace) {
   const gl::StateGuard guard(*gl_);
@@ -300,6 +496,128 @@ TEST_P(GridBuilds, StopAfterEveryStepAndBeginAnew) {
     if (stop % 7 != 0) continue;
     const render::BuiltGrid anew = build(data, settings);
     ASSERT_NO_FATAL_FAILURE(expect_same(expected, anew, read(anew), rounding)) << stop;
+  }
+}
+
+// Of a view, as viewers have it.
+scene::MarchSourcePtr planned(const Reference& reference, const grid::LatticePtr& lattice,
+                              const grid::RefineSettings& settings) {
+  scene::GridPlan plan{lattice, lattice->own.levels(grid::ViewLevels(lattice->cube, settings)), settings.max_cells};
+  return std::make_shared<const scene::MarchSource>(
+      scene::make_planned_source(std::move(plan), reference.volume, reference.statistics, {}));
+}
+
+constexpr std::uint64_t no_limit = std::numeric_limits<std::uint64_t>::max();
+
+void wait_for(render::GridBuilds& builds, const scene::MarchSourcePtr& source, std::uint64_t most_bytes = no_limit) {
+  while (!builds.advance({source}, {source}, most_bytes, Deadline::max()))
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+void expect_of_the_cpu(const render::BuiltGrid& built, const grid::TetGrid& expected, const std::string& why) {
+  ASSERT_TRUE(built.grid) << why;
+  EXPECT_NE(built.why_not.find(why), std::string::npos) << built.why_not;
+  ASSERT_EQ(built.grid->cells.size(), expected.cells.size());
+  EXPECT_EQ(
+      std::memcmp(built.grid->cells.data(), expected.cells.data(), expected.cells.size() * sizeof(grid::CellRecord)),
+      0);
+  EXPECT_EQ(built.bytes(), 0U) << "none of GL's";
+}
+
+TEST_P(GridBuilds, WhatGlHasNoRoomForTheCpuBuilds) {
+  const gl::StateGuard guard(*gl_);
+  const Reference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
+  const grid::RefineSettings settings;
+  const grid::LatticePtr lattice = reference.lattice(settings);
+  const scene::MarchSourcePtr source = planned(reference, lattice, settings);
+  const grid::TetGrid expected = reference.grid(settings);
+  const std::uint64_t held = upload(lattice, reference.statistics)->bytes();
+  struct Case {
+    std::int64_t block;
+    std::uint64_t most;
+    const char* why;
+  };
+  const auto cells = static_cast<std::int64_t>(expected.cells.size());
+  const std::array<Case, 4> cases{
+      {{4096, no_limit, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE is 4096"},
+       {24 * cells, no_limit, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE"},
+       {limits_.storage_block_bytes, held / 2, "the lattice needs"},
+       {limits_.storage_block_bytes, held + 40 * expected.cells.size(), "building the grid needs"}}};
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.why);
+    gl::Limits limits = limits_;
+    limits.storage_block_bytes = c.block;
+    render::GridBuilds builds(gl_, programs_, limits);
+    wait_for(builds, source, c.most);
+    ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(builds.built().at(source), expected, c.why));
+    EXPECT_LE(builds.bytes(), held) << "nothing but a lattice is left";
+    // Left before it is done, it ends by itself.
+    builds.clear();
+    builds.advance({source}, {source}, c.most, Deadline::max());
+  }
+  render::GridBuilds builds(gl_, programs_, limits_);
+  wait_for(builds, source);
+  EXPECT_FALSE(builds.built().at(source).grid);
+}
+
+// Whatever cannot be made is no end of it: nothing of it stays, and the CPU builds the grid.
+TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
+  const gl::StateGuard guard(*gl_);
+  const Reference reference(test::noise_volume({16, 16, 12}, glm::ivec3(0), 1));
+  const grid::RefineSettings settings;
+  const grid::LatticePtr lattice = reference.lattice(settings);
+  const scene::MarchSourcePtr source = planned(reference, lattice, settings);
+  const grid::TetGrid expected = reference.grid(settings);
+  test::FakeGl fake(headless::Context::get_proc, context_.get());
+  const gl::FunctionsPtr functions = gl::load_functions(test::FakeGl::get_proc, &fake);
+  const auto before = fake.alive();
+  std::int64_t failed = 0;
+  for (std::int64_t n = 0; n < 1000; ++n) {
+    SCOPED_TRACE(n);
+    {
+      render::GridBuilds builds(functions, programs_, limits_);
+      fake.fail_allocation(n);
+      wait_for(builds, source);
+      fake.fail_allocation(-1);
+      const render::BuiltGrid& built = builds.built().at(source);
+      if (!built.grid) break;
+      ++failed;
+      ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(built, expected, ""));
+      // The next is GL's again.
+      builds.clear();
+      wait_for(builds, source);
+      ASSERT_FALSE(builds.built().at(source).grid);
+    }
+    ASSERT_EQ(fake.alive(), before);
+  }
+  EXPECT_GT(failed, 20) << "buffers, and storage for each";
+}
+
+// A camera on its way: what a grid takes it gives back. CUMULET_REFITS: how many instead of a hundred.
+TEST_P(GridBuilds, RefitsDoNotGrow) {
+  const gl::StateGuard guard(*gl_);
+  const Reference reference(test::noise_volume({40, 35, 30}, glm::ivec3(0), 1));
+  grid::RefineSettings settings;
+  const grid::LatticePtr lattice = reference.lattice(settings);
+  test::FakeGl fake(headless::Context::get_proc, context_.get());
+  const gl::FunctionsPtr functions = gl::load_functions(test::FakeGl::get_proc, &fake);
+  const char* wanted = std::getenv("CUMULET_REFITS");
+  const int refits = wanted == nullptr ? 100 : std::atoi(wanted);
+  test::Cameras cameras(17);
+  render::GridBuilds builds(functions, programs_, limits_);
+  std::map<std::string, std::size_t> alive;
+  std::uint64_t bytes = 0;
+  for (int i = 0; i < refits; ++i) {
+    settings.camera = cameras.about(lattice->cube);
+    const scene::MarchSourcePtr source = planned(reference, lattice, settings);
+    wait_for(builds, source);
+    const std::uint64_t built = builds.built().at(source).bytes();
+    ASSERT_GT(built, 0U) << i;
+    if (i == 0) bytes = builds.bytes() - built;
+    ASSERT_EQ(builds.bytes(), bytes + built) << i;
+    builds.clear_built();
+    if (i == 0) alive = fake.alive();
+    ASSERT_EQ(fake.alive(), alive) << i;
   }
 }
 

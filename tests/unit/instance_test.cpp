@@ -509,14 +509,8 @@ TEST(Instances, AreToldAsTheyAre) {
   }
 }
 
-// A source's table that gives off so much, and no more of it.
-void make_glow(Instance& instance, double power, double length) {
-  auto source = std::make_shared<scene::MarchSource>(*instance.source);
-  source->glow.power = power;
-  source->glow.length = length;
-  source->glow.cells.resize(power > 0.0 ? 1 : 0);
-  instance.source = std::move(source);
-}
+// Its source gives off so much.
+void make_glow(Instance& instance, double power, double length) { instance.glow = {.power = power, .length = length}; }
 
 TEST(Instances, ArePickedByWhatTheyGiveOff) {
   std::vector<Instance> instances = any_instances(40, 16);

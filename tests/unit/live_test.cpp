@@ -216,6 +216,30 @@ TEST_F(CLive, IsRefusedInOneLine) {
   EXPECT_STREQ(cumulet_last_error(viewer.get()), "the viewer shows no live volume");
 }
 
+// States whose grids GL builds: with and without channels, of sizes that change, each is what it is alone.
+TEST_F(CLive, AStatesGridIsGlsToo) {
+  const LiveRef live = make_live();
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.build = CUMULET_BUILD_GPU;
+  const auto make_on_gl = [&] {
+    ViewerPtr viewer = make();
+    EXPECT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK) << cumulet_last_error(viewer.get());
+    return viewer;
+  };
+  const ViewerPtr viewer = make_on_gl();
+  ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
+  Picture before;
+  for (int step = 0; step < 4; ++step) {
+    const Sides& size = step == 2 ? odd : small;
+    const State state = step % 2 == 1 ? fire(size, step) : smoke(size, step);
+    hand_over(live, state);
+    const Picture found = picture(viewer.get());
+    EXPECT_NE(found, std::exchange(before, found)) << step;
+    const ViewerPtr single = make_on_gl();
+    EXPECT_EQ(difference(found, picture_of(single.get(), alone(state).get(), target_)), "") << step;
+  }
+}
+
 // Odd sizes, sizes and channels that change: to the last bit what it is alone, voxels and picture.
 TEST_F(CLive, AStateIsWhatItIsAlone) {
   const LiveRef live = make_live();

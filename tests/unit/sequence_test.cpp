@@ -233,6 +233,33 @@ TEST_F(CSequence, AFrameIsTheSameHoweverItCame) {
   EXPECT_GT(info_of(viewer.get()).bytes, 10'000U);
 }
 
+// Frames whose grids GL builds, one after another on as many lattices.
+TEST_F(CSequence, AFramesGridIsGlsToo) {
+  clip_.with_flame(2);
+  const SequenceRef sequence = make_sequence(clip_.paths());
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.build = CUMULET_BUILD_GPU;
+  const auto make_on_gl = [&] {
+    ViewerPtr viewer = make();
+    EXPECT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK) << cumulet_last_error(viewer.get());
+    return viewer;
+  };
+  const ViewerPtr viewer = make_on_gl();
+  ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
+  Picture before;
+  for (const int frame : {3, 1, 2, 3}) {
+    ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), frame / 24.0), CUMULET_OK);
+    const Picture found = picture(viewer.get());
+    const ViewerPtr single = make_on_gl();
+    ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(frame).c_str(), nullptr), CUMULET_OK);
+    EXPECT_EQ(difference(found, picture(single.get())), "") << frame;
+    EXPECT_NE(found, std::exchange(before, found)) << frame;
+    auto stats = make_desc<cumulet_stats>();
+    ASSERT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+    EXPECT_GT(stats.cells, 100U) << frame;
+  }
+}
+
 TEST_F(CSequence, TellsWhatItPlaysOver) {
   clip_.remove(2);
   clip_.corrupt(3);

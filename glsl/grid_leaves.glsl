@@ -1,0 +1,69 @@
+// The cells of a grid that is built, and their voxels: for the kernels that make the cells and what these carry.
+#ifndef CM_GRID_LEAVES_GLSL
+#define CM_GRID_LEAVES_GLSL
+
+struct CmTreeCell {
+  uint child;   // the first of two; 0: a leaf
+  uint leaves;  // below it, itself if it is one
+  uvec2 where;  // v0 and shape, as in a record
+};
+layout(std430, binding = CM_STORAGE_GRID_STATE) buffer CmState { CmGridState cm_state; };
+layout(std430, binding = CM_STORAGE_GRID_CELLS) buffer CmCells { CmTreeCell cm_cells[]; };
+layout(location = 0) uniform uint cm_first;
+layout(location = 1) uniform uint cm_end;
+
+vec3 cm_v0_of(uvec2 where) { return cm_record_v0(uvec4(where, 0u, 0u)); }
+uint cm_shape_of(uvec2 where) { return where.y >> 16; }
+
+// The nearest half, of two as near the larger: drivers round as they like.
+uint cm_half(float value) {
+  uint bits = floatBitsToUint(value);
+  uint sign_bit = (bits >> 16) & 0x8000u;
+  bits &= 0x7fffffffu;
+  if (bits >= 0x47800000u) return sign_bit | 0x7c00u;
+  if (bits >= 0x38800000u) return sign_bit | ((bits - 0x38000000u + 0x1000u) >> 13);
+  uint shift = 126u - (bits >> 23);
+  return shift > 24u ? sign_bit : sign_bit | ((((bits & 0x7fffffu) | 0x800000u) + (1u << (shift - 1u))) >> shift);
+}
+
+// A voxel of the cell.
+ivec3 cm_leaf_voxel(vec3 v0, uint shape) {
+  return ivec3(v0 + cm_from_frame(cm_frame_centroid(cm_shape_class(shape)) * cm_shape_unit(shape), shape));
+}
+// Whether it is within a brick; then its level there.
+bool cm_is_fine(uint shape) { return cm_shape_exponent(shape) + (cm_shape_class(shape) == 1u ? 0u : 1u) <= 3u; }
+uint cm_fine_level(uint shape) {
+  uint cell_class = cm_shape_class(shape);
+  return 3u * (3u - cm_shape_exponent(shape)) - (cell_class == 1u ? 0u : (cell_class == 2u ? 2u : 1u));
+}
+
+// Voxels are counted along the frame's axes, from the one at v0: the place of that one in the brick, and steps.
+int cm_voxel_at_v0(vec3 v0, uint shape) {
+  return int(cm_in_block(ivec3(floor(v0 + cm_from_frame(vec3(0.5), shape)))));
+}
+ivec3 cm_voxel_steps(uint shape) {
+  uvec3 axis = uvec3((shape >> 3) & 3u, (shape >> 5) & 3u, (shape >> 7) & 3u);
+  ivec3 steps = ivec3(64) >> ivec3(3u * axis);
+  return steps * (ivec3(1) - 2 * ivec3(int(shape & 1u), int((shape >> 1) & 1u), int((shape >> 2) & 1u)));
+}
+// Of a part (grid::CellPart): how far its voxel is from that at v0.
+int cm_voxel_of_part(uint word, ivec3 steps) {
+  return int(word & 15u) * steps.x + int((word >> 4) & 15u) * steps.y + int((word >> 8) & 15u) * steps.z;
+}
+
+// The octree's cube that a cell above bricks is of.
+uint cm_coarse_size(uint shape) { return cm_shape_exponent(shape) + (cm_shape_class(shape) == 1u ? 0u : 1u); }
+
+// The box of all that there is to see grows by the cell.
+void cm_put_in_box(vec3 v0, uint shape) {
+  for (uint k = 0u; k < 4u; ++k) {
+    vec3 vertex = cm_cell_vertex(v0, shape, k);
+    uint at[3] = uint[3](uint(vertex.x), uint(vertex.y), uint(vertex.z));
+    for (uint axis = 0u; axis < 3u; ++axis) {
+      if (at[axis] < cm_state.low[axis]) atomicMin(cm_state.low[axis], at[axis]);
+      if (at[axis] > cm_state.high[axis]) atomicMax(cm_state.high[axis], at[axis]);
+    }
+  }
+}
+
+#endif

@@ -1,0 +1,164 @@
+#include "grid/lattice_channel.hpp"
+
+#include <algorithm>
+
+#include "base/luminance.hpp"
+#include "grid/evaluation.hpp"
+#include "volume/brick_values.hpp"
+
+namespace cumulet::grid {
+
+using glm::dvec3;
+using glm::ivec3;
+using glm::vec3;
+
+ChannelFields::ChannelFields(Channel channel, const Statistics& density, const Channels& channels)
+    : channel_(channel), coloured_(channels.scattering != nullptr) {
+  const auto add = [&](const Statistics& field) { fields_[used_++] = &field; };
+  const auto add_colours = [&](const auto& field) {
+    for (std::size_t i = 0; i < 3; ++i) add(field.component(i));
+  };
+  switch (channel) {
+    case Channel::emission:
+      add_colours(*channels.emission);
+      return;
+    case Channel::colour:
+      add_colours(*channels.scattering);
+      add(density);
+      return;
+    case Channel::anisotropy:
+      add(channels.forward->statistics());
+      if (coloured_) {
+        add_colours(*channels.scattering);
+      } else {
+        add(density);
+      }
+      return;
+    case Channel::velocity:
+      add_colours(*channels.momentum);
+      add(density);
+      fastest_ = channels.momentum->fastest();
+      return;
+  }
+}
+
+std::size_t ChannelFields::count() const {
+  switch (channel_) {
+    case Channel::emission:
+      return 3;
+    case Channel::anisotropy:
+      return 2;
+    case Channel::colour:
+    case Channel::velocity:
+      break;
+  }
+  return 4;
+}
+
+std::size_t ChannelFields::record_words() const {
+  switch (channel_) {
+    case Channel::emission:
+      return sizeof(EmissionRecord) / 4;
+    case Channel::velocity:
+      return sizeof(glm::uvec2) / 4;
+    case Channel::colour:
+    case Channel::anisotropy:
+      break;
+  }
+  return 1;
+}
+
+ChannelNumbers ChannelFields::numbers(const std::array<float, most_fields>& values) const {
+  switch (channel_) {
+    case Channel::emission:
+    case Channel::colour:
+      return values;
+    case Channel::anisotropy: {
+      const float scatters = coloured_ ? luminance(vec3(values[1], values[2], values[3])) : values[1];
+      return {2.0F * values[0] - scatters, scatters};
+    }
+    case Channel::velocity:
+      break;
+  }
+  // Of what moves slowly the difference is exact, and is not lost in sums.
+  const auto relative = [&](std::size_t i) { return 2.0F * values[i] - values[3]; };
+  return {relative(0), relative(1), relative(2), values[3]};
+}
+
+std::optional<ChannelNumbers> ChannelFields::even(const ivec3& corner, int log2_size) const {
+  std::array<float, most_fields> values{};
+  for (std::size_t i = 0; i < used_; ++i) {
+    const Statistics::Node& node = fields_[i]->node_at(corner, log2_size);
+    if (!node.is_uniform()) return std::nullopt;
+    values[i] = node.uniform;
+  }
+  return numbers(values);
+}
+
+void ChannelFields::fill(const ivec3& corner, std::span<float> out) const {
+  struct Found {
+    const float* values = nullptr;  // of a brick; null: one
+    float uniform = 0.0F;
+    volume::BrickValues::Brick room{};
+  };
+  std::array<Found, most_fields> found;
+  for (std::size_t i = 0; i < used_; ++i) {
+    const Statistics::Node& node = fields_[i]->node_at(corner);
+    found[i].uniform = node.uniform;
+    if (!node.is_uniform()) found[i].values = fields_[i]->values(node, found[i].room);
+  }
+  std::array<float, most_fields> values{};
+  for (std::size_t v = 0; v < volume::brick_voxels; ++v) {
+    for (std::size_t i = 0; i < used_; ++i)
+      values[i] = found[i].values == nullptr ? found[i].uniform : found[i].values[v];
+    const ChannelNumbers here = numbers(values);
+    std::copy_n(here.begin(), count(), out.begin() + static_cast<std::ptrdiff_t>(v * count()));
+  }
+}
+
+std::array<Moments, 3> ChannelFields::emission(const vec3& v0, std::uint32_t shape) const {
+  return {fields_[0]->moments(v0, shape), fields_[1]->moments(v0, shape), fields_[2]->moments(v0, shape)};
+}
+
+bool ChannelFields::emits(const vec3& v0, std::uint32_t shape) const {
+  return channel_ == Channel::emission && grid::emits(emission(v0, shape));
+}
+
+void ChannelFields::put_record(const vec3& v0, std::uint32_t shape, CellKind cells,
+                               std::span<std::uint32_t> record) const {
+  const auto mass = [&](std::size_t i) { return fields_[i]->moments(v0, shape).mass; };
+  const auto masses = [&](std::size_t first) { return dvec3(mass(first), mass(first + 1), mass(first + 2)); };
+  switch (channel_) {
+    case Channel::emission: {
+      const EmissionRecord made = emission_record(emission(v0, shape), shape, centroid_of(v0, shape), cells);
+      record[0] = glm::floatBitsToUint(made.mean.x);
+      record[1] = glm::floatBitsToUint(made.mean.y);
+      record[2] = glm::floatBitsToUint(made.mean.z);
+      record[3] = made.gradient;
+      return;
+    }
+    case Channel::colour:
+      record[0] = pack_colour(masses(0), mass(3));
+      return;
+    case Channel::anisotropy:
+      record[0] = static_cast<std::uint16_t>(pack_anisotropy(mass(0), coloured_ ? luminance(masses(1)) : mass(1)));
+      return;
+    case Channel::velocity: {
+      const glm::uvec2 made = pack_velocity(masses(0), mass(3), fastest_);
+      record[0] = made.x;
+      record[1] = made.y;
+      return;
+    }
+  }
+}
+
+std::vector<ChannelFields> fields_of(const Statistics& density, const Channels& channels) {
+  std::vector<ChannelFields> all;
+  if (channels.emission) all.emplace_back(Channel::emission, density, channels);
+  if (channels.scattering) all.emplace_back(Channel::colour, density, channels);
+  if (channels.forward) all.emplace_back(Channel::anisotropy, density, channels);
+  if (channels.momentum) all.emplace_back(Channel::velocity, density, channels);
+  return all;
+}
+
+}  // namespace cumulet::grid
