@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numbers>
 #include <string>
@@ -117,6 +118,52 @@ bool can_stand(const dmat4& to_world) {
   return is_sound(whole);
 }
 
+namespace {
+
+// But for where it stands, and its first triangle.
+CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& at) {
+  CmModel record{};
+  record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U) |
+                 (model.ends ? core::CM_MODEL_MOVES : 0U);
+  record.nodes = at.first + mesh.nodes;
+  record.records = at.first + mesh.records;
+  record.triangles = at.first + mesh.triangles;
+  record.vertices = at.first + model.source->vertices;
+  record.materials = at.first + model.source->materials;
+  record.emitters = at.first + mesh.emitters;
+  record.emitter_count = mesh.emitter_count;
+  record.textures = at.textures;
+  record.group = model.group;
+  return record;
+}
+
+// Of a mesh that is placed so within the model.
+PlaceEnds ends_of(const Model& model, const dmat4& placing) {
+  if (!model.ends) return {model.to_world * placing, model.to_world * placing};
+  return {model.ends->open * placing, model.ends->close * placing};
+}
+
+// World bounds of a box in all of these places, and of what goes straight between them; size: how far from the origin.
+struct Way {
+  dvec3 low{std::numeric_limits<double>::max()};
+  dvec3 high{-low};
+  double size = 0.0;
+};
+
+Way way_of(std::initializer_list<dmat4> places, const dvec3& low, const dvec3& high) {
+  Way way;
+  for (const dmat4& place : places) {
+    const Block block = block_of(place, low, high);
+    way.low = glm::min(way.low, block.middle - reach_of(block));
+    way.high = glm::max(way.high, block.middle + reach_of(block));
+  }
+  const dvec3 most = glm::max(glm::abs(way.low), glm::abs(way.high));
+  way.size = std::max({most.x, most.y, most.z});
+  return way;
+}
+
+}  // namespace
+
 ModelTable make_model_table(std::span<const Model> models, const std::function<ModelWords(const ModelSource&)>& words) {
   ModelTable table;
   std::vector<TreeBox> boxes;
@@ -142,9 +189,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
       for (std::size_t k = 0; k < mesh.placings.size(); ++k) {
         const dmat4 to_world = model.to_world * mesh.placings[k];
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
-        CmModel record{};
-        record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U) |
-                       (model.ends ? core::CM_MODEL_MOVES : 0U);
+        CmModel record = record_of(model, mesh, at);
         place(record, to_world);
         // What a file scales to nothing is not there.
         if (!is_sound(record)) continue;
@@ -152,43 +197,21 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         triangles += mesh.triangle_count;
         if (triangles >= std::numeric_limits<std::uint32_t>::max())
           refuse(ErrorCode::unsupported, "with it there are more than 2^32 triangles, each counted wherever it stands");
-        record.nodes = at.first + mesh.nodes;
-        record.records = at.first + mesh.records;
-        record.triangles = at.first + mesh.triangles;
-        record.vertices = at.first + source.vertices;
-        record.materials = at.first + source.materials;
-        record.emitters = at.first + mesh.emitters;
-        record.emitter_count = mesh.emitter_count;
-        record.textures = at.textures;
-        record.group = model.group;
-        std::vector<dmat4> places{to_world};
-        if (model.ends) {
-          places.push_back(model.ends->open * mesh.placings[k]);
-          places.push_back(model.ends->close * mesh.placings[k]);
-        }
+        const PlaceEnds ends = ends_of(model, mesh.placings[k]);
         if (moves) {
-          place(opens.emplace_back(), places[model.ends ? 1 : 0]);
-          place(closes.emplace_back(), places[model.ends ? 2 : 0]);
+          place(opens.emplace_back(), ends.open);
+          place(closes.emplace_back(), ends.close);
         }
         const bool solid = own_low.x <= own_high.x;
         TreeBox box{vec3(0.0F), vec3(0.0F), solid};
         if (solid) {
-          // Corners go straight: where they are in between is between where they are at the ends.
-          dvec3 least(std::numeric_limits<double>::max());
-          dvec3 most(-least);
-          for (const dmat4& of : places) {
-            const Block block = block_of(of, own_low, own_high);
-            least = glm::min(least, block.middle - reach_of(block));
-            most = glm::max(most, block.middle + reach_of(block));
-          }
-          const dvec3 farthest_of = glm::max(glm::abs(least), glm::abs(most));
-          const double size = std::max({farthest_of.x, farthest_of.y, farthest_of.z});
-          if (!(size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the world's origin");
+          const Way way = way_of({to_world, ends.open, ends.close}, own_low, own_high);
+          if (!(way.size < farthest)) refuse(ErrorCode::unsupported, "it reaches 1e12 or more from the world's origin");
           // What rays meet in its own space is here, but for what rounding may be.
-          box.low = vec3(least - 2e-6 * size);
-          box.high = vec3(most + 2e-6 * size);
-          low = glm::min(low, least);
-          high = glm::max(high, most);
+          box.low = vec3(way.low - 2e-6 * way.size);
+          box.high = vec3(way.high + 2e-6 * way.size);
+          low = glm::min(low, way.low);
+          high = glm::max(high, way.high);
         }
         boxes.push_back(box);
         power.push_back(mesh.flux * stretch * stretch);

@@ -146,7 +146,7 @@ VolumeAsset::Density VolumeAsset::density(const volume::Ramp& ramp, Progress& pr
     return {{frame_, &frame_->density}, statistics_};
   }
   const bool was_there = ramped_ && ramped_->ramp == ramp;
-  const Density density = ramped(ramp, progress).density;
+  Density density = ramped(ramp, progress).density;
   if (!was_there) seconds = since();
   return density;
 }
