@@ -46,7 +46,7 @@ class ChannelFields {
   /// Those of each voxel of a cube of the octree, if they are the same.
   [[nodiscard]] std::optional<ChannelNumbers> even(const glm::ivec3& corner, int log2_size) const;
   /// Of a brick: count() a voxel, volume::brick_voxels times as many.
-  void fill(const glm::ivec3& corner, std::span<float> numbers) const;
+  void fill(const glm::ivec3& corner, std::span<float> out) const;
   /// Of a cell above bricks, record_words() words.
   void put_record(const glm::vec3& v0, std::uint32_t shape, CellKind cells, std::span<std::uint32_t> record) const;
   /// Whether a cell above bricks gives off light.
