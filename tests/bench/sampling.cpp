@@ -36,7 +36,7 @@ double mean_of(const std::vector<double>& values) {
 
 std::vector<JudgedScene> scenes_of(const Options& options) {
   std::vector<std::string> skipped;
-  const std::vector<JudgedScene> scenes = judged_scenes(options, skipped);
+  std::vector<JudgedScene> scenes = judged_scenes(options, skipped);
   for (const std::string& line : skipped) progress("skipped: " + line);
   return scenes;
 }
