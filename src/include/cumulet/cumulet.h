@@ -1105,10 +1105,10 @@ typedef enum cumulet_criterion {
 typedef enum cumulet_build {
   CUMULET_BUILD_CPU = 0, /* by a worker, with all that a volume has */
   /* By compute shaders, within frames' budgets, the old cells being shown meanwhile: the same cells, what they hold
-     (density, what glows, colour, anisotropy, velocity) but for a rounding. A worker computes once, a volume and medium,
-     what does not depend on the view; a camera that moves then costs the device's passes alone. A grid that is larger
-     than the driver's storage blocks, or whose making takes more GL memory than there is or cumulet_limits_desc.gl_bytes
-     allows, is built by the CPU, which the log says with the reason */
+     (density, what glows, colour, anisotropy, velocity) but for a rounding. A worker computes once, a volume and
+     medium, what does not depend on the view; a camera that moves then costs the device's passes alone. A grid that is
+     larger than the driver's storage blocks, or whose making takes more GL memory than there is or
+     cumulet_limits_desc.gl_bytes allows, is built by the CPU, which the log says with the reason */
   CUMULET_BUILD_GPU = 1
 } cumulet_build;
 
