@@ -11,6 +11,7 @@
 #include <models.hpp>
 #include <mutex>
 #include <optional>
+#include <places.hpp>
 #include <shader_cache.hpp>
 #include <string>
 #include <timeline.hpp>

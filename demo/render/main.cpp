@@ -37,6 +37,7 @@
 #include "metadata.hpp"
 #include "models.hpp"
 #include "options.hpp"
+#include "places.hpp"
 #include "progress.hpp"
 #include "settled.hpp"
 

@@ -902,36 +902,9 @@ void set_shutter(const SceneShutter& shutter, const double (&to_world)[16], doub
   end(shutter.close, close);
 }
 
-cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene) {
-  const double* first = scene.places.empty() ? nullptr : scene.places.front().data();
-  const cumulet_status status =
-      cumulet_set_volume_places(viewer, first, static_cast<std::uint32_t>(scene.places.size()));
-  if (status != CUMULET_OK || !scene.shutter.moves()) return status;
-  const std::size_t count = std::max<std::size_t>(scene.places.size(), 1);
-  std::vector<double> open;
-  std::vector<double> close;
-  for (std::size_t i = 0; i < count; ++i) {
-    double place[16] = {};
-    double at_open[16];
-    double at_close[16];
-    if (!scene.places.empty()) std::ranges::copy(scene.places[i], place);
-    set_shutter(scene.shutter, place, at_open, at_close);
-    open.insert(open.end(), at_open, at_open + 16);
-    close.insert(close.end(), at_close, at_close + 16);
-  }
-  return cumulet_set_volume_shutter(viewer, open.data(), close.data(), static_cast<std::uint32_t>(count));
-}
-
 void end_shutter(SceneOptions& scene) {
   scene.camera_open.reset();
   scene.camera_close.reset();
-}
-
-cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene) {
-  const auto end = [](const auto& desc) { return desc ? &*desc : nullptr; };
-  const cumulet_status status = cumulet_camera_set(camera, &scene.camera);
-  if (status != CUMULET_OK || !(scene.camera_open || scene.camera_close)) return status;
-  return cumulet_camera_set_shutter(camera, end(scene.camera_open), end(scene.camera_close));
 }
 
 std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations) {

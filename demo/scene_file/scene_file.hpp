@@ -145,12 +145,8 @@ void for_each_group(Scene& scene, Visit&& visit) {
 
 /// As the library takes it; the file must outlive it.
 [[nodiscard]] cumulet_volume_file_desc volume_file(const VolumeFile& file);
-/// Where the first volume stands, in that viewer, and how it moves.
-[[nodiscard]] cumulet_status set_places(cumulet_viewer* viewer, const SceneOptions& scene);
 /// Its camera is another from now on, and stands still.
 void end_shutter(SceneOptions& scene);
-/// The scene's camera, and how it moves.
-[[nodiscard]] cumulet_status set_camera(cumulet_camera* camera, const SceneOptions& scene);
 
 /// Whether there is anything to be seen.
 [[nodiscard]] inline bool is_empty(const SceneOptions& scene) {
