@@ -813,7 +813,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         constexpr unsigned mebibyte = 20;
         options.gpu_memory = parse_integer(text, 1, std::uint64_t{1} << 40U) << mebibyte;
       },
-      "GL memory: grids are as coarse as it takes (default: no limit)");
+      "GL memory: grids are as coarse as it takes beside what there is (default: no limit)");
   add(
       app, group, "--first-sample", "N",
       [&](const std::string& text) {
@@ -871,6 +871,9 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
     throw UsageError("--light-groups needs an .exr to write to");
+  if (app.count("--adaptive") > 0 && options.scene.sampling.adaptive == 1 &&
+      options.scene.sampling.noise_target_percent == 0.0F)
+    throw UsageError("--adaptive needs a --noise-target");
   check_together(options, app.count("--first-sample") > 0);
   // As all flags of the scene's: files of pictures that differ in it have another scene's hash.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;

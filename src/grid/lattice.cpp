@@ -96,6 +96,13 @@ Lattice::Lattice(const Statistics& statistics, const Channels& beside, const Ref
   if (beside.momentum) channels.back().fastest = beside.momentum->fastest();
 }
 
+std::uint64_t Lattice::device_bytes() const {
+  std::uint64_t values = std::uint64_t{bricks} * volume::brick_voxels * (halves ? 2 : 4);
+  for (const LatticeChannel& channel : channels)
+    values += (channel.even_bricks.size() + channel.bricks.size()) * volume::brick_voxels * channel.numbers * 4;
+  return bytes() + values + std::uint64_t{blocks.size()} * CM_BLOCK_POINTS * 4;
+}
+
 void Lattice::find_blocks(const Statistics& statistics, const std::vector<ChannelFields>& beside, Progress* progress) {
   std::vector<std::uint8_t> all;
   resize(all, own.nodes.size(), progress);

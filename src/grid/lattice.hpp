@@ -82,6 +82,8 @@ struct Lattice {
     return beside + own.bytes() + blocks.size() * sizeof(glm::uvec2) + places.size() * sizeof(LatticePlace) +
            coarse.size() * sizeof(CoarseCells) + even_bricks.size() * 4;
   }
+  /// In buffers for shaders, with the values of bricks and room for priorities.
+  [[nodiscard]] std::uint64_t device_bytes() const;
 
  private:
   void find_blocks(const Statistics& statistics, const std::vector<ChannelFields>& beside, Progress* progress);

@@ -62,6 +62,7 @@ double Allotment::even_out(double squared) {
 
 void Allotment::decide(std::span<const SquareError> errors, double noise_target, std::uint32_t samples) {
   constexpr double woken = 2.0;
+  constexpr double looked_after = 16.0;
   double brightness = 0.0;
   double all = 0.0;
   for (const SquareError& error : errors) {
@@ -80,15 +81,20 @@ void Allotment::decide(std::span<const SquareError> errors, double noise_target,
   };
   for_each_half([&](Half& half, std::size_t square, unsigned number, double) {
     const glm::uvec2 at(square % squares_.x, square / squares_.x);
-    const unsigned other = pixels(at, 1 - number) > 0 ? 1 - number : number;
-    half.deviation = std::sqrt(own(square, other) * halves_[square].at(other).samples);
+    const bool alone = pixels(at, 1 - number) == 0;
+    // Of a last row that is alone the square above; of a picture that is no more than that itself.
+    const std::size_t teller = alone && at.y > 0 ? square - squares_.x : square;
+    const unsigned other = alone ? number : 1 - number;
+    half.deviation = std::sqrt(own(teller, other) * halves_[teller].at(other).samples);
   });
   const double ratio = even_out(squared * all);
   bool any = false;
   for_each_half([&](Half& half, std::size_t square, unsigned number, double) {
     half.wanted = ratio > 0.0 ? half.deviation / ratio : 0.0;
-    const double enough = rests(square, number) ? woken * half.samples : half.samples;
-    const bool goes_on = half.wanted > enough;
+    const bool rested = rests(square, number);
+    // What is so rare that neither half has found it is looked for now and then.
+    const bool forgotten = rested && samples >= looked_after * half.samples;
+    const bool goes_on = half.wanted > (rested ? woken : 1.0) * half.samples || forgotten;
     live_[square] = static_cast<std::uint8_t>((live_[square] & ~(1U << number)) | (goes_on ? 1U << number : 0U));
     any = any || goes_on;
   });

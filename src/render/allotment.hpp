@@ -17,9 +17,11 @@ namespace cumulet::render {
 /// A half is the even or the odd rows of a square of 8 x 8 pixels. Of halves of w pixels with a sample's deviation s,
 /// those n ~ s have a squared error sum(w s^2 / n) of V with the least sum(w n) (Neyman, "On the Two Different Aspects
 /// of the Representative Method", 1934), less what those that have more already leave to the others. A half that has
-/// its n rests; it is woken where that has come to more than twice as many since. The deviation that decides is that of
-/// the square's other half, whose samples are independent of its own: how many a pixel has says next to nothing of what
-/// they are.
+/// its n rests; it is woken where that has come to more than twice as many since, and where others have 16 times as
+/// many: rare light that neither half has found is not lost for good. The deviation that decides is that of the
+/// square's other half (of a last row that is alone, the square above), whose samples are independent of its own: how
+/// many a pixel has says next to nothing of what they are. Only where no half goes on by that, though there is noise
+/// left, do their own errors decide.
 class Allotment {
  public:
   static constexpr unsigned edge = 8;

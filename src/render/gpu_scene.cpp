@@ -441,7 +441,7 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const std::vecto
       present_ = data_of_;  // should what follows fail
       upload_.reset();
       data_revision_.advance();
-    } catch (const Error&) {
+    } catch (...) {
       data_.fail(of, upload_->settings);
       upload_.reset();
       grids_.clear_built();

@@ -64,6 +64,8 @@ class GpuScene {
   /// Of that volume, if it is the last that came, or is coming.
   [[nodiscard]] std::optional<double> upload_seconds(const scene::MarchSourcePtr& of) const;
   [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? data_->bytes() : 0; }
+  /// Of all else that bytes() has, what goes as volumes come: a build under way, and what is free of their pages.
+  [[nodiscard]] std::uint64_t passing_bytes() const { return grids_.bytes() + heap_.free_bytes(); }
   /// Of tetrahedra that are here; null: they are not.
   [[nodiscard]] const MarchData::Cells* cells(const scene::MarchSourcePtr& of) const {
     return data_ && of ? data_->cells(*of) : nullptr;

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <numeric>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -206,19 +208,27 @@ std::uint64_t BuiltGrid::bytes() const {
 
 double GridPace::ms(const gl::ProgramKey& key, double cost) const {
   const auto known = known_.find(key);
-  return known == known_.end() || !known->second.warm ? cost : known->second.ms;
+  return known == known_.end() ? cost : known->second;
 }
 
-void GridPace::learn(const std::vector<Sent>& sent, double ms) {
+void GridPace::learn(const std::vector<Sent>& sent, double ms, Measured measured) {
   double expected = 0.0;
-  for (const Sent& s : sent) expected += this->ms(s.key, s.cost) * s.items;
-  // By steps: one may have waited for what else the host has queued.
-  const double ratio = std::clamp(ms / std::max(expected, 1e-6), 0.25, 4.0);
+  bool first = false;
   for (const Sent& s : sent) {
-    // Few items tell of the dispatch, not of themselves.
-    if (s.items < group) continue;
-    const auto [known, first] = known_.try_emplace(s.key);
-    if (!first) known->second = {this->ms(s.key, s.cost) * std::sqrt(ratio), true};
+    expected += this->ms(s.key, s.cost) * s.items;
+    first = known_.try_emplace(s.key, s.cost).second || first;
+  }
+  if (first) return;
+  // What was seen late is no reason to go slowly.
+  const double most = measured == Measured::exactly ? 64.0 : 4.0;
+  constexpr double least = 1.0 / 64.0;
+  const double step = std::sqrt(std::clamp(ms / std::max(expected, 1e-6), 0.25, 4.0));
+  std::set<gl::ProgramKey> known;
+  for (const Sent& s : sent) {
+    // Few items tell of the dispatch, not of themselves; a kernel's many are one measurement.
+    if (s.items < group || !known.insert(s.key).second) continue;
+    double& of = known_.at(s.key);
+    of = std::clamp(of * step, least * s.cost, most * s.cost);
   }
 }
 
@@ -289,7 +299,7 @@ bool GridBuild::has_room_in_flight() {
   constexpr double most_in_flight_ms = 8.0;
   if (in_flight_ms_ < most_in_flight_ms) return true;
   if (!fence_.passed()) return false;
-  pace_->learn(in_flight_, milliseconds(std::chrono::steady_clock::now() - sent_));
+  pace_->learn(in_flight_, milliseconds(std::chrono::steady_clock::now() - sent_), GridPace::Measured::at_most);
   in_flight_.clear();
   in_flight_ms_ = 0.0;
   return true;
@@ -315,7 +325,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   const GridPace::Sent sent{pass.key, pass.cost * cost_ms(*gl_), static_cast<double>(items)};
   if (gl_->dispatches_in_call) {
-    pace_->learn({sent}, milliseconds(std::chrono::steady_clock::now() - begun));
+    pace_->learn({sent}, milliseconds(std::chrono::steady_clock::now() - begun), GridPace::Measured::exactly);
     return first + items;
   }
   if (in_flight_.empty()) sent_ = begun;
@@ -558,13 +568,32 @@ void GridBuild::plan_glow() {
   });
 }
 
-void GridBuild::begin_glow_table() {
-  const auto task = std::make_shared<std::packaged_task<scene::GlowTable()>>(
-      [words = std::move(glow_words_), cube = data_->lattice().cube] {
-        return scene::glow_table(in_order(words), cube);
-      });
-  glow_table_ = task->get_future();
+namespace {
+
+// What a thread of its own makes, whose failures are Errors.
+template <class Made, class Work>
+std::future<Made> make_apart(const char* what, Work work) {
+  const auto task = std::make_shared<std::packaged_task<Made()>>([what, work = std::move(work)] {
+    try {
+      return work();
+    } catch (const Error&) {
+      throw;
+    } catch (const std::exception& error) {
+      throw Error(ErrorCode::out_of_memory, std::string(what) + ": " + error.what());
+    }
+  });
+  std::future<Made> made = task->get_future();
   leave([task] { (*task)(); });
+  return made;
+}
+
+}  // namespace
+
+void GridBuild::begin_glow_table() {
+  glow_table_ = make_apart<scene::GlowTable>("the table of what glows",
+                                             [words = std::move(glow_words_), cube = data_->lattice().cube] {
+                                               return scene::glow_table(in_order(words), cube);
+                                             });
 }
 
 void GridBuild::plan_tree_cells(const std::vector<std::uint32_t>& level_first) {
@@ -611,7 +640,7 @@ bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint6
     return std::ranges::all_of(sources, [&](const scene::MarchSourcePtr& source) {
       return !source->plan || built_.contains(source) || build(source, most_bytes, deadline);
     });
-  } catch (const Error&) {
+  } catch (...) {
     upload_.reset();
     under_way_.reset();
     on_cpu_.reset();
@@ -681,7 +710,7 @@ double GridBuilds::progress() const {
 
 CpuGridBuild::CpuGridBuild(scene::MarchSourcePtr source, std::string why)
     : source_(std::move(source)), why_(std::move(why)), progress_(std::make_shared<Progress>()) {
-  const auto task = std::make_shared<std::packaged_task<BuiltGrid()>>([of = source_, progress = progress_] {
+  made_ = make_apart<BuiltGrid>("building the grid on the CPU", [of = source_, progress = progress_] {
     const scene::GridPlan& plan = *of->plan;
     const grid::DiamondSet diamonds(plan.lattice->own, plan.levels, plan.max_cells, progress.get());
     grid::GridBuilder builder(*of->statistics, diamonds);
@@ -697,8 +726,6 @@ CpuGridBuild::CpuGridBuild(scene::MarchSourcePtr source, std::string why)
     made.content_max = made.grid->content_max;
     return made;
   });
-  made_ = task->get_future();
-  leave([task] { (*task)(); });
 }
 
 CpuGridBuild::~CpuGridBuild() { progress_->cancel(); }

@@ -121,15 +121,15 @@ class GridPace {
     double cost = 0.0;
     double items = 0.0;
   };
-  /// These took that long, one after another. What is the first of its kernel is not believed: drivers compile in it.
-  void learn(const std::vector<Sent>& sent, double ms);
+  enum class Measured {
+    exactly,  ///< of these alone
+    at_most   ///< until it was seen that they are over: a host's own work and its frames count with them
+  };
+  /// These took that long, one after another. None that has the first of a kernel is believed: drivers compile in it.
+  void learn(const std::vector<Sent>& sent, double ms, Measured measured);
 
  private:
-  struct Known {
-    double ms = 0.0;
-    bool warm = false;
-  };
-  std::map<gl::ProgramKey, Known> known_;
+  std::map<gl::ProgramKey, double> known_;  // of an item
 };
 using GridPacePtr = std::shared_ptr<GridPace>;
 

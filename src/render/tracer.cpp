@@ -1129,6 +1129,8 @@ void Tracer::restore(Picture& picture, std::span<const std::byte> saved) {
   const std::size_t squares = picture.allotment_.saved().size();
   std::optional<std::uint32_t> pass;
   if (picture.adaptive_) pass = saved_pass(saved.last(squares + sizeof(SavedPass)), picture.target_samples_);
+  if (pass && std::ranges::any_of(saved.last(squares), [](std::byte live) { return live > std::byte{3}; }))
+    throw Error(ErrorCode::invalid_argument, "these bytes are no accumulation: what of it is sampled on is damaged");
   if (told.most > picture.target_samples_) {
     throw Error(ErrorCode::invalid_argument, "the accumulation has pixels of " + std::to_string(told.most) +
                                                  " samples, and the picture shall have " +

@@ -82,6 +82,20 @@ std::uint64_t cells_that_fit_gl(const grid::Channels& channels, const Allowance&
   return (most - std::min(most, tables)) / bytes_a_cell(channels);
 }
 
+// Of a plan, where GL builds the cells: beside them there are the lattice, what it builds of, the grid before and a
+// copy.
+std::uint64_t planned_cells_that_fit_gl(const grid::Channels& channels, const grid::Lattice& lattice,
+                                        const Allowance& allowance) {
+  const std::uint64_t most = allowance.gl_cell_bytes();
+  if (most == Allowance::no_limit) return most;
+  constexpr std::uint64_t tree_bytes = 80;
+  constexpr std::uint64_t glowing_bytes = 28;
+  const std::uint64_t a_cell = 3 * bytes_a_cell(channels) + tree_bytes + (channels.emission ? glowing_bytes : 0);
+  const std::uint64_t left = most / 2 * 5;  // Viewer::share_gl
+  const std::uint64_t held = lattice.device_bytes() + tables;
+  return (left - std::min(left, held)) / a_cell;
+}
+
 }  // namespace
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
@@ -126,7 +140,9 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
         before && before->lattice == lattice
             ? lattice->own.levels(lattice->cube, settings.refine, before->levels, &progress)
             : lattice->own.levels(grid::ViewLevels(lattice->cube, settings.refine), &progress);
-    const std::uint64_t most = std::min(settings.refine.max_cells, cells_that_fit_gl(channels, allowance));
+    const std::uint64_t most =
+        std::min({settings.refine.max_cells, cells_that_fit(channels, volume->bytes(), allowance),
+                  planned_cells_that_fit_gl(channels, *lattice, allowance)});
     scene::MarchSource source =
         scene::make_planned_source({lattice, std::move(levels), most}, voxels, statistics, channels);
     source.optical_depth = statistics->mean_optical_depth();

@@ -219,7 +219,7 @@ FrameResult Viewer::render(const Frame& frame) {
     attempt("cumulet: surfaces alone", [&] { g.draw_surfaces_alone(shot, frame); });
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.tell(shot, frame, result);
-    gl_beside_volumes_ = g.bytes() - g.scene().data_bytes();
+    gl_beside_volumes_ = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
     share_gl();
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
     if (busy()) {

@@ -133,6 +133,64 @@ TEST(Allotment, CountsPixelsAtTheEdges) {
   EXPECT_EQ(allotment.live({0U, 0U}), 1U);
 }
 
+// A last row that is alone goes by the square above it.
+TEST(Allotment, ALastRowDoesNotDecideAboutItself) {
+  Allotment allotment;
+  allotment.begin({8U, 9U});
+  const std::array dark_row{SquareError{{32.0, 32.0}, 64.0, 64.0}, SquareError{{0.0, 0.0}, 8.0, 8.0}};
+  allotment.decide(dark_row, 0.1, 16);
+  EXPECT_EQ(allotment.live({0U, 1U}), 1U);
+}
+
+// Pixels that are 1/p by chance p, else 0: the mean of all is 1, whether they are adaptive or not.
+TEST(Allotment, RareLightIsNotLost) {
+  constexpr unsigned squares = 32;
+  constexpr double target = 0.5;
+  std::mt19937_64 random(3);
+  const auto chance_of = [](unsigned square) { return square < squares / 2 ? 0.002 : 0.9; };
+  double sum = 0.0;
+  constexpr int pictures = 60;
+  for (int picture = 0; picture < pictures; ++picture) {
+    Allotment allotment;
+    allotment.begin({8U * squares, 8U});
+    std::vector<double> total(std::size_t{64} * squares);
+    std::vector<double> of_squares(total.size());
+    std::vector<double> count(total.size());
+    for (double samples = 16.0;; samples = std::ceil(samples * std::sqrt(2.0))) {
+      std::vector<SquareError> errors(squares);
+      double squared = 0.0;
+      double brightness = 0.0;
+      for (std::size_t i = 0; i < total.size(); ++i) {
+        const auto x = static_cast<unsigned>(i % (8 * squares));
+        const auto y = static_cast<unsigned>(i / (8 * squares));
+        const double p = chance_of(x / 8);
+        if (allotment.is_live({x, y})) {
+          std::binomial_distribution<int> hits(static_cast<int>(samples - count[i]), p);
+          const double found = hits(random);
+          total[i] += found / p;
+          of_squares[i] += found / (p * p);
+          count[i] = samples;
+        }
+        const double mean = total[i] / count[i];
+        const double variance = (of_squares[i] / count[i] - mean * mean) / (count[i] - 1.0);
+        SquareError& error = errors[x / 8];
+        error.squared.at(y % 2) += variance;
+        error.brightness += mean;
+        error.pixels += 1.0;
+        squared += variance;
+        brightness += mean;
+      }
+      const auto pixels = static_cast<double>(total.size());
+      if (std::sqrt(squared / pixels) <= target * brightness / pixels || samples > 20000.0) {
+        sum += brightness / pixels;
+        break;
+      }
+      allotment.decide(errors, target, static_cast<std::uint32_t>(samples));
+    }
+  }
+  EXPECT_NEAR(sum / pictures, 1.0, 0.02);
+}
+
 TEST(Allotment, GoesOnFromWhatIsSaved) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> value(0.0, 3.0);

@@ -235,6 +235,42 @@ TEST_F(Limits, GlMemoryIsKeptByCoarserCells) {
   EXPECT_EQ(stats_of(viewer).cells, all.cells);
 }
 
+// By shaders, which take more while they build, and to the same cells however often.
+TEST_F(Limits, GlMemoryIsKeptWhereGlBuilds) {
+  std::vector<std::string> lines;
+  const ViewerPtr viewer =
+      make_viewer({.get_proc = Context::get_proc,
+                   .user = &context_,
+                   .log = [](void* user, cumulet_log_level,
+                             const char* line) { static_cast<std::vector<std::string>*>(user)->emplace_back(line); },
+                   .log_user = &lines,
+                   .samples = 2});
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.build = CUMULET_BUILD_GPU;
+  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+  const VolumeRef large = make_ball(96);
+  picture_of(viewer.get(), large.get(), target_);
+  const cumulet_stats all = stats_of(viewer);
+  ASSERT_EQ(all.limited, 0);
+  picture_of(viewer.get(), make_ball(12).get(), target_);
+  const std::uint64_t room = stats_of(viewer).gl_bytes + 4 * all.cell_bytes;
+  limit(viewer, 0, room);
+  picture_of(viewer.get(), large.get(), target_);
+  const std::uint64_t cells = stats_of(viewer).cells;
+  EXPECT_EQ(stats_of(viewer).limited, 1);
+  EXPECT_GT(cells, all.cells / 20);
+  auto whole = target_.frame();
+  whole.target = CUMULET_TARGET_NONE;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+    converge(viewer.get(), whole);
+    EXPECT_EQ(stats_of(viewer).cells, cells);
+    EXPECT_LE(stats_of(viewer).gl_bytes, room);
+  }
+  for (const std::string& line : lines) EXPECT_EQ(line.find("on the CPU"), std::string::npos) << line;
+}
+
 TEST_F(Limits, GlMemoryIsKept) {
   const VolumeRef small = make_ball(12);
   const VolumeRef large = make_ball(96);

@@ -1070,7 +1070,8 @@ typedef struct cumulet_limits_desc {
    */
   uint64_t memory_bytes;
   /*
-   * GL memory. Cells, not instances', are as coarse as two fifths of what the rest leaves take (cumulet_stats.limited).
+   * GL memory. Cells, not instances', are as coarse as two fifths of what the rest leaves take (cumulet_stats.limited);
+   * the rest is what there was in the last frame, so pictures of a first one are not foreseen. Voxels are as they are.
    * A volume that would yet bring gl_bytes above it, beside the one before, is not uploaded, and that one stays:
    * cumulet_render tells CUMULET_ERROR_OUT_OF_MEMORY once. Surfaces and pictures count, and are not refused.
    */
@@ -1118,7 +1119,8 @@ typedef enum cumulet_build {
      (density, what glows, colour, anisotropy, velocity) but for a rounding. A worker computes once, a volume and
      medium, what does not depend on the view; a camera that moves then costs the device's passes alone. A grid that is
      larger than the driver's storage blocks, or whose making takes more GL memory than there is or
-     cumulet_limits_desc.gl_bytes allows, is built by the CPU, which the log says with the reason */
+     cumulet_limits_desc.gl_bytes allows, or that moves while the shutter is open, is built by the CPU, which the log
+     says with the reason */
   CUMULET_BUILD_GPU = 1
 } cumulet_build;
 
