@@ -871,9 +871,6 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = most_samples;
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
     throw UsageError("--light-groups needs an .exr to write to");
-  if (app.count("--adaptive") > 0 && options.scene.sampling.adaptive == 1 &&
-      options.scene.sampling.noise_target_percent == 0.0F)
-    throw UsageError("--adaptive needs a --noise-target");
   check_together(options, app.count("--first-sample") > 0);
   // As all flags of the scene's: files of pictures that differ in it have another scene's hash.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;

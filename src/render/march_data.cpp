@@ -101,12 +101,20 @@ static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 
 // What a grid's cells have in channels, one after another.
 struct ChannelBytes {
+  // cells, glowing: of a plan.
   ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing)
       : glow(glowing * sizeof(scene::GlowingCell)) {
     using grid::Channel;
+    if (const grid::TetGrid* made = source.grid.get()) {
+      emission = channel_bytes(Channel::emission, made->emission.size());
+      velocity = channel_bytes(Channel::velocity, made->velocity.size());
+      change = made->change.size() * sizeof(glm::uvec2);  // GL makes none
+      colour = channel_bytes(Channel::colour, made->colour.size());
+      anisotropy = channel_bytes(Channel::anisotropy, made->anisotropy.size());
+      return;
+    }
     if (source.emits()) emission = channel_bytes(Channel::emission, cells);
     if (source.moves()) velocity = channel_bytes(Channel::velocity, cells);
-    if (source.changes()) change = source.grid->change.size() * sizeof(glm::uvec2);  // GL makes none
     if (source.coloured()) colour = channel_bytes(Channel::colour, cells);
     if (source.anisotropic()) anisotropy = channel_bytes(Channel::anisotropy, cells);
   }

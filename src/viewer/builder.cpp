@@ -82,15 +82,15 @@ std::uint64_t cells_that_fit_gl(const grid::Channels& channels, const Allowance&
   return (most - std::min(most, tables)) / bytes_a_cell(channels);
 }
 
-// Of a plan, where GL builds the cells: beside them there are the lattice, what it builds of, the grid before and a
-// copy.
+// Of a plan, where GL builds the cells: beside them there are the lattice, what it builds of, the grid before, a copy,
+// and what is left of the heap's pages.
 std::uint64_t planned_cells_that_fit_gl(const grid::Channels& channels, const grid::Lattice& lattice,
                                         const Allowance& allowance) {
   const std::uint64_t most = allowance.gl_cell_bytes();
   if (most == Allowance::no_limit) return most;
   constexpr std::uint64_t tree_bytes = 80;
   constexpr std::uint64_t glowing_bytes = 28;
-  const std::uint64_t a_cell = 3 * bytes_a_cell(channels) + tree_bytes + (channels.emission ? glowing_bytes : 0);
+  const std::uint64_t a_cell = 4 * bytes_a_cell(channels) + tree_bytes + (channels.emission ? glowing_bytes : 0);
   const std::uint64_t left = most / 2 * 5;  // Viewer::share_gl
   const std::uint64_t held = lattice.device_bytes() + tables;
   return (left - std::min(left, held)) / a_cell;

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 #include <tbb/parallel_sort.h>
+#include <tbb/partitioner.h>
 
 #include <algorithm>
 #include <atomic>
@@ -243,14 +244,16 @@ Box box_of_active(const ActiveMask& mask, glm::ivec3 origin) {
 bool detail::HeldLeaves::sweep(const Visit& visit, Progress* progress, Portion portion) const {
   ProgressPart part(progress, portion.from, portion.to, count());
   std::atomic<bool> wanted = true;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count(), 64), [&](const tbb::blocked_range<std::size_t>& range) {
+  const auto visit_some = [&](const tbb::blocked_range<std::size_t>& range) {
     std::array<float, brick_voxels> room;
     for (std::size_t i = range.begin(); i != range.end() && wanted; ++i) {
       values(i, room.data());
       if (!visit(i, room)) wanted = false;
     }
     part.add(range.size());
-  });
+  };
+  // In small parts, after each of which progress is told.
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count(), 64), visit_some, tbb::simple_partitioner());
   return wanted;
 }
 
