@@ -26,7 +26,7 @@ struct Instance {
   core::CmMedium medium{};
   bool hidden_from_camera = false;
   std::optional<PlaceEnds> ends = {};  ///< as the place; nothing: it stands still
-  GlowSum glow{};  ///< of the source's cells
+  GlowSum glow{};                      ///< of the source's cells
 };
 
 /// All arrays go into buffers as they are; ends behind the records.

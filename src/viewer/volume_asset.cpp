@@ -159,8 +159,7 @@ std::shared_ptr<const VolumeAsset> VolumeAsset::while_open(double seconds, Progr
   drop(exposed_);
   volume::VolumeFrame open = volume::advect(*frame_, -0.5 * seconds, &progress);
   volume::VolumeFrame close = volume::advect(*frame_, 0.5 * seconds, &progress);
-  put(exposed_,
-      Exposed{seconds, std::make_shared<const VolumeAsset>(std::move(open), std::move(close), &progress)});
+  put(exposed_, Exposed{seconds, std::make_shared<const VolumeAsset>(std::move(open), std::move(close), &progress)});
   return exposed_->asset;
 }
 
