@@ -71,7 +71,7 @@ std::shared_ptr<ModelData> ModelData::plan(const gl::FunctionsPtr& gl, const gl:
       continue;
     }
     const std::size_t from = std::size_t{was->first} * sizeof(glm::uvec4);
-    upload.add_pieces(size, [gl, to, last, at = place_at(part.first), from](std::size_t first, std::size_t count) {
+    upload.add_pieces(size, [gl, last, at = place_at(part.first), from](std::size_t first, std::size_t count) {
       const Upload::Place place = at();
       gl->CopyNamedBufferSubData(last->words_.buffer(), place.buffer,
                                  static_cast<GLintptr>(last->words_.offset() + from + first),

@@ -39,41 +39,44 @@ class BrickChange {
   std::array<volume::BrickValues::Brick, 2> rooms_{};
 };
 
+// Behind the others. values: null where all are the node's.
+void add_brick(MarchSource& source, const grid::Statistics::Node& node, const float* values,
+               const BrickChange* change) {
+  const float scale = source.density_a_value();
+  for (int i = 0; i < volume::brick_voxels; ++i) {
+    source.brick_values.push_back(glm::packHalf1x16((values == nullptr ? node.uniform : values[i]) * scale));
+    if (source.channels.ends)
+      source.brick_changes.push_back(glm::packHalf1x16(change != nullptr ? (*change)[i] : 0.0F));
+  }
+}
+
 void pack_bricks(MarchSource& source) {
   const grid::Statistics& statistics = *source.statistics;
   const ivec3 first = source.box_low >> 3;
   source.brick_count = ((source.box_low + source.box_size + 7) >> 3) - first;
   constexpr std::uint32_t empty = 0xfffffffeU;
   std::unordered_map<float, std::uint32_t> uniform_slots;
-  const float scale = source.density_a_value();
   std::uint32_t count = 0;
   volume::BrickValues::Brick room;
-  BrickChange change(source.channels.ends.get(), scale);
+  BrickChange change(source.channels.ends.get(), source.density_a_value());
+  const auto pack = [&](const ivec3& corner) {
+    const grid::Statistics::Node& node = statistics.node_at(corner);
+    const bool dark = !source.channels.emission || source.channels.emission->is_zero(corner);
+    const bool changes = change.look_up(corner);
+    if (node.is_uniform() && node.uniform == 0.0F && dark) return source.brick_slots.push_back(empty);
+    if (node.is_uniform() && !changes) {
+      const auto [found, added] = uniform_slots.emplace(node.uniform, count);
+      source.brick_slots.push_back(found->second);
+      if (!added) return;
+    } else {
+      source.brick_slots.push_back(count);
+    }
+    ++count;
+    add_brick(source, node, node.is_uniform() ? nullptr : statistics.values(node, room), changes ? &change : nullptr);
+  };
   for (int z = 0; z < source.brick_count.z; ++z) {
     for (int y = 0; y < source.brick_count.y; ++y) {
-      for (int x = 0; x < source.brick_count.x; ++x) {
-        const ivec3 corner = (first + ivec3(x, y, z)) * 8;
-        const grid::Statistics::Node& node = statistics.node_at(corner);
-        const bool dark = !source.channels.emission || source.channels.emission->is_zero(corner);
-        const bool changes = change.look_up(corner);
-        if (node.is_uniform() && node.uniform == 0.0F && dark) {
-          source.brick_slots.push_back(empty);
-          continue;
-        }
-        if (node.is_uniform() && !changes) {
-          const auto [found, added] = uniform_slots.emplace(node.uniform, count);
-          source.brick_slots.push_back(found->second);
-          if (!added) continue;
-        } else {
-          source.brick_slots.push_back(count);
-        }
-        ++count;
-        const float* values = node.is_uniform() ? nullptr : statistics.values(node, room);
-        for (int i = 0; i < volume::brick_voxels; ++i) {
-          source.brick_values.push_back(glm::packHalf1x16((values == nullptr ? node.uniform : values[i]) * scale));
-          if (source.channels.ends) source.brick_changes.push_back(glm::packHalf1x16(changes ? change[i] : 0.0F));
-        }
-      }
+      for (int x = 0; x < source.brick_count.x; ++x) pack((first + ivec3(x, y, z)) * 8);
     }
   }
   if (source.brick_values.empty()) source.brick_values.resize(volume::brick_voxels);
