@@ -300,6 +300,10 @@ class Viewer {
   [[nodiscard]] Followed follow(std::shared_ptr<Sequence> sequence, std::optional<BuildSettings> settings);
   // Tells the shelf of its newest wish, and looks what is there.
   void tell_wish(Followed& f, FrameShelf& shelf) const;
+  // What was taken last of all that plays is in this frame.
+  void note_rendered();
+  // Whether a frame or a state is ready, and not taken until the one before is seen.
+  [[nodiscard]] bool something_waits() const;
   // What is to be shown of it now, if that may change.
   [[nodiscard]] std::optional<FrameShelf::Ready> take(Followed& f, const FrameShelf& shelf) const;
   // It is this from now on. Returns false if it was.

@@ -181,6 +181,20 @@ void Viewer::note_drawn(const Context& g, Watched& w) {
   ++w.told.drawn_count;
 }
 
+void Viewer::note_rendered() {
+  if (followed_) followed_->is_rendered = true;
+  for (const PlayedPtr& played : played_) played->followed.is_rendered = true;
+  if (watched_) watched_->is_rendered = true;
+  for (const WatchingPtr& watching : watching_) watching->watched.is_rendered = true;
+}
+
+bool Viewer::something_waits() const {
+  const auto is_due = [](const PlayedPtr& played) { return played->followed.take_due; };
+  const auto waits = [](const WatchingPtr& watching) { return watching->watched.waits; };
+  return (followed_ && followed_->take_due) || (watched_ && watched_->waits) || std::ranges::any_of(played_, is_due) ||
+         std::ranges::any_of(watching_, waits);
+}
+
 FrameResult Viewer::render(const Frame& frame) {
   const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
@@ -209,10 +223,7 @@ FrameResult Viewer::render(const Frame& frame) {
       prepare(frame);
       if (frame.budget_ms >= 0.0) g.upload(shot(), {page_texels_, most_gl_bytes_}, deadline);
     });
-    if (followed_) followed_->is_rendered = true;
-    for (const PlayedPtr& played : played_) played->followed.is_rendered = true;
-    if (watched_) watched_->is_rendered = true;
-    for (const WatchingPtr& watching : watching_) watching->watched.is_rendered = true;
+    note_rendered();
     follow_upload(g);
     const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
@@ -228,10 +239,7 @@ FrameResult Viewer::render(const Frame& frame) {
     }
     if (watched_) note_drawn(g, *watched_);
     for (const WatchingPtr& watching : watching_) note_drawn(g, watching->watched);
-    const auto is_due = [](const PlayedPtr& played) { return played->followed.take_due; };
-    const auto waits = [](const WatchingPtr& watching) { return watching->watched.waits; };
-    if ((followed_ && followed_->take_due) || (watched_ && watched_->waits) || std::ranges::any_of(played_, is_due) ||
-        std::ranges::any_of(watching_, waits)) {
+    if (something_waits()) {
       result.more = true;
       result.converged = false;
     }
