@@ -85,11 +85,10 @@ struct Built {
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
 
 /// Of a volume, on this thread. Throws Error(cancelled), and what its parts throw.
-/// What GL builds is planned: the job is done once GL can begin. What moves while the shutter is open is built here, which
-/// the log is told.
-/// Cells are as coarse as the allowance's memory takes, main and GL's; where it does not do for the coarsest,
-/// Error(out_of_memory). before: of a camera in motion the plan that is shown, whose cells do not come and go without
-/// need.
+/// What GL builds is planned: the job is done once GL can begin. What moves while the shutter is open is built here,
+/// which the log is told. Cells are as coarse as the allowance's memory takes, main and GL's; where it does not do for
+/// the coarsest, Error(out_of_memory). before: of a camera in motion the plan that is shown, whose cells do not come
+/// and go without need.
 [[nodiscard]] Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettings& settings,
                                Progress& progress, const Allowance& allowance = {},
                                const scene::GridPlanPtr& before = nullptr);
