@@ -8,12 +8,11 @@ namespace cumulet::render {
 void Allotment::begin(glm::uvec2 size) {
   size_ = size;
   squares_ = (size + edge - 1U) / edge;
-  const std::size_t count = std::size_t{squares_.x} * squares_.y;
-  live_.assign(count, 0);
-  halves_.assign(count, {});
-  for_each_half([&](const Half&, std::size_t square, unsigned number, double) {
-    live_[square] = static_cast<std::uint8_t>(live_[square] | 1U << number);
-  });
+  live_.clear();
+  live_.reserve(std::size_t{squares_.x} * squares_.y);
+  for (unsigned y = 0; y < squares_.y; ++y)
+    live_.insert(live_.end(), squares_.x, pixels({0U, y}, 1) > 0 ? std::uint8_t{3} : std::uint8_t{1});
+  halves_.clear();
   decided_ = false;
 }
 
@@ -34,7 +33,7 @@ void Allotment::for_each_half(Visit&& visit) {
       const glm::uvec2 square(x, y);
       for (unsigned half = 0; half < 2; ++half) {
         const std::uint32_t count = pixels(square, half);
-        if (count > 0) visit(halves_[index(square)][half], index(square), half, double(count));
+        if (count > 0) visit(halves_[index(square)][half], square, half, double(count));
       }
     }
   }
@@ -46,7 +45,7 @@ double Allotment::even_out(double squared) {
   for (int step = 0; step < most_steps; ++step) {
     double left = squared;
     double deviations = 0.0;
-    for_each_half([&](const Half& half, std::size_t, unsigned, double count) {
+    for_each_half([&](const Half& half, glm::uvec2, unsigned, double count) {
       if (half.deviation <= least * half.samples) {
         left -= count * half.deviation * half.deviation / std::max(1U, half.samples);
       } else {
@@ -71,52 +70,50 @@ void Allotment::decide(std::span<const SquareError> errors, double noise_target,
   }
   const double mean = brightness / std::max(1.0, all);
   const double squared = noise_target * mean * noise_target * mean;  // a pixel
-  const auto rests = [&](std::size_t square, unsigned half) { return (live_[square] >> half & 1U) == 0; };
-  for_each_half([&](Half& half, std::size_t square, unsigned number, double) {
-    if (!rests(square, number)) half.samples = samples;
+  halves_.resize(live_.size());
+  for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
+    if (is_live(square, number)) half.samples = samples;
   });
-  const auto own = [&](std::size_t square, unsigned half) {
-    const glm::uvec2 at(square % squares_.x, square / squares_.x);
-    return errors[square].squared.at(half) / std::max(1U, pixels(at, half));
+  const auto own = [&](glm::uvec2 square, unsigned half) {
+    return errors[index(square)].squared.at(half) / std::max(1U, pixels(square, half));
   };
-  for_each_half([&](Half& half, std::size_t square, unsigned number, double) {
-    const glm::uvec2 at(square % squares_.x, square / squares_.x);
-    const bool alone = pixels(at, 1 - number) == 0;
+  for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
+    const bool alone = pixels(square, 1 - number) == 0;
     // Of a last row that is alone the square above; of a picture that is no more than that itself.
-    const std::size_t teller = alone && at.y > 0 ? square - squares_.x : square;
+    const glm::uvec2 teller = alone && square.y > 0 ? square - glm::uvec2(0U, 1U) : square;
     const unsigned other = alone ? number : 1 - number;
-    half.deviation = std::sqrt(own(teller, other) * halves_[teller].at(other).samples);
+    half.deviation = std::sqrt(own(teller, other) * halves_[index(teller)].at(other).samples);
   });
   const double ratio = even_out(squared * all);
   bool any = false;
-  for_each_half([&](Half& half, std::size_t square, unsigned number, double) {
+  for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
     half.wanted = ratio > 0.0 ? half.deviation / ratio : 0.0;
-    const bool rested = rests(square, number);
+    const bool rests = !is_live(square, number);
     // What is so rare that neither half has found it is looked for now and then.
-    const bool forgotten = rested && samples >= looked_after * half.samples;
-    const bool goes_on = half.wanted > (rested ? woken : 1.0) * half.samples || forgotten;
-    live_[square] = static_cast<std::uint8_t>((live_[square] & ~(1U << number)) | (goes_on ? 1U << number : 0U));
+    const bool forgotten = rests && samples >= looked_after * half.samples;
+    const bool goes_on = half.wanted > (rests ? woken : 1.0) * half.samples || forgotten;
+    set_live(square, number, goes_on);
     any = any || goes_on;
   });
   decided_ = true;
   if (any) return;
   // The halves' own samples show more noise than the others' told.
-  for_each_half([&](Half& half, std::size_t square, unsigned number, double) {
+  for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
     if (own(square, number) <= squared) return;
     half.wanted = own(square, number) / squared * half.samples;
-    live_[square] = static_cast<std::uint8_t>(live_[square] | 1U << number);
+    set_live(square, number, true);
   });
 }
 
 double Allotment::expected(double most) const {
+  if (!decided_) return most * size_.x * size_.y;
   double sum = 0.0;
   for (unsigned y = 0; y < squares_.y; ++y) {
     for (unsigned x = 0; x < squares_.x; ++x) {
       for (unsigned number = 0; number < 2; ++number) {
         const glm::uvec2 square(x, y);
         const Half& half = halves_[index(square)].at(number);
-        const bool goes_on = (live(square) >> number & 1U) != 0;
-        const double each = decided_ ? (goes_on ? std::max<double>(half.samples, half.wanted) : half.samples) : most;
+        const double each = is_live(square, number) ? std::max<double>(half.samples, half.wanted) : half.samples;
         sum += pixels(square, number) * std::min(most, each);
       }
     }
@@ -124,12 +121,17 @@ double Allotment::expected(double most) const {
   return sum;
 }
 
+void Allotment::set_live(glm::uvec2 square, unsigned half, bool live) {
+  std::uint8_t& bits = live_[index(square)];
+  bits = static_cast<std::uint8_t>((bits & ~(1U << half)) | (live ? 1U << half : 0U));
+}
+
 void Allotment::restore(std::span<const std::uint8_t> saved,
                         const std::function<std::uint32_t(glm::uvec2 pixel)>& samples_of) {
   std::ranges::copy(saved, live_.begin());
-  for_each_half([&](Half& half, std::size_t square, unsigned number, double) {
-    const glm::uvec2 at(square % squares_.x, square / squares_.x);
-    half.samples = samples_of(edge * at + glm::uvec2(0U, number));
+  halves_.resize(live_.size());
+  for_each_half([&](Half& half, glm::uvec2 square, unsigned number, double) {
+    half.samples = samples_of(edge * square + glm::uvec2(0U, number));
   });
   decided_ = false;
 }

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "path_blocks.glsl"
 #include "render/pace.hpp"
 
 namespace cumulet::render {
@@ -24,7 +25,7 @@ namespace cumulet::render {
 /// left, do their own errors decide.
 class Allotment {
  public:
-  static constexpr unsigned edge = 8;
+  static constexpr unsigned edge = CM_SQUARE_EDGE;
 
   /// Of a picture of that size, all of which is sampled.
   void begin(glm::uvec2 size);
@@ -37,7 +38,7 @@ class Allotment {
   [[nodiscard]] glm::uvec2 squares() const { return squares_; }
   /// Of a square: bit 0 its even rows, bit 1 its odd, where they are sampled.
   [[nodiscard]] std::uint32_t live(glm::uvec2 square) const { return live_[index(square)]; }
-  [[nodiscard]] bool is_live(glm::uvec2 pixel) const { return (live(pixel / edge) >> (pixel.y & 1U) & 1U) != 0; }
+  [[nodiscard]] bool is_live(glm::uvec2 pixel) const { return is_live(pixel / edge, pixel.y & 1U); }
   /// How many pixels of a square are sampled.
   [[nodiscard]] std::uint32_t live_pixels(glm::uvec2 square) const;
 
@@ -52,6 +53,8 @@ class Allotment {
     double deviation = 0.0;
   };
   [[nodiscard]] std::size_t index(glm::uvec2 square) const { return std::size_t{square.y} * squares_.x + square.x; }
+  [[nodiscard]] bool is_live(glm::uvec2 square, unsigned half) const { return (live(square) >> half & 1U) != 0; }
+  void set_live(glm::uvec2 square, unsigned half, bool live);
   [[nodiscard]] std::uint32_t pixels(glm::uvec2 square, unsigned half) const;
   // Calls visit with each half that has pixels, its square, its number there and its pixels.
   template <class Visit>
@@ -62,7 +65,7 @@ class Allotment {
   glm::uvec2 size_{0U};
   glm::uvec2 squares_{0U};
   std::vector<std::uint8_t> live_;
-  std::vector<std::array<Half, 2>> halves_;
+  std::vector<std::array<Half, 2>> halves_;  // empty until something is decided
   bool decided_ = false;
 };
 

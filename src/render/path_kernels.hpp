@@ -26,7 +26,6 @@ class PathKernels {
   static constexpr std::uint32_t block_width = CM_BLOCK_WIDTH;
   static constexpr std::uint32_t block_height = CM_BLOCK_HEIGHT;
   static constexpr std::uint32_t begins_pass = CM_BEGINS;
-  static constexpr std::uint32_t square_edge = CM_SQUARE_EDGE;
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 

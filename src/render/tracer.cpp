@@ -22,6 +22,8 @@ namespace {
 constexpr std::uint32_t tile_edge = 512;
 constexpr std::uint32_t block_width = PathKernels::block_width;
 constexpr std::uint32_t block_height = PathKernels::block_height;
+static_assert(tile_edge / block_width * (tile_edge / block_height) <= CM_MOST_BLOCKS);
+static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= Flights::most_words, "told at once");
 constexpr double hasty_rest = 0.03;  // of a tile's pixels
 constexpr std::uint32_t most_rounds = 65536;
 constexpr std::uint32_t longest_pass = 64;
@@ -146,7 +148,7 @@ void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) 
   // Lanes that are done for good begin again; so do the others' present samples, with the same result.
   if (done_ || retargeted || (tiles_ == glm::uvec2(1U) && !noise_target_)) {
     tile_ = 0;
-    errors_.assign(errors_.size(), {});
+    errors_.clear();
     if (done_ || !noise_target_) pass_target_ = pass_after(pass_target_);
     begin_tile();
   }
@@ -158,7 +160,7 @@ void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) 
 
 void Picture::go_on_from(const Accumulated& told, std::optional<std::uint32_t> pass) {
   tile_ = 0;
-  errors_.assign(errors_.size(), {});
+  errors_.clear();
   noise_.reset();
   samples_ = std::make_shared<std::uint64_t>(told.all);
   progress_before_ = 0.0;
@@ -223,6 +225,7 @@ void Picture::end_tile() {
   if (measures()) {
     if (!tile_errors_ || tile_errors_->empty()) return;
     const glm::uvec2 squares = tile_squares();
+    errors_.resize(allotment_.saved().size());
     for (std::uint32_t y = 0; y < squares.y; ++y) {
       const glm::uvec2 first = first_square() + glm::uvec2(0U, y);
       std::copy_n(tile_errors_->begin() + std::size_t{y} * squares.x, squares.x,
@@ -257,7 +260,7 @@ void Picture::end_pass() {
     }
     expected_samples_ = adaptive_ ? allotment_.expected(target_samples_) : each * static_cast<double>(box_.area());
   }
-  errors_.assign(errors_.size(), {});
+  errors_.clear();
   if (pass_target_ >= target_samples_) {
     done_ = true;
   } else if (!done_) {
@@ -565,7 +568,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.holes_ = true;
   picture.pass_target_ = picture.pass_after(0);
   picture.allotment_.begin(box.size);
-  picture.errors_.assign(std::size_t{picture.allotment_.squares().x} * picture.allotment_.squares().y, {});
+  picture.errors_.clear();
   picture.noise_.reset();
   picture.progress_before_ = 0.0;
   picture.samples_before_ = 0;

@@ -188,7 +188,6 @@ class Picture {
     return box_.first + glm::uvec2(tile_ % tiles_.x, tile_ / tiles_.x) * tile_size_;
   }
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, box_.first + box_.size - tile_corner()); }
-  bool motion_ = false;  // something moves while the shutter is open
   // Samples of each pixel after a pass that ends with so many.
   [[nodiscard]] std::uint32_t pass_after(std::uint32_t samples) const;
   // Whether the pass under way ends with a look at the noise.
@@ -214,12 +213,13 @@ class Picture {
   std::uint32_t view_row_ = 0;              // a debug view is made by rows
   bool hasty_ = false;
   std::optional<double> noise_target_;
+  bool motion_ = false;  // something moves while the shutter is open
   bool adaptive_ = false;
   Allotment allotment_;
   std::vector<std::uint32_t> live_;            // of each block of the tile under way, of its squares what is sampled
   std::shared_ptr<SquareErrors> tile_errors_;  // of the tile under way, once it was asked for
-  SquareErrors errors_;                        // of the picture's squares, as far as this pass has come
-  std::optional<double> noise_;                // as of the last pass that was looked at
+  SquareErrors errors_;          // of the picture's squares, as far as this pass has come, where it is measured
+  std::optional<double> noise_;  // as of the last pass that was looked at
   // Progress: what it was when it was last known how many samples it would take, and then.
   double progress_before_ = 0.0;
   std::uint64_t samples_before_ = 0;
