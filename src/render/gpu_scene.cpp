@@ -128,15 +128,15 @@ void GpuScene::find_present(const scene::Snapshot& snapshot) {
   if (present_.empty()) present_ = data_of_;
 }
 
-bool GpuScene::anything_moves(const scene::Snapshot& snapshot) const {
-  return snapshot.view_ends->has_value() || std::ranges::any_of(present_, moves) ||
-         (placed_ && !placed_->table().ends.empty());
-}
+bool GpuScene::models_move() const { return placed_ && !placed_->table().ends.empty(); }
 
 void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& wanted) {
   // Where anything moves, a single one is a table, too: fewer programs. And what is a hole is known of those alone.
-  if (present_.empty() ||
-      (present_.size() < 2 && std::ranges::none_of(present_, is_hole) && !anything_moves(snapshot))) {
+  const auto stands_alone = [&] {
+    return present_.size() < 2 && std::ranges::none_of(present_, is_hole) && std::ranges::none_of(present_, moves) &&
+           !snapshot.view_ends->has_value() && !models_move();
+  };
+  if (present_.empty() || stands_alone()) {
     if (instances_) {
       data_revision_.advance();
       instances_revision_.advance();
@@ -577,7 +577,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Ob
   }
   p.view = view_of(view, eye_of(view.eye), size);
   const std::optional<scene::ViewEnds>& ends = *snapshot.view_ends;
-  if (instances_ && anything_moves(snapshot)) {
+  if (instances_ && (ends || instances_->moves() || models_move())) {
     p.shutter = shutter_of(ends ? *ends : scene::ViewEnds{view, view}, eye_of, size);
     p.shutter.lasts = 1U;
   }

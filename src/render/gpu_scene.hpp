@@ -107,7 +107,7 @@ class GpuScene {
   // Those of the snapshot whose data are here; one whose newest are not with those that came. Of none: what came.
   void find_present(const scene::Snapshot& snapshot);
   // While the shutter is open.
-  [[nodiscard]] bool anything_moves(const scene::Snapshot& snapshot) const;
+  [[nodiscard]] bool models_move() const;
   void update_instances(const scene::Snapshot& snapshot, const Wanted& wanted);
   [[nodiscard]] light::Lit ball_of(const scene::Volume& volume) const;
   // The mean over rays through the ball of all volumes that are here: of each, by how much of that it takes.

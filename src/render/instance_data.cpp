@@ -37,6 +37,7 @@ InstanceData InstanceData::make(const gl::FunctionsPtr& gl, const gl::Limits& li
     data.medium_.anisotropic |= instance.medium.anisotropic;
     data.medium_.changes |= instance.medium.changes;
   }
+  data.moves_ = !table.ends.empty() || data.medium_.changes != 0;
   data.glow_power_ = table.glow_power;
   data.glow_length_ = table.glow_length;
   data.bytes_ = record_bytes + node_bytes;

@@ -26,6 +26,8 @@ class InstanceData {
   /// Of all of them, as scene::GlowSum has both.
   [[nodiscard]] double glow_power() const { return glow_power_; }
   [[nodiscard]] double glow_length() const { return glow_length_; }
+  /// Whether any does while the shutter is open.
+  [[nodiscard]] bool moves() const { return moves_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
@@ -36,6 +38,7 @@ class InstanceData {
   glm::dvec3 origin_{0.0};
   double glow_power_ = 0.0;
   double glow_length_ = 0.0;
+  bool moves_ = false;
   std::uint64_t bytes_ = 0;
 };
 
