@@ -30,4 +30,7 @@ class Error : public std::runtime_error {
   ErrorCode code_;
 };
 
+/// What is being handled, as an Error; what: was begun, where there was not enough memory. Only in a handler.
+[[nodiscard]] Error caught(const std::string& what);
+
 }  // namespace cumulet

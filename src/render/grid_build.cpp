@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <exception>
 #include <numeric>
 #include <set>
 #include <span>
@@ -27,6 +26,7 @@ namespace {
 
 constexpr std::uint32_t group = 64;  // invocations of a work group, of all kernels here
 constexpr std::size_t roots_words = 52;
+constexpr double most_in_flight_ms = 8.0;  // whatever the deadline: the host draws, too
 
 // As glsl/grid_cells.comp has it.
 struct TreeCell {
@@ -35,6 +35,9 @@ struct TreeCell {
   glm::uvec2 where;
 };
 static_assert(sizeof(TreeCell) == 16);
+
+// With their links and their place in the order.
+constexpr std::uint64_t tree_cell_bytes = sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2);
 
 using BrickPointWords = std::array<std::uint32_t, (CM_BRICK_POINTS + 3) / 4 * 4>;
 BrickPointWords brick_point_words() {
@@ -197,6 +200,11 @@ std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells) {
   return cells * sizeof(glm::uvec2);
 }
 
+std::uint64_t building_bytes_a_cell(bool emits) {
+  // As many as there are leaves are no leaves.
+  return 2 * tree_cell_bytes + (emits ? glowing_words * sizeof(std::uint32_t) : 0);
+}
+
 std::uint64_t BuiltGrid::bytes() const {
   if (grid) return 0;
   std::uint64_t bytes = std::uint64_t{count} * (sizeof(grid::CellRecord) + 4) + 28 * sizeof(std::uint32_t);
@@ -295,8 +303,6 @@ double GridBuild::aim_ms() const {
 }
 
 bool GridBuild::has_room_in_flight() {
-  // What is on its way is bounded, whatever the deadline: the host draws, too.
-  constexpr double most_in_flight_ms = 8.0;
   if (in_flight_ms_ < most_in_flight_ms) return true;
   if (!fence_.passed()) return false;
   pace_->learn(in_flight_, milliseconds(std::chrono::steady_clock::now() - sent_), GridPace::Measured::at_most);
@@ -331,7 +337,7 @@ std::optional<std::uint32_t> GridBuild::dispatch(const Pass& pass, std::uint32_t
   if (in_flight_.empty()) sent_ = begun;
   in_flight_.push_back(sent);
   in_flight_ms_ += ms * items;
-  fence_ = gl::Fence(gl_);
+  if (in_flight_ms_ >= most_in_flight_ms) fence_ = gl::Fence(gl_);
   return first + items;
 }
 
@@ -435,7 +441,7 @@ void GridBuild::plan_cells() {
   built_.limited = state_.limited != 0;
   built_.levels = static_cast<std::uint32_t>(level_first.size() - 2);
   // Before any of it is made.
-  std::uint64_t needs = std::uint64_t{count} * (sizeof(TreeCell) + sizeof(glm::uvec4) + sizeof(glm::uvec2));
+  std::uint64_t needs = count * tree_cell_bytes;
   for (const grid::LatticeChannel& channel : data_->lattice().channels)
     needs += channel_bytes(channel.channel, built_.count);
   require_room(needs + built_.bytes());
@@ -576,10 +582,8 @@ std::future<Made> make_apart(const char* what, Work work) {
   const auto task = std::make_shared<std::packaged_task<Made()>>([what, work = std::move(work)] {
     try {
       return work();
-    } catch (const Error&) {
-      throw;
-    } catch (const std::exception& error) {
-      throw Error(ErrorCode::out_of_memory, std::string(what) + ": " + error.what());
+    } catch (...) {
+      throw caught(what);
     }
   });
   std::future<Made> made = task->get_future();

@@ -110,6 +110,8 @@ struct BuiltGrid {
 };
 /// Of the records of a channel of so many cells.
 std::uint64_t channel_bytes(grid::Channel channel, std::size_t cells);
+/// Of GL memory, what building a grid takes a cell beside what is built.
+std::uint64_t building_bytes_a_cell(bool emits);
 
 /// What kernels that build grids take, by how long they took: of an item, in ms.
 class GridPace {

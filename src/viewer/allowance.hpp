@@ -21,9 +21,9 @@ class Allowance {
   void set(unsigned threads, std::uint64_t memory_bytes);
   /// Of volumes and grids, in main memory.
   [[nodiscard]] std::uint64_t memory_bytes() const { return memory_bytes_; }
-  /// Of GL memory, what the cells of a volume may be: as many as fit are built. Of what is begun from now on.
-  void set_gl_cells(std::uint64_t bytes) { gl_cell_bytes_ = bytes; }
-  [[nodiscard]] std::uint64_t gl_cell_bytes() const { return gl_cell_bytes_; }
+  /// Of GL memory, what there is for volumes: as many cells as fit are built. Of what is begun from now on.
+  void set_gl(std::uint64_t bytes) { gl_bytes_ = bytes; }
+  [[nodiscard]] std::uint64_t gl_bytes() const { return gl_bytes_; }
   /// Throws Error(out_of_memory) where that is less; what: takes it, begins the line.
   void require(std::uint64_t bytes, const std::string& what) const;
   /// Does it on this thread, or one that works for it; waits until there is room.
@@ -40,7 +40,7 @@ class Allowance {
   unsigned threads_ = 0;
   std::shared_ptr<Arena> arena_;  // null: no limit
   std::atomic<std::uint64_t> memory_bytes_ = no_limit;
-  std::atomic<std::uint64_t> gl_cell_bytes_ = no_limit;
+  std::atomic<std::uint64_t> gl_bytes_ = no_limit;
 };
 using AllowancePtr = std::shared_ptr<const Allowance>;
 

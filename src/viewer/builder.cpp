@@ -5,6 +5,7 @@
 
 #include "base/apart.hpp"
 #include "grid/tet_grid.hpp"
+#include "render/grid_build.hpp"
 #include "viewer/stopwatch.hpp"
 #include "volume/advection.hpp"
 
@@ -51,10 +52,12 @@ namespace {
 // With its node of the tree, and what glows of it.
 std::uint64_t bytes_a_cell(const grid::Channels& channels) {
   std::uint64_t bytes = sizeof(grid::CellRecord) + sizeof(std::uint32_t);
-  if (channels.emission) bytes += sizeof(grid::EmissionRecord) + sizeof(scene::GlowingCell);
-  if (channels.scattering) bytes += sizeof(std::uint32_t);
-  if (channels.forward) bytes += sizeof(std::int16_t);
-  if (channels.momentum) bytes += sizeof(glm::uvec2);
+  using grid::Channel;
+  using render::channel_bytes;
+  if (channels.emission) bytes += channel_bytes(Channel::emission, 1) + sizeof(scene::GlowingCell);
+  if (channels.scattering) bytes += channel_bytes(Channel::colour, 1);
+  if (channels.forward) bytes += channel_bytes(Channel::anisotropy, 1);
+  if (channels.momentum) bytes += channel_bytes(Channel::velocity, 1);
   if (channels.ends) bytes += sizeof(glm::uvec2);
   return bytes;
 }
@@ -78,7 +81,8 @@ std::uint64_t cells_that_fit(const grid::Channels& channels, std::uint64_t held,
 }
 
 std::uint64_t cells_that_fit_gl(const grid::Channels& channels, const Allowance& allowance) {
-  const std::uint64_t most = allowance.gl_cell_bytes();
+  // What was there stays until all cells have come, and pictures may grow meanwhile.
+  const std::uint64_t most = allowance.gl_bytes() / 5 * 2;
   return (most - std::min(most, tables)) / bytes_a_cell(channels);
 }
 
@@ -86,14 +90,10 @@ std::uint64_t cells_that_fit_gl(const grid::Channels& channels, const Allowance&
 // and what is left of the heap's pages.
 std::uint64_t planned_cells_that_fit_gl(const grid::Channels& channels, const grid::Lattice& lattice,
                                         const Allowance& allowance) {
-  const std::uint64_t most = allowance.gl_cell_bytes();
-  if (most == Allowance::no_limit) return most;
-  constexpr std::uint64_t tree_bytes = 80;
-  constexpr std::uint64_t glowing_bytes = 28;
-  const std::uint64_t a_cell = 4 * bytes_a_cell(channels) + tree_bytes + (channels.emission ? glowing_bytes : 0);
-  const std::uint64_t left = most / 2 * 5;  // Viewer::share_gl
+  const std::uint64_t most = allowance.gl_bytes();
   const std::uint64_t held = lattice.device_bytes() + tables;
-  return (left - std::min(left, held)) / a_cell;
+  return (most - std::min(most, held)) /
+         (4 * bytes_a_cell(channels) + render::building_bytes_a_cell(channels.emission != nullptr));
 }
 
 }  // namespace

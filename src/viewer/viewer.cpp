@@ -303,7 +303,7 @@ Viewer::LiveStatus Viewer::Watched::status() const {
 Viewer::LiveStatus Viewer::live() { return watched().status(); }
 
 Viewer::LiveStatus Viewer::live(const Instance& instance) {
-  const Shown& shown = look_up(instance);
+  const Shown& shown = *look_up(instance);
   if (!shown.is_seen() || !shown.watching)
     throw Error(ErrorCode::invalid_argument, "the instance shows no live volume");
   return shown.watching->watched.status();
@@ -405,15 +405,15 @@ std::optional<Error> Viewer::frame_failure(std::uint32_t frame) {
   return frames_.failure_of(frame);
 }
 
-const Viewer::Shown& Viewer::look_up(const Instance& instance) {
+std::vector<Viewer::Shown>::iterator Viewer::look_up(const Instance& instance) {
   sync();
   const auto shown = find(instance);
   if (shown == shown_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the instance");
-  return *shown;
+  return shown;
 }
 
 const Viewer::Shown& Viewer::shown_sequence(const Instance& instance) {
-  const Shown& shown = look_up(instance);
+  const Shown& shown = *look_up(instance);
   if (!shown.is_seen() || !shown.played) throw Error(ErrorCode::invalid_argument, "the instance shows no sequence");
   return shown;
 }
@@ -539,10 +539,7 @@ void Viewer::add_instance(std::shared_ptr<Instance> instance) {
 }
 
 void Viewer::remove_instance(const Instance& instance) {
-  sync();
-  const auto place = find(instance);
-  if (place == shown_.end()) throw Error(ErrorCode::invalid_argument, "the viewer does not show the instance");
-  shown_.erase(place);
+  shown_.erase(look_up(instance));
   wishes_due_ = true;
   touch();
 }
@@ -903,13 +900,8 @@ void Viewer::rebuild() {
 }
 
 void Viewer::share_gl() {
-  if (most_gl_bytes_ == Allowance::no_limit) {
-    allowance_->set_gl_cells(Allowance::no_limit);
-    return;
-  }
-  // What was there stays until all cells have come, and pictures may grow meanwhile.
-  const std::uint64_t left = most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_);
-  allowance_->set_gl_cells(left / 5 * 2);
+  const bool limited = most_gl_bytes_ != Allowance::no_limit;
+  allowance_->set_gl(limited ? most_gl_bytes_ - std::min(most_gl_bytes_, gl_beside_volumes_) : Allowance::no_limit);
 }
 
 void Viewer::set_limits(const Limits& limits) {

@@ -272,7 +272,7 @@ class Viewer {
   void follow_upload(const Context& g);
   // Of grids that GL built, once they are there.
   void take_cells(const Context& g);
-  /// Tells builds what cells may take of GL memory.
+  // Tells builds what of GL memory the last frame left for volumes.
   void share_gl();
   // Of what is shown, this sequence's.
   [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
@@ -530,7 +530,7 @@ class Viewer {
 
   [[nodiscard]] Followed& followed();
   // Throw Error(invalid_argument) for an instance that the viewer does not show, or that follows no sequence.
-  [[nodiscard]] const Shown& look_up(const Instance& instance);
+  [[nodiscard]] std::vector<Shown>::iterator look_up(const Instance& instance);
   [[nodiscard]] const Shown& shown_sequence(const Instance& instance);
   std::optional<Followed> followed_;  // that is shown in place of a volume
   [[nodiscard]] Watched& watched();

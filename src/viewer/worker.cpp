@@ -1,6 +1,5 @@
 #include "viewer/worker.hpp"
 
-#include <new>
 #include <utility>
 
 namespace cumulet::viewer {
@@ -21,18 +20,6 @@ std::optional<Error> failure_of(const Worker::Job& job, const AllowancePtr& allo
 }
 
 }  // namespace
-
-Error caught(const std::string& what) {
-  try {
-    throw;
-  } catch (const Error& error) {
-    return error;
-  } catch (const std::bad_alloc&) {
-    return {ErrorCode::out_of_memory, what + ": out of memory"};
-  } catch (const std::exception& error) {
-    return {ErrorCode::internal, std::string("internal error: ") + error.what()};
-  }
-}
 
 Worker::~Worker() {
   {

@@ -16,9 +16,6 @@
 
 namespace cumulet::viewer {
 
-/// What is being handled, as an Error; what: was begun, where there was not enough memory. Only in a handler.
-[[nodiscard]] Error caught(const std::string& what);
-
 /// A thread that does one job at a time; of those that wait, the newest. It begins with the first job. All calls are
 /// safe from any thread, but for jobs, which may only look.
 class Worker {
