@@ -407,6 +407,22 @@ bool fill(const LeafSource& leaves, const Box& bounds, Bricks& bricks, std::vect
   return true;
 }
 
+/// Whether the first that are read can be kept as halves.
+bool begins_with_halves(const LeafSource& leaves, const Box& bounds, const Bricks& bricks, double at) {
+  constexpr int enough = 256;
+  std::atomic<int> looked_at = 0;
+  std::atomic<bool> halves = true;
+  const auto look = [&](std::size_t leaf, std::span<float, brick_voxels> found) {
+    const std::size_t place = bricks.place[leaf];
+    if (place == bricks.origins.size()) return true;
+    std::array<std::uint16_t, brick_voxels> room;
+    if (!clean(found, bricks.origins[place], bounds).constant && !keep(found, room.data())) halves = false;
+    return halves && ++looked_at < enough;
+  };
+  leaves.sweep(look, nullptr, {at, at});
+  return halves;
+}
+
 /// Closes the gaps that constant bricks left.
 template <class T>
 void close_gaps(const Bricks& bricks, std::vector<T>& values, std::vector<glm::ivec3>& origins,
@@ -504,14 +520,15 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
     bricks.constant.resize(order.size());
     bricks.first.resize(order.size());
   }
-  // Halves first. What they do not hold is found early, but for odd files.
+  // Halves first, unless it shows at once, before there is room for all, that they do not do.
   const auto sweep = [&](auto values, Portion part) {
     if (!fill(leaves, bounds, bricks, values, progress, part)) return false;
     close_gaps(bricks, values, out.brick_origins, progress);
     out.brick_values = std::move(values);
     return true;
   };
-  if (!sweep(std::vector<std::uint16_t>(), portion.part(0.3, 1.0))) {
+  if (!begins_with_halves(leaves, bounds, bricks, portion.at(0.3)) ||
+      !sweep(std::vector<std::uint16_t>(), portion.part(0.3, 1.0))) {
     const double reached = progress != nullptr ? progress->fraction() : portion.at(0.3);
     sweep(std::vector<float>(), {reached, portion.to});
   }

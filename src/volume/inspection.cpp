@@ -49,13 +49,14 @@ struct Sums {
 
 using Histogram = std::array<std::uint64_t, histogram_bins>;
 
-/// Calls f(leaf, value) for every active voxel, on many threads at a time.
-template <typename Call>
-void for_active(const LeafSource& leaves, Call&& f) {
+/// Calls what take_of(leaf) returns with the value of each of the leaf's active voxels, on many threads at a time.
+template <typename TakeOf>
+void for_active(const LeafSource& leaves, TakeOf&& take_of) {
   const auto visit = [&](std::size_t leaf, std::span<const float, brick_voxels> values) {
     const ActiveMask mask = leaves.active(leaf);
+    const auto take = take_of(leaf);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      if (((mask[i / 64] >> (i % 64)) & 1U) != 0) f(leaf, values[i]);
+      if (((mask[i / 64] >> (i % 64)) & 1U) != 0) take(values[i]);
     }
     return true;
   };
@@ -93,7 +94,7 @@ GridValues values_of(const SourceGrid& source) {
 
   // A leaf's by itself: sums do not depend on who came first.
   std::vector<Sums> of_leaves(leaves.count());
-  for_active(leaves, [&](std::size_t leaf, float value) { of_leaves[leaf].add(value, 1); });
+  for_active(leaves, [&](std::size_t leaf) { return [&sums = of_leaves[leaf]](float value) { sums.add(value, 1); }; });
   Sums all;
   for (const Sums& leaf : of_leaves) all.add(leaf);
   for_active_tiles(source, [&](float value, std::uint64_t voxels) { all.add(value, voxels); });
@@ -111,7 +112,9 @@ GridValues values_of(const SourceGrid& source) {
     histogram[std::min(bin, histogram_bins - 1)] += voxels;
   };
   tbb::enumerable_thread_specific<Histogram> histograms([] { return Histogram{}; });
-  for_active(leaves, [&](std::size_t /*leaf*/, float value) { count(histograms.local(), value, 1); });
+  for_active(leaves, [&](std::size_t /*leaf*/) {
+    return [&count, &histogram = histograms.local()](float value) { count(histogram, value, 1); };
+  });
   for_active_tiles(source, [&](float value, std::uint64_t voxels) { count(out.histogram, value, voxels); });
   for (const Histogram& some : histograms)
     std::transform(some.begin(), some.end(), out.histogram.begin(), out.histogram.begin(), std::plus<>());
