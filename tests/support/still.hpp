@@ -34,6 +34,9 @@ class Still {
   void set_volume(volume::ScalarVolume volume) {
     set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(volume)));
   }
+  void set_volume(volume::VolumeFrame frame) {
+    set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+  }
   void set_volume(viewer::VolumeAssetPtr volume) { viewer_->set_volume(std::move(volume)); }
   void set_grid(const viewer::GridSettings& settings) {
     adaptive_ = settings.camera_adaptive;

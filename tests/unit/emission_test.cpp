@@ -267,9 +267,7 @@ TEST(Anisotropy, CellsAreSplitWhereItVaries) {
 
 class EmissionPicture : public test::ViewerTest {
  protected:
-  static void show(test::Still& viewer, VolumeFrame frame) {
-    viewer.set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
-  }
+  static void show(test::Still& viewer, VolumeFrame frame) { viewer.set_volume(std::move(frame)); }
   // Looks down -z at the middle of a slab of 64 x 64 voxels.
   static test::Picture look(test::Still& viewer, double from = 500.0, std::uint32_t samples = 64) {
     viewer.set_camera(test::camera_at({31.5, 31.5, from}, {31.5, 31.5, from - 1.0}, 0.5));

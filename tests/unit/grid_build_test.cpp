@@ -507,6 +507,16 @@ scene::MarchSourcePtr planned(const Reference& reference, const grid::LatticePtr
       scene::make_planned_source(std::move(plan), reference.volume, reference.statistics, {}));
 }
 
+// A volume's plan, and what the CPU makes of it.
+struct Planned {
+  explicit Planned(volume::ScalarVolume v) : reference(std::move(v)) {}
+  Reference reference;
+  grid::RefineSettings settings;
+  grid::LatticePtr lattice = reference.lattice(settings);
+  scene::MarchSourcePtr source = planned(reference, lattice, settings);
+  grid::TetGrid expected = reference.grid(settings);
+};
+
 constexpr std::uint64_t no_limit = std::numeric_limits<std::uint64_t>::max();
 
 void wait_for(render::GridBuilds& builds, const scene::MarchSourcePtr& source, std::uint64_t most_bytes = no_limit) {
@@ -526,48 +536,40 @@ void expect_of_the_cpu(const render::BuiltGrid& built, const grid::TetGrid& expe
 
 TEST_P(GridBuilds, WhatGlHasNoRoomForTheCpuBuilds) {
   const gl::StateGuard guard(*gl_);
-  const Reference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
-  const grid::RefineSettings settings;
-  const grid::LatticePtr lattice = reference.lattice(settings);
-  const scene::MarchSourcePtr source = planned(reference, lattice, settings);
-  const grid::TetGrid expected = reference.grid(settings);
-  const std::uint64_t held = upload(lattice, reference.statistics)->bytes();
+  const Planned plan(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
+  const std::uint64_t held = upload(plan.lattice, plan.reference.statistics)->bytes();
   struct Case {
     std::int64_t block;
     std::uint64_t most;
     const char* why;
   };
-  const auto cells = static_cast<std::int64_t>(expected.cells.size());
+  const auto cells = static_cast<std::int64_t>(plan.expected.cells.size());
   const std::array<Case, 4> cases{
       {{4096, no_limit, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE is 4096"},
        {24 * cells, no_limit, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE"},
        {limits_.storage_block_bytes, held / 2, "the lattice needs"},
-       {limits_.storage_block_bytes, held + 40 * expected.cells.size(), "building the grid needs"}}};
+       {limits_.storage_block_bytes, held + 40 * plan.expected.cells.size(), "building the grid needs"}}};
   for (const Case& c : cases) {
     SCOPED_TRACE(c.why);
     gl::Limits limits = limits_;
     limits.storage_block_bytes = c.block;
     render::GridBuilds builds(gl_, programs_, limits);
-    wait_for(builds, source, c.most);
-    ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(builds.built().at(source), expected, c.why));
+    wait_for(builds, plan.source, c.most);
+    ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(builds.built().at(plan.source), plan.expected, c.why));
     EXPECT_LE(builds.bytes(), held) << "nothing but a lattice is left";
     // Left before it is done, it ends by itself.
     builds.clear();
-    builds.advance({source}, {source}, c.most, Deadline::max());
+    builds.advance({plan.source}, {plan.source}, c.most, Deadline::max());
   }
   render::GridBuilds builds(gl_, programs_, limits_);
-  wait_for(builds, source);
-  EXPECT_FALSE(builds.built().at(source).grid);
+  wait_for(builds, plan.source);
+  EXPECT_FALSE(builds.built().at(plan.source).grid);
 }
 
 // Whatever cannot be made is no end of it: nothing of it stays, and the CPU builds the grid.
 TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
   const gl::StateGuard guard(*gl_);
-  const Reference reference(test::noise_volume({16, 16, 12}, glm::ivec3(0), 1));
-  const grid::RefineSettings settings;
-  const grid::LatticePtr lattice = reference.lattice(settings);
-  const scene::MarchSourcePtr source = planned(reference, lattice, settings);
-  const grid::TetGrid expected = reference.grid(settings);
+  const Planned plan(test::noise_volume({16, 16, 12}, glm::ivec3(0), 1));
   test::FakeGl fake(headless::Context::get_proc, context_.get());
   const gl::FunctionsPtr functions = gl::load_functions(test::FakeGl::get_proc, &fake);
   const auto before = fake.alive();
@@ -577,16 +579,16 @@ TEST_P(GridBuilds, AllocationsMayFailAtEveryPass) {
     {
       render::GridBuilds builds(functions, programs_, limits_);
       fake.fail_allocation(n);
-      wait_for(builds, source);
+      wait_for(builds, plan.source);
       fake.fail_allocation(-1);
-      const render::BuiltGrid& built = builds.built().at(source);
+      const render::BuiltGrid& built = builds.built().at(plan.source);
       if (!built.grid) break;
       ++failed;
-      ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(built, expected, ""));
+      ASSERT_NO_FATAL_FAILURE(expect_of_the_cpu(built, plan.expected, ""));
       // The next is GL's again.
       builds.clear();
-      wait_for(builds, source);
-      ASSERT_FALSE(builds.built().at(source).grid);
+      wait_for(builds, plan.source);
+      ASSERT_FALSE(builds.built().at(plan.source).grid);
     }
     ASSERT_EQ(fake.alive(), before);
   }

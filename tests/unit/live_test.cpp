@@ -114,9 +114,13 @@ void expect_same(const VolumeRef& a, const VolumeRef& b) {
 
 class CLive : public testing::Test {
  protected:
-  [[nodiscard]] ViewerPtr make() {
-    return make_viewer(
-        {.get_proc = Context::get_proc, .user = &context_, .log = Lines::add, .log_user = &lines_, .samples = 2});
+  [[nodiscard]] ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
+    return make_viewer({.get_proc = Context::get_proc,
+                        .user = &context_,
+                        .log = Lines::add,
+                        .log_user = &lines_,
+                        .samples = 2,
+                        .build = build});
   }
   Picture picture(cumulet_viewer* of) { return drawn_once(of, target_); }
   // Of a viewer of its own, which never showed another.
@@ -219,14 +223,7 @@ TEST_F(CLive, IsRefusedInOneLine) {
 // States whose grids GL builds: with and without channels, of sizes that change, each is what it is alone.
 TEST_F(CLive, AStatesGridIsGlsToo) {
   const LiveRef live = make_live();
-  auto grid = make_desc<cumulet_grid_desc>();
-  grid.build = CUMULET_BUILD_GPU;
-  const auto make_on_gl = [&] {
-    ViewerPtr viewer = make();
-    EXPECT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK) << cumulet_last_error(viewer.get());
-    return viewer;
-  };
-  const ViewerPtr viewer = make_on_gl();
+  const ViewerPtr viewer = make(CUMULET_BUILD_GPU);
   ASSERT_EQ(cumulet_set_live(viewer.get(), live.get()), CUMULET_OK);
   Picture before;
   for (int step = 0; step < 4; ++step) {
@@ -235,7 +232,7 @@ TEST_F(CLive, AStatesGridIsGlsToo) {
     hand_over(live, state);
     const Picture found = picture(viewer.get());
     EXPECT_NE(found, std::exchange(before, found)) << step;
-    const ViewerPtr single = make_on_gl();
+    const ViewerPtr single = make(CUMULET_BUILD_GPU);
     EXPECT_EQ(difference(found, picture_of(single.get(), alone(state).get(), target_)), "") << step;
   }
 }

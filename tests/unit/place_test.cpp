@@ -27,10 +27,6 @@ volume::VolumeFrame burning(const dmat4& place = dmat4(1.0)) {
   return frame;
 }
 
-void show(test::Still& still, volume::VolumeFrame frame) {
-  still.set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
-}
-
 dvec3 moved(const dmat4& place, const dvec3& p) { return dvec3(place * glm::dvec4(p, 1.0)); }
 
 viewer::GridSettings transmittance(double threshold) {
@@ -71,9 +67,9 @@ class Place : public test::ViewerTest {
       still->set_grid(grid);
       still->set_camera(test::camera_at(moved(place, {90.0, 60.0, 80.0}), moved(place, {20.0, 18.0, 15.0}), 40.0));
     }
-    show(*placed_, burning());
+    placed_->set_volume(burning());
     placed_->viewer().set_places({{place}});
-    show(*made_there_, burning(place));
+    made_there_->set_volume(burning(place));
   }
 
   std::unique_ptr<test::Still> placed_;

@@ -215,7 +215,7 @@ TEST_P(RampPicture, OfTemperatureFollowsTheBlackBody) {
   const auto viewer = make();
   VolumeFrame frame{.density = test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& /*p*/) { return 1e-6F; })};
   frame.temperature = test::make_volume({64, 64, 8}, ivec3(0), [](const ivec3& p) { return p.z < 4 ? 0.5F : 1.0F; });
-  viewer->set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+  viewer->set_volume(std::move(frame));
   viewer->set_light({});
   viewer::Medium medium;
   medium.field_emission.blackbody = 1.0;

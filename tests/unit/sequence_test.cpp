@@ -62,9 +62,13 @@ SequenceRef make_sequence(const std::vector<std::string>& files, const cumulet_v
 class CSequence : public testing::Test {
  protected:
   static constexpr int count = 7;
-  [[nodiscard]] ViewerPtr make() {
-    return make_viewer(
-        {.get_proc = Context::get_proc, .user = &context_, .log = Lines::add, .log_user = &lines_, .samples = 2});
+  [[nodiscard]] ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
+    return make_viewer({.get_proc = Context::get_proc,
+                        .user = &context_,
+                        .log = Lines::add,
+                        .log_user = &lines_,
+                        .samples = 2,
+                        .build = build});
   }
   Picture picture(cumulet_viewer* of) { return drawn_once(of, target_); }
   static cumulet_sequence_info info_of(cumulet_viewer* viewer) {
@@ -237,20 +241,13 @@ TEST_F(CSequence, AFrameIsTheSameHoweverItCame) {
 TEST_F(CSequence, AFramesGridIsGlsToo) {
   clip_.with_flame(2);
   const SequenceRef sequence = make_sequence(clip_.paths());
-  auto grid = make_desc<cumulet_grid_desc>();
-  grid.build = CUMULET_BUILD_GPU;
-  const auto make_on_gl = [&] {
-    ViewerPtr viewer = make();
-    EXPECT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK) << cumulet_last_error(viewer.get());
-    return viewer;
-  };
-  const ViewerPtr viewer = make_on_gl();
+  const ViewerPtr viewer = make(CUMULET_BUILD_GPU);
   ASSERT_EQ(cumulet_set_sequence(viewer.get(), sequence.get()), CUMULET_OK);
   Picture before;
   for (const int frame : {3, 1, 2, 3}) {
     ASSERT_EQ(cumulet_sequence_set_time(sequence.get(), frame / 24.0), CUMULET_OK);
     const Picture found = picture(viewer.get());
-    const ViewerPtr single = make_on_gl();
+    const ViewerPtr single = make(CUMULET_BUILD_GPU);
     ASSERT_EQ(cumulet_load_volume(single.get(), clip_.path(frame).c_str(), nullptr), CUMULET_OK);
     EXPECT_EQ(difference(found, picture(single.get())), "") << frame;
     EXPECT_NE(found, std::exchange(before, found)) << frame;

@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "support/blocks.hpp"
+#include "support/cloud_test.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
@@ -52,38 +53,24 @@ std::vector<scene::Place> places_of(const Offsets& offsets) {
   return places;
 }
 
-class Several : public test::StillTest {
+class Several : public test::CloudTest {
  protected:
   static constexpr std::uint32_t edge = 16;
 
   void SetUp() override {
-    test::StillTest::SetUp();
+    test::CloudTest::SetUp();
     if (IsSkipped()) return;
-    medium_.density_scale = 0.15;
-    medium_.albedo = {0.95F, 0.8F, 0.5F};
-    medium_.phase.anisotropy = 0.4F;
-    still_->set_medium(medium_);
     look_from({60.0, 50.0, 70.0}, {14.0, 10.0, 14.0});
   }
   void look_from(const dvec3& eye, const dvec3& at) { still_->set_camera(test::camera_at(eye, at, 32.0)); }
   void show(volume::ScalarVolume density, std::optional<volume::ScalarVolume> flame, const Offsets& places) {
-    volume::VolumeFrame frame{.density = std::move(density)};
-    frame.flame = std::move(flame);
-    still_->set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+    CloudTest::show(std::move(density), std::move(flame));
     viewer().set_places(places_of(places));
   }
   test::Blocks blocks(std::uint32_t samples = 64, unsigned pictures = 6) {
     return test::blocks_of(pictures, [&](unsigned k) {
       return test::render(*still_, {edge, edge, samples, 100 + k, render::View::shaded});
     });
-  }
-  // Under a sky of 1: pictures are of transmittance.
-  void only_absorb(double density_scale) {
-    medium_ = {};
-    medium_.albedo = vec3(0.0F);
-    medium_.density_scale = density_scale;
-    still_->set_medium(medium_);
-    still_->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   }
   // In places and merged.
   void expect_same_as_merged(const Offsets& offsets, bool burns = false) {
@@ -93,8 +80,6 @@ class Several : public test::StillTest {
     show(merged(cloud(), offsets), burns ? std::optional(merged(*flame, offsets)) : std::nullopt, {ivec3(0)});
     test::expect_alike(several, blocks());
   }
-
-  viewer::Medium medium_;
 };
 CUMULET_ON_BACKENDS(Several);
 

@@ -11,6 +11,7 @@
 #include "base/error.hpp"
 #include "scene/space.hpp"
 #include "support/blocks.hpp"
+#include "support/cloud_test.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
@@ -32,31 +33,14 @@ dmat4 moved(double x, double y, double z) { return glm::translate(dmat4(1.0), dv
 // Straight from one to the other, as the library has it.
 dmat4 between(const dmat4& a, const dmat4& b, double t) { return a + (b - a) * t; }
 
-class Shutter : public test::StillTest {
+class Shutter : public test::CloudTest {
  protected:
   static constexpr std::uint32_t edge = 16;
 
   void SetUp() override {
-    test::StillTest::SetUp();
+    test::CloudTest::SetUp();
     if (IsSkipped()) return;
-    medium_.density_scale = 0.15;
-    medium_.albedo = {0.95F, 0.8F, 0.5F};
-    medium_.phase.anisotropy = 0.4F;
-    still_->set_medium(medium_);
     still_->set_camera(test::camera_at({40.0, 34.0, 50.0}, {12.0, 10.0, 11.0}, 32.0));
-  }
-  // Under a sky of 1: pictures are of transmittance.
-  void only_absorb(double density_scale) {
-    medium_ = {};
-    medium_.albedo = vec3(0.0F);
-    medium_.density_scale = density_scale;
-    still_->set_medium(medium_);
-    still_->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
-  }
-  void show(volume::ScalarVolume density, std::optional<volume::ScalarVolume> flame = {}) {
-    volume::VolumeFrame frame{.density = std::move(density)};
-    frame.flame = std::move(flame);
-    still_->set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
   }
   static volume::ScalarVolume cloud() { return test::noise_volume({24, 20, 22}, ivec3(0), 2); }
   static volume::ScalarVolume flames() {
@@ -102,8 +86,6 @@ class Shutter : public test::StillTest {
     const Blocks swept = blurred();
     test::expect_alike(swept, still_mean([&](double t) { viewer().set_places({{between(open, close, t)}}); }));
   }
-
-  viewer::Medium medium_;
 };
 // Numbers alone are looked at here, in one driver's.
 INSTANTIATE_TEST_SUITE_P(Gl, Shutter, testing::Values(headless::Backend::egl), test::backend_name);
@@ -296,7 +278,7 @@ TEST_P(Shutter, ASlabMovesByItsVelocity) {
   for (std::size_t part = 0; part < velocity.parts.size(); ++part)
     velocity.parts[part] = test::make_volume(size, ivec3(0), [=](const ivec3&) { return part == 0 ? 16.0F : 0.0F; });
   frame.velocity = std::move(velocity);
-  still_->set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
+  still_->set_volume(std::move(frame));
   const double depth = 0.1 * 16.0;
   const double passing = (1.0 - std::exp(-depth)) / depth;
   const double held = std::exp(-depth);

@@ -165,9 +165,7 @@ class VelocityPicture : public test::ViewerTest {
  protected:
   static constexpr std::uint32_t edge = 8;
 
-  static void show(test::Still& viewer, VolumeFrame frame) {
-    viewer.set_volume(std::make_shared<const viewer::VolumeAsset>(std::move(frame)));
-  }
+  static void show(test::Still& viewer, VolumeFrame frame) { viewer.set_volume(std::move(frame)); }
   static std::vector<vec3> look(test::Still& viewer, const dvec3& eye = {31.5, 31.5, 500.0},
                                 const dvec3& at = {31.5, 31.5, 0.0}) {
     viewer.set_camera(test::camera_at(eye, at, 0.5));

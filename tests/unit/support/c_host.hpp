@@ -235,6 +235,7 @@ struct ViewerOptions {
   cumulet_gl_state gl_state = CUMULET_GL_STATE_RESTORE;
   std::uint32_t samples = 4;
   cumulet_programs* programs = nullptr;
+  cumulet_build build = CUMULET_BUILD_CPU;
 };
 
 /// As the library makes one. Throws std::runtime_error.
@@ -272,8 +273,10 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   cumulet_camera* camera = nullptr;
   if (cumulet_camera_create(&stand, &camera) != CUMULET_OK) throw std::runtime_error("no camera");
   const CameraRef owner(camera);
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.build = options.build;
   if (cumulet_set_light(out, &light) != CUMULET_OK || cumulet_set_sampling(out, &sampling) != CUMULET_OK ||
-      cumulet_set_camera(out, camera) != CUMULET_OK)
+      cumulet_set_grid(out, &grid) != CUMULET_OK || cumulet_set_camera(out, camera) != CUMULET_OK)
     throw std::runtime_error(cumulet_last_error(out));
   return viewer;
 }
