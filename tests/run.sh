@@ -31,6 +31,8 @@ count() { # PASSED FAILED SKIPPED
   passed=$((passed + $1)) failed=$((failed + $2)) skipped=$((skipped + $3))
 }
 
+failures=() # said again at the end, where those who see the end of a long log alone find them
+
 # What tests that were killed leave behind goes with this folder.
 TMPDIR=$(mktemp -d)
 export TMPDIR
@@ -39,6 +41,7 @@ finish() {
   trap - EXIT
   rm -rf "$TMPDIR"
   say "all done"
+  [ "${#failures[@]}" -eq 0 ] || printf 'FAILED: %s\n' "${failures[@]}"
   if [ "$skipped" -gt 0 ]; then
     echo "$passed passed, $failed failed, $skipped skipped"
   else
@@ -60,6 +63,7 @@ check() { # NAME COMMAND...: one check that counts as one test
     say "$name: passed in $(elapsed "$since")"
   else
     count 0 1 0
+    failures+=("$name")
     say "$name: FAILED after $(elapsed "$since")"
   fi
 }
@@ -77,10 +81,25 @@ run_ctest() { # NAME FOLDER CTEST_OPTION...: its tests, each counted
   if [ "${total:-0}" -eq 0 ]; then
     say "$name: no test ran"
     count 0 1 0
+    failures+=("$name: no test ran")
     return
   fi
+  mapfile -t -O "${#failures[@]}" failures < <(failed_tests "$name" "$report")
   count $((total - bad - skips)) "$bad" "$skips"
   say "$name: $bad of $total failed, in $(elapsed "$since")"
+}
+
+# failed_tests NAME FILE: of a report of ctest's, each with the end of what it printed.
+failed_tests() {
+  python3 - "$@" <<'EOF'
+import sys
+import xml.etree.ElementTree as xml
+
+for case in xml.parse(sys.argv[2]).iter("testcase"):
+    if case.get("status") == "fail":
+        output = (case.findtext("system-out") or "").strip().replace("\n", " | ")
+        print(f"{sys.argv[1]}: {case.get('name')}: {output[-600:]}")
+EOF
 }
 
 junit() { # ATTRIBUTE FILE: of the test suite; 0 if there is none
@@ -149,7 +168,7 @@ tidy() {
   local good=0
   for source in "${sources[@]}"; do
     key=$stamps/$({ echo "$common $source"; cat "$source"; } | sha256sum | cut -c1-32)
-    [ ! -e "$key" ] || good=$((good + 1))
+    if [ -e "$key" ]; then good=$((good + 1)); else failures+=("clang-tidy: $source"); fi
   done
   count "$good" $((files - good)) 0
   say "clang-tidy: $((files - good)) of $files failed, in $(elapsed "$since")"
@@ -169,6 +188,7 @@ build_and_test() {
     run_ctest "$preset" "$folder" "$@"
   else
     count 0 1 0
+    failures+=("$preset: did not build")
   fi
 }
 
