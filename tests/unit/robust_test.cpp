@@ -142,13 +142,13 @@ TEST(Robust, AThousandLivesLeaveNothing) {
   EXPECT_EQ(host.fake.wrong_deletes(), 0U);
   EXPECT_EQ(FakeGl::strays(), 0U);
   if (!sanitized) {
-    // What leaks does so in every stretch; tables of Mesa's grow by hundreds of thousands once in a while.
+    // What leaks does so in every stretch; Mesa's tables grow in some of them, and the more the busier the machine is.
     std::vector<double> growth;
     for (std::size_t i = 1; i < heap.size(); ++i) growth.push_back((heap[i] - heap[i - 1]) / stretch);
-    std::ranges::nth_element(growth, growth.begin() + growth.size() / 2);
-    const double typical = growth[growth.size() / 2];
-    RecordProperty("heap_bytes_a_life", static_cast<int>(typical));
-    EXPECT_LT(typical, 512.0) << "bytes a life";
+    const std::size_t quarter = growth.size() / 4;
+    std::ranges::nth_element(growth, growth.begin() + quarter);
+    RecordProperty("heap_bytes_a_life", static_cast<int>(growth[quarter]));
+    EXPECT_LT(growth[quarter], 512.0) << "bytes a life";
   }
 }
 
