@@ -409,7 +409,7 @@ bool fill(const LeafSource& leaves, const Box& bounds, Bricks& bricks, std::vect
 
 /// Whether the first that are read can be kept as halves.
 bool begins_with_halves(const LeafSource& leaves, const Box& bounds, const Bricks& bricks, double at) {
-  constexpr int enough = 256;
+  constexpr int enough = 64;
   std::atomic<int> looked_at = 0;
   std::atomic<bool> halves = true;
   const auto look = [&](std::size_t leaf, std::span<float, brick_voxels> found) {

@@ -1,5 +1,6 @@
 #include "volume/source_file.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
 
@@ -20,7 +21,8 @@ SourceFile::Buffer::Buffer(const std::filesystem::path& file, Progress* progress
 
 SourceFile::Buffer::int_type SourceFile::Buffer::underflow() {
   if (!held_) check(progress_);
-  const std::streamsize got = file_.sgetn(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
+  const std::streamsize got = file_.sgetn(bytes_.data(), static_cast<std::streamsize>(next_read_));
+  next_read_ = std::min(2 * next_read_, bytes_.size());
   setg(bytes_.data(), bytes_.data(), bytes_.data() + got);
   end_ += got;
   if (got == 0) return traits_type::eof();
@@ -56,6 +58,7 @@ SourceFile::Buffer::pos_type SourceFile::Buffer::seekpos(pos_type position, std:
     if (file_.pubseekpos(target, std::ios::in) != position) return {off_type{-1}};
     setg(nullptr, nullptr, nullptr);
     end_ = target;
+    next_read_ = least_read;
   }
   return position;
 }

@@ -15,14 +15,15 @@
 namespace cumulet::volume::detail {
 
 /// A file as a stream that tells how much of it was read and, cancelled, throws Error(cancelled) out of the read,
-/// through whatever library is reading. Seeks within its buffer cost nothing: OpenVDB seeks at every leaf.
+/// through whatever library is reading. Seeks within its buffer cost nothing: OpenVDB seeks at every leaf. After others
+/// it reads little ahead, and more with each read: heads of grids lie far apart, and shared storage pays for each byte.
 class SourceFile final : public std::istream {
  public:
   /// Throws std::runtime_error if it cannot be opened.
   SourceFile(const std::filesystem::path& file, Progress* progress);
 
   [[nodiscard]] std::int64_t size() const { return buffer_.size(); }
-  /// From here on, bytes read and whatever is added to the part count towards total.
+  /// From this place on, bytes of the file and whatever is added to the part count towards total.
   ProgressPart& begin(double from, double to, std::uint64_t total) { return buffer_.begin(from, to, total); }
   /// Holds cancellation off where a throw would lose memory; off it comes with the next read.
   void hold(bool held) { buffer_.hold(held); }
@@ -33,7 +34,9 @@ class SourceFile final : public std::istream {
     Buffer(const std::filesystem::path& file, Progress* progress);
     [[nodiscard]] std::int64_t size() const { return size_; }
     ProgressPart& begin(double from, double to, std::uint64_t total) {
-      return part_.emplace(progress_, from, to, total);
+      part_.emplace(progress_, from, to, total);
+      part_->add(static_cast<std::uint64_t>(egptr() - gptr()));  // read already
+      return *part_;
     }
     void hold(bool held) { held_ = held; }
 
@@ -46,8 +49,11 @@ class SourceFile final : public std::istream {
    private:
     [[nodiscard]] std::int64_t position() const { return end_ - (egptr() - gptr()); }
 
+    static constexpr std::size_t least_read = std::size_t{16} << 10U;
+
     std::filebuf file_;
     std::vector<char> bytes_;
+    std::size_t next_read_ = least_read;
     std::int64_t size_ = 0;
     std::int64_t end_ = 0;  ///< place in the file of the buffer's end, and of file_
     Progress* progress_;

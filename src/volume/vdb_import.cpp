@@ -306,6 +306,7 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
   }
 
   openvdb::GridBase::Ptr read_grid(const openvdb::io::GridDescriptor& descriptor, Portion portion) {
+    stream_.seekg(descriptor.getGridPos());
     // An instance holds no tree. Without offsets a grid's end is unknown, and the file's the best guess.
     if (!descriptor.isInstance()) {
       const std::int64_t bytes =
@@ -315,7 +316,6 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
     openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(descriptor.gridType());
     own_tree(*grid);
     grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
-    stream_.seekg(descriptor.getGridPos());
     readGrid(grid, descriptor, stream_);
     const std::int64_t end = inputHasGridOffsets() ? descriptor.getEndPos() : size_;
     with_type(*grid, [&]<typename GridT>() { tree_of<GridT>(*grid)->ends_at(end); });

@@ -182,7 +182,9 @@ class OwningTree final : public TreeT {
       std::vector<char> bytes;
     };
     using RunPtr = std::shared_ptr<Run>;
-    constexpr std::size_t leaves_a_run = 256;
+    // Short ones first: what is left early has then read little ahead.
+    constexpr std::size_t most_leaves = 256;
+    std::size_t leaves_a_run = 4;
     std::size_t next = 0;
     const auto take_run = [&](tbb::flow_control& flow) -> RunPtr {
       if (next == leaves.size() || !wanted) {
@@ -191,6 +193,7 @@ class OwningTree final : public TreeT {
       }
       const auto run = std::make_shared<Run>(Run{next, std::min(next + leaves_a_run, leaves.size()), {}});
       for (; next != run->last; ++next) copy(stream.file, *leaves[next], run->bytes);
+      leaves_a_run = std::min(2 * leaves_a_run, most_leaves);
       return run;
     };
     const auto unpack = [&](const RunPtr& run) {
