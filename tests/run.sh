@@ -32,6 +32,10 @@ count() { # PASSED FAILED SKIPPED
 }
 
 failures=() # said again at the end, where those who see the end of a long log alone find them
+fail() { # WHAT: counts as one test
+  count 0 1 0
+  failures+=("$1")
+}
 
 # What tests that were killed leave behind goes with this folder.
 TMPDIR=$(mktemp -d)
@@ -51,7 +55,7 @@ finish() {
   exit
 }
 # Whatever ends the script, the closing line tells of it.
-trap 'count 0 1 0; finish' EXIT
+trap 'fail "$(basename "$0") ended early"; finish' EXIT
 trap 'exit 130' INT TERM
 
 check() { # NAME COMMAND...: one check that counts as one test
@@ -62,8 +66,7 @@ check() { # NAME COMMAND...: one check that counts as one test
     count 1 0 0
     say "$name: passed in $(elapsed "$since")"
   else
-    count 0 1 0
-    failures+=("$name")
+    fail "$name"
     say "$name: FAILED after $(elapsed "$since")"
   fi
 }
@@ -80,8 +83,7 @@ run_ctest() { # NAME FOLDER CTEST_OPTION...: its tests, each counted
   skips=$(($(junit skipped "$report") + $(junit disabled "$report")))
   if [ "${total:-0}" -eq 0 ]; then
     say "$name: no test ran"
-    count 0 1 0
-    failures+=("$name: no test ran")
+    fail "$name: no test ran"
     return
   fi
   mapfile -t -O "${#failures[@]}" failures < <(failed_tests "$name" "$report")
@@ -153,7 +155,7 @@ tidy() {
       first = ""; vdb = 0
     }' | grep -E '^(src|demo)/.*\.cpp$' | LC_ALL=C sort -u || true)
   files=${#sources[@]}
-  [ "$files" -gt 0 ] || { say "clang-tidy: found no files"; count 0 1 0; return; }
+  [ "$files" -gt 0 ] || { say "clang-tidy: found no files"; fail "clang-tidy: found no files"; return; }
 
   common=$({ cat .clang-tidy; echo "$tidy_checks"; clang-tidy --version; find src demo glsl -name '*.h' -o -name '*.hpp' -o -name '*.glsl' |
     LC_ALL=C sort | xargs cat; } | sha256sum)
@@ -187,8 +189,7 @@ build_and_test() {
   if build "$preset" $targets; then
     run_ctest "$preset" "$folder" "$@"
   else
-    count 0 1 0
-    failures+=("$preset: did not build")
+    fail "$preset: did not build"
   fi
 }
 
