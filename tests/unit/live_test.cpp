@@ -7,34 +7,27 @@
 #include <chrono>
 #include <cstring>
 #include <limits>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <variant>
 #include <vector>
 
-#include "support/c_host.hpp"
+#include "support/c_playback.hpp"
 #include "support/simulated.hpp"
 #include "support/volumes.hpp"
 #include "viewer/c_handles.hpp"
 
 namespace {
 
-using cumulet::headless::Backend;
-using cumulet::headless::Context;
 using cumulet::test::at;
 using cumulet::test::CameraRef;
 using cumulet::test::difference;
-using cumulet::test::drawn_once;
 using cumulet::test::expect_same_voxels;
-using cumulet::test::HostTarget;
 using cumulet::test::InstanceRef;
 using cumulet::test::LiveRef;
-using cumulet::test::load_gl;
 using cumulet::test::make_ball;
 using cumulet::test::make_desc;
 using cumulet::test::make_live;
-using cumulet::test::make_viewer;
 using cumulet::test::picture_of;
 using cumulet::test::Sides;
 using cumulet::test::simulated;
@@ -46,16 +39,6 @@ using Picture = std::vector<std::uint8_t>;
 
 constexpr Sides small = {24, 24, 24};
 constexpr Sides odd = {23, 31, 17};
-
-struct Lines {
-  std::mutex mutex;
-  std::vector<std::string> warnings;
-  static void add(void* user, cumulet_log_level level, const char* message) {
-    auto& lines = *static_cast<Lines*>(user);
-    const std::scoped_lock lock(lines.mutex);
-    if (level == CUMULET_LOG_WARNING) lines.warnings.emplace_back(message);
-  }
-};
 
 using HandOver = cumulet_status (*)(cumulet_live*, const cumulet_state_desc*, char*, std::size_t);
 
@@ -112,17 +95,8 @@ void expect_same(const VolumeRef& a, const VolumeRef& b) {
   }
 }
 
-class CLive : public testing::Test {
+class CLive : public cumulet::test::CPlaybackTest {
  protected:
-  [[nodiscard]] ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
-    return make_viewer({.get_proc = Context::get_proc,
-                        .user = &context_,
-                        .log = Lines::add,
-                        .log_user = &lines_,
-                        .samples = 2,
-                        .build = build});
-  }
-  Picture picture(cumulet_viewer* of) { return drawn_once(of, target_); }
   // Of a viewer of its own, which never showed another.
   Picture picture_alone(const State& state) {
     const ViewerPtr viewer = make();
@@ -149,11 +123,6 @@ class CLive : public testing::Test {
     }
     return seen;
   }
-
-  Lines lines_;
-  Context context_ = Context::create(Backend::automatic);
-  GladGLContext gl_ = load_gl(Context::get_proc, &context_);
-  HostTarget target_{gl_, 32, 32};
 };
 
 TEST_F(CLive, IsRefusedInOneLine) {
@@ -365,8 +334,8 @@ TEST_F(CLive, WhatIsRefusedLeavesTheLastGoodState) {
   EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_FILE);
   const std::string line = cumulet_last_error(viewer.get());
   EXPECT_EQ(line.rfind("smoke: density: its active voxels span ", 0), 0U) << line;
-  ASSERT_EQ(lines_.warnings.size(), 1U);
-  EXPECT_EQ(lines_.warnings[0], line + ": the state before it stays");
+  ASSERT_EQ(warnings_.lines.size(), 1U);
+  EXPECT_EQ(warnings_.lines[0], line + ": the state before it stays");
   auto progress = make_desc<cumulet_progress>();
   ASSERT_EQ(cumulet_get_progress(viewer.get(), &progress), CUMULET_OK);
   EXPECT_EQ(progress.volume_message, line);

@@ -9,41 +9,25 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "support/c_host.hpp"
+#include "support/c_playback.hpp"
 #include "support/clip.hpp"
 
 namespace {
 
-using cumulet::headless::Backend;
-using cumulet::headless::Context;
 using cumulet::test::CameraRef;
 using cumulet::test::Clip;
 using cumulet::test::difference;
-using cumulet::test::drawn_once;
 using cumulet::test::HostTarget;
 using cumulet::test::InstanceRef;
-using cumulet::test::load_gl;
 using cumulet::test::make_desc;
-using cumulet::test::make_viewer;
 using cumulet::test::SequenceRef;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
 using Picture = std::vector<std::uint8_t>;
-
-struct Lines {
-  std::mutex mutex;
-  std::vector<std::string> warnings;
-  static void add(void* user, cumulet_log_level level, const char* message) {
-    auto& lines = *static_cast<Lines*>(user);
-    const std::scoped_lock lock(lines.mutex);
-    if (level == CUMULET_LOG_WARNING) lines.warnings.emplace_back(message);
-  }
-};
 
 SequenceRef make_sequence(const std::vector<std::string>& files, const cumulet_volume_file_desc* file = nullptr) {
   std::vector<const char*> paths;
@@ -59,18 +43,9 @@ SequenceRef make_sequence(const std::vector<std::string>& files, const cumulet_v
   return SequenceRef(out);
 }
 
-class CSequence : public testing::Test {
+class CSequence : public cumulet::test::CPlaybackTest {
  protected:
   static constexpr int count = 7;
-  [[nodiscard]] ViewerPtr make(cumulet_build build = CUMULET_BUILD_CPU) {
-    return make_viewer({.get_proc = Context::get_proc,
-                        .user = &context_,
-                        .log = Lines::add,
-                        .log_user = &lines_,
-                        .samples = 2,
-                        .build = build});
-  }
-  Picture picture(cumulet_viewer* of) { return drawn_once(of, target_); }
   static cumulet_sequence_info info_of(cumulet_viewer* viewer) {
     auto info = make_desc<cumulet_sequence_info>();
     EXPECT_EQ(cumulet_get_sequence_info(viewer, &info, nullptr, 0), CUMULET_OK) << cumulet_last_error(viewer);
@@ -94,10 +69,6 @@ class CSequence : public testing::Test {
   }
 
   Clip clip_{count};
-  Lines lines_;
-  Context context_ = Context::create(Backend::automatic);
-  GladGLContext gl_ = load_gl(Context::get_proc, &context_);
-  HostTarget target_{gl_, 32, 32};
 };
 
 TEST_F(CSequence, IsRefusedInOneLine) {
@@ -283,7 +254,7 @@ TEST_F(CSequence, TellsWhatItPlaysOver) {
   EXPECT_EQ(std::string(cause.data()).rfind(clip_.path(3) + ": ", 0), 0U) << cause.data();
   ASSERT_EQ(cumulet_get_sequence_frame(viewer.get(), 4, cause.data(), cause.size()), CUMULET_OK);
   EXPECT_STREQ(cause.data(), "");
-  EXPECT_EQ(lines_.warnings.size(), 2U);
+  EXPECT_EQ(warnings_.lines.size(), 2U);
 }
 
 TEST_F(CSequence, WithoutAFrameItFailsAndWhatWasThereStays) {
