@@ -228,6 +228,10 @@ CM_FN uvec4 cm_emitter(uint model, uint i) { return cm_words(cm_models[model].em
 // is looked at, along w; n: its unit normal.
 CM_FN float cm_emitter_density(uint model, uvec4 entry, vec3 way, vec3 w, vec3 n) {
   float by_area = cm_models[model].emitter_chance * abs(uintBitsToFloat(entry.w)) * cm_own_area(model, n);
+#if CM_MOTION
+  // The table's chances are of the areas at the frame's moment.
+  if (cm_model_deforms(model)) by_area *= cm_area_share(cm_vertex_mix(model, entry.x, vec2(0.0f)));
+#endif
   return by_area * dot(way, way) / max(abs(dot(n, w)), 1e-12f);
 }
 
@@ -262,9 +266,9 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   if (pick.y > entry.y) entry = cm_emitter(model, entry.z);
   float root = sqrt(u.x);
   CmVertexMix m = cm_vertex_mix(model, entry.x, vec2(root * (1.0f - u.y), root * u.y));
-  vec3 a = cm_out_of_model_point(model, vec3(cm_floats(m.corner.x)));
-  vec3 b = cm_out_of_model_point(model, vec3(cm_floats(m.corner.y)));
-  vec3 c = cm_out_of_model_point(model, vec3(cm_floats(m.corner.z)));
+  vec3 a = cm_out_of_model_point(model, cm_corner(m, 0).position);
+  vec3 b = cm_out_of_model_point(model, cm_corner(m, 1).position);
+  vec3 c = cm_out_of_model_point(model, cm_corner(m, 2).position);
   vec3 g = cm_turning_normal(a, b, c);
   vec3 point = m.weight.x * a + m.weight.y * b + m.weight.z * c;
   bool along = dot(g, point - here) > 0.0f;  // seen from where the vertices turn clockwise

@@ -6,11 +6,15 @@
 CM_FN CmStanding cm_model_end(uint at) {
   return CmStanding(cm_models[at].to_world_x, cm_models[at].to_world_y, cm_models[at].to_world_z, cm_models[at].origin);
 }
-// One that moves: behind the table's records are others, of where all stand as the shutter opens and as it closes.
+// Behind the table's records are others, of where all stand as the shutter opens and as it closes.
+CM_FN uint cm_model_open(uint at) { return at + cm.surfaces.models; }
+CM_FN uint cm_model_close(uint at) { return at + 2u * cm.surfaces.models; }
 CM_FN bool cm_model_moves(uint at) { return (cm_models[at].flags & CM_MODEL_MOVES) != 0u; }
 CM_FN CmStanding cm_model_standing(uint at) {
-  return cm_between(cm_model_end(at + cm.surfaces.models), cm_model_end(at + 2u * cm.surfaces.models));
+  return cm_between(cm_model_end(cm_model_open(at)), cm_model_end(cm_model_close(at)));
 }
+// One that deforms: those records have a tree and vertices as they are then.
+CM_FN bool cm_model_deforms(uint at) { return (cm_models[at].flags & CM_MODEL_DEFORMS) != 0u; }
 #endif
 
 // Where the origin of a model's own space is in the world.

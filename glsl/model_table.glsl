@@ -10,6 +10,7 @@ const uint CM_MODEL_SEEN = 1u;      // by camera rays; others meet it in any cas
 const uint CM_MODEL_MIRRORS = 2u;   // what turns clockwise in its own space turns the other way in the world
 const uint CM_MODEL_HOLDOUT = 4u;   // cameras see a hole
 const uint CM_MODEL_MOVES = 8u;     // it stands elsewhere as the shutter opens, or as it closes (glsl/moment.glsl)
+const uint CM_MODEL_DEFORMS = 16u;  // its triangles are elsewhere in its own space
 
 // One standing of a mesh. Words: of the tables of surface_tables.glsl, which meshes share wherever they stand.
 CM_BLOCK(CmModel) {

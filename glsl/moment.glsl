@@ -17,6 +17,13 @@ CM_FN float cm_moment(uint number, uint stream) { return cm_even_pair(number, st
 float cm_now = 0.0;
 #endif
 
+// Straight from one end to the other. What is no larger at both ends is no larger in between, to the last bit: boxes hold
+// what they hold at both.
+CM_FN vec3 cm_straight(vec3 open, vec3 close) {
+  CM_PRECISE vec3 v = (1.0f - cm_now) * open + cm_now * close;
+  return v;
+}
+
 // Where something stands that moves: columns of the linear part of its own space to that which rays are in, and where
 // its origin is there. All of them go straight from one end to the other, and so does each of its points.
 struct CmStanding {

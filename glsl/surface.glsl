@@ -13,8 +13,32 @@
 
 CM_FN vec4 cm_floats(uint word) { return uintBitsToFloat(cm_words(word)); }
 
-CM_FN uvec4 cm_bvh_node(uint texel) { return cm_words(cm_models[cm_model].nodes + texel); }
-CM_FN uvec4 cm_bvh_triangle(uint texel) { return cm_words(cm_models[cm_model].records + texel); }
+#if CM_MOTION
+// A tree's texel now, of those at both ends: both have the same links, and the same triangles in the same order.
+CM_FN uvec4 cm_tree_between(uint open, uint close) {
+  uvec4 first = cm_words(open);
+  return uvec4(floatBitsToUint(cm_straight(uintBitsToFloat(uvec3(first)), vec3(cm_floats(close)))), first.w);
+}
+#endif
+
+CM_FN uvec4 cm_bvh_node(uint texel) {
+#if CM_MOTION
+  if (cm_model_deforms(cm_model)) {
+    return cm_tree_between(cm_models[cm_model_open(cm_model)].nodes + texel,
+                           cm_models[cm_model_close(cm_model)].nodes + texel);
+  }
+#endif
+  return cm_words(cm_models[cm_model].nodes + texel);
+}
+CM_FN uvec4 cm_bvh_triangle(uint texel) {
+#if CM_MOTION
+  if (cm_model_deforms(cm_model)) {
+    return cm_tree_between(cm_models[cm_model_open(cm_model)].records + texel,
+                           cm_models[cm_model_close(cm_model)].records + texel);
+  }
+#endif
+  return cm_words(cm_models[cm_model].records + texel);
+}
 
 // What the ray under way is, for cm_hit_accept.
 uint cm_hit_seed = 0u;
@@ -169,6 +193,45 @@ struct CmSurfacePoint {
 #endif
 };
 
+// What a vertex has that moves, in its mesh's own space.
+struct CmCorner {
+  vec3 position;
+  vec3 normal;
+  vec4 tangent;  // w: its hand; 0: it has none
+};
+
+CM_FN CmCorner cm_corner_at(uint first) {
+  uvec4 place = cm_words(first + CM_VERTEX_PLACE);
+  uvec4 rest = cm_words(first + CM_VERTEX_REST);
+  return CmCorner(uintBitsToFloat(uvec3(place)), cm_octahedral(place.w),
+                  vec4(cm_octahedral(rest.x), uintBitsToFloat(rest.y)));
+}
+
+CM_FN CmCorner cm_corner(CmVertexMix m, int i) {
+#if CM_MOTION
+  if (cm_model_deforms(m.model)) {
+    uint vertex = m.corner[i] - cm_models[m.model].vertices;
+    CmCorner open = cm_corner_at(cm_models[cm_model_open(m.model)].vertices + vertex);
+    CmCorner close = cm_corner_at(cm_models[cm_model_close(m.model)].vertices + vertex);
+    vec3 tangent = cm_straight(vec3(open.tangent), vec3(close.tangent));
+    return CmCorner(cm_straight(open.position, close.position), cm_straight(open.normal, close.normal),
+                    vec4(tangent, open.tangent.w));
+  }
+#endif
+  return cm_corner_at(m.corner[i]);
+}
+
+#if CM_MOTION
+// Of a triangle of a mesh that deforms, in its own space: its area at the frame's moment, over that now.
+CM_FN float cm_area_share(CmVertexMix m) {
+  vec3 now = cm_corner(m, 0).position;
+  now = cross(cm_corner(m, 1).position - now, cm_corner(m, 2).position - now);
+  vec3 then = cm_corner_at(m.corner[0]).position;
+  then = cross(cm_corner_at(m.corner[1]).position - then, cm_corner_at(m.corner[2]).position - then);
+  return min(length(then) / max(length(now), 1e-30f), 1e12f);
+}
+#endif
+
 // The corners of a triangle in the world.
 struct CmCorners {
   vec3 position[3];
@@ -178,9 +241,9 @@ struct CmCorners {
 CM_FN CmCorners cm_corners(CmVertexMix m) {
   CmCorners corners;
   for (int i = 0; i < 3; ++i) {
-    uvec4 first = cm_words(m.corner[i] + CM_VERTEX_PLACE);
-    corners.position[i] = cm_out_of_model_point(m.model, uintBitsToFloat(uvec3(first)));
-    corners.normal[i] = cm_model_normal(m.model, cm_octahedral(first.w));
+    CmCorner corner = cm_corner(m, i);
+    corners.position[i] = cm_out_of_model_point(m.model, corner.position);
+    corners.normal[i] = cm_model_normal(m.model, corner.normal);
   }
   return corners;
 }
@@ -350,10 +413,9 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
   vec3 normal = vec3(0.0f);
   vec4 tangent = vec4(0.0f);
   for (int i = 0; i < 3; ++i) {
-    uvec4 last = cm_words(m.corner[i] + CM_VERTEX_REST);
     normal += m.weight[i] * corners.normal[i];
-    float hand = uintBitsToFloat(last.y);
-    if (hand != 0.0f) tangent += m.weight[i] * vec4(cm_model_direction(model, cm_octahedral(last.x)), hand);
+    vec4 along = cm_corner(m, i).tangent;
+    if (along.w != 0.0f) tangent += m.weight[i] * vec4(cm_model_direction(model, vec3(along)), along.w);
   }
   if (cm_mirrors(model)) tangent.w = -tangent.w;
   point.position = m.weight.x * corners.position[0] + m.weight.y * corners.position[1] +

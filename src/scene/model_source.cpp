@@ -6,13 +6,16 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <span>
+#include <tuple>
 
 #include "base/apart.hpp"
 #include "base/error.hpp"
 #include "base/progress_part.hpp"
+#include "scene/threaded_tree.hpp"
 
 namespace cumulet::core {
 #include "surface_tables.glsl"
@@ -22,6 +25,7 @@ namespace cumulet::scene {
 
 namespace {
 
+using glm::dvec3;
 using glm::uvec2;
 using glm::uvec4;
 using glm::vec2;
@@ -98,15 +102,38 @@ void write_material(uvec4* to, const Material& m, bool double_sided) {
 
 std::uint32_t size_of(const std::vector<uvec4>& words) { return static_cast<std::uint32_t>(words.size()); }
 
-void pack_tree(ModelSource& source, ModelMesh& mesh, const Progress* progress) {
-  std::vector<uvec4>& words = source.words;
-  const auto nodes = std::as_bytes(mesh.bvh.nodes());
-  const auto records = std::as_bytes(mesh.bvh.records());
-  mesh.nodes = size_of(words);
-  mesh.records = mesh.nodes + static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
+// Where its nodes begin, and its records.
+std::pair<std::uint32_t, std::uint32_t> pack_tree(std::vector<uvec4>& words, const surface::Bvh& bvh,
+                                                  const Progress* progress) {
+  const auto nodes = std::as_bytes(bvh.nodes());
+  const auto records = std::as_bytes(bvh.records());
+  const std::uint32_t first = size_of(words);
+  const std::uint32_t second = first + static_cast<std::uint32_t>(nodes.size() / sizeof(uvec4));
   resize(words, words.size() + (nodes.size() + records.size()) / sizeof(uvec4), progress);
-  std::memcpy(words.data() + mesh.nodes, nodes.data(), nodes.size());
-  if (!records.empty()) std::memcpy(words.data() + mesh.records, records.data(), records.size());
+  std::memcpy(words.data() + first, nodes.data(), nodes.size());
+  if (!records.empty()) std::memcpy(words.data() + second, records.data(), records.size());
+  return {first, second};
+}
+
+// Where they begin.
+std::uint32_t pack_vertices(std::vector<uvec4>& words, const surface::Scene& scene,
+                            const std::vector<surface::PosedVertex>& vertices, const Progress* progress) {
+  const std::uint32_t first = size_of(words);
+  resize(words, words.size() + core::CM_VERTEX_WORDS * scene.attributes.size(), progress);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
+    check(progress);
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      const surface::PosedVertex& v = vertices[i];
+      const surface::VertexAttributes& a = scene.attributes[i];
+      uvec4* to = &words[first + core::CM_VERTEX_WORDS * i];
+      to[core::CM_VERTEX_PLACE] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
+      to[core::CM_VERTEX_UV] = bits(vec4(a.uv[0], a.uv[1]));
+      to[core::CM_VERTEX_REST] =
+          uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),
+                unorm16(a.color.x) | unorm16(a.color.y) << 16U, unorm16(a.color.z) | unorm16(a.color.w) << 16U);
+    }
+  });
+  return first;
 }
 
 bool draws_rich(const surface::Scene& scene, const surface::Pose& pose) {
@@ -132,7 +159,7 @@ void pack_emitters(ModelSource& source, ModelMesh& mesh, const Progress* progres
 void pack_words(ModelSource& source, const Progress* progress) {
   const surface::Scene& scene = *source.scene;
   std::vector<uvec4>& words = source.words;
-  for (ModelMesh& mesh : source.meshes) pack_tree(source, mesh, progress);
+  for (ModelMesh& mesh : source.meshes) std::tie(mesh.nodes, mesh.records) = pack_tree(words, mesh.bvh, progress);
 
   check(progress);
   const std::uint32_t triangles = size_of(words);
@@ -147,21 +174,7 @@ void pack_words(ModelSource& source, const Progress* progress) {
   }
   for (ModelMesh& mesh : source.meshes) mesh.triangles = triangles + mesh.first_triangle;
   check(progress);
-  source.vertices = size_of(words);
-  resize(words, words.size() + core::CM_VERTEX_WORDS * scene.attributes.size(), progress);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scene.attributes.size(), 4096), [&](const auto& range) {
-    check(progress);
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const surface::PosedVertex& v = source.pose.vertices[i];
-      const surface::VertexAttributes& a = scene.attributes[i];
-      uvec4* to = &words[source.vertices + core::CM_VERTEX_WORDS * i];
-      to[core::CM_VERTEX_PLACE] = uvec4(glm::floatBitsToUint(v.position), octahedral(v.normal));
-      to[core::CM_VERTEX_UV] = bits(vec4(a.uv[0], a.uv[1]));
-      to[core::CM_VERTEX_REST] =
-          uvec4(octahedral(vec3(v.tangent)), glm::floatBitsToUint(v.tangent.w),
-                unorm16(a.color.x) | unorm16(a.color.y) << 16U, unorm16(a.color.z) | unorm16(a.color.w) << 16U);
-    }
-  });
+  source.vertices = pack_vertices(words, scene, source.pose.vertices, progress);
 
   source.materials = size_of(words);
   for (const Material& material : surface::materials_of(scene, source.pose)) {
@@ -186,29 +199,111 @@ void build(ModelSource& source, ModelMesh& mesh, const std::vector<std::uint32_t
 }
 
 // Draws [first, last), as they are in the indices.
-void add_mesh(ModelSource& source, std::size_t first, std::size_t last, std::vector<glm::dmat4> placings) {
+void add_mesh(ModelSource& source, std::size_t first, std::size_t last, std::vector<glm::dmat4> placings,
+              std::optional<std::size_t> prototype) {
   const surface::Scene& scene = *source.scene;
   const std::size_t end = last < scene.draws.size() ? scene.draws[last].first_index : scene.indices.size();
   ModelMesh mesh;
   mesh.first_triangle = first < scene.draws.size() ? scene.draws[first].first_index / 3 : 0;
   mesh.triangle_count = static_cast<std::uint32_t>(end / 3) - mesh.first_triangle;
   mesh.placings = std::move(placings);
+  mesh.prototype = prototype;
   if (mesh.triangle_count > 0) source.meshes.push_back(std::move(mesh));
 }
 
 void find_meshes(ModelSource& source) {
   const surface::Scene& scene = *source.scene;
   source.meshes.clear();
-  if (scene.first_prototype_draw() > 0) add_mesh(source, 0, scene.first_prototype_draw(), {glm::dmat4(1.0)});
+  if (scene.first_prototype_draw() > 0) add_mesh(source, 0, scene.first_prototype_draw(), {glm::dmat4(1.0)}, {});
   for (std::size_t p = 0; p < scene.prototypes.size(); ++p) {
     const surface::Prototype& prototype = scene.prototypes[p];
-    add_mesh(source, prototype.first_draw, prototype.first_draw + prototype.draw_count, source.pose.placings[p]);
+    add_mesh(source, prototype.first_draw, prototype.first_draw + prototype.draw_count, source.pose.placings[p], p);
+  }
+}
+
+// Whether it is another at the other end. What is too far away for a tree at one of them stands still.
+bool deforms(const surface::Scene& scene, const ModelMesh& mesh, const surface::PoseEnds& ends) {
+  bool differs = false;
+  for (const std::uint32_t i : part_of(scene.indices, mesh, 3)) {
+    const surface::PosedVertex& open = ends.open.vertices[i];
+    const surface::PosedVertex& close = ends.close.vertices[i];
+    if (!core::cm_is_within(open.position, static_cast<float>(farthest)) ||
+        !core::cm_is_within(close.position, static_cast<float>(farthest)))
+      return false;
+    differs =
+        differs || open.position != close.position || open.normal != close.normal || open.tangent != close.tangent;
+  }
+  return differs;
+}
+
+MeshEnds::End pack_end(ModelSource& source, MeshEnds& ends, const ModelMesh& mesh, const surface::Pose& pose,
+                       const Progress* progress) {
+  surface::Bvh bvh = mesh.bvh;
+  bvh.refit(pose.vertices, part_of(source.scene->indices, mesh, 3), progress);
+  const auto [low, high] = box_of(bvh);
+  ends.low = glm::min(ends.low, low);
+  ends.high = glm::max(ends.high, high);
+  MeshEnds::End end;
+  std::tie(end.nodes, end.records) = pack_tree(source.words, bvh, progress);
+  return end;
+}
+
+void pack_ends(ModelSource& source, const surface::PoseEnds& ends, const Progress* progress) {
+  bool any = false;
+  for (ModelMesh& mesh : source.meshes) {
+    check(progress);
+    if (!deforms(*source.scene, mesh, ends)) continue;
+    MeshEnds& made = mesh.ends.emplace();
+    made.low = dvec3(std::numeric_limits<double>::max());
+    made.high = -made.low;
+    made.open = pack_end(source, made, mesh, ends.open, progress);
+    made.close = pack_end(source, made, mesh, ends.close, progress);
+    any = true;
+  }
+  if (!any) return;
+  const std::uint32_t open = pack_vertices(source.words, *source.scene, ends.open.vertices, progress);
+  const std::uint32_t close = pack_vertices(source.words, *source.scene, ends.close.vertices, progress);
+  for (ModelMesh& mesh : source.meshes) {
+    if (!mesh.ends) continue;
+    mesh.ends->open.vertices = open;
+    mesh.ends->close.vertices = close;
+  }
+}
+
+// Of what stands in other places at the ends, and is there at both.
+std::vector<PlaceEnds> placing_ends(const std::vector<glm::dmat4>& now, const std::vector<glm::dmat4>& open,
+                                    const std::vector<glm::dmat4>& close) {
+  std::vector<PlaceEnds> ends;
+  if (open == close || open.size() != now.size() || close.size() != now.size()) return ends;
+  for (std::size_t i = 0; i < now.size(); ++i) ends.push_back({open[i], close[i]});
+  return ends;
+}
+
+void move(ModelSource& source, const std::optional<surface::PoseEnds>& ends, const Progress* progress) {
+  if (!ends) return;
+  pack_ends(source, *ends, progress);
+  for (ModelMesh& mesh : source.meshes) {
+    if (!mesh.prototype) continue;
+    mesh.placing_ends =
+        placing_ends(mesh.placings, ends->open.placings[*mesh.prototype], ends->close.placings[*mesh.prototype]);
   }
 }
 
 }  // namespace
 
-ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Progress* progress) {
+std::pair<dvec3, dvec3> box_of(const surface::Bvh& bvh) {
+  dvec3 low(std::numeric_limits<double>::max());
+  dvec3 high(-low);
+  for (const surface::Bvh::Node::Child& child : bvh.nodes().front().child) {
+    if (!core::cm_is_within(child.low, static_cast<float>(farthest))) continue;  // a child that is not there
+    low = glm::min(low, dvec3(child.low));
+    high = glm::max(high, dvec3(child.high));
+  }
+  return {low, high};
+}
+
+ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Progress* progress,
+                                 const std::optional<surface::PoseEnds>& ends) {
   auto source = make_left<ModelSource>();
   source->scene = std::move(scene);
   source->pose = std::move(pose);
@@ -223,10 +318,12 @@ ModelSourcePtr make_model_source(surface::ScenePtr scene, surface::Pose pose, Pr
   source->centres = blended_centres(*source->raster, source->pose, progress);
   check(progress);
   pack_words(*source, progress);
+  move(*source, ends, progress);
   return source;
 }
 
-ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Progress* progress) {
+ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Progress* progress,
+                                 const std::optional<surface::PoseEnds>& ends) {
   auto source = make_left<ModelSource>();
   source->scene = last.scene;
   source->pose = std::move(pose);
@@ -257,6 +354,7 @@ ModelSourcePtr make_model_source(const ModelSource& last, surface::Pose pose, Pr
   }
   source->centres = blended_centres(*source->raster, source->pose, progress);
   pack_words(*source, progress);
+  move(*source, ends, progress);
   return source;
 }
 

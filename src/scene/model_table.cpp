@@ -9,6 +9,7 @@
 
 #include "base/error.hpp"
 #include "light/alias_table.hpp"
+#include "scene/space.hpp"
 
 namespace cumulet::scene {
 
@@ -70,17 +71,6 @@ void share_looks(ModelTable& table, const std::vector<double>& power) {
 
 }  // namespace
 
-std::pair<dvec3, dvec3> box_of(const surface::Bvh& bvh) {
-  dvec3 low(std::numeric_limits<double>::max());
-  dvec3 high(-low);
-  for (const surface::Bvh::Node::Child& child : bvh.nodes().front().child) {
-    if (!core::cm_is_within(child.low, static_cast<float>(farthest))) continue;  // a child that is not there
-    low = glm::min(low, dvec3(child.low));
-    high = glm::max(high, dvec3(child.high));
-  }
-  return {low, high};
-}
-
 surface::PunctualLight placed(surface::PunctualLight light, const dmat4& to_world) {
   light.position = vec3(to_world * glm::dvec4(light.position, 1.0));
   const dvec3 direction = glm::dmat3(to_world) * dvec3(light.direction);
@@ -124,7 +114,8 @@ namespace {
 CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& at) {
   CmModel record{};
   record.flags = (model.shadow_only ? 0U : core::CM_MODEL_SEEN) | (model.holdout ? core::CM_MODEL_HOLDOUT : 0U) |
-                 (model.ends ? core::CM_MODEL_MOVES : 0U);
+                 (model.ends || !mesh.placing_ends.empty() ? core::CM_MODEL_MOVES : 0U) |
+                 (mesh.ends ? core::CM_MODEL_DEFORMS : 0U);
   record.nodes = at.first + mesh.nodes;
   record.records = at.first + mesh.records;
   record.triangles = at.first + mesh.triangles;
@@ -137,10 +128,39 @@ CmModel record_of(const Model& model, const ModelMesh& mesh, const ModelWords& a
   return record;
 }
 
-// Of a mesh that is placed so within the model.
-PlaceEnds ends_of(const Model& model, const dmat4& placing) {
-  if (!model.ends) return {model.to_world * placing, model.to_world * placing};
-  return {model.ends->open * placing, model.ends->close * placing};
+// Of a mesh, that is placed so within the model.
+PlaceEnds ends_of(const Model& model, const ModelMesh& mesh, std::size_t placing) {
+  const PlaceEnds of_model = model.ends.value_or(PlaceEnds{model.to_world, model.to_world});
+  const dmat4& still = mesh.placings[placing];
+  const PlaceEnds within = mesh.placing_ends.empty() ? PlaceEnds{still, still} : mesh.placing_ends[placing];
+  const PlaceEnds ends{of_model.open * within.open, of_model.close * within.close};
+  // An animation is not refused for what turns too fast: that stands still.
+  if (can_stand(ends.open) && can_stand(ends.close) && stays_solid(ends.open, ends.close)) return ends;
+  return {model.to_world * still, model.to_world * still};
+}
+
+// A mesh that stands so at an end, and as it is then, if it deforms.
+CmModel record_of_end(const dmat4& to_world, const ModelMesh& mesh, MeshEnds::End MeshEnds::*end, std::uint32_t first) {
+  CmModel record{};
+  place(record, to_world);
+  if (!mesh.ends) return record;
+  const MeshEnds::End& at = (*mesh.ends).*end;
+  record.nodes = first + at.nodes;
+  record.records = first + at.records;
+  record.vertices = first + at.vertices;
+  return record;
+}
+
+// All that it ever is in, in its own space.
+std::pair<dvec3, dvec3> own_box(const ModelMesh& mesh) {
+  auto [low, high] = box_of(mesh.bvh);
+  if (!mesh.ends) return {low, high};
+  return {glm::min(low, mesh.ends->low), glm::max(high, mesh.ends->high)};
+}
+
+bool moves(const Model& model) {
+  const auto of_itself = [](const ModelMesh& mesh) { return mesh.ends || !mesh.placing_ends.empty(); };
+  return model.ends || std::ranges::any_of(model.source->meshes, of_itself);
 }
 
 // World bounds of a box in all of these places, and of what goes straight between them; size: how far from the origin.
@@ -169,7 +189,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
   std::vector<TreeBox> boxes;
   std::vector<double> power;
   std::uint64_t triangles = 0;
-  const bool moves = std::ranges::any_of(models, [](const Model& model) { return model.ends.has_value(); });
+  const bool any_moves = std::ranges::any_of(models, moves);
   std::vector<CmModel> opens;
   std::vector<CmModel> closes;
   dvec3 low(std::numeric_limits<double>::max());
@@ -185,7 +205,7 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
     const ModelWords at = words(source);
     for (std::size_t i = 0; i < source.meshes.size(); ++i) {
       const ModelMesh& mesh = source.meshes[i];
-      const auto [own_low, own_high] = box_of(mesh.bvh);
+      const auto [own_low, own_high] = own_box(mesh);
       for (std::size_t k = 0; k < mesh.placings.size(); ++k) {
         const dmat4 to_world = model.to_world * mesh.placings[k];
         const double stretch = std::cbrt(std::abs(glm::determinant(glm::dmat3(to_world))));
@@ -197,10 +217,10 @@ ModelTable make_model_table(std::span<const Model> models, const std::function<M
         triangles += mesh.triangle_count;
         if (triangles >= std::numeric_limits<std::uint32_t>::max())
           refuse(ErrorCode::unsupported, "with it there are more than 2^32 triangles, each counted wherever it stands");
-        const PlaceEnds ends = ends_of(model, mesh.placings[k]);
-        if (moves) {
-          place(opens.emplace_back(), ends.open);
-          place(closes.emplace_back(), ends.close);
+        const PlaceEnds ends = ends_of(model, mesh, k);
+        if (any_moves) {
+          opens.push_back(record_of_end(ends.open, mesh, &MeshEnds::open, at.first));
+          closes.push_back(record_of_end(ends.close, mesh, &MeshEnds::close, at.first));
         }
         const bool solid = own_low.x <= own_high.x;
         TreeBox box{vec3(0.0F), vec3(0.0F), solid};

@@ -37,7 +37,8 @@ struct ModelPart {
 /// meets.
 struct ModelTable {
   std::vector<core::CmModel> records;  ///< one for each place of each mesh
-  /// Behind them: where all stand as the shutter opens, then as it closes. Empty where nothing moves.
+  /// Behind them: where all stand as the shutter opens, then as it closes, and the tables of those that deform as they
+  /// are then. Empty where nothing moves.
   std::vector<core::CmModel> ends;
   std::vector<core::CmInstanceNode> nodes;    ///< at least one
   std::vector<ModelPart> parts;               ///< of the records
@@ -53,9 +54,6 @@ struct ModelTable {
 
 /// A model's lamp, where that stands. Its intensity stays.
 surface::PunctualLight placed(surface::PunctualLight light, const glm::dmat4& to_world);
-
-/// The box that all triangles of a tree are in, low and high; empty, low above high, where there are none.
-std::pair<glm::dvec3, glm::dvec3> box_of(const surface::Bvh& bvh);
 
 /// World bounds of a model's triangles; nothing where it has none.
 struct ModelBounds {

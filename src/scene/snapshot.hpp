@@ -14,6 +14,7 @@
 #include "scene/model_source.hpp"
 #include "scene/part.hpp"
 #include "scene/phase.hpp"
+#include "scene/place.hpp"
 
 namespace cumulet::scene {
 
@@ -56,20 +57,6 @@ struct Ground {
   glm::vec3 albedo{0.0F};
   double reach = 0.0;  ///< of rays that may meet it; beyond, nobody sees whether they do
   bool operator==(const Ground&) const = default;
-};
-
-/// Where something is as the shutter opens, and as it closes: likewise. In between all goes straight.
-struct PlaceEnds {
-  glm::dmat4 open{1.0};
-  glm::dmat4 close{1.0};
-  bool operator==(const PlaceEnds&) const = default;
-};
-
-/// Where something stands.
-struct Place {
-  glm::dmat4 to_world{1.0};            ///< affine, from the world that it was made in
-  std::optional<PlaceEnds> ends = {};  ///< nothing: it stands still
-  bool operator==(const Place&) const = default;
 };
 
 /// Which of a sequence's frames, or of a live volume's states, a source is.

@@ -32,6 +32,7 @@ struct MeshPart {
   std::vector<float> weights;     ///< of a vertex add up to 1
   std::uint32_t joint_count = 0;  ///< that a skin must have
   std::vector<MorphTarget> targets;
+  std::vector<glm::vec3> velocities;  ///< a second, at rest; empty: none
 };
 
 /// What of a file is not drawn as it was meant, for one line each.

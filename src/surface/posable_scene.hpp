@@ -50,8 +50,13 @@ class PosableScene final : public Scene {
   void finish();
 
   [[nodiscard]] Pose pose(double time, std::size_t animation, const Progress* progress) const override;
+  [[nodiscard]] bool may_move(std::size_t animation) const override;
+  [[nodiscard]] std::optional<PoseEnds> pose_ends(double time, std::size_t animation, double seconds,
+                                                  const Progress* progress) const override;
 
  private:
+  /// drift: seconds, for which parts have gone by their velocities.
+  [[nodiscard]] Pose pose(double time, std::size_t animation, double drift, const Progress* progress) const;
   /// Of what is there.
   void bound(Pose& pose) const;
   /// Materials and lights.
@@ -59,7 +64,7 @@ class PosableScene final : public Scene {
   /// Where each prototype's draws are shown; those that are flat nowhere.
   [[nodiscard]] std::vector<std::vector<glm::dmat4>> place_prototypes(const Stance& now) const;
   /// True if the instance mirrors.
-  bool place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const;
+  bool place(const Instance& instance, const Stance& now, double drift, Pose& pose, const Progress* progress) const;
 };
 
 }  // namespace cumulet::surface::detail

@@ -44,7 +44,7 @@ struct Shape {
   glm::vec4 tangent;
 };
 
-Shape morph(const MeshPart& part, const std::vector<float>& weights, std::size_t v) {
+Shape morph(const MeshPart& part, const std::vector<float>& weights, float drift, std::size_t v) {
   Shape shape{part.positions[v], part.flat ? glm::vec3(0, 1, 0) : part.normals[v],
               part.tangents.empty() ? glm::vec4(0.0F) : part.tangents[v]};
   for (std::size_t t = 0; t < std::min(part.targets.size(), weights.size()); ++t) {
@@ -55,7 +55,34 @@ Shape morph(const MeshPart& part, const std::vector<float>& weights, std::size_t
     if (!target.normals.empty()) shape.normal += weight * target.normals[v];
     if (!target.tangents.empty()) shape.tangent += glm::vec4(weight * target.tangents[v], 0.0F);
   }
+  if (!part.velocities.empty()) shape.position += drift * part.velocities[v];
   return shape;
+}
+
+// A moment of an animation, which begins anew past its end.
+double looped(double time, double duration) {
+  if (!std::isfinite(time)) return 0.0;
+  if (time >= 0.0 && time <= duration) return time;
+  const double within = duration > 0.0 ? std::fmod(time, duration) : 0.0;
+  return within < 0.0 ? within + duration : within;
+}
+
+// Whether all is in the same place, as far as a picture would show.
+bool alike(const Pose& a, const Pose& b) {
+  const auto most = static_cast<float>(1e-4 * glm::length(a.high - a.low));
+  for (std::size_t i = 0; i < a.vertices.size(); ++i) {
+    if (!(glm::distance(a.vertices[i].position, b.vertices[i].position) <= most)) return false;
+  }
+  for (std::size_t p = 0; p < a.placings.size(); ++p) {
+    if (a.placings[p].size() != b.placings[p].size()) return false;
+    for (std::size_t i = 0; i < a.placings[p].size(); ++i) {
+      for (int c = 0; c < 4; ++c) {
+        const double bound = c == 3 ? double{most} : 1e-4 * glm::length(a.placings[p][i][c]);
+        if (!(glm::distance(a.placings[p][i][c], b.placings[p][i][c]) <= bound)) return false;
+      }
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -100,7 +127,8 @@ void PosableScene::finish() {
   }
 }
 
-bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose, const Progress* progress) const {
+bool PosableScene::place(const Instance& instance, const Stance& now, double drift, Pose& pose,
+                         const Progress* progress) const {
   const MeshPart& part = parts[instance.part];
   const std::vector<float>& weights = now.weights[instance.node];
   const glm::dmat4 to_world = instance.in_prototype ? glm::dmat4(1.0) : now.to_world[instance.node];
@@ -124,7 +152,7 @@ bool PosableScene::place(const Instance& instance, const Stance& now, Pose& pose
 
   PosedVertex* const vertices = &pose.vertices[instance.first_vertex];
   const auto at = [&](std::size_t v) {
-    const Shape shape = morph(part, weights, v);
+    const Shape shape = morph(part, weights, static_cast<float>(drift), v);
     glm::mat4 matrix = rigid;
     glm::mat3 for_normals = rigid_normals;
     if (instance.skin >= 0) {
@@ -244,19 +272,19 @@ void PosableScene::bound(Pose& pose) const {
 }
 
 Pose PosableScene::pose(double time, std::size_t animation, const Progress* progress) const {
+  return pose(time, animation, 0.0, progress);
+}
+
+Pose PosableScene::pose(double time, std::size_t animation, double drift, const Progress* progress) const {
   const Track* track = animation < rig.tracks.size() ? &rig.tracks[animation] : nullptr;
-  if (track != nullptr && !std::isfinite(time)) time = 0.0;
-  if (track != nullptr && (time < 0.0 || time > track->duration)) {
-    time = track->duration > 0.0 ? std::fmod(time, track->duration) : 0.0;
-    if (time < 0.0) time += track->duration;
-  }
+  if (track != nullptr) time = looped(time, track->duration);
   const Stance now = stance(rig, track, time);
   Pose result;
   result.time = time;
   resize(result.vertices, attributes.size(), progress);
   for (const Instance& instance : instances) {
     check(progress);
-    result.flipped.push_back(place(instance, now, result, progress) ? 1 : 0);
+    result.flipped.push_back(place(instance, now, drift, result, progress) ? 1 : 0);
     result.hidden.push_back(now.visible[instance.node] ? 0 : 1);
   }
   check(progress);
@@ -278,6 +306,31 @@ Pose PosableScene::pose(double time, std::size_t animation, const Progress* prog
     if (finite(now.to_world[node])) result.cameras.back().to_world = now.to_world[node];
   }
   return result;
+}
+
+bool PosableScene::may_move(std::size_t animation) const {
+  return animation < rig.tracks.size() ||
+         std::ranges::any_of(parts, [](const MeshPart& part) { return !part.velocities.empty(); });
+}
+
+std::optional<PoseEnds> PosableScene::pose_ends(double time, std::size_t animation, double seconds,
+                                                const Progress* progress) const {
+  if (!may_move(animation)) return std::nullopt;
+  const double half = 0.5 * seconds;
+  double open = time - half;
+  double close = time + half;
+  if (animation < rig.tracks.size()) {
+    const double duration = rig.tracks[animation].duration;
+    const double moment = looped(time, duration);
+    open = moment - half;
+    close = moment + half;
+    const bool leaves = open < 0.0 || close > duration;
+    if (leaves && !(seconds < duration && alike(pose(0.0, animation, progress), pose(duration, animation, progress)))) {
+      open = std::max(open, 0.0);
+      close = std::min(close, duration);
+    }
+  }
+  return PoseEnds{pose(open, animation, -half, progress), pose(close, animation, half, progress)};
 }
 
 }  // namespace cumulet::surface::detail

@@ -180,6 +180,12 @@ struct Pose {
   glm::dvec3 high{0.0};
 };
 
+/// As the shutter opens, and as it closes.
+struct PoseEnds {
+  Pose open;
+  Pose close;
+};
+
 struct Animation {
   std::string name;
   double duration = 0.0;  ///< seconds
@@ -227,6 +233,17 @@ class Scene {
   /// Linear, step and cubic spline interpolation, skins and morph targets (glTF 2.0, 3.7.3, 3.7.2.2, 3.11).
   /// Cancelled, throws Error(cancelled).
   [[nodiscard]] virtual Pose pose(double time, std::size_t animation = 0, const Progress* progress = nullptr) const = 0;
+
+  /// Whether pose_ends() may be something.
+  [[nodiscard]] virtual bool may_move(std::size_t /*animation*/) const { return false; }
+  /// Half of `seconds` before that moment of the animation, and half after it. Past its end it goes on at its beginning
+  /// where it is there as it was at the end, and else stops, so that nothing sweeps from the last pose to the first.
+  /// Nothing where it stands still. Cancelled, throws Error(cancelled).
+  [[nodiscard]] virtual std::optional<PoseEnds> pose_ends(double /*time*/, std::size_t /*animation*/,
+                                                          double /*seconds*/,
+                                                          const Progress* /*progress*/ = nullptr) const {
+    return std::nullopt;
+  }
 };
 
 inline std::uint64_t Scene::shown_triangles() const {

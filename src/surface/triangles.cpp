@@ -31,8 +31,12 @@ void check_mesh(const TriangleMesh& mesh) {
   if (count > std::numeric_limits<std::uint32_t>::max()) malformed("has more than 2^32 vertices");
   if (!mesh.normals.empty() && mesh.normals.size() != 3 * count) malformed("normals are not 3 a vertex");
   if (!mesh.colors.empty() && mesh.colors.size() != 4 * count) malformed("colors are not 4 a vertex");
+  if (!mesh.velocities.empty() && mesh.velocities.size() != 3 * count) malformed("velocities are not 3 a vertex");
   require_finite(mesh.positions, "positions are");
   require_finite(mesh.normals, "normals are");
+  if (!std::ranges::all_of(mesh.velocities, [](float v) { return std::abs(v) < 1e18F; })) {
+    malformed("velocities are not finite, or too large");
+  }
   if (!std::ranges::all_of(mesh.colors, [](float c) { return c >= 0.0F && c <= 1.0F; })) {
     malformed("a color is not from 0 to 1");
   }
@@ -67,6 +71,7 @@ MeshPart part_of(const TriangleMesh& mesh) {
   for (std::size_t i = 0; i < which.size(); ++i) {
     part.positions.push_back(vector_at<3>(mesh.positions, which[i]));
     if (!part.flat) part.normals.push_back(vector_at<3>(mesh.normals, which[i]));
+    if (!mesh.velocities.empty()) part.velocities.push_back(vector_at<3>(mesh.velocities, which[i]));
     if (!mesh.colors.empty()) part.attributes[i].color = vector_at<4>(mesh.colors, which[i]);
   }
   if (!part.flat) make_unit(part);

@@ -45,6 +45,7 @@ surface::TriangleMesh mesh_of(const cumulet_mesh_desc& d, const std::string& wha
       .normals = array_of(d.normals, d.normals == nullptr ? 0 : d.vertex_count, 3, what + ": normals"),
       .colors = array_of(d.colors, d.colors == nullptr ? 0 : d.vertex_count, 4, what + ": colors"),
       .indices = array_of(d.indices, d.index_count, 1, what + ": indices"),
+      .velocities = array_of(d.velocities, d.velocities == nullptr ? 0 : d.vertex_count, 3, what + ": velocities"),
       .to_world = matrix_or_identity(d.to_world),
       .material = material_of(d, what)};
   bool clear = mesh.material.base_color.a < 1.0F;

@@ -17,6 +17,7 @@ SurfaceAsset::Rest SurfaceAsset::rest() const {
 }
 
 scene::ModelSourcePtr SurfaceAsset::posed(SurfaceChoice choice, Progress& progress) const {
+  if (!scene_->may_move(choice.animation)) choice.shutter_seconds = 0.0;
   const auto lock = patient_lock(mutex_, progress);
   scene::ModelSourcePtr last = newest_.lock();
   if (last && newest_choice_ == choice) return last;
@@ -26,8 +27,11 @@ scene::ModelSourcePtr SurfaceAsset::posed(SurfaceChoice choice, Progress& progre
   if (choice.variant > 0 && choice.variant <= scene_->variants.size()) {
     pose.chosen = scene_->variants[choice.variant - 1].materials;
   }
-  scene::ModelSourcePtr made = last ? scene::make_model_source(*last, std::move(pose), &progress)
-                                    : scene::make_model_source(scene_, std::move(pose), &progress);
+  std::optional<surface::PoseEnds> ends;
+  if (choice.shutter_seconds > 0.0)
+    ends = scene_->pose_ends(choice.time, choice.animation, choice.shutter_seconds, &progress);
+  scene::ModelSourcePtr made = last ? scene::make_model_source(*last, std::move(pose), &progress, ends)
+                                    : scene::make_model_source(scene_, std::move(pose), &progress, ends);
   newest_ = made;
   newest_choice_ = choice;
   return made;

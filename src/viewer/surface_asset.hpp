@@ -17,8 +17,9 @@ namespace cumulet::viewer {
 struct SurfaceChoice {
   double time = 0.0;  // seconds
   std::uint32_t animation = 0;
-  bool double_sided = false;  // all of its materials
-  std::uint32_t variant = 0;  // 0: none, else the scene's, from 1; one that is not there: none
+  bool double_sided = false;     // all of its materials
+  std::uint32_t variant = 0;     // 0: none, else the scene's, from 1; one that is not there: none
+  double shutter_seconds = 0.0;  // of the animation, around that time
   bool operator==(const SurfaceChoice&) const = default;
 };
 

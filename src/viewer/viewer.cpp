@@ -610,7 +610,7 @@ void Viewer::follow_poses() {
       shown.wish.reset();
       continue;
     }
-    PoseShelf::Wish wish{shown.settings.surfaces, shown.settings.choice};
+    PoseShelf::Wish wish{shown.settings.surfaces, while_open(shown.settings.choice, shown.settings.surfaces)};
     if (shown.wish != wish) {
       if (shown.wish && poses_.is_under_way(*shown.wish)) shown.begun = std::move(shown.wish);
       shown.wish = wish;
@@ -635,6 +635,15 @@ void Viewer::follow_poses() {
 
 std::optional<scene::PlaceEnds> Viewer::while_open(const std::optional<scene::PlaceEnds>& ends) const {
   return sampling_.shutter_seconds > 0.0 ? ends : std::nullopt;
+}
+
+SurfaceChoice Viewer::while_open(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const {
+  if (!surfaces || surfaces->scene().may_move(choice.animation)) choice.shutter_seconds = sampling_.shutter_seconds;
+  return choice;
+}
+
+void Viewer::pose_surfaces() {
+  if (surface_asset_) surface_builder_.pose(surface_asset_, while_open(surface_settings_.choice, surface_asset_));
 }
 
 std::vector<scene::Model> Viewer::models() const {
@@ -941,7 +950,7 @@ bool Viewer::builds() const {
 
 void Viewer::load_surfaces(const std::string& path) {
   sync();
-  surface_builder_.load(path, surface_settings_.choice);
+  surface_builder_.load(path, while_open(surface_settings_.choice, nullptr));
   touch();
 }
 
@@ -961,11 +970,8 @@ void Viewer::set_surfaces(SurfaceAssetPtr surfaces) {
   }
   sync();
   surface_asset_ = std::move(surfaces);
-  if (surface_asset_) {
-    surface_builder_.pose(surface_asset_, surface_settings_.choice);
-  } else {
-    model_source_ = nullptr;
-  }
+  pose_surfaces();
+  if (!surface_asset_) model_source_ = nullptr;
   touch();
 }
 
@@ -975,11 +981,11 @@ SurfaceAssetPtr Viewer::surfaces_asset() {
 }
 
 void Viewer::set_surface_settings(const SurfaceSettings& settings) {
-  if (settings.choice != surface_settings_.choice && !surface_builder_.configure_load(settings.choice)) {
-    sync();
-    if (surface_asset_) surface_builder_.pose(surface_asset_, settings.choice);
-  }
+  const bool poses = settings.choice != surface_settings_.choice &&
+                     !surface_builder_.configure_load(while_open(settings.choice, nullptr));
+  if (poses) sync();
   surface_settings_ = settings;
+  if (poses) pose_surfaces();
   touch();
 }
 
@@ -1231,7 +1237,14 @@ void Viewer::set_ground(const GroundSettings& settings) {
 
 void Viewer::set_sampling(const Sampling& sampling) {
   sync();
+  const bool other_shutter = sampling_.shutter_seconds != sampling.shutter_seconds;
   sampling_ = sampling;
+  if (other_shutter) {
+    poses_due_ = true;
+    const bool loads = surface_builder_.configure_load(while_open(surface_settings_.choice, nullptr));
+    if (!loads && surface_asset_ && surface_asset_->scene().may_move(surface_settings_.choice.animation))
+      pose_surfaces();
+  }
   if (grid_.build.shutter_seconds != sampling.shutter_seconds) {
     wishes_due_ = true;
     take_medium();

@@ -427,6 +427,10 @@ class Viewer {
   [[nodiscard]] static std::optional<PoseShelf::Wish> previous_pose(const ShownModel& shown);
   // Where the shutter opens.
   [[nodiscard]] std::optional<scene::PlaceEnds> while_open(const std::optional<scene::PlaceEnds>& ends) const;
+  // Likewise, where surfaces may move; null: those that are to be read.
+  [[nodiscard]] SurfaceChoice while_open(SurfaceChoice choice, const SurfaceAssetPtr& surfaces) const;
+  // Begins to pose the viewer's own.
+  void pose_surfaces();
   // All that are there, the viewer's own among them.
   [[nodiscard]] std::vector<scene::Model> models() const;
   std::vector<Shown>::iterator find(const Instance& instance);

@@ -247,6 +247,7 @@ class Program {
     mesh.positions = positions.data();
     mesh.normals = data_.ConsumeBool() ? normals.data() : nullptr;
     mesh.colors = data_.ConsumeBool() ? colors.data() : nullptr;
+    mesh.velocities = data_.ConsumeBool() ? normals.data() : nullptr;
     mesh.vertex_count = vertices;
     mesh.indices = indices.data();
     mesh.index_count = indices.size();
@@ -259,10 +260,43 @@ class Program {
     if (surfaces != nullptr) surfaces_.reset(surfaces);
   }
 
+  /// A matrix, most often one that a place may have; at times as it was.
+  void put_place(double* to_world) {
+    const int kind = data_.ConsumeIntegralInRange(0, 7);
+    if (kind == 0) return;
+    std::fill_n(to_world, 16, 0.0);
+    if (kind == 1) return;
+    for (int axis = 0; axis < 3; ++axis) {
+      to_world[5 * axis] = data_.PickValueInArray({1.0, -1.0, 0.5, 2.0});
+      to_world[12 + axis] = data_.ConsumeIntegralInRange(-20, 20);
+    }
+    to_world[1] = data_.PickValueInArray({0.0, 0.5, 1.0});
+    to_world[15] = 1.0;
+  }
+
+  void set_places() {
+    constexpr std::uint32_t most = 3;
+    std::array<double, std::size_t{16} * most> places{};
+    const auto all = [&] {
+      for (std::size_t i = 0; i < most; ++i) put_place(&places[16 * i]);
+      return places;
+    };
+    const auto count = data_.ConsumeIntegralInRange(0U, most);
+    told(cumulet_set_volume_places(viewer_.get(), all().data(), count));
+    const auto open = all();
+    const auto close = all();
+    told(cumulet_set_volume_shutter(viewer_.get(), data_.ConsumeBool() ? open.data() : nullptr,
+                                    data_.ConsumeBool() ? close.data() : nullptr,
+                                    data_.ConsumeBool() ? count : most - count));
+  }
+
   void change_instances() {
     auto medium = described<cumulet_medium_desc>();
     std::array<cumulet_instance_desc, 2> desc{};
     desc[0] = described<cumulet_instance_desc>();
+    put_place(desc[0].to_world);
+    put_place(desc[0].open_to_world);
+    put_place(desc[0].close_to_world);
     desc[0].volume = volume_.get();
     desc[0].sequence = volume_ ? nullptr : sequence_.get();
     desc[0].live = volume_ || sequence_ ? nullptr : live_.get();
@@ -292,6 +326,9 @@ class Program {
   void change_models() {
     std::array<cumulet_model_desc, 2> desc{};
     desc[0] = described<cumulet_model_desc>();
+    put_place(desc[0].to_world);
+    put_place(desc[0].open_to_world);
+    put_place(desc[0].close_to_world);
     desc[0].surfaces = surfaces_.get();
     switch (data_.ConsumeIntegralInRange(0, 6)) {
       case 0:
@@ -676,7 +713,7 @@ class Program {
 
   void call() {
     cumulet_viewer* viewer = viewer_.get();
-    switch (data_.ConsumeIntegralInRange(0, 36)) {
+    switch (data_.ConsumeIntegralInRange(0, 37)) {
       case 0:
         return make_dense();
       case 1:
@@ -752,6 +789,8 @@ class Program {
         return change_live();
       case 35:
         return focus();
+      case 36:
+        return set_places();
       default:
         told(cumulet_detach(viewer));
         if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));

@@ -704,7 +704,8 @@ TEST(CppSurfaces, AreAHostsTriangles) {
                       .metallic = 0.5F,
                       .smoothness = 0.6F,
                       .emission = {7, 8, 9},
-                      .double_sided = true};
+                      .double_sided = true,
+                      .velocities = normals};
   const cumulet_mesh_desc c = desc;
   EXPECT_EQ(c.struct_size, sizeof c);
   EXPECT_EQ(c.positions, positions.data());
@@ -719,9 +720,11 @@ TEST(CppSurfaces, AreAHostsTriangles) {
   EXPECT_EQ(c.smoothness, 0.6F);
   expect_same(c.emission, desc.emission);
   EXPECT_EQ(c.double_sided, 1);
+  EXPECT_EQ(c.velocities, normals.data());
   const cumulet_mesh_desc bare = MeshDesc{.positions = positions};
   EXPECT_EQ(bare.normals, nullptr);
   EXPECT_EQ(bare.colors, nullptr);
+  EXPECT_EQ(bare.velocities, nullptr);
 
   const std::array<MeshDesc, 2> meshes = {desc, MeshDesc{.positions = positions}};
   const Surfaces surfaces = Surfaces::from_triangles({.meshes = meshes, .name = "made"}).value();
@@ -739,7 +742,7 @@ TEST(CppSurfaces, AreAHostsTriangles) {
   EXPECT_TRUE(Surfaces::from_triangles({}));
   for (const MeshDesc& bad :
        {MeshDesc{.positions = std::span(positions).first(8)}, MeshDesc{.positions = positions, .normals = colors},
-        MeshDesc{.positions = positions, .colors = positions},
+        MeshDesc{.positions = positions, .colors = positions}, MeshDesc{.positions = positions, .velocities = colors},
         MeshDesc{.positions = positions, .indices = std::span(indices).first(4)}}) {
     EXPECT_EQ(Surfaces::from_triangles({.meshes = {&bad, 1}}).error().status, StatusCode::invalid_argument);
   }

@@ -529,6 +529,34 @@ TEST(Gltf, RotationsTakeTheShorterWay) {
   near(corners(*scene, scene->pose(3.0))[1], {0, 1, 0});
 }
 
+TEST(Gltf, AShutterStopsAtAnAnimationsEndsUnlessTheyAreAlike) {
+  const auto moved_by = [](const std::vector<float>& way) {
+    GltfModel model = triangle_model();
+    model.add("animations",
+              {{"samplers", json::array({{{"input", model.scalars({0, 1, 2})}, {"output", model.vec3(way)}}})},
+               {"channels", json::array({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}})}});
+    return imported(model);
+  };
+  const auto expect_ends = [](const Scene& scene, double time, double seconds, float open, float close) {
+    SCOPED_TRACE(time);
+    const std::optional<surface::PoseEnds> ends = scene.pose_ends(time, 0, seconds);
+    ASSERT_TRUE(ends);
+    near(corners(scene, ends->open)[0], {open, 0, 0});
+    near(corners(scene, ends->close)[0], {close, 0, 0});
+  };
+  const ScenePtr once = moved_by({0, 0, 0, 1, 0, 0, 3, 0, 0});
+  expect_ends(*once, 1.0, 1.0, 0.5F, 2.0F);
+  expect_ends(*once, 0.25, 1.0, 0.0F, 0.75F);
+  expect_ends(*once, 2.0, 1.0, 2.0F, 3.0F);
+  expect_ends(*once, 5.75, 1.0, 1.5F, 3.0F);  // looped
+  EXPECT_FALSE(once->may_move(1));
+  EXPECT_FALSE(once->pose_ends(1.0, 1, 1.0));
+  const ScenePtr again = moved_by({0, 0, 0, 4, 0, 0, 0, 0, 0});
+  expect_ends(*again, 0.25, 1.0, 1.0F, 3.0F);
+  expect_ends(*again, 1.75, 1.0, 3.0F, 1.0F);
+  expect_ends(*again, 1.0, 4.0, 0.0F, 0.0F);  // more than all of it
+}
+
 TEST(Gltf, MorphedFlatTrianglesTurnTheirNormals) {
   GltfModel model;
   const int target = model.vec3({0, 0, 0, 0, 0, 0, 0, -1, 1});  // the third vertex: from (0, 1, 0) to (0, 0, 1)

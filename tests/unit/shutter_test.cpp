@@ -1,9 +1,11 @@
 // Motion blur: against closed forms, and against means of many pictures of what stands still.
 
 #include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 #include <vector>
@@ -12,12 +14,16 @@
 #include "scene/space.hpp"
 #include "support/blocks.hpp"
 #include "support/cloud_test.hpp"
+#include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
 #include "support/surfaces.hpp"
+#include "support/vdb_files.hpp"
 #include "support/volumes.hpp"
+#include "surface/triangles.hpp"
 #include "viewer/instance.hpp"
+#include "viewer/sequence.hpp"
 
 namespace {
 
@@ -269,6 +275,155 @@ TEST_P(Shutter, AModelThatMovesIsTheMeanOfStills) {
                      }));
 }
 
+// Posed by its moment: `move` changes the pose at rest.
+class PosedScene final : public test::StillScene {
+ public:
+  std::function<void(surface::Pose&, double)> move;
+
+  [[nodiscard]] surface::Pose pose(double time, std::size_t animation, const Progress* progress) const override {
+    surface::Pose posed = StillScene::pose(time, animation, progress);
+    move(posed, time);
+    return posed;
+  }
+  [[nodiscard]] bool may_move(std::size_t /*animation*/) const override { return true; }
+  [[nodiscard]] std::optional<surface::PoseEnds> pose_ends(double time, std::size_t animation, double seconds,
+                                                           const Progress* progress) const override {
+    return surface::PoseEnds{pose(time - 0.5 * seconds, animation, progress),
+                             pose(time + 0.5 * seconds, animation, progress)};
+  }
+};
+
+viewer::ModelSettings posed_at(std::shared_ptr<const surface::Scene> scene, double time) {
+  viewer::ModelSettings settings;
+  settings.surfaces = std::make_shared<const viewer::SurfaceAsset>(std::move(scene), std::string("posed"));
+  settings.choice.time = time;
+  return settings;
+}
+
+// Black, before a sky of 1.
+std::shared_ptr<PosedScene> black_square() {
+  auto scene = std::make_shared<PosedScene>();
+  scene->add_quad({{{0, 0, 0}, {8, 0, 0}, {8, 8, 0}, {0, 8, 0}}}, scene->add(test::diffuse(vec3(0.0F))));
+  return scene;
+}
+
+TEST_P(Shutter, ASquareThatDeformsCoversForItsPartOfTheTime) {
+  only_absorb(0.1);
+  const std::shared_ptr<PosedScene> square = black_square();
+  // Its right edge goes from x = 8 to 16 in a second, all of it 40 up.
+  square->move = [](surface::Pose& pose, double t) {
+    for (std::size_t i = 0; i < 4; ++i)
+      pose.vertices[i].position += vec3(i == 1 || i == 2 ? 8.0 * t : 0.0, 40.0 * t, 0.0);
+  };
+  const auto model = std::make_shared<viewer::ModelInstance>(posed_at(square, 0.5));
+  viewer().add_model(model);
+  // y = 20 is covered from 20 = 8 + 40 t on, to 20 = 40 t.
+  EXPECT_NEAR(along_z(4.0, 20.0), 0.8, 4.5 * sigma(0.8));
+  // x = 11 is there from 8 + 8 t = 11 on.
+  const double clear = 1.0 - (0.5 - 0.375);
+  EXPECT_NEAR(along_z(11.0, 20.0), clear, 4.5 * sigma(clear));
+  EXPECT_NEAR(along_z(11.0, 24.0, 0.0), 0.0, 1e-6) << "the shutter is closed";
+  EXPECT_NEAR(along_z(4.0, 10.0, 0.0), 1.0, 1e-6) << "the shutter is closed";
+  // In half of the time from t = 0.25 on: it is there from 0.375 to 0.5.
+  EXPECT_NEAR(along_z(11.0, 20.0, 0.5), 0.75, 4.5 * sigma(0.75));
+  model->edit([](viewer::ModelSettings& of) { of.choice.time = 4.5; });
+  EXPECT_NEAR(along_z(11.0, 20.0), 1.0, 1e-6) << "it is elsewhere";
+  EXPECT_NEAR(along_z(11.0, 180.0), 0.8, 4.5 * sigma(0.8)) << "it is posed anew";
+}
+
+// One that shines grows, is sheared and turns its normals; copies of a sphere are squashed, and stand on a way of their
+// own, on that of their model.
+TEST_P(Shutter, AModelThatDeformsIsTheMeanOfStills) {
+  auto scene = std::make_shared<PosedScene>();
+  surface::Material glow = test::diffuse(vec3(0.3F));
+  glow.emission = {3.0F, 2.0F, 1.0F};
+  glow.double_sided = true;
+  scene->add_quad({{{-30, -2, 40}, {60, -2, 40}, {60, -2, -30}, {-30, -2, -30}}},
+                  scene->add(test::diffuse(vec3(0.6F))));
+  scene->add_quad({{{4, 12, 4}, {9, 12, 4}, {9, 12, 9}, {4, 12, 9}}}, scene->add(glow));
+  scene->add_sphere({0, 0, 0}, 5.0F, scene->add(test::diffuse(vec3(0.7F, 0.5F, 0.3F))), 8);
+  scene->prototypes.push_back({2, 1, 2});
+  const std::size_t square = 4;
+  const std::size_t sphere = 8;
+  scene->move = [=](surface::Pose& pose, double t) {
+    const auto s = static_cast<float>(t);
+    const std::array<vec3, 4> way{{{-4, 0, 0}, {6, 4, 2}, {8, 8, 9}, {0, 3, 5}}};
+    for (std::size_t i = 0; i < way.size(); ++i) pose.vertices[square + i].position += s * way[i];
+    for (std::size_t i = sphere; i < pose.vertices.size(); ++i) {
+      surface::PosedVertex& vertex = pose.vertices[i];
+      const vec3 narrow(vertex.normal.x, vertex.normal.y * 3.0F, vertex.normal.z);
+      vertex.position.y *= 1.0F - 0.6F * s;
+      vertex.normal = glm::normalize(glm::mix(vertex.normal, glm::normalize(narrow), s));
+    }
+    pose.placings = {{between(moved(4, 4, 16), moved(10, 8, 18), t), between(moved(16, 6, 8), moved(13, 3, 8), t)}};
+  };
+  only_absorb(0.02);
+  show(cloud());
+  still_->set_light({40.0F, 50.0F, vec3(1.0F), vec3(0.3F)});
+  const auto model = std::make_shared<viewer::ModelInstance>(posed_at(scene, 0.5));
+  const scene::PlaceEnds ends{moved(-1, 0, 0), moved(3, 1, 0)};
+  model->edit([&](viewer::ModelSettings& of) { of.ends = ends; });
+  viewer().add_model(model);
+  const Blocks swept = blurred();
+  const Blocks stills = still_mean([&](double t) {
+    model->edit([&](viewer::ModelSettings& of) {
+      of.choice.time = t;
+      of.ends.reset();
+      of.to_world = between(ends.open, ends.close, t);
+    });
+  });
+  test::expect_alike(swept, stills);
+}
+
+TEST_P(Shutter, WhatIsPosedAlikeIsAsBefore) {
+  const std::shared_ptr<PosedScene> square = black_square();
+  bool moves = false;
+  square->move = [&](surface::Pose& pose, double t) {
+    for (surface::PosedVertex& vertex : pose.vertices) vertex.position.z += static_cast<float>(moves ? t : 0.5);
+  };
+  show(cloud());
+  const auto model = std::make_shared<viewer::ModelInstance>(posed_at(square, 0.5));
+  viewer().add_model(model);
+  const test::Image image{edge, edge, 8, 3, render::View::shaded};
+  test::Image open = image;
+  open.shutter_seconds = 0.5;
+  const auto words = [&](double shutter_seconds) {
+    viewer::SurfaceChoice choice;
+    choice.time = 0.5;
+    choice.shutter_seconds = shutter_seconds;
+    Progress progress;
+    return viewer::SurfaceAsset(square, std::string("posed")).posed(choice, progress)->words.size();
+  };
+  const test::Picture before = test::render(*still_, image);
+  const std::size_t closed = words(0.0);
+  EXPECT_EQ(test::render(*still_, open).pixels, before.pixels) << "nothing moves";
+  EXPECT_EQ(words(0.5), closed) << "and takes no memory";
+  moves = true;
+  EXPECT_EQ(test::render(*still_, image).pixels, before.pixels) << "it is closed";
+  EXPECT_NE(test::render(*still_, open).pixels, before.pixels);
+  EXPECT_GT(words(0.5), closed) << "it is there at both ends";
+  EXPECT_EQ(words(0.0), closed);
+  EXPECT_EQ(test::render(*still_, image).pixels, before.pixels) << "closed again";
+}
+
+// A host's own triangles go by their velocities, as the viewer's own surfaces.
+TEST_P(Shutter, AHostsTrianglesMoveByTheirVelocities) {
+  only_absorb(0.1);
+  const std::array<float, 9> positions{0, 0, 0, 8, 0, 0, 0, 8, 0};
+  const std::array<float, 9> velocities{-5, 0, 0, -5, 0, 0, -5, 0, 0};
+  surface::TriangleMesh mesh;
+  mesh.positions = positions;
+  mesh.velocities = velocities;
+  mesh.to_world = glm::scale(dmat4(1.0), dvec3(2.0));
+  mesh.material = test::diffuse(vec3(0.0F));
+  const surface::ScenePtr scene = surface::import_triangles(std::span(&mesh, 1), "mesh");
+  viewer().set_surfaces(std::make_shared<const viewer::SurfaceAsset>(scene, std::string("mesh")));
+  // At y = 8 from x = 0 to 8, by 5 to each side: over x = 6 but for what is left of t = 1 - 3 / 10, and x < 0.
+  EXPECT_NEAR(along_z(6.0, 8.0), 0.3, 4.5 * sigma(0.3));
+  EXPECT_NEAR(along_z(-2.0, 8.0), 0.7, 4.5 * sigma(0.7));
+  EXPECT_NEAR(along_z(6.0, 8.0, 0.0), 0.0, 1e-6) << "the shutter is closed";
+}
+
 // It moves by its own width: where it is at one end alone its depth is linear in time, from nothing to all of it.
 TEST_P(Shutter, ASlabMovesByItsVelocity) {
   only_absorb(0.1);
@@ -294,6 +449,35 @@ TEST_P(Shutter, ASlabMovesByItsVelocity) {
     EXPECT_NEAR(along_z(0.0, 31.5, 0.0), held, 4.5 * sigma(held)) << "the shutter is closed";
     EXPECT_NEAR(along_z(18.0, 31.5, 0.0), 1.0, 1e-6) << "the shutter is closed";
   }
+}
+
+// Its voxels a second are another length for each scale.
+TEST_P(Shutter, ASequenceMovesByItsVelocityTimesItsScale) {
+  only_absorb(0.1);
+  openvdb::initialize();
+  const test::Folder folder;
+  const auto density = test::fog("density");
+  density->fill({{0, 0, 0}, {15, 63, 15}}, 1.0F);
+  const auto velocity = openvdb::Vec3SGrid::create(openvdb::Vec3f(0.0F));
+  velocity->setName("vel");
+  velocity->fill({{-8, -8, -8}, {23, 71, 23}}, openvdb::Vec3f(8.0F, 0.0F, 0.0F));
+  const std::string path = (folder / "moves.vdb").string();
+  openvdb::io::File(path).write({density, velocity});
+  const auto files = std::make_shared<const viewer::FrameFiles>(viewer::FrameFiles{{path}, {}});
+  viewer::SequenceState state;
+  state.playback.velocity_scale = 2.0;
+  const auto sequence = std::make_shared<viewer::Sequence>(files, state);
+  viewer().set_sequence(sequence);
+  const double depth = 0.1 * 16.0;
+  const double passing = (1.0 - std::exp(-depth)) / depth;
+  const double held = std::exp(-depth);
+  // From [-8.5, 7.5] to [7.5, 23.5] in a second.
+  EXPECT_NEAR(along_z(0.0, 31.5), passing, 4.5 * sigma(passing));
+  state.playback.velocity_scale = 1.0;
+  sequence->set_playback(state.playback);
+  // From [-4.5, 11.5] to [3.5, 19.5].
+  EXPECT_NEAR(along_z(8.0, 31.5), held, 4.5 * sigma(held));
+  EXPECT_NEAR(along_z(14.0, 31.5), passing, 4.5 * sigma(passing));
 }
 
 TEST(ShutterEnds, WhatIsFlatHalfwayIsKnown) {

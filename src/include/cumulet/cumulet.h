@@ -714,6 +714,12 @@ typedef struct cumulet_mesh_desc {
   float smoothness;        /* 1 - roughness, 0 to 1 */
   float emission[3];       /* radiance of the front */
   int32_t double_sided;    /* 0: the camera sees through it from behind; 1: both sides are fronts */
+  /*
+   * 3 a vertex, of its own space a second: for motion blur (cumulet_sampling_desc.shutter_seconds), while the shutter
+   * is open each vertex goes straight by it, and is at its position at the frame's moment. Normals that are given stay.
+   * NULL: it stands still.
+   */
+  const float* velocities;
 } cumulet_mesh_desc;
 
 typedef struct cumulet_triangles_desc {
@@ -723,7 +729,7 @@ typedef struct cumulet_triangles_desc {
   const char* name; /* for messages; NULL: "triangles" */
 } cumulet_triangles_desc;
 
-/* A host's own meshes, copied. What moves is made anew. */
+/* A host's own meshes, copied. What moves is made anew, frame by frame; velocities blur it in between. */
 CUMULET_API cumulet_status cumulet_surfaces_from_triangles(const cumulet_triangles_desc* desc, cumulet_surfaces** out,
                                                            char* error, size_t error_size);
 
@@ -1306,8 +1312,9 @@ typedef struct cumulet_sampling_desc {
    * Motion blur: how long the shutter is open, half of it before the frame's moment and half after, as Blender's
    * default has it; 0: all stands still. Each path is of one moment of that time, evenly (Cook, Porter and Carpenter,
    * "Distributed Ray Tracing", 1984). What moves is what a host says of cameras (cumulet_camera_set_shutter), of places
-   * (cumulet_set_volume_shutter, cumulet_instance_desc, cumulet_model_desc), and by their velocities, in world units a
-   * second, volumes that have some: docs/motion_blur.md. The frame's moment alone have AOVs, picks, views, maps, what
+   * (cumulet_set_volume_shutter, cumulet_instance_desc, cumulet_model_desc), surfaces by the animation that they play
+   * and hosts' meshes by their velocities, and by theirs, in world units a second, volumes that have some:
+   * docs/motion_blur.md. The frame's moment alone have AOVs, picks, views, maps, what
    * is rasterised (so CUMULET_SURFACE_LIGHT_NONE's surfaces), models' lamps and the host's depth.
    */
   float shutter_seconds;
@@ -1495,7 +1502,7 @@ typedef struct cumulet_model_desc {
   int32_t holdout;     /* 1: what cameras see of it is a hole, as of a medium: cumulet_medium_desc. What is rasterised
                           leaves it out */
   /* Where it is as the shutter opens and as it closes: as in cumulet_set_volume_shutter; zeros: as at to_world. Its
-   * pose is that of its time throughout. */
+   * animation goes on meanwhile. */
   double open_to_world[16];
   double close_to_world[16];
 } cumulet_model_desc;

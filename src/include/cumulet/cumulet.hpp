@@ -460,6 +460,7 @@ struct MeshDesc {
   float smoothness = 0.0F;
   Rgb emission{};
   bool double_sided = false;
+  std::span<const float> velocities{};
 
   operator cumulet_mesh_desc() const noexcept {
     cumulet_mesh_desc c{.struct_size = sizeof c,
@@ -474,7 +475,8 @@ struct MeshDesc {
                         .metallic = metallic,
                         .smoothness = smoothness,
                         .emission = {emission[0], emission[1], emission[2]},
-                        .double_sided = double_sided};
+                        .double_sided = double_sided,
+                        .velocities = velocities.empty() ? nullptr : velocities.data()};
     std::ranges::copy(to_world, c.to_world);
     return c;
   }
@@ -518,9 +520,11 @@ class Surfaces {
       const MeshDesc& mesh = desc.meshes[i];
       const std::size_t count = mesh.positions.size() / 3;
       if (mesh.positions.size() % 3 != 0 || (!mesh.normals.empty() && mesh.normals.size() != 3 * count) ||
-          (!mesh.colors.empty() && mesh.colors.size() != 4 * count)) {
+          (!mesh.colors.empty() && mesh.colors.size() != 4 * count) ||
+          (!mesh.velocities.empty() && mesh.velocities.size() != 3 * count)) {
         return Error{StatusCode::invalid_argument,
-                     Text<512>("a vertex is 3 positions, 3 normals (or none at all) and 4 colors (or none at all)")};
+                     Text<512>("a vertex is 3 positions, 3 normals (or none at all), 4 colors (or none at all) and "
+                               "3 velocities (or none at all)")};
       }
       meshes[i] = mesh;
     }
