@@ -14,6 +14,7 @@
 #include <type_traits>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 namespace cumulet::test {
 
@@ -104,6 +105,9 @@ class FakeGl {
   /// Says that the driver compiles in parallel, and is never done before finish_compiling(true).
   void compile_in_parallel() { parallel_ = true; }
   void finish_compiling(bool finish) { compiled_ = finish; }
+  /// From now on compute shaders with any of these lines in their source are compiled without what they do: for tests of
+  /// which programs are built, in scenes that use others.
+  void hollow_kernels(std::vector<std::string> lines) { hollow_ = std::move(lines); }
   /// Questions about programs and shaders that a driver could not have answered while it was compiling.
   [[nodiscard]] std::uint64_t waits() const { return waits_; }
 
@@ -208,6 +212,9 @@ class FakeGl {
       if constexpr (F == Fn::GetProgramiv || F == Fn::GetShaderiv) {
         if (fake->answer(args...)) return Result();
       }
+      if constexpr (F == Fn::ShaderSource) {
+        if (fake->hollow(args...)) return Result();
+      }
       if constexpr (F == Fn::GetStringi) {
         if (const GLubyte* extension = fake->extension(args...)) return extension;
       }
@@ -290,6 +297,17 @@ class FakeGl {
     return first ? reinterpret_cast<const GLubyte*>("GL_KHR_parallel_shader_compile") : nullptr;
   }
 
+  bool hollow(GLuint shader, GLsizei count, const GLchar* const* sources, const GLint* lengths) const {
+    if (hollow_.empty() || count != 1 || lengths != nullptr) return false;
+    const std::string_view source = sources[0];
+    if (!contains(source, "local_size_x")) return false;
+    const auto has = [&](const std::string& line) { return contains(source, line + '\n'); };
+    if (std::none_of(hollow_.begin(), hollow_.end(), has)) return false;
+    const char* nothing = "#version 450\nlayout(local_size_x = 1) in;\nvoid main() {}\n";
+    real_.ShaderSource(shader, 1, &nothing, nullptr);
+    return true;
+  }
+
   GetProc get_proc_;
   void* user_;
   GladGLContext real_{};
@@ -311,6 +329,7 @@ class FakeGl {
   bool parallel_ = false;
   bool compiled_ = false;
   std::uint64_t waits_ = 0;
+  std::vector<std::string> hollow_;
 };
 
 }  // namespace cumulet::test
