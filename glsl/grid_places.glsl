@@ -29,11 +29,14 @@ uint cm_slot_of(ivec3 vertex) {
 
 // Whose values a voxel has.
 uint cm_brick_at(ivec3 voxel) {
-  CmPlace place;
-  place.block = CM_TOP_BLOCK;
-  for (uint scale = cm_log2_size / 3u; scale > 0u && place.block != 0u; --scale)
-    place = cm_places[place.block * CM_BLOCK_POINTS + cm_in_block(voxel >> ivec3(int(3u * scale)))];
-  return place.brick;
+  uint block = CM_TOP_BLOCK;
+  uint brick = 0u;
+  for (uint scale = cm_log2_size / 3u; scale > 0u && block != 0u; --scale) {
+    uint at = block * CM_BLOCK_POINTS + cm_in_block(voxel >> ivec3(int(3u * scale)));
+    block = cm_places[at].block;
+    brick = cm_places[at].brick;
+  }
+  return brick;
 }
 
 // The cells of the octree's cube of 2^size voxels at this corner; 0: it has one value.

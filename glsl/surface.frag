@@ -112,7 +112,7 @@ void main() {
   vec3 colour = base.rgb;
   float alpha = CM_ALPHA == 2 ? clamp(base.a, 0.0, 1.0) : 1.0;
   if (cm_material.flags.z == 0u) {
-    vec3 wo = cm_view.depth.w != 0.0 ? -cm_view.forward.xyz : -normalize(cm_from_eye);
+    vec3 wo = cm_view.counts.z != 0u ? -cm_view.forward.xyz : -normalize(cm_from_eye);
     vec4 reflection = cm_material.reflection;
     if (cm_has(CM_MAP_METALLIC_ROUGHNESS)) reflection.xy *= CM_SAMPLE(CM_MAP_METALLIC_ROUGHNESS).zy;
     vec4 specular = cm_material.specular;

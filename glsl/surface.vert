@@ -28,8 +28,9 @@ void main() {
   precise vec3 turned = cm_place_x * cm_position.x + cm_place_y * cm_position.y + cm_place_z * cm_position.z;
   precise vec3 q = (turned + cm_place_high) + cm_place_low;
   precise vec3 v = cm_view.to_view_x.xyz * q.x + cm_view.to_view_y.xyz * q.y + cm_view.to_view_z.xyz * q.z;
-  float w = cm_view.depth.w != 0.0 ? 1.0 : v.z;
-  gl_Position = vec4(v.x + cm_shift.x * w, -v.y + cm_shift.y * w, cm_view.depth.x + cm_view.depth.y * v.z, w);
+  // One sum for every projection: of "orthographic ? 1 : z" NVIDIA's 580 makes varyings that nothing divides by w again.
+  float w = cm_view.clip.z + cm_view.clip.w * v.z;
+  gl_Position = vec4(v.x + cm_shift.x * w, -v.y + cm_shift.y * w, cm_view.clip.x + cm_view.clip.y * v.z, w);
   cm_from_eye = q;
   // Products of short columns would vanish.
   vec3 longest = max(max(abs(cm_place_x), abs(cm_place_y)), abs(cm_place_z));

@@ -25,14 +25,14 @@ layout(std140, binding = CM_UNIFORM_SURFACE_VIEW) uniform CmSurfaceView {
   vec4 to_view_x;       // columns of world (from the eye) to picture: x and y are -1 to 1 (times z in perspective), z is
   vec4 to_view_y;       // the view depth
   vec4 to_view_z;
-  vec4 depth;           // clip-space depth is x + y z over w; w: z, or 1 where orthographic; w: 1 where orthographic
+  vec4 clip;            // of view depth z: clip-space depth is x + y z, and w is z + w z
   vec4 forward;         // unit
   vec4 sun_direction;   // unit, towards the sun
   vec4 sun_irradiance;
   vec4 sky_radiance;    // the mean
   CmHarmonics sky;      // what there is beyond it, before it is turned
   vec4 sky_turn;        // from +Z towards +X: cosine, sine; z: times what glossy lobes see of it
-  uvec4 counts;         // x: lamps; y: 1 where there is a sky beyond the mean
+  uvec4 counts;         // x: lamps; y: 1 where there is a sky beyond the mean; z: 1 where orthographic
 #ifdef __cplusplus
 };
 #else

@@ -564,7 +564,11 @@ class Studio {
     const std::vector<float> denoised = denoise(viewer_, options, network_, progress_);
     progress_.stage("writing " + options.output);
     // The picture last: where it is, all is.
-    if (!options.stats.empty()) write_stats(options, stats_of(viewer_), context_.name());
+    if (!options.stats.empty()) {
+      double noise = 0.0;  // the statistics tell what was measured last
+      check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
+      write_stats(options, stats_of(viewer_), context_.name());
+    }
     write_picture(viewer_, options, denoised);
   }
 

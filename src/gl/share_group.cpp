@@ -1,15 +1,31 @@
 #include "gl/share_group.hpp"
 
+#include <algorithm>
+#include <cstdint>
+
 #include "base/error.hpp"
 
 namespace cumulet::gl {
 
-ShareGroup::ShareGroup(FunctionsPtr gl) : gl_(std::move(gl)), token_(gl_->FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)) {
-  check(*gl_, "creating a sync object");
+ShareGroup::ShareGroup(FunctionsPtr gl)
+    : gl_(std::move(gl)),
+      token_(make_buffer(gl_, 4, nullptr, 0, "creating the share group's token")),
+      label_("cumulet: share group " + std::to_string(reinterpret_cast<std::uintptr_t>(this))) {
+  gl_->ObjectLabel(GL_BUFFER, token_.name(), static_cast<GLsizei>(label_.size()), label_.c_str());
+  check(*gl_, "creating the share group's token");
+  keeps_label_ = has_label();
 }
 
-ShareGroup::~ShareGroup() {
-  if (!gl_->abandoned.load(std::memory_order_relaxed)) gl_->DeleteSync(token_);
+bool ShareGroup::is_current() const {
+  return gl_->IsBuffer(token_.name()) != GL_FALSE && (!keeps_label_ || has_label());
+}
+
+bool ShareGroup::has_label() const {
+  std::string label(label_.size() + 2, '\0');
+  GLsizei length = 0;
+  gl_->GetObjectLabel(GL_BUFFER, token_.name(), static_cast<GLsizei>(label.size()), &length, label.data());
+  label.resize(static_cast<std::size_t>(std::clamp<GLsizei>(length, 0, static_cast<GLsizei>(label.size()))));
+  return label == label_;
 }
 
 void ShareGroup::require() const {

@@ -453,7 +453,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   block.to_view_x = glm::vec4(glm::vec3(matrix[0]), 0.0F);
   block.to_view_y = glm::vec4(glm::vec3(matrix[1]), 0.0F);
   block.to_view_z = glm::vec4(glm::vec3(matrix[2]), 0.0F);
-  block.depth = glm::vec4(depth.x, depth.y, 0.0, view.orthographic ? 1.0 : 0.0);
+  block.clip = view.orthographic ? glm::vec4(depth, 1.0, 0.0) : glm::vec4(depth, 0.0, 1.0);
   block.forward = glm::vec4(glm::vec3(glm::normalize(view.forward)), 0.0F);
   block.sun_direction = glm::vec4(lighting.sun_direction, 0.0F);
   block.sun_irradiance = glm::vec4(lighting.sun_irradiance, 0.0F);
@@ -473,6 +473,7 @@ void SurfaceRaster::upload_view(const SurfaceView& view, const SurfaceLighting& 
   const std::vector<CmLamp> records = light::lamp_records(of_host, lamps, view.eye);
   block.counts.x = static_cast<std::uint32_t>(records.size());
   block.counts.y = lighting.gloss && lighting.gloss_strength > 0.0F ? 1U : 0U;
+  block.counts.z = view.orthographic ? 1U : 0U;
   gl_->NamedBufferSubData(view_block_.name(), 0, sizeof(block), &block);
 
   fill(light_buffer_, light_bytes_, records.data(), records.size() * sizeof(CmLamp), "creating the surfaces' lights");

@@ -71,10 +71,10 @@ void fit(Entry& tets, const ImageReference& reference, const Options& options) {
   }
 }
 
-Run run(const Entry& entry, std::uint32_t samples, std::uint32_t seed) {
+Run run(const Entry& entry, std::uint32_t samples, std::uint32_t seed, bool by_clock) {
   if (entry.grid) entry.grid->bind();
   Run run = entry.subject->shaded(samples, seed);
-  run.seconds = run.processor_seconds;  // other programs run beside this one
+  if (!by_clock) run.seconds = run.processor_seconds;  // other programs run beside this one
   return run;
 }
 
@@ -119,11 +119,12 @@ void measure_peers(headless::Context& context, const Asset& asset, const Options
   for (const auto& [type, look] :
        {std::pair(NanoType::float32, Look::delta), {NanoType::float32, Look::ratio}, {NanoType::fp16, Look::ratio}})
     entries.push_back(peer(context, asset, type, look, options, density_scale));
-  for (const Entry& entry : entries) run(entry, 1, 1);  // compiles
+  for (const Entry& entry : entries) run(entry, 1, 1, options.by_clock);  // compiles
   progress("  turns");
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     for (Entry& entry : entries)
-      entry.runs.push_back(run(entry, options.fewest_samples, 1000 + static_cast<std::uint32_t>(repeat)));
+      entry.runs.push_back(
+          run(entry, options.fewest_samples, 1000 + static_cast<std::uint32_t>(repeat), options.by_clock));
   }
   const double fpn = static_cast<double>(make_nano_grid(asset.volume->volume(), NanoType::fpn).size()) * 4.0;
   std::printf("\n%s: %llu active voxels, mean optical depth %g, %u x %u pixels, %d x %u samples; FpN: %.2f MB\n\n",

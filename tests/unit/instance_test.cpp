@@ -598,6 +598,11 @@ CUMULET_ON_BACKENDS(GlInstances);
 
 constexpr std::size_t most_visits = 32;
 
+// GPUs divide within two and a half units in the last place.
+bool is_alike(const Visit& a, const Visit& b) {
+  return a.instance == b.instance && std::abs(a.entry - b.entry) <= 4e-6F * std::max(1.0F, std::abs(b.entry));
+}
+
 TEST_P(GlInstances, AreVisitedAsByCpp) {
   const gl::Object program = test::compute_program(gl_, head() + R"(
 layout(local_size_x = 64) in;
@@ -640,7 +645,7 @@ void main() {
       Visits expected = visits_of(by_cpp, rays[r]);
       visits += expected.size();
       expected.resize(most_visits, Visit{-1.0F, CM_INSTANCE_NONE});
-      for (std::size_t i = 0; i < most_visits; ++i) others += found[r * most_visits + i] == expected[i] ? 0 : 1;
+      for (std::size_t i = 0; i < most_visits; ++i) others += is_alike(found[r * most_visits + i], expected[i]) ? 0 : 1;
     }
     EXPECT_GT(visits, 1000U);
     EXPECT_EQ(others, 0U) << "of " << visits;

@@ -477,7 +477,8 @@ TEST_P(State, ObjectsDeletedInAnotherContextWhileBound) {
     }
     EXPECT_EQ(gl_->GetError(), GLenum{GL_NO_ERROR});
     gl_->ActiveTexture(GL_TEXTURE2);
-    EXPECT_EQ(integer(*gl_, GL_TEXTURE_BINDING_2D), 0);
+    // Some drivers (NVIDIA's) still take the name of what is bound somewhere.
+    EXPECT_TRUE(integer(*gl_, GL_TEXTURE_BINDING_2D) == 0 || integer(*gl_, GL_TEXTURE_BINDING_2D) == name);
     EXPECT_EQ(integer(*gl_, GL_SAMPLER_BINDING), 0);
     EXPECT_EQ(integer(*gl_, GL_PIXEL_PACK_BUFFER_BINDING), 0);
     gl_->BindTexture(GL_TEXTURE_3D, 0);
