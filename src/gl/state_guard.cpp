@@ -411,12 +411,10 @@ void StateGuard::restore_textures() const {
     for (std::size_t t = 0; t < targets; ++t) {
       if (!textures_[unit][t].used) continue;
       const GLuint texture = name_of(textures_[unit][t].value);
-      if (texture != 0 && gl.IsTexture(texture) != GL_FALSE) {
-        gl.BindTextureUnit(unit, texture);  // never an error, not even if the name is of another target by now
-      } else {
-        gl.ActiveTexture(GL_TEXTURE0 + unit);
-        gl.BindTexture(texture_targets[t].target, 0);
-      }
+      // Ours goes even if the name is of another target by now.
+      gl.ActiveTexture(GL_TEXTURE0 + unit);
+      gl.BindTexture(texture_targets[t].target, 0);
+      if (texture != 0 && gl.IsTexture(texture) != GL_FALSE) gl.BindTextureUnit(unit, texture);
     }
     if (samplers_[unit].used) {
       const GLuint sampler = name_of(samplers_[unit].value);

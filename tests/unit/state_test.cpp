@@ -237,7 +237,9 @@ void expect_untouched(const gl::FunctionsPtr& functions, Frame& frame, const std
     frame.draw();
     ASSERT_EQ(functions->GetError(), GLenum{GL_NO_ERROR}) << seed;
     ASSERT_EQ(state_differences(before, read_gl_state(*functions)), "") << seed;
-    ASSERT_EQ(frame.read(), expected) << seed;
+    const std::vector<float> read = frame.read();
+    const auto [is, was] = std::ranges::mismatch(read, expected);
+    ASSERT_EQ(is, read.end()) << seed << ": " << *is << " for " << *was << " at " << is - read.begin();
     ASSERT_EQ(state_differences(before, read_gl_state(*functions)), "") << seed;
   }
 }

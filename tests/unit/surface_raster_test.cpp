@@ -15,6 +15,7 @@
 #include <numbers>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/error.hpp"
@@ -240,6 +241,9 @@ TEST_P(SurfaceRasters, NothingIsInfinitelyFarAndTransparent) {
 }
 
 TEST_P(SurfaceRasters, DepthIsTheAnalyticOne) {
+  // Hardware puts vertices on a raster of 1/256 of a pixel; llvmpipe's planes are those of the vertices themselves.
+  const std::string driver = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
+  const double slack = driver.find("llvmpipe") != std::string::npos ? 4e-6 : 1e-3;
   // A wall z = -6 + 0.5 x - 0.25 y, not over the right of the picture, and a box's face at z = -3 before it.
   const auto scene = std::make_shared<HandScene>();
   scene->add_matte(glm::vec3(1.0F)).double_sided = true;
@@ -278,7 +282,7 @@ TEST_P(SurfaceRasters, DepthIsTheAnalyticOne) {
           if (std::isinf(expected)) {
             ASSERT_EQ(z, infinite) << x << ',' << y;
           } else {
-            ASSERT_NEAR(z, expected, 4e-6 * expected) << x << ',' << y << " layer " << layer;
+            ASSERT_NEAR(z, expected, slack * expected) << x << ',' << y << " layer " << layer;
             ASSERT_EQ(picture.colour(x, y, layer).a, 1.0F);
           }
         }
@@ -896,7 +900,10 @@ TEST_P(SurfaceRasters, RestIsSharpAtOnce) {
     }
     progressive.advance(wish, nothing, surfaces, std::chrono::steady_clock::now(), 0.1);
   };
-  for (int i = 0; i < 200; ++i) step(i % 2 == 0);  // two calls a frame, as hosts may
+  for (int i = 0; i < 200; ++i) {  // two calls a frame, as hosts may
+    step(i % 2 == 0);
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
   ASSERT_NE(progressive.shown(), nullptr);
   EXPECT_EQ(progressive.shown()->layers().size, (size + 1U) / 2U);
   wish.held = false;

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
+#include <thread>
 
 #include "base/error.hpp"
 #include "light/environment_file.hpp"
@@ -39,10 +41,13 @@ class ViewerFrames : public test::StillTest {
     for (int i = 0; i < 20000; ++i) {
       result = viewer().render(f);
       if (result.converged) return result;
+      wait_a_little();
     }
     ADD_FAILURE() << "does not converge";
     return result;
   }
+  // As hosts do between frames, for a device to get on.
+  static void wait_a_little() { std::this_thread::sleep_for(std::chrono::microseconds(100)); }
   [[nodiscard]] std::vector<float> read(glm::uvec2 size) const {
     std::vector<float> rgba(std::size_t{size.x} * size.y * 4);
     viewer().read_linear(rgba.data(), rgba.size());
@@ -95,6 +100,7 @@ TEST_P(ViewerFrames, ShowsSomethingWhileTheCameraNeverRests) {
     viewer().camera()->orbit(0.01, 0.0);
     const viewer::FrameResult result = viewer().render(frame(256, 256, 0.01));
     EXPECT_FALSE(result.converged);
+    wait_a_little();
     if (result.size.x == 0) continue;
     const float now = read(result.size)[std::size_t{4} * (result.size.x / 2 + result.size.x * (result.size.y / 2))];
     pictures += now != last ? 1 : 0;
