@@ -3,7 +3,7 @@
 # AddressSanitizer and UndefinedBehaviorSanitizer, and the checks of format, scripts and (clang-tidy) code.
 # The last line is "N passed, N failed" (", N skipped"); the exit status is 0 if none failed.
 # --quick: the release build's tests alone, without those labelled slow. --long: everything, clang-tidy with the static
-# analyzer, then the tests of threads under ThreadSanitizer, the soak, light behind OSMesa's door, all drivers' pictures
+# analyzer, then the tests of threads under ThreadSanitizer, the soak, most behind OSMesa's door, all drivers' pictures
 # and a minute of each fuzzer (an hour and a half more).
 # shellcheck source=scripts/common.sh
 . "$(dirname "${BASH_SOURCE[0]}")/../scripts/common.sh"
