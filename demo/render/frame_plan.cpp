@@ -1,6 +1,7 @@
 #include "frame_plan.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <frame_pattern.hpp>
@@ -29,10 +30,12 @@ std::optional<FramePattern> volume_pattern(const RenderOptions& options) {
   throw UsageError("--frames: the name '" + volume + "' has neither a number nor a place for one, such as ####");
 }
 
-/// A file to write in each frame.
+/// A file to write in each frame. All have the decimals that one of them needs: so they sort as they are played.
 class Written {
  public:
-  Written(const char* flag, const std::string& name, std::size_t count) : name_(name) {
+  Written(const char* flag, const std::string& name, const std::vector<Moment>& moments) : name_(name) {
+    const std::size_t count = moments.size();
+    for (const Moment& moment : moments) decimals_ = std::max(decimals_, moment.decimals());
     try {
       pattern_ = FramePattern::parse(name);
     } catch (const UsageError& error) {
@@ -45,11 +48,14 @@ class Written {
                        path.extension().string());
     }
   }
-  [[nodiscard]] std::string of(const Moment& moment) const { return pattern_ ? pattern_->file(moment) : name_; }
+  [[nodiscard]] std::string of(const Moment& moment) const {
+    return pattern_ ? pattern_->file(moment, decimals_) : name_;
+  }
 
  private:
   std::string name_;
   std::optional<FramePattern> pattern_;
+  std::size_t decimals_ = 0;
 };
 
 /// Files that are so many frames apart, from the first that is there on.
@@ -102,9 +108,9 @@ std::optional<FramePlan> plan_frames(const RenderOptions& options) {
   std::vector<Moment> frames = options.frames;
   if (frames.empty() && options.scene.sequence.frame) frames = {*options.scene.sequence.frame};
   if (frames.empty()) frames.assign(there.begin(), there.end());
-  const Written output("--output", options.output, frames.size());
-  const Written stats("--stats", options.stats, frames.size());
-  const Written checkpoint("--checkpoint", options.checkpoint, frames.size());
+  const Written output("--output", options.output, frames);
+  const Written stats("--stats", options.stats, frames);
+  const Written checkpoint("--checkpoint", options.checkpoint, frames);
 
   const Grid grid(there);
   const bool moments = std::ranges::any_of(frames, &Moment::is_between);

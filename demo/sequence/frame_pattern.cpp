@@ -95,9 +95,10 @@ std::optional<FramePattern> FramePattern::of_file(const std::string& path) {
 
 std::string FramePattern::file(Frame frame) const { return file(Moment(frame)); }
 
-std::string FramePattern::file(const Moment& moment) const {
+std::string FramePattern::file(const Moment& moment, std::size_t decimals) const {
   const std::string number = std::to_string(moment.frame);
-  return head_ + std::string(digits_ - std::min(digits_, number.size()), '0') + number + moment.part_text() + tail_;
+  return head_ + std::string(digits_ - std::min(digits_, number.size()), '0') + number + moment.part_text(decimals) +
+         tail_;
 }
 
 std::optional<Frame> FramePattern::frame_of(std::string_view path) const {

@@ -28,8 +28,8 @@ class FramePattern {
   [[nodiscard]] static std::optional<FramePattern> of_file(const std::string& path);
 
   [[nodiscard]] std::string file(Frame frame) const;
-  /// Of what is between two frames the decimals stand behind the number: out.0001.5.exr.
-  [[nodiscard]] std::string file(const Moment& moment) const;
+  /// The decimals, of what is between two frames or so many at least, stand behind the number: out.0001.5.exr.
+  [[nodiscard]] std::string file(const Moment& moment, std::size_t decimals = 0) const;
 
   /// The frames that the folder has files of, ascending; none where the folder cannot be read.
   [[nodiscard]] std::vector<Frame> frames_there() const;

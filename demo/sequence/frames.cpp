@@ -52,12 +52,19 @@ std::pair<std::string_view, std::string_view> cut(std::string_view text, char at
 
 }  // namespace
 
-std::string Moment::part_text() const {
-  if (!is_between()) return "";
+std::string Moment::part_text(std::size_t decimals) const {
+  const std::size_t shown = std::max(decimals, this->decimals());
+  if (shown == 0) return "";
   std::string digits = std::to_string(whole + thousandths);
   digits.front() = '.';
-  while (digits.back() == '0') digits.pop_back();
+  digits.resize(1 + shown, '0');
   return digits;
+}
+
+std::size_t Moment::decimals() const {
+  std::size_t count = 3;
+  for (std::uint32_t rest = whole + thousandths; count > 0 && rest % 10 == 0; rest /= 10) --count;
+  return count;
 }
 
 std::string Moment::text() const { return std::to_string(frame) + part_text(); }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -27,8 +28,10 @@ struct Moment {
   [[nodiscard]] bool is_between() const { return thousandths != 0; }
   /// "5", "5.25".
   [[nodiscard]] std::string text() const;
-  /// ".25"; "" of a frame.
-  [[nodiscard]] std::string part_text() const;
+  /// ".25"; "" of a frame. With so many decimals at least: ".250".
+  [[nodiscard]] std::string part_text(std::size_t decimals = 0) const;
+  /// That it has: 0 to 3.
+  [[nodiscard]] std::size_t decimals() const;
 };
 
 /// "5", "1-100", "1-100x2" (1, 3, 5, ... up to 100), "1-2x0.25" (1, 1.25, ... 2; three decimals at most) and several of

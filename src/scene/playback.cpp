@@ -23,10 +23,6 @@ double at_whole(double x) {
 
 }  // namespace
 
-std::uint32_t Moment::frame() const {
-  return static_cast<std::uint32_t>(std::max(0.0, forward ? std::floor(position) : std::ceil(position)));
-}
-
 Moment moment_at(const Playback& playback, double seconds) {
   const double x = at_whole((seconds - playback.offset_seconds) * playback.frames_per_second);
   const double first = playback.first;

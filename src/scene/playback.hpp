@@ -37,9 +37,6 @@ struct Moment {
   double position = 0.0;  ///< in frames: 2.25 is a quarter of the way from frame 2 to frame 3
   bool forward = true;    ///< whether frames come in ascending order about here, as the clock runs
   bool operator==(const Moment&) const = default;
-
-  /// The frame that has come last: each is there for as long as the next takes to come.
-  [[nodiscard]] std::uint32_t frame() const;
 };
 
 /// A frame's time is its own to within a millionth of a frame: rounding takes none to the one before.
@@ -47,6 +44,10 @@ struct Moment {
 /// The step that has come last: each is there for as long as the next takes to come. Between the last frame of a loop
 /// and its first there is none.
 [[nodiscard]] std::uint32_t step_of(const Playback& playback, const Moment& moment);
+/// The frame of that step, the earlier of the two where it is between them.
+[[nodiscard]] inline std::uint32_t frame_of(const Playback& playback, const Moment& moment) {
+  return step_of(playback, moment) / playback.steps;
+}
 /// The first time, from the offset on, at which a frame that is played comes; of others what that would be.
 [[nodiscard]] double time_of(const Playback& playback, double position);
 

@@ -105,7 +105,8 @@ cumulet_status cumulet_sequence_get_frame_at(const cumulet_sequence* sequence, d
   return on(sequence, "sequence", [&](const Sequence& s) {
     require_seconds(seconds);
     require(frame != nullptr, "frame is NULL");
-    *frame = cumulet::scene::moment_at(s.get().playback, seconds).frame();
+    const Playback playback = s.get().playback;
+    *frame = cumulet::scene::frame_of(playback, cumulet::scene::moment_at(playback, seconds));
   });
 }
 

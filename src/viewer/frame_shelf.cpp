@@ -1,7 +1,6 @@
 #include "viewer/frame_shelf.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <iterator>
 #include <limits>
@@ -43,20 +42,25 @@ void FrameShelf::wish(Wish wish) {
   std::vector<Shelved> old;  // ends after the lock, as all that may be large
   {
     const std::scoped_lock lock(mutex_);
-    if (!is_wished(wish.files)) {
+    const bool other_files = !is_wished(wish.files);
+    const bool other_steps = other_files || wish.steps != wish_->steps;
+    if (other_steps) {
       worker_.cancel();
+      stand_ins_.reserve(wish.steps.count(wish.files->count()));  // once there is a wish nothing throws
+    }
+    if (other_files) {
       old = std::exchange(shelf_, std::vector<Shelved>(wish.steps.count(wish.files->count())));
       judging_ = Judging::due;
       judged_.reset();
       said_.clear();
-    } else if (wish.steps != wish_->steps) {
-      worker_.cancel();
+    } else if (other_steps) {
       old = take_other_steps(wish.steps);
     }
     const bool suggested = wish.takes_suggested && wish.files->shown.suggested_density_scale;
     if (suggested && judged_ && judged_->density_scale && wish.settings)
       wish.settings->refine.density_scale = *judged_->density_scale;
     wish_ = std::move(wish);
+    if (other_steps) find_stand_ins();
     cancelled_ = false;
     std::ranges::move(take_excess(), std::back_inserter(old));
     start();
@@ -85,6 +89,7 @@ void FrameShelf::rebuild() {
     shelved.stale = true;
     shelved.failure.reset();
   }
+  find_stand_ins();
   // What is under way began before.
   worker_.cancel();
   if (judging_ == Judging::in_vain) judging_ = Judging::due;
@@ -110,11 +115,16 @@ std::optional<FrameShelf::Ready> FrameShelf::nearest() const {
   const std::scoped_lock lock(mutex_);
   if (!wish_) return std::nullopt;
   const auto wanted = first();
-  const std::int64_t target = wanted.value_or(wish_->order.front());
+  const std::uint32_t target = wanted.value_or(wish_->order.front());
+  const auto steps_there = static_cast<std::uint32_t>(shelf_.size());
   std::optional<std::uint32_t> found;
-  const auto away = [&](std::uint32_t step) { return std::abs(step - target); };
-  for (std::uint32_t step = 0; step < shelf_.size(); ++step) {
-    if (shelf_[step].built && (!found || away(step) < away(*found))) found = step;
+  // Of two as far away the earlier.
+  for (std::uint32_t away = 0; !found && (away <= target || away < steps_there - target); ++away) {
+    if (away <= target && shelf_[target - away].built) {
+      found = target - away;
+    } else if (away < steps_there - target && shelf_[target + away].built) {
+      found = target + away;
+    }
   }
   if (!found) return std::nullopt;
   const Steps& steps = wish_->steps;
@@ -198,17 +208,16 @@ bool FrameShelf::is_possible(std::uint32_t step) const {
   return !steps.is_between(step) || !own(frame + 1).failure;
 }
 
-std::vector<std::optional<std::uint32_t>> FrameShelf::stand_ins() const {
-  std::vector<std::optional<std::uint32_t>> of(shelf_.size());
+void FrameShelf::find_stand_ins() {
+  stand_ins_.assign(shelf_.size(), std::nullopt);
   std::uint32_t last = 0;
   while (last < shelf_.size() && shelf_[last].failure) last += wish_->steps.a_frame;
-  if (last >= shelf_.size()) return of;
+  if (last >= shelf_.size()) return;
   for (std::uint32_t step = 0; step < shelf_.size(); ++step) {
     const bool possible = is_possible(step);
     if (possible && !wish_->steps.is_between(step)) last = step;
-    of[step] = possible ? step : last;
+    stand_ins_[step] = possible ? step : last;
   }
-  return of;
 }
 
 std::vector<FrameShelf::Shelved> FrameShelf::take_other_steps(const Steps& steps) {
@@ -228,9 +237,8 @@ std::vector<std::uint32_t> FrameShelf::kept() const {
   std::vector<std::uint32_t> frames;
   std::vector<bool> taken(shelf_.size());
   std::uint64_t bytes = 0;
-  const auto shown = stand_ins();
   for (const std::uint32_t wished : wish_->order) {
-    const auto frame = shown[wished];
+    const auto frame = stand_ins_[wished];
     if (!frame || taken[*frame]) continue;
     const std::uint64_t takes = shelf_[*frame].grid_bytes > 0 ? shelf_[*frame].grid_bytes : likely;
     if (!frames.empty() && bytes + takes > wish_->memory_bytes) break;
@@ -342,6 +350,7 @@ void FrameShelf::fail(const Which& which, std::optional<std::uint32_t> frame, co
     progress.check();  // who wants it anew asks under the lock, too
     if (!is_wished(which)) return;
     (frame ? own(*frame) : shelf_[which.step]).failure = failure;
+    find_stand_ins();
     ++revision_;
   }
   log_.warning(std::string(failure.what()) + ": another frame of the sequence is shown instead");

@@ -158,9 +158,9 @@ class FrameShelf {
   [[nodiscard]] std::vector<Shelved> take_other_steps(const Steps& steps);
   [[nodiscard]] bool is_ready(const Shelved& shelved) const;
   [[nodiscard]] bool is_judged() const { return judging_ != Judging::due; }
-  // Of each step the one that is shown for it: itself unless it cannot be; nothing if no frame can. O(steps).
-  [[nodiscard]] std::vector<std::optional<std::uint32_t>> stand_ins() const;
-  [[nodiscard]] std::optional<std::uint32_t> first() const { return stand_ins()[wish_->order.front()]; }
+  // Once other steps are possible than before.
+  void find_stand_ins();
+  [[nodiscard]] std::optional<std::uint32_t> first() const { return stand_ins_[wish_->order.front()]; }
   // Steps that are to be there: as many as the memory holds, by what they are known or likely to take.
   [[nodiscard]] std::vector<std::uint32_t> kept() const;
   [[nodiscard]] std::optional<std::uint32_t> next() const;
@@ -177,6 +177,8 @@ class FrameShelf {
   mutable std::condition_variable changed_;
   std::optional<Wish> wish_;
   std::vector<Shelved> shelf_;  // one a step
+  // Of each step the one that is shown for it: itself unless it cannot be; nothing if no frame can.
+  std::vector<std::optional<std::uint32_t>> stand_ins_;
   Judging judging_ = Judging::due;
   std::optional<Judged> judged_;  // that nobody took
   std::set<std::string> said_;    // by the log, but for files' names

@@ -387,7 +387,7 @@ Viewer::Followed& Viewer::followed() {
 
 Viewer::SequenceStatus Viewer::status_of(const Followed& f, const FrameShelf& shelf) const {
   SequenceStatus status;
-  status.asked = f.state.moment.frame();
+  status.asked = scene::frame_of(f.state.playback, f.state.moment);
   const std::uint32_t step = scene::step_of(f.state.playback, f.state.moment);
   status.asked_position = FrameShelf::Steps::of(f.state.playback).position(step);
   // What was there before may be another's.

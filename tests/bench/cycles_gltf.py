@@ -77,10 +77,13 @@ def pack(model, binary, folder):
     return bytes(chunk)
 
 
-def simplify(model):
-    """Takes out what the two do not both show; says what that was."""
+def simplify(model, animation=None):
+    """Takes out what the two do not both show, and all animations but the one of that number; says what that was."""
     changes = []
-    if model.pop("animations", None):
+    animations = model.pop("animations", [])
+    if animation is not None:
+        model["animations"] = [animations[animation]]
+    elif animations:
         changes.append("animation")
     if "KHR_lights_punctual" in model.get("extensions", {}):
         changes.append("lights")

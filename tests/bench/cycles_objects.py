@@ -66,6 +66,14 @@ def open_shutter(description):
     bpy.app.handlers.render_init.append(begin)
 
 
+def set_clock(actions, time):
+    """The frame's moment is so many seconds into them, which were imported at a frame a second."""
+    for curve in (curve for action in actions for curve in action.fcurves):
+        for point in curve.keyframe_points:
+            for end in (point.co, point.handle_left, point.handle_right):
+                end.x += 1 - time
+
+
 def medium(name, grid, settings):
     material = bpy.data.materials.new(name)
     material.use_nodes = True
@@ -112,16 +120,18 @@ def place_all(*_):
             instance.parent = origin
             instance.matrix_parent_inverse = matrix(place) @ shift
     bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
+    bpy.context.scene.render.fps = 1  # of keys that are imported
     for number, one in enumerate(scene.get("models", [])):
         origin = origin_of(scene, one, f"origin of model {number}")
-        before = set(bpy.data.objects)
+        before, actions_before = set(bpy.data.objects), set(bpy.data.actions)
         bpy.ops.import_scene.gltf(filepath=os.path.join(folder, one["file"]))
         new = [o for o in bpy.data.objects if o not in before]
         # Blender has turned it to Z-up.
         turned = matrix(one["to_world"]) @ Matrix.Rotation(-math.pi / 2, 4, "X")
         for root in [o for o in new if o.parent is None]:
-            root.matrix_world = turned @ root.matrix_world
             root.parent = origin
+            root.matrix_parent_inverse = turned
+        set_clock(set(bpy.data.actions) - actions_before, one.get("time", 0))
         for other in [o for o in new if o.type in ("LIGHT", "CAMERA")]:
             bpy.data.objects.remove(other)
 

@@ -1,7 +1,8 @@
 """Renders a scene of three volumes that overlap and two models, which stand in them, with cumulet-render and with Blender's
 Cycles: all materials matte, two seeds each, one run. Prints a row of a Markdown table, which README.md here has, and writes
 scene.png (ours, Cycles', eight times the difference) into the folder --out. With --moving some of them and the camera move
-while the shutter is open; with --flow there is a Mantaflow file alone, which moves by its velocity.
+while the shutter is open; with --flow there is a Mantaflow file alone, which moves by its velocity, and with --deform a model
+alone, which moves by an animation.
 
 The peer is cycles.py, with cycles_objects.py before it for what it does not know; it needs Blender 3.4 and numpy."""
 
@@ -66,7 +67,7 @@ def matte(model_file, out, options):
     """The model as both show it, in one file, and its bounds."""
     model, binary = cycles_gltf.read_model(model_file)
     chunk = cycles_gltf.pack(model, binary, model_file.parent)
-    cycles_gltf.simplify(model)
+    cycles_gltf.simplify(model, options.deform)
     cycles_gltf.read_nearest_texels(model)
     packed = out.with_suffix(".packed.glb")
     cycles_gltf.write_glb(packed, model, chunk)
@@ -126,7 +127,8 @@ def main():
     parser.add_argument("render", type=pathlib.Path, help="cumulet-render")
     parser.add_argument("peer", type=pathlib.Path, help="folder of cycles.py, lambert.py and compare.py")
     parser.add_argument("files", type=pathlib.Path, nargs="+",
-                        help="cumulet-scene's cumulus.vdb and explosion_0012.vdb and two models, .gltf or .glb; with --flow one of Mantaflow's")
+                        help="cumulet-scene's cumulus.vdb and explosion_0012.vdb and two models, .gltf or .glb; with --flow one of "
+                             "Mantaflow's, with --deform a model")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for scenes and pictures")
     parser.add_argument("--size", default="128x96")
     parser.add_argument("--spp", type=int, default=64, help="samples a pixel and seed")
@@ -136,10 +138,12 @@ def main():
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument("--moving", action="store_true", help="there is motion")
     motion.add_argument("--flow", action="store_true", help="one volume, which moves by its velocity")
-    parser.add_argument("--shutter", type=float, help="seconds (default: 1 with --moving, 0.0005 with --flow)")
+    motion.add_argument("--deform", type=int, metavar="N", help="one model, by its animation of that number, from 0")
+    parser.add_argument("--time", type=float, default=0.0, help="of --deform: seconds into the animation")
+    parser.add_argument("--shutter", type=float, help="seconds (default: 1 with --moving, 0.0005 with --flow, 0.04 with --deform)")
     parser.add_argument("--within", type=float, nargs=2, metavar=("MEAN", "BLOCKS"), help="fail where they differ by more, in %%, beyond the noise")
     options = parser.parse_args()
-    if len(options.files) != (1 if options.flow else 4):
+    if len(options.files) != (1 if options.flow or options.deform is not None else 4):
         parser.error("other files are needed")
     for missing, what in ((numpy is None, "numpy"), (not shutil.which("blender", path=PEER_PATH), "Blender"),
                           (not (options.peer / "cycles.py").exists(), f"{options.peer}/cycles.py"),
@@ -148,10 +152,15 @@ def main():
             print(f"skipped: there is no {what}")
             sys.exit(77)
     options.out.mkdir(parents=True, exist_ok=True)
-    camera, models, shutter = CAMERA, [], 0.0
+    camera, shown, models, shutter = CAMERA, [], [], 0.0
     if options.flow:
         shown = flow(str(options.files[0].resolve()))
         shutter = 0.0005 if options.shutter is None else options.shutter
+    elif options.deform is not None:
+        out = options.out / "model.glb"
+        at = standing(matte(options.files[0], out, options), CAMERA["target"], 80, 60)
+        models.append({"file": out.name, "to_world": at, "time": options.time})
+        shutter = 0.04 if options.shutter is None else options.shutter
     else:
         shown = volumes(*(str(file.resolve()) for file in options.files[:2]))
         for number, (file, middle, size, degrees) in enumerate(zip(options.files[2:], ([-24, 24, 22], [22, 18, 40]), (40, 22), (25, -40))):

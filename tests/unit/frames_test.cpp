@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -82,6 +83,8 @@ TEST(Frames, WhatIsBetweenThemIsReadInDecimals) {
   EXPECT_EQ(Moment(3).text(), "3");
   EXPECT_EQ(frames_text({1, 2, 3, {3, 500}, 4, {1, 500}}), "1, 1.5, 2, 3, 3.5, 4");
   EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(12, 250)), "out.0012.25.exr");
+  EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(12), 2), "out.0012.00.exr");
+  EXPECT_EQ(FramePattern::parse("out.####.exr")->file(Moment(12, 125), 2), "out.0012.125.exr");
 }
 
 TEST(Frames, AreToldInFewWords) {
@@ -263,7 +266,11 @@ TEST_F(Plan, WhatIsBetweenTwoFilesIsOfBoth) {
   EXPECT_FALSE(plan->frames[0].next);
   const auto& quarter = plan->frames[1];
   EXPECT_EQ(quarter.volume, folder / "f.0010.vdb");
-  EXPECT_EQ(quarter.output, "out.0010.5.exr");
+  EXPECT_EQ(quarter.output, "out.0010.50.exr");
+  std::vector<std::string> outputs;
+  for (const PlannedFrame& frame : plan->frames) outputs.push_back(frame.output);
+  EXPECT_EQ(outputs.front(), "out.0010.00.exr");
+  EXPECT_TRUE(std::ranges::is_sorted(outputs)) << "by name they come as they are played";
   ASSERT_TRUE(quarter.next);
   EXPECT_EQ(quarter.next->volume, folder / "f.0012.vdb");
   EXPECT_EQ(quarter.next->part, 1U);

@@ -9,6 +9,7 @@
 namespace {
 
 using cumulet::scene::Between;
+using cumulet::scene::frame_of;
 using cumulet::scene::Moment;
 using cumulet::scene::moment_at;
 using cumulet::scene::Playback;
@@ -18,11 +19,15 @@ using cumulet::scene::time_of;
 using cumulet::scene::upcoming;
 using Frames = std::vector<std::uint32_t>;
 
+std::uint32_t frame_at(const Playback& playback, double seconds) {
+  return frame_of(playback, moment_at(playback, seconds));
+}
+
 // What comes in so many frames' time, from the clock's frame `from` on.
 Frames played(const Playback& playback, int from, int count) {
   Frames frames;
   for (int i = from; i < from + count; ++i)
-    frames.push_back(moment_at(playback, playback.offset_seconds + i / playback.frames_per_second).frame());
+    frames.push_back(frame_at(playback, playback.offset_seconds + i / playback.frames_per_second));
   return frames;
 }
 
@@ -51,9 +56,9 @@ TEST(Playback, FramesLastTheSame) {
   for (const Repeat repeat : {Repeat::loop, Repeat::ping_pong}) {
     const Playback playback{.frames_per_second = 10.0, .repeat = repeat, .count = 5};
     for (int i = 0; i < 40; ++i) {
-      const auto frame = moment_at(playback, i / 10.0).frame();
+      const auto frame = frame_at(playback, i / 10.0);
       for (const double part : {0.01, 0.5, 0.99})
-        EXPECT_EQ(moment_at(playback, (i + part) / 10.0).frame(), frame) << i << " and " << part;
+        EXPECT_EQ(frame_at(playback, (i + part) / 10.0), frame) << i << " and " << part;
     }
   }
 }
@@ -62,7 +67,7 @@ TEST(Playback, AFramesTimeIsItsOwn) {
   for (const double rate : {23.976, 24.0, 25.0, 29.97, 60.0, 1000.0 / 3.0}) {
     const Playback playback{.frames_per_second = rate, .offset_seconds = 1.0 / 3.0, .first = 7, .count = 5000};
     for (std::uint32_t frame = 7; frame < 5007; ++frame)
-      ASSERT_EQ(moment_at(playback, time_of(playback, frame)).frame(), frame) << rate;
+      ASSERT_EQ(frame_at(playback, time_of(playback, frame)), frame) << rate;
   }
 }
 
@@ -71,14 +76,14 @@ TEST(Playback, SubFramesArePositions) {
   EXPECT_NEAR(moment_at(playback, 2.125).position, 1.25, 1e-9);
   EXPECT_NEAR(moment_at(playback, 2.525).position, 2.75, 1e-9);  // on the way back
   EXPECT_FALSE(moment_at(playback, 2.525).forward);
-  EXPECT_EQ(moment_at(playback, 2.525).frame(), 3U);
+  EXPECT_EQ(frame_at(playback, 2.525), 3U);
 }
 
 TEST(Playback, WhatIsFarAwayIsStillAFrame) {
   for (const Repeat repeat : {Repeat::hold, Repeat::loop, Repeat::ping_pong}) {
     const Playback playback{.repeat = repeat, .first = 2, .count = 5};
     for (const double seconds : {-1e15, -1e-18, 1e15, 1e300, -1e300}) {
-      const auto frame = moment_at(playback, seconds).frame();
+      const auto frame = frame_at(playback, seconds);
       EXPECT_GE(frame, 2U);
       EXPECT_LE(frame, 6U);
     }
@@ -135,6 +140,7 @@ TEST(Playback, StepsBetweenFramesComeInTheirOrder) {
   back.repeat = Repeat::ping_pong;
   EXPECT_EQ(at(back, 2.25), 15U);
   EXPECT_EQ(at(back, 2.3), 15U);
+  EXPECT_EQ(frame_of(back, moment_at(back, 2.3 / 24.0)), 3U) << "as the step that is shown";
   // From the last of a loop to the first there is nothing.
   Playback loop = hold;
   loop.repeat = Repeat::loop;

@@ -331,6 +331,26 @@ TEST_P(Shutter, ASquareThatDeformsCoversForItsPartOfTheTime) {
   EXPECT_NEAR(along_z(11.0, 180.0), 0.8, 4.5 * sigma(0.8)) << "it is posed anew";
 }
 
+// Each moves by as much as its model, or its instance, moves back: at any moment it is in one place, if all of them are
+// of the same moment.
+TEST_P(Shutter, WhatMovesAgainstItsPlaceStands) {
+  only_absorb(0.1);
+  const std::shared_ptr<PosedScene> squares = black_square();
+  squares->add_quad({{{0, 20, 0}, {8, 20, 0}, {8, 28, 0}, {0, 28, 0}}}, squares->add(test::diffuse(vec3(0.0F))));
+  squares->prototypes.push_back({1, 1, 1});
+  squares->move = [](surface::Pose& pose, double t) {
+    for (std::size_t i = 0; i < 8; ++i) pose.vertices[i].position.x += static_cast<float>((i < 4 ? 20.0 : 50.0) * t);
+    pose.placings = {{moved(-30.0 * t, 0, 0)}};
+  };
+  viewer::ModelSettings settings = posed_at(squares, 0.5);
+  settings.ends = scene::PlaceEnds{dmat4(1.0), moved(-20, 0, 0)};
+  viewer().add_model(std::make_shared<viewer::ModelInstance>(settings));
+  for (const double y : {4.0, 24.0}) {
+    EXPECT_NEAR(along_z(4.0, y), 0.0, 1e-6) << y;
+    EXPECT_NEAR(along_z(12.0, y), 1.0, 1e-6) << y;
+  }
+}
+
 // One that shines grows, is sheared and turns its normals; copies of a sphere are squashed, and stand on a way of their
 // own, on that of their model.
 TEST_P(Shutter, AModelThatDeformsIsTheMeanOfStills) {
