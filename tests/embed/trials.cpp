@@ -379,6 +379,7 @@ void Caller::call_all() {
   auto programs = make_desc<cumulet_programs_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
   std::array<float, 3> rgb{};
+  const auto name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
 
   // The exceptions.
   for (cumulet_viewer* v : {viewer, other}) {
@@ -395,7 +396,8 @@ void Caller::call_all() {
                 "cumulet_instance_retain",  "cumulet_instance_release",   "cumulet_live_retain",
                 "cumulet_live_release",     "cumulet_model_retain",       "cumulet_model_release",
                 "cumulet_sequence_retain",  "cumulet_sequence_release",   "cumulet_inspection_release",
-                "cumulet_destroy",          "cumulet_last_error",         "cumulet_transmittance_map_glsl"});
+                "cumulet_destroy",          "cumulet_last_error",         "cumulet_transmittance_map_glsl",
+                "cumulet_cryptomatte_id"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
@@ -407,6 +409,7 @@ void Caller::call_all() {
   cumulet_model_release(cumulet_model_retain(nullptr));
   cumulet_sequence_release(cumulet_sequence_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
+  if (cumulet_cryptomatte_id("hello") != 0x248bfa47U) wrong.push_back("id");
   if (cumulet_transmittance_map_glsl() == nullptr) wrong.push_back("glsl");
   // Refused without a status.
   cumulet_destroy(viewer);
@@ -533,6 +536,7 @@ void Caller::call_all() {
     CALL(cumulet_read_denoised, v, &denoise, one.data(), one.size());
     CALL(cumulet_read_aov, v, CUMULET_AOV_BEAUTY, one.data(), one.size());
     CALL(cumulet_read_light_group, v, 0, one.data(), one.size());
+    CALL(cumulet_read_cryptomatte, v, name, nullptr, 1U, one.data(), one.size());
     CALL(cumulet_measure_noise, v, &number);
     CALL(cumulet_read_accumulation, v, bytes.data(), &room);
     CALL(cumulet_restore_accumulation, v, bytes.data(), bytes.size());
