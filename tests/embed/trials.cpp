@@ -201,6 +201,7 @@ class NoContext : public Trial {
     double noise = 0.0;
     auto denoise = make_desc<cumulet_denoise_desc>();
     denoise.network = "none.tza";
+    const auto object_name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
     for (int round = 0; round < 2; ++round) {
       for (const auto& call : std::vector<std::function<cumulet_status()>>{
                [&] { return cumulet_render(v_, &frame, nullptr); },
@@ -210,6 +211,7 @@ class NoContext : public Trial {
                [&] { return cumulet_read_linear(v_, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_display(v_, bytes.data(), bytes.size()); },
                [&] { return cumulet_read_aov(v_, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
+               [&] { return cumulet_read_cryptomatte(v_, object_name, nullptr, 1, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_denoised(v_, &denoise, rgba.data(), rgba.size()); },
                [&] { return cumulet_measure_noise(v_, &noise); },
                [&] {
@@ -379,7 +381,7 @@ void Caller::call_all() {
   auto programs = make_desc<cumulet_programs_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
   std::array<float, 3> rgb{};
-  const auto name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
+  const auto object_name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
 
   // The exceptions.
   for (cumulet_viewer* v : {viewer, other}) {
@@ -536,7 +538,7 @@ void Caller::call_all() {
     CALL(cumulet_read_denoised, v, &denoise, one.data(), one.size());
     CALL(cumulet_read_aov, v, CUMULET_AOV_BEAUTY, one.data(), one.size());
     CALL(cumulet_read_light_group, v, 0, one.data(), one.size());
-    CALL(cumulet_read_cryptomatte, v, name, nullptr, 1U, one.data(), one.size());
+    CALL(cumulet_read_cryptomatte, v, object_name, nullptr, 1U, one.data(), one.size());
     CALL(cumulet_measure_noise, v, &number);
     CALL(cumulet_read_accumulation, v, bytes.data(), &room);
     CALL(cumulet_restore_accumulation, v, bytes.data(), bytes.size());
