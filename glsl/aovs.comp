@@ -37,6 +37,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "ray.glsl"
 #include "walk.glsl"
 #include "ground.glsl"
+#include "fact_ray.glsl"
 
 layout(rgba32f, binding = CM_IMAGE_NORMAL) uniform writeonly image2D cm_normal;
 layout(rgba32f, binding = CM_IMAGE_ALBEDO) uniform writeonly image2D cm_albedo;
@@ -135,19 +136,15 @@ void main() {
 #endif
   float share = 1.0 / float(cm.dispatch.samples);
   for (int i = 0; i < int(cm.dispatch.samples); ++i) {
-    // Roberts's sequences; the first ray is the pixel's and the lens' middle.
-    vec2 within = fract(0.5 + float(i) * vec2(0.7548776662, 0.5698402910));
-    vec3 o;
-    vec3 w;
-    vec2 lens = fract(0.5 + float(i) * vec2(0.6287067210, 0.5385972572));
-    float t_per_z = cm_lens_ray(pixel, within, cm_on_disc(lens), o, w);
-    vec3 d = cm_to_cube(w);
-    float surface_t = t_per_z * cm_surface_z(pixel, within, uint(i));
+    CmFactRay ray = cm_fact_ray(pixel, i);
+    vec3 o = ray.o;
+    vec3 w = ray.w;
+    vec3 d = ray.d;
+    float t_per_z = ray.t_per_z;
+    float surface_t = ray.end;
 #if CM_SURFACES
     vec3 of_surface = vec3(0.0);
     CmHit hit;
-    cm_hit_seed = cm_hash3(uvec3(pixel.y * cm.view.size.x + pixel.x, uint(i), cm.integrator.seed)).x;
-    cm_hit_camera = true;
     if (cm_trace_models(cm_from_cube_point(o), w, 0.0, surface_t, false, hit)) {
       surface_t = hit.t;
       CmSurfacePoint point = cm_surface_point(hit.triangle, hit.barycentrics, w, !hit.front);
@@ -186,7 +183,7 @@ void main() {
       used += depth;
       // Of what scatters in this part of the ray: its chance, and where in it, as if it were even.
       float chance = 1.0 - exp(-depth);
-      float within_part = depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
+      float within_part = cm_middle_of_part(depth, chance);
 #if CM_CHANNELS
       // As if it were dimmed evenly within this part.
       float dimmed = depth > 1e-3 ? clear * chance / depth : clear;

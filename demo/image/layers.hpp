@@ -31,6 +31,9 @@ inline constexpr LayerName error{"error", "Y"};
 inline constexpr LayerName velocity{"velocity", "XYZ"};
 inline constexpr LayerName backward{"backward", "uv"};
 inline constexpr LayerName volume_backward{"volume_backward", "uv"};
+/// Of mattes, before the number of each layer of two ranks.
+inline constexpr std::string_view cryptomatte_prefix = "CryptoObject";
+inline constexpr std::string_view cryptomatte_channels = "RGBA";
 /// Of a group of lights, before its name: as Blender calls them.
 inline constexpr std::string_view light_group_prefix = "Combined_";
 inline constexpr std::string_view light_group_channels = "RGB";

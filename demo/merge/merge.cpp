@@ -65,6 +65,15 @@ Part open(const std::string& path) {
   return part;
 }
 
+/// Which ids the file's mattes have; nothing where it has none.
+std::string manifest_of(const Part& part) {
+  const auto found = std::ranges::find_if(part.contents.attributes, [](const image::Attribute& attribute) {
+    return attribute.name.starts_with("cryptomatte/") && attribute.name.ends_with("/manifest");
+  });
+  const auto* text = found == part.contents.attributes.end() ? nullptr : std::get_if<std::string>(&found->value);
+  return text == nullptr ? std::string() : *text;
+}
+
 template <class Value>
 void check_same(const Part& a, const Part& b, std::string_view name, const char* what) {
   if (find<Value>(a.contents, name) != find<Value>(b.contents, name))
@@ -84,6 +93,7 @@ void check_together(const Part& a, const Part& b) {
   check_same<std::string>(a, b, attributes::march, "another march");
   check_same<std::string>(a, b, attributes::scene, "another scene");
   if (a.contents.channels != b.contents.channels) refuse(b.path, "has other layers than " + a.path);
+  if (manifest_of(a) != manifest_of(b)) refuse(b.path, "has mattes of other names than " + a.path);
 }
 
 /// In the order of their samples.
@@ -117,6 +127,16 @@ bool has(const image::Contents& contents, const image::LayerName& layer) {
     if (!name.empty()) name += '.';
     return std::ranges::find(contents.channels, name + letter) != contents.channels.end();
   });
+}
+
+/// Calls visit with each layer whose name begins so, and whose channels include R.
+template <class Visit>
+void for_each_layer(const image::Contents& contents, std::string_view prefix, std::string_view channels,
+                    Visit&& visit) {
+  for (const std::string& channel : contents.channels) {
+    const std::string_view name = std::string_view(channel).substr(0, channel.rfind('.'));
+    if (name.starts_with(prefix) && channel.ends_with(".R")) visit(image::LayerName{name, channels});
+  }
 }
 
 std::size_t pixels_of(const Part& part) {
@@ -208,15 +228,15 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
   std::vector<std::pair<image::LayerName, std::vector<float>>> made;
   for (const image::LayerName& layer : {layers::beauty, layers::volume})
     if (has(first, layer)) made.emplace_back(layer, mean(parts, layer));
-  for (const std::string& channel : first.channels) {
-    const std::string_view name = std::string_view(channel).substr(0, channel.rfind('.'));
-    if (!name.starts_with(layers::light_group_prefix) || !channel.ends_with(".R")) continue;
-    const image::LayerName layer{name, layers::light_group_channels};
-    made.emplace_back(layer, mean(parts, layer));
-  }
+  for_each_layer(first, layers::light_group_prefix, layers::light_group_channels,
+                 [&](const image::LayerName& layer) { made.emplace_back(layer, mean(parts, layer)); });
   for (const image::LayerName& layer : {layers::transmittance, layers::depth, layers::volume_depth, layers::normal,
                                         layers::albedo, layers::velocity, layers::backward, layers::volume_backward})
     if (has(first, layer)) made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
+  // Nor do mattes depend on samples, and there is no mean of ids.
+  for_each_layer(first, layers::cryptomatte_prefix, layers::cryptomatte_channels, [&](const image::LayerName& layer) {
+    made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
+  });
 
   std::vector<image::Attribute> said = first.attributes;
   const auto samples = static_cast<double>(merged.samples);

@@ -1,7 +1,12 @@
 #include "aovs.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace cumulet::demo {
@@ -35,6 +40,52 @@ image::LayerName layer_of(cumulet_aov aov) {
 }
 
 namespace {
+
+constexpr std::uint32_t matte_ranks = 6;  // as most renderers have them
+constexpr std::uint32_t matte_layers = matte_ranks / 2;
+
+std::string matte_digits(std::string_view name) {
+  std::array<char, 9> digits{};
+  std::snprintf(digits.data(), digits.size(), "%08x", cumulet_cryptomatte_id(std::string(name).c_str()));
+  return digits.data();
+}
+
+/// What is known of a viewer's mattes: their pixels, and the id of each name.
+class Mattes {
+ public:
+  explicit Mattes(const ObjectName& name) : name_(name) {}
+
+  cumulet_status read(cumulet_viewer* viewer, std::size_t pixels) {
+    std::vector<float> pairs(pixels * 2 * matte_ranks);
+    const cumulet_status status = cumulet_read_cryptomatte(viewer, tell, this, matte_ranks, pairs.data(), pairs.size());
+    for (std::vector<float>& layer : layers_) layer.reserve(4 * pixels);
+    for (std::size_t i = 0; i < pairs.size(); ++i) layers_[i / 4 % matte_layers].push_back(pairs[i]);
+    return status;
+  }
+  [[nodiscard]] const std::vector<float>& layer(std::size_t number) const { return layers_.at(number); }
+  /// The attributes that Cryptomatte's specification asks for.
+  [[nodiscard]] std::vector<image::Attribute> attributes() const {
+    const std::string of = "cryptomatte/" + matte_digits(image::layers::cryptomatte_prefix).substr(0, 7) + "/";
+    nlohmann::json manifest = nlohmann::json::object();
+    for (const auto& [name, digits] : ids_) manifest[name] = digits;
+    return {{of + "name", std::string(image::layers::cryptomatte_prefix)},
+            {of + "hash", std::string("MurmurHash3_32")},
+            {of + "conversion", std::string("uint32_to_float32")},
+            {of + "manifest", manifest.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}};
+  }
+
+ private:
+  static const char* tell(void* user, cumulet_object_kind kind, std::uint64_t tag, std::uint32_t /*place*/) noexcept {
+    auto& mattes = *static_cast<Mattes*>(user);
+    const std::string name = mattes.name_(kind, tag);
+    if (name.empty()) return nullptr;
+    return mattes.ids_.emplace(name, matte_digits(name)).first->first.c_str();
+  }
+
+  const ObjectName& name_;
+  std::map<std::string, std::string> ids_;  // names', in hexadecimal
+  std::array<std::vector<float>, matte_layers> layers_;
+};
 
 /// The region's pixels of a picture.
 std::vector<float> cut(const image::Windows& windows, std::span<const float> whole) {
@@ -74,8 +125,9 @@ void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Win
   std::vector<std::vector<float>> values;
   std::vector<image::Layer> layers;
   std::vector<std::string> names;  // of layers, whose own they are
-  values.reserve(2 + picture.light_groups.size() + aovs.size());
-  names.reserve(picture.light_groups.size());
+  std::vector<image::Attribute> said(attributes.begin(), attributes.end());
+  values.reserve(2 + picture.light_groups.size() + aovs.size() + matte_layers);
+  names.reserve(picture.light_groups.size() + matte_layers);
   const auto add = [&](const image::LayerName& name, std::span<const float> pixels) {
     layers.push_back({name, values.emplace_back(cut(windows, pixels))});
   };
@@ -100,7 +152,17 @@ void write_exr(cumulet_viewer* viewer, const std::string& path, const image::Win
     }
     add(name, pixels);
   }
-  image::write_exr(path, windows, layers, attributes);
+  if (picture.object_name) {
+    Mattes mattes(picture.object_name);
+    check(mattes.read(viewer, std::size_t{windows.whole_width} * windows.whole_height));
+    for (std::uint32_t i = 0; i < matte_layers; ++i) {
+      const std::string& name =
+          names.emplace_back(image::layers::cryptomatte_prefix).append("0").append(std::to_string(i));
+      add({name, image::layers::cryptomatte_channels}, mattes.layer(i));
+    }
+    for (image::Attribute& attribute : mattes.attributes()) said.push_back(std::move(attribute));
+  }
+  image::write_exr(path, windows, layers, said);
 }
 
 }  // namespace cumulet::demo

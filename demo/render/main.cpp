@@ -36,6 +36,7 @@
 #include "memory.hpp"
 #include "metadata.hpp"
 #include "models.hpp"
+#include "object_name.hpp"
 #include "options.hpp"
 #include "places.hpp"
 #include "progress.hpp"
@@ -300,7 +301,8 @@ std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, c
   }
 }
 
-void write_picture(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised) {
+void write_picture(const Viewer& viewer, const RenderOptions& options, const cumulet::demo::Instances& others,
+                   const std::vector<float>& denoised) {
   cumulet::image::Image image{options.scene.width, options.scene.height, {}};
   const std::size_t count = std::size_t{4} * image.width * image.height;
   const cumulet::image::Windows windows =
@@ -321,8 +323,14 @@ void write_picture(const Viewer& viewer, const RenderOptions& options, const std
   image.rgba.resize(count);
   check(viewer, cumulet_read_linear(viewer.get(), image.rgba.data(), image.rgba.size()));
   if (options.format == OutputFormat::exr) {
-    cumulet::demo::write_exr(viewer.get(), options.output, windows, {image.rgba, denoised, options.scene.light_groups},
-                             options.aovs,
+    cumulet::demo::ObjectName name;
+    if (options.cryptomatte) {
+      name = [&](cumulet_object_kind kind, std::uint64_t tag) {
+        return cumulet::demo::object_name(options.scene, others, kind, tag);
+      };
+    }
+    cumulet::demo::write_exr(viewer.get(), options.output, windows,
+                             {image.rgba, denoised, options.scene.light_groups, std::move(name)}, options.aovs,
                              cumulet::demo::metadata_of(viewer.get(), options.scene, image.width, image.height));
   } else {
     cumulet::image::write_pfm(options.output, image);
@@ -569,7 +577,7 @@ class Studio {
       check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
       write_stats(options, stats_of(viewer_), context_.name());
     }
-    write_picture(viewer_, options, denoised);
+    write_picture(viewer_, options, others_, denoised);
   }
 
   /// For another run with a time limit.
@@ -888,6 +896,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
     if (!studio) studio = open_studio(options, plan);
     studio->progress().of("frame " + frame.number.text());
     RenderOptions picture = options;
+    picture.scene.name = options.scene.label();  // that of the sequence, in each of its frames
     picture.scene.volume = frame.volume;
     picture.output = frame.output;
     picture.stats = frame.stats;

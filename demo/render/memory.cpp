@@ -37,6 +37,10 @@ PictureMemory picture_memory(const RenderOptions& options) {
     gl += 16 * (groups + 2);
     main += 24 * groups;
   }
+  if (options.cryptomatte) {
+    gl += 48;
+    main += std::uint64_t{3} * 48;  // read, in layers, and in the file
+  }
   if (!options.aovs.empty()) {
     gl += 16 + 36;
     main += 16;

@@ -692,9 +692,8 @@ void check_together(const RenderOptions& options, bool part) {
   if (options.json && !options.info) throw UsageError("--json is for --info");
   if (options.info) return;
   if (options.output.empty()) throw UsageError("--output is required");
-  if (!options.aovs.empty() && options.format != OutputFormat::exr)
-    throw UsageError("--aovs needs an .exr to write to");
-  if (!options.aovs.empty() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
+  if (options.has_layers() && options.format != OutputFormat::exr) throw UsageError("--aovs needs an .exr to write to");
+  if (options.has_layers() && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--aovs needs the shaded view");
   if (options.denoise != Denoise::off && options.scene.sampling.view != CUMULET_VIEW_SHADED)
     throw UsageError("--denoise needs the shaded view");
@@ -772,19 +771,22 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       app, group, "--aovs", "NAME,...|all",
       [&](const std::string& text) {
         options.aovs.clear();
+        options.cryptomatte = false;
         for (const std::string_view part : split(text, ',')) {
-          const auto before = options.aovs.size();
+          const bool mattes = part == "all" || part == cryptomatte_name;
+          options.cryptomatte = options.cryptomatte || mattes;
           for (const auto& [name, aov] : aov_names) {
             const bool meant = part == "all" || part == name;
             if (meant && std::ranges::find(options.aovs, aov) == options.aovs.end()) options.aovs.push_back(aov);
           }
           const bool known = std::ranges::any_of(aov_names, [&](const auto& n) { return part == n.name; });
-          if (options.aovs.size() == before && !known && part != "all")
-            throw UsageError(in_quotes(part) + " is none of all, " + list_names(aov_names, ", "));
+          if (!known && !mattes)
+            throw UsageError(in_quotes(part) + " is none of all, " + list_names(aov_names, ", ") + ", " +
+                             cryptomatte_name);
         }
       },
       "Layers that an .exr gets beside the picture: volume, transmittance, depth, volume_depth, normal, albedo, "
-      "error, velocity, backward, volume_backward");
+      "error, velocity, backward, volume_backward, cryptomatte");
   add(
       app, group, "--stats", "FILE.json",
       [&](const std::string& text) {

@@ -57,6 +57,9 @@ struct RenderOptions {
   Denoise denoise = Denoise::off;    // the picture; of an .exr a layer beside it
   std::string denoiser;              // a folder of networks; empty: where the script puts them
   std::vector<cumulet_aov> aovs;     // layers of an .exr beside the picture
+  bool cryptomatte = false;          // likewise
+
+  [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };
 
 /// Whether both names are of one file, there or not, however they are written; none is of none.

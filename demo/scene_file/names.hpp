@@ -24,6 +24,8 @@ inline constexpr std::array aov_names = {
     Name{"normal", CUMULET_AOV_NORMAL},       Name{"albedo", CUMULET_AOV_ALBEDO},
     Name{"error", CUMULET_AOV_ERROR},         Name{"velocity", CUMULET_AOV_VELOCITY},
     Name{"backward", CUMULET_AOV_MOTION},     Name{"volume_backward", CUMULET_AOV_VOLUME_MOTION}};
+/// Of layers that are no AOV of the library.
+inline constexpr const char* cryptomatte_name = "cryptomatte";
 /// The names, for a message or a help text.
 template <class Names>
 [[nodiscard]] std::string list_names(const Names& names, const char* separator) {

@@ -47,6 +47,8 @@ inline constexpr FilmLayer velocity{"velocity", GL_RGBA32F, 16};
 inline constexpr FilmLayer motion{"motion", GL_RGBA32F, 16};
 /// As radiance, of so many groups of lights; then of what cameras see of the sky and of the sun.
 constexpr FilmLayer light_groups(unsigned count) { return {"light groups", GL_RGBA32F, 16 * (count + 2), count + 2}; }
+/// Ids and shares, of glsl/cryptomatte.comp; two ranks a slice.
+constexpr FilmLayer mattes(unsigned slices) { return {"mattes", GL_RGBA32F, 16 * slices, slices}; }
 }  // namespace film_layers
 
 /// What passes leave for each other, of one picture. Layers are there from the first pass that writes them on.

@@ -433,6 +433,14 @@ const Tracer::Program& Tracer::facts_program(const Picture& picture, const March
   return inspect_program(data, obstacles, "aovs.comp", std::span(macros).first(used));
 }
 
+const Tracer::Program& Tracer::matte_program(const Picture& picture, const MarchData& data,
+                                             const Obstacles& obstacles) {
+  std::vector<std::string> more;
+  if (obstacles.scene != nullptr) more.emplace_back("CM_SURFACES 1");
+  const bool several = obstacles.instances != nullptr;
+  return program(data.defines(several, several && picture.motion_), "cryptomatte.comp", more);
+}
+
 void Tracer::make_shared_objects() {
   if (!uniforms_)
     uniforms_ = gl::make_buffer(gl_, sizeof(core::CmParameters), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating uniforms");
@@ -934,6 +942,45 @@ void Tracer::read_fact(const Picture& picture, PixelFact fact, float* values) co
   gl_->GetTextureImage(picture.film_.texture(layer), 0, channels == 1 ? GL_RED : GL_RGB, GL_FLOAT,
                        static_cast<GLsizei>(floats * sizeof(float)), values);
   gl::check(*gl_, "reading what is known of pixels");
+}
+
+void Tracer::read_mattes(Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
+                         std::uint32_t ranks, float* values) {
+  const FilmLayer layer = film_layers::mattes((ranks + 1) / 2);
+  std::vector<std::uint32_t> table{ids.ground};
+  table.insert(table.end(), ids.volumes.begin(), ids.volumes.end());
+  if (obstacles.scene != nullptr) {
+    for (const scene::ModelPart& part : obstacles.scene->table().parts) table.push_back(ids.models.at(part.model));
+  }
+  const gl::Object buffer =
+      gl::make_buffer(gl_, table.size() * sizeof(std::uint32_t), table.data(), 0, "creating the table of mattes");
+  std::uint32_t row = 0;
+  const auto work = [&](const Film& film, Deadline until) {
+    make_shared_objects();
+    flights_.order();
+    const Program& program = matte_program(picture, data, obstacles);
+    program.object->use(*gl_);
+    bind(data, obstacles);
+    film.bind(*gl_, core::CM_IMAGE_MATTES, layer, GL_WRITE_ONLY);
+    gl_->BindBufferBase(GL_SHADER_STORAGE_BUFFER, core::CM_STORAGE_MATTES, buffer.name());
+    core::CmParameters parameters = picture.parameters_;
+    describe(obstacles, parameters);
+    parameters.dispatch.samples = matte_rays;
+    if (row == 0) empty_around(picture, std::array{layer});
+    return inspect(picture, parameters, program, row, until);
+  };
+  while (!run(gl_, picture.film_, {"cumulet: mattes", {}, {layer}, work}, deadline_after(1000.0))) {
+  }
+  const std::size_t pixels = std::size_t{picture.size_.x} * picture.size_.y;
+  std::vector<glm::vec2> pairs(pixels * 2 * layer.slices);
+  gl_->GetTextureImage(picture.film_.texture(layer), 0, GL_RGBA, GL_FLOAT,
+                       static_cast<GLsizei>(pairs.size() * sizeof(glm::vec2)), pairs.data());
+  gl::check(*gl_, "reading mattes");
+  picture.film_.drop(layer);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    for (std::uint32_t rank = 0; rank < ranks; ++rank, values += 2)
+      std::memcpy(values, &pairs[(rank / 2 * pixels + pixel) * 2 + rank % 2], sizeof(glm::vec2));
+  }
 }
 
 Tracer::Picked Tracer::pick(const MarchData& data, const PictureParameters& parameters, const Obstacles& obstacles,

@@ -101,6 +101,18 @@ enum class PixelFacts { guides, all };
 /// Rays a pixel that facts are means of, where they are read; a filter does with few.
 constexpr std::uint32_t fact_rays = 16;
 
+/// Rays a pixel that mattes are found by, and most ranks that there are.
+constexpr std::uint32_t matte_rays = 64;
+constexpr std::uint32_t most_matte_ranks = 16;
+
+/// Ids of what can be seen (cryptomatte_id), 0 for what is in no matte. Of volumes in the order of what Picked::place
+/// counts, and of models.
+struct MatteIds {
+  std::uint32_t ground = 0;
+  std::vector<std::uint32_t> volumes;
+  std::vector<std::uint32_t> models;
+};
+
 /// Samples that pixels have.
 struct Accumulated {
   std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
@@ -295,6 +307,11 @@ class Tracer {
   bool able_to_find(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
   /// A fact a pixel (PixelFact), each channels_of(fact) floats, once find_facts has found them.
   void read_fact(const Picture& picture, PixelFact fact, float* values) const;
+  /// width * height * ranks pairs of floats, an id as a float's bits and the share of the pixel that it has, the
+  /// largest first: glsl/cryptomatte.comp. Found anew in each call. ranks: 1 to most_matte_ranks; data and obstacles
+  /// being those that the picture was made of.
+  void read_mattes(Picture& picture, const MarchData& data, const Obstacles& obstacles, const MatteIds& ids,
+                   std::uint32_t ranks, float* values);
   [[nodiscard]] Totals totals(const Picture& picture) const;
   /// What this context does from now on comes after what is under way, whichever made that. Waits for nothing.
   void order() const { flights_.order(); }
@@ -358,7 +375,8 @@ class Tracer {
                                  std::span<const char* const> macros = {});
   const Program& facts_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles,
                                PixelFacts facts);
-  // One of inspect.comp or aovs.comp over rows from `row` on, until done or about the deadline.
+  const Program& matte_program(const Picture& picture, const MarchData& data, const Obstacles& obstacles);
+  // One of inspect.comp, aovs.comp or cryptomatte.comp over rows from `row` on, until done or about the deadline.
   bool inspect(const Picture& picture, const core::CmParameters& parameters, const Program& program, std::uint32_t& row,
                Deadline deadline);
   void make_shared_objects();

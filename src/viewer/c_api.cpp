@@ -2,6 +2,9 @@
 
 #include <array>
 
+#include "base/callback_scope.hpp"
+#include "base/murmur_hash.hpp"
+#include "render/tracer.hpp"
 #include "settings/ramp.hpp"
 #include "viewer/c_lamps.hpp"
 #include "viewer/c_ramp.hpp"
@@ -682,6 +685,22 @@ cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov aov, float* 
 cumulet_status cumulet_read_light_group(cumulet_viewer* viewer, uint32_t group, float* rgb, size_t count) {
   return guarded(viewer, [&](core::Viewer& v) { v.read_light_group(group, rgb, count); });
 }
+
+cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumulet_object_name_fn name, void* user, uint32_t ranks,
+                                        float* values, size_t count) {
+  return guarded(viewer, [&](core::Viewer& v) {
+    require(name != nullptr, "name is NULL");
+    require(ranks >= 1 && ranks <= render::most_matte_ranks, "ranks is not from 1 to 16");
+    const auto id_of = [&](const core::MatteObject& object) {
+      const cumulet::CallbackScope inside;
+      const char* text = name(user, static_cast<cumulet_object_kind>(object.kind), object.tag, object.place);
+      return text == nullptr || *text == '\0' ? 0U : cumulet::cryptomatte_id(text);
+    };
+    v.read_mattes(id_of, ranks, values, count);
+  });
+}
+
+uint32_t cumulet_cryptomatte_id(const char* name) { return name == nullptr ? 0 : cumulet::cryptomatte_id(name); }
 
 cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {
   return guarded(viewer, [&](core::Viewer& v) {

@@ -115,6 +115,9 @@ class Context {
   /// Throws Error(invalid_argument) for too few values, or what was not gathered.
   void read_aov(const Shot& shot, Aov aov, float* values, std::size_t count);
   void read_light_group(const DisplaySettings& settings, std::uint32_t group, float* rgb, std::size_t count);
+  /// id_of is asked for each volume's place, each model and the ground that are there, but for holes, and not told
+  /// tags.
+  void read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count);
   void read_linear(const DisplaySettings& settings, float* rgba, std::size_t count);
   /// Whether read_denoised can give this picture.
   [[nodiscard]] bool can_denoise(const render::Picture& picture) const;
@@ -183,6 +186,10 @@ class Context {
                  const render::FrameTarget& target);
   // Throws Error(invalid_argument) where the picture is of another scene than the one there is.
   void find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts);
+  // As readable(), and throws where it is a debug view.
+  render::Picture& readable_shaded();
+  // Throws where what is shown is not what the picture is of any more, or where not this as well.
+  void require_present(bool also) const;
   // The picture denoised, which has its facts: row 0 the top.
   gl::Object by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network);
   gl::Object filtered(const render::Picture& picture, bool with_background);

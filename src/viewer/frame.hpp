@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <optional>
 #include <string>
@@ -89,6 +90,17 @@ struct MapResult {
   glm::dmat4 to_map{1.0};
   glm::dvec2 range{0.0};
 };
+
+/// What a matte can be of: cumulet_object_kind, and the rest of what a cumulet_object_name_fn is told.
+struct MatteObject {
+  enum class Kind { volume = 0, surfaces = 1, ground = 2 };
+  Kind kind = Kind::volume;
+  std::uint64_t id = 0;  // of the viewer's instances and models; its own have 0
+  std::uint32_t place = 0;
+  std::uint64_t tag = 0;  // the host's
+};
+/// Its id in mattes; 0: it is in none.
+using MatteIdOf = std::function<std::uint32_t(const MatteObject&)>;
 
 /// cumulet_aov.
 enum class Aov {

@@ -179,12 +179,24 @@ void Context::read_composite(render::Picture& picture, bool transparent, float* 
   gl::check(*functions_, "reading the picture back");
 }
 
-void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t count) {
-  using render::PixelFact;
+render::Picture& Context::readable_shaded() {
   render::Picture& picture = readable();
   if (picture.view() != render::View::shaded) {
     throw Error(ErrorCode::invalid_argument, "the picture is a debug view: there are AOVs of shaded ones alone");
   }
+  return picture;
+}
+
+void Context::require_present(bool also) const {
+  if (!also || scene_.data() == nullptr ||
+      !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
+    throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
+  }
+}
+
+void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t count) {
+  using render::PixelFact;
+  render::Picture& picture = readable_shaded();
   const std::size_t pixels = std::size_t{picture.size().x} * picture.size().y;
   const bool colour = aov == Aov::beauty || aov == Aov::volume;
   const std::optional<PixelFact> fact = fact_of(aov);
@@ -223,13 +235,36 @@ void Context::read_light_group(const DisplaySettings& settings, std::uint32_t gr
   progressive_.tracer().read_light_group(picture, group, settings.shown(false).shows_background(), rgb);
 }
 
+void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_t ranks, float* values,
+                          std::size_t count) {
+  render::Picture& picture = readable_shaded();
+  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 2 * ranks;
+  if (values == nullptr || count < floats)
+    throw Error(ErrorCode::invalid_argument, "the picture needs " + std::to_string(floats) + " floats");
+  require_present(true);
+  render::MatteIds ids;
+  MatteObject object;
+  for (const scene::Volume& volume : scene_.volumes()) {
+    // The places of one volume lie together.
+    object.place = !ids.volumes.empty() && object.id == volume.id ? object.place + 1 : 0;
+    object.id = volume.id;
+    ids.volumes.push_back((*volume.medium).holdout ? 0 : id_of(object));
+  }
+  const render::Obstacles met = obstacles(shot);
+  object = {.kind = MatteObject::Kind::surfaces};
+  for (std::size_t i = 0; met.scene != nullptr && i < met.scene->models().size(); ++i) {
+    const scene::Model& model = met.scene->models()[i];
+    object.id = model.id;
+    ids.models.push_back(model.holdout || model.shadow_only ? 0 : id_of(object));
+  }
+  if (*shot.scene->ground) ids.ground = id_of({.kind = MatteObject::Kind::ground});
+  progressive_.tracer().read_mattes(picture, *scene_.data(), met, ids, ranks, values);
+}
+
 void Context::find_facts(const Shot& shot, render::Picture& picture, render::PixelFacts facts) {
   // Motion is told from now on.
   const bool of_now = facts != render::PixelFacts::all || progressive_.newest_is_seen_as(*shot.scene);
-  if (scene_.data() == nullptr || !of_now ||
-      !progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision())) {
-    throw Error(ErrorCode::invalid_argument, "the picture is of what was shown before: render until there is a newer");
-  }
+  require_present(of_now);
   render::Obstacles met = obstacles(shot);
   scene::MotionTable motion;
   if (facts == render::PixelFacts::all) {

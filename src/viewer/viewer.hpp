@@ -184,6 +184,7 @@ class Viewer {
   /// Throws Error(invalid_argument) without a volume.
   Bounds bounds();
   void read_light_group(std::uint32_t group, float* rgb, std::size_t count);
+  void read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count);
   void read_linear(float* rgba, std::size_t count);
   void read_display(std::uint8_t* rgba, std::size_t count);
   /// By the network in this file, which stays in memory. Throws Error(file) if it is none.
@@ -420,6 +421,8 @@ class Viewer {
     [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
   };
   std::vector<ShownModel>::iterator find(const ModelInstance& model);
+  // The host's, of an instance or a model that is shown; 0 of the viewer's own.
+  [[nodiscard]] std::uint64_t tag_of(std::uint64_t id) const;
   void follow_models();
   // Their poses, as far as they are there.
   void follow_poses();

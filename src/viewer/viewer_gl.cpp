@@ -292,11 +292,25 @@ void Viewer::drop_map(std::uint32_t slot) {
 Pick Viewer::pick(double x, double y) {
   Pick pick;
   with_gl([&](Context& g) { pick = g.pick(shot(), x, y); });
-  const auto met = std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.id == pick.volume; });
-  if (pick.volume != 0 && met != shown_.end()) pick.tag = met->settings.tag;
-  const auto model = std::ranges::find(shown_models_, pick.model, &ShownModel::id);
-  if (pick.model != 0 && model != shown_models_.end()) pick.tag = model->settings.tag;
+  pick.tag = tag_of(pick.volume != 0 ? pick.volume : pick.model);
   return pick;
+}
+
+std::uint64_t Viewer::tag_of(std::uint64_t id) const {
+  if (const auto volume = std::ranges::find(shown_, id, &Shown::id); volume != shown_.end())
+    return volume->settings.tag;
+  const auto model = std::ranges::find(shown_models_, id, &ShownModel::id);
+  return model != shown_models_.end() ? model->settings.tag : 0;
+}
+
+void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
+  const auto of_tagged = [&](MatteObject object) {
+    // What surfaces alone are in is nothing.
+    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !facts_) return 0U;
+    object.tag = tag_of(object.id);
+    return id_of(object);
+  };
+  with_gl([&](Context& g) { g.read_mattes(shot(), of_tagged, ranks, values, count); });
 }
 
 void Viewer::read_aov(Aov aov, float* values, std::size_t count) {

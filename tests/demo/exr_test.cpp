@@ -1,6 +1,7 @@
 // What a picture's OpenEXR file says of it, as OpenEXR's own library reads it.
 
 #include <ImfArray.h>
+#include <ImfChannelList.h>
 #include <ImfDoubleAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfInputFile.h>
@@ -12,9 +13,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdio>
 #include <layers.hpp>
+#include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -23,6 +28,7 @@
 #include "headless.hpp"
 #include "merge.hpp"
 #include "metadata.hpp"
+#include "object_name.hpp"
 #include "support/folder.hpp"
 
 namespace {
@@ -102,8 +108,14 @@ class Exr : public testing::TestWithParam<Backend> {
     std::vector<float> rgba(std::size_t{4} * width * height);
     EXPECT_EQ(cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
     const std::string file = (folder_ / name).string();
+    cumulet::demo::ObjectName object_name;
+    if (mattes_) {
+      object_name = [&](cumulet_object_kind kind, std::uint64_t tag) {
+        return cumulet::demo::object_name(scene_, {}, kind, tag);
+      };
+    }
     cumulet::demo::write_exr(viewer_.get(), file, cumulet::demo::windows_of(scene_.sampling.region, width, height),
-                             {.beauty = rgba, .light_groups = scene_.light_groups}, aovs_,
+                             {.beauty = rgba, .light_groups = scene_.light_groups, .object_name = object_name}, aovs_,
                              cumulet::demo::metadata_of(viewer_.get(), scene_, width, height));
     return file;
   }
@@ -130,6 +142,7 @@ class Exr : public testing::TestWithParam<Backend> {
 
   SceneOptions scene_;
   std::vector<cumulet_aov> aovs_;
+  bool mattes_ = false;
   Context context_;
   std::unique_ptr<cumulet_viewer, Destroy> viewer_;
   cumulet::test::Folder folder_;
@@ -249,6 +262,84 @@ TEST_P(Exr, GroupsOfLightsAreLayersWhoseSumIsThePicture) {
     }
     EXPECT_GT(sun, 1.0);
   }
+}
+
+// As Cryptomatte's specification has it, by OpenEXR's library and a parser of JSON.
+TEST_P(Exr, HasMattesByName) {
+  scene_.name = "a \"cloud\" of \xc3\xa4ther";
+  scene_.ground.place = CUMULET_GROUND_AT_HEIGHT;
+  scene_.ground.height = -3.0;
+  ASSERT_EQ(cumulet_set_ground(viewer_.get(), &scene_.ground), CUMULET_OK);
+  mattes_ = true;
+  render();
+  const std::string path = write("mattes.exr");
+  Imf::InputFile file(path.c_str());
+  const auto text = [&](const std::string& name) {
+    return file.header().typedAttribute<Imf::StringAttribute>("cryptomatte/3ae39a5/" + name).value();
+  };
+  EXPECT_EQ(text("name"), "CryptoObject");
+  EXPECT_EQ(text("hash"), "MurmurHash3_32");
+  EXPECT_EQ(text("conversion"), "uint32_to_float32");
+  const nlohmann::json manifest = nlohmann::json::parse(text("manifest"));
+  std::array<char, 9> digits{};
+  std::snprintf(digits.data(), digits.size(), "%08x", cumulet_cryptomatte_id(scene_.name.c_str()));
+  EXPECT_EQ(manifest, (nlohmann::json{{"ground", "c5b51ede"}, {scene_.name, digits.data()}}));
+  EXPECT_EQ(cumulet_cryptomatte_id("CryptoObject") >> 4U, 0x3ae39a5U);
+
+  std::array<std::vector<float>, 12> channels;
+  Imf::FrameBuffer pixels;
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    channels.at(i).resize(std::size_t{width} * height);
+    const std::string name =
+        std::string("CryptoObject0").append(std::to_string(i / 4)).append(".").append(1, "RGBA"[i % 4]);
+    ASSERT_NE(file.header().channels().findChannel(name), nullptr) << name;
+    EXPECT_EQ(file.header().channels()[name].type, Imf::FLOAT);
+    pixels.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(channels.at(i).data()), sizeof(float),
+                                   sizeof(float) * width));
+  }
+  file.setFrameBuffer(pixels);
+  file.readPixels(0, static_cast<int>(height) - 1);
+  std::map<std::uint32_t, double> sums;
+  for (std::size_t rank = 0; rank < 6; ++rank) {
+    for (std::size_t i = 0; i < channels[0].size(); ++i)
+      sums[std::bit_cast<std::uint32_t>(channels.at(2 * rank)[i])] += double(channels.at(2 * rank + 1)[i]);
+  }
+  EXPECT_EQ(sums.size(), 3U) << "and nothing";
+  EXPECT_EQ(sums[0], 0.0);
+  EXPECT_GT(sums[cumulet_cryptomatte_id("ground")], 100.0);
+  EXPECT_GT(sums[cumulet_cryptomatte_id(scene_.name.c_str())], 4.0);
+
+  // Parts have the same, and so has what is merged of them.
+  scene_.sampling.first_sample = scene_.sampling.samples;
+  render();
+  const std::string merged = (folder_ / "merged.exr").string();
+  cumulet::demo::merge({path, write("next.exr")}, merged);
+  for (const char* name : {"CryptoObject00", "CryptoObject01", "CryptoObject02"}) {
+    const cumulet::image::LayerName layer{name, "RGBA"};
+    const auto wanted = cumulet::image::read_exr(path, layer).values;
+    EXPECT_EQ(cumulet::image::read_exr(merged, layer).values, wanted);
+    EXPECT_EQ(cumulet::image::read_exr((folder_ / "next.exr").string(), layer).values, wanted);
+  }
+}
+
+TEST(ObjectName, IsThatOfTheSceneOrTheFile) {
+  SceneOptions scene;
+  const cumulet::demo::Instances others;
+  const auto name = [&](cumulet_object_kind kind, std::uint64_t tag) {
+    return cumulet::demo::object_name(scene, others, kind, tag);
+  };
+  scene.volume = "folder/cloud.vdb";
+  scene.surfaces = "folder/house.glb";
+  scene.models.resize(2);
+  scene.models[0].file = "folder/tree.glb";
+  scene.models[1].name = "oak";
+  EXPECT_EQ(name(CUMULET_OBJECT_VOLUME, 0), "cloud.vdb");
+  EXPECT_EQ(name(CUMULET_OBJECT_SURFACES, 0), "house.glb");
+  EXPECT_EQ(name(CUMULET_OBJECT_SURFACES, 1), "tree.glb");
+  EXPECT_EQ(name(CUMULET_OBJECT_SURFACES, 2), "oak");
+  EXPECT_EQ(name(CUMULET_OBJECT_GROUND, 0), "ground");
+  scene.name = "steam";
+  EXPECT_EQ(name(CUMULET_OBJECT_VOLUME, 0), "steam");
 }
 
 // Of a region the pixels are those of the whole, where they are in it; and its parts are merged.

@@ -201,6 +201,7 @@ class NoContext : public Trial {
     double noise = 0.0;
     auto denoise = make_desc<cumulet_denoise_desc>();
     denoise.network = "none.tza";
+    const auto object_name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
     for (int round = 0; round < 2; ++round) {
       for (const auto& call : std::vector<std::function<cumulet_status()>>{
                [&] { return cumulet_render(v_, &frame, nullptr); },
@@ -210,6 +211,7 @@ class NoContext : public Trial {
                [&] { return cumulet_read_linear(v_, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_display(v_, bytes.data(), bytes.size()); },
                [&] { return cumulet_read_aov(v_, CUMULET_AOV_NORMAL, rgba.data(), rgba.size()); },
+               [&] { return cumulet_read_cryptomatte(v_, object_name, nullptr, 1, rgba.data(), rgba.size()); },
                [&] { return cumulet_read_denoised(v_, &denoise, rgba.data(), rgba.size()); },
                [&] { return cumulet_measure_noise(v_, &noise); },
                [&] {
@@ -379,6 +381,7 @@ void Caller::call_all() {
   auto programs = make_desc<cumulet_programs_desc>();
   auto warm_up = make_desc<cumulet_warm_up_result>();
   std::array<float, 3> rgb{};
+  const auto object_name = [](void*, cumulet_object_kind, std::uint64_t, std::uint32_t) { return "object"; };
 
   // The exceptions.
   for (cumulet_viewer* v : {viewer, other}) {
@@ -395,7 +398,8 @@ void Caller::call_all() {
                 "cumulet_instance_retain",  "cumulet_instance_release",   "cumulet_live_retain",
                 "cumulet_live_release",     "cumulet_model_retain",       "cumulet_model_release",
                 "cumulet_sequence_retain",  "cumulet_sequence_release",   "cumulet_inspection_release",
-                "cumulet_destroy",          "cumulet_last_error",         "cumulet_transmittance_map_glsl"});
+                "cumulet_destroy",          "cumulet_last_error",         "cumulet_transmittance_map_glsl",
+                "cumulet_cryptomatte_id"});
   cumulet_volume_release(cumulet_volume_retain(volume));
   cumulet_surfaces_release(cumulet_surfaces_retain(surfaces));
   cumulet_programs_release(cumulet_programs_retain(nullptr));
@@ -407,6 +411,7 @@ void Caller::call_all() {
   cumulet_model_release(cumulet_model_retain(nullptr));
   cumulet_sequence_release(cumulet_sequence_retain(nullptr));
   if (cumulet_status_text(CUMULET_OK) == nullptr || cumulet_version() == 0) wrong.push_back("text or version");
+  if (cumulet_cryptomatte_id("hello") != 0x248bfa47U) wrong.push_back("id");
   if (cumulet_transmittance_map_glsl() == nullptr) wrong.push_back("glsl");
   // Refused without a status.
   cumulet_destroy(viewer);
@@ -533,6 +538,7 @@ void Caller::call_all() {
     CALL(cumulet_read_denoised, v, &denoise, one.data(), one.size());
     CALL(cumulet_read_aov, v, CUMULET_AOV_BEAUTY, one.data(), one.size());
     CALL(cumulet_read_light_group, v, 0, one.data(), one.size());
+    CALL(cumulet_read_cryptomatte, v, object_name, nullptr, 1U, one.data(), one.size());
     CALL(cumulet_measure_noise, v, &number);
     CALL(cumulet_read_accumulation, v, bytes.data(), &room);
     CALL(cumulet_restore_accumulation, v, bytes.data(), bytes.size());

@@ -590,7 +590,14 @@ class Program {
     std::array<cumulet_pick, 2> pick{};
     pick[0] = described<cumulet_pick>();
     std::size_t room = bytes.size();
-    switch (data_.ConsumeIntegralInRange(0, 8)) {
+    switch (data_.ConsumeIntegralInRange(0, 9)) {
+      case 9: {
+        const auto name = [](void*, cumulet_object_kind kind, std::uint64_t, std::uint32_t) {
+          return kind == CUMULET_OBJECT_GROUND ? nullptr : "object";
+        };
+        return told(cumulet_read_cryptomatte(viewer_.get(), name, nullptr, data_.ConsumeIntegralInRange(0U, 17U),
+                                             values.data(), values.size()));
+      }
       case 8:
         return told(cumulet_drop_transmittance_map(viewer_.get(), data_.ConsumeIntegralInRange(0U, 17U)));
       case 7: {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <limits>
 #include <memory>
@@ -474,6 +475,17 @@ TEST_F(CppViewer, ShowsAVolume) {
   EXPECT_EQ(linear[2], 0.25F);
   EXPECT_EQ(linear[3], 0.0F);
   EXPECT_GT(linear[(8 * 24 + 12) * 4 + 3], 0.9F);  // the ball's alpha, in the middle
+  std::vector<float> mattes(24 * 16 * 2);
+  int asked = 0;
+  const auto name = [&](ObjectKind kind, std::uint64_t tag, std::uint32_t place) -> const char* {
+    asked += kind == ObjectKind::volume && tag == 0 && place == 0 ? 1 : 100;
+    return "ball";
+  };
+  viewer.read_cryptomatte(name, 1, mattes).value();
+  EXPECT_EQ(asked, 1);
+  EXPECT_EQ(std::bit_cast<std::uint32_t>(mattes[(8 * 24 + 12) * 2]), cumulet_cryptomatte_id("ball"));
+  EXPECT_GT(mattes[(8 * 24 + 12) * 2 + 1], 0.9F);
+  EXPECT_EQ(viewer.read_cryptomatte(name, 17, mattes).error().status, StatusCode::invalid_argument);
   std::vector<std::uint8_t> display(linear.size());
   viewer.read_display(display).value();
   EXPECT_EQ(display[0], 255);  // 1 x 2^1, clipped

@@ -40,7 +40,8 @@ struct Description {
   bool error = true;
   bool volume = false;
   bool denoised = false;
-  bool whole = true;  // every pixel has its samples
+  std::string manifest = {};  // of mattes; "": there are none
+  bool whole = true;          // every pixel has its samples
 };
 
 double luminance(const std::array<double, 4>& rgba) { return 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]; }
@@ -84,6 +85,13 @@ class Merge : public ::testing::Test {
     if (of.error) all.push_back({layers::error, errors});
     if (of.volume) all.push_back({layers::volume, rgba});
     if (of.denoised) all.push_back({layers::denoised, rgba});
+    // Two that were not merged, as ids have no mean.
+    std::vector<float> mattes;
+    for (std::size_t i = 0; i < rgba.size(); ++i) mattes.push_back(static_cast<float>(i) * 1e-30F);
+    if (!of.manifest.empty()) {
+      for (const char* name : {"CryptoObject00", "CryptoObject01"})
+        all.push_back({{name, layers::cryptomatte_channels}, mattes});
+    }
     std::vector<image::Attribute> said{{"cumulet:eye", std::array{1.0, 2.0, 3.0}},
                                        {std::string(attributes::comments), attributes::comments_text(of.version, n)},
                                        {std::string(attributes::version), of.version},
@@ -93,6 +101,7 @@ class Merge : public ::testing::Test {
                                        {std::string(attributes::seed), of.seed},
                                        {std::string(attributes::samples), of.whole ? n : n - 0.25}};
     if (of.whole) said.push_back({std::string(attributes::first_sample), double(first)});
+    if (!of.manifest.empty()) said.push_back({"cryptomatte/3ae39a5/manifest", of.manifest});
     if (samples > 1) {
       const double count = double(of.width) * height;
       said.push_back({std::string(attributes::noise), std::sqrt(squared / count) / (bright / count)});
@@ -212,6 +221,21 @@ TEST_F(Merge, PartsOfOtherPicturesAreRefused) {
   EXPECT_EQ(refusal({a, part(4, 4, {.march = "dense"})}), "part4.exr: is of another march than part0.exr");
   EXPECT_EQ(refusal({a, part(4, 4, {.scene = "0"})}), "part5.exr: is of another scene than part0.exr");
   EXPECT_EQ(refusal({a, part(4, 4, {.error = false})}), "part6.exr: has other layers than part0.exr");
+}
+
+TEST_F(Merge, MattesAreThoseOfTheFirstPart) {
+  const Description named{.manifest = R"({"cloud":"13851a76"})"};
+  const std::string first = part(0, 4, named);
+  merge({part(4, 12, named), first}, output());
+  for (const char* name : {"CryptoObject00", "CryptoObject01"}) expect_layer(first, {name, "RGBA"}, 0.0);
+  const image::Contents made = image::read_contents(output());
+  const auto found = std::ranges::find(made.attributes, "cryptomatte/3ae39a5/manifest", &image::Attribute::name);
+  ASSERT_NE(found, made.attributes.end());
+  EXPECT_EQ(std::get<std::string>(found->value), named.manifest);
+  std::filesystem::remove(output());
+  EXPECT_EQ(refusal({first, part(4, 4, {.manifest = R"({"smoke":"13851a76"})"})}),
+            "part2.exr: has mattes of other names than part0.exr");
+  EXPECT_EQ(refusal({first, part(4, 4)}), "part3.exr: has other layers than part0.exr");
 }
 
 TEST_F(Merge, WhatIsNoPartIsRefused) {

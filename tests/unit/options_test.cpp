@@ -541,6 +541,16 @@ TEST(Options, AovsAreListedOrAll) {
   EXPECT_EQ(aovs_of("albedo,all").size(), 10U);
   EXPECT_EQ(aovs_of("error"), std::vector<cumulet_aov>{CUMULET_AOV_ERROR});
   EXPECT_EQ(aovs_of("velocity"), std::vector<cumulet_aov>{CUMULET_AOV_VELOCITY});
+  const auto has_mattes = [](const char* text) {
+    std::ostringstream out;
+    return parse_render_options({"--volume", "a.vdb", "-o", "a.exr", "--aovs", text}, out)->cryptomatte;
+  };
+  EXPECT_TRUE(aovs_of("cryptomatte").empty());
+  EXPECT_TRUE(has_mattes("cryptomatte"));
+  EXPECT_TRUE(has_mattes("depth,cryptomatte,normal"));
+  EXPECT_TRUE(has_mattes("all"));
+  EXPECT_FALSE(has_mattes("depth"));
+  EXPECT_FALSE(parse({}).cryptomatte);
 }
 
 TEST(Options, ACriterionThatIsNamedIsNoDefault) {
@@ -606,6 +616,7 @@ TEST(Options, WrongUsageIsOneLineThatNamesTheFlag) {
                                         {"--camera", "0,0 0,0,0 40"},
                                         {"--march", "fast"},
                                         {"--aovs", "all"},  // of a .png
+                                        {"--aovs", "cryptomatte"},
                                         {"--march", ""},
                                         {"--cells", "Linear"},
                                         {"--criterion", "best"},

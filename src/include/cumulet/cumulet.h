@@ -2041,6 +2041,48 @@ CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov 
  * previews there are none.
  */
 CUMULET_API cumulet_status cumulet_read_light_group(cumulet_viewer* viewer, uint32_t group, float* rgb, size_t count);
+
+/* What is in a picture, by name: mattes. */
+typedef enum cumulet_object_kind {
+  CUMULET_OBJECT_VOLUME = 0,   /* the viewer's own volume, in one of its places, or an instance */
+  CUMULET_OBJECT_SURFACES = 1, /* the viewer's own surfaces, or a model */
+  CUMULET_OBJECT_GROUND = 2    /* cumulet_ground_desc's */
+} cumulet_object_kind;
+
+/*
+ * The name of an object, zero-terminated UTF-8, which is used in the call alone; NULL or "": it is in no matte. tag:
+ * cumulet_instance_desc.tag or cumulet_model_desc.tag; of the viewer's own and the ground 0. place: of
+ * cumulet_set_volume_places; of others 0. Objects of one name share a matte.
+ */
+typedef const char* (*cumulet_object_name_fn)(void* user, cumulet_object_kind kind, uint64_t tag, uint32_t place);
+
+/*
+ * [GL] Mattes of the picture so far, as Cryptomatte has them (Friedman and Jones 2015; specification 1.2 of
+ * https://github.com/Psyop/Cryptomatte): width x height (of the result) x ranks pairs of floats, first pixel top left.
+ * A pair is an object's id, whose bits are cumulet_cryptomatte_id of its name, and its coverage: the share of the pixel
+ * at which it is what camera rays come to first. In a volume that is where they are scattered or absorbed, so that
+ * coverages add up to the picture's alpha but for noise. The pair with the largest coverage comes first; where there
+ * are no more, both are 0, and what there is beyond ranks (1 to 16; files mostly have 6) is left out, the smallest
+ * coverages. Of more than 32 names in one pixel small ones may be left out.
+ *
+ * name is called for each object that is there, once, in this call; calls of the library from it are refused. What is
+ * hidden is not there. A holdout (of a medium, of surfaces, of a model) has no matte, as it has no alpha, and hides
+ * what is behind it; so does the host's depth. Models that cameras do not see (shadow_only) have none. Surfaces that
+ * transmit count whole, those that cover in part (BLEND) by their coverage.
+ *
+ * Found anew in each call, by 64 rays a pixel at fixed places, spread over lens and shutter too, along which volumes'
+ * coverages are exact (of at most four at one place): without noise, but where surfaces cover in part. It does not
+ * depend on the picture's samples. 8 bytes a pixel and rank of GL's memory for the time of the call, rounded up to even
+ * ranks. count is the number of floats at values. CUMULET_ERROR_INVALID_ARGUMENT as cumulet_read_aov.
+ */
+CUMULET_API cumulet_status cumulet_read_cryptomatte(cumulet_viewer* viewer, cumulet_object_name_fn name, void* user,
+                                                    uint32_t ranks, float* values, size_t count);
+/*
+ * The id of a name in Cryptomatte: MurmurHash3_32 of its bytes, seed 0, with the lowest bit of a float's exponent
+ * turned over where that would be no finite normal number. What a file's manifest has in hexadecimal. In any thread; 0
+ * of NULL, which no name has.
+ */
+CUMULET_API uint32_t cumulet_cryptomatte_id(const char* name);
 /* [GL] Relative standard error of the picture so far: the root of the mean over pixels of the squared standard error of
  * their luminance (CUMULET_AOV_ERROR), over the mean luminance; of the pixels that have two samples, and 0 where none
  * has. Samples count as independent: what they spread more evenly than chance makes the true error less. Reads the

@@ -1489,6 +1489,16 @@ class Viewer {
   [[nodiscard]] Result<> read_light_group(std::uint32_t group, std::span<float> rgb) noexcept {
     return result(cumulet_read_light_group(handle(), group, rgb.data(), rgb.size()));
   }
+  /// name(ObjectKind, tag, place) -> const char*: cumulet_object_name_fn. It may not throw.
+  template <class Name>
+  [[nodiscard]] Result<> read_cryptomatte(Name&& name, std::uint32_t ranks, std::span<float> values) noexcept {
+    const auto call = [](void* user, cumulet_object_kind kind, std::uint64_t tag,
+                         std::uint32_t place) noexcept -> const char* {
+      return (*static_cast<std::remove_reference_t<Name>*>(user))(static_cast<ObjectKind>(kind), tag, place);
+    };
+    void* user = const_cast<void*>(static_cast<const void*>(std::addressof(name)));
+    return result(cumulet_read_cryptomatte(handle(), call, user, ranks, values.data(), values.size()));
+  }
   [[nodiscard]] Result<double> measure_noise() noexcept {
     double noise = 0.0;
     if (auto done = result(cumulet_measure_noise(handle(), &noise)); !done) return done.error();

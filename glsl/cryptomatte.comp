@@ -1,0 +1,132 @@
+#version 450
+// Whose a pixel is, as Cryptomatte has it (Friedman and Jones, "Fully automatic ID mattes with support for motion blur and
+// transparency", SIGGRAPH 2015 posters; specification 1.2): the ids of what is seen in it, and of each the share of the
+// pixel at which camera rays end there, by their first scattering or absorption in a volume, or at a surface or the
+// ground. Of a fixed set of rays, cm.dispatch.samples of them; the shares along each are exact, of at most as many volumes
+// at one place as walk.glsl takes. A slice has two ids, as a float's bits, and a share each, the largest share first; 0
+// where there are no more. What has no id, as holes have none, hides what is behind it and is nobody's.
+// variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_MOTION=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_MOTION=1
+// variants: - or CM_SURFACES=1
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#include "bindings.glsl"
+#include "shared.glsl"
+#include "parameters.glsl"
+#include "cell.glsl"
+#include "random.glsl"
+#include "phase.glsl"
+#include "buffers.glsl"
+#include "march.glsl"
+#if CM_SURFACES
+#define CM_BVH_SHARED_STACK 64u
+#include "surface.glsl"
+#endif
+#include "ray.glsl"
+#include "walk.glsl"
+#include "ground.glsl"
+#include "fact_ray.glsl"
+
+layout(rgba32f, binding = CM_IMAGE_MATTES) uniform writeonly image2DArray cm_mattes;
+
+// Ids, 0 for none: the ground's, one for each volume, and one for each record of models.
+layout(std430, binding = CM_STORAGE_MATTES) readonly buffer CmMatteIds { uint cm_matte_ids[]; };
+const uint CM_MATTE_OF_VOLUMES = 1u;
+
+// Ids that are kept apart in one pixel.
+const uint CM_MOST_MATTES = 32u;
+uint cm_matte_id[CM_MOST_MATTES];
+float cm_matte_share[CM_MOST_MATTES];
+uint cm_matte_count = 0u;
+uint cm_matte_last = 0u;  // the one that had something last: seldom is the next another
+
+// The slot of an id; with more than there are the least gives way.
+uint cm_matte_slot(uint id) {
+  uint slot = 0u;
+  while (slot < cm_matte_count && cm_matte_id[slot] != id) slot += 1u;
+  if (slot < cm_matte_count) return slot;
+  if (slot == CM_MOST_MATTES) {
+    slot = 0u;
+    for (uint i = 1u; i < CM_MOST_MATTES; ++i) {
+      if (cm_matte_share[i] < cm_matte_share[slot]) slot = i;
+    }
+  } else {
+    cm_matte_count += 1u;
+  }
+  cm_matte_id[slot] = id;
+  cm_matte_share[slot] = 0.0;
+  return slot;
+}
+
+void cm_add_to_matte(uint id, float share) {
+  if (id == 0u || !(share > 0.0)) return;
+  bool again = cm_matte_last < cm_matte_count && cm_matte_id[cm_matte_last] == id;
+  if (!again) cm_matte_last = cm_matte_slot(id);
+  cm_matte_share[cm_matte_last] += share;
+}
+
+// Takes out the one with the largest share: its id, as a float's bits, and that share.
+vec2 cm_take_largest_matte() {
+  uint largest = 0u;
+  for (uint i = 1u; i < cm_matte_count; ++i) {
+    if (cm_matte_share[i] > cm_matte_share[largest]) largest = i;
+  }
+  if (cm_matte_count == 0u || !(cm_matte_share[largest] > 0.0)) return vec2(0.0);
+  vec2 rank = vec2(uintBitsToFloat(cm_matte_id[largest]), cm_matte_share[largest]);
+  cm_matte_share[largest] = 0.0;
+  return rank;
+}
+
+void main() {
+  uvec2 local = gl_GlobalInvocationID.xy + uvec2(0u, cm.dispatch.rows.x);
+  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
+  uvec2 pixel = cm.dispatch.tile_corner + local;
+  uint first_model = CM_MATTE_OF_VOLUMES + max(cm.space.volumes, 1u);
+  float share = 1.0 / float(cm.dispatch.samples);
+  for (int i = 0; i < int(cm.dispatch.samples); ++i) {
+    CmFactRay ray = cm_fact_ray(pixel, i);
+    float solid_t = ray.end;
+    uint solid = 0u;  // the host's has no id
+#if CM_SURFACES
+    CmHit hit;
+    if (cm_trace_models(cm_from_cube_point(ray.o), ray.w, 0.0, solid_t, false, hit)) {
+      solid_t = hit.t;
+      solid = cm_matte_ids[first_model + cm_model_of(hit.triangle)];
+    }
+#endif
+    float ground_t = cm_ground_distance(ray.o, ray.d);
+    if (ground_t < min(solid_t, CM_NO_GROUND)) {
+      solid_t = ground_t;
+      solid = cm_matte_ids[0];
+    }
+    float used = 0.0;
+    float clear = share;
+    CmWalk walk = cm_walk(ray.o, ray.d, solid_t);
+    // Beyond e^-40 nothing is left to know.
+    for (int j = 0; j < 100000 && used < 40.0; ++j) {
+      float t_1, e_0, e_1;
+      if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+      float way = walk.t_end - walk.t;
+      float span = t_1 - walk.t;
+      float depth = cm_depth_of(e_0, e_1, span, way);
+      used += depth;
+      float chance = 1.0 - exp(-depth);
+      // Each volume has its share of the extinction there, which is linear.
+      float middle = walk.t + cm_middle_of_part(depth, chance) * min(span, way);
+      float extinction = 0.0;
+      for (int k = 0; k < walk.count; ++k) extinction += cm_front_extinction(walk.front[k], middle);
+      float rare = extinction > 0.0 ? clear * chance / extinction : 0.0;
+      for (int k = 0; k < walk.count; ++k) {
+        cm_add_to_matte(cm_matte_ids[CM_MATTE_OF_VOLUMES + walk.front[k].volume],
+                        rare * cm_front_extinction(walk.front[k], middle));
+      }
+      clear -= clear * chance;
+      cm_walk_on(walk, t_1);
+    }
+    cm_add_to_matte(solid, share * exp(-used));
+  }
+  int slices = imageSize(cm_mattes).z;
+  for (int slice = 0; slice < slices; ++slice) {
+    vec2 first = cm_take_largest_matte();
+    imageStore(cm_mattes, ivec3(ivec2(pixel), slice), vec4(first, cm_take_largest_matte()));
+  }
+}

@@ -1,0 +1,40 @@
+// The rays by which a pixel is looked at without chance: a fixed set, spread evenly over the pixel, the lens and, with
+// CM_MOTION, the time that the shutter is open. The includer has buffers.glsl and ray.glsl before this, and with
+// CM_SURFACES surface.glsl.
+#ifndef CM_FACT_RAY_GLSL
+#define CM_FACT_RAY_GLSL
+
+struct CmFactRay {
+  vec3 o;         // cube space
+  vec3 w;         // world, unit
+  vec3 d;         // the same in cube space
+  float t_per_z;  // distance along it per unit of view depth
+  float end;      // where the host's depth is
+};
+
+// By Roberts's sequences; the first is of the pixel's and the lens' middle, in the middle of that time. Triangles that it
+// meets are those that cameras see, and where they cover in part they have the ray's own chance.
+CmFactRay cm_fact_ray(uvec2 pixel, int i) {
+  vec2 within = fract(0.5 + float(i) * vec2(0.7548776662, 0.5698402910));
+  vec2 lens = fract(0.5 + float(i) * vec2(0.6287067210, 0.5385972572));
+#if CM_MOTION
+  cm_now = fract(0.5 + float(i) * 0.8566748839);
+#endif
+  CmFactRay ray;
+  ray.t_per_z = cm_lens_ray(pixel, within, cm_on_disc(lens), ray.o, ray.w);
+  ray.d = cm_to_cube(ray.w);
+  ray.end = ray.t_per_z * cm_surface_z(pixel, within, uint(i));
+#if CM_SURFACES
+  cm_hit_seed = cm_hash3(uvec3(pixel.y * cm.view.size.x + pixel.x, uint(i), cm.integrator.seed)).x;
+  cm_hit_camera = true;
+#endif
+  return ray;
+}
+
+// Where in a part of a ray light scatters for the first time, of what does so there: the mean, from 0 at its beginning to
+// 1, as if the part were even. Of its optical depth and of the chance that it does.
+float cm_middle_of_part(float depth, float chance) {
+  return depth > 0.05 ? 1.0 / depth - (1.0 - chance) / chance : 0.5 - depth * (1.0 / 12.0);
+}
+
+#endif
