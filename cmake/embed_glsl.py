@@ -1,4 +1,4 @@
-"""Resolve #include "x.glsl" in glsl/, validate each shader, and write one C++ file that holds them all.
+"""Resolve #include "x.glsl" in glsl/, and write one C++ file that holds all shaders.
 
 A shader that is compiled with macros says in comments with which ones; gl::Programs builds no others:
 
@@ -6,20 +6,16 @@ A shader that is compiled with macros says in comments with which ones; gl::Prog
     // variants: - or CM_LAYERS=1
 
 A line holds alternatives, one of which every variant has; "-" is none of the macros. 1,2 are values; 1..8 is a range of
-them, and what holds at both of its ends is taken to hold between. Each variant (the product of the lines; of ranges
-beyond eight numbers the ends) is validated with glslangValidator where there is one.
+them. Variants are the product of the lines; cmake/validate_glsl.py validates them.
 """
 import argparse
 import itertools
 import pathlib
 import re
-import subprocess
 import sys
-import tempfile
 
 INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 MACRO = re.compile(r"(CM_[A-Z_]+)=(?:(\d+)\.\.(\d+)|(\w+(?:,\w+)*))")
-AT_ONCE = 64  # files a call of the validator
 
 
 def flatten(path, seen):
@@ -34,6 +30,12 @@ def flatten(path, seen):
             seen.add(included)
             lines += flatten(included, seen)
     return lines
+
+
+def shaders_of(folder):
+    """Path and whole source of each."""
+    for path in sorted(p for p in folder.iterdir() if p.suffix in (".comp", ".vert", ".frag")):
+        yield path, "\n".join(flatten(path, set())) + "\n"
 
 
 def parse_macro(text, where):
@@ -57,34 +59,6 @@ def variants_of(name, source):
     return [sum(choice, []) for choice in itertools.product(*lines)]
 
 
-def with_defines(source, defines):
-    version, rest = source.split("\n", 1)
-    lines = "".join(f"#define {d.replace('=', ' ')}\n" for d in defines)
-    return f"{version}\n{lines}{rest}"
-
-
-def validate(validator, name, source, variants):
-    texts = []
-    for macros in variants:
-        choices = [[f"{macro}={value}" for value in (values[::len(values) - 1] if is_range and len(values) > 8 else values)]
-                   for macro, values, is_range in macros]
-        texts += [with_defines(source, defines) for defines in itertools.product(*choices)]
-    with tempfile.TemporaryDirectory() as folder:
-        files = []
-        for i, text in enumerate(texts):
-            files.append(pathlib.Path(folder) / f"{i}{pathlib.Path(name).suffix}")
-            files[-1].write_text(text)
-        for i in range(0, len(files), AT_ONCE):
-            result = subprocess.run([validator, "-t", *files[i:i + AT_ONCE]], capture_output=True, text=True)
-            if result.returncode == 0:
-                continue
-            for file in files[i:i + AT_ONCE]:  # one by one: which is it?
-                result = subprocess.run([validator, file], capture_output=True, text=True)
-                if result.returncode != 0:
-                    defines = re.findall(r"^#define (.*)$", file.read_text().split("\n//", 1)[0], re.M)
-                    sys.exit(f"{name} [{', '.join(defines)}]:\n{result.stdout}{result.stderr}")
-
-
 def variant_tables(symbol, variants):
     """C++ of the shader's variants, as gl/shader_sources.hpp declares them."""
     rows, uses = [], []
@@ -105,19 +79,14 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path, required=True)
-    parser.add_argument("--validator", default="")
     options = parser.parse_args()
 
-    shaders = sorted(p for p in options.folder.iterdir() if p.suffix in (".comp", ".vert", ".frag"))
     parts = ['#include "gl/shader_sources.hpp"\n\nnamespace cumulet::gl {\n']
     entries = []
-    for path in shaders:
-        source = "\n".join(flatten(path, set())) + "\n"
+    for path, source in shaders_of(options.folder):
         if number := re.search(r"binding\s*=\s*\d.*", source):
             sys.exit(f"{path.name}: '{number.group()}' is no name of glsl/bindings.glsl")
         variants = variants_of(path.name, source)
-        if options.validator and not options.validator.endswith("NOTFOUND"):
-            validate(options.validator, path.name, source, variants)
         symbol = path.name.replace(".", "_")
         # Compilers limit the length of one literal; adjacent ones join.
         chunks = [source[i:i + 8000] for i in range(0, len(source), 8000)]

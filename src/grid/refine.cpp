@@ -2,9 +2,12 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/combinable.h>
+#include <tbb/concurrent_unordered_map.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <vector>
 
@@ -17,7 +20,23 @@ namespace cumulet::grid {
 
 using glm::ivec3;
 
-DiamondSet::Address DiamondSet::address(const ivec3& vertex) {
+// Priorities of 8^3 lattice points. Octaves 3m to 3m + 2 of h share the lattice of spacing 8^m.
+struct DiamondSet::Block {
+  int scale = 0;
+  ivec3 corner{0};  // in units of 8 lattice points
+  std::array<std::atomic<std::uint16_t>, 512> priority{};
+};
+
+namespace {
+
+struct Address {
+  std::uint64_t key;
+  unsigned local;
+  int scale;
+  ivec3 corner;
+};
+
+Address address_of(const ivec3& vertex) {
   const int scale = static_cast<int>(core::cm_octave(vertex)) / 3;
   const ivec3 lattice = vertex >> (3 * scale);
   const ivec3 corner = lattice >> 3;
@@ -26,15 +45,42 @@ DiamondSet::Address DiamondSet::address(const ivec3& vertex) {
   return {key, core::cm_in_block(lattice), scale, corner};
 }
 
+// Keys differ in few bits; the map's buckets need all of them mixed (MurmurHash3's finalizer).
+struct Hash {
+  std::size_t operator()(std::uint64_t key) const {
+    key = (key ^ (key >> 33U)) * 0xff51afd7ed558ccdULL;
+    key = (key ^ (key >> 33U)) * 0xc4ceb9fe1a85ec53ULL;
+    return key ^ (key >> 33U);
+  }
+};
+
+}  // namespace
+
+struct DiamondSet::Blocks {
+  tbb::concurrent_unordered_map<std::uint64_t, std::unique_ptr<Block>, Hash> by_key;
+};
+
+// Raises vertices; remembers the last block.
+class DiamondSet::Raiser {
+ public:
+  explicit Raiser(DiamondSet& set) : blocks_(set.blocks_.get()) {}
+  void operator()(const ivec3& vertex, std::uint16_t priority);
+
+ private:
+  Blocks* blocks_;
+  std::uint64_t key_ = ~std::uint64_t{0};
+  Block* block_ = nullptr;
+};
+
 void DiamondSet::Raiser::operator()(const ivec3& vertex, std::uint16_t priority) {
-  const Address a = address(vertex);
+  const Address a = address_of(vertex);
   if (a.key != key_) {
-    auto found = set_->map_.find(a.key);
-    if (found == set_->map_.end()) {
+    auto found = blocks_->by_key.find(a.key);
+    if (found == blocks_->by_key.end()) {
       auto block = std::make_unique<Block>();
       block->scale = a.scale;
       block->corner = a.corner;
-      found = set_->map_.emplace(a.key, std::move(block)).first;
+      found = blocks_->by_key.emplace(a.key, std::move(block)).first;
     }
     key_ = a.key;
     block_ = found->second.get();
@@ -46,11 +92,12 @@ void DiamondSet::Raiser::operator()(const ivec3& vertex, std::uint16_t priority)
 }
 
 bool DiamondCursor::is_split(const ivec3& vertex) {
-  const DiamondSet::Address a = DiamondSet::address(vertex);
+  const Address a = address_of(vertex);
   if (a.key != key_) {
-    const auto found = set_->map_.find(a.key);
+    const auto& blocks = set_->blocks_->by_key;
+    const auto found = blocks.find(a.key);
     key_ = a.key;
-    block_ = found == set_->map_.end() ? nullptr : found->second.get();
+    block_ = found == blocks.end() ? nullptr : found->second.get();
   }
   return block_ != nullptr && block_->priority[a.local].load(std::memory_order_relaxed) >= set_->cut_;
 }
@@ -95,7 +142,7 @@ double estimate_floor(const Evaluation& evaluation, const ViewLevels& view, std:
 
 DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, const RefineSettings& settings,
                        Progress* progress)
-    : log2_size_(statistics.cube().log2_size) {
+    : log2_size_(statistics.cube().log2_size), blocks_(std::make_unique<Blocks>()) {
   check(progress);
   const Evaluations evaluations(statistics, channels, settings, progress);
   const ViewLevels view(statistics.cube(), settings);
@@ -107,7 +154,7 @@ DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, c
   choose_cut(settings.max_cells, progress);
   if (!limited_ && floor > threshold * threshold) {
     // The estimate was too high after all.
-    map_.clear();
+    blocks_->by_key.clear();
     evaluate(evaluations, view, threshold * threshold, progress, 0.5, progress_part);
     choose_cut(settings.max_cells, progress);
   }
@@ -115,7 +162,7 @@ DiamondSet::DiamondSet(const Statistics& statistics, const Channels& channels, c
 
 DiamondSet::DiamondSet(const OwnPriorities& own, std::span<const std::uint8_t> levels, std::uint64_t max_cells,
                        Progress* progress)
-    : log2_size_(own.log2_size) {
+    : log2_size_(own.log2_size), blocks_(std::make_unique<Blocks>()) {
   ProgressPart part(progress, 0.0, 0.4, own.nodes.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, own.nodes.size(), 64), [&](const auto& range) {
     Raiser raise(*this);
@@ -126,10 +173,14 @@ DiamondSet::DiamondSet(const OwnPriorities& own, std::span<const std::uint8_t> l
   choose_cut(max_cells, progress);
 }
 
+DiamondSet::DiamondSet(DiamondSet&&) noexcept = default;
+DiamondSet& DiamondSet::operator=(DiamondSet&&) noexcept = default;
+DiamondSet::~DiamondSet() = default;
+
 std::vector<glm::uvec2> DiamondSet::blocks(const Progress* progress) const {
   std::vector<glm::uvec2> blocks;
-  blocks.reserve(map_.size());
-  for (const auto& [key, block] : map_) {
+  blocks.reserve(blocks_->by_key.size());
+  for (const auto& [key, block] : blocks_->by_key) {
     if (blocks.size() % 1024 == 0) check(progress);
     const glm::uvec3 corner(block->corner);
     blocks.emplace_back(corner.x | (corner.y << 16U), corner.z | (static_cast<std::uint32_t>(block->scale) << 16U));
@@ -170,7 +221,7 @@ void DiamondSet::evaluate(const Evaluation& evaluation, const ViewLevels& view, 
 
 std::vector<DiamondSet::Block*> DiamondSet::blocks_of(int scale, const Progress* progress) const {
   std::vector<Block*> blocks;
-  for (const auto& [key, block] : map_) {
+  for (const auto& [key, block] : blocks_->by_key) {
     check(progress);
     if (block->scale == scale) blocks.push_back(block.get());
   }
@@ -247,8 +298,8 @@ void DiamondSet::raise_parents(Raiser& raise, const ivec3& v, const ivec3& odd, 
 void DiamondSet::choose_cut(std::uint64_t max_cells, const Progress* progress) {
   // How many cells each priority adds; splitting a diamond adds one cell for each that it has.
   std::vector<Block*> blocks;
-  blocks.reserve(map_.size());
-  for (const auto& [key, block] : map_) blocks.push_back(block.get());
+  blocks.reserve(blocks_->by_key.size());
+  for (const auto& [key, block] : blocks_->by_key) blocks.push_back(block.get());
   tbb::combinable<std::vector<std::uint64_t>> partial([] { return std::vector<std::uint64_t>(65536); });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&](const auto& range) {
     std::vector<std::uint64_t>& histogram = partial.local();

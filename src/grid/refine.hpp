@@ -1,10 +1,6 @@
 #pragma once
 
-#include <tbb/concurrent_unordered_map.h>
-
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
@@ -96,6 +92,10 @@ class DiamondSet {
   DiamondSet(const OwnPriorities& own, std::span<const std::uint8_t> levels, std::uint64_t max_cells,
              Progress* progress = nullptr);
 
+  DiamondSet(DiamondSet&&) noexcept;
+  DiamondSet& operator=(DiamondSet&&) noexcept;
+  ~DiamondSet();
+
   static constexpr double progress_part = 0.6;
 
   /// How many cells the grid has.
@@ -108,40 +108,10 @@ class DiamondSet {
 
  private:
   friend class DiamondCursor;
-  // Priorities of 8^3 lattice points. Octaves 3m to 3m + 2 of h share the lattice of spacing 8^m.
-  struct Block {
-    int scale = 0;
-    glm::ivec3 corner{0};  // in units of 8 lattice points
-    std::array<std::atomic<std::uint16_t>, 512> priority{};
-  };
-  // Keys differ in few bits; the map's buckets need all of them mixed (MurmurHash3's finalizer).
-  struct Hash {
-    std::size_t operator()(std::uint64_t key) const {
-      key = (key ^ (key >> 33U)) * 0xff51afd7ed558ccdULL;
-      key = (key ^ (key >> 33U)) * 0xc4ceb9fe1a85ec53ULL;
-      return key ^ (key >> 33U);
-    }
-  };
-  using Map = tbb::concurrent_unordered_map<std::uint64_t, std::unique_ptr<Block>, Hash>;
+  struct Block;
+  struct Blocks;
+  class Raiser;
 
-  struct Address {
-    std::uint64_t key;
-    unsigned local;
-    int scale;
-    glm::ivec3 corner;
-  };
-  static Address address(const glm::ivec3& vertex);
-  /// Raises vertices; remembers the last block.
-  class Raiser {
-   public:
-    explicit Raiser(DiamondSet& set) : set_(&set) {}
-    void operator()(const glm::ivec3& vertex, std::uint16_t priority);
-
-   private:
-    DiamondSet* set_;
-    std::uint64_t key_ = ~std::uint64_t{0};
-    Block* block_ = nullptr;
-  };
   void evaluate(const Evaluations& evaluations, const ViewLevels& view, double floor_squared, Progress* progress,
                 double from, double to);
   // Of nodes of one size.
@@ -156,7 +126,7 @@ class DiamondSet {
   [[nodiscard]] std::vector<Block*> blocks_of(int scale, const Progress* progress) const;
 
   int log2_size_;
-  Map map_;
+  std::unique_ptr<Blocks> blocks_;
   std::uint16_t cut_ = 1;
   std::uint64_t cells_ = 24;
   bool limited_ = false;

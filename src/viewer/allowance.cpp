@@ -1,6 +1,7 @@
 #include "viewer/allowance.hpp"
 
 #include <tbb/info.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 
@@ -8,6 +9,13 @@
 #include "base/one_line.hpp"
 
 namespace cumulet::viewer {
+
+struct Allowance::Arena {
+  explicit Arena(int count) : threads(count), arena(count) {}
+  int threads;
+  tbb::task_arena arena;
+  std::mutex alone;  // of one thread: a second job's would bring another with it
+};
 
 void Allowance::set(unsigned threads, std::uint64_t memory_bytes) {
   std::shared_ptr<Arena> arena;  // the one before ends after the lock

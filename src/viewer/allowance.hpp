@@ -1,7 +1,5 @@
 #pragma once
 
-#include <tbb/task_arena.h>
-
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -30,12 +28,7 @@ class Allowance {
   void run(const std::function<void()>& work) const;
 
  private:
-  struct Arena {
-    explicit Arena(int count) : threads(count), arena(count) {}
-    int threads;
-    tbb::task_arena arena;
-    std::mutex alone;  // of one thread: a second job's would bring another with it
-  };
+  struct Arena;
   mutable std::mutex mutex_;
   unsigned threads_ = 0;
   std::shared_ptr<Arena> arena_;  // null: no limit

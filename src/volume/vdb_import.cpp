@@ -13,6 +13,7 @@
 #include "volume/import_detail.hpp"
 #include "volume/source_file.hpp"
 #include "volume/vdb_leaves.hpp"
+#include "volume/vdb_trees.hpp"
 
 namespace cumulet::volume::detail {
 namespace {
