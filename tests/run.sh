@@ -178,6 +178,9 @@ tidy() {
 
 # No display and no session: what a test finds must not depend on them.
 unset DISPLAY WAYLAND_DISPLAY XDG_RUNTIME_DIR
+# What Mesa makes of shaders is kept from test to test, wherever there is a home or none.
+export MESA_SHADER_CACHE_DIR=$root/build/mesa MESA_SHADER_CACHE_MAX_SIZE=4G
+mkdir -p "$MESA_SHADER_CACHE_DIR"
 export CTEST_OUTPUT_ON_FAILURE=1
 install_packages test
 
