@@ -483,7 +483,7 @@ TEST_F(CppViewer, ShowsAVolume) {
   };
   viewer.read_cryptomatte(name, 1, mattes).value();
   EXPECT_EQ(asked, 1);
-  EXPECT_EQ(std::bit_cast<std::uint32_t>(mattes[(8 * 24 + 12) * 2]), cumulet_cryptomatte_id("ball"));
+  EXPECT_EQ(std::bit_cast<std::uint32_t>(mattes[(8 * 24 + 12) * 2]), Viewer::cryptomatte_id("ball"));
   EXPECT_GT(mattes[(8 * 24 + 12) * 2 + 1], 0.9F);
   EXPECT_EQ(viewer.read_cryptomatte(name, 17, mattes).error().status, StatusCode::invalid_argument);
   std::vector<std::uint8_t> display(linear.size());

@@ -1499,6 +1499,10 @@ class Viewer {
     void* user = const_cast<void*>(static_cast<const void*>(std::addressof(name)));
     return result(cumulet_read_cryptomatte(handle(), call, user, ranks, values.data(), values.size()));
   }
+  /// The id of a name in these mattes; thread-safe.
+  [[nodiscard]] static std::uint32_t cryptomatte_id(const std::string& name) noexcept {
+    return cumulet_cryptomatte_id(name.c_str());
+  }
   [[nodiscard]] Result<double> measure_noise() noexcept {
     double noise = 0.0;
     if (auto done = result(cumulet_measure_noise(handle(), &noise)); !done) return done.error();
