@@ -182,6 +182,7 @@ void spell_out_defaults(SceneOptions& scene) {
   for_each_group(scene, [](auto& group) { settings::spell_out_zeros(group); });
   settings::spell_out_zeros(scene.sequence.playback);
   settings::spell_out_zeros(scene.camera);
+  for (NamedCamera& camera : scene.cameras) settings::spell_out_zeros(camera.camera);
   for (SceneVolume& other : scene.others) {
     const double scale = other.medium.density_scale;
     settings::spell_out_zeros(other.medium);

@@ -10,6 +10,10 @@
 #include <numbers>
 #include <presets.hpp>
 #include <settings.hpp>
+#include <string>
+#include <vector>
+
+#include "history.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -354,6 +358,39 @@ void Panel::threshold(settings::Facts facts, cumulet_grid_desc& grid) {
   ImGui::EndDisabled();
 }
 
+void Panel::cameras(Model& model) {
+  std::vector<NamedCamera>& cameras = model.scene.cameras;
+  const NamedCamera* const shown = looked_through(model.scene);
+  int chosen = shown != nullptr ? static_cast<int>(shown - cameras.data()) : -1;
+  std::vector<Choice> choices;
+  choices.reserve(cameras.size());
+  for (const NamedCamera& camera : cameras)
+    choices.push_back({camera.name.c_str(), static_cast<int>(choices.size()), "A camera that the scene keeps."});
+  ImGui::BeginDisabled(cameras.empty());
+  if (ui_.choose("Look through", "Which of the scene's cameras is looked through, as long as nobody moves it.", choices,
+                 chosen))
+    look_through(model.scene, cameras[static_cast<std::size_t>(chosen)].name);
+  ImGui::EndDisabled();
+  bool keep = ui_.text("Camera name", "What the present view is called once it is kept.", "a name", camera_name_);
+  const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
+  const bool can_keep = !camera_name_.empty() && !is_unplaced(model.scene.camera);
+  ImGui::BeginDisabled(!can_keep);
+  keep |= ui_.button("Keep camera", "Makes the present view one of the scene's cameras; one of that name becomes it.",
+                     {width, 0.0f});
+  ImGui::EndDisabled();
+  ImGui::SameLine();
+  ImGui::BeginDisabled(chosen < 0);
+  const bool remove =
+      ui_.button("Remove camera", "Takes the one that is looked through from the scene's cameras.", {width, 0.0f});
+  ImGui::EndDisabled();
+  if (remove && chosen >= 0) cameras.erase(cameras.begin() + chosen);
+  if (!keep || !can_keep) return;
+  const auto same = std::ranges::find(cameras, camera_name_, &NamedCamera::name);
+  NamedCamera& kept = same != cameras.end() ? *same : cameras.emplace_back();
+  static_cast<SceneCamera&>(kept) = model.scene;
+  kept.name = camera_name_;
+}
+
 void Panel::camera(Model& model, std::vector<Command>& commands) {
   using Desc = cumulet_navigation_desc;
   Desc& navigation = model.navigation;
@@ -399,6 +436,7 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
   if (ui_.button("Frame all", "The whole volume in the picture (F, Home).", {-1.0f, 0.0f}))
     commands.push_back({Action::frame_all});
   ImGui::EndDisabled();
+  cameras(model);
 }
 
 void Panel::sampling(Model& model) {

@@ -38,6 +38,8 @@ class Panel {
   void toolbar(Model& model, std::vector<Command>& commands);
   void file(Model& model, std::vector<Command>& commands);
   void camera(Model& model, std::vector<Command>& commands);
+  /// Those that the scene keeps.
+  void cameras(Model& model);
   void display(Model& model);
   void light(Model& model);
   void environment(Model& model, std::vector<Command>& commands);
@@ -84,6 +86,7 @@ class Panel {
   std::string state_;
   std::map<std::size_t, std::string> names_;        // of volumes, as typed
   std::map<std::size_t, std::string> model_names_;  // of models, likewise
+  std::string camera_name_;                         // as typed
   std::string path_;                                // likewise
   std::string path_of_;
 };

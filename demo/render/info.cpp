@@ -186,6 +186,7 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
     info.update(surfaces_info(model.file));
     json["other_models"].push_back(info);
   }
+  for (const NamedCamera& camera : scene.cameras) json["scene"]["cameras"].push_back({{"name", camera.name}});
   if (as_json) {
     // Names may be in any encoding: what is not UTF-8 is replaced. What is not finite is null.
     out << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';

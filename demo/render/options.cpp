@@ -445,6 +445,16 @@ void add_scene_options(CLI::App& app, SceneOptions& scene) {
       app, group, "--scene", "FILE.json", [&](const std::string& text) { scene = load_scene(text); },
       "Scene file, as cumulet-demo saves it; the other flags override what it says");
   add(
+      app, group, "--scene-camera", "NAME",
+      [&](const std::string& text) {
+        try {
+          look_through(scene, text);
+        } catch (const std::runtime_error& error) {
+          throw UsageError(error.what());
+        }
+      },
+      "Look through this one of the scene's cameras");
+  add(
       app, group, "--volume", "FILE",
       [&](const std::string& text) {
         if (text.empty()) throw UsageError("the file's name is empty");

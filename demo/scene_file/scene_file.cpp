@@ -65,6 +65,13 @@ constexpr double max_integer = 9007199254740992.0;
   throw std::runtime_error(file + ": " + one_line(cause));  // a key may be of any text
 }
 
+/// For a message.
+std::string list_quoted(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "\"" : ", \"") + name + "\"";
+  return list.empty() ? "none" : list;
+}
+
 /// About an axis, x, y or z, counter-clockwise as seen against it.
 Matrix rotation(std::size_t axis, double degrees) {
   const double angle = degrees * std::numbers::pi / 180.0;
@@ -80,6 +87,7 @@ Matrix rotation(std::size_t axis, double degrees) {
 constexpr std::size_t most_places = 100'000;
 constexpr std::size_t most_volumes = 10'000;
 constexpr std::size_t most_models = 10'000;
+constexpr std::size_t most_cameras = 10'000;
 
 /// Scaled, then turned about x, y and z, then moved.
 struct PlaceParts {
@@ -125,6 +133,11 @@ class Reader {
     if (!value->is_string()) wrong(key, "is not a text");
     out = value->get<std::string>();
     if (out.find('\0') != std::string::npos) wrong(key, "holds a zero byte");
+  }
+
+  [[nodiscard]] bool is_text(const std::string& key) {
+    const Json* value = find(key).value;
+    return value != nullptr && value->is_string();
   }
 
   /// Whether the key's value is this word; takes nothing else.
@@ -361,22 +374,48 @@ bool read_pose(Reader& reader, const std::string& of, bool is_end, cumulet_camer
   return eye;
 }
 
-/// What an end says nothing of is as at the frame's moment.
-void read_cameras(Reader& reader, SceneFormat format, SceneOptions& scene) {
-  const bool placed = read_pose(reader, "camera.", false, scene.camera);
-  reader.number("camera.lens_radius", scene.camera.lens_radius, settings::not_negative);
-  reader.number("camera.focus_distance", scene.camera.focus_distance, settings::not_negative);
+/// of: "camera." or "cameras[0]." What an end says nothing of is as at the frame's moment.
+void read_camera(Reader& reader, SceneFormat format, const std::string& of, SceneCamera& out) {
+  const bool placed = read_pose(reader, of, false, out.camera);
+  reader.number(of + "lens_radius", out.camera.lens_radius, settings::not_negative);
+  reader.number(of + "focus_distance", out.camera.focus_distance, settings::not_negative);
   if (format == SceneFormat::first) return;
-  const auto end = [&](const std::string& key, std::optional<cumulet_camera_desc>& out) {
+  const auto end = [&](const std::string& key, std::optional<cumulet_camera_desc>& pose) {
     if (!reader.has(key)) return;
     if (!placed) reader.wrong(key, "is of a camera that has no eye and no target");
-    out = scene.camera;
-    read_pose(reader, key + ".", true, *out);
-    if ((out->orthographic_height > 0.0) != (scene.camera.orthographic_height > 0.0))
+    pose = out.camera;
+    read_pose(reader, key + ".", true, *pose);
+    if ((pose->orthographic_height > 0.0) != (out.camera.orthographic_height > 0.0))
       reader.wrong(key + ".orthographic_height", "is of another projection than the camera's");
   };
-  end("camera.open", scene.camera_open);
-  end("camera.close", scene.camera_close);
+  end(of + "open", out.camera_open);
+  end(of + "close", out.camera_close);
+}
+
+void read_named_cameras(Reader& reader, std::vector<NamedCamera>& cameras) {
+  cameras.resize(reader.list("cameras", most_cameras));
+  std::set<std::string_view> known;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::string of = "cameras[" + std::to_string(i) + "].";
+    std::string& name = cameras[i].name;
+    if (!reader.has(of + "name")) reader.wrong(of + "name", "is missing");
+    reader.text(of + "name", name);
+    if (name.empty()) reader.wrong(of + "name", "is empty");
+    if (!known.insert(name).second) reader.wrong(of + "name", "\"" + name + "\" is another camera's, too");
+    read_camera(reader, SceneFormat::second, of, cameras[i]);
+  }
+}
+
+void read_cameras(Reader& reader, SceneFormat format, SceneOptions& scene) {
+  if (format == SceneFormat::second) read_named_cameras(reader, scene.cameras);
+  if (format == SceneFormat::first || !reader.is_text("camera")) return read_camera(reader, format, "camera.", scene);
+  std::string name;
+  reader.text("camera", name);
+  try {
+    look_through(scene, name);
+  } catch (const std::runtime_error& error) {
+    reader.wrong("camera", error.what());
+  }
 }
 
 template <class Desc, class Value>
@@ -570,10 +609,10 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   const bool second = format == SceneFormat::second;
   if (second) read_second(reader, scene);
   read_volume(reader, format, scene);
+  read_cameras(reader, format, scene);
   reader.text("surfaces.file", scene.surfaces);
   reader.text("surfaces.variant", scene.surface_variant);
   reader.integer("surfaces.camera", scene.surface_camera, -1.0, 1e6);
-  read_cameras(reader, format, scene);
   reader.text("environment.file", scene.environment);
   if (second) {
     if (!reader.has("environment") && !reader.has("lights")) scene.set_daylight();
@@ -707,6 +746,27 @@ Json pose_json(const cumulet_camera_desc& view) {
   return camera;
 }
 
+Json camera_json(const SceneCamera& view, SceneFormat format) {
+  Json camera = pose_json(view.camera);
+  if (view.camera.lens_radius > 0.0) camera["lens_radius"] = view.camera.lens_radius;
+  if (view.camera.focus_distance > 0.0) camera["focus_distance"] = view.camera.focus_distance;
+  if (format == SceneFormat::first) return camera;
+  if (view.camera_open) camera["open"] = pose_json(*view.camera_open);
+  if (view.camera_close) camera["close"] = pose_json(*view.camera_close);
+  return camera;
+}
+
+void put_cameras(Writer& writer, SceneFormat format, const SceneOptions& scene) {
+  const NamedCamera* const named = format == SceneFormat::second ? looked_through(scene) : nullptr;
+  writer.put("camera", named != nullptr ? Json(named->name) : camera_json(scene, format));
+  if (format == SceneFormat::first) return;
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    Json camera = {{"name", scene.cameras[i].name}};
+    camera.update(camera_json(scene.cameras[i], format));
+    writer.put("cameras[" + std::to_string(i) + "]", camera);
+  }
+}
+
 void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, const std::string& file) {
   if (format == SceneFormat::second) writer.put_text("volume.name", volume.name);
   writer.put("volume.file", file);
@@ -787,12 +847,7 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   for (std::size_t i = 0; models && i < scene.models.size(); ++i)
     put_model(writer, i + (scene.surfaces.empty() ? 0 : 1), scene.models[i], named(scene.models[i].file));
 
-  Json camera = pose_json(scene.camera);
-  if (scene.camera.lens_radius > 0.0) camera["lens_radius"] = scene.camera.lens_radius;
-  if (scene.camera.focus_distance > 0.0) camera["focus_distance"] = scene.camera.focus_distance;
-  writer.put("camera", camera);
-  if (second && scene.camera_open) writer.put("camera.open", pose_json(*scene.camera_open));
-  if (second && scene.camera_close) writer.put("camera.close", pose_json(*scene.camera_close));
+  put_cameras(writer, format, scene);
 
   writer.put_settings(scene.light);
   if (!scene.environment.empty()) {
@@ -840,7 +895,6 @@ std::string SceneVolume::label() const { return name.empty() ? fs::path(volume).
 
 SceneOptions::SceneOptions() {
   for_each_group(*this, [](auto& group) { group.struct_size = sizeof group; });
-  camera.struct_size = sizeof camera;
   sampling.samples = 64;
   display.denoise = CUMULET_DENOISE_FAST;
 }
@@ -902,6 +956,24 @@ void set_shutter(const SceneShutter& shutter, const double (&to_world)[16], doub
   end(shutter.close, close);
 }
 
+void look_through(SceneOptions& scene, const std::string& name) {
+  const auto found = std::ranges::find(scene.cameras, name, &NamedCamera::name);
+  if (found == scene.cameras.end()) {
+    std::vector<std::string> names;
+    for (const NamedCamera& camera : scene.cameras) names.push_back(camera.name);
+    throw std::runtime_error("there is no camera \"" + name + "\": the scene has " + list_quoted(names));
+  }
+  static_cast<SceneCamera&>(scene) = *found;
+  scene.surface_camera = -1;
+}
+
+const NamedCamera* looked_through(const SceneOptions& scene) {
+  const Json shown = camera_json(scene, SceneFormat::second);
+  const auto found = std::ranges::find_if(
+      scene.cameras, [&](const NamedCamera& camera) { return camera_json(camera, SceneFormat::second) == shown; });
+  return found == scene.cameras.end() ? nullptr : &*found;
+}
+
 void end_shutter(SceneOptions& scene) {
   scene.camera_open.reset();
   scene.camera_close.reset();
@@ -921,10 +993,7 @@ std::uint32_t variant_number(const std::string& file, const std::string& wanted,
   const char* const end = wanted.data() + wanted.size();
   const auto [rest, error] = std::from_chars(wanted.data(), end, number);
   if (error == std::errc() && rest == end && number < names.size()) return number + 1;
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "\"" : ", \"") + name + "\"";
-  throw std::runtime_error(file + ": there is no variant \"" + wanted + "\": the file has " +
-                           (list.empty() ? "none" : list));
+  throw std::runtime_error(file + ": there is no variant \"" + wanted + "\": the file has " + list_quoted(names));
 }
 
 void SceneOptions::set_daylight() {
@@ -1034,6 +1103,7 @@ std::string scene_hash(const SceneOptions& scene) {
   shown.name.clear();
   for (SceneVolume& other : shown.others) other.name.clear();
   for (SceneModel& model : shown.models) model.name.clear();
+  shown.cameras.clear();
   const std::string text =
       to_json(shown, SceneFormat::second, named).dump(-1, ' ', false, Json::error_handler_t::replace);
   std::array<char, 17> digits{};

@@ -98,8 +98,22 @@ struct SceneModel {
   [[nodiscard]] std::string label() const;
 };
 
+/// What is looked through: where it stands, and where as the shutter opens and closes.
+struct SceneCamera {
+  cumulet_camera_desc camera{};
+  std::optional<cumulet_camera_desc> camera_open = {};   // nothing: as it is
+  std::optional<cumulet_camera_desc> camera_close = {};  // likewise
+
+  SceneCamera() { camera.struct_size = sizeof camera; }
+};
+
+/// One of those that a scene keeps to look through.
+struct NamedCamera : SceneCamera {
+  std::string name;  // not empty, and no other's
+};
+
 /// What every demo program can show. Its first volume is what flags and the demo's panel set, and may be none.
-struct SceneOptions : SceneVolume {
+struct SceneOptions : SceneVolume, SceneCamera {
   std::vector<SceneVolume> others;   // beside the first; their max_bounces are 0: the first one's counts
   std::string surfaces;              // a glTF file; "": none
   std::string surface_variant;       // of the surfaces' materials, by name or number; "": none
@@ -113,9 +127,7 @@ struct SceneOptions : SceneVolume {
   std::string environment;  // a .hdr or .exr file; "": the light's sky
   cumulet_environment_settings_desc environment_settings{};
   cumulet_ground_desc ground{};
-  cumulet_camera_desc camera{};
-  std::optional<cumulet_camera_desc> camera_open = {};   // as the shutter opens; nothing: as it is
-  std::optional<cumulet_camera_desc> camera_close = {};  // as it closes
+  std::vector<NamedCamera> cameras;  // beside the one that is looked through
   cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
   cumulet_display_desc display{};
@@ -145,6 +157,11 @@ void for_each_group(Scene& scene, Visit&& visit) {
 
 /// As the library takes it; the file must outlive it.
 [[nodiscard]] cumulet_volume_file_desc volume_file(const VolumeFile& file);
+/// Looks through the one of its cameras that has this name. Throws std::runtime_error, a line that lists them, where
+/// there is none.
+void look_through(SceneOptions& scene, const std::string& name);
+/// The first of its cameras that is the same as what is looked through; null where none is.
+[[nodiscard]] const NamedCamera* looked_through(const SceneOptions& scene);
 /// Its camera is another from now on, and stands still.
 void end_shutter(SceneOptions& scene);
 

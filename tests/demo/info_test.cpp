@@ -125,6 +125,15 @@ TEST_F(Info, OfANanoVdb) {
   expect_line(lines(volume("one.nvdb")), "- smoke");
 }
 
+TEST_F(Info, OfAScenesCameras) {
+  write_vdb("one.vdb", {box("density")});
+  SceneOptions scene = volume("one.vdb");
+  EXPECT_FALSE(told(scene).contains("scene"));
+  for (const char* name : {"front", "the side"}) scene.cameras.emplace_back().name = name;
+  EXPECT_EQ(told(scene)["scene"], json::parse(R"({"cameras": [{"name": "front"}, {"name": "the side"}]})"));
+  expect_line(lines(scene), "- the side");
+}
+
 TEST_F(Info, OfAModel) {
   // Two meshes, one of two primitives; the first is placed twice, the other one not at all.
   std::ofstream(path("model.gltf")) << R"({

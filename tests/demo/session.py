@@ -639,8 +639,11 @@ def test_exposure(s):
 
 
 def test_scene_file(s):
+    # A view is kept, left and looked through again.
+    view = ['click "Camera name"', "frames 2", 'text "near"', "key enter", "frames 3", "drag viewport 0.5 0.5 to viewport 0.3 0.3",
+            "frames 3", 'click "Look through"', "frames 2", 'click "Look through/near"', "frames 3"]
     s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
-                    "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
+                    *view, "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
                     "wait loaded", "wait converged", "key escape", "frames 2", *shot("saved"), "key f12", "frames 2",
                     "key ctrl+a", 'text "picture.png"', "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", 'text "picture.exr"', "key enter",
                     "frames 3", *shot("messages")],
@@ -650,6 +653,7 @@ def test_scene_file(s):
     scene = json.loads((s.out / "scene.json").read_text())
     medium = scene["volumes"][0]["medium"]
     assert scene["display"]["exposure_stops"] > 0.3 and medium["density_scale"] > 1, scene
+    assert scene["camera"] == "near" and [camera["name"] for camera in scene["cameras"]] == ["near"], scene
     saved, report, area = look(s, "saved")
     x, y, width, height = report["viewport"]
     assert [scene["picture"]["width"], scene["picture"]["height"]] == [width, height]
@@ -657,10 +661,12 @@ def test_scene_file(s):
     subprocess.run([s.renderer, "--scene", "scene.json", "-o", "rendered.png"], cwd=s.out, check=True)
     assert_alike(saved, s.picture("rendered"), area)
     s.play("open", ["wait loaded", f'drop "{s.out}/scene.json"', "wait loaded", "wait converged", "key escape", "frames 2",
-                    *shot("opened"),
+                    *shot("opened"), "key ctrl+shift+s", "frames 2", "key ctrl+a", 'text "again.json"', "key enter", "frames 3",
                     "key ctrl+z", "wait loaded", *shot("back")], "--volume", s.explosion)
     assert_alike(saved, look(s, "opened")[0], area)
     assert s.report("opened")["scene"]["medium"] == medium
+    again = json.loads((s.out / "again.json").read_text())
+    assert [again["camera"], again["cameras"]] == ["near", scene["cameras"]], again
     assert s.report("back")["scene"]["volume"]["file"].endswith("explosion_0012.vdb"), "opening a scene can be undone"
 
 

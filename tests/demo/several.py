@@ -15,19 +15,20 @@ shutil.rmtree(folder, ignore_errors=True)
 folder.mkdir(parents=True)
 
 
-def run(name, volumes, *flags):
-    """A run's process; the picture, if it makes one, is folder/name.pfm."""
+def run(name, volumes, *flags, **keys):
+    """A run's process; the picture, if it makes one, is folder/name.pfm. keys: of the scene."""
     scene = folder / f"{name}.json"
     camera = {"eye": [0, 20, 130], "target": [0, 15, 0]}
     picture = {"width": 64, "height": 48, "samples": 64}
-    scene.write_text(json.dumps({"cumulet_scene": 2, "volumes": volumes, "camera": camera, "picture": picture}))
+    whole = {"cumulet_scene": 2, "volumes": volumes, "camera": camera, "picture": picture, **keys}
+    scene.write_text(json.dumps(whole))
     command = [program, "--scene", scene, "--output", folder / f"{name}.pfm", "--stats", folder / f"{name}.stats", *flags]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def render(name, volumes, *flags):
+def render(name, volumes, *flags, **keys):
     """A picture's bytes."""
-    done = run(name, volumes, *flags)
+    done = run(name, volumes, *flags, **keys)
     assert done.returncode == 0, (name, done.stderr)
     return (folder / f"{name}.pfm").read_bytes()
 
@@ -71,6 +72,15 @@ places = {"places": [{"translate": [-25, 0, 0]}, {"translate": [25, 0, 0]}]}
 first = render("first_places", [volume(cloud, 0.8, **places)])
 second = render("second_places", [volume(fire, 1, **hidden), volume(cloud, 0.8, **places)])
 assert near(mean(second), mean(first), 0.01), (mean(second), mean(first))
+
+# What is looked through is one of the scene's cameras, or another.
+cameras = [{"name": "front", "eye": [0, 20, 130], "target": [0, 15, 0]},
+           {"name": "above", "eye": [0, 200, 1], "target": [0, 15, 0]}]
+assert render("front", [volume(cloud, 0.8)], camera="front", cameras=cameras) == whole
+above = render("above", [volume(cloud, 0.8)], "--scene-camera", "above", camera="front", cameras=cameras)
+assert above != whole
+pose = {key: cameras[1][key] for key in ("eye", "target")}
+assert render("posed", [volume(cloud, 0.8)], camera=pose) == above
 
 missing = run("missing", [volume(cloud, 0.8), volume("/nowhere.vdb", 1)])
 assert missing.returncode != 0 and missing.stderr.count("\n") == 1 and "/nowhere.vdb" in missing.stderr, missing.stderr

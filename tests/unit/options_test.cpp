@@ -375,6 +375,37 @@ TEST_F(SceneOption, FlagsOverrideTheSceneFileWhereverTheyStand) {
   EXPECT_EQ(mixed->scene.display.exposure_stops, 2.0f);
 }
 
+TEST_F(SceneOption, AnotherOfItsCamerasIsLookedThrough) {
+  const std::string path = write_scene(R"({"cumulet_scene": 2, "volumes": [{"file": "/a/smoke.vdb"}],
+    "models": [{"file": "/a/m.glb", "camera": 3}], "camera": "front", "cameras": [
+      {"name": "front", "eye": [0, 0, 9], "target": [0, 0, 0], "fovy_degrees": 30},
+      {"name": "the side", "eye": [9, 0, 0], "target": [0, 0, 0], "lens_radius": 0.5}]})");
+  const auto options = [&](const Arguments& more) {
+    Arguments all = {"--scene", path, "-o", "a.png"};
+    all.insert(all.begin(), more.begin(), more.end());
+    std::ostringstream out;
+    return parse_render_options(all, out)->scene;
+  };
+  EXPECT_EQ(options({}).camera.eye[2], 9.0);
+  EXPECT_EQ(options({}).surface_camera, 3) << "the model's comes before the scene's";
+  const SceneOptions side = options({"--scene-camera", "the side"});
+  EXPECT_EQ(side.camera.eye[0], 9.0);
+  EXPECT_EQ(side.camera.lens_radius, 0.5);
+  EXPECT_EQ(side.camera.fovy_degrees, 0.0);
+  EXPECT_EQ(side.surface_camera, -1) << "but not before one that is asked for";
+  EXPECT_EQ(options({"--gltf-camera", "2", "--scene-camera", "the side"}).surface_camera, 2);
+  const SceneOptions moved = options({"--camera", "1,0,0 0,0,0 30", "--scene-camera", "the side"});
+  EXPECT_EQ(moved.camera.eye[0], 1.0);
+  EXPECT_EQ(moved.camera.lens_radius, 0.5);
+  std::ostringstream out;
+  const auto loose = parse_render_options({path, "--scene-camera", "the side", "-o", "a.png"}, out);
+  EXPECT_EQ(loose->scene.camera.eye[0], 9.0) << "of a scene without a flag";
+  EXPECT_EQ(usage_error({"--scene", path, "-o", "a.png", "--scene-camera", "side"}),
+            R"(--scene-camera: there is no camera "side": the scene has "front", "the side")");
+  EXPECT_EQ(usage_error(with({"--scene-camera", "side"})),
+            R"(--scene-camera: there is no camera "side": the scene has none)");
+}
+
 TEST_F(SceneOption, MustNameAVolumeOrAFlag) {
   const std::string path = write_scene(R"({"cumulet_scene": 1})");
   EXPECT_NE(usage_error({"--scene", path, "-o", "a.png"}).find("--volume"), std::string::npos);

@@ -30,6 +30,9 @@ std::string error_of(const std::string& text) {
 /// A scene with this one more section.
 std::string with(const std::string& more) { return R"({"cumulet_scene": 1, )" + more + "}"; }
 
+/// What is told of a scene of version 2 with these sections.
+std::string told(const std::string& sections) { return error_of(R"({"cumulet_scene": 2, )" + sections + "}"); }
+
 SceneOptions full_scene() {
   SceneOptions scene;
   scene.volume = "/data/cloud.vdb";
@@ -215,21 +218,13 @@ TEST(SceneFile, EveryDifferenceCounts) {
 }
 
 TEST(SceneFile, AKeyIsGivenOnce) {
-  const auto told = [](const std::string& text) -> std::string {
-    try {
-      static_cast<void>(parse_scene(text, "s.json"));
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_EQ(told(R"({"cumulet_scene": 1, "cumulet_scene": 1})"), "s.json: cumulet_scene: is given twice");
-  EXPECT_EQ(told(R"({"cumulet_scene": 1, "picture": {"width": 8, "height": 8, "width": 9}})"),
-            "s.json: picture.width: is given twice");
-  EXPECT_EQ(told(R"({"cumulet_scene": 1, "light": {"sun": {"irradiance": [1, 1, 1], "irradiance": [2, 2, 2]}}})"),
-            "s.json: light.sun.irradiance: is given twice");
+  EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "cumulet_scene": 1})"), "dir/s.json: cumulet_scene: is given twice");
+  EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "picture": {"width": 8, "height": 8, "width": 9}})"),
+            "dir/s.json: picture.width: is given twice");
+  EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "light": {"sun": {"irradiance": [1, 1, 1], "irradiance": [2, 2, 2]}}})"),
+            "dir/s.json: light.sun.irradiance: is given twice");
   // The same key in two objects is no repeat.
-  EXPECT_EQ(told(R"({"cumulet_scene": 1, "volume": {"file": "a.vdb"}, "surfaces": {"file": "a.glb"}})"), "");
+  EXPECT_EQ(error_of(R"({"cumulet_scene": 1, "volume": {"file": "a.vdb"}, "surfaces": {"file": "a.glb"}})"), "");
 }
 
 TEST(SceneFile, WhatIsLeftOutIsTheDefault) {
@@ -373,7 +368,6 @@ TEST(SceneFile, TheSecondVersionSaysWhatTheFirstDoes) {
 }
 
 TEST(SceneFile, OfTheSecondVersionErrorsNameThePlaceInIt) {
-  const auto told = [](const std::string& more) { return error_of(R"({"cumulet_scene": 2, )" + more + "}"); };
   const std::string start = "dir/s.json: ";
   EXPECT_EQ(told(R"("volumes": [{}, {}])"), start + "volumes[1].file: is missing");
   EXPECT_EQ(told(R"("volumes": [{}, {"file": ""}])"), start + "volumes[1].file: is empty");
@@ -493,22 +487,14 @@ TEST(SceneFile, WhatMovesIsKept) {
     change(other);
     EXPECT_FALSE(same_scene(scene, other));
   }
-  const auto told = [](const std::string& keys) {
-    try {
-      static_cast<void>(parse_scene(R"({"cumulet_scene": 2, )" + keys + "}", "s.json"));
-    } catch (const std::runtime_error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
   EXPECT_EQ(told(R"("camera": {"open": {"eye": [1, 2, 3], "target": [0, 0, 0]}})"),
-            "s.json: camera.open: is of a camera that has no eye and no target");
+            "dir/s.json: camera.open: is of a camera that has no eye and no target");
   EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"orthographic_height": 3}})"),
-            "s.json: camera.close.orthographic_height: is of another projection than the camera's");
+            "dir/s.json: camera.close.orthographic_height: is of another projection than the camera's");
   EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"lens_radius": 3}})"),
-            "s.json: camera.close.lens_radius: there is no such setting");
+            "dir/s.json: camera.close.lens_radius: there is no such setting");
   EXPECT_EQ(told(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
-            "s.json: volumes[0].open.turn: there is no such setting");
+            "dir/s.json: volumes[0].open.turn: there is no such setting");
   // Of what stands somewhere, from there.
   double place[16] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1};
   double open[16];
@@ -517,6 +503,85 @@ TEST(SceneFile, WhatMovesIsKept) {
   EXPECT_EQ(open[0], 2.0);
   EXPECT_EQ(open[12], 4.0);
   EXPECT_EQ(close[15], 0.0) << "where it stands";
+}
+
+TEST(SceneFile, CamerasAreKept) {
+  const std::string cameras = R"("cameras": [
+      {"name": "front", "eye": [1, 2, 9], "target": [0, 1, 0], "fovy_degrees": 30, "lens_radius": 0.25,
+       "focus_distance": 7, "open": {"eye": [0.5, 2, 9]}},
+      {"name": "a \"plan\"", "eye": [0, 50, 0], "target": [0, 0, 0], "up": [0, 0, -1], "orthographic_height": 20},
+      {"name": "wherever", "fovy_degrees": 50}])";
+  const auto read = [&](const std::string& more) {
+    return parse_scene(R"({"cumulet_scene": 2, )" + cameras + more + "}", "s.json");
+  };
+  const auto again = [](const SceneOptions& scene) { return parse_scene(scene_text(scene, "s.json"), "s.json"); };
+  const SceneOptions scene = read(R"(, "camera": {"eye": [7, 8, 9], "target": [0, 0, 0]})");
+  ASSERT_EQ(scene.cameras.size(), 3U);
+  EXPECT_EQ(looked_through(scene), nullptr);
+  using cumulet::settings::same;
+  const SceneOptions reread = again(scene);
+  EXPECT_TRUE(same_scene(scene, reread));
+  ASSERT_EQ(reread.cameras.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(reread.cameras[i].name, scene.cameras[i].name);
+    EXPECT_TRUE(same(reread.cameras[i].camera, scene.cameras[i].camera)) << i;
+  }
+  ASSERT_TRUE(reread.cameras[0].camera_open);
+  EXPECT_EQ(reread.cameras[0].camera_open->eye[0], 0.5);
+  EXPECT_EQ(reread.cameras[0].camera_open->fovy_degrees, 30.0) << "the camera's";
+  EXPECT_EQ(reread.cameras[1].camera.orthographic_height, 20.0);
+  EXPECT_EQ(reread.camera.eye[0], 7.0);
+
+  // By name, with all that is its own; it is written so, as long as nobody moves it.
+  const SceneOptions front = read(R"(, "camera": "front")");
+  EXPECT_TRUE(same(front.camera, scene.cameras[0].camera));
+  EXPECT_EQ(front.camera.lens_radius, 0.25);
+  ASSERT_TRUE(front.camera_open);
+  EXPECT_EQ(front.camera_open->eye[0], 0.5);
+  EXPECT_EQ(looked_through(front), front.cameras.data());
+  EXPECT_NE(scene_text(front, "s.json").find(R"("camera": "front")"), std::string::npos);
+  EXPECT_TRUE(same_scene(front, again(front)));
+  EXPECT_EQ(parse_scene(scene_text(front, "s.json", SceneFormat::first), "s.json").camera.eye[2], 9.0)
+      << "the first version has no names";
+  SceneOptions moved = front;
+  moved.camera.eye[0] = 1.5;
+  EXPECT_EQ(again(moved).camera.eye[0], 1.5);
+  EXPECT_EQ(again(moved).cameras[0].camera.eye[0], 1.0);
+  SceneOptions still = front;
+  end_shutter(still);
+  EXPECT_EQ(looked_through(still), nullptr);
+
+  // They count for the scene, not for the picture.
+  SceneOptions renamed = scene;
+  renamed.cameras[2].name = "anywhere";
+  EXPECT_FALSE(same_scene(scene, renamed));
+  EXPECT_EQ(scene_hash(scene), scene_hash(renamed));
+  SceneOptions named = scene;
+  look_through(named, "front");
+  EXPECT_NE(scene_hash(scene), scene_hash(named));
+  SceneOptions alone = named;
+  alone.cameras.clear();
+  EXPECT_EQ(scene_hash(named), scene_hash(alone));
+}
+
+TEST(SceneFile, CamerasHaveNamesOfTheirOwn) {
+  const std::string two = R"("cameras": [{"name": "a"}, {"name": "b"}], )";
+  EXPECT_EQ(told(two + R"("camera": "c")"), R"(dir/s.json: camera: there is no camera "c": the scene has "a", "b")");
+  EXPECT_EQ(told(R"("camera": "c")"), R"(dir/s.json: camera: there is no camera "c": the scene has none)");
+  EXPECT_EQ(told(R"("cameras": [{"name": "a"}, {"name": "b"}, {"name": "a"}])"),
+            R"(dir/s.json: cameras[2].name: "a" is another camera's, too)");
+  EXPECT_EQ(told(R"("cameras": [{}])"), "dir/s.json: cameras[0].name: is missing");
+  EXPECT_EQ(told(R"("cameras": [{"name": ""}])"), "dir/s.json: cameras[0].name: is empty");
+  EXPECT_EQ(told(R"("cameras": [{"name": 1}])"), "dir/s.json: cameras[0].name: is not a text");
+  EXPECT_EQ(told(R"("cameras": ["a"])"), "dir/s.json: cameras[0] is not an object");
+  EXPECT_EQ(told(R"("cameras": {})"), "dir/s.json: cameras: is not a list");
+  EXPECT_EQ(told(R"("camera": 1)"), "dir/s.json: camera is not an object");
+  EXPECT_EQ(told(R"("cameras": [{"name": "a", "eye": [0, 0, 1]}])"), "dir/s.json: cameras[0].target: is missing");
+  EXPECT_EQ(told(R"("cameras": [{"name": "a", "fovy": 1}])"), "dir/s.json: cameras[0].fovy: there is no such setting");
+  EXPECT_EQ(told(R"("cameras": [{"name": "a", "open": {"fovy_degrees": 3}}])"),
+            "dir/s.json: cameras[0].open: is of a camera that has no eye and no target");
+  EXPECT_EQ(error_of(with(R"("cameras": [{"name": "a"}])")), "dir/s.json: cameras: there is no such setting");
+  EXPECT_EQ(error_of(with(R"("camera": "a")")), "dir/s.json: camera is not an object");
 }
 
 TEST(SceneFile, WithoutAWordOnLightItIsDay) {
