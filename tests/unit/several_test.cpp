@@ -107,6 +107,12 @@ TEST_P(Several, ExtinctionsAddUpAlongARay) {
 TEST_P(Several, ApartAreThoseOfOne) { expect_same_as_merged(apart); }
 TEST_P(Several, OverlappingAreThoseOfOne) { expect_same_as_merged(overlapping); }
 
+TEST_P(Several, TenThatOverlapAreThoseOfOne) {
+  Offsets ten = overlapping;
+  ten.insert(ten.end(), {{-6, 2, 5}, {12, -4, 8}, {2, 7, 3}, {15, 1, -4}, {6, 5, 13}, {-3, -6, 1}});
+  expect_same_as_merged(ten);
+}
+
 TEST_P(Several, VoxelsAreToo) {
   for (const render::March march : {render::March::dense, render::March::brick}) {
     still_->set_grid(test::settings_of({march, grid::CellKind::constant}));

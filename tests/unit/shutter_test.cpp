@@ -351,6 +351,33 @@ TEST_P(Shutter, WhatMovesAgainstItsPlaceStands) {
   }
 }
 
+// It stays where it is, and only its normals turn away from the sun, which stands behind the camera.
+TEST_P(Shutter, NormalsTurnAsVerticesMove) {
+  only_absorb(0.1);
+  still_->set_light({0.0F, 0.0F, vec3(std::numbers::pi_v<float>), vec3(0.0F)});
+  auto square = std::make_shared<PosedScene>();
+  square->add_quad({{{0, 0, 0}, {8, 0, 0}, {8, 8, 0}, {0, 8, 0}}}, square->add(test::diffuse(vec3(0.5F))));
+  const vec3 aside(0.8F, 0.0F, 0.6F);
+  square->move = [=](surface::Pose& pose, double t) {
+    for (surface::PosedVertex& vertex : pose.vertices)
+      vertex.normal = glm::normalize(glm::mix(vec3(0, 0, 1), aside, static_cast<float>(t)));
+  };
+  const auto model = std::make_shared<viewer::ModelInstance>(posed_at(square, 0.5));
+  viewer().add_model(model);
+  const double swept = along_z(4.0, 4.0);
+  const auto still = [&](double t) {
+    model->edit([&](viewer::ModelSettings& of) { of.choice.time = t; });
+    return along_z(4.0, 4.0, 0.0);
+  };
+  constexpr int moments = 8;
+  double mean = 0.0;
+  for (int i = 0; i < moments; ++i) mean += still((i + 0.5) / moments) / moments;
+  EXPECT_NEAR(swept, mean, 2e-3);
+  // Lit by what the normals say at each moment: neither end's.
+  EXPECT_NEAR(still(0.0), 0.5, 5e-3);
+  EXPECT_LT(still(1.0), 0.35);
+}
+
 // One that shines grows, is sheared and turns its normals; copies of a sphere are squashed, and stand on a way of their
 // own, on that of their model.
 TEST_P(Shutter, AModelThatDeformsIsTheMeanOfStills) {
