@@ -544,6 +544,7 @@ TEST_F(CSequence, MovesInAnyThread) {
   ends = true;
   for (std::thread& thread : threads) thread.join();
   ASSERT_EQ(cumulet_sequence_set_frame(sequence.get(), 4.0), CUMULET_OK);
+  ASSERT_EQ(cumulet_rebuild(other.get()), CUMULET_OK);  // cancelled last, it rests until something else is asked for
   const Picture found = picture(viewer.get());
   EXPECT_EQ(difference(found, alone(4)), "");
   EXPECT_EQ(difference(picture(other.get()), found), "");
