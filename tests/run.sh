@@ -209,12 +209,10 @@ tidy
 export ASAN_OPTIONS=detect_odr_violation=0:strict_string_checks=1:intercept_tls_get_addr=0
 export LSAN_OPTIONS=suppressions=$root/tests/leaks.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
-if [ "$tier" = long ]; then
-  build_and_test sanitize tests/unit/all tests/unit
-else
+if [ "$tier" = all ]; then
   build_and_test sanitize cumulet_sanitized_tests tests/unit --label-exclude long
-fi
-if [ "$tier" = long ]; then
+else
+  build_and_test sanitize tests/unit/all tests/unit
   run_ctest release-long build/release --label-regex long
   # What TSan cannot see into is left out. TBB has one thread (of one core), or its own ways of waiting would count as
   # races; the library's threads stay many.

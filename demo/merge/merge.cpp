@@ -230,13 +230,14 @@ Merged merge(const std::vector<std::string>& paths, const std::string& output) {
     if (has(first, layer)) made.emplace_back(layer, mean(parts, layer));
   for_each_layer(first, layers::light_group_prefix, layers::light_group_channels,
                  [&](const image::LayerName& layer) { made.emplace_back(layer, mean(parts, layer)); });
+  const auto take_first = [&](const image::LayerName& layer) {
+    made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
+  };
   for (const image::LayerName& layer : {layers::transmittance, layers::depth, layers::volume_depth, layers::normal,
                                         layers::albedo, layers::velocity, layers::backward, layers::volume_backward})
-    if (has(first, layer)) made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
+    if (has(first, layer)) take_first(layer);
   // Nor do mattes depend on samples, and there is no mean of ids.
-  for_each_layer(first, layers::cryptomatte_prefix, layers::cryptomatte_channels, [&](const image::LayerName& layer) {
-    made.emplace_back(layer, image::read_exr(parts.front().path, layer).values);
-  });
+  for_each_layer(first, layers::cryptomatte_prefix, layers::cryptomatte_channels, take_first);
 
   std::vector<image::Attribute> said = first.attributes;
   const auto samples = static_cast<double>(merged.samples);

@@ -1,6 +1,6 @@
 #include "gl/share_group.hpp"
 
-#include <algorithm>
+#include <array>
 #include <cstdint>
 
 #include "base/error.hpp"
@@ -21,11 +21,9 @@ bool ShareGroup::is_current() const {
 }
 
 bool ShareGroup::has_label() const {
-  std::string label(label_.size() + 2, '\0');
-  GLsizei length = 0;
-  gl_->GetObjectLabel(GL_BUFFER, token_.name(), static_cast<GLsizei>(label.size()), &length, label.data());
-  label.resize(static_cast<std::size_t>(std::clamp<GLsizei>(length, 0, static_cast<GLsizei>(label.size()))));
-  return label == label_;
+  std::array<char, 64> label{};  // longer than ours
+  gl_->GetObjectLabel(GL_BUFFER, token_.name(), static_cast<GLsizei>(label.size()), nullptr, label.data());
+  return label_ == label.data();
 }
 
 void ShareGroup::require() const {
