@@ -234,6 +234,8 @@ CM_BLOCK(CmDispatch) {
   uint view;     // of inspect.comp
   uint picks;    // 1: inspect.comp looks at one pixel, the tile's, and tells of it at (0, 0)
   CM_ALIGN(8) uvec2 rows;  // of the tile, for kernels that run by rows: the first, and the one after the last
+  uint lanes;    // that there are for paths
+  uint places;   // pixels that they take, those of the tile's list of squares: glsl/path_places.glsl
   CM_EQUALITY(CmDispatch)
 };
 

@@ -1,12 +1,15 @@
-// The tile's pixels in blocks, of which a dispatch has some, and blocks in squares, of which each half (its even and its
-// odd rows) is sampled or is not. Shared by GLSL and C++.
+// The lanes of a tile in blocks, of which a dispatch has some; and the tile's pixels in squares, of which those that are
+// sampled are in a list. Shared by GLSL and C++.
 #ifndef CM_PATH_BLOCKS_GLSL
 #define CM_PATH_BLOCKS_GLSL
 
-#define CM_BLOCK_WIDTH 128u
-#define CM_BLOCK_HEIGHT 8u
+#define CM_BLOCK_LANES 1024u
+#define CM_MOST_BLOCKS 128u
+#define CM_BEGINS 0x80000000u  // with a block's number: a tile begins
 #define CM_SQUARE_EDGE 8u
-#define CM_MOST_BLOCKS 256u    // of a tile
-#define CM_BEGINS 0x80000000u  // with a block's number: a pass begins
+#define CM_SQUARE_PIXELS 64u
+#define CM_MOST_SQUARES 16384u  // of a tile
+// A word of the list: the square's number in the tile, and from this bit on whether its even and its odd rows are sampled.
+#define CM_SQUARE_ROWS 30
 
 #endif

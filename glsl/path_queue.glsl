@@ -4,7 +4,7 @@
 //   trace_meet.comp     the tree is asked
 //   trace_shade.comp    what happens on triangles
 //   trace_camera.comp   samples are added to their pixels, and the next begun
-// and a dispatch is trace_camera.comp over all pixels of its blocks (CM_DENSE), and some rounds. After a round no path
+// and a dispatch is trace_camera.comp over all lanes of its blocks (CM_DENSE), and some rounds. After a round no path
 // waits but for the next round.
 #ifndef CM_PATH_QUEUE_GLSL
 #define CM_PATH_QUEUE_GLSL

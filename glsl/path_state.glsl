@@ -47,6 +47,7 @@
 //   bounces         events of the path
 //   steps           cells marched
 //   number          the sample's, of its pixel
+//   place           the pixel's (glsl/path_places.glsl)
 //   ahead           with CM_EQUIANGULAR, of such a ray: how far ahead of o, along w, the path goes on
 // CM_PATH_FLIGHT, what goes on to the next ray:
 //   w               world direction of flight, kept during shadow rays
@@ -84,7 +85,8 @@
 #define CM_PATH_RAY(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS)                                                            \
   VEC3(o) FLOAT(t) VEC3(d) FLOAT(t_end) FLOAT(depth) FLOAT(depth_0) UVEC2(cell) UINT(cache) UVEC2(start_cell)        \
   FLOAT(reach)
-#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) CM_PATH_AHEAD(FLOAT)
+#define CM_PATH_SUM(VEC3, VEC2, UVEC2, FLOAT, UINT, BITS) VEC3(radiance) UINT(bounces) UINT(steps) UINT(number) UINT(place)             \
+  CM_PATH_AHEAD(FLOAT)
 #if CM_EQUIANGULAR
 #define CM_PATH_AHEAD(FLOAT) FLOAT(ahead)
 #else

@@ -1,5 +1,5 @@
-// Where paths are kept between dispatches: a plane of lanes for each four words of a path. A lane is a pixel of the tile.
-// Those who include this have glsl/path_state.glsl before it.
+// Where paths are kept between dispatches: a plane of lanes for each four words of a path. A lane has a pixel of the tile
+// until that is done, and then another (glsl/path_places.glsl). Those who include this have glsl/path_state.glsl before it.
 #ifndef CM_PATH_STORE_GLSL
 #define CM_PATH_STORE_GLSL
 
@@ -7,11 +7,12 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 #include "path_blocks.glsl"
 
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
-  uvec4 cm_total;     // x: rounds that lanes marched: full ones, or visits of trace_travel.comp
-  uvec4 cm_blocks[CM_MOST_BLOCKS];  // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block of
-                                    // the tile its pixels without their target samples, those without any and its
-                                    // samples finished in this dispatch
-  uint cm_live[CM_MOST_BLOCKS];  // of each block of the tile the halves of squares that are sampled, two bits a square
+  uvec4 cm_total;  // x: rounds that lanes marched: full ones, or visits of trace_travel.comp
+  uvec4 cm_blocks[CM_MOST_BLOCKS];    // x: which blocks there are in the dispatch, and CM_BEGINS; then of each block its
+                                      // lanes that have a pixel, those whose pixel has no sample, and the samples
+                                      // that they finished in this dispatch
+  uint cm_next_place;                 // that no lane has had
+  uint cm_squares[CM_MOST_SQUARES];   // the list of those that are sampled: CM_SQUARE_ROWS
 };
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
@@ -21,7 +22,7 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
 #define CM_ZERO_UINT(name) p.name = 0u;
 #define CM_ZERO_BITS(name, bits) p.name = 0u;
 
-uint cm_lanes() { return cm.dispatch.tile_size.x * cm.dispatch.tile_size.y; }
+uint cm_lanes() { return cm.dispatch.lanes; }
 
 // Words of a part, in the list's order; the places are constants to every compiler.
 #define CM_UNPACK_UINT(name) p.name = words[word++];
@@ -134,26 +135,13 @@ void cm_store_path(CmPath p, uint lane) {
   cm_store_ends(p, lane);
 }
 
-uint cm_lane_of(uvec2 local) { return local.y * cm.dispatch.tile_size.x + local.x; }
-uvec2 cm_local_of(uint lane) { return uvec2(lane % cm.dispatch.tile_size.x, lane / cm.dispatch.tile_size.x); }
-uint cm_blocks_across() { return (cm.dispatch.tile_size.x + CM_BLOCK_WIDTH - 1u) / CM_BLOCK_WIDTH; }
-uint cm_block_of(uvec2 local) {
-  return local.y / CM_BLOCK_HEIGHT * cm_blocks_across() + local.x / CM_BLOCK_WIDTH;
-}
-
-// A kernel that has a row of work groups for each block of the dispatch: this lane's pixel of the tile, perhaps outside,
-// and whether a pass begins, so that every pixel goes on from the samples it has.
-uvec2 cm_block_pixel() {
+// A kernel that has a row of work groups for each block of the dispatch: its lane, which there may not be; and whether a
+// tile begins, so that no lane has a path.
+uint cm_block_lane() {
   uint block = cm_blocks[gl_WorkGroupID.y].x & ~CM_BEGINS;
-  uvec2 corner = uvec2(block % cm_blocks_across() * CM_BLOCK_WIDTH, block / cm_blocks_across() * CM_BLOCK_HEIGHT);
-  return corner + uvec2(gl_GlobalInvocationID.x, gl_LocalInvocationID.y);
-}
-// Whether it is of the tile, and of a half that is sampled.
-bool cm_is_live(uvec2 local) {
-  if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.tile_size.y) return false;
-  uint bit = local.x % CM_BLOCK_WIDTH / CM_SQUARE_EDGE * 2u + (local.y & 1u);
-  return (cm_live[cm_block_of(local)] >> bit & 1u) != 0u;
+  return block * CM_BLOCK_LANES + gl_WorkGroupID.x * 64u + gl_LocalInvocationIndex;
 }
 bool cm_block_begins() { return (cm_blocks[gl_WorkGroupID.y].x & CM_BEGINS) != 0u; }
+uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
 
 #endif

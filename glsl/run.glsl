@@ -1,16 +1,26 @@
 // All stages of a path that meets no triangles, in one kernel. Shared by GLSL and C++; the includer provides what glsl/flight.glsl asks for, and
-//   CmPixel cm_load_pixel(uvec2 at)               what a pixel's samples have come to
+//   uvec2 cm_pixel_of(uint place)                 the path's pixel
+//   CmPixel cm_load_pixel(uvec2 at)               what its samples have come to
 //   void cm_store_pixel(CmPixel pixel, uvec2 at)
+//   void cm_take_next_place(inout CmPath p, inout uint samples)   another one, with so many samples, if there is any
 #ifndef CM_RUN_GLSL
 #define CM_RUN_GLSL
 
 #include "flight.glsl"
 
-// At most so many rounds of the samples of a pixel, which has so many. Returns how often it marched.
-CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rounds) {
-  uint marches = 0u;
+// What lanes did.
+struct CmRun {
+  uint marches;
+  uint finished;  // samples
+};
+
+// At most so many rounds, of a path whose pixel has so many samples.
+CM_FN CmRun cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uint rounds) {
+  CmRun run;
+  run.marches = 0u;
+  run.finished = 0u;
   for (uint i = 0u; i < rounds && p.stage != CM_STAGE_DONE; ++i) {
-    if (p.stage == CM_STAGE_CAMERA) cm_camera(p, samples, at);
+    if (p.stage == CM_STAGE_CAMERA) cm_camera(p, samples, cm_pixel_of(p.place));
     if (p.stage == CM_STAGE_AIM) {
       cm_aim(p);
       if (CM_INSTANCES == 0 && p.cell.x == CM_NONE) {
@@ -19,8 +29,9 @@ CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rou
         p.stage = ends ? CM_STAGE_FINISH : CM_STAGE_EVENT;
       }
     }
-    marches += cm_travel(p);
+    run.marches += cm_travel(p);
     if (p.stage == CM_STAGE_FINISH) {
+      uvec2 at = cm_pixel_of(p.place);
 #if CM_GROUPS
       cm_finish_groups(p, at);
 #endif
@@ -28,9 +39,11 @@ CM_FN uint cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uvec2 at, uint rou
       cm_finish(p, pixel);
       cm_store_pixel(pixel, at);
       samples = pixel.samples;
+      run.finished += 1u;
+      if (p.stage == CM_STAGE_DONE) cm_take_next_place(p, samples);
     }
   }
-  return marches;
+  return run;
 }
 
 #endif

@@ -1,6 +1,6 @@
 #version 450
-// The path tracer as one kernel, where paths meet no triangles. One lane a pixel of some blocks of the tile: loads its
-// path, runs it for a bounded number of rounds, stores it.
+// The path tracer as one kernel, where paths meet no triangles. Each lane of some blocks loads its path, runs it for a
+// bounded number of rounds, stores it.
 // variants: CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=1,2,6 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_HOLDOUT=1 or CM_MARCH=0 CM_LINEAR=0,1 CM_PAGES=6 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1 or CM_MARCH=1,2 CM_LINEAR=0 CM_PAGES=1 CM_INSTANCES=1 CM_HOLDOUT=1 CM_MOTION=1
 // variants: - or CM_LAYERS=1 or CM_AOVS=1 or CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 or CM_LAMPS=1 CM_LAYERS=1 or CM_LAMPS=1 CM_AOVS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1 or CM_LAMPS=1 CM_LAYERS=1 CM_GROUPS=1 or CM_LAMPS=1 CM_LAYERS=1 CM_AOVS=1 CM_GROUPS=1 or CM_LAMPS=1 CM_EQUIANGULAR=1 CM_GROUPS=1
 // variants: - or CM_SECOND_LOBE=1
@@ -19,6 +19,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "path_state.glsl"
 #include "path_store.glsl"
 #include "pixel_store.glsl"
+#include "path_places.glsl"
 #include "run.glsl"
 #include "groups.glsl"
 
@@ -36,29 +37,29 @@ void cm_forget_triangles(inout CmPath p) {
 }
 
 void main() {
-  uvec2 local = cm_block_pixel();
-  if (!cm_is_live(local)) return;
-  uvec2 at = cm.dispatch.tile_corner + local;
-  uint before = cm_pixel_samples(at);
-  if (before >= cm.dispatch.samples) return;
-  uint lane = cm_lane_of(local);
+  uint lane = cm_block_lane();
+  if (lane >= cm_lanes()) return;
 #if CM_GROUPS
   cm_group_lane = lane;
 #endif
   CmPath p = cm_begin_path();
-  if (!cm_block_begins()) {
+  uint samples = 0u;
+  if (cm_block_begins()) {
+    cm_take_place(p, lane, samples);
+  } else {
     p = cm_load_path(lane);
     cm_load_visit(p, lane);
+    if (p.stage == CM_STAGE_DONE) return;
+    samples = cm_pixel_samples(cm_pixel_of(p.place));
   }
   cm_forget_triangles(p);
-  uint samples = before;
-  uint marches = cm_run(p, samples, at, cm.dispatch.rounds);
+  CmRun run = cm_run(p, samples, cm.dispatch.rounds);
   cm_forget_triangles(p);
   cm_store_path(p, lane);
   cm_store_visit(p, lane);
-  uint block = cm_block_of(local);
+  uint block = cm_block_of(lane);
   if (p.stage != CM_STAGE_DONE) atomicAdd(cm_blocks[block].y, 1u);
-  if (samples == 0u) atomicAdd(cm_blocks[block].z, 1u);
-  if (samples != before) atomicAdd(cm_blocks[block].w, samples - before);
-  if (marches != 0u) atomicAdd(cm_total.x, (marches + CM_EVENTS - 1u) / CM_EVENTS);
+  if (p.stage != CM_STAGE_DONE && samples == 0u) atomicAdd(cm_blocks[block].z, 1u);
+  if (run.finished != 0u) atomicAdd(cm_blocks[block].w, run.finished);
+  if (run.marches != 0u) atomicAdd(cm_total.x, (run.marches + CM_EVENTS - 1u) / CM_EVENTS);
 }

@@ -49,12 +49,12 @@ class Reserve {
   double part_ = 0.0;
 };
 
-/// Some pixels of a tile in one pass.
+/// Some of the lanes that sample a tile's pixels in one pass.
 struct Block {
   std::uint32_t lanes = 0;
-  std::uint32_t unfinished = 0;  // as far as is known: no fewer are
-  std::uint32_t empty = 0;
-  std::uint32_t under_way = 0;  // dispatches
+  std::uint32_t unfinished = 0;  // have a pixel, as far as is known: no fewer have
+  std::uint32_t empty = 0;       // of those: one without a sample
+  std::uint32_t under_way = 0;   // dispatches
   bool begins = true;
 };
 using Blocks = std::vector<Block>;
@@ -129,7 +129,7 @@ struct DispatchRecord {
 class Flights {
  public:
   static constexpr std::size_t most = 3;
-  static constexpr std::size_t most_words = 4096;  // uvec4, that a dispatch tells: one a square of a tile
+  static constexpr std::size_t most_words = 16384;  // uvec4, that a dispatch tells: one a square of a tile
 
   explicit Flights(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 

@@ -30,20 +30,16 @@ constexpr std::size_t head_bytes = sizeof(glm::uvec4);
 constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MOST_ROUNDS + 1) * head_bytes;
 constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // a lane
 
-// Behind cm_total and cm_blocks.
-constexpr std::size_t live_at = (1 + CM_MOST_BLOCKS) * sizeof(glm::uvec4);
-
-std::uint32_t groups_across(std::uint32_t tile_width) {
-  return (std::min(tile_width, PathKernels::block_width) + 7) / 8;
-}
+// cm_next_place and cm_squares, behind cm_total and cm_blocks.
+constexpr std::size_t next_place_at = (1 + CM_MOST_BLOCKS) * sizeof(glm::uvec4);
+constexpr std::size_t squares_at = next_place_at + sizeof(std::uint32_t);
+constexpr std::size_t blocks_bytes = squares_at + CM_MOST_SQUARES * sizeof(std::uint32_t);
 
 }  // namespace
 
 void PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
   if (!blocks_) {
-    blocks_ = gl::make_buffer(gl_, live_at + CM_MOST_BLOCKS * sizeof(std::uint32_t), nullptr, GL_DYNAMIC_STORAGE_BIT,
-                              "creating the counters");
-    live_.clear();
+    blocks_ = gl::make_buffer(gl_, blocks_bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counters");
   }
   const std::size_t path_bytes = lanes * lane_bytes(visits, within, groups);
   if (path_bytes > path_bytes_) {
@@ -71,17 +67,17 @@ void PathKernels::set_counters(std::span<const glm::uvec4> words) const {
   gl_->NamedBufferSubData(blocks_.name(), 0, static_cast<GLsizeiptr>(words.size_bytes()), words.data());
 }
 
-void PathKernels::set_live(std::span<const std::uint32_t> blocks) {
-  if (std::ranges::equal(blocks, live_)) return;
-  live_.assign(blocks.begin(), blocks.end());
-  gl_->NamedBufferSubData(blocks_.name(), live_at, static_cast<GLsizeiptr>(blocks.size_bytes()), blocks.data());
+void PathKernels::set_squares(std::span<const std::uint32_t> squares, std::uint32_t lanes) const {
+  gl_->NamedBufferSubData(blocks_.name(), next_place_at, sizeof lanes, &lanes);
+  gl_->NamedBufferSubData(blocks_.name(), squares_at, static_cast<GLsizeiptr>(squares.size_bytes()), squares.data());
 }
 
-void PathKernels::run_one(std::uint32_t tile_width, std::size_t blocks) const {
-  gl_->DispatchCompute(groups_across(tile_width), static_cast<GLuint>(blocks), 1);
+void PathKernels::run_one(std::uint32_t lanes, std::size_t blocks) const {
+  const std::uint32_t across = (std::min(lanes, block_lanes) + CM_SQUARE_PIXELS - 1) / CM_SQUARE_PIXELS;
+  gl_->DispatchCompute(across, static_cast<GLuint>(blocks), 1);
 }
 
-void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t tile_width, std::size_t blocks,
+void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t lanes, std::size_t blocks,
                              std::uint32_t rounds) const {
   const std::vector<glm::uvec4> heads(std::size_t{CM_QUEUES} * (rounds + 1), glm::uvec4(0U, 1U, 1U, 0U));
   gl_->NamedBufferSubData(queues_.name(), 0, static_cast<GLsizeiptr>(heads.size() * head_bytes), heads.data());
@@ -91,7 +87,7 @@ void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t tile_w
                        GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
   };
   programs.begin->use(*gl_);
-  run_one(tile_width, blocks);
+  run_one(lanes, blocks);
   settle();
   const std::array<const gl::Program*, CM_QUEUES> order{programs.travel, programs.meet, programs.shade,
                                                         programs.camera};

@@ -23,13 +23,13 @@ struct StagePrograms {
 /// All calls need the context current and a StateGuard around.
 class PathKernels {
  public:
-  static constexpr std::uint32_t block_width = CM_BLOCK_WIDTH;
-  static constexpr std::uint32_t block_height = CM_BLOCK_HEIGHT;
-  static constexpr std::uint32_t begins_pass = CM_BEGINS;
+  static constexpr std::uint32_t block_lanes = CM_BLOCK_LANES;
+  static constexpr std::uint32_t most_lanes = CM_BLOCK_LANES * CM_MOST_BLOCKS;
+  static constexpr std::uint32_t begins_tile = CM_BEGINS;
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// Makes room for the paths of a tile, with queues if they are to be run by stages, with what paths among several
+  /// Makes room for so many paths, with queues if they are to be run by stages, with what paths among several
   /// volumes keep of their visits, with what they keep of the glass that they are within, and with sums of so many
   /// groups of lights. Throws on a GL error.
   void reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups);
@@ -38,14 +38,13 @@ class PathKernels {
   /// The buffer of counters: which blocks a dispatch covers, and what it did (CmBlocks of glsl/path_store.glsl).
   [[nodiscard]] GLuint counters() const { return blocks_.name(); }
   void set_counters(std::span<const glm::uvec4> words) const;
-  /// What of each block of the tile is sampled, from the next dispatch on: a square's even and its odd rows are a bit
-  /// each.
-  void set_live(std::span<const std::uint32_t> blocks);
-  /// One kernel over so many blocks of a tile of that width; its program is in use.
-  void run_one(std::uint32_t tile_width, std::size_t blocks) const;
-  /// Rounds of stages over so many blocks.
-  void run_stages(const StagePrograms& programs, std::uint32_t tile_width, std::size_t blocks,
-                  std::uint32_t rounds) const;
+  /// The list of a tile's squares that are sampled (CM_SQUARE_ROWS of glsl/path_blocks.glsl); no place of theirs is
+  /// taken but those that so many lanes begin with.
+  void set_squares(std::span<const std::uint32_t> squares, std::uint32_t lanes) const;
+  /// One kernel over so many blocks of so many lanes; its program is in use.
+  void run_one(std::uint32_t lanes, std::size_t blocks) const;
+  /// Rounds of stages over them.
+  void run_stages(const StagePrograms& programs, std::uint32_t lanes, std::size_t blocks, std::uint32_t rounds) const;
   /// Rounds that run_stages does at most.
   static std::uint32_t most_rounds();
   [[nodiscard]] std::uint64_t bytes() const;
@@ -57,7 +56,6 @@ class PathKernels {
   gl::Object queues_;
   std::size_t queues_lanes_ = 0;
   gl::Object blocks_;
-  std::vector<std::uint32_t> live_;  // as blocks_ has it
 };
 
 }  // namespace cumulet::render

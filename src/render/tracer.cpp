@@ -19,11 +19,13 @@ namespace cumulet::render {
 
 namespace {
 
-constexpr std::uint32_t tile_edge = 512;
-constexpr std::uint32_t block_width = PathKernels::block_width;
-constexpr std::uint32_t block_height = PathKernels::block_height;
-static_assert(tile_edge / block_width * (tile_edge / block_height) <= CM_MOST_BLOCKS);
-static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= Flights::most_words, "told at once");
+constexpr std::uint32_t tile_edge = 1024;
+constexpr std::uint32_t block_lanes = PathKernels::block_lanes;
+// Of a driver that runs them on the CPU: few enough for its caches, and many times as many as it runs at once.
+constexpr std::uint32_t lanes_in_call = 32 * block_lanes;
+static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_MOST_SQUARES);
+static_assert(CM_MOST_SQUARES <= Flights::most_words, "told at once");
+static_assert(CM_MOST_SQUARES <= 1U << CM_SQUARE_ROWS);
 constexpr double hasty_rest = 0.03;  // of a tile's pixels
 constexpr std::uint32_t most_rounds = 65536;
 constexpr std::uint32_t longest_pass = 64;
@@ -114,15 +116,20 @@ std::uint32_t Picture::pass_after(std::uint32_t samples) const {
   if (samples == 0 && hasty_) {
     next = 1;  // the first picture comes at once
   } else if (!noise_target_) {
-    // Twice as many each time: waiting for slow pixels at a pass's end costs little. One tile needs no passes, lanes go
-    // on with their next samples while others are at their first.
-    next = tiles_ == glm::uvec2(1U) ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
+    // Twice as many each time: waiting for slow pixels at a pass's end costs little. Where all have lanes there need be
+    // no passes: some go on with their next samples while others are at their first.
+    next = has_lanes_for_all() ? target_samples_ : samples + std::clamp(samples, 1U, longest_pass);
   } else if (samples < first_measured) {
-    next = tiles_ == glm::uvec2(1U) ? first_measured : std::max(1U, 2 * samples);
+    next = has_lanes_for_all() ? first_measured : std::max(1U, 2 * samples);
   } else {
     next = look_after(samples);
   }
   return std::min(next, target_samples_);
+}
+
+bool Picture::has_lanes_for_all() const {
+  const glm::uvec2 squares = tile_squares();
+  return tiles_ == glm::uvec2(1U) && lanes_ >= CM_SQUARE_PIXELS * squares.x * squares.y;
 }
 
 bool Picture::measures() const {
@@ -146,7 +153,7 @@ void Picture::extend(std::uint32_t samples, std::optional<double> noise_target) 
   // What was enough for another target is not.
   if (retargeted) allotment_.begin(box_.size);
   // Lanes that are done for good begin again; so do the others' present samples, with the same result.
-  if (done_ || retargeted || (tiles_ == glm::uvec2(1U) && !noise_target_)) {
+  if (done_ || retargeted || (has_lanes_for_all() && !noise_target_)) {
     tile_ = 0;
     errors_.clear();
     if (done_ || !noise_target_) pass_target_ = pass_after(pass_target_);
@@ -183,25 +190,30 @@ void Picture::go_on_from(const Accumulated& told, std::optional<std::uint32_t> p
 void Picture::begin_tile() {
   // What is under way tells the tile it is of, and no one asks that one.
   blocks_ = std::make_shared<Blocks>();
-  live_.clear();
+  squares_.clear();
   tile_errors_.reset();
   block_ = 0;
-  constexpr glm::uvec2 squares_of_block(block_width / Allotment::edge, block_height / Allotment::edge);
-  static_assert(squares_of_block == glm::uvec2(16U, 1U), "two bits each are a word");
   const glm::uvec2 squares = tile_squares();
+  std::vector<std::uint32_t> pixels;  // of each square that is sampled
   for (std::uint32_t y = 0; y < squares.y; ++y) {
-    for (std::uint32_t x = 0; x < squares.x; x += squares_of_block.x) {
-      std::uint32_t lanes = 0;
-      std::uint32_t live = 0;
-      for (std::uint32_t i = 0; i < std::min(squares_of_block.x, squares.x - x); ++i) {
-        const glm::uvec2 square = first_square() + glm::uvec2(x + i, y);
-        lanes += allotment_.live_pixels(square);
-        live |= allotment_.live(square) << 2 * i;
-      }
-      // Not known of a pass that begins with holes until its blocks tell.
-      blocks_->push_back({lanes, lanes, holes_ ? lanes : 0, 0, true});
-      live_.push_back(live);
+    for (std::uint32_t x = 0; x < squares.x; ++x) {
+      const glm::uvec2 square = first_square() + glm::uvec2(x, y);
+      const std::uint32_t live = allotment_.live(square);
+      if (live == 0) continue;
+      squares_.push_back((y * squares.x + x) | live << CM_SQUARE_ROWS);
+      pixels.push_back(allotment_.live_pixels(square));
     }
+  }
+  constexpr std::size_t squares_a_block = block_lanes / CM_SQUARE_PIXELS;
+  const std::size_t begun = std::min(squares_.size(), std::size_t{lanes_ / CM_SQUARE_PIXELS});
+  const bool more = begun < squares_.size();  // than lanes: each finds one
+  for (std::size_t first = 0; first < begun; first += squares_a_block) {
+    const std::size_t end = std::min(begun, first + squares_a_block);
+    const auto lanes = more ? static_cast<std::uint32_t>((end - first) * CM_SQUARE_PIXELS)
+                            : std::accumulate(pixels.begin() + static_cast<std::ptrdiff_t>(first),
+                                              pixels.begin() + static_cast<std::ptrdiff_t>(end), 0U);
+    // Not known of a pass that begins with holes until its blocks tell.
+    blocks_->push_back({lanes, lanes, holes_ ? lanes : 0, 0, true});
   }
 }
 
@@ -216,9 +228,9 @@ void Picture::end_tile() {
   }
   const glm::uvec2 extent = tile_extent();
   const auto rest = hasty_ && !complete_ ? static_cast<std::uint64_t>(hasty_rest * extent.x * extent.y) : 0;
-  const bool one_tile = tiles_ == glm::uvec2(1U);
-  if (one_tile && empty <= rest) complete_ = true;
-  holes_ = one_tile ? empty > 0 : hasty_ && pass_ < 2;
+  const bool all_begun = has_lanes_for_all();
+  if (all_begun && empty <= rest) complete_ = true;
+  holes_ = all_begun ? empty > 0 : hasty_ && pass_ < 2;
   // The last few of a hasty first pass are left to the next.
   const bool first_pass = pass_target_ == 1 && target_samples_ > 1;
   if (unfinished > (first_pass ? rest : 0)) return;
@@ -541,7 +553,9 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   make_shared_objects();
   const PixelBox box = settings.region.pixels(size, settings.margin);
   const glm::uvec2 tile = glm::min(box.size, glm::uvec2(tile_edge));
-  const std::size_t lanes = std::size_t{tile.x} * tile.y;
+  const glm::uvec2 squares = (tile + Allotment::edge - 1U) / Allotment::edge;
+  const std::uint32_t most_lanes = gl_->dispatches_in_call ? lanes_in_call : PathKernels::most_lanes;
+  const std::uint32_t lanes = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, most_lanes);
   picture.complete_ = false;
   picture.size_ = size;
   picture.region_ = settings.region;
@@ -571,6 +585,7 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   picture.tile_size_ = tile;
   picture.tiles_ = (box.size + tile - 1U) / tile;
   picture.tile_ = 0;
+  picture.lanes_ = lanes;
   picture.hasty_ = settings.hasty;
   picture.pass_ = 0;
   picture.holes_ = true;
@@ -647,7 +662,7 @@ void Tracer::collect() {
     learn(what, landed->ms, landed->at_most_ms, landed->words[0].x);
     for (const std::uint32_t block : what.blocks) *what.samples += landed->words[1 + block].w;
     if (log_ != nullptr) {
-      const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_width * block_height;
+      const auto lanes = static_cast<std::uint32_t>(what.blocks.size()) * block_lanes;
       log_->push_back(
           {what.aim_ms, ms, lanes, static_cast<std::uint32_t>(what.lanes), what.rounds, what.most_ms > 0.0});
     }
@@ -725,6 +740,9 @@ bool Tracer::accumulate(Picture& picture, const MarchData& data, const Obstacles
   std::optional<StagePrograms> stages;
   if (picture.traced_ > 0) stages = stage_programs(picture, data);
   until_complete = until_complete && !picture.complete_;
+  // What another picture's paths have taken the place of begins anew.
+  const auto begun = [](const Block& block) { return !block.begins; };
+  if (paths_of_.lock() != picture.blocks_ && std::ranges::any_of(*picture.blocks_, begun)) picture.begin_tile();
   const double aim = std::clamp(0.7 * milliseconds_until(deadline), least_ms, dispatch_ms);
   const std::uint32_t rounds = stages ? PathKernels::most_rounds() : most_rounds;
   bool sent = false;
@@ -790,6 +808,8 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   parameters.dispatch.tile_size = extent;
   parameters.dispatch.rounds = what.rounds;
   parameters.dispatch.samples = picture.pass_target_;
+  parameters.dispatch.lanes = picture.lanes_;
+  parameters.dispatch.places = static_cast<std::uint32_t>(CM_SQUARE_PIXELS * picture.squares_.size());
   // Blocks are dealt out far apart: a driver that gives each core a run of work groups then gives each its share of the
   // costly ones.
   const std::size_t count = what.blocks.size();
@@ -801,7 +821,7 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   std::vector<glm::uvec4> words(1 + picture.blocks_->size(), glm::uvec4(0U));
   for (std::size_t i = 0; i < count; ++i) {
     Block& block = (*picture.blocks_)[what.blocks[i]];
-    words[1 + i].x = what.blocks[i] | (block.begins ? PathKernels::begins_pass : 0U);
+    words[1 + i].x = what.blocks[i] | (block.begins ? PathKernels::begins_tile : 0U);
     block.begins = false;
     ++block.under_way;
   }
@@ -810,12 +830,15 @@ void Tracer::dispatch(Picture& picture, const Obstacles& obstacles, const std::o
   what.samples = picture.samples_;
   gl_->NamedBufferSubData(uniforms_.name(), 0, sizeof(parameters), &parameters);
   kernels_.set_counters(words);
-  kernels_.set_live(picture.live_);
+  if (paths_of_.lock() != picture.blocks_) {
+    kernels_.set_squares(picture.squares_, picture.lanes_);
+    paths_of_ = picture.blocks_;
+  }
   flights_.begin(Flights::Kind::dispatch);
   if (stages) {
-    kernels_.run_stages(*stages, extent.x, count, what.rounds);
+    kernels_.run_stages(*stages, picture.lanes_, count, what.rounds);
   } else {
-    kernels_.run_one(extent.x, count);
+    kernels_.run_one(picture.lanes_, count);
   }
   flights_.end(std::move(what), kernels_.counters(), words.size());
   gl::memory_barrier(*gl_, GL_SHADER_STORAGE_BARRIER_BIT | GL_SHADER_IMAGE_ACCESS_BARRIER_BIT |

@@ -122,11 +122,12 @@ struct Accumulated {
 
 /// One accumulation under way.
 ///
-/// A tile is what paths are stored for; a dispatch covers some of its blocks, those that have something to do, and in
-/// it a lane runs a bounded number of rounds and keeps its path for the next. Samples come in passes that end in every
-/// tile before the next begins (a picture of one tile has one pass). Each pixel belongs to one lane at a time and adds
-/// its samples in order, and a sample that is begun anew ends the same: so the image depends on parameters and sample
-/// count alone, not on tiles, blocks, budgets or timing, nor on when it is known what a dispatch did.
+/// A tile is what lanes sample at a time, of which there are as many as its pixels at most: a lane whose pixel is done
+/// takes another. A dispatch covers some blocks of lanes, those that have something to do, and in it a lane runs a
+/// bounded number of rounds and keeps its path for the next. Samples come in passes that end in every tile before the
+/// next begins (a picture whose pixels have a lane each has one pass). Each pixel belongs to one lane at a time and
+/// adds its samples in order, and a sample that is begun anew ends the same: so the image depends on parameters and
+/// sample count alone, not on tiles, lanes, budgets or timing, nor on when it is known what a dispatch did.
 class Picture {
  public:
   [[nodiscard]] glm::uvec2 size() const { return size_; }
@@ -202,6 +203,8 @@ class Picture {
   [[nodiscard]] glm::uvec2 tile_extent() const { return glm::min(tile_size_, box_.first + box_.size - tile_corner()); }
   // Samples of each pixel after a pass that ends with so many.
   [[nodiscard]] std::uint32_t pass_after(std::uint32_t samples) const;
+  // Whether each pixel has a lane of its own.
+  [[nodiscard]] bool has_lanes_for_all() const;
   // Whether the pass under way ends with a look at the noise.
   [[nodiscard]] bool measures() const;
   // Whether it is time to find the tile's error.
@@ -218,6 +221,7 @@ class Picture {
   glm::uvec2 tile_size_{1U};
   glm::uvec2 tiles_{1U};
   std::uint32_t tile_ = 0;
+  std::uint32_t lanes_ = 0;         // that there are
   std::shared_ptr<Blocks> blocks_;  // of the tile and pass under way
   std::size_t block_ = 0;           // where the next dispatch looks for some
   std::uint32_t pass_target_ = 1;
@@ -228,7 +232,7 @@ class Picture {
   bool motion_ = false;  // something moves while the shutter is open
   bool adaptive_ = false;
   Allotment allotment_;
-  std::vector<std::uint32_t> live_;            // of each block of the tile under way, of its squares what is sampled
+  std::vector<std::uint32_t> squares_;         // of the tile under way that are sampled: glsl/path_blocks.glsl
   std::shared_ptr<SquareErrors> tile_errors_;  // of the tile under way, once it was asked for
   SquareErrors errors_;          // of the picture's squares, as far as this pass has come, where it is measured
   std::optional<double> noise_;  // as of the last pass that was looked at
@@ -414,6 +418,7 @@ class Tracer {
   std::map<gl::ProgramKey, Program> used_;                  // those that this one used, and what they cost
   std::vector<std::shared_ptr<DrawnLayers>> drawn_layers_;  // pictures share them
   PathKernels kernels_;
+  std::weak_ptr<const Blocks> paths_of_;  // the tile that they are of
   gl::Object uniforms_;
   gl::Object pick_;        // its depth...
   gl::Object pick_place_;  // ...and what has been met

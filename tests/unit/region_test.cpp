@@ -187,11 +187,11 @@ TEST_P(RegionPicture, TakesItsOwnSamplesAlone) {
   EXPECT_EQ(before, 1.0);
 }
 
-// Of several tiles, too.
+// Of several tiles, too, and of fewer pixels than there are lanes, of a whole that has more.
 TEST_P(RegionPicture, OfALargePictureHasTheBitsOfTheWhole) {
-  constexpr std::uint32_t width = 640;
-  constexpr std::uint32_t height = 24;
-  constexpr std::array<float, 4> across{0.1F, 0.25F, 0.85F, 0.5F};
+  constexpr std::uint32_t width = 1200;
+  constexpr std::uint32_t height = 40;
+  constexpr std::array<float, 4> across{0.05F, 0.25F, 0.9F, 0.5F};
   sampling_.samples = 2;
   auto frame = target_->frame();
   frame.target = CUMULET_TARGET_NONE;
@@ -206,7 +206,7 @@ TEST_P(RegionPicture, OfALargePictureHasTheBitsOfTheWhole) {
   converge(viewer_.get(), frame);
   ASSERT_EQ(cumulet_read_linear(viewer_.get(), made.data(), made.size()), CUMULET_OK);
   const PixelBox box = pixels_of(across, width, height);
-  EXPECT_GT(box.size.x, 512U) << "of two tiles";
+  EXPECT_GT(box.size.x, 1024U) << "of two tiles";
   for (std::size_t i = 0; i < made.size(); ++i) {
     const glm::uvec2 pixel(i / 4 % width, i / 4 / width);
     ASSERT_EQ(made[i], box.holds(pixel) ? all[i] : 0.0F) << pixel.x << ", " << pixel.y;
