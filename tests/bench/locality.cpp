@@ -2,12 +2,9 @@
 //
 //     cumulet-bench-locality [--threshold T] [--optical-depth D] [--size PIXELS] [--samples N] FILE...
 //
-// Paths of the shaders' own source on the CPU (tests/unit/support/cpu_tracer.hpp's way) record the cells that they
-// march through. Waves of 8 x 8 pixels march in step, 16 of them in turn on each of four compute units, each with a
-// first-level cache, all with one second-level cache; both are 16 ways wide and forget what is least recently used.
-// Orders are permutations of the same records.
-#include <openvdb/openvdb.h>
-
+// Paths record the cells that they march through (recording.hpp). Waves of 8 x 8 pixels march in step, 16 of them in
+// turn on each of four compute units, each with a first-level cache, all with one second-level cache; both are 16 ways
+// wide and forget what is least recently used. Orders are permutations of the same records.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -16,54 +13,13 @@
 #include <exception>
 #include <filesystem>
 #include <headless.hpp>
-#include <memory>
 #include <numeric>
 #include <random>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
-#include "asset.hpp"
-#include "settings/settings.hpp"
-#include "subject.hpp"
-#include "support/cpu_tracer.hpp"
-#include "support/still.hpp"
-
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-namespace cumulet::core {
-
-#undef CM_SURFACES
-#define CM_SURFACES 0
-#define CM_MARCH 0
-#define CM_LINEAR 1
-
-struct RecordingData {
-  CmParameters cm{};
-  const grid::TetGrid* grid = nullptr;
-  std::vector<std::uint32_t>* visits = nullptr;
-  float cm_surface_z(uvec2 pixel, vec2 within, uint layer) const { return 3.0e38F; }
-  uvec4 cm_record(uint cell, uint part) const {
-    if (part != 0) return grid->cells[cell].data;
-    visits->push_back(cell);
-    return grid->cells[cell].links;
-  }
-  uint cm_tree(uint node) const { return grid->tree[node]; }
-  uint cm_root_leaf(uint root) const { return grid->roots[root].first_leaf; }
-  uint cm_root_node(uint root) const { return grid->roots[root].first_internal; }
-};
-
-struct Recording : RecordingData {
-#include "support/traced.inc"
-  float density_at(std::uint32_t cell, const vec3& p) const {
-    const uvec4 data = grid->cells[cell].data;
-    const uint shape = cm_record_shape(data);
-    return cm_cell_density(data, cm_cell_frame(cm_record_v0(data), shape, p, vec3(0.0F)), shape).x;
-  }
-};
-
-}  // namespace cumulet::core
-#pragma GCC diagnostic pop
+#include "recording.hpp"
 
 namespace {
 
@@ -75,13 +31,7 @@ constexpr std::size_t units = 4;
 constexpr std::size_t waves_a_unit = 16;
 constexpr std::size_t ways = 16;
 
-struct Options {
-  double threshold = settings::default_threshold(CUMULET_CRITERION_TRANSMITTANCE);
-  double optical_depth = 10.0;
-  std::uint32_t size = 128;
-  std::uint32_t samples = 2;
-  std::vector<std::filesystem::path> files;
-};
+using Options = bench::RecordingOptions;
 
 /// Of one pixel's paths, one after the other.
 using Visits = std::vector<std::uint32_t>;
@@ -386,7 +336,7 @@ std::vector<std::vector<Visits>> record(core::Recording& recording, const Option
     for (std::uint32_t x = 0; x < options.size; x += wave_side) {
       auto& wave = waves.emplace_back();
       for (std::uint32_t i = 0; i < wave_side * wave_side; ++i) {
-        recording.visits = &wave.emplace_back();
+        recording.march = [&visits = wave.emplace_back()](std::uint32_t cell) { visits.push_back(cell); };
         recording.traced({x + i % wave_side, y + i / wave_side});
       }
     }
@@ -394,42 +344,8 @@ std::vector<std::vector<Visits>> record(core::Recording& recording, const Option
   return waves;
 }
 
-void measure(headless::Context& context, const std::filesystem::path& file, const Options& options) {
-  bench::Input input;
-  input.file = file;
-  input.grid = "density";
-  const bench::Asset asset = bench::load_asset(input);
-  const double density_scale = asset.density_scale(options.optical_depth);
-  test::Still still(context);
-  still.viewer().camera()->frame(asset.volume->bounds(), 1.0);
-  still.set_volume(asset.volume);
-  still.set_light(bench::bench_light());
-  viewer::Medium medium;
-  medium.density_scale = density_scale;
-  still.set_medium(medium);
-  viewer::GridSettings grid_settings;
-  grid_settings.build.refine.criterion = grid::Criterion::transmittance;
-  grid_settings.build.refine.threshold = options.threshold;
-  still.set_grid(grid_settings);
-  still.set_image({options.size, options.size, 1, 0});
-  still.build();
-  while (!still.render(500.0)) {
-  }
-
-  grid::RefineSettings refine = grid_settings.build.refine;
-  refine.density_scale = density_scale;
-  const volume::ScalarVolume& volume = asset.volume->volume();
-  const grid::Statistics statistics(volume, grid::fit_cube(volume));
-  const grid::DiamondSet diamonds(statistics, refine);
-  grid::GridBuilder builder(statistics, diamonds);
-  builder.bisect();
-  const grid::TetGrid grid = builder.records(refine.cells, volume.max_value);
-  if (grid.cells.size() != still.viewer().stats().cells) throw std::runtime_error("this is not the viewer's grid");
-
-  core::Recording recording;
-  recording.cm = still.viewer().trace_parameters();
-  recording.cm.dispatch.samples = options.samples;
-  recording.grid = &grid;
+void measure(core::Recording& recording, const std::filesystem::path& file, const Options& options) {
+  const grid::TetGrid& grid = *recording.grid;
   const auto waves = record(recording, options);
   double steps = 0.0;
   for (const auto& wave : waves) {
@@ -469,35 +385,20 @@ void measure(headless::Context& context, const std::filesystem::path& file, cons
   }
 }
 
-Options parse(int argc, char** argv) {
-  Options options;
-  for (int i = 1; i < argc; ++i) {
-    const std::string flag = argv[i];
-    const auto value = [&] {
-      if (i + 1 >= argc) throw std::invalid_argument(flag + " needs a value");
-      return std::string(argv[++i]);
-    };
-    if (flag == "--threshold")
-      options.threshold = std::stod(value());
-    else if (flag == "--optical-depth")
-      options.optical_depth = std::stod(value());
-    else if (flag == "--size")
-      options.size = static_cast<std::uint32_t>(std::stoul(value()));
-    else if (flag == "--samples")
-      options.samples = static_cast<std::uint32_t>(std::stoul(value()));
-    else
-      options.files.emplace_back(flag);
-  }
-  return options;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
-    const Options options = parse(argc, argv);
+    Options options;
+    for (int i = 1; i < argc; ++i) {
+      if (!bench::take_option(options, argc, argv, i))
+        throw std::invalid_argument(std::string(argv[i]) + " is no option here");
+    }
     headless::Context context = headless::Context::create(headless::Backend::automatic);
-    for (const std::filesystem::path& file : options.files) measure(context, file, options);
+    for (const std::filesystem::path& file : options.files) {
+      bench::with_recording(context, file, options,
+                            [&](core::Recording& recording) { measure(recording, file, options); });
+    }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "cumulet-bench-locality: %s\n", error.what());
     return 1;
