@@ -4,7 +4,7 @@
 #define CM_PATH_BLOCKS_GLSL
 
 #define CM_BLOCK_LANES 1024u
-#define CM_MOST_BLOCKS 128u
+#define CM_MOST_BLOCKS 256u
 #define CM_BEGINS 0x80000000u  // with a block's number: a tile begins
 #define CM_SQUARE_EDGE 8u
 #define CM_SQUARE_PIXELS 64u

@@ -21,7 +21,11 @@ namespace {
 
 constexpr std::uint32_t tile_edge = 1024;
 constexpr std::uint32_t block_lanes = PathKernels::block_lanes;
-// Of a driver that runs them on the CPU: few enough for its caches, and many times as many as it runs at once.
+// Lanes at most. Of one kernel somewhat more than the largest GPU runs at once: the fewer there are, the more take the
+// next pixel. Of stages more: each of their kernels has some of them. Of a driver that runs them on the CPU few enough
+// for its caches.
+constexpr std::uint32_t lanes_at_once = 128 * block_lanes;
+constexpr std::uint32_t lanes_of_stages = PathKernels::most_lanes;
 constexpr std::uint32_t lanes_in_call = 32 * block_lanes;
 static_assert(tile_edge / Allotment::edge * (tile_edge / Allotment::edge) <= CM_MOST_SQUARES);
 static_assert(CM_MOST_SQUARES <= Flights::most_words, "told at once");
@@ -554,8 +558,6 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   const PixelBox box = settings.region.pixels(size, settings.margin);
   const glm::uvec2 tile = glm::min(box.size, glm::uvec2(tile_edge));
   const glm::uvec2 squares = (tile + Allotment::edge - 1U) / Allotment::edge;
-  const std::uint32_t most_lanes = gl_->dispatches_in_call ? lanes_in_call : PathKernels::most_lanes;
-  const std::uint32_t lanes = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, most_lanes);
   picture.complete_ = false;
   picture.size_ = size;
   picture.region_ = settings.region;
@@ -571,7 +573,10 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
   if (!picture.volume_alone_) picture.film_.drop(film_layers::volume);
   if (picture.light_groups_ == 0) picture.film_.drop(film_layers::light_groups(0));
   for (const FilmLayer& layer : accumulated(picture)) picture.film_.make(gl_, layer);
-  if (shaded) kernels_.reserve(lanes, picture.traced_ > 0, picture.several_, picture.rich_, picture.light_groups_);
+  const bool stages = picture.traced_ > 0;
+  const std::uint32_t most_lanes = gl_->dispatches_in_call ? lanes_in_call : (stages ? lanes_of_stages : lanes_at_once);
+  const std::uint32_t lanes = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, most_lanes);
+  if (shaded) kernels_.reserve(lanes, stages, picture.several_, picture.rich_, picture.light_groups_);
   find_programs(picture, data, obstacles);
   picture.parameters_ = assemble(parameters, obstacles);
   picture.parameters_.integrator.groups = picture.light_groups_;
